@@ -4,7 +4,8 @@ use s3d_geom::Aabb;
 
 /// Returns the intersection over union of two boxes, 0 if both are flat.
 ///
-/// mmdetection3d defines it so in `axis_aligned_bbox_overlaps_3d`, but with a floor of 1e-6 m³ for the union.
+/// mmdetection3d defines it so in `axis_aligned_bbox_overlaps_3d`, but with a floor of 1e-6 m³ for the
+/// union.
 pub fn iou(a: &Aabb, b: &Aabb) -> f64 {
     let shared = Aabb { min: a.min.max(b.min), max: a.max.min(b.max) };
     let shared = if shared.is_empty() { 0.0 } else { volume(&shared) };

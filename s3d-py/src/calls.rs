@@ -176,14 +176,18 @@ pub(crate) fn report(
 ) -> PyResult<PathBuf> {
     let Reported { pano_width, thumbs, mesh_faces, verify, single, overwrite } = how;
     let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
-    watched(py, threads, &sink, |ctx| {
+    let made = watched(py, threads, &sink, |ctx| {
         let ending = if single { "_report.html" } else { "_report" };
         let to = to.map_or_else(|| s3d_dataset::beside(&root, ending), Ok)?;
-        match against {
-            Some(other) => s3d_report::report_against(&root, &other, &to, &options, ctx)?,
-            None => s3d_report::report(&root, &to, &options, ctx)?,
+        let made = match against {
+            Some(other) => s3d_report::report_against(&root, &other, &to, &options, ctx),
+            None => s3d_report::report(&root, &to, &options, ctx),
         };
-        Ok(if single { to } else { to.join("index.html") })
+        Ok(made.map(|_| if single { to } else { to.join("index.html") }))
+    })?;
+    made.map_err(|error| match error {
+        s3d_report::Error::Dataset(error) => exception(&error),
+        error => usage(error.to_string()),
     })
 }
 

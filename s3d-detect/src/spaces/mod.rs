@@ -17,8 +17,8 @@ use crate::surfel::Surfel;
 use dividers::{Dividers, find_dividers};
 use merge::{NO_SPACE, merge_cells};
 
-/// Returns the angle of the building's walls to the axes, in degrees, −45 to 45. It is the mean direction of
-/// upright surfaces, modulo a quarter turn; 0 if there are none.
+/// Returns the angle of the building's walls to the axes, in degrees, −45 to 45. It is the mean direction
+/// of upright surfaces, modulo a quarter turn; 0 if there are none.
 pub fn building_angle_deg(surfels: &[Surfel]) -> f64 {
     let mut sine = 0.0;
     let mut cosine = 0.0;

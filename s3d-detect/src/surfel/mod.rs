@@ -19,8 +19,8 @@ pub struct Surfel {
     /// The direction in which the points in this cell and the 26 around it vary least. Its sign means
     /// nothing.
     pub normal: Vec3,
-    /// The share of this direction in their whole variance, 0 (a plane) to ⅓: the surface variation of Pauly,
-    /// Gross and Kobbelt (2002).
+    /// The share of this direction in their whole variance, 0 (a plane) to ⅓: the surface variation of
+    /// Pauly, Gross and Kobbelt (2002).
     pub curvature: f32,
     /// Mean R G B, 0 to 1.
     pub color: Vec3,

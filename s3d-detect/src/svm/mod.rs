@@ -57,8 +57,8 @@ impl Linear {
     }
 }
 
-/// Minimises ½(|w|² + b²) + Σ cᵢ·loss(yᵢ(w·xᵢ + b)). The bias is the weight of a column of ones, as in
-/// scikit-learn's `LinearSVC`. `positive` holds yᵢ and `costs` holds cᵢ, an entry for each row.
+/// Minimises ½(|w|² + b²) + Σ cᵢ·loss(yᵢ(w·xᵢ + b)). The bias is the weight of a column of ones,
+/// as in scikit-learn's `LinearSVC`. `positive` holds yᵢ and `costs` holds cᵢ, an entry for each row.
 ///
 /// The same arguments give the same bits on every computer.
 ///

@@ -9,8 +9,8 @@ pub struct DepthScores {
     pub replaced: u64,
     /// In this order: mean absolute error (m); absolute and squared error relative to the truth (AbsRel;
     /// SqRel, m); root mean square error (m), and the same for decimal logarithms; mean absolute error of
-    /// decimal logarithms; shares of pixels with δ below 1.25, 1.25² and 1.25³, where δ is the larger of both
-    /// quotients of prediction and truth.
+    /// decimal logarithms; shares of pixels with δ below 1.25, 1.25² and 1.25³, where δ is the larger of
+    /// both quotients of prediction and truth.
     pub values: [f64; 9],
 }
 
