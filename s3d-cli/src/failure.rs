@@ -16,6 +16,10 @@ pub(crate) const TRY_AGAIN: u8 = 75;
 pub(crate) enum Failure {
     /// The call did not succeed.
     Call(Error),
+    /// The call cannot be, whatever the files hold. The text names options as on the command line.
+    Usage(String),
+    /// The input does not fit together.
+    Input(String),
     /// The call succeeded, and its answer is a failure: faults were found.
     Answer(String),
 }
@@ -31,8 +35,8 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Call(e) if e.is_temporary() => TRY_AGAIN,
-            Self::Call(Error::Usage(_)) => 2,
-            Self::Call(_) | Self::Answer(_) => 1,
+            Self::Call(Error::Usage(_)) | Self::Usage(_) => 2,
+            Self::Call(_) | Self::Input(_) | Self::Answer(_) => 1,
         }
     }
 }
@@ -46,7 +50,7 @@ impl fmt::Display for Failure {
             }
             Self::Call(e) if e.is_temporary() => write!(f, "{e}; {}", resume_hint()),
             Self::Call(e) => e.fmt(f),
-            Self::Answer(text) => f.write_str(text),
+            Self::Usage(text) | Self::Input(text) | Self::Answer(text) => f.write_str(text),
         }
     }
 }
@@ -69,6 +73,7 @@ mod tests {
         let code = |error: Error| Failure::from(error).exit_code();
         assert_eq!((code(Error::Usage("a".into())), code(Error::Input("b".into()))), (2, 1));
         assert_eq!((code(Error::Temporary("c".into())), code(Error::Cancelled)), (75, 75));
+        assert_eq!((Failure::Usage("a".into()).exit_code(), Failure::Input("b".into()).exit_code()), (2, 1));
         assert_eq!(Failure::Answer("2 faults".into()).exit_code(), 1);
     }
 }

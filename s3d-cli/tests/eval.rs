@@ -41,8 +41,11 @@ fn a_data_set_against_its_own_package_is_perfect_in_text_and_json() {
 
     s3d_fails(&[&call[..], &["--variant", "mine"]].concat(), 2, &["panoptic has no variant \"mine\""]);
     s3d_fails(&[&call[..], &["--areas", "5"]].concat(), 2, &["no area 5: it has 1"]);
+    s3d_fails(&[&call[..], &["--stuff", "grass"]].concat(), 2, &["--stuff: \"grass\" is no class"]);
     let without = ["eval", "det", "--truth", text(&out), "--pred", text(&none)];
     s3d_fails(&without, 1, &["none.json"]);
+    let twice = [&without[..], &["--classes", "sofa,sofa"]].concat();
+    s3d_fails(&twice, 2, &["--classes: sofa is there twice"]);
     let without = ["eval", "sem3d", "--truth", text(&out), "--pred", text(&coco)];
     s3d_fails(&without, 1, &["office_1"]);
     s3d_fails(&["eval", "sem2d", "--truth", "a", "--pred", "b"], 2, &["inst-ap"]);

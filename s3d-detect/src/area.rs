@@ -1,9 +1,10 @@
 //! An area of a data set, as the detector reads it.
 
+use crate::error::{Error, Result};
 use crate::surfel::{Surfel, surfels_of};
 use glam::Vec3;
 use rayon::prelude::*;
-use s3d_dataset::{Context, DataSet, Error, Result};
+use s3d_dataset::{Context, DataSet};
 use s3d_geom::{Aabb, PointCloud};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotationTree, OnFault, PointReader, TreeOptions};
@@ -11,7 +12,7 @@ use s3d_label::Class;
 use std::io::Cursor;
 use std::path::Path;
 
-/// The classes that are detected, in the order of the paper's table: seven structural, five movable.
+/// The classes to detect, in the order of the paper's table: seven structural, five movable.
 pub const CLASSES: [Class; 12] = [
     Class::CEILING,
     Class::FLOOR,
@@ -33,15 +34,15 @@ pub const STRUCTURAL: usize = 7;
 /// An annotated element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Element {
-    /// Its place in [`CLASSES`].
+    /// The index of its class in [`CLASSES`].
     pub class: usize,
-    /// The room that it is of: its place in [`Area::rooms`].
+    /// The index of its room in [`Area::rooms`].
     pub room: u32,
     /// Its box, in metres.
     pub bbox: Aabb,
 }
 
-/// The points of an area, thinned, and its annotated elements: world frame, metres, Z up.
+/// The thinned points of an area and its annotated elements, in the world frame: metres, Z up.
 #[derive(Clone, Debug)]
 pub struct Area {
     /// Its number.
@@ -50,27 +51,27 @@ pub struct Area {
     pub surfels: Vec<Surfel>,
     /// The names of its rooms.
     pub rooms: Vec<String>,
-    /// Elements of [`CLASSES`] of `instances.json`.
+    /// Its elements of one of [`CLASSES`].
     pub elements: Vec<Element>,
 }
 
 impl Area {
-    /// Reads `s3dis/Area_k/ROOM/ROOM.txt` of every room, which has no labels, and the boxes of
-    /// `area_k/3d/instances.json`. Classes of another taxonomy are what they count as.
+    /// Reads `s3dis/Area_k/ROOM/ROOM.txt` of every room, which has no labels, and the boxes in
+    /// `area_k/3d/instances.json`. A class of another taxonomy becomes the class of S3DIS that it counts as.
     ///
     /// # Errors
-    /// [`Error::File`] with the file that is missing, damaged or not named by the data set's list;
-    /// [`Error::Input`] if the data set has no labels or not this area; [`Error::Cancelled`].
+    /// [`Error::Unlabelled`] if the data set has no labels. [`Error::UnknownArea`] if it lacks this area.
+    /// [`Error::Dataset`] if a file is missing, damaged or not in the data set's list, or if the call is
+    /// cancelled.
     pub fn read(data: &DataSet, number: u32, ctx: &Context) -> Result<Self> {
-        let name = data.layout().root().display();
+        let root = || data.layout().root().to_owned();
         let Some(taxonomy) = data.taxonomy() else {
-            return Err(Error::Input(format!(
-                "{name} has no labels to learn from: give scenes [annotations]"
-            )));
+            return Err(Error::Unlabelled { root: root() });
         };
         if !data.areas().contains(&number) {
-            return Err(Error::Input(format!("{name} has no area {number}: it has {:?}", data.areas())));
+            return Err(Error::UnknownArea { root: root(), area: number, areas: data.areas().to_vec() });
         }
+
         let options = TreeOptions { taxonomy: taxonomy.clone(), ..TreeOptions::default() };
         let tree = AnnotationTree::open_with(&data.layout().s3dis_area_dir(number), &options)?;
         let progress = ctx.progress("reading", "rooms", tree.rooms.len() as u64);
@@ -84,22 +85,23 @@ impl Area {
         });
         let (mut rooms, surfels): (Vec<String>, Vec<Vec<Surfel>>) =
             rooms.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+
         let mut elements = Vec::new();
         let path = data.layout().instances_json(number);
         for entry in data.instances(number)? {
             let class = taxonomy
                 .class(&entry.class)
                 .map_err(|e| FileError::format(&path, e.to_string()))?;
-            if let Some(class) = CLASSES.iter().position(|c| *c == class.s3dis()) {
-                let [x0, y0, z0, x1, y1, z1] = entry.bbox;
-                let bbox = Aabb { min: Vec3::new(x0, y0, z0), max: Vec3::new(x1, y1, z1) };
-                // A room without points is in no tree.
-                let room = rooms.iter().position(|r| *r == entry.room).unwrap_or_else(|| {
-                    rooms.push(entry.room.clone());
-                    rooms.len() - 1
-                });
-                elements.push(Element { class, room: room as u32, bbox });
-            }
+            let Some(class) = CLASSES.iter().position(|c| *c == class.s3dis()) else { continue };
+
+            let [x0, y0, z0, x1, y1, z1] = entry.bbox;
+            let bbox = Aabb { min: Vec3::new(x0, y0, z0), max: Vec3::new(x1, y1, z1) };
+            // The tree leaves out rooms without points.
+            let room = rooms.iter().position(|r| *r == entry.room).unwrap_or_else(|| {
+                rooms.push(entry.room.clone());
+                rooms.len() - 1
+            });
+            elements.push(Element { class, room: room as u32, bbox });
         }
         Ok(Self { number, surfels: surfels.concat(), rooms, elements })
     }

@@ -2,17 +2,22 @@
 
 use s3d_geom::Aabb;
 
-/// Intersection over union of two boxes, 0 if both are flat. As mmdetection3d's
-/// `axis_aligned_bbox_overlaps_3d` without its floor of 1e-6 m³ for the union.
+/// Returns the intersection over union of two boxes, 0 if both are flat.
+///
+/// mmdetection3d defines it so in `axis_aligned_bbox_overlaps_3d`, but with a floor of 1e-6 m³ for the
+/// union.
 pub fn iou(a: &Aabb, b: &Aabb) -> f64 {
-    let volume = |b: &Aabb| b.size().as_dvec3().element_product();
     let shared = Aabb { min: a.min.max(b.min), max: a.max.min(b.max) };
     let shared = if shared.is_empty() { 0.0 } else { volume(&shared) };
     let union = volume(a) + volume(b) - shared;
     if union > 0.0 { shared / union } else { 0.0 }
 }
 
-/// Intersection over union of two intervals on one axis; 1 for two that are the same point.
+fn volume(b: &Aabb) -> f64 {
+    b.size().as_dvec3().element_product()
+}
+
+/// Returns the intersection over union of two intervals on one axis, 1 if both are the same point.
 pub(crate) fn iou_1d(a: [f32; 2], b: [f32; 2]) -> f32 {
     let shared = (a[1].min(b[1]) - a[0].max(b[0])).max(0.0);
     let union = (a[1] - a[0]) + (b[1] - b[0]) - shared;
@@ -23,8 +28,8 @@ pub(crate) fn iou_1d(a: [f32; 2], b: [f32; 2]) -> f32 {
     }
 }
 
-/// Greedy non-maximum suppression: indices of the boxes that stay, the highest score first (ties: the lower
-/// index). A box goes if its IoU with one that stays is larger than `limit`.
+/// Greedy non-maximum suppression: returns the indices of the boxes that stay, the highest score first. The
+/// lower index wins a tie. A box goes if its IoU with a box that stays is larger than `limit`.
 pub fn suppress(boxes: &[Aabb], scores: &[f64], limit: f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..boxes.len()).collect();
     order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
@@ -58,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn the_highest_of_those_that_overlap_stays() {
+    fn the_highest_of_overlapping_boxes_stays() {
         let boxes = [cube(0.0), cube(0.1), cube(0.2), cube(5.0)];
         assert_eq!(suppress(&boxes, &[1.0, 3.0, 3.0, 2.0], 0.5), [1, 3]);
         assert_eq!(suppress(&boxes, &[1.0, 3.0, 3.0, 2.0], 0.9), [1, 2, 3, 0]);

@@ -1,15 +1,17 @@
-//! The description of a box: 6×6×6 cells of what its points are like, and where and how large it is in its
-//! space.
+//! The features of a box: what its points are like in 6×6×6 cells, its place in its space, and its size.
 //!
-//! The paper names what a description is made of; the forms here are ours. Cells hold: whether there are
-//! surfels and how many; the mean of each part of normals, without sign; mean curvature; mean colour, less
-//! the space's: walls and woods of another building have other colours; and how much of that colour is the
-//! box's own, and not its surroundings'. Cells reach beyond the box by a quarter of its size, so that two in
-//! six along an axis are outside. Colour has besides what is told of a box by its [palette](super::palette).
-//! Position and size are told by bins, which a linear machine can weigh each: a number counts in the two bins
-//! next to it.
+//! The paper names the kinds of features; their forms here are ours.
+//!
+//! - Each cell holds whether it has surfels and how many; the mean of each component of their normals,
+//!   without sign; their mean curvature; their mean colour, less the mean of the space, since walls and woods
+//!   of another building have other colours; and how much of that colour is the box's own rather than its
+//!   surroundings'. The cells reach beyond the box by a quarter of its size, so that two in six along an axis
+//!   are outside.
+//! - The colour of the whole box is described by its [palette](super::palette).
+//! - Position and size are spread over bins, and a linear machine weighs each bin: a number counts in the two
+//!   bins next to it.
 
-use crate::palette::{ENTRIES, LAYERS, Palette, own_of, share};
+use crate::palette::{ENTRIES, LAYERS, Palette, Shares, own_of, share};
 use crate::surfel::index::Index;
 use glam::Vec3;
 use s3d_geom::Aabb;
@@ -19,22 +21,23 @@ use std::ops::Range;
 /// Cells along an axis.
 const SIDE: usize = 6;
 const CELLS: usize = SIDE * SIDE * SIDE;
-/// What the cells reach beyond a box: this share of its size, between these lengths in metres.
+/// How far the cells reach beyond a box: this share of its size, between these lengths in metres.
 const BEYOND: f32 = 0.25;
 const BEYOND_M: [f32; 2] = [0.02, 0.3];
 
 const OCCUPANCY: Range<usize> = 0..2 * CELLS;
 const NORMAL: Range<usize> = OCCUPANCY.end..OCCUPANCY.end + 3 * CELLS;
 const CURVATURE: Range<usize> = NORMAL.end..NORMAL.end + CELLS;
-/// By cell: colour, and how much of it is the box's own; of the box: shares of the palette in it, around it
-/// and in its layers; contrasts.
+/// Colour. Each cell has its mean and how much of it is the box's own; the box has the shares of the palette
+/// inside, around and in its layers, and its contrasts.
 const CELL_COLOR: Range<usize> = CURVATURE.end..CURVATURE.end + 3 * CELLS;
 const OWN: Range<usize> = CELL_COLOR.end..CELL_COLOR.end + CELLS;
 const SHARES: Range<usize> = OWN.end..OWN.end + (2 + LAYERS) * ENTRIES;
 const CONTRAST: Range<usize> = SHARES.end..SHARES.end + 7 * CONTRAST_BINS;
 const COLOR: Range<usize> = CELL_COLOR.start..CONTRAST.end;
 
-/// Bins of position in the unit cube, of heights in metres, of lengths, and of shares of the space's length.
+/// The numbers of bins for a position in the unit cube, a height, a length, a share of the space's length,
+/// and a contrast.
 const POSITION_BINS: usize = 11;
 const HEIGHT_BINS: usize = 13;
 const SIZE_BINS: usize = 16;
@@ -43,25 +46,25 @@ const CONTRAST_BINS: usize = 6;
 const POSITION: Range<usize> = COLOR.end..COLOR.end + 5 * POSITION_BINS + 2 * HEIGHT_BINS;
 const SIZE: Range<usize> = POSITION.end..POSITION.end + 3 * (SIZE_BINS + SHARE_BINS);
 
-/// Numbers that describe a box.
+/// The number of features of a box.
 pub const FEATURES: usize = SIZE.end;
 
-/// Heights that bins tell apart, in metres.
+/// The range of the bins of heights, in metres.
 const HEIGHTS_M: [f32; 2] = [0.0, 3.6];
-/// Lengths that bins tell apart, by their logarithm, in metres.
+/// The range of the bins of lengths, in metres. Their steps are even in the logarithm.
 const LENGTHS_M: [f32; 2] = [0.01, 12.0];
-/// Colours are differences to the space's mean, and weigh so much.
+/// The factor of colours, which are differences to the mean of the space.
 const COLOR_WEIGHT: f32 = 2.0;
-/// What shares of a palette are multiplied by.
+/// The factor of the shares of a palette.
 const SHARE_WEIGHT: f32 = 3.0;
-/// Bins weigh as much as some ten cells.
+/// The weight of a bin: as much as about ten cells.
 const BIN_WEIGHT: f32 = 3.0;
 
-/// What a machine is given of a description: the rows of the paper's table.
+/// The features that a machine is given: the rows of the paper's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variant {
-    /// All.
+    /// All features.
     Full,
     /// No position and size.
     NoGlobal,
@@ -72,10 +75,10 @@ pub enum Variant {
 }
 
 impl Variant {
-    /// All, in the order of the table.
+    /// All variants, in the order of the table.
     pub const ALL: [Self; 4] = [Self::Full, Self::NoGlobal, Self::NoLocal, Self::NoColor];
 
-    /// Its row's name in the paper's table.
+    /// The name of its row in the paper's table.
     pub fn name(self) -> &'static str {
         match self {
             Self::Full => "Full model",
@@ -85,7 +88,7 @@ impl Variant {
         }
     }
 
-    /// The columns that it is not given.
+    /// The columns of features that it leaves out.
     pub fn without(self) -> Vec<Range<usize>> {
         match self {
             Self::Full => vec![],
@@ -106,16 +109,24 @@ struct Cell {
     own: f32,
 }
 
-/// Describes a box of a space of this extent; all in the space's frame.
+/// Returns the [`FEATURES`] features of a box, in the frame of a space of this extent.
 pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
     let mut out = vec![0.0; FEATURES];
     let beyond = (b.size() * BEYOND).clamp(Vec3::splat(BEYOND_M[0]), Vec3::splat(BEYOND_M[1]));
     let grown = Aabb { min: b.min - beyond, max: b.max + beyond };
-    let scale = SIDE as f32 / grown.size();
-    let mut cells = [Cell::default(); CELLS];
     let palette = Palette::new(b, index.shades_within(&grown).map(|(s, shade)| (s.position, shade)));
-    let own = palette.own();
-    for (s, shade) in index.shades_within(&grown) {
+
+    describe_cells(&mut out, index, &grown, &palette.own());
+    describe_palette(&mut out, &palette);
+    describe_place(&mut out, extent, b);
+    out
+}
+
+/// Fills the features of the cells of a grown box.
+fn describe_cells(out: &mut [f32], index: &Index, grown: &Aabb, own: &Shares) {
+    let mut cells = [Cell::default(); CELLS];
+    let scale = SIDE as f32 / grown.size();
+    for (s, shade) in index.shades_within(grown) {
         let at = ((s.position - grown.min) * scale)
             .as_uvec3()
             .min(glam::UVec3::splat(SIDE as u32 - 1));
@@ -124,8 +135,9 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
         cell.normal += s.normal.abs();
         cell.curvature += s.curvature;
         cell.color += s.color;
-        cell.own += own_of(shade, &own);
+        cell.own += own_of(shade, own);
     }
+
     let occupied = cells.iter().filter(|c| c.count > 0.0).count() as f32;
     let mean = cells.iter().map(|c| c.count).sum::<f32>() / occupied.max(1.0);
     for (i, cell) in cells.iter().enumerate().filter(|(_, c)| c.count > 0.0) {
@@ -138,6 +150,10 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
         out[CELL_COLOR.start + 3 * i..][..3].copy_from_slice(&color.to_array());
         out[OWN.start + i] = cell.own / cell.count;
     }
+}
+
+/// Fills the features of the colours of a box: shares, then contrasts.
+fn describe_palette(out: &mut [f32], palette: &Palette) {
     let shares = palette
         .inside_and_around()
         .into_iter()
@@ -145,14 +161,21 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
     for (out, share) in out[SHARES].iter_mut().zip(shares.flatten()) {
         *out = SHARE_WEIGHT * share;
     }
+
     for (bins, contrast) in out[CONTRAST].chunks_exact_mut(CONTRAST_BINS).zip(palette.contrasts()) {
         if let Some(contrast) = contrast {
             put(Some(bins), contrast);
         }
     }
+}
+
+/// Fills the features of the place and the size of a box.
+fn describe_place(out: &mut [f32], extent: Vec3, b: &Aabb) {
     let unit = |p: Vec3| p / extent.max(Vec3::splat(0.1));
-    let (center, low, high, size) = (unit(b.center()), unit(b.min), unit(b.max), b.size());
+    let [center, low, high] = [b.center(), b.min, b.max].map(unit);
+    let size = b.size();
     let (position, sizes) = out[POSITION.start..].split_at_mut(SIZE.start - POSITION.start);
+
     let mut bins = position.chunks_exact_mut(POSITION_BINS);
     for value in [center.x, center.y, center.z, low.z, high.z] {
         put(bins.next(), value);
@@ -161,6 +184,7 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
     for height in [b.min.z, extent.z - b.max.z] {
         put(bins.next(), (height - HEIGHTS_M[0]) / (HEIGHTS_M[1] - HEIGHTS_M[0]));
     }
+
     let mut bins = sizes.chunks_exact_mut(SIZE_BINS);
     let [least, most] = LENGTHS_M.map(libm::logf);
     for axis in 0..3 {
@@ -170,10 +194,9 @@ pub fn describe(index: &Index, extent: Vec3, b: &Aabb) -> Vec<f32> {
     for axis in 0..3 {
         put(bins.next(), unit(size)[axis]);
     }
-    out
 }
 
-/// Shares a number between 0 and 1 between the two bins next to it.
+/// Spreads a number between 0 and 1 over the two bins next to it.
 fn put(bins: Option<&mut [f32]>, value: f32) {
     let Some(bins) = bins else { return };
     let place = value.clamp(0.0, 1.0) * (bins.len() - 1) as f32;
@@ -202,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_hold_what_they_say() {
+    fn each_block_holds_its_features() {
         let index = Index::new(vec![
             surfel(vec3(1.5, 1.5, 0.55)),
             Surfel { color: Vec3::splat(0.4), ..surfel(vec3(3.0, 3.0, 2.0)) },
@@ -210,23 +233,26 @@ mod tests {
         let b = Aabb { min: vec3(1.0, 1.0, 0.0), max: vec3(2.0, 2.0, 1.0) };
         let row = describe(&index, vec3(4.0, 4.0, 2.5), &b);
         assert_eq!(row.len(), FEATURES);
+
         // The box is grown to 1.5 m; the surfel is in the middle of it: cell (3, 3, 3).
         let cell = (3 * 6 + 3) * 6 + 3;
         let local: Vec<usize> = (0..CELL_COLOR.end).filter(|&i| row[i] != 0.0).collect();
         let colors = [0, 1, 2].map(|k| CELL_COLOR.start + 3 * cell + k);
         let mut expected = vec![2 * cell, 2 * cell + 1, NORMAL.start + 3 * cell + 1, CURVATURE.start + cell];
-        // Its green is the mean's.
+        // Its green is the mean of the space.
         expected.extend([colors[0], colors[2]]);
         assert_eq!(local, expected);
         assert_eq!((row[2 * cell], row[2 * cell + 1], row[NORMAL.start + 3 * cell + 1]), (1.0, 0.5, 1.0));
         assert!((row[CURVATURE.start + cell] - 0.3).abs() < 1e-6 && (row[colors[2]] - 0.2).abs() < 1e-6);
-        // All of the colour is the box's own; it is in its middle third, and there is nothing to differ from.
+
+        // All of the colour is the box's own. It is in the middle third, and has nothing to differ from.
         assert!(row[OWN.start + cell] > 0.9 && row[OWN].iter().filter(|v| **v != 0.0).count() == 1);
         let shares: Vec<f32> = row[SHARES].chunks(ENTRIES).map(|of| of.iter().sum()).collect();
         let expected = [SHARE_WEIGHT, 0.0, 0.0, SHARE_WEIGHT, 0.0];
         assert!(shares.iter().zip(expected).all(|(s, e)| (s - e).abs() < 1e-5), "{shares:?}");
         assert!(row[CONTRAST].iter().all(|v| *v == 0.0));
-        // Every number is told by bins that sum to the weight of one.
+
+        // The bins of a number sum to the weight of one bin.
         let global: f32 = row[POSITION.start..].iter().sum();
         assert!((global - BIN_WEIGHT * (5 + 2 + 3 + 3) as f32).abs() < 1e-4, "{global}");
         // The middle of the unit cube's x is 0.375, between bins 3 and 4 of 11.
@@ -235,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn variants_leave_out_what_the_paper_leaves_out() {
+    fn variants_leave_out_the_features_of_the_paper() {
         let left = |v: Variant| FEATURES - v.without().iter().map(Range::len).sum::<usize>();
         assert_eq!(Variant::ALL.map(left), [FEATURES, 2312, FEATURES - 6 * CELLS, FEATURES - 1016]);
         assert_eq!(SIZE.end, 2312 + 55 + 26 + 75);

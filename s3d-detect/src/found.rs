@@ -1,19 +1,20 @@
 //! The elements that a trained model finds in an area.
 
 use crate::area::CLASSES;
+use crate::error::Result;
 use crate::model::Model;
 use crate::parsed_area::ParsedArea;
 use crate::proposals::Prepared;
 use rayon::prelude::*;
-use s3d_dataset::{Context, Result};
+use s3d_dataset::Context;
 use serde::{Deserialize, Serialize};
 
-/// An element that was found, in the world: written so, a list of them is what `s3d eval det` reads.
+/// An element that was found, in the world frame. `s3d eval det` reads a JSON list of these.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FoundBox {
     /// The number of the area.
     pub area: u32,
-    /// The room that most of its points are of.
+    /// The room of most of its points.
     pub room: String,
     /// The name of its class.
     pub class: String,
@@ -25,10 +26,11 @@ pub struct FoundBox {
     pub max: [f32; 3],
 }
 
-/// What the first of a model's machines finds in an area: by space, then by class, the best first.
+/// Returns the elements that the first machines of a model find in an area: by space, then by class, the best
+/// first.
 ///
 /// # Errors
-/// [`Error::Cancelled`].
+/// [`Error::Dataset`](crate::Error::Dataset) if the call is cancelled.
 pub fn detect_area(model: &Model, area: &ParsedArea, ctx: &Context) -> Result<Vec<FoundBox>> {
     let progress = ctx.progress("detecting", "spaces", area.spaces.len() as u64);
     let found = area.spaces.par_iter().map(|space| {
@@ -37,8 +39,10 @@ pub fn detect_area(model: &Model, area: &ParsedArea, ctx: &Context) -> Result<Ve
         let proposals = model.proposer.propose(&prepared);
         let detections = model.detect(&prepared, &proposals).swap_remove(0);
         progress.add(1);
+
         let found = detections.iter().map(|d| {
-            let (room, bbox) = (space.room_of(&d.bbox), space.to_world(&d.bbox));
+            let room = space.room_of(&d.bbox);
+            let bbox = space.to_world(&d.bbox);
             FoundBox {
                 area: area.number,
                 room: area.rooms[room as usize].clone(),

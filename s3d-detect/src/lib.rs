@@ -15,12 +15,12 @@
 //!
 //! # From a model to boxes
 //!
-//! [`detect_area`] returns the elements that a model finds in an area, as boxes in the world frame, in metres.
-//! [`cross_validate`] trains and tests over the folds of the paper, scores with [`s3d_eval::boxes`], and
-//! returns a [`table::Table`] in the form of the paper.
+//! [`detect_area`] returns the elements that a model finds in an area, as boxes in the world frame, in
+//! metres. [`cross_validate`] trains and tests over the folds of the paper, scores with [`s3d_eval::boxes`],
+//! and returns a [`table::Table`] in the form of the paper.
 //!
-//! The same data, options and seed give the same bytes for any number of threads. Each module says what is the
-//! paper's and what is chosen here; `docs/detector.md` has the whole of it, with figures.
+//! The same data, options and seed give the same bytes for any number of threads. Each module says what is
+//! the paper's and what is chosen here; `docs/detector.md` has the whole of it, with figures.
 //!
 //! # Example
 //!
@@ -49,8 +49,8 @@
 //!         }
 //!     }
 //!     let elements = vec![Element { class, room: 0, bbox: table }];
-//!     let area = Area { number, surfels: surfels_of(&cloud, 0), rooms: vec!["office_1".to_owned()], elements };
-//!     ParsedArea::new(area, SpaceSource::Rooms)
+//!     let rooms = vec!["office_1".to_owned()];
+//!     ParsedArea::new(Area { number, surfels: surfels_of(&cloud, 0), rooms, elements }, SpaceSource::Rooms)
 //! };
 //!
 //! let (seen, unseen, context) = (room(1, 1.0, 1.2), room(2, 2.0, 0.5), Context::default());
@@ -80,16 +80,18 @@ pub mod svm;
 pub mod table;
 
 mod area;
+mod error;
 mod found;
 mod model;
 mod parsed_area;
 mod space;
 
 pub use area::{Area, CLASSES, Element, STRUCTURAL};
+pub use error::{Error, Result};
 pub use found::{FoundBox, detect_area};
 pub use model::{Detection, Model, TrainOptions, recalled};
 pub use parsed_area::{ParsedArea, read_areas};
-pub use s3d_dataset::{Context, Error, Result};
+pub use s3d_dataset::Context;
 pub use space::{Space, SpaceSource, UnknownSpaceSource, spaces_of};
 pub use table::cross_validation::cross_validate;
 

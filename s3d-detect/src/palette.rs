@@ -1,53 +1,56 @@
-//! A palette: the few colours that descriptions tell apart, how much of each there is in a box and around it,
-//! and how well the two differ.
+//! A palette: a few colours, their shares in a box and around it, and how well the two differ.
 //!
-//! Palettes stand for the paper's colour, whose form is not public. A colour is shared by the entries next
-//! to it (Swain and Ballard's histograms, 1991, with soft borders), lightness is told against the space's
-//! mean, so that light counts little, and what the box has more of than its surroundings is told for every
-//! surfel (their back-projection, with the surroundings in the place of the image).
+//! It stands for the colour features of the paper, whose form is not public. A colour is spread over the
+//! entries next to it: these are the histograms of Swain and Ballard (1991) with soft borders. Lightness is
+//! relative to the mean of the space, so that the light of a room counts little. Each surfel has a number for
+//! how much more of its colour the box has than its surroundings: this is the back-projection of Swain and
+//! Ballard, with the surroundings in the place of the image.
 
 use glam::Vec3;
 use s3d_geom::Aabb;
 
-/// Hues of the palette: sixths of the circle, from red over yellow, green, cyan and blue.
+/// The hues of the palette, in sixths of the circle: from red over yellow, green, cyan and blue.
 const HUES: [f32; 9] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 2.0, 3.0, 3.5, 4.0, 5.0];
-/// Lightness of coloured entries and of greys, as shares of the space's mean.
+/// The lightness of the coloured entries, as shares of the mean of the space.
 const LIGHTNESS: [f32; 2] = [0.35, 0.9];
+/// The lightness of the greys, likewise.
 const GREYS: [f32; 4] = [0.25, 0.55, 0.85, 1.15];
-/// Less saturated colours are greys, more saturated ones colours; between them they are both.
+/// A colour below the first saturation is grey, above the second it is coloured, in between it is both.
 const SATURATED: [f32; 2] = [0.06, 0.22];
 
-/// How many colours a palette has.
+/// The number of colours of a palette.
 pub const ENTRIES: usize = HUES.len() * LIGHTNESS.len() + GREYS.len();
 
-/// How much there is of each colour.
+/// The amount of each colour.
 pub type Shares = [f32; ENTRIES];
 
-/// The entries that share a colour, and their shares in 255ths.
+/// The entries that a colour is spread over, and their shares in 255ths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Shade([(u8, u8); 6]);
 
 impl Shade {
-    /// Of R G B, 0 to 1, in a space of this mean colour.
+    /// Spreads a colour (R G B, 0 to 1) in a space of this mean colour.
     pub fn new(color: Vec3, mean: Vec3) -> Self {
         let lightness = color.element_sum() / mean.element_sum().max(0.05);
-        let (most, least) = (color.max_element(), color.min_element());
-        let chroma = most - least;
+        let most = color.max_element();
+        let chroma = most - color.min_element();
         let saturation = if most > 0.0 { chroma / most } else { 0.0 };
         let [low, high] = SATURATED;
         let colored = ((saturation - low) / (high - low)).clamp(0.0, 1.0);
+
         let mut shares = [(0, 0.0); 6];
-        let (dark, light) = (between(&LIGHTNESS, lightness), between(&GREYS, lightness));
         if colored > 0.0 {
+            let light = between(&LIGHTNESS, lightness);
             let hue = between_hues(hue(color, most, chroma));
             for (i, (h, l)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
                 let (entry, of_hue) = hue[h];
-                shares[i] = (entry * LIGHTNESS.len() + dark[l].0, colored * of_hue * dark[l].1);
+                shares[i] = (entry * LIGHTNESS.len() + light[l].0, colored * of_hue * light[l].1);
             }
         }
-        for (k, (grey, share)) in light.into_iter().enumerate() {
+        for (k, (grey, share)) in between(&GREYS, lightness).into_iter().enumerate() {
             shares[4 + k] = (HUES.len() * LIGHTNESS.len() + grey, (1.0 - colored) * share);
         }
+
         Self(shares.map(|(entry, share)| (entry as u8, (255.0 * share).round() as u8)))
     }
 
@@ -66,7 +69,7 @@ impl Shade {
     }
 }
 
-/// Where a colour lies on the circle of hues, in sixths.
+/// Returns the place of a colour on the circle of hues, in sixths.
 fn hue(color: Vec3, most: f32, chroma: f32) -> f32 {
     let [r, g, b] = color.to_array();
     if chroma <= 0.0 {
@@ -80,7 +83,7 @@ fn hue(color: Vec3, most: f32, chroma: f32) -> f32 {
     }
 }
 
-/// The two places next to a value, and its shares of them.
+/// Returns the two places next to a value, and the share of each.
 fn between(places: &[f32], value: f32) -> [(usize, f32); 2] {
     let value = value.clamp(places[0], places[places.len() - 1]);
     let high = places.iter().position(|p| *p >= value).unwrap_or(0).max(1);
@@ -97,24 +100,24 @@ fn between_hues(hue: f32) -> [(usize, f32); 2] {
     [(last, 1.0 - share), (0, share)]
 }
 
-/// Parts of a box that have shares of their own: its thirds from below.
+/// The number of layers of a box, each with shares of its own: thirds, from below.
 pub const LAYERS: usize = 3;
-/// A surfel so near to a box is in it: thin boxes are as thin as noise.
+/// A surfel this near to a box counts as inside, in metres, since thin boxes are as thin as noise.
 const NEAR_M: f32 = 0.005;
-/// Of what there is little of, the difference tells little.
+/// Added to the shares that [`Palette::own`] divides by: a difference of small shares counts little.
 const LITTLE: f32 = 0.02;
 
 /// The colours of a box and of what is around it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Palette {
-    /// In the thirds of the box, from below.
+    /// The colours in each third of the box, from below.
     pub layers: [Shares; LAYERS],
-    /// Around it, by side: at the low end of x, of y, of z, then at the high ends.
+    /// The colours at each side of the box: the low ends of x, y and z, then the high ends.
     pub sides: [Shares; 6],
 }
 
 impl Palette {
-    /// Of the surfels in a box and around it.
+    /// Counts the surfels in a box and around it.
     pub fn new<'a>(b: &Aabb, surfels: impl Iterator<Item = (Vec3, &'a Shade)>) -> Self {
         let mut palette = Self { layers: [[0.0; ENTRIES]; LAYERS], sides: [[0.0; ENTRIES]; 6] };
         let size = b.size().max(Vec3::splat(NEAR_M));
@@ -124,7 +127,7 @@ impl Palette {
                 let layer = LAYERS as f32 * (position.z - b.min.z) / size.z;
                 &mut palette.layers[(layer.max(0.0) as usize).min(LAYERS - 1)]
             } else {
-                // Outside of two sides it counts for that which it is farther from, as a share of the size.
+                // Outside of two sides: the farther one counts, as a share of the size.
                 let away = (out / size).to_array();
                 let axis = (1..3).fold(0, |far, k| if away[k] > away[far] { k } else { far });
                 &mut palette.sides[if position[axis] < b.min[axis] { axis } else { 3 + axis }]
@@ -134,13 +137,13 @@ impl Palette {
         palette
     }
 
-    /// The shares in the box, and around it.
+    /// Returns the shares in the box, then around it.
     pub fn inside_and_around(&self) -> [Shares; 2] {
         [share(&sum(&self.layers)), share(&sum(&self.sides))]
     }
 
-    /// How much the colours of each side differ from those of the box, and then all of them: 0 to 1; none
-    /// where there are no surfels.
+    /// Returns how much the colours of each side differ from the colours of the box, then the colours of all
+    /// sides together: 0 to 1. `None` where there are no surfels.
     pub fn contrasts(&self) -> [Option<f32>; 7] {
         let inside = sum(&self.layers);
         let mut out = [None; 7];
@@ -154,14 +157,14 @@ impl Palette {
         out
     }
 
-    /// For each colour how much more of it is in the box than around it: −1 to 1.
+    /// Returns for each colour how much more of it is in the box than around it: −1 to 1.
     pub fn own(&self) -> Shares {
         let [inside, around] = self.inside_and_around();
         std::array::from_fn(|i| (inside[i] - around[i]) / (inside[i] + around[i] + LITTLE))
     }
 }
 
-/// How much of a shade is the box's own, −1 to 1: by [`Palette::own`].
+/// Returns how much of a shade is the box's own, −1 to 1; `own` is [`Palette::own`] of the box.
 pub fn own_of(shade: &Shade, own: &Shares) -> f32 {
     shade.weighed(own)
 }
@@ -174,7 +177,7 @@ fn total(shares: &Shares) -> f32 {
     shares.iter().sum()
 }
 
-/// Scaled to a sum of 1; 0 if there is nothing.
+/// Scales amounts to a sum of 1; they stay 0 if there is nothing.
 pub fn share(shares: &Shares) -> Shares {
     let total = total(shares);
     if total > 0.0 {
@@ -214,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_that_differs_from_its_surroundings_is_told() {
+    fn contrasts_are_high_where_a_box_differs_from_its_surroundings() {
         let b = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
         let (red, white) = (Shade::new(vec3(0.8, 0.1, 0.1), MEAN), Shade::new(Vec3::splat(0.9), MEAN));
         let places = [vec3(0.5, 0.5, 0.1), vec3(0.5, 0.5, 0.9), vec3(-0.2, 0.5, 1.1), vec3(0.5, 0.5, 1.2)];

@@ -1,8 +1,9 @@
-//! Areas with the spaces that they are searched by.
+//! Areas, cut into the spaces to search.
 
 use crate::area::{Area, Element};
+use crate::error::Result;
 use crate::space::{Space, SpaceSource, spaces_of};
-use s3d_dataset::{Context, DataSet, Result};
+use s3d_dataset::{Context, DataSet};
 
 /// An area with its spaces.
 #[derive(Clone, Debug)]
@@ -13,24 +14,24 @@ pub struct ParsedArea {
     pub rooms: Vec<String>,
     /// Its spaces.
     pub spaces: Vec<Space>,
-    /// Its annotated elements, in the world.
+    /// Its annotated elements, in the world frame.
     pub elements: Vec<Element>,
     /// How well its spaces agree with its rooms: the adjusted Rand index.
     pub agreement: f64,
 }
 
 impl ParsedArea {
-    /// Finds the spaces of an area.
+    /// Cuts an area into spaces.
     pub fn new(area: Area, source: SpaceSource) -> Self {
         let (spaces, agreement) = spaces_of(&area, source);
         Self { number: area.number, rooms: area.rooms, spaces, elements: area.elements, agreement }
     }
 }
 
-/// Reads and parses areas, one after the other.
+/// Reads areas one after the other, and cuts each into spaces.
 ///
 /// # Errors
-/// As [`Area::read`].
+/// Fails like [`Area::read`].
 pub fn read_areas(
     data: &DataSet,
     areas: &[u32],

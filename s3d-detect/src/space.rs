@@ -3,6 +3,7 @@
 use crate::area::{Area, Element};
 use crate::spaces::frame::{Frame, canonical_frames};
 use crate::spaces::merge::NO_SPACE;
+use crate::spaces::rand_index::adjusted_rand_index;
 use crate::spaces::{building_angle_deg, parse};
 use crate::surfel::Surfel;
 use crate::surfel::index::Index;
@@ -13,11 +14,11 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// What the spaces of an area are.
+/// The kind of spaces that an area is cut into.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SpaceSource {
-    /// Those that [`parse`] finds.
+    /// The spaces that [`parse`] finds.
     #[default]
     Parsed,
     /// The annotated rooms.
@@ -50,53 +51,65 @@ impl fmt::Display for SpaceSource {
     }
 }
 
-/// Walls that are turned by less than this, in degrees, stand along the axes.
+/// Walls that are turned by less than this, in degrees, count as parallel to the axes.
 const ALIGNED_DEG: f64 = 0.5;
 
-/// A space in its canonical frame: metres, the least corner at the origin.
+/// A space in its canonical frame, in metres, with its least corner at the origin.
 #[derive(Clone, Debug)]
 pub struct Space {
     /// The number of its area.
     pub area: u32,
     /// Its number in the area.
     pub number: u32,
-    /// From the building's axes to its own.
+    /// Takes the axes of the building to its own.
     pub frame: Frame,
-    /// By how much the building is turned against the world, in degrees.
+    /// The angle of the building to the axes of the world, in degrees.
     pub building_deg: f64,
-    /// Its points, thinned.
+    /// Its thinned points.
     pub index: Index,
-    /// Annotated elements that lie in it.
+    /// The annotated elements that lie in it.
     pub elements: Vec<Element>,
 }
 
 impl Space {
-    /// The room that most of the points in a box of this space are of; of the whole space if there are none
-    /// in it.
+    /// Returns the room of most points in a box of this space, or in the whole space if the box has none.
     pub fn room_of(&self, b: &Aabb) -> u32 {
-        let most = |surfels: &mut dyn Iterator<Item = &Surfel>| {
-            let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
-            surfels.for_each(|s| *counts.entry(s.room).or_default() += 1);
-            counts
-                .into_iter()
-                .reduce(|best, next| if next.1 > best.1 { next } else { best })
-        };
-        let grown = Aabb { min: b.min - 0.02, max: b.max + 0.02 };
-        let room = most(&mut self.index.within(&grown)).or_else(|| most(&mut self.index.surfels().iter()));
-        room.map_or(0, |(room, _)| room)
+        let inside = most_frequent_room(self.index.within(&grown(b)));
+        inside
+            .or_else(|| most_frequent_room(self.index.surfels().iter()))
+            .unwrap_or(0)
     }
 
-    /// A box of this space in the world: of one that is turned by no quarter, the box around it.
+    /// Takes a box of this space to the world. If the building is turned, it is the box around the turned
+    /// box.
     pub fn to_world(&self, b: &Aabb) -> Aabb {
         spun_box(&self.frame.to_building(b), self.building_deg)
     }
 }
 
-/// The spaces of an area that hold points, and how well they agree with its rooms: the adjusted Rand index
-/// over surfels. An element belongs to the space that has most surfels in its box, and to none without any.
+/// Returns the room of most surfels; the lower number wins a tie.
+fn most_frequent_room<'a>(surfels: impl Iterator<Item = &'a Surfel>) -> Option<u32> {
+    let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+    surfels.for_each(|s| *counts.entry(s.room).or_default() += 1);
+    counts
+        .into_iter()
+        .reduce(|best, next| if next.1 > best.1 { next } else { best })
+        .map(|(room, _)| room)
+}
+
+/// Grows a box by 2 cm, which is more than the noise of points.
+fn grown(b: &Aabb) -> Aabb {
+    Aabb { min: b.min - 0.02, max: b.max + 0.02 }
+}
+
+/// Returns the spaces of an area that hold points, and how well they agree with its rooms: the adjusted Rand
+/// index over surfels. An element belongs to the space with most surfels in its box, or to no space if there
+/// are none.
 pub fn spaces_of(area: &Area, source: SpaceSource) -> (Vec<Space>, f64) {
     let angle = building_angle_deg(&area.surfels);
     let angle = if angle.abs() < ALIGNED_DEG { 0.0 } else { angle };
+
+    // All that follows has the axes of the building.
     let mut surfels = area.surfels.clone();
     if angle != 0.0 {
         for s in &mut surfels {
@@ -105,6 +118,7 @@ pub fn spaces_of(area: &Area, source: SpaceSource) -> (Vec<Space>, f64) {
             s.extent = spun_box(&s.extent, -angle);
         }
     }
+
     let rooms: Vec<u32> = surfels.iter().map(|s| s.room).collect();
     let (of_surfel, count) = match source {
         SpaceSource::Parsed => {
@@ -113,13 +127,15 @@ pub fn spaces_of(area: &Area, source: SpaceSource) -> (Vec<Space>, f64) {
         }
         SpaceSource::Rooms => (rooms.clone(), area.rooms.len() as u32),
     };
-    let agreement = crate::spaces::rand_index::adjusted_rand_index(&of_surfel, &rooms);
+    let agreement = adjusted_rand_index(&of_surfel, &rooms);
+
     let mut bounds = vec![Aabb::EMPTY; count as usize];
     let mut of_space: Vec<Vec<Surfel>> = vec![Vec::new(); count as usize];
     for (surfel, &space) in surfels.iter().zip(&of_surfel).filter(|(_, s)| **s != NO_SPACE) {
         bounds[space as usize] = bounds[space as usize].union(surfel.extent);
         of_space[space as usize].push(*surfel);
     }
+
     let kept: Vec<usize> = (0..bounds.len()).filter(|&i| !bounds[i].is_empty()).collect();
     let boxes: Vec<Aabb> = kept.iter().map(|&i| bounds[i]).collect();
     let frames = canonical_frames(&boxes);
@@ -135,6 +151,7 @@ pub fn spaces_of(area: &Area, source: SpaceSource) -> (Vec<Space>, f64) {
             elements: Vec::new(),
         })
         .collect();
+
     for element in &area.elements {
         let around = spun_box(&element.bbox, -angle);
         if let Some(space) = home(&around, &boxes, &spaces) {
@@ -155,9 +172,9 @@ fn in_frame(surfels: &[Surfel], frame: &Frame) -> Index {
     Index::new(moved.collect())
 }
 
-/// The space with most surfels in a box that is grown by 2 cm.
+/// Returns the space with most surfels in a box, grown by 2 cm.
 fn home(element: &Aabb, boxes: &[Aabb], spaces: &[Space]) -> Option<usize> {
-    let grown = Aabb { min: element.min - 0.02, max: element.max + 0.02 };
+    let grown = grown(element);
     let inside = |i: usize| {
         if boxes[i].max.cmplt(grown.min).any() || boxes[i].min.cmpgt(grown.max).any() {
             return 0;
@@ -170,12 +187,16 @@ fn home(element: &Aabb, boxes: &[Aabb], spaces: &[Space]) -> Option<usize> {
         .map(|(i, _)| i)
 }
 
+/// Turns a point about the Z axis.
 fn spun(p: Vec3, degrees: f64) -> Vec3 {
-    let (sine, cosine) = (libm::sin(degrees.to_radians()), libm::cos(degrees.to_radians()));
-    let (x, y) = (f64::from(p.x), f64::from(p.y));
+    let sine = libm::sin(degrees.to_radians());
+    let cosine = libm::cos(degrees.to_radians());
+    let x = f64::from(p.x);
+    let y = f64::from(p.y);
     vec3((cosine * x - sine * y) as f32, (sine * x + cosine * y) as f32, p.z)
 }
 
+/// Returns the box around a box that is turned about the Z axis.
 fn spun_box(b: &Aabb, degrees: f64) -> Aabb {
     if degrees == 0.0 {
         return *b;

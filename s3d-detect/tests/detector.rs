@@ -1,12 +1,12 @@
-//! From an exported data set to a model, detections and a table.
+//! From an exported data set to a model, to detections, and to a table.
 
-use s3d_dataset::{Context, DataSet, Error, Export, ExportOptions};
+use s3d_dataset::{Context, DataSet, Export, ExportOptions};
 use s3d_detect::boxes::iou;
 use s3d_detect::features::Variant;
 use s3d_detect::table::markdown;
 use s3d_detect::{
-    CLASSES, Element, Model, ParsedArea, Space, SpaceSource, TrainOptions, cross_validate, detect_area,
-    read_areas,
+    CLASSES, Element, Error, Model, ParsedArea, Space, SpaceSource, TrainOptions, cross_validate,
+    detect_area, read_areas,
 };
 use s3d_geom::Aabb;
 use s3d_synth::{Building, BuildingOptions, ScanOptions};
@@ -14,7 +14,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::LazyLock;
 
-/// A data set of areas 1 and 5, two rooms and a hallway each.
+/// A data set of areas 1 and 5 with two rooms and a hallway each.
 static DATA: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let scenes = [1, 5].map(|area| {
@@ -72,14 +72,15 @@ fn the_same_seed_gives_the_same_bytes_for_any_number_of_threads() {
 }
 
 #[test]
-fn what_is_learnt_beats_chance_and_finds_again_what_it_learnt_from() {
+fn models_beat_chance_and_find_what_they_learnt_from() {
     let areas = areas();
     for area in &areas {
-        // Two rooms and a hallway; every element is in a space, and its room is known.
+        // Two rooms and a hallway. Every element is in a space.
         assert_eq!(area.spaces.len(), 3, "{}", area.agreement);
         assert!(area.agreement > 0.95, "{}", area.agreement);
         assert_eq!(area.spaces.iter().map(|s| s.elements.len()).sum::<usize>(), area.elements.len());
     }
+
     let options = TrainOptions { seed: 1, ..TrainOptions::default() };
     let table = cross_validate(&areas, &options, &Context::default()).unwrap();
     let overall = |row: &str| table.numbers(row, 0).unwrap()[CLASSES.len() + 2].unwrap();
@@ -94,9 +95,10 @@ fn what_is_learnt_beats_chance_and_finds_again_what_it_learnt_from() {
         let mut boxes = of_class.map(|f| Aabb { min: f.min.into(), max: f.max.into() });
         boxes.any(|b| iou(&b, &e.bbox) > 0.5)
     };
-    let (all, again) = (areas[0].elements.len(), areas[0].elements.iter().filter(is_found).count());
+    let all = areas[0].elements.len();
+    let again = areas[0].elements.iter().filter(is_found).count();
     assert!(2 * again > all, "{again} of {all}");
-    // Rooms are told for each box, and are those of the area.
+    // Each box has a room of the area.
     assert!(found.iter().all(|f| f.area == 1 && areas[0].rooms.contains(&f.room)));
 }
 
@@ -107,6 +109,7 @@ fn models_are_saved_loaded_and_checked() {
     let model = train(&areas(), 2);
     model.save(&path).unwrap();
     assert_eq!(Model::load(&path).unwrap(), model);
+
     let text = serde_json::to_string(&model).unwrap();
     let refused = |from: &str, to: &str, why: &str| {
         assert!(text.contains(from), "{from}");
@@ -120,9 +123,11 @@ fn models_are_saved_loaded_and_checked() {
     refused("\"class\":0", "\"class\":77", "class 77");
     refused("\"weights\":[", "\"weights\":[0.5,", "finite weights");
     refused("\"unary\":[", "\"unary\":[[0,0],", "context");
+
+    let is_file = |error: &Error| matches!(error, Error::Dataset(s3d_dataset::Error::File(_)));
     fs::write(&path, &text[..text.len() / 2]).unwrap();
-    assert!(matches!(Model::load(&path), Err(Error::File(_))));
-    assert!(matches!(Model::load(Path::new("nowhere.json")), Err(Error::File(_))));
+    assert!(Model::load(&path).is_err_and(|e| is_file(&e)));
+    assert!(Model::load(Path::new("nowhere.json")).is_err_and(|e| is_file(&e)));
 }
 
 #[test]
@@ -132,6 +137,7 @@ fn calls_that_make_no_sense_say_so() {
         .unwrap_err()
         .to_string();
     assert!(told.contains("no area 2"), "{told}");
+
     let areas = areas();
     let told = cross_validate(&areas[..1], &TrainOptions::default(), &context)
         .unwrap_err()
@@ -141,6 +147,8 @@ fn calls_that_make_no_sense_say_so() {
         .unwrap_err()
         .to_string();
     assert!(told.contains("no annotated element"), "{told}");
+
     context.cancel.cancel();
-    assert!(matches!(read_areas(&data(), &[1], SpaceSource::Rooms, &context), Err(Error::Cancelled)));
+    let cancelled = read_areas(&data(), &[1], SpaceSource::Rooms, &context).unwrap_err();
+    assert!(matches!(cancelled, Error::Dataset(s3d_dataset::Error::Cancelled)), "{cancelled}");
 }

@@ -1,5 +1,5 @@
-//! Held against scikit-learn's `LinearSVC`: inputs and objectives in `reference/svm/cases.json`, which
-//! `reference/svm/reference.py` wrote.
+//! Compares machines with scikit-learn's `LinearSVC`. `reference/svm/reference.py` wrote its inputs and
+//! objectives to `reference/svm/cases.json`.
 
 use s3d_detect::svm::sparse::SparseRows;
 use s3d_detect::svm::{Linear, Loss, SvmOptions, objective, train};
@@ -34,7 +34,7 @@ fn cases() -> Vec<Case> {
 }
 
 #[test]
-fn objectives_are_those_of_scikit_learn_to_six_digits() {
+fn scikit_learn_gives_the_same_objectives_to_six_digits() {
     for (case, loss) in cases()
         .iter()
         .flat_map(|case| [Loss::Hinge, Loss::SquaredHinge].map(move |loss| (case, loss)))
@@ -49,7 +49,8 @@ fn objectives_are_those_of_scikit_learn_to_six_digits() {
             case.squared_hinge
         };
         assert!((ours - theirs).abs() <= 1e-6 * theirs, "{loss:?}: {ours}, scikit-learn {theirs}");
-        // That no machine is better near by.
+
+        // No machine near by is better.
         for column in 0..rows.width() {
             for step in [-1e-3, 1e-3] {
                 let mut other = machine.clone();
@@ -82,7 +83,8 @@ fn the_seed_decides_the_way_and_not_the_end() {
 #[test]
 fn examples_without_cost_and_columns_left_out_do_not_count() {
     let case = &cases()[1];
-    let (all, half) = (case.rows(), case.x.len() / 2);
+    let all = case.rows();
+    let half = case.x.len() / 2;
     let mut costs = case.costs.clone();
     costs[half..].fill(0.0);
     let options = SvmOptions { tolerance: 1e-10, max_passes: 1_000_000, ..SvmOptions::default() };
@@ -95,6 +97,7 @@ fn examples_without_cost_and_columns_left_out_do_not_count() {
             .zip(&alone.weights)
             .all(|(a, b)| (a - b).abs() < 1e-6)
     );
+
     let masked = all.select(0..all.len(), std::slice::from_ref(&(2..5)));
     let without = train(&masked, &case.positive, &case.costs, &options);
     assert_eq!(without.weights[2..5], [0.0; 3]);

@@ -1,5 +1,5 @@
-//! How long the metrics of `det` and `panoptic` take, without files: as many boxes as in S3DIS with ten
-//! detections each, and a panorama of the published size.
+//! How long do the metrics of `det` and `panoptic` take, without files? There are as many boxes as in S3DIS,
+//! with ten detections each, and a panorama of the published size.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rand::{RngExt, SeedableRng};
@@ -9,14 +9,17 @@ use s3d_eval::panoptic::{PanopticCounts, Segment};
 use s3d_label::Class;
 use std::hint::black_box;
 
-/// Rooms, boxes a room, and detections a box.
+/// The number of rooms.
 const ROOMS: u32 = 272;
+/// The number of boxes in a room.
 const BOXES: usize = 36;
+/// The number of detections of a box.
 const COPIES: usize = 10;
 
 fn boxes() -> (Vec<GroundTruth>, Vec<Detection>) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let (mut truth, mut detections) = (Vec::new(), Vec::new());
+    let mut truth = Vec::new();
+    let mut detections = Vec::new();
     for room in 0..ROOMS {
         for i in 0..BOXES {
             let class = Class::S3DIS[i % 12];
@@ -26,7 +29,8 @@ fn boxes() -> (Vec<GroundTruth>, Vec<Detection>) {
                 |by: f64| std::array::from_fn(|k| if k < 3 { low[k] + by } else { low[k - 3] + size[k - 3] });
             truth.push(GroundTruth { room, class, bbox: bbox(0.0) });
             for _ in 0..COPIES {
-                let (score, by) = (rng.random(), rng.random_range(-0.5..0.2));
+                let score = rng.random();
+                let by = rng.random_range(-0.5..0.2);
                 detections.push(Detection { room, class, score, bbox: bbox(by) });
             }
         }
@@ -51,7 +55,8 @@ fn det(c: &mut Criterion) {
 fn panoptic(c: &mut Criterion) {
     let mut group = c.benchmark_group("panoptic");
     let [width, height] = [4096u32, 2048];
-    // 128 rectangles, and the same a little to the side; a noisy border makes short runs.
+
+    // 128 rectangles, and the same ones moved to the side. Every third row is moved further, for short runs.
     let id = |x: u32, y: u32| 1 + x / 256 + 16 * (y / 256);
     let pixels = |shift: u32| -> Vec<u32> {
         let place = |at: u32| ((at + shift * (1 + at / width % 3)) % width, at / width);
@@ -63,7 +68,8 @@ fn panoptic(c: &mut Criterion) {
             .collect()
     };
     let segments: Vec<Segment> = (1..=128).map(|id| Segment { id, class: id as usize % 13 }).collect();
-    let (truth, predicted) = (pixels(0), pixels(20));
+    let [truth, predicted] = [0, 20].map(pixels);
+
     group
         .sample_size(10)
         .throughput(Throughput::Elements(u64::from(width * height)));

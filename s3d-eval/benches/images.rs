@@ -1,5 +1,5 @@
-//! How many panoramas a second are evaluated on one core? A minute for a thousand of 1024 × 512 is the aim;
-//! those of 4096 × 2048 show what decoding costs.
+//! How many panoramas are evaluated in a second on one core? The aim is a thousand of 1024 × 512 in a
+//! minute. The panoramas of 4096 × 2048 show the cost of decoding.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_dataset::{DataSet, Export, ExportOptions};
@@ -22,6 +22,7 @@ fn images(criterion: &mut Criterion) {
         .num_threads(1)
         .build()
         .expect("a thread");
+
     for pano_width in [1024, 4096] {
         let truth = dir.path().join(format!("{pano_width}"));
         let options =
@@ -36,6 +37,7 @@ fn images(criterion: &mut Criterion) {
             .into_iter()
             .filter(|image| image.frame == Frame::Panorama)
             .collect();
+
         for (protocol, variant, domain) in [
             (Protocol::SemPano, "hohonet", Domain::Semantic),
             (Protocol::Depth, "hohonet", Domain::Depth),
@@ -56,6 +58,7 @@ fn images(criterion: &mut Criterion) {
                     fs::copy(from, to).expect("a prediction");
                 }
             }
+
             let mut options = EvalOptions::default();
             options.variant = Some(variant.to_owned());
             options.images = Some(ImageKind::Panoramas);

@@ -1,5 +1,5 @@
-//! How many points a second are evaluated: of text files of the truth and NPY or NPZ files of predictions,
-//! and in memory.
+//! How many points are evaluated in a second, from text files of the truth and NPY or NPZ files of
+//! predictions, and in memory?
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_dataset::s3d_io::cloud::NpyWriter;
@@ -14,7 +14,7 @@ use std::path::Path;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// The built-in scene, of some million points.
+/// Exports the built-in scene with millions of points.
 fn data_set(dir: &Path) -> DataSet {
     let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
     let scene = Building::demo()
@@ -56,7 +56,7 @@ fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) {
     zip.finish().unwrap();
 }
 
-/// Predictions in the four forms, and the number of points.
+/// Writes predictions in four forms, and returns the number of points.
 fn write_predictions(dir: &Path, data: &DataSet) -> u64 {
     let ctx = Context::default();
     for form in ["labels", "logits", "masks", "segments"] {
@@ -64,7 +64,9 @@ fn write_predictions(dir: &Path, data: &DataSet) -> u64 {
     }
     let mut points = 0;
     for room in data.tree_rooms(1).unwrap() {
-        let (mut labels, mut ids, mut classes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut labels = Vec::new();
+        let mut ids = Vec::new();
+        let mut classes = Vec::new();
         for (id, instance) in (0i64..).zip(&room.instances) {
             let count = data.point_count(instance, &ctx).unwrap() as usize;
             let class = instance.class.index() as i64;
@@ -72,7 +74,8 @@ fn write_predictions(dir: &Path, data: &DataSet) -> u64 {
             ids.extend(id.to_le_bytes().repeat(count));
             classes.extend(class.to_le_bytes());
         }
-        let (n, k) = (labels.len() / 8, classes.len() / 8);
+
+        let [n, k] = [labels.len() / 8, classes.len() / 8];
         points += n as u64;
         let of_points = npy("<i8", &[n as u64], &labels);
         let logits: Vec<u8> = labels
@@ -89,6 +92,7 @@ fn write_predictions(dir: &Path, data: &DataSet) -> u64 {
             .flat_map(|id| (0..k).map(move |k| u8::from(k as i64 == i64::from_le_bytes(*id))))
             .collect();
         let scores = npy("<f4", &[k as u64], &0.5f32.to_le_bytes().repeat(k));
+
         let name = format!("Area_1_{}", room.name);
         fs::write(dir.join(format!("labels/{name}.npy")), &of_points).unwrap();
         fs::write(dir.join(format!("logits/{name}.npy")), npy("<f4", &[n as u64, 13], &logits)).unwrap();
@@ -148,6 +152,7 @@ fn memory(c: &mut Criterion) {
             counts
         });
     });
+
     let truth: Vec<TrueInstance> = (0..60).map(|i| TrueInstance { class: i % 13, points: 1000 }).collect();
     let predicted = (0..120usize).map(|i| PredictedInstance {
         class: i % 13,

@@ -1,13 +1,16 @@
-//! How far scores would stray had other rooms been scanned.
+//! Intervals of scores: how much they would differ if other rooms had been scanned.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// The 95 % interval of each score by the percentile bootstrap: as many units (rooms, images) as there are
-/// are drawn with replacement, `rounds` times, and `score` gives the scores of those, always as many. Values
-/// that are NaN in a round are left out; a score that always is has the interval NaN to NaN. The same for any
-/// number of threads. Source: Efron and Tibshirani 1993, chapter 13.
+/// Returns the 95 % interval of each score by the percentile bootstrap (Efron and Tibshirani 1993, chapter
+/// 13).
+///
+/// Each round draws as many units (rooms, images) as there are, with replacement. `score` returns the scores
+/// of the drawn units, always in the same order. A round in which a score is NaN does not count for it; a
+/// score that is NaN in all rounds has the interval NaN to NaN. The result is the same for any number of
+/// threads.
 pub fn bootstrap<T: Sync>(
     units: &[T],
     rounds: u32,
@@ -26,6 +29,7 @@ pub fn bootstrap<T: Sync>(
             score(&drawn)
         })
         .collect();
+
     let count = of_rounds.iter().map(Vec::len).min().unwrap_or(0);
     (0..count)
         .map(|at| {
@@ -40,13 +44,14 @@ pub fn bootstrap<T: Sync>(
         .collect()
 }
 
-/// Between the two nearest of sorted values, linearly, as numpy's default; NaN of none.
+/// Interpolates linearly between the two nearest of sorted values, like numpy by default. NaN if there are
+/// none.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
     let place = share * last as f64;
-    let (below, part) = (place.floor(), place.fract());
+    let below = place.floor();
     let [low, high] = [below as usize, (below as usize + 1).min(last)].map(|at| sorted[at]);
-    low + part * (high - low)
+    low + place.fract() * (high - low)
 }
 
 #[cfg(test)]
@@ -58,10 +63,10 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_of_a_mean_is_that_of_theory() {
+    fn the_interval_of_a_mean_agrees_with_theory() {
         let units: Vec<f64> = (0..400).map(|i| f64::from(i % 20)).collect();
         let intervals = bootstrap(&units, 4000, 7, mean);
-        // Deviation of a mean of 400 numbers, each uniform of 0 to 19.
+        // The deviation of the mean of 400 numbers, each uniform in 0 to 19.
         let expected = 1.96 * ((400.0 - 1.0) / 12.0f64).sqrt() / 20.0;
         let [low, high] = intervals[0];
         assert!((9.5 - low - expected).abs() < 0.04 && (high - 9.5 - expected).abs() < 0.04, "{intervals:?}");

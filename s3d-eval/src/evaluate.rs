@@ -1,17 +1,19 @@
-//! The call that evaluates.
+//! The call that evaluates predictions.
 
+use crate::error::Result;
 use crate::task::Task;
 use crate::{EvalOptions, Evaluation, Protocol, boxes, images, panoptic, points};
-use s3d_dataset::{Context, DataSet, Result};
+use s3d_dataset::{Context, DataSet};
 use std::path::Path;
 
-/// Holds the predictions in the folder or file `predictions` against the data set in the folder `truth`.
+/// Compares the predictions in the folder or file `predictions` with the data set in the folder `truth`.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if the options do not fit the protocol or the data set;
-/// [`Error::Input`](crate::Error::Input) if the data set lacks what the protocol needs;
-/// [`Error::File`](crate::Error::File) if a prediction is missing, double, of the wrong size or damaged, or a
-/// file of the data set is; [`Error::Cancelled`](crate::Error::Cancelled).
+/// An error that [is a usage error](crate::Error::is_usage) if the options do not fit the protocol or the
+/// data set. [`Unlabelled`](crate::Error::Unlabelled), [`NoRooms`](crate::Error::NoRooms) or
+/// [`NoImages`](crate::Error::NoImages) if the data set has nothing to compare with.
+/// [`Dataset`](crate::Error::Dataset) if a prediction is missing, double, of the wrong size or damaged, if a
+/// file of the data set is damaged, or if the call is cancelled.
 pub fn evaluate(
     protocol: Protocol,
     truth: &Path,

@@ -1,36 +1,36 @@
-//! What an evaluation says.
+//! The result of an evaluation.
 
 use crate::Protocol;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Scores with the definition that they follow. Serializes as what `--json` writes.
+/// Scores with the definition that they follow. `s3d eval` writes its serialized form as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// The protocol's name.
+    /// The protocol, serialized by its name.
     #[serde(serialize_with = "name")]
     pub protocol: Protocol,
     /// The version of its definition.
     pub version: u32,
-    /// Which of its variants.
+    /// The variant of the protocol.
     pub variant: &'static str,
-    /// The definition, a sentence each.
+    /// The definition, in sentences.
     pub definition: Vec<String>,
-    /// How many rooms, images, points … were counted, by noun.
+    /// The number of rooms, images, points … that were counted, by noun.
     pub counted: BTreeMap<&'static str, u64>,
     /// The scores.
     pub tables: Vec<Table>,
-    /// What should be known beside the scores, a sentence each.
+    /// Notes on the scores, in sentences.
     pub notes: Vec<String>,
 }
 
-/// Scores of classes, or of all.
+/// Scores of classes and of all classes together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Table {
-    /// What it is of: `areas 2, 4`.
+    /// The areas that it is for: `areas 2, 4`.
     pub title: String,
-    /// What its columns are called: `IoU`, `accuracy`.
+    /// The names of its columns: `IoU`, `accuracy`.
     pub columns: Vec<String>,
     /// Its rows, each as long as `columns`.
     pub rows: Vec<Row>,
@@ -41,14 +41,14 @@ pub struct Table {
 pub struct Row {
     /// A class, or `mean`, `overall` …
     pub name: String,
-    /// One a column.
+    /// A score for each column.
     pub scores: Vec<Score>,
 }
 
 /// A number of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Score {
-    /// In the protocol's unit; NaN where it is not defined, which is `null` in JSON.
+    /// The value, in the unit of the protocol. NaN where it is not defined, which is `null` in JSON.
     pub value: f64,
     /// The 95 % interval of the bootstrap, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -66,20 +66,20 @@ fn name<S: Serializer>(protocol: &Protocol, serializer: S) -> Result<S::Ok, S::E
 }
 
 impl Table {
-    /// A row of scores without intervals.
+    /// Adds a row of scores without intervals.
     pub(crate) fn push(&mut self, name: impl Into<String>, values: impl IntoIterator<Item = f64>) {
         let scores = values.into_iter().map(Score::from).collect();
         self.rows.push(Row { name: name.into(), scores });
     }
 
-    /// All scores, row by row.
+    /// Returns all scores, row by row.
     pub fn scores(&self) -> impl Iterator<Item = f64> {
         self.rows
             .iter()
             .flat_map(|row| row.scores.iter().map(|score| score.value))
     }
 
-    /// Gives its scores their intervals, row by row.
+    /// Sets the intervals of its scores, row by row.
     pub(crate) fn set_intervals(&mut self, intervals: impl IntoIterator<Item = [f64; 2]>) {
         let scores = self.rows.iter_mut().flat_map(|row| &mut row.scores);
         scores
@@ -89,7 +89,7 @@ impl Table {
 }
 
 impl Evaluation {
-    /// The score of a row and column of a table, by their names.
+    /// Returns a score by the names of its table, row and column.
     pub fn score(&self, table: &str, row: &str, column: &str) -> Option<f64> {
         let table = self.tables.iter().find(|t| t.title == table)?;
         let at = table.columns.iter().position(|c| c == column)?;
@@ -97,18 +97,20 @@ impl Evaluation {
         row.scores.get(at).map(|score| score.value)
     }
 
-    /// The same as text: the definition, the tables and the notes.
+    /// Writes the definition, the tables and the notes as Markdown.
     pub fn to_markdown(&self) -> String {
         let mut text = format!("# {}, version {}, as {}\n\n", self.protocol, self.version, self.variant);
         for sentence in &self.definition {
             let _ = writeln!(text, "- {sentence}");
         }
+
         let counted: Vec<String> = self
             .counted
             .iter()
             .map(|(noun, count)| format!("{noun} {count}"))
             .collect();
         let _ = writeln!(text, "\nCounted: {}.", counted.join(", "));
+
         for table in &self.tables {
             let _ = write!(text, "\n## {}\n\n| |", table.title);
             table.columns.iter().for_each(|column| {
@@ -123,6 +125,7 @@ impl Evaluation {
                 text.push('\n');
             }
         }
+
         for note in &self.notes {
             let _ = writeln!(text, "\n{note}");
         }
@@ -130,12 +133,14 @@ impl Evaluation {
     }
 }
 
-/// A score as it is read: four digits after the point, and nothing where it is not defined.
+/// Writes a score with four digits after the point, or a dash where it is not defined.
 fn shown(score: &Score) -> String {
-    match (score.value.is_nan(), score.interval) {
-        (true, _) => "–".to_owned(),
-        (false, None) => format!("{:.4}", score.value),
-        (false, Some([low, high])) => format!("{:.4} [{low:.4}, {high:.4}]", score.value),
+    if score.value.is_nan() {
+        return "–".to_owned();
+    }
+    match score.interval {
+        None => format!("{:.4}", score.value),
+        Some([low, high]) => format!("{:.4} [{low:.4}, {high:.4}]", score.value),
     }
 }
 
@@ -158,9 +163,11 @@ mod tests {
             tables: vec![table],
             notes: Vec::new(),
         };
+
         let text = evaluation.to_markdown();
         assert!(text.contains("| chair | 0.5000 [0.2500, 0.7500] | – |"), "{text}");
         assert!(text.contains("Counted: points 40, rooms 3."), "{text}");
+
         let json = serde_json::to_value(&evaluation).unwrap();
         assert_eq!(json["protocol"], "sem3d");
         assert_eq!(json["tables"][0]["rows"][0]["scores"][0]["interval"][1], 0.75);

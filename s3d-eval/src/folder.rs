@@ -1,12 +1,11 @@
-//! Folders of predictions.
+//! Lists folders of predictions.
 
-use s3d_dataset::Result;
 use s3d_io::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What is in a folder and not hidden, sorted by name.
-pub(crate) fn entries(dir: &Path) -> Result<Vec<PathBuf>> {
+/// Returns the files and folders in a folder, sorted by name, without hidden ones.
+pub(crate) fn entries(dir: &Path) -> Result<Vec<PathBuf>, Error> {
     let failed = |e| Error::io(dir, "read the folder", e);
     let mut paths = Vec::new();
     for entry in fs::read_dir(dir).map_err(failed)? {

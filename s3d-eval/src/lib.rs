@@ -1,9 +1,11 @@
-//! One evaluator for results on 2D-3D-Semantic data: what eight scripts of others count, each by its own
-//! definition, to the digit.
+//! One evaluator for results on 2D-3D-Semantic data. It gives the scores of eight published scripts, each by
+//! its own definition, to the digit.
 //!
-//! [`evaluate`] holds predictions against a data set by a [`Protocol`], a named and versioned definition, and
-//! returns an [`Evaluation`]: tables of scores, with the definition that they follow. `docs/evaluation.md`
-//! explains each protocol with its source, where others differ, and the files that predictions come in.
+//! # From files to scores
+//!
+//! [`evaluate`] compares predictions with a data set by a [`Protocol`], which is a named and versioned
+//! definition. It returns an [`Evaluation`]: tables of scores, with the definition that they follow.
+//! `docs/evaluation.md` explains each protocol, its source, how others differ, and the files of predictions.
 //!
 //! ```no_run
 //! use s3d_eval::{Context, EvalOptions, Protocol, evaluate};
@@ -13,6 +15,20 @@
 //! let result = evaluate(Protocol::Sem3d, truth, predictions, &options, &Context::default())?;
 //! println!("{}", result.to_markdown());
 //! # Ok::<(), s3d_eval::Error>(())
+//! ```
+//!
+//! # From values to scores
+//!
+//! The metrics need no files: [`boxes`], [`points`], [`images`] and [`panoptic`] have them, with values in
+//! and scores out. [`bootstrap`] gives their intervals.
+//!
+//! ```
+//! use s3d_eval::points::{AbsentClass, SemanticCounts};
+//!
+//! // The true and the predicted class of each point; -1 is void.
+//! let mut counts = SemanticCounts::new(2);
+//! counts.add([(0, 0), (0, 1), (1, 1), (-1, 1)]);
+//! assert_eq!(counts.scores(AbsentClass::LeftOut).mean_iou, 0.5);
 //! ```
 
 // What a file holds must not make it panic.
@@ -24,6 +40,7 @@ pub mod panoptic;
 pub mod points;
 
 mod bootstrap;
+mod error;
 mod evaluate;
 mod evaluation;
 mod folder;
@@ -34,14 +51,15 @@ mod tables;
 mod task;
 
 pub use bootstrap::bootstrap;
+pub use error::{ClassFault, ClassOption, Error, Result};
 pub use evaluate::evaluate;
 pub use evaluation::{Evaluation, Row, Score, Table};
 pub use folds::{Fold, Folds};
-pub use options::{EvalOptions, ImageKind};
+pub use options::{EvalOptions, ImageKind, UnknownImageKind};
 pub use protocol::{Protocol, UnknownProtocol};
-pub use s3d_dataset::{Context, Error, Result};
+pub use s3d_dataset::Context;
 
-/// The README's example, compiled and run.
+/// The example of the README, compiled.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,47 +1,49 @@
-//! How an evaluation is done.
+//! The options of an evaluation.
 
+use crate::error::{Error, Result};
 use crate::{Folds, Protocol};
-use s3d_dataset::{ClassList, Error, Result};
+use s3d_dataset::ClassList;
 use s3d_io::dataset::Frame;
 use std::fmt;
 use std::str::FromStr;
+use thiserror::Error as ThisError;
 
-/// How an evaluation is done. Its `Default` is the protocol's own way on all areas.
+/// The options of an evaluation. The default is the default variant of the protocol on all areas.
 #[derive(Clone, Debug, PartialEq, Default)]
 #[non_exhaustive]
 pub struct EvalOptions {
-    /// One of [`Protocol::variants`]; `None`: the first.
+    /// One of [`Protocol::variants`]. `None` is the first.
     pub variant: Option<String>,
-    /// Which areas are tested, and which of them together.
+    /// The areas to test, and which of them together.
     pub folds: Folds,
-    /// How many times rooms (or images, where there are no rooms) are drawn again with replacement for the
-    /// 95 % intervals of scores; `None`: no intervals.
+    /// The number of rounds of the [`bootstrap`](crate::bootstrap()) of rooms, or of images where there are
+    /// no rooms. `None` gives no intervals.
     pub bootstrap: Option<u32>,
-    /// Everything random comes from it.
+    /// The source of everything random.
     pub seed: u64,
-    /// `depth`: predictions are scaled to the median of the truth first, image by image.
+    /// `depth` only: scales each predicted image to the median of its truth first.
     pub median_scale: bool,
-    /// `normal`: which images are evaluated; `None`: those that the predictions are named after. The other
-    /// protocols of images have one kind each.
+    /// `normal` only: the kind of images to evaluate. `None` is the kind that the predictions are named
+    /// after. The other protocols of images have one kind each.
     pub images: Option<ImageKind>,
-    /// `det`: the classes to detect, by name; `None`: the paper's 12.
+    /// `det` only: the classes to detect, by name. `None` means the 12 of the paper.
     pub classes: Option<Vec<String>>,
-    /// `panoptic`: the classes of which all of an image is one segment; `None`: those that the taxonomy calls
-    /// stuff.
+    /// `panoptic` only: the stuff classes, of which each image has one segment. `None` means the stuff of the
+    /// taxonomy.
     pub stuff: Option<ClassList>,
 }
 
 /// A kind of images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageKind {
-    /// Perspective views: normals are in the camera's axes.
+    /// Perspective views: normals are in the axes of the camera.
     Views,
-    /// Panoramas: normals are in the world's axes.
+    /// Panoramas: normals are in the axes of the world.
     Panoramas,
 }
 
 impl ImageKind {
-    /// Which kind an image is of.
+    /// Returns the kind of an image.
     pub fn of(frame: Frame) -> Self {
         if frame == Frame::Panorama {
             Self::Panoramas
@@ -60,29 +62,34 @@ impl fmt::Display for ImageKind {
     }
 }
 
-impl FromStr for ImageKind {
-    type Err = Error;
+/// A word that names no kind of images.
+#[derive(Clone, Debug, PartialEq, Eq, ThisError)]
+#[error("{0:?} is no kind of images: views and panoramas are")]
+pub struct UnknownImageKind(String);
 
-    fn from_str(word: &str) -> Result<Self> {
+impl FromStr for ImageKind {
+    type Err = UnknownImageKind;
+
+    fn from_str(word: &str) -> Result<Self, UnknownImageKind> {
         let found = [Self::Views, Self::Panoramas]
             .into_iter()
             .find(|kind| kind.to_string() == word);
-        found.ok_or_else(|| Error::Usage(format!("{word:?} is no kind of images: views and panoramas are")))
+        found.ok_or_else(|| UnknownImageKind(word.to_owned()))
     }
 }
 
 impl EvalOptions {
-    /// The variant that is asked for.
+    /// Returns the variant of a protocol that these options ask for.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the protocol has none of this name.
+    /// [`Error::UnknownVariant`] if the protocol has no such variant.
     pub fn variant_of(&self, protocol: Protocol) -> Result<&'static str> {
         let variants = protocol.variants();
         let Some(word) = &self.variant else { return Ok(variants[0]) };
         let found = variants.iter().find(|name| *name == word);
-        found.copied().ok_or_else(|| {
-            Error::Usage(format!("{protocol} has no variant {word:?}: it has {}", variants.join(", ")))
-        })
+        found
+            .copied()
+            .ok_or_else(|| Error::UnknownVariant { protocol, name: word.clone() })
     }
 }
 

@@ -1,32 +1,32 @@
-//! The protocols by name.
+//! The names, versions and variants of the protocols.
 
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error as ThisError;
 
-/// A definition by which predictions are held against a data set. `docs/evaluation.md` describes each.
+/// A definition of how to compare predictions with a data set. `docs/evaluation.md` describes each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Protocol {
-    /// Average precision of 3D boxes, as mmdetection3d's indoor evaluation.
+    /// Average precision of 3D boxes, like the indoor evaluation of mmdetection3d.
     Det,
-    /// Semantic segmentation of points, as Pointcept.
+    /// Semantic segmentation of points, like Pointcept.
     Sem3d,
-    /// Average precision of instances of points, as ScanNet's script in Pointcept's form.
+    /// Average precision of instances of points, like ScanNet's script in the form of Pointcept.
     InstAp,
-    /// Coverage, precision and recall of instances of points, as ASIS.
+    /// Coverage, precision and recall of instances of points, like ASIS.
     InstCov,
-    /// Semantic segmentation of panoramas, as HoHoNet.
+    /// Semantic segmentation of panoramas, like HoHoNet.
     SemPano,
-    /// Depth of panoramas, as HoHoNet or UniFuse.
+    /// Depth of panoramas, like HoHoNet or UniFuse.
     Depth,
-    /// Surface normals of images, as DSINE or Omnidata.
+    /// Surface normals of images, like DSINE or Omnidata.
     Normal,
-    /// Panoptic quality of images, as panopticapi.
+    /// Panoptic quality of images, like panopticapi.
     Panoptic,
 }
 
-/// A protocol as it is called, its version, and its variants, of which the first is the default.
+/// A protocol with its name, its version and its variants. The first variant is the default.
 type Entry = (Protocol, &'static str, u32, &'static [&'static str]);
 
 const PROTOCOLS: [Entry; 8] = [
@@ -41,27 +41,27 @@ const PROTOCOLS: [Entry; 8] = [
 ];
 
 impl Protocol {
-    /// All of them.
+    /// Returns all protocols.
     pub fn all() -> impl Iterator<Item = Self> {
         PROTOCOLS.into_iter().map(|(protocol, ..)| protocol)
     }
 
     fn entry(self) -> Entry {
-        // Every protocol has its line, in the order of the enum.
+        // The table has the order of the enum.
         PROTOCOLS[self as usize]
     }
 
-    /// What it is called: `sem3d`.
+    /// Returns its name, such as `sem3d`.
     pub fn name(self) -> &'static str {
         self.entry().1
     }
 
-    /// Changes with every change of its definition.
+    /// Returns the version of its definition.
     pub fn version(self) -> u32 {
         self.entry().2
     }
 
-    /// The names of its variants, the default first.
+    /// Returns the names of its variants, the default first.
     pub fn variants(self) -> &'static [&'static str] {
         self.entry().3
     }

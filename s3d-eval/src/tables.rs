@@ -1,13 +1,13 @@
-//! Tables of scores over rooms or images: a fold each, all together, and the mean over folds.
+//! Makes tables of scores over rooms or images: one for each fold, one for all, and the mean over folds.
 
 use crate::task::Task;
 use crate::{Table, bootstrap};
 
-/// The rows of a table: names and scores.
+/// The rows of a table: a name and its scores each.
 pub(crate) type Rows = Vec<(String, Vec<f64>)>;
 
-/// The tables of units (rooms, images), each with the fold that it is in. `score` gives the rows of any set
-/// of units, always of the same names. With the options' bootstrap, scores have intervals.
+/// Makes the tables of units (rooms, images). `units` has the fold of each. `score` returns the rows of any
+/// set of units, always with the same names. Scores have intervals if the options ask for a bootstrap.
 pub(crate) fn tables<T: Sync>(
     task: &Task<'_>,
     columns: &[&str],
@@ -16,6 +16,7 @@ pub(crate) fn tables<T: Sync>(
 ) -> Vec<Table> {
     let all: Vec<&(usize, T)> = units.iter().collect();
     let mut tables = of_units(task, columns, &all, &score);
+
     if let Some(rounds) = task.options.bootstrap {
         let intervals = bootstrap(units, rounds, task.options.seed, |drawn| {
             of_units(task, columns, drawn, &score)
@@ -44,6 +45,7 @@ fn of_units<T>(
         rows.into_iter().for_each(|(name, values)| table.push(name, values));
         table
     };
+
     let pooled = score(&units.iter().map(|(_, unit)| unit).collect::<Vec<_>>());
     if let [fold] = task.folds {
         return vec![table(&fold.name, pooled)];
@@ -51,12 +53,13 @@ fn of_units<T>(
     let of_fold = |fold: usize| {
         let units: Vec<&T> = units.iter().filter(|(f, _)| *f == fold).map(|(_, unit)| unit).collect();
         let mut rows = score(&units);
-        // A fold of which nothing was drawn has no scores.
+        // A fold without drawn units has no scores.
         if units.is_empty() {
             rows.iter_mut().for_each(|(_, values)| values.fill(f64::NAN));
         }
         rows
     };
+
     let folds: Vec<Rows> = (0..task.folds.len()).map(of_fold).collect();
     let mean = |row: usize, column: usize| {
         mean_of_defined(folds.iter().filter_map(|rows| rows.get(row)?.1.get(column).copied()))
@@ -69,7 +72,7 @@ fn of_units<T>(
     of_folds.chain([table("all folds, pooled", pooled), means]).collect()
 }
 
-/// The mean of those values that are not NaN; NaN of none.
+/// Returns the mean of the values that are not NaN; NaN if there are none.
 pub(crate) fn mean_of_defined(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values
         .filter(|value| !value.is_nan())

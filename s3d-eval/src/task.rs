@@ -1,21 +1,21 @@
-//! What a protocol is handed.
+//! The input of a protocol.
 
-use crate::{EvalOptions, Evaluation, Fold, Protocol, Table};
+use crate::{Error, EvalOptions, Evaluation, Fold, Protocol, Table};
 use s3d_dataset::{Context, DataSet};
 use std::path::Path;
 
-/// What the tables of several folds are.
-const OF_FOLDS: &str = "All folds, pooled: what was counted in all of them, together. Mean over folds: of each \
-                        score, over the folds in which it is defined.";
+/// The definition of the tables over several folds.
+const OF_FOLDS: &str = "All folds, pooled: the counts of all folds together. Mean over folds: the mean of each \
+                        score over the folds in which it is defined.";
 
-/// What is to be evaluated.
+/// An evaluation to do.
 #[derive(Clone, Copy)]
 pub(crate) struct Task<'a> {
     pub(crate) protocol: Protocol,
-    /// One of the protocol's.
+    /// A variant of the protocol.
     pub(crate) variant: &'static str,
     pub(crate) data: &'a DataSet,
-    /// None without an area; an area is in one fold at most.
+    /// Each has an area, and no area is in two folds.
     pub(crate) folds: &'a [Fold],
     pub(crate) predictions: &'a Path,
     pub(crate) options: &'a EvalOptions,
@@ -23,7 +23,18 @@ pub(crate) struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// The evaluation with these parts; of several folds, `definition` goes on with what their tables are.
+    /// Returns the error for a data set without labels.
+    pub(crate) fn unlabelled(&self) -> Error {
+        Error::Unlabelled { root: self.data.layout().root().to_owned(), protocol: self.protocol }
+    }
+
+    /// Returns the error for areas without annotated rooms.
+    pub(crate) fn no_rooms(&self) -> Error {
+        Error::NoRooms { root: self.data.layout().root().to_owned() }
+    }
+
+    /// Returns the evaluation with these parts. With several folds, `definition` goes on with the definition
+    /// of their tables.
     pub(crate) fn evaluation(
         &self,
         definition: &[&str],

@@ -1,4 +1,4 @@
-//! Detections as files, held against a data set.
+//! Evaluates files of detections on a data set.
 
 mod scene;
 
@@ -25,7 +25,7 @@ fn message(predictions: &Path, change: impl Fn(&mut EvalOptions)) -> String {
     det(predictions, change).unwrap_err().to_string()
 }
 
-/// The data set's own boxes, as a list.
+/// Lists the boxes of the data set itself.
 fn own_boxes() -> Vec<Value> {
     let data = DataSet::open(data_set()).unwrap();
     let mut list = Vec::new();
@@ -33,9 +33,10 @@ fn own_boxes() -> Vec<Value> {
         for i in data.instances(*area).unwrap() {
             let b = i.bbox.map(f64::from);
             let mut entry = json!({"area": area, "room": i.room, "class": i.class, "score": 0.5});
-            // Both forms of a box.
+            // Boxes alternate between both forms.
             if list.len() % 2 == 0 {
-                (entry["min"], entry["max"]) = (json!(b[..3]), json!(b[3..]));
+                entry["min"] = json!(b[..3]);
+                entry["max"] = json!(b[3..]);
             } else {
                 entry["center"] = json!([0, 1, 2].map(|k| (b[k] + b[k + 3]) / 2.0));
                 entry["size"] = json!([0, 1, 2].map(|k| b[k + 3] - b[k]));
@@ -46,7 +47,7 @@ fn own_boxes() -> Vec<Value> {
     list
 }
 
-/// The data set's own boxes of five classes as mmdetection3d writes them, by room.
+/// Writes the boxes of the data set itself, of five classes, like mmdetection3d: a file for each room.
 fn own_samples(folder: &Path) {
     let data = DataSet::open(data_set()).unwrap();
     for area in data.areas() {
@@ -54,7 +55,9 @@ fn own_samples(folder: &Path) {
         for room in instances.iter().map(|i| &i.room) {
             let of_room = instances.iter().filter(|i| i.room == *room);
             let corner = [0, 1, 2].map(|k| of_room.clone().map(|i| i.bbox[k]).fold(f32::INFINITY, f32::min));
-            let (mut labels, mut boxes) = (Vec::new(), Vec::new());
+
+            let mut labels = Vec::new();
+            let mut boxes = Vec::new();
             for (label, b) in of_room.filter_map(|i| Some((FIVE.iter().position(|c| *c == i.class)?, i.bbox)))
             {
                 let [x, y] = [0, 1].map(|k| (b[k] + b[k + 3]) / 2.0 - corner[k]);
@@ -73,7 +76,7 @@ fn write(folder: &Path, name: &str, value: &Value) {
     fs::write(folder.join(name), value.to_string()).unwrap();
 }
 
-/// That all classes of the truth have the score 1, and which of them there are.
+/// Asserts that all classes of the truth have the score 1, and returns the number of such rows.
 fn assert_perfect(evaluation: &Evaluation, mean: bool) -> usize {
     let text = evaluation.to_markdown();
     for table in &evaluation.tables {
@@ -115,7 +118,7 @@ fn a_data_set_against_itself_is_perfect() {
         assert!(row.scores.iter().all(|s| s.value == f64::from(u8::from(is_there))), "{row:?}");
     }
 
-    // A folder of lists is the same.
+    // A folder of lists gives the same.
     let lists = tempfile::tempdir().unwrap();
     let all = own_boxes();
     write(lists.path(), "a.json", &json!(all[..10]));
@@ -137,10 +140,10 @@ fn mmdetection3d_files_of_the_data_set_are_perfect() {
         assert!(assert_perfect(&evaluation, true) >= 4);
         assert_eq!(evaluation.tables[0].rows.len(), 6);
     }
-    // The labels are of five classes.
+    // The files have labels of five classes.
     let e = message(&below, |o| o.classes = Some(vec!["sofa".into()]));
     assert!(e.contains(": label ") && e.contains("labels count sofa"), "{e}");
-    assert!(message(&below, |o| o.classes = Some(vec!["stool".into()])).contains("--classes: \"stool\""));
+    assert!(message(&below, |o| o.classes = Some(vec!["stool".into()])).contains("classes: \"stool\""));
 }
 
 #[test]
@@ -151,11 +154,13 @@ fn folds_and_intervals() {
     let mut boxes = own_boxes();
     boxes.retain(|b| b["area"] == 2);
     let mut nowhere = boxes[0].clone();
-    (nowhere["class"], nowhere["score"]) = (json!("chair"), json!(0.25));
+    nowhere["class"] = json!("chair");
+    nowhere["score"] = json!(0.25);
     nowhere["min"] = json!([90, 90, 90]);
     nowhere["max"] = json!([91, 91, 91]);
     boxes.push(nowhere);
     fs::write(&path, json!(boxes).to_string()).unwrap();
+
     let run = |o: &mut EvalOptions| {
         o.folds = Folds::Paper;
         o.bootstrap = Some(50);
@@ -178,17 +183,18 @@ fn folds_and_intervals() {
             assert!(low <= row.scores[0].value && row.scores[0].value <= high, "{} {row:?}", table.title);
         }
     }
+
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let again = one.install(|| det(&path, run).unwrap());
     assert_eq!(again.to_markdown(), evaluation.to_markdown());
-    // Of one area, boxes of others are told.
+    // With one area, the boxes in other areas are noted.
     let evaluation = det(&path, |o| o.folds = Folds::Areas(vec![5])).unwrap();
     assert_eq!(evaluation.counted["detections"], 0);
     assert!(evaluation.notes[0].contains("areas that are not tested"), "{:?}", evaluation.notes);
 }
 
 #[test]
-fn wrong_lists_are_told() {
+fn wrong_lists_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("boxes.json");
     let good = own_boxes().remove(0);
@@ -207,6 +213,7 @@ fn wrong_lists_are_told() {
     assert!(with("size", json!([1, 1, 1])).contains("min and max, or center and size"));
     assert!(with("max", json!([-1e3, 0, 0])).contains("ends before it begins"));
     assert!(with("max", json!([1, 2])).contains("invalid length"));
+
     fs::write(&path, "[{\"score\": NaN}]").unwrap();
     assert!(message(&path, |_| ()).contains("boxes.json, line 1"));
     fs::write(&path, "{}").unwrap();
@@ -220,7 +227,7 @@ fn wrong_lists_are_told() {
 }
 
 #[test]
-fn wrong_files_of_mmdetection3d_are_told() {
+fn wrong_files_of_mmdetection3d_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     own_samples(folder.path());
     let mut files: Vec<_> = fs::read_dir(folder.path())
@@ -228,7 +235,8 @@ fn wrong_files_of_mmdetection3d_are_told() {
         .map(|e| e.unwrap().path())
         .collect();
     files.sort();
-    let (path, text) = (&files[0], fs::read_to_string(&files[0]).unwrap());
+    let path = &files[0];
+    let text = fs::read_to_string(path).unwrap();
     let name = path.file_name().unwrap().to_str().unwrap();
     let damaged = |value: Value| {
         fs::write(path, value.to_string()).unwrap();
@@ -237,6 +245,7 @@ fn wrong_files_of_mmdetection3d_are_told() {
         assert!(e.contains(name), "{e}");
         e
     };
+
     let sample = |row: Value| json!({"labels_3d": [0], "scores_3d": [1.0], "bboxes_3d": [row]});
     assert!(damaged(sample(json!([1, 2, 0, 1, 1, 1, 0.5]))).contains("box 1: it is turned"));
     assert!(damaged(sample(json!([1, 2, 0, 1, 1]))).contains("5 numbers instead of 7"));
@@ -248,6 +257,7 @@ fn wrong_files_of_mmdetection3d_are_told() {
     value["box_type_3d"] = json!("Depth");
     assert!(damaged(value).contains("[1, 0, 1] labels_3d, scores_3d, bboxes_3d"));
     assert!(damaged(json!([])).contains("is a list of boxes"));
+
     fs::remove_file(path).unwrap();
     assert!(message(folder.path(), five).contains(&format!("{name}: missing, as are 1 of")));
     fs::write(folder.path().join("office_1.json"), sample(json!([1, 2, 0, 1, 1, 1])).to_string()).unwrap();

@@ -1,4 +1,4 @@
-//! Average precision of boxes, held against mmdetection3d's and Open3D-ML's own numbers: see
+//! Compares the average precision of boxes with the numbers of mmdetection3d and Open3D-ML:
 //! `reference/boxes/README.md`.
 
 mod scene;
@@ -54,7 +54,7 @@ fn cases() -> BTreeMap<String, (Case, Value)> {
         .collect()
 }
 
-/// Whether both are the same number, `null` being NaN, but for a relative error.
+/// Whether two numbers are equal up to a relative error. `null` is NaN.
 fn same(ours: f64, theirs: &Value, error: f64) -> bool {
     let theirs = theirs.as_f64().unwrap_or(f64::NAN);
     (ours.is_nan() && theirs.is_nan()) || (ours - theirs).abs() <= error * theirs.abs()
@@ -62,7 +62,7 @@ fn same(ours: f64, theirs: &Value, error: f64) -> bool {
 
 #[test]
 fn mmdetection3d_gives_the_same() {
-    // It rounds average precision to f32, and their mean.
+    // It rounds each average precision and their mean to f32.
     const F32: f64 = 1.2e-7;
     for (name, (case, numbers)) in cases() {
         let theirs = &numbers["mmdetection3d"];
@@ -98,7 +98,7 @@ fn open3d_ml_gives_the_same() {
     }
 }
 
-/// What `s3d detect` found in rooms of a generated area.
+/// The detections of `s3d detect` in rooms of a generated area.
 #[derive(Deserialize)]
 struct Detected {
     classes: Vec<String>,
@@ -109,7 +109,7 @@ struct Detected {
     detections: Vec<(usize, usize, f64, [f32; 6])>,
 }
 
-/// A data set whose area 5 has these instances alone.
+/// Makes a data set whose area 5 has only these instances.
 fn with_instances(detected: &Detected) -> &'static Path {
     let root = scene::data_set();
     let entries = detected
@@ -127,10 +127,12 @@ fn with_instances(detected: &Detected) -> &'static Path {
             points_per_voxel: vec![0; 216],
         });
     let path = Layout::new(root).instances_json(5);
-    let (list, manifest) = (root.join("files.csv"), root.join("manifest.json"));
     let (bytes, sum) = checksum_of_file(&path).unwrap();
     write_json(&path, &json!({"instances": entries.collect::<Vec<_>>()})).unwrap();
-    // The list of files and the manifest tell of the new one.
+
+    // The list of files and the manifest must agree with the new file.
+    let list = root.join("files.csv");
+    let manifest = root.join("manifest.json");
     let (new_bytes, new_sum) = checksum_of_file(&path).unwrap();
     let text = fs::read_to_string(&list).unwrap();
     fs::write(&list, text.replace(&format!("{bytes},{sum}"), &format!("{new_bytes},{new_sum}"))).unwrap();
@@ -143,12 +145,13 @@ fn with_instances(detected: &Detected) -> &'static Path {
 }
 
 #[test]
-fn mmdetection3d_gives_the_same_for_what_our_detector_finds() {
+fn mmdetection3d_gives_the_same_for_detections_of_our_detector() {
     let detected: Detected = serde_json::from_str(include_str!("reference/boxes/detector.json")).unwrap();
     let theirs: Value =
         serde_json::from_str(include_str!("reference/boxes/detector_reference.json")).unwrap();
     let list = detected.detections.iter().map(|(room, class, score, b)| {
-        let (room, class) = (&detected.rooms[*room], &detected.classes[*class]);
+        let room = &detected.rooms[*room];
+        let class = &detected.classes[*class];
         json!({"area": 5, "room": room, "class": class, "score": score, "min": b[..3], "max": b[3..]})
     });
     let folder = tempfile::tempdir().unwrap();
@@ -160,7 +163,8 @@ fn mmdetection3d_gives_the_same_for_what_our_detector_finds() {
     let ours = evaluate(Protocol::Det, root, &found, &options, &Context::default()).unwrap();
     assert_eq!(ours.counted["boxes"], detected.truth.len() as u64);
     assert_eq!(ours.counted["detections"], detected.detections.len() as u64);
-    let mut told = 0;
+
+    let mut between = 0;
     for class in detected.classes.iter().map(String::as_str).chain(["mean"]) {
         for suffix in ["0.25", "0.50"] {
             let [ap, recall] = match class {
@@ -170,10 +174,10 @@ fn mmdetection3d_gives_the_same_for_what_our_detector_finds() {
             for (column, key, error) in [("AP", ap, 2.4e-7), ("AR", recall, 1e-12)] {
                 let ours = ours.score("area 5", class, &format!("{column}@{suffix}")).unwrap();
                 assert!(same(ours, &theirs[&key], error), "{key}: {ours}, {}", theirs[&key]);
-                told += usize::from(ours > 0.0 && ours < 1.0);
+                between += usize::from(ours > 0.0 && ours < 1.0);
             }
         }
     }
-    // Numbers that say something.
-    assert!(told > 30, "{told}");
+    // Enough numbers are neither 0 nor 1.
+    assert!(between > 30, "{between}");
 }

@@ -1,4 +1,4 @@
-//! Protocols of images from files to tables: a data set against itself, known differences, and mistakes.
+//! The protocols of images, from files to tables: a perfect prediction, known differences, and mistakes.
 
 use s3d_dataset::{DataSet, Export, ExportOptions};
 use s3d_eval::{Context, EvalOptions, Evaluation, Folds, ImageKind, Protocol, evaluate};
@@ -11,7 +11,7 @@ use s3d_synth::{Building, ScanOptions};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Two areas, 2 and 5, of the built-in scene; panoramas of 160 × 80 and views of 64 × 64.
+/// Exports areas 2 and 5 of the built-in scene, with panoramas of 160 × 80 and views of 64 × 64.
 fn data_set(folder: &Path) -> PathBuf {
     let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
     let scenes = [2, 5].map(|area| {
@@ -24,7 +24,7 @@ fn data_set(folder: &Path) -> PathBuf {
         let text = fs::read_to_string(&scene).unwrap();
         assert!(text.contains("area = 1"));
         fs::write(&scene, text.replace("area = 1", &format!("area = {area}"))).unwrap();
-        // Scan locations of other names.
+        // The scan locations of the two areas need different names.
         let cameras = folder.join("cameras.csv");
         let lines = fs::read_to_string(&cameras).unwrap();
         let renamed = lines.lines().map(|line| format!("{area}{}\n", &line[1..]));
@@ -47,7 +47,7 @@ fn images(data: &DataSet, kind: ImageKind) -> Vec<DatasetImage> {
     all.filter(|image| ImageKind::of(image.frame) == kind).collect()
 }
 
-/// Writes a file an image into folders of areas, with this ending.
+/// Writes a file for each image into the folders of areas, with this ending.
 fn predict(data: &DataSet, out: &Path, kind: ImageKind, ending: &str, write: impl Fn(&DatasetImage, &Path)) {
     for image in images(data, kind) {
         let folder = out.join(format!("area_{}", image.area));
@@ -61,7 +61,7 @@ fn depth(data: &DataSet, image: &DatasetImage) -> Raster<u16> {
     decode_gray16(&data.read(&path).unwrap(), &path).unwrap()
 }
 
-/// Classes by the place in the taxonomy, 255 for none.
+/// Returns the index of the class of each pixel, 255 for none.
 fn classes(data: &DataSet, image: &DatasetImage) -> Raster<u8> {
     let path = image.path(data.layout(), Domain::Semantic);
     let table = data.labels().unwrap().unwrap();
@@ -149,7 +149,7 @@ fn known_differences_have_their_scores() {
     let truth = data_set(dir.path());
     let data = DataSet::open(&truth).unwrap();
 
-    // Distances that are 4 % too long, in an array of the evaluation's size.
+    // Distances that are 4 % too long, in an array of the size of the evaluation.
     let out = dir.path().join("depth");
     predict(&data, &out, ImageKind::Panoramas, "npy", |image, path| {
         let depth = depth(&data, image);
@@ -176,7 +176,7 @@ fn known_differences_have_their_scores() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert_eq!(one.install(|| run(Protocol::Depth, &truth, &out, &both)), result);
 
-    // Half of the vectors are turned by 90°, half by none.
+    // Half of the vectors are turned by 90°, the others are not turned.
     let out = dir.path().join("normals");
     predict(&data, &out, ImageKind::Views, "npy", |image, path| {
         let from = image.path(data.layout(), Domain::Normal);
@@ -205,7 +205,7 @@ fn known_differences_have_their_scores() {
     );
     assert_eq!(one.install(|| run(Protocol::Normal, &truth, &out, &intervals)), result);
 
-    // All is a wall, by numbers of one's own.
+    // Everything is a wall, by a list of classes beside the predictions.
     let out = dir.path().join("classes");
     predict(&data, &out, ImageKind::Panoramas, "png", |_, path| {
         fs::write(path, encode_gray8(&Raster::filled(1024, 512, 1))).unwrap();
@@ -227,11 +227,12 @@ fn known_differences_have_their_scores() {
 }
 
 #[test]
-fn mistakes_are_told_with_their_file() {
+fn mistakes_are_refused_with_their_file() {
     let dir = tempfile::tempdir().unwrap();
     let truth = data_set(dir.path());
     let data = DataSet::open(&truth).unwrap();
     let out = dir.path().join("predictions");
+
     let first = images(&data, ImageKind::Panoramas).remove(0);
     let view = images(&data, ImageKind::Views).remove(0);
     let stem = first.stem();

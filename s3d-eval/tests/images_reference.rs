@@ -1,4 +1,4 @@
-//! The metrics of images against the reference programs: `reference/images/README.md`.
+//! Compares the metrics of images with the reference programs: `reference/images/README.md`.
 
 use s3d_eval::images::{
     AngleSums, Lanczos, PANORAMA, PanoramaClasses, dsine_angle, hohonet_depth, median_of_angles,
@@ -11,7 +11,7 @@ fn expected() -> Value {
     serde_json::from_str(include_str!("reference/images/expected.json")).unwrap()
 }
 
-/// As `mix` of reference/images/inputs.py.
+/// The same as `mix` in reference/images/inputs.py.
 fn mix(seed: u64, i: u64) -> u64 {
     const MASK: u64 = 0xFFFF_FFFF;
     let mut x = (i.wrapping_mul(0x9E37_79B1).wrapping_add(seed * 0x85EB_CA77)) & MASK;
@@ -47,7 +47,7 @@ fn rgb(width: u32, height: u32, seed: u64) -> Raster<[u8; 3]> {
     })
 }
 
-/// HoHoNet's numbers of the classes that there are labels of: all but beam and column.
+/// HoHoNet's numbers of the classes with labels: all but beam and column.
 const CLASSES: [u8; 11] = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12];
 
 fn semantic(name: &str, width: u32, height: u32, seed: u64) -> Raster<[u8; 3]> {
@@ -74,7 +74,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-/// Equal to 1e-12, relative; below 1e-12 both are nothing.
+/// Asserts that numbers are equal to a relative 1e-12, or both below 1e-12.
 #[track_caller]
 fn same(ours: &[f64], theirs: &[f64], what: &str) {
     near(ours, theirs, 1e-12, what);
@@ -89,7 +89,7 @@ fn near(ours: &[f64], theirs: &[f64], tolerance: f64, what: &str) {
 }
 
 #[test]
-fn places_are_those_of_the_libraries() {
+fn the_libraries_take_the_same_pixels() {
     let expected = &expected()["resampling"];
     for (library, places) in [
         ("pillow", pillow_nearest as fn(u32, u32) -> Vec<u32>),
@@ -109,7 +109,7 @@ fn places_are_those_of_the_libraries() {
 }
 
 #[test]
-fn lanczos_is_pillows() {
+fn pillow_gives_the_same_after_lanczos() {
     for (name, width, height, seed) in PANORAMAS.into_iter().filter(|(_, width, ..)| *width <= 2048) {
         let image = rgb(width, height, seed);
         let lanczos = Lanczos::new([width, height], PANORAMA);
@@ -129,7 +129,7 @@ fn lanczos_is_pillows() {
 }
 
 #[test]
-fn classes_of_panoramas_are_hohonets() {
+fn hohonet_gives_the_same_for_classes_of_panoramas() {
     for (fold, names) in [("1_valid", &["a", "b", "void"][..]), ("2_valid", &["c", "d"]), ("3_valid", &["f"])]
     {
         let mut all = s3d_eval::images::Confusion::new(13);
@@ -141,6 +141,7 @@ fn classes_of_panoramas_are_hohonets() {
             all.add(&truth.compare(&prediction, 13).unwrap());
             assert_eq!(truth.classes.iter().all(Option::is_none), name == "void");
         }
+
         let expected = &expected()["sem-pano"][fold];
         let scores = all.scores();
         let of_there = |values: &[f64]| CLASSES.map(|class| values[usize::from(class)]);
@@ -169,7 +170,8 @@ fn depth(width: u32, height: u32, seed: u64) -> Vec<u16> {
 
 fn predicted_depth(truth: &[u16], seed: u64) -> Vec<f64> {
     let predicted = |(truth, i): (&u16, u64)| {
-        let (h, metres) = (mix(seed + 2, i), f64::from(*truth) / 512.0);
+        let h = mix(seed + 2, i);
+        let metres = f64::from(*truth) / 512.0;
         match h / 1024 % 16 {
             0 => metres * 1.25,
             1 => 0.0,
@@ -187,7 +189,7 @@ fn metres(units: &[u16]) -> Vec<f64> {
         .collect()
 }
 
-/// The scripts average what is within in 32 bits.
+/// The scripts average the shares below the limits of δ in 32 bits.
 #[track_caller]
 fn same_depth(ours: &[f64], theirs: &Value, what: &str) {
     let theirs = numbers(theirs);
@@ -198,7 +200,7 @@ fn same_depth(ours: &[f64], theirs: &Value, what: &str) {
 }
 
 #[test]
-fn depth_is_that_of_both_scripts() {
+fn both_scripts_give_the_same_depth_scores() {
     let expected = &expected()["depth"];
     let cases = [
         ("mixed", depth(4096, 1, 11)),
@@ -208,11 +210,12 @@ fn depth_is_that_of_both_scripts() {
         ("odd", depth(999, 1, 13)),
     ];
     for (seed, (name, units)) in (0..).zip(cases) {
-        let (truth, prediction) = (metres(&units), predicted_depth(&units, seed));
+        let truth = metres(&units);
+        let prediction = predicted_depth(&units, seed);
         let without_sq_rel = |scores: [f64; 9]| [&scores[..2], &scores[3..]].concat();
         let ours = without_sq_rel(hohonet_depth(&truth, &prediction).values);
         same_depth(&ours, &expected[name]["hohonet"], name);
-        // As the script is called: in 32 bits.
+        // The script itself computes in 32 bits.
         near(&ours, &numbers(&expected[name]["hohonet in 32 bits"]), 1e-6, name);
         let ours = unifuse_depth(&truth, &prediction, false);
         assert_eq!(ours.pixels == 0, name == "beyond");
@@ -226,10 +229,11 @@ fn depth_is_that_of_both_scripts() {
 }
 
 #[test]
-fn depth_of_files_is_that_of_both_scripts() {
+fn both_scripts_give_the_same_depth_scores_of_files() {
     let whole = depth(4096, 2048, 21);
     let sampled = |places: fn(u32, u32) -> Vec<u32>| {
-        let (columns, rows) = (places(4096, 1024), places(2048, 512));
+        let columns = places(4096, 1024);
+        let rows = places(2048, 512);
         let at = |row: u32, column: u32| whole[row as usize * 4096 + column as usize];
         rows.iter()
             .flat_map(|&row| columns.iter().map(move |&c| at(row, c)))
@@ -243,13 +247,14 @@ fn depth_of_files_is_that_of_both_scripts() {
     same_depth(&scores.values, &expected["unifuse"], "unifuse");
 }
 
-/// True and predicted vectors that are evaluated.
+/// Makes true and predicted vectors of evaluated pixels.
 fn normals(n: u64, seed: u64) -> Vec<[[f64; 3]; 2]> {
     let vector = |seed: u64, i: u64| [0, 1, 2].map(|c| (mix(seed + c, i) % 2001) as f64 / 1000.0 - 1.0);
     (0..n)
         .filter(|&i| mix(seed + 20, i) % 16 != 3)
         .map(|i| {
-            let (truth, shift) = (vector(seed, i), vector(seed + 10, i));
+            let truth = vector(seed, i);
+            let shift = vector(seed + 10, i);
             let prediction = match mix(seed + 20, i) % 16 {
                 0 => truth,
                 1 => truth.map(|c| -c),
@@ -262,7 +267,7 @@ fn normals(n: u64, seed: u64) -> Vec<[[f64; 3]; 2]> {
 }
 
 #[test]
-fn angles_are_those_of_both_scripts() {
+fn both_scripts_give_the_same_angles() {
     let expected = &expected()["normal"];
     let images = [(4000, 31), (1, 40), (2501, 33)].map(|(n, seed)| normals(n, seed));
     let angles = |image: &[[[f64; 3]; 2]], angle: fn([f64; 3], [f64; 3]) -> f64| -> Vec<f64> {
@@ -271,6 +276,7 @@ fn angles_are_those_of_both_scripts() {
             .map(|&[truth, prediction]| angle(truth, prediction))
             .collect()
     };
+
     let mut sums = AngleSums::default();
     images
         .iter()
@@ -279,11 +285,11 @@ fn angles_are_those_of_both_scripts() {
     let ([mean, rmse], below) = sums.mean_rmse_below();
     let ours = [&[mean, median_of_angles(&mut all).unwrap(), rmse][..], &below].concat();
     let theirs = numbers(&expected["dsine"]);
-    // Of equal and opposite vectors the last bit of the cosine decides: 0° or a millionth, which differs by
-    // the instructions that PyTorch is built with.
+    // For equal and opposite vectors, the last bit of the cosine decides between 0° and a millionth. It
+    // depends on the instructions that PyTorch is built with.
     near(&[ours[0], ours[2]], &[theirs[0], theirs[2]], 1e-9, "dsine");
     same(&[&ours[1..2], &ours[3..]].concat(), &[&theirs[1..2], &theirs[3..]].concat(), "dsine");
-    // As the script is called: in 32 bits, in which equal vectors are up to 0.03° apart.
+    // The script itself computes in 32 bits, where equal vectors are up to 0.03° apart.
     near(&ours, &numbers(&expected["dsine in 32 bits"]), 1e-4, "dsine in 32 bits");
 
     for (image, theirs) in images.iter().zip(expected["omnidata"].as_array().unwrap()) {

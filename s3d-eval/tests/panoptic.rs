@@ -1,4 +1,4 @@
-//! COCO's panoptic files, held against a data set.
+//! Evaluates COCO's panoptic files on a data set.
 
 mod scene;
 
@@ -16,7 +16,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// The data set's own images as a package, in a folder of its own.
+/// Packs the images of the data set itself into a folder.
 fn packed(change: impl Fn(&mut PackOptions)) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("coco");
@@ -32,7 +32,7 @@ fn panoptic(predictions: &Path, change: impl Fn(&mut EvalOptions)) -> Result<Eva
     evaluate(Protocol::Panoptic, data_set(), predictions, &options, &Context::default())
 }
 
-/// What is said of the package with its list of annotations altered.
+/// Returns the error for the package after its list of annotations was changed.
 fn message(package: &Path, change: impl FnOnce(&mut Value)) -> String {
     let path = package.join("panoptic.json");
     let before: Value = read_json(&path).unwrap();
@@ -63,7 +63,7 @@ fn a_data_set_against_itself_is_perfect() {
     let (views, panoramas) = (evaluation.counted["views"], evaluation.counted["panoramas"]);
     assert!(views + panoramas == count && views > 0 && panoramas > 0 && evaluation.notes.is_empty());
 
-    // The file by its name; panoramas alone; of one area, in folds, with intervals.
+    // The file by its name; then only panoramas, in folds, with intervals; then one area.
     assert_perfect(&panoptic(&package.join("panoptic.json"), |_| ()).unwrap());
     let (_folder, package) = packed(|o| o.images = Some(PackedImages::Panoramas));
     let evaluation = panoptic(&package, |o| (o.folds, o.bootstrap) = (Folds::EachArea, Some(20))).unwrap();
@@ -76,12 +76,14 @@ fn a_data_set_against_itself_is_perfect() {
 }
 
 #[test]
-fn what_is_stuff_can_be_said() {
+fn the_stuff_classes_can_be_chosen() {
     let stuff: ClassList = "floor,door".parse().unwrap();
     let (_folder, package) = packed(|o| o.specific.stuff = Some(stuff.clone()));
     let told = panoptic(&package, |_| ()).unwrap_err().to_string();
     assert!(
-        told.contains("ceiling is a thing, and by the taxonomy of the data set stuff, unless --stuff"),
+        told.contains(
+            "ceiling is a thing, and by the taxonomy of the data set stuff, unless the option `stuff`"
+        ),
         "{told}"
     );
     let evaluation = panoptic(&package, |o| o.stuff = Some(stuff.clone())).unwrap();
@@ -91,10 +93,10 @@ fn what_is_stuff_can_be_said() {
     let told = panoptic(&package, |o| o.stuff = Some("grass".parse().unwrap()))
         .unwrap_err()
         .to_string();
-    assert!(told.contains("--stuff: \"grass\" is no class"), "{told}");
+    assert!(told.contains("stuff: \"grass\" is no class"), "{told}");
 }
 
-/// Where a view lies outside of its photograph there is nothing to be found.
+/// There is nothing to find where a view reaches beyond its photograph.
 #[test]
 fn outside_of_photographs_is_void() {
     let folder = tempfile::tempdir().unwrap();
@@ -107,7 +109,8 @@ fn outside_of_photographs_is_void() {
         .unwrap();
     let with_frames = fs::read_to_string(&scene).unwrap() + "\n[frames]\npath = \"transforms.json\"\n";
     fs::write(&scene, with_frames).unwrap();
-    // Pincushion distortion, so that the view reaches beyond the photograph; along x from a scan location.
+
+    // The view along x from a scan location reaches beyond its photograph, because of pincushion distortion.
     let pose = [[0.0, 0.0, -1.0, 14.15], [-1.0, 0.0, 0.0, 7.75], [0.0, 1.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]];
     let list = json!({
         "camera_model": "OPENCV", "w": 80, "h": 60, "fl_x": 50, "fl_y": 50, "cx": 40, "cy": 30, "k1": 0.3,
@@ -116,9 +119,10 @@ fn outside_of_photographs_is_void() {
     write_json(&at("scan/transforms.json"), &list).unwrap();
     let picture = Raster::from_vec(80, 60, (0..4800u32).map(|i| [1 + (i * 37 % 251) as u8; 3]).collect());
     fs::write(at("scan/0.png"), encode_rgb8(&picture, Content::Photo, Compression::Balanced)).unwrap();
+
     let options =
         ExportOptions { views: 1, size: 32, pano_width: 64, points_per_m2: 5.0, ..ExportOptions::default() };
-    let (out, package) = (at("out"), at("coco"));
+    let [out, package] = ["out", "coco"].map(at);
     Export::new([scene])
         .options(options)
         .run(&out, &Context::default())
@@ -130,8 +134,8 @@ fn outside_of_photographs_is_void() {
     let mut options = PackOptions { output: Some(package.clone()), ..PackOptions::default() };
     options.images = Some(PackedImages::Views);
     pack(&out, PackageKind::Coco, &options, &Context::default()).unwrap();
-    let (options, context) = (EvalOptions::default(), Context::default());
-    let evaluation = evaluate(Protocol::Panoptic, &out, &package, &options, &context).unwrap();
+    let options = EvalOptions::default();
+    let evaluation = evaluate(Protocol::Panoptic, &out, &package, &options, &Context::default()).unwrap();
     let scores = evaluation.tables[0].rows.iter().flat_map(|row| &row.scores);
     assert!(scores.clone().all(|s| s.value == 1.0 || s.value.is_nan()), "{}", evaluation.to_markdown());
     assert_eq!(evaluation.score("area 1", "mean", "PQ"), Some(1.0));
@@ -139,7 +143,7 @@ fn outside_of_photographs_is_void() {
 
 #[test]
 fn trainers_write_other_names() {
-    // A flat folder with names of their own, and no categories; an image that is not listed.
+    // A flat folder with other names, no categories, and an image that is not listed.
     let (_folder, package) = packed(|o| o.images = Some(PackedImages::Panoramas));
     let path = package.join("panoptic.json");
     let mut value: Value = read_json(&path).unwrap();
@@ -162,7 +166,8 @@ fn a_segment_that_is_lost_is_missed() {
     let (_folder, package) = packed(|o| o.images = Some(PackedImages::Panoramas));
     let path = package.join("panoptic.json");
     let mut value: Value = read_json(&path).unwrap();
-    // The first floor becomes void.
+
+    // The first segment of a floor becomes void.
     let lost = |segment: &Value| segment["category_id"] == 2;
     let mut floors = 0;
     let mut segment = None;
@@ -191,7 +196,7 @@ fn a_segment_that_is_lost_is_missed() {
 }
 
 #[test]
-fn wrong_predictions_are_told() {
+fn wrong_predictions_are_refused() {
     let (_folder, package) = packed(|o| o.images = Some(PackedImages::Panoramas));
     let first = |value: &mut Value, key: &str, new: Value| value["annotations"][0][key] = new;
     let e = message(&package, |v| first(v, "image_id", json!(2)));
@@ -259,7 +264,7 @@ fn wrong_predictions_are_told() {
         .to_string();
     assert!(e.contains("panoptic: missing"), "{e}");
 
-    // With another list of stuff, segments are others.
+    // Another list of stuff gives other segments.
     let walls = SpecificOptions { stuff: Some(ClassList(vec!["wall".into()])), ..SpecificOptions::default() };
     let (_folder, package) = packed(|o| o.specific = walls.clone());
     let e = panoptic(&package, |_| ()).unwrap_err().to_string();

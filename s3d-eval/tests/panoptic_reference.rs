@@ -1,10 +1,10 @@
-//! Panoptic quality, held against panopticapi's own numbers: see `reference/panoptic/README.md`.
+//! Compares panoptic quality with the numbers of panopticapi: `reference/panoptic/README.md`.
 
 use s3d_eval::panoptic::{PanopticCounts, PanopticScore, Segment, mean};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Pixels, and number and class of segments.
+/// The pixels, and the number and the class of each segment.
 type Side = (Vec<u32>, Vec<(u32, usize)>);
 
 const CLASSES: usize = 5;
@@ -19,7 +19,7 @@ fn same(ours: f64, theirs: &Value) -> bool {
 fn assert_same(ours: PanopticScore, theirs: &Value, name: &str) {
     let pairs = [(ours.pq, "pq"), (ours.sq, "sq"), (ours.rq, "rq")];
     if theirs.is_null() {
-        // Without a class there is no mean: the script stops there.
+        // The script stops if there is no class to take the mean over.
         return assert!(pairs.iter().all(|(ours, _)| ours.is_nan()), "{name}: {ours:?}");
     }
     assert!(pairs.iter().all(|(ours, key)| same(*ours, &theirs[key])), "{name}: {ours:?}, {theirs}");
@@ -55,7 +55,7 @@ fn panopticapi_gives_the_same() {
             assert!(same(counts.iou, &theirs[3]), "{name}, class {class}: {counts:?}, {theirs}");
         }
         if let Some(scores) = theirs["scores"].as_array().filter(|scores| !scores.is_empty()) {
-            // It gives 0 to classes that it then leaves out.
+            // It gives 0 to the classes that it leaves out of means.
             let there = classes.iter().zip(scores).filter(|(counts, _)| !counts.is_absent());
             there.for_each(|(counts, theirs)| assert_same(counts.score(), theirs, name));
         }

@@ -1,4 +1,4 @@
-//! Predictions of points against an export: files, orders, folds, faults.
+//! Evaluates predictions of points on an export: files, orders, folds, faults.
 
 use s3d_dataset::s3d_io::cloud::NpyWriter;
 use s3d_dataset::{Export, ExportOptions, Profile, ProfileOptions, profile};
@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// A data set of two areas, 1 and 5, with the profiles of mmdetection3d and Pointcept.
+/// Exports areas 1 and 5, with the profiles of mmdetection3d and Pointcept.
 fn data_set() -> &'static Path {
     static MADE: OnceLock<TempDir> = OnceLock::new();
     static PATH: OnceLock<PathBuf> = OnceLock::new();
@@ -29,7 +29,7 @@ fn data_set() -> &'static Path {
                 .unwrap();
             let text = fs::read_to_string(&scene).unwrap();
             fs::write(&scene, text.replacen("area = 1", &format!("area = {area}"), 1)).unwrap();
-            // A location is in one area.
+            // The locations of the two areas need different names.
             let cameras = folder.join("cameras.csv");
             let of_area = |line: &str| match line.split_once(',') {
                 Some((uuid, rest)) if uuid.len() == 32 => format!("{}{area},{rest}\n", &uuid[1..]),
@@ -58,7 +58,7 @@ fn data_set() -> &'static Path {
     })
 }
 
-/// Classes and instances of the points of each room, as the profile of mmdetection3d has them.
+/// Returns the classes and the instances of the points of each room, from the profile of mmdetection3d.
 fn rooms() -> BTreeMap<String, (Vec<i64>, Vec<i64>)> {
     let arrays = data_set().join("profiles/mmdet3d/s3dis_data");
     let numbers = |path: &Path| -> Vec<i64> {
@@ -89,7 +89,7 @@ fn npy(kind: &str, shape: &[u64], bytes: &[u8]) -> Vec<u8> {
     array.into_inner().unwrap()
 }
 
-/// The same, said to be stored column by column.
+/// Marks an array as stored column by column.
 fn transposed(mut array: Vec<u8>) -> Vec<u8> {
     let at = array.windows(5).position(|word| word == b"False").unwrap();
     array[at..at + 5].copy_from_slice(b"True ");
@@ -116,7 +116,8 @@ fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) {
 
 fn options(variant: Option<&str>, folds: Folds) -> EvalOptions {
     let mut options = EvalOptions::default();
-    (options.variant, options.folds) = (variant.map(str::to_owned), folds);
+    options.variant = variant.map(str::to_owned);
+    options.folds = folds;
     options
 }
 
@@ -124,7 +125,7 @@ fn eval(protocol: Protocol, predictions: &Path, options: &EvalOptions) -> Result
     evaluate(protocol, data_set(), predictions, options, &Context::default())
 }
 
-/// All scores are 1, or 0 or not defined for a class that is not there.
+/// Asserts that all scores are 1, or 0 or not defined for a class that does not exist.
 #[track_caller]
 fn assert_perfect(evaluation: &Evaluation) {
     let present: Vec<&str> = ["ceiling", "floor", "wall", "door", "table", "chair"].to_vec();
@@ -143,7 +144,7 @@ fn assert_perfect(evaluation: &Evaluation) {
     }
 }
 
-/// Perfect predictions of classes.
+/// Writes perfect predictions of classes.
 fn write_classes(dir: &Path) {
     for (room, (classes, _)) in rooms() {
         fs::write(dir.join(format!("{room}.npy")), integers(&classes)).unwrap();
@@ -172,9 +173,9 @@ fn the_profile_of_mmdetection3d_is_a_perfect_prediction_of_classes() {
     assert_eq!(evaluation.counted["points"], points as u64);
 }
 
-/// What numpy makes of a profile's tree, as Pointcept's preprocessing: files sorted, their classes repeated.
+/// Reads the tree of a profile like Pointcept's preprocessing: files sorted, their classes repeated.
 #[test]
-fn the_order_is_that_of_pointcepts_preprocessing_and_scores_of_classes_are_read() {
+fn points_have_the_order_of_pointcept_and_scores_of_classes_are_read() {
     let dir = tempfile::tempdir().unwrap();
     for area in ["Area_1", "Area_5"] {
         fs::create_dir(dir.path().join(area)).unwrap();
@@ -192,7 +193,7 @@ fn the_order_is_that_of_pointcepts_preprocessing_and_scores_of_classes_are_read(
                 let stem = file.file_stem().unwrap().to_str().unwrap();
                 let class = names.split(' ').position(|name| stem.starts_with(name)).unwrap();
                 let lines = fs::read_to_string(&file).unwrap().lines().count();
-                // The last of the highest is another class: the first counts.
+                // Higher classes have the same score: the first one wins the tie.
                 let row = std::array::from_fn::<f32, 13, _>(|i| f32::from(i >= class));
                 scores.extend(row.repeat(lines));
             }
@@ -209,10 +210,11 @@ fn the_order_is_that_of_pointcepts_preprocessing_and_scores_of_classes_are_read(
     assert_perfect(&eval(Protocol::Sem3d, dir.path(), &options(Some("nanmean"), Folds::All)).unwrap());
 }
 
-/// Perfect predictions of instances, in the form of the number.
+/// Writes perfect predictions of instances in one of the five forms.
 fn write_instances(dir: &Path, form: usize) {
     for (room, (classes, instances)) in rooms() {
-        let (n, k) = (classes.len(), instances.iter().max().copied().unwrap() as usize);
+        let n = classes.len();
+        let k = instances.iter().max().copied().unwrap() as usize;
         let ids: Vec<i64> = instances.iter().map(|id| id - 1).collect();
         let of_instance: Vec<i64> = (0..k)
             .map(|id| classes[ids.iter().position(|i| *i == id as i64).unwrap()])
@@ -225,6 +227,7 @@ fn write_instances(dir: &Path, form: usize) {
         let one_by_one: Vec<u8> = (0..k)
             .flat_map(|k| ids.iter().map(move |id| u8::from(*id == k as i64)))
             .collect();
+
         let shape = |a: usize, b: usize| [a as u64, b as u64];
         let of_instance = integers(&of_instance);
         let arrays = match form {
@@ -275,7 +278,7 @@ fn a_data_set_is_a_perfect_prediction_of_its_instances() {
     }
 }
 
-/// Predictions of which every third point is wrong, and another class in each room.
+/// Writes predictions where every third point has the same class, another one in each room.
 fn write_faulty(dir: &Path) {
     for (number, (room, (mut classes, _))) in (0..).zip(rooms()) {
         classes.iter_mut().step_by(3).for_each(|class| *class = number % 13);
@@ -304,7 +307,7 @@ fn intervals_hold_the_score_and_threads_change_nothing() {
 }
 
 #[test]
-fn what_is_wrong_with_predictions_is_told_with_the_file() {
+fn wrong_predictions_are_refused_with_their_file() {
     let rooms = rooms();
     let (room, (classes, _)) = rooms.first_key_value().unwrap();
     let n = classes.len() as u64;
@@ -316,6 +319,7 @@ fn what_is_wrong_with_predictions_is_told_with_the_file() {
             .unwrap_err()
             .to_string()
     };
+
     let file = format!("{room}.npy");
     let written =
         |bytes: Vec<u8>| message(Protocol::Sem3d, &|dir| fs::write(dir.join(&file), &bytes).unwrap());
@@ -335,6 +339,7 @@ fn what_is_wrong_with_predictions_is_told_with_the_file() {
         let message = written(bytes);
         assert!(message.contains(words) && message.contains(room), "{words}: {message}");
     }
+
     let gone = message(Protocol::Sem3d, &|dir| {
         fs::rename(dir.join(format!("{room}.npy")), dir.join(format!("{room}x.npy"))).unwrap();
     });
@@ -354,7 +359,7 @@ fn what_is_wrong_with_predictions_is_told_with_the_file() {
 }
 
 #[test]
-fn what_is_wrong_with_instances_is_told_with_the_file() {
+fn wrong_instances_are_refused_with_their_file() {
     let rooms = rooms();
     let (room, (classes, instances)) = rooms.first_key_value().unwrap();
     let n = classes.len();

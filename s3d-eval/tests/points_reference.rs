@@ -1,4 +1,4 @@
-//! The metrics of points give the numbers of the programs that they are defined by: `reference/points`.
+//! Compares the metrics of points with the programs that define them: `reference/points`.
 
 use s3d_eval::points::{
     AbsentClass, InstanceMatches, Mask, RoomCoverage, SemanticCounts, coverage, instance_ap,
@@ -12,7 +12,7 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
 }
 
-/// The cases of a protocol: their names, rooms and expected numbers.
+/// Returns the name, the rooms and the expected numbers of each case of a protocol.
 fn cases(protocol: &str) -> Vec<(String, Vec<Value>, Value)> {
     let cases = json(include_str!("reference/points/cases.json"));
     let expected = json(include_str!("reference/points/expected.json"));
@@ -22,7 +22,7 @@ fn cases(protocol: &str) -> Vec<(String, Vec<Value>, Value)> {
     cases[protocol].as_object().unwrap().iter().map(of).collect()
 }
 
-/// Runs `[…, count]` as points of their other numbers.
+/// Expands runs `[…, count]` to points that have the other numbers.
 fn points<const N: usize>(runs: &Value) -> Vec<[i64; N]> {
     let number = |value: &Value| value.as_i64().unwrap();
     let run = |run: &Value| {
@@ -39,7 +39,7 @@ fn truth(room: &Value) -> Vec<(i64, i64)> {
         .collect()
 }
 
-/// Equal to 1e-12, relatively; `null` is NaN.
+/// Asserts that numbers are equal to a relative 1e-12. `null` is NaN.
 #[track_caller]
 fn assert_same(got: f64, expected: &Value, what: &str) {
     let Some(expected) = expected.as_f64() else {
@@ -59,7 +59,7 @@ fn assert_all_same(got: &[f64], expected: &Value, what: &str) {
 }
 
 #[test]
-fn classes_as_pointcept_mmdetection3d_and_open3d_ml() {
+fn pointcept_mmdetection3d_and_open3d_ml_give_the_same_for_classes() {
     for (name, rooms, expected) in cases("sem3d") {
         let rooms: Vec<SemanticCounts> = rooms
             .iter()
@@ -76,7 +76,8 @@ fn classes_as_pointcept_mmdetection3d_and_open3d_ml() {
             ("mmdetection3d", AbsentClass::LeftOut),
             ("open3d-ml", AbsentClass::LeftOut),
         ] {
-            let (scores, what) = (sum.scores(absent), format!("{name}, {program}"));
+            let scores = sum.scores(absent);
+            let what = format!("{name}, {program}");
             let expected = &expected[program];
             assert_all_same(&scores.iou, &expected[0], &what);
             assert_all_same(&scores.accuracy, &expected[1], &what);
@@ -90,7 +91,7 @@ fn classes_as_pointcept_mmdetection3d_and_open3d_ml() {
 }
 
 #[test]
-fn average_precision_of_instances_as_pointcept() {
+fn pointcept_gives_the_same_average_precision_of_instances() {
     for (name, rooms, expected) in cases("inst-ap") {
         let rooms: Vec<InstanceMatches> = rooms
             .iter()
@@ -131,7 +132,7 @@ fn average_precision_of_instances_as_pointcept() {
 }
 
 #[test]
-fn coverage_of_instances_as_asis() {
+fn asis_gives_the_same_coverage_of_instances() {
     for (name, rooms, expected) in cases("inst-cov") {
         let rooms: Vec<RoomCoverage> = rooms
             .iter()

@@ -1,6 +1,6 @@
 //! Calls on whole data sets. What they found goes to Python as JSON and text.
 
-use crate::error::{fault, usage};
+use crate::error::{exception, fault, input, usage};
 use crate::mesh::parsed;
 use crate::work::watched;
 use pyo3::prelude::*;
@@ -106,13 +106,28 @@ pub(crate) fn evaluate(
     options.median_scale = how.median_scale;
     options.images = how
         .images
-        .map(|word| word.parse().map_err(|e| crate::error::exception(&e)))
+        .map(|word| {
+            word.parse()
+                .map_err(|e: s3d_eval::UnknownImageKind| usage(e.to_string()))
+        })
         .transpose()?;
     options.classes = how.classes;
     options.stuff = how.stuff.map(ClassList);
-    let evaluation =
-        watched(py, threads, &sink, |ctx| s3d_eval::evaluate(protocol, &truth, &predictions, &options, ctx))?;
+
+    let evaluation = watched(py, threads, &sink, |ctx| {
+        Ok(s3d_eval::evaluate(protocol, &truth, &predictions, &options, ctx))
+    })?;
+    let evaluation = evaluation.map_err(|e| exception_of_evaluation(&e))?;
     Ok((json(&evaluation)?, evaluation.to_markdown()))
+}
+
+/// Returns the exception for an error of the evaluation.
+fn exception_of_evaluation(error: &s3d_eval::Error) -> PyErr {
+    match error {
+        s3d_eval::Error::Dataset(error) => exception(error),
+        error if error.is_usage() => usage(error.to_string()),
+        error => input(error.to_string()),
+    }
 }
 
 #[pyfunction]
@@ -161,14 +176,18 @@ pub(crate) fn report(
 ) -> PyResult<PathBuf> {
     let Reported { pano_width, thumbs, mesh_faces, verify, single, overwrite } = how;
     let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
-    watched(py, threads, &sink, |ctx| {
+    let made = watched(py, threads, &sink, |ctx| {
         let ending = if single { "_report.html" } else { "_report" };
         let to = to.map_or_else(|| s3d_dataset::beside(&root, ending), Ok)?;
-        match against {
-            Some(other) => s3d_report::report_against(&root, &other, &to, &options, ctx)?,
-            None => s3d_report::report(&root, &to, &options, ctx)?,
+        let made = match against {
+            Some(other) => s3d_report::report_against(&root, &other, &to, &options, ctx),
+            None => s3d_report::report(&root, &to, &options, ctx),
         };
-        Ok(if single { to } else { to.join("index.html") })
+        Ok(made.map(|_| if single { to } else { to.join("index.html") }))
+    })?;
+    made.map_err(|error| match error {
+        s3d_report::Error::Dataset(error) => exception(&error),
+        error => usage(error.to_string()),
     })
 }
 

@@ -1,28 +1,34 @@
 //! The baseline detector: trained, kept, run.
 
-use crate::error::{exception, usage};
+use crate::error::{exception, input, usage};
 use crate::mesh::parsed;
 use crate::work::watched;
 use pyo3::prelude::*;
-use s3d_dataset::{Context, Error};
-use s3d_detect::{Model, ParsedArea, Space, SpaceSource, TrainOptions, detect_area, read_areas};
+use s3d_dataset::Context;
+use s3d_detect::{
+    Error, Model, ParsedArea, Result, Space, SpaceSource, TrainOptions, detect_area, read_areas,
+};
 use std::path::PathBuf;
 
 /// A trained detector.
 #[pyclass(frozen)]
 pub(crate) struct Detector(Model);
 
-fn read(
-    root: PathBuf,
-    areas: &[u32],
-    spaces: SpaceSource,
-    ctx: &Context,
-) -> s3d_dataset::Result<Vec<ParsedArea>> {
+fn read(root: PathBuf, areas: &[u32], spaces: SpaceSource, ctx: &Context) -> Result<Vec<ParsedArea>> {
     let data = s3d_dataset::DataSet::open(&root)?;
-    if let Some(area) = areas.iter().find(|area| !data.areas().contains(area)) {
-        return Err(Error::Usage(format!("areas: there is no area {area}")));
+    if let Some(&area) = areas.iter().find(|area| !data.areas().contains(area)) {
+        return Err(Error::UnknownArea { root, area, areas: data.areas().to_vec() });
     }
     read_areas(&data, if areas.is_empty() { data.areas() } else { areas }, spaces, ctx)
+}
+
+/// Returns the exception for an error of the detector.
+fn exception_of(error: &Error) -> PyErr {
+    match error {
+        Error::Dataset(error) => exception(error),
+        Error::UnknownArea { area, .. } => usage(format!("areas: there is no area {area}")),
+        error => input(error.to_string()),
+    }
 }
 
 #[pymethods]
@@ -45,21 +51,23 @@ impl Detector {
             return Err(usage("most_spaces=0: must be at least 1"));
         }
         let options = TrainOptions { seed, spaces, most_spaces, ..TrainOptions::default() };
-        let model = watched(py, threads, &sink, |ctx| {
+
+        let train = |ctx: &Context| {
             let areas = read(root, &areas, spaces, ctx)?;
             let spaces: Vec<&Space> = areas.iter().flat_map(|area| &area.spaces).collect();
             Model::train(&spaces, &options, ctx)
-        })?;
-        Ok(Self(model))
+        };
+        let model = watched(py, threads, &sink, |ctx| Ok(train(ctx)))?;
+        model.map(Self).map_err(|e| exception_of(&e))
     }
 
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        py.detach(|| Model::load(&path)).map(Self).map_err(|e| exception(&e))
+        py.detach(|| Model::load(&path)).map(Self).map_err(|e| exception_of(&e))
     }
 
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| self.0.save(&path)).map_err(|e| exception(&e))
+        py.detach(|| self.0.save(&path)).map_err(|e| exception_of(&e))
     }
 
     #[getter]
@@ -81,13 +89,14 @@ impl Detector {
         threads: Option<usize>,
         sink: Py<PyAny>,
     ) -> PyResult<String> {
-        let found = watched(py, threads, &sink, |ctx| {
+        let find = |ctx: &Context| {
             let mut found = Vec::new();
             for area in read(root, &areas, self.0.spaces, ctx)? {
                 found.extend(detect_area(&self.0, &area, ctx)?);
             }
             Ok(found)
-        })?;
+        };
+        let found = watched(py, threads, &sink, |ctx| Ok(find(ctx)))?.map_err(|e| exception_of(&e))?;
         crate::calls::json(&found)
     }
 }

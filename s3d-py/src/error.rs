@@ -12,6 +12,11 @@ pub(crate) fn usage(message: impl Into<String>) -> PyErr {
     exception(&Error::Usage(message.into()))
 }
 
+/// The input does not fit together: `InputError`.
+pub(crate) fn input(message: impl Into<String>) -> PyErr {
+    raise("InputError", &message.into(), None)
+}
+
 /// The exception that an error is.
 pub(crate) fn exception(error: &Error) -> PyErr {
     match error {

@@ -1,4 +1,4 @@
-//! Another data set beside the one that is shown: what differs, and its pictures where they do.
+//! Writes another data set beside the shown one: the differences, and its pictures where they differ.
 
 use crate::areas;
 use crate::content::{Content, Shown};
@@ -26,35 +26,36 @@ const SHOWN: [Domain; 4] = [Domain::Rgb, Domain::Depth, Domain::Normal, Domain::
 /// `data/compare.js`.
 #[derive(Serialize)]
 struct Compared<'a> {
-    /// Without its images: they are in `pictures`.
+    /// The comparison without its images, which are in `pictures`.
     comparison: &'a Comparison,
-    /// The other's: `labels` and `classes` as in the index.
+    /// `classes` and `labels` of the other data set, like in the index.
     classes: Vec<ClassEntry>,
     labels: Vec<LabelEntry>,
     depth_units_per_m: f64,
-    /// The files `changed_A.js`: areas with faces of other labels.
+    /// The areas with a file `changed_A.js`: they have faces with other labels.
     changed_faces: Vec<u32>,
-    /// Images that differ; the Kth is that of `other_K.js`.
+    /// The images that differ; the Kth is in `other_K.js`.
     pictures: Vec<PictureEntry>,
-    /// What is wrong in the other's files of these.
+    /// The faults of their files in the other data set.
     faults: Vec<Fault>,
 }
 
 /// An image that differs.
 #[derive(Serialize)]
 struct PictureEntry {
-    /// The picture of a view in this report, or the location of a panorama.
+    /// The number of the picture of a view in this report.
     picture: Option<usize>,
+    /// The location of a panorama in this report.
     pano: Option<usize>,
-    /// Whether anything is left of the other's.
+    /// Whether the other image has any file.
     is_there: bool,
-    /// By modality.
+    /// The changes by modality.
     pixels: BTreeMap<&'static str, PixelChanges>,
-    /// Places in the comparison's matrix of classes, and pixels.
+    /// Indices of the matrix of classes of the comparison, and numbers of pixels.
     classes: Vec<(usize, u64)>,
 }
 
-/// `data/changed_A.js`: faces with other labels, packed, and the largest patches of them.
+/// `data/changed_A.js`: the faces with other labels, packed, and their largest patches.
 #[derive(Serialize)]
 struct ChangedFaces<'a> {
     faces: usize,
@@ -72,7 +73,7 @@ struct Pair {
     classes: Vec<ClassPixels>,
 }
 
-/// Compares the data set that is shown with another, and writes what the page needs. Returns the bytes.
+/// Compares the shown data set with another, and writes the data for the page. Returns the bytes written.
 pub(crate) fn write(
     ctx: &Context,
     (out, content): (&Path, &Content<'_>),
@@ -98,6 +99,7 @@ pub(crate) fn write(
         Ok((bytes, faults.into_vec()))
     })?;
     drop(progress);
+
     let matrix = comparison.labels.iter().flat_map(|labels| &labels.matrix);
     let place_of: BTreeMap<_, usize> = matrix.map(|pair| (pair.a, pair.b)).zip(0..).collect();
     let mut bytes = 0;
@@ -114,6 +116,7 @@ pub(crate) fn write(
         let is_there = written.is_some();
         pictures.push(PictureEntry { picture, pano, is_there, pixels: pair.pixels, classes });
     }
+
     let mut changed_faces = Vec::new();
     for area in comparison.areas.iter().filter(|area| !area.faces.is_empty()) {
         let number =
@@ -128,6 +131,7 @@ pub(crate) fn write(
         bytes += scripts.write(&format!("changed_{}", area.area), &faces)?;
         changed_faces.push(area.area);
     }
+
     let compared = Compared {
         comparison: &comparison,
         classes: areas::classes(&other),
@@ -140,7 +144,7 @@ pub(crate) fn write(
     Ok(bytes + scripts.write_list("compare", &compared)?)
 }
 
-/// The images that differ in what is shown, in the order of the pictures.
+/// Returns the images that differ in a shown modality, in the order of the pictures.
 fn pairs(other: &DataSet, content: &Content<'_>, changes: &[ImageChange]) -> Vec<Pair> {
     let named = |area: u32, path: &str| {
         let name = path.rsplit('/').next().and_then(ImageName::parse)?;
@@ -151,6 +155,7 @@ fn pairs(other: &DataSet, content: &Content<'_>, changes: &[ImageChange]) -> Vec
     let images: BTreeMap<_, DatasetImage> = images
         .map(|image| ((image.area, image.uuid.clone(), image.room.clone(), image.frame), image))
         .collect();
+
     let shown = content.shown();
     let mut pairs: BTreeMap<Shown, Pair> = BTreeMap::new();
     for change in changes {
@@ -166,12 +171,13 @@ fn pairs(other: &DataSet, content: &Content<'_>, changes: &[ImageChange]) -> Vec
         pair.pixels.insert(change.modality, change.pixels);
         pair.classes.extend_from_slice(&change.classes);
     }
-    // Of the others nothing is shown.
+
+    // The page does not show other modalities.
     let is_shown = |pair: &Pair| SHOWN.iter().any(|domain| pair.pixels.contains_key(domain.folder()));
     pairs.into_values().filter(is_shown).collect()
 }
 
-/// Writes the other's picture; `None` if nothing is left of it.
+/// Writes the picture of the other data set. Returns the bytes written; `None` if the image has no file left.
 fn write_picture(
     data: &DataSet,
     table: Option<&LabelTable>,

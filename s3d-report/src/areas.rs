@@ -1,4 +1,4 @@
-//! What the tables of a data set tell: labels, classes, rooms, votes, statistics.
+//! Reads the tables of a data set: labels, classes, rooms, votes, statistics.
 
 use crate::faults::Faults;
 use crate::index::{AreaVotes, ClassEntry, LabelEntry, RoomEntry, rounded};
@@ -26,7 +26,8 @@ struct Polygon {
     holes: Vec<Vec<[f64; 2]>>,
 }
 
-/// A JSON file of the data set; nothing if it has none, or one that is wrong, which is told.
+/// Reads a JSON file of the data set. `None` if there is no such file, or if it is wrong, which becomes a
+/// fault.
 fn json<T: DeserializeOwned>(data: &DataSet, path: &Path, faults: &mut Faults) -> Result<Option<T>> {
     if !data.names(path) {
         return Ok(None);
@@ -46,11 +47,13 @@ pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomEntry
         let instances = faults
             .keep(data.layout().root(), data.instances(area))?
             .unwrap_or_default();
+
         let mut heights: BTreeMap<String, [f32; 2]> = BTreeMap::new();
         for InstanceEntry { room, bbox: [_, _, low, _, _, high], .. } in instances {
             let range = heights.entry(room).or_insert([low, high]);
             *range = [range[0].min(low), range[1].max(high)];
         }
+
         rooms.extend(found.into_iter().map(|Room { room: name, floor_m2, outline }| {
             let rings = outline
                 .into_iter()
@@ -77,7 +80,7 @@ pub(crate) fn statistics(data: &DataSet, faults: &mut Faults) -> Result<Option<V
     json(data, &data.layout().statistics_json(), faults)
 }
 
-/// What the manifest tells of each area, but for the list of its input.
+/// Returns the entry of each area in the manifest, without the list of its input.
 pub(crate) fn areas(data: &DataSet) -> Result<Vec<Value>> {
     let entry = |area| {
         let failed = |e: serde_json::Error| FileError::format(&data.layout().manifest(), e.to_string());

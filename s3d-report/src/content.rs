@@ -1,4 +1,4 @@
-//! What a data set holds, and its way into the files of a report, on all threads.
+//! The content of a data set, and its way into the files of a report, on all threads.
 
 use crate::areas;
 use crate::faults::Faults;
@@ -14,7 +14,7 @@ use crate::write::ReportOptions;
 use s3d_dataset::{Context, DataSet, Progress, Result, map_in_order};
 use s3d_geom::{Camera, Raster, TriMesh};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{DatasetImage, Domain, Frame, PhotographRecord, ViewRecord};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, PhotographRecord, PoseFile, ViewRecord};
 use s3d_io::image::PngReader;
 use s3d_label::LabelTable;
 use s3d_render::{Caster, Scene};
@@ -22,74 +22,77 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Pictures of views in a file, which a page loads to show one of them large.
+/// The number of pictures of views in a file. The page loads a file to show a large view.
 const VIEWS_PER_FILE: usize = 12;
 
-/// Small images in a file, for the grid.
+/// The number of small images for the grid in a file.
 const THUMBS_PER_FILE: usize = 48;
 
-/// Meshes of as many faces or more are in no picture: a pixel has 24 bits.
+/// Pictures show faces of smaller meshes only, since a pixel has 24 bits.
 const FACES_OF_PICTURES: usize = 0xff_ffff;
 
-/// What a data set holds, before its images are read.
+/// The content of a data set, before its images are read.
 pub(crate) struct Content<'a> {
     data: &'a DataSet,
     table: Option<LabelTable>,
     photographs: BTreeMap<(u32, String), PhotographRecord>,
-    /// Area and uuid of scan locations, in order, each with its room if it has an image.
+    /// The area and the uuid of each scan location, in order, with its room if it has an image.
     locations: Vec<(u32, String, Option<String>)>,
-    /// Panoramas with their locations.
+    /// Panoramas with the indices of their locations.
     panoramas: Vec<(usize, DatasetImage)>,
     views: Vec<DatasetImage>,
-    /// The numbers of their pictures. An area begins with a new file.
+    /// The numbers of the pictures of views. Each area begins with a new file.
     pictures: Vec<usize>,
-    /// All that `views.json` lists, by area.
+    /// All entries of `views.json`, with their areas.
     candidates: Vec<(u32, ViewRecord)>,
 }
 
-/// Where a report shows an image.
+/// The place where a report shows an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Shown {
-    /// As the panorama of a location.
+    /// The panorama of the location with this index.
     Panorama(usize),
-    /// As the picture of so many.
+    /// The picture with this number.
     Picture(usize),
 }
 
-/// Where the camera of an image is.
+/// The pose of the camera of an image, for the index.
 struct Located {
     position: [f64; 3],
     azimuth_rad: f64,
+    /// Yaw, pitch and horizontal angle of view.
     angles_deg: [f64; 3],
     forward: [f64; 3],
     up: [f64; 3],
+    /// The position and the azimuth of its scan location.
     original: ([f64; 3], f64),
 }
 
-/// What became of an image.
+/// An image that was read and written.
 pub(crate) struct ReadImage {
     located: Option<Located>,
     pub(crate) seen: Option<Shares>,
 }
 
-/// What became of all images and meshes.
+/// All images and meshes that were written.
 #[derive(Default)]
 pub(crate) struct Written {
     pub(crate) bytes: u64,
-    /// By place in `Content::panoramas` and `Content::views`.
+    /// In the order of `Content::panoramas`.
     pub(crate) panoramas: Vec<ReadImage>,
+    /// In the order of `Content::views`.
     pub(crate) views: Vec<ReadImage>,
     meshes: Vec<MeshEntry>,
-    /// What of a class's surface an area has.
+    /// Classes and their surface in an area.
     surfaces: Vec<(usize, Surface)>,
 }
 
-/// A pinhole camera, for the page to compute rays by.
+/// A pinhole camera, by which the page computes rays.
 #[derive(Serialize)]
 struct Pinhole {
-    /// Focal lengths and principal point, pixels of the data set's image.
+    /// Focal lengths and principal point, in pixels of the image of the data set.
     k: [f64; 4],
-    /// World → camera, OpenCV's axes.
+    /// World → camera, with the axes of OpenCV.
     rt: [[f64; 4]; 3],
 }
 
@@ -100,26 +103,50 @@ struct ViewPicture {
     camera: Option<Pinhole>,
 }
 
-/// One or more images whose files are made by one thread.
+/// Images whose files one thread makes.
 enum Job<'a> {
     Panorama(usize, &'a DatasetImage),
     Views(usize, &'a [DatasetImage]),
 }
 
-/// What a thread makes pictures with.
+/// The tools of a thread.
 struct Tools<'s, 'm> {
     reader: PngReader,
     caster: Option<Caster<'s, 'm>>,
 }
 
-/// The face that each pixel of an image of this size sees, which shows the nearest pixels of the camera's.
+/// Returns the face of each pixel of a reduced image. Its pixels are the nearest pixels of the camera.
 fn faces(caster: &mut Caster<'_, '_>, camera: &Camera, [w, h]: [u32; 2]) -> Raster<u32> {
     let stride = camera.width / w.max(1);
     if [w * stride, h * stride] == [camera.width, camera.height] {
-        // Every pixel that is shown, and no other.
+        // Casts only the pixels that are shown.
         return caster.cast_strided(camera, stride).face;
     }
     nearest(&caster.cast(camera).face, [w, h])
+}
+
+impl Located {
+    /// Makes the entry of a pose. `size` is the size of its image, if this is known.
+    fn new(pose: &PoseFile, size: Option<[u32; 2]>) -> Self {
+        let original = pose.original();
+        let this = pose.pose();
+        let (yaw, pitch) = original.yaw_pitch_to(&this);
+        // The full horizontal angle. For a photograph with its centre off the middle, it follows the focal
+        // length.
+        let half_width = size.map_or(pose.camera_k_matrix[0][2], |[w, _]| f64::from(w) / 2.0);
+        let fov = 2.0 * (half_width / pose.camera_k_matrix[0][0]).atan();
+        // The rows of the matrix are the axes of the camera: right, down, forward.
+        let [_, down, forward] = this.rt_matrix().map(|[x, y, z, _]| [x, y, z].map(|c| rounded(c, 6)));
+
+        Self {
+            position: this.location.to_array(),
+            azimuth_rad: this.azimuth_rad(),
+            angles_deg: [yaw, pitch, fov].map(degrees),
+            forward,
+            up: down.map(|c| 0.0 - c),
+            original: (original.location.to_array(), original.azimuth_rad()),
+        }
+    }
 }
 
 impl<'a> Content<'a> {
@@ -135,6 +162,7 @@ impl<'a> Content<'a> {
             pictures: Vec::new(),
             candidates: Vec::new(),
         };
+
         let mut rooms: BTreeMap<(u32, String), Option<String>> = BTreeMap::new();
         let mut images = Vec::new();
         for &area in data.areas() {
@@ -157,6 +185,7 @@ impl<'a> Content<'a> {
             .into_iter()
             .map(|((area, uuid), room)| (area, uuid, room))
             .collect();
+
         for image in images {
             match image.frame {
                 Frame::View(_) => {
@@ -184,7 +213,7 @@ impl<'a> Content<'a> {
             .ok()
     }
 
-    /// Where its images are shown, by area, scan location, room and frame.
+    /// Returns the places where images are shown, by area, scan location, room and frame.
     pub(crate) fn shown(&self) -> BTreeMap<(u32, String, String, Frame), Shown> {
         let panoramas = self.panoramas.iter().map(|(i, image)| (image, Shown::Panorama(*i)));
         let views = self
@@ -209,6 +238,7 @@ impl<'a> Content<'a> {
     ) -> Result<Written> {
         let progress = ctx.progress("reporting", "images", (self.panoramas.len() + self.views.len()) as u64);
         let mut written = Written::default();
+
         for &area in self.data.areas() {
             let read = faults.keep(self.data.layout().root(), self.data.mesh(area))?.flatten();
             let mesh = read.as_ref().map(|file| &file.mesh);
@@ -244,7 +274,9 @@ impl<'a> Content<'a> {
         let first = self.pictures.get(first).map_or(0, |picture| picture / THUMBS_PER_FILE);
         let chunks = of_area.chunks(THUMBS_PER_FILE).enumerate();
         jobs.extend(chunks.map(|(i, images)| Job::Views(first + i, images)));
-        let (of_panorama, of_view) = (options.of_panoramas(), options.of_views());
+
+        let of_panorama = options.of_panoramas();
+        let of_view = options.of_views();
         let scene = mesh
             .filter(|mesh| mesh.faces().len() < FACES_OF_PICTURES)
             .map(Scene::new);
@@ -254,7 +286,8 @@ impl<'a> Content<'a> {
             || Tools { reader: PngReader::default(), caster: scene.as_ref().map(Caster::new) },
             |tools, job| {
                 let mut faults = Faults::default();
-                let (mut made, mut bytes) = (Vec::new(), 0);
+                let mut made = Vec::new();
+                let mut bytes = 0;
                 match job {
                     Job::Panorama(i, image) => {
                         let (one, picture, _) = self.make(image, of_panorama, tools, &mut faults)?;
@@ -285,6 +318,7 @@ impl<'a> Content<'a> {
                 Ok((made, bytes, faults.into_vec()))
             },
         )?;
+
         for (job, (made, bytes, found)) in jobs.iter().zip(results) {
             written.bytes += bytes;
             faults.extend(found);
@@ -296,7 +330,7 @@ impl<'a> Content<'a> {
         Ok(())
     }
 
-    /// An image as the page shows it, its small image, and what is known of it. What its pixels see is cast
+    /// Reads an image. Returns its entry, its picture and its small image. The faces of its pixels are cast
     /// again.
     fn make(
         &self,
@@ -310,6 +344,7 @@ impl<'a> Content<'a> {
         if images.is_none() {
             nothing_left(self.data, image, faults);
         }
+
         let mut pose = None;
         if image.has(Domain::Pose) {
             pose = faults.keep(root, self.data.pose(image))?;
@@ -319,23 +354,8 @@ impl<'a> Content<'a> {
         if let (Some(pose), Some(size)) = (&pose, size) {
             camera = faults.keep(root, self.data.camera(image, pose, size))?;
         }
-        let located = pose.as_ref().map(|pose| {
-            let (original, this) = (pose.original(), pose.pose());
-            let (yaw, pitch) = original.yaw_pitch_to(&this);
-            // The full horizontal angle; of a photograph whose centre is off, that of its focal length.
-            let half_width = size.map_or(pose.camera_k_matrix[0][2], |[w, _]| f64::from(w) / 2.0);
-            let fov = 2.0 * (half_width / pose.camera_k_matrix[0][0]).atan();
-            // Rows of the matrix are the camera's axes: right, down, forward.
-            let [_, down, forward] = this.rt_matrix().map(|[x, y, z, _]| [x, y, z].map(|c| rounded(c, 6)));
-            Located {
-                position: this.location.to_array(),
-                azimuth_rad: this.azimuth_rad(),
-                angles_deg: [yaw, pitch, fov].map(degrees),
-                forward,
-                up: down.map(|c| 0.0 - c),
-                original: (original.location.to_array(), original.azimuth_rad()),
-            }
-        });
+        let located = pose.as_ref().map(|pose| Located::new(pose, size));
+
         let Some(images) = images else { return Ok((ReadImage { located, seen: None }, None, None)) };
         let faces = |size| Some(faces(caster.as_mut()?, camera.as_ref()?, size));
         let (picture, thumb) = images
@@ -349,9 +369,12 @@ impl<'a> Content<'a> {
         Ok((read, Some(ViewPicture { picture, camera: pinhole }), thumb))
     }
 
+    /// Returns the index of the report.
     pub(crate) fn index(&self, out: &Path, made: &Written, mut faults: Faults) -> Result<Index> {
         let data = self.data;
         let classes = areas::classes(data);
+
+        // The sums over all images and meshes.
         let mut pixels_by_class = vec![0; classes.len()];
         let mut pixels_unlabelled = 0;
         let mut surface_by_class = vec![Surface::default(); classes.len()];
@@ -373,6 +396,7 @@ impl<'a> Content<'a> {
                 }
             }
         }
+
         let (files, bytes) = data.size();
         let manifest = data.layout().manifest();
         let options = serde_json::to_value(data.options());
@@ -387,10 +411,12 @@ impl<'a> Content<'a> {
             depth_units_per_m: data.options().depth_units.per_m(),
             options: options.map_err(|e| FileError::format(&manifest, e.to_string()))?,
         };
+
         let locations = self.locations(made);
         let views = self.view_entries(made);
         let labels = self.table.as_ref().map(areas::labels).unwrap_or_default();
-        let (rooms, votes) = (areas::rooms(data, &mut faults)?, areas::votes(data, &mut faults)?);
+        let rooms = areas::rooms(data, &mut faults)?;
+        let votes = areas::votes(data, &mut faults)?;
         let statistics = areas::statistics(data, &mut faults)?;
         Ok(Index {
             form: FORM,
@@ -423,19 +449,22 @@ impl<'a> Content<'a> {
             ..LocationEntry::default()
         };
         let mut entries: Vec<LocationEntry> = self.locations.iter().map(entry).collect();
-        // A location without a panorama stands where its views do.
+
+        // The views of a location tell its place, too, if it has no panorama.
         for (image, made) in self.views.iter().zip(&made.views) {
             let entry = self
                 .location_of(image.area, &image.uuid)
                 .and_then(|i| entries.get_mut(i));
             if let (Some(entry), Some(located)) = (entry, &made.located) {
-                (entry.position, entry.azimuth_rad) = (Some(located.original.0), Some(located.original.1));
+                entry.position = Some(located.original.0);
+                entry.azimuth_rad = Some(located.original.1);
             }
         }
         for ((i, _), made) in self.panoramas.iter().zip(&made.panoramas) {
             let Some(entry) = entries.get_mut(*i) else { continue };
             if let Some(located) = &made.located {
-                (entry.position, entry.azimuth_rad) = (Some(located.position), Some(located.azimuth_rad));
+                entry.position = Some(located.position);
+                entry.azimuth_rad = Some(located.azimuth_rad);
             }
             entry.pano = made.seen.is_some();
             entry.seen.clone_from(&made.seen);
@@ -443,7 +472,7 @@ impl<'a> Content<'a> {
         entries
     }
 
-    /// Kept views and photographs in the order of their files, then the candidates that were dropped.
+    /// Returns kept views and photographs in the order of their files, then the dropped candidates.
     fn view_entries(&self, made: &Written) -> Vec<ViewEntry> {
         let options = self.data.options();
         let listed: Vec<(u32, &ViewRecord)> =
@@ -457,15 +486,7 @@ impl<'a> Content<'a> {
                 None => dropped.push((area, view, place)),
             }
         }
-        let of_record = |entry: ViewEntry, view: &ViewRecord, place: Place| ViewEntry {
-            candidate: Some(view.candidate),
-            yaw_deg: Some(degrees(view.yaw_rad)),
-            pitch_deg: Some(degrees(view.pitch_rad)),
-            fov_deg: Some(degrees(view.fov_rad)),
-            entropy: Some(rounded(view.entropy, 4)),
-            place: Some(place),
-            ..entry
-        };
+
         let mut entries = Vec::with_capacity(self.views.len() + dropped.len());
         for ((image, made), picture) in self.views.iter().zip(&made.views).zip(&self.pictures) {
             let photograph = self.photographs.get(&(image.area, image.uuid.clone()));
@@ -489,6 +510,7 @@ impl<'a> Content<'a> {
                 seen: made.seen.clone(),
                 ..ViewEntry::default()
             };
+
             let record = kept
                 .get(&(image.area, image.uuid.as_str(), frame))
                 .filter(|_| !is_photograph);
@@ -497,6 +519,7 @@ impl<'a> Content<'a> {
                 None => entry,
             });
         }
+
         for (area, view, place) in dropped {
             let location = self.location_of(area, &view.camera_uuid);
             let room = location
@@ -506,5 +529,18 @@ impl<'a> Content<'a> {
             entries.push(of_record(entry, view, place));
         }
         entries
+    }
+}
+
+/// Adds the record of a candidate to the entry of its view.
+fn of_record(entry: ViewEntry, view: &ViewRecord, place: Place) -> ViewEntry {
+    ViewEntry {
+        candidate: Some(view.candidate),
+        yaw_deg: Some(degrees(view.yaw_rad)),
+        pitch_deg: Some(degrees(view.pitch_rad)),
+        fov_deg: Some(degrees(view.fov_rad)),
+        entropy: Some(rounded(view.entropy, 4)),
+        place: Some(place),
+        ..entry
     }
 }

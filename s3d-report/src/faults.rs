@@ -1,4 +1,4 @@
-//! What is missing or damaged in a data set, and is told in its report.
+//! The faults of a data set, which its report lists.
 
 use s3d_dataset::{Error, Result};
 use serde::Serialize;
@@ -9,18 +9,19 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[non_exhaustive]
 pub struct Fault {
-    /// The file, below the data set's folder, with `/`.
+    /// The path of the file below the folder of the data set, with `/`.
     pub path: String,
     /// What is wrong with it.
     pub message: String,
 }
 
-/// The faults that were found, each once and in the order of their paths.
+/// The faults that were found, one for each file, ordered by path.
 #[derive(Debug, Default)]
 pub(crate) struct Faults(BTreeMap<String, String>);
 
 impl Faults {
-    /// What was read. A file that is wrong becomes a fault, and `None`; an error that may pass stays one.
+    /// Returns the value that was read. A wrong file becomes a fault, and `None`. Any other error stays an
+    /// error.
     pub(crate) fn keep<T>(&mut self, root: &Path, read: Result<T>) -> Result<Option<T>> {
         match read {
             Ok(value) => Ok(Some(value)),
@@ -32,12 +33,12 @@ impl Faults {
         }
     }
 
-    /// Adds one, unless something is wrong with the file already.
+    /// Adds a fault, unless the file has one.
     pub(crate) fn add(&mut self, path: String, message: &str) {
         self.0.entry(path).or_insert_with(|| message.to_owned());
     }
 
-    /// Adds those that another thread has found.
+    /// Adds the faults that another thread found.
     pub(crate) fn extend(&mut self, others: Vec<Fault>) {
         others
             .into_iter()
@@ -52,7 +53,7 @@ impl Faults {
     }
 }
 
-/// How a file is called below the data set's folder.
+/// Returns the path of a file below the folder of the data set.
 pub(crate) fn name(root: &Path, path: &Path) -> String {
     let below = path.strip_prefix(root).unwrap_or(path);
     below
@@ -67,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_told_once_and_below_its_folder() {
+    fn a_file_has_one_fault_below_the_folder() {
         let root = Path::new("a/data");
         let mut faults = Faults::default();
         let wrong = |text: &str| -> Result<()> {

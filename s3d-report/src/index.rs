@@ -1,4 +1,5 @@
-//! The index of a report: all but the images. `docs/report.md` describes it, and `web/src/data.ts` reads it.
+//! The index of a report: everything but the images. `docs/report.md` describes it, and `web/src/data.ts`
+//! reads it.
 
 use crate::faults::Fault;
 use crate::pixels::Shares;
@@ -8,10 +9,10 @@ use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
 
-/// The form of the files of a report. It grows by one when an older page could not read them.
+/// The version of the files of a report. It grows by one when an older page could not read them.
 pub(crate) const FORM: u32 = 2;
 
-/// The name of a folder, whatever it is called by.
+/// Returns the name of a folder, whatever path leads to it.
 pub(crate) fn folder_name(folder: &Path) -> String {
     let canonical = std::fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
     canonical.file_name().unwrap_or_default().to_string_lossy().into_owned()
@@ -24,37 +25,39 @@ pub(crate) struct Index {
     pub(crate) data_set: DataSetEntry,
     pub(crate) areas: Vec<Value>,
     pub(crate) classes: Vec<ClassEntry>,
-    /// By index, the null label first.
+    /// The labels by index, the null label first.
     pub(crate) labels: Vec<LabelEntry>,
     pub(crate) rooms: Vec<RoomEntry>,
     pub(crate) locations: Vec<LocationEntry>,
     pub(crate) views: Vec<ViewEntry>,
     pub(crate) meshes: Vec<MeshEntry>,
-    /// The name of the other data set's folder, if there is `compare.js`.
+    /// The name of the folder of the other data set, if there is `compare.js`.
     pub(crate) against: Option<String>,
-    /// How many pictures a file `data/views_N.js` has, and a file `data/thumbs_N.js`.
+    /// The number of pictures in a file `data/views_N.js`.
     pub(crate) views_per_file: usize,
+    /// The number of pictures in a file `data/thumbs_N.js`.
     pub(crate) thumbs_per_file: usize,
     /// `statistics.json`.
     pub(crate) statistics: Option<Value>,
     /// `votes.json` of each area that has one.
     pub(crate) votes: Vec<AreaVotes>,
-    /// Pixels of all panoramas and views together by class, and those without a label; full-size images.
+    /// The pixels of all panoramas and views together by class, at full size.
     pub(crate) pixels_by_class: Vec<u64>,
-    /// Of all meshes, by class.
+    /// The surface of all meshes by class.
     pub(crate) surface_by_class: Vec<Surface>,
+    /// The pixels of all panoramas and views without a label.
     pub(crate) pixels_unlabelled: u64,
     pub(crate) faults: Vec<Fault>,
-    /// What `verify` found, if it was asked.
+    /// The result of `verify`, if it was asked for.
     pub(crate) verified: Option<Verified>,
 }
 
-/// What `verify` found.
+/// The result of `verify`.
 #[derive(Serialize)]
 pub(crate) struct Verified {
     files: u64,
     checks: u64,
-    /// What was left out, and why, a sentence each.
+    /// Sentences on checks that were left out, and why.
     notes: Vec<String>,
     faults: Vec<VerifyFaults>,
 }
@@ -65,7 +68,7 @@ struct VerifyFaults {
     topic: &'static str,
     kind: &'static str,
     count: u64,
-    /// Those that are named: a file, from the data set's folder, and what is wrong with it.
+    /// The faults that are named: a file below the folder of the data set, and what is wrong with it.
     first: Vec<(String, String)>,
 }
 
@@ -80,15 +83,15 @@ impl From<VerifyReport> for Verified {
 
 #[derive(Serialize)]
 pub(crate) struct DataSetEntry {
-    /// That of its folder.
+    /// The name of its folder.
     pub(crate) name: String,
-    /// What is not there yet, a sentence each, if the export did not finish.
+    /// Sentences on missing parts, if the export did not finish.
     pub(crate) missing_yet: Option<Vec<String>>,
     pub(crate) version: String,
     pub(crate) seed: u64,
     pub(crate) files: u64,
     pub(crate) bytes: u64,
-    /// Nothing if there are no labels.
+    /// `None` without labels.
     pub(crate) taxonomy: Option<String>,
     pub(crate) depth_units_per_m: f64,
     pub(crate) options: Value,
@@ -103,9 +106,9 @@ pub(crate) struct ClassEntry {
 #[derive(Serialize)]
 pub(crate) struct LabelEntry {
     pub(crate) name: String,
-    /// A place in `classes`; nothing for the null label.
+    /// An index of `classes`; `None` for the null label.
     pub(crate) class: Option<usize>,
-    /// That of `semantic_pretty`.
+    /// The colour in `semantic_pretty`.
     pub(crate) color: [u8; 3],
 }
 
@@ -114,10 +117,10 @@ pub(crate) struct RoomEntry {
     pub(crate) area: u32,
     pub(crate) name: String,
     pub(crate) floor_m2: f64,
-    /// World z from the lowest to the highest of its instances, metres.
+    /// The lowest and the highest z of its instances in the world, in metres.
     pub(crate) heights: Option<[f64; 2]>,
-    /// Rings of world x and y, metres, rounded to millimetres: outer ones and holes, to be filled by the
-    /// even-odd rule.
+    /// Rings of x and y in the world, in metres, rounded to millimetres: outer rings and holes, to fill by
+    /// the even-odd rule.
     pub(crate) outline: Vec<Vec<[f64; 2]>>,
 }
 
@@ -126,11 +129,11 @@ pub(crate) struct LocationEntry {
     pub(crate) area: u32,
     pub(crate) uuid: String,
     pub(crate) room: String,
-    /// World, metres; nothing without poses.
+    /// Its place in the world, in metres; `None` without poses.
     pub(crate) position: Option<[f64; 3]>,
-    /// Where the panorama's centre column looks: radians from +X towards +Y.
+    /// The direction of the centre column of the panorama: radians from +X towards +Y.
     pub(crate) azimuth_rad: Option<f64>,
-    /// Whether there is a file `data/pano_N.js`, N being the location's place in the list.
+    /// Whether there is a file `data/pano_N.js`, where N is the index of the location.
     pub(crate) pano: bool,
     pub(crate) seen: Option<Shares>,
 }
@@ -138,73 +141,77 @@ pub(crate) struct LocationEntry {
 #[derive(Default, Serialize)]
 pub(crate) struct ViewEntry {
     pub(crate) area: u32,
-    /// A place in `locations`; nothing for photographs.
+    /// An index of `locations`; `None` for photographs.
     pub(crate) location: Option<usize>,
     pub(crate) room: String,
-    /// The name of the photograph that it is the view of.
+    /// The name of its photograph.
     pub(crate) photograph: Option<String>,
-    /// Its number in names of files; nothing if it was dropped.
+    /// Its number in names of files; `None` if it was dropped.
     pub(crate) frame: Option<u32>,
     /// Its number among the candidates of its location.
     pub(crate) candidate: Option<u32>,
-    /// Its place among the pictures: picture N is in `data/views_{N / views_per_file}.js`; likewise thumbs.
+    /// The number N of its picture, which is in `data/views_{N / views_per_file}.js`, and likewise in thumbs.
     pub(crate) picture: Option<usize>,
-    /// To the left of the location's camera, above its horizon, and the horizontal angle of view.
+    /// The angle to the left of the camera of the location.
     pub(crate) yaw_deg: Option<f64>,
+    /// The angle above its horizon.
     pub(crate) pitch_deg: Option<f64>,
+    /// The horizontal angle of view.
     pub(crate) fov_deg: Option<f64>,
-    /// What it was selected by, nats.
+    /// The entropy that decided about its selection, in nats.
     pub(crate) entropy: Option<f64>,
     pub(crate) place: Option<Place>,
-    /// Where its camera stands; only for photographs, since others stand at their location.
+    /// The place of its camera; only for photographs, since other views stand at their location.
     pub(crate) position: Option<[f64; 3]>,
-    /// Of photographs, directions in the world.
+    /// Its directions in the world; only for photographs.
     pub(crate) forward: Option<[f64; 3]>,
     pub(crate) up: Option<[f64; 3]>,
     pub(crate) seen: Option<Shares>,
 }
 
-/// The mesh of an area, and the files it is in.
+/// The mesh of an area, and its files.
 #[derive(Clone, Serialize)]
 pub(crate) struct MeshEntry {
     pub(crate) area: u32,
-    /// Of the data set's mesh.
+    /// The number of faces in the data set.
     pub(crate) faces: usize,
-    /// In the report.
+    /// The number of faces in the report.
     pub(crate) shown: usize,
-    /// Edge of the cells whose vertices were merged, metres; nothing if all faces are shown.
+    /// The width of the cells whose vertices were merged, in metres; `None` if all faces are shown.
     pub(crate) cell_m: Option<f64>,
-    /// World box, metres.
+    /// The least and the largest corner of its box in the world, in metres.
     pub(crate) min: [f64; 3],
     pub(crate) max: [f64; 3],
-    /// How many files `data/mesh_AREA_K.js`, and `data/textures_AREA_K.js`.
+    /// The number of files `data/mesh_AREA_K.js`.
     pub(crate) files: usize,
+    /// The number of files `data/textures_AREA_K.js`.
     pub(crate) texture_files: usize,
-    /// Whether there is a file `data/faces_AREA.js`, and `data/boxes_AREA.js`.
+    /// Whether there is a file `data/faces_AREA.js`.
     pub(crate) has_votes: bool,
+    /// Whether there is a file `data/boxes_AREA.js`.
     pub(crate) has_boxes: bool,
-    /// Nothing without votes.
+    /// `None` without votes.
     pub(crate) spread: Option<VoteSpread>,
     pub(crate) materials: Vec<MaterialEntry>,
 }
 
 #[derive(Clone, Serialize)]
 pub(crate) struct MaterialEntry {
-    /// Where there is neither a texture nor colours of vertices.
+    /// The colour of faces without a texture and without colours of vertices.
     pub(crate) color: [u8; 3],
     pub(crate) texture: Option<u32>,
 }
 
-/// How the votes of an area's faces are spread, by `votes.npz`.
+/// The distribution of the votes of the faces of an area, from `votes.npz`.
 #[derive(Clone, Default, Serialize)]
 pub(crate) struct VoteSpread {
-    /// Faces by all of their votes: 0, 1, 2, 3 to 4, 5 to 8 and so on, up to the most of a face.
+    /// The faces by number of votes: 0, 1, 2, 3 to 4, 5 to 8 and so on, up to the most votes of a face.
     pub(crate) votes: Vec<Surface>,
-    /// Faces with votes, by margin in ten parts.
+    /// The faces with votes by margin, in ten parts.
     pub(crate) margin: [Surface; 10],
 }
 
-/// So many faces, and their area.
+/// A number of faces, and their area.
 #[derive(Clone, Copy, Default, Serialize)]
 pub(crate) struct Surface {
     pub(crate) faces: u64,
@@ -225,14 +232,14 @@ pub(crate) struct AreaVotes {
     pub(crate) votes: Value,
 }
 
-/// A number with so many places behind the point.
+/// Rounds a number to this number of decimal places.
 pub(crate) fn rounded(value: f64, places: i32) -> f64 {
     let scale = 10f64.powi(places);
     // Adding 0 turns −0 into 0.
     (value * scale).round() / scale + 0.0
 }
 
-/// An angle in degrees, to a hundredth.
+/// Converts an angle to degrees, rounded to a hundredth.
 pub(crate) fn degrees(radians: f64) -> f64 {
     rounded(radians.to_degrees(), 2)
 }

@@ -1,9 +1,11 @@
 //! An offline report of a data set: a page that opens from the disk by a double click.
 //!
-//! [`report`] reads a data set and writes a folder: `index.html`, which has the page with its style and its
-//! program in it, and `data/`, which has reduced images, the mesh and what is known of them. Nothing in
-//! the data set is altered. `docs/report.md` describes the files of the folder; the page itself is
-//! in `web/`, in TypeScript, and its bundle in `web/dist/`, so that no Node is needed to build this crate.
+//! [`report`] reads a data set and writes a folder. `index.html` is the page with its style and its program.
+//! `data/` has reduced images, the mesh, and their tables. The data set is not altered. [`report_against`]
+//! shows another data set beside it, with the differences.
+//!
+//! `docs/report.md` describes the files of the folder. The source of the page is in `web/`, in TypeScript.
+//! Its bundle is in `web/dist/`, so that this crate builds without Node.
 //!
 //! ```no_run
 //! use s3d_report::{Context, ReportOptions, report};
@@ -23,6 +25,7 @@
 mod against;
 mod areas;
 mod content;
+mod error;
 mod faults;
 mod index;
 mod mesh;
@@ -33,11 +36,12 @@ mod script;
 mod selection;
 mod write;
 
+pub use error::{Error, Result};
 pub use faults::Fault;
-pub use s3d_dataset::{Context, Error, Result};
+pub use s3d_dataset::Context;
 pub use write::{Report, ReportOptions, report, report_against};
 
-/// The README's example, compiled and run.
+/// The example of the README, compiled.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

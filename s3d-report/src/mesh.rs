@@ -1,4 +1,4 @@
-//! The mesh of an area for the 3D view, simplified if it is large: `docs/report.md`, "Meshes".
+//! Writes the mesh of an area for the 3D view, simplified if it is large: `docs/report.md`, "Meshes".
 
 use crate::faults::Faults;
 use crate::index::{MaterialEntry, MeshEntry, Surface, VoteSpread, rounded};
@@ -15,19 +15,19 @@ use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-/// Faces in a file.
+/// The number of faces in a file.
 const FACES_PER_FILE: usize = 1 << 16;
 
-/// Materials at most; faces of further ones look like the last.
+/// The most materials. Faces of further materials look like the last one.
 const MATERIALS: usize = 1 << 16;
 
-/// Textures in a file.
+/// The number of textures in a file.
 const TEXTURES_PER_FILE: usize = 16;
 
-/// Pixels of all textures of an area together; more are reduced.
+/// The most pixels of all textures of an area together. Larger textures are reduced.
 const TEXTURE_PIXELS: f64 = (1u32 << 24) as f64;
 
-/// Width of a texture.
+/// The greatest width of a texture.
 const TEXTURE_WIDTH: u32 = 4096;
 
 /// A part of a mesh.
@@ -47,7 +47,7 @@ struct Part {
     material: String,
 }
 
-/// How the faces voted.
+/// The votes of faces.
 #[derive(Serialize)]
 struct FaceVotes {
     faces: usize,
@@ -63,21 +63,21 @@ struct BoxEntry {
     r#box: [f32; 6],
 }
 
-/// A mesh as it is shown: all of it, or a simplified one.
+/// The shown mesh: the whole mesh, or a simplified one.
 struct Shown<'m> {
     mesh: &'m TriMesh,
     positions: &'m [Vec3],
     faces: &'m [[u32; 3]],
-    /// By vertex; empty if the mesh has none.
+    /// The colours of vertices; empty if the mesh has none.
     colors: Vec<[u8; 3]>,
-    /// Which face of the mesh a face is.
+    /// For each shown face, its number in the mesh.
     face_of: &'m [u32],
 }
 
-/// What the index tells of an area's mesh, the surface of each class, and the bytes that were written.
+/// The entry of a mesh in the index, the surface of each class, and the bytes that were written.
 type Written = (MeshEntry, Vec<(usize, Surface)>, u64);
 
-/// Writes all files of an area's mesh.
+/// Writes all files of the mesh of an area.
 pub(crate) fn write(
     ctx: &Context,
     (data, table): (&DataSet, Option<&LabelTable>),
@@ -86,6 +86,7 @@ pub(crate) fn write(
     scripts: &Scripts,
     faults: &mut Faults,
 ) -> Result<Written> {
+    // The shown mesh, in parts of one file each.
     let simplified = simplify(mesh, most_faces as usize);
     let all: Vec<u32>;
     let shown = match &simplified {
@@ -112,6 +113,7 @@ pub(crate) fn write(
     )?;
     let (textures, written) = write_textures(ctx, area, mesh, scripts)?;
     bytes.push(written);
+
     let root = data.layout().root();
     let votes = faults.keep(root, data.face_votes(area))?.flatten();
     if let Some(votes) = &votes {
@@ -121,6 +123,7 @@ pub(crate) fn write(
     let surfaces = table
         .map(|table| surface_by_class(mesh, labels, table))
         .unwrap_or_default();
+
     let instances = faults.keep(root, data.instances(area))?.unwrap_or_default();
     let boxes: Vec<BoxEntry> = instances
         .into_iter()
@@ -129,6 +132,7 @@ pub(crate) fn write(
     if !boxes.is_empty() {
         bytes.push(scripts.write(&format!("boxes_{area}"), &boxes)?);
     }
+
     let materials = mesh
         .materials()
         .iter()
@@ -146,7 +150,7 @@ pub(crate) fn write(
         has_votes: votes.is_some(),
         has_boxes: !boxes.is_empty(),
         spread: votes.as_ref().map(|votes| vote_spread(mesh, votes)),
-        // The last is that of faces without a material.
+        // The last one is for faces without a material.
         materials: materials
             .chain([MaterialEntry { color: DEFAULT_COLOR, texture: None }])
             .take(MATERIALS)
@@ -155,7 +159,7 @@ pub(crate) fn write(
     Ok((entry, surfaces, bytes.into_iter().sum()))
 }
 
-/// How many faces have a label of each class that has some, and their surface.
+/// Returns the number and the area of the faces of each class that has any.
 fn surface_by_class(mesh: &TriMesh, labels: &[u32], table: &LabelTable) -> Vec<(usize, Surface)> {
     let mut by_label: BTreeMap<u32, Surface> = BTreeMap::new();
     for (face, label) in (0..).zip(labels) {
@@ -172,7 +176,7 @@ fn vote_spread(mesh: &TriMesh, votes: &FaceVoteColumns) -> VoteSpread {
     let counts = votes.total.iter().zip(votes.votes.iter().zip(&votes.runner_up_votes));
     for (face, (all, (first, second))) in (0..).zip(counts) {
         let m2 = mesh.area(face);
-        // The bin of 2^k + 1 to 2^(k + 1) votes is k + 2.
+        // Bin k + 2 holds 2^k + 1 to 2^(k + 1) votes.
         let bin = all
             .checked_sub(1)
             .map_or(0, |less| (u32::BITS - less.leading_zeros()) as usize + 1);
@@ -182,6 +186,7 @@ fn vote_spread(mesh: &TriMesh, votes: &FaceVoteColumns) -> VoteSpread {
         if let Some(bin) = spread.votes.get_mut(bin) {
             bin.add(m2);
         }
+
         let lead = u64::from(first.saturating_sub(*second));
         let part = (10 * lead)
             .checked_div(u64::from(*all))
@@ -193,7 +198,7 @@ fn vote_spread(mesh: &TriMesh, votes: &FaceVoteColumns) -> VoteSpread {
     spread
 }
 
-/// The colours of merged vertices: means of theirs.
+/// Returns the mean colours of merged vertices.
 fn mean_colors(mesh: &TriMesh, vertex_of: &[u32], vertices: usize) -> Vec<[u8; 3]> {
     let colors = &mesh.parts().colors;
     if colors.is_empty() {
@@ -211,7 +216,7 @@ fn mean_colors(mesh: &TriMesh, vertex_of: &[u32], vertices: usize) -> Vec<[u8; 3
         .collect()
 }
 
-/// Steps of 16 bits from the least to the greatest of some numbers, axis by axis.
+/// Even steps of 16 bits between the least and the greatest number of each axis.
 struct Steps<const N: usize> {
     origin: [f64; N],
     step: [f64; N],
@@ -219,7 +224,8 @@ struct Steps<const N: usize> {
 
 impl<const N: usize> Steps<N> {
     fn of(values: &[[f64; N]]) -> Self {
-        let (mut least, mut most) = ([f64::INFINITY; N], [f64::NEG_INFINITY; N]);
+        let mut least = [f64::INFINITY; N];
+        let mut most = [f64::NEG_INFINITY; N];
         for value in values {
             least
                 .iter_mut()
@@ -236,9 +242,12 @@ impl<const N: usize> Steps<N> {
     }
 
     fn pack(&self, values: &[[f64; N]]) -> String {
-        let axis = |((value, origin), step): ((&f64, &f64), &f64)| match *step > 0.0 {
-            true => ((value - origin) / step).round() as u16,
-            false => 0,
+        let axis = |((value, origin), step): ((&f64, &f64), &f64)| {
+            if *step > 0.0 {
+                ((value - origin) / step).round() as u16
+            } else {
+                0
+            }
         };
         let steps = values
             .iter()
@@ -248,13 +257,14 @@ impl<const N: usize> Steps<N> {
 }
 
 impl Shown<'_> {
-    /// The faces, those of a material together.
+    /// Returns the faces, ordered by material.
     fn by_material(&self) -> Vec<usize> {
         let mut faces: Vec<usize> = (0..self.faces.len()).collect();
         faces.sort_by_key(|i| self.material_of(*i));
         faces
     }
 
+    /// Returns the number of a shown face in the mesh.
     fn original(&self, i: usize) -> u32 {
         self.face_of.get(i).copied().unwrap_or_default()
     }
@@ -267,6 +277,7 @@ impl Shown<'_> {
             .min(MATERIALS - 1)
     }
 
+    /// Returns a part of the mesh, whose vertices are numbered anew.
     fn part(&self, faces: &[usize]) -> Part {
         let mut numbers: HashMap<u32, u32> = HashMap::new();
         let mut vertices: Vec<u32> = Vec::new();
@@ -289,9 +300,11 @@ impl Shown<'_> {
                 _ => [[0.0; 2]; 3],
             });
         }
+
         let position = |v: &u32| self.positions.get(*v as usize).map_or(DVec3::ZERO, |p| p.as_dvec3());
         let positions: Vec<[f64; 3]> = vertices.iter().map(|v| position(v).to_array()).collect();
-        let (place, of_uv) = (Steps::of(&positions), Steps::of(&uvs));
+        let place = Steps::of(&positions);
+        let of_uv = Steps::of(&uvs);
         let color = |v: &u32| self.colors.get(*v as usize).copied().unwrap_or(DEFAULT_COLOR);
         Part {
             vertices: vertices.len(),
@@ -311,7 +324,8 @@ impl Shown<'_> {
     }
 }
 
-/// The same places of a texture, nearer to zero where it repeats: steps are of the farthest.
+/// Moves texture coordinates nearer to zero where the texture repeats, since steps depend on the farthest
+/// ones.
 fn near_zero(uvs: [Vec2; 3], [along_u, along_v]: [Wrap; 2]) -> [Vec2; 3] {
     let least = uvs.into_iter().fold(Vec2::INFINITY, Vec2::min).floor();
     let axis = |uv: f32, least: f32, wrap| match wrap {
@@ -322,7 +336,7 @@ fn near_zero(uvs: [Vec2; 3], [along_u, along_v]: [Wrap; 2]) -> [Vec2; 3] {
     uvs.map(|uv| vec2(axis(uv.x, least.x, along_u), axis(uv.y, least.y, along_v)))
 }
 
-/// Writes the textures, reduced if they are many or large. Returns the number of files, and their bytes.
+/// Writes the textures, reduced if they are many or large. Returns the number and the bytes of their files.
 fn write_textures(ctx: &Context, area: u32, mesh: &TriMesh, scripts: &Scripts) -> Result<(usize, u64)> {
     let pixels = |image: &Raster<[u8; 3]>| f64::from(image.width()) * f64::from(image.height());
     let all: f64 = mesh.textures().iter().map(|texture| pixels(&texture.image)).sum();

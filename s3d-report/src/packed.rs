@@ -1,4 +1,4 @@
-//! Images and long rows of numbers as text.
+//! Encodes images and long rows of numbers as text.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -9,17 +9,17 @@ use s3d_geom::Raster;
 use s3d_io::image::{Content, encode_rgb8};
 use std::io::Write;
 
-/// Of JPEG files, 1 to 100.
+/// The quality of JPEG files, 1 to 100.
 const QUALITY: u8 = 85;
 
-/// Numbers as their bytes in a zlib stream in Base64.
+/// Packs the bytes of numbers into a zlib stream in Base64.
 pub(crate) fn packed<T, const N: usize>(
     numbers: impl IntoIterator<Item = T>,
     bytes: fn(T) -> [u8; N],
 ) -> String {
     let bytes: Vec<u8> = numbers.into_iter().flat_map(bytes).collect();
     let mut stream = ZlibEncoder::new(Vec::new(), Compression::default());
-    // Nothing fails in memory.
+    // Writing to memory does not fail.
     let stream = stream
         .write_all(&bytes)
         .and_then(|()| stream.finish())
@@ -27,17 +27,17 @@ pub(crate) fn packed<T, const N: usize>(
     BASE64_STANDARD.encode(stream)
 }
 
-/// An image without loss as a `data:` URL.
+/// Encodes an image without loss as a `data:` URL.
 pub(crate) fn png_url(image: &Raster<[u8; 3]>, content: Content) -> String {
     let bytes = encode_rgb8(image, content, s3d_io::image::Compression::Fast);
     format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes))
 }
 
-/// An image in good quality as a `data:` URL. Its colours are half as fine as its light (4:2:0), which takes half the
-/// time.
+/// Encodes an image in good quality as a `data:` URL. Its colours are half as fine as its light (4:2:0),
+/// which takes half the time.
 ///
-/// Not the `image` crate's encoder, which takes twice as long. Not the instructions for AVX2 of this
-/// one: they save a fifth, and round otherwise, so that bytes would depend on the processor.
+/// The encoder of the `image` crate takes twice as long. The AVX2 instructions of this encoder save a fifth,
+/// but round differently, so that the bytes would depend on the processor.
 pub(crate) fn jpeg_url(image: &Raster<[u8; 3]>) -> Result<String, EncodingError> {
     let side = |pixels: u32| {
         let longer = |_| EncodingError::Write(format!("{pixels} pixels are more than JPEG has"));

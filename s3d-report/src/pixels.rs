@@ -1,5 +1,5 @@
-//! The pictures of a report: an image of the data set in every modality that is shown, reduced, and what its
-//! pixels show at full size.
+//! The pictures of a report: an image of the data set in each shown modality, reduced, and the shares of its
+//! pixels at full size.
 
 use crate::faults::{Faults, name};
 use crate::index::rounded;
@@ -17,15 +17,15 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The colour of a pixel that sees nothing; in a photograph also of one beside it.
+/// The colour of a pixel that sees nothing, or that is outside of its photograph.
 const MISSING_COLOR: [u8; 3] = [0; 3];
 
 /// The images of a picture as `data:` URLs.
 #[derive(Serialize)]
 pub(crate) struct Picture {
-    /// Width and height of the data set's images.
+    /// The width and the height in the data set.
     pub(crate) of: [u32; 2],
-    /// Those of `depth` and `label`.
+    /// The width and the height of `depth` and `label`.
     pub(crate) size: [u32; 2],
     pub(crate) rgb: Option<String>,
     pub(crate) normal: Option<String>,
@@ -34,15 +34,15 @@ pub(crate) struct Picture {
     pub(crate) face: Option<String>,
 }
 
-/// What the pixels of an image show, as shares of all of them.
+/// What the pixels of an image show, as shares of all its pixels.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Shares {
-    /// Those that see the mesh.
+    /// The share that sees the mesh.
     pub(crate) coverage: Option<f64>,
     pub(crate) unlabelled: Option<f64>,
-    /// How many instances.
+    /// The number of instances.
     pub(crate) instances: Option<usize>,
-    /// By class, of those that are there.
+    /// The share of each class that occurs.
     pub(crate) classes: Vec<(usize, f64)>,
     #[serde(skip)]
     pub(crate) pixels_by_class: BTreeMap<usize, u64>,
@@ -50,17 +50,17 @@ pub(crate) struct Shares {
     pub(crate) pixels_unlabelled: u64,
 }
 
-/// How wide the images of a picture are at most.
+/// The greatest widths of the images of a picture.
 #[derive(Clone, Copy)]
 pub(crate) struct Widths {
-    /// Depth, label and normals.
+    /// The width of depth, label and normals.
     pub(crate) lossless: u32,
     pub(crate) rgb: u32,
-    /// A small image for a grid.
+    /// The width of a small image for a grid.
     pub(crate) thumb: Option<u32>,
 }
 
-/// The images of a picture, those that are there and whole, reduced, and what they show.
+/// The images of a picture that exist and are whole, reduced, and what they show.
 pub(crate) struct Images {
     pub(crate) size: [u32; 2],
     pub(crate) seen: Shares,
@@ -72,7 +72,7 @@ pub(crate) struct Images {
 }
 
 impl Images {
-    /// Reads an image. Files that are wrong are told to `faults`; `None` if none is left.
+    /// Reads an image. Wrong files become faults. `None` if no file is left.
     pub(crate) fn read(
         data: &DataSet,
         image: &DatasetImage,
@@ -91,7 +91,9 @@ impl Images {
         let normal = files
             .colors(Domain::Normal, widths.lossless, MISSING_NORMAL)?
             .map(|(normal, _)| normal);
-        let (mut label, mut counted) = (None, None);
+
+        let mut label = None;
+        let mut counted = None;
         if let Some(Labels { image, counts, path }) = files.labels(widths.lossless, table)? {
             label = Some(image);
             if let (Some(table), Some(counts)) = (table, counts) {
@@ -100,6 +102,7 @@ impl Images {
                 label = label.filter(|_| counted.is_some());
             }
         }
+
         let mut no_depth = None;
         let depth = files
             .depth(widths.lossless, counted.is_none())?
@@ -107,9 +110,10 @@ impl Images {
                 no_depth = missing;
                 depth
             });
+
         let all_gone = rgb.is_none() && normal.is_none() && label.is_none() && depth.is_none();
         let Some(size) = files.size.filter(|_| !all_gone) else { return Ok(None) };
-        // Depth misses what is beyond its range; labels do not.
+        // Labels come first, since depth is missing beyond its range, too.
         let missing = counted
             .as_ref()
             .map(|counted| counted.missing)
@@ -119,14 +123,14 @@ impl Images {
         Ok(Some(Self { size, seen, widths, rgb, normal, label, depth }))
     }
 
-    /// The images as they are shown, and a small one for a grid. `face` tells what each pixel of an image of
-    /// this size sees.
+    /// Returns the shown images, and a small one for a grid. `face` returns the face of each pixel of an
+    /// image of this size.
     pub(crate) fn picture(
         &self,
         face: impl FnOnce([u32; 2]) -> Option<Raster<u32>>,
     ) -> Result<(Picture, Option<String>), EncodingError> {
         let size = shown_size(self.size, self.widths.lossless);
-        // Of the smaller image: means of means.
+        // Reduces the smaller image again: means of means.
         let small = |width, rgb: &Raster<_>| mean(rgb, shown_size(self.size, width), Some(MISSING_COLOR));
         let thumb = self
             .widths
@@ -148,18 +152,19 @@ impl Images {
     }
 }
 
-/// The files of an image, of which each is read once, line by line.
+/// The files of an image. Each is read once, line by line.
 struct Files<'a> {
     data: &'a DataSet,
     image: &'a DatasetImage,
-    /// That of the first that could be read, which all others must have.
+    /// The size of the first file that could be read. All others must have it.
     size: Option<[u32; 2]>,
     reader: &'a mut PngReader,
     faults: &'a mut Faults,
 }
 
 impl Files<'_> {
-    /// Takes the lines of a modality; `None` if there are none, or something is wrong, which is told.
+    /// Reads the lines of a modality. `None` if it has no file, or if the file is wrong, which becomes a
+    /// fault.
     fn take<const N: usize, T>(
         &mut self,
         domain: Domain,
@@ -185,7 +190,7 @@ impl Files<'_> {
         Ok(self.faults.keep(layout.root(), read)?.map(|taken| (taken, path)))
     }
 
-    /// Means of colours, and how many pixels of the file are missing.
+    /// Reads means of colours, and the number of missing pixels of the file.
     fn colors(
         &mut self,
         domain: Domain,
@@ -200,6 +205,7 @@ impl Files<'_> {
         Ok(taken.map(|((missing, image), _)| (image, missing)))
     }
 
+    /// Reads labels, and counts their pixels.
     fn labels(&mut self, width: u32, table: Option<&LabelTable>) -> Result<Option<Labels>> {
         let taken = self.take(Domain::Semantic, PngReader::rgb8, |size, lines| {
             let mut nearest = Nearest::new(size, shown_size(size, width));
@@ -213,7 +219,7 @@ impl Files<'_> {
         Ok(taken.map(|((image, counts), path)| Labels { image, counts, path }))
     }
 
-    /// Depth, and if `counts`, how many pixels of the file are missing.
+    /// Reads depth, and the number of missing pixels of the file if `counts`.
     fn depth(&mut self, width: u32, counts: bool) -> Result<Option<(Raster<u16>, Option<u64>)>> {
         let taken = self.take(Domain::Depth, PngReader::gray16, |size, lines| {
             let mut nearest = Nearest::new(size, shown_size(size, width));
@@ -231,7 +237,7 @@ impl Files<'_> {
     }
 }
 
-/// Labels, what was counted of them, and their file.
+/// Labels, the counts of their pixels, and their file.
 struct Labels {
     image: Raster<[u8; 3]>,
     counts: Option<LabelCounts>,
@@ -242,16 +248,17 @@ struct Labels {
 struct LabelCounts {
     missing: u64,
     by_label: Vec<u64>,
-    /// The least label that is none of the data set's.
+    /// The least label that the data set does not have.
     unknown: Option<u32>,
 }
 
-/// Pixels that are compared at once to find where a run of equal ones ends.
+/// The number of pixels that are compared at once to find the end of a run of equal ones.
 const RUN: usize = 16;
 
-/// Whether all of them are equal, as words of 64 bits: a comparison of the array is a call of `memcmp`.
+/// Whether pixels are equal, compared as words of 64 bits: a comparison of the arrays would call `memcmp`.
 fn are(pixels: &[[u8; 3]; RUN], expected: &[[u8; 3]; RUN]) -> bool {
-    let (words, expected) = (pixels.as_flattened().as_chunks().0, expected.as_flattened().as_chunks().0);
+    let words = pixels.as_flattened().as_chunks().0;
+    let expected = expected.as_flattened().as_chunks().0;
     let differ = |(a, b): (&[u8; 8], &[u8; 8])| u64::from_ne_bytes(*a) ^ u64::from_ne_bytes(*b);
     words.iter().zip(expected).map(differ).fold(0, |all, bits| all | bits) == 0
 }
@@ -275,6 +282,7 @@ impl LabelCounts {
             {
                 rest = others;
             }
+
             let pixels = (line.len() - rest.len()) as u64;
             line = rest;
             let label = u32::from_be_bytes([0, r, g, b]);
@@ -331,7 +339,7 @@ fn shares([width, height]: [u32; 2], counted: Option<Counted>, missing: Option<u
     }
 }
 
-/// A fault of an image of which nothing is left to be shown.
+/// Adds the fault of an image without any file that can be shown.
 pub(crate) fn nothing_left(data: &DataSet, image: &DatasetImage, faults: &mut Faults) {
     if let Some(domain) = image.domains.first() {
         let path = name(data.layout().root(), &image.path(data.layout(), *domain));
@@ -353,6 +361,7 @@ mod tests {
             lines.iter().for_each(|line| counts.add(line));
             counts.by_class(&table, Path::new("a.png"))
         };
+
         let counts = counted(&[&[MISSING_INDEX, n, a, a], &[b, w, w, a]]).unwrap();
         let missing = Some(counts.missing);
         let seen = shares([4, 2], Some(counts), missing);
@@ -360,6 +369,7 @@ mod tests {
         assert_eq!(seen.classes, [(2, 0.25), (8, 0.5)]);
         let e = counted(&[&[a, [0, 1, 0], [0, 2, 0]]]).err().unwrap().to_string();
         assert!(e.contains("a.png: a pixel has label 256"), "{e}");
+
         // Long runs.
         for (before, long) in [(0, 1), (1, 15), (3, 16), (2, 17), (7, 64), (0, 100)] {
             let line = [vec![a; before], vec![w; long], vec![b; 5]].concat();

@@ -1,18 +1,18 @@
-//! Smaller images: means of colours, and nearest pixels of what is no colour.
+//! Reduces images: means of colours, and nearest pixels of everything else.
 
 use s3d_geom::Raster;
 use s3d_simd::dispatch;
 use std::ops::Add;
 
-/// The size of an image that is reduced to `width` pixels across, and never enlarged.
+/// Returns the size of an image that is reduced to `width` pixels across. No image is enlarged.
 pub(crate) fn reduced_size([w, h]: [u32; 2], width: u32) -> [u32; 2] {
     let width = width.clamp(1, w.max(1));
     let height = (u64::from(h) * u64::from(width) + u64::from(w) / 2) / u64::from(w.max(1));
     [width, u32::try_from(height).unwrap_or(u32::MAX).max(1)]
 }
 
-/// The size at which the page shows an image: about `width` pixels across. If every second, third or n-th
-/// pixel makes at most an eighth more or less than that, it is those: their faces can be cast alone, and
+/// Returns the size at which the page shows an image: about `width` pixels across. The size of every second,
+/// third or n-th pixel is chosen if it differs by at most an eighth: then only these pixels need rays, and
 /// means are of whole pixels.
 pub(crate) fn shown_size(size: [u32; 2], width: u32) -> [u32; 2] {
     let width = width.max(1);
@@ -29,30 +29,31 @@ pub(crate) fn shown_size(size: [u32; 2], width: u32) -> [u32; 2] {
     )
 }
 
-/// The pixel of an axis of `from` pixels that pixel `i` of `to` shows: the one in which its centre lies.
-/// `docs/report.md` states it, since the page computes rays by it.
+/// Returns the pixel of an axis of `from` pixels that holds the centre of pixel `i` of `to`. `docs/report.md`
+/// states this rule, since the page computes rays by it.
 pub(crate) fn source_pixel(i: u32, from: u32, to: u32) -> u32 {
     ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))) as u32
 }
 
-/// The nearest pixels of an image that comes line by line.
+/// Takes the nearest pixels of an image that comes line by line.
 pub(crate) struct Nearest<T> {
     size: [u32; 2],
     columns: Vec<usize>,
-    /// The line that comes next, and the height of the image.
+    /// The next line.
     y: u32,
+    /// The height of the image.
     height: u32,
     pixels: Vec<T>,
 }
 
 impl<T: Copy> Nearest<T> {
-    /// Of an image of `from` pixels, which is not enlarged.
+    /// Begins an image of `width` × `height` pixels, to be reduced to `size`.
     pub(crate) fn new([width, height]: [u32; 2], size: [u32; 2]) -> Self {
         let columns = (0..size[0]).map(|i| source_pixel(i, width, size[0]) as usize).collect();
         Self { size, columns, y: 0, height, pixels: Vec::with_capacity(size[0] as usize * size[1] as usize) }
     }
 
-    /// Takes the next line, pixels that `value` makes out of what is given.
+    /// Takes the next line. `value` converts its pixels.
     pub(crate) fn line<P: Copy>(&mut self, line: &[P], value: impl Fn(P) -> T) {
         let next = (self.pixels.len() / self.columns.len().max(1)) as u32;
         if next < self.size[1] && self.y == source_pixel(next, self.height, self.size[1]) {
@@ -71,45 +72,46 @@ impl<T: Copy> Nearest<T> {
     }
 }
 
-/// The nearest pixels.
+/// Reduces an image to its nearest pixels.
 pub(crate) fn nearest<T: Copy>(image: &Raster<T>, size: [u32; 2]) -> Raster<T> {
     let mut nearest = Nearest::new([image.width(), image.height()], size);
     image.rows().for_each(|line| nearest.line(line, |pixel| pixel));
     nearest.finish()
 }
 
-/// Lines whose sums fit into 16 bits, and their number into 8.
+/// The most lines whose sums fit into 16 bits, and whose number fits into 8.
 const LINES: u32 = 255;
 
-/// Below so many pixels their mean is a multiplication.
+/// The mean of fewer pixels than this is a multiplication.
 const FEW: u32 = 4096;
 
-/// Means of an image that comes line by line: of the pixels that lie in a pixel, of those that are not
-/// `missing`; `missing` where there are none.
+/// Computes means of an image that comes line by line. A pixel is the mean of the pixels that it covers,
+/// without `missing` ones; it is `missing` if there are no others.
 ///
-/// Lines are added up first, columns then, so that most of it is done 16 bytes at a time.
+/// Lines are added up first, then columns, so that most of the work is done 16 bytes at a time.
 pub(crate) struct Mean {
     from: [u32; 2],
     size: [u32; 2],
     missing: Option<[u8; 3]>,
-    /// How many columns lie in each.
+    /// The number of columns that each pixel covers.
     widths: Vec<u32>,
-    /// Lines that were taken, and those of them that `columns` are the sums of.
+    /// The number of lines that were taken.
     y: u32,
+    /// The number of lines in `columns`.
     lines: u32,
-    /// Sums of all lines, by channel of a column.
+    /// The sums of these lines, by channel of a column.
     columns: Vec<u16>,
-    /// By byte of a line, in how many of them the bytes of a missing pixel begin there, be it across pixels;
-    /// and whether there is one.
+    /// For each byte of a line, the number of these lines in which the bytes of a missing pixel begin there,
+    /// even across pixels.
     missing_at: Vec<u8>,
+    /// Whether `missing_at` has any.
     some_missing: bool,
-    /// Sums of the pixels that come next, and of how many.
+    /// The sums of the channels of the next pixels, and the numbers of pixels in them.
     sums: Vec<[u32; 4]>,
     divisor: Divisor,
-    /// Where a pixel is the mean of 2ⁿ × 2ⁿ, and their sum fits into 16 bits: n.
+    /// n, if each pixel is the mean of 2ⁿ × 2ⁿ pixels, and their sum fits into 16 bits.
     halvings: Option<u32>,
-    /// What is made of `columns` and `missing_at` then. Behind the last whole pixel they hold what is of no
-    /// use.
+    /// `columns` and `missing_at` while they are halved. Their values behind the last whole pixel are unused.
     halved: Vec<u16>,
     halved_missing: Vec<u8>,
     means: Vec<u8>,
@@ -117,7 +119,7 @@ pub(crate) struct Mean {
     all_missing: u64,
 }
 
-/// Where a pixel of an axis begins.
+/// Returns the first source pixel of pixel `i` of an axis.
 fn edge(i: u32, from: u32, to: u32) -> u32 {
     (u64::from(i) * u64::from(from) / u64::from(to.max(1))) as u32
 }
@@ -130,7 +132,7 @@ fn add_line(sums: &mut [u16], line: &[u8]) {
     }
 }
 
-/// Whether three bytes of a line that follow each other are those of `pixel`, be it across pixels.
+/// Whether the three bytes of a pixel follow each other in a line, even across pixels.
 #[inline(always)]
 fn is_in(line: &[u8], [r, g, b]: [u8; 3]) -> bool {
     let (second, third) = (line.get(1..).unwrap_or_default(), line.get(2..).unwrap_or_default());
@@ -141,7 +143,7 @@ fn is_in(line: &[u8], [r, g, b]: [u8; 3]) -> bool {
     any != 0
 }
 
-/// Adds one to the counts of the bytes at which [`is_in`] finds them.
+/// Adds one to the counts of the bytes where [`is_in`] finds a pixel.
 #[inline(always)]
 fn count_at(counts: &mut [u8], line: &[u8], [r, g, b]: [u8; 3]) {
     let (second, third) = (line.get(1..).unwrap_or_default(), line.get(2..).unwrap_or_default());
@@ -150,7 +152,7 @@ fn count_at(counts: &mut [u8], line: &[u8], [r, g, b]: [u8; 3]) {
     }
 }
 
-/// Adds each number to the one `step` places before it.
+/// Adds each number to the number `step` places before it.
 #[inline(always)]
 fn add_next<T: Copy + Add<Output = T>>(sums: &[T], step: usize, to: &mut [T]) {
     for ((to, a), b) in to.iter_mut().zip(sums).zip(sums.get(step..).unwrap_or_default()) {
@@ -158,7 +160,7 @@ fn add_next<T: Copy + Add<Output = T>>(sums: &[T], step: usize, to: &mut [T]) {
     }
 }
 
-/// Sums over their number, a power of two, rounded.
+/// Divides sums by a power of two, and rounds.
 #[inline(always)]
 fn divide(sums: &[u16], shift: u32, to: &mut [u8]) {
     for (to, sum) in to.iter_mut().zip(sums) {
@@ -166,14 +168,14 @@ fn divide(sums: &[u16], shift: u32, to: &mut [u8]) {
     }
 }
 
-/// Divides by numbers of pixels, few of them by a multiplication.
+/// Divides by numbers of pixels. Small numbers take a multiplication.
 struct Divisor {
-    /// 2³² over a number, rounded up.
+    /// 2³² divided by each number, rounded up.
     inverse: Vec<u64>,
 }
 
 impl Divisor {
-    /// By at most so many.
+    /// Prepares to divide by at most this number.
     fn new(most: u64) -> Self {
         Self {
             inverse: (0..=most.min(u64::from(FEW - 1)))
@@ -182,12 +184,12 @@ impl Divisor {
         }
     }
 
-    /// The mean of so many pixels, from the sums of their channels.
+    /// Returns the mean of `n` pixels from the sums of their channels; `None` for no pixels.
     #[inline]
     fn mean(&self, [r, g, b, n]: [u32; 4]) -> Option<[u8; 3]> {
         match (n, self.inverse.get(n as usize)) {
             (0, _) => None,
-            // Exact: the product of sum and number is below 2³².
+            // This is exact, since the product of sum and number is below 2³².
             (n, Some(inverse)) => Some([r, g, b].map(|sum| ((u64::from(sum + n / 2) * inverse) >> 32) as u8)),
             (n, None) => Some([r, g, b].map(|sum| ((sum + n / 2) / n) as u8)),
         }
@@ -195,7 +197,7 @@ impl Divisor {
 }
 
 impl Mean {
-    /// Of an image of `from` pixels, which is not enlarged.
+    /// Begins an image of `from` pixels, to be reduced to `size`.
     pub(crate) fn new(from: [u32; 2], size: [u32; 2], missing: Option<[u8; 3]>) -> Self {
         let [[width, height], [w, h]] = [from, size];
         let most = u64::from(width.div_ceil(w.max(1))) * u64::from(height.div_ceil(h.max(1)));
@@ -230,6 +232,7 @@ impl Mean {
             self.all_missing += line.iter().filter(is_missing).count() as u64;
             return;
         }
+
         self.lines += 1;
         let bytes = line.as_flattened();
         let level = s3d_simd::level().without_avx512();
@@ -240,9 +243,12 @@ impl Mean {
             self.some_missing = true;
             dispatch!(level, _simd => count_at(&mut self.missing_at, bytes, missing));
         }
+
         let next = (self.pixels.len() / self.size[0].max(1) as usize) as u32 + 1;
         let is_last = self.y == edge(next, self.from[1], self.size[1]);
-        if let (true, Some(halvings)) = (is_last, self.halvings) {
+        if let Some(halvings) = self.halvings
+            && is_last
+        {
             return self.halve_columns(halvings);
         }
         if is_last || self.lines == LINES {
@@ -255,7 +261,7 @@ impl Mean {
         }
     }
 
-    /// Makes a line of pixels that are means of 2ⁿ × 2ⁿ.
+    /// Makes a line of pixels that are means of 2ⁿ × 2ⁿ pixels.
     fn halve_columns(&mut self, halvings: u32) {
         let level = s3d_simd::level().without_avx512();
         for n in 0..halvings {
@@ -263,10 +269,15 @@ impl Mean {
             std::mem::swap(&mut self.columns, &mut self.halved);
         }
         dispatch!(level, _simd => divide(&self.columns, 2 * halvings, &mut self.means));
-        let (begin, step) = (self.pixels.len(), 3 << halvings);
+        let begin = self.pixels.len();
+        let step = 3 << halvings;
         let first = |bytes: &[u8]| bytes.first_chunk().copied().unwrap_or_default();
         self.pixels.extend(self.means.chunks_exact(step).map(first));
-        if let (true, Some(missing)) = (self.some_missing, self.missing) {
+
+        // Pixels that cover missing ones are made again, without these.
+        if let Some(missing) = self.missing
+            && self.some_missing
+        {
             for n in 0..halvings {
                 dispatch!(level, _simd => add_next(&self.missing_at, 3 << n, &mut self.halved_missing));
                 std::mem::swap(&mut self.missing_at, &mut self.halved_missing);
@@ -277,7 +288,8 @@ impl Mean {
                 if let ([r, g, b, ..], [gone, ..]) = (sums, gone)
                     && *gone > 0
                 {
-                    let (gone, all) = (u32::from(*gone), 1 << (2 * halvings));
+                    let gone = u32::from(*gone);
+                    let all = 1 << (2 * halvings);
                     let [dr, dg, db] = missing.map(|channel| gone * u32::from(channel));
                     let [r, g, b] = [*r, *g, *b].map(u32::from);
                     let seen = self.divisor.mean([r - dr, g - dg, b - db, all - gone]);
@@ -292,34 +304,43 @@ impl Mean {
         self.lines = 0;
     }
 
-    /// Adds up what lies in each pixel.
+    /// Adds up the columns that each pixel covers.
     fn add_columns(&mut self) {
         let mut columns = self.columns.as_chunks::<3>().0;
         for ([r, g, b, n], width) in self.sums.iter_mut().zip(&self.widths) {
             let (these, others) = columns.split_at(*width as usize);
             columns = others;
             for [dr, dg, db] in these {
-                (*r, *g, *b) = (*r + u32::from(*dr), *g + u32::from(*dg), *b + u32::from(*db));
+                *r += u32::from(*dr);
+                *g += u32::from(*dg);
+                *b += u32::from(*db);
             }
             *n += self.lines * width;
         }
-        if let (true, Some(missing)) = (self.some_missing, self.missing) {
+
+        if let Some(missing) = self.missing
+            && self.some_missing
+        {
             let mut missing_at = self.missing_at.as_chunks::<3>().0;
             for ([r, g, b, n], width) in self.sums.iter_mut().zip(&self.widths) {
                 let (these, others) = missing_at.split_at(*width as usize);
                 missing_at = others;
                 let gone: u32 = these.iter().map(|[count, ..]| u32::from(*count)).sum();
                 let [dr, dg, db] = missing.map(|channel| gone * u32::from(channel));
-                (*r, *g, *b, *n) = (*r - dr, *g - dg, *b - db, *n - gone);
+                *r -= dr;
+                *g -= dg;
+                *b -= db;
+                *n -= gone;
                 self.all_missing += u64::from(gone);
             }
             self.missing_at.fill(0);
         }
         self.columns.fill(0);
-        (self.lines, self.some_missing) = (0, false);
+        self.lines = 0;
+        self.some_missing = false;
     }
 
-    /// How many pixels were missing.
+    /// Returns the number of missing pixels.
     pub(crate) fn missing(&self) -> u64 {
         self.all_missing
     }
@@ -329,15 +350,14 @@ impl Mean {
     }
 }
 
-/// The mean of the pixels that lie in a pixel, of those that are not `missing`; `missing` where there are
-/// none. No image is enlarged.
+/// Reduces an image to means: see [`Mean`]. No image is enlarged.
 pub(crate) fn mean(image: &Raster<[u8; 3]>, size: [u32; 2], missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
     let mut mean = Mean::new([image.width(), image.height()], size, missing);
     image.rows().for_each(|line| mean.line(line));
     mean.finish()
 }
 
-/// A number of up to 24 bits as a pixel, the highest bits in red.
+/// Packs a number of up to 24 bits into a pixel, with the highest bits in red.
 pub(crate) fn pack(value: u32) -> [u8; 3] {
     let [_, r, g, b] = value.to_be_bytes();
     [r, g, b]
@@ -366,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn nearest_pixels_are_those_of_the_centres() {
+    fn nearest_pixels_hold_the_centres() {
         let of = |from, to| (0..to).map(|i| source_pixel(i, from, to)).collect::<Vec<_>>();
         assert_eq!(of(4, 2), [1, 3]);
         assert_eq!(of(3, 3), [0, 1, 2]);
@@ -381,18 +401,18 @@ mod tests {
         let [a, b, n] = [[10, 20, 30], [21, 40, 60], [0; 3]];
         let image = Raster::from_vec(4, 2, vec![a, b, n, n, n, a, n, n]);
         assert_eq!(mean(&image, [2, 1], Some(n)).into_vec(), [[14, 27, 40], n]);
-        // Each pixel lies in one.
+        // Each pixel counts once.
         let image = Raster::from_vec(3, 1, vec![a, b, b]);
         assert_eq!(mean(&image, [2, 1], None).into_vec(), [a, b]);
         assert_eq!(mean(&image, [3, 1], Some(n)).into_vec(), image.into_vec());
     }
 
-    /// Pixel by pixel.
+    /// Computes the same means pixel by pixel.
     fn plain_mean(image: &Raster<[u8; 3]>, [w, h]: [u32; 2], missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
         let (width, height) = (image.width(), image.height());
         let pixel = |i, j| {
-            let (columns, rows) =
-                (edge(i, width, w)..edge(i + 1, width, w), edge(j, height, h)..edge(j + 1, height, h));
+            let columns = edge(i, width, w)..edge(i + 1, width, w);
+            let rows = edge(j, height, h)..edge(j + 1, height, h);
             let inside = rows.flat_map(|y| columns.clone().map(move |x| image.at(x, y)));
             let seen: Vec<[u8; 3]> = inside.filter(|pixel| Some(*pixel) != missing).collect();
             let n = seen.len() as u32;
@@ -407,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn means_are_those_pixel_by_pixel() {
+    fn means_agree_with_plain_ones() {
         let mut state = 1u32;
         let mut byte = move || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

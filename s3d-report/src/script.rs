@@ -1,5 +1,5 @@
-//! Files of data as scripts: a page that was opened from the disk may run them, and fetch nothing. In a
-//! report of one file they are in the page.
+//! Writes data as scripts: a page that was opened from the disk may run scripts, but may not fetch files. In
+//! a report of one file, the data is in the page.
 
 use crate::packed::packed;
 use s3d_dataset::{Error, Result};
@@ -10,18 +10,18 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Bytes of data in a page at most: browsers read all of it before they show anything.
-const MOST_BYTES: u64 = 150_000_000;
+/// The most bytes of data in a page: browsers read all of them before they show anything.
+pub(crate) const MOST_BYTES: u64 = 150_000_000;
 
-/// Longer texts are packed where they are not images, which are as small as they can be.
+/// Longer texts are packed, except images, which are compressed already.
 const LONG: usize = 1 << 20;
 
-/// Where the data of a report goes.
+/// The destination of the data of a report.
 pub(crate) enum Scripts {
-    /// Files `data/KEY.js` in this folder: calls that hand over the key and the value as text of JSON. The
-    /// page parses the text, so that no name in it can be anything but text.
+    /// Files `data/KEY.js` in this folder. Each calls the page with the key, and with the value as text in
+    /// JSON. The page parses the text, so that names in it stay text.
     Files(PathBuf),
-    /// Elements of the page, by key.
+    /// The elements of the page, by key.
     Page(Mutex<Elements>),
 }
 
@@ -33,21 +33,23 @@ pub(crate) struct Elements {
 }
 
 impl Scripts {
-    /// Writes a value, and returns the bytes written.
+    /// Writes a value, and returns the bytes written. If the page becomes too large, the call fails as if it
+    /// were cancelled, and [`is_too_large`](Self::is_too_large) is true.
     pub(crate) fn write<T: Serialize>(&self, key: &str, value: &T) -> Result<u64> {
         self.write_text(key, value, usize::MAX)
     }
 
-    /// The same of a value that may be a long list of words and numbers, and is packed if it is.
+    /// Writes a value that may be a long list of words and numbers. A long list is packed.
     pub(crate) fn write_list<T: Serialize>(&self, key: &str, value: &T) -> Result<u64> {
         self.write_text(key, value, LONG)
     }
 
-    /// Writes a value; its text is packed if it is longer than `long`.
+    /// Writes a value, and packs its text if it is longer than `long`.
     fn write_text<T: Serialize>(&self, key: &str, value: &T, long: usize) -> Result<u64> {
         let name = format!("data/{key}.js");
         let failed = |e: serde_json::Error| FileError::format(Path::new(&name), e.to_string());
         let text = serde_json::to_string(value).map_err(failed)?;
+
         match self {
             Self::Files(folder) => {
                 let is_packed = text.len() > long;
@@ -62,7 +64,7 @@ impl Scripts {
                 Ok(write_bytes(&folder.join(&name), script.as_bytes())?)
             }
             Self::Page(elements) => {
-                // Nothing in the text can end the element: in JSON, < stands in strings alone.
+                // Nothing in the text may end the element. In JSON, < occurs in strings only.
                 let text = text.replace('<', "\\u003c");
                 let element =
                     format!("<script type=\"application/json\" data-key=\"{key}\">{text}</script>\n");
@@ -70,11 +72,7 @@ impl Scripts {
                 let mut elements = elements.lock().unwrap_or_else(PoisonError::into_inner);
                 elements.bytes += bytes;
                 if elements.bytes > MOST_BYTES {
-                    return Err(Error::Usage(format!(
-                        "one file of more than {} MB would open slowly or not at all: make a folder (without \
-                         --single), or smaller images (--pano-width, --thumbs)",
-                        MOST_BYTES / 1_000_000
-                    )));
+                    return Err(Error::Cancelled);
                 }
                 elements.by_key.insert(key.to_owned(), element);
                 Ok(bytes)
@@ -82,7 +80,17 @@ impl Scripts {
         }
     }
 
-    /// The elements of a page, in the order of their keys.
+    /// Whether a page became too large.
+    pub(crate) fn is_too_large(&self) -> bool {
+        match self {
+            Self::Files(_) => false,
+            Self::Page(elements) => {
+                elements.lock().unwrap_or_else(PoisonError::into_inner).bytes > MOST_BYTES
+            }
+        }
+    }
+
+    /// Returns the elements of a page, in the order of their keys.
     pub(crate) fn into_elements(self) -> impl Iterator<Item = String> {
         let elements = match self {
             Self::Files(_) => Elements::default(),
@@ -146,12 +154,14 @@ mod tests {
     }
 
     #[test]
-    fn one_file_has_an_end() {
+    fn a_page_has_a_greatest_size() {
         let page = Scripts::Page(Mutex::default());
         let large = "x".repeat(60_000_000);
         page.write("a", &large).unwrap();
         page.write("b", &large).unwrap();
-        let e = page.write("c", &large).unwrap_err().to_string();
-        assert!(e.contains("150 MB") && e.contains("--single"), "{e}");
+        assert!(!page.is_too_large());
+        assert!(page.write("c", &large).is_err() && page.is_too_large());
+        let e = crate::Error::TooLarge(MOST_BYTES).to_string();
+        assert!(e.contains("150 MB") && e.contains("make a folder"), "{e}");
     }
 }

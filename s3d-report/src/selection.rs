@@ -1,4 +1,4 @@
-//! Why a candidate view was kept or dropped, as far as its entropy tells.
+//! Why candidate views were kept or dropped, as far as their entropy tells.
 
 use s3d_io::dataset::ViewRecord;
 use s3d_sample::{Pool, Selection};
@@ -15,9 +15,9 @@ pub(crate) enum Reason {
     Highest,
     /// It was drawn from the middle of its pool.
     Drawn,
-    /// It was not drawn from the middle.
+    /// It was in the middle of its pool, and not drawn.
     NotDrawn,
-    /// Its entropy is among the lowest.
+    /// Its entropy is among the lowest of its pool.
     Lowest,
 }
 
@@ -25,13 +25,13 @@ pub(crate) enum Reason {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct Place {
     pub(crate) reason: Reason,
-    /// From 1, the highest entropy.
+    /// Its rank, from 1 for the highest entropy.
     pub(crate) rank: usize,
-    /// Members of the pool.
+    /// The number of members of the pool.
     pub(crate) pool: usize,
 }
 
-/// The places of candidates, each with its area, in their order.
+/// Returns the places of candidates, in their order. `views` has the area of each.
 pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -> Vec<Place> {
     let mut pools: BTreeMap<(u32, &str), Vec<usize>> = BTreeMap::new();
     for (i, (area, view)) in views.iter().enumerate() {
@@ -42,6 +42,7 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
         };
         pools.entry(key).or_default().push(i);
     }
+
     let selection = Selection::default();
     let mut ranked: Vec<(usize, Place)> = Vec::with_capacity(views.len());
     for members in pools.into_values() {
@@ -49,19 +50,21 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
             .into_iter()
             .filter_map(|i| views.get(i).map(|(area, view)| (i, *area, *view)))
             .collect();
-        // Of equal entropies the one that is named first counts as the higher, as in the selection.
+        // The first name wins a tie, like in the selection.
         let name = |(_, area, v): &(usize, u32, &ViewRecord)| (*area, v.camera_uuid.clone(), v.candidate);
         members.sort_by_cached_key(name);
         members.sort_by(|a, b| b.2.entropy.total_cmp(&a.2.entropy));
+
         let n = members.len();
-        let (certain, dropped) = (selection.certain(n), selection.discarded(n));
+        let certain = selection.certain(n);
+        let dropped = selection.discarded(n);
         for (at, (i, _, view)) in members.into_iter().enumerate() {
-            let reason = match view.frame_num.is_some() {
-                true if keep_all => Reason::All,
-                true if at < certain => Reason::Highest,
-                true => Reason::Drawn,
-                false if at + dropped >= n => Reason::Lowest,
-                false => Reason::NotDrawn,
+            let reason = match view.frame_num {
+                Some(_) if keep_all => Reason::All,
+                Some(_) if at < certain => Reason::Highest,
+                Some(_) => Reason::Drawn,
+                None if at + dropped >= n => Reason::Lowest,
+                None => Reason::NotDrawn,
             };
             ranked.push((i, Place { reason, rank: at + 1, pool: n }));
         }
@@ -76,7 +79,7 @@ mod tests {
     use s3d_sample::{PoolItem, select_pooled};
 
     #[test]
-    fn reasons_fit_what_the_selection_does() {
+    fn reasons_agree_with_the_selection() {
         let mut views: Vec<(u32, ViewRecord)> = Vec::new();
         for candidate in 0..60 {
             for (area, uuid) in [(1, "b"), (2, "a")] {

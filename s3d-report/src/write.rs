@@ -1,14 +1,13 @@
 //! The call that writes a report.
 
 use crate::against;
-use crate::content::Content;
+use crate::content::{Content, ReadImage};
+use crate::error::{Error, Result};
 use crate::faults::{Fault, Faults};
-use crate::index::{FORM, Verified, folder_name};
+use crate::index::{FORM, Index, Verified, folder_name};
 use crate::pixels::Widths;
-use crate::script::Scripts;
-use s3d_dataset::{
-    Context, DataSet, Error, FolderKind, NewFile, NewFolder, Result, VerifyOptions, check_apart, verify,
-};
+use crate::script::{MOST_BYTES, Scripts};
+use s3d_dataset::{Context, DataSet, FolderKind, NewFile, NewFolder, VerifyOptions, check_apart, verify};
 use s3d_io::fs::{create_dir, write_bytes, write_json, write_whole};
 use serde::Serialize;
 use std::ops::RangeInclusive;
@@ -18,14 +17,18 @@ use std::sync::Mutex;
 /// The page: markup, style and program in one file.
 const PAGE: &str = include_str!("../web/dist/index.html");
 
-/// Where the data of a report of one file goes.
+/// The place of the data in a report of one file.
 const DATA: &str = "<!-- data -->\n";
 
-/// Ends what every page begins with.
+/// The end of the head that all pages share.
 const HEAD_END: &str = "<meta name=\"viewport\"";
 
-/// How many faces a page may be asked to show.
-const MESH_FACES: RangeInclusive<u32> = 1000..=10_000_000;
+/// The widths that panoramas may have, in pixels.
+pub(crate) const PANO_WIDTHS: RangeInclusive<u32> = 16..=16_384;
+/// The widths that views may have, in pixels.
+pub(crate) const THUMB_WIDTHS: RangeInclusive<u32> = 16..=2048;
+/// The numbers of faces that a mesh may have.
+pub(crate) const MESH_FACES: RangeInclusive<u32> = 1000..=10_000_000;
 
 const GENERATOR: &str = "s3d report";
 
@@ -36,20 +39,20 @@ const KIND: FolderKind = FolderKind {
     action: "use as the report's folder",
 };
 
-/// How a report is made.
+/// The options of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportOptions {
-    /// Width of panoramas in pixels; the data set's own if that is less.
+    /// The width of panoramas in pixels. Smaller panoramas keep their width.
     pub pano_width: u32,
-    /// Width of the views' images in pixels; their colours are twice as wide where they are shown large.
+    /// The width of views in pixels. The colours of a large view are twice as wide.
     pub thumbs: u32,
-    /// Faces of an area's mesh in the report; a larger mesh is simplified.
+    /// The most faces of the mesh of an area. A larger mesh is simplified.
     pub mesh_faces: u32,
-    /// Verify the data set as well, every pixel of it, and show what was found.
+    /// Whether to verify every pixel of the data set, and show the result.
     pub verify: bool,
-    /// All in one file, which is sent or published more easily; for small data sets.
+    /// Whether to write a single file, which is easier to send or publish. For small data sets.
     pub single: bool,
-    /// Replace an earlier report.
+    /// Whether to replace an earlier report.
     pub overwrite: bool,
 }
 
@@ -67,34 +70,34 @@ impl Default for ReportOptions {
 }
 
 impl ReportOptions {
-    /// The images of panoramas.
+    /// Returns the widths of the images of panoramas.
     pub(crate) fn of_panoramas(&self) -> Widths {
         Widths { lossless: self.pano_width, rgb: self.pano_width, thumb: None }
     }
 
-    /// The images of views.
+    /// Returns the widths of the images of views.
     pub(crate) fn of_views(&self) -> Widths {
         Widths { lossless: self.thumbs, rgb: 2 * self.thumbs, thumb: Some(self.thumbs) }
     }
 }
 
-/// What was written.
+/// A report that was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Report {
-    /// The page, to be opened by a browser.
+    /// The page to open in a browser.
     pub page: PathBuf,
-    /// Panoramas in it.
+    /// The number of panoramas in it.
     pub panoramas: usize,
-    /// Views in it.
+    /// The number of views in it.
     pub views: usize,
-    /// Bytes of its files.
+    /// The size of its files in bytes.
     pub bytes: u64,
-    /// What is missing or damaged in the data set, and told in the report.
+    /// The files of the data set that are missing or damaged. The page lists them, too.
     pub faults: Vec<Fault>,
 }
 
-/// What `report.json` says. No paths and no times: the same data set gives the same bytes.
+/// `report.json`. It has no paths and no times, so that the same data set gives the same bytes.
 #[derive(Serialize)]
 struct About {
     generator: &'static str,
@@ -103,22 +106,24 @@ struct About {
 }
 
 /// Writes the report of the data set in the folder `out` to `to`, a folder or one file, whole or not at all.
-/// The bytes depend on the data set, the name of its folder and the options alone. Files of the data set that
-/// are missing or damaged are told in the report, in [`Report::faults`] and as warnings; the rest is shown.
-/// Of an export that did not finish the report shows what is there so far.
+///
+/// The bytes depend only on the data set, the name of its folder and the options. Files of the data set that
+/// are missing or damaged are listed in the report, in [`Report::faults`] and as warnings; everything else is
+/// shown. If an export did not finish, the report shows the files so far.
 ///
 /// # Errors
-/// [`Error::Usage`] if there is something else in `to`, or the options are out of range; [`Error::File`] if
-/// there is no data set in `out`, its list of files is damaged, or `to` cannot be written;
-/// [`Error::Cancelled`]; [`Error::Temporary`].
+/// [`Error::OutOfRange`] for the options. [`Error::Occupied`] if a file at `to` is no report.
+/// [`Error::TooLarge`] for a single file. [`Error::Dataset`] if there is no data set in `out`, its list of
+/// files is damaged, `to` cannot be written or holds something else, or the call is cancelled.
 pub fn report(out: &Path, to: &Path, options: &ReportOptions, ctx: &Context) -> Result<Report> {
     write(out, None, to, options, ctx)
 }
 
-/// The same, with what differs from the data set in the folder `against`: the page shows both side by side.
+/// Writes a report like [`report`], with the differences to the data set in the folder `against`. The page
+/// shows both side by side.
 ///
 /// # Errors
-/// As [`report`], of either data set.
+/// Fails like [`report`], for either data set.
 pub fn report_against(
     out: &Path,
     against: &Path,
@@ -136,16 +141,14 @@ fn write(
     options: &ReportOptions,
     ctx: &Context,
 ) -> Result<Report> {
-    let within = (16..=16_384).contains(&options.pano_width) && (16..=2048).contains(&options.thumbs);
-    if !within || !MESH_FACES.contains(&options.mesh_faces) {
-        return Err(Error::Usage(format!(
-            "panoramas of {} and views of {} pixels across, meshes of {} faces: 16 to 16384, 16 to 2048, and \
-             1000 to 10000000 are possible",
-            options.pano_width, options.thumbs, options.mesh_faces
-        )));
+    let is_within = PANO_WIDTHS.contains(&options.pano_width)
+        && THUMB_WIDTHS.contains(&options.thumbs)
+        && MESH_FACES.contains(&options.mesh_faces);
+    if !is_within {
+        return Err(Error::OutOfRange(options.clone()));
     }
     if let Some(against) = against {
-        // What cannot be compared is refused before anything is written.
+        // A data set that cannot be compared is refused before anything is written.
         check_apart(to, against)?;
         DataSet::open(out)?;
         DataSet::open(against)?;
@@ -159,26 +162,15 @@ fn write(
         }
         Place::File { .. } => Scripts::Page(Mutex::default()),
     };
-    let mut faults = Faults::default();
-    for (path, message) in data.missing(ctx)? {
-        faults.add(path, &message);
-    }
-    let content = Content::read(&data, &mut faults)?;
-    let made = content.write_files(ctx, options, &scripts, &mut faults)?;
-    let shown = |made: &[crate::content::ReadImage]| made.iter().filter(|made| made.seen.is_some()).count();
-    let (panoramas, views) = (shown(&made.panoramas), shown(&made.views));
-    let mut index = content.index(out, &made, faults)?;
-    let mut bytes = made.bytes;
-    if let Some(against) = against {
-        bytes += against::write(ctx, (out, &content), against, options, &scripts)?;
-        index.against = Some(folder_name(against));
-    }
-    if options.verify {
-        index.verified = Some(Verified::from(verify(out, &VerifyOptions::default(), ctx)?));
-    }
-    bytes += scripts.write_list("index", &index)?;
+
+    let written = match write_data(ctx, (out, &data), against, options, &scripts) {
+        Err(_) if scripts.is_too_large() => return Err(Error::TooLarge(MOST_BYTES)),
+        written => written?,
+    };
+    let Data { index, panoramas, views, mut bytes } = written;
     let page = place.page();
     bytes += place.finish(scripts)?;
+
     for sentence in data.missing_yet().into_iter().flatten() {
         ctx.warn(format_args!("{}: not finished: {sentence}", out.display()));
     }
@@ -194,7 +186,46 @@ fn write(
     Ok(report)
 }
 
-/// Where a report is made.
+/// The data of a report.
+struct Data {
+    index: Index,
+    /// The number of panoramas and views that are shown.
+    panoramas: usize,
+    views: usize,
+    bytes: u64,
+}
+
+/// Writes all but the page.
+fn write_data(
+    ctx: &Context,
+    (out, data): (&Path, &DataSet),
+    against: Option<&Path>,
+    options: &ReportOptions,
+    scripts: &Scripts,
+) -> s3d_dataset::Result<Data> {
+    let mut faults = Faults::default();
+    for (path, message) in data.missing(ctx)? {
+        faults.add(path, &message);
+    }
+    let content = Content::read(data, &mut faults)?;
+    let made = content.write_files(ctx, options, scripts, &mut faults)?;
+
+    let mut index = content.index(out, &made, faults)?;
+    let mut bytes = made.bytes;
+    if let Some(against) = against {
+        bytes += against::write(ctx, (out, &content), against, options, scripts)?;
+        index.against = Some(folder_name(against));
+    }
+    if options.verify {
+        index.verified = Some(Verified::from(verify(out, &VerifyOptions::default(), ctx)?));
+    }
+    bytes += scripts.write_list("index", &index)?;
+
+    let shown = |made: &[ReadImage]| made.iter().filter(|made| made.seen.is_some()).count();
+    Ok(Data { index, panoramas: shown(&made.panoramas), views: shown(&made.views), bytes })
+}
+
+/// The place where a report is made.
 enum Place {
     Folder(NewFolder),
     File { place: PathBuf, file: NewFile },
@@ -203,20 +234,17 @@ enum Place {
 impl Place {
     fn begin(ctx: &Context, to: &Path, out: &Path, options: &ReportOptions) -> Result<Self> {
         if !options.single {
-            return NewFolder::begin(ctx, to, out, KIND, options.overwrite).map(Self::Folder);
+            return Ok(Self::Folder(NewFolder::begin(ctx, to, out, KIND, options.overwrite)?));
         }
         check_apart(to, out)?;
         let is_report = || std::fs::read(to).is_ok_and(|page| page.starts_with(head().as_bytes()));
         match to.symlink_metadata() {
-            Ok(_) if !is_report() => Err(Error::Usage(format!(
-                "{} is there already, and was not written by {GENERATOR}: choose another name with -o",
-                to.display()
-            ))),
+            Ok(_) if !is_report() => Err(Error::Occupied(to.to_owned())),
             _ => Ok(Self::File { place: to.to_owned(), file: NewFile::begin(ctx, to, options.overwrite)? }),
         }
     }
 
-    /// What a browser opens.
+    /// Returns the file to open in a browser.
     fn page(&self) -> PathBuf {
         match self {
             Self::Folder(folder) => folder.place().join("index.html"),
@@ -224,7 +252,8 @@ impl Place {
         }
     }
 
-    /// Writes the page, puts all in place, and returns the bytes written beside those of the scripts.
+    /// Writes the page and puts everything in place. Returns the bytes written, without the bytes of the
+    /// scripts.
     fn finish(self, scripts: Scripts) -> Result<u64> {
         match self {
             Self::Folder(folder) => {
@@ -235,7 +264,7 @@ impl Place {
                 Ok(bytes)
             }
             Self::File { file, .. } => {
-                // Before the body, whose content the program makes.
+                // The data stands before the body, whose content the program makes.
                 let (before, program) = PAGE.split_once(DATA).unwrap_or((PAGE, ""));
                 write_whole(file.path(), |page| {
                     page.write_all(before.as_bytes())?;
@@ -251,7 +280,7 @@ impl Place {
     }
 }
 
-/// How every page begins.
+/// Returns the beginning of every page.
 fn head() -> &'static str {
     PAGE.split_once(HEAD_END).map_or(PAGE, |(head, _)| head)
 }
@@ -267,7 +296,7 @@ mod tests {
         {
             let options = ReportOptions { pano_width, thumbs, mesh_faces, ..ReportOptions::default() };
             let e = report("none".as_ref(), "to".as_ref(), &options, &Context::default()).unwrap_err();
-            assert!(matches!(e, Error::Usage(_)) && e.to_string().contains("16 to 2048"), "{e}");
+            assert!(matches!(e, Error::OutOfRange(_)) && e.to_string().contains("16 to 2048"), "{e}");
         }
     }
 }

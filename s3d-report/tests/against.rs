@@ -267,6 +267,9 @@ fn the_same_data_and_those_that_cannot_be_compared() {
         fs::write(other.join(&path), bytes).unwrap();
     }
     let e = report_against(&out, &other, &other.join("report"), &SMALL, &ctx).unwrap_err();
-    assert!(matches!(e, Error::Usage(_)) && e.to_string().contains("in one another"), "{e}");
+    assert!(
+        matches!(e, Error::Dataset(s3d_dataset::Error::Usage(_))) && e.to_string().contains("in one another"),
+        "{e}"
+    );
     assert!(!to.exists() && !other.join("report").exists());
 }

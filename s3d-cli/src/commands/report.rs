@@ -2,9 +2,9 @@
 
 use super::on_threads;
 use crate::args::Threads;
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use clap::{Args, value_parser};
-use s3d_report::ReportOptions;
+use s3d_report::{Error, ReportOptions};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -12,28 +12,28 @@ pub(crate) struct ReportArgs {
     /// The data set's folder. Nothing in it is altered.
     #[arg(value_name = "OUT")]
     pub(crate) dataset: PathBuf,
-    /// Another data set, to be shown beside it where both differ. Nothing in it is altered.
+    /// Another data set to show beside it where both differ. Nothing in it is altered.
     #[arg(long, value_name = "B")]
     pub(crate) against: Option<PathBuf>,
     /// The report's folder, or its file with --single [default: beside OUT: OUT_report]
     #[arg(short, long, value_name = "PATH")]
     pub(crate) output: Option<PathBuf>,
-    /// Width of panoramas in the report, pixels; the data set's own if that is less.
+    /// Width of panoramas in the report, in pixels. Smaller panoramas keep their width.
     #[arg(long, value_name = "PIXELS", default_value_t = 2048,
         value_parser = value_parser!(u32).range(16..=16_384))]
     pub(crate) pano_width: u32,
-    /// Width of views in the report, pixels; their colours are twice as wide where they are shown large.
+    /// Width of views in the report, in pixels. The colours of a large view are twice as wide.
     #[arg(long, value_name = "PIXELS", default_value_t = 256,
         value_parser = value_parser!(u32).range(16..=2048))]
     pub(crate) thumbs: u32,
-    /// Faces of an area's mesh in the report; a larger mesh is simplified.
+    /// The most faces of the mesh of an area in the report. A larger mesh is simplified.
     #[arg(long, value_name = "FACES", default_value_t = 300_000,
         value_parser = value_parser!(u32).range(1000..=10_000_000))]
     pub(crate) mesh_faces: u32,
-    /// Verify the data set as well, every pixel of it, and show what was found.
+    /// Verify every pixel of the data set as well, and show the result.
     #[arg(long)]
     pub(crate) verify: bool,
-    /// Write one file, to be sent or published, instead of a folder; for small data sets.
+    /// Write one file, to send or publish, instead of a folder. For small data sets.
     #[arg(long)]
     pub(crate) single: bool,
     /// Replace an earlier report.
@@ -57,15 +57,27 @@ pub(crate) fn run(args: ReportArgs) -> Outcome<()> {
         threads,
     } = args;
     let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
-    on_threads(threads, |context| {
+    let made = on_threads(threads, |context| {
         let to = output.map_or_else(
             || s3d_dataset::beside(&dataset, if single { "_report.html" } else { "_report" }),
             Ok,
         )?;
-        match against {
+        Ok(match against {
             Some(other) => s3d_report::report_against(&dataset, &other, &to, &options, context),
             None => s3d_report::report(&dataset, &to, &options, context),
+        })
+    })?;
+    made.map(drop).map_err(failure)
+}
+
+/// Says an error of the report in the words of the command line.
+fn failure(error: Error) -> Failure {
+    match error {
+        Error::Dataset(error) => error.into(),
+        Error::Occupied(_) => Failure::Usage(format!("{error} with -o")),
+        Error::TooLarge(_) => {
+            Failure::Usage(format!("{error}: leave --single out, or use --pano-width and --thumbs"))
         }
-        .map(drop)
-    })
+        error => Failure::Usage(error.to_string()),
+    }
 }

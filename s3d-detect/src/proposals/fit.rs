@@ -1,4 +1,4 @@
-//! Boxes fitted to the points in a window, since a window is exact to a step alone.
+//! Fits boxes to the points in a window, since a window is exact to one step only.
 
 use crate::boxes::iou_1d;
 use crate::surfel::Surfel;
@@ -11,19 +11,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
-    /// It stays.
+    /// It stays as it is.
     Window,
     /// The shortest interval that holds this share of the surfels.
     Share(f32),
-    /// As long as things of its size are, where it holds most surfels: walls, floors, what is thin.
+    /// An interval as long as things of its size, where it holds most surfels: walls, floors and other thin
+    /// things.
     Densest,
-    /// The longest run without a gap: what has a distance to its neighbours.
+    /// The longest run without a gap: things at a distance from their neighbours.
     Run,
-    /// What lies before the plane around the window, off it by at most so many metres: boards on walls.
+    /// The layer before the plane around the window, up to this distance in metres: boards on walls.
     Front(f32),
 }
 
-/// What is tried.
+/// The fits that [`learn`] tries.
 pub const FITS: [Fit; 10] = [
     Fit::Share(1.0),
     Fit::Share(0.98),
@@ -39,23 +40,25 @@ pub const FITS: [Fit; 10] = [
 
 /// How far beyond a window its surfels may lie, in metres.
 const BEYOND_M: f32 = 0.05;
-/// Bins in which surfels are counted, in metres.
+/// The width of the bins that count surfels, in metres.
 const BIN_M: f32 = 0.01;
-/// Surfels on a thin thing lie so near to its middle, in metres.
+/// Surfels on a thin thing are at most this far from its middle, in metres.
 const THIN_M: f32 = 0.025;
-/// A run goes on over gaps up to this, in bins: less than the width of a surfel's cell.
+/// The longest gap in a run, in bins: less than the width of the cell of a surfel.
 const GAP_BINS: usize = 4;
-/// A plane before which something may lie is looked for so far around the window, in metres.
+/// How far around the window to look for the plane of [`Fit::Front`], in metres.
 const AROUND_M: f32 = 0.2;
-/// What is nearer to a plane than this, in metres, is of it.
+/// Surfels nearer to a plane than this, in metres, belong to it.
 const OF_PLANE_M: f32 = 0.01;
 
-/// The box of a window's surfels. Axes that are [`Fit::Densest`] or [`Fit::Front`] come first, and the
-/// surfels outside of their interval do not count for the others. `None` if the window holds no surfel, or no plane.
+/// Fits a box to the surfels in a window, in the frame of the space, in metres. [`Fit::Densest`] axes come
+/// first, then [`Fit::Front`] axes; surfels outside of their intervals do not count for the other axes.
+/// Returns `None` if the window holds no surfel, or no plane.
 pub fn fit(index: &Index, window: &Aabb, size: Vec3, fits: [Fit; 3]) -> Option<Aabb> {
     let grown = Aabb { min: window.min - BEYOND_M, max: window.max + BEYOND_M };
     let mut surfels: Vec<&Surfel> = index.within(&grown).collect();
     let mut out = *window;
+
     for (axis, how) in fits.into_iter().enumerate() {
         if how == Fit::Densest {
             let [low, high] = densest(&surfels, &grown, axis, size[axis])?;
@@ -64,6 +67,7 @@ pub fn fit(index: &Index, window: &Aabb, size: Vec3, fits: [Fit; 3]) -> Option<A
             surfels.retain(|s| s.position[axis] >= low - slack && s.position[axis] <= high + slack);
         }
     }
+
     for (axis, how) in fits.into_iter().enumerate() {
         if let Fit::Front(layer) = how {
             let [low, high] = front(index, &surfels, &grown, axis, layer)?;
@@ -71,6 +75,7 @@ pub fn fit(index: &Index, window: &Aabb, size: Vec3, fits: [Fit; 3]) -> Option<A
             surfels.retain(|s| s.position[axis] >= low && s.position[axis] <= high);
         }
     }
+
     for (axis, how) in fits.into_iter().enumerate() {
         let [low, high] = match how {
             Fit::Share(share) => shortest(&surfels, &grown, axis, share)?,
@@ -79,9 +84,11 @@ pub fn fit(index: &Index, window: &Aabb, size: Vec3, fits: [Fit; 3]) -> Option<A
         };
         (out.min[axis], out.max[axis]) = (low, high);
     }
+
     if surfels.is_empty() { None } else { Some(out) }
 }
 
+/// Counts the surfels along an axis.
 fn histogram(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Vec<u32> {
     let bin = |x: f32| ((x - grown.min[axis]) / BIN_M).max(0.0) as usize;
     let mut counts = vec![0; bin(grown.max[axis]) + 1];
@@ -89,30 +96,37 @@ fn histogram(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Vec<u32> {
     counts
 }
 
-/// The interval of a length in which most surfels lie, about their mean.
-fn densest(surfels: &[&Surfel], grown: &Aabb, axis: usize, length: f32) -> Option<[f32; 2]> {
-    let counts = histogram(surfels, grown, axis);
-    let bins = ((length / BIN_M).ceil() as usize).clamp(1, counts.len());
-    let mut inside: u32 = counts[..bins].iter().sum();
-    let (mut most, mut best) = (inside, 0);
-    for start in 1..=counts.len() - bins {
-        inside = inside + counts[start + bins - 1] - counts[start - 1];
-        if inside > most {
-            (most, best) = (inside, start);
-        }
-    }
-    // A plane may lie on the border of two bins.
-    let low = grown.min[axis] + (best as f32 - 0.5) * BIN_M;
-    let high = low + (bins + 1) as f32 * BIN_M;
+/// Returns the ends of the surfels whose positions are in an interval along an axis; `None` if there are
+/// none.
+fn ends_within(surfels: &[&Surfel], axis: usize, [low, high]: [f32; 2]) -> Option<[f32; 2]> {
     let within = surfels
         .iter()
         .filter(|s| s.position[axis] >= low && s.position[axis] <= high);
     let ends = within.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
-    if ends.is_empty() {
-        return None;
+    (!ends.is_empty()).then(|| [ends.min[axis], ends.max[axis]])
+}
+
+/// Returns the interval of a length that holds most surfels, about their mean.
+fn densest(surfels: &[&Surfel], grown: &Aabb, axis: usize, length: f32) -> Option<[f32; 2]> {
+    let counts = histogram(surfels, grown, axis);
+    let bins = ((length / BIN_M).ceil() as usize).clamp(1, counts.len());
+    let mut inside: u32 = counts[..bins].iter().sum();
+    let mut most = inside;
+    let mut best = 0;
+    for start in 1..=counts.len() - bins {
+        inside = inside + counts[start + bins - 1] - counts[start - 1];
+        if inside > most {
+            most = inside;
+            best = start;
+        }
     }
-    let thin = length <= 2.0 * THIN_M;
-    let middle = if thin {
+
+    // A plane may lie on the border of two bins.
+    let low = grown.min[axis] + (best as f32 - 0.5) * BIN_M;
+    let high = low + (bins + 1) as f32 * BIN_M;
+    let [first, last] = ends_within(surfels, axis, [low, high])?;
+    let is_thin = length <= 2.0 * THIN_M;
+    let middle = if is_thin {
         let near: Vec<f64> = surfels
             .iter()
             .map(|s| s.position[axis])
@@ -121,16 +135,18 @@ fn densest(surfels: &[&Surfel], grown: &Aabb, axis: usize, length: f32) -> Optio
             .collect();
         (near.iter().sum::<f64>() / near.len() as f64) as f32
     } else {
-        0.5 * (ends.min[axis] + ends.max[axis])
+        0.5 * (first + last)
     };
     Some([middle - 0.5 * length, middle + 0.5 * length])
 }
 
-/// The shortest interval that holds a share of the surfels, to the ends of what they stand for.
+/// Returns the shortest interval that holds a share of the surfels, up to the ends of their extents.
 fn shortest(surfels: &[&Surfel], grown: &Aabb, axis: usize, share: f32) -> Option<[f32; 2]> {
     let counts = histogram(surfels, grown, axis);
     let wanted = (share * surfels.len() as f32).ceil().max(1.0) as u32;
-    let (mut inside, mut start) = (0, 0);
+
+    let mut inside = 0;
+    let mut start = 0;
     let mut best: Option<[usize; 2]> = None;
     for (end, count) in counts.iter().enumerate() {
         inside += count;
@@ -142,21 +158,15 @@ fn shortest(surfels: &[&Surfel], grown: &Aabb, axis: usize, share: f32) -> Optio
             best = Some([start, end]);
         }
     }
+
     let [start, end] = best?;
-    let (low, high) = (grown.min[axis] + start as f32 * BIN_M, grown.min[axis] + (end + 1) as f32 * BIN_M);
-    let within = surfels
-        .iter()
-        .filter(|s| s.position[axis] >= low && s.position[axis] <= high);
-    let ends = within.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
-    if ends.is_empty() {
-        None
-    } else {
-        Some([ends.min[axis], ends.max[axis]])
-    }
+    let low = grown.min[axis] + start as f32 * BIN_M;
+    let high = grown.min[axis] + (end + 1) as f32 * BIN_M;
+    ends_within(surfels, axis, [low, high])
 }
 
-/// The longest run of bins that surfels reach into, to the ends of what these stand for. Of equal ones the
-/// first.
+/// Returns the longest run of bins that surfels reach into, up to the ends of their extents. The first run
+/// wins a tie.
 fn run(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Option<[f32; 2]> {
     let bin = |x: f32| ((x - grown.min[axis]) / BIN_M).max(0.0) as usize;
     let mut covered = vec![false; bin(grown.max[axis]) + 1];
@@ -164,6 +174,7 @@ fn run(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Option<[f32; 2]> {
         let last = bin(s.extent.max[axis]).min(covered.len() - 1);
         covered[bin(s.extent.min[axis]).min(last)..=last].fill(true);
     }
+
     let mut best: Option<[usize; 2]> = None;
     let mut now: Option<[usize; 2]> = None;
     for at in (0..covered.len()).filter(|&i| covered[i]) {
@@ -175,27 +186,23 @@ fn run(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Option<[f32; 2]> {
             best = now;
         }
     }
+
     let [start, end] = best?;
-    let (low, high) = (grown.min[axis] + start as f32 * BIN_M, grown.min[axis] + (end + 1) as f32 * BIN_M);
-    let within = surfels
-        .iter()
-        .filter(|s| s.position[axis] >= low && s.position[axis] <= high);
-    let ends = within.fold(Aabb::EMPTY, |b, s| b.union(s.extent));
-    if ends.is_empty() {
-        None
-    } else {
-        Some([ends.min[axis], ends.max[axis]])
-    }
+    let low = grown.min[axis] + start as f32 * BIN_M;
+    let high = grown.min[axis] + (end + 1) as f32 * BIN_M;
+    ends_within(surfels, axis, [low, high])
 }
 
-/// The interval from a plane's near side to the end of what lies before it, at most `layer` off it. The plane
-/// is the densest of the surfels around the window, and before it is where most of the window's surfels lie.
+/// Returns the interval from the near side of a plane to the end of the surfels before it, at most `layer`
+/// metres from it. The plane is the densest one of the surfels around the window. Before it is the side with
+/// most of the surfels in the window.
 fn front(index: &Index, surfels: &[&Surfel], grown: &Aabb, axis: usize, layer: f32) -> Option<[f32; 2]> {
     let mut wide = Aabb { min: grown.min - AROUND_M, max: grown.max + AROUND_M };
     (wide.min[axis], wide.max[axis]) = (grown.min[axis], grown.max[axis]);
     let around: Vec<&Surfel> = index.within(&wide).filter(|s| !grown.contains(s.position)).collect();
     let [low, high] = densest(&around, &wide, axis, OF_PLANE_M)?;
     let plane = 0.5 * (low + high);
+
     let off = |s: &&&Surfel| {
         let off = s.position[axis] - plane;
         (OF_PLANE_M..=layer).contains(&off.abs()).then_some(off)
@@ -211,6 +218,7 @@ fn front(index: &Index, surfels: &[&Surfel], grown: &Aabb, axis: usize, layer: f
     if above == 0 || ends.is_empty() {
         return None;
     }
+
     Some(if above > 0 {
         [plane + OF_PLANE_M, ends.max[axis].min(plane + layer)]
     } else {
@@ -218,9 +226,9 @@ fn front(index: &Index, surfels: &[&Surfel], grown: &Aabb, axis: usize, layer: f
     })
 }
 
-/// For each axis what brings windows nearest to the boxes that they are for, by mean overlap on that axis:
-/// axes that are best fitted by [`Fit::Densest`] or [`Fit::Front`] are found first. `examples` have an index,
-/// a window and a box each.
+/// Returns the fit of each axis that brings windows nearest to their true boxes, by the mean overlap along
+/// this axis. Each axis is chosen twice, so that the second time knows the others. `examples` have an index,
+/// a window and a true box each.
 pub fn learn(examples: &[(&Index, Aabb, Aabb)], size: Vec3) -> [Fit; 3] {
     let mut fits = [Fit::Share(1.0); 3];
     for _ in 0..2 {
@@ -251,7 +259,7 @@ mod tests {
     use super::*;
     use glam::vec3;
 
-    /// A wall at y = 1 with a floor before it and a box on the floor.
+    /// Makes a wall at y = 1 with a floor before it.
     fn room() -> Index {
         let mut surfels = Vec::new();
         let mut add = |position: Vec3| {
@@ -277,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thin_thing_is_found_where_its_points_are() {
+    fn fits_find_thin_things_boards_and_runs() {
         let window = Aabb { min: vec3(0.0, 0.85, 0.0), max: vec3(4.0, 1.05, 2.5) };
         let truth = Aabb { min: vec3(0.0, 0.995, 0.0), max: vec3(4.0, 1.005, 2.5) };
         let size = truth.size();
@@ -286,7 +294,8 @@ mod tests {
         assert_eq!(fits[1], Fit::Densest);
         let found = fit(&index, &window, size, fits).unwrap();
         assert!(crate::boxes::iou(&found, &truth) > 0.9, "{found:?}");
-        // With a board of 2.5 cm, 1 cm off the wall, whose edges are not seen: its back is told by the wall.
+
+        // A board of 2.5 cm, 1 cm off the wall, whose edges are not seen: the wall tells where its back is.
         let mut surfels = index.surfels().to_vec();
         let is_hidden = |p: Vec3| p.y > 0.99 && (1.0..3.0).contains(&p.x) && (1.0..2.0).contains(&p.z);
         let hidden: Vec<Surfel> = surfels.iter().filter(|s| is_hidden(s.position)).copied().collect();
@@ -303,7 +312,8 @@ mod tests {
         assert!(matches!(fits[1], Fit::Front(_)), "{fits:?}");
         let found = fit(&index, &window, truth.size(), fits).unwrap();
         assert!(crate::boxes::iou(&found, &truth) > 0.85, "{found:?} {fits:?}");
-        // A run ends where there is a gap.
+
+        // A run ends at a gap.
         let line = |x: f32| {
             index
                 .surfels()
@@ -313,6 +323,7 @@ mod tests {
         let some: Vec<&Surfel> = [0.1, 0.15, 0.2, 0.4, 0.45].into_iter().filter_map(line).collect();
         let found = run(&some, &Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 0).unwrap();
         assert!((found[1] - found[0] - 0.14).abs() < 0.02 && found[1] < 0.3, "{found:?}");
+
         let nowhere = Aabb { min: vec3(8.0, 8.0, 8.0), max: vec3(9.0, 9.0, 9.0) };
         assert_eq!(fit(&index, &nowhere, size, fits), None);
         assert_eq!(fit(&index, &nowhere, size, [Fit::Window; 3]), None);

@@ -1,9 +1,10 @@
-//! Boxes that may hold an element: windows of learnt sizes slide over a space in steps of 0.1 m, a linear
-//! machine a size scores all of them from [summed volumes](crate::surfel::volume), and the best are
-//! [fitted](fit) to their points.
+//! Proposes boxes that may hold an element.
 //!
-//! The sizes and the step are the paper's; the score, without which all of some millions of windows a space
-//! would have to be described, and the fit are ours.
+//! Windows of learnt sizes slide over a space in steps of 0.1 m. A linear machine for each size scores all of
+//! them from [summed volumes](crate::surfel::volume), and the best are [fitted](fit) to their points.
+//!
+//! The paper has the sizes and the step. The score and the fit are ours: without a score, the features of
+//! millions of windows would be needed in each space.
 
 pub mod fit;
 pub mod sizes;
@@ -11,6 +12,7 @@ pub mod windows;
 
 use crate::area::CLASSES;
 use crate::boxes::{iou, suppress};
+use crate::error::Result;
 use crate::space::Space;
 use crate::surfel::volume::Volumes;
 use crate::svm::sparse::SparseRows;
@@ -20,13 +22,13 @@ use glam::{Vec3, ivec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use s3d_dataset::{Context, Result};
+use s3d_dataset::Context;
 use s3d_geom::Aabb;
 use serde::{Deserialize, Serialize};
 use sizes::cluster_sizes;
 use windows::{WINDOW_FEATURES, Window, best_windows, reach, window_cells, window_features};
 
-/// A space with what it is searched by.
+/// A space that is ready to be searched.
 #[derive(Clone, Debug)]
 pub struct Prepared<'a> {
     /// The space.
@@ -41,7 +43,7 @@ impl<'a> Prepared<'a> {
         Self { space, volumes: Volumes::new(space.index.surfels(), space.frame.extent) }
     }
 
-    /// The boxes of a class.
+    /// Returns the true boxes of a class.
     pub fn truth(&self, class: usize) -> impl Iterator<Item = &Aabb> {
         self.space
             .elements
@@ -51,64 +53,68 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// A box that may hold an element of a class, in the space's frame.
+/// A box that may hold an element of a class, in the frame of the space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proposal {
-    /// The place of the class in [`CLASSES`].
+    /// The index of the class in [`CLASSES`].
     pub class: usize,
     /// The fitted box.
     pub bbox: Aabb,
-    /// The window's score.
+    /// The score of the window.
     pub score: f32,
 }
 
 /// Windows of one size for a class.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WindowSize {
-    /// The place of the class in [`CLASSES`].
+    /// The index of the class in [`CLASSES`].
     pub class: usize,
-    /// The size of its elements in metres.
+    /// The size of its elements, in metres.
     pub size_m: [f32; 3],
-    /// How high above the floor windows begin, in metres: least and most.
+    /// The least and the greatest height of the bottom of windows above the floor, in metres.
     pub bottom_m: [f32; 2],
-    /// How windows become boxes.
+    /// How windows become boxes, by axis.
     pub fits: [Fit; 3],
-    /// The score of a window's description.
+    /// Scores the features of a window.
     pub machine: Linear,
 }
 
 /// Proposes boxes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Proposer {
-    /// Windows by class.
+    /// The sizes of windows, by class.
     pub sizes: Vec<WindowSize>,
 }
 
-/// Windows of a size that are looked at further, and proposals of a class, at most, a space.
+/// The most windows of a size that a space keeps.
 const BEST_OF_SIZE: usize = 60;
+/// The most proposals of a class in a space.
 const BEST_OF_CLASS: usize = 150;
-/// Of windows, and then of boxes, that overlap more than this the best stays.
+/// The best stays of windows that overlap by a larger IoU than this.
 const SAME_WINDOW: f64 = 0.7;
+/// The best stays of fitted boxes that overlap by a larger IoU than this.
 const SAME_BOX: f64 = 0.8;
-/// Windows drawn at random to learn from, in all and a space.
+/// The number of windows that are drawn at random as negative examples of a size.
 const NEGATIVES: usize = 3000;
-/// Spaces that are searched for windows that score high and are none; of each so many.
+/// The number of spaces that are searched for hard negative examples: windows that score high and hold
+/// nothing.
 const SEARCHED: usize = 12;
+/// The most hard negative examples of a space.
 const HARD: usize = 30;
-/// Boxes that a fit is learnt from, at most.
+/// The most boxes that a fit is learnt from.
 const FITTED: usize = 40;
-/// Boxes that overlap less than this with all of a class are none of it.
+/// A box is a negative example of a class if its IoU with all elements of the class is smaller than this.
 pub const NEGATIVE_IOU: f64 = 0.3;
-/// Boxes that overlap more than this with one of a class are of it.
+/// A box is a positive example of a class if its IoU with an element of the class is larger than this.
 pub const POSITIVE_IOU: f64 = 0.5;
-/// Windows may begin so far below and above where those of training did, in metres.
+/// The bottoms of windows may lie this far below and above the bottoms of the training boxes, in metres.
 const BOTTOM_SLACK_M: f32 = 0.2;
 
 impl Proposer {
-    /// Learns sizes, fits and scores from annotated spaces, with all threads of the current rayon pool.
+    /// Learns sizes, fits and scores from annotated spaces, on all threads of the current rayon pool.
     ///
     /// # Errors
-    /// [`s3d_dataset::Error::Cancelled`].
+    /// [`Error::Dataset`](crate::Error::Dataset) if the call is cancelled.
     pub fn train(spaces: &[Prepared<'_>], seed: u64, ctx: &Context) -> Result<Self> {
         let mut sizes = Vec::new();
         for class in 0..CLASSES.len() {
@@ -124,6 +130,7 @@ impl Proposer {
                 sizes.push((class, size, members.collect::<Vec<_>>()));
             }
         }
+
         let progress = ctx.progress("learning", "window sizes", sizes.len() as u64);
         let learnt = sizes.par_iter().enumerate().map(|(number, (class, size, members))| {
             ctx.check()?;
@@ -135,7 +142,7 @@ impl Proposer {
         Ok(Self { sizes: learnt.collect::<Result<_>>()? })
     }
 
-    /// The proposals of a space: of each class at most 150, the highest score first.
+    /// Returns the proposals of a space: at most 150 for each class, the highest score first.
     pub fn propose(&self, prepared: &Prepared<'_>) -> Vec<Proposal> {
         let mut out = Vec::new();
         for class in 0..CLASSES.len() {
@@ -145,6 +152,7 @@ impl Proposer {
                 let best = best_windows(&prepared.volumes, &size.machine, cells, size.bottom_m, BEST_OF_SIZE);
                 windows.extend(best.into_iter().map(|(w, score)| (w, score, size)));
             }
+
             let boxes: Vec<Aabb> = windows.iter().map(|(w, _, _)| w.bbox()).collect();
             let scores: Vec<f64> = windows.iter().map(|(_, s, _)| f64::from(*s)).collect();
             let kept = suppress(&boxes, &scores, SAME_WINDOW)
@@ -156,6 +164,7 @@ impl Proposer {
                 Some(Proposal { class, bbox, score })
             });
             let fitted: Vec<Proposal> = fitted.collect();
+
             let boxes: Vec<Aabb> = fitted.iter().map(|p| p.bbox).collect();
             let scores: Vec<f64> = fitted.iter().map(|p| f64::from(p.score)).collect();
             let stay = suppress(&boxes, &scores, SAME_BOX);
@@ -165,7 +174,7 @@ impl Proposer {
     }
 }
 
-/// Learns windows of one size from the boxes of its cluster: a space and a box each.
+/// Learns the windows of one size from the boxes of its cluster. `members` has the space and the box of each.
 fn learn_size(
     spaces: &[Prepared<'_>],
     class: usize,
@@ -179,7 +188,9 @@ fn learn_size(
         bottoms.clone().fold(f32::INFINITY, f32::min) - BOTTOM_SLACK_M,
         bottoms.fold(f32::NEG_INFINITY, f32::max) + BOTTOM_SLACK_M,
     ];
-    let (mut rows, mut positive) = (SparseRows::new(WINDOW_FEATURES), Vec::new());
+
+    let mut rows = SparseRows::new(WINDOW_FEATURES);
+    let mut positive = Vec::new();
     let mut examples = Vec::new();
     for (i, bbox) in members {
         let prepared = &spaces[*i];
@@ -188,11 +199,7 @@ fn learn_size(
         positive.push(true);
         examples.push((&prepared.space.index, window.bbox(), *bbox));
     }
-    let is_none = |prepared: &Prepared<'_>, w: &Window| {
-        prepared
-            .truth(class)
-            .all(|b| iou(&loosened(b), &w.bbox()) < NEGATIVE_IOU)
-    };
+
     for _ in 0..NEGATIVES {
         let prepared = &spaces[rng.random_range(0..spaces.len())];
         let cells = window_cells(size, &prepared.volumes);
@@ -200,29 +207,38 @@ fn learn_size(
         let pick = |axis: usize, rng: &mut ChaCha8Rng| rng.random_range(least[axis]..=most[axis]);
         let corner = ivec3(pick(0, &mut rng), pick(1, &mut rng), pick(2, &mut rng));
         let window = Window { corner, cells };
-        if is_none(prepared, &window) {
+        if is_negative(prepared, class, &window) {
             rows.push(&window_features(&prepared.volumes, &window));
             positive.push(false);
         }
     }
+
     let mut machine = train_windows(&rows, &positive, seed);
     for _ in 0..SEARCHED.min(spaces.len()) {
         let prepared = &spaces[rng.random_range(0..spaces.len())];
         let cells = window_cells(size, &prepared.volumes);
         for (window, _) in best_windows(&prepared.volumes, &machine, cells, bottom_m, HARD) {
-            if is_none(prepared, &window) {
+            if is_negative(prepared, class, &window) {
                 rows.push(&window_features(&prepared.volumes, &window));
                 positive.push(false);
             }
         }
     }
     machine = train_windows(&rows, &positive, seed);
+
     let step = examples.len().div_ceil(FITTED).max(1);
     let some: Vec<_> = examples.into_iter().step_by(step).collect();
     WindowSize { class, size_m: size.to_array(), bottom_m, fits: learn(&some, size), machine }
 }
 
-/// A box that is as thick as a window at least.
+/// Whether a window holds no element of a class.
+fn is_negative(prepared: &Prepared<'_>, class: usize, window: &Window) -> bool {
+    prepared
+        .truth(class)
+        .all(|b| iou(&loosened(b), &window.bbox()) < NEGATIVE_IOU)
+}
+
+/// Grows a box to the thickness of a window.
 fn loosened(b: &Aabb) -> Aabb {
     let grow = (Vec3::splat(0.2) - b.size()).max(Vec3::ZERO) * 0.5;
     Aabb { min: b.min - grow, max: b.max + grow }
@@ -230,7 +246,7 @@ fn loosened(b: &Aabb) -> Aabb {
 
 fn train_windows(rows: &SparseRows, positive: &[bool], seed: u64) -> Linear {
     let count = positive.iter().filter(|p| **p).count().max(1);
-    // Both sides weigh alike.
+    // Positive and negative examples weigh alike.
     let weight = (positive.len() - count) as f64 / count as f64;
     let costs: Vec<f64> = positive
         .iter()

@@ -1,36 +1,38 @@
-//! Sizes of windows: clusters of the sizes of training boxes.
+//! Chooses the sizes of windows: clusters of the sizes of training boxes.
 
 use glam::Vec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Sizes below this, in metres, are alike: windows have a step of 0.1 m.
+/// Lengths below this, in metres, count as equal, since windows have a step of 0.1 m.
 const THIN_M: f32 = 0.05;
-/// So many sizes a class (Armeni et al.): at least, at most.
+/// The least and the greatest number of sizes of a class (Armeni et al.).
 const SIZES: [usize; 2] = [3, 8];
-/// The fewest sizes are taken that cover boxes this well, as a share of what the most would.
+/// The number of sizes is the least that covers this share of what the best number covers.
 const ENOUGH: f64 = 0.97;
+/// The number of rounds of k-means.
 const ROUNDS: usize = 30;
 
 fn log_size(size: Vec3) -> Vec3 {
     Vec3::from(size.max(Vec3::splat(THIN_M)).to_array().map(libm::logf))
 }
 
-/// How well a size covers another: IoU of the two about one centre, thin sides taken as [`THIN_M`].
+/// Returns how well a size covers another: the IoU of both about one centre. Thin sides count as [`THIN_M`].
 fn cover(a: Vec3, b: Vec3) -> f64 {
-    let (a, b) = (a.max(Vec3::splat(THIN_M)).as_dvec3(), b.max(Vec3::splat(THIN_M)).as_dvec3());
+    let [a, b] = [a, b].map(|size| size.max(Vec3::splat(THIN_M)).as_dvec3());
     let shared = a.min(b).element_product();
     shared / (a.element_product() + b.element_product() - shared)
 }
 
-/// Clusters sizes by k-means on their logarithms, begun as k-means++ does (Arthur and Vassilvitskii, 2007): 3
-/// to 8 of them, fewer if there are not as many boxes. Gives each cluster's median and the cluster of each
+/// Clusters sizes by k-means on their logarithms, with the start of k-means++ (Arthur and Vassilvitskii,
+/// 2007). Returns the medians of 3 to 8 clusters, or fewer if there are fewer boxes, and the cluster of each
 /// box.
 pub fn cluster_sizes(sizes: &[Vec3], seed: u64) -> (Vec<Vec3>, Vec<usize>) {
     let all: Vec<_> = (SIZES[0]..=SIZES[1]).map(|k| k_means(sizes, k, seed)).collect();
     let covered = |(centers, of): &(Vec<Vec3>, Vec<usize>)| {
         sizes.iter().zip(of).map(|(s, &c)| cover(*s, centers[c])).sum::<f64>()
     };
+
     let most = all.iter().map(covered).fold(0.0, f64::max);
     all.into_iter()
         .find(|clusters| covered(clusters) >= ENOUGH * most)
@@ -39,6 +41,36 @@ pub fn cluster_sizes(sizes: &[Vec3], seed: u64) -> (Vec<Vec3>, Vec<usize>) {
 
 fn k_means(sizes: &[Vec3], k: usize, seed: u64) -> (Vec<Vec3>, Vec<usize>) {
     let points: Vec<Vec3> = sizes.iter().map(|s| log_size(*s)).collect();
+    let mut centers = first_centers(&points, k, seed);
+
+    let mut of = vec![0; points.len()];
+    for _ in 0..ROUNDS {
+        for (p, of) in points.iter().zip(&mut of) {
+            *of = nearest(&centers, *p);
+        }
+        for (c, center) in centers.iter_mut().enumerate() {
+            let members = members_of(c, &points, &of);
+            if !members.is_empty() {
+                *center = members.iter().sum::<Vec3>() / members.len() as f32;
+            }
+        }
+    }
+
+    let medians = (0..centers.len()).map(|c| {
+        let members = members_of(c, sizes, &of);
+        let median = |axis: usize| {
+            let mut values: Vec<f32> = members.iter().map(|s| s[axis]).collect();
+            values.sort_by(f32::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(THIN_M)
+        };
+        Vec3::new(median(0), median(1), median(2))
+    });
+    (medians.collect(), of)
+}
+
+/// Draws the first centres among the points, each with a probability that grows with its distance to the
+/// others.
+fn first_centers(points: &[Vec3], k: usize, seed: u64) -> Vec<Vec3> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut centers: Vec<Vec3> = Vec::new();
     while centers.len() < k.min(points.len()) {
@@ -53,6 +85,7 @@ fn k_means(sizes: &[Vec3], k: usize, seed: u64) -> (Vec<Vec3>, Vec<usize>) {
         if total <= 0.0 {
             break;
         }
+
         let mut rest = rng.random::<f64>() * total;
         let next = weights.iter().position(|w| {
             rest -= w;
@@ -60,40 +93,16 @@ fn k_means(sizes: &[Vec3], k: usize, seed: u64) -> (Vec<Vec3>, Vec<usize>) {
         });
         centers.push(points[next.unwrap_or(points.len() - 1)]);
     }
-    let mut of = vec![0; points.len()];
-    for _ in 0..ROUNDS {
-        for (p, of) in points.iter().zip(&mut of) {
-            *of = nearest(&centers, *p);
-        }
-        for (c, center) in centers.iter_mut().enumerate() {
-            let members: Vec<Vec3> = points
-                .iter()
-                .zip(&of)
-                .filter(|(_, o)| **o == c)
-                .map(|(p, _)| *p)
-                .collect();
-            if !members.is_empty() {
-                *center = members.iter().sum::<Vec3>() / members.len() as f32;
-            }
-        }
-    }
-    let medians = (0..centers.len()).map(|c| {
-        let members: Vec<Vec3> = sizes
-            .iter()
-            .zip(&of)
-            .filter(|(_, o)| **o == c)
-            .map(|(s, _)| *s)
-            .collect();
-        let median = |axis: usize| {
-            let mut values: Vec<f32> = members.iter().map(|s| s[axis]).collect();
-            values.sort_by(f32::total_cmp);
-            values.get(values.len() / 2).copied().unwrap_or(THIN_M)
-        };
-        Vec3::new(median(0), median(1), median(2))
-    });
-    (medians.collect(), of)
+    centers
 }
 
+/// Returns the points of a cluster; `of` has the cluster of each point.
+fn members_of(cluster: usize, points: &[Vec3], of: &[usize]) -> Vec<Vec3> {
+    let members = points.iter().zip(of).filter(|(_, o)| **o == cluster);
+    members.map(|(p, _)| *p).collect()
+}
+
+/// Returns the index of the centre nearest to a point; the first wins a tie.
 fn nearest(centers: &[Vec3], p: Vec3) -> usize {
     let distance = |c: usize| centers[c].distance_squared(p);
     (1..centers.len()).fold(0, |best, c| if distance(c) < distance(best) { c } else { best })

@@ -1,33 +1,33 @@
-//! Planes in which walls stand, from density histograms.
+//! Finds the planes of walls in density histograms.
 
 use crate::surfel::{CELL_M, Surfel};
 
-/// Width of a histogram's bins in metres.
+/// The width of the bins of a histogram, in metres.
 const BIN_M: f32 = 0.025;
-/// Widths of the gaps that filters look for, in bins: 5 to 50 cm.
+/// The widths of the gaps that filters look for, in bins: 5 to 50 cm.
 const GAPS: std::ops::RangeInclusive<usize> = 2..=20;
-/// Width of a peak, in bins.
+/// The width of a peak, in bins.
 const PEAK: usize = 2;
-/// What a filter must answer, in m² of wall.
+/// The least response of a filter, in m² of wall.
 const LEAST_M2: f64 = 2.0;
-/// Of dividers nearer to each other than this, in metres, the stronger one stays.
+/// The stronger one stays of two dividers nearer to each other than this, in metres.
 const APART_M: f32 = 0.12;
 
 /// A plane across an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divider {
-    /// Where it cuts the axis: the middle of the gap, in metres.
+    /// Its place on the axis: the middle of the gap, in metres.
     pub at: f32,
-    /// The gap's width in metres.
+    /// The width of the gap, in metres.
     pub gap: f32,
-    /// What the filter answers, in m².
+    /// The response of the filter, in m².
     pub response: f64,
 }
 
 /// Dividers across x and y, ascending.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Dividers {
-    /// Across x, then across y.
+    /// The dividers across x, then across y.
     pub axes: [Vec<Divider>; 2],
 }
 
@@ -45,13 +45,15 @@ fn dividers_along(axis: usize, surfels: &[Surfel]) -> Vec<Divider> {
     if surfels.is_empty() {
         return Vec::new();
     }
-    // Surfels stand for a cell of surface each; the ends have room for a filter.
+
+    // Each surfel stands for a cell of surface. Both ends have room for a filter.
     let margin = GAPS.end() + PEAK;
     let bin = |x: f32| ((x - ends[0]) / BIN_M) as usize + margin;
     let mut histogram = vec![0.0; bin(ends[1]) + margin + 1];
     for s in surfels {
         histogram[bin(s.position[axis])] += f64::from(CELL_M * CELL_M);
     }
+
     let origin = ends[0] - margin as f32 * BIN_M;
     strongest(&respond(&histogram))
         .into_iter()
@@ -63,9 +65,9 @@ fn dividers_along(axis: usize, surfels: &[Surfel]) -> Vec<Divider> {
         .collect()
 }
 
-/// The filters' answers: for each place, counted in half bins, the widest answer of all gaps and that gap. A
-/// filter answers with the smaller of its two peaks, less the mean density in the gap times a peak's width:
-/// floors and furniture, which are dense everywhere, do not count.
+/// Returns for each place, in half bins, the largest response of all gaps, and this gap. The response of a
+/// filter is the smaller of its two peaks, less the mean density in the gap times the width of a peak: floors
+/// and furniture, which are dense everywhere, do not count.
 fn respond(histogram: &[f64]) -> Vec<(f64, usize)> {
     let mut sums = vec![0.0];
     for value in histogram {
@@ -87,7 +89,7 @@ fn respond(histogram: &[f64]) -> Vec<(f64, usize)> {
     best
 }
 
-/// Places that answer enough, ascending, each the strongest around: (half bins, gap, response).
+/// Returns the places with enough response, ascending, each the strongest around: (half bins, gap, response).
 fn strongest(answers: &[(f64, usize)]) -> Vec<(usize, usize, f64)> {
     let mut order: Vec<usize> = (0..answers.len()).filter(|&i| answers[i].0 >= LEAST_M2).collect();
     order.sort_by(|&a, &b| answers[b].0.total_cmp(&answers[a].0).then(a.cmp(&b)));
@@ -107,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_layers_answer_and_one_layer_does_not() {
+    fn two_layers_are_a_divider_and_one_layer_is_not() {
         let mut histogram = vec![1.0; 100];
         // A wall of two layers, 6 bins apart; a single layer at 70.
         (histogram[28], histogram[29]) = (5.0, 5.0);
@@ -120,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_dividers() {
+    fn no_surfels_have_no_dividers() {
         assert_eq!(find_dividers(&[]), Dividers::default());
     }
 }

@@ -1,17 +1,16 @@
 //! The canonical frame of a space.
 
-use glam::{Vec3, vec2, vec3};
+use glam::{Vec2, Vec3, vec2, vec3};
 use s3d_geom::Aabb;
-use s3d_geom::glam::Vec2;
 
-/// Spaces whose boxes are nearer than this, in metres, are neighbours where they face each other.
+/// The boxes of neighbours are nearer to each other than this, in metres.
 const NEIGHBOUR_M: f32 = 0.7;
-/// … over so many metres.
+/// Neighbours face each other over this length at least, in metres.
 const FACING_M: f32 = 0.8;
 
-/// From the building's axes to those of a space: turned about Z by quarters, so that x runs along the wall of
-/// the entrance and y away from it; the least corner is the origin. Metres; [`Frame::extent`] scales to the
-/// unit cube.
+/// A frame of a space, in metres: the axes of the building, turned about Z by quarters, so that x runs along
+/// the wall of the entrance and y away from it. Its origin is the least corner. [`Frame::extent`] scales to
+/// the unit cube.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     /// Quarter turns to the left, 0 to 3.
@@ -36,37 +35,39 @@ fn turned_box(b: &Aabb, turns: u8) -> Aabb {
 }
 
 impl Frame {
-    /// The frame of a space that fills a box, turned so often.
+    /// Makes the frame of a space that fills a box, turned this many times.
     pub fn new(bounds: &Aabb, turns: u8) -> Self {
         let bounds = turned_box(bounds, turns);
         Self { turns, origin: bounds.min, extent: bounds.size() }
     }
 
-    /// A point of the building in this frame.
+    /// Takes a point of the building to this frame.
     pub fn point(&self, p: Vec3) -> Vec3 {
         turned(p, self.turns) - self.origin
     }
 
-    /// A direction of the building in this frame.
+    /// Takes a direction of the building to this frame.
     pub fn direction(&self, d: Vec3) -> Vec3 {
         turned(d, self.turns)
     }
 
-    /// A box of the building in this frame.
+    /// Takes a box of the building to this frame.
     pub fn to_frame(&self, b: &Aabb) -> Aabb {
         let b = turned_box(b, self.turns);
         Aabb { min: b.min - self.origin, max: b.max - self.origin }
     }
 
-    /// A box of this frame in the building.
+    /// Takes a box of this frame to the building.
     pub fn to_building(&self, b: &Aabb) -> Aabb {
         turned_box(&Aabb { min: b.min + self.origin, max: b.max + self.origin }, 4 - self.turns)
     }
 }
 
-/// The frames of spaces that fill these boxes. The entrance is towards the neighbour with the most
-/// neighbours, which in a building is a hallway; of equal ones the one that faces it longest, then the first.
-/// A space without neighbours has its longer side along x.
+/// Returns the frames of spaces that fill these boxes.
+///
+/// The entrance of a space is towards the neighbour with the most neighbours, which in a building is a
+/// hallway. In a tie the neighbour that faces it over the greatest length wins, then the first. A space
+/// without neighbours has its longer side along x.
 pub fn canonical_frames(bounds: &[Aabb]) -> Vec<Frame> {
     let sides: Vec<Vec<(usize, u8, f32)>> = (0..bounds.len())
         .map(|i| {
@@ -76,6 +77,7 @@ pub fn canonical_frames(bounds: &[Aabb]) -> Vec<Frame> {
                 .collect()
         })
         .collect();
+
     let frame = |(bounds, near): (&Aabb, &Vec<(usize, u8, f32)>)| {
         let entrance = near.iter().reduce(|best, other| {
             let rank = |n: &(usize, u8, f32)| (sides[n.0].len(), n.2);
@@ -87,8 +89,8 @@ pub fn canonical_frames(bounds: &[Aabb]) -> Vec<Frame> {
     bounds.iter().zip(&sides).map(frame).collect()
 }
 
-/// If two boxes are neighbours, the turns that bring `b` before `a` along y, and over how many metres they
-/// face each other.
+/// Returns the turns that bring `b` before `a` along y, and the length over which they face each other, in
+/// metres; `None` if the two boxes are no neighbours.
 fn side(a: &Aabb, b: &Aabb) -> Option<(u8, f32)> {
     let flat = |v: Vec3| vec2(v.x, v.y);
     let gaps: Vec2 = flat(b.min - a.max).max(flat(a.min - b.max));

@@ -1,37 +1,39 @@
-//! Cells between dividers, merged where no wall stands between them.
+//! Merges the cells between dividers where no wall stands between them.
 
 use super::dividers::{Divider, Dividers};
 use crate::surfel::Surfel;
 use s3d_geom::Aabb;
 
-/// The space of surfels that belong to none.
+/// The space of surfels that belong to no space.
 pub const NO_SPACE: u32 = u32::MAX;
 
-/// Spaces have so many surfels at least, 2 m² of surface, and are so long and wide, in metres.
+/// The least number of surfels of a space: 2 m² of surface.
 const LEAST_SURFELS: usize = 800;
+/// The least length and width of a space, in metres.
 const LEAST_M: f32 = 0.6;
-/// Width of the columns in which the face between two cells is looked at, in metres.
+/// The width of the columns that the face between two cells is cut into, in metres.
 const COLUMN_M: f32 = 0.1;
-/// How far wall may lie beyond the edge of the gap, in metres.
+/// How far a wall may lie beyond the edge of the gap, in metres.
 const LAYER_M: f32 = 0.1;
-/// A column has a wall if so many surfels of 5 cm stand in it, on one side: 1.6 m of its two columns of
-/// cells.
+/// A column has a wall if this many surfels stand in it on one side: it holds two columns of cells of 5 cm,
+/// so that these are 1.6 m of height.
 const WALL_SURFELS: u32 = 64;
-/// Ceilings lie so high above the floor, and doors end below, in metres.
+/// Ceilings lie above this height over the floor, and doors end below it, in metres.
 const OVERHEAD_M: f32 = 2.2;
-/// Neighbours merge if so many columns between them are open, and at least this share of them.
+/// Neighbours merge if this many columns between them are open, and this share of the columns that tell.
 const OPEN_COLUMNS: usize = 4;
 const OPEN_SHARE: f64 = 0.4;
 
-/// What is seen of one column of a face.
+/// One column of a face.
 #[derive(Clone, Copy, Default)]
 struct Column {
+    /// The surfels of walls before and behind the divider.
     walls: [u32; 2],
     /// Whether the ceiling goes through.
     passes: bool,
 }
 
-/// The space of each surfel, and how many spaces there are. Spaces are numbered by their first cell: by y,
+/// Returns the space of each surfel, and the number of spaces. Spaces are numbered by their first cell: by y,
 /// then by x.
 pub fn merge_cells(surfels: &[Surfel], dividers: &Dividers) -> (Vec<u32>, u32) {
     let place = |axis: usize, x: f32| dividers.axes[axis].partition_point(|d| d.at <= x);
@@ -41,6 +43,8 @@ pub fn merge_cells(surfels: &[Surfel], dividers: &Dividers) -> (Vec<u32>, u32) {
     let cells: Vec<usize> = surfels.iter().map(cell_of).collect();
     let mut counts = vec![0usize; width * height];
     cells.iter().for_each(|&c| counts[c] += 1);
+
+    // Cells on both sides of an open face are one group.
     let mut groups = Groups::new(width * height);
     for axis in 0..2 {
         for (number, divider) in dividers.axes[axis].iter().enumerate() {
@@ -57,6 +61,7 @@ pub fn merge_cells(surfels: &[Surfel], dividers: &Dividers) -> (Vec<u32>, u32) {
             }
         }
     }
+
     let group_of_cell: Vec<usize> = (0..counts.len()).map(|cell| groups.of(cell)).collect();
     let mut found: Vec<(usize, Aabb)> = vec![(0, Aabb::EMPTY); counts.len()];
     for (surfel, &cell) in surfels.iter().zip(&cells) {
@@ -64,20 +69,27 @@ pub fn merge_cells(surfels: &[Surfel], dividers: &Dividers) -> (Vec<u32>, u32) {
         *size += 1;
         *bounds = bounds.with(surfel.position);
     }
+
     let (numbers, count) = number_spaces(&found);
     (cells.into_iter().map(|cell| numbers[group_of_cell[cell]]).collect(), count)
 }
 
-/// Numbers groups that are large enough for a space; others get the number of the one that they lie at, such
-/// as the panes of a room's windows. A group's size and box; those without surfels get none.
+/// Whether a group of this size and box is large enough for a space.
+fn is_space((size, b): &(usize, Aabb)) -> bool {
+    *size >= LEAST_SURFELS && b.size().truncate().min_element() >= LEAST_M
+}
+
+/// Numbers the groups that are large enough for a space. A smaller group, such as the panes of a window, gets
+/// the number of the space beside it. A group without surfels gets [`NO_SPACE`]. `groups` has the size and
+/// the box of each.
 fn number_spaces(groups: &[(usize, Aabb)]) -> (Vec<u32>, u32) {
-    let is_space =
-        |(size, b): &(usize, Aabb)| *size >= LEAST_SURFELS && b.size().truncate().min_element() >= LEAST_M;
-    let (mut numbers, mut count) = (vec![NO_SPACE; groups.len()], 0);
+    let mut numbers = vec![NO_SPACE; groups.len()];
+    let mut count = 0;
     for (number, _) in numbers.iter_mut().zip(groups).filter(|(_, g)| is_space(g)) {
         *number = count;
         count += 1;
     }
+
     for (i, (_, b)) in groups.iter().enumerate().filter(|(_, g)| g.0 > 0 && !is_space(g)) {
         let gap = |other: &Aabb| {
             let apart = (b.min - other.max).max(other.min - b.max).truncate();
@@ -97,17 +109,19 @@ fn number_spaces(groups: &[(usize, Aabb)]) -> (Vec<u32>, u32) {
     (numbers, count)
 }
 
-/// The columns of every face in a divider's plane, by the place across it.
+/// Returns the columns of each face in the plane of a divider, in the order of the cuts across it.
 fn faces(axis: usize, divider: &Divider, surfels: &[Surfel], dividers: &Dividers) -> Vec<Vec<Column>> {
     let cuts = &dividers.axes[1 - axis];
     let mut faces: Vec<(f32, Vec<Column>)> = Vec::new();
     let near = surfels
         .iter()
         .filter(|s| (s.position[axis] - divider.at).abs() <= 0.5 * divider.gap + LAYER_M);
+
     let least = near.clone().map(|s| s.position[1 - axis]).fold(f32::INFINITY, f32::min);
     let overhead = near.clone().map(|s| s.position.z).fold(f32::INFINITY, f32::min) + OVERHEAD_M;
     faces.push((least, Vec::new()));
     faces.extend(cuts.iter().map(|cut| (cut.at, Vec::new())));
+
     for s in near {
         let across = s.position[1 - axis];
         let (start, columns) = &mut faces[cuts.partition_point(|d| d.at <= across)];
@@ -115,6 +129,7 @@ fn faces(axis: usize, divider: &Divider, surfels: &[Surfel], dividers: &Dividers
         if columns.len() <= place {
             columns.resize(place + 1, Column::default());
         }
+
         let beside = s.position[axis] - divider.at;
         if s.normal[axis].abs() > 0.7 {
             columns[place].walls[usize::from(beside > 0.0)] += 1;
@@ -128,7 +143,7 @@ fn faces(axis: usize, divider: &Divider, surfels: &[Surfel], dividers: &Dividers
     faces.into_iter().map(|(_, columns)| columns).collect()
 }
 
-/// Whether the ceiling goes through in enough columns: it does not through doors, and does above bookcases.
+/// Whether the ceiling goes through in enough columns. It does above bookcases, and does not above doors.
 fn is_open(columns: &[Column]) -> bool {
     let is_wall = |c: &&Column| !c.passes && c.walls.into_iter().max() >= Some(WALL_SURFELS);
     let walls = columns.iter().filter(is_wall).count();
@@ -136,7 +151,7 @@ fn is_open(columns: &[Column]) -> bool {
     open >= OPEN_COLUMNS && open as f64 >= OPEN_SHARE * (open + walls) as f64
 }
 
-/// The transitive closure of mergers: a forest, whose roots are the least of their group.
+/// The transitive closure of mergers: a forest whose roots are the least members of their groups.
 struct Groups(Vec<usize>);
 
 impl Groups {
@@ -165,7 +180,7 @@ mod tests {
     use glam::{Vec3, vec3};
 
     #[test]
-    fn groups_are_what_is_connected() {
+    fn connected_cells_are_one_group() {
         let mut groups = Groups::new(6);
         groups.join(4, 2);
         groups.join(5, 4);
@@ -174,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn slivers_belong_to_the_space_that_they_lie_at() {
+    fn slivers_belong_to_the_space_beside_them() {
         let group = |size, x: [f32; 2]| (size, Aabb { min: vec3(x[0], 0.0, 0.0), max: vec3(x[1], 3.0, 2.0) });
         let none = (0, Aabb::EMPTY);
         let groups = [
@@ -185,11 +200,11 @@ mod tests {
             group(900, [9.0, 9.1]),
         ];
         let (numbers, count) = number_spaces(&groups);
-        // One that is as near to two belongs to the larger; one that is far from all to none.
+        // A sliver between two spaces belongs to the larger one, a sliver far from all belongs to none.
         assert_eq!((numbers, count), (vec![NO_SPACE, 0, 1, 1, NO_SPACE], 2));
     }
 
-    /// Two rooms, a wall of 15 cm between them with a door of 0.9 m, and floors and ceilings.
+    /// Makes two rooms with floors and ceilings. A wall of 15 cm is between them, with a door of 0.9 m.
     fn two_rooms(wall: bool) -> Vec<Surfel> {
         let mut surfels = Vec::new();
         let mut add = |position: Vec3, normal: Vec3| {
@@ -199,7 +214,7 @@ mod tests {
         let at = |i: usize| 0.025 + 0.05 * i as f32;
         for (i, j) in (0..160).flat_map(|i| (0..80).map(move |j| (i, j))) {
             // The wall is x = 4 to 4.15; the door is y = 1 to 1.9.
-            let (x, y) = (at(i), at(j));
+            let [x, y] = [i, j].map(at);
             let in_wall = wall && (4.0..4.15).contains(&x);
             let in_door = (1.0..1.9).contains(&y);
             if !in_wall || in_door {
@@ -210,7 +225,7 @@ mod tests {
             }
         }
         for (j, k) in (0..80).flat_map(|j| (0..52).map(move |k| (j, k))) {
-            let (y, z) = (at(j), at(k));
+            let [y, z] = [j, k].map(at);
             if wall && (!(1.0..1.9).contains(&y) || z > 2.1) {
                 add(vec3(3.995, y, z), Vec3::X);
                 add(vec3(4.155, y, z), Vec3::X);
@@ -220,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_with_a_door_parts_rooms() {
+    fn a_wall_with_a_door_separates_rooms() {
         let dividers = find_dividers(&two_rooms(true));
         assert_eq!((dividers.axes[0].len(), dividers.axes[1].len()), (1, 0));
         assert!((dividers.axes[0][0].at - 4.075).abs() < 0.03, "{dividers:?}");

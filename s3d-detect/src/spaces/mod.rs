@@ -1,12 +1,12 @@
-//! The spaces of an area — rooms, hallways — without training, after Armeni et al., "3D Semantic Parsing of
-//! Large-Scale Indoor Spaces" (CVPR 2016), section 3.
+//! Parses an area into spaces, such as rooms and hallways, without training: Armeni et al., "3D Semantic
+//! Parsing of Large-Scale Indoor Spaces" (CVPR 2016), section 3.
 //!
-//! A wall between two spaces is two dense layers of points with a gap between them: a peak, a gap and a peak
-//! in the density of points along the axis that it stands across. [Dividers](dividers) found so cut the area
-//! in cells; neighbouring cells with no wall where they touch are [merged](merge), and what is connected by
-//! mergers is a space. Each gets a [canonical frame](frame).
+//! A wall between two spaces is two dense layers of points with a gap between them. Along the axis across the
+//! wall, the density of points has a peak, a gap and a peak. [Dividers](dividers) found this way cut the area
+//! into cells. Neighbouring cells are [merged](merge) if no wall stands where they touch, and cells that are
+//! connected by mergers make a space. Each space gets a [canonical frame](frame).
 //!
-//! Widths, thresholds and the rule for an entrance are not public, and ours.
+//! The paper does not publish the widths, the thresholds and the rule for an entrance: they are ours.
 
 pub mod dividers;
 pub mod frame;
@@ -17,10 +17,11 @@ use crate::surfel::Surfel;
 use dividers::{Dividers, find_dividers};
 use merge::{NO_SPACE, merge_cells};
 
-/// The angle by which the building's walls are turned against the axes, in degrees, −45 to 45: the mean
-/// direction of upright surfaces, four times round a circle. 0 where there are none.
+/// Returns the angle of the building's walls to the axes, in degrees, −45 to 45. It is the mean direction
+/// of upright surfaces, modulo a quarter turn; 0 if there are none.
 pub fn building_angle_deg(surfels: &[Surfel]) -> f64 {
-    let (mut sine, mut cosine) = (0.0, 0.0);
+    let mut sine = 0.0;
+    let mut cosine = 0.0;
     for s in surfels.iter().filter(|s| s.normal.z.abs() < 0.3) {
         let angle = 4.0 * libm::atan2(f64::from(s.normal.y), f64::from(s.normal.x));
         sine += libm::sin(angle);
@@ -33,18 +34,18 @@ pub fn building_angle_deg(surfels: &[Surfel]) -> f64 {
     }
 }
 
-/// The spaces of an area, in whose axes its walls stand.
+/// The spaces of an area whose walls are parallel to the axes.
 #[derive(Clone, Debug)]
 pub struct Spaces {
-    /// Where walls are.
+    /// The planes of the walls.
     pub dividers: Dividers,
-    /// The space of each surfel; [`NO_SPACE`] for those of cells too small to be one.
+    /// The space of each surfel; [`NO_SPACE`] in cells too small to be a space.
     pub of_surfel: Vec<u32>,
-    /// How many spaces there are.
+    /// The number of spaces.
     pub count: u32,
 }
 
-/// Parses an area.
+/// Parses the surfels of an area.
 pub fn parse(surfels: &[Surfel]) -> Spaces {
     let dividers = find_dividers(surfels);
     let (of_surfel, count) = merge_cells(surfels, &dividers);

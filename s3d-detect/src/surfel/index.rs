@@ -1,33 +1,34 @@
-//! Finds the surfels of a space in a box.
+//! An index that finds the surfels in a box.
 
 use crate::palette::Shade;
 use crate::surfel::Surfel;
 use glam::{DVec3, IVec3, Vec3, ivec3};
 use s3d_geom::Aabb;
 
-/// Cells a metre: surfels are ordered by cells of 10 cm.
+/// The number of cells in a metre: cells are 10 cm wide.
 const CELLS_A_M: f32 = 10.0;
 
-/// The surfels of a space by cell: z, then y, then x.
+/// The surfels of a space, ordered by cell: z, then y, then x.
 #[derive(Clone, Debug)]
 pub struct Index {
     surfels: Vec<Surfel>,
     shades: Vec<Shade>,
     cells: IVec3,
-    /// Where each row of cells along x begins.
+    /// The start of each row of cells along x.
     rows: Vec<u32>,
     mean_color: Vec3,
 }
 
 impl Index {
-    /// Of surfels in a space's frame, whose origin is their least corner.
+    /// Orders surfels in the frame of a space, whose origin is their least corner.
     pub fn new(mut surfels: Vec<Surfel>) -> Self {
-        let cell = |s: &Surfel| (s.position * CELLS_A_M).floor().as_ivec3().max(IVec3::ZERO);
         surfels.sort_by(|a, b| {
-            let (i, j, p, q) = (cell(a), cell(b), a.position, b.position);
+            let [i, j] = [a, b].map(cell);
+            let [p, q] = [a.position, b.position];
             let by_place = p.z.total_cmp(&q.z).then(p.y.total_cmp(&q.y)).then(p.x.total_cmp(&q.x));
             (i.z, i.y, i.x).cmp(&(j.z, j.y, j.x)).then(by_place)
         });
+
         let cells = surfels.iter().fold(IVec3::ZERO, |most, s| most.max(cell(s) + 1));
         let mut rows = vec![0u32; (cells.y * cells.z) as usize + 1];
         for s in &surfels {
@@ -37,13 +38,14 @@ impl Index {
         for i in 1..rows.len() {
             rows[i] += rows[i - 1];
         }
+
         let sum = surfels.iter().map(|s| s.color.as_dvec3()).sum::<DVec3>();
         let mean_color = (sum / surfels.len().max(1) as f64).as_vec3();
         let shades = surfels.iter().map(|s| Shade::new(s.color, mean_color)).collect();
         Self { surfels, shades, cells, rows, mean_color }
     }
 
-    /// Their mean colour; black without any.
+    /// The mean colour of all surfels; black if there are none.
     pub fn mean_color(&self) -> Vec3 {
         self.mean_color
     }
@@ -53,12 +55,12 @@ impl Index {
         &self.surfels
     }
 
-    /// Those whose positions are in a box, in their order.
+    /// Returns the surfels whose positions are in a box, in their order.
     pub fn within<'a>(&'a self, b: &'a Aabb) -> impl Iterator<Item = &'a Surfel> + 'a {
         self.places_within(b).map(|i| &self.surfels[i])
     }
 
-    /// As [`within`](Self::within), with the shades of their colours.
+    /// Returns the same surfels as [`within`](Self::within), with the shades of their colours.
     pub fn shades_within<'a>(&'a self, b: &'a Aabb) -> impl Iterator<Item = (&'a Surfel, &'a Shade)> + 'a {
         self.places_within(b).map(|i| (&self.surfels[i], &self.shades[i]))
     }
@@ -69,7 +71,7 @@ impl Index {
         let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| ivec3(0, y, z)));
         rows.flat_map(move |c| {
             let row = (c.z * self.cells.y + c.y) as usize;
-            let (from, to) = (self.rows[row] as usize, self.rows[row + 1] as usize);
+            let [from, to] = [self.rows[row] as usize, self.rows[row + 1] as usize];
             let x = |s: &Surfel| (s.position.x * CELLS_A_M).floor() as i32;
             let start = from + self.surfels[from..to].partition_point(|s| x(s) < low.x);
             (start..to).take_while(move |&i| x(&self.surfels[i]) <= high.x)
@@ -78,13 +80,17 @@ impl Index {
     }
 }
 
+fn cell(s: &Surfel) -> IVec3 {
+    (s.position * CELLS_A_M).floor().as_ivec3().max(IVec3::ZERO)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::vec3;
 
     #[test]
-    fn a_box_has_those_that_a_search_finds() {
+    fn a_box_has_the_surfels_that_a_search_finds() {
         let surfel = |i: u32| {
             let r = |k: u32| (i.wrapping_mul(k) % 997) as f32 / 997.0;
             let position = vec3(3.0 * r(7919), 2.0 * r(104_729), r(1_299_709));

@@ -1,4 +1,4 @@
-//! Points, thinned to one surfel a cell: what everything after is made of.
+//! Surfels: points, thinned to one for each cell. All later steps work on them.
 
 pub mod index;
 pub mod volume;
@@ -6,25 +6,26 @@ pub mod volume;
 use glam::{DVec3, Vec3};
 use s3d_geom::{Aabb, PointCloud};
 
-/// Width of a cell in metres: chosen by us, half a step of the sliding windows.
+/// The width of a cell in metres: chosen here, half a step of the sliding windows.
 pub const CELL_M: f32 = 0.05;
 
-/// What the points in a cell tell of the surface there.
+/// The surface in a cell, as its points show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surfel {
-    /// Their mean.
+    /// The mean of the points.
     pub position: Vec3,
-    /// The box around them.
+    /// The box around the points.
     pub extent: Aabb,
-    /// The direction in which the points of this cell and of the 26 around it vary least, either way.
+    /// The direction in which the points in this cell and the 26 around it vary least. Its sign means
+    /// nothing.
     pub normal: Vec3,
-    /// The share of that direction in all their variance, 0 (a plane) to ⅓: Pauly, Gross and Kobbelt's
-    /// surface variation (2002).
+    /// The share of this direction in their whole variance, 0 (a plane) to ⅓: the surface variation of
+    /// Pauly, Gross and Kobbelt (2002).
     pub curvature: f32,
     /// Mean R G B, 0 to 1.
     pub color: Vec3,
-    /// The room whose points these are: of an area its place in [`Area::rooms`](crate::area::Area::rooms).
-    /// Detections are told by it, and not made with it.
+    /// The room of the points: an index of [`Area::rooms`](crate::Area::rooms). Detections are named by it,
+    /// and do not depend on it.
     pub room: u32,
 }
 
@@ -40,23 +41,22 @@ struct Sums {
     extent: Aabb,
 }
 
-/// Thins the points of a room, which has this number. The surfels are by cell: z, then y, then x. Their order
-/// follows from where the points are, and not from the order of the points, but for the last bits of sums.
+/// Thins the points of the room with this number. Surfels are ordered by cell: z, then y, then x. The order
+/// of the points changes the last bits of sums at most.
 ///
 /// # Panics
 /// If the cloud has no colours.
 pub fn surfels_of(points: &PointCloud, room: u32) -> Vec<Surfel> {
     assert_eq!(points.colors.len(), points.len(), "a colour a point");
-    let key = |p: Vec3| (p / CELL_M).floor().as_ivec3().to_array();
     let mut order: Vec<([i32; 3], u32)> = Vec::with_capacity(points.len());
     order.extend(points.positions.iter().zip(0..).map(|(&p, i)| {
-        let [x, y, z] = key(p);
+        let [x, y, z] = (p / CELL_M).floor().as_ivec3().to_array();
         ([z, y, x], i)
     }));
     order.sort_unstable();
+
     let mut cells: Vec<Sums> = Vec::new();
     for &([z, y, x], i) in &order {
-        let (point, color) = (points.positions[i as usize], points.colors[i as usize]);
         if cells.last().is_none_or(|c| c.key != [x, y, z]) {
             cells.push(Sums {
                 key: [x, y, z],
@@ -68,6 +68,9 @@ pub fn surfels_of(points: &PointCloud, room: u32) -> Vec<Surfel> {
             });
         }
         let Some(cell) = cells.last_mut() else { continue };
+
+        let point = points.positions[i as usize];
+        let color = points.colors[i as usize];
         let p = point.as_dvec3() - corner(cell.key);
         cell.count += 1.0;
         cell.sum += p;
@@ -79,45 +82,48 @@ pub fn surfels_of(points: &PointCloud, room: u32) -> Vec<Surfel> {
     with_normals(&cells, room)
 }
 
+/// Returns the least corner of a cell.
 fn corner(key: [i32; 3]) -> DVec3 {
     DVec3::from(key.map(|k| f64::from(k) * f64::from(CELL_M)))
 }
 
-/// Surfels of cells in their order. The 27 cells around one are 9 runs of neighbours along x; where each run
-/// begins only moves on from one cell to the next.
+/// The components of a symmetric matrix, in the order of [`Sums::squares`].
+const COMPONENTS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+/// Returns the surfels of cells, which are in order. The 27 cells around a cell are 9 runs of neighbours
+/// along x. From one cell to the next, the start of each run only moves on.
 fn with_normals(cells: &[Sums], room: u32) -> Vec<Surfel> {
     let order = |k: [i32; 3]| [k[2], k[1], k[0]];
     let mut starts = [0usize; 9];
     let mut surfels = Vec::with_capacity(cells.len());
     for cell in cells {
+        // The moments of all 27 cells, about the corner of this one.
         let here = corner(cell.key);
-        let (mut count, mut sum, mut squares) = (0.0, DVec3::ZERO, [0.0; 6]);
+        let mut count = 0.0;
+        let mut sum = DVec3::ZERO;
+        let mut squares = [0.0; 6];
         for (run, start) in starts.iter_mut().enumerate() {
             let [x, y, z] = cell.key;
-            let (y, z) = (y + run as i32 % 3 - 1, z + run as i32 / 3 - 1);
+            let y = y + run as i32 % 3 - 1;
+            let z = z + run as i32 / 3 - 1;
             while cells.get(*start).is_some_and(|c| order(c.key) < [z, y, x - 1]) {
                 *start += 1;
             }
             for near in cells[*start..].iter().take_while(|c| order(c.key) <= [z, y, x + 1]) {
-                let shift = corner(near.key) - here;
-                // Moments about this cell's corner.
-                let (n, s, d) = (near.count, near.sum, shift);
-                let moved = |i: usize, a: usize, b: usize| {
-                    near.squares[i] + s[a] * d[b] + d[a] * s[b] + n * d[a] * d[b]
-                };
-                let all = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
-                    .iter()
-                    .enumerate()
-                    .map(|(i, &(a, b))| moved(i, a, b));
-                squares.iter_mut().zip(all).for_each(|(t, v)| *t += v);
+                let n = near.count;
+                let s = near.sum;
+                let d = corner(near.key) - here;
+                for (i, (a, b)) in COMPONENTS.into_iter().enumerate() {
+                    squares[i] += near.squares[i] + s[a] * d[b] + d[a] * s[b] + n * d[a] * d[b];
+                }
                 count += n;
                 sum += s + n * d;
             }
         }
+
         let mean = sum / count;
-        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
         let mut covariance = [0.0; 6];
-        for (i, (a, b)) in pairs.into_iter().enumerate() {
+        for (i, (a, b)) in COMPONENTS.into_iter().enumerate() {
             covariance[i] = squares[i] / count - mean[a] * mean[b];
         }
         let (normal, curvature) = least_direction(covariance);
@@ -133,12 +139,13 @@ fn with_normals(cells: &[Sums], room: u32) -> Vec<Surfel> {
     surfels
 }
 
-/// The eigenvector of the least eigenvalue of a covariance (xx, xy, xz, yy, yz, zz), and that eigenvalue's
-/// share in their sum: by Jacobi's rotations.
+/// Returns the eigenvector of the least eigenvalue of a covariance (xx, xy, xz, yy, yz, zz), and the share of
+/// this eigenvalue in the sum of all three. Uses Jacobi rotations.
 fn least_direction([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> (DVec3, f64) {
     let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let trace = xx + yy + zz;
+
     for _ in 0..12 {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             if a[p][q].abs() <= 1e-15 * trace {
@@ -148,6 +155,7 @@ fn least_direction([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> (DVec3, f64) {
             let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
             let c = 1.0 / (t * t + 1.0).sqrt();
             let s = t * c;
+
             for row in &mut a {
                 (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
             }
@@ -157,6 +165,7 @@ fn least_direction([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> (DVec3, f64) {
             }
         }
     }
+
     let least = (0..3).fold(0, |least, i| if a[i][i] < a[least][least] { i } else { least });
     let share = if trace > 0.0 {
         (a[least][least] / trace).clamp(0.0, 1.0 / 3.0)
@@ -179,7 +188,8 @@ mod tests {
     #[test]
     fn a_slanted_plane_has_its_normal_and_no_curvature() {
         let points = (0..40_000).map(|i| {
-            let (u, v) = ((i % 200) as f32 * 0.01, (i / 200) as f32 * 0.01);
+            let u = (i % 200) as f32 * 0.01;
+            let v = (i / 200) as f32 * 0.01;
             vec3(u, v, 3.0 + 0.5 * u)
         });
         let surfels = surfels_of(&cloud(points.collect()), 0);
@@ -193,9 +203,10 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_is_curved_and_points_off_each_other_are_a_surfel_each() {
+    fn an_edge_is_curved_and_lone_points_are_a_surfel_each() {
         let edge = (0..10_000).flat_map(|i| {
-            let (u, v) = ((i % 100) as f32 * 0.01, (i / 100) as f32 * 0.01);
+            let u = (i % 100) as f32 * 0.01;
+            let v = (i / 100) as f32 * 0.01;
             [vec3(u, v, 0.0), vec3(0.0, v, u)]
         });
         let surfels = surfels_of(&cloud(edge.collect()), 0);
@@ -213,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_by_runs_are_those_by_search() {
+    fn runs_find_the_same_neighbours_as_a_search() {
         let points: Vec<Vec3> = (0..3000u32)
             .map(|i| {
                 let r = |k: u32| (i.wrapping_mul(k) % 1009) as f32 / 1009.0;

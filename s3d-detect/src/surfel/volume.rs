@@ -1,46 +1,47 @@
-//! Summed volumes: the number of occupied cells in any box of a grid, from eight of its corners (Crow's
-//! summed areas, 1984, in three dimensions).
+//! Summed volumes: they give the number of occupied cells in any box of a grid from the eight corners of the
+//! box. Crow (1984) has them in two dimensions.
 
 use crate::surfel::Surfel;
 use glam::{IVec3, Vec3, ivec3};
 
-/// Width of a cell and step of sliding windows, in metres.
+/// The width of a cell, which is the step of sliding windows, in metres.
 pub const STEP_M: f32 = 0.1;
 
-/// Cells around a space that are empty: windows may reach out of it, and look at what is beside them.
+/// The width of the empty border around a space, in cells: windows may reach out, and look beside themselves.
 pub const PAD: i32 = 5;
 
-/// Directions of surfaces that are told apart: across x, across y, level.
+/// The number of directions of surfaces: across x, across y, level.
 pub const DIRECTIONS: usize = 3;
 
-/// A grid around a space, and for each direction of surfaces the summed volume of the cells that hold such.
+/// A grid around a space, with a summed volume of occupied cells for each direction of surfaces.
 #[derive(Clone, Debug)]
 pub struct Volumes {
-    /// Cells of the space along each axis, without [`PAD`].
+    /// The number of cells of the space along each axis, without [`PAD`].
     pub cells: IVec3,
-    /// Corners along each axis.
+    /// The number of corners along each axis.
     corners: IVec3,
-    /// Corner (x, y, z) is at `(z·corners.y + y)·corners.x + x`. Counts up to 2²⁴ are exact.
+    /// Corner (x, y, z) is at index `(z·corners.y + y)·corners.x + x`. Counts up to 2²⁴ are exact.
     sums: [Vec<f32>; DIRECTIONS],
 }
 
-/// The axis that a surfel's normal is nearest to; of equal ones the last.
+/// Returns the axis that the normal of a surfel is nearest to. The last axis wins a tie.
 pub fn direction(s: &Surfel) -> usize {
     let n = s.normal.abs();
     (0..3).fold(0, |best, axis| if n[axis] >= n[best] { axis } else { best })
 }
 
 impl Volumes {
-    /// The grid of a space of this extent, from its origin.
+    /// Counts the surfels of a space of this extent, which begins at the origin.
     pub fn new(surfels: &[Surfel], extent: Vec3) -> Self {
         let cells = (extent / STEP_M).ceil().as_ivec3().max(IVec3::ONE);
         let corners = cells + 2 * PAD + 1;
         let len = corners.as_usizevec3().element_product();
         let mut sums = [(); DIRECTIONS].map(|()| vec![0.0; len]);
+
         let index = |c: IVec3| ((c.z * corners.y + c.y) * corners.x + c.x) as usize;
         for s in surfels {
             let cell = (s.position / STEP_M).floor().as_ivec3().clamp(IVec3::ZERO, cells - 1);
-            // The cell's far corner: sums run up to a corner, and not beyond it.
+            // The far corner of the cell, since a sum ends at its corner.
             sums[direction(s)][index(cell + PAD + 1)] = 1.0;
         }
         for sums in &mut sums {
@@ -51,8 +52,8 @@ impl Volumes {
         Self { cells, corners, sums }
     }
 
-    /// How many cells from corner `from` up to corner `to` hold surfaces of a direction. Corners are counted
-    /// from the space's origin; those outside the grid are taken to its border.
+    /// Returns the number of cells between the corners `from` and `to` that hold surfaces of a direction.
+    /// Corners are counted from the origin of the space. A corner outside the grid is moved to its border.
     pub fn count(&self, direction: usize, from: IVec3, to: IVec3) -> f32 {
         let at = |c: IVec3| {
             let c = (c + PAD).clamp(IVec3::ZERO, self.corners - 1);
@@ -67,21 +68,21 @@ impl Volumes {
         count
     }
 
-    /// The summed volume's values at corners (`x` …, `y`, `z`), `count` of them, counted as in
+    /// Returns the sums at `count` corners from (`x`, `y`, `z`) on along x, numbered as in
     /// [`Volumes::count`]. All must be in the grid.
     pub(crate) fn run(&self, direction: usize, [x, y, z]: [i32; 3], count: usize) -> &[f32] {
         let start = (((z + PAD) * self.corners.y + y + PAD) * self.corners.x + x + PAD) as usize;
         &self.sums[direction][start..start + count]
     }
 
-    /// Whether a corner, counted from the space's origin, is in the grid.
+    /// Whether a corner, counted from the origin of the space, is in the grid.
     pub(crate) fn holds(&self, corner: IVec3) -> bool {
         let c = corner + PAD;
         c.cmpge(IVec3::ZERO).all() && c.cmplt(self.corners).all()
     }
 }
 
-/// Adds to each value the one a step before it, along the axis of that step.
+/// Adds to each value the value one step before it, along the axis of this step.
 fn accumulate(sums: &mut [f32], step: usize, corners: IVec3) {
     let length = if step == 1 {
         corners.x as usize
@@ -104,7 +105,7 @@ mod tests {
     use s3d_geom::Aabb;
 
     #[test]
-    fn counts_are_those_of_counting() {
+    fn sums_give_the_same_counts_as_counting() {
         let surfels: Vec<Surfel> = (0..400u32)
             .map(|i| {
                 let r = |k: u32| (i.wrapping_mul(k) % 997) as f32 / 997.0;
@@ -116,6 +117,7 @@ mod tests {
             .collect();
         let volumes = Volumes::new(&surfels, vec3(2.3, 1.1, 0.7));
         assert_eq!(volumes.cells, ivec3(23, 11, 7));
+
         for i in 0..200 {
             let from = ivec3(i % 20 - 2, i % 7 - 1, i % 5 - 2);
             let to = from + ivec3(1 + i % 9, 1 + i % 4, 1 + i % 6);

@@ -1,36 +1,37 @@
 //! Linear support vector machines.
 //!
-//! Dual coordinate descent: Hsieh, Chang, Lin, Keerthi and Sundararajan, "A dual coordinate descent method
-//! for large-scale linear SVM" (ICML 2008), algorithm 1 with random order, without shrinking. Own code:
-//! crates that were tried are slower by 4 to 1,000 times, or bind C++.
+//! They are trained by dual coordinate descent: algorithm 1 of Hsieh, Chang, Lin, Keerthi and Sundararajan,
+//! "A dual coordinate descent method for large-scale linear SVM" (ICML 2008), in random order, without
+//! shrinking. The code is our own because the crates that were tried are 4 to 1,000 times slower, or bind
+//! C++.
 
 pub mod sparse;
 
-use crate::svm::sparse::{SparseRows, dot};
+use crate::svm::sparse::{SparseRow, SparseRows, dot};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// What a margin below 1 costs.
+/// The cost of a margin below 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
-    /// max(0, 1 − margin), called L1-loss.
+    /// max(0, 1 − margin), also called L1-loss.
     Hinge,
-    /// Its square, called L2-loss.
+    /// The square of the hinge, also called L2-loss.
     SquaredHinge,
 }
 
 /// How a machine is trained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SvmOptions {
-    /// What a margin below 1 costs.
+    /// The cost of a margin below 1.
     pub loss: Loss,
-    /// Ends when projected gradients of a pass differ by less.
+    /// Training ends when the projected gradients of a pass differ by less than this.
     pub tolerance: f64,
-    /// Ends after so many passes over the examples at the latest.
+    /// Training ends after this number of passes over the examples at the latest.
     pub max_passes: u32,
-    /// From which the order of the examples comes.
+    /// Decides the order of the examples.
     pub seed: u64,
 }
 
@@ -43,26 +44,26 @@ impl Default for SvmOptions {
 /// A linear function of a row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Linear {
-    /// A number a column.
+    /// A weight for each column.
     pub weights: Vec<f64>,
     /// Added to the product.
     pub bias: f64,
 }
 
 impl Linear {
-    /// Its value.
-    pub fn score(&self, row: crate::svm::sparse::SparseRow<'_>) -> f64 {
+    /// Returns its value for a row.
+    pub fn score(&self, row: SparseRow<'_>) -> f64 {
         dot(row, &self.weights) + self.bias
     }
 }
 
-/// Minimises ½(|w|² + b²) + Σ cᵢ·loss(yᵢ(w·xᵢ + b)): the bias is a weight of a column of ones, as
-/// scikit-learn's `LinearSVC` has it. `positive` has yᵢ, `costs` has cᵢ, an entry a row each.
+/// Minimises ½(|w|² + b²) + Σ cᵢ·loss(yᵢ(w·xᵢ + b)). The bias is the weight of a column of ones,
+/// as in scikit-learn's `LinearSVC`. `positive` holds yᵢ and `costs` holds cᵢ, an entry for each row.
 ///
-/// The same arguments give the same bits on every machine.
+/// The same arguments give the same bits on every computer.
 ///
 /// # Panics
-/// If `positive` or `costs` have another length than there are rows.
+/// If `positive` or `costs` has not an entry for each row.
 pub fn train(rows: &SparseRows, positive: &[bool], costs: &[f64], options: &SvmOptions) -> Linear {
     assert!(positive.len() == rows.len() && costs.len() == rows.len(), "an entry a row");
     let mut machine = Linear { weights: vec![0.0; rows.width()], bias: 0.0 };
@@ -71,14 +72,17 @@ pub fn train(rows: &SparseRows, positive: &[bool], costs: &[f64], options: &SvmO
     let mut alphas = vec![0.0f64; rows.len()];
     let mut order: Vec<usize> = (0..rows.len()).filter(|&i| costs[i] > 0.0).collect();
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+
     for _ in 0..options.max_passes {
         order.shuffle(&mut rng);
-        let (mut most, mut least) = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut most = f64::NEG_INFINITY;
+        let mut least = f64::INFINITY;
         for &i in &order {
             let (bound, diagonal) = match options.loss {
                 Loss::Hinge => (costs[i], 0.0),
                 Loss::SquaredHinge => (f64::INFINITY, 0.5 / costs[i]),
             };
+
             let sign = if positive[i] { 1.0 } else { -1.0 };
             let alpha = alphas[i];
             let gradient = sign * machine.score(rows.row(i)) - 1.0 + diagonal * alpha;
@@ -89,7 +93,9 @@ pub fn train(rows: &SparseRows, positive: &[bool], costs: &[f64], options: &SvmO
             } else {
                 gradient
             };
-            (most, least) = (most.max(projected), least.min(projected));
+            most = most.max(projected);
+            least = least.min(projected);
+
             if projected != 0.0 {
                 alphas[i] = (alpha - gradient / (squares[i] + diagonal)).clamp(0.0, bound);
                 let step = sign * (alphas[i] - alpha);
@@ -100,6 +106,7 @@ pub fn train(rows: &SparseRows, positive: &[bool], costs: &[f64], options: &SvmO
                 machine.bias += step;
             }
         }
+
         if most - least <= options.tolerance {
             break;
         }
@@ -107,7 +114,7 @@ pub fn train(rows: &SparseRows, positive: &[bool], costs: &[f64], options: &SvmO
     machine
 }
 
-/// What [`train`] minimises, for a machine.
+/// Returns the value that [`train`] minimises, for a machine.
 pub fn objective(machine: &Linear, rows: &SparseRows, positive: &[bool], costs: &[f64], loss: Loss) -> f64 {
     let square: f64 = machine.weights.iter().map(|w| w * w).sum::<f64>() + machine.bias * machine.bias;
     let lost = (0..rows.len()).map(|i| {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// A matrix by rows, of which only the entries that are not zero are held: six bytes each.
+/// A matrix by rows that holds only the entries other than zero, in six bytes each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SparseRows {
     columns: Vec<u16>,
@@ -12,14 +12,14 @@ pub struct SparseRows {
     width: usize,
 }
 
-/// One row: columns, ascending, and their values.
+/// One row: the columns, ascending, and their values.
 pub type SparseRow<'a> = (&'a [u16], &'a [f32]);
 
 impl SparseRows {
-    /// No rows, of `width` columns.
+    /// Makes a matrix of `width` columns without rows.
     ///
     /// # Panics
-    /// If a column's number does not fit in 16 bits.
+    /// If the number of a column does not fit in 16 bits.
     pub fn new(width: usize) -> Self {
         assert!(width <= 1 << 16, "{width} columns");
         Self { width, starts: vec![0], ..Self::default() }
@@ -40,10 +40,10 @@ impl SparseRows {
         self.len() == 0
     }
 
-    /// Adds a row of as many numbers as there are columns.
+    /// Adds a row, which has a number for each column.
     ///
     /// # Panics
-    /// If it has another length.
+    /// If the row has another length.
     pub fn push(&mut self, row: &[f32]) {
         assert_eq!(row.len(), self.width, "numbers in a row");
         for (column, &value) in row.iter().enumerate().filter(|(_, v)| **v != 0.0) {
@@ -53,16 +53,16 @@ impl SparseRows {
         self.starts.push(self.columns.len());
     }
 
-    /// Row `i`.
+    /// Returns row `i`.
     pub fn row(&self, i: usize) -> SparseRow<'_> {
         let range = self.starts[i]..self.starts[i + 1];
         (&self.columns[range.clone()], &self.values[range])
     }
 
-    /// Adds the rows of another matrix behind these.
+    /// Appends the rows of another matrix.
     ///
     /// # Panics
-    /// If it has another number of columns.
+    /// If the other matrix has another number of columns.
     pub fn append(&mut self, other: &Self) {
         assert_eq!(other.width, self.width, "columns");
         let before = self.columns.len();
@@ -71,7 +71,7 @@ impl SparseRows {
         self.starts.extend(other.starts[1..].iter().map(|start| before + start));
     }
 
-    /// The rows `which`, with zeros in the columns `without`; the number of columns stays.
+    /// Copies the rows `which`, with zeros in the columns `without`. The number of columns stays.
     #[must_use]
     pub fn select(&self, which: impl IntoIterator<Item = usize>, without: &[Range<usize>]) -> Self {
         let mut out = Self::new(self.width);
@@ -89,7 +89,7 @@ impl SparseRows {
     }
 }
 
-/// The product of a row and a dense vector.
+/// Returns the product of a row and a dense vector.
 pub fn dot((columns, values): SparseRow<'_>, dense: &[f64]) -> f64 {
     columns
         .iter()
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_what_was_pushed() {
+    fn rows_hold_the_numbers_that_were_pushed() {
         let mut rows = SparseRows::new(4);
         rows.push(&[0.0, 1.0, 0.0, 2.0]);
         rows.push(&[0.0; 4]);

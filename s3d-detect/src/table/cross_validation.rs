@@ -1,6 +1,7 @@
 //! Trains and tests over the folds of the paper.
 
 use crate::area::CLASSES;
+use crate::error::{Error, Result};
 use crate::features::{FEATURES, Variant, describe};
 use crate::learn::{elements, random_scores};
 use crate::model::{Detection, Model, TrainOptions, recalled};
@@ -11,45 +12,48 @@ use crate::svm::sparse::SparseRows;
 use crate::table::precision::{Scored, average_precision};
 use crate::table::{Row, Table};
 use rayon::prelude::*;
-use s3d_dataset::{Context, Error, Result};
+use s3d_dataset::Context;
 use s3d_geom::Aabb;
 use std::collections::BTreeMap;
 
-/// What is measured besides, in the order of the table.
+/// The rows besides the variants of the model.
 const RANDOM: &str = "Random scores";
 const NO_CONTEXT: &str = "Full model, no context";
 const TRUE_BOXES: &str = "Full model on true boxes";
 const RECALL: &str = "Proposals: recall";
 
-/// Overlaps that average precision is told at.
+/// The thresholds of IoU of the table.
 pub const THRESHOLDS: [f64; 2] = [0.5, 0.25];
 
-/// Detections in the world, of a class and an area.
+/// Detections in the world frame, by row and class.
 type Found = BTreeMap<(String, usize), Vec<Scored>>;
 
-/// Average precision over the paper's folds, cut down to the areas that are there: the mean of the folds, in
-/// which a class that an area does not have is left out. Options without the full model get it.
+/// Returns the average precision over the folds of the paper, as far as their areas exist. Each number is the
+/// mean over folds; a fold whose areas lack a class is left out. All variants are trained, whatever
+/// `options.variants` says.
 ///
 /// # Errors
-/// [`Error::Input`] if the areas make no fold; as [`Model::train`].
+/// [`Error::NoFold`] if the areas make no fold. Otherwise fails like [`Model::train`].
 pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Context) -> Result<Table> {
     let numbers: Vec<u32> = areas.iter().map(|a| a.number).collect();
     let folds = s3d_sample::folds(&numbers);
     if folds.is_empty() {
-        let needs = "the published folds need areas of two of 1, 3, 6 / 2, 4 / 5";
-        return Err(Error::Input(format!("areas {numbers:?} make no fold: {needs}")));
+        return Err(Error::NoFold { areas: numbers });
     }
+
     let options = &TrainOptions { variants: Variant::ALL.to_vec(), ..options.clone() };
     let mut table = Table::new(options.seed);
     table.agreement = areas.iter().map(|a| (a.number, a.agreement)).collect();
     for fold in folds {
         let of = |wanted: &[u32]| areas.iter().filter(|a| wanted.contains(&a.number)).collect::<Vec<_>>();
-        let (training, testing) = (of(&fold.train), of(&fold.test));
+        let training = of(&fold.train);
+        let testing = of(&fold.test);
         let spaces: Vec<&Space> = training.iter().flat_map(|a| &a.spaces).collect();
         ctx.info(format_args!(
             "fold {}: train on areas {:?}, test on {:?}",
             fold.number, fold.train, fold.test
         ));
+
         let model = Model::train(&spaces, options, ctx)?;
         let rows = test(&model, &testing, ctx)?;
         let told = rows
@@ -61,11 +65,10 @@ pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Contex
     Ok(table)
 }
 
-/// Tests a model on areas: a row for each of its machines and each comparison, and of each one AP a class and
-/// threshold.
+/// Tests a model on areas. Returns a row for each of its machines and each comparison.
 ///
 /// # Errors
-/// [`Error::Cancelled`].
+/// [`Error::Dataset`] if the call is cancelled.
 pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<Row>> {
     let spaces: Vec<&Space> = areas.iter().flat_map(|a| &a.spaces).collect();
     let progress = ctx.progress("testing", "spaces", spaces.len() as u64);
@@ -75,6 +78,7 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
         progress.add(1);
         Ok(tested)
     });
+
     let mut found = Found::new();
     let mut recalls = vec![[[0usize; 2]; 2]; CLASSES.len()];
     for (of_space, recall) in tested.collect::<Result<Vec<_>>>()? {
@@ -90,6 +94,7 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
             *sum += more;
         }
     }
+
     let names = model
         .machines
         .iter()
@@ -110,20 +115,15 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
         Row { name: name.to_owned(), ap: THRESHOLDS.map(of) }
     });
     let mut rows: Vec<Row> = rows.collect();
-    let share = |[found, all]: [usize; 2]| {
-        if all == 0 {
-            None
-        } else {
-            Some(found as f64 / all as f64)
-        }
-    };
+
+    let share = |[found, all]: [usize; 2]| (all > 0).then(|| found as f64 / all as f64);
     let of = |t: usize| recalls.iter().map(|r| share(r[t])).collect();
     rows.push(Row { name: RECALL.to_owned(), ap: [of(0), of(1)] });
     Ok(rows)
 }
 
-/// What is found in a space, by row and class, and how many elements its proposals overlap: by class,
-/// threshold.
+/// Returns the detections in a space by row and class, and the number of elements that its proposals overlap,
+/// by class and threshold.
 fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
     let prepared = Prepared::new(space);
     let proposals = model.proposer.propose(&prepared);
@@ -132,6 +132,7 @@ fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
         let scored = Scored { scene: (space.area, space.room_of(bbox)), bbox: space.to_world(bbox), score };
         found.entry((name.to_owned(), class)).or_default().push(scored);
     };
+
     for (machines, detections) in model.machines.iter().zip(model.detect(&prepared, &proposals)) {
         for Detection { class, bbox, score, in_context } in detections {
             put(machines.variant.name(), class, &bbox, in_context);
@@ -140,10 +141,12 @@ fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
             }
         }
     }
+
     let seed = model.seed ^ u64::from(space.area) << 32 ^ u64::from(space.number);
     for node in elements(&proposals, &random_scores(proposals.len(), seed)) {
         put(RANDOM, node.class, &node.bbox, node.score);
     }
+
     if let Some(full) = model.machines.iter().find(|m| m.variant == Variant::Full) {
         for element in &space.elements {
             let mut row = SparseRows::new(FEATURES);
@@ -155,6 +158,7 @@ fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
             }
         }
     }
+
     let recall = |class| THRESHOLDS.map(|threshold| recalled(&prepared, &proposals, class, threshold));
     (found, (0..CLASSES.len()).map(recall).collect())
 }

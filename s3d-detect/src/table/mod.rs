@@ -1,4 +1,4 @@
-//! The table of average precision, in the paper's form.
+//! The table of average precision, in the form of the paper.
 
 pub mod cross_validation;
 pub mod precision;
@@ -7,25 +7,24 @@ use crate::area::{CLASSES, STRUCTURAL};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
-/// A row of one fold: average precision by threshold and class; `None` for classes that its areas do not
-/// have.
+/// A row of one fold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// What is measured.
+    /// The name of the row.
     pub name: String,
-    /// Its numbers.
+    /// Its average precisions.
     pub ap: Precisions,
 }
 
 impl Row {
-    /// The mean of the classes that are there at IoU .5, in per cent.
+    /// Returns the mean over all classes that exist, at IoU .5, in per cent.
     pub fn overall(&self) -> Option<f64> {
         mean(self.ap[0].iter().flatten().map(|ap| 100.0 * ap))
     }
 }
 
-/// Average precision by threshold (IoU .5, then .25), then by class, 0 to 1; `None` for classes that are not
-/// there.
+/// Average precision by threshold (IoU .5, then .25), then by class: 0 to 1. `None` for a class that the
+/// areas do not have.
 pub type Precisions = [Vec<Option<f64>>; 2];
 
 /// The rows of all folds, for one seed.
@@ -33,14 +32,14 @@ pub type Precisions = [Vec<Option<f64>>; 2];
 pub struct Table {
     /// The seed.
     pub seed: u64,
-    /// By area: the adjusted Rand index of its spaces.
+    /// For each area the adjusted Rand index of its spaces.
     pub agreement: Vec<(u32, f64)>,
-    /// By row: its name, and what each fold has.
+    /// For each row its name, and the precisions of each fold.
     pub rows: Vec<(String, Vec<Precisions>)>,
 }
 
 impl Table {
-    /// Without rows.
+    /// Makes a table without rows.
     pub fn new(seed: u64) -> Self {
         Self { seed, agreement: Vec::new(), rows: Vec::new() }
     }
@@ -55,8 +54,9 @@ impl Table {
         }
     }
 
-    /// A row's numbers at a threshold (0 is IoU .5, 1 is .25): by class the mean of the folds that have it,
-    /// in per cent; and the means of structural, movable and all classes. `None` for a row that there is not.
+    /// Returns the numbers of a row at a threshold (0 is IoU .5, 1 is .25), in per cent: for each class the
+    /// mean over the folds that have it, then the means over structural, movable and all classes. `None` if
+    /// there is no such row.
     pub fn numbers(&self, name: &str, threshold: usize) -> Option<Vec<Option<f64>>> {
         let (_, folds) = self.rows.iter().find(|(n, _)| n == name)?;
         let classes: Vec<Option<f64>> = (0..CLASSES.len())
@@ -74,25 +74,26 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     if n == 0 { None } else { Some(sum / f64::from(n)) }
 }
 
-/// Mean and standard deviation (n − 1) of numbers; the latter is 0 for one.
+/// Returns the mean and the standard deviation (n − 1) of numbers. The deviation of one number is 0.
 fn spread(values: &[f64]) -> Option<[f64; 2]> {
     let mean = mean(values.iter().copied())?;
     let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
     Some([mean, (squares / (values.len().max(2) - 1) as f64).sqrt()])
 }
 
-/// What every table says about its numbers.
+/// The note below every table.
 pub const NOTE: &str = "AP on generated areas tests the implementation and is not comparable with the \
                         published 49.93, for which the six licensed areas are needed.";
 
-/// Tables of several seeds as JSON, with [`NOTE`]: what each fold has, by row, threshold and class.
+/// Writes tables of several seeds as JSON, with [`NOTE`]: the precisions of each fold, by row, threshold and
+/// class.
 pub fn json(tables: &[Table]) -> String {
     let classes = CLASSES.map(|c| c.name());
     format!("{:#}\n", serde_json::json!({ "classes": classes, "note": NOTE, "tables": tables }))
 }
 
-/// Tables of several seeds as Markdown: the paper's columns, means over seeds, and behind the last three
-/// means ± the standard deviation between seeds.
+/// Writes tables of several seeds as Markdown: the columns of the paper, with means over seeds. The last
+/// three means have ± the standard deviation between seeds.
 pub fn markdown(tables: &[Table]) -> String {
     let mut out = String::new();
     for (threshold, name) in [".5", ".25"].into_iter().enumerate() {
@@ -102,30 +103,14 @@ pub fn markdown(tables: &[Table]) -> String {
             [&classes[..STRUCTURAL], &["**mean**"], &classes[STRUCTURAL..], &["**mean**", "**overall**"]];
         let _ = writeln!(out, "| | {} |", columns.concat().join(" | "));
         let _ = writeln!(out, "|---|{}", "--:|".repeat(CLASSES.len() + 3));
-        let names = tables
-            .first()
-            .map_or(&[][..], |t| &t.rows[..])
-            .iter()
-            .map(|(name, _)| name);
-        for name in names {
-            let of_seeds: Vec<_> = tables.iter().filter_map(|t| t.numbers(name, threshold)).collect();
-            let cell = |column: usize| {
-                let values: Vec<f64> = of_seeds.iter().filter_map(|n| n[column]).collect();
-                match spread(&values) {
-                    Some([mean, deviation]) if column >= CLASSES.len() && tables.len() > 1 => {
-                        format!("{mean:.2} ± {deviation:.2}")
-                    }
-                    Some([mean, _]) => format!("{mean:.2}"),
-                    None => "–".to_owned(),
-                }
-            };
-            let of = |columns: std::ops::Range<usize>| columns.map(cell).collect::<Vec<_>>();
-            let n = CLASSES.len();
-            let cells = [of(0..STRUCTURAL), of(n..n + 1), of(STRUCTURAL..n), of(n + 1..n + 3)].concat();
+
+        for (name, _) in tables.first().map_or(&[][..], |t| &t.rows[..]) {
+            let cells = cells_of_row(tables, name, threshold);
             let _ = writeln!(out, "| {name} | {} |", cells.join(" | "));
         }
         out.push('\n');
     }
+
     for (area, ari) in tables.first().map_or(&[][..], |t| &t.agreement) {
         let _ = writeln!(out, "Spaces of area {area}: adjusted Rand index {ari:.3}");
     }
@@ -133,12 +118,32 @@ pub fn markdown(tables: &[Table]) -> String {
     out
 }
 
+/// Returns the cells of a row at a threshold, in the order of the columns.
+fn cells_of_row(tables: &[Table], name: &str, threshold: usize) -> Vec<String> {
+    let of_seeds: Vec<_> = tables.iter().filter_map(|t| t.numbers(name, threshold)).collect();
+    let cell = |column: usize| {
+        let values: Vec<f64> = of_seeds.iter().filter_map(|n| n[column]).collect();
+        match spread(&values) {
+            Some([mean, deviation]) if column >= CLASSES.len() && tables.len() > 1 => {
+                format!("{mean:.2} ± {deviation:.2}")
+            }
+            Some([mean, _]) => format!("{mean:.2}"),
+            None => "–".to_owned(),
+        }
+    };
+
+    // The mean over structural classes stands behind them, the other two means at the end.
+    let n = CLASSES.len();
+    let columns = (0..STRUCTURAL).chain(n..n + 1).chain(STRUCTURAL..n).chain(n + 1..n + 3);
+    columns.map(cell).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn means_are_of_the_classes_that_are_there() {
+    fn means_leave_out_classes_that_do_not_exist() {
         let mut table = Table::new(1);
         let row = |first: Option<f64>, last: Option<f64>| {
             let mut ap = vec![Some(0.5); CLASSES.len()];

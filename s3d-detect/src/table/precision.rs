@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// A box with a score, in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scored {
-    /// The scene, an area and a room; boxes of different scenes never meet.
+    /// The scene: an area and a room. Boxes of different scenes never meet.
     pub scene: (u32, u32),
     /// The box.
     pub bbox: Aabb,
@@ -16,8 +16,8 @@ pub struct Scored {
     pub score: f64,
 }
 
-/// Average precision of one class by the rule of mmdetection3d, as `s3d eval det` has it. `None` without
-/// boxes to find.
+/// Returns the average precision of one class by the rule of mmdetection3d, which is the default of `s3d eval
+/// det`: 0 to 1. `None` if there are no boxes to find.
 pub fn average_precision(detections: &[Scored], truth: &[((u32, u32), Aabb)], threshold: f64) -> Option<f64> {
     let mut rooms = BTreeMap::new();
     let mut room = |scene| {
@@ -25,7 +25,8 @@ pub fn average_precision(detections: &[Scored], truth: &[((u32, u32), Aabb)], th
         *rooms.entry(scene).or_insert(next)
     };
     let corners = |b: &Aabb| [b.min.x, b.min.y, b.min.z, b.max.x, b.max.y, b.max.z].map(f64::from);
-    // Any one class, in truth and detections.
+
+    // Any class will do, since truth and detections have the same.
     let class = Class::CHAIR;
     let truth: Vec<GroundTruth> = truth
         .iter()
@@ -35,6 +36,7 @@ pub fn average_precision(detections: &[Scored], truth: &[((u32, u32), Aabb)], th
         .iter()
         .map(|d| Detection { room: room(d.scene), class, score: d.score, bbox: corners(&d.bbox) })
         .collect();
+
     let rule = Rule::Mmdetection3d;
     let scores = s3d_eval::boxes::average_precision(&truth, &detections, &[class], threshold, rule);
     scores.first().map(|score| score.ap).filter(|ap| !ap.is_nan())
@@ -53,12 +55,12 @@ mod tests {
     fn hand_made_curves() {
         let truth = [(1, 0.0), (1, 5.0), (2, 0.0), (2, 9.0)].map(|(room, x)| ((1, room), cube(x)));
         let at = |room, x, score| Scored { scene: (1, room), bbox: cube(x), score };
-        // True, false (a second time), false (another scene), true: precision 1 at ¼, ½ at ½.
+        // True, false (found before), false (another scene), true: precision 1 at recall ¼, ½ at ½.
         let found = [at(1, 0.0, 4.0), at(1, 0.1, 3.0), at(3, 0.0, 2.0), at(2, 9.2, 1.0)];
         assert_eq!(average_precision(&found, &truth, 0.5), Some(0.25 + 0.25 * 0.5));
         assert_eq!(average_precision(&[], &truth, 0.5), Some(0.0));
         assert_eq!(average_precision(&found, &[], 0.5), None);
-        // An overlap of exactly the threshold does not do.
+        // An overlap of exactly the threshold is too small.
         assert_eq!(average_precision(&[at(1, 0.0, 1.0)], &truth[..1], 1.0), Some(0.0));
     }
 }

@@ -1,20 +1,20 @@
-//! How much two boxes are the same.
+//! Intersection over union of boxes.
 
 use super::Rule;
 
-/// The least width and depth of a box for the overlap on the ground plane, metres, and the least divisor of
-/// the IoU, cubic metres. Source: mmdetection3d at fe25f7a, `BaseInstance3DBoxes.overlaps`.
+/// The least width and depth of a box in the overlap on the ground plane, in metres, and the least divisor of
+/// the IoU, in cubic metres. Source: mmdetection3d at fe25f7a, `BaseInstance3DBoxes.overlaps`.
 const LEAST: (f64, f64) = (1e-4, 1e-8);
 
-/// The IoU of two boxes along the axes, `[xmin, ymin, zmin, xmax, ymax, zmax]`: volume of what both share by
-/// volume of what either holds.
+/// Returns the intersection over union of two boxes along the axes, `[xmin, ymin, zmin, xmax, ymax, zmax]`.
 ///
-/// Of flat boxes it is as odd as in the program that is followed. By [`Rule::Mmdetection3d`] widths in x and
-/// y that are less than 0.1 mm are 0.1 mm for the shared volume but not for that of each box, and the divisor
-/// is 1e-8 m³ at least, so that it may be more than 1; boxes without height share nothing. By
-/// [`Rule::Open3dMl`] it is NaN of two boxes that have heights but no volume.
+/// The IoU of flat boxes is as odd as in the program that the rule follows:
+///
+/// - By [`Rule::Mmdetection3d`], widths in x and y of less than 0.1 mm count as 0.1 mm in the shared volume,
+///   but not in the volume of each box. The divisor is at least 1e-8 m³. The IoU may therefore be more than
+///   1. Boxes without height share nothing.
+/// - By [`Rule::Open3dMl`], the IoU of two boxes with heights but no volume is NaN.
 pub fn iou(a: &[f64; 6], b: &[f64; 6], rule: Rule) -> f64 {
-    let volume = |v: &[f64; 6]| (v[3] - v[0]) * (v[4] - v[1]) * (v[5] - v[2]);
     let height = (a[5].min(b[5]) - a[2].max(b[2])).max(0.0);
     let (least, least_divisor) = match rule {
         Rule::Mmdetection3d => LEAST,
@@ -27,15 +27,22 @@ pub fn iou(a: &[f64; 6], b: &[f64; 6], rule: Rule) -> f64 {
     shared / (volume(a) + volume(b) - shared).max(least_divisor)
 }
 
-/// The length that both share of an axis; boxes are `least` long at least, about their middle.
+fn volume(v: &[f64; 6]) -> f64 {
+    (v[3] - v[0]) * (v[4] - v[1]) * (v[5] - v[2])
+}
+
+/// Returns the length that two boxes share along an axis. Boxes shorter than `least` are grown about their
+/// middle.
 fn shared(a: &[f64; 6], b: &[f64; 6], axis: usize, least: f64) -> f64 {
-    let ends = |v: &[f64; 6]| {
-        let (low, high) = (v[axis], v[axis + 3]);
-        let missing = (least - (high - low)).max(0.0) / 2.0;
-        (low - missing, high + missing)
-    };
-    let ((a_low, a_high), (b_low, b_high)) = (ends(a), ends(b));
+    let [a_low, a_high] = ends(a, axis, least);
+    let [b_low, b_high] = ends(b, axis, least);
     (a_high.min(b_high) - a_low.max(b_low)).max(0.0)
+}
+
+fn ends(v: &[f64; 6], axis: usize, least: f64) -> [f64; 2] {
+    let [low, high] = [v[axis], v[axis + 3]];
+    let missing = (least - (high - low)).max(0.0) / 2.0;
+    [low - missing, high + missing]
 }
 
 #[cfg(test)]
@@ -50,7 +57,7 @@ mod tests {
             assert_eq!(iou(&a, &a, rule), 1.0);
             assert_eq!(iou(&a, &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0], rule), 0.5);
             assert_eq!(iou(&a, &[1.0, 0.5, 0.5, 3.0, 1.5, 1.5], rule), 0.25 / 3.75);
-            // Touching, and apart in one axis alone.
+            // Two that touch, and two that are apart along one axis only.
             assert_eq!(iou(&a, &[2.0, 0.0, 0.0, 3.0, 1.0, 1.0], rule), 0.0);
             assert_eq!(iou(&a, &[0.0, 0.0, 5.0, 2.0, 1.0, 6.0], rule), 0.0);
         }
@@ -59,7 +66,7 @@ mod tests {
     #[test]
     fn flat_boxes() {
         let wall = [1.0, 0.0, 0.0, 1.0, 2.0, 3.0];
-        // 1e-4 · 2 · 3 m³ shared, less than nothing in either, and so 1e-8 m³ to divide by.
+        // 1e-4 · 2 · 3 m³ are shared, and neither has a volume, so that the divisor is 1e-8 m³.
         assert!((iou(&wall, &wall, Mm) - 6e4).abs() < 1e-6);
         assert!(iou(&wall, &wall, O3d).is_nan());
         let floor = [0.0, 0.0, 1.0, 2.0, 2.0, 1.0];

@@ -1,6 +1,6 @@
 //! Detection of objects as boxes along the axes: protocol `det`.
 //!
-//! [`average_precision`] is the metric, on slices and without files.
+//! [`average_precision`] is the metric. It works on slices, without files.
 //!
 //! ```
 //! use s3d_eval::boxes::{Detection, GroundTruth, Rule, average_precision};
@@ -29,34 +29,39 @@ use room::Verdict;
 use s3d_label::Class;
 use std::collections::BTreeMap;
 
-/// `[xmin, ymin, zmin, xmax, ymax, zmax]`, metres.
+/// `[xmin, ymin, zmin, xmax, ymax, zmax]`, in metres.
 type Bbox = [f64; 6];
-/// A detection of a class in a room: score and box.
+/// The score and the box of a detection, of one class in one room.
 type Found = (f64, Bbox);
 
-/// Whose definition is followed: which detections are true, and what their average precision is.
+/// The program whose definition is followed: it says which detections are true, and what average precision
+/// is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// mmdetection3d's `indoor_eval`. By descending score, each detection takes the box of its class in its
-    /// room with which its IoU is largest (the first of equal ones), and is true if that IoU is more than the
-    /// threshold and no detection has taken the box before. The average precision is the area under the curve
-    /// of precision over recall, of which each precision is the largest at that recall or more.
+    /// mmdetection3d's `indoor_eval`.
+    ///
+    /// By descending score, each detection takes the box of its class and room with the largest IoU; the
+    /// first box wins a tie. It is true if this IoU is more than the threshold and no detection has taken the
+    /// box before. Average precision is the area under the curve of precision over recall, after each
+    /// precision is raised to the largest at its recall or more.
     Mmdetection3d,
-    /// Open3D-ML's `mAP`, with its boxes in 3D. A detection is true if its IoU with a box is the threshold or
-    /// more, and it is the one with the largest IoU (the first of equal ones, whatever their scores) for that
-    /// or another box. Precision is sampled at the scores of true detections, 41 at most, evenly by recall,
-    /// and its mean is taken over every fourth of them if there are 41, or else over those that there are.
+    /// Open3D-ML's `mAP`, with its boxes in 3D.
+    ///
+    /// A detection is true if its IoU with some box is the threshold or more, and if it is the detection with
+    /// the largest IoU for this or another box; the first detection wins a tie, whatever the scores.
+    /// Precision is sampled at the scores of at most 41 true detections, evenly by recall. Its mean is taken
+    /// over every fourth of 41 samples, or over all samples if there are fewer.
     Open3dMl,
 }
 
-/// A box of the truth.
+/// A true box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroundTruth {
-    /// Any number that tells its room from others.
+    /// The number of its room, whatever numbers rooms have.
     pub room: u32,
-    /// What is in it.
+    /// The class of its object.
     pub class: Class,
-    /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, metres.
+    /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, in metres.
     pub bbox: [f64; 6],
 }
 
@@ -65,24 +70,24 @@ pub struct GroundTruth {
 pub struct Detection {
     /// The number of its room.
     pub room: u32,
-    /// What is said to be in it.
+    /// The predicted class.
     pub class: Class,
-    /// How sure that is: any finite number, larger if surer.
+    /// The confidence: any finite number, larger if more certain.
     pub score: f64,
-    /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, metres.
+    /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, in metres.
     pub bbox: [f64; 6],
 }
 
-/// How well the objects of each of `classes` were found: detections of all rooms pooled, at one threshold of
-/// the IoU. Boxes of other classes are passed over. Where scores are equal, rooms count by number, and
-/// detections of a room in the order of the slice.
+/// Returns the scores of each of `classes`, with the detections of all rooms pooled, at one threshold of the
+/// IoU. Boxes of other classes do not count. Detections with equal scores are ordered by the number of their
+/// room, then by their place in the slice.
 ///
-/// Average precision is a share of 1. It is NaN for a class that [is absent](ClassScore::is_absent), and, by
-/// [`Rule::Mmdetection3d`], for one that is only detected; by [`Rule::Open3dMl`] it is 0 for both.
+/// Average precision is a share of 1. For a class that [is absent](ClassScore::is_absent), or has detections
+/// only, it is NaN by [`Rule::Mmdetection3d`] and 0 by [`Rule::Open3dMl`].
 ///
 /// Source: mmdetection3d at fe25f7a, `mmdet3d/evaluation/functional/indoor_eval.py` and
-/// `structures/bbox_3d/base_box3d.py`; Open3D-ML at 5e81f52, `ml3d/metrics/mAP.py`. They compute boxes in f32
-/// and mmdetection3d its average precision, too; here all is f64.
+/// `structures/bbox_3d/base_box3d.py`; Open3D-ML at 5e81f52, `ml3d/metrics/mAP.py`. Both compute boxes in
+/// f32, and mmdetection3d its average precision, too. Everything is f64 here.
 pub fn average_precision(
     truth: &[GroundTruth],
     detections: &[Detection],
@@ -98,6 +103,7 @@ pub fn average_precision(
         for d in detections.iter().filter(|d| d.class == class) {
             rooms.entry(d.room).or_default().1.push((d.score, d.bbox));
         }
+
         let mut judged: Vec<(f64, Verdict)> = Vec::new();
         for (boxes, found) in rooms.values() {
             let verdicts = room::verdicts(boxes, found, &[threshold], rule);
@@ -113,7 +119,7 @@ pub fn average_precision(
 mod tests {
     use super::*;
 
-    /// A box of 1 m, its corner at x.
+    /// Makes a box of 1 m with its corner at x.
     fn cube(x: f64) -> [f64; 6] {
         [x, 0.0, 0.0, x + 1.0, 1.0, 1.0]
     }
@@ -134,21 +140,22 @@ mod tests {
     fn a_box_is_found_once() {
         let c = Class::CHAIR;
         let boxes = [truth(1, c, 0.0), truth(2, c, 0.0)];
-        // Right, the same again, of another room, nowhere.
+        // Right, the same again, in another room, nowhere.
         let all =
             [found(1, c, 0.1, 0.9), found(1, c, 0.0, 0.8), found(2, c, 0.0, 0.7), found(2, c, 9.0, 0.6)];
         let score = chairs(&boxes, &all, 0.5, Rule::Mmdetection3d);
         assert_eq!((score.truth, score.detections, score.hits, score.recall), (2, 4, 2, 1.0));
         // Precision 1 up to a recall of 1/2, then 2/3.
         assert!((score.ap - (0.5 + 0.5 * 2.0 / 3.0)).abs() < 1e-15);
-        // The second is nearer: it is the true one.
+
+        // The second is nearer, and so the true one.
         let score = chairs(&boxes, &all, 0.5, Rule::Open3dMl);
         assert_eq!(score.hits, 2);
         assert!((score.ap - (2.0 / 3.0)).abs() < 1e-15 && score.recall.is_nan(), "{score:?}");
     }
 
     #[test]
-    fn an_iou_at_the_threshold_is_told_apart() {
+    fn rules_differ_for_an_iou_at_the_threshold() {
         let boxes = [GroundTruth { room: 0, class: Class::CHAIR, bbox: [0.0, 0.0, 0.0, 2.0, 1.0, 1.0] }];
         let half = [found(0, Class::CHAIR, 0.0, 1.0)];
         assert_eq!(chairs(&boxes, &half, 0.5, Rule::Mmdetection3d).ap, 0.0);
@@ -158,7 +165,8 @@ mod tests {
 
     #[test]
     fn classes_without_boxes_or_detections() {
-        let (c, nothing) = (Class::CHAIR, &[][..]);
+        let c = Class::CHAIR;
+        let nothing = &[][..];
         let missed = chairs(&[truth(0, c, 0.0)], &[], 0.25, Rule::Mmdetection3d);
         assert_eq!((missed.ap, missed.recall, missed.is_absent()), (0.0, 0.0, false));
         let invented = chairs(&[], &[found(0, c, 0.0, 1.0)], 0.25, Rule::Mmdetection3d);

@@ -1,30 +1,31 @@
-//! From true and false detections to average precision.
+//! Computes average precision from true and false detections.
 
 use super::Rule;
 use super::room::Verdict;
 
-/// How well the objects of a class were found.
+/// The scores of a class.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClassScore {
-    /// Average precision, a share of 1; NaN where the definition gives none.
+    /// Average precision, a share of 1. NaN where the definition gives none.
     pub ap: f64,
-    /// The share of the truth's boxes that were found; NaN without any, and by [`Rule::Open3dMl`], which
-    /// knows none.
+    /// The share of the true boxes that were found. NaN if there are none, and by [`Rule::Open3dMl`], which
+    /// has no recall.
     pub recall: f64,
-    /// Boxes of the truth.
+    /// The number of true boxes.
     pub truth: u64,
-    /// Detections.
+    /// The number of detections.
     pub detections: u64,
-    /// Those that are true.
+    /// The number of true detections.
     pub hits: u64,
 }
 
-/// Scores at which Open3D-ML samples precision, at most, and which of them it takes the mean of.
+/// The most scores at which Open3D-ML samples precision.
 const SAMPLES: usize = 41;
+/// Open3D-ML takes the mean of every fourth sample.
 const STRIDE: usize = 4;
 
 impl ClassScore {
-    /// Of so many boxes, and scores of detections with what they count as, which become sorted by score.
+    /// Scores the detections of a class with this number of true boxes. Sorts `judged` by score.
     pub(super) fn new(truth: u64, judged: &mut [(f64, Verdict)], rule: Rule) -> Self {
         judged.sort_by(|a, b| b.0.total_cmp(&a.0));
         let hits = judged.iter().filter(|(_, verdict)| *verdict == Verdict::True).count() as u64;
@@ -42,8 +43,9 @@ impl ClassScore {
     }
 }
 
-/// The means of average precision and recall over classes: by [`Rule::Mmdetection3d`] over those that are not
-/// absent, and NaN if one of these is only detected; by [`Rule::Open3dMl`] over all.
+/// Returns the means of average precision and recall over classes. By [`Rule::Mmdetection3d`], absent classes
+/// do not count, and a class with detections only makes the means NaN. By [`Rule::Open3dMl`], all classes
+/// count.
 pub fn mean(scores: &[ClassScore], rule: Rule) -> (f64, f64) {
     let counted: Vec<_> = scores
         .iter()
@@ -55,7 +57,7 @@ pub fn mean(scores: &[ClassScore], rule: Rule) -> (f64, f64) {
     (of(|score| score.ap), of(|score| score.recall))
 }
 
-/// The area under precision over recall, each precision the largest from there on.
+/// Returns the area under precision over recall, after each precision is raised to the largest from there on.
 fn area(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
     let mut hits = 0u64;
     let mut precisions: Vec<(bool, f64)> = (1u64..)
@@ -66,12 +68,14 @@ fn area(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
             (hit, hits as f64 / count as f64)
         })
         .collect();
+
     let mut largest = 0.0f64;
     for (_, precision) in precisions.iter_mut().rev() {
         largest = largest.max(*precision);
         *precision = largest;
     }
-    // Recall grows by as much with each hit. The sum of none is −0.
+
+    // Recall grows by the same amount with each hit. An empty sum is −0.
     let of_hits = precisions
         .iter()
         .filter(|(hit, _)| *hit)
@@ -79,7 +83,7 @@ fn area(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
     (0.0 + of_hits.sum::<f64>()) / truth as f64
 }
 
-/// Open3D-ML's mean of sampled precision.
+/// Returns the mean of sampled precision, as Open3D-ML has it.
 fn sampled(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
     let of_hits: Vec<f64> = judged
         .iter()
@@ -90,11 +94,13 @@ fn sampled(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
         .into_iter()
         .map(|threshold| precision_from(judged, threshold))
         .collect();
+
     let mut largest = 0.0f64;
     for precision in precisions.iter_mut().rev() {
         largest = largest.max(*precision);
         *precision = largest;
     }
+
     let every_fourth: Vec<f64> = precisions.iter().copied().step_by(STRIDE).collect();
     let whole = SAMPLES / STRIDE + 1;
     match precisions.len() {
@@ -104,7 +110,7 @@ fn sampled(truth: u64, judged: &[(f64, Verdict)]) -> f64 {
     }
 }
 
-/// Of descending scores of hits those that are the nearest to steps of recall.
+/// Selects the scores nearest to even steps of recall from the descending scores of hits.
 fn thresholds(scores: &[f64], truth: u64) -> Vec<f64> {
     let mut chosen = Vec::new();
     let mut wanted = 0.0;
@@ -121,12 +127,12 @@ fn thresholds(scores: &[f64], truth: u64) -> Vec<f64> {
     chosen
 }
 
-/// The share of hits among detections with this score or more.
+/// Returns the share of hits among the detections with this score or more.
 fn precision_from(judged: &[(f64, Verdict)], threshold: f64) -> f64 {
     let above = &judged[..judged.partition_point(|(score, _)| *score >= threshold)];
     let count = |wanted| above.iter().filter(|(_, verdict)| *verdict == wanted).count();
-    let (hits, misses) = (count(Verdict::True), count(Verdict::False));
-    // A threshold is the score of a hit.
+    let [hits, misses] = [Verdict::True, Verdict::False].map(count);
+    // There is a hit, since the threshold is the score of one.
     hits as f64 / (hits + misses) as f64
 }
 
@@ -159,13 +165,13 @@ mod tests {
 
     #[test]
     fn precision_is_sampled_at_hits() {
-        // Few hits: the mean is over those that there are, whatever the recall.
+        // With few hits, the mean is over all of them, whatever the recall.
         assert_eq!(sampled(1000, &judged("t")), 1.0);
         assert!((sampled(4, &judged("tvft")) - (1.0 + 2.0 / 3.0) / 2.0).abs() < 1e-15);
-        // 41 of 80, and every fourth of these.
+        // 41 of 80 are sampled, and every fourth of these counts.
         assert_eq!(thresholds(&vec![0.5; 80], 80).len(), 41);
         assert_eq!(sampled(80, &judged(&"t".repeat(80))), 1.0);
-        // Of 80 hits, false ones between the later 40: sampled are hit 1, and every eighth.
+        // 80 hits with false detections between the later 40: hit 1 and every eighth hit count.
         let half = "t".repeat(40) + &"ft".repeat(40);
         let later: f64 = [48, 56, 64, 72, 80]
             .map(|h| f64::from(h) / f64::from(2 * h - 40))

@@ -1,13 +1,13 @@
-//! Reads detections: lists of boxes, or mmdetection3d's files, one a room.
+//! Reads detections: lists of boxes, or a file of mmdetection3d for each room.
 
 use super::Bbox;
 use super::truth::{Classes, Room};
+use crate::error::Result;
 use crate::folder::entries;
 use crate::task::Task;
 use s3d_dataset::s3d_io::Error as FileError;
 use s3d_dataset::s3d_io::fs::read_json;
 use s3d_dataset::s3d_label::Class;
-use s3d_dataset::{Error, Result};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -15,14 +15,15 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// The detections of all rooms: score, class and box, world metres, in the order of the file.
+/// The detections of all rooms.
 pub(super) struct Predictions {
-    /// As many as rooms.
+    /// For each room the score, the class and the box (world frame, metres) of its detections, in the order
+    /// of the file.
     pub(super) of_rooms: Vec<Vec<(f64, Class, Bbox)>>,
     pub(super) notes: Vec<String>,
 }
 
-/// What a file of detections is: an array or an object.
+/// The content of a file of detections: an array or an object.
 enum Content {
     List(Vec<BoxEntry>),
     Sample(Sample),
@@ -41,12 +42,12 @@ struct BoxEntry {
     size: Option<[f64; 3]>,
 }
 
-/// What mmdetection3d's inferencers write of a room.
+/// A file that an inferencer of mmdetection3d writes for a room.
 #[derive(Deserialize)]
 struct Sample {
     labels_3d: Vec<usize>,
     scores_3d: Vec<f64>,
-    /// Middle of the lower face, size, and perhaps an angle.
+    /// The middle of the lower face, the size, and perhaps an angle.
     bboxes_3d: Vec<Vec<f64>>,
     box_type_3d: Option<String>,
 }
@@ -71,6 +72,7 @@ impl Predictions {
             other_classes: 0,
             samples: BTreeMap::new(),
         };
+
         let (files, others) = files(task.predictions)?;
         let mut list = None;
         for path in &files {
@@ -90,40 +92,48 @@ impl Predictions {
     }
 }
 
-/// The JSON files of predictions, and the names of what else lies there.
+/// Returns the JSON files of predictions, and the names of the other entries of their folder.
 fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>)> {
     if path.is_file() {
         return Ok((vec![path.to_owned()], Vec::new()));
     }
-    let list = |dir: &Path| -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-        Ok(entries(dir)?
-            .into_iter()
-            .partition(|p| p.extension().is_some_and(|e| e == "json") && p.is_file()))
-    };
-    let (mut found, mut others) = list(path)?;
-    // Inferencers write into this folder of the one that they are told.
+    let (mut found, mut others) = json_and_others(path)?;
+
+    // Inferencers write into this folder below the one that they are given.
     let below = path.join("preds");
     if found.is_empty() && below.is_dir() {
-        let (more, beside) = list(&below)?;
+        let (more, beside) = json_and_others(&below)?;
         others.retain(|other| *other != below);
-        (found, others) = (more, [others, beside].concat());
+        others.extend(beside);
+        found = more;
+    }
+
+    if found.is_empty() {
+        let pickle = others
+            .iter()
+            .find(|p| p.extension().is_some_and(|e| e == "pkl" || e == "pickle"));
+        let fault = match pickle {
+            Some(pickle) => FileError::format(
+                pickle,
+                format!(
+                    "pickles are not read: docs/evaluation.md has the lines that make JSON of them; {FORMS}"
+                ),
+            ),
+            None => FileError::format(path, format!("has no JSON file: {FORMS}")),
+        };
+        return Err(fault.into());
     }
     let names = others
         .iter()
         .map(|p| p.strip_prefix(path).unwrap_or(p).display().to_string())
         .collect();
-    let pickle = others
-        .iter()
-        .find(|p| p.extension().is_some_and(|e| e == "pkl" || e == "pickle"));
-    match (found.is_empty(), pickle) {
-        (false, _) => Ok((found, names)),
-        (true, Some(pickle)) => Err(FileError::format(
-            pickle,
-            format!("pickles are not read: docs/evaluation.md has the lines that make JSON of them; {FORMS}"),
-        )
-        .into()),
-        (true, None) => Err(FileError::format(path, format!("has no JSON file: {FORMS}")).into()),
-    }
+    Ok((found, names))
+}
+
+/// Returns the JSON files in a folder, and its other entries.
+fn json_and_others(dir: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let is_json = |p: &PathBuf| p.extension().is_some_and(|e| e == "json") && p.is_file();
+    Ok(entries(dir)?.into_iter().partition(is_json))
 }
 
 fn read_content(path: &Path) -> Result<Content> {
@@ -164,9 +174,9 @@ impl<'de> Visitor<'de> for ContentVisitor {
     }
 }
 
-/// What is wrong with a box of a file, counted from 0.
-fn fault(path: &Path, index: usize, message: &str) -> Error {
-    FileError::format(path, format!("box {}: {message}", index + 1)).into()
+/// Returns the error for a box of a file, whose index counts from 0.
+fn fault(path: &Path, index: usize, message: &str) -> FileError {
+    FileError::format(path, format!("box {}: {message}", index + 1))
 }
 
 struct Reader<'a> {
@@ -175,27 +185,30 @@ struct Reader<'a> {
     rooms: &'a [Room],
     places: BTreeMap<(u32, &'a str), usize>,
     of_rooms: Vec<Vec<(f64, Class, Bbox)>>,
-    /// Boxes of areas that are not tested, and of classes that are not detected.
+    /// The number of boxes in areas that are not tested.
     other_areas: u64,
+    /// The number of boxes of classes that are not evaluated.
     other_classes: u64,
-    /// Rooms that have a file.
+    /// The rooms that have a file of their own.
     samples: BTreeMap<usize, PathBuf>,
 }
 
 impl Reader<'_> {
-    /// The room of these names; `None` if its area is not tested.
+    /// Returns the index of a room; `None` if its area is not tested.
     fn place(&self, area: u32, room: &str) -> Result<Option<usize>, String> {
         if let Some(place) = self.places.get(&(area, room)) {
             return Ok(Some(*place));
         }
-        let tested = self.task.folds.iter().any(|fold| fold.areas.contains(&area));
-        match (tested, self.task.data.areas().contains(&area)) {
-            (false, true) => Ok(None),
-            (false, false) => Err(format!("the data set has no area {area}")),
-            (true, _) => Err(format!("the data set has no room {room:?} with annotations in area {area}")),
+        if self.task.folds.iter().any(|fold| fold.areas.contains(&area)) {
+            return Err(format!("the data set has no room {room:?} with annotations in area {area}"));
         }
+        if !self.task.data.areas().contains(&area) {
+            return Err(format!("the data set has no area {area}"));
+        }
+        Ok(None)
     }
 
+    /// Adds a box of a list.
     fn entry(&mut self, path: &Path, index: usize, entry: BoxEntry) -> Result<()> {
         let wrong = |message: &str| fault(path, index, message);
         let Some(place) = self.place(entry.area, &entry.room).map_err(|e| wrong(&e))? else {
@@ -203,16 +216,17 @@ impl Reader<'_> {
             return Ok(());
         };
         let class = self.classes.named(&entry.class).map_err(|e| wrong(&e))?;
+
         let (min, max) = match (entry.min, entry.max, entry.center, entry.size) {
             (Some(min), Some(max), None, None) => (min, max),
             (None, None, Some(center), Some(size)) => {
                 let end = |sign: f64| std::array::from_fn(|k| center[k] + sign * size[k] / 2.0);
                 (end(-1.0), end(1.0))
             }
-            _ => return Err(wrong("a box has min and max, or center and size, each x y z in metres")),
+            _ => return Err(wrong("a box has min and max, or center and size, each x y z in metres").into()),
         };
         if (0..3).any(|k| min[k] > max[k]) {
-            return Err(wrong(&format!("it ends before it begins: {min:?} to {max:?}")));
+            return Err(wrong(&format!("it ends before it begins: {min:?} to {max:?}")).into());
         }
         self.add(place, entry.score, class, [min[0], min[1], min[2], max[0], max[1], max[2]]);
         Ok(())
@@ -226,81 +240,54 @@ impl Reader<'_> {
         }
     }
 
-    /// Boxes of a room, which are in its own frame: its least coordinates are 0.
+    /// Adds the boxes of a room. They are in the frame of the room, whose least coordinates are 0.
     fn sample(&mut self, path: &Path, sample: Sample) -> Result<()> {
-        let file = |message: String| Error::from(FileError::format(path, message));
+        let file = |message: String| FileError::format(path, message);
         let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
         let name = stem.strip_prefix("Area_").and_then(|rest| rest.split_once('_'));
         let Some((area, room)) = name.and_then(|(area, room)| Some((area.parse().ok()?, room))) else {
-            return Err(file("a room's file is called Area_N_ROOM.json, as Area_5_office_1.json".to_owned()));
+            let message = "a room's file is called Area_N_ROOM.json, as Area_5_office_1.json";
+            return Err(file(message.to_owned()).into());
         };
         if let Some(kind) = sample.box_type_3d.filter(|kind| kind != "Depth") {
-            return Err(file(format!(
-                "box_type_3d is {kind:?}: only boxes of type \"Depth\" have z upwards"
-            )));
+            let message = format!("box_type_3d is {kind:?}: only boxes of type \"Depth\" have z upwards");
+            return Err(file(message).into());
         }
         let counts = [sample.labels_3d.len(), sample.scores_3d.len(), sample.bboxes_3d.len()];
         if counts != [counts[0]; 3] {
-            return Err(file(format!("has {counts:?} labels_3d, scores_3d, bboxes_3d: as many of each")));
+            let message = format!("has {counts:?} labels_3d, scores_3d, bboxes_3d: as many of each");
+            return Err(file(message).into());
         }
         let Some(place) = self.place(area, room).map_err(file)? else {
             self.other_areas += counts[0] as u64;
             return Ok(());
         };
+
         self.samples.insert(place, path.to_owned());
         let corner = self.rooms[place].corner;
         let rows = sample.labels_3d.into_iter().zip(sample.scores_3d).zip(sample.bboxes_3d);
         for (i, ((label, score), row)) in rows.enumerate() {
             let Some(class) = self.classes.list.get(label).copied() else {
-                return Err(fault(
-                    path,
-                    i,
-                    &format!(
-                        "label {label}, but there are {} classes: labels count {}; name the classes of the \
-                         training, in its order",
-                        self.classes.list.len(),
-                        self.classes.names()
-                    ),
-                ));
+                let message = format!(
+                    "label {label}, but there are {} classes: labels count {}; name the classes of the \
+                     training, in its order",
+                    self.classes.list.len(),
+                    self.classes.names()
+                );
+                return Err(fault(path, i, &message).into());
             };
-            let (x, y, z, size) = match row[..] {
-                [x, y, z, dx, dy, dz] | [x, y, z, dx, dy, dz, 0.0] => (x, y, z, [dx, dy, dz]),
-                [_, _, _, _, _, _, _] => {
-                    return Err(fault(path, i, "it is turned: only boxes along the axes are evaluated"));
-                }
-                _ => return Err(fault(path, i, &format!("has {} numbers instead of 7", row.len()))),
-            };
-            if size.iter().any(|v| *v < 0.0) {
-                return Err(fault(path, i, &format!("its size is negative: {size:?}")));
-            }
-            let min = [x - size[0] / 2.0 + corner[0], y - size[1] / 2.0 + corner[1], z + corner[2]];
-            let [a, b, c] = min;
-            self.add(place, score, class, [a, b, c, a + size[0], b + size[1], c + size[2]]);
+            let bbox = box_of_row(&row, corner).map_err(|message| fault(path, i, &message))?;
+            self.add(place, score, class, bbox);
         }
         Ok(())
     }
 
+    /// Checks that a file of each room was read, if rooms have files, and makes the notes.
     fn finish(self, list: Option<&PathBuf>, others: &[String]) -> Result<Predictions> {
         if let Some(sample) = self.samples.values().next() {
-            if let Some(list) = list {
-                let message =
-                    "is a list of boxes, and other files are mmdetection3d's: leave those of one kind";
-                return Err(FileError::format(list, message).into());
-            }
-            let missing: Vec<String> = (self.rooms.iter().enumerate())
-                .filter(|(i, _)| !self.samples.contains_key(i))
-                .map(|(_, room)| format!("Area_{}_{}.json", room.area, room.name))
-                .collect();
-            if let Some(first) = missing.first() {
-                let message = format!(
-                    "missing, as are {} of {} rooms: a room in which nothing was found has a file with \
-                     empty lists",
-                    missing.len(),
-                    self.rooms.len()
-                );
-                return Err(FileError::format(&sample.with_file_name(first), message).into());
-            }
+            self.check_samples(sample, list)?;
         }
+
         let mut notes = Vec::new();
         if self.other_areas > 0 {
             notes.push(format!("{} detections are of areas that are not tested.", self.other_areas));
@@ -314,4 +301,39 @@ impl Reader<'_> {
         }
         Ok(Predictions { of_rooms: self.of_rooms, notes })
     }
+
+    /// Refuses a list beside files of rooms, and rooms without a file. `sample` is one of the files.
+    fn check_samples(&self, sample: &Path, list: Option<&PathBuf>) -> Result<()> {
+        if let Some(list) = list {
+            let message = "is a list of boxes, and other files are mmdetection3d's: leave those of one kind";
+            return Err(FileError::format(list, message).into());
+        }
+        let missing: Vec<String> = (self.rooms.iter().enumerate())
+            .filter(|(i, _)| !self.samples.contains_key(i))
+            .map(|(_, room)| format!("Area_{}_{}.json", room.area, room.name))
+            .collect();
+        let Some(first) = missing.first() else { return Ok(()) };
+        let message = format!(
+            "missing, as are {} of {} rooms: a room in which nothing was found has a file with empty lists",
+            missing.len(),
+            self.rooms.len()
+        );
+        Err(FileError::format(&sample.with_file_name(first), message).into())
+    }
+}
+
+/// Returns the box of a row of `bboxes_3d` in the world. `corner` has the least coordinates of the room.
+fn box_of_row(row: &[f64], corner: [f64; 3]) -> Result<Bbox, String> {
+    let (x, y, z, size) = match *row {
+        [x, y, z, dx, dy, dz] | [x, y, z, dx, dy, dz, 0.0] => (x, y, z, [dx, dy, dz]),
+        [_, _, _, _, _, _, _] => {
+            return Err("it is turned: only boxes along the axes are evaluated".to_owned());
+        }
+        _ => return Err(format!("has {} numbers instead of 7", row.len())),
+    };
+    if size.iter().any(|v| *v < 0.0) {
+        return Err(format!("its size is negative: {size:?}"));
+    }
+    let [a, b, c] = [x - size[0] / 2.0 + corner[0], y - size[1] / 2.0 + corner[1], z + corner[2]];
+    Ok([a, b, c, a + size[0], b + size[1], c + size[2]])
 }

@@ -1,18 +1,20 @@
-//! The protocol: rooms in parallel, then classes over rooms.
+//! Protocol `det`: judges rooms in parallel, then scores classes over rooms.
 
 use super::precision::{ClassScore, mean};
 use super::predictions::Predictions;
 use super::room::{Verdict, verdicts};
-use super::truth::{Classes, rooms};
+use super::truth::{Classes, Room, rooms};
 use super::{Bbox, Found, Rule};
+use crate::error::Result;
 use crate::tables::{Rows, tables};
 use crate::task::Task;
 use crate::{Evaluation, Fold};
+use s3d_dataset::map_in_order;
 use s3d_dataset::s3d_label::Class;
-use s3d_dataset::{Result, map_in_order};
 
-/// The thresholds of the IoU, and what their columns are called.
+/// The thresholds of the IoU.
 const THRESHOLDS: [f64; 2] = [0.25, 0.5];
+/// The names of the columns.
 const COLUMNS: [&str; 4] = ["AP@0.25", "AR@0.25", "AP@0.50", "AR@0.50"];
 
 const MMDETECTION3D: [&str; 5] = [
@@ -42,13 +44,15 @@ const OPEN3D_ML: [&str; 4] = [
      1 instead of 100.",
 ];
 
-/// A class in a room: boxes of the truth, and scores with what they count as at each threshold.
+/// The boxes of a class in a room.
 struct OfClass {
+    /// The number of true boxes.
     truth: u64,
+    /// The score of each detection, and its verdict at each threshold.
     judged: Vec<(f64, Vec<Verdict>)>,
 }
 
-/// The boxes of rooms against detections.
+/// Evaluates detections as boxes.
 pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
     let rule = if task.variant == "open3d-ml" {
         Rule::Open3dMl
@@ -58,6 +62,7 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
     let classes = Classes::new(task)?;
     let rooms = rooms(task, &classes)?;
     let Predictions { of_rooms, mut notes } = Predictions::read(task, &classes, &rooms)?;
+
     let progress = task.ctx.progress("evaluate", "rooms", rooms.len() as u64);
     let jobs: Vec<_> = rooms.iter().zip(&of_rooms).collect();
     let judged = map_in_order(
@@ -65,33 +70,20 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
         &jobs,
         || (),
         |(), (room, found)| {
-            let of_class = |class: &Class| {
-                let truth: Vec<Bbox> = room
-                    .boxes
-                    .iter()
-                    .filter(|(c, _)| c == class)
-                    .map(|(_, bbox)| *bbox)
-                    .collect();
-                let found: Vec<Found> = found
-                    .iter()
-                    .filter(|(_, c, _)| c == class)
-                    .map(|(s, _, bbox)| (*s, *bbox))
-                    .collect();
-                let verdicts = verdicts(&truth, &found, &THRESHOLDS, rule);
-                let judged = found.iter().map(|(score, _)| *score).zip(verdicts).collect();
-                OfClass { truth: truth.len() as u64, judged }
-            };
+            let of_class = |class: &Class| OfClass::judge(room, found, *class, rule);
             let of_classes: Vec<OfClass> = classes.list.iter().map(of_class).collect();
             progress.add(1);
             Ok((room.fold, of_classes))
         },
     )?;
     drop(progress);
+
     let columns: Vec<&str> = match rule {
         Rule::Mmdetection3d => COLUMNS.to_vec(),
         Rule::Open3dMl => vec![COLUMNS[0], COLUMNS[2]],
     };
     let tables = tables(task, &columns, &judged, |rooms| rows(rooms, &classes.list, rule));
+
     let of_rule = if rule == Rule::Mmdetection3d {
         &MMDETECTION3D[..]
     } else {
@@ -109,12 +101,15 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
     );
     let mut definition: Vec<&str> = vec![&truth];
     definition.extend(of_rule);
+
     let boxes = rooms.iter().flat_map(|room| &room.boxes);
     let flat = boxes.clone().filter(|(_, b)| (0..3).any(|k| b[k + 3] <= b[k])).count();
     if flat > 0 {
         notes.push(format!("{flat} boxes of the truth are flat: see the definition for what that means."));
     }
-    notes.extend(invented(task.folds, &judged, &classes.list).filter(|_| rule == Rule::Mmdetection3d));
+    if rule == Rule::Mmdetection3d {
+        notes.extend(invented(task.folds, &judged, &classes.list));
+    }
     let detections = of_rooms.iter().map(|found| found.len() as u64).sum();
     let counted =
         [("rooms", rooms.len() as u64), ("boxes", boxes.count() as u64), ("detections", detections)];
@@ -123,7 +118,27 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
     Ok(evaluation)
 }
 
-/// Which classes are detected in a fold whose truth has none of them.
+impl OfClass {
+    /// Judges the detections of a class in a room.
+    fn judge(room: &Room, found: &[(f64, Class, Bbox)], class: Class, rule: Rule) -> Self {
+        let truth: Vec<Bbox> = room
+            .boxes
+            .iter()
+            .filter(|(c, _)| *c == class)
+            .map(|(_, bbox)| *bbox)
+            .collect();
+        let found: Vec<Found> = found
+            .iter()
+            .filter(|(_, c, _)| *c == class)
+            .map(|(score, _, bbox)| (*score, *bbox))
+            .collect();
+        let verdicts = verdicts(&truth, &found, &THRESHOLDS, rule);
+        let judged = found.iter().map(|(score, _)| *score).zip(verdicts).collect();
+        Self { truth: truth.len() as u64, judged }
+    }
+}
+
+/// Returns a note on the classes that are detected in a fold without true boxes of them.
 fn invented(folds: &[Fold], rooms: &[(usize, Vec<OfClass>)], classes: &[Class]) -> Option<String> {
     let in_fold = |(i, fold): (usize, &Fold)| {
         let of_fold = rooms.iter().filter(move |(at, _)| *at == i).map(|(_, of)| of);
@@ -141,8 +156,7 @@ fn invented(folds: &[Fold], rooms: &[(usize, Vec<OfClass>)], classes: &[Class]) 
     (!names.is_empty()).then(|| format!("{told}: {}.", names.join(", ")))
 }
 
-/// The rows of classes, then means: of those that a building is made of, of those that can be moved, and of
-/// all.
+/// Returns the rows of classes, then the means over structural, movable and all classes.
 fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
     let of_class = |class: usize, threshold: usize| {
         let of_rooms = rooms.iter().map(|room| &room[class]);
@@ -155,6 +169,7 @@ fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
     let scores: Vec<[ClassScore; 2]> = (0..classes.len())
         .map(|class| [0, 1].map(|threshold| of_class(class, threshold)))
         .collect();
+
     let columns = |pairs: [(f64, f64); 2]| match rule {
         Rule::Mmdetection3d => pairs.into_iter().flat_map(|(ap, recall)| [ap, recall]).collect(),
         Rule::Open3dMl => pairs.into_iter().map(|(ap, _)| ap).collect::<Vec<f64>>(),
@@ -165,6 +180,7 @@ fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
         .zip(&scores)
         .map(|(class, of)| (class.name().to_owned(), of_row(of)))
         .collect();
+
     let mean_of = |wanted: &dyn Fn(Class) -> bool| {
         let chosen = |threshold: usize| -> Vec<ClassScore> {
             classes
@@ -176,13 +192,19 @@ fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
         };
         columns([0, 1].map(|threshold| mean(&chosen(threshold), rule)))
     };
-    let (structural, movable) = (|c: Class| c.s3dis() <= Class::DOOR, |c: Class| c.s3dis() > Class::DOOR);
-    if classes.iter().any(|c| structural(*c)) && classes.iter().any(|c| movable(*c)) {
-        rows.push(("mean of structural".to_owned(), mean_of(&structural)));
-        rows.push(("mean of movable".to_owned(), mean_of(&movable)));
+    let has_both_kinds =
+        classes.iter().any(|c| is_structural(*c)) && !classes.iter().all(|c| is_structural(*c));
+    if has_both_kinds {
+        rows.push(("mean of structural".to_owned(), mean_of(&is_structural)));
+        rows.push(("mean of movable".to_owned(), mean_of(&|class| !is_structural(class))));
     }
     rows.push(("mean".to_owned(), mean_of(&|_| true)));
     rows
+}
+
+/// Whether a building is made of things of a class, rather than furnished with them.
+fn is_structural(class: Class) -> bool {
+    class.s3dis() <= Class::DOOR
 }
 
 #[cfg(test)]
@@ -190,7 +212,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_detected_in_vain_is_told() {
+    fn classes_without_true_boxes_are_noted() {
         let folds = [5, 2].map(|area| Fold { name: format!("area {area}"), areas: vec![area] });
         let of = |truth, found: bool| OfClass {
             truth,

@@ -1,17 +1,17 @@
-//! Which detections of a room are true.
+//! Decides which detections of a room are true.
 
 use super::{Bbox, Found, Rule, iou};
 
-/// What a detection counts as.
+/// The verdict on a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
     True,
     False,
-    /// Neither: its IoU with a box is not defined.
+    /// Neither, since its IoU with a box is not defined.
     Void,
 }
 
-/// For each detection (score and box) of one class in one room what it counts as at each threshold.
+/// Returns the verdicts on each detection of one class in one room, by threshold.
 pub(super) fn verdicts(truth: &[Bbox], found: &[Found], thresholds: &[f64], rule: Rule) -> Vec<Vec<Verdict>> {
     match rule {
         Rule::Mmdetection3d => greedy(truth, found, thresholds),
@@ -24,6 +24,7 @@ fn greedy(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdic
     let mut taken = vec![vec![false; truth.len()]; thresholds.len()];
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by(|a, b| found[*b].0.total_cmp(&found[*a].0));
+
     for d in order {
         let ious = truth
             .iter()
@@ -31,6 +32,7 @@ fn greedy(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdic
             .enumerate();
         let best = ious.reduce(|best, next| if next.1 > best.1 { next } else { best });
         let Some((at, largest)) = best else { continue };
+
         for ((verdict, taken), threshold) in verdicts[d].iter_mut().zip(&mut taken).zip(thresholds) {
             if largest > *threshold && !std::mem::replace(&mut taken[at], true) {
                 *verdict = Verdict::True;
@@ -43,7 +45,8 @@ fn greedy(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdic
 fn best_of_boxes(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdict>> {
     let with_all = |bbox| found.iter().map(|(_, of)| iou(of, bbox, Rule::Open3dMl)).collect();
     let ious: Vec<Vec<f64>> = truth.iter().map(with_all).collect();
-    // Of each box the detection with the largest IoU; the first that is not defined, as numpy's argmax.
+
+    // The best detection of each box has the largest IoU, or the first IoU that is NaN, like numpy's argmax.
     let mut is_best = vec![false; found.len()];
     for of_box in &ious {
         let best = of_box.iter().enumerate().reduce(|best, next| {
@@ -55,6 +58,7 @@ fn best_of_boxes(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec
         });
         best.into_iter().for_each(|(d, _)| is_best[d] = true);
     }
+
     let verdict = |d: usize, threshold: f64| {
         if ious.iter().any(|of_box| of_box[d] >= threshold) {
             return if is_best[d] { Verdict::True } else { Verdict::False };
@@ -79,20 +83,21 @@ mod tests {
     const MOVED: [f64; 6] = [0.5, 0.0, 0.0, 1.5, 1.0, 1.0];
 
     #[test]
-    fn the_surest_takes_the_box() {
-        // An IoU of 1/3, then 1: at 0.25 the first takes the box, at 0.5 the second.
+    fn the_detection_with_the_higher_score_takes_the_box() {
+        // IoU of 1/3 and 1: at 0.25 the higher score takes the box, at 0.5 the other.
         let found = [(0.5, ONE), (0.9, MOVED)];
         let at = |rule| verdicts(&[ONE], &found, &[0.25, 0.5], rule);
         assert_eq!(at(Rule::Mmdetection3d), [[False, True], [True, False]]);
         assert_eq!(at(Rule::Open3dMl), [[True, True], [False, False]]);
-        // Of equal scores the first.
+        // The first wins a tie.
         let ties = verdicts(&[ONE], &[(0.5, ONE), (0.5, ONE)], &[0.5], Rule::Mmdetection3d);
         assert_eq!(ties, [[True], [False]]);
     }
 
     #[test]
     fn open3d_takes_the_best_of_any_box() {
-        // The second detection is the best of no box; the first is of the far one, which it does not touch.
+        // The last detection is the best of no box; the first is the best of the far box, which it does not
+        // touch.
         let far = [9.0, 9.0, 9.0, 10.0, 10.0, 10.0];
         let found = [(0.9, MOVED), (0.8, ONE), (0.7, ONE)];
         let boxes = verdicts(&[ONE, far], &found, &[0.25], Rule::Open3dMl);

@@ -1,28 +1,24 @@
-//! The boxes that are held against detections: those of the data set's instances.
+//! The true boxes, from the instances of the data set.
 
 use super::Bbox;
+use crate::error::{ClassFault, ClassOption, Error, Result};
 use crate::task::Task;
 use s3d_dataset::s3d_io::Error as FileError;
 use s3d_dataset::s3d_label::{Class, Taxonomy};
-use s3d_dataset::{Error, Result};
 use std::collections::BTreeMap;
 
-/// The classes that are detected.
+/// The classes to detect.
 pub(super) struct Classes {
     taxonomy: Taxonomy,
     pub(super) list: Vec<Class>,
-    /// Whether classes are what they count as in S3DIS.
+    /// Whether each class stands for the class of S3DIS that it counts as.
     as_s3dis: bool,
 }
 
 impl Classes {
-    /// Those of the options: by name, or else the paper's 12.
+    /// Returns the classes that the options name, or the 12 of the paper.
     pub(super) fn new(task: &Task<'_>) -> Result<Self> {
-        let root = task.data.layout().root().display();
-        let Some(taxonomy) = task.data.taxonomy().cloned() else {
-            let message = format!("{root}: {} needs labels, and the data set has none", task.protocol);
-            return Err(Error::Input(message));
-        };
+        let Some(taxonomy) = task.data.taxonomy().cloned() else { return Err(task.unlabelled()) };
         let Some(names) = &task.options.classes else {
             let list = Class::S3DIS
                 .into_iter()
@@ -30,23 +26,23 @@ impl Classes {
                 .collect();
             return Ok(Self { taxonomy, list, as_s3dis: true });
         };
+
+        let refused = |fault| Error::Classes { option: ClassOption::Classes, fault };
         let mut list = Vec::new();
         for name in names {
-            let class = taxonomy
-                .class(name)
-                .map_err(|e| Error::Usage(format!("--classes: {e}")))?;
+            let class = taxonomy.class(name).map_err(|e| refused(e.into()))?;
             if list.contains(&class) {
-                return Err(Error::Usage(format!("--classes: {class} is there twice")));
+                return Err(refused(ClassFault::Double(class)));
             }
             list.push(class);
         }
         if list.is_empty() {
-            return Err(Error::Usage("--classes: name a class".to_owned()));
+            return Err(refused(ClassFault::Empty));
         }
         Ok(Self { taxonomy, list, as_s3dis: false })
     }
 
-    /// The class that a name means, whether it is detected or not; the error says which there are.
+    /// Returns the class of a name, whether it is to be detected or not. The error lists the classes.
     pub(super) fn named(&self, name: &str) -> Result<Class, String> {
         match self.taxonomy.class(name) {
             Ok(class) if self.as_s3dis => Ok(class.s3dis()),
@@ -55,7 +51,7 @@ impl Classes {
         }
     }
 
-    /// The names of those that are detected.
+    /// Lists the names of the classes to detect.
     pub(super) fn names(&self) -> String {
         self.list
             .iter()
@@ -69,15 +65,15 @@ impl Classes {
 pub(super) struct Room {
     pub(super) fold: usize,
     pub(super) area: u32,
-    /// Such as `office_3`.
+    /// Its name, such as `office_3`.
     pub(super) name: String,
-    /// The boxes of classes that are detected, world metres.
+    /// Its boxes of the classes to detect, in the world frame, in metres.
     pub(super) boxes: Vec<(Class, Bbox)>,
-    /// The least coordinates of all of its instances.
+    /// The least coordinates of all its instances.
     pub(super) corner: [f64; 3],
 }
 
-/// The rooms of all folds, by fold, area, and type and number.
+/// Returns the rooms of all folds, ordered by fold, area, type and number.
 pub(super) fn rooms(task: &Task<'_>, classes: &Classes) -> Result<Vec<Room>> {
     let mut rooms = Vec::new();
     for (fold, area) in task
@@ -95,6 +91,7 @@ pub(super) fn rooms(task: &Task<'_>, classes: &Classes) -> Result<Vec<Room>> {
                 .room(&instance.room)
                 .map_err(|e| wrong(e.to_string()))?;
             let class = classes.named(&instance.class).map_err(wrong)?;
+
             let bbox = instance.bbox.map(f64::from);
             let room = of_area.entry(key).or_insert_with(|| Room {
                 fold,
@@ -114,8 +111,7 @@ pub(super) fn rooms(task: &Task<'_>, classes: &Classes) -> Result<Vec<Room>> {
         rooms.extend(of_area.into_values());
     }
     if rooms.is_empty() {
-        let root = task.data.layout().root().display();
-        return Err(Error::Input(format!("{root}: no annotated room in the areas that are tested")));
+        return Err(task.no_rooms());
     }
     Ok(rooms)
 }
@@ -132,7 +128,9 @@ mod tests {
         assert_eq!(classes.named("bookshelf"), Ok(Class::BOOKCASE));
         assert_eq!(classes.named("beam"), Ok(Class::BEAM));
         assert!(classes.named("stool").unwrap_err().contains("bookshelf"));
-        (classes.list, classes.as_s3dis) = (vec![own], false);
+
+        classes.list = vec![own];
+        classes.as_s3dis = false;
         assert_eq!((classes.named("bookshelf"), classes.names()), (Ok(own), "bookshelf".to_owned()));
         assert!(classes.named("beam").is_err());
     }

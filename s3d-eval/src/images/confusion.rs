@@ -1,6 +1,6 @@
-//! Counts of classes, and what HoHoNet makes of them.
+//! Confusion matrices, and the scores that HoHoNet computes from them.
 
-/// How many pixels of each class were predicted as which.
+/// The number of pixels of each true class that were predicted as each class.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Confusion {
     classes: usize,
@@ -10,23 +10,23 @@ pub struct Confusion {
 /// Scores of a [`Confusion`], each from 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassScores {
-    /// Intersection over union by class; NaN for a class without true pixels.
+    /// The intersection over union of each class. NaN for a class without true pixels.
     pub iou: Vec<f64>,
-    /// Share of a class's pixels that were found, by class; NaN for a class without true pixels.
+    /// The share of the true pixels of each class that were found. NaN for a class without true pixels.
     pub accuracy: Vec<f64>,
-    /// Mean of `iou` over the classes that have true pixels; NaN without any.
+    /// The mean of `iou` over the classes with true pixels. NaN if there are none.
     pub mean_iou: f64,
-    /// Mean of `accuracy` over the same.
+    /// The mean of `accuracy` over the same classes.
     pub mean_accuracy: f64,
 }
 
 impl Confusion {
-    /// Of so many classes, nothing counted yet.
+    /// Makes an empty matrix of this number of classes.
     pub fn new(classes: usize) -> Self {
         Self { classes, counts: vec![0; classes * classes] }
     }
 
-    /// Counts a pixel of the class `truth` that was predicted to be of the class `prediction`.
+    /// Counts a pixel of the class `truth` that was predicted as the class `prediction`.
     ///
     /// # Panics
     /// If there is no such class.
@@ -35,10 +35,10 @@ impl Confusion {
         self.counts[truth * self.classes + prediction] += 1;
     }
 
-    /// Adds the counts of another of as many classes.
+    /// Adds the counts of another matrix.
     ///
     /// # Panics
-    /// If it has another number of classes.
+    /// If the other has another number of classes.
     pub fn add(&mut self, other: &Self) {
         assert_eq!(self.classes, other.classes, "the same classes");
         self.counts
@@ -47,7 +47,7 @@ impl Confusion {
             .for_each(|(sum, count)| *sum += count);
     }
 
-    /// The places that are not 0, and their counts: little of one image.
+    /// Returns the indices of the counts other than 0, and these counts. A single image has few.
     pub(super) fn counted(&self) -> Vec<(u32, u32)> {
         let there = (0u32..).zip(&self.counts).filter(|(_, count)| **count > 0);
         there
@@ -55,21 +55,21 @@ impl Confusion {
             .collect()
     }
 
-    /// Adds what [`Confusion::counted`] gave.
+    /// Adds counts that [`Confusion::counted`] returned.
     pub(super) fn add_counted(&mut self, counted: &[(u32, u32)]) {
         counted
             .iter()
             .for_each(|(at, count)| self.counts[*at as usize] += u64::from(*count));
     }
 
-    /// How many pixels were counted.
+    /// Returns the number of pixels that were counted.
     pub fn pixels(&self) -> u64 {
         self.counts.iter().sum()
     }
 
-    /// The scores of HoHoNet's script: classes without true pixels are taken out of the matrix first, rows
-    /// and columns, so that a pixel that was predicted to be of one of them counts nowhere, not even as
-    /// missed. Source: HoHoNet, `test_sem.py`, "Summarize".
+    /// Returns the scores of HoHoNet's script (`test_sem.py`, "Summarize"). It removes the rows and columns
+    /// of classes without true pixels first. A pixel that was predicted as one of these classes therefore
+    /// counts nowhere, not even as missed.
     pub fn scores(&self) -> ClassScores {
         let of = |truth: usize, prediction: usize| self.counts[truth * self.classes + prediction];
         let there: Vec<usize> = (0..self.classes)
@@ -81,6 +81,7 @@ impl Confusion {
             mean_iou: f64::NAN,
             mean_accuracy: f64::NAN,
         };
+
         for &class in &there {
             let found = of(class, class) as f64;
             let truth = there.iter().map(|&other| of(class, other)).sum::<u64>() as f64;
@@ -88,8 +89,10 @@ impl Confusion {
             scores.iou[class] = found / (truth + predicted - found);
             scores.accuracy[class] = found / truth;
         }
+
         let mean = |values: &[f64]| there.iter().map(|&c| values[c]).sum::<f64>() / there.len() as f64;
-        (scores.mean_iou, scores.mean_accuracy) = (mean(&scores.iou), mean(&scores.accuracy));
+        scores.mean_iou = mean(&scores.iou);
+        scores.mean_accuracy = mean(&scores.accuracy);
         scores
     }
 }

@@ -1,6 +1,7 @@
-//! Protocol `depth`.
+//! Protocol `depth`: distances of panoramas.
 
 use crate::Evaluation;
+use crate::error::{Error, Result};
 use crate::images::depth_metrics::{DEPTH_COLUMNS, DepthScores, hohonet_depth, unifuse_depth};
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
 use crate::images::read::{self, Places};
@@ -8,7 +9,7 @@ use crate::images::resample::{opencv_nearest, pillow_nearest};
 use crate::options::ImageKind;
 use crate::tables::tables;
 use crate::task::Task;
-use s3d_dataset::{Error, Result, map_in_order};
+use s3d_dataset::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
 use s3d_io::image::read_gray16;
@@ -43,12 +44,12 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
     let median_scale = task.options.median_scale;
     let is_unifuse = task.variant == "unifuse";
     if median_scale && !is_unifuse {
-        let message = format!("depth as {} has no scale to the median: depth as unifuse has", task.variant);
-        return Err(Error::Usage(message));
+        return Err(Error::NoMedianScale { variant: task.variant });
     }
     if task.options.images == Some(ImageKind::Views) {
-        return Err(Error::Usage("depth is of panoramas, not of views".to_owned()));
+        return Err(Error::PanoramasOnly { protocol: task.protocol });
     }
+
     let wanted = Wanted {
         domain: Domain::Depth,
         besides: &[],
@@ -57,6 +58,7 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
         known: &[],
     };
     let Matched { images, mut notes, .. } = find(task, &wanted)?;
+
     let progress = task.ctx.progress("evaluating", "panoramas", images.len() as u64);
     let units = map_in_order(
         task.ctx,
@@ -90,6 +92,7 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
             "{replaced} pixels were predicted beyond 10 m and held against 10 m instead of their truth."
         ));
     }
+
     let tables = tables(task, &DEPTH_COLUMNS, &units, |units| vec![("mean".to_owned(), mean(units))]);
     let pixels = units.iter().map(|(_, scores)| scores.pixels).sum();
     let counted = [("panoramas", images.len() as u64), ("pixels", pixels)];
@@ -100,7 +103,7 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
     Ok(Evaluation { notes, ..task.evaluation(&definition, counted, tables) })
 }
 
-/// The mean of scores over the images that have some.
+/// Returns the means of scores over the images that have any.
 fn mean(units: &[&DepthScores]) -> Vec<f64> {
     let there = units.iter().filter(|scores| scores.pixels > 0);
     let mut sums = [0.0; DEPTH_COLUMNS.len()];
@@ -111,14 +114,14 @@ fn mean(units: &[&DepthScores]) -> Vec<f64> {
     sums.map(|sum| sum / count).to_vec()
 }
 
-/// Truth (0 where it is missing) and prediction in metres, at the pixels of the evaluation; where the truth
-/// is above 0 and at most `farthest` there is a prediction.
+/// Returns truth and prediction in metres at the pixels of the evaluation. Missing truth is 0. Refuses a file
+/// without a prediction where the truth is above 0 and at most `farthest`.
 fn both(
     task: &Task<'_>,
     predicted: &Predicted,
     nearest: fn(u32, u32) -> Vec<u32>,
     farthest: f64,
-) -> Result<(Vec<f64>, Vec<f64>)> {
+) -> s3d_dataset::Result<(Vec<f64>, Vec<f64>)> {
     let units = task.data.options().depth_units;
     let image = read::gray16(task.data, &predicted.image, Domain::Depth)?;
     let places = Places::new([image.width(), image.height()], nearest);
@@ -128,6 +131,7 @@ fn both(
         .into_iter()
         .map(|value| metres(value, 0.0))
         .collect();
+
     let file = &predicted.file;
     let (size, prediction) = if read::is_png(file) {
         let image = read_gray16(file)?;
@@ -139,6 +143,7 @@ fn both(
         let (size, values) = read::floats(file, &places.sizes(), 1)?;
         (size, places.sample_prediction(size, values))
     };
+
     let wrong =
         |(truth, prediction): (&f64, &f64)| *truth > 0.0 && *truth <= farthest && !prediction.is_finite();
     if let Some(at) = truth.iter().zip(&prediction).position(wrong) {

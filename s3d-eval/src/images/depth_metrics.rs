@@ -1,20 +1,20 @@
-//! Depth against depth, as HoHoNet's and UniFuse's scripts.
+//! The depth metrics of HoHoNet's and UniFuse's scripts.
 
-/// Scores of one image. All are of metres.
+/// The scores of one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthScores {
-    /// How many pixels were evaluated; without any, all others are NaN.
+    /// The number of pixels that were evaluated. If it is 0, all values are NaN.
     pub pixels: u64,
-    /// How many of them were held against 10 m instead of their truth, by [`unifuse_depth`].
+    /// The number of pixels that [`unifuse_depth`] compared with 10 m instead of their truth.
     pub replaced: u64,
     /// In this order: mean absolute error (m); absolute and squared error relative to the truth (AbsRel;
-    /// SqRel, m); root mean square error (m), and of decimal logarithms; mean absolute error of decimal
-    /// logarithms; shares of pixels whose ratio to the truth, or the truth's to them, is below 1.25, 1.25²
-    /// and 1.25³.
+    /// SqRel, m); root mean square error (m), and the same for decimal logarithms; mean absolute error of
+    /// decimal logarithms; shares of pixels with δ below 1.25, 1.25² and 1.25³, where δ is the larger of
+    /// both quotients of prediction and truth.
     pub values: [f64; 9],
 }
 
-/// What [`DepthScores::values`] are called.
+/// The names of [`DepthScores::values`].
 pub const DEPTH_COLUMNS: [&str; 9] = [
     "MAE (m)",
     "AbsRel",
@@ -27,32 +27,34 @@ pub const DEPTH_COLUMNS: [&str; 9] = [
     "δ < 1.25³",
 ];
 
-/// The farthest that is told apart, metres.
+/// The greatest distance that counts, in metres.
 const FARTHEST: f64 = 10.0;
 
-/// As HoHoNet: pixels whose truth is above 0 (metres; 0 is missing); truth and prediction are brought between
-/// 0.01 and 10 m first. Its script has no SqRel: that is UniFuse's formula. Source: HoHoNet, `test_depth.py`,
-/// `eval_metric`, which computes in 32 bits.
+/// Returns the scores of HoHoNet. `truth` and `prediction` are in metres; a missing truth is 0.
 ///
-/// A prediction that is NaN makes scores NaN.
+/// Pixels with a truth above 0 count. Truth and prediction are clamped to 0.01 to 10 m first. A prediction
+/// that is NaN makes scores NaN. HoHoNet has no SqRel: the formula is UniFuse's. Source: HoHoNet,
+/// `test_depth.py`, `eval_metric`, which computes in 32 bits.
 ///
 /// # Panics
-/// If the slices are not of one length.
+/// If the slices have different lengths.
 pub fn hohonet_depth(truth: &[f64], prediction: &[f64]) -> DepthScores {
     assert_eq!(truth.len(), prediction.len(), "a prediction a pixel");
     let pairs = truth.iter().zip(prediction).filter(|(truth, _)| **truth > 0.0);
     scores(pairs.map(|(truth, prediction)| [truth, prediction].map(|v| v.clamp(0.01, FARTHEST))))
 }
 
-/// As UniFuse: pixels whose truth is above 0 and at most 10 m (0 is missing); truth and prediction are at
-/// least 0.1 m. Where a prediction is beyond 10 m the script sets the truth to 10 m, not the prediction, by
-/// what must be an oversight: such pixels are counted in [`DepthScores::replaced`]. With `median_scale`
-/// predictions are then scaled so that both medians are the same, the lower of two middle values being the
-/// median. Source: UniFuse, `metrics.py`, `compute_depth_metrics`; the mask is that of
-/// `datasets/stanford2d3d.py`.
+/// Returns the scores of UniFuse. `truth` and `prediction` are in metres; a missing truth is 0.
+///
+/// Pixels with a truth above 0 and at most 10 m count. Truth and prediction are raised to 0.1 m first. Where
+/// a prediction is beyond 10 m, the script sets the truth to 10 m instead of the prediction, which must be an
+/// oversight: [`DepthScores::replaced`] counts these pixels. With `median_scale`, predictions are then scaled
+/// so that both medians are the same. The lower of two middle values is the median.
+///
+/// Source: UniFuse, `metrics.py`, `compute_depth_metrics`; the mask is in `datasets/stanford2d3d.py`.
 ///
 /// # Panics
-/// If the slices are not of one length.
+/// If the slices have different lengths.
 pub fn unifuse_depth(truth: &[f64], prediction: &[f64], median_scale: bool) -> DepthScores {
     assert_eq!(truth.len(), prediction.len(), "a prediction a pixel");
     let valid = truth
@@ -62,6 +64,7 @@ pub fn unifuse_depth(truth: &[f64], prediction: &[f64], median_scale: bool) -> D
     let mut pairs: Vec<[f64; 2]> = valid
         .map(|(t, p)| [t.max(0.1), if *p < 0.1 { 0.1 } else { *p }])
         .collect();
+
     let mut replaced = 0;
     for [truth, prediction] in &mut pairs {
         if *prediction > FARTHEST {
@@ -69,6 +72,7 @@ pub fn unifuse_depth(truth: &[f64], prediction: &[f64], median_scale: bool) -> D
             replaced += 1;
         }
     }
+
     if median_scale && !pairs.is_empty() {
         let [truth, prediction] = [0, 1].map(|i| lower_median(pairs.iter().map(|pair| pair[i]).collect()));
         let scale = truth / prediction;
@@ -84,23 +88,26 @@ fn lower_median(mut values: Vec<f64>) -> f64 {
 
 fn scores(pairs: impl Iterator<Item = [f64; 2]>) -> DepthScores {
     let mut pixels = 0;
-    let (mut sums, mut within) = ([0.0; 6], [0u64; 3]);
+    let mut sums = [0.0; 6];
+    let mut within = [0u64; 3];
     for [truth, prediction] in pairs {
         let error = (truth - prediction).abs();
         let square = error * error;
-        // The larger of both quotients, as division rounds monotonically, or NaN.
+        // The larger of both quotients, since division rounds monotonically, or NaN.
         let ratio = if truth > prediction {
             truth / prediction
         } else {
             prediction / truth
         };
-        let (relative, of_logs) = (error / truth, libm::log10(ratio));
+        let relative = error / truth;
+        let of_logs = libm::log10(ratio);
         let terms = [error, relative, square / truth, square, of_logs * of_logs, of_logs];
         sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
         let below = [1.25, 1.5625, 1.953125].map(|most| u64::from(ratio < most));
         within.iter_mut().zip(below).for_each(|(count, is)| *count += is);
         pixels += 1;
     }
+
     let [mae, abs_rel, sq_rel, square, square_of_logs, of_logs] = sums.map(|sum| sum / pixels as f64);
     let [d1, d2, d3] = within.map(|count| count as f64 / pixels as f64);
     let values = [mae, abs_rel, sq_rel, square.sqrt(), square_of_logs.sqrt(), of_logs, d1, d2, d3];

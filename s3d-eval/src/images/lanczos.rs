@@ -1,24 +1,23 @@
-//! Pillow's Lanczos filter on 8-bit images, to the bit: what is black after it is not evaluated.
+//! Pillow's Lanczos filter on 8-bit images, to the bit. Pixels that it makes black are not evaluated.
 
 use s3d_geom::Raster;
 use std::f64::consts::PI;
 
-/// Bits behind the point of its weights: 8 for a pixel and 2 for what overshoots are taken off 32.
+/// The number of fraction bits of a weight: 32, less 8 for a pixel and 2 for overshoots.
 const BITS: u32 = 22;
-/// A weight is `high · 2^LOW_BITS + low`, both of 16 bits: processors multiply and add such fast.
+/// A weight is `high · 2^LOW_BITS + low`. Both have 16 bits, which processors multiply and add fast.
 const LOW_BITS: u32 = 11;
-/// How far the filter reaches, in pixels of the coarser of both images.
+/// The reach of the filter, in pixels of the coarser of both images.
 const REACH: f64 = 3.0;
 
-/// What a pixel along an axis is made of: the weights of the pixels from `start` on.
+/// The weights that make one pixel along an axis: of the pixels from `start` on.
 struct Taps {
     start: usize,
     high: Vec<i16>,
     low: Vec<i16>,
 }
 
-/// Pillow's `resize(…, LANCZOS)` of an image with 8 bits a channel. Source: Pillow,
-/// `libImaging/Resample.c`.
+/// Pillow's `resize(…, LANCZOS)` for images with 8 bits a channel. Source: Pillow, `libImaging/Resample.c`.
 pub struct Lanczos {
     columns: Option<Vec<Taps>>,
     rows: Option<Vec<Taps>>,
@@ -26,19 +25,20 @@ pub struct Lanczos {
 }
 
 impl Lanczos {
-    /// From an image of `from` pixels (width, height) to one of `to`.
+    /// Prepares to resize images of `from` pixels (width, height) to `to` pixels.
     pub fn new(from: [u32; 2], to: [u32; 2]) -> Self {
-        // An axis that stays as it is is left out by the library too.
+        // The library, too, skips an axis that keeps its length.
         let axis =
             |i: usize| (from[i] != to[i]).then(|| (0..to[i]).map(|at| taps(from[i], to[i], at)).collect());
         Self { columns: axis(0), rows: axis(1), width: to[0] as usize }
     }
 
-    /// A channel of the result, row by row.
+    /// Returns a channel of the result, row by row.
     ///
     /// # Panics
-    /// If `image` is not of the size that this was made for, or `channel` is not below 3.
+    /// If `image` has another size than `from`, or `channel` is not below 3.
     pub fn channel(&self, image: &Raster<[u8; 3]>, channel: usize) -> Vec<u8> {
+        // Along x.
         let mut line: Vec<i16> = Vec::new();
         let mut wide = Vec::with_capacity(self.width * image.height() as usize);
         for row in image.rows() {
@@ -50,6 +50,8 @@ impl Lanczos {
             line.extend(row.iter().map(|pixel| i16::from(pixel[channel])));
             wide.extend(columns.iter().map(|taps| taps.of(&line[taps.start..])));
         }
+
+        // Along y, all columns at once.
         let Some(rows) = &self.rows else { return wide };
         let mut out = Vec::with_capacity(self.width * rows.len());
         let mut sums = vec![0i32; self.width];
@@ -67,10 +69,10 @@ impl Lanczos {
         out
     }
 
-    /// The pixel of a channel in column `x` and row `y` of the result.
+    /// Returns the pixel of a channel in column `x` and row `y` of the result.
     ///
     /// # Panics
-    /// As [`Lanczos::channel`], and if the pixel is outside.
+    /// Like [`Lanczos::channel`], and if the pixel is outside.
     pub fn pixel(&self, image: &Raster<[u8; 3]>, channel: usize, x: usize, y: usize) -> u8 {
         let across = |row: usize| {
             let row = image.row(row as u32);
@@ -87,7 +89,7 @@ impl Lanczos {
 }
 
 impl Taps {
-    /// The weighted sum of the pixels of which `line` begins with the first.
+    /// Returns the weighted sum of the first pixels of `line`.
     fn of(&self, line: &[i16]) -> u8 {
         let sum = |weights: &[i16]| {
             let products = weights.iter().zip(line).map(|(w, p)| i32::from(*w) * i32::from(*p));
@@ -98,7 +100,7 @@ impl Taps {
     }
 }
 
-/// The weights of pixel `at` of an axis of `to` pixels that is made of one of `from`.
+/// Returns the weights for pixel `at` of an axis that is resized from `from` pixels to `to`.
 fn taps(from: u32, to: u32, at: u32) -> Taps {
     let scale = f64::from(from) / f64::from(to);
     let coarse = scale.max(1.0);
@@ -119,12 +121,15 @@ fn taps(from: u32, to: u32, at: u32) -> Taps {
     Taps { start: start as usize, high, low }
 }
 
-/// sinc(x) · sinc(x/3) within 3 of 0.
+/// Returns sinc(x) · sinc(x/3) where |x| is below 3, and 0 elsewhere.
 fn lanczos(x: f64) -> f64 {
-    let sinc = |x: f64| if x == 0.0 { 1.0 } else { libm::sin(x * PI) / (x * PI) };
     if (-REACH..REACH).contains(&x) {
         sinc(x) * sinc(x / REACH)
     } else {
         0.0
     }
+}
+
+fn sinc(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { libm::sin(x * PI) / (x * PI) }
 }

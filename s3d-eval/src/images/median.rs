@@ -1,4 +1,4 @@
-//! Exact medians of more angles than fit into memory, in two passes.
+//! Finds exact medians of more angles than fit into memory, in two passes.
 
 use crate::images::normal_metrics::degrees;
 use std::collections::BTreeMap;
@@ -6,14 +6,15 @@ use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::{Mutex, PoisonError};
 
-/// Steps of the first pass.
+/// The number of steps of the first pass.
 const STEPS: usize = 1 << 16;
 
+/// Returns the step of an angle in degrees.
 fn step(angle: f64) -> usize {
     ((angle * (STEPS as f64 / 180.0)) as usize).min(STEPS - 1)
 }
 
-/// The first pass: how many angles are in each step, of each fold.
+/// The first pass: counts the angles of each fold in each step.
 pub(super) struct Medians(Vec<Mutex<Vec<u64>>>);
 
 impl Medians {
@@ -21,13 +22,13 @@ impl Medians {
         Self((0..folds).map(|_| Mutex::new(vec![0; STEPS])).collect())
     }
 
-    /// Counts angles of an image of a fold, 0 to 180°.
+    /// Counts the angles of an image of a fold, 0 to 180°.
     pub(super) fn count(&self, fold: usize, angles: &[f64]) {
         let mut counts = self.0[fold].lock().unwrap_or_else(PoisonError::into_inner);
         angles.iter().for_each(|angle| counts[step(*angle)] += 1);
     }
 
-    /// The second pass, which must be shown the cosines of the same angles.
+    /// Begins the second pass, which needs the cosines of the same angles.
     pub(super) fn search(self) -> Search {
         let folds: Vec<Vec<u64>> = self
             .0
@@ -47,16 +48,16 @@ impl Medians {
     }
 }
 
-/// The second pass: the angles of the steps that hold the middle ones, of each fold and of all.
+/// The second pass: collects the angles in the steps that hold the middle angles, for each fold and for all.
 pub(super) struct Search(Vec<Group>);
 
 struct Group {
     steps: RangeInclusive<usize>,
-    /// What the cosines of their angles lie between, and perhaps others': few need an arc cosine.
+    /// The range of the cosines of their angles, a little wider. It spares most angles an arc cosine.
     cosines: RangeInclusive<f64>,
-    /// The places of the two middle angles among those of the steps; `None` without angles.
+    /// The places of the two middle angles among the angles in these steps; `None` without angles.
     middle: Option<[u64; 2]>,
-    /// How many times an angle is there, by its bits, whose order is that of angles from 0 on.
+    /// The count of each angle, by its bits, which order angles from 0 on.
     angles: Mutex<BTreeMap<u64, u64>>,
 }
 
@@ -65,6 +66,7 @@ impl Group {
         let total: u64 = counts.iter().sum();
         let Some(last) = total.checked_sub(1) else { return Self::new(0..=0, None) };
         let middle = [last / 2, total / 2];
+
         let mut before = 0;
         let mut first: Option<(usize, u64)> = None;
         for (at, count) in counts.iter().enumerate() {
@@ -82,14 +84,14 @@ impl Group {
 
     fn new(steps: RangeInclusive<usize>, middle: Option<[u64; 2]>) -> Self {
         let cosine = |step: usize| libm::cos(step as f64 * (PI / STEPS as f64));
-        // Rounding brings cosines beyond 1 too.
+        // Wider, since rounding moves cosines, even beyond 1.
         let cosines = cosine(steps.end() + 1) - 1e-12..=cosine(*steps.start()) + 1e-12;
         Self { steps, cosines, middle, angles: Mutex::default() }
     }
 }
 
 impl Search {
-    /// Looks at the angles of an image of a fold, by their cosines.
+    /// Looks at the angles of an image of a fold, given their cosines.
     pub(super) fn look(&self, fold: usize, cosines: &[f64]) {
         for group in [fold, self.0.len() - 1].into_iter().filter_map(|at| self.0.get(at)) {
             let near = cosines.iter().filter(|cosine| group.cosines.contains(cosine));
@@ -105,7 +107,8 @@ impl Search {
         }
     }
 
-    /// The median of each fold, and of all; of two middle angles their mean, NaN without angles.
+    /// Returns the median of each fold, then the median of all: the mean of both middle angles, NaN without
+    /// angles.
     pub(super) fn found(self) -> Vec<f64> {
         let median = |group: Group| {
             let counts = group.angles.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -130,7 +133,7 @@ mod tests {
     use crate::images::median_of_angles;
 
     #[test]
-    fn medians_are_those_of_sorted_angles() {
+    fn medians_agree_with_sorted_angles() {
         let cosines: [&[&[f64]]; 4] = [
             &[&[0.9, 1.0 + f64::EPSILON], &[0.0, 0.0, -1.0]],
             &[&[0.5, 0.25]],
@@ -144,10 +147,12 @@ mod tests {
                 images.iter().for_each(|image| f(fold, image));
             }
         };
+
         each(&|fold, image| medians.count(fold, &angles(image)));
         let search = medians.search();
         each(&|fold, image| search.look(fold, image));
         let found = search.found();
+
         let sorted = |cosines: &[f64]| median_of_angles(&mut angles(cosines)).unwrap_or(f64::NAN);
         let mut expected: Vec<f64> = cosines.iter().map(|images| sorted(&images.concat())).collect();
         expected.push(sorted(&cosines.concat().concat()));

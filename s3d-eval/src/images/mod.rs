@@ -1,4 +1,4 @@
-//! Images against images: classes and depth of panoramas, normals of views or panoramas.
+//! Evaluates images: classes and depth of panoramas, normals of views or panoramas.
 
 mod confusion;
 mod depth;

@@ -1,6 +1,7 @@
-//! Protocol `normal`.
+//! Protocol `normal`: surface normals of views or panoramas.
 
 use crate::Evaluation;
+use crate::error::Result;
 use crate::images::median::Medians;
 use crate::images::normal_metrics::{
     AngleSums, DSINE_LIMITS, degrees, dsine_cosine, omnidata_cosine, omnidata_scores,
@@ -10,7 +11,7 @@ use crate::images::read;
 use crate::options::ImageKind;
 use crate::tables::{mean_of_defined, tables};
 use crate::task::Task;
-use s3d_dataset::{Result, map_in_order};
+use s3d_dataset::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
 use s3d_io::image::read_rgb8;
@@ -40,6 +41,7 @@ pub(crate) fn normal(task: &Task<'_>) -> Result<Evaluation> {
         known: &[],
     };
     let matched = find(task, &wanted)?;
+
     let (of_axes, noun) = match matched.kind {
         ImageKind::Views => {
             ("Views: normals are in the camera's axes, as the data set stores them.", "views")
@@ -57,6 +59,7 @@ pub(crate) fn normal(task: &Task<'_>) -> Result<Evaluation> {
     Ok(Evaluation { notes: matched.notes, ..task.evaluation(&definition, counted, tables) })
 }
 
+/// The definition, the number of pixels, and the tables.
 type Parts = (Vec<&'static str>, u64, Vec<crate::Table>);
 
 fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
@@ -67,6 +70,7 @@ fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         progress.add(1);
         Ok((predicted.fold, (angles.len() as u64, omnidata_scores(angles))))
     })?;
+
     let score = |units: &[&(u64, Option<[f64; 5]>)]| {
         let there = units.iter().filter_map(|unit| unit.1);
         let mut sums = [0.0; 5];
@@ -81,10 +85,10 @@ fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     Ok((OMNIDATA.to_vec(), units.iter().map(|unit| unit.1.0).sum(), made))
 }
 
-/// What is kept of an image: sums, and with intervals how many of its angles are in each of many steps.
+/// An image: its sums, and with intervals the number of its angles in each of [`STEPS`] steps.
 type Unit = (AngleSums, Vec<u32>);
 
-/// Steps of the histograms of images, of which medians of the bootstrap are taken.
+/// The number of steps of the histograms that give the medians of the bootstrap.
 const STEPS: usize = 900;
 
 fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
@@ -105,7 +109,8 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         progress.add(1);
         Ok((predicted.fold, (AngleSums::of(angles), steps)))
     })?;
-    // The angles do not fit into memory: those around the medians are looked at once more.
+
+    // The angles do not fit into memory, so that the second pass reads the images again.
     let search = medians.search();
     map_in_order(task.ctx, images, Vec::new, |found, predicted| {
         cosines(task, predicted, dsine_cosine, found)?;
@@ -117,7 +122,8 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     let medians = search.found();
 
     let score = |units: &[&Unit]| {
-        let (mut sums, mut steps) = (AngleSums::default(), vec![0u64; STEPS]);
+        let mut sums = AngleSums::default();
+        let mut steps = vec![0u64; STEPS];
         for (of_image, counts) in units {
             sums.add(of_image);
             steps.iter_mut().zip(counts).for_each(|(sum, n)| *sum += u64::from(*n));
@@ -131,10 +137,11 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         .into_iter()
         .chain(below.iter().map(String::as_str));
     let mut made = tables(task, &columns.collect::<Vec<_>>(), &units, score);
-    // Those of steps are for intervals.
+    // Medians of steps are for intervals only.
     for (table, median) in made.iter_mut().zip(of_tables(&medians)) {
         table.rows[0].scores[1].value = median;
     }
+
     let mut definition = DSINE.to_vec();
     if with_intervals {
         definition.push("Intervals of medians are of angles in steps of 0.2°.");
@@ -142,14 +149,15 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     Ok((definition, units.iter().map(|unit| unit.1.0.pixels).sum(), made))
 }
 
-/// Medians in the order of tables, of those of the folds and that of all: one fold has no other table.
+/// Returns medians in the order of tables: of folds, of all, and the mean over folds. `medians` has the first
+/// two. A single fold has the first table only.
 fn of_tables(medians: &[f64]) -> Vec<f64> {
     let [folds @ .., _] = medians else { return Vec::new() };
     let mean = mean_of_defined(folds.iter().copied());
     medians.iter().copied().chain([mean]).collect()
 }
 
-/// Where half of the angles are below, evenly within a step.
+/// Returns the angle below which half of the angles are, as if they were spread evenly within each step.
 fn median_of_steps(steps: &[u64]) -> f64 {
     let half = steps.iter().sum::<u64>() as f64 / 2.0;
     let mut below = 0.0;
@@ -162,21 +170,22 @@ fn median_of_steps(steps: &[u64]) -> f64 {
     f64::NAN
 }
 
-/// Puts the cosines of an image's angles, where its truth shows something, in place of what `found` holds.
+/// Replaces the content of `found` by the cosines of an image, at the pixels where its truth shows something.
 fn cosines(
     task: &Task<'_>,
     predicted: &Predicted,
     cosine: impl Fn([f64; 3], [f64; 3]) -> f64,
     found: &mut Vec<f64>,
-) -> Result<()> {
-    /// Nothing is seen.
+) -> s3d_dataset::Result<()> {
+    /// The pixel that shows nothing.
     const MISSING: [u8; 3] = [128; 3];
     let channels: [f64; 256] = std::array::from_fn(|channel| (channel as f64 - 127.5) / 127.5);
     let decoded = |pixel: [u8; 3]| pixel.map(|channel| channels[usize::from(channel)]);
     let image = read::rgb8(task.data, &predicted.image, Domain::Normal)?;
-    let (size, file) = ([image.width(), image.height()], &predicted.file);
+    let size = [image.width(), image.height()];
+    let file = &predicted.file;
     let wrong = |at: usize, what: String| {
-        let (x, y) = (at % size[0] as usize, at / size[0] as usize);
+        let [x, y] = [at % size[0] as usize, at / size[0] as usize];
         let message = format!("has {what} in column {x}, row {y}, which is evaluated");
         Err(FileError::format(file, message).into())
     };
@@ -187,6 +196,7 @@ fn cosines(
         .filter(|(_, pixel)| **pixel != MISSING);
     found.clear();
     found.reserve(image.len());
+
     if read::is_png(file) {
         let prediction = read_rgb8(file)?;
         read::check_size(file, [prediction.width(), prediction.height()], &[size])?;
@@ -199,11 +209,12 @@ fn cosines(
         }
         return Ok(());
     }
+
     let (_, values) = read::floats(file, &[size], 3)?;
     let vectors = values.as_chunks::<3>().0;
     for (at, truth) in truth {
         let vector = vectors[at];
-        // Lengths that networks give are about 1; colours from 0 to 255 are none.
+        // The vectors of networks have lengths of about 1, and colours from 0 to 255 are no vectors.
         let square: f64 = vector.iter().map(|c| c * c).sum();
         if square.is_nan() || square > 4.0 {
             return wrong(at, format!("{vector:?}, no unit vector,"));

@@ -1,31 +1,34 @@
-//! Angles between surface normals, as DSINE's and Omnidata's scripts.
+//! The metrics of surface normals of DSINE's and Omnidata's scripts.
 
 use std::f64::consts::PI;
 
-/// The angle between two vectors, degrees, as DSINE: each is divided by its length, at least 1e-8, so that
-/// the angle to a vector of no length is 90°. Source: DSINE, `utils/utils.py`, `compute_normal_error`, and
-/// PyTorch's `cosine_similarity` since 1.13; the script computes in 32 bits, in which angles below 0.03°
-/// are told apart from 0° by chance.
+/// Returns the angle between two vectors by DSINE, in degrees. Each vector is divided by its length, at least
+/// 1e-8, so that the angle to a vector of no length is 90°.
+///
+/// Source: DSINE, `utils/utils.py`, `compute_normal_error`, and PyTorch's `cosine_similarity` since 1.13. The
+/// script computes in 32 bits, where angles below 0.03° may become 0° by chance.
 pub fn dsine_angle(truth: [f64; 3], prediction: [f64; 3]) -> f64 {
     degrees(dsine_cosine(truth, prediction))
 }
 
-/// The cosine of [`dsine_angle`].
+/// Returns the cosine of [`dsine_angle`].
 pub(crate) fn dsine_cosine(truth: [f64; 3], prediction: [f64; 3]) -> f64 {
-    let unit = |v: [f64; 3]| {
-        let length = dot(v, v).sqrt().max(1e-8);
-        v.map(|c| c / length)
-    };
     dot(unit(prediction), unit(truth))
 }
 
-/// The same as Omnidata: the product is divided by that of the lengths, at least 1e-8. Source: Omnidata,
-/// `paper_code/evaluation_metrics.py`, `get_metrics`, which computes in 64 bits.
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = dot(v, v).sqrt().max(1e-8);
+    v.map(|c| c / length)
+}
+
+/// Returns the angle between two vectors by Omnidata, in degrees. The dot product is divided by the product
+/// of the lengths, at least 1e-8. Source: Omnidata, `paper_code/evaluation_metrics.py`, `get_metrics`, which
+/// computes in 64 bits.
 pub fn omnidata_angle(truth: [f64; 3], prediction: [f64; 3]) -> f64 {
     degrees(omnidata_cosine(truth, prediction))
 }
 
-/// The cosine of [`omnidata_angle`].
+/// Returns the cosine of [`omnidata_angle`].
 pub(crate) fn omnidata_cosine(truth: [f64; 3], prediction: [f64; 3]) -> f64 {
     let lengths = dot(prediction, prediction).sqrt() * dot(truth, truth).sqrt();
     dot(prediction, truth) / lengths.max(1e-8)
@@ -35,29 +38,30 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The angle of a cosine, which rounding may have brought beyond 1.
+/// Returns the angle of a cosine, in degrees. Rounding may have brought the cosine beyond 1.
 pub(crate) fn degrees(cosine: f64) -> f64 {
     libm::acos(cosine.clamp(-1.0, 1.0)) * 180.0 / PI
 }
 
-/// The limits of [`AngleSums::below`], degrees.
+/// The limits of [`AngleSums::below`], in degrees.
 pub const DSINE_LIMITS: [f64; 5] = [5.0, 7.5, 11.25, 22.5, 30.0];
 
-/// What is summed over angles of any number of images for DSINE's scores; the median needs the angles.
+/// The sums over the angles of any number of images that DSINE's scores need. Only the median needs the
+/// angles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AngleSums {
-    /// How many there are.
+    /// The number of angles.
     pub pixels: u64,
-    /// Their sum, degrees.
+    /// The sum of the angles, in degrees.
     pub sum: f64,
     /// The sum of their squares.
     pub squares: f64,
-    /// How many are below each of [`DSINE_LIMITS`].
+    /// The number of angles below each of [`DSINE_LIMITS`].
     pub below: [u64; 5],
 }
 
 impl AngleSums {
-    /// Counts angles, degrees.
+    /// Sums angles in degrees.
     pub fn of(angles: &[f64]) -> Self {
         let mut sums = Self { pixels: angles.len() as u64, ..Self::default() };
         for &angle in angles {
@@ -71,7 +75,7 @@ impl AngleSums {
         sums
     }
 
-    /// Adds those of other images.
+    /// Adds the sums of other images.
     pub fn add(&mut self, other: &Self) {
         self.pixels += other.pixels;
         self.sum += other.sum;
@@ -79,17 +83,17 @@ impl AngleSums {
         self.below.iter_mut().zip(other.below).for_each(|(n, more)| *n += more);
     }
 
-    /// Mean and root mean square, degrees, and the shares below each limit, percent; NaN of nothing. Source:
-    /// DSINE, `utils/utils.py`, `compute_normal_metrics`.
+    /// Returns the mean and the root mean square in degrees, and the shares below each limit in per cent. NaN
+    /// without angles. Source: DSINE, `utils/utils.py`, `compute_normal_metrics`.
     pub fn mean_rmse_below(&self) -> ([f64; 2], [f64; 5]) {
         let n = self.pixels as f64;
         ([self.sum / n, (self.squares / n).sqrt()], self.below.map(|below| 100.0 * (below as f64 / n)))
     }
 }
 
-/// Omnidata's scores of the angles of one image, degrees: their mean and median, and the shares (0 to 1) of
-/// those that are at most 11.25°, 22.5° and 30°; `None` without an angle. Source: Omnidata,
-/// `paper_code/evaluation_metrics.py`, `get_metrics`. The order of angles is lost.
+/// Returns Omnidata's scores of one image: the mean and the median of its angles in degrees, and the shares
+/// (0 to 1) of angles of at most 11.25°, 22.5° and 30°. `None` without an angle. Changes the order of the
+/// angles. Source: Omnidata, `paper_code/evaluation_metrics.py`, `get_metrics`.
 pub fn omnidata_scores(angles: &mut [f64]) -> Option<[f64; 5]> {
     let n = angles.len() as f64;
     let mean = angles.iter().sum::<f64>() / n;
@@ -98,7 +102,7 @@ pub fn omnidata_scores(angles: &mut [f64]) -> Option<[f64; 5]> {
     Some([mean, median_of_angles(angles)?, a, b, c])
 }
 
-/// The middle one of angles, or the mean of both; `None` of nothing. Their order is lost.
+/// Returns the middle angle, or the mean of both middle angles; `None` without angles. Changes their order.
 pub fn median_of_angles(values: &mut [f64]) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     let (below, &mut high, _) = values.select_nth_unstable_by(values.len() / 2, f64::total_cmp);

@@ -1,33 +1,36 @@
-//! The classes of a panorama, as HoHoNet prepares them.
+//! The classes of a panorama, prepared like HoHoNet does.
 
 use crate::images::confusion::Confusion;
 use crate::images::lanczos::Lanczos;
 use crate::images::resample::pillow_nearest;
 use s3d_geom::Raster;
 
-/// The size that panoramas are evaluated at, width and height.
+/// The width and the height at which panoramas are evaluated.
 pub const PANORAMA: [u32; 2] = [1024, 512];
 
-/// A panorama's classes at the size of the evaluation. Source: HoHoNet, `README_prepare_data_s2d3d.md`,
+/// The classes of a panorama at the size of the evaluation. Source: HoHoNet, `README_prepare_data_s2d3d.md`,
 /// step 3, and `lib/dataset/dataset_s2d3d_sem.py`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PanoramaClasses {
-    /// By pixel, row by row: the class, or `None` where nothing is evaluated.
+    /// The class of each pixel, row by row; `None` where it is not evaluated.
     pub classes: Vec<Option<u8>>,
 }
 
 impl PanoramaClasses {
-    /// Brings the pixels of a panorama's `semantic` and `rgb` images, of one size, to 1024 × 512: indices by
-    /// [`pillow_nearest`], colours by [`Lanczos`]. `class` tells the class of an index. Not evaluated is what
-    /// has none, what has an index beyond 65,535 (as 13, 13, 13, which is missing), and what is black then.
+    /// Resizes the `semantic` and `rgb` images of a panorama to 1024 × 512: indices by [`pillow_nearest`],
+    /// colours by [`Lanczos`]. `class` returns the class of an index.
+    ///
+    /// A pixel is not evaluated if its index has no class, if its index is beyond 65,535 (such as 13, 13, 13,
+    /// which is missing), or if its colour is black after resizing.
     ///
     /// # Panics
-    /// If the images are of different sizes, or have no pixel.
+    /// If the images have different sizes, or have no pixel.
     pub fn new(rgb: &Raster<[u8; 3]>, semantic: &Raster<[u8; 3]>, class: impl Fn(u16) -> Option<u8>) -> Self {
         let size = [semantic.width(), semantic.height()];
         assert_eq!([rgb.width(), rgb.height()], size, "images of one size");
         let columns = pillow_nearest(size[0], PANORAMA[0]);
         let rows = pillow_nearest(size[1], PANORAMA[1]);
+
         let of_index = |[r, g, b]: [u8; 3]| {
             if r == 0 {
                 class(u16::from_be_bytes([g, b]))
@@ -43,6 +46,8 @@ impl PanoramaClasses {
             })
             .map(of_index)
             .collect();
+
+        // Few pixels have no green: only these need the other channels.
         let lanczos = Lanczos::new(size, PANORAMA);
         let green = lanczos.channel(rgb, 1);
         let width = PANORAMA[0] as usize;
@@ -61,13 +66,13 @@ impl PanoramaClasses {
         Self { classes }
     }
 
-    /// Counts a prediction: a class a pixel, row by row.
+    /// Counts a prediction, which has a class for each pixel, row by row.
     ///
     /// # Errors
-    /// The place of the first pixel that is evaluated and whose prediction is none of the `count` classes.
+    /// Returns the index of the first evaluated pixel whose prediction is none of the `count` classes.
     ///
     /// # Panics
-    /// If a true class is none of them, or `prediction` has another length.
+    /// If a true class is none of the `count` classes, or `prediction` has another length.
     pub fn compare(&self, prediction: &[u8], count: usize) -> Result<Confusion, usize> {
         assert_eq!(prediction.len(), self.classes.len(), "a prediction a pixel");
         let mut confusion = Confusion::new(count);

@@ -1,31 +1,31 @@
-//! Which file predicts which image.
+//! Finds the file that predicts each image.
 
+use crate::error::{Error, Result};
 use crate::options::ImageKind;
 use crate::task::Task;
-use s3d_dataset::{Error, Result};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What is predicted, and how its files look.
+/// The images to evaluate, and the form of their predictions.
 pub(super) struct Wanted<'a> {
-    /// What is held against the truth.
+    /// The image that is predicted.
     pub(super) domain: Domain,
-    /// What else of an image the truth is made of.
+    /// Other images that the truth needs.
     pub(super) besides: &'a [Domain],
-    /// Which images; `None`: those that the predictions are named after.
+    /// The kind of images. `None` is the kind that the predictions are named after.
     pub(super) kind: Option<ImageKind>,
-    /// How files of predictions end.
+    /// The endings of the files of predictions.
     pub(super) endings: &'a [&'a str],
-    /// Other files in the folder that are read.
+    /// The names of other files in the folder that are read.
     pub(super) known: &'a [&'a str],
 }
 
 /// An image and its prediction.
 pub(super) struct Predicted {
-    /// The place of its fold.
+    /// The index of its fold.
     pub(super) fold: usize,
     pub(super) image: DatasetImage,
     pub(super) file: PathBuf,
@@ -38,24 +38,24 @@ pub(super) struct Matched {
     pub(super) notes: Vec<String>,
 }
 
-/// What lies in the folder of predictions.
+/// The content of the folder of predictions.
 #[derive(Default)]
 struct Folder {
-    /// Files that end as predictions do, with the number of the area whose folder they are in.
+    /// The files with the endings of predictions, and the number of the area whose folder they are in.
     files: Vec<(PathBuf, Option<u32>)>,
-    /// Names of all other things.
+    /// The names of all other entries.
     others: BTreeSet<String>,
 }
 
 impl Folder {
-    fn read(root: &Path, wanted: &Wanted<'_>) -> Result<Self> {
+    fn read(root: &Path, wanted: &Wanted<'_>) -> Result<Self, FileError> {
         let mut found = Self::default();
         found.add(root, None, wanted)?;
         found.files.sort();
         Ok(found)
     }
 
-    fn add(&mut self, folder: &Path, area: Option<u32>, wanted: &Wanted<'_>) -> Result<()> {
+    fn add(&mut self, folder: &Path, area: Option<u32>, wanted: &Wanted<'_>) -> Result<(), FileError> {
         let failed = |e| FileError::io(folder, "read", e);
         for entry in fs::read_dir(folder).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
@@ -72,7 +72,7 @@ impl Folder {
         Ok(())
     }
 
-    /// What is not read, as a sentence.
+    /// Returns a sentence on the entries that are not read.
     fn told(&self) -> Option<String> {
         let first: Vec<&str> = self.others.iter().take(5).map(String::as_str).collect();
         let more = if self.others.len() > first.len() { " …" } else { "" };
@@ -81,7 +81,7 @@ impl Folder {
     }
 }
 
-/// The images of the folds' areas, each with the file that predicts it.
+/// Returns the images in the areas of the folds, each with the file that predicts it.
 ///
 /// # Errors
 /// If an image has no file or two, a file names no image, or files name images of both kinds.
@@ -102,19 +102,14 @@ pub(super) fn find(task: &Task<'_>, wanted: &Wanted<'_>) -> Result<Matched> {
         }
         of_kinds[ImageKind::of(image.frame) as usize].get_or_insert_with(|| path.clone());
     }
+
     let kind = kind_of(wanted, &of_kinds)?;
     images.tested.retain(|(_, image, _)| ImageKind::of(image.frame) == kind);
     if images.tested.is_empty() {
-        let nouns: Vec<&str> = wanted
-            .besides
-            .iter()
-            .chain([&wanted.domain])
-            .map(|d| d.folder())
-            .collect();
-        let message =
-            format!("the areas that are tested have no {kind} with images of {}", nouns.join(" and "));
-        return Err(Error::Input(message));
+        let domains = wanted.besides.iter().chain([&wanted.domain]).copied().collect();
+        return Err(Error::NoImages { kind, domains });
     }
+
     let missing = images.tested.iter().filter(|(_, _, file)| file.is_none());
     if let Some((_, first, _)) = missing.clone().next() {
         let message = format!(
@@ -128,6 +123,7 @@ pub(super) fn find(task: &Task<'_>, wanted: &Wanted<'_>) -> Result<Matched> {
         );
         return Err(FileError::format(task.predictions, message.trim_end()).into());
     }
+
     let mut notes: Vec<String> = folder.told().into_iter().collect();
     if elsewhere > 0 {
         notes.push(format!("Predictions of areas that are not tested, and not read: {elsewhere}."));
@@ -137,7 +133,7 @@ pub(super) fn find(task: &Task<'_>, wanted: &Wanted<'_>) -> Result<Matched> {
     Ok(Matched { images: images.tested.into_iter().filter_map(with_file).collect(), kind, notes })
 }
 
-/// Which kind is evaluated, of which `files` has a file a kind.
+/// Returns the kind of images to evaluate. `files` has an example of a file for each kind.
 fn kind_of(wanted: &Wanted<'_>, files: &[Option<PathBuf>; 2]) -> Result<ImageKind> {
     let [views, panoramas] = files;
     match (wanted.kind, views, panoramas) {
@@ -162,11 +158,12 @@ fn kind_of(wanted: &Wanted<'_>, files: &[Option<PathBuf>; 2]) -> Result<ImageKin
     }
 }
 
-/// The images of a data set, by name.
+/// The images of a data set by name.
 struct Images {
-    /// Those that are tested: the place of the fold, and the file that was found.
+    /// The images that are tested, with the index of their fold and the file that was found.
     tested: Vec<(usize, DatasetImage, Option<PathBuf>)>,
-    /// By name, which no other area has, the area and the place in `tested`; `None` if it is not tested.
+    /// The area and the index in `tested` of each name, which is unique in the data set; `None` if it is not
+    /// tested.
     names: BTreeMap<String, (u32, Option<usize>)>,
 }
 
@@ -193,7 +190,7 @@ impl Images {
         images
     }
 
-    /// The place of the image that a file predicts; `None` if its area is not tested.
+    /// Returns the index of the image that a file predicts; `None` if its area is not tested.
     fn named(&self, path: &Path, area: Option<u32>, wanted: &Wanted<'_>) -> Result<Option<usize>> {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let (stem, domain) = name

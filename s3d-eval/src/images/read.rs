@@ -1,4 +1,4 @@
-//! Truth and predictions from files.
+//! Reads truth and predictions from files.
 
 use crate::images::panorama::PANORAMA;
 use s3d_dataset::{DataSet, Result};
@@ -10,25 +10,25 @@ use s3d_io::image::{decode_gray16, decode_rgb8};
 use std::io::Read;
 use std::path::Path;
 
-/// An 8-bit image of the data set.
+/// Reads an 8-bit image of the data set.
 pub(super) fn rgb8(data: &DataSet, image: &DatasetImage, domain: Domain) -> Result<Raster<[u8; 3]>> {
     let path = image.path(data.layout(), domain);
     Ok(decode_rgb8(&data.read(&path)?, &path)?)
 }
 
-/// A 16-bit image of the data set.
+/// Reads a 16-bit image of the data set.
 pub(super) fn gray16(data: &DataSet, image: &DatasetImage, domain: Domain) -> Result<Raster<u16>> {
     let path = image.path(data.layout(), domain);
     Ok(decode_gray16(&data.read(&path)?, &path)?)
 }
 
-/// Whether a file is an image, and no array.
+/// Whether a file is an image rather than an array.
 pub(super) fn is_png(file: &Path) -> bool {
     file.extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("png"))
 }
 
-/// Refuses a prediction whose width and height are none of `sizes`.
+/// Refuses a prediction whose width and height are not among `sizes`.
 pub(super) fn check_size(file: &Path, found: [u32; 2], sizes: &[[u32; 2]]) -> Result<()> {
     if sizes.contains(&found) {
         return Ok(());
@@ -41,8 +41,8 @@ pub(super) fn check_size(file: &Path, found: [u32; 2], sizes: &[[u32; 2]]) -> Re
     Err(FileError::format(file, message).into())
 }
 
-/// Width, height and the floats of an NPY or NPZ file, row by row, `channels` a pixel; the size must be one
-/// of `sizes`.
+/// Reads the width, the height and the floats of an NPY or NPZ file, row by row, with `channels` floats a
+/// pixel. The size must be one of `sizes`.
 pub(super) fn floats(file: &Path, sizes: &[[u32; 2]], channels: u64) -> Result<([u32; 2], Vec<f64>)> {
     if file
         .extension()
@@ -67,7 +67,7 @@ fn floats_of<R: Read>(
     channels: u64,
 ) -> Result<([u32; 2], Vec<f64>)> {
     let wrong = |message: String| Err(FileError::format(file, message).into());
-    // A batch of one image, and a single channel, are sides of 1.
+    // A batch of one image or a single channel is a side of 1.
     let shape: Vec<u64> = array.shape().iter().copied().filter(|side| *side != 1).collect();
     let (of_pixel, form) = if channels == 1 {
         (&[][..], "H × W")
@@ -81,18 +81,20 @@ fn floats_of<R: Read>(
     let side = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
     let size = [side(width), side(height)];
     check_size(file, size, sizes)?;
+
     if !array.is_float() {
         return wrong("holds whole numbers: save floats, or a PNG in the data set's encoding".to_owned());
     }
     if array.is_column_major() {
         return wrong("is stored column by column: save numpy.ascontiguousarray(array)".to_owned());
     }
+
     let mut values = Vec::with_capacity(size[0] as usize * size[1] as usize * channels as usize);
     while array.read_floats(&mut values)? > 0 {}
     Ok((size, values))
 }
 
-/// Which pixels of a panorama are evaluated at 1024 × 512.
+/// The pixels of a panorama that are evaluated at 1024 × 512.
 pub(super) struct Places {
     whole: [u32; 2],
     columns: Vec<u32>,
@@ -100,18 +102,18 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Those of a panorama of the size `whole`, by a rule for an axis.
+    /// Selects the pixels of a panorama of the size `whole` by a rule for each axis.
     pub(super) fn new(whole: [u32; 2], nearest: fn(u32, u32) -> Vec<u32>) -> Self {
         let [columns, rows] = [0, 1].map(|axis| nearest(whole[axis], PANORAMA[axis]));
         Self { whole, columns, rows }
     }
 
-    /// The sizes that predictions may have.
+    /// Returns the sizes that predictions may have.
     pub(super) fn sizes(&self) -> [[u32; 2]; 2] {
         [PANORAMA, self.whole]
     }
 
-    /// The pixels of an image of the panorama's size that are evaluated.
+    /// Returns the evaluated pixels of an image, which has the size of the panorama.
     pub(super) fn sample<T: Copy>(&self, pixels: &[T]) -> Vec<T> {
         let of_row = |row: &u32| &pixels[*row as usize * self.whole[0] as usize..];
         self.rows
@@ -120,12 +122,12 @@ impl Places {
             .collect()
     }
 
-    /// The same of a prediction of one of the sizes.
+    /// Returns the evaluated pixels of a prediction, which has one of [`sizes`](Self::sizes).
     pub(super) fn sample_prediction<T: Copy>(&self, size: [u32; 2], pixels: Vec<T>) -> Vec<T> {
         if size == PANORAMA { pixels } else { self.sample(&pixels) }
     }
 
-    /// Column and row in a prediction of this size of a pixel that is evaluated.
+    /// Returns the column and the row of evaluated pixel `at` in a prediction of this size.
     pub(super) fn place(&self, size: [u32; 2], at: usize) -> [u32; 2] {
         let [x, y] = [at % PANORAMA[0] as usize, at / PANORAMA[0] as usize];
         if size == PANORAMA {

@@ -1,6 +1,7 @@
-//! Protocol `sem-pano`.
+//! Protocol `sem-pano`: classes of panoramas.
 
 use crate::Evaluation;
+use crate::error::{Error, Result};
 use crate::images::confusion::Confusion;
 use crate::images::panorama::PanoramaClasses;
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
@@ -9,7 +10,7 @@ use crate::images::resample::pillow_nearest;
 use crate::options::ImageKind;
 use crate::tables::tables;
 use crate::task::Task;
-use s3d_dataset::{DataSet, Error, Result, map_in_order};
+use s3d_dataset::{DataSet, map_in_order};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
 use s3d_io::image::read_numbers8;
@@ -31,15 +32,15 @@ const DEFINITION: [&str; 6] = [
     "As HoHoNet's test_sem.py of RGB (commit 2bbc0866).",
 ];
 
-/// The file that tells what the numbers of predictions mean.
+/// The file with the class of each number of predictions.
 const CLASSES: &str = "classes.txt";
 
 pub(crate) fn sem_pano(task: &Task<'_>) -> Result<Evaluation> {
     if task.options.images == Some(ImageKind::Views) {
-        return Err(Error::Usage("sem-pano is of panoramas, not of views".to_owned()));
+        return Err(Error::PanoramasOnly { protocol: task.protocol });
     }
     let Some((taxonomy, table)) = task.data.taxonomy().zip(task.data.labels()?) else {
-        return Err(Error::Input(format!("{} has no labels", task.data.layout().root().display())));
+        return Err(task.unlabelled());
     };
     let classes: Vec<Option<u8>> = (0..table.len())
         .map(|id| table.class_of(LabelId(id as u32)).map(|class| class.index() as u8))
@@ -53,6 +54,7 @@ pub(crate) fn sem_pano(task: &Task<'_>) -> Result<Evaluation> {
         known: &[CLASSES],
     };
     let Matched { images, notes, .. } = find(task, &wanted)?;
+
     let count = taxonomy.classes().len();
     let progress = task.ctx.progress("evaluating", "panoramas", images.len() as u64);
     let units = map_in_order(
@@ -78,6 +80,7 @@ pub(crate) fn sem_pano(task: &Task<'_>) -> Result<Evaluation> {
             .chain([("mean".to_owned(), vec![scores.mean_iou, scores.mean_accuracy])])
             .collect()
     };
+
     let pixels = units.iter().flat_map(|unit| &unit.1).map(|(_, n)| u64::from(*n)).sum();
     let counted = [("panoramas", images.len() as u64), ("pixels", pixels)];
     let tables = tables(task, &["IoU", "accuracy"], &units, score);
@@ -89,16 +92,16 @@ struct Truth {
     places: Places,
 }
 
-/// The true classes of a panorama; `classes` has the class of every index.
-fn truth(data: &DataSet, predicted: &Predicted, classes: &[Option<u8>]) -> Result<Truth> {
-    let [rgb, semantic] =
-        [Domain::Rgb, Domain::Semantic].map(|domain| read::rgb8(data, &predicted.image, domain));
-    let (rgb, semantic) = (rgb?, semantic?);
+/// Returns the true classes of a panorama. `classes` has the class of each index.
+fn truth(data: &DataSet, predicted: &Predicted, classes: &[Option<u8>]) -> s3d_dataset::Result<Truth> {
+    let rgb = read::rgb8(data, &predicted.image, Domain::Rgb)?;
+    let semantic = read::rgb8(data, &predicted.image, Domain::Semantic)?;
     let path = predicted.image.path(data.layout(), Domain::Semantic);
     let size = [semantic.width(), semantic.height()];
     if [rgb.width(), rgb.height()] != size {
         return Err(FileError::format(&path, "is of another size than the RGB image of its panorama").into());
     }
+
     let unknown = Cell::new(None);
     let truth = PanoramaClasses::new(&rgb, &semantic, |index| {
         classes.get(usize::from(index)).copied().unwrap_or_else(|| {
@@ -115,8 +118,8 @@ fn truth(data: &DataSet, predicted: &Predicted, classes: &[Option<u8>]) -> Resul
     }
 }
 
-/// Counts the prediction in a file; `meaning` has the class of every number.
-fn compare(truth: &Truth, file: &Path, meaning: &[u8], count: usize) -> Result<Confusion> {
+/// Counts the prediction in a file. `meaning` has the class of each number.
+fn compare(truth: &Truth, file: &Path, meaning: &[u8], count: usize) -> s3d_dataset::Result<Confusion> {
     let Truth { classes, places } = truth;
     let image = read_numbers8(file)?;
     let size = [image.width(), image.height()];
@@ -136,7 +139,8 @@ fn compare(truth: &Truth, file: &Path, meaning: &[u8], count: usize) -> Result<C
         })
 }
 
-/// The class that each number of predictions means: those of a file, a line a class, or the taxonomy's order.
+/// Returns the class of each number of predictions. A file may list them, one on each line; otherwise they
+/// have the order of the taxonomy.
 fn meaning(path: &Path, taxonomy: &Taxonomy) -> Result<Vec<u8>> {
     let own: Vec<u8> = (0..taxonomy.classes().len()).map(|index| index as u8).collect();
     if !path.exists() {

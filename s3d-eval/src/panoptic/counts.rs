@@ -1,70 +1,71 @@
-//! Segments against segments, and what panopticapi makes of them.
+//! Matches segments, and computes the scores of panopticapi.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use thiserror::Error;
 
-/// The number of a pixel that is in no segment.
+/// The number of the pixels that are in no segment.
 const VOID: u32 = 0;
 
 /// A segment of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
-    /// Its number in the image; not 0.
+    /// Its number in the image, other than 0.
     pub id: u32,
     /// The index of its class.
     pub class: usize,
 }
 
-/// Pixels and segments of an image that do not fit together.
+/// Why pixels and segments of an image do not fit together.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum SegmentFault {
-    /// Pixels of a number that no segment has.
+    /// Pixels have a number that no segment has.
     #[error("{pixels} pixels are of segment {id}, which is not listed")]
     Unlisted {
         /// The number.
         id: u32,
-        /// How many.
+        /// How many pixels have it.
         pixels: u64,
     },
-    /// A segment without pixels.
+    /// A segment has no pixels.
     #[error("segment {0} is listed, and no pixel is of it")]
     Empty(u32),
-    /// Two segments of one number.
+    /// Two segments have the same number.
     #[error("segment {0} is listed twice")]
     Double(u32),
-    /// A segment with the number of void.
+    /// A segment has the number of void.
     #[error("a segment has the number 0, which is void")]
     Void,
-    /// A class that is not there.
+    /// A segment has a class that does not exist.
     #[error("segment {id} is of class {class}, and there are {classes}")]
     Class {
         /// The segment.
         id: u32,
         /// Its class.
         class: usize,
-        /// How many there are.
+        /// The number of classes.
         classes: usize,
     },
-    /// Not as many pixels on both sides.
+    /// Truth and prediction have different numbers of pixels.
     #[error("{predicted} pixels are predicted of {truth}")]
     Size {
-        /// Pixels of the truth.
+        /// The pixels of the truth.
         truth: usize,
-        /// Pixels of the prediction.
+        /// The pixels of the prediction.
         predicted: usize,
     },
 }
 
-/// Segments of a class: matched, invented and missed.
+/// The segments of a class, counted: matched (true positives), invented (false positives) and missed (false
+/// negatives).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClassCounts {
-    /// Pairs of a true and a predicted segment whose IoU is more than 1/2.
+    /// The pairs of a true and a predicted segment whose IoU is more than 1/2.
     pub matched: u64,
-    /// Predicted segments that match none and are not mostly void.
+    /// The predicted segments without a match that are not mostly void.
     pub invented: u64,
-    /// True segments that match none.
+    /// The true segments without a match.
     pub missed: u64,
-    /// The sum of the IoU of pairs.
+    /// The sum of the IoU of the pairs.
     pub iou: f64,
 }
 
@@ -73,24 +74,25 @@ pub struct ClassCounts {
 pub struct PanopticScore {
     /// `sq · rq`.
     pub pq: f64,
-    /// Mean IoU of matched segments; 0 without any.
+    /// The mean IoU of matched segments; 0 if there are none.
     pub sq: f64,
-    /// Matched segments by those, half of the invented and half of the missed.
+    /// The number of matched segments, divided by its sum with half of the invented and half of the missed
+    /// ones.
     pub rq: f64,
 }
 
 impl PanopticScore {
-    /// That of a class without segments.
+    /// The score of a class without segments.
     const NONE: Self = Self { pq: f64::NAN, sq: f64::NAN, rq: f64::NAN };
 }
 
 impl ClassCounts {
-    /// Whether neither side has a segment of the class that counts.
+    /// Whether no segment of the class counts on either side.
     pub fn is_absent(&self) -> bool {
         self.matched + self.invented + self.missed == 0
     }
 
-    /// The scores; all NaN if the class [is absent](Self::is_absent).
+    /// Returns the scores; all are NaN if the class [is absent](Self::is_absent).
     pub fn score(&self) -> PanopticScore {
         if self.is_absent() {
             return PanopticScore::NONE;
@@ -109,7 +111,8 @@ impl ClassCounts {
     }
 }
 
-/// The means of the scores of these classes, those that are absent left out; NaN if all are.
+/// Returns the means of the scores of classes. Absent classes do not count; if all are absent, the means are
+/// NaN.
 pub fn mean<'a>(classes: impl IntoIterator<Item = &'a ClassCounts>) -> PanopticScore {
     let scores: Vec<PanopticScore> = classes
         .into_iter()
@@ -120,31 +123,31 @@ pub fn mean<'a>(classes: impl IntoIterator<Item = &'a ClassCounts>) -> PanopticS
     PanopticScore { pq: of(|s| s.pq), sq: of(|s| s.sq), rq: of(|s| s.rq) }
 }
 
-/// Segments of images, counted by class, as panopticapi counts them. Counts of images add up.
+/// The segments of images, counted by class like panopticapi does. The counts of images can be added.
 ///
-/// Source: panopticapi at 7bb4655, `panopticapi/evaluation.py`. Its crowds are not here: our data sets have
-/// none.
+/// Source: panopticapi at 7bb4655, `panopticapi/evaluation.py`. Its crowds are left out, since our data sets
+/// have none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PanopticCounts(Vec<ClassCounts>);
 
-/// The segments of one side of an image: its class and its pixels, by number.
+/// The class and the number of pixels of each segment of one side of an image, by the number of the segment.
 type Sized = BTreeMap<u32, (usize, u64)>;
 
 impl PanopticCounts {
-    /// Of so many classes, nothing counted yet.
+    /// Makes empty counts of this number of classes.
     pub fn new(classes: usize) -> Self {
         Self(vec![ClassCounts::default(); classes])
     }
 
-    /// What was counted, by class.
+    /// Returns the counts of each class.
     pub fn classes(&self) -> &[ClassCounts] {
         &self.0
     }
 
-    /// Adds the counts of another of as many classes.
+    /// Adds other counts.
     ///
     /// # Panics
-    /// If it has another number of classes.
+    /// If the other has another number of classes.
     pub fn add_counts(&mut self, other: &Self) {
         assert_eq!(self.0.len(), other.0.len(), "the same classes");
         self.0
@@ -153,15 +156,15 @@ impl PanopticCounts {
             .for_each(|(sum, counts)| sum.add(counts));
     }
 
-    /// Counts an image. `truth` and `predicted` are the numbers of its pixels' segments, 0 where there is
-    /// none.
+    /// Counts an image. `truth` and `predicted` have the number of the segment of each pixel, 0 for void.
     ///
-    /// Two segments of a class match if their IoU is more than 1/2; pixels of the predicted one that are void
-    /// in the truth do not count. Predicted segments that match none are invented, unless more than half of
-    /// their pixels are void in the truth.
+    /// Two segments of a class match if their IoU is more than 1/2. Pixels of the predicted segment that are
+    /// void in the truth do not count. A predicted segment without a match is invented, unless more than half
+    /// of its pixels are void in the truth.
     ///
     /// # Errors
-    /// [`SegmentFault`], of the truth before that of the prediction; then nothing was counted.
+    /// [`SegmentFault`] if pixels and segments do not fit together; the truth is checked first. Then nothing
+    /// was counted.
     pub fn add(
         &mut self,
         truth: &[u32],
@@ -172,6 +175,7 @@ impl PanopticCounts {
         if truth.len() != predicted.len() {
             return Err(SegmentFault::Size { truth: truth.len(), predicted: predicted.len() });
         }
+
         let shared = shared(truth, predicted);
         let classes = self.0.len();
         let truth = sized(segments, classes, shared.iter().map(|((truth, _), n)| (*truth, *n)))?;
@@ -181,7 +185,9 @@ impl PanopticCounts {
             .map(|((_, id), n)| (*id, *n))
             .collect();
         let void_of = |id: u32| void.get(&id).copied().unwrap_or(0);
-        let (mut of_truth, mut of_found) = (BTreeSet::new(), BTreeSet::new());
+
+        let mut matched_truth = BTreeSet::new();
+        let mut matched_found = BTreeSet::new();
         for ((true_id, id), both) in &shared {
             let pair = truth.get(true_id).zip(found.get(id));
             let Some(((class, true_area), (of, area))) = pair else { continue };
@@ -189,25 +195,26 @@ impl PanopticCounts {
             if class == of && 2 * both > union {
                 self.0[*class].matched += 1;
                 self.0[*class].iou += *both as f64 / union as f64;
-                of_truth.insert(*true_id);
-                of_found.insert(*id);
+                matched_truth.insert(*true_id);
+                matched_found.insert(*id);
             }
         }
-        for (_, (class, _)) in truth.iter().filter(|(id, _)| !of_truth.contains(id)) {
+
+        for (_, (class, _)) in truth.iter().filter(|(id, _)| !matched_truth.contains(id)) {
             self.0[*class].missed += 1;
         }
-        for (id, (class, area)) in found.iter().filter(|(id, _)| !of_found.contains(id)) {
+        for (id, (class, area)) in found.iter().filter(|(id, _)| !matched_found.contains(id)) {
             self.0[*class].invented += u64::from(2 * void_of(*id) <= *area);
         }
         Ok(())
     }
 }
 
-/// How many pixels are of a segment of the truth and of a predicted one, by their numbers.
+/// Returns the number of pixels that each true segment shares with each predicted segment.
 fn shared(truth: &[u32], predicted: &[u32]) -> BTreeMap<(u32, u32), u64> {
     let mut counts: HashMap<(u32, u32), u64> = HashMap::new();
     let mut at = 0;
-    // Neighbours are mostly alike.
+    // Most pixels have the numbers of their neighbour.
     while let (Some(a), Some(b)) = (truth.get(at), predicted.get(at)) {
         let same = truth[at..]
             .iter()
@@ -220,7 +227,7 @@ fn shared(truth: &[u32], predicted: &[u32]) -> BTreeMap<(u32, u32), u64> {
     counts.into_iter().collect()
 }
 
-/// The segments with their pixels, which must be of these.
+/// Returns the segments with their numbers of pixels. Each pixel must belong to one of them, or to void.
 fn sized(
     segments: &[Segment],
     classes: usize,
@@ -238,6 +245,7 @@ fn sized(
             return Err(SegmentFault::Double(id));
         }
     }
+
     let mut unlisted: BTreeMap<u32, u64> = BTreeMap::new();
     for (id, count) in pixels.filter(|(id, _)| *id != VOID) {
         *sized
@@ -276,7 +284,7 @@ mod tests {
         // An IoU of 2/4, and of 2/3 with a void pixel.
         assert_eq!(counted(&[1, 1, 1, 2], &[(1, 0), (2, 1)], &[0, 5, 5, 5], 0), [[0, 1, 1], [0, 0, 1]]);
         assert_eq!(counted(&[1, 1, 1, 0], &[(1, 0)], &[0, 5, 5, 5], 0), [[1, 0, 0], [0; 3]]);
-        // Of another class; and half void, which counts, or more, which does not.
+        // Another class; then half void, which counts, and more than half, which does not.
         assert_eq!(counted(&[1, 1], &[(1, 0)], &[5, 5], 1), [[0, 0, 1], [0, 1, 0]]);
         assert_eq!(counted(&[1, 1, 1, 0], &[(1, 0)], &[0, 0, 5, 5], 0), [[0, 1, 1], [0; 3]]);
         assert_eq!(counted(&[1, 1, 0, 0], &[(1, 0)], &[0, 5, 5, 5], 1), [[0, 0, 1], [0; 3]]);
@@ -295,13 +303,14 @@ mod tests {
         assert!(scores[2].pq.is_nan());
         assert_eq!(mean(counts.classes()).pq, 1.0 / 3.0);
         assert!(mean(&[]).rq.is_nan());
+
         let mut twice = counts.clone();
         twice.add_counts(&counts);
         assert_eq!((twice.classes()[0].matched, twice.classes()[0].score()), (2, scores[0]));
     }
 
     #[test]
-    fn faults_are_told() {
+    fn faults_are_found() {
         let fault = |truth: &[u32], predicted: &[u32], found: &[(u32, usize)]| {
             let mut counts = PanopticCounts::new(2);
             let fault = counts.add(truth, &of(&[(1, 0)]), predicted, &of(found)).unwrap_err();

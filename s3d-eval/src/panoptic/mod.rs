@@ -1,11 +1,11 @@
 //! Panoptic segmentation of images: protocol `panoptic`.
 //!
-//! [`PanopticCounts`] is the metric, on slices and without files.
+//! [`PanopticCounts`] is the metric. It works on slices, without files.
 //!
 //! ```
 //! use s3d_eval::panoptic::{PanopticCounts, Segment};
 //!
-//! // Segments 7 and 8 of the truth, void 0; the prediction has one segment less.
+//! // The truth has segments 7 and 8, and 0 is void. The prediction has one segment less.
 //! let (truth, found) = ([7, 7, 7, 8, 0], [1, 1, 1, 1, 1]);
 //! let chair = |id| Segment { id, class: 0 };
 //! let mut counts = PanopticCounts::new(2);

@@ -1,10 +1,11 @@
-//! Reads COCO's panoptic files: a list of segments by image, and a folder of images of their numbers.
+//! Reads COCO's panoptic files: a list of the segments of each image, and a folder of images with their
+//! numbers.
 
+use crate::error::Result;
 use s3d_dataset::s3d_io::Error as FileError;
 use s3d_dataset::s3d_io::dataset::{DatasetImage, ImageName};
 use s3d_dataset::s3d_io::fs::read_json;
 use s3d_dataset::s3d_label::{Class, Taxonomy};
-use s3d_dataset::{Error, Result};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -46,7 +47,7 @@ struct Category {
     isthing: Option<u8>,
 }
 
-/// What tells an image from others.
+/// Identifies an image: its location, its room and its frame.
 type Key = (String, String, String);
 
 pub(super) fn key(image: &DatasetImage) -> Key {
@@ -59,12 +60,12 @@ pub(super) struct Predicted {
     pub(super) segments: Vec<SegmentInfo>,
 }
 
-/// Predictions by image.
+/// The predictions of all images.
 pub(super) struct Predictions {
     /// The file that lists them.
     pub(super) json: PathBuf,
     pub(super) of_images: BTreeMap<Key, Predicted>,
-    /// Images of the folder that the file does not list, and how many there are.
+    /// The first image in the folder that the file does not list, and the number of such images.
     pub(super) unlisted: Option<(String, usize)>,
 }
 
@@ -72,16 +73,17 @@ const FORM: &str = "predictions are COCO's panoptic file NAME.json with its imag
                     beside it";
 
 impl Predictions {
-    /// Those of the file at `path`, or of the only one in the folder at `path`.
+    /// Reads the file at `path`, or the only one in the folder at `path`.
     pub(super) fn read(path: &Path, taxonomy: &Taxonomy, stuff: &[Class]) -> Result<Self> {
         let json = find(path)?;
-        let wrong = |message: String| Error::from(FileError::format(&json, message));
+        let wrong = |message: String| FileError::format(&json, message);
         let file: File = read_json(&json).map_err(|e| wrong(format!("{e}; {FORM}")))?;
         check_categories(&file.categories, taxonomy, stuff).map_err(wrong)?;
         let folder = json.with_extension("");
         if !folder.is_dir() {
             return Err(FileError::format(&folder, format!("missing: {FORM}")).into());
         }
+
         let names: BTreeMap<u64, String> = file.images.into_iter().map(|i| (i.id, i.file_name)).collect();
         let mut of_images: BTreeMap<Key, Predicted> = BTreeMap::new();
         let mut listed = BTreeSet::new();
@@ -91,16 +93,17 @@ impl Predictions {
             let name = image.rsplit(['/', '\\']).next().and_then(ImageName::parse).ok_or_else(|| {
                 wrong(format!(
                     "image {image_id}: {image:?} is no name of an image of the data set; images are listed \
-                     by the names of their colours, as `s3d pack --to coco` has them"
+                     by the names of their colours, as in its COCO package"
                 ))
             })?;
             let png = folder.join(&file_name);
             listed.insert(png.clone());
             let key = (name.uuid, name.room, name.frame.to_string());
             if of_images.insert(key, Predicted { png, segments }).is_some() {
-                return Err(wrong(format!("image {image_id}: {image:?} is annotated twice")));
+                return Err(wrong(format!("image {image_id}: {image:?} is annotated twice")).into());
             }
         }
+
         let mut others = Vec::new();
         unlisted(&folder, &listed, &mut others)?;
         others.sort();
@@ -110,7 +113,7 @@ impl Predictions {
     }
 }
 
-/// The panoptic file at or in `path`.
+/// Returns the panoptic file at or in `path`.
 fn find(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         return Ok(path.to_owned());
@@ -134,7 +137,7 @@ fn find(path: &Path) -> Result<PathBuf> {
     }
 }
 
-/// Refuses categories that mean other classes than the data set's.
+/// Refuses categories whose numbers mean other classes in the data set.
 fn check_categories(categories: &[Category], taxonomy: &Taxonomy, stuff: &[Class]) -> Result<(), String> {
     for Category { id, name, isthing } in categories {
         let Some(class) = taxonomy.classes().iter().find(|class| taxonomy.id(**class) == *id) else {
@@ -142,8 +145,7 @@ fn check_categories(categories: &[Category], taxonomy: &Taxonomy, stuff: &[Class
         };
         if class.name() != name {
             return Err(format!(
-                "category {id} is {name:?}, and of the data set {class}: number them as `s3d \
-                                pack --to coco` does"
+                "category {id} is {name:?}, and of the data set {class}: number them as its COCO package does"
             ));
         }
         if isthing.is_some_and(|is| (is == 0) != stuff.contains(class)) {
@@ -153,15 +155,16 @@ fn check_categories(categories: &[Category], taxonomy: &Taxonomy, stuff: &[Class
                 ["stuff", "a thing"]
             };
             return Err(format!(
-                "{name} is {here}, and by the taxonomy of the data set {there}, unless --stuff says otherwise"
+                "{name} is {here}, and by the taxonomy of the data set {there}, unless the option `stuff` says \
+                 otherwise"
             ));
         }
     }
     Ok(())
 }
 
-/// The PNG files below a folder that are not `listed`.
-fn unlisted(folder: &Path, listed: &BTreeSet<PathBuf>, others: &mut Vec<PathBuf>) -> Result<()> {
+/// Adds the PNG files below a folder that are not `listed` to `others`.
+fn unlisted(folder: &Path, listed: &BTreeSet<PathBuf>, others: &mut Vec<PathBuf>) -> Result<(), FileError> {
     let io = |e| FileError::io(folder, "read the folder", e);
     for entry in fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();

@@ -1,22 +1,23 @@
-//! The protocol: image by image, on all threads.
+//! Protocol `panoptic`: counts images on all threads, then scores classes.
 
 use super::counts::{ClassCounts, PanopticCounts, PanopticScore, Segment, mean};
 use super::predictions::{Predicted, Predictions, key};
 use crate::Evaluation;
+use crate::error::{ClassOption, Error, Result};
 use crate::tables::{Rows, tables};
 use crate::task::Task;
 use s3d_dataset::s3d_io::Error as FileError;
 use s3d_dataset::s3d_io::dataset::{DatasetImage, Domain, Frame};
 use s3d_dataset::s3d_io::image::{decode_rgb8, read_rgb8};
 use s3d_dataset::s3d_io::package::coco_panoptic;
-use s3d_dataset::s3d_label::{Class, LabelTable};
-use s3d_dataset::{Error, Result, map_in_order};
+use s3d_dataset::s3d_label::{Class, LabelTable, Taxonomy, UnknownClass};
+use s3d_dataset::{ClassList, map_in_order};
 use s3d_geom::Raster;
 use std::collections::BTreeSet;
 
 const COLUMNS: [&str; 3] = ["PQ", "SQ", "RQ"];
 
-/// What is no pixel of a surface in a semantic image. Source: formats.md, "What is written".
+/// The pixel of a semantic image that shows no surface. Source: formats.md, "What is written".
 const MISSING: [u8; 3] = [13; 3];
 
 const DEFINITION: [&str; 5] = [
@@ -30,21 +31,22 @@ const DEFINITION: [&str; 5] = [
     "As in panopticapi 7bb4655 (panopticapi/evaluation.py), which prints 0 for such classes.",
 ];
 
-/// What an image is held against.
+/// The truth of all images.
 struct Truth<'a> {
     task: &'a Task<'a>,
     table: LabelTable,
     stuff: Vec<Class>,
-    /// Cameras of photographs that do not fill their images.
+    /// The areas and cameras of photographs that do not fill their images.
     masked: BTreeSet<(u32, String)>,
 }
 
-/// Panoptic segmentation of images.
+/// Evaluates the panoptic segmentation of images.
 pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     let truth = Truth::new(task)?;
     let taxonomy = truth.table.taxonomy();
     let mut predictions = Predictions::read(task.predictions, taxonomy, &truth.stuff)?;
     let (images, mut notes) = images(task, &mut predictions)?;
+
     let progress = task.ctx.progress("evaluate", "images", images.len() as u64);
     let counts = map_in_order(
         task.ctx,
@@ -57,8 +59,10 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
         },
     )?;
     drop(progress);
+
     let classes = taxonomy.classes();
     let tables = tables(task, &COLUMNS, &counts, |images| rows(images, classes, &truth.stuff));
+
     let names = |of: &[Class]| of.iter().map(|class| class.name()).collect::<Vec<_>>().join(", ");
     let but = match &*names(&truth.stuff) {
         "" => String::new(),
@@ -70,6 +74,7 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     );
     let mut definition: Vec<&str> = vec![&source];
     definition.extend(DEFINITION);
+
     if let Some((first, count)) = predictions.unlisted {
         notes.push(format!("{count} images that are not listed were passed over, as {first}."));
     }
@@ -83,10 +88,10 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     Ok(evaluation)
 }
 
-/// An image that is evaluated, with the fold that it is in.
+/// The fold, the image and the prediction of an image that is evaluated.
 type Job = (usize, DatasetImage, Predicted);
 
-/// The images of all folds, of the kinds that are predicted, and what should be told.
+/// Returns the images of all folds, of the kinds that are predicted, and notes.
 fn images(task: &Task<'_>, predictions: &mut Predictions) -> Result<(Vec<Job>, Vec<String>)> {
     let mut there = Vec::new();
     for (fold, areas) in task.folds.iter().enumerate() {
@@ -98,13 +103,16 @@ fn images(task: &Task<'_>, predictions: &mut Predictions) -> Result<(Vec<Job>, V
         );
     }
     let is_panorama = |image: &DatasetImage| image.frame == Frame::Panorama;
-    let (mut jobs, mut missing) = (Vec::new(), Vec::new());
+
+    let mut jobs = Vec::new();
+    let mut missing = Vec::new();
     for (fold, image) in there {
         match predictions.of_images.remove(&key(&image)) {
             Some(predicted) => jobs.push((fold, image, predicted)),
             None => missing.push(image),
         }
     }
+
     let wrong = |message| Error::from(FileError::format(&predictions.json, message));
     let kinds: BTreeSet<bool> = jobs.iter().map(|(_, image, _)| is_panorama(image)).collect();
     missing.retain(|image| kinds.contains(&is_panorama(image)));
@@ -116,6 +124,8 @@ fn images(task: &Task<'_>, predictions: &mut Predictions) -> Result<(Vec<Job>, V
             first.relative_path(Domain::Rgb)
         )));
     }
+
+    // All other predictions must be of other areas.
     let others = task.data.areas().iter().flat_map(|area| task.data.images(*area));
     let known: BTreeSet<_> = others
         .filter(|image| image.has(Domain::Semantic))
@@ -135,14 +145,10 @@ fn images(task: &Task<'_>, predictions: &mut Predictions) -> Result<(Vec<Job>, V
 
 impl<'a> Truth<'a> {
     fn new(task: &'a Task<'a>) -> Result<Self> {
-        let Some(table) = task.data.labels()? else {
-            let root = task.data.layout().root().display();
-            let message = format!("{root}: {} needs labels, and the data set has none", task.protocol);
-            return Err(Error::Input(message));
-        };
+        let Some(table) = task.data.labels()? else { return Err(task.unlabelled()) };
         let taxonomy = table.taxonomy();
         let stuff = match &task.options.stuff {
-            Some(list) => list.classes(taxonomy)?,
+            Some(list) => classes_of(list, taxonomy)?,
             None => taxonomy
                 .classes()
                 .iter()
@@ -150,6 +156,7 @@ impl<'a> Truth<'a> {
                 .filter(|class| taxonomy.is_stuff(*class))
                 .collect(),
         };
+
         let mut masked = BTreeSet::new();
         for area in task.folds.iter().flat_map(|fold| &fold.areas) {
             let photographs = task.data.photographs(*area)?.into_iter();
@@ -158,11 +165,11 @@ impl<'a> Truth<'a> {
         Ok(Self { task, table, stuff, masked })
     }
 
-    /// The semantic image, void where the photograph does not show it, as `s3d pack --to coco` has it.
-    fn semantic(&self, image: &DatasetImage) -> Result<Raster<[u8; 3]>> {
+    /// Reads the semantic image, with void where the photograph does not show it, like in the COCO package.
+    fn semantic(&self, image: &DatasetImage) -> s3d_dataset::Result<Raster<[u8; 3]>> {
         let read = |domain| {
             let path = image.path(self.task.data.layout(), domain);
-            Ok::<_, Error>(decode_rgb8(&self.task.data.read(&path)?, &path)?)
+            Ok::<_, s3d_dataset::Error>(decode_rgb8(&self.task.data.read(&path)?, &path)?)
         };
         let mut semantic = read(Domain::Semantic)?;
         if image.frame == Frame::View(0) && self.masked.contains(&(image.area, image.uuid.clone())) {
@@ -181,43 +188,40 @@ impl<'a> Truth<'a> {
         image: &DatasetImage,
         predicted: &Predicted,
         predictions: &Predictions,
-    ) -> Result<PanopticCounts> {
+    ) -> s3d_dataset::Result<PanopticCounts> {
         let taxonomy = self.table.taxonomy();
         let class_of = |id: u32| taxonomy.classes().iter().position(|class| taxonomy.id(*class) == id);
         let path = image.path(self.task.data.layout(), Domain::Semantic);
-        let damaged = |message: String| Error::from(FileError::format(&path, message));
         let (panoptic, segments) = coco_panoptic(&self.semantic(image)?, &self.table, &self.stuff)
-            .map_err(|e| damaged(e.to_string()))?;
+            .map_err(|e| FileError::format(&path, e.to_string()))?;
         let segments: Vec<Segment> = segments
             .iter()
             .filter_map(|s| Some(Segment { id: s.id, class: class_of(s.category_id)? }))
             .collect();
+
         let found = predicted.segments.iter().map(|s| {
             let class = class_of(s.category_id).ok_or_else(|| {
-                let (png, category) = (predicted.png.display(), s.category_id);
+                let png = predicted.png.display();
                 let message = format!(
-                    "segment {} of {png} is of category {category}, which the data set has not",
-                    s.id
+                    "segment {} of {png} is of category {}, which the data set has not",
+                    s.id, s.category_id
                 );
                 FileError::format(&predictions.json, message)
             })?;
             Ok(Segment { id: s.id, class })
         });
-        let found: Vec<Segment> = found.collect::<Result<_>>()?;
+        let found: Vec<Segment> = found.collect::<Result<_, FileError>>()?;
         let png = read_rgb8(&predicted.png)?;
-        let sizes = [(panoptic.width(), panoptic.height()), (png.width(), png.height())];
-        let wrong = |message: String| Error::from(FileError::format(&predicted.png, message));
-        if sizes[0] != sizes[1] {
-            let [(w, h), (width, height)] = sizes;
-            return Err(wrong(format!("{width} × {height} pixels, and the data set's image has {w} × {h}")));
+        let [size, due] = [&png, &panoptic].map(|image| [image.width(), image.height()]);
+        let wrong = |message: String| FileError::format(&predicted.png, message);
+        if size != due {
+            let message = format!(
+                "{} × {} pixels, and the data set's image has {} × {}",
+                size[0], size[1], due[0], due[1]
+            );
+            return Err(wrong(message).into());
         }
-        let ids = |image: &Raster<[u8; 3]>| -> Vec<u32> {
-            image
-                .pixels()
-                .iter()
-                .map(|[r, g, b]| u32::from_le_bytes([*r, *g, *b, 0]))
-                .collect()
-        };
+
         let mut counts = PanopticCounts::new(taxonomy.classes().len());
         counts
             .add(&ids(&panoptic), &segments, &ids(&png), &found)
@@ -226,7 +230,28 @@ impl<'a> Truth<'a> {
     }
 }
 
-/// The rows of classes, then means: of things, of stuff, of all.
+/// Returns the number of the segment of each pixel.
+fn ids(image: &Raster<[u8; 3]>) -> Vec<u32> {
+    image
+        .pixels()
+        .iter()
+        .map(|[r, g, b]| u32::from_le_bytes([*r, *g, *b, 0]))
+        .collect()
+}
+
+/// Returns the classes that the option `stuff` names, in their order and once each.
+fn classes_of(list: &ClassList, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
+    let class = |name: &String| {
+        let refused = |e: UnknownClass| Error::Classes { option: ClassOption::Stuff, fault: e.into() };
+        taxonomy.class(name).map_err(refused)
+    };
+    let mut classes = list.0.iter().map(class).collect::<Result<Vec<_>>>()?;
+    classes.sort_unstable();
+    classes.dedup();
+    Ok(classes)
+}
+
+/// Returns the rows of classes, then the means over things, stuff and all.
 fn rows(images: &[&PanopticCounts], classes: &[Class], stuff: &[Class]) -> Rows {
     let mut sum = PanopticCounts::new(classes.len());
     images.iter().for_each(|counts| sum.add_counts(counts));
@@ -236,6 +261,7 @@ fn rows(images: &[&PanopticCounts], classes: &[Class], stuff: &[Class]) -> Rows 
         .clone()
         .map(|(class, of)| row(class.name(), of.score()))
         .collect();
+
     let of_kind = |is_stuff: bool| {
         let of = counts.clone().filter(|(class, _)| stuff.contains(class) == is_stuff);
         mean(of.map(|(_, counts)| counts).collect::<Vec<&ClassCounts>>())

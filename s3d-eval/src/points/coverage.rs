@@ -4,28 +4,31 @@
 
 use super::matching::{PredictedInstance, TrueInstance};
 
-/// The IoU from which on a prediction is right.
+/// The least IoU of a right prediction.
 const LEAST_IOU: f64 = 0.5;
 
-/// How the instances of a room are covered, class by class.
+/// The coverage of the instances of a room, by class.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomCoverage(Vec<ClassCoverage>);
 
-/// Those of a class.
+/// The coverage of the instances of a class.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct ClassCoverage {
-    /// Over true instances: the sum of the largest IoU, and of this times points.
+    /// The sum of the largest IoU of each true instance.
     covered: f64,
+    /// The same sum, weighted by the points of the instance.
     covered_points: f64,
+    /// The number of true instances, and of their points.
     truth: u64,
     points: u64,
+    /// The number of right predictions, and of all.
     right: u64,
     predicted: u64,
 }
 
 impl RoomCoverage {
-    /// Those of a room; scores and void points of predictions do not matter. Instances of a class that is not
-    /// below `classes` are left out.
+    /// Compares the instances of a room. Scores and void points of predictions do not matter. An instance
+    /// does not count if its class is not below `classes`.
     pub fn new(truth: &[TrueInstance], predicted: &[PredictedInstance], classes: usize) -> Self {
         let mut coverage = vec![ClassCoverage::default(); classes];
         let mut best = vec![0.0f64; truth.len()];
@@ -41,6 +44,7 @@ impl RoomCoverage {
             }
             class.right += u64::from(largest >= LEAST_IOU);
         }
+
         for (instance, best) in truth.iter().zip(best) {
             let Some(class) = coverage.get_mut(instance.class) else { continue };
             class.truth += 1;
@@ -52,20 +56,20 @@ impl RoomCoverage {
     }
 }
 
-/// Scores of a class, or their means, 0 to 1.
+/// The scores of a class, or their means, from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoverageScores {
-    /// Right predictions over all; NaN without predictions.
+    /// The number of right predictions, divided by the number of predictions. NaN without predictions.
     pub precision: f64,
-    /// Right predictions over true instances; NaN without these.
+    /// The number of right predictions, divided by the number of true instances. NaN without true instances.
     pub recall: f64,
-    /// The mean over rooms of the mean largest IoU of their true instances; NaN without these.
+    /// The mean over rooms of the mean largest IoU of their true instances. NaN without true instances.
     pub coverage: f64,
-    /// The same, each instance weighted by its points.
+    /// The same mean, with each instance weighted by its points.
     pub weighted_coverage: f64,
 }
 
-/// The scores of classes over rooms, of as many classes each.
+/// Returns the scores of each class over rooms, which have the same number of classes.
 pub fn coverage(rooms: &[&RoomCoverage]) -> Vec<CoverageScores> {
     let classes = rooms.iter().map(|room| room.0.len()).max().unwrap_or(0);
     let of_class = |class: usize| {
@@ -79,6 +83,7 @@ pub fn coverage(rooms: &[&RoomCoverage]) -> Vec<CoverageScores> {
                 .collect();
             scores.iter().sum::<f64>() / scores.len() as f64
         };
+
         let right = sum(|room| room.right);
         CoverageScores {
             precision: right / sum(|room| room.predicted),
@@ -91,7 +96,7 @@ pub fn coverage(rooms: &[&RoomCoverage]) -> Vec<CoverageScores> {
 }
 
 impl CoverageScores {
-    /// Precision, recall, coverage, weighted coverage.
+    /// Returns precision, recall, coverage and weighted coverage.
     pub fn to_array(self) -> [f64; 4] {
         [self.precision, self.recall, self.coverage, self.weighted_coverage]
     }

@@ -1,17 +1,18 @@
-//! Finds the files of predictions, by the names that trainers give them.
+//! Finds the files of predictions by the names that trainers give them.
 
 use super::truth::Room;
+use crate::error::Result;
 use crate::folder::entries;
 use crate::task::Task;
-use s3d_dataset::{Error, Result, s3d_io};
+use s3d_dataset::s3d_io;
 use s3d_io::Error as FileError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Names that are listed in a sentence.
+/// The most names that a sentence lists.
 const LISTED: usize = 5;
 
-/// The file of each room, in their order, and what else lies there, a sentence each.
+/// Returns the file of each room, in their order, and sentences on other files.
 pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<(Vec<PathBuf>, Vec<String>)> {
     let mut known: BTreeSet<(u32, String)> = BTreeSet::new();
     for area in task.data.areas() {
@@ -22,7 +23,9 @@ pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<
                 .map(|room| (room.area, room.name)),
         );
     }
-    let (mut found, mut others) = (BTreeMap::<(u32, String), PathBuf>::new(), Vec::new());
+
+    let mut found: BTreeMap<(u32, String), PathBuf> = BTreeMap::new();
+    let mut others = Vec::new();
     for path in files(task.predictions)? {
         let room = room_of(&path, endings).filter(|room| known.contains(room));
         let Some(room) = room else {
@@ -37,6 +40,7 @@ pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<
             return Err(FileError::format(&path, message).into());
         }
     }
+
     let key = |room: &Room| (room.tree.area, room.tree.name.clone());
     let paths: Vec<Option<PathBuf>> = rooms.iter().map(|room| found.remove(&key(room))).collect();
     let missing: Vec<&Room> = rooms
@@ -63,6 +67,7 @@ pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<
         }
         return Err(FileError::format(task.predictions, message).into());
     }
+
     let mut notes = Vec::new();
     if !found.is_empty() {
         notes.push(format!("Predictions of {} rooms that are not tested were left out.", found.len()));
@@ -74,7 +79,7 @@ pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<
     Ok((paths.into_iter().flatten().collect(), notes))
 }
 
-/// What lies in the folder and in folders of areas, by name, without hidden files.
+/// Returns the entries of the folder and of folders of areas, by name, without hidden ones.
 fn files(dir: &Path) -> Result<Vec<PathBuf>> {
     if dir.is_file() {
         let message = "is a file: predictions are a folder with a file a room";
@@ -82,9 +87,10 @@ fn files(dir: &Path) -> Result<Vec<PathBuf>> {
     }
     let mut found = Vec::new();
     for path in entries(dir)? {
-        match path.is_dir() && area_of_folder(&path).is_some() {
-            true => found.extend(entries(&path)?),
-            false => found.push(path),
+        if path.is_dir() && area_of_folder(&path).is_some() {
+            found.extend(entries(&path)?);
+        } else {
+            found.push(path);
         }
     }
     Ok(found)
@@ -94,7 +100,7 @@ fn area_of_folder(path: &Path) -> Option<u32> {
     path.file_name()?.to_str()?.strip_prefix("Area_")?.parse().ok()
 }
 
-/// The area and room that a file is named after.
+/// Returns the area and the room that a file is named after.
 fn room_of(path: &Path, endings: &[&str]) -> Option<(u32, String)> {
     let ending = path.extension()?.to_str()?;
     if !endings.iter().any(|e| ending.eq_ignore_ascii_case(e)) || path.is_dir() {
@@ -113,7 +119,7 @@ fn below(dir: &Path, path: &Path) -> String {
     path.strip_prefix(dir).unwrap_or(path).display().to_string()
 }
 
-/// The first names, and how many more there are.
+/// Lists the first names, and the number of the others.
 fn listed(names: &[String]) -> String {
     let first = names.iter().take(LISTED).cloned().collect::<Vec<_>>().join(", ");
     match names.len().saturating_sub(LISTED) {
@@ -122,8 +128,8 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-/// What is wrong with a file of predictions.
-pub(super) fn wrong(path: &Path, message: impl Into<String>) -> Error {
+/// Returns the error for a file of predictions.
+pub(super) fn wrong(path: &Path, message: impl Into<String>) -> s3d_dataset::Error {
     FileError::format(path, message).into()
 }
 
@@ -132,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rooms_are_named_as_trainers_do() {
+    fn rooms_are_found_by_the_names_of_trainers() {
         let room = |path: &str| room_of(Path::new(path), &["npy", "npz"]);
         for path in [
             "result/Area_5-office_1_pred.npy",

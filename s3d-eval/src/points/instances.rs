@@ -1,4 +1,4 @@
-//! Predicted instances of a room, read piece by piece from an NPZ archive.
+//! Reads the predicted instances of a room from an NPZ archive, piece by piece.
 
 use super::CLASSES;
 use super::find::wrong;
@@ -15,13 +15,13 @@ const IDS: [&str; 2] = ["instance", "pts_instance_mask"];
 const INSTANCE_CLASSES: [&str; 3] = ["classes", "pred_classes", "instance_labels"];
 const SCORES: [&str; 3] = ["scores", "pred_scores", "instance_scores"];
 
-/// The true instances of a room, and the predicted ones with what they share.
+/// The true and the predicted instances of a room.
 pub(super) type Instances = (Vec<TrueInstance>, Vec<PredictedInstance>);
 
-/// The true instances of a room, and what each prediction shares with them.
+/// The true instances of a room, and the points that each prediction shares with them.
 type Shared = (Vec<TrueInstance>, Vec<Overlaps>);
 
-/// An archive of predictions of a room.
+/// The archive of the predictions of a room.
 struct Prediction<'a> {
     path: &'a Path,
     archive: NpzArchive,
@@ -31,12 +31,13 @@ struct Prediction<'a> {
     ctx: &'a Context,
 }
 
-/// Predictions for average precision: a mask an instance, which may overlap, or an instance a point; a class
-/// and a score an instance. Those of class -1 are left out.
+/// Reads predictions for average precision. Each instance has a mask, which may overlap others, or each point
+/// has an instance. Each instance has a class and a score. Instances of class -1 are left out.
 pub(super) fn scored(path: &Path, room: &Room, points: &Points, ctx: &Context) -> Result<Instances> {
     let mut file = Prediction::open(path, room, points, ctx)?;
     let classes = file.classes()?;
     let scores = file.scores(classes.len())?;
+
     let ids = maybe_named(path, &file.names, &IDS)?;
     let (truth, shared) = match (maybe_named(path, &file.names, &MASKS)?, ids) {
         (Some(masks), Some(ids)) => {
@@ -45,6 +46,7 @@ pub(super) fn scored(path: &Path, room: &Room, points: &Points, ctx: &Context) -
         (Some(masks), None) => file.of_masks(&masks, classes.len())?,
         (None, _) => file.of_ids(&named(path, &file.names, &[IDS, MASKS].concat())?, classes.len())?,
     };
+
     let of = |((class, score), overlaps): ((i64, f64), Overlaps)| {
         let points = overlaps.iter().map(|(_, common)| common).sum();
         let class = usize::try_from(class).ok()?;
@@ -54,14 +56,15 @@ pub(super) fn scored(path: &Path, room: &Room, points: &Points, ctx: &Context) -
     Ok((truth, predicted))
 }
 
-/// Predictions for coverage: an instance a point, -1 for none, and a class a point or an instance. The class
-/// of an instance is that of most of its points, the first of equals.
+/// Reads predictions for coverage. Each point has an instance, -1 for none. Each point or each instance has a
+/// class. An instance has the class of most of its points; the lowest class wins a tie.
 pub(super) fn segments(path: &Path, room: &Room, points: &Points, ctx: &Context) -> Result<Instances> {
     let mut file = Prediction::open(path, room, points, ctx)?;
     if let Some(masks) = maybe_named(path, &file.names, &MASKS)? {
         let message = format!("has {masks}, which may overlap: coverage takes `instance`, one a point");
         return Err(wrong(path, message));
     }
+
     let name = named(path, &file.names, &IDS)?;
     if maybe_named(path, &file.names, &SEMANTIC)?.is_none() {
         let classes = file.classes()?;
@@ -83,7 +86,7 @@ impl<'a> Prediction<'a> {
         Ok(Self { path, archive, names, room, points, ctx })
     }
 
-    /// The classes of its instances: 0 to 12, or -1.
+    /// Reads the classes of its instances: 0 to 12, or -1.
     fn classes(&mut self) -> Result<Vec<i64>> {
         let name = named(self.path, &self.names, &INSTANCE_CLASSES)?;
         let mut array = self.archive.array(&name)?;
@@ -97,6 +100,7 @@ impl<'a> Prediction<'a> {
         }
     }
 
+    /// Reads the scores of its instances, of which there are `instances`.
     fn scores(&mut self, instances: usize) -> Result<Vec<f64>> {
         let name = named(self.path, &self.names, &SCORES)?;
         let mut array = self.archive.array(&name)?;
@@ -111,14 +115,15 @@ impl<'a> Prediction<'a> {
         }
         match scores.iter().find(|score| !score.is_finite()) {
             Some(score) => Err(wrong(array.name(), format!("{score} is no score"))),
-            // Zero has one sign, so that equals are equal.
+            // Adding 0 turns -0 into 0, so that both are equal when scores are sorted.
             None => Ok(scores.into_iter().map(|score| score + 0.0).collect()),
         }
     }
 
-    /// What each mask shares with the true instances.
+    /// Reads the points that each mask shares with the true instances.
     fn of_masks(&mut self, name: &str, instances: usize) -> Result<Shared> {
-        let (array, k) = (self.archive.array(name)?, instances as u64);
+        let array = self.archive.array(name)?;
+        let k = instances as u64;
         let (is_by_point, rows) = match *array.shape() {
             [rows, columns] if columns == k && !(rows == k && name == "pred_masks") => (true, Some(rows)),
             [rows, columns] if rows == k => (false, Some(columns)),
@@ -128,15 +133,17 @@ impl<'a> Prediction<'a> {
             let due = format!("N × {instances} or {instances} × N");
             return Err(shape_error(array.name(), array.shape(), &due, self.room, self.points));
         };
-        // The last index runs fastest, unless numpy says otherwise.
-        let shared = match is_by_point != array.is_column_major() {
-            true => masks_by_point(array, &truth, instances, self.ctx)?,
-            false => masks_one_by_one(array, &truth, instances, self.ctx)?,
+
+        // The last index runs fastest, unless the array is column-major.
+        let shared = if is_by_point != array.is_column_major() {
+            masks_by_point(array, &truth, instances, self.ctx)?
+        } else {
+            masks_one_by_one(array, &truth, instances, self.ctx)?
         };
         Ok((truth, shared))
     }
 
-    /// What each instance, of so many, shares with the true ones.
+    /// Reads the points that each of `instances` instances shares with the true ones.
     fn of_ids(&mut self, name: &str, instances: usize) -> Result<Shared> {
         let (truth, ids) = self.ids(name)?;
         let mut shared = vec![Vec::new(); instances];
@@ -160,6 +167,7 @@ impl<'a> Prediction<'a> {
         }
     }
 
+    /// Reads an instance and a class for each point.
     fn of_ids_and_classes(&mut self, name: &str) -> Result<Instances> {
         let (truth, ids) = self.ids(name)?;
         let semantic = named(self.path, &self.names, &SEMANTIC)?;
@@ -167,13 +175,17 @@ impl<'a> Prediction<'a> {
         if of_labels != truth {
             return Err(wrong(self.path, format!("{semantic} and {name} are not of as many points")));
         }
-        let (mut segments, mut runs, mut rest) = (Segments::default(), Runs::new(&truth), &ids[..]);
+
+        let mut segments = Segments::default();
+        let mut runs = Runs::new(&truth);
+        let mut rest = &ids[..];
         loop {
             self.ctx.check()?;
             let labels = labels.next()?;
             if labels.is_empty() {
                 return Ok((truth, segments.finish()));
             }
+
             let (now, later) = rest.split_at(labels.len().min(rest.len()));
             rest = later;
             let points: Vec<(i64, i64)> = labels.iter().copied().zip(now.iter().copied()).collect();
@@ -184,7 +196,7 @@ impl<'a> Prediction<'a> {
         }
     }
 
-    /// The instance of each point.
+    /// Reads the instance of each point.
     fn ids(&mut self, name: &str) -> Result<(Vec<TrueInstance>, Vec<i64>)> {
         let mut array = self.archive.array(name)?;
         let mut ids = Vec::new();
@@ -207,13 +219,13 @@ impl<'a> Prediction<'a> {
     }
 }
 
-/// An array whose shape is not the one that is due.
+/// Returns the error for an array of another shape than `due`.
 fn shape_error(name: &Path, shape: &[u64], due: &str, room: &Room, points: &Points) -> Error {
     let expected = rows_expected(room, points);
     wrong(name, format!("has the shape {shape:?}, where {due} is due: {expected}"))
 }
 
-/// Masks whose numbers come point by point.
+/// Reads masks whose numbers come point by point.
 fn masks_by_point(
     mut array: NpyArray<impl Read>,
     truth: &[TrueInstance],
@@ -221,7 +233,8 @@ fn masks_by_point(
     ctx: &Context,
 ) -> Result<Vec<Overlaps>> {
     let mut shared = vec![Vec::new(); instances];
-    let (mut runs, mut numbers) = (Runs::new(truth), Vec::new());
+    let mut runs = Runs::new(truth);
+    let mut numbers = Vec::new();
     while array.read_floats(&mut numbers)? > 0 {
         ctx.check()?;
         let rows: Vec<&[f64]> = numbers.chunks_exact(instances.max(1)).collect();
@@ -243,7 +256,7 @@ fn masks_by_point(
     Ok(shared)
 }
 
-/// Masks that come one after another.
+/// Reads masks that come one after another.
 fn masks_one_by_one(
     mut array: NpyArray<impl Read>,
     truth: &[TrueInstance],
@@ -253,7 +266,9 @@ fn masks_one_by_one(
     let rows: u64 = truth.iter().map(|instance| instance.points).sum();
     let mut shared = vec![Vec::new(); instances];
     let mut masks = shared.iter_mut();
-    let (mut mask, mut runs, mut left) = (masks.next(), Runs::new(truth), rows);
+    let mut mask = masks.next();
+    let mut runs = Runs::new(truth);
+    let mut left = rows;
     let mut numbers = Vec::new();
     while array.read_floats(&mut numbers)? > 0 {
         ctx.check()?;
@@ -267,9 +282,13 @@ fn masks_one_by_one(
                     count(overlaps, at, points);
                 }
             });
-            (rest, left) = (later, left - n as u64);
+
+            rest = later;
+            left -= n as u64;
             if left == 0 {
-                (mask, runs, left) = (masks.next(), Runs::new(truth), rows);
+                mask = masks.next();
+                runs = Runs::new(truth);
+                left = rows;
             }
         }
         numbers.clear();

@@ -1,4 +1,4 @@
-//! Predicted classes of the points of a room, read piece by piece.
+//! Reads the predicted classes of the points of a room, piece by piece.
 
 use super::CLASSES;
 use super::find::wrong;
@@ -9,24 +9,28 @@ use s3d_io::cloud::{NpyArray, NpzArchive};
 use std::io::Read;
 use std::path::Path;
 
-/// What the array of classes may be called.
+/// The names that the array of classes may have.
 pub(super) const SEMANTIC: [&str; 2] = ["semantic", "pts_semantic_mask"];
 
-/// Predicted classes, from 0 to 12, or -1 for none.
+/// The predicted classes of points: 0 to 12, or -1 for none.
 pub(super) struct Labels<R> {
     array: NpyArray<R>,
-    /// Numbers a point: labels, if one.
+    /// How many numbers a point has: one is a class, more are the scores of classes.
     columns: usize,
-    /// Which classes are valid: from this to 12.
+    /// The least valid class: 0, or -1 if it stands for none.
     least: i64,
+    /// The classes of the current piece.
     labels: Vec<i64>,
+    /// Scores that were read and not used yet.
     scores: Vec<f64>,
+    /// The number of points before the current piece.
     done: u64,
 }
 
 impl<R: Read> Labels<R> {
-    /// Those of a room, and the true instances of their points: labels of whole numbers, N or N × 1, or
-    /// scores of classes, N × 13, of which the largest counts, the first of equals.
+    /// Opens the array of a room, and returns the true instances of its points as well. The array holds
+    /// classes as whole numbers, N or N × 1, or the scores of classes, N × 13. The class with the largest
+    /// score counts; the first wins a tie.
     pub(super) fn new(
         array: NpyArray<R>,
         room: &Room,
@@ -34,17 +38,17 @@ impl<R: Read> Labels<R> {
         least: i64,
     ) -> Result<(Self, Vec<TrueInstance>)> {
         let refused = || {
-            let (shape, expected) = (array.shape(), rows_expected(room, points));
-            wrong(
-                array.name(),
-                format!("has the shape {shape:?}, where N or N × {CLASSES} is due: {expected}"),
-            )
+            let shape = array.shape();
+            let expected = rows_expected(room, points);
+            let message = format!("has the shape {shape:?}, where N or N × {CLASSES} is due: {expected}");
+            wrong(array.name(), message)
         };
         let (rows, columns) = match *array.shape() {
             [rows] | [rows, 1] => (rows, 1),
             [rows, columns] if columns == CLASSES as u64 => (rows, CLASSES),
             _ => return Err(refused()),
         };
+
         let instances = points.of_rows(rows).ok_or_else(refused)?;
         if columns > 1 && array.is_column_major() {
             let message = "is stored column by column: save numpy.ascontiguousarray(array)";
@@ -53,7 +57,7 @@ impl<R: Read> Labels<R> {
         Ok((Self { array, columns, least, labels: Vec::new(), scores: Vec::new(), done: 0 }, instances))
     }
 
-    /// The next ones; none at the end.
+    /// Returns the classes of the next points; none at the end.
     pub(super) fn next(&mut self) -> Result<&[i64]> {
         self.labels.clear();
         if self.columns == 1 {
@@ -85,20 +89,23 @@ impl<R: Read> Labels<R> {
     }
 }
 
-/// The place of the largest number, the first of equals; `None` if one is NaN.
+/// Returns the index of the largest number; the first wins a tie. `None` if one is NaN.
 fn largest(row: &[f64]) -> Option<i64> {
-    let (mut at, mut most) = (0, f64::NEG_INFINITY);
+    let mut at = 0;
+    let mut most = f64::NEG_INFINITY;
     let mut has_nan = false;
     for (i, value) in (0..).zip(row) {
         has_nan |= value.is_nan();
         if *value > most {
-            (at, most) = (i, *value);
+            at = i;
+            most = *value;
         }
     }
     (!has_nan).then_some(at)
 }
 
-/// Hands the predicted classes of a room's points to `each`, with the true instance that they are of.
+/// Calls `each` with a true instance and the predicted classes of some of its points, for all points of a
+/// room.
 pub(super) fn for_each_run(
     path: &Path,
     room: &Room,
@@ -141,11 +148,12 @@ fn walk(
     }
 }
 
-/// Tells which instance each point is of, when points come in their order, some at a time.
+/// Assigns points to their instances. The points come in their order, some at a time.
 pub(super) struct Runs<'a> {
     instances: &'a [TrueInstance],
+    /// The instance of the next point.
     at: usize,
-    /// Points of this instance that are used up.
+    /// How many points of this instance came before.
     used: u64,
 }
 
@@ -154,7 +162,8 @@ impl<'a> Runs<'a> {
         Self { instances, at: 0, used: 0 }
     }
 
-    /// Hands on what is told of the next points, an instance at a time.
+    /// Calls `each` with the index of an instance and the next points of it, until all `points` are handed
+    /// on.
     pub(super) fn split<T>(&mut self, mut points: &[T], mut each: impl FnMut(usize, &[T])) {
         while let Some(instance) = self.instances.get(self.at).filter(|_| !points.is_empty()) {
             let left = instance.points.saturating_sub(self.used);
@@ -166,21 +175,22 @@ impl<'a> Runs<'a> {
             points = rest;
             self.used += n as u64;
             if self.used >= instance.points {
-                (self.at, self.used) = (self.at + 1, 0);
+                self.at += 1;
+                self.used = 0;
             }
         }
     }
 }
 
-/// Which of these names an archive has.
+/// Returns the one of the wanted names that an archive has.
 pub(super) fn named(path: &Path, names: &[String], wanted: &[&str]) -> Result<String> {
     maybe_named(path, names, wanted)?.ok_or_else(|| {
-        let (wanted, names) = (wanted.join(" or "), names.join(", "));
-        wrong(path, format!("has no array {wanted}: it has {names}"))
+        let message = format!("has no array {}: it has {}", wanted.join(" or "), names.join(", "));
+        wrong(path, message)
     })
 }
 
-/// The same, or none.
+/// Returns the one of the wanted names that an archive has, or `None`.
 pub(super) fn maybe_named(path: &Path, names: &[String], wanted: &[&str]) -> Result<Option<String>> {
     let mut found = names.iter().filter(|name| wanted.contains(&&***name));
     let name = found.next();
@@ -197,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_of_the_largest_counts() {
+    fn the_first_wins_a_tie() {
         assert_eq!(largest(&[0.1, 0.7, 0.7]), Some(1));
         assert_eq!(largest(&[f64::NEG_INFINITY; 2]), Some(0));
         assert_eq!(largest(&[0.1, f64::NAN]), None);

@@ -1,8 +1,9 @@
-//! Instances of a room, true and predicted, by what they share.
+//! True and predicted instances of a room, and the points that they share.
 
 use std::collections::{BTreeMap, HashMap};
 
-/// With which true instances, by their places in a list, a prediction shares how many points.
+/// The true instances with which a prediction shares points: the index of each, and the number of shared
+/// points.
 pub(super) type Overlaps = Vec<(usize, u64)>;
 
 /// An annotated instance.
@@ -10,7 +11,7 @@ pub(super) type Overlaps = Vec<(usize, u64)>;
 pub struct TrueInstance {
     /// Its class, from 0.
     pub class: usize,
-    /// How many points it has.
+    /// The number of its points.
     pub points: u64,
 }
 
@@ -19,19 +20,19 @@ pub struct TrueInstance {
 pub struct PredictedInstance {
     /// Its class, from 0.
     pub class: usize,
-    /// How sure its prediction is: higher is surer. Not NaN.
+    /// The confidence: larger if more certain, and not NaN.
     pub score: f64,
-    /// How many points it has.
+    /// The number of its points.
     pub points: u64,
-    /// How many of them are void: without a true class.
+    /// The number of its points that are void, which means without a true class.
     pub void: u64,
-    /// The true instances with which it shares points, whatever their class: their places in the list of
-    /// true instances, each once, and how many points it shares.
+    /// The true instances with which it shares points, whatever their class. Each has its index in the list
+    /// of true instances, which occurs once, and the number of shared points.
     pub overlaps: Vec<(usize, u64)>,
 }
 
 impl PredictedInstance {
-    /// The true instances of its class with which it shares points, and for each the points and the IoU.
+    /// Returns the true instances of its class with which it shares points: index, shared points and IoU.
     pub(super) fn of_its_class<'a>(
         &'a self,
         truth: &'a [TrueInstance],
@@ -51,22 +52,26 @@ impl PredictedInstance {
 pub struct Mask<'a> {
     /// Its class, from 0.
     pub class: usize,
-    /// How sure its prediction is: higher is surer. Not NaN.
+    /// The confidence: larger if more certain, and not NaN.
     pub score: f64,
-    /// Whether a point is in it.
+    /// Whether each point is in it.
     pub inside: &'a [bool],
 }
 
-/// The instances of a room whose predictions are masks, which may overlap. `truth` has the class of each
-/// point, from 0, negative if void, and its instance, negative for none. The class of a true instance is that
-/// of its first point; those that begin in void are left out. Points beyond the shorter slice do not count.
+/// Returns the true and the predicted instances of a room whose predictions are masks, which may overlap.
+///
+/// `truth` has the class (from 0, negative if void) and the instance (negative for none) of each point. A
+/// true instance has the class of its first point, and is left out if this point is void. Points beyond the
+/// shorter slice do not count.
 pub fn instances_of_masks(
     truth: &[(i64, i64)],
     masks: &[Mask<'_>],
 ) -> (Vec<TrueInstance>, Vec<PredictedInstance>) {
     let (instances, places) = true_instances(truth);
     let predicted = masks.iter().map(|mask| {
-        let (mut points, mut void, mut overlaps) = (0, 0, Vec::new());
+        let mut points = 0;
+        let mut void = 0;
+        let mut overlaps = Vec::new();
         let inside = truth
             .iter()
             .zip(&places)
@@ -83,9 +88,11 @@ pub fn instances_of_masks(
     (instances, predicted)
 }
 
-/// The instances of a room whose predictions are an instance a point. Both sides have the class and the
-/// instance of each point, negative for none. The class of a predicted instance is that of most of its
-/// points, the lowest of equals, and its score 0; see [`instances_of_masks`] for the rest.
+/// Returns the true and the predicted instances of a room whose predictions have an instance for each point.
+///
+/// Both sides have the class and the instance of each point, negative for none. A predicted instance has the
+/// class of most of its points, and the score 0; the lowest class wins a tie. The rest is like in
+/// [`instances_of_masks`].
 pub fn instances_of_segments(
     truth: &[(i64, i64)],
     predicted: &[(i64, i64)],
@@ -98,13 +105,15 @@ pub fn instances_of_segments(
     (instances, segments.finish())
 }
 
-/// The true instances by number, and the one that each point is of.
+/// Returns the true instances, ordered by number, and the index of the instance of each point.
 fn true_instances(truth: &[(i64, i64)]) -> (Vec<TrueInstance>, Vec<Option<usize>>) {
     let mut first: BTreeMap<i64, (i64, u64)> = BTreeMap::new();
     for (class, instance) in truth.iter().filter(|(_, instance)| *instance >= 0) {
         first.entry(*instance).or_insert((*class, 0)).1 += 1;
     }
-    let (mut instances, mut places) = (Vec::new(), HashMap::new());
+
+    let mut instances = Vec::new();
+    let mut places = HashMap::new();
     for (instance, (class, points)) in first {
         if let Ok(class) = usize::try_from(class) {
             places.insert(instance, instances.len());
@@ -118,17 +127,18 @@ fn true_instances(truth: &[(i64, i64)]) -> (Vec<TrueInstance>, Vec<Option<usize>
     (instances, of_points)
 }
 
-/// Predicted instances that are an instance a point, while their points are counted.
+/// Counts the points of predicted instances, where each point has an instance.
 #[derive(Default)]
 pub(super) struct Segments {
+    /// The index of each instance in `segments`.
     places: HashMap<i64, usize>,
-    /// By first point: points by class, and those shared with true instances.
+    /// The points of each instance by class, and the points shared with true instances. Ordered by first
+    /// point.
     segments: Vec<(BTreeMap<usize, u64>, Overlaps)>,
 }
 
 impl Segments {
-    /// Counts a point: the true instance that it is of, and its predicted class and instance, negative for
-    /// none.
+    /// Counts a point with its true instance, and its predicted class and instance, negative for none.
     pub(super) fn add(&mut self, truth: Option<usize>, class: i64, instance: i64) {
         if instance < 0 {
             return;
@@ -143,6 +153,7 @@ impl Segments {
         truth.iter().for_each(|at| count(overlaps, *at, 1));
     }
 
+    /// Returns the predicted instances.
     pub(super) fn finish(self) -> Vec<PredictedInstance> {
         let segment = |(classes, overlaps): (BTreeMap<usize, u64>, _)| {
             let most = classes.values().max().copied();
@@ -157,7 +168,7 @@ impl Segments {
     }
 }
 
-/// Some points more that are shared with a true instance.
+/// Adds points that are shared with a true instance.
 pub(super) fn count(overlaps: &mut Overlaps, at: usize, points: u64) {
     match overlaps.last_mut() {
         Some((last, common)) if *last == at => *common += points,
@@ -165,7 +176,7 @@ pub(super) fn count(overlaps: &mut Overlaps, at: usize, points: u64) {
     }
 }
 
-/// Each true instance once.
+/// Merges the entries of each true instance.
 fn merged(mut overlaps: Overlaps) -> Overlaps {
     overlaps.sort_unstable();
     overlaps.dedup_by(|next, kept| {

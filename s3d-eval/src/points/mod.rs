@@ -1,8 +1,8 @@
 //! Segmentation of points: classes and instances of the rooms of a data set.
 //!
-//! The metrics need no files: [`SemanticCounts`] for classes; for instances [`InstanceMatches`] with
-//! [`instance_ap`], and [`RoomCoverage`] with [`coverage`]. Counts of rooms add up, so that rooms may be
-//! counted one after another.
+//! The metrics need no files. [`SemanticCounts`] is for classes; [`InstanceMatches`] with [`instance_ap`],
+//! and [`RoomCoverage`] with [`coverage`], are for instances. Each counts one room, and the scores take any
+//! number of rooms.
 //!
 //! ```
 //! use s3d_eval::points::{AbsentClass, SemanticCounts};
@@ -30,5 +30,5 @@ pub use precision::{InstanceAp, InstanceMatches, LEAST_POINTS, instance_ap};
 pub(crate) use protocols::{inst_ap, inst_cov, sem3d};
 pub use semantic::{AbsentClass, SemanticCounts, SemanticScores};
 
-/// S3DIS's classes, which every class of a data set counts as.
+/// The number of classes of S3DIS. Each class of a data set counts as one of them.
 const CLASSES: usize = s3d_dataset::s3d_label::Class::S3DIS.len();

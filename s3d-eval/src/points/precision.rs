@@ -6,12 +6,12 @@
 use super::matching::{PredictedInstance, TrueInstance};
 use super::semantic::nan_mean;
 
-/// Instances of fewer points do not count, on both sides.
+/// Instances with fewer points do not count, on both sides.
 pub const LEAST_POINTS: u64 = 100;
-/// How many IoU thresholds there are.
+/// The number of thresholds of the IoU.
 const THRESHOLDS: usize = 10;
 
-/// The IoU thresholds: .5 to .9 in steps of .05, as numpy's `arange` rounds them, and .25.
+/// Returns the thresholds of the IoU: .5 to .9 in steps of .05, rounded like numpy's `arange`, then .25.
 fn thresholds() -> [f64; THRESHOLDS] {
     let step = (0.5 + 0.05) - 0.5;
     std::array::from_fn(|i| {
@@ -27,10 +27,10 @@ fn thresholds() -> [f64; THRESHOLDS] {
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstanceMatches(Vec<ClassMatches>);
 
-/// Those of a class.
+/// The instances of a class.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct ClassMatches {
-    /// For every true instance that counts: the predictions that share points with it, and their IoU.
+    /// For each true instance that counts, the predictions that share points with it, and their IoU.
     truth: Vec<Vec<(usize, f64)>>,
     predicted: Vec<Candidate>,
 }
@@ -39,17 +39,17 @@ struct ClassMatches {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     score: f64,
-    /// Its largest IoU with a true instance, of any size.
+    /// Its largest IoU with a true instance of any size.
     best_iou: f64,
-    /// The share of its points that are void, or of true instances that are too small.
+    /// The share of its points that are void or in true instances that are too small.
     ignored: f64,
 }
 
 impl InstanceMatches {
-    /// Those of a room. Instances of a class that is not below `classes` are left out.
+    /// Matches the instances of a room. An instance does not count if its class is not below `classes`.
     pub fn new(truth: &[TrueInstance], predicted: &[PredictedInstance], classes: usize) -> Self {
         let mut matches = vec![ClassMatches::default(); classes];
-        // Where the true instances that count stand among those of their class.
+        // The index of each true instance that counts among the instances of its class.
         let mut places = Vec::with_capacity(truth.len());
         for instance in truth {
             let class = matches
@@ -60,9 +60,11 @@ impl InstanceMatches {
                 class.truth.len() - 1
             }));
         }
+
         for instance in predicted.iter().filter(|instance| instance.points >= LEAST_POINTS) {
             let Some(class) = matches.get_mut(instance.class) else { continue };
-            let (mut best_iou, mut ignored) = (0.0f64, instance.void);
+            let mut best_iou = 0.0f64;
+            let mut ignored = instance.void;
             for (at, common, iou) in instance.of_its_class(truth) {
                 best_iou = best_iou.max(iou);
                 match places
@@ -84,21 +86,23 @@ impl InstanceMatches {
     }
 }
 
-/// Average precision of instances, 0 to 1.
+/// The average precision of instances, from 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstanceAp {
-    /// By class: the mean over IoU .50 to .90, at .50, and at .25. NaN if no true instance counts.
+    /// For each class the mean over IoU .50 to .90, the value at .50, and the value at .25. NaN if no true
+    /// instance of the class counts.
     pub by_class: Vec<[f64; 3]>,
-    /// The means of what is not NaN: over classes and thresholds, at .50, and at .25.
+    /// The means over classes, without NaN: over IoU .50 to .90, at .50, and at .25.
     pub mean: [f64; 3],
 }
 
-/// The average precision over rooms, of as many classes each.
+/// Returns the average precision over rooms, which have the same number of classes.
 pub fn instance_ap(rooms: &[&InstanceMatches]) -> InstanceAp {
     let classes = rooms.iter().map(|room| room.0.len()).max().unwrap_or(0);
     let at: Vec<[f64; THRESHOLDS]> = (0..classes)
         .map(|class| thresholds().map(|threshold| class_ap(rooms, class, threshold)))
         .collect();
+
     let strict = |ap: &[f64; THRESHOLDS]| ap.iter().take(THRESHOLDS - 1).copied().collect::<Vec<f64>>();
     let three = |ap: &[f64; THRESHOLDS]| [nan_mean(strict(ap)), ap[0], ap[THRESHOLDS - 1]];
     let by_class: Vec<[f64; 3]> = at.iter().map(three).collect();
@@ -110,25 +114,29 @@ pub fn instance_ap(rooms: &[&InstanceMatches]) -> InstanceAp {
     InstanceAp { by_class, mean }
 }
 
-/// The average precision of a class at an IoU.
+/// Returns the average precision of a class at a threshold of the IoU.
 fn class_ap(rooms: &[&InstanceMatches], class: usize, threshold: f64) -> f64 {
-    let (mut found, mut missed) = (Vec::new(), 0);
-    let (mut has_truth, mut has_predicted) = (false, false);
+    let mut found = Vec::new();
+    let mut missed = 0;
+    let mut has_truth = false;
+    let mut has_predicted = false;
     for room in rooms.iter().filter_map(|room| room.0.get(class)) {
         has_truth |= !room.truth.is_empty();
         has_predicted |= !room.predicted.is_empty();
         missed += room.decide(threshold, &mut found);
     }
-    match (has_truth, has_predicted) {
-        (true, true) => area(found, missed),
-        (true, false) => 0.0,
-        (false, _) => f64::NAN,
+    if !has_truth {
+        f64::NAN
+    } else if has_predicted {
+        area(found, missed)
+    } else {
+        0.0
     }
 }
 
 impl ClassMatches {
-    /// Appends the score of every prediction that counts, and whether it is right; gives how many true
-    /// instances have none.
+    /// Appends the score of each prediction that counts, and whether it is right. Returns the number of true
+    /// instances without a prediction.
     fn decide(&self, threshold: f64, found: &mut Vec<(f64, bool)>) -> u64 {
         let mut is_taken = vec![false; self.predicted.len()];
         let mut missed = 0;
@@ -141,7 +149,8 @@ impl ClassMatches {
                 if *taken || *iou <= threshold {
                     continue;
                 }
-                // Only the first is taken: another is a duplicate here, and may be right elsewhere.
+
+                // Only the first is taken. Another is a duplicate here, and may be right elsewhere.
                 best = Some(match best {
                     Some(score) => {
                         found.push((score.min(candidate.score), false));
@@ -158,6 +167,7 @@ impl ClassMatches {
                 None => missed += 1,
             }
         }
+
         let is_wrong = |c: &&Candidate| c.best_iou <= threshold && c.ignored <= threshold;
         found.extend(
             self.predicted
@@ -169,13 +179,16 @@ impl ClassMatches {
     }
 }
 
-/// The area below precision over recall, by the trapezes of ScanNet's script: each distinct score is a point,
-/// and precision 1 at recall 0 is another.
+/// Returns the area below precision over recall, in trapezia like ScanNet's script. Each distinct score is a
+/// point of the curve, and precision 1 at recall 0 is another.
 fn area(mut found: Vec<(f64, bool)>, missed: u64) -> f64 {
     found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let right = found.iter().filter(|(_, is_right)| *is_right).count() as u64;
-    let (mut precision, mut recall) = (Vec::new(), Vec::new());
-    let (mut at, mut right_below) = (0, 0);
+
+    let mut precision = Vec::new();
+    let mut recall = Vec::new();
+    let mut at = 0;
+    let mut right_below = 0;
     for group in found.chunk_by(|a, b| a.0 == b.0) {
         let right_here = right - right_below;
         precision.push(right_here as f64 / (found.len() - at) as f64);
@@ -185,6 +198,7 @@ fn area(mut found: Vec<(f64, bool)>, missed: u64) -> f64 {
     }
     precision.push(1.0);
     recall.push(0.0);
+
     let before = recall.first().into_iter().chain(&recall);
     let after = recall.iter().skip(1).chain([&0.0]);
     let widths = before.zip(after).map(|(before, after)| 0.5 * before - 0.5 * after);
@@ -219,12 +233,13 @@ mod tests {
     }
 
     #[test]
-    fn a_duplicate_is_wrong_and_what_lies_in_void_does_not_count() {
+    fn a_duplicate_is_wrong_and_predictions_in_void_do_not_count() {
         let truth = [TrueInstance { class: 0, points: 100 }];
         let duplicate = [predicted(0.9, 100, &[(0, 100)]), predicted(0.8, 100, &[(0, 100)])];
         let ap = instance_ap(&[&InstanceMatches::new(&truth, &duplicate, 1)]).by_class[0][1];
-        // Precision 1/2 at recall 1, 1 at 1 and at 0: half a trapeze each.
+        // Precision 1/2 at recall 1, 1 at 1 and at 0: half a trapezium each.
         assert_eq!(ap, 1.0);
+
         let surer = [predicted(0.7, 200, &[]), predicted(0.6, 100, &[(0, 100)])];
         let ap = instance_ap(&[&InstanceMatches::new(&truth, &surer, 1)]).by_class[0][1];
         assert_eq!(ap, 0.25);

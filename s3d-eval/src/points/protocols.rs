@@ -1,4 +1,4 @@
-//! The protocols: room by room, on all threads.
+//! Protocols `sem3d`, `inst-ap` and `inst-cov`: they count rooms on all threads, then score classes.
 
 use super::CLASSES;
 use super::coverage::{CoverageScores, RoomCoverage, coverage};
@@ -8,11 +8,12 @@ use super::labels::for_each_run;
 use super::precision::{InstanceMatches, instance_ap};
 use super::semantic::{AbsentClass, SemanticCounts, nan_mean};
 use super::truth::{Points, Room};
+use crate::error::Result;
 use crate::tables::{Rows, tables};
 use crate::task::Task;
 use crate::{Evaluation, Table};
+use s3d_dataset::map_in_order;
 use s3d_dataset::s3d_label::Class;
-use s3d_dataset::{Result, map_in_order};
 use std::path::Path;
 
 const TRUTH: &str = "The points of a room are those of its files \
@@ -21,21 +22,23 @@ const TRUTH: &str = "The points of a room are those of its files \
 const OF_CLASSES: &str =
     "Classes are the 13 of S3DIS; a class of another taxonomy is the one that it counts as.";
 
-/// What rooms gave, and what should be told besides.
+/// The results of all rooms, and notes.
 struct Counted<T> {
+    /// The fold and the result of each room.
     rooms: Vec<(usize, T)>,
     points: u64,
     notes: Vec<String>,
 }
 
-/// Does `work` on the prediction of each room.
+/// Calls `work` with the prediction of each room.
 fn count<T: Send + Sync>(
     task: &Task<'_>,
     endings: &[&str],
-    work: impl Fn(&Path, &Room, &Points) -> Result<T> + Sync,
+    work: impl Fn(&Path, &Room, &Points) -> s3d_dataset::Result<T> + Sync,
 ) -> Result<Counted<T>> {
     let rooms = Room::all(task)?;
     let (paths, notes) = find(task, &rooms, endings)?;
+
     let progress = task.ctx.progress("evaluate", "rooms", rooms.len() as u64);
     let jobs: Vec<_> = rooms.iter().zip(&paths).collect();
     let results = map_in_order(

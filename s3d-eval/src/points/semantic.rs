@@ -1,52 +1,52 @@
-//! Semantic segmentation: counts of points by class, and what follows from them.
+//! Semantic segmentation: counts of points by class, and their scores.
 
-/// Points by class: how many the truth has, how many are predicted, and how many are both.
+/// The numbers of points of each class: in the truth, in the prediction, and in both.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SemanticCounts {
-    /// Points that are of the class.
+    /// The points of each true class.
     pub truth: Vec<u64>,
-    /// Points that are predicted to be.
+    /// The points of each predicted class.
     pub predicted: Vec<u64>,
-    /// Points that are, and are predicted to be.
+    /// The points whose true and predicted class is this one.
     pub intersection: Vec<u64>,
 }
 
-/// What a class counts that neither the truth nor the predictions have.
+/// The scores of a class that neither the truth nor the predictions have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AbsentClass {
-    /// IoU and accuracy 0, in the mean too, since 1e-10 is added to every denominator. Source: Pointcept
-    /// d74c646, `pointcept/engines/test.py`.
+    /// IoU and accuracy are 0 and count in the means, since 1e-10 is added to each denominator. Source:
+    /// Pointcept d74c646, `pointcept/engines/test.py`.
     Zero,
-    /// IoU and accuracy NaN, left out of the mean; the accuracy of a class that the truth has not is NaN as
-    /// well. Sources: mmdetection3d fe25f7a, `mmdet3d/evaluation/functional/seg_eval.py`; Open3D-ML 5e81f52,
-    /// `ml3d/torch/modules/metrics/semseg_metric.py`, which has no overall accuracy.
+    /// IoU and accuracy are NaN and left out of the means. The accuracy of a class that only the truth lacks
+    /// is NaN, too. Sources: mmdetection3d fe25f7a, `mmdet3d/evaluation/functional/seg_eval.py`; Open3D-ML
+    /// 5e81f52, `ml3d/torch/modules/metrics/semseg_metric.py`, which has no overall accuracy.
     LeftOut,
 }
 
-/// Scores of a semantic segmentation, 0 to 1.
+/// The scores of a semantic segmentation, from 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SemanticScores {
-    /// By class: points that are both over points that are either.
+    /// The intersection over union of each class.
     pub iou: Vec<f64>,
-    /// By class: points that are both over points of the truth.
+    /// The share of the true points of each class that were found.
     pub accuracy: Vec<f64>,
-    /// mIoU.
+    /// The mean of `iou`, called mIoU.
     pub mean_iou: f64,
-    /// mAcc.
+    /// The mean of `accuracy`, called mAcc.
     pub mean_accuracy: f64,
-    /// OA: right points over all that are not void.
+    /// The share of right points among all points that are not void, called OA.
     pub overall_accuracy: f64,
 }
 
 impl SemanticCounts {
-    /// No points, of so many classes.
+    /// Makes empty counts of this number of classes.
     pub fn new(classes: usize) -> Self {
         let none = vec![0; classes];
         Self { truth: none.clone(), predicted: none.clone(), intersection: none }
     }
 
-    /// Counts points, each its true and its predicted class, from 0. A true class that is none, such as -1,
-    /// makes the point void: it does not count. A predicted one that is none makes it wrong.
+    /// Counts points by their true and predicted classes, from 0. A point whose true class does not exist,
+    /// such as -1, is void and does not count. A point whose predicted class does not exist is wrong.
     pub fn add(&mut self, points: impl IntoIterator<Item = (i64, i64)>) {
         for (truth, predicted) in points {
             if let Some(class) = usize::try_from(truth).ok().filter(|class| *class < self.truth.len()) {
@@ -73,12 +73,9 @@ impl SemanticCounts {
         }
     }
 
-    /// The sum of counts of as many classes each.
+    /// Returns the sum of counts, which have the same number of classes.
     pub fn sum<'a>(classes: usize, counts: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut sum = Self::new(classes);
-        let add = |sum: &mut [u64], counts: &[u64]| {
-            sum.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-        };
         for counts in counts {
             add(&mut sum.truth, &counts.truth);
             add(&mut sum.predicted, &counts.predicted);
@@ -87,7 +84,7 @@ impl SemanticCounts {
         sum
     }
 
-    /// The scores of these counts.
+    /// Returns the scores of these counts.
     pub fn scores(&self, absent: AbsentClass) -> SemanticScores {
         let share = |part: u64, whole: u64| match absent {
             AbsentClass::Zero => part as f64 / (whole as f64 + 1e-10),
@@ -113,9 +110,14 @@ impl SemanticCounts {
     }
 }
 
-/// The mean of what is not NaN; NaN of none.
+fn add(sum: &mut [u64], counts: &[u64]) {
+    sum.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+}
+
+/// Returns the mean of the values that are not NaN; NaN if there are none.
 pub(super) fn nan_mean(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0u32);
+    let mut sum = 0.0;
+    let mut count = 0u32;
     for value in values.into_iter().filter(|value| !value.is_nan()) {
         sum += value;
         count += 1;
@@ -128,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_class_that_is_nowhere_counts_as_is_said() {
+    fn absent_classes_are_zero_or_left_out() {
         let mut counts = SemanticCounts::new(3);
         counts.add([(0, 0), (0, 1), (1, 1), (-1, 0), (7, 1), (1, -1)]);
         assert_eq!((&counts.truth[..], &counts.predicted[..]), (&[2, 2, 0][..], &[1, 2, 0][..]));

@@ -1,27 +1,26 @@
-//! The points that predictions are held against: those of the S3DIS tree, in the order of its profiles.
+//! The true points: they come from the S3DIS tree, in the order of its profiles.
 
 use super::CLASSES;
 use super::matching::TrueInstance;
+use crate::error::Result;
 use crate::task::Task;
-use s3d_dataset::{Error, Result, TreeRoom};
+use s3d_dataset::TreeRoom;
 
 /// A room that is tested.
 pub(super) struct Room {
-    /// The fold that it is in.
+    /// The index of its fold.
     pub(super) fold: usize,
     pub(super) tree: TreeRoom,
 }
 
-/// The instances of a room, in the order of its points: one after another.
+/// The instances of a room. Its points come one instance after another.
 pub(super) struct Points(Vec<TrueInstance>);
 
 impl Room {
-    /// The rooms of all folds, fold by fold.
+    /// Returns the rooms of all folds, fold by fold.
     pub(super) fn all(task: &Task<'_>) -> Result<Vec<Self>> {
-        let root = task.data.layout().root().display();
         if task.data.taxonomy().is_none() {
-            let message = format!("{root}: {} needs labels, and the data set has none", task.protocol);
-            return Err(Error::Input(message));
+            return Err(task.unlabelled());
         }
         let mut rooms = Vec::new();
         for (fold, areas) in task.folds.iter().enumerate() {
@@ -30,36 +29,37 @@ impl Room {
             }
         }
         if rooms.is_empty() {
-            return Err(Error::Input(format!("{root}: no annotated room in the areas that are tested")));
+            return Err(task.no_rooms());
         }
         Ok(rooms)
     }
 
-    /// `Area_5/office_1`.
+    /// Returns its name with its area, such as `Area_5/office_1`.
     pub(super) fn name(&self) -> String {
         format!("Area_{}/{}", self.tree.area, self.tree.name)
     }
 
     /// Counts its points.
-    pub(super) fn points(&self, task: &Task<'_>) -> Result<Points> {
+    pub(super) fn points(&self, task: &Task<'_>) -> s3d_dataset::Result<Points> {
         let count = |instance| task.data.point_count(instance, task.ctx);
         let instances = self
             .tree
             .instances
             .iter()
             .map(|instance| Ok(TrueInstance { class: instance.class.index(), points: count(instance)? }));
-        Ok(Points(instances.collect::<Result<_>>()?))
+        Ok(Points(instances.collect::<s3d_dataset::Result<_>>()?))
     }
 }
 
 impl Points {
-    /// How many there are.
+    /// Returns the number of points.
     pub(super) fn count(&self) -> u64 {
         self.0.iter().map(|instance| instance.points).sum()
     }
 
-    /// The instances, if predictions may be for so many points: all of the room; or all, with the only point
-    /// of an instance twice, as the profile for Pointcept has it. `None` for another number.
+    /// Returns the instances of predictions with this number of rows. It must be the number of points of the
+    /// room, or this number with the only point of an instance counted twice, like in the profile for
+    /// Pointcept. `None` for another number.
     pub(super) fn of_rows(&self, rows: u64) -> Option<Vec<TrueInstance>> {
         if rows == self.count() {
             return Some(self.0.clone());
@@ -73,7 +73,7 @@ impl Points {
     }
 }
 
-/// What predictions of a room should look like.
+/// Describes the predictions that a room should have.
 pub(super) fn rows_expected(room: &Room, points: &Points) -> String {
     format!(
         "{} has {} points, in the order of `s3d profile`: predictions are for all of them (those on voxels \
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_only_point_of_an_instance_may_stand_twice() {
+    fn the_only_point_of_an_instance_may_count_twice() {
         let of = |points: &[u64]| points.iter().map(|&points| TrueInstance { class: 2, points }).collect();
         let points = Points(of(&[5, 1, 0, 1]));
         assert_eq!(points.of_rows(7), Some(of(&[5, 1, 0, 1])));

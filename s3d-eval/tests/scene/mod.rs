@@ -14,8 +14,9 @@ static OUT: LazyLock<PathBuf> = LazyLock::new(|| {
         let scan = ScanOptions { points_per_m2: 60.0, area, seed: area.into(), ..ScanOptions::default() };
         let to = folder.join(format!("scan {area}"));
         let scene = building.write_scan(&to, &scan, || true).unwrap();
-        // Scan locations of two areas have different names.
-        let (path, digit) = (to.join("cameras.csv"), area.to_string());
+        // The scan locations of the two areas need different names.
+        let path = to.join("cameras.csv");
+        let digit = area.to_string();
         let rows = fs::read_to_string(&path).unwrap();
         let renamed = |row: &str| digit.clone() + &row[1..];
         fs::write(&path, rows.lines().map(renamed).collect::<Vec<_>>().join("\n")).unwrap();

@@ -1,13 +1,15 @@
 //! `s3d detect`: the paper's baseline detector, trained, run, and measured.
 
 use crate::args::Threads;
-use crate::commands::{on_threads, print};
-use crate::failure::Outcome;
+use crate::commands::print;
+use crate::commands::scores::on_threads_or;
+use crate::failure::{Failure, Outcome};
 use crate::values::parsed;
 use clap::{Args, Subcommand, value_parser};
-use s3d_dataset::{Context, DataSet, NewFile, Result};
+use s3d_dataset::{Context, DataSet, NewFile};
 use s3d_detect::{
-    Model, ParsedArea, Space, SpaceSource, TrainOptions, cross_validate, detect_area, read_areas, table,
+    Error, Model, ParsedArea, Result, Space, SpaceSource, TrainOptions, cross_validate, detect_area,
+    read_areas, table,
 };
 use std::path::{Path, PathBuf};
 
@@ -27,16 +29,16 @@ enum Command {
     Table(TableArgs),
 }
 
-/// What is learnt from.
+/// What to learn from.
 #[derive(Clone, Debug, Args)]
 struct Learning {
-    /// Everything random comes from it.
+    /// The source of everything random.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// What is searched: spaces that are found in the points, or the annotated rooms.
+    /// The spaces to search: spaces that are found in the points, or the annotated rooms.
     #[arg(long, default_value_t, value_parser = parsed::<SpaceSource>, value_name = "parsed|rooms")]
     spaces: SpaceSource,
-    /// Learn from so many spaces at most, drawn at random: time and memory follow.
+    /// Learn from at most N spaces, drawn at random. Time and memory grow with N.
     #[arg(long, value_name = "N", default_value_t = 100,
         value_parser = value_parser!(u32).range(1..=100_000))]
     most_spaces: u32,
@@ -97,7 +99,7 @@ struct TableArgs {
     dataset: PathBuf,
     #[command(flatten)]
     learning: Learning,
-    /// Do it for so many seeds, from --seed on, and tell how far they spread.
+    /// Repeat it for N seeds, from --seed on, and add the spread between them.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Print JSON.
@@ -123,19 +125,19 @@ fn read(dataset: &Path, areas: &[u32], spaces: SpaceSource, context: &Context) -
 
 fn train(args: TrainArgs) -> Outcome<()> {
     let TrainArgs { dataset, output, areas, learning, overwrite, threads } = args;
-    on_threads(threads, |context| {
+    on_threads_or(threads, failure, |context| {
         let file = NewFile::begin(context, &output, overwrite)?;
         let options = learning.options();
         let areas = read(&dataset, &areas, options.spaces, context)?;
         let spaces: Vec<&Space> = areas.iter().flat_map(|a| &a.spaces).collect();
         Model::train(&spaces, &options, context)?.save(file.path())?;
-        file.finish()
+        Ok(file.finish()?)
     })
 }
 
 fn find(args: RunArgs) -> Outcome<()> {
     let RunArgs { dataset, model, output, areas, overwrite, threads } = args;
-    on_threads(threads, |context| {
+    on_threads_or(threads, failure, |context| {
         let file = NewFile::begin(context, &output, overwrite)?;
         let model = Model::load(&model)?;
         let mut found = Vec::new();
@@ -143,12 +145,12 @@ fn find(args: RunArgs) -> Outcome<()> {
             found.extend(detect_area(&model, &area, context)?);
         }
         s3d_io::fs::write_json(file.path(), &found)?;
-        file.finish()
+        Ok(file.finish()?)
     })
 }
 
 fn print_table(args: &TableArgs) -> Outcome<()> {
-    let tables = on_threads(args.threads, |context| {
+    let tables = on_threads_or(args.threads, failure, |context| {
         let options = args.learning.options();
         let areas = read(&args.dataset, &[], options.spaces, context)?;
         let of_seed = |seed| cross_validate(&areas, &TrainOptions { seed, ..options.clone() }, context);
@@ -161,4 +163,12 @@ fn print_table(args: &TableArgs) -> Outcome<()> {
     } else {
         table::markdown(&tables)
     })
+}
+
+/// Says an error of the detector in the words of the command line.
+fn failure(error: Error) -> Failure {
+    match error {
+        Error::Dataset(error) => error.into(),
+        error => Failure::Input(error.to_string()),
+    }
 }

@@ -2,17 +2,17 @@
 
 use crate::answer::JsonArgs;
 use crate::args::Threads;
-use crate::commands::on_threads;
-use crate::failure::Outcome;
+use crate::commands::scores::on_threads_or;
+use crate::failure::{Failure, Outcome};
 use crate::values::parsed;
 use clap::{Args, ValueEnum, value_parser};
 use s3d_dataset::ClassList;
-use s3d_eval::{EvalOptions, Folds, ImageKind, Protocol};
+use s3d_eval::{Error, EvalOptions, Folds, ImageKind, Protocol};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct EvalArgs {
-    /// By which definition (docs/evaluation.md).
+    /// The definition of the scores (docs/evaluation.md).
     #[arg(value_parser = parsed::<Protocol>,
         value_name = "det|sem3d|inst-ap|inst-cov|sem-pano|depth|normal|panoptic")]
     pub(crate) protocol: Protocol,
@@ -22,34 +22,33 @@ pub(crate) struct EvalArgs {
     /// The predictions: a folder, or a file.
     #[arg(long, value_name = "DIR")]
     pub(crate) pred: PathBuf,
-    /// A variant of the protocol, by the name of whoever counts so [default: the first that
-    /// docs/evaluation.md names]
+    /// A variant of the protocol, named after the script that it follows [default: the first in
+    /// docs/evaluation.md]
     #[arg(long, value_name = "NAME")]
     pub(crate) variant: Option<String>,
-    /// Which areas are tested, and which of them together: all of them, each by itself (six-fold), or the
-    /// paper's three folds.
+    /// The areas to test together: all of them, each by itself (six-fold), or the paper's three folds.
     #[arg(long, value_enum, default_value_t, value_name = "all|each|paper", hide_possible_values = true)]
     pub(crate) folds: FoldsArg,
-    /// Test these areas only, together: 5 for what most results on S3DIS are of.
+    /// Test only these areas, together. Most results on S3DIS are of area 5.
     #[arg(long, value_name = "N,…", value_delimiter = ',', conflicts_with = "folds")]
     pub(crate) areas: Vec<u32>,
     /// det: the classes to detect [default: the paper's 12]
     #[arg(long, value_name = "CLASS,…", value_delimiter = ',')]
     pub(crate) classes: Vec<String>,
-    /// panoptic: classes of which all of an image is one segment, or none [default: those that the taxonomy
-    /// calls stuff: ceiling,floor,wall]
+    /// panoptic: the stuff classes, of which each image has one segment, or none [default: the stuff of the
+    /// taxonomy: ceiling,floor,wall]
     #[arg(long, value_name = "CLASS,…|none", value_parser = parsed::<ClassList>)]
     pub(crate) stuff: Option<ClassList>,
-    /// depth: scale predictions to the median of the truth first, image by image.
+    /// depth: scale each predicted image to the median of its truth first.
     #[arg(long)]
     pub(crate) median_scale: bool,
-    /// normal: which images are tested [default: those that the predictions are named after]
+    /// normal: the kind of images to test [default: the kind that the predictions are named after]
     #[arg(long, value_parser = parsed::<ImageKind>, value_name = "views|panoramas")]
     pub(crate) images: Option<ImageKind>,
-    /// Tell 95 % intervals of the scores, by drawing rooms (images, where there are no rooms) N times.
+    /// Add 95 % intervals of the scores: draw rooms (or images, where there are no rooms) N times.
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(10..=100_000))]
     pub(crate) bootstrap: Option<u32>,
-    /// Everything random comes from it.
+    /// The source of everything random.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
     #[command(flatten)]
@@ -82,11 +81,22 @@ pub(crate) fn run(args: EvalArgs) -> Outcome<()> {
     options.median_scale = args.median_scale;
     options.classes = (!args.classes.is_empty()).then_some(args.classes);
     options.stuff = args.stuff;
-    let evaluation = on_threads(args.threads, |context| {
+
+    let evaluation = on_threads_or(args.threads, failure, |context| {
         json.check_free()?;
         let evaluation = s3d_eval::evaluate(args.protocol, &args.truth, &args.pred, &options, context)?;
         json.write(&evaluation, context)?;
         Ok(evaluation)
     })?;
     json.print(&evaluation, || evaluation.to_markdown())
+}
+
+/// Says an error of the evaluation in the words of the command line.
+fn failure(error: Error) -> Failure {
+    match error {
+        Error::Dataset(error) => error.into(),
+        Error::Classes { option, fault } => Failure::Usage(format!("--{option}: {fault}")),
+        error if error.is_usage() => Failure::Usage(error.to_string()),
+        error => Failure::Input(error.to_string()),
+    }
 }

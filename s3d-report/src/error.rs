@@ -1,0 +1,40 @@
+//! Why a report was not made.
+
+use crate::write::{MESH_FACES, PANO_WIDTHS, ReportOptions, THUMB_WIDTHS};
+use std::path::PathBuf;
+use thiserror::Error as ThisError;
+
+/// The result of the calls of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why a report was not made. Nothing that was there before is lost.
+#[derive(Debug, ThisError)]
+#[non_exhaustive]
+pub enum Error {
+    /// A number of the options is out of range.
+    #[error(
+        "panoramas of {} and views of {} pixels across, meshes of {} faces: {} to {}, {} to {}, and {} to {} are \
+         possible",
+        .0.pano_width, .0.thumbs, .0.mesh_faces, PANO_WIDTHS.start(), PANO_WIDTHS.end(), THUMB_WIDTHS.start(),
+        THUMB_WIDTHS.end(), MESH_FACES.start(), MESH_FACES.end()
+    )]
+    OutOfRange(ReportOptions),
+    /// There is a file in the place of the report that is no report.
+    #[error("{} is there already, and was not written by s3d report: choose another name", .0.display())]
+    Occupied(PathBuf),
+    /// The report is too large for a single file.
+    #[error(
+        "one file of more than {} MB would open slowly or not at all: make a folder, or smaller images",
+        .0 / 1_000_000
+    )]
+    TooLarge(u64),
+    /// A file is wrong or missing, the disk refuses, the place is in use, or the call was cancelled.
+    #[error(transparent)]
+    Dataset(#[from] s3d_dataset::Error),
+}
+
+impl From<s3d_io::Error> for Error {
+    fn from(error: s3d_io::Error) -> Self {
+        Self::Dataset(error.into())
+    }
+}
