@@ -42,6 +42,9 @@ pub use options::{EvalOptions, ImageKind};
 pub use protocol::{Protocol, UnknownProtocol};
 pub use s3d_dataset::{Context, Error, Result};
 
+#[doc = include_str!("../docs/evaluation.md")]
+pub mod protocols {}
+
 /// The README's example, compiled and run.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -37,6 +37,9 @@ pub use faults::Fault;
 pub use s3d_dataset::{Context, Error, Result};
 pub use write::{Report, ReportOptions, report, report_against};
 
+#[doc = include_str!("../docs/report.md")]
+pub mod files {}
+
 /// The README's example, compiled and run.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
