@@ -59,6 +59,9 @@ pub use options::{EvalOptions, ImageKind, UnknownImageKind};
 pub use protocol::{Protocol, UnknownProtocol};
 pub use s3d_dataset::Context;
 
+#[doc = include_str!("../docs/evaluation.md")]
+pub mod protocols {}
+
 /// The example of the README, compiled.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -101,6 +101,9 @@ pub mod scene;
 pub use error::{Error, Place, Result};
 pub use guarded::panic_is_caught;
 
+#[doc = include_str!("../docs/formats.md")]
+pub mod formats {}
+
 /// The README's example is compiled and run with the tests.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

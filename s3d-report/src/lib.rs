@@ -41,6 +41,9 @@ pub use faults::Fault;
 pub use s3d_dataset::Context;
 pub use write::{Report, ReportOptions, report, report_against};
 
+#[doc = include_str!("../docs/report.md")]
+pub mod files {}
+
 /// The example of the README, compiled.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

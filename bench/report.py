@@ -1,6 +1,6 @@
 """What a report costs beside the export of the same data set.
 
-    python3 report.py S3D… [--scene SCENE.toml] [--rounds N] [--threads N] [--scratch DIR]
+    python3 bench/report.py S3D… [--scene SCENE.toml] [--rounds N] [--threads N] [--scratch DIR]
 
 Each binary exports the scene, or the built-in one at full size, and makes the report of it, in turns. Printed are medians
 of seconds, of processor seconds (user and system), and the median of the rounds' ratios report / export of both.

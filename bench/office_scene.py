@@ -1,6 +1,6 @@
 """Makes a scan that `s3d export` reads of the synthetic office of the peers.
 
-    python3 office_scene.py OFFICE [OUT]
+    python3 bench/office_scene.py OFFICE [OUT]
 
 OFFICE is the folder that gen_scene.py wrote (scene.obj with texture.png, scene.bin, scene.uv.bin, scene.json). Writes
 scene.toml, cameras.csv and the S3DIS tree Area_1 into OUT (OFFICE if not given): each object of scene.json is an

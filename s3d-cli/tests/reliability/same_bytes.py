@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Do two states of the project make the same bytes?
 
-    python3 same_bytes.py OLD_S3D NEW_S3D [--scene SCENE.toml]… [--threads N]
-    python3 same_bytes.py OUT_A OUT_B
+    python3 s3d-cli/tests/reliability/same_bytes.py OLD_S3D NEW_S3D [--scene SCENE.toml]… [--threads N]
+    python3 s3d-cli/tests/reliability/same_bytes.py OUT_A OUT_B
 
 The first form runs both binaries: the demo, and each scene at full size, into a temporary folder. The second compares two
 data sets that are there. Files are compared byte for byte, but for the version of s3d: in manifest.json it is left out, and

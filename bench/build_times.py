@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How long the crates take to build from nothing, each alone: the processor time of all that it depends on.
 
-    python3 docs/performance/build_times.py [TREE]
+    python3 bench/build_times.py [TREE]
 
 TREE is a checkout of this repository. Its release build is made once, in an empty folder, with this program as
 RUSTC_WRAPPER: it notes the processor time of each call of the compiler. The time of a crate is the sum over the packages

@@ -1,7 +1,7 @@
 """One scan location, everything rendered and written: Open3D + numpy + OpenCV + OpenEXR against `s3d export`.
 
     cargo build --release -p s3d-cli
-    python3 location_peers.py SCENE.toml… [--rounds N] [--scratch DIR]
+    python3 bench/location_peers.py SCENE.toml… [--rounds N] [--scratch DIR]
 
 Needs Linux, numpy, open3d, opencv-python-headless and OpenEXR. Each scene's first location is exported alone.
 
@@ -29,7 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
-S3D = Path(__file__).resolve().parent.parent.parent / "target" / "release" / "s3d"
+S3D = Path(__file__).resolve().parent.parent / "target" / "release" / "s3d"
 PEER_VIEWS = 5
 
 

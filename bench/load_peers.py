@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How long does a textured OBJ of 300,000 faces take to load, here and with Open3D and trimesh?
 
-    python3 docs/performance/load_peers.py FOLDER [--faces 300000] [--runs 3]
+    python3 bench/load_peers.py FOLDER [--faces 300000] [--runs 3]
 
 Makes the mesh in FOLDER if it is not there yet (fixed seed: 12 materials, their textures JPEG and PNG from 1024² to
 4096²), builds `s3d-io`'s example `load_mesh`, and times every reader in a process of its own, with one thread and with
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[1]
 SIDES = [4096, 4096, 2048, 2048, 2048, 2048, 1024, 1024, 1024, 1024, 1024, 1024]
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Nearest faces and coloured points a second and core, here and with Open3D, trimesh and numpy.
 
-    python3 docs/performance/near_sample_peers.py MESH.obj|scan_like:300000 [--up y|z] [--points 1000000] [--runs 3]
+    python3 bench/near_sample_peers.py MESH.obj|scan_like:300000 [--up y|z] [--points 1000000] [--runs 3]
 
 Builds and runs s3d-io's example `near_and_sample`, which writes the mesh, its points — 5 mm off the surface, either side
 — and its answers to a temporary folder; then times the others on exactly these, each in a process of its own. A figure is
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[1]
 # trimesh takes seconds for what others do at once.
 SLOW_SHARE = 10
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Exports of the built-in scene with random options, each checked.
 
-    python3 soak.py S3D [--runs N] [--seed SEED] [--check CHECKER [--python PYTHON]]
+    python3 s3d-cli/tests/reliability/soak.py S3D [--runs N] [--seed SEED] [--check CHECKER [--python PYTHON]]
 
 Each run draws options from SEED and its number, exports with 1 and with 2 threads, holds the two against each other byte
 for byte, and verifies one. CHECKER is a program of your own that takes the folder of a data set, and exits with 0 if it

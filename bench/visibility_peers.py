@@ -1,7 +1,7 @@
 """The visibility pass against Embree: speed and exactness, on three scenes, in one run.
 
     cargo build --release -p s3d-render --example visibility
-    python3 visibility_peers.py OFFICE/scene.obj COPYROOM/rgb.obj [--rounds N] [--scratch DIR] [--only SCENE] [--isa ISA --visibility PROGRAM]
+    python3 bench/visibility_peers.py OFFICE/scene.obj COPYROOM/rgb.obj [--rounds N] [--scratch DIR] [--only SCENE] [--isa ISA --visibility PROGRAM]
 
 Needs Linux, g++, Embree 3 (Debian: libembree-dev) and numpy. OFFICE is a folder written by gen_scene.py of the peers
 (Z up), COPYROOM the scan of the copy room (Y up); the third scene is generated. The dumps take 0.8 GB a scene.
@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-VISIBILITY = HERE.parent.parent / "target" / "release" / "examples" / "visibility"
+VISIBILITY = HERE.parent / "target" / "release" / "examples" / "visibility"
 NO_FACE = -1
 
 

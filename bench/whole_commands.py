@@ -1,6 +1,6 @@
 """Whole commands of two states of the project against each other.
 
-    python3 whole_commands.py OLD_S3D NEW_S3D SCENE.toml… [--rounds N] [--scratch DIR]
+    python3 bench/whole_commands.py OLD_S3D NEW_S3D SCENE.toml… [--rounds N] [--scratch DIR]
 
 Both binaries take turns on each scene, with one thread. Printed are medians of user seconds, and the median of the
 ratios new / old of the rounds. `reading` samples a single point of the exported mesh. What begins with `=` is the

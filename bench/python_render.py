@@ -1,6 +1,6 @@
 """Views in Python: `s3d_py.Scene.render` and Open3D's `RaycastingScene`, in turns, in one process.
 
-    python3 python_render.py OFFICE/scene.obj --up z --at X,Y,Z [--rounds N] [--size PX]
+    python3 bench/python_render.py OFFICE/scene.obj --up z --at X,Y,Z [--rounds N] [--size PX]
 
 Needs s3d_py of a release build, and open3d for the second half. Twelve views of a place, each of SIZE² pixels and 75°; seconds are
 processor time of the process, so that other work on the machine disturbs little. Open3D gets its rays ready-made, on one thread,

@@ -1,7 +1,7 @@
 //! Does a library of wide registers do for the kernel of the visibility pass what s3d-render's own do?
 //!
 //! ```text
-//! cargo run --release --manifest-path docs/performance/simd_library/Cargo.toml
+//! cargo run --release --manifest-path bench/simd_library/Cargo.toml
 //! ```
 //!
 //! The kernel (`s3d-render/src/raster/chunk.rs`, as it is there) draws 4,000 chunks of 16 columns and 4 to 16

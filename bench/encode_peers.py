@@ -3,7 +3,7 @@
 Usage:
     python3 -m venv venv && venv/bin/pip install numpy pillow opencv-python-headless OpenEXR
     s3d export scene.toml -o dataset --compression balanced
-    venv/bin/python encode_peers.py dataset [--views 8] [--area 1]
+    venv/bin/python bench/encode_peers.py dataset [--views 8] [--area 1]
 
 The images of some views, spread evenly over all, are decoded and encoded again: PNG by OpenCV at levels 1 and 6, and by
 Pillow at levels 6 and 9 (both are libpng with its own choice of filters); OpenEXR by OpenEXR, ZIP, half floats. Printed is for each

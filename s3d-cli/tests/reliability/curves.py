@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """How time and memory of `s3d export` grow with a scan: makes scans of growing size with the example `large_scene`,
-exports each, and writes `large.csv` and `large.svg` beside itself.
+exports each, and writes `large.csv` beside itself and the picture docs/reliability/large.svg.
 
     cargo build --release -p s3d-cli -p s3d-synth --bin s3d --example large_scene
-    docs/reliability/curves.py --work /somewhere/with/25/GB [--only points,tree,faces,materials,locations,labels] [--most N]
+    s3d-cli/tests/reliability/curves.py --work /somewhere/with/25/GB [--only points,tree,faces,materials,locations,labels] [--most N]
 
 Measured are the process's wall clock, its user and system time and its peak memory (getrusage of the child), beside the
 times of the stages that it logs. Images are few and small, so that what grows is what is measured. `--most` leaves out
@@ -21,7 +21,7 @@ import sys
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
+ROOT = HERE.parents[2]
 FEW_IMAGES = ["--views", "1", "--size", "64", "--modalities", "pose", "--points-per-m2", "10"]
 
 # Name: what grows, its sizes, the other arguments of the scene, those of the export.
@@ -167,7 +167,7 @@ def main():
                     writer = csv.DictWriter(f, COLUMNS, lineterminator="\n")
                     writer.writeheader()
                     writer.writerows(rows)
-    draw(rows, HERE / "large.svg")
+    draw(rows, ROOT / "docs/reliability/large.svg")
     print(table_of(rows))
 
 

@@ -2,7 +2,7 @@
 
     cargo build --release -p s3d-render --example view_images
     cp target/release/examples/view_images NAME          (once for each state)
-    python3 states.py NAME… [--scenes scan-like,copyroom,office] [--rounds N]
+    python3 bench/states.py NAME… [--scenes scan-like,copyroom,office] [--rounds N]
 
 The programs live side by side and take turns of nine views, about a sixth of a second: what disturbs the machine disturbs
 all of them alike. Printed are milliseconds a view, each the mean over views of the least, of the lowest fifth's border and

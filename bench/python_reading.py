@@ -1,6 +1,6 @@
 """Views in Python: all modalities of a view read by `s3d_py.View.load` and by the data set's own utils.py, in turns, in one process.
 
-    python3 python_reading.py DATASET [--views N] [--rounds N]
+    python3 bench/python_reading.py DATASET [--views N] [--rounds N]
 
 Needs s3d_py of a release build, Pillow and OpenEXR. Both read colours, distances, normals, labels, instances' colours and world
 coordinates of the same views from the page cache. Seconds are processor time of the process, all threads together, and those of the

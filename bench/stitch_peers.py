@@ -2,7 +2,7 @@
 
     cargo build --release -p s3d-cli
     python3 -m venv venv && venv/bin/pip install numpy opencv-python-headless
-    venv/bin/python stitch_peers.py [--s3d S3D] [--rounds N] [--scratch DIR] [--whole] [--pictures]
+    venv/bin/python bench/stitch_peers.py [--s3d S3D] [--rounds N] [--scratch DIR] [--whole] [--pictures]
 
 Needs Linux. The scene is the built-in one (`s3d demo`) with one location. Its captures are made by `s3d render`:
 1280 x 1024 pixels, three rings of six, 0.85 radians up, level and down, each 4 cm ahead of the centre, bent by
@@ -38,7 +38,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-S3D = Path(__file__).resolve().parent.parent.parent / "target" / "release" / "s3d"
+S3D = Path(__file__).resolve().parent.parent / "target" / "release" / "s3d"
 UUID = "00000000000000000000000000000001"
 LOCATION = np.array([16.9, 8.35, 1.52])
 WIDTH, HEIGHT, FOCAL, CENTER = 1280, 1024, 1075.7, (636.9, 515.0)
