@@ -15,9 +15,10 @@ use crate::shade::filter::{Footprints, MipLevels};
 use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
 use crate::simd::{Kernel, Simd, dispatch};
-use glam::DVec3;
+use glam::{DMat3, DVec2, DVec3};
 use s3d_geom::{Camera, Raster, Rays};
 use s3d_simd::level;
+use std::f64::consts::{PI, TAU};
 
 /// The colour of a pixel that sees the mesh where no picture shows it.
 #[derive(Clone, Copy, Debug)]
@@ -164,69 +165,71 @@ fn narrow(v: DVec3) -> [f32; 3] {
 impl CubeRays {
     fn new(cube: &CubeMap, camera: &Camera) -> Self {
         let turn = cube.frame_from_world();
-        let w = camera.width;
-        let h = camera.height;
-
-        let spread = |values: &dyn Fn(u32) -> DVec3| -> [Vec<f32>; 3] {
-            let all: Vec<[f32; 3]> = (0..w).map(|i| narrow(values(i))).collect();
-            std::array::from_fn(|k| {
-                // The last column is repeated beyond the end, so that the padding has a direction, too.
-                let last = all.last().map_or(0.0, |c| c[k]);
-                all.iter()
-                    .map(|c| c[k])
-                    .chain(std::iter::repeat_n(last, 2 * LANES))
-                    .collect()
-            })
-        };
-
+        let size = [camera.width, camera.height];
         match camera.rays() {
             Rays::Perspective { x_step, y_step, origin } => {
-                let x = turn * x_step;
-                let y = turn * y_step;
-                let o = turn * origin;
-                let row = |j: u32| RowFactors {
-                    scale: 1.0,
-                    add: narrow(o + y * (f64::from(j) + 0.5)),
-                    slope_scale: 0.0,
-                    slope_add: narrow(y),
-                };
-                Self {
-                    columns: spread(&|i| x * (f64::from(i) + 0.5)),
-                    is_panorama: false,
-                    slopes: spread(&|_| x),
-                    rows: (0..h).map(row).collect(),
-                }
+                Self::of_view(size, turn * x_step, turn * y_step, turn * origin)
             }
-            Rays::Equirectangular { columns, rows } => {
-                use std::f64::consts::{PI, TAU};
-                let up = turn * DVec3::Z;
-                let right = TAU / f64::from(w);
-                let down = PI / f64::from(h);
-
-                let row = |j: u32| {
-                    let r = rows[j as usize];
-                    // Longitude grows to the right and azimuth to the left; latitude falls.
-                    RowFactors {
-                        scale: r.x as f32,
-                        add: narrow(up * r.y),
-                        slope_scale: (r.y * down) as f32,
-                        slope_add: narrow(up * (-r.x * down)),
-                    }
-                };
-                let column = |i: u32| turn * columns[i as usize].extend(0.0);
-                let slope = |i: u32| {
-                    let c = columns[i as usize];
-                    turn * DVec3::new(c.y, -c.x, 0.0) * right
-                };
-                Self {
-                    columns: spread(&column),
-                    is_panorama: true,
-                    slopes: spread(&slope),
-                    rows: (0..h).map(row).collect(),
-                }
-            }
+            Rays::Equirectangular { columns, rows } => Self::of_panorama(size, turn, &columns, &rows),
         }
     }
+
+    /// Returns the directions of a perspective view, from the steps and the origin in the cube's frame.
+    fn of_view([width, height]: [u32; 2], x_step: DVec3, y_step: DVec3, origin: DVec3) -> Self {
+        let row = |j: u32| RowFactors {
+            scale: 1.0,
+            add: narrow(origin + y_step * (f64::from(j) + 0.5)),
+            slope_scale: 0.0,
+            slope_add: narrow(y_step),
+        };
+        Self {
+            columns: by_axis(width, |i| x_step * (f64::from(i) + 0.5)),
+            slopes: by_axis(width, |_| x_step),
+            rows: (0..height).map(row).collect(),
+            is_panorama: false,
+        }
+    }
+
+    /// Returns the directions of a panorama, from the unit vectors of its columns and rows in the world.
+    fn of_panorama([width, height]: [u32; 2], turn: DMat3, columns: &[DVec2], rows: &[DVec2]) -> Self {
+        let up = turn * DVec3::Z;
+        let right = TAU / f64::from(width);
+        let down = PI / f64::from(height);
+
+        // Longitude grows to the right and azimuth to the left; latitude falls.
+        let row = |j: u32| {
+            let r = rows[j as usize];
+            RowFactors {
+                scale: r.x as f32,
+                add: narrow(up * r.y),
+                slope_scale: (r.y * down) as f32,
+                slope_add: narrow(up * (-r.x * down)),
+            }
+        };
+        let slope = |i: u32| {
+            let c = columns[i as usize];
+            turn * DVec3::new(c.y, -c.x, 0.0) * right
+        };
+        Self {
+            columns: by_axis(width, |i| turn * columns[i as usize].extend(0.0)),
+            slopes: by_axis(width, slope),
+            rows: (0..height).map(row).collect(),
+            is_panorama: true,
+        }
+    }
+}
+
+/// Returns the vectors of some columns by axis. The last column is repeated beyond the end, so that the
+/// padding has a direction, too.
+fn by_axis(columns: u32, vector: impl Fn(u32) -> DVec3) -> [Vec<f32>; 3] {
+    let all: Vec<[f32; 3]> = (0..columns).map(|i| narrow(vector(i))).collect();
+    std::array::from_fn(|k| {
+        let last = all.last().map_or(0.0, |c| c[k]);
+        all.iter()
+            .map(|c| c[k])
+            .chain(std::iter::repeat_n(last, 2 * LANES))
+            .collect()
+    })
 }
 
 impl PictureKernel<'_> {

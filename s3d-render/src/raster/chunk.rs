@@ -24,7 +24,7 @@ pub(crate) const CLOSE_ULPS: i32 = 424;
 /// A linear function of the pixel in a chunk.
 ///
 /// Its value in column i and row j from the anchor is at + across·u(i) + bend·v(i) + down·r(j): see
-/// [`Chunk`].
+/// [`ChunkGrid`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Linear {
     pub(crate) at: f32,
@@ -116,7 +116,7 @@ pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
 
     let mut any = 0;
     for k in 0..rows {
-        // `k` is below `rows`, and both slices were asserted to hold that many rows.
+        // SAFETY: `k` is below `rows`, and both slices were asserted to hold that many rows.
         let (best, slots) = unsafe {
             let (best, slots) = (best.as_mut_ptr().add(k * pitch), slots.as_mut_ptr().add(k * pitch));
             (from_raw_parts_mut(best, L::N), from_raw_parts_mut(slots, L::N))

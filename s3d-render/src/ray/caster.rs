@@ -112,7 +112,7 @@ impl Nearest {
 /// let mut sight = Sight::from(&scene, DVec3::Z);
 /// assert!(!sight.is_free(DVec3::new(0.0, 4.0, 1.0), 0.0));
 /// assert!(sight.is_free(DVec3::new(0.0, 1.9, 1.0), 0.0));
-/// A point on the wall is free if faces within 1 cm in front of it do not count.
+/// // A point on the wall is free if faces within 1 cm in front of it do not count.
 /// assert!(sight.is_free(DVec3::new(0.0, 2.0, 1.0), 0.01));
 /// # Ok::<(), s3d_geom::MeshError>(())
 /// ```

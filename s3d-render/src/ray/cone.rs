@@ -136,7 +136,7 @@ mod tests {
         ) {
             let a = DVec3::from(a);
             let b = DVec3::from(b);
-            let d = a * s + b * t; // In the plane of a and b, but for rounding.
+            let d = a * s + b * t; // In the plane of a and b, up to rounding.
             let one = side(d, a, b);
             let other = side(d, b, a);
             prop_assert!((one > 0.0) == (other < 0.0) && (one < 0.0) == (other > 0.0), "{one} {other}");

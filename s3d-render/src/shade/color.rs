@@ -1,4 +1,4 @@
-//! The RGB image.
+//! Makes the RGB image.
 //!
 //! Faces that first appear in a band of rows are prepared eight at a time. Each row is then coloured in two
 //! passes. The first pass walks the spans of equal faces: [`crate::shade::anchor`] gives the texture

@@ -43,7 +43,7 @@ impl Default for TextureFilter {
 /// let mip_maps = MipMaps::new(&mesh);
 /// assert_eq!(mip_maps.bytes(), 3 * (4 * 4 + 2 * 2 + 1));
 ///
-/// In a few pixels, the chequers are seen as their mean.
+/// // In a few pixels, the chequers are seen as their mean.
 /// let (scene, camera) = (Scene::new(&mesh), Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 1.2, 5, 5));
 /// let rgb = rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
 /// assert_eq!(rgb.at(2, 2), [100; 3]);

@@ -206,7 +206,7 @@ fn resolve_by_fours<const PANORAMA: bool>(
 #[derive(Clone, Copy)]
 pub(crate) struct Wide256(pub(crate) Avx2);
 
-/// Values in a register of 256 bits.
+/// The number of values in a register of 256 bits.
 const WIDTH: usize = 8;
 
 /// Returns the same register, but hides its origin from the compiler.

@@ -176,7 +176,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]) {
-        // SAFETY: `self` holds the proof of AVX2; 32 bytes are loaded of 32, and 16 + 8 stored of 24.
+        // SAFETY: `self` holds the proof of AVX2; all 32 bytes are loaded, and all 24 are stored, as 16 + 8.
         unsafe {
             let packed = _mm256_loadu_si256(packed.as_ptr().cast());
             let three = _mm_setr_epi8(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1);
@@ -188,7 +188,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn store_repeated(self, packed: u32, to: &mut [u8; COLOR_BLOCK]) {
-        // SAFETY: `self` holds the proof of AVX2; 32 bytes are stored of 32.
+        // SAFETY: `self` holds the proof of AVX2; all 32 bytes are stored.
         unsafe {
             let three = _mm256_setr_epi8(
                 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, //
@@ -230,7 +230,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
-        // SAFETY: `self` holds the proof of AVX2; three times eight numbers are stored of 24.
+        // SAFETY: `self` holds the proof of AVX2; all 24 numbers are stored, as three times eight.
         unsafe {
             let points = self.0.points::<PANORAMA>(rays);
             for (k, eight) in points.iter().enumerate() {
@@ -240,7 +240,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn half_points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
-        // SAFETY: `self` holds the proof of F16C; three times eight numbers are stored of 24.
+        // SAFETY: `self` holds the proof of F16C; all 24 numbers are stored, as three times eight.
         unsafe {
             let points = self.0.points::<PANORAMA>(rays);
             for (k, eight) in points.iter().enumerate() {

@@ -119,7 +119,7 @@ impl Width for Avx2 {
     }
     #[inline(always)]
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
-        // SAFETY: `self` is the proof of AVX2. Sixteen bytes are loaded of sixteen.
+        // SAFETY: `self` is the proof of AVX2. All sixteen bytes are loaded.
         unsafe {
             let mut sum = sum;
             for (neighbors, corners) in NEIGHBORS.iter().zip(corners) {
@@ -231,7 +231,7 @@ impl Width for Avx512 {
     }
     #[inline(always)]
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
-        // SAFETY: `self` is the proof of AVX-512. Sixteen bytes are loaded of sixteen.
+        // SAFETY: `self` is the proof of AVX-512. All sixteen bytes are loaded.
         unsafe {
             let mut sum = sum;
             for k in 0..2 {
