@@ -18,7 +18,7 @@
 //! Ours is what an export calls. For each modality and library the bench prints
 //!
 //! - as small: the fastest way whose files are at most 5 % larger than ours, or else the fastest of those
-//! within 2 % of the smallest;
+//!   within 2 % of the smallest;
 //! - as fast: the smallest way that takes at most 5 % more time than ours, or else the fastest;
 //! - fastest: the fastest way, whatever the size.
 //!

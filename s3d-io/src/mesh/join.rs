@@ -163,7 +163,6 @@ fn joined_column(
 }
 
 /// Puts the file's name in front of its warnings.
-
 fn name_warnings(warnings: &mut [String], path: &Path) {
     let shown = path.display().to_string();
     for warning in warnings {

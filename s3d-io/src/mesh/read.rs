@@ -13,8 +13,10 @@ struct MeshFormat {
     /// The cargo feature that reads it.
     feature: &'static str,
     /// Its reader. `None` if this build is without the feature.
-    read: Option<fn(OpenMesh<'_>, &Path, UpAxis, &MeshOptions) -> Result<MeshFile>>,
+    read: Option<Reader>,
 }
+
+type Reader = fn(OpenMesh<'_>, &Path, UpAxis, &MeshOptions) -> Result<MeshFile>;
 
 /// The formats that are read. The endings in messages, and the feature that a smaller build names, come from
 /// here.

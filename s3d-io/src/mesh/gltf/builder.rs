@@ -53,7 +53,7 @@ struct Shared {
 }
 
 impl<'a> Builder<'a> {
-    // Checks that all instances together are not too large.
+    /// Checks that all instances together are not too large.
     pub(crate) fn new(
         document: &'a GltfDocument,
         looks: &'a GltfLooks,
@@ -336,7 +336,7 @@ impl<'a> Builder<'a> {
         Ok(Some(start))
     }
 
-    // Checks that an accessor has one element for each vertex.
+    /// Checks that an accessor has one element for each vertex.
     fn same_count(&self, accessor: Index<Accessor>, vertices: usize, who: &str, what: &str) -> Result<()> {
         let n = self.document.get(accessor, who, "accessor")?.count.0;
         if n == vertices as u64 {
@@ -347,7 +347,7 @@ impl<'a> Builder<'a> {
             .fail(format!("{who}: {n} elements of {what} for {vertices} vertices")))
     }
 
-    // Returns the index of the next element, if `more` of them fit.
+    /// Returns the index of the next element, if `more` of them fit.
     fn next_start(&self, length: usize, more: usize) -> Result<u32> {
         match u32::try_from(length + more) {
             Ok(end) if end < NO_INDEX => Ok(length as u32),

@@ -192,7 +192,7 @@ impl GltfDocument {
         (name, bytes)
     }
 
-    // Reads all buffers. `blob` is the binary chunk of a `.glb`.
+    /// Reads all buffers. `blob` is the binary chunk of a `.glb`.
     fn load_buffers(&self, mut blob: Option<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
         let mut buffers = Vec::new();
         for (i, json) in self.root().buffers.iter().enumerate() {

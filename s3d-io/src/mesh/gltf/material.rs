@@ -258,7 +258,7 @@ pub(crate) fn srgb_from_linear(light: f32) -> u8 {
     (encoded * 255.0).round() as u8
 }
 
-// Decodes an sRGB byte to light from 0 to 1.
+/// Decodes an sRGB byte to light from 0 to 1.
 fn linear_from_srgb(byte: u8) -> f32 {
     let encoded = f64::from(byte) / 255.0;
     (if encoded <= 0.040_45 {
@@ -298,8 +298,7 @@ mod tests {
         assert_eq!(UvMapping::PLAIN.apply(vec2(0.25, 0.0)), vec2(0.25, 1.0));
         let m = UvMapping { offset: vec2(0.5, 0.25), scale: vec2(2.0, 4.0), ..UvMapping::PLAIN };
         assert_eq!(m.apply(vec2(0.1, 0.1)), vec2(0.7, 1.0 - 0.65));
-        // A quarter turn. The extension's matrix, with v down, takes (1, 0) to (0, −1) and (0, 1) to (1,
-        // 0).
+        // A quarter turn. The matrix of the extension, with v down, takes u to −v and v to u.
         let m = UvMapping { rotation_rad: std::f32::consts::FRAC_PI_2, ..UvMapping::PLAIN };
         assert!(m.apply(vec2(1.0, 0.0)).abs_diff_eq(vec2(0.0, 2.0), 1e-6));
         assert!(m.apply(vec2(0.0, 1.0)).abs_diff_eq(vec2(1.0, 1.0), 1e-6));

@@ -259,7 +259,7 @@ impl Instancing {
         Ok(many)
     }
 
-    // Reads an attribute, or repeats its default.
+    /// Reads an attribute, or repeats its default.
     fn read<const N: usize>(
         &self,
         document: &GltfDocument,

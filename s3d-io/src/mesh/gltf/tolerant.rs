@@ -129,7 +129,7 @@ pub(crate) fn needed(document: Value) -> Value {
 }
 
 impl Keep {
-    // Reduces a value. Returns `None` if nothing is left.
+    /// Reduces a value. Returns `None` if nothing is left.
     fn of(&self, value: Value) -> Option<Value> {
         match (self, value) {
             (_, Value::Null) => None,

@@ -141,7 +141,7 @@ impl<'a> NormalObj<'a> {
         Some(obj)
     }
 
-    // Hands a range of the file to tobj.
+    /// Hands a range of the file to tobj.
     fn keep(&mut self, place: Range<usize>) {
         match self.pieces.last_mut() {
             Some(Piece::File(last)) if last.end == place.start => last.end = place.end,
@@ -149,7 +149,7 @@ impl<'a> NormalObj<'a> {
         }
     }
 
-    // Hands a rewritten line to tobj.
+    /// Hands a rewritten line to tobj.
     fn rewrite(&mut self, line: &[u8]) {
         let start = self.rewritten.len();
         self.rewritten.extend_from_slice(line);

@@ -91,7 +91,7 @@ impl<'r> Source<'r> {
         self.start = self.start.saturating_add(n).min(self.end);
     }
 
-    // Skips the next `n` bytes, in the buffer or not.
+    /// Skips the next `n` bytes, in the buffer or not.
     pub(crate) fn skip(&mut self, mut n: u64) -> Outcome {
         while n > 0 {
             let step = usize::try_from(n).map_or(BUFFER, |n| n.min(BUFFER));
