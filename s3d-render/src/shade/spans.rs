@@ -86,8 +86,7 @@ impl Spans {
         pieces.clear();
 
         for (span, &number) in starts.windows(2).zip(numbers.iter()) {
-            let start = span[0];
-            let end = span[1];
+            let (start, end) = (span[0], span[1]);
             let at = pieces.len();
             pieces.extend([start, start + PIECE].map(|start| Piece { start, number }));
             if end - start > 2 * PIECE {
