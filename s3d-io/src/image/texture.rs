@@ -199,8 +199,8 @@ impl Together {
             return Ok(());
         }
         Err(format!(
-            "is the texture that makes {} of them with {} pixels: all textures of a file have \
-             {MAX_PIXELS_TOGETHER} at most; scale them down, or cut the scene in parts",
+            "is texture {} of the file, and the textures up to it have {} pixels together, more than \
+             {MAX_PIXELS_TOGETHER}: scale them down, or cut the scene in parts",
             self.textures, self.pixels
         ))
     }
@@ -296,7 +296,7 @@ pub(crate) mod tests {
             together
                 .add(1, 1)
                 .unwrap_err()
-                .starts_with("is the texture that makes 2049 of them")
+                .starts_with("is texture 2049 of the file")
         );
         assert!(Together { pixels: u64::MAX, textures: 1 }.add(9, 9).is_err());
     }

@@ -118,7 +118,7 @@ impl MeshLabels {
             let name = quote(material.name.as_bytes());
             let n = count(others.iter().sum(), "face");
             warnings.push(format!(
-                "{n} without a label: the names of their materials are none, the first is {name}"
+                "{n} without a label: the names of their materials are no labels, the first is {name}"
             ));
         }
         if without > 0 {
@@ -267,7 +267,7 @@ mod tests {
         assert_eq!(faces, [1, NO_INDEX, 0, NO_INDEX]);
         assert_eq!(
             warnings,
-            ["1 face without a label: the names of their materials are none, the first is `default`"]
+            ["1 face without a label: the names of their materials are no labels, the first is `default`"]
         );
         let (_, warnings) =
             MeshLabels::from_materials(&mesh(&names, vec![2, 1, 0, NO_INDEX]), &Taxonomy::s3dis()).unwrap();

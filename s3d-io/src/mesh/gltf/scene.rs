@@ -80,7 +80,9 @@ pub(crate) fn instances(
             .filter(|_| precision == Precision::Exact);
         let world_from_node = world_from_parent
             * parent_from_node(node, place).ok_or_else(|| {
-                document.fail(format!("node {index} has a transform that is not finite or turns by no angle"))
+                document.fail(format!(
+                    "node {index} has a transform that is not finite, or a rotation of length 0"
+                ))
             })?;
 
         if let Some(mesh) = node.mesh {
@@ -290,7 +292,7 @@ impl Instancing {
             transform(exact(scale), rotation, exact(translation)).ok_or_else(|| {
                 let who = &self.who;
                 document.fail(format!(
-                    "{who}: instance {n} has a transform that is not finite or turns by no angle"
+                    "{who}: instance {n} has a transform that is not finite, or a rotation of length 0"
                 ))
             })
         });
@@ -316,7 +318,7 @@ fn parent_from_node(node: &Node, place: Option<DVec3>) -> Option<DMat4> {
     }
 }
 
-/// Scales, then turns, then moves. Returns `None` if that is not finite or turns by no angle. Unit
+/// Scales, then turns, then moves. Returns `None` if the transform is not finite or the rotation has no length. Unit
 /// quaternions are normalised, since files round them to `f32` or to fewer bits.
 fn transform(scale: DVec3, rotation: [f32; 4], translation: DVec3) -> Option<DMat4> {
     let rotation = DQuat::from_vec4(DVec4::from_array(rotation.map(f64::from)).try_normalize()?);

@@ -239,7 +239,9 @@ fn unit_in_comments(bytes: &[u8]) -> Option<LengthUnit> {
 /// Says that a comment names another unit than metres.
 fn told(unit: LengthUnit) -> Option<String> {
     (unit != LengthUnit::Metre).then(|| {
-        format!("a comment says that its unit is {unit}: positions are taken to metres (units says another)")
+        format!(
+            "a comment says that its unit is {unit}: positions are converted to metres (set units for another unit)"
+        )
     })
 }
 

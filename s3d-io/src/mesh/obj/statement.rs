@@ -125,6 +125,6 @@ pub(crate) fn out_of_range(column: usize, index: i64, count: u64) -> Why {
     let what = COLUMNS.get(column).copied().unwrap_or_default();
     match index {
         0 => format!("{what} 0: indices count from 1"),
-        _ => format!("{what} {index} is not there, {count} are"),
+        _ => format!("{what} {index} is not there; there are {count}"),
     }
 }

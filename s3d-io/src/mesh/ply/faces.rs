@@ -56,7 +56,7 @@ impl PlyFaces {
                 let polygon = batch.list(corners, row);
                 for &corner in polygon {
                     if !(corner >= 0.0 && corner < vertices as f64) {
-                        let message = format!("vertex {corner} is not there, {vertices} are");
+                        let message = format!("vertex {corner} is not there; there are {vertices}");
                         return Err(reader.fail(&batch, row, message));
                     }
                     out.corners.push(corner as u32);
@@ -127,7 +127,7 @@ impl PlyFaces {
                         continue;
                     }
                     if corner >= vertices as f64 {
-                        let message = format!("vertex {corner} is not there, {vertices} are");
+                        let message = format!("vertex {corner} is not there; there are {vertices}");
                         return Err(reader.fail(&batch, row, message));
                     }
 

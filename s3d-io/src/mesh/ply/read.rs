@@ -87,7 +87,7 @@ pub(crate) fn read(
         .element("face")
         .is_some_and(|(_, e)| e.find(&["red", "diffuse_red"]).is_some());
     if has_face_colors && vertices.colors.is_empty() {
-        warnings.push("colours of faces are not read; colours of vertices or a texture are".into());
+        warnings.push("face colours are not read, but vertex colours and textures are".into());
     }
 
     let looks = Looks::load(path, &header, &mut warnings)?;
@@ -388,7 +388,7 @@ mod tests {
 
         let elements = square("", "property uchar red\nproperty uchar green\nproperty uchar blue\n", 1);
         let file = read_ply(&elements, &format!("{SQUARE}4 0 1 2 3 9 9 9\n")).unwrap();
-        assert_eq!(file.warnings, ["colours of faces are not read; colours of vertices or a texture are"]);
+        assert_eq!(file.warnings, ["face colours are not read, but vertex colours and textures are"]);
     }
 
     #[test]
@@ -565,7 +565,7 @@ mod tests {
     fn faults_are_named_with_their_place() {
         let face = |row: &str| read_ply(&square("", "", 1), &format!("{SQUARE}{row}\n"));
         for (outcome, words) in [
-            (face("3 0 1 4"), "line 14: face 0: vertex 4 is not there, 4 are"),
+            (face("3 0 1 4"), "line 14: face 0: vertex 4 is not there; there are 4"),
             (face("3 0 1 -1"), "line 14: face 0: vertex -1 is not there"),
             (face("2 0 1"), "has no face that can be used"),
             (face("4 0 2 1 3"), "has no face that can be used, as face 0 (counted from 0): "),
@@ -589,7 +589,7 @@ mod tests {
                 ),
                 "its vertices have no x, y and z",
             ),
-            (read_ply(&format!("element face 1\n{FACE}"), "3 0 1 2\n"), "vertex 0 is not there, 0 are"),
+            (read_ply(&format!("element face 1\n{FACE}"), "3 0 1 2\n"), "vertex 0 is not there; there are 0"),
             (
                 read_ply(
                     &format!("element vertex 4\n{XYZ}element face 1\nproperty int a\n"),

@@ -32,6 +32,7 @@ pub struct TextureOut<'a> {
 /// not finite are written as 0. Faces without a material get one with the name `default`. OBJ cannot say that
 /// a texture is mirrored beyond its edge. Other readers repeat it, and a comment tells our own,
 /// [`read_mesh`](crate::mesh::read_mesh).
+///
 /// ```
 /// use s3d_geom::glam::Vec3;
 /// use s3d_geom::{MeshParts, TriMesh};
