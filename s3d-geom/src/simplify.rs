@@ -32,7 +32,7 @@ pub struct SimplifiedMesh {
     /// For each of `faces`, the face of the mesh that it was; ascending.
     pub face_of: Vec<u32>,
     /// For each vertex of the mesh, the index in `positions` of the vertex that it became.
-    /// [`NO_INDEX`](crate::NO_INDEX) if no face that stays has a corner in its cell.
+    /// [`NO_INDEX`](crate::NO_INDEX) if no face uses it, or no face that stays has a corner in its cell.
     pub vertex_of: Vec<u32>,
 }
 

@@ -360,7 +360,7 @@ mod tests {
         assert!((found.blurred_m2 - 1.0).abs() < 1e-6, "{}", found.blurred_m2);
         for (p, color) in mesh.positions().iter().zip(&found.colors) {
             let is_inside = [p.x, p.y].iter().all(|v| (0.05..0.95).contains(v));
-            // At the border, the mean of a one-sided neighbourhood is that of a place further in.
+            // At the border, the neighbourhood is one-sided, and its mean belongs to a place further in.
             let most = if is_inside { 1 } else { 8 };
             let off = color.iter().zip(ramp(*p)).map(|(a, b)| a.abs_diff(b)).max().unwrap();
             assert!(off <= most, "{p}: {color:?} for {:?}", ramp(*p));

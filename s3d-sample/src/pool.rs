@@ -7,7 +7,7 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Which views compete with each other. Source: formats.md, "Views".
+/// The views that compete with each other. Source: formats.md, "Views".
 ///
 /// ```
 /// use s3d_sample::Pool;

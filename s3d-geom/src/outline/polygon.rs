@@ -457,13 +457,15 @@ mod tests {
         assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), Err(PolygonError::ZeroArea));
         assert_eq!(of(&[[1.0, 1.0]; 5]), Err(PolygonError::ZeroArea));
         assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0]]), Err(PolygonError::ZeroArea));
+
         // There and back, with a bend.
         assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 0.0]]), Err(PolygonError::ZeroArea));
         assert_eq!(
             of(&[[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0]]),
             Err(PolygonError::OutOfRange { corner: 1 })
         );
-        // A bow tie, lopsided so that its halves do not cancel.
+
+        // A bow tie whose halves differ, so that their areas do not cancel.
         assert!(matches!(
             of(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]]),
             Err(PolygonError::SelfIntersection { .. })
@@ -473,6 +475,7 @@ mod tests {
             of(&[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.0, 0.0], [1.0, 1.0], [0.0, 2.0]]),
             Err(PolygonError::Overlap)
         );
+
         // A pentagram goes around its middle twice.
         let star: Vec<[f64; 2]> = (0..5)
             .map(|i| {
