@@ -25,11 +25,11 @@ pub struct AnnotationOptions {
     pub classes: BTreeMap<String, Option<Class>>,
     /// The room of points whose file names none. If a column holds room *numbers*, the type of these rooms.
     pub room: Option<Room>,
-    /// The name of the column of classes; `None`: what the format calls it.
+    /// The name of the column of classes. `None`: one of the usual names.
     pub class_column: Option<String>,
-    /// The name of the column of instance numbers; `None`: what the format calls it, or none.
+    /// The name of the column of instance numbers. `None`: one of the usual names, if there is such a column.
     pub instance_column: Option<String>,
-    /// The name of the column of rooms; `None`: there is none.
+    /// The name of the column of rooms. `None`: there is no such column.
     pub room_column: Option<String>,
     /// The names of the columns, in order, for a file that does not name them (a plain NPY array). Empty: `x
     /// y z r g b class` and, if there is one more column, `instance`.

@@ -47,8 +47,8 @@ impl Annotations {
     ///   [`AnnotationOptions::room`]'s type), or else [`AnnotationOptions::room`], or else the name of the
     ///   file (`office_3.ply`, `Area_1_office_3.npy`) or of the E57 scan.
     ///
-    /// Colours of 16 bits or as floats become 8 bits: 16-bit numbers count as 8-bit ones if no number in the
-    /// file is above 255, floats from 0 to 1 if none is above 1.
+    /// Colours become 8-bit. 16-bit numbers count as 8-bit ones if no number in the file is above 255. Floats
+    /// count as 0 to 1 if no number in the file is above 1, and else as 0 to 255.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for a path of another kind, for the faults that the format's reader

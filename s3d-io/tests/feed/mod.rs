@@ -68,8 +68,8 @@ fn file(dir: &Path, name: &str, data: &[u8]) -> PathBuf {
     path
 }
 
-/// Checks what a mesh promises: indices in range, finite corners, and for each column an entry an element or
-/// none.
+/// Checks what a mesh promises: indices in range, finite corners, and columns that are empty or have one
+/// entry an element.
 fn check_mesh(dir: &Path, result: Result<MeshFile>) -> Option<MeshFile> {
     let file = check(dir, result)?;
     let mesh = &file.mesh;

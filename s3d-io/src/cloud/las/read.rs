@@ -34,7 +34,7 @@ pub(crate) struct LasCloud<'a> {
     options: &'a AnnotationOptions,
 }
 
-/// Where a point's record holds what is read.
+/// The fields of a point's record.
 struct Fields {
     is_extended: bool,
     position: [Field; 3],

@@ -1,4 +1,4 @@
-//! Finds the columns of a table of points by their names, of which every program has its own.
+//! Finds the columns of a table of points by name. Every program has names of its own.
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::error::{Error, Result};

@@ -59,7 +59,7 @@ impl PointStore {
     }
 }
 
-/// Where a point begins in the file. Where no file can reach, the system refuses to seek.
+/// The first byte of a point in the file. The system refuses to seek beyond what a file can have.
 fn byte_of(point: u64) -> u64 {
     point.saturating_mul(POINT_BYTES as u64)
 }
