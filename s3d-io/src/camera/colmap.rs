@@ -126,7 +126,7 @@ fn are_points(line: &[u8]) -> bool {
         words += u64::from(is_of_number(byte) && !in_word);
         in_word = is_of_number(byte);
     }
-    words % 3 == 0
+    words.is_multiple_of(3)
 }
 
 /// Returns whether a byte can be part of a number.

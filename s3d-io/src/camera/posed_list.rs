@@ -100,6 +100,7 @@ fn read(path: &Path) -> Result<ReadList> {
             tum::read(path, &text)?
         }
     };
+
     Ok(ReadList::of_files(cameras, files))
 }
 

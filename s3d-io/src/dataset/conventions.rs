@@ -160,6 +160,7 @@ impl Conventions {
             NormalAxes::Paper => "towards the camera",
             NormalAxes::OpenCv => "forward, away from the camera",
         };
+
         json!({
             "conventions": 1,
             "world": { "unit": "m", "up": "+Z", "handedness": "right" },

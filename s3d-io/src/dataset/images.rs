@@ -88,6 +88,7 @@ pub fn dataset_images(layout: &Layout, area: u32) -> Result<Vec<DatasetImage>> {
             }
         }
     }
+
     let images = found.into_iter();
     Ok(images
         .map(|((uuid, room, frame), domains)| DatasetImage { area, uuid, room, frame, domains })

@@ -69,7 +69,7 @@ pub enum MeshColors {
     #[default]
     File,
     /// The annotated points. This is for a mesh without textures, and builds
-    /// [`VertexColors`](s3d_geom::VertexColors).
+    /// `s3d_geom::VertexColors`.
     Points,
 }
 

@@ -100,7 +100,7 @@ impl PublishedArea {
     pub fn open_with(path: &Path, options: &PublishedOptions) -> Result<Self> {
         std::fs::read_dir(path).map_err(|e| Error::io(path, "read the folder", e))?;
         let Some(area) = options.area.or_else(|| area_of(path)) else {
-            let message = "has no name of a published area, such as area_3 or area_5a: rename the folder";
+            let message = "has no name of a published area, as in area_3 or area_5a: rename the folder";
             return Err(Error::format(path, message));
         };
         let Some(mesh) = existing(path.join("3d/rgb.obj")) else {
@@ -122,6 +122,7 @@ impl PublishedArea {
             world_offset_m: DVec3::ZERO,
             warnings: Vec::new(),
         };
+
         this.find_world_offset();
         this.read_locations()?;
         if this.semantic_mesh.is_none() {
@@ -172,8 +173,8 @@ impl PublishedArea {
         Ok(())
     }
 
-    /// Returns the path of the taxonomy's file, beside the area's folder. The classes are those of S3DIS if
-    /// it does not exist.
+    /// Returns the path of the taxonomy's file, beside the area's folder. If it does not exist, the taxonomy
+    /// is S3DIS's.
     pub fn taxonomy_json(&self) -> PathBuf {
         self.path.join("../assets/taxonomy.json")
     }
