@@ -318,8 +318,8 @@ fn parent_from_node(node: &Node, place: Option<DVec3>) -> Option<DMat4> {
     }
 }
 
-/// Scales, then turns, then moves. Returns `None` if the transform is not finite or the rotation has no length. Unit
-/// quaternions are normalised, since files round them to `f32` or to fewer bits.
+/// Scales, then turns, then moves. Returns `None` if the transform is not finite or the rotation has no
+/// length. Unit quaternions are normalised, since files round them to `f32` or to fewer bits.
 fn transform(scale: DVec3, rotation: [f32; 4], translation: DVec3) -> Option<DMat4> {
     let rotation = DQuat::from_vec4(DVec4::from_array(rotation.map(f64::from)).try_normalize()?);
     let matrix = DMat4::from_scale_rotation_translation(scale, rotation, translation);

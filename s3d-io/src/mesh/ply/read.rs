@@ -1,12 +1,10 @@
 //! Reads meshes in PLY files.
 //!
-//! [`PlyReader`] reads the numbers, [`PlyVertices`] and [`PlyFaces`] know their names, and this module makes
-//! a mesh of them. Comments name the texture images, as MeshLab writes them: `comment TextureFile wall.png`.
+//! [`PlyReader`] reads the numbers, [`PlyVertices`] and [`PlyFaces`] know their names, [`PlyLooks`] reads the
+//! textures, and this module makes a mesh of them.
 
 use crate::error::{Error, Result};
-use crate::fs::quote::{count, quote};
-use crate::image::find::find_image;
-use crate::image::texture::{TextureFile, read_textures};
+use crate::fs::quote::count;
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
 use crate::mesh::labels::LabelElement;
 use crate::mesh::origin::FileFrame;
@@ -14,10 +12,11 @@ use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::faces::{PlyFaces, PlyTriangles};
 use crate::mesh::ply::header::PlyHeader;
 use crate::mesh::ply::labels::PlyLabels;
+use crate::mesh::ply::looks::{PlyLooks, lay_textures};
 use crate::mesh::ply::vertices::PlyVertices;
-use s3d_geom::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX, Texture, Wrap};
+use s3d_geom::{MeshParts, NO_INDEX};
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Reads a PLY file of `bytes` bytes (0: not known). Errors name the file by `path`. Vertices and faces keep
 /// the file's order, and vertices their number.
@@ -90,7 +89,7 @@ pub(crate) fn read(
         warnings.push("face colours are not read, but vertex colours and textures are".into());
     }
 
-    let looks = Looks::load(path, &header, &mut warnings)?;
+    let looks = PlyLooks::load(path, &header, &mut warnings)?;
     let mut parts = MeshParts::default();
     lay_textures(&mut parts, &mut vertices, &mut faces, &triangles, &looks, &mut warnings);
     let PlyTriangles { faces: triangles, polygons, cut, .. } = triangles;
@@ -170,133 +169,6 @@ fn tell_triangles(path: &Path, triangles: &PlyTriangles, warnings: &mut Vec<Stri
         warnings.push(format!("{n} with fewer than three corners left out, the first is face {first}"));
     }
     Ok(())
-}
-
-/// The images that the header's comments name.
-#[derive(Default)]
-struct Looks {
-    /// The name in each comment, and its texture if the image could be read.
-    by_comment: Vec<(String, Option<u32>)>,
-    textures: Vec<Texture>,
-    files: Vec<Option<TextureFile>>,
-    /// The images that were read.
-    companions: Vec<PathBuf>,
-}
-
-impl Looks {
-    /// Reads the images. A missing image is a warning.
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`] for images that are too large.
-    fn load(path: &Path, header: &PlyHeader, warnings: &mut Vec<String>) -> Result<Self> {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let names = header.comments.iter().filter_map(|comment| texture_name(comment));
-
-        let mut looks = Self::default();
-        let mut wanted: Vec<PathBuf> = Vec::new();
-        // For each comment the index of its image.
-        let mut images: Vec<Option<usize>> = Vec::new();
-        for name in names {
-            match find_image(name, folder, folder) {
-                Some((image, exact)) => {
-                    if !exact {
-                        let written = quote(name.as_bytes());
-                        warnings.push(format!("texture {written} is not there; {} is used", image.display()));
-                    }
-                    images.push(Some(wanted.len()));
-                    wanted.push(image);
-                }
-                None => {
-                    let written = quote(name.as_bytes());
-                    warnings.push(format!("texture {written} is not there; its faces are drawn without it"));
-                    images.push(None);
-                }
-            }
-            looks.by_comment.push((name.to_owned(), None));
-        }
-
-        for (index, (loaded, path)) in read_textures(&wanted)?.into_iter().zip(&wanted).enumerate() {
-            match loaded {
-                Ok(loaded) => {
-                    let texture = looks.textures.len() as u32;
-                    for ((_, slot), image) in looks.by_comment.iter_mut().zip(&images) {
-                        if *image == Some(index) {
-                            *slot = Some(texture);
-                        }
-                    }
-                    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                    looks
-                        .textures
-                        .push(Texture { name, image: loaded.image, wrap: [Wrap::Repeat; 2] });
-                    looks.files.push(Some(loaded.file));
-                }
-                Err(why) => {
-                    warnings.push(format!("texture {} {why}; its faces are drawn without it", path.display()))
-                }
-            }
-        }
-
-        looks.companions = wanted;
-        Ok(looks)
-    }
-}
-
-/// Returns the name in a comment `TextureFile NAME`.
-fn texture_name(comment: &str) -> Option<&str> {
-    let (keyword, name) = comment.split_once(char::is_whitespace)?;
-    keyword.eq_ignore_ascii_case("TextureFile").then(|| name.trim())
-}
-
-/// Gives the faces a material for each texture, and texture coordinates: of the corners, or else of the
-/// vertices.
-fn lay_textures(
-    parts: &mut MeshParts,
-    vertices: &mut PlyVertices,
-    faces: &mut PlyFaces,
-    triangles: &PlyTriangles,
-    looks: &Looks,
-    warnings: &mut Vec<String>,
-) {
-    let uvs = faces.take_uvs(triangles);
-    if looks.by_comment.is_empty() {
-        if uvs.is_some() || !vertices.uvs.is_empty() {
-            warnings.push(
-                "texture coordinates are not used: no \"comment TextureFile NAME\" in the header names an \
-                 image"
-                    .into(),
-            );
-        }
-        return;
-    }
-
-    parts.materials = looks
-        .by_comment
-        .iter()
-        .map(|(name, texture)| Material { name: name.clone(), color: DEFAULT_COLOR, texture: *texture })
-        .collect();
-    parts.face_materials = faces.textures(triangles);
-
-    let known = looks.by_comment.len() as u32;
-    let mut unknown = 0;
-    for material in parts.face_materials.iter_mut().filter(|m| **m >= known) {
-        unknown += usize::from(*material != NO_INDEX);
-        *material = NO_INDEX;
-    }
-    if unknown > 0 {
-        let faces = count(unknown, "face");
-        let textures = count(known as usize, "texture");
-        warnings.push(format!("{faces} without a texture: texnumber is beyond the {textures} of the header"));
-    }
-
-    // Coordinates of corners win over coordinates of vertices.
-    match uvs {
-        Some((uvs, face_uvs)) => (parts.uvs, parts.face_uvs) = (uvs, face_uvs),
-        None if !vertices.uvs.is_empty() => {
-            parts.uvs = std::mem::take(&mut vertices.uvs);
-            parts.face_uvs = triangles.faces.clone();
-        }
-        None => warnings.push("the header names a texture, but nothing has texture coordinates".into()),
-    }
 }
 
 #[cfg(test)]
