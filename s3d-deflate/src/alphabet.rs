@@ -1,5 +1,5 @@
-//! The alphabets of RFC 1951 (3.2.5): symbols of literals, lengths and distances, how often they occur, and
-//! their codes.
+//! The alphabets of RFC 1951 (3.2.5): the symbols of literals, lengths and distances, their counts and their
+//! codes.
 
 use crate::bit_writer::Bits;
 use crate::huffman::canonical_codes;
@@ -8,13 +8,14 @@ use std::array::from_fn;
 /// The longest match.
 pub(crate) const LONGEST_MATCH: usize = 258;
 
-/// Symbols of distances.
+/// The number of symbols of distances.
 pub(crate) const DISTANCES: usize = 30;
-/// The longest code of a symbol, in bits: one less than the format allows, so that four are written in one
-/// step.
+
+/// The longest code of a symbol, in bits. It is one less than the format allows, so that four codes are
+/// written in one step.
 pub(crate) const LONGEST_CODE: u8 = 14;
 
-/// The symbol of a length of 3 to 258, counted from 257, and its number of extra bits.
+/// Returns the symbol of a length of 3 to 258, counted from 257, and its number of extra bits.
 const fn length_symbol(length: usize) -> (usize, u32) {
     if length == 258 {
         return (28, 0);
@@ -27,16 +28,16 @@ const fn length_symbol(length: usize) -> (usize, u32) {
     (4 * extra as usize + (l >> extra), extra)
 }
 
-/// The symbol of a distance of 1 to 32,768 and its number of extra bits.
+/// Returns the symbol of a distance of 1 to 32,768, and its number of extra bits.
 #[inline(always)]
 pub(crate) const fn distance_symbol(distance: usize) -> (usize, u32) {
     let d = distance - 1;
-    // The first four have symbols of their own, as if they had a bit more.
+    // The first four distances have a symbol each; `| 2` makes the logarithm fit them.
     let extra = (d | 2).ilog2() - 1;
     (2 * extra as usize + (d >> extra), extra)
 }
 
-/// Symbol and number of extra bits by length − 3.
+/// For each length − 3, the symbol and its number of extra bits.
 pub(crate) const LENGTH_SYMBOLS: [(u8, u8); 256] = {
     let mut table = [(0, 0); 256];
     let mut i = 0;
@@ -50,13 +51,13 @@ pub(crate) const LENGTH_SYMBOLS: [(u8, u8); 256] = {
 
 /// The code lengths of a block, 0 for symbols that do not occur.
 pub(crate) struct CodeLengths {
-    /// Of literals and lengths.
+    /// Code lengths of literals and lengths.
     pub(crate) litlen: [u8; 288],
     pub(crate) distance: [u8; 32],
 }
 
 impl CodeLengths {
-    /// Those of blocks with fixed codes.
+    /// The code lengths of blocks with fixed codes.
     pub(crate) const FIXED: Self = {
         let mut litlen = [8; 288];
         let mut i = 144;
@@ -67,22 +68,23 @@ impl CodeLengths {
         Self { litlen, distance: [5; 32] }
     };
 
-    /// The codes: of literals and lengths, and of distances.
+    /// Returns the codes of literals and lengths, and the codes of distances.
     pub(crate) fn codes(&self) -> ([Bits; 288], [Bits; 32]) {
         (codes(&self.litlen), codes(&self.distance))
     }
 
-    /// Bits that the counted symbols take, without extra bits.
+    /// Returns the number of bits of the counted symbols, without extra bits.
     pub(crate) fn bits(&self, counts: &Counts) -> u64 {
-        let sum = |counts: &[u32], lengths: &[u8]| -> u64 {
-            counts
-                .iter()
-                .zip(lengths)
-                .map(|(&n, &l)| u64::from(n) * u64::from(l))
-                .sum()
-        };
-        sum(&counts.litlen, &self.litlen) + sum(&counts.distance, &self.distance)
+        sum_of_bits(&counts.litlen, &self.litlen) + sum_of_bits(&counts.distance, &self.distance)
     }
+}
+
+fn sum_of_bits(counts: &[u32], lengths: &[u8]) -> u64 {
+    counts
+        .iter()
+        .zip(lengths)
+        .map(|(&n, &l)| u64::from(n) * u64::from(l))
+        .sum()
 }
 
 fn codes<const N: usize>(lengths: &[u8; N]) -> [Bits; N] {
@@ -91,10 +93,10 @@ fn codes<const N: usize>(lengths: &[u8; N]) -> [Bits; N] {
     from_fn(|i| Bits::new(codes[i].into(), lengths[i].into()))
 }
 
-/// How often each symbol occurs.
+/// The counts of the symbols.
 pub(crate) struct Counts {
     pub(crate) litlen: [u32; 288],
     pub(crate) distance: [u32; 32],
-    /// Extra bits of lengths and distances.
+    /// The number of extra bits of lengths and distances.
     pub(crate) extra: u64,
 }

@@ -1,17 +1,17 @@
-//! Bits into bytes, lowest first.
+//! Writes bits into bytes, lowest first.
 
-/// Up to 48 bits and their number, in one word: the number in its lowest byte.
+/// Up to 48 bits and their number in one word. The number is in the lowest byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Bits(u64);
 
 impl Bits {
-    /// The lowest `count` bits of `value`; the others are 0.
+    /// Makes `count` bits from `value`, whose other bits are 0.
     #[inline(always)]
     pub(crate) const fn new(value: u64, count: u32) -> Self {
         Self(value << 8 | count as u64)
     }
 
-    /// These, and then the next.
+    /// Returns these bits followed by `next`.
     #[inline(always)]
     pub(crate) fn then(self, next: Self) -> Self {
         let count = (self.0 & 0xff) + (next.0 & 0xff);
@@ -23,20 +23,20 @@ impl Bits {
         self.0 >> 8
     }
 
-    /// The number, for a shift.
+    /// Returns the number of bits, for a shift.
     #[inline(always)]
     fn shift(self) -> u64 {
         self.0 & 0x3f
     }
 }
 
-/// Bits that may be added between two flushes.
+/// The largest number of bits that may be added between two flushes.
 const MOST: u64 = 56;
 
 /// Appends bits to a vector of bytes.
 pub(crate) struct BitWriter<'a> {
     out: &'a mut Vec<u8>,
-    /// Where the next whole bytes go; what follows in `out` is room.
+    /// The place of the next whole byte. The bytes of `out` from there on are room to write.
     end: usize,
     bits: u64,
     count: u32,
@@ -56,7 +56,7 @@ impl<'a> BitWriter<'a> {
         }
     }
 
-    /// Adds the lowest `count` bits; the others are 0. At most [`MOST`] bits may be added between two
+    /// Adds `count` bits; the other bits of `bits` are 0. At most [`MOST`] bits may be added between two
     /// flushes.
     #[inline(always)]
     pub(crate) fn add(&mut self, bits: u64, count: u32) {
@@ -64,39 +64,46 @@ impl<'a> BitWriter<'a> {
         self.count += count;
     }
 
-    /// As [`add`](Self::add).
+    /// Adds bits like [`add`](Self::add).
     pub(crate) fn append(&mut self, bits: Bits) {
         self.add(bits.value(), bits.shift() as u32);
     }
 
-    /// Stores the whole bytes.
+    /// Stores the whole bytes, and keeps the other bits.
     #[inline(always)]
     pub(crate) fn flush(&mut self) {
         self.out[self.end..self.end + 8].copy_from_slice(&self.bits.to_le_bytes());
         self.end += (self.count / 8) as usize;
-        // At most 63 bits are there, so the shift is by 56 at most.
+        // There are at most 63 bits, so the shift is at most 56.
         self.bits >>= self.count & !7;
         self.count &= 7;
     }
 
-    /// Adds the bits that `table` has for each of `indices`, modulo its length; if `FIT`, any four are
-    /// [`MOST`] at most. There is room for them.
+    /// Adds the bits in `table` for each of `indices`, modulo its length. The caller has made room. `FIT`
+    /// says that any four entries have at most [`MOST`] bits together.
     #[inline(always)]
     pub(crate) fn add_all<I: Copy + Into<usize>, const N: usize, const FIT: bool>(
         &mut self,
         indices: &[[I; 4]],
         table: &[Bits; N],
     ) {
-        // What is written may be anywhere, as far as the compiler knows: all that is needed is kept outside
-        // of memory.
+        // Local copies stay in registers. As far as the compiler knows, a write to `out` could change the
+        // fields.
         let out = self.out.as_mut_slice();
-        let (mut end, mut bits, mut count) = (self.end, self.bits, u64::from(self.count));
+        let mut end = self.end;
+        let mut bits = self.bits;
+        let mut count = u64::from(self.count);
+
         for four in indices {
-            // Joined in pairs, as adding to the writer's bits waits for what was added before.
+            // Four entries are joined in pairs first, since each addition to `bits` waits for the one before.
             let [a, b, c, d] = four.map(|i| table[i.into() % N]);
-            let (first, second) = (a.value() | b.value() << a.shift(), c.value() | d.value() << c.shift());
-            let (n, more) = (a.0 + b.0, c.0 + d.0);
-            let (mut value, mut sum) = (first | second << (n & 0x3f), (n + more) & 0xff);
+            let first = a.value() | b.value() << a.shift();
+            let second = c.value() | d.value() << c.shift();
+            let n = a.0 + b.0;
+            let more = c.0 + d.0;
+            let mut value = first | second << (n & 0x3f);
+            let mut sum = (n + more) & 0xff;
+
             if !FIT && sum > MOST {
                 bits |= first << count;
                 count += n & 0xff;
@@ -104,33 +111,38 @@ impl<'a> BitWriter<'a> {
                 end += (count / 8) as usize;
                 bits >>= count & 0x38;
                 count &= 7;
-                (value, sum) = (second, more & 0xff);
+                value = second;
+                sum = more & 0xff;
             }
+
             bits |= value << count;
             count += sum;
             out[end..end + 8].copy_from_slice(&bits.to_le_bytes());
             end += (count / 8) as usize;
-            // At most 63 bits are there, so the shift is by 56 at most.
+            // There are at most 63 bits, so the shift is at most 56.
             bits >>= count & 0x38;
             count &= 7;
         }
-        (self.end, self.bits, self.count) = (end, bits, count as u32);
+
+        self.end = end;
+        self.bits = bits;
+        self.count = count as u32;
     }
 
-    /// Fills the last byte with zeros.
+    /// Fills up the last byte with zeros.
     pub(crate) fn align(&mut self) {
         self.count = self.count.next_multiple_of(8);
         self.flush();
     }
 
-    /// Whole bytes after an [`align`](Self::align).
+    /// Adds whole bytes. The writer must be [aligned](Self::align).
     pub(crate) fn bytes(&mut self, bytes: &[u8]) {
         debug_assert_eq!(self.count, 0);
         self.out[self.end..self.end + bytes.len()].copy_from_slice(bytes);
         self.end += bytes.len();
     }
 
-    /// Ends after whole bytes.
+    /// Fills up the last byte, and cuts off the unused room.
     pub(crate) fn finish(mut self) {
         self.align();
         self.out.truncate(self.end);
@@ -161,7 +173,7 @@ mod tests {
 
     #[test]
     fn bits_of_a_table_are_those_that_are_added_one_by_one() {
-        // From none to as many as there may be: four of them are too many for one step.
+        // Entries of 0 to 28 bits: four of the longest are too many for one step.
         let table: [Bits; 32] = from_fn(|i| {
             let count = (3 * i as u32).min(28);
             Bits::new(0x5_a5a5_a5a5_u64.rotate_left(i as u32) & ((1 << count) - 1), count)
@@ -169,12 +181,15 @@ mod tests {
         let indices: Vec<[u16; 4]> = (0..1000u32)
             .map(|i| from_fn(|k| (i.wrapping_mul(2_654_435_761) >> (6 * k)) as u16))
             .collect();
-        let (mut bytes, mut expected) = (vec![], vec![]);
+
+        let mut bytes = vec![];
         let mut out = BitWriter::new(&mut bytes);
         out.reserve(4000 * 28);
         out.add(1, 3);
         out.add_all::<_, _, false>(&indices, &table);
         out.finish();
+
+        let mut expected = vec![];
         let mut plain = BitWriter::new(&mut expected);
         plain.reserve(4000 * 28);
         plain.add(1, 3);

@@ -1,4 +1,4 @@
-//! Blocks: literals and matches become bits, in whichever of the three forms of RFC 1951 is shortest.
+//! Blocks: writes literals and matches in the shortest of the three forms of RFC 1951.
 
 use crate::alphabet::{CodeLengths, DISTANCES, LONGEST_CODE};
 use crate::bit_writer::BitWriter;
@@ -9,39 +9,43 @@ use std::ops::Range;
 
 const END_OF_BLOCK: usize = 256;
 const LITERALS_AND_LENGTHS: usize = 286;
+
 /// The order in which the code lengths of the code length alphabet are written.
 const CODE_LENGTH_ORDER: [usize; 19] = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
-/// The header of a block with dynamic codes: the code lengths of both alphabets, themselves coded.
+
+/// The header of a block with dynamic codes: the code lengths of both alphabets, coded themselves.
 struct DynamicHeader {
-    /// Symbols of the code length alphabet, and the values of their extra bits.
+    /// The symbols of the code length alphabet, and the values of their extra bits.
     symbols: Vec<(u8, u8)>,
     lengths: [u8; 19],
     codes: [u16; 19],
-    /// HLIT, HDIST and HCLEN of the format, plus what it takes off them: how many code lengths there are for
-    /// literals and lengths, for distances, and of the code length alphabet.
+    /// The numbers of code lengths: for literals and lengths, for distances, and for the code length
+    /// alphabet. The format writes them as HLIT + 257, HDIST + 1 and HCLEN + 4.
     counts: [usize; 3],
     bits: u64,
 }
 
-/// Extra bits of the code length alphabet's symbols.
+/// The extra bits of the symbols of the code length alphabet.
 const CODE_LENGTH_EXTRA: [u32; 19] = {
     let mut extra = [0; 19];
-    (extra[16], extra[17], extra[18]) = (2, 3, 7);
+    extra[16] = 2;
+    extra[17] = 3;
+    extra[18] = 7;
     extra
 };
 
 impl DynamicHeader {
     fn new(block: &CodeLengths) -> Self {
-        let used =
-            |lengths: &[u8], min: usize| lengths.iter().rposition(|&l| l > 0).map_or(min, |i| min.max(i + 1));
-        let (litlens, distances) = (used(&block.litlen, 257), used(&block.distance, 1));
+        let litlens = used_symbols(&block.litlen, 257);
+        let distances = used_symbols(&block.distance, 1);
         let mut all = [0; LITERALS_AND_LENGTHS + DISTANCES];
         all[..litlens].copy_from_slice(&block.litlen[..litlens]);
         all[litlens..][..distances].copy_from_slice(&block.distance[..distances]);
 
         let mut symbols = Vec::with_capacity(litlens + distances);
         for same in all[..litlens + distances].chunk_by(|a, b| a == b) {
-            let (length, mut n) = (same[0], same.len());
+            let length = same[0];
+            let mut n = same.len();
             if length > 0 {
                 symbols.push((length, 0));
                 n -= 1;
@@ -58,11 +62,14 @@ impl DynamicHeader {
             }
             symbols.extend((0..n).map(|_| (length, 0)));
         }
+
         let mut counts = [0; 19];
         symbols.iter().for_each(|&(symbol, _)| counts[usize::from(symbol)] += 1);
-        let (mut lengths, mut codes) = ([0; 19], [0; 19]);
+        let mut lengths = [0; 19];
+        let mut codes = [0; 19];
         code_lengths(&counts, 7, &mut lengths);
         canonical_codes(&lengths, &mut codes);
+
         let written = CODE_LENGTH_ORDER
             .iter()
             .rposition(|&i| lengths[i] > 0)
@@ -92,8 +99,13 @@ impl DynamicHeader {
     }
 }
 
-/// Writes the bytes in `place` of `data` as one block: `tokens` are its literals and matches. Sets `costs` to
-/// those of the block's codes.
+/// Returns the number of symbols up to the last that occurs, at least `min`.
+fn used_symbols(lengths: &[u8], min: usize) -> usize {
+    lengths.iter().rposition(|&l| l > 0).map_or(min, |i| min.max(i + 1))
+}
+
+/// Writes the bytes in `place` of `data` as one block. `tokens` are the literals and matches of the block.
+/// Sets `costs` from the codes of the block.
 #[inline(always)]
 pub(crate) fn write_block(
     data: &[u8],
@@ -110,6 +122,8 @@ pub(crate) fn write_block(
     code_lengths(&counts.litlen, LONGEST_CODE, &mut lengths.litlen);
     code_lengths(&counts.distance, LONGEST_CODE, &mut lengths.distance);
     *costs = Costs::of(&lengths, tokens);
+
+    // The shortest form wins.
     let header = DynamicHeader::new(&lengths);
     let dynamic = header.bits + lengths.bits(&counts) + counts.extra;
     let fixed = CodeLengths::FIXED.bits(&counts) + counts.extra;
@@ -119,6 +133,7 @@ pub(crate) fn write_block(
         write_stored(&data[place], last, out);
         return;
     }
+
     out.reserve(dynamic.min(fixed) + 3);
     let lengths = if fixed <= dynamic {
         out.add(first | 1 << 1, 3);

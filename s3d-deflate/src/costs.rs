@@ -1,4 +1,4 @@
-//! What literals and matches cost in bits, which decides what is taken.
+//! The costs of literals and matches in bits, which decide which are taken.
 
 use crate::alphabet::{CodeLengths, DISTANCES, LENGTH_SYMBOLS, LONGEST_CODE};
 use crate::fixed_distance::{FIXED, FixedMatch};
@@ -6,24 +6,24 @@ use crate::huffman::code_lengths;
 use crate::tokens::{Tokens, count_bytes};
 use std::array::from_fn;
 
-/// What a symbol that has not occurred is taken to cost; a distance's symbol costs no more than the second.
+/// The assumed cost of a symbol that has not occurred.
 const RARE: u8 = 13;
+/// The largest assumed cost of the symbol of a distance.
 const FAR: u8 = 9;
 
-/// Bits that literals and matches cost, as far as is known when they are chosen: by the codes of the block
-/// before.
+/// The expected costs of literals and matches in bits, by the codes of the block before.
 pub(crate) struct Costs {
     literals: [u8; 256],
-    /// By length − 3, with its extra bits.
+    /// For each length − 3, with extra bits.
     lengths: [u8; 256],
-    /// By the distance's logarithm, rounded down, with its extra bits.
+    /// For each logarithm of the distance, rounded down, with extra bits.
     distances: [u8; 16],
-    /// The same by number of the fixed distance.
+    /// For each fixed distance, with extra bits.
     fixed_distances: [u8; FIXED],
 }
 
 impl Costs {
-    /// Before there was a block: literals as they are distributed in `data`.
+    /// Guesses the costs for the first block. Literals cost as their distribution in `data` says.
     pub(crate) fn guess(data: &[u8], tokens: &Tokens) -> Self {
         let mut lengths = CodeLengths { litlen: [0; 288], distance: [5; 32] };
         let mut counts = [0; 256];
@@ -33,10 +33,11 @@ impl Costs {
         Self::of(&lengths, tokens)
     }
 
+    /// Returns the costs by the codes of a block.
     pub(crate) fn of(lengths: &CodeLengths, tokens: &Tokens) -> Self {
         let cost = |length: u8| if length == 0 { RARE } else { length };
         let distances: [u8; 16] = from_fn(|log| {
-            // Two symbols have that logarithm, nearly.
+            // Two symbols have this logarithm, except at the ends.
             let shorter = lengths.distance[2 * log].min(lengths.distance[(2 * log + 1).min(DISTANCES - 1)]);
             cost(shorter).min(FAR) + (log as u8).saturating_sub(1)
         });
@@ -61,7 +62,8 @@ impl Costs {
         u32::from(self.lengths[length - 3]) + u32::from(self.distances[distance.ilog2() as usize & 15])
     }
 
-    /// Whether a match at `at` costs less than its bytes as literals. Only the first three of them are asked.
+    /// Returns true if a match at `at` costs less than its bytes as literals. The cost of the literals is
+    /// extrapolated from the first three.
     #[inline(always)]
     pub(crate) fn pays(&self, data: &[u8], at: usize, found: FixedMatch) -> bool {
         const PRICED: usize = 3;

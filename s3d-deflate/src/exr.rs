@@ -1,15 +1,15 @@
-//! What OpenEXR's ZIP compresses of a block of scan lines: the samples' bytes apart, those at even places
-//! before those at odd places, each as the difference to the one before. Source: OpenEXR's file layout, "ZIP
-//! compression".
+//! The filter of OpenEXR's ZIP for a block of scan lines. It separates the bytes of the samples: the bytes at
+//! even places come before the bytes at odd places. Then it replaces each byte by the difference from the
+//! byte before. Source: OpenEXR's file layout, "ZIP compression".
 //!
-//! In wide registers and one pass over the three channels: with the `exr` crate alone a file takes several
-//! times as long (bench `compressors`).
+//! It runs in wide registers, in one pass over the three channels. With the `exr` crate alone, a file takes
+//! several times as long (bench `compressors`).
 
 use crate::Error;
 use crate::simd::{Compare, Kernel, dispatch};
 
-/// A block of scan lines of three channels, prepared for OpenEXR's ZIP. Its buffers serve one block after the
-/// other.
+/// A block of scan lines of three channels, filtered for OpenEXR's ZIP. Its buffers are reused from block to
+/// block.
 ///
 /// ```
 /// use s3d_deflate::exr::ZipBlock;
@@ -19,14 +19,14 @@ use crate::simd::{Compare, Kernel, dispatch};
 /// let pixels: Vec<[f32; 3]> = (0..1600).map(|i| [1.0, 2.0, (i / 100) as f32]).collect();
 /// let mut block = ZipBlock::default();
 /// block.set(&pixels, 100, f32::to_le_bytes)?;
-/// // Even and odd bytes are apart, so a line comes back after half its bytes.
+/// // Even and odd bytes are apart, so a line repeats after half its bytes.
 /// let mut deflater = Deflater::new(Search::floats(100 * 3 * 4 / 2, 4))?;
 /// let mut stream = Vec::new();
 /// deflater.zlib(block.differences(), Some(block.differences().len() / 2), &mut stream);
 /// assert!(stream.len() < 19_200 / 50, "{}", stream.len());
-/// // A block that does not shrink is stored as it is: B, G and R of a line, one after the other.
+/// // A block that does not shrink is stored unfiltered: B, G and R of a line, one after the other.
 /// assert_eq!(block.stored().take(4).collect::<Vec<u8>>(), 0f32.to_le_bytes());
-/// // Of what a reader has inflated, the pixels come back.
+/// // A reader inflates the differences and gets the pixels back.
 /// let differences = block.differences().to_vec();
 /// block.differences_mut(differences.len()).copy_from_slice(&differences);
 /// let mut read = vec![[0.0; 3]; 1600];
@@ -38,20 +38,20 @@ use crate::simd::{Compare, Kernel, dispatch};
 pub struct ZipBlock {
     /// One line, channel by channel.
     line: Vec<u8>,
-    /// The samples' bytes, line by line and channel by channel: those at even places, then those at odd
-    /// places.
+    /// The bytes of the samples, line by line and channel by channel: first the bytes at even places, then
+    /// the bytes at odd places.
     separated: Vec<u8>,
-    /// The same, each but the first as the difference to the one before.
+    /// `separated`, with each byte but the first as the difference from the byte before.
     differences: Vec<u8>,
 }
 
 impl ZipBlock {
-    /// Takes the lines of a block: rows of `width` pixels with the channels R, G, B, whose samples are of `N`
+    /// Filters the lines of a block: rows of `width` pixels with the channels R, G, B and samples of `N`
     /// bytes. Channels are stored in the order of their names: B, G, R.
     ///
     /// # Errors
-    /// [`Error::PartialLine`] if `pixels` are not whole rows, or there are none; [`Error::Setting`] if a
-    /// sample has an odd number of bytes.
+    /// [`Error::PartialLine`] if there are no pixels or they are not whole rows; [`Error::Setting`] if `N` is
+    /// odd or 0.
     pub fn set<T: Copy, const N: usize>(
         &mut self,
         pixels: &[[T; 3]],
@@ -67,11 +67,12 @@ impl ZipBlock {
         Ok(())
     }
 
-    /// The pixels of the block whose differences are in [`Self::differences_mut`]: the reverse of [`Self::set`].
+    /// Restores the pixels of the block from the differences in [`Self::differences_mut`]. It is the reverse
+    /// of [`Self::set`].
     ///
     /// # Errors
-    /// As [`Self::set`]; [`Error::PartialLine`] also if there are more or fewer differences than bytes of
-    /// samples.
+    /// The errors of [`Self::set`]; [`Error::PartialLine`] also if the number of differences is not the
+    /// number of bytes of all samples.
     pub fn get<T: Copy, const N: usize>(
         &mut self,
         pixels: &mut [[T; 3]],
@@ -89,26 +90,27 @@ impl ZipBlock {
         Ok(())
     }
 
-    /// Room for the differences of a block whose samples have so many bytes.
+    /// Returns the buffer for the differences of a block whose samples have `bytes` bytes in all.
     pub fn differences_mut(&mut self, bytes: usize) -> &mut [u8] {
         self.differences.resize(bytes, 0);
         &mut self.differences
     }
 
-    /// What is to be compressed. Even bytes of samples are before its middle and odd ones after it.
+    /// Returns the bytes to compress. The even bytes of samples are in the first half, the odd bytes in the
+    /// second.
     pub fn differences(&self) -> &[u8] {
         &self.differences
     }
 
-    /// What is to be stored if compression does not make it shorter: the samples' bytes, line by line and
-    /// channel by channel.
+    /// Returns the bytes to store if compression does not make them shorter: the bytes of the samples, line
+    /// by line and channel by channel.
     pub fn stored(&self) -> impl Iterator<Item = u8> {
         let (even, odd) = self.separated.split_at(self.separated.len() / 2);
         even.iter().zip(odd).flat_map(|(even, odd)| [*even, *odd])
     }
 }
 
-/// How many bytes the samples of rows of `width` pixels have.
+/// Returns the number of bytes of the samples of whole rows of `width` pixels.
 fn bytes_of<const N: usize>(pixels: usize, width: usize) -> Result<usize, Error> {
     if width == 0 || pixels == 0 || !pixels.is_multiple_of(width) {
         return Err(Error::PartialLine { len: pixels, line: width });
@@ -119,7 +121,7 @@ fn bytes_of<const N: usize>(pixels: usize, width: usize) -> Result<usize, Error>
     Ok(3 * N * pixels)
 }
 
-/// Takes the samples' bytes apart, and their differences.
+/// Separates the bytes of samples, and takes their differences.
 struct Prepare<'a, T, F> {
     pixels: &'a [[T; 3]],
     width: usize,
@@ -140,7 +142,8 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Kernel for Prepare<'_, T, F> 
         let (even, odd) = separated.split_at_mut(separated.len() / 2);
         let lines = even.chunks_exact_mut(half).zip(odd.chunks_exact_mut(half));
         for (row, (even, odd)) in pixels.chunks_exact(width).zip(lines) {
-            // First the three channels, then one byte in two: simple steps that are done for many at once.
+            // First separate the three channels, then even and odd bytes. Each step is simple enough for wide
+            // registers.
             let (blue, rest) = line.as_chunks_mut::<N>().0.split_at_mut(width);
             let (green, red) = rest.split_at_mut(width);
             for (((pixel, b), g), r) in row.iter().zip(blue).zip(green).zip(red) {
@@ -152,6 +155,7 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Kernel for Prepare<'_, T, F> 
                 [*even, *odd] = *pair;
             }
         }
+
         differences[0] = separated[0];
         for ((difference, byte), before) in differences[1..].iter_mut().zip(&separated[1..]).zip(&*separated)
         {
@@ -161,7 +165,7 @@ impl<T: Copy, const N: usize, F: Fn(T) -> [u8; N]> Kernel for Prepare<'_, T, F> 
     }
 }
 
-/// Adds differences up, and puts the samples' bytes together.
+/// Adds up differences, and joins the bytes of samples.
 struct Restore<'a, T, F, const N: usize> {
     pixels: &'a mut [[T; 3]],
     width: usize,
@@ -179,6 +183,7 @@ impl<T: Copy, const N: usize, F: Fn([u8; N]) -> T> Kernel for Restore<'_, T, F, 
     fn run<C: Compare>(self, _: C) {
         let Self { pixels, width, from_le_bytes, line, separated, differences } = self;
         add_up(differences, separated);
+
         let half = 3 * N / 2 * width;
         let (even, odd) = separated.split_at(separated.len() / 2);
         let lines = even.chunks_exact(half).zip(odd.chunks_exact(half));
@@ -195,25 +200,28 @@ impl<T: Copy, const N: usize, F: Fn([u8; N]) -> T> Kernel for Restore<'_, T, F, 
     }
 }
 
-/// Sums of differences, 128 standing for none. Of eight bytes together: those at even places and those at odd ones are
-/// four numbers of 16 bits each, which a multiplication adds up.
+/// Adds up differences, where 128 stands for none. It takes eight bytes at once: the bytes at even places and
+/// the bytes at odd places are four numbers of 16 bits each, which a multiplication adds up.
 #[inline(always)]
 fn add_up(differences: &[u8], sums: &mut [u8]) {
     const LOW: u64 = 0x00ff_00ff_00ff_00ff;
     const ONES: u64 = 0x0001_0001_0001_0001;
+
     let mut before = 128u64;
     let (eights, rest) = differences.as_chunks::<8>();
     let (out, out_rest) = sums.as_chunks_mut::<8>();
     for (eight, out) in eights.iter().zip(out) {
         let bytes = u64::from_le_bytes(*eight) ^ 0x8080_8080_8080_8080;
-        let (even, odd) = ((bytes & LOW).wrapping_mul(ONES), (bytes >> 8 & LOW).wrapping_mul(ONES));
-        // The sum so far is added last, so that eights wait for each other no longer than for one addition.
+        let even = (bytes & LOW).wrapping_mul(ONES);
+        let odd = (bytes >> 8 & LOW).wrapping_mul(ONES);
+        // The sum so far is added last, so one eight waits for the other for a single addition only.
         let all = (before & 0xff) * ONES;
         let at_even = even.wrapping_add(odd << 16).wrapping_add(all);
         let at_odd = even.wrapping_add(odd).wrapping_add(all);
         *out = (at_even & LOW | (at_odd & LOW) << 8).to_le_bytes();
         before += even.wrapping_add(odd) >> 48;
     }
+
     let mut sum = before as u8;
     for (difference, out) in rest.iter().zip(out_rest) {
         sum = sum.wrapping_add(*difference).wrapping_sub(128);
@@ -241,7 +249,8 @@ mod tests {
             let mut read = vec![[0; 3]; pixels.len()];
             reader.get(&mut read, width, u16::from_le_bytes).unwrap();
             prop_assert_eq!(read, pixels);
-            // One by one.
+
+            // The plain reference adds up one by one.
             let mut sum = 128u8;
             let plain: Vec<u8> = differences
                 .iter()
@@ -259,14 +268,15 @@ mod tests {
         // Two lines of two pixels with samples of two bytes.
         let pixels = [[0x0102u16, 0x0304, 0x0506], [0x0708, 0x090a, 0x0b0c], [1, 2, 3], [4, 5, 6]];
         let mut block = ZipBlock::default();
-        // What an earlier, larger block left does not matter.
+        // The content of an earlier, larger block does not matter.
         block.set(&[[9u16; 3]; 40], 20, u16::to_le_bytes).unwrap();
         block.set(&pixels, 2, u16::to_le_bytes).unwrap();
         let stored: Vec<u8> = block.stored().collect();
         let lines: [[u16; 6]; 2] = [[0x0506, 0x0b0c, 0x0304, 0x090a, 0x0102, 0x0708], [3, 6, 2, 5, 1, 4]];
         let expected: Vec<u8> = lines.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(stored, expected);
-        // Even places first; then each from the one before, as a reader adds them up.
+
+        // Even places come first. The differences add up as a reader does it.
         let apart: Vec<u8> = [0, 1]
             .iter()
             .flat_map(|i| expected.iter().skip(*i).step_by(2))

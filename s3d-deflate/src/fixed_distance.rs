@@ -1,11 +1,13 @@
 //! Matches at fixed distances: the 32 smallest and 32 around a line, or half as many of each.
 //!
-//! What filters leave of a smooth image repeats there and hardly anywhere else: steps that come at nearly
-//! equal intervals along a line, and again nearly below in the next. So there are no hashes and no chains;
-//! every byte is compared with those at all distances, which takes one or two comparisons of registers. The
-//! answers are the bits of a mask, and a match lasts as long as the masks of the places that follow have a
-//! bit in common; what is longer than most is compared directly, so that masks inside it are not needed.
-//! Depth, normals and coordinates of a view take 15 ms so, 52 ms with libdeflate at the same or larger sizes
+//! A filtered smooth image repeats at these distances and hardly anywhere else. It has steps at nearly equal
+//! intervals along a line, and again nearly below in the next line. So there are no hashes and no chains.
+//! Every byte is compared with the bytes at all distances, which takes one or two comparisons of registers.
+//!
+//! The results are the bits of a mask. A match lasts as long as the masks of successive places have a bit in
+//! common. Long matches are compared directly, so the masks inside them are not needed.
+//!
+//! Depth, normals and coordinates of a view take 15 ms, and 52 ms with libdeflate at the same or larger sizes
 //! (bench `compressors`).
 
 use crate::WINDOW;
@@ -16,29 +18,34 @@ use std::array::from_fn;
 use std::hint::select_unpredictable;
 use std::ops::{BitAnd, BitOr, Not};
 
-/// How many fixed distances there are.
+/// The number of fixed distances.
 pub(crate) const FIXED: usize = 2 * WIDTH;
-/// Places of which masks are made at a time; after a match that went beyond those that there are, fewer.
+/// The number of places whose masks are made at a time.
 const TILE: usize = 512;
+/// The number of places after a match that went beyond the existing masks.
 const SHORT_TILE: usize = 128;
-/// Masks that there is room for: as much as the fastest memory takes.
+/// The room for masks: as many as the fastest cache takes.
 const ROOM: usize = 2048;
-/// Bytes of a match, at least, of which the masks are asked, before it is compared directly.
+/// The length from which a match is compared directly, instead of by masks.
 const ASKED: usize = 64;
-/// Masks that a match's end may ask for.
+/// The number of masks that the search for a match may read.
 const AHEAD: usize = ASKED + 8;
 
-/// Which distances agree at a place, of the `N` smallest and `N` around a line: the highest bit for the
-/// distance 1, the `N`th for `N`; the lower `N` for those from a line less `N` / 2 − 1 to a line and `N` / 2.
+/// The distances that agree at a place, as bits. The upper `N` bits are for the `N` smallest distances, from
+/// the highest bit for distance 1. The lower `N` bits are for the distances from a line − `N` / 2 + 1 to a
+/// line + `N` / 2.
 pub(crate) trait Mask<const N: usize>:
     Copy + Default + PartialEq + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self>
 {
-    /// All of them, and the smallest.
+    /// All distances.
     const ALL: Self;
+    /// The smallest distances.
     const NEAR: Self;
-    /// That of a place with this `byte`, from the bytes before it and those around it in the line above.
+    /// Returns the mask of a place with this `byte`, from the `near` bytes before it and the bytes around it
+    /// in the line `above`.
     fn agreeing<C: Compare>(compare: C, near: &[u8; N], above: &[u8; N], byte: u8) -> Self;
-    /// Those of the places from `place` on, around which in the line above bytes begin at `above`.
+    /// Makes the masks of a row of places from `place` on. The bytes around the first place in the line above
+    /// begin at `above`.
     fn agreeing_in_row<C: Compare>(
         compare: C,
         data: &[u8],
@@ -46,11 +53,11 @@ pub(crate) trait Mask<const N: usize>:
         above: usize,
         masks: &mut [Self; ROW],
     );
-    /// That of the distance that has so many before it.
+    /// Returns the mask of a single distance, by its number.
     fn bit(number: usize) -> Self;
-    /// The first distance's number; there is one.
+    /// Returns the number of the first distance. The mask must not be empty.
     fn first(self) -> usize;
-    /// Which of [`fixed_distances`] that is.
+    /// Returns the index in [`fixed_distances`] of the distance with this number.
     fn fixed(number: usize) -> usize;
 }
 
@@ -71,8 +78,7 @@ impl Mask<WIDTH> for u64 {
         above: usize,
         masks: &mut [Self; ROW],
     ) {
-        let (near, above) = (bytes(data, place - WIDTH), bytes(data, above));
-        compare.equal_in_two(near, above, bytes(data, place), masks);
+        compare.equal_in_two(bytes(data, place - WIDTH), bytes(data, above), bytes(data, place), masks);
     }
 
     #[inline(always)]
@@ -110,8 +116,7 @@ impl Mask<HALF> for u32 {
         above: usize,
         masks: &mut [Self; ROW],
     ) {
-        let (near, above) = (bytes(data, place - HALF), bytes(data, above));
-        compare.equal_in_halves(near, above, bytes(data, place), masks);
+        compare.equal_in_halves(bytes(data, place - HALF), bytes(data, above), bytes(data, place), masks);
     }
 
     #[inline(always)]
@@ -126,17 +131,17 @@ impl Mask<HALF> for u32 {
 
     #[inline(always)]
     fn fixed(number: usize) -> usize {
-        // Those around the line are in the middle of the others'.
+        // The half around the line is the middle of the full set around the line.
         number + (number & HALF) / 2 * 3
     }
 }
 
-/// Which distances agree at the places of a piece of the data.
+/// The masks of the places in a piece of the data.
 pub(crate) struct FixedDistanceMatcher<M> {
     masks: Vec<M>,
-    /// The first place of `masks`.
+    /// The place of the first of `masks`.
     start: usize,
-    /// Behind the last place that was compared.
+    /// The place after the last of `masks`.
     end: usize,
     line: usize,
     distances: [usize; FIXED],
@@ -145,13 +150,13 @@ pub(crate) struct FixedDistanceMatcher<M> {
 /// A match.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FixedMatch {
-    /// 3 to [`LONGEST_MATCH`].
+    /// 3 to [`LONGEST_MATCH`] bytes.
     pub(crate) length: usize,
-    /// Which of [`fixed_distances`].
+    /// The index of the distance in [`fixed_distances`].
     pub(crate) index: usize,
 }
 
-/// The distances that are asked for: the 32 smallest, and 32 around a line.
+/// Returns the fixed distances: the 32 smallest, and 32 around a line.
 pub(crate) fn fixed_distances(line: usize) -> [usize; FIXED] {
     from_fn(|i| {
         if i < WIDTH {
@@ -162,18 +167,19 @@ pub(crate) fn fixed_distances(line: usize) -> [usize; FIXED] {
     })
 }
 
-/// So many bytes of `data`.
+/// Returns `N` bytes of `data`.
 #[inline(always)]
 fn bytes<const N: usize>(data: &[u8], from: usize) -> &[u8; N] {
     data[from..].first_chunk().expect("they are there")
 }
 
-/// Whether all distances around a line are possible.
+/// Returns true if all distances around a line are possible.
 fn has_line(line: usize) -> bool {
     (WIDTH..=WINDOW - WIDTH / 2).contains(&line)
 }
 
-/// The mask of a place: the first bytes have less before them, and the first line none above it.
+/// Returns the mask of a place. The first bytes of the data have fewer bytes before them, and the first line
+/// has no line above.
 #[inline(always)]
 fn agreeing<C: Compare, M: Mask<N>, const N: usize>(compare: C, data: &[u8], place: usize, line: usize) -> M {
     let byte = data[place];
@@ -189,22 +195,23 @@ fn agreeing<C: Compare, M: Mask<N>, const N: usize>(compare: C, data: &[u8], pla
 }
 
 impl<M> FixedDistanceMatcher<M> {
-    /// For lines of `line` bytes.
+    /// Makes a matcher for lines of `line` bytes.
     pub(crate) fn new(line: usize) -> Self {
         Self { masks: Vec::new(), start: 0, end: 0, line, distances: fixed_distances(line) }
     }
 
-    /// Begins at `start` of other data.
+    /// Begins at the place `start` of new data.
     pub(crate) fn begin<const N: usize>(&mut self, start: usize)
     where
         M: Mask<N>,
     {
         self.masks.resize(ROOM + AHEAD, M::default());
-        (self.start, self.end) = (start, start);
+        self.start = start;
+        self.end = start;
     }
 
-    /// Sees to it that the masks of `at`, which does not go back, and of those ahead are there, and returns
-    /// up to which place they are.
+    /// Makes the masks from `at` on, as far as a match at `at` needs them. `at` must not go back. Returns the
+    /// place before which matches may now be searched.
     #[inline(always)]
     pub(crate) fn reach<C: Compare, const N: usize>(&mut self, compare: C, data: &[u8], at: usize) -> usize
     where
@@ -220,6 +227,7 @@ impl<M> FixedDistanceMatcher<M> {
         }
     }
 
+    /// Makes the masks of the next tile of places.
     #[inline(always)]
     fn advance<C: Compare, const N: usize>(&mut self, compare: C, data: &[u8], at: usize)
     where
@@ -227,22 +235,27 @@ impl<M> FixedDistanceMatcher<M> {
     {
         let mut tile = TILE;
         if at > self.end {
-            // Nobody asks for the places between.
+            // The places between are inside a match, and their masks are not needed.
             self.start += at - self.end;
             self.end = at;
             tile = SHORT_TILE;
         }
+
+        // Without room, the masks from `at` on move to the front.
         if self.end + tile > self.start + ROOM {
             self.masks.copy_within(at - self.start..self.end - self.start, 0);
             self.start = at;
         }
+
         let from = self.end;
         self.end = data.len().min(from + tile);
         let (masks, behind) = self.masks[from - self.start..].split_at_mut(self.end - from);
         if self.end == data.len() {
-            // Nothing is there behind the end.
+            // Nothing agrees after the end of the data.
             behind[..AHEAD].fill(M::default());
         }
+
+        // Whole rows of places are compared at once, other places one by one.
         let above = self.line + N / 2;
         let rows = if has_line(self.line) && from >= above {
             masks.len() / ROW * ROW
@@ -258,7 +271,7 @@ impl<M> FixedDistanceMatcher<M> {
         }
     }
 
-    /// The places that have been [`reach`](Self::reach)ed.
+    /// Returns the places that have been [`reach`](Self::reach)ed.
     #[inline(always)]
     pub(crate) fn places(&self) -> Places<'_, M> {
         Places { masks: &self.masks, start: self.start, line: self.line, distances: &self.distances }
@@ -269,15 +282,14 @@ impl<M> FixedDistanceMatcher<M> {
 #[derive(Clone, Copy)]
 pub(crate) struct Places<'a, M> {
     masks: &'a [M],
-    /// The first of them.
+    /// The place of the first of `masks`.
     start: usize,
     line: usize,
     distances: &'a [usize; FIXED],
 }
 
 impl<M> Places<'_, M> {
-    /// The first place from `at` to `until` at which there is a match of three bytes; `until` if there is
-    /// none.
+    /// Returns the first place from `at` to `until` with a match of three bytes, or `until` if there is none.
     #[inline(always)]
     pub(crate) fn next<const N: usize>(self, at: usize, until: usize) -> usize
     where
@@ -290,8 +302,8 @@ impl<M> Places<'_, M> {
             .count()
     }
 
-    /// The longest match at `at`, which has been [`reach`](FixedDistanceMatcher::reach)ed: the nearest of
-    /// several.
+    /// Returns the longest match at `at`, which must have been [`reach`](FixedDistanceMatcher::reach)ed. The
+    /// nearest distance wins a tie.
     #[inline(always)]
     pub(crate) fn longest<C: Compare, const N: usize, const SHORTEST: usize>(
         self,
@@ -309,6 +321,8 @@ impl<M> Places<'_, M> {
         if agree == none {
             return None;
         }
+
+        // Four places at a time.
         let mut length = SHORTEST;
         let [mut first, mut second, mut third, mut fourth] = from_fn(|i| masks[length + i]);
         loop {
@@ -316,13 +330,15 @@ impl<M> Places<'_, M> {
             if next == none {
                 break;
             }
-            (agree, length) = (next, length + 4);
+            agree = next;
+            length += 4;
             if length >= ASKED {
                 return Some(self.extended(compare, data, at, agree, length));
             }
             [first, second, third, fourth] = from_fn(|i| masks[length + i]);
         }
-        // Up to three more, without a branch.
+
+        // Up to three places more, without a branch.
         let one = agree & first;
         let two = one & second;
         let three = two & third;
@@ -333,7 +349,7 @@ impl<M> Places<'_, M> {
         Some(FixedMatch { length, index: M::fixed(agree.first()) })
     }
 
-    /// The longest match at `at` of those distances that `agree` in the first `length` bytes.
+    /// Returns the longest match at `at` among the distances that `agree` in the first `length` bytes.
     #[inline(always)]
     fn extended<C: Compare, const N: usize>(
         self,
@@ -346,7 +362,8 @@ impl<M> Places<'_, M> {
     where
         M: Mask<N>,
     {
-        let (here, end) = (at + length, data.len().min(at + LONGEST_MATCH));
+        let here = at + length;
+        let end = data.len().min(at + LONGEST_MATCH);
         let mut best = FixedMatch { length: 0, index: 0 };
         loop {
             let number = agree.first();
@@ -358,7 +375,8 @@ impl<M> Places<'_, M> {
             if at + best.length == end {
                 return best;
             }
-            // What is longer agrees in the next byte too.
+
+            // A longer match agrees in the next byte too.
             let next = agreeing::<_, M, N>(compare, data, at + best.length, self.line);
             agree = agree & next & !M::bit(number);
             if agree == M::default() {
@@ -374,7 +392,7 @@ mod tests {
     use proptest::prelude::*;
     use s3d_simd::Scalar;
 
-    /// The plain way: every distance, byte by byte.
+    /// The plain reference: every distance, byte by byte.
     fn reference(data: &[u8], at: usize, line: usize, n: usize, shortest: usize) -> Option<(usize, usize)> {
         let reaches = (WIDTH..=WINDOW - WIDTH / 2).contains(&line) && at >= line + n / 2;
         let above = (line.saturating_sub(n / 2 - 1)..=line + n / 2).filter(|_| reaches);
@@ -391,10 +409,11 @@ mod tests {
 
     fn check<M: Mask<N>, const N: usize, const SHORTEST: usize>(data: &[u8], line: usize, steps: &[usize]) {
         let mut matcher = FixedDistanceMatcher::<M>::new(line);
-        // A second time, with what the first left, and not from the beginning.
+        // The second time starts in the middle, with the masks of the first time.
         for start in [0, data.len() / 2] {
             matcher.begin(start);
-            let (mut at, mut steps) = (start, steps.iter().cycle());
+            let mut at = start;
+            let mut steps = steps.iter().cycle();
             while at < data.len() {
                 matcher.reach(Scalar, data, at);
                 let found = matcher
@@ -415,7 +434,7 @@ mod tests {
             line in prop_oneof![1usize..200, Just(WINDOW), Just(WINDOW - WIDTH / 2)],
             steps in proptest::collection::vec(1usize..259, 1..20),
         ) {
-            // Pieces that repeat at any distance, each ended by another byte.
+            // Pieces repeat at any distance, and each ends with another byte.
             let mut data: Vec<u8> = vec![];
             for (len, back, byte) in pieces {
                 for _ in 0..len {

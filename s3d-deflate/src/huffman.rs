@@ -1,16 +1,17 @@
 //! Prefix codes: optimal lengths under a limit, and the canonical codes of RFC 1951, section 3.2.2.
 
-/// The lengths of an optimal prefix code for symbols that occur `counts` times, none above `limit`; 0 for a
-/// symbol that does not occur. One symbol alone gets one bit.
+/// Computes the lengths of an optimal prefix code for symbols that occur `counts` times, none above `limit`.
+/// A symbol that does not occur gets 0, and a single symbol gets one bit.
 ///
-/// Where the optimum is too deep, the longest codes are shortened and others lengthened until the code is
-/// complete again: within a hair of the best code under the limit.
+/// If the optimal code is too deep, the longest codes are shortened and others lengthened until the code is
+/// complete again. The result is nearly the best code under the limit.
 ///
 /// # Panics
 /// If there are more symbols than codes of `limit` bits.
 pub(crate) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
     lengths.fill(0);
-    // Symbol in the low bits: a sort by number, then by symbol.
+
+    // The count is in the high bits and the symbol in the low bits, to sort by count, then by symbol.
     let mut keys = [0u64; 288];
     let mut n = 0;
     for (symbol, &count) in counts.iter().enumerate() {
@@ -27,10 +28,27 @@ pub(crate) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
     }
     keys.sort_unstable();
 
-    // Two queues, leaves and joined nodes, both ascending: the two smallest are at their fronts.
+    let mut leaves_at = leaves_by_depth(keys, usize::from(limit));
+    fit_to_limit(&mut leaves_at, usize::from(limit));
+
+    let mut rarest_first = keys.iter();
+    for d in (1..=usize::from(limit)).rev() {
+        for &key in rarest_first.by_ref().take(leaves_at[d] as usize) {
+            lengths[(key & 0xffff) as usize] = d as u8;
+        }
+    }
+}
+
+/// Returns the number of leaves at each depth of the optimal tree. Leaves deeper than `limit` count at
+/// `limit`. `keys` are ascending.
+fn leaves_by_depth(keys: &[u64], limit: usize) -> [u32; 16] {
+    // There are two queues, of leaves and of joined nodes. Both are ascending, so the two smallest weights
+    // are at their fronts.
+    let n = keys.len();
     let mut weights = [0u64; 287];
     let mut parents = [0u16; 2 * 288];
-    let (mut leaf, mut node) = (0, 0);
+    let mut leaf = 0;
+    let mut node = 0;
     for joined in 0..n - 1 {
         let mut sum = 0;
         for _ in 0..2 {
@@ -43,17 +61,22 @@ pub(crate) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
         weights[joined] = sum;
     }
 
-    // How many leaves lie how deep; a node's depth is known before its children's, as parents come later.
+    // From the back, the depth of a parent is known before the depths of its children.
     let mut depths = [0u8; 2 * 288];
     let mut leaves_at = [0u32; 16];
     for i in (0..2 * n - 2).rev() {
         depths[i] = (depths[usize::from(parents[i])] + 1).min(64);
         if i < n {
-            leaves_at[usize::from(depths[i].min(limit))] += 1;
+            leaves_at[usize::from(depths[i]).min(limit)] += 1;
         }
     }
-    // Leaves that were moved up to the limit take room (in units of the longest code) that others give back.
-    let limit = usize::from(limit);
+    leaves_at
+}
+
+/// Moves leaves between depths until the code is complete.
+fn fit_to_limit(leaves_at: &mut [u32; 16], limit: usize) {
+    // Leaves that were moved up to the limit take too much room, in units of the longest code. Others get
+    // longer codes and give it back.
     let mut taken: u32 = (1..=limit).map(|d| leaves_at[d] << (limit - d)).sum();
     while taken > 1 << limit {
         let d = (1..limit)
@@ -64,7 +87,8 @@ pub(crate) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
         leaves_at[d + 1] += 1;
         taken -= 1 << (limit - d - 1);
     }
-    // And what was given back too much, the longest codes take again.
+
+    // The longest codes take the room that is left over.
     while taken < 1 << limit {
         let free = (1 << limit) - taken;
         let d = (2..=limit)
@@ -74,21 +98,16 @@ pub(crate) fn code_lengths(counts: &[u32], limit: u8, lengths: &mut [u8]) {
         leaves_at[d - 1] += 1;
         taken += 1 << (limit - d);
     }
-    let mut rarest_first = keys.iter();
-    for d in (1..=limit).rev() {
-        for &key in rarest_first.by_ref().take(leaves_at[d] as usize) {
-            lengths[(key & 0xffff) as usize] = d as u8;
-        }
-    }
 }
 
-/// The canonical codes of these lengths, first bit lowest, as they are written.
+/// Computes the canonical codes of these lengths. The first bit is the lowest, as codes are written.
 pub(crate) fn canonical_codes(lengths: &[u8], codes: &mut [u16]) {
     let mut next = [0u32; 16];
     for &length in lengths {
         next[usize::from(length)] += 1;
     }
     next[0] = 0;
+
     let mut first = 0;
     for n in &mut next {
         let count = *n;
@@ -96,6 +115,7 @@ pub(crate) fn canonical_codes(lengths: &[u8], codes: &mut [u16]) {
         *n = first;
         first += count;
     }
+
     for (code, &length) in codes.iter_mut().zip(lengths) {
         let n = &mut next[usize::from(length)];
         *code = if length == 0 {
@@ -112,8 +132,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The cost of the best code without a limit: all sums of joined pairs, by searching for the smallest
-    /// two.
+    /// Returns the cost of the best code without a limit. It adds up the sums of joined pairs, and searches
+    /// for the smallest two each time.
     fn best_cost(counts: &[u32]) -> u64 {
         let mut weights: Vec<u64> = counts.iter().filter(|n| **n > 0).map(|n| u64::from(*n)).collect();
         let mut cost = 0;
@@ -143,7 +163,7 @@ mod tests {
                 prop_assert_eq!(taken, 1 << limit);
                 let cost: u64 = counts.iter().zip(&lengths).map(|(n, l)| u64::from(*n) * u64::from(*l)).sum();
                 let best = best_cost(&counts);
-                // The limit may cost a little.
+                // The limit may make the code a little longer.
                 prop_assert!(cost >= best && cost <= best + best / 16, "{} against {}", cost, best);
                 prop_assert!(cost == best || lengths.contains(&limit));
             }
@@ -166,7 +186,7 @@ mod tests {
 
     #[test]
     fn codes_are_those_of_the_standards_example() {
-        // RFC 1951, 3.2.2: lengths 3 3 3 3 3 2 4 4 of A to H.
+        // RFC 1951, 3.2.2: A to H have the lengths 3 3 3 3 3 2 4 4.
         let mut codes = [0; 8];
         canonical_codes(&[3, 3, 3, 3, 3, 2, 4, 4], &mut codes);
         let reversed = |code: u16, bits: u32| code.reverse_bits() >> (16 - bits);

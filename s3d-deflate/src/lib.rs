@@ -1,51 +1,69 @@
-//! Deflate (RFC 1951) in zlib's wrapping (RFC 1950), both ways, written for what filters leave of images, and
-//! the filters of PNG and of OpenEXR's ZIP. Any reader of PNG, OpenEXR or zlib reads what it makes, and
-//! [`Inflater`] reads what anybody makes.
+//! Deflate (RFC 1951) in the zlib format (RFC 1950) for filtered images, and the filters of PNG and of
+//! OpenEXR's ZIP, in both directions.
 //!
-//! General libraries walk chains of places one after the other, and on filtered images the processor
-//! mispredicts at each. Here
+//! # Compress
 //!
-//! - matches are looked for at fixed distances, the smallest and those around a line back, where nearly all
-//!   are if an image is smooth; or, in other images, at the last places of the same hash. All are compared at
-//!   once, without a branch;
-//! - a match is taken if it costs fewer bits than the literals it stands for, by the codes of the block
-//!   before, so that noise becomes literals;
-//! - a block is a list of small numbers, which one loop counts and another writes, without a branch on their
-//!   kind; it has codes of its own, and is written in the shortest of the format's three ways.
+//! [`Deflater`] compresses bytes into a zlib stream that every reader of PNG, OpenEXR or zlib reads. A
+//! [`Search`] says where it looks for matches; its constructors are for kinds of images. The bytes depend on
+//! the data alone and are the same on every processor.
 //!
-//! Everything is done with integers and depends on the data alone: the same bytes on every processor.
+//! # Inflate
 //!
-//! The reason that it exists: a location of a real scan (52 views of 1080² and a panorama of 4096 × 2048,
-//! each in six images) takes 1.6 s of processor time for its files with this crate, 4.7 s (6 % larger) with
-//! libdeflate and 5.6 s (3 % larger) with zlib-rs, where the whole location takes 2.4 s: it saves 56 to 62 %
-//! of a location. `cargo bench -p s3d-io --bench compressors` repeats that; the README has it by image.
+//! [`Inflater`] reads the zlib streams of every writer, into memory whose size is known.
 //!
-//! A PNG file's samples, filtered and compressed:
+//! # Filter
+//!
+//! [`png`] has the filters of PNG. [`exr`] has the byte order and differences of OpenEXR's ZIP.
+//!
+//! # Example
+//!
+//! The samples of a PNG file, filtered and compressed:
 //!
 //! ```
 //! use s3d_deflate::png::{self, Filter};
 //! use s3d_deflate::{Deflater, Search};
 //!
-//! // A gray ramp of 300 × 200 pixels with 16 bits each, big-endian as PNG wants them.
+//! // A grey ramp of 300 × 200 pixels with 16 bits each, big-endian as in PNG.
 //! let gray = |i: u16| 1000 + 3 * (i % 300) + i / 300;
 //! let samples: Vec<u8> = (0..300 * 200).flat_map(|i| gray(i).to_be_bytes()).collect();
 //! let filtered = png::filter(&samples, 2 * 300, 2, Filter::Paeth)?;
 //! let mut stream = Vec::new();
 //! Deflater::new(Search::depth(1 + 2 * 300))?.zlib(&filtered, None, &mut stream);
-//! // All that is left of a plane is its slope.
+//! // The filter leaves only the slope of a plane.
 //! assert!(stream.len() < samples.len() / 50, "{}", stream.len());
 //!
-//! // Any reader of zlib streams gets it back. An IDAT chunk holds such a stream.
+//! // Any reader of zlib streams reads it. An IDAT chunk contains such a stream.
 //! let read = fdeflate::decompress_to_vec(&stream).expect("a zlib stream");
 //! assert_eq!(read, filtered);
 //! # Ok::<(), s3d_deflate::Error>(())
 //! ```
+//!
+//! # How it is fast
+//!
+//! General libraries walk chains of earlier places one by one. On filtered images, the processor mispredicts
+//! at each. This crate does it differently:
+//!
+//! - It looks for matches at fixed distances: the smallest, and those around a line back. A smooth image has
+//!   nearly all its matches there. For other images, it looks at the last places with the same hash. It
+//!   compares all candidates at once, without a branch.
+//! - It takes a match if the match costs fewer bits than its bytes as literals, by the codes of the block
+//!   before. Noise therefore becomes literals.
+//! - A block is a list of small numbers. One loop counts them and another writes them, without a branch on
+//!   their kind. Every block has its own codes, and is written in the shortest of the three forms of the
+//!   format.
+//!
+//! # Why not a library
+//!
+//! A location of a real scan has 52 views of 1080² and a panorama of 4096 × 2048, each in six images. Their
+//! files take 1.6 s of processor time with this crate, 4.7 s (6 % larger) with libdeflate and 5.6 s (3 %
+//! larger) with zlib-rs. The whole location takes 2.4 s, so the crate saves 56 to 62 % of a location. `cargo
+//! bench -p s3d-io --bench compressors` repeats the measurement; the README has the figures by image.
 
 #![expect(
     clippy::indexing_slicing,
     clippy::expect_used,
-    reason = "on the way of every byte of an image: places are those that the encoder's own search found, and the \
-              decoder compares those that a stream names before it goes there"
+    reason = "speed: the places in the encoder come from its own search, and the decoder checks the places \
+              that a stream names"
 )]
 
 mod alphabet;
@@ -76,31 +94,31 @@ use tokens::Tokens;
 /// The largest distance of a match, in bytes.
 const WINDOW: usize = 1 << 15;
 
-/// A call that cannot be answered.
+/// The errors of this crate.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A setting of a [`Search`] is out of its range.
     #[error("{setting} is {value}, not {min} to {max}")]
     Setting {
-        /// The field's name.
+        /// The name of the field.
         setting: &'static str,
-        /// Its value.
+        /// The value of the field.
         value: usize,
-        /// The least that is possible.
+        /// The smallest valid value.
         min: usize,
-        /// The most.
+        /// The largest valid value.
         max: usize,
     },
-    /// Samples do not fill whole lines, or lines no whole pixels.
-    #[error("{len} are no whole lines of {line}")]
+    /// Samples are not whole lines, or a line is not whole pixels.
+    #[error("{len} bytes or pixels are not whole lines or pixels of {line}")]
     PartialLine {
-        /// How many bytes or pixels there are.
+        /// The number of bytes or pixels.
         len: usize,
-        /// How many of them make a line.
+        /// The number of them in a line (or of bytes in a pixel).
         line: usize,
     },
-    /// A line of a PNG image begins with a number that no filter has.
+    /// A line of a PNG image begins with a number that is not the number of a filter.
     #[error("a filter of number {number}, not 0 to 4")]
     UnknownFilter {
         /// The number.
@@ -109,7 +127,7 @@ pub enum Error {
     /// A zlib stream cannot be read.
     #[error("a damaged zlib stream: {about}")]
     Stream {
-        /// What is wrong with it.
+        /// The fault of the stream.
         about: std::borrow::Cow<'static, str>,
     },
 }
@@ -126,8 +144,8 @@ struct Readme;
 
 /// Compresses one stream after the other.
 ///
-/// The codes of one stream are what the next expects things to cost, so a stream's bytes depend on those
-/// before: make a new `Deflater` for each file if equal input is to give equal files.
+/// A stream takes its expected costs from the codes of the stream before, so its bytes depend on earlier
+/// streams. Make a new `Deflater` for each file if equal input has to give equal files.
 ///
 /// ```
 /// use s3d_deflate::{Deflater, Error, Search};
@@ -150,14 +168,14 @@ pub struct Deflater {
     tokens: Tokens,
 }
 
-/// How much of the first data is looked at to begin with.
+/// The number of bytes of the first data from which the first costs are guessed.
 const SAMPLE: usize = 1 << 15;
 
 impl Deflater {
-    /// With its own memory: 600 kB to 1.1 MB.
+    /// Makes a compressor with memory of its own, 600 kB to 1.1 MB.
     ///
     /// # Errors
-    /// [`Error::Setting`].
+    /// [`Error::Setting`] if a setting of `search` is out of its range.
     pub fn new(search: Search) -> Result<Self, Error> {
         search.check()?;
         Ok(Self {
@@ -170,11 +188,12 @@ impl Deflater {
         })
     }
 
-    /// Appends `data` to `out` as a zlib stream. At `boundary` begins data of another kind, which gets codes
+    /// Appends `data` to `out` as a zlib stream. If data of another kind begins at `boundary`, it gets codes
     /// of its own.
     pub fn zlib(&mut self, data: &[u8], boundary: Option<usize>, out: &mut Vec<u8>) {
-        // Deflate, 32 KiB back; no claim about the effort; divisible by 31.
+        // The header: deflate with a window of 32 KiB, the lowest level, divisible by 31.
         out.extend([0x78, 0x01]);
+
         let sample = &data[..data.len().min(SAMPLE)];
         let costs = self.costs.get_or_insert_with(|| Costs::guess(sample, &self.tokens));
         let mut bits = BitWriter::new(out);
@@ -189,6 +208,7 @@ impl Deflater {
         };
         parser.run(data, &mut bits);
         bits.finish();
+
         out.extend(simd_adler32::adler32(&data).to_be_bytes());
     }
 }
@@ -209,7 +229,7 @@ mod tests {
         patience: 6,
     };
 
-    /// One of each kind, from the quickest to the most thorough.
+    /// Returns one search of each kind, from the quickest to the most thorough.
     fn searches() -> Vec<Search> {
         use Candidates::{
             FixedDistances, HalfOfFixedDistances, Hash1, Hash2, Hash4, Hash16, LongFixedDistances,
@@ -230,7 +250,7 @@ mod tests {
         ]
     }
 
-    /// Another implementation reads it, to the last byte.
+    /// Inflates with another implementation, which must read the stream to the last byte.
     fn inflated(stream: &[u8], len: usize) -> Vec<u8> {
         let mut out = Vec::with_capacity(len + 1);
         let mut reader = flate2::Decompress::new(true);
@@ -245,7 +265,7 @@ mod tests {
     fn check(data: &[u8], boundary: usize) {
         for search in searches() {
             let mut deflater = Deflater::new(search).unwrap();
-            // A second time with what the first taught.
+            // The second time, with the costs of the first.
             for _ in 0..2 {
                 let mut out = Vec::new();
                 deflater.zlib(data, Some(boundary), &mut out);
@@ -255,7 +275,7 @@ mod tests {
         }
     }
 
-    /// No block but the last and that at a boundary is of fewer bytes, nearly.
+    /// Nearly the smallest number of bytes of a block, except the last block and the one at a boundary.
     const BLOCK_AT_LEAST: usize = 60_000;
 
     fn noise(len: usize, values: u32) -> Vec<u8> {
@@ -269,7 +289,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(96))]
-        /// Pieces repeated at any distance, with noise between them.
+        /// The data is pieces repeated at any distance, with noise between them.
         #[test]
         fn data_comes_back(
             pieces in proptest::collection::vec((0usize..400, 1usize..3000, 1u32..256), 0..40),
@@ -297,7 +317,7 @@ mod tests {
 
     #[test]
     fn matches_as_far_back_as_they_may_be_are_found() {
-        // Noise that comes back after the longest distance, and after one more.
+        // Noise repeats after the longest distance, and after one byte more.
         let find = |distance: usize| {
             let once = noise(distance, 256);
             let data = [&once[..], &once[..10_000]].concat();
@@ -313,11 +333,12 @@ mod tests {
 
     #[test]
     fn bytes_do_not_depend_on_the_processor() {
-        // The path for any processor against the one that was chosen.
+        // Compares the path for any processor with the chosen path.
         let data = [noise(30_000, 3), noise(5_000, 256), noise(30_000, 1)].concat();
         for search in searches() {
             let mut chosen = Vec::new();
             Deflater::new(search).unwrap().zlib(&data, Some(40_000), &mut chosen);
+
             let mut plain = vec![0x78, 0x01];
             let mut bits = BitWriter::new(&mut plain);
             let mut tokens = Tokens::new(fixed_distances(search.line));
@@ -336,6 +357,7 @@ mod tests {
                 parser.at_fixed_distances(s3d_simd::Scalar, &data, &mut bits);
             }
             bits.finish();
+
             assert_eq!(plain, chosen[..chosen.len() - 4], "{search:?}");
         }
     }
@@ -352,7 +374,8 @@ mod tests {
         for search in wrong {
             assert!(matches!(Deflater::new(search).err(), Some(Error::Setting { .. })), "{search:?}");
         }
-        // At the ends of their ranges they are settings like others.
+
+        // The ends of the ranges are valid.
         let data = noise(20_000, 5);
         for candidates in searches().iter().map(|search| search.candidates) {
             for (line, sample, patience) in
@@ -367,8 +390,8 @@ mod tests {
         }
     }
 
-    /// Exports of different versions are compared byte by byte: sizes and Adler checksums of two streams of
-    /// each search.
+    /// Exports of different versions are compared byte by byte. These are the sizes and Adler checksums of
+    /// two streams of each search.
     #[test]
     fn streams_stay_as_they_are() {
         let data = [noise(50_000, 3), noise(5_000, 256), noise(30_000, 1)].concat();

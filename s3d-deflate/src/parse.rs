@@ -1,4 +1,4 @@
-//! Data to tokens: which bytes become literals, and which matches.
+//! Parses data into tokens: decides which bytes become literals and which become matches.
 
 use crate::WINDOW;
 use crate::alphabet::LONGEST_MATCH;
@@ -11,19 +11,18 @@ use crate::search::{Candidates, Search};
 use crate::simd::{Compare, Kernel, dispatch};
 use crate::tokens::{BLOCK, Tokens};
 
-/// Places passed over at most.
+/// The largest number of steps that are skipped.
 const LONGEST_STEP: usize = 32;
-/// Matches of more bytes than that pay, whatever their bytes cost as literals.
+/// Longer matches pay, whatever their bytes cost as literals.
 const PAYING: usize = 5;
-/// Bytes, at least, of matches where only long ones are looked for.
+/// The length from which matches are taken in a search for long ones.
 const LONG: usize = 15;
-/// Bytes to the next place where only long ones are looked for. What begins between two places is found at
-/// the second.
+/// The step in a search for long matches. A match that begins between two places is found at the second.
 const LONG_STEP: usize = 4;
-/// Bytes at the end in which nothing is looked for.
+/// The number of bytes at the end that are not searched.
 const TAIL: usize = LONGEST_MATCH + 8;
 
-/// One pass over data.
+/// A pass over data.
 pub(crate) struct Parser<'a> {
     pub(crate) hash_matcher: &'a mut HashMatcher,
     pub(crate) all_distances: &'a mut FixedDistanceMatcher<u64>,
@@ -31,12 +30,12 @@ pub(crate) struct Parser<'a> {
     pub(crate) tokens: &'a mut Tokens,
     pub(crate) costs: &'a mut Costs,
     pub(crate) search: Search,
-    /// A place where a block ends, as the data is of another kind after it.
+    /// A place where a block ends, because data of another kind follows.
     pub(crate) boundary: usize,
 }
 
 impl Parser<'_> {
-    /// Writes `data` as blocks, in the widest registers that pay.
+    /// Writes `data` as blocks, in the widest registers that make it faster.
     pub(crate) fn run(self, data: &[u8], out: &mut BitWriter<'_>) {
         if self.search.candidates.are_of_a_hash() {
             dispatch(ByHash { parser: self, data, out });
@@ -45,13 +44,13 @@ impl Parser<'_> {
         }
     }
 
-    /// Matches at the fixed distances alone.
+    /// Writes `data` as blocks, with matches at the fixed distances only.
     #[inline(always)]
     pub(crate) fn at_fixed_distances<C: Compare>(self, compare: C, data: &[u8], out: &mut BitWriter<'_>) {
         let Self { all_distances: all, half_of_distances: half, tokens, costs, search, boundary, .. } = self;
         let mut at = 0;
         for (until, is_last) in [(boundary.min(data.len()), false), (data.len(), true)] {
-            // A stream without data has a block, too.
+            // A stream without data has a block too.
             if at == until && !(is_last && data.is_empty()) {
                 continue;
             }
@@ -65,14 +64,14 @@ impl Parser<'_> {
         }
     }
 
-    /// Matches at places of the same hash, and a line back.
+    /// Writes `data` as blocks, with matches at places of the same hash and a line back.
     #[inline(always)]
     pub(crate) fn by_hash(self, data: &[u8], out: &mut BitWriter<'_>) {
+        // Edges at an angle are shifted by a sample or two from line to line.
         let line = self.search.line;
-        // Lines seen at an angle are shifted against each other by a sample or two.
         let s = self.search.sample;
         let around = [line, line.saturating_sub(s), line + s, line.saturating_sub(2 * s), line + 2 * s];
-        // Very short and very long lines: any other distance will do.
+        // For very short and very long lines, any other distance will do.
         let around = around.map(|distance| distance.clamp(1, WINDOW));
         match self.search.candidates {
             Candidates::Hash1 => self.parse_by_hash::<1, 1, 0, 3, 3>(data, [], out),
@@ -82,9 +81,9 @@ impl Parser<'_> {
         }
     }
 
-    /// `PIXEL` bytes belong together, after one byte at the start of each line if `PIXEL` is more than one.
-    /// Every `STEP` bytes a match is looked for, among the last `WAYS` places of the hash, of `WORDS` words,
-    /// and `ROWS` distances.
+    /// Searches for a match every `STEP` bytes, among the last `WAYS` places of the hash, which are in
+    /// `WORDS` words, and at `ROWS` distances. `PIXEL` bytes are a pixel. If `PIXEL` is more than one, each
+    /// line starts with one byte of the filter.
     #[inline(always)]
     fn parse_by_hash<
         const WORDS: usize,
@@ -101,12 +100,18 @@ impl Parser<'_> {
         let Self { hash_matcher, tokens, costs, search, boundary, .. } = self;
         hash_matcher.begin::<WORDS>();
         tokens.clear();
+
         let end = data.len().saturating_sub(TAIL);
         let mut at = 1;
-        // The block's first byte, its symbols so far, and the first byte that is in no token.
-        let (mut block, mut symbols, mut pending) = (0, 0, 0);
         let mut line_end = search.line;
+        // The first byte of the block, and its number of symbols so far.
+        let mut block = 0;
+        let mut symbols = 0;
+        // The first byte that is not in a token.
+        let mut pending = 0;
+
         while at < end {
+            // Go to the next first byte of a pixel.
             if PIXEL > 1 {
                 while at >= line_end {
                     line_end += search.line;
@@ -117,6 +122,7 @@ impl Parser<'_> {
                     continue;
                 }
             }
+
             let places = hash_matcher.insert::<WORDS>(data, at);
             let mut found = hash_matcher.best::<WORDS, WAYS, ROWS>(data, at, places, rows, costs);
             if found.gain <= 0 {
@@ -125,6 +131,7 @@ impl Parser<'_> {
                 }
                 at += STEP + PIXEL * ((at - pending) >> search.patience).min(LONGEST_STEP);
             } else {
+                // The next place may have a better match.
                 let mut known = at + PIXEL;
                 while found.length < search.lazy && at + PIXEL < end {
                     let places = hash_matcher.insert::<WORDS>(data, at + PIXEL);
@@ -136,7 +143,8 @@ impl Parser<'_> {
                     at += PIXEL;
                     found = next;
                 }
-                // It may have begun before, at a place passed over.
+
+                // The match may begin earlier, at a place that was skipped.
                 while at > pending.max(found.distance)
                     && found.length < LONGEST_MATCH
                     && data[at - 1] == data[at - 1 - found.distance]
@@ -144,13 +152,15 @@ impl Parser<'_> {
                     at -= 1;
                     found.length += 1;
                 }
+
                 tokens.literals(data, pending, at);
                 tokens.any_match(found.length, found.distance);
                 symbols += at - pending + 1;
                 at += found.length;
                 pending = at;
+
+                // Remember the places in the match. The places in a run are all alike.
                 let until = at.min(end);
-                // The places in a run are all alike.
                 let run = found.distance <= 8 && found.distance < found.length;
                 if run || found.length > search.remember {
                     known += (until.saturating_sub(known) / PIXEL).saturating_sub(4) * PIXEL;
@@ -160,24 +170,29 @@ impl Parser<'_> {
                     known += PIXEL;
                 }
             }
+
             let full = symbols + (at - pending) >= BLOCK || block < boundary && at >= boundary;
             if full && at < end {
                 tokens.literals(data, pending, at);
                 write_block(data, block..at, tokens, false, costs, out);
                 tokens.clear();
-                (block, symbols, pending) = (at, 0, at);
+                block = at;
+                symbols = 0;
+                pending = at;
             }
         }
+
         tokens.literals(data, pending, data.len());
         write_block(data, block..data.len(), tokens, true, costs, out);
     }
 }
 
-/// A part of the data, to be searched at fixed distances.
+/// A part of the data, for the search at fixed distances.
 struct FixedPart<'a, 'b> {
     data: &'a [u8],
-    /// Its first byte, and where the next part begins.
+    /// The first byte of the part.
     at: usize,
+    /// The first byte of the next part.
     until: usize,
     tokens: &'a mut Tokens,
     costs: &'a mut Costs,
@@ -185,8 +200,8 @@ struct FixedPart<'a, 'b> {
 }
 
 impl FixedPart<'_, '_> {
-    /// Writes it as blocks, with matches of `SHORTEST` bytes and more, which is 3 or [`LONG`], and returns
-    /// where it ended: the last match may go on behind it.
+    /// Writes the part as blocks, with matches of at least `SHORTEST` bytes, which is 3 or [`LONG`]. Returns
+    /// the place where it ended: the last match may extend into the next part.
     #[inline(always)]
     fn parse<C: Compare, M: Mask<N>, const N: usize, const SHORTEST: usize>(
         &mut self,
@@ -196,9 +211,12 @@ impl FixedPart<'_, '_> {
         let Self { data, mut at, until, ref mut tokens, ref mut costs, ref mut out } = *self;
         matcher.begin(at);
         tokens.clear();
-        // The block's first byte, the first that is in no token, and the place where the block is full if no
-        // match comes before.
-        let (mut block, mut pending, mut full) = (at, at, at + BLOCK);
+
+        // The first byte of the block, and the first byte that is not in a token.
+        let mut block = at;
+        let mut pending = at;
+        // The place where the block is full if no match comes before.
+        let mut full = at + BLOCK;
         loop {
             at = at.min(data.len());
             if at >= full.min(until) {
@@ -209,10 +227,12 @@ impl FixedPart<'_, '_> {
                     return at;
                 }
                 tokens.clear();
-                (block, pending, full) = (at, at, at + BLOCK);
+                block = at;
+                pending = at;
+                full = at + BLOCK;
             }
-            // Where there is something else to do than to look for matches: the block may be full, or masks
-            // are missing.
+
+            // The search pauses where the block may be full or masks are missing.
             let pause = matcher.reach(compare, data, at).min(full).min(until);
             let places = matcher.places();
             while at < pause {
@@ -224,10 +244,13 @@ impl FixedPart<'_, '_> {
                     };
                     continue;
                 };
+
                 if SHORTEST <= PAYING && found.length <= PAYING && !costs.pays(data, at, found) {
                     at += 1;
                     continue;
                 }
+
+                // The match may begin earlier, at a place that was skipped.
                 if SHORTEST > PAYING {
                     let distance = tokens.fixed_distances[found.index];
                     while at > pending.max(distance)
@@ -238,6 +261,7 @@ impl FixedPart<'_, '_> {
                         found.length += 1;
                     }
                 }
+
                 tokens.literals(data, pending, at);
                 tokens.fixed_match(found.index, found.length);
                 at += found.length;

@@ -1,64 +1,69 @@
-//! How hard and where matches are looked for.
+//! The settings of the search for matches.
 
 use crate::Error;
 
-/// Distances around a line are computed without overflow.
+/// The largest line and sample, so that distances around a line do not overflow.
 const MAX_BYTES: usize = isize::MAX as usize / 4;
 
-/// How hard and where matches are looked for. The constructors give settings that were chosen on images of
-/// scans; `..` changes some of them:
+/// The settings of the search for matches.
+///
+/// The constructors return settings that were chosen on images of scans; `..` changes some of them:
 ///
 /// ```
 /// use s3d_deflate::Search;
 ///
-/// // Pixels of 3 bytes, 640 a line, after the filter's byte. Less time for larger files.
+/// // Lines of 640 pixels of 3 bytes, after the byte of the filter. Takes less time, for larger files.
 /// let search = Search { nice: 16, patience: 3, ..Search::photo(1 + 3 * 640) };
 /// assert_eq!(search.sample, 3);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Search {
-    /// Which earlier places a place is compared with.
+    /// The earlier places with which a place is compared.
     pub candidates: Candidates,
-    /// Bytes from one line to the next, the filter's own byte included: 1 to `isize::MAX / 4`.
+    /// The number of bytes from one line to the next, with the byte of the filter: 1 to `isize::MAX / 4`.
     pub line: usize,
-    /// Bytes from one sample of a line to the next: likewise. Lines are also compared shifted by one and two.
+    /// The number of bytes from one sample of a line to the next: 1 to `isize::MAX / 4`. A line is also
+    /// compared with the line before shifted by one and two samples.
     pub sample: usize,
-    /// Bytes that a hash is made of, 4 to 8, and so the shortest match but at the distance of a line.
+    /// The number of bytes in a hash, 4 to 8. Matches are at least as long, except at the distance of a line.
     pub hash_bytes: u32,
-    /// A match shorter than this is dropped if the next place has a better one.
+    /// A match shorter than this is dropped if the next place has a better match.
     pub lazy: usize,
-    /// A match as long as this is taken at once.
+    /// A match of at least this length is taken at once.
     pub nice: usize,
-    /// Every place in a match as long as this is remembered; of longer ones, and of runs, a few at the end.
+    /// All places in a match up to this length are remembered. In longer matches and in runs, only a few
+    /// places at the end are.
     pub remember: usize,
-    /// After 2ⁿ bytes without a match, places are passed over, more and more: n is 31 at most.
+    /// After 2ⁿ bytes without a match, the search skips more and more places. `patience` is n, 0 to 31.
     pub patience: u32,
 }
 
-/// Which earlier places a place is compared with.
+/// The earlier places with which a place is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Candidates {
-    /// The last of its hash, at every third byte: for noisy pixels of three bytes.
+    /// The last place of the same hash, at every third byte: for noisy pixels of three bytes.
     Hash1,
-    /// The two last of its hash and that a line back, at every third byte: for pixels of three bytes in
-    /// patches.
+    /// The last two places of the same hash and the place a line back, at every third byte: for patches of
+    /// pixels of three bytes.
     Hash2,
-    /// The four last of its hash and those around a line back, at every second byte: for steps along lines.
+    /// The last four places of the same hash and the places around a line back, at every second byte: for
+    /// steps along lines.
     Hash4,
-    /// The sixteen last of its hash and those around a line back.
+    /// The last sixteen places of the same hash and the places around a line back, at every byte.
     Hash16,
-    /// Those 1 to 32 bytes back and those a line less 15 to a line and 16 back, at every byte: for smooth
-    /// surfaces. Of the other settings, only `line` matters.
+    /// The places 1 to 32 bytes back, and a line − 15 to a line + 16 bytes back, at every byte: for smooth
+    /// surfaces. Besides `candidates`, only `line` matters.
     FixedDistances,
-    /// Those 1 to 16 bytes back and those a line less 7 to a line and 8 back, at every byte: likewise, in
-    /// less time, in larger files.
+    /// The places 1 to 16 bytes back, and a line − 7 to a line + 8 bytes back, at every byte: for smooth
+    /// surfaces, in less time and larger files.
     HalfOfFixedDistances,
-    /// As `FixedDistances`, but only matches of 15 bytes and more, at every fourth byte: where literals cost
-    /// little.
+    /// The places of `FixedDistances`, but only for matches of at least 15 bytes, at every fourth byte: for
+    /// data whose literals cost little.
     LongFixedDistances,
-    /// As `FixedDistances` before the data's boundary; after it only matches of 15 bytes and more, at every
-    /// fourth byte, of `HalfOfFixedDistances`: where numbers have their noisy bytes apart, before the others.
+    /// `FixedDistances` before the boundary of the data. After it, the places of `HalfOfFixedDistances`, only
+    /// for matches of at least 15 bytes, at every fourth byte. For numbers whose noisy bytes come apart,
+    /// before the others.
     SplitFixedDistances,
 }
 
@@ -69,7 +74,7 @@ impl Candidates {
 }
 
 impl Search {
-    /// For colours with noise, 8 bits a channel, three channels, after Paeth's filter.
+    /// Returns settings for noisy colours, three channels of 8 bits, after Paeth's filter.
     pub const fn photo(line: usize) -> Self {
         Self {
             candidates: Candidates::Hash1,
@@ -83,22 +88,24 @@ impl Search {
         }
     }
 
-    /// For three bytes a pixel that are constant in patches, after the filter "up", in the least time.
+    /// Returns settings for pixels of three bytes that are constant in patches, after the filter "up", in the
+    /// least time.
     pub const fn patches(line: usize) -> Self {
         Self { candidates: Candidates::Hash2, hash_bytes: 6, nice: 64, patience: 8, ..Self::photo(line) }
     }
 
-    /// The same in smaller files.
+    /// Returns settings for the same images as [`Search::patches`], in smaller files.
     pub const fn labels(line: usize) -> Self {
         Self { candidates: Candidates::Hash4, hash_bytes: 4, lazy: 258, nice: 258, ..Self::patches(line) }
     }
 
-    /// For what changes little along a line and from line to line: normals without a filter.
+    /// Returns settings for data that changes little along a line and from line to line: normals without a
+    /// filter.
     pub const fn smooth(line: usize) -> Self {
         Self { candidates: Candidates::HalfOfFixedDistances, ..Self::photo(line) }
     }
 
-    /// For OpenEXR's blocks of floats of so many bytes, of which even bytes come before odd ones.
+    /// Returns settings for OpenEXR's blocks of floats of so many bytes, with even bytes before odd bytes.
     pub const fn floats(line: usize, bytes: usize) -> Self {
         // Half floats have their exponents in the odd bytes.
         let candidates = if bytes == 2 {
@@ -109,13 +116,14 @@ impl Search {
         Self { candidates, ..Self::photo(line) }
     }
 
-    /// For 16-bit samples of smooth surfaces after Paeth's filter, such as depth, of which small numbers are
-    /// left.
+    /// Returns settings for 16-bit samples of smooth surfaces, such as depth, after Paeth's filter, which
+    /// leaves small numbers.
     pub const fn depth(line: usize) -> Self {
         Self { candidates: Candidates::LongFixedDistances, sample: 2, ..Self::thorough(line, 2) }
     }
 
-    /// For any image with samples of so many bytes: the smallest files, in several times the time.
+    /// Returns settings for any image with samples of so many bytes: the smallest files, in several times the
+    /// time.
     pub const fn thorough(line: usize, sample: usize) -> Self {
         Self { candidates: Candidates::Hash16, sample, remember: 258, ..Self::labels(line) }
     }

@@ -1,22 +1,24 @@
 //! Loops over bytes in wide registers.
 //!
-//! Wide registers against the portable form make a view's files in a third of the time
-//! (`docs/performance/encoding.md`). Every form gives the same bytes: tests hold each to the portable one.
+//! Wide registers make the files of a view in a third of the time of the portable form
+//! (`docs/performance/encoding.md`). Every form gives the same bytes; tests compare each with the portable
+//! form.
 
 use s3d_simd::{Level, Scalar, level};
 
-/// Bytes in a register, and places that one comparison asks.
+/// The number of bytes in a register, and of places that one comparison covers.
 pub(crate) const WIDTH: usize = 32;
-/// Bytes in a row that are compared at once.
+/// The number of successive bytes that are compared at once.
 pub(crate) const ROW: usize = 16;
 
-/// Compares bytes. Levels of instructions do, with their own.
+/// A comparison of bytes, with the instructions of a level.
 pub(crate) trait Compare: Copy {
-    /// Which bytes of `window` are `byte`: a bit for each, the first lowest.
+    /// Returns which bytes of `window` equal `byte`: a bit for each, the first lowest.
     fn equal(self, window: &[u8; WIDTH], byte: u8) -> u32;
 
-    /// The same of a row of bytes and two windows for each, of which the first begin those of `upper` and
-    /// `lower`, and each next a byte behind: those of the upper window in the upper half.
+    /// Compares each byte of a row with two windows. The windows of the first byte begin at the first byte of
+    /// `upper` and `lower`; the windows of each next byte begin one byte later. The result of the upper
+    /// window is in the upper half of the bits.
     #[inline(always)]
     fn equal_in_two(
         self,
@@ -31,7 +33,7 @@ pub(crate) trait Compare: Copy {
         }
     }
 
-    /// The same of windows of half the size.
+    /// Compares each byte of a row like [`equal_in_two`](Self::equal_in_two), with windows of half the size.
     #[inline(always)]
     fn equal_in_halves(
         self,
@@ -47,7 +49,7 @@ pub(crate) trait Compare: Copy {
     }
 }
 
-/// Two windows of half the size in one.
+/// Joins two windows of half the size.
 #[inline(always)]
 pub(crate) fn joined(upper: &[u8; WIDTH / 2], lower: &[u8; WIDTH / 2]) -> [u8; WIDTH] {
     let mut window = [0; WIDTH];
@@ -64,7 +66,7 @@ impl Compare for Scalar {
         let mut equal = 0;
         for (i, eight) in window.as_chunks::<8>().0.iter().enumerate() {
             let differ = u64::from_le_bytes(*eight) ^ expected;
-            // The highest bit of each byte that is 0, then all of them side by side.
+            // The highest bit of each byte that is 0. The multiplication then moves them side by side.
             let zeros = !(((differ & LOW) + LOW) | differ | LOW);
             equal |= ((zeros >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * i);
         }
@@ -72,16 +74,16 @@ impl Compare for Scalar {
     }
 }
 
-/// Loops over bytes. `run` is `#[inline(always)]`, so that [`dispatch`] compiles it once for each kind of
-/// registers.
+/// Work that loops over bytes. `run` is `#[inline(always)]`, so [`dispatch`] compiles it once for each kind
+/// of registers.
 pub(crate) trait Kernel {
     type Output;
-    /// Whether AVX-512 makes it faster than AVX2.
+    /// True if AVX-512 is faster than AVX2.
     const GAINS_FROM_AVX512: bool;
     fn run<C: Compare>(self, compare: C) -> Self::Output;
 }
 
-/// Runs `kernel` in the widest registers that are in use and that it gains from.
+/// Runs `kernel` in the widest registers that are in use and make it faster.
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     dispatch_on(
         if K::GAINS_FROM_AVX512 {
@@ -101,7 +103,7 @@ fn dispatch_on<K: Kernel>(level: Level, kernel: K) -> K::Output {
             #[inline(always)]
             || kernel.run(avx2),
         ),
-        // Comparisons into its mask registers are no faster; what surrounds them is.
+        // Comparisons use AVX2, since mask registers are no faster. The code around them gains from AVX-512.
         #[cfg(target_arch = "x86_64")]
         Level::Avx512(avx512) => avx512.vectorize(
             #[inline(always)]
@@ -119,7 +121,7 @@ mod x86_64 {
         _mm256_movemask_epi8, _mm256_set_m128i, _mm256_set1_epi8,
     };
 
-    /// Expands `$body` for each byte of a row, whose number is the constant `$j`.
+    /// Expands `$body` for each byte of a row. The constant `$j` is the number of the byte.
     macro_rules! for_each_of_row {
         ($j:ident => $body:expr) => {
             for_each_of_row!(@ $j [0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15] => $body)
@@ -127,21 +129,23 @@ mod x86_64 {
         (@ $j:ident [$($n:literal)*] => $body:expr) => { $({ const $j: usize = $n; $body; })* };
     }
 
-    /// The bytes of `window` from `at` on.
+    /// Loads the bytes of `window` from `at` on.
     #[inline(always)]
     fn load<const N: usize>(window: &[u8; N], at: usize) -> __m256i {
         let bytes: &[u8; WIDTH] = window[at..].first_chunk().expect("a window is longer");
-        // SAFETY: the load reads 32 bytes, from any address; it is called where the processor has AVX2.
+        // SAFETY: the load reads 32 bytes, from any address. The callers are methods of `Avx2`, which proves
+        // that the processor has AVX2.
         #[allow(unsafe_code)]
         unsafe {
             _mm256_loadu_si256(bytes.as_ptr().cast())
         }
     }
 
-    /// The halves of numbers, the lower first.
+    /// Views numbers as their halves, the lower half first.
     #[inline(always)]
     fn halves(numbers: &mut [u64; ROW]) -> &mut [[u32; 2]; ROW] {
-        // SAFETY: as large, and aligned to less; both take any bits. The lower half comes first on x86-64.
+        // SAFETY: the types have the same size, the target needs less alignment, and both take any bits. The
+        // lower half comes first on x86-64.
         #[allow(unsafe_code)]
         unsafe {
             &mut *std::ptr::from_mut(numbers).cast()
@@ -151,14 +155,14 @@ mod x86_64 {
     impl Compare for Avx2 {
         #[inline(always)]
         fn equal(self, window: &[u8; WIDTH], byte: u8) -> u32 {
-            // SAFETY: an `Avx2` is made only where the processor has AVX2.
+            // SAFETY: an `Avx2` exists only if the processor has AVX2.
             #[allow(unsafe_code)]
             unsafe {
                 _mm256_movemask_epi8(_mm256_cmpeq_epi8(load(window, 0), _mm256_set1_epi8(byte as i8))) as u32
             }
         }
 
-        // Windows are shifted together in registers, in halves of 16 bytes: loading each would take longer.
+        // Windows are shifted in registers, in halves of 16 bytes. Loading each window would take longer.
         #[inline(always)]
         fn equal_in_two(
             self,
@@ -167,11 +171,14 @@ mod x86_64 {
             bytes: &[u8; ROW],
             equal: &mut [u64; ROW],
         ) {
-            let (upper, after_upper) = (load(upper, 0), load(upper, ROW));
-            let (lower, after_lower) = (load(lower, 0), load(lower, ROW));
+            let after_upper = load(upper, ROW);
+            let upper = load(upper, 0);
+            let after_lower = load(lower, ROW);
+            let lower = load(lower, 0);
             let halves = halves(equal);
+
             for_each_of_row!(J => {
-                // SAFETY: as above.
+                // SAFETY: an `Avx2` exists only if the processor has AVX2.
                 #[allow(unsafe_code)]
                 unsafe {
                     let byte = _mm256_set1_epi8(bytes[J] as i8);
@@ -191,7 +198,7 @@ mod x86_64 {
             bytes: &[u8; ROW],
             equal: &mut [u32; ROW],
         ) {
-            // SAFETY: the loads read 16 of 32 bytes; otherwise as above.
+            // SAFETY: the loads read 16 of 32 bytes, and an `Avx2` exists only if the processor has AVX2.
             #[allow(unsafe_code)]
             let (both, after) = unsafe {
                 let half =
@@ -201,8 +208,9 @@ mod x86_64 {
                     _mm256_set_m128i(half(upper, ROW), half(lower, ROW)),
                 )
             };
+
             for_each_of_row!(J => {
-                // SAFETY: as above.
+                // SAFETY: an `Avx2` exists only if the processor has AVX2.
                 #[allow(unsafe_code)]
                 unsafe {
                     let windows = _mm256_alignr_epi8::<{ J as i32 }>(after, both);
@@ -219,7 +227,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Both comparisons of a row.
+    /// A kernel that makes both comparisons of a row.
     #[derive(Clone, Copy)]
     struct Windows<'a> {
         upper: &'a [u8; WIDTH + ROW],
@@ -234,7 +242,8 @@ mod tests {
         const GAINS_FROM_AVX512: bool = true;
 
         fn run<C: Compare>(self, compare: C) -> Self::Output {
-            let (mut in_two, mut in_halves) = ([0; ROW], [0; ROW]);
+            let mut in_two = [0; ROW];
+            let mut in_halves = [0; ROW];
             compare.equal_in_two(self.upper, self.lower, self.bytes, &mut in_two);
             compare.equal_in_halves(self.upper_half, self.lower_half, self.bytes, &mut in_halves);
             (in_two, in_halves)
@@ -254,8 +263,10 @@ mod tests {
         fn all_processors_compare_rows_alike(data in proptest::collection::vec(0u8..4, 3 * (WIDTH + ROW))) {
             let [upper, lower, bytes] = data.as_chunks::<{ WIDTH + ROW }>().0 else { unreachable!() };
             let bytes: &[u8; ROW] = bytes.first_chunk().unwrap();
-            let (upper_half, lower_half) = (upper.first_chunk().unwrap(), lower.first_chunk().unwrap());
-            // The plain way: byte by byte.
+            let upper_half = upper.first_chunk().unwrap();
+            let lower_half = lower.first_chunk().unwrap();
+
+            // The plain reference: byte by byte.
             let in_window = |window: &[u8], at: usize, width: usize| {
                 (0..width).fold(0, |bits, i| bits | u64::from(window[at + i] == bytes[at]) << i)
             };
@@ -266,6 +277,7 @@ mod tests {
             let expected_in_halves = std::array::from_fn(|at| {
                 (in_window(upper, at, half) << half | in_window(lower, at, half)) as u32
             });
+
             let windows = Windows { upper, lower, upper_half, lower_half, bytes };
             for level in Level::all() {
                 prop_assert_eq!(dispatch_on(level, windows), (expected, expected_in_halves));

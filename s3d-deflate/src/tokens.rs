@@ -1,43 +1,44 @@
-//! What a block consists of, one small number after the other: literals, lengths, distances, and extra bits.
+//! The content of a block as a list of small numbers: literals, lengths, distances and extra bits.
 //!
-//! All of them are counted and written in the same way, without a branch on which kind is next: it would be
-//! mispredicted. Only long runs of literals stay where they lie, and are counted and written from there.
+//! All of them are counted and written in the same way, without a branch on the kind, which would be
+//! mispredicted. Only long runs of literals stay in the data, and are counted and written from there.
 
 use crate::WINDOW;
 use crate::alphabet::{Counts, DISTANCES, LENGTH_SYMBOLS, LONGEST_MATCH, distance_symbol};
 use crate::bit_writer::{BitWriter, Bits};
 use crate::fixed_distance::FIXED;
 
-/// Symbols in a block; only steps over several bytes make it a few more.
+/// The number of symbols in a block. Steps over several bytes may add a few more.
 pub(crate) const BLOCK: usize = 64_000;
-/// Tokens in a block at most: a match takes four.
+/// The largest number of tokens in a block. A match takes up to four.
 const ROOM: usize = 4 * (BLOCK + 4 * LONGEST_MATCH);
 
-/// Literals come first; then there is a token for each length, with the extra bits of its symbol;
+/// The first token of lengths, after the literals. There is one for each length, with its extra bits.
 const LENGTH: usize = 256;
-/// then one for each symbol of distances, without its extra bits;
+/// The first token of distances. There is one for each symbol, without extra bits.
 const DISTANCE: usize = LENGTH + LONGEST_MATCH - 2;
-/// one for each of the [fixed distances](crate::fixed_distance::fixed_distances), with them;
+/// The first token of the [fixed distances](crate::fixed_distance::fixed_distances). There is one for each,
+/// with its extra bits.
 const FIXED_DISTANCE: usize = DISTANCE + DISTANCES;
-/// and those for bits alone: the empty one, the two of one bit, the four of two, up to those of
+/// The first token of bare bits: the empty one, two of one bit, four of two bits, and so on up to
 /// [`MOST_BITS`].
 const BITS: usize = FIXED_DISTANCE + FIXED;
 const MOST_BITS: u32 = 7;
-/// How many there are.
+/// The number of different tokens.
 const KINDS: usize = BITS + (2 << MOST_BITS) - 1;
-/// The power of two that is not less.
+/// The number of entries in a table of tokens, a power of two.
 const SLOTS: usize = KINDS.next_power_of_two();
 
-/// The token of the lowest `count` bits of `value`, up to [`MOST_BITS`]. The others are 0.
+/// Returns the token of `count` bits of `value`, at most [`MOST_BITS`]. The other bits of `value` are 0.
 #[inline(always)]
 fn bits_token(value: usize, count: u32) -> u16 {
     (BITS + (1 << count) - 1 + value) as u16
 }
 
-/// Literals in a row from which on they are counted and written where they lie, instead of as tokens.
+/// The number of successive literals from which they stay in the data, instead of becoming tokens.
 const LONG: usize = 64;
 
-/// What those for bits alone stand for.
+/// The bits of the tokens of bare bits.
 const ALONE: [Bits; KINDS - BITS] = {
     let mut table = [Bits::new(0, 0); KINDS - BITS];
     let mut i = 0;
@@ -58,24 +59,25 @@ pub(crate) struct Tokens {
     pub(crate) fixed_distances: [usize; FIXED],
 }
 
-/// Many literals in a row.
+/// A run of many literals.
 struct LiteralRun {
-    /// How many tokens, a multiple of four, come before.
+    /// The number of tokens before the run, a multiple of four.
     tokens: usize,
-    /// Where the bytes begin in the data, and how many they are, a multiple of four.
+    /// The place of the first byte in the data.
     from: usize,
+    /// The number of bytes, a multiple of four.
     len: usize,
 }
 
 impl Tokens {
-    /// None as yet; `fixed_distances` are those that [`fixed_match`](Self::fixed_match) means.
+    /// Starts without tokens. `fixed_distances` are the distances for [`fixed_match`](Self::fixed_match).
     pub(crate) fn new(fixed_distances: [usize; FIXED]) -> Self {
         let fixed_distances = fixed_distances.map(|distance| distance.clamp(1, WINDOW));
         let tokens = vec![0; ROOM].try_into().expect("as many");
         Self { tokens, len: 0, literal_runs: Vec::new(), fixed_distances }
     }
 
-    /// Forgets them.
+    /// Removes all tokens.
     pub(crate) fn clear(&mut self) {
         self.len = 0;
         self.literal_runs.clear();
@@ -85,11 +87,12 @@ impl Tokens {
     #[inline(always)]
     pub(crate) fn literals(&mut self, data: &[u8], mut from: usize, to: usize) {
         const FEW: usize = 16;
+
         if to - from >= LONG {
             from = self.literal_run(from, to);
         }
-        // Sixteen at once, whether there are as many or not: mostly there are few, which are then
-        // overwritten.
+
+        // Sixteen are copied at once, even if there are fewer; later tokens overwrite the excess.
         let few = data[from..]
             .first_chunk::<FEW>()
             .zip(self.tokens[self.len..].first_chunk_mut());
@@ -98,6 +101,7 @@ impl Tokens {
             FEW
         });
         self.len += to - from;
+
         if to - from > done {
             let tokens = &mut self.tokens[..self.len];
             let rest = &data[from + done..to];
@@ -109,7 +113,7 @@ impl Tokens {
         }
     }
 
-    /// Adds most of many literals, and returns the place of the first that is left.
+    /// Adds a run of literals, a multiple of four. Returns the place of the first literal that is left.
     #[cold]
     #[inline(never)]
     fn literal_run(&mut self, from: usize, to: usize) -> usize {
@@ -119,7 +123,7 @@ impl Tokens {
         from + len
     }
 
-    /// Fills up to a multiple of four, with what is no bits.
+    /// Fills up to a multiple of four with tokens of no bits.
     fn pad(&mut self) {
         let len = self.len.next_multiple_of(4);
         self.push([bits_token(0, 0); 3]);
@@ -152,10 +156,11 @@ impl Tokens {
         self.len += N;
     }
 
-    /// How often each symbol occurs; `data` are the bytes that [`literals`](Self::literals) was told of.
+    /// Counts the symbols. `data` are the bytes that were given to [`literals`](Self::literals).
     pub(crate) fn count(&mut self, data: &[u8]) -> Counts {
         self.pad();
-        // Four tables: equal tokens in a row would wait for each other.
+
+        // With four tables, equal tokens in a row do not wait for each other.
         let mut tables = [[0u16; SLOTS]; 4];
         for four in self.tokens[..self.len].as_chunks::<4>().0 {
             for (table, &token) in tables.iter_mut().zip(four) {
@@ -175,21 +180,25 @@ impl Tokens {
         for run in &self.literal_runs {
             count_bytes(&data[run.from..run.from + run.len], &mut sums.litlen);
         }
+
         let lengths = LENGTH_SYMBOLS.chunk_by(|(a, _), (b, _)| a == b);
         let mut rest = &counts[LENGTH..DISTANCE];
         for same in lengths {
             let (these, others) = rest.split_at(same.len());
-            let ((symbol, extra), n) = (same[0], these.iter().sum::<u32>());
+            let (symbol, extra) = same[0];
+            let n = these.iter().sum::<u32>();
             sums.litlen[257 + usize::from(symbol)] += n;
             sums.extra += u64::from(n) * u64::from(extra);
             rest = others;
         }
+
         sums.distance[..DISTANCES].copy_from_slice(&counts[DISTANCE..FIXED_DISTANCE]);
         for (&n, distance) in counts[FIXED_DISTANCE..BITS].iter().zip(self.fixed_distances) {
             let (symbol, extra) = distance_symbol(distance);
             sums.distance[symbol] += n;
             sums.extra += u64::from(n) * u64::from(extra);
         }
+
         for count in 1..=MOST_BITS {
             let n = counts[usize::from(bits_token(0, count))..][..1 << count]
                 .iter()
@@ -199,7 +208,7 @@ impl Tokens {
         sums
     }
 
-    /// Writes them; there is [room](BitWriter::reserve) for that.
+    /// Writes all tokens. The caller has made [room](BitWriter::reserve).
     #[inline(always)]
     pub(crate) fn write(
         &self,
@@ -218,12 +227,14 @@ impl Tokens {
             let value = if extra == 0 { 0 } else { i & ((1 << extra) - 1) };
             *entry = litlen[257 + usize::from(symbol)].then(Bits::new(value as u64, extra.into()));
         }
+
         table[DISTANCE..FIXED_DISTANCE].copy_from_slice(&distance[..DISTANCES]);
         for (entry, of) in table[FIXED_DISTANCE..BITS].iter_mut().zip(self.fixed_distances) {
             let (symbol, extra) = distance_symbol(of);
             *entry = distance[symbol].then(Bits::new((of as u64 - 1) & ((1 << extra) - 1), extra));
         }
         table[BITS..KINDS].copy_from_slice(&ALONE);
+
         let literals: &[Bits; LENGTH] = table.first_chunk().expect("they come first");
         let mut done = 0;
         for run in &self.literal_runs {
@@ -235,9 +246,9 @@ impl Tokens {
     }
 }
 
-/// Adds how often each byte occurs.
+/// Counts the bytes of `data`, and adds the counts to `counts`.
 pub(crate) fn count_bytes(data: &[u8], counts: &mut [u32]) {
-    // Eight tables: equal bytes near each other would wait for each other.
+    // With eight tables, equal bytes near each other do not wait for each other.
     let mut tables = [[0u32; 256]; 8];
     let (eights, rest) = data.as_chunks::<8>();
     for eight in eights {
@@ -259,9 +270,10 @@ mod tests {
     use crate::fixed_distance::fixed_distances;
     use proptest::prelude::*;
 
-    /// A table in which each token has bits of its own, as a reader takes them apart.
+    /// Codes that are the numbers of the symbols, in 9 and 5 bits.
     const PLAIN: ([Bits; 288], [Bits; 32]) = {
-        let (mut litlen, mut distance) = ([Bits::new(0, 0); 288], [Bits::new(0, 0); 32]);
+        let mut litlen = [Bits::new(0, 0); 288];
+        let mut distance = [Bits::new(0, 0); 32];
         let mut i = 0;
         while i < 288 {
             litlen[i] = Bits::new(i as u64, 9);
@@ -287,8 +299,12 @@ mod tests {
             let data: Vec<u8> = (0..10_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
             let mut tokens = Tokens::new(fixed_distances(line));
             tokens.clear();
-            // The plain way: symbol by symbol, each with its extra bits.
-            let (mut litlen, mut distances, mut extra, mut expected) = ([0; 288], [0; 32], 0, vec![]);
+
+            // The plain reference: symbol by symbol, each with its extra bits.
+            let mut litlen = [0; 288];
+            let mut distances = [0; 32];
+            let mut extra = 0;
+            let mut expected = vec![];
             let mut plain = BitWriter::new(&mut expected);
             plain.reserve(1 << 20);
             let mut put = |value: usize, count: u32| {
@@ -321,6 +337,7 @@ mod tests {
                 extra += u64::from(bits) + u64::from(more);
             }
             plain.finish();
+
             let counts = tokens.count(&data);
             prop_assert_eq!((counts.litlen, counts.distance, counts.extra), (litlen, distances, extra));
             let mut written = vec![];

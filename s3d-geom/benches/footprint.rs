@@ -1,5 +1,5 @@
-//! How many points a second go into a footprint, in the order of a scan and shuffled, and how long does it
-//! take to draw the outline of a 400 m² hall?
+//! The number of points per second that a footprint takes, in the order of a scan and shuffled, and the time
+//! to draw the outline of a 400 m² hall.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand::{Rng, SeedableRng};
@@ -19,6 +19,7 @@ fn footprint(c: &mut Criterion) {
             .partial_cmp(&((b.x * 20.0) as i32, b.y))
             .expect("numbers")
     });
+
     let collect = |points: &[Vec3]| {
         let mut builder = FootprintBuilder::new(FootprintOptions::default());
         points.iter().for_each(|&p| builder.add(p));

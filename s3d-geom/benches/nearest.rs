@@ -1,13 +1,13 @@
-//! How many annotated points a second find the face to vote for, 5 mm off a mesh, as the mesh grows, when
-//! points come in the order of a scan and when they come shuffled, on tidy ground and on a scan? The aim is
-//! three million a second and core.
+//! The number of annotated points per second, 5 mm off a mesh, that find their nearest face. The mesh grows,
+//! points are in the order of a scan or shuffled, and the mesh is a tidy ground or a scan. The aim is three
+//! million per second and core.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::vec3;
 use s3d_geom::{Density, Nearest, NearestFaces, PointCloud, SurfaceSampler, TriMesh};
 use s3d_synth::scenes::scan_like;
 
-/// A bumpy square of 2·n² faces, each about 10 cm large.
+/// Returns a bumpy square of 2·n² faces, each about 10 cm large.
 fn ground(n: u32) -> TriMesh {
     let at = |i: u32, j: u32| i * (n + 1) + j;
     let positions = (0..=n).flat_map(|i| (0..=n).map(move |j| (i as f32, j as f32)));
@@ -26,6 +26,7 @@ fn vote(c: &mut Criterion) {
         .num_threads(1)
         .build()
         .expect("a thread pool");
+
     let meshes = [40, 125, 400].map(|n| ("", ground(n)));
     for (of, mesh) in meshes.into_iter().chain([("scan, ", scan_like(300_000, 1))]) {
         let faces = NearestFaces::new(&mesh);
@@ -35,8 +36,10 @@ fn vote(c: &mut Criterion) {
         for (p, &face) in scan.iter_mut().zip(&cloud.faces) {
             *p += mesh.normal(face) * 0.005;
         }
-        // 7919 is prime and no divisor: every point once, each far from the one before.
+
+        // 7919 is prime and not a divisor, so every point comes once, far from the point before.
         let shuffled = (0..scan.len()).map(|i| scan[i * 7919 % scan.len()]).collect();
+
         for (order, points) in [("in order", scan), ("shuffled", shuffled)] {
             let mut out: Vec<Nearest> = Vec::new();
             let name = format!("{of}{order}");

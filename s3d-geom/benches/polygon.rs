@@ -1,12 +1,12 @@
-//! How many faces a second of 4, 6, 20 and 500 corners are cut into triangles? Meshes of modelling programs
-//! have tens of thousands of them, most of them quads.
+//! The number of faces of 4, 6, 20 and 500 corners that are cut into triangles per second. Meshes of
+//! modelling programs have tens of thousands of such faces, most of them quads.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{Vec3, vec3};
 use s3d_geom::triangulate_face;
 use std::hint::black_box;
 
-/// A star with every other corner drawn in, tilted; a square for four.
+/// Returns a tilted star with every other corner drawn in, or a square for four corners.
 fn face(corners: u32) -> Vec<Vec3> {
     let at = |i: u32| {
         let (s, c) = libm::sincos(f64::from(i) / f64::from(corners) * std::f64::consts::TAU);

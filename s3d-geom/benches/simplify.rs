@@ -1,4 +1,4 @@
-//! How long does a mesh take to become one of 300,000 faces, which a page can show, as it grows?
+//! The time to simplify meshes of growing size to 300,000 faces, which a page can show.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::simplify;

@@ -1,6 +1,6 @@
-//! How many coloured points a second come from a textured mesh of 32 thousand faces, and from scans of 300
-//! thousand, with three textures and with a dozen large ones, on one thread and on all? The aim is 15 million
-//! a second and core.
+//! The number of coloured points per second drawn from a textured mesh of 32 thousand faces, and from scans
+//! of 300 thousand faces with three textures and with a dozen large ones, on one thread and on all. The aim
+//! is 15 million per second and core.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use s3d_geom::glam::{Vec3, vec2, vec3};
@@ -8,7 +8,7 @@ use s3d_geom::{Density, Material, MeshParts, PointCloud, Raster, SurfaceSampler,
 use s3d_synth::scenes::scan_like;
 use std::hint::black_box;
 
-/// A bumpy square of 2 × `n`² faces, 10 cm a cell, whose texture coordinates are in cells.
+/// Returns a bumpy square of 2 × `n`² faces in cells of 10 cm, with texture coordinates in cells.
 fn ground(n: u32) -> MeshParts {
     let vertices = || (0..=n).flat_map(|i| (0..=n).map(move |j| (i as f32, j as f32)));
     let at = |i: u32, j: u32| i * (n + 1) + j;
@@ -43,7 +43,7 @@ fn add_textures(parts: &mut MeshParts, count: u32, side: u32) {
     }
 }
 
-/// 2 × 128² faces under a 2048 × 2048 texture that repeats four times.
+/// Returns 2 × 128² faces with a 2048 × 2048 texture that repeats four times.
 fn textured_ground() -> TriMesh {
     let mut parts = ground(128);
     parts.uvs.iter_mut().for_each(|uv| *uv /= 32.0);
@@ -51,21 +51,23 @@ fn textured_ground() -> TriMesh {
     TriMesh::new(parts).expect("a valid mesh")
 }
 
-/// 301,088 faces under twelve textures of 4096 × 4096 (604 MB), as a scanner's software lays them out: patches of
-/// 4 × 4 cells, each anywhere in any of the textures.
+/// Returns 301,088 faces with twelve textures of 4096 × 4096 (604 MB), in the layout of scanner software:
+/// patches of 4 × 4 cells, each anywhere in any of the textures.
 fn ground_of_patches() -> TriMesh {
     const CELLS: u32 = 388;
     const PATCH: u32 = 4;
-    /// Patches along a texture's side: all textures are full.
+    /// Patches along the side of a texture. All textures are full.
     const PATCHES: u32 = 28;
+
     let mut parts = ground(CELLS);
     add_textures(&mut parts, 12, 4096);
     parts.face_uvs.clear();
     parts.uvs.clear();
+
     let vertices = (0..=PATCH).flat_map(|i| (0..=PATCH).map(move |j| vec2(i as f32, j as f32)));
     let vertices: Vec<_> = vertices.collect();
     let patches = (CELLS / PATCH) * (CELLS / PATCH);
-    // A number without a divisor in common with that of the places: every patch has one of its own.
+    // 5477 has no divisor in common with the number of places, so every patch has a place of its own.
     let place = |patch: u32| patch * 5477 % (12 * PATCHES * PATCHES);
     for patch in 0..patches {
         let place = place(patch) % (PATCHES * PATCHES);
@@ -74,11 +76,14 @@ fn ground_of_patches() -> TriMesh {
             .uvs
             .extend(vertices.iter().map(|uv| (corner + *uv / PATCH as f32) / PATCHES as f32));
     }
+
     for cell in 0..CELLS * CELLS {
-        let (i, j) = (cell / CELLS, cell % CELLS);
+        let i = cell / CELLS;
+        let j = cell % CELLS;
         let patch = (i / PATCH) * (CELLS / PATCH) + j / PATCH;
         let at = |i: u32, j: u32| patch * (PATCH + 1) * (PATCH + 1) + i * (PATCH + 1) + j;
-        let (k, l) = (i % PATCH, j % PATCH);
+        let k = i % PATCH;
+        let l = j % PATCH;
         parts.face_uvs.push([at(k, l), at(k + 1, l), at(k + 1, l + 1)]);
         parts.face_uvs.push([at(k, l), at(k + 1, l + 1), at(k, l + 1)]);
         let texture = place(patch) / (PATCHES * PATCHES);

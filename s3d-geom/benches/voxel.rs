@@ -1,5 +1,5 @@
-//! How many points a second are sorted into the voxels of their instance, from a chair to the floor of a
-//! hall?
+//! The number of points per second that are sorted into the voxels of their instance, from a chair to the
+//! floor of a hall.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rand::{Rng, SeedableRng};

@@ -1,5 +1,5 @@
-//! From a mesh to annotations: samples a table in a room into a cloud, lets the points vote for their nearest
-//! faces with some noise on them, and sorts the table's points into voxels.
+//! From a mesh to annotations. The program samples a table in a room into a cloud, adds noise, finds the
+//! faces nearest to the points, and sorts the points of the table into voxels.
 //!
 //! `cargo run --release --example sample_and_vote -- [points per m²]`
 
@@ -11,7 +11,7 @@ use s3d_geom::{
 use std::error::Error;
 use std::io::Write;
 
-/// A rectangle as two triangles, from a corner and two edges.
+/// Adds a rectangle as two triangles, from a corner and two edges.
 fn rectangle(positions: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>, corner: Vec3, right: Vec3, up: Vec3) {
     let first = positions.len() as u32;
     positions.extend([corner, corner + right, corner + right + up, corner + up]);
@@ -24,8 +24,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err(format!("{per_m2} points per m²: a density is at least 0").into());
     }
 
-    // Faces 0 and 1 are the floor of 4 × 5 m, 2 and 3 a table top with faces 4 and 5 as its one leg.
-    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    // Faces 0 and 1 are a floor of 4 × 5 m, faces 2 and 3 a table top, and faces 4 and 5 the leg of the
+    // table.
+    let mut positions = Vec::new();
+    let mut faces = Vec::new();
     rectangle(&mut positions, &mut faces, Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 5.0);
     rectangle(&mut positions, &mut faces, vec3(1.0, 1.0, 0.75), Vec3::X * 1.6, Vec3::Y * 0.8);
     rectangle(&mut positions, &mut faces, vec3(1.7, 1.4, 0.0), Vec3::X * 0.2, Vec3::Z * 0.75);
@@ -43,6 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .enumerate()
         .map(|(i, &p)| p + Vec3::Z * ((i % 9) as f32 - 4.0) * 0.001)
         .collect();
+
     let mut votes = Vec::new();
     NearestFaces::new(&mesh).nearest_many(&measured, &mut votes);
     let right = votes
@@ -64,6 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     )?;
     writeln!(out, "{right} vote for the face that they were drawn from")?;
     writeln!(out, "floor: {:.2} m²", footprint.finish().area_m2)?;
+
     if let Some(voxels) = Voxels::from_points(&measured[table.start as usize..]) {
         let occupied = voxels.occupancy().iter().filter(|&&o| o).count();
         writeln!(

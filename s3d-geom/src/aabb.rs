@@ -14,44 +14,44 @@ use glam::Vec3;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
-    /// The corner of the smallest coordinates.
+    /// The corner with the smallest coordinates.
     pub min: Vec3,
-    /// The corner of the largest coordinates.
+    /// The corner with the largest coordinates.
     pub max: Vec3,
 }
 
 impl Aabb {
-    /// The box of no point: it contains nothing, and adding a point to it gives that point's box.
+    /// The box without any point. Adding a point to it gives the box of that point.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The smallest box around `points`, [`Aabb::EMPTY`] if there are none.
+    /// Returns the smallest box around `points`, or [`Aabb::EMPTY`] if there are none.
     pub fn from_points(points: impl IntoIterator<Item = Vec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, Self::with)
     }
 
-    /// The smallest box around this one and `point`.
+    /// Returns the smallest box around this one and `point`.
     #[must_use]
     pub fn with(self, point: Vec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
-    /// The smallest box around this one and `other`.
+    /// Returns the smallest box around this one and `other`.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Whether no point is inside.
+    /// Returns true if the box contains no point.
     pub fn is_empty(&self) -> bool {
         !(self.min.cmple(self.max).all())
     }
 
-    /// Whether `point` is inside or on the surface.
+    /// Returns true if `point` is inside or on the surface.
     pub fn contains(&self, point: Vec3) -> bool {
         point.cmpge(self.min).all() && point.cmple(self.max).all()
     }
 
-    /// Length, width and height; zero on each axis if empty.
+    /// Returns the extent along x, y and z, in metres; zero on each axis if the box is empty.
     pub fn size(&self) -> Vec3 {
         if self.is_empty() {
             Vec3::ZERO
@@ -60,18 +60,18 @@ impl Aabb {
         }
     }
 
-    /// The point in the middle. Not a number if empty.
+    /// Returns the centre. It is NaN if the box is empty.
     pub fn center(&self) -> Vec3 {
         self.min + (self.max - self.min) * 0.5
     }
 
-    /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, as the data set writes a box.
+    /// Returns `[xmin, ymin, zmin, xmax, ymax, zmax]`, as the data set writes a box.
     pub fn to_array(&self) -> [f32; 6] {
         [self.min.x, self.min.y, self.min.z, self.max.x, self.max.y, self.max.z]
     }
 }
 
-/// As data: its corners, or nothing if it is empty, since JSON has no infinite numbers.
+/// The serialized form: the two corners, or nothing if the box is empty, since JSON has no infinite numbers.
 #[cfg(feature = "serde")]
 mod as_data {
     use super::Aabb;

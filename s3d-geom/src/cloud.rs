@@ -1,8 +1,8 @@
-//! Point clouds, as a struct of columns.
+//! Point clouds, as columns.
 
 use glam::Vec3;
 
-/// A coloured point cloud in world metres, Z-up. Every column that is not empty has one entry a point.
+/// A coloured point cloud in world metres, Z-up. Every column is empty or has one entry per point.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -21,7 +21,7 @@ use glam::Vec3;
 /// # Ok::<(), s3d_geom::MeshError>(())
 /// ```
 pub struct PointCloud {
-    /// Where the points are.
+    /// The positions of the points.
     pub positions: Vec<Vec3>,
     /// Colours R G B; empty if unknown.
     pub colors: Vec<[u8; 3]>,
@@ -30,17 +30,17 @@ pub struct PointCloud {
 }
 
 impl PointCloud {
-    /// Number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// Whether there is no point.
+    /// Returns true if there is no point.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// Removes all points and keeps the memory.
+    /// Removes all points but keeps the allocated memory.
     pub fn clear(&mut self) {
         self.positions.clear();
         self.colors.clear();

@@ -1,31 +1,56 @@
-//! Vocabulary and plain geometry of indoor scans.
+//! Vocabulary and plain geometry of indoor scans. World frame everywhere: metres, Z-up, right-handed.
 //!
-//! The nouns that the other crates of `s3d` exchange — [`TriMesh`], [`PointCloud`], [`Camera`], [`Lens`],
-//! [`Pose`], [`Raster`] — and the geometry that needs nothing else: a surface's points ([`SurfaceSampler`]),
-//! a point's nearest face ([`NearestFaces`]), polygons and their triangles ([`Polygon`],
-//! [`triangulate_face`]), a room's floor ([`FootprintBuilder`]), the voxels of an instance
-//! ([`Voxels`]), and meshes of fewer faces to look at ([`simplify()`]).
-//! World frame everywhere: metres, Z-up, right-handed.
+//! # Vocabulary
+//!
+//! The other crates of `s3d` exchange these nouns: [`TriMesh`], [`PointCloud`], [`Camera`], [`Lens`],
+//! [`Pose`], [`Aabb`], [`Raster`], [`Texture`].
+//!
+//! # Surfaces
+//!
+//! [`SurfaceSampler`] draws points from a mesh, and [`NearestFaces`] finds the face nearest to a point.
+//! [`VertexColors`] carries the colours of a cloud over to a mesh. [`simplify()`] makes meshes of fewer faces
+//! to look at. [`primitives`] builds plain bodies.
+//!
+//! # Rooms and instances
+//!
+//! [`FootprintBuilder`] measures the floor of a room, and [`Voxels`] fills the box of an instance.
+//! [`Polygon`] and [`triangulate_face`] cut polygons into triangles.
+//!
+//! # Example
 //!
 //! ```
-//! use s3d_geom::{Camera, Pose, glam::dvec3};
+//! use s3d_geom::glam::{dvec3, vec3};
+//! use s3d_geom::{Camera, Density, NearestFaces, PointCloud, Pose, SurfaceSampler, TriMesh};
 //!
-//! // A camera 1.5 m above the floor that looks along +Y, and the pixel in which it sees a point ahead of it.
+//! // A wall 4 m ahead, as two triangles.
+//! let corners = vec![vec3(-2.0, 4.0, 0.0), vec3(2.0, 4.0, 0.0), vec3(2.0, 4.0, 3.0), vec3(-2.0, 4.0, 3.0)];
+//! let wall = TriMesh::from_faces(corners, vec![[0, 1, 2], [0, 2, 3]])?;
+//!
+//! // 100 points of the wall: each is nearest to the face that it was drawn from.
+//! let mut cloud = PointCloud::default();
+//! SurfaceSampler::new(&wall, Density::Total(100), 42).sample(0..100, &mut cloud);
+//! let nearest = NearestFaces::new(&wall);
+//! assert!((0..100).all(|i| nearest.nearest(cloud.positions[i]).face == cloud.faces[i]));
+//!
+//! // A camera 1.5 m above the floor that looks along +Y sees the middle of the wall in its central pixel.
 //! let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 75f64.to_radians(), 1080, 1080);
-//! let (pixel, depth) = camera.project(dvec3(0.0, 4.0, 1.5)).unwrap();
+//! let (pixel, depth) = camera.project(dvec3(0.0, 4.0, 1.5)).ok_or("behind the camera")?;
 //! assert!((pixel.x - 540.0).abs() < 1e-9 && (depth - 4.0).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With the cargo feature `serde`, the vocabulary is data: boxes, poses, cameras, lenses, outlines, polygons,
-//! voxels, point clouds. What is read is checked as it is by constructors (a pose's matrix and a polygon's
-//! corners are taken as they are), and a number that JSON can hold comes back to the bit where the reader
-//! rounds correctly (serde_json's `float_roundtrip`). Meshes, textures and images have their own files.
+//! # Features
 //!
-//! The features `nearest` ([`NearestFaces`]) and `sampling` ([`SurfaceSampler`]) are on by default; without
-//! them, the crate builds from half as many packages.
+//! `nearest` ([`NearestFaces`]) and `sampling` ([`SurfaceSampler`]) are on by default. Without them, the
+//! crate builds from half as many packages.
+//!
+//! `serde` serializes the vocabulary: boxes, poses, cameras, lenses, outlines, polygons, voxels and point
+//! clouds. Values read are checked like the arguments of constructors, except for the matrix of a pose and
+//! the corners of a polygon. A number that JSON can hold is read back to the bit if the reader rounds
+//! correctly (serde_json's `float_roundtrip`). Meshes, textures and images have their own files.
 
-// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what a constructor
-// checked.
+// Only a caller's mistake panics, and a section "Panics" names it. Loops take their indices from checked
+// columns.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)

@@ -1,11 +1,14 @@
-//! Faces that hang together.
+//! Connected faces.
 
 use crate::TriMesh;
 use std::collections::{BTreeMap, HashMap};
 use std::hash::Hash;
 
-/// Which of some faces of the same key hang together by their corners: places in `faces`, patch by patch, in
-/// the order of their first faces. Corners are the same where their coordinates are.
+/// Returns the connected patches among `faces`: lists of places in `faces`, in the order of their first
+/// faces.
+///
+/// Two faces are connected if they have the same key and share a corner. Corners are the same if their
+/// coordinates are equal.
 ///
 /// ```
 /// use s3d_geom::{TriMesh, face_patches, glam::Vec3};
@@ -18,9 +21,9 @@ use std::hash::Hash;
 /// ```
 ///
 /// # Panics
-/// If the mesh has not so many faces.
+/// If the mesh does not have one of `faces`.
 pub fn face_patches<K: Copy + Eq + Hash>(mesh: &TriMesh, faces: &[(u32, K)]) -> Vec<Vec<usize>> {
-    // Which face is in whose patch: the first of each stands for it.
+    // A union-find forest: the root of a patch is its first face.
     let mut first: Vec<usize> = (0..faces.len()).collect();
     let mut at_corner: HashMap<([u32; 3], K), usize> = HashMap::new();
     for (place, (face, key)) in faces.iter().enumerate() {
@@ -28,12 +31,14 @@ pub fn face_patches<K: Copy + Eq + Hash>(mesh: &TriMesh, faces: &[(u32, K)]) -> 
             // Adding 0 turns −0 into 0.
             let corner = (corner + 0.0).to_array().map(f32::to_bits);
             let other = *at_corner.entry((corner, *key)).or_insert(place);
-            let (a, b) = (root(&mut first, place), root(&mut first, other));
+            let a = root(&mut first, place);
+            let b = root(&mut first, other);
             if let Some(later) = first.get_mut(a.max(b)) {
                 *later = a.min(b);
             }
         }
     }
+
     let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for place in 0..faces.len() {
         members.entry(root(&mut first, place)).or_default().push(place);
@@ -41,12 +46,12 @@ pub fn face_patches<K: Copy + Eq + Hash>(mesh: &TriMesh, faces: &[(u32, K)]) -> 
     members.into_values().collect()
 }
 
-/// The first face of the patch that a face is in.
+/// Returns the first face of the patch to which the face at `place` belongs.
 fn root(first: &mut [usize], mut place: usize) -> usize {
     while let Some(&parent) = first.get(place)
         && parent != place
     {
-        // Halves the way for whoever comes next.
+        // Path halving: shortens the way for later calls.
         let grandparent = first.get(parent).copied().unwrap_or(parent);
         if let Some(entry) = first.get_mut(place) {
             *entry = grandparent;

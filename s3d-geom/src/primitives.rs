@@ -1,8 +1,8 @@
 //! Plain patches and bodies, as [`MeshParts`] that can be changed and merged.
 //!
-//! Patches ([`quad`], [`grid`]) have texture coordinates from (0, 0) to (1, 1); those of bodies ([`cuboid`],
-//! [`cylinder`]) count metres, so that a texture repeats once a metre. Corners at the same place are the same
-//! vertex wherever a body is closed. Nothing has a material.
+//! Patches ([`quad`], [`grid`]) have texture coordinates from (0, 0) to (1, 1). Bodies ([`cuboid`],
+//! [`cylinder`]) have texture coordinates in metres, so a texture repeats once per metre. A closed body has
+//! one vertex per corner, shared by its faces. Nothing has a material.
 //!
 //! ```
 //! use s3d_geom::glam::{Vec3, vec3};
@@ -20,8 +20,8 @@
 use crate::MeshParts;
 use glam::{Vec2, Vec3, vec2, vec3};
 
-/// Two triangles over four `corners`, given counter-clockwise seen from the front, from the texture's bottom
-/// left.
+/// Returns two triangles over four `corners`, which run counter-clockwise seen from the front. The first
+/// corner is at the bottom left of the texture.
 pub fn quad(corners: [Vec3; 4]) -> MeshParts {
     MeshParts {
         positions: corners.to_vec(),
@@ -32,14 +32,15 @@ pub fn quad(corners: [Vec3; 4]) -> MeshParts {
     }
 }
 
-/// The parallelogram from `origin` along `u` and `v`, in `cells[0]` × `cells[1]` quads of two triangles; its
-/// front is on the side of `u × v`. Row by row along `u`.
+/// Returns the parallelogram from `origin` along `u` and `v`, in `cells[0]` × `cells[1]` quads of two
+/// triangles. Its front is on the side of `u × v`. Vertices and faces are in rows along `u`.
 ///
 /// # Panics
-/// If there is no cell.
+/// If a number of cells is 0.
 pub fn grid(origin: Vec3, u: Vec3, v: Vec3, cells: [u32; 2]) -> MeshParts {
     let [nu, nv] = cells;
     assert!(nu > 0 && nv > 0, "a grid of {nu} × {nv} cells");
+
     let mut parts = MeshParts::default();
     for j in 0..=nv {
         for i in 0..=nu {
@@ -48,6 +49,7 @@ pub fn grid(origin: Vec3, u: Vec3, v: Vec3, cells: [u32; 2]) -> MeshParts {
             parts.uvs.push(uv);
         }
     }
+
     for j in 0..nv {
         for i in 0..nu {
             let a = j * (nu + 1) + i;
@@ -59,18 +61,21 @@ pub fn grid(origin: Vec3, u: Vec3, v: Vec3, cells: [u32; 2]) -> MeshParts {
     parts
 }
 
-/// The closed box between two corners, its front outside. Eight vertices; side by side in the order z, x, y,
-/// the side at `min` before the one at `max`.
+/// Returns the closed box between two corners, its front outside. It has eight vertices. Its sides are in the
+/// order z, x, y, the side at `min` before the one at `max`.
 ///
 /// # Panics
 /// If `max` is not above `min` on each axis.
 pub fn cuboid(min: Vec3, max: Vec3) -> MeshParts {
     assert!(min.cmplt(max).all(), "a box from {min} to {max}");
-    // Corners of the lower lid counter-clockwise seen from above, then those of the upper one.
+
+    // The corners of the bottom, counter-clockwise seen from above, then the corners of the top.
     let plan = [[min.x, min.y], [max.x, min.y], [max.x, max.y], [min.x, max.y]];
-    let at = |z: f32| plan.map(|[x, y]| vec3(x, y, z));
-    let mut parts = MeshParts { positions: [at(min.z), at(max.z)].concat(), ..MeshParts::default() };
-    // The axis that a side is across, and its corners counter-clockwise seen from inside.
+    let bottom = plan.map(|[x, y]| vec3(x, y, min.z));
+    let top = plan.map(|[x, y]| vec3(x, y, max.z));
+    let mut parts = MeshParts { positions: [bottom, top].concat(), ..MeshParts::default() };
+
+    // The axis across a side, and the corners of the side, counter-clockwise seen from inside.
     let sides = [
         (2, [0, 1, 2, 3]),
         (2, [4, 7, 6, 5]),
@@ -83,19 +88,21 @@ pub fn cuboid(min: Vec3, max: Vec3) -> MeshParts {
         let first = parts.uvs.len() as u32;
         for corner in [a, b, c, d] {
             let p = parts.positions[corner as usize] - min;
-            // Upwards on walls.
+            // The texture is upright on walls.
             parts.uvs.push([vec2(p.y, p.z), vec2(p.x, p.z), vec2(p.x, p.y)][axis]);
         }
+
         parts.faces.extend([[a, c, b], [a, d, c]]);
         parts
             .face_uvs
             .extend([[first, first + 2, first + 1], [first, first + 3, first + 2]]);
     }
+
     parts
 }
 
-/// A closed upright cylinder, its front outside: `base` is the centre of its bottom, `sides` the number of
-/// its quads around.
+/// Returns a closed upright cylinder, its front outside. `base` is the centre of the bottom, and `sides` the
+/// number of quads around.
 ///
 /// # Panics
 /// If a length is not positive or there are fewer than three sides.
@@ -104,25 +111,29 @@ pub fn cylinder(base: Vec3, radius_m: f32, height_m: f32, sides: u32) -> MeshPar
         radius_m > 0.0 && height_m > 0.0 && sides >= 3,
         "a cylinder of {radius_m} m × {height_m} m, {sides} sides"
     );
+
     let step_rad = std::f32::consts::TAU / sides as f32;
     let mut parts = MeshParts {
         positions: vec![base, base + Vec3::Z * height_m],
         uvs: vec![Vec2::splat(radius_m)],
         ..MeshParts::default()
     };
-    // Per column: a vertex below, one above; coordinates of the lid's corner, then of the wall's lower and
-    // upper one.
+
+    // Each column has two vertices, at the bottom and at the top. It has three texture coordinates: for the
+    // lids, and for the lower and the upper corner of the wall.
     for i in 0..=sides {
         let spoke = Vec2::from_angle(i as f32 * step_rad) * radius_m;
         if i < sides {
             let foot = base + spoke.extend(0.0);
             parts.positions.extend([foot, foot + Vec3::Z * height_m]);
         }
+
         let along = i as f32 * step_rad * radius_m;
         parts
             .uvs
             .extend([spoke + radius_m, vec2(along, 0.0), vec2(along, height_m)]);
     }
+
     for i in 0..sides {
         let [a, b] = [i, (i + 1) % sides].map(|k| 2 + 2 * k);
         let [ta, tb] = [i, i + 1].map(|k| 1 + 3 * k);
@@ -133,6 +144,7 @@ pub fn cylinder(base: Vec3, radius_m: f32, height_m: f32, sides: u32) -> MeshPar
             .face_uvs
             .extend([[0, tb, ta], [0, ta, tb], [ta + 1, tb + 1, tb + 2], [ta + 1, tb + 2, ta + 2]]);
     }
+
     parts
 }
 
@@ -142,7 +154,7 @@ mod tests {
     use crate::{Aabb, TriMesh};
     use std::collections::BTreeMap;
 
-    /// The volume that the faces enclose, positive if their fronts are outside.
+    /// Returns the volume that the faces enclose, positive if their fronts are outside.
     fn volume(parts: &MeshParts) -> f64 {
         let p = |v: u32| parts.positions[v as usize].as_dvec3();
         parts
@@ -152,7 +164,7 @@ mod tests {
             .sum()
     }
 
-    /// How many edges are not run through once in each direction.
+    /// Returns the number of edges that faces do not run along equally often in both directions.
     fn open_edges(parts: &MeshParts) -> usize {
         let mut balance = BTreeMap::new();
         for &[a, b, c] in &parts.faces {
@@ -203,7 +215,8 @@ mod tests {
 
     #[test]
     fn boxes_follow_their_corners() {
-        let (low, high) = (vec3(10.1, 5.3, 0.7), vec3(11.7, 5.9, 1.3));
+        let low = vec3(10.1, 5.3, 0.7);
+        let high = vec3(11.7, 5.9, 1.3);
         assert_eq!(Aabb::from_points(cuboid(low, high).positions), Aabb { min: low, max: high });
     }
 

@@ -1,6 +1,7 @@
 //! Row-major images of any pixel type.
 
-/// A `width` × `height` image, row-major, its origin at the top left: pixel (x, y) is `data[y * width + x]`.
+/// A `width` × `height` image, row-major, with the origin at the top left: pixel (x, y) is
+/// `data[y * width + x]`.
 ///
 /// ```
 /// use s3d_geom::Raster;
@@ -17,7 +18,7 @@ pub struct Raster<T> {
 }
 
 impl<T> Raster<T> {
-    /// Takes `data` as the rows of an image, top row first.
+    /// Makes an image from its rows, top row first.
     ///
     /// # Panics
     /// If `data.len()` is not `width * height`.
@@ -30,37 +31,37 @@ impl<T> Raster<T> {
         Self { width, height, data }
     }
 
-    /// Width in pixels.
+    /// Returns the width in pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Height in pixels.
+    /// Returns the height in pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Number of pixels.
+    /// Returns the number of pixels.
     pub fn len(&self) -> usize {
         self.data.len()
     }
 
-    /// Whether the image has no pixel.
+    /// Returns true if the image has no pixel.
     pub fn is_empty(&self) -> bool {
         self.data.is_empty()
     }
 
-    /// All pixels, row by row.
+    /// Returns all pixels, row by row.
     pub fn pixels(&self) -> &[T] {
         &self.data
     }
 
-    /// All pixels, row by row, to write to.
+    /// Returns all pixels, row by row, for writing.
     pub fn pixels_mut(&mut self) -> &mut [T] {
         &mut self.data
     }
 
-    /// The pixels of row `y`, left to right.
+    /// Returns the pixels of row `y`, left to right.
     ///
     /// # Panics
     /// If `y` is not below the height.
@@ -69,24 +70,24 @@ impl<T> Raster<T> {
         &self.data[start..start + self.width as usize]
     }
 
-    /// The rows, top to bottom.
+    /// Iterates over the rows, top to bottom.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = &[T]> {
         self.data.chunks_exact(self.width.max(1) as usize)
     }
 
-    /// Gives up the pixels, row by row.
+    /// Turns the image into its pixels, row by row.
     pub fn into_vec(self) -> Vec<T> {
         self.data
     }
 }
 
 impl<T: Copy> Raster<T> {
-    /// An image of one value everywhere.
+    /// Makes an image with the same value everywhere.
     pub fn filled(width: u32, height: u32, value: T) -> Self {
         Self { width, height, data: vec![value; width as usize * height as usize] }
     }
 
-    /// The pixel at column `x`, row `y`.
+    /// Returns the pixel at column `x`, row `y`.
     ///
     /// # Panics
     /// If `y` is not below the height.
@@ -95,7 +96,7 @@ impl<T: Copy> Raster<T> {
         self.data[y as usize * self.width as usize + x as usize]
     }
 
-    /// An image of the same size, each pixel from this one's.
+    /// Makes an image of the same size by applying `f` to each pixel.
     pub fn map<U>(&self, f: impl FnMut(T) -> U) -> Raster<U> {
         Raster { width: self.width, height: self.height, data: self.data.iter().copied().map(f).collect() }
     }

@@ -1,47 +1,51 @@
-//! Meshes of fewer faces, to be looked at: vertices that lie in one cell of a grid become one.
+//! Meshes of fewer faces, for viewing: the vertices in a cell of a grid are merged.
 //!
-//! P. Lindstrom, "Out-of-core simplification of large polygonal models", 2000: the vertex of a cell is where
-//! the squared distances to the planes of the faces that meet in the cell, weighted by area, are least. Any
-//! mesh will do, whatever its topology; the faces that stay are faces of the mesh, so that what is known of a
-//! face stays known.
+//! The method is P. Lindstrom's, "Out-of-core simplification of large polygonal models", 2000. The vertex of
+//! a cell minimises the squared distances to the planes of the faces with a corner in the cell, weighted by
+//! area. The mesh may have any topology. Every face that stays is a face of the mesh, so its attributes still
+//! hold.
 
 use crate::TriMesh;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashSet;
 
-/// Cells along an axis at most, so that a cell's number fits in 63 bits.
+/// The largest number of cells along an axis, so that the number of a cell fits in 63 bits.
 const MOST_CELLS: f64 = (1u32 << 21) as f64;
 
-/// From try to try cells grow by this much.
+/// The factor by which cells grow from one attempt to the next.
 const GROWTH: f64 = 1.3;
 
-/// How strongly the vertex of a cell is held at the mean of its vertices: flat surfaces have no other hold
-/// along themselves.
+/// The weight that draws the vertex of a cell towards the mean of its vertices. On a flat surface, the planes
+/// alone leave the place within the surface open.
 const HOLD: f64 = 1e-3;
 
 /// A mesh with fewer faces, made by [`simplify`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimplifiedMesh {
-    /// Edge of the cells, metres. A vertex moved by less than their diagonal.
+    /// The edge of the cells, in metres. Every vertex moved by less than the diagonal of a cell.
     pub cell_m: f64,
-    /// World positions of vertices.
+    /// The vertices, in world metres.
     pub positions: Vec<Vec3>,
-    /// Three vertices a face.
+    /// Three indices into `positions` per face.
     pub faces: Vec<[u32; 3]>,
-    /// Which face of the mesh each of `faces` was; ascending.
+    /// For each of `faces`, the face of the mesh that it was; ascending.
     pub face_of: Vec<u32>,
-    /// Which vertex each vertex of the mesh became; [`NO_INDEX`](crate::NO_INDEX) if no face used it.
+    /// For each vertex of the mesh, the index in `positions` of the vertex that it became.
+    /// [`NO_INDEX`](crate::NO_INDEX) if no face uses it, or no face that stays has a corner in its cell.
     pub vertex_of: Vec<u32>,
 }
 
-/// Merges the vertices of cells, as small as will do, until at most `most` faces are left; `None` if the mesh
-/// has no more than that. Faces that lost an edge go, and so do those that cover another that stays.
+/// Merges the vertices in the cells of a grid, so that at most `most` faces are left. Returns `None` if the
+/// mesh has no more faces already.
+///
+/// The cells grow from attempt to attempt until the number fits. A face goes if two of its corners are
+/// merged, or if it has the corners of an earlier face.
 ///
 /// ```
 /// use s3d_geom::{TriMesh, primitives::grid, simplify, glam::Vec3};
 ///
-/// // A floor of 20,000 triangles becomes one of a thousand, and stays one floor.
+/// // A floor of 20,000 triangles becomes a floor of at most a thousand.
 /// let floor = TriMesh::new(grid(Vec3::ZERO, Vec3::X * 5.0, Vec3::Y * 5.0, [100, 100]))?;
 /// let small = simplify(&floor, 1000).expect("it has more");
 /// assert!((300..=1000).contains(&small.faces.len()));
@@ -53,28 +57,30 @@ pub fn simplify(mesh: &TriMesh, most: usize) -> Option<SimplifiedMesh> {
     if mesh.faces().len() <= most {
         return None;
     }
+
+    // The first cells are rather small: four of them have the area of one of `most` equal faces.
     let size = f64::from(mesh.aabb().size().max_element());
-    // Surface without detail leaves two faces in a square of two cells; detail less than that.
     let smallest = (mesh.total_area() / most.max(1) as f64).sqrt() / 2.0;
     let mut cell_m = smallest.max(2.0 * size / MOST_CELLS);
+
     loop {
-        // Of the digits that are told.
-        let told = (cell_m.max(1e-4) * 1e4).round() / 1e4;
-        let cells = Cells::new(mesh, told);
-        if cells.count(mesh) <= most || told > size {
+        // `cell_m` is reported in tenths of a millimetre.
+        let rounded_m = (cell_m.max(1e-4) * 1e4).round() / 1e4;
+        let cells = Cells::new(mesh, rounded_m);
+        if cells.count(mesh) <= most || rounded_m > size {
             return Some(cells.simplified(mesh));
         }
-        cell_m = (told * GROWTH).max(told + 1e-4);
+        cell_m = (rounded_m * GROWTH).max(rounded_m + 1e-4);
     }
 }
 
-/// A grid over a mesh, and which cell each vertex is in.
+/// A grid over a mesh, with the cell of each vertex.
 struct Cells {
     cell_m: f64,
     origin: DVec3,
-    /// Numbers of the cells that have a vertex, ascending.
+    /// The numbers of the cells that have a vertex, ascending.
     numbers: Vec<u64>,
-    /// By vertex of the mesh a place in `numbers`, or none.
+    /// For each vertex of the mesh, a place in `numbers`, or `NO_INDEX` if no face uses the vertex.
     of_vertex: Vec<u32>,
 }
 
@@ -86,6 +92,7 @@ impl Cells {
             let [x, y, z] = cell.to_array().map(|c| c.clamp(0.0, MOST_CELLS - 1.0) as u64);
             (x << 42) | (y << 21) | z
         };
+
         let mut used = vec![false; mesh.positions().len()];
         mesh.faces().iter().flatten().for_each(|v| used[*v as usize] = true);
         let of_vertex: Vec<Option<u64>> = mesh
@@ -94,9 +101,11 @@ impl Cells {
             .zip(&used)
             .map(|(p, used)| used.then(|| number(p)))
             .collect();
+
         let mut numbers: Vec<u64> = of_vertex.iter().flatten().copied().collect();
         numbers.par_sort_unstable();
         numbers.dedup();
+
         let place = |number: &Option<u64>| {
             let found = number.and_then(|number| numbers.binary_search(&number).ok());
             found.map_or(crate::NO_INDEX, |place| place as u32)
@@ -109,7 +118,7 @@ impl Cells {
         corners.map(|v| self.of_vertex[v as usize])
     }
 
-    /// How many faces have their corners in three cells.
+    /// Returns the number of faces whose corners are in three different cells.
     fn count(&self, mesh: &TriMesh) -> usize {
         let is_left = |corners: &&[u32; 3]| {
             let [a, b, c] = self.of_face(**corners);
@@ -118,7 +127,8 @@ impl Cells {
         mesh.faces().par_iter().filter(is_left).count()
     }
 
-    /// Those faces, of several in the same three cells the first.
+    /// Returns the faces whose corners are in three different cells. If several have the same cells and the
+    /// same winding, only the first is returned.
     fn kept(&self, mesh: &TriMesh) -> Vec<u32> {
         let mut seen = HashSet::new();
         let mut kept = Vec::new();
@@ -127,7 +137,8 @@ impl Cells {
             if a == b || b == c || c == a {
                 continue;
             }
-            // The two sides of a sheet are two faces: turns of the corners are the same, a swap is not.
+
+            // Start with the smallest cell and keep the winding: the two sides of a sheet are two faces.
             let first = a.min(b).min(c);
             let turned = if first == a {
                 [a, b, c]
@@ -143,8 +154,8 @@ impl Cells {
         kept
     }
 
-    fn simplified(self, mesh: &TriMesh) -> SimplifiedMesh {
-        let kept = self.kept(mesh);
+    /// Returns the quadric of each cell.
+    fn quadrics(&self, mesh: &TriMesh) -> Vec<Quadric> {
         let mut sums = vec![Quadric::ZERO; self.numbers.len()];
         for (v, cell) in self.of_vertex.iter().enumerate() {
             if *cell != crate::NO_INDEX {
@@ -158,12 +169,21 @@ impl Cells {
                 sums[cell as usize].add_plane(normal, a);
             }
         }
-        let vertex = |(number, sum): (&u64, &Quadric)| {
-            let cell = [number >> 42, (number >> 21) & 0x1f_ffff, number & 0x1f_ffff];
-            let low = DVec3::from_array(cell.map(|c| c as f64)) * self.cell_m;
-            (self.origin + sum.least().clamp(low, low + self.cell_m)).as_vec3()
-        };
-        // Cells of which no face is left are dropped.
+        sums
+    }
+
+    /// Returns the vertex that minimises the quadric of the cell `number`, within the cell.
+    fn vertex(&self, number: u64, quadric: &Quadric) -> Vec3 {
+        let cell = [number >> 42, (number >> 21) & 0x1f_ffff, number & 0x1f_ffff];
+        let low = DVec3::from_array(cell.map(|c| c as f64)) * self.cell_m;
+        (self.origin + quadric.minimizer().clamp(low, low + self.cell_m)).as_vec3()
+    }
+
+    fn simplified(self, mesh: &TriMesh) -> SimplifiedMesh {
+        let kept = self.kept(mesh);
+        let quadrics = self.quadrics(mesh);
+
+        // Only cells with a face that stays get a vertex.
         let mut place = vec![crate::NO_INDEX; self.numbers.len()];
         let mut positions = Vec::new();
         let mut faces = Vec::with_capacity(kept.len());
@@ -172,18 +192,23 @@ impl Cells {
                 let cell = cell as usize;
                 if place[cell] == crate::NO_INDEX {
                     place[cell] = positions.len() as u32;
-                    positions.push(vertex((&self.numbers[cell], &sums[cell])));
+                    positions.push(self.vertex(self.numbers[cell], &quadrics[cell]));
                 }
                 place[cell]
             }));
         }
-        let new = |cell: &u32| place.get(*cell as usize).copied().unwrap_or(crate::NO_INDEX);
-        let vertex_of = self.of_vertex.iter().map(new).collect();
+
+        let vertex_of = self
+            .of_vertex
+            .iter()
+            .map(|cell| place.get(*cell as usize).copied().unwrap_or(crate::NO_INDEX))
+            .collect();
         SimplifiedMesh { cell_m: self.cell_m, positions, faces, face_of: kept, vertex_of }
     }
 }
 
-/// The squared distance to planes, as a function of the place: xᵀAx − 2bx + c, without the c.
+/// The sum of the squared distances to planes, as a function of the place x: xᵀAx − 2bx + c. The constant c
+/// is left out.
 #[derive(Clone, Copy)]
 struct Quadric {
     a: DMat3,
@@ -200,7 +225,7 @@ impl Quadric {
         self.count += 1.0;
     }
 
-    /// Adds a plane by the normal of a face, as long as twice its area, and a point of it.
+    /// Adds the plane of a face through the point `at`. The length of `normal` is twice the area of the face.
     fn add_plane(&mut self, normal: DVec3, at: DVec3) {
         let weight = 1.0 / normal.length();
         if weight.is_finite() {
@@ -210,8 +235,9 @@ impl Quadric {
         }
     }
 
-    /// Where it is least, and near the mean of the vertices where it does not tell.
-    fn least(&self) -> DVec3 {
+    /// Returns the place of the minimum. Directions that the planes leave open follow the mean of the
+    /// vertices.
+    fn minimizer(&self) -> DVec3 {
         let mean = self.vertices / self.count.max(1.0);
         let hold = HOLD * (self.a.x_axis.x + self.a.y_axis.y + self.a.z_axis.z);
         let held = self.a + DMat3::from_diagonal(DVec3::splat(hold));
@@ -227,7 +253,7 @@ mod tests {
     use crate::primitives::{cuboid, grid};
     use glam::vec3;
 
-    /// A room of 4 × 3 × 2.5 m whose walls are grids of centimetres.
+    /// Returns a room of 4 × 3 × 2.5 m whose walls are grids of 5 cm.
     fn room() -> TriMesh {
         let [x, y, z] = [Vec3::X * 4.0, Vec3::Y * 3.0, Vec3::Z * 2.5];
         let walls = [
@@ -247,17 +273,19 @@ mod tests {
         let small = simplify(&mesh, 4000).unwrap();
         assert!((1500..=4000).contains(&small.faces.len()), "{}", small.faces.len());
         let kept = TriMesh::from_faces(small.positions.clone(), small.faces.clone()).unwrap();
-        // Quadrics put vertices into the corner, where means would round it off.
+        // Quadrics put vertices into the corner. Means would round it off.
         assert!((kept.total_area() / mesh.total_area() - 1.0).abs() < 0.01, "{}", kept.total_area());
         for corner in [Vec3::ZERO, vec3(4.0, 3.0, 2.5), vec3(4.0, 0.0, 2.5)] {
             let nearest = |p: &Vec3| p.distance(corner);
             let least = small.positions.iter().map(nearest).fold(f32::MAX, f32::min);
             assert!(least < 0.005, "{corner}: {least} m");
         }
+
         assert!(small.face_of.is_sorted());
         for (face, was) in small.faces.iter().zip(&small.face_of) {
             assert_eq!(*face, mesh.faces()[*was as usize].map(|v| small.vertex_of[v as usize]));
         }
+
         let diagonal = 3f64.sqrt() * small.cell_m;
         for (old, new) in mesh.positions().iter().zip(&small.vertex_of) {
             if let Some(new) = small.positions.get(*new as usize) {

@@ -1,29 +1,29 @@
-//! Colours of points carried to the vertices of a mesh.
+//! The transfer of colours from points to the vertices of a mesh.
 
 use crate::nearest::{Nearest, NearestFaces};
 use crate::{DEFAULT_COLOR, PointCloud, TriMesh};
 use glam::{DVec3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
-/// A point farther than this from every face gives it no colour: it belongs to something that the mesh lacks.
+/// A point farther than this from the mesh gives no colour: it belongs to something that the mesh lacks.
 const FAR_M: f32 = 0.1;
 
-/// Points whose nearest faces are in memory at once.
+/// The number of points whose nearest faces are in memory at once.
 const CHUNK_POINTS: usize = 1 << 20;
 
-/// A face with more points than this shows more than three corners can hold.
+/// A face with more points than this loses detail, since it has only three corners.
 const MANY_POINTS: u32 = 16;
 
-/// What a weight of 1 counts as. Sums of whole numbers are the same in any order.
+/// The whole number for a weight of 1. Sums of whole numbers are the same in any order.
 const ONE: f64 = 4096.0;
 
-/// Colours the vertices of a mesh by points that lie on it, which come block by block.
+/// Colours the vertices of a mesh from a point cloud, block by block.
 ///
-/// Each point within 10 cm of the mesh counts for the corners of its nearest face, by its barycentric
-/// coordinates there; a vertex has the weighted mean. Vertices at one place count as one, unless their
-/// surfaces are more than 45° apart. Those that no point counts for take the mean of the neighbours that have
-/// a colour, spreading along edges. The result is the same for any order of blocks and any number of threads.
-/// Colours are 8-bit R G B as they are stored.
+/// A point within 10 cm of the mesh counts for the corners of its nearest face, weighted by its barycentric
+/// coordinates. The colour of a vertex is the weighted mean. Vertices at one place count as one vertex,
+/// unless their surfaces are more than 45° apart. A vertex without points takes the mean colour of its
+/// neighbours, so colours spread along edges. The result is the same for any order of blocks and any number
+/// of threads. Colours are 8-bit R G B; the mean is taken of the stored values.
 ///
 /// ```
 /// use s3d_geom::{NearestFaces, PointCloud, TriMesh, VertexColors, glam::{Vec3, vec3}};
@@ -34,45 +34,45 @@ const ONE: f64 = 4096.0;
 /// let positions = vec![vec3(0.0, 0.0, 0.01), vec3(1.0, 0.0, 0.0), vec3(0.5, 0.0, 5.0)];
 /// colors.add(&PointCloud { positions, colors: vec![[255, 0, 0], [0, 9, 0], [7; 3]], faces: vec![] });
 /// let found = colors.finish();
-/// // The third point is far; the third vertex takes the mean of its neighbours.
+/// // The third point is far, so the third vertex takes the mean of its neighbours.
 /// assert_eq!(found.colors, [[255, 0, 0], [0, 9, 0], [128, 5, 0]]);
 /// assert_eq!((found.points, found.far_points, found.spread_m2), (3, 1, 0.5));
 /// # Ok::<(), s3d_geom::MeshError>(())
 /// ```
 pub struct VertexColors<'m> {
     nearest_faces: &'m NearestFaces<'m>,
-    /// Of each vertex, which of those that count as one it is in.
+    /// For each vertex, the group of vertices that count as one.
     group_of_vertex: Vec<u32>,
-    /// Of each group, which place it is at: those at one place follow each other.
+    /// For each group, the number of its place. Groups at one place follow each other.
     place_of_group: Vec<u32>,
-    /// Of each group: the weighted sums of R, G, B, and the weights.
+    /// For each group, the weighted sums of R, G and B, and the sum of the weights.
     sums: Vec<[u64; 4]>,
     points_of_face: Vec<u32>,
     points: u64,
     far_points: u64,
-    /// Of a chunk of points; kept for its memory.
+    /// The nearest faces of a chunk of points; kept for its memory.
     nearest: Vec<Nearest>,
 }
 
-/// The colours of vertices, and where they come from.
+/// The colours of vertices, and statistics of their sources.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColoredVertices {
-    /// R G B, one a vertex: for [`TriMesh::with_vertex_colors`](crate::TriMesh::with_vertex_colors).
+    /// R G B, one per vertex, for [`TriMesh::with_vertex_colors`](crate::TriMesh::with_vertex_colors).
     pub colors: Vec<[u8; 3]>,
-    /// How many points came.
+    /// The number of points.
     pub points: u64,
-    /// How many of them were farther than 10 cm from every face, and gave no colour.
+    /// The number of points farther than 10 cm from the mesh, which gave no colour.
     pub far_points: u64,
-    /// The area of the faces with a corner that no point counts for, whose colour has spread from others.
+    /// The area of the faces with a corner that has no points and took its colour from neighbours, in m².
     pub spread_m2: f64,
-    /// The area of the faces that no colour reaches: they are [`DEFAULT_COLOR`].
+    /// The area of the faces with a corner that no colour reaches, in m². Such corners are [`DEFAULT_COLOR`].
     pub bare_m2: f64,
-    /// The area of the faces with more than 16 points: what is finer than these faces is lost.
+    /// The area of the faces with more than 16 points, in m². Details finer than these faces are lost.
     pub blurred_m2: f64,
 }
 
 impl<'m> VertexColors<'m> {
-    /// Without a point yet, for the mesh of `nearest_faces`.
+    /// Starts without points, for the mesh of `nearest_faces`.
     pub fn new(nearest_faces: &'m NearestFaces<'m>) -> Self {
         let (group_of_vertex, place_of_group) = groups(nearest_faces.mesh());
         let sums = vec![[0; 4]; place_of_group.len()];
@@ -88,12 +88,12 @@ impl<'m> VertexColors<'m> {
         }
     }
 
-    /// Points (world metres) with a colour each. Points that are not finite count as far.
+    /// Adds coloured points, in world metres. Points that are not finite count as far.
     ///
     /// # Panics
-    /// If there is not one colour a point.
+    /// If the cloud does not have one colour per point.
     pub fn add(&mut self, cloud: &PointCloud) {
-        assert_eq!(cloud.positions.len(), cloud.colors.len(), "one colour a point");
+        assert_eq!(cloud.positions.len(), cloud.colors.len(), "one colour per point");
         let mesh = self.nearest_faces.mesh();
         self.points += cloud.len() as u64;
         for (points, colors) in cloud
@@ -107,8 +107,10 @@ impl<'m> VertexColors<'m> {
                     self.far_points += 1;
                     continue;
                 }
+
                 let points = &mut self.points_of_face[nearest.face as usize];
                 *points = points.saturating_add(1);
+
                 let corners = mesh.triangle(nearest.face).map(|p| p.as_dvec3());
                 let vertices = mesh.faces()[nearest.face as usize];
                 for (vertex, share) in
@@ -125,30 +127,39 @@ impl<'m> VertexColors<'m> {
         }
     }
 
-    /// The colours of all vertices, from the points so far.
+    /// Returns the groups of the corners of a face.
+    fn groups_of(&self, face: &[u32; 3]) -> [u32; 3] {
+        face.map(|vertex| self.group_of_vertex[vertex as usize])
+    }
+
+    /// Returns the area of the faces with a corner that has no colour, in m².
+    fn area_without_color(&self, colors: &[Option<[u8; 3]>]) -> f64 {
+        let mesh = self.nearest_faces.mesh();
+        let is_without = |group: &u32| colors[*group as usize].is_none();
+        (0u32..)
+            .zip(mesh.faces())
+            .filter(|(_, face)| self.groups_of(face).iter().any(is_without))
+            .map(|(f, _)| mesh.area(f))
+            .sum()
+    }
+
+    /// Returns the colours of all vertices, from the points so far.
     pub fn finish(self) -> ColoredVertices {
         let mesh = self.nearest_faces.mesh();
         let mut colors: Vec<Option<[u8; 3]>> = self.sums.iter().map(mean).collect();
-        let groups = |face: &[u32; 3]| face.map(|vertex| self.group_of_vertex[vertex as usize]);
-        let area_without = |colors: &[Option<[u8; 3]>]| -> f64 {
-            let faces = (0u32..).zip(mesh.faces());
-            let is_without = |group: &u32| colors[*group as usize].is_none();
-            faces
-                .filter(|(_, face)| groups(face).iter().any(is_without))
-                .map(|(f, _)| mesh.area(f))
-                .sum()
-        };
-        let unseen_m2 = area_without(&colors);
+
+        let unseen_m2 = self.area_without_color(&colors);
         if unseen_m2 > 0.0 {
-            let faces: Vec<[u32; 3]> = mesh.faces().iter().map(groups).collect();
+            let faces: Vec<[u32; 3]> = mesh.faces().iter().map(|face| self.groups_of(face)).collect();
             let around = FacesAround::new(&faces, colors.len());
             spread(&mut colors, &around);
-            // Around an edge, where vertices of two surfaces are at one place.
+            // At an edge between two surfaces, colours cross from one to the other.
             while share(&mut colors, &self.place_of_group) {
                 spread(&mut colors, &around);
             }
         }
-        let bare_m2 = area_without(&colors);
+        let bare_m2 = self.area_without_color(&colors);
+
         let color_of = |group: &u32| colors[*group as usize].unwrap_or(DEFAULT_COLOR);
         ColoredVertices {
             colors: self.group_of_vertex.iter().map(color_of).collect(),
@@ -165,8 +176,8 @@ impl<'m> VertexColors<'m> {
     }
 }
 
-/// Which vertices count as one: those at one place whose surfaces are at most 45° apart from the first's. Of
-/// each vertex its group, and of each group the number of its place.
+/// Groups the vertices that count as one: vertices at one place whose normals are at most 45° away from the
+/// normal of the first. Returns the group of each vertex, and the number of the place of each group.
 fn groups(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
     let mut normals = vec![Vec3::ZERO; mesh.positions().len()];
     for (f, face) in (0u32..).zip(mesh.faces()) {
@@ -174,14 +185,19 @@ fn groups(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
         face.iter()
             .for_each(|vertex| normals[*vertex as usize] += (b - a).cross(c - a));
     }
-    // Adding 0 makes −0 the same place.
-    let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
+
+    // Adding 0 turns −0 into 0, so that equal positions have equal bits.
+    let key = |vertex: u32| {
+        (mesh.positions()[vertex as usize] + Vec3::ZERO)
+            .to_array()
+            .map(f32::to_bits)
+    };
     let mut order: Vec<u32> = (0..normals.len() as u32).collect();
-    order.sort_unstable_by_key(|vertex| (key(mesh.positions()[*vertex as usize]), *vertex));
-    let (mut group_of_vertex, mut place_of_group) = (vec![0; normals.len()], Vec::new());
-    let vertices_at_places =
-        order.chunk_by(|a, b| key(mesh.positions()[*a as usize]) == key(mesh.positions()[*b as usize]));
-    for (place, vertices) in (0u32..).zip(vertices_at_places) {
+    order.sort_unstable_by_key(|&vertex| (key(vertex), vertex));
+
+    let mut group_of_vertex = vec![0; normals.len()];
+    let mut place_of_group = Vec::new();
+    for (place, vertices) in (0u32..).zip(order.chunk_by(|&a, &b| key(a) == key(b))) {
         // The normal of the first vertex of each group at this place.
         let first_group = place_of_group.len();
         let mut firsts: Vec<Vec3> = Vec::new();
@@ -199,12 +215,12 @@ fn groups(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
     (group_of_vertex, place_of_group)
 }
 
-/// The mean of weighted colours, rounded; nothing without a weight.
+/// Returns the mean of weighted colours, rounded. Returns `None` if the weight is 0.
 fn mean([r, g, b, weight]: &[u64; 4]) -> Option<[u8; 3]> {
     (*weight > 0).then(|| [r, g, b].map(|sum| ((2 * sum + weight) / (2 * weight)) as u8))
 }
 
-/// The mean of colours that count the same.
+/// Returns the unweighted mean of colours.
 fn plain_mean(colors: impl Iterator<Item = [u8; 3]>) -> Option<[u8; 3]> {
     let add = |sums: [u64; 4], [r, g, b]: [u8; 3]| {
         [sums[0] + u64::from(r), sums[1] + u64::from(g), sums[2] + u64::from(b), sums[3] + 1]
@@ -215,8 +231,9 @@ fn plain_mean(colors: impl Iterator<Item = [u8; 3]>) -> Option<[u8; 3]> {
 /// The faces around each group of vertices.
 struct FacesAround<'f> {
     faces: &'f [[u32; 3]],
-    /// Those of a group, one group after the other, and where each begins.
+    /// The faces around group 0, then around group 1, and so on.
     around: Vec<u32>,
+    /// For each group, the place of its first face in `around`.
     first: Vec<usize>,
 }
 
@@ -225,7 +242,9 @@ impl<'f> FacesAround<'f> {
         let mut first = vec![0; groups + 1];
         faces.iter().flatten().for_each(|group| first[*group as usize + 1] += 1);
         (1..first.len()).for_each(|i| first[i] += first[i - 1]);
-        let (mut next, mut around) = (first.clone(), vec![0; 3 * faces.len()]);
+
+        let mut next = first.clone();
+        let mut around = vec![0; 3 * faces.len()];
         for (face, group) in (0u32..)
             .zip(faces)
             .flat_map(|(face, groups)| groups.map(|group| (face, group)))
@@ -236,28 +255,31 @@ impl<'f> FacesAround<'f> {
         Self { faces, around, first }
     }
 
-    /// The corners of the faces around `group`: its neighbours, and itself.
+    /// Iterates over the corners of the faces around `group`: its neighbours and itself.
     fn corners(&self, group: u32) -> impl Iterator<Item = u32> {
         let faces = &self.around[self.first[group as usize]..self.first[group as usize + 1]];
         faces.iter().flat_map(|face| self.faces[*face as usize])
     }
 }
 
-/// Gives each group without a colour the mean of the neighbours that have one, those next to a colour first.
+/// Gives each group without a colour the mean colour of its neighbours. It proceeds ring by ring, starting
+/// with the groups next to a colour.
 fn spread(colors: &mut [Option<[u8; 3]>], around: &FacesAround<'_>) {
     let is_without = |colors: &[Option<[u8; 3]>], group: u32| colors[group as usize].is_none();
     let mut ring: Vec<u32> = (0..colors.len() as u32)
         .filter(|group| is_without(colors, *group))
         .filter(|group| around.corners(*group).any(|other| !is_without(colors, other)))
         .collect();
+
     while !ring.is_empty() {
-        // All of a ring look at what was there before it. A neighbour counts for each face that they share.
+        // All groups of a ring see the colours before the ring. A neighbour counts once for each shared face.
         let color =
             |group: &u32| plain_mean(around.corners(*group).filter_map(|other| colors[other as usize]));
         let found: Vec<Option<[u8; 3]>> = ring.iter().map(color).collect();
         ring.iter()
             .zip(&found)
             .for_each(|(group, color)| colors[*group as usize] = *color);
+
         let next = ring.iter().flat_map(|group| around.corners(*group));
         let mut next: Vec<u32> = next.filter(|other| is_without(colors, *other)).collect();
         next.sort_unstable();
@@ -266,9 +288,11 @@ fn spread(colors: &mut [Option<[u8; 3]>], around: &FacesAround<'_>) {
     }
 }
 
-/// Gives groups without a colour the mean of those at the same place, and returns whether there was one.
+/// Gives each group without a colour the mean of the groups at the same place. Returns true if a group got a
+/// colour.
 fn share(colors: &mut [Option<[u8; 3]>], place_of_group: &[u32]) -> bool {
-    let (mut begin, mut is_shared) = (0, false);
+    let mut begin = 0;
+    let mut is_shared = false;
     for at_place in place_of_group.chunk_by(|a, b| a == b) {
         let here = &mut colors[begin..begin + at_place.len()];
         begin += at_place.len();
@@ -281,7 +305,7 @@ fn share(colors: &mut [Option<[u8; 3]>], place_of_group: &[u32]) -> bool {
     is_shared
 }
 
-/// The barycentric coordinates of a point of a triangle: at least 0, with a sum of 1.
+/// Returns the barycentric coordinates of a point of a triangle: at least 0, with a sum of 1.
 fn barycentric([a, b, c]: [DVec3; 3], point: DVec3) -> [f64; 3] {
     let normal = (b - a).cross(c - a);
     let share = |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(normal).max(0.0);
@@ -301,12 +325,12 @@ mod tests {
     use glam::vec3;
     use proptest::prelude::*;
 
-    /// A floor of 1 m² in 10 × 10 cells.
+    /// Returns a floor of 1 m² in 10 × 10 cells.
     fn floor() -> TriMesh {
         TriMesh::new(primitives::grid(Vec3::ZERO, Vec3::X, Vec3::Y, [10, 10])).unwrap()
     }
 
-    /// A colour that is linear in x and y.
+    /// Returns a colour that is linear in x and y.
     fn ramp(p: Vec3) -> [u8; 3] {
         [(200.0 * p.x) as u8 + 20, (100.0 * p.y) as u8 + 50, (80.0 * (p.x + p.y)) as u8]
     }
@@ -326,8 +350,9 @@ mod tests {
     fn a_ramp_of_colours_comes_back_at_the_vertices() {
         let mesh = floor();
         let points = (0..100_000u32).map(|i| {
-            // Points of two irrational steps fill the square evenly.
-            let (u, v) = ((f64::from(i) * 0.754_877_666).fract(), (f64::from(i) * 0.569_840_29).fract());
+            // Multiples of two irrational steps fill the square evenly.
+            let u = (f64::from(i) * 0.754_877_666).fract();
+            let v = (f64::from(i) * 0.569_840_29).fract();
             vec3(u as f32, v as f32, 0.01)
         });
         let found = colored(&mesh, &[cloud(points.collect(), ramp)]);
@@ -335,7 +360,7 @@ mod tests {
         assert!((found.blurred_m2 - 1.0).abs() < 1e-6, "{}", found.blurred_m2);
         for (p, color) in mesh.positions().iter().zip(&found.colors) {
             let is_inside = [p.x, p.y].iter().all(|v| (0.05..0.95).contains(v));
-            // At the border the mean of a one-sided neighbourhood is a fraction of a cell further in.
+            // At the border, the neighbourhood is one-sided, and its mean belongs to a place further in.
             let most = if is_inside { 1 } else { 8 };
             let off = color.iter().zip(ramp(*p)).map(|(a, b)| a.abs_diff(b)).max().unwrap();
             assert!(off <= most, "{p}: {color:?} for {:?}", ramp(*p));
@@ -344,7 +369,7 @@ mod tests {
 
     #[test]
     fn colours_spread_to_where_no_point_is_and_not_to_what_is_apart() {
-        // A second floor beside the first, which no point is on.
+        // A second floor beside the first, without points.
         let mut parts = primitives::grid(Vec3::ZERO, Vec3::X, Vec3::Y, [10, 10]);
         parts.append(primitives::grid(vec3(2.0, 0.0, 0.0), Vec3::X, Vec3::Y, [2, 2]));
         let mesh = TriMesh::new(parts).unwrap();
@@ -360,7 +385,7 @@ mod tests {
 
     #[test]
     fn vertices_at_one_place_have_one_colour() {
-        // Two triangles that share an edge, and no vertex.
+        // Two triangles that share an edge in space but no vertex.
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X, vec3(1.0, 1.0, 0.0), vec3(-0.0, 1.0, -0.0)];
         let mesh = TriMesh::from_faces(corners.to_vec(), vec![[0, 1, 2], [3, 4, 5]]).unwrap();
         let found = colored(&mesh, &[cloud(vec![vec3(0.6, 0.3, 0.0)], |_| [90, 80, 70])]);
@@ -375,7 +400,7 @@ mod tests {
         let both = cloud(vec![vec3(0.3, 0.3, 0.0), vec3(0.0, 0.3, 0.3)], at);
         let [floor, wall] = [[200, 100, 0], [10, 20, 30]];
         assert_eq!(colored(&mesh, &[both]).colors, [floor, floor, floor, wall, wall, wall]);
-        // A wall that no point is on takes the colours of the corner, and not less.
+        // A wall without points takes the colours of the corner.
         let one = colored(&mesh, &[cloud(vec![vec3(0.3, 0.3, 0.0)], at)]);
         assert_eq!((one.colors, one.spread_m2, one.bare_m2), (vec![floor; 6], 0.5, 0.0));
     }

@@ -1,16 +1,16 @@
-//! The box of an instance, split in 6 × 6 × 6 voxels.
+//! The box of an instance, split into 6 × 6 × 6 voxels.
 //!
-//! Source: formats.md, "What is written" (the data set's `Bbox`, `Voxels`, `Voxel_Occupancy`,
-//! `Points_per_Voxel`).
+//! Source: formats.md, "What is written" (`Bbox`, `Voxels`, `Voxel_Occupancy` and `Points_per_Voxel` of the
+//! data set).
 
 use crate::Aabb;
 use glam::Vec3;
 
-/// A box split in [`VoxelGrid::SIDE`]³ equal voxels.
+/// A box split into [`VoxelGrid::SIDE`]³ equal voxels.
 ///
-/// Voxel (ix, iy, iz), counted along the axes from the box's `min`, has the index `(ix * 6 + iy) * 6 + iz`. A
-/// point between two voxels belongs to the upper one, a point on the upper face of the box to the last voxel;
-/// along an axis without extent there is one layer, index 0.
+/// Voxel (ix, iy, iz), counted along the axes from `min` of the box, has the index `(ix * 6 + iy) * 6 + iz`.
+/// A point between two voxels belongs to the upper one. A point on the upper face of the box belongs to the
+/// last voxel. Along an axis without extent, there is only layer 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -22,31 +22,31 @@ pub struct VoxelGrid {
     pub bbox: Aabb,
 }
 
-/// The seven planes that bound the six layers of an axis, for the three axes.
+/// The seven planes that bound the six layers, for each of the three axes.
 type Planes = [[f32; VoxelGrid::SIDE + 1]; 3];
 
 impl VoxelGrid {
-    /// Voxels along each axis.
+    /// The number of voxels along each axis.
     pub const SIDE: usize = 6;
-    /// Voxels in all.
+    /// The number of all voxels.
     pub const CELLS: usize = Self::SIDE * Self::SIDE * Self::SIDE;
 
-    /// Index of the voxel that holds `point`. A point outside of the box belongs to the nearest voxel of the
-    /// surface.
+    /// Returns the index of the voxel that contains `point`. A point outside of the box belongs to the
+    /// nearest voxel.
     pub fn cell_of(&self, point: Vec3) -> usize {
         cell_between(&self.planes(), point)
     }
 
-    /// The voxel of each of `points`, as [`VoxelGrid::cell_of`] gives it, into `out`, whose content they
-    /// replace.
+    /// Writes the voxel of each of `points` into `out`, as [`VoxelGrid::cell_of`] returns it. The old content
+    /// of `out` is replaced.
     pub fn cells_of(&self, points: &[Vec3], out: &mut Vec<u8>) {
         let planes = self.planes();
         out.clear();
         out.extend(points.iter().map(|&p| cell_between(&planes, p) as u8));
     }
 
-    /// The box of voxel `cell`. It contains, in `f32`, every point of the box that [`VoxelGrid::cell_of`]
-    /// puts there.
+    /// Returns the box of voxel `cell`. It contains, in `f32`, every point of the whole box for which
+    /// [`VoxelGrid::cell_of`] returns `cell`.
     ///
     /// # Panics
     /// If `cell` is not below [`VoxelGrid::CELLS`].
@@ -54,19 +54,21 @@ impl VoxelGrid {
         assert!(cell < Self::CELLS, "voxel {cell} of {}", Self::CELLS);
         let planes = self.planes();
         let layers = [cell / (Self::SIDE * Self::SIDE), cell / Self::SIDE % Self::SIDE, cell % Self::SIDE];
-        // A flat axis has one layer, and its planes coincide: the other layers are as flat and hold nothing.
+        // The planes of an axis without extent coincide. Its other layers are just as flat, and empty.
         Aabb {
             min: Vec3::from_array(std::array::from_fn(|axis| planes[axis][layers[axis]])),
             max: Vec3::from_array(std::array::from_fn(|axis| planes[axis][layers[axis] + 1])),
         }
     }
 
-    /// One set of planes decides for points and for voxel boxes, so that the two cannot disagree by a
-    /// rounding.
+    /// Returns the planes between the layers. They decide for points and for the boxes of voxels, so the two
+    /// cannot disagree by a rounding.
     fn planes(&self) -> Planes {
-        let (min, max) = (self.bbox.min.to_array(), self.bbox.max.to_array());
+        let min = self.bbox.min.to_array();
+        let max = self.bbox.max.to_array();
         std::array::from_fn(|axis| {
-            let (low, high) = (f64::from(min[axis]), f64::from(max[axis]));
+            let low = f64::from(min[axis]);
+            let high = f64::from(max[axis]);
             let mut planes: [f32; Self::SIDE + 1] =
                 std::array::from_fn(|k| (low + (high - low) * (k as f64 / Self::SIDE as f64)) as f32);
             planes[Self::SIDE] = max[axis];
@@ -89,7 +91,7 @@ fn cell_between(planes: &Planes, point: Vec3) -> usize {
     (layer(0) * VoxelGrid::SIDE + layer(1)) * VoxelGrid::SIDE + layer(2)
 }
 
-/// The points of an instance by voxel of their tightest box.
+/// The points of an instance, sorted into the voxels of their tightest box.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -106,16 +108,17 @@ fn cell_between(planes: &Planes, point: Vec3) -> usize {
 /// assert_eq!(voxels.grid.voxel_aabb(0).size(), Vec3::ONE);
 /// ```
 pub struct Voxels {
-    /// The tightest box of the points, and its voxels.
+    /// The voxels of the tightest box of the points.
     pub grid: VoxelGrid,
-    /// The points of voxel `c` are `members[starts[c]..starts[c + 1]]`; [`VoxelGrid::CELLS`] + 1 numbers.
+    /// [`VoxelGrid::CELLS`] + 1 places in `members`. The points of voxel `c` are
+    /// `members[starts[c]..starts[c + 1]]`.
     pub starts: Vec<u32>,
-    /// Indices of the points, grouped by voxel, ascending within each; as many as there are points.
+    /// The indices of all points, grouped by voxel, ascending within a voxel.
     pub members: Vec<u32>,
 }
 
 impl Voxels {
-    /// Sorts points, which must be finite, into the voxels of their box. `None` if there is no point.
+    /// Sorts points, which must be finite, into the voxels of their box. Returns `None` if there is no point.
     ///
     /// # Panics
     /// If there are more than `u32::MAX` points.
@@ -124,6 +127,7 @@ impl Voxels {
             return None;
         }
         assert!(u32::try_from(points.len()).is_ok(), "{} points in one instance", points.len());
+
         let grid = VoxelGrid { bbox: Aabb::from_points(points.iter().copied()) };
         let mut cells = Vec::with_capacity(points.len());
         grid.cells_of(points, &mut cells);
@@ -135,6 +139,7 @@ impl Voxels {
         for c in 0..VoxelGrid::CELLS {
             starts[c + 1] += starts[c];
         }
+
         let mut next = starts.clone();
         let mut members = vec![0u32; points.len()];
         for (point, &cell) in cells.iter().enumerate() {
@@ -145,20 +150,23 @@ impl Voxels {
         Some(Self { grid, starts, members })
     }
 
-    /// Which voxels hold a point.
+    /// Returns for each voxel whether it contains a point.
     pub fn occupancy(&self) -> [bool; VoxelGrid::CELLS] {
         std::array::from_fn(|cell| self.count(cell) > 0)
     }
 
-    /// How many points voxel `cell` holds.
+    /// Returns the number of points in voxel `cell`.
     ///
     /// # Panics
-    /// If `cell` is not below [`VoxelGrid::CELLS`]; so does [`Voxels::members_of`].
+    /// If `cell` is not below [`VoxelGrid::CELLS`].
     pub fn count(&self, cell: usize) -> usize {
         self.members_of(cell).len()
     }
 
-    /// Indices of the points in voxel `cell`, ascending.
+    /// Returns the indices of the points in voxel `cell`, ascending.
+    ///
+    /// # Panics
+    /// If `cell` is not below [`VoxelGrid::CELLS`].
     pub fn members_of(&self, cell: usize) -> &[u32] {
         &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
@@ -203,10 +211,10 @@ mod as_data {
                 && starts.last().is_some_and(|end| *end as usize == members.len())
                 && starts.is_sorted();
             if !is_whole {
-                return Err("where voxels start does not fit their number and their points");
+                return Err("`starts` does not fit the number of voxels and points");
             }
             if members.iter().any(|point| *point as usize >= members.len()) {
-                return Err("a point of a voxel that is not there");
+                return Err("a voxel has a point that is not there");
             }
             Ok(Self { grid, starts, members })
         }
@@ -266,7 +274,7 @@ mod tests {
         let _ = UNIT.voxel_aabb(216);
     }
 
-    /// Boxes of ordinary size, far from the origin, and so thin that planes coincide.
+    /// Makes boxes of ordinary size, far from the origin, and so thin that planes coincide.
     fn points() -> impl Strategy<Value = Vec<Vec3>> {
         let coordinate = prop_oneof![-5.0..5.0f32, 1000.0..1000.0006f32, Just(3.0f32), -1e30..1e30f32];
         let axis = move || prop::collection::vec(coordinate.clone(), 1..200);

@@ -1,35 +1,35 @@
-//! Wider registers where the processor has them.
+//! Wider registers, if the processor has them.
 
 use s3d_simd::{dispatch, level};
 
-/// Work whose loops the compiler may vectorise. `run` and what it calls in its loops are `#[inline(always)]`,
-/// so that they are compiled once for any processor of the target and once for one with AVX2.
+/// Work whose loops the compiler may vectorise. `run` and the functions that it calls in loops are
+/// `#[inline(always)]`, so they are compiled twice: for any processor of the target, and for AVX2.
 pub(crate) trait Work {
     type Output;
     fn run(self) -> Self::Output;
 }
 
-/// Runs `work`, compiled for AVX2 where that is in use. The answer is the same, as no rounding depends on the
-/// width: products and sums are not fused.
+/// Runs `work`, compiled for AVX2 if that is in use. The result is the same at every width, because products
+/// and sums are not fused.
 pub(crate) fn run<W: Work>(work: W) -> W::Output {
     dispatch!(level().without_avx512(), _simd => work.run())
 }
 
-/// The larger, `b` if one is NaN: a single instruction, unlike [`f32::max`].
+/// Returns the larger number, or `b` if one is NaN. Unlike [`f32::max`], this is a single instruction.
 #[cfg(feature = "nearest")]
 #[inline(always)]
 pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The smaller, `b` if one is NaN.
+/// Returns the smaller number, or `b` if one is NaN.
 #[cfg(feature = "nearest")]
 #[inline(always)]
 pub(crate) fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The lanes whose value is at most `bound`, as bits.
+/// Returns the lanes whose value is at most `bound`, as bits.
 #[cfg(feature = "nearest")]
 #[inline(always)]
 pub(crate) fn at_most(values: &[f32; 8], bound: f32) -> u32 {
@@ -40,7 +40,7 @@ pub(crate) fn at_most(values: &[f32; 8], bound: f32) -> u32 {
     bits.iter().sum()
 }
 
-/// The smallest of values that are no NaN.
+/// Returns the smallest value. None may be NaN.
 #[cfg(feature = "nearest")]
 #[inline(always)]
 pub(crate) fn least(values: &[f32; 8]) -> f32 {

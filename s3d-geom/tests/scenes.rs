@@ -1,4 +1,4 @@
-//! Meshes as they come: rooms with textures, and one as untidy as a scan.
+//! Meshes as users have them: rooms with textures, and one as untidy as a scan.
 
 use s3d_geom::glam::Vec3;
 use s3d_geom::primitives::{cuboid, quad};
@@ -13,13 +13,16 @@ fn parts_keep_their_attributes_when_they_are_merged() {
     let textured = furnished_room(7).into_parts();
     let mut colored = quad([Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y]);
     colored.colors = vec![[1; 3], [2; 3], [3; 3], [4; 3]];
-    (colored.face_uvs, colored.uvs) = (vec![], vec![]);
+    colored.face_uvs = vec![];
+    colored.uvs = vec![];
     colored.normals = vec![Vec3::Z];
     colored.face_normals = vec![[0; 3]; 2];
     colored.face_tags = vec![4; 2];
+
     let mut plain = cuboid(Vec3::ZERO, Vec3::ONE);
     plain.materials = vec![Material { name: "plain".into(), color: [9; 3], texture: None }];
     plain.face_materials = vec![0; 12];
+
     let [n, m] = [textured.faces.len() as u32, colored.faces.len() as u32];
     let all = MeshParts::merge([textured.clone(), colored.clone(), plain, textured.clone()]);
     let tag = |f: u32| all.face_tags[f as usize];
@@ -54,7 +57,8 @@ fn a_mesh_without_such_faces_is_as_it_was() {
     assert_eq!((repeated, mesh.faces()), (0, &before[..]));
 }
 
-/// Points on the faces of a mesh, off by up to `off` metres, every 37th far off and every 101st nowhere.
+/// Returns points on the faces of a mesh, moved off by up to twice `off` metres. Every 37th is far off, and
+/// every 101st is NaN.
 fn around(mesh: &TriMesh, points: u64, off: f32) -> Vec<Vec3> {
     let mut cloud = PointCloud::default();
     SurfaceSampler::new(mesh, Density::Total(points), 3).sample(0..points, &mut cloud);
@@ -78,14 +82,16 @@ fn around(mesh: &TriMesh, points: u64, off: f32) -> Vec<Vec3> {
 fn a_scan_in_any_order() {
     let m = scan_like(2500, 5);
     let faces = NearestFaces::new(&m);
-    let (mut in_order, mut shuffled) = (Vec::new(), Vec::new());
+    let mut in_order = Vec::new();
+    let mut shuffled = Vec::new();
     for off in [0.0, 0.0025, 0.3] {
         let points = around(&m, 3001, off);
         faces.nearest_many(&points, &mut in_order);
         for (&p, found) in points.iter().zip(&in_order).filter(|(p, _)| p.is_finite()) {
             assert_eq!(*found, nearest_brute_force(&m, p), "at {p}");
         }
-        // 1009 is prime and no divisor.
+
+        // 1009 is prime and not a divisor, so every point comes once.
         let order: Vec<usize> = (0..points.len()).map(|i| i * 1009 % points.len()).collect();
         let mixed: Vec<Vec3> = order.iter().map(|&i| points[i]).collect();
         faces.nearest_many(&mixed, &mut shuffled);

@@ -1,4 +1,4 @@
-//! The vocabulary as JSON: what is written comes back to the bit, and what cannot be is refused.
+//! The vocabulary as JSON: values are read back to the bit, and invalid values are refused.
 
 use proptest::prelude::*;
 use s3d_geom::glam::{DMat3, DVec2, DVec3, Vec3, dvec2, vec3};
@@ -63,7 +63,8 @@ proptest! {
         comes_back(&Camera::perspective(pose, fov_rad, size.0, size.1))?;
         comes_back(&Camera::equirectangular(pose, 2 * size.0))?;
         let middle = dvec2(f64::from(size.0), f64::from(size.1)) * 0.5;
-        let (focal, center) = (middle * dvec2(0.3, fov_rad), dvec2(fov_rad, -7.5));
+        let focal = middle * dvec2(0.3, fov_rad);
+        let center = dvec2(fov_rad, -7.5);
         comes_back(&Camera::pinhole(pose_at(pose.location), focal, center, size.0, size.1).unwrap())?;
         let lens = Lens::new(size.into(), middle * 1.7, middle, [0.11, -0.23, 0.0012, fov_rad * 1e-4, 0.05]);
         prop_assert!(lens.is_some());
@@ -122,7 +123,7 @@ fn what_cannot_be_is_refused() {
     assert!(refusal::<Camera>(&pinhole.replace("400.0", "0.0")).contains("focal lengths of 500 and 0 px"));
 
     let lens = r#"{"size":[0,480],"focal_px":[500,500],"center_px":[320,240],"distortion":[0,0,0,0,0]}"#;
-    assert!(refusal::<Lens>(lens).contains("no picture"));
+    assert!(refusal::<Lens>(lens).contains("no direction is projected to the middle"));
     assert!(serde_json::from_str::<Lens>(&lens.replace("[0,480]", "[640,480]")).is_ok());
 
     let cloud = r#"{"positions":[[0,0,0],[1,1,1]],"colors":[[1,2,3]],"faces":[]}"#;

@@ -1,6 +1,6 @@
-//! How fast are scan locations read, from each form of list: locations a second?
+//! Measures how fast scan locations are read from each form of list, in locations a second.
 //!
-//! 2,000 cameras around a building, made here; files are warm in the system's cache.
+//! The lists have 2,000 cameras around a building. The files are warm in the system's cache.
 #![allow(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 const LOCATIONS: u32 = 2000;
 
 fn pose(i: u32) -> Pose {
-    let (x, y) = (f64::from(i % 50) * 0.9, f64::from(i / 50) * 0.9);
+    let x = f64::from(i % 50) * 0.9;
+    let y = f64::from(i / 50) * 0.9;
     Pose::from_scanner(dvec3(x, y, 1.5), DQuat::from_rotation_z(0.01 * f64::from(i)))
 }
 
@@ -24,7 +25,7 @@ fn uuid(i: u32) -> String {
     format!("{:032x}", u128::from(i) * 0x9e37_79b9_7f4a_7c15_f39c_c060 + 1)
 }
 
-/// Image lists of COLMAP: the text, and the same in binary.
+/// Returns the list of images of a COLMAP model, as text and in binary.
 fn colmap() -> (String, Vec<u8>) {
     let mut text = String::new();
     let mut binary = u64::from(LOCATIONS).to_le_bytes().to_vec();
@@ -34,8 +35,10 @@ fn colmap() -> (String, Vec<u8>) {
         let q = DQuat::from_mat3(&r);
         let t = -(r * p.location);
         let numbers = [q.w, q.x, q.y, q.z, t.x, t.y, t.z];
+
         let line: Vec<String> = numbers.iter().map(f64::to_string).collect();
         let _ = writeln!(text, "{} {} 1 {}.jpg\n1.5 2.5 -1 3.5 4.5 -1", i + 1, line.join(" "), uuid(i));
+
         binary.extend((i + 1).to_le_bytes());
         numbers.iter().for_each(|v| binary.extend(v.to_le_bytes()));
         binary.extend(1u32.to_le_bytes());
@@ -46,9 +49,11 @@ fn colmap() -> (String, Vec<u8>) {
     (text, binary)
 }
 
+/// Writes a list of each form, and returns their names and paths.
 fn write_all(dir: &Path) -> Vec<(&'static str, PathBuf)> {
     let at = |name: &str| dir.join(name);
-    let (mut csv, mut frames) = (String::new(), Vec::new());
+    let mut csv = String::new();
+    let mut frames = Vec::new();
     fs::create_dir(at("poses")).unwrap();
     for i in 0..LOCATIONS {
         let p = pose(i);
@@ -63,6 +68,7 @@ fn write_all(dir: &Path) -> Vec<(&'static str, PathBuf)> {
             half.sin(),
             half.cos()
         );
+
         let m = p.world_from_camera;
         let row =
             |k: usize| format!("[{}, {}, {}, {}]", m.x_axis[k], m.y_axis[k], m.z_axis[k], p.location[k]);
@@ -73,10 +79,12 @@ fn write_all(dir: &Path) -> Vec<(&'static str, PathBuf)> {
             row(1),
             row(2)
         ));
+
         let camera = Camera::equirectangular(p, 4096);
         let file = PoseFile::new(&camera, &p, &uuid(i), "office_1_1", Frame::Panorama).to_json();
         fs::write(at(&format!("poses/{}.json", uuid(i))), file).unwrap();
     }
+
     let (text, binary) = colmap();
     fs::write(at("cameras.csv"), csv).unwrap();
     fs::write(at("images.txt"), text).unwrap();

@@ -1,8 +1,8 @@
-//! How fast are flat clouds read and grouped by instance, in points a second: the whole of
-//! `Annotations::open`, for each kind of file; and how much slower through a temporary file?
+//! Times reading tables of points and grouping them by instance, in points a second: all of
+//! `Annotations::open`, for each kind of file, and once through a temporary file.
 //!
-//! The points are made here, with a fixed seed: 200 instances of 8 classes in no order. Files are warm in the
-//! system's cache.
+//! The points are made here with a fixed seed: 200 instances of 8 classes in random order. Files are warm in
+//! the system's cache.
 #![allow(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -37,7 +37,7 @@ fn points() -> Vec<Point> {
     (0..POINTS).map(point).collect()
 }
 
-/// The columns x y z (float) red green blue (uchar) class (uchar) instance (ushort), little-endian.
+/// The points as rows of x y z (float) red green blue (uchar) class (uchar) instance (ushort), little-endian.
 fn rows(points: &[Point]) -> Vec<u8> {
     let mut bytes = Vec::new();
     for p in points {
@@ -60,6 +60,7 @@ fn write_ply(dir: &Path, points: &[Point], ascii: bool) -> PathBuf {
          property uchar class\nproperty ushort instance\nend_header\n"
     )
     .unwrap();
+
     if ascii {
         let mut text = String::new();
         for Point { position: [x, y, z], color: [r, g, b], class, instance } in points {
@@ -78,10 +79,12 @@ fn write_npy(dir: &Path, points: &[Point]) -> PathBuf {
         "{{'descr': [('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('rgb', '|u1', (3,)), ('class', '|u1'), \
          ('instance', '<u2')], 'fortran_order': False, 'shape': ({POINTS},), }}"
     );
+
     while !(header.len() + 11).is_multiple_of(64) {
         header.push(' ');
     }
     header.push('\n');
+
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
     bytes.extend((header.len() as u16).to_le_bytes());
     bytes.extend(header.as_bytes());
@@ -92,17 +95,19 @@ fn write_npy(dir: &Path, points: &[Point]) -> PathBuf {
 
 fn write_las(dir: &Path, points: &[Point], name: &str) -> PathBuf {
     let path = dir.join(name);
+
     let mut builder = las::Builder::from((1, 4));
     builder.point_format = las::point::Format::new(7).unwrap();
     let header = builder.into_header().unwrap();
     let mut writer = las::Writer::from_path(&path, header).unwrap();
+
     for p in points {
         let [red, green, blue] = p.color.map(|c| u16::from(c) * 257);
         let point = las::Point {
             x: p.position[0],
             y: p.position[1],
             z: p.position[2],
-            // Codes that mean something of their own are not all allowed: those above 18 are free.
+            // Codes with a meaning of their own are not all allowed. Codes above 18 are free.
             classification: las::point::Classification::new(64 + p.class).unwrap(),
             point_source_id: p.instance,
             color: Some(las::Color { red, green, blue }),
@@ -136,6 +141,7 @@ fn write_e57(dir: &Path, points: &[Point]) -> PathBuf {
         own("class", 255),
         own("instance", 65_535),
     ];
+
     let mut scan = writer.add_pointcloud("{1}", prototype).unwrap();
     for p in points {
         let mut values: Vec<RecordValue> =
@@ -149,7 +155,7 @@ fn write_e57(dir: &Path, points: &[Point]) -> PathBuf {
     path
 }
 
-/// The structured array in an archive, stored.
+/// Writes the structured array into an archive, without compression.
 fn write_npz(dir: &Path, npy: &Path) -> PathBuf {
     let path = dir.join("stored.npz");
     let mut archive = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
@@ -160,7 +166,7 @@ fn write_npz(dir: &Path, npy: &Path) -> PathBuf {
     path
 }
 
-/// A scan of ScanNet whose vertices are the points: a segment a class and instance.
+/// Writes a scan of ScanNet whose vertices are the points, with a segment for each class and instance.
 fn write_scannet(dir: &Path, points: &[Point]) -> PathBuf {
     const NAMES: [&str; 8] = ["wall", "floor", "chair", "table", "door", "window", "couch", "bookshelf"];
     let folder = dir.join("scene0000_00");
@@ -171,7 +177,9 @@ fn write_scannet(dir: &Path, points: &[Point]) -> PathBuf {
         .map(|p| (u32::from(p.class) * 25 + u32::from(p.instance)).to_string())
         .collect();
     let segs = format!("{{\"sceneId\": \"scene0000_00\", \"segIndices\": [{}]}}", segments.join(","));
+
     std::fs::write(folder.join("scene0000_00_vh_clean_2.0.010000.segs.json"), segs).unwrap();
+
     let groups: Vec<String> = (0..200)
         .map(|i| {
             let name = NAMES[i / 25];
@@ -190,6 +198,7 @@ fn clouds(c: &mut Criterion) {
     let scannet = write_scannet(dir.path(), &points);
     let npy = write_npy(dir.path(), &points);
     let npz = write_npz(dir.path(), &npy);
+
     let paths = [
         write_ply(dir.path(), &points, true),
         write_ply(dir.path(), &points, false),
@@ -200,14 +209,17 @@ fn clouds(c: &mut Criterion) {
         write_las(dir.path(), &points, "cloud.laz"),
         write_e57(dir.path(), &points),
     ];
+
     let classes = (0..72)
         .map(|k: usize| (k.to_string(), Some(Class::S3DIS[k % 8])))
         .collect();
     let room = Some("office_1".parse().unwrap());
     let memory = AnnotationOptions { classes, room, ..AnnotationOptions::default() };
     let spool = AnnotationOptions { points_in_memory: 0, ..memory.clone() };
+
     let mut group = c.benchmark_group("clouds");
     group.sample_size(10).throughput(Throughput::Elements(POINTS as u64));
+
     for path in &paths {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         let open = |options| Annotations::open(black_box(std::slice::from_ref(path)), options).unwrap();

@@ -1,13 +1,13 @@
-//! What does the deflate of our own buy: the same images in files of about the same size, against zlib-rs,
-//! libdeflate and fdeflate?
+//! What does our own deflate gain? It is compared with zlib-rs, libdeflate and fdeflate on the same images,
+//! in files of about the same size.
 //!
 //! ```sh
 //! s3d export scene.toml -o OUT --threads 1          # user time / locations = core-seconds a location
 //! S3D_EXPORT=OUT cargo bench -p s3d-io --bench compressors
 //! ```
 //!
-//! The images are those of an export: `S3D_VIEWS` of its views (6), spread evenly, and one panorama. Without
-//! an export they are those of a generated room. Every combination is tried of
+//! The images come from an export: `S3D_VIEWS` of its views (6), spread evenly, and one panorama. Without an
+//! export they show a generated room. These combinations are all tried:
 //!
 //! - zlib-rs (through flate2), libdeflate (through libdeflater) and fdeflate, at some levels, on bytes that
 //!   our own filters made, as none, up or Paeth: whole PNG files, written by the `png` crate;
@@ -15,16 +15,16 @@
 //! - the same libraries on the blocks of an OpenEXR file as ZIP prepares them (preparing costs all of them
 //!   the same, and counts), and the `exr` crate alone.
 //!
-//! Ours is what an export calls. Printed are, for each modality and library,
+//! Ours is what an export calls. For each modality and library the bench prints
 //!
-//! - as small: the fastest of those that make files at most 5 % larger than ours; where there is none, of
-//!   those within 2 % of the smallest;
-//! - as fast: the smallest of those that take at most 5 % more time than ours, or else the fastest;
-//! - fastest: whatever the size.
+//! - as small: the fastest way whose files are at most 5 % larger than ours, or else the fastest of those
+//!   within 2 % of the smallest;
+//! - as fast: the smallest way that takes at most 5 % more time than ours, or else the fastest;
+//! - fastest: the fastest way, whatever the size.
 //!
-//! Times are the least processor time of some rounds in which all take turns, sizes are ratios to ours.
-//! `best` chooses for each modality among all libraries. A location is as many views as the export kept for
-//! one on average, and a panorama.
+//! A time is the least processor time of some rounds in which all take turns, and a size is the ratio to
+//! ours. `best` chooses among all libraries for each modality. A location has as many views as the export
+//! kept for one on average, and a panorama.
 #![allow(clippy::print_stdout, missing_docs)]
 
 mod room;
@@ -44,9 +44,9 @@ use std::hint::black_box;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What counts as being as small, or as fast, as ours.
+/// The largest ratio to ours that counts as equally small, or equally fast.
 const LIKE_OURS: f64 = 1.05;
-/// Lines in a block of OpenEXR's ZIP.
+/// The number of lines in a block of OpenEXR's ZIP.
 const BLOCK_LINES: usize = 16;
 const MODALITIES: [&str; 6] = ["rgb", "depth", "normal", "semantic", "semantic_pretty", "global_xyz"];
 
@@ -108,6 +108,7 @@ impl Way {
             .iter()
             .flat_map(|(library, levels)| levels.iter().map(|level| (*library, *level)));
         let mut ways = Vec::new();
+
         for (library, level) in libraries {
             let filters = match image {
                 Image::Coordinates(_) => &[Filtering::None][..],
@@ -116,13 +117,14 @@ impl Way {
             };
             ways.extend(filters.iter().map(|&filter| Self { library, level, filter }));
         }
+
         if matches!(image, Image::Coordinates(_)) {
             ways.push(Self { library: Library::ExrCrate, level: 4, filter: Filtering::None });
         }
         ways
     }
 
-    /// `data` as a zlib stream.
+    /// Compresses `data` to a zlib stream.
     fn zlib(self, data: &[u8]) -> Vec<u8> {
         match self.library {
             Library::ZlibRs => {
@@ -148,7 +150,7 @@ impl Way {
     }
 }
 
-/// The file that we make.
+/// Makes our file.
 fn ours(image: &Image) -> Vec<u8> {
     match image {
         Image::Colors(pixels, content) => encode_rgb8(pixels, *content, Compression::Balanced),
@@ -165,7 +167,7 @@ struct Samples<'a> {
     bytes: Cow<'a, [u8]>,
 }
 
-/// Those of an image that becomes a PNG file.
+/// Returns the samples of an image that becomes a PNG file.
 fn samples(image: &Image) -> Option<Samples<'_>> {
     match image {
         Image::Colors(pixels, _) => Some(Samples {
@@ -189,7 +191,7 @@ fn samples(image: &Image) -> Option<Samples<'_>> {
     }
 }
 
-/// The size of the file that a library makes.
+/// Returns the size of the file that a library makes.
 fn theirs(image: &Image, way: Way) -> usize {
     if let Some(Samples { width, height, format, bytes }) = samples(image) {
         return black_box(png_file(width, height, format, &bytes, way)).len();
@@ -202,10 +204,11 @@ fn theirs(image: &Image, way: Way) -> usize {
             let blocks = pixels.pixels().chunks(BLOCK_LINES * width).map(|lines| {
                 block.set(lines, width, f16::to_le_bytes).expect("whole lines");
                 let data = block.differences();
-                // Eight bytes before each block, eight in the table; a block that does not shrink is stored.
+                // There are eight bytes before each block and eight in the table. A block that does not
+                // shrink is stored.
                 16 + black_box(way.zlib(data)).len().min(data.len())
             });
-            // What the header takes.
+            // The size of the header.
             313 + blocks.sum::<usize>()
         }
         _ => unreachable!("the others have samples"),
@@ -236,6 +239,7 @@ fn png_file(width: u32, height: u32, (color, depth, pixel): Format, bytes: &[u8]
             return file;
         }
     };
+
     let compressed = way.zlib(&filter(bytes, width as usize * pixel, pixel, by).expect("whole lines"));
     let written = encoder.write_header().and_then(|mut writer| {
         writer.write_chunk(png::chunk::IDAT, &compressed)?;
@@ -267,7 +271,7 @@ fn exr_file(image: &Raster<[f16; 3]>) -> usize {
     file.into_inner().len()
 }
 
-/// Milliseconds of processor time of this thread.
+/// Returns the processor time of this thread in milliseconds.
 #[cfg(target_os = "linux")]
 fn now() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
@@ -280,7 +284,7 @@ fn now() -> f64 {
     START.elapsed().as_secs_f64() * 1e3
 }
 
-/// Least time and size.
+/// The least time, and the size.
 #[derive(Clone, Copy, Debug)]
 struct Cost {
     ms: f64,
@@ -297,7 +301,7 @@ impl Cost {
 
 const UNKNOWN: Cost = Cost { ms: f64::INFINITY, bytes: 0.0 };
 
-/// The means of ours and of all others, of some images of one modality.
+/// Returns the mean costs of our way and of all others, over some images of one modality.
 fn measure(images: &[Image], rounds: usize) -> (Cost, BTreeMap<Way, Cost>) {
     let mut mean = (Cost { ms: 0.0, bytes: 0.0 }, BTreeMap::new());
     let n = images.len() as f64;
@@ -325,7 +329,7 @@ fn measure(images: &[Image], rounds: usize) -> (Cost, BTreeMap<Way, Cost>) {
     mean
 }
 
-/// Of `ways`, those that are as small as ours, as fast as ours, and the fastest: see the head.
+/// Chooses the ways that are as small as ours, as fast as ours, and the fastest; see the head of this file.
 fn choices<'a>(
     own: Cost,
     ways: impl Iterator<Item = (&'a Way, &'a Cost)>,
@@ -333,7 +337,8 @@ fn choices<'a>(
     let ways: Vec<(Way, Cost)> = ways.map(|(way, cost)| (*way, *cost)).collect();
     let by_time = |a: &&(Way, Cost), b: &&(Way, Cost)| a.1.ms.total_cmp(&b.1.ms);
     let by_size = |a: &&(Way, Cost), b: &&(Way, Cost)| a.1.bytes.total_cmp(&b.1.bytes);
-    let (smallest, fastest) = (ways.iter().min_by(by_size)?, ways.iter().min_by(by_time)?);
+    let smallest = ways.iter().min_by(by_size)?;
+    let fastest = ways.iter().min_by(by_time)?;
     let small = (LIKE_OURS * own.bytes).max(1.02 * smallest.1.bytes);
     let small = ways.iter().filter(|(_, cost)| cost.bytes <= small).min_by(by_time)?;
     let fast = ways
@@ -346,14 +351,14 @@ fn choices<'a>(
 
 const CHOICES: [&str; 3] = ["as small", "as fast", "fastest"];
 
-/// Sums over modalities: ours, and a library's choices.
+/// The sums over all modalities: our costs, and the costs of a library's choices.
 #[derive(Clone, Copy)]
 struct Total {
     own: Cost,
     theirs: [Cost; CHOICES.len()],
 }
 
-/// The last takes for each modality the best of all.
+/// The last one takes the best library for each modality.
 const LIBRARIES: [(&str, &[Library]); 5] = [
     ("zlib-rs", &[Library::ZlibRs]),
     ("libdeflate", &[Library::Libdeflate]),
@@ -425,16 +430,21 @@ fn report_filters(images: &[Vec<Image>], rounds: usize) {
                     .zlib(filtered, None, &mut out);
                 out.len()
             };
+
             let filtered = filter(&bytes, line, pixel, by).expect("whole lines");
             let adapted = idat(&png_file(width, height, format, &bytes, fast));
             let adapted = fdeflate::decompress_to_vec(&adapted).expect("a zlib stream");
-            let (mut ours, mut whole, mut stream) = (UNKNOWN, UNKNOWN, UNKNOWN);
+
+            let mut ours = UNKNOWN;
+            let mut whole = UNKNOWN;
+            let mut stream = UNKNOWN;
             for _ in 0..rounds {
                 ours.measure(|| black_box(filter(&bytes, line, pixel, by)).map_or(0, |bytes| bytes.len()));
                 // The crate filters and compresses in one go.
                 whole.measure(|| black_box(png_file(width, height, format, &bytes, fast)).len());
                 stream.measure(|| black_box(fast.zlib(&adapted)).len());
             }
+
             fixed.ms += ours.ms / n;
             fixed.bytes += compress(&filtered) as f64 / n;
             adaptive.ms += (whole.ms - stream.ms) / n;
@@ -447,9 +457,10 @@ fn report_filters(images: &[Vec<Image>], rounds: usize) {
     }
 }
 
-/// The zlib stream of a PNG file.
+/// Returns the zlib stream of a PNG file.
 fn idat(file: &[u8]) -> Vec<u8> {
-    let (mut stream, mut rest) = (Vec::new(), &file[8..]);
+    let mut stream = Vec::new();
+    let mut rest = &file[8..];
     while let Some((length, next)) = rest.split_first_chunk() {
         let (content, next) = next[4..].split_at(u32::from_be_bytes(*length) as usize);
         if rest[4..8] == *b"IDAT" {
@@ -469,7 +480,7 @@ fn print_totals(title: &str, totals: &[Total; LIBRARIES.len()]) {
     );
     println!("|---|---|---|---|---|");
     let all = totals[LIBRARIES.len() - 1].own.bytes;
-    // Not of a library that makes some modalities only.
+    // A library that makes only some modalities has no total.
     for ((name, _), Total { own, theirs }) in LIBRARIES.iter().zip(totals).filter(|(_, t)| t.own.bytes == all)
     {
         let cell = |cost: Cost| {
@@ -479,7 +490,7 @@ fn print_totals(title: &str, totals: &[Total; LIBRARIES.len()]) {
     }
 }
 
-/// The files of a folder, in order.
+/// Returns the files of a folder, in order.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("a file").path()).collect();
@@ -502,7 +513,8 @@ fn read(path: &Path, modality: &str) -> Image {
     }
 }
 
-/// `count` images of each modality, spread evenly over those of a folder of them, and how many there are.
+/// Reads `count` images of each modality, spread evenly over its folder. Also returns how many a modality
+/// has.
 fn spread(folder: &Path, count: usize) -> (Vec<Vec<Image>>, usize) {
     let mut n = 0;
     let images = MODALITIES.map(|modality| {
@@ -516,7 +528,7 @@ fn spread(folder: &Path, count: usize) -> (Vec<Vec<Image>>, usize) {
     (images.into(), n)
 }
 
-/// The images of the generated room, one of each modality.
+/// Returns the images of the generated room, one of each modality.
 fn generated() -> Vec<Vec<Image>> {
     let room::Images { photo, depth, normals, labels, pretty, xyz } = room::images();
     let images = [
@@ -546,18 +558,21 @@ fn main() {
         report_filters(&images, rounds);
         return;
     };
+
     let area = files(&export)
         .into_iter()
         .find(|p| p.join("data/rgb").is_dir())
         .expect("an area of an export");
     let (views, kept) = spread(&area.join("data"), number("S3D_VIEWS", 6));
     let (panoramas, locations) = spread(&area.join("pano"), 1);
+
     let images = views;
     let views = report(&format!("Views: {} of {kept}", images[0].len()), &images, rounds);
     print_totals("view", &views);
     report_filters(&images, rounds);
     let panoramas = report("Panorama", &panoramas, rounds.min(2));
     print_totals("panorama", &panoramas);
+
     let n = kept as f64 / locations as f64;
     let mut totals = views;
     for (total, panorama) in totals.iter_mut().zip(panoramas) {
@@ -570,5 +585,6 @@ fn main() {
             *sum = join(*sum, panorama);
         }
     }
+
     print_totals(&format!("location: {n:.1} views and a panorama"), &totals);
 }

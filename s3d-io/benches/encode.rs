@@ -1,13 +1,13 @@
-//! What does it cost to write a view of 1080² pixels, each of its images, on one core — and S3DIS text, OBJ
-//! meshes, PLY points, instances and poses?
+//! What does it cost on one core to write a view of 1080² pixels, and each of its images? What do S3DIS
+//! text, OBJ meshes, PLY points, instances and poses cost?
 //!
-//! The images are those of a furnished room made here from a fixed seed: uneven walls as a scan has them,
-//! seen at an angle, a texture with noise, a few dozen instances. `Throughput` is in bytes before
+//! The images show a furnished room that is made here from a fixed seed: uneven walls as a scan has them,
+//! seen at an angle, a texture with noise, and a few dozen instances. `Throughput` counts bytes before
 //! compression; the size after it is printed once. `view` is all six images of a view, one after the other.
-//! `docs/performance/encode_peers.py` has other encoders' figures for images of a data set.
+//! `docs/performance/encode_peers.py` has figures of other encoders for images of a data set.
 //!
-//! Goal: a view in 50 ms, balanced; no PNG image more than 1.1 times as large as libpng's level 6 makes it
-//! (RGB 1.15), no OpenEXR image larger than OpenEXR makes it.
+//! Goal: a view in 50 ms with balanced compression; no PNG image more than 1.1 times as large as by libpng's
+//! level 6 (RGB 1.15), and no OpenEXR image larger than by OpenEXR.
 #![allow(clippy::print_stderr, missing_docs)]
 
 mod room;
@@ -28,6 +28,7 @@ fn encode(c: &mut Criterion) {
     let halves = floats.map(|p| p.map(f16::from_f32));
     let mut group = c.benchmark_group("encode");
     group.sample_size(20);
+
     let n = photo.len();
     type Encode<'a> = &'a dyn Fn(Compression) -> Vec<u8>;
     let images: [(&str, usize, Encode<'_>); 7] = [
@@ -40,6 +41,7 @@ fn encode(c: &mut Criterion) {
         ("xyz_float_exr", 12 * n, &|c| encode_xyz_float(&floats, c)),
     ];
     let of_a_view = &images[..6];
+
     for compression in Compression::ALL {
         for (name, bytes, encode) in images {
             eprintln!("{name}, {compression}: {bytes} bytes become {}", encode(compression).len());
@@ -62,7 +64,7 @@ fn encode(c: &mut Criterion) {
     group.finish();
 }
 
-/// Points a second into the room's and the instance's file.
+/// Points per second into the files of a room and an instance.
 fn s3dis(c: &mut Criterion) {
     let n = 200_000;
     let positions: Vec<Vec3> = (0..n)
@@ -85,7 +87,7 @@ fn s3dis(c: &mut Criterion) {
     group.finish();
 }
 
-/// Faces a second into `semantic.obj`.
+/// Faces per second into `semantic.obj`.
 fn obj(c: &mut Criterion) {
     let side = 300;
     let positions = (0..side * side)
@@ -95,9 +97,11 @@ fn obj(c: &mut Criterion) {
         .map(|i| (i / (side - 1)) * side + i % (side - 1))
         .flat_map(|v| [[v, v + 1, v + side], [v + 1, v + side + 1, v + side]])
         .collect();
+
     let mesh = TriMesh::from_faces(positions, faces).expect("a mesh");
     let names: Vec<String> = (0..50).map(|i| format!("chair_{i}_office_5_1")).collect();
     let labels: Vec<u32> = (0..mesh.faces().len() as u32).map(|f| f / 97 % 50).collect();
+
     let mut group = c.benchmark_group("obj");
     group
         .sample_size(10)
@@ -109,7 +113,7 @@ fn obj(c: &mut Criterion) {
     group.finish();
 }
 
-/// Points a second into `pointcloud.ply`.
+/// Points per second into `pointcloud.ply`.
 fn ply(c: &mut Criterion) {
     let n = 200_000u32;
     let cloud = PointCloud {
@@ -131,18 +135,20 @@ fn ply(c: &mut Criterion) {
     group.finish();
 }
 
-/// Points a second into `instances.json` and `instances.npz`, 100 instances of 10,000.
+/// Points per second into `instances.json` and `instances.npz`, for 100 instances of 10,000.
 fn instances(c: &mut Criterion) {
     let points: Vec<Vec3> = (0..10_000u32)
         .map(|i| vec3((i % 97) as f32, (i % 89) as f32, (i % 83) as f32) * 0.01)
         .collect();
     let bbox = Aabb::from_points(points.iter().copied());
+
     let mut group = c.benchmark_group("instances");
     group.sample_size(10).throughput(Throughput::Elements(1_000_000));
     group.bench_function("json_and_npz", |b| {
         let dir = tempfile::tempdir().expect("a temporary folder");
         b.iter(|| {
-            let (json, npz) = (dir.path().join("i.json"), dir.path().join("i.npz"));
+            let json = dir.path().join("i.json");
+            let npz = dir.path().join("i.npz");
             let mut writer = InstanceWriter::create(&json, &npz).expect("the files");
             for label_index in 0..100 {
                 let record = InstanceRecord {
@@ -160,7 +166,7 @@ fn instances(c: &mut Criterion) {
     group.finish();
 }
 
-/// Pose files a second.
+/// Pose files per second.
 fn pose(c: &mut Criterion) {
     let original = Pose::level(DVec3::new(3.0, 2.0, 1.5), 0.3);
     let camera = Camera::perspective(original.turned(0.4, -0.1), 1.1, SIZE, SIZE);

@@ -1,13 +1,13 @@
-//! What does the inflater of our own buy: streams of our PNG files, against fdeflate, libdeflate and
-//! zlib-rs?
+//! What does our own inflater gain? It reads the streams of our PNG files, against fdeflate, libdeflate and
+//! zlib-rs.
 //!
 //! ```sh
 //! S3D_EXPORT=OUT cargo bench -p s3d-io --bench inflate
 //! ```
 //!
-//! The images are six views of an export, spread evenly, or else those of a generated room. Each library
-//! fills memory whose size is known; the checksum is left out by those that can do without it (ours and
-//! fdeflate, as the `png` crate wants it).
+//! The images are six views of an export, spread evenly, or else images of a generated room. Each library
+//! fills memory of a known size. Ours and fdeflate leave out the checksum, as the png crate does with
+//! fdeflate.
 #![allow(missing_docs)]
 
 #[expect(dead_code, reason = "not all images of the room are PNG")]
@@ -22,9 +22,11 @@ use std::path::Path;
 
 const VIEWS: usize = 6;
 
-/// The zlib stream of a PNG file, and the number of bytes in it.
+/// Returns the zlib stream of a PNG file, and the number of bytes that it inflates to.
 fn stream(file: &[u8]) -> (Vec<u8>, usize) {
-    let (mut stream, mut rest, mut len) = (Vec::new(), &file[8..], 0);
+    let mut stream = Vec::new();
+    let mut rest = &file[8..];
+    let mut len = 0;
     while let Some((length, next)) = rest.split_first_chunk() {
         let (content, next) = next[4..].split_at(u32::from_be_bytes(*length) as usize);
         match &rest[4..8] {
@@ -43,7 +45,7 @@ fn stream(file: &[u8]) -> (Vec<u8>, usize) {
     (stream, len)
 }
 
-/// Files of some views of an export.
+/// Reads the files of some views of an export.
 fn views(export: &Path, modality: &str) -> Vec<Vec<u8>> {
     let files = |folder: &Path| {
         let entries = std::fs::read_dir(folder).expect("a folder of an export");
@@ -55,6 +57,7 @@ fn views(export: &Path, modality: &str) -> Vec<Vec<u8>> {
         .into_iter()
         .find(|p| p.join("data/rgb").is_dir())
         .expect("an area of an export");
+
     let views = files(&area.join("data").join(modality));
     let n = VIEWS.min(views.len());
     let spread = (0..n).map(|i| &views[(2 * i + 1) * views.len() / (2 * n)]);
@@ -77,10 +80,13 @@ fn inflate(c: &mut Criterion) {
         let files = export
             .as_ref()
             .map_or_else(|| vec![file], |export| views(export.as_ref(), modality));
+
         let streams: Vec<_> = files.iter().map(|file| stream(file)).collect();
         let mut out = vec![0; streams.iter().map(|(_, len)| *len).max().unwrap_or(0)];
+
         let mut group = c.benchmark_group(format!("inflate/{modality}"));
         group.throughput(Throughput::Bytes(streams.iter().map(|(_, len)| *len as u64).sum()));
+
         let mut bench = |name: &str, one: &mut dyn FnMut(&[u8], &mut [u8])| {
             group.bench_function(name, |b| {
                 b.iter(|| {
@@ -90,6 +96,7 @@ fn inflate(c: &mut Criterion) {
                 });
             });
         };
+
         let mut inflater = Inflater::default();
         bench("ours", &mut |stream, out| inflater.zlib_without_checksum(stream, out).expect("our stream"));
         bench("fdeflate", &mut |stream, out| {

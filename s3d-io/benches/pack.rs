@@ -1,8 +1,8 @@
-//! How fast are packages written: bytes a second into shards and out of clouds, images a second into
-//! COLMAP's, nerfstudio's, COCO's and Parquet's files?
+//! How fast are packages written? Bytes a second into shards and out of clouds, and images a second into the
+//! files of COLMAP, nerfstudio, COCO and Parquet.
 //!
-//! Everything is made here with fixed seeds, so that figures compare between machines; files go to a
-//! temporary folder and stay in the system's cache.
+//! The inputs are made here with fixed seeds, so that figures can be compared between machines. Files lie in
+//! a temporary folder, in the cache of the system.
 #![allow(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -17,7 +17,7 @@ use s3d_io::package::{
 use s3d_label::{Class, Label, LabelTable};
 use std::hint::black_box;
 
-/// Images of a package.
+/// How many images a package has.
 const IMAGES: u64 = 2000;
 
 fn cloud(points: usize) -> PointCloud {
@@ -42,7 +42,7 @@ fn poses() -> Vec<(Camera, PoseFile)> {
         .collect()
 }
 
-/// A semantic image of 1080² that shows 30 instances in patches with ragged edges.
+/// Makes a semantic image of 1080² that shows 30 instances in patches with ragged edges.
 fn semantic() -> (Raster<[u8; 3]>, LabelTable) {
     let labels = (1..=30).map(|instance| Label {
         class: Class::S3DIS[instance as usize % 13],
@@ -52,7 +52,8 @@ fn semantic() -> (Raster<[u8; 3]>, LabelTable) {
     });
     let table = LabelTable::from_labels(labels).unwrap();
     let pixels = (0..1080u32 * 1080).map(|i| {
-        let (x, y) = (i % 1080, i / 1080);
+        let x = i % 1080;
+        let y = i / 1080;
         let index = (x + (y * 7919) % 11) / 200 + y / 220 * 6;
         [0, 0, (index % 31) as u8]
     });
@@ -72,6 +73,7 @@ fn shards(c: &mut Criterion) {
             tar.finish().unwrap()
         });
     });
+
     let path = dir.path().join("cloud.ply");
     let bytes = write_colored_points(&path, &cloud(2_000_000)).unwrap();
     group.throughput(Throughput::Bytes(bytes));
@@ -94,12 +96,14 @@ fn cameras(c: &mut Criterion) {
             rt: camera.pose.rt_matrix(),
         })
         .collect();
+
     let points = cloud(100_000);
     let mut group = c.benchmark_group("pack");
     group.throughput(Throughput::Elements(IMAGES));
     let model = ColmapModel::new(&images, &points);
     group.bench_function("colmap, text", |b| b.iter(|| model.write_text(dir.path()).unwrap()));
     group.bench_function("colmap, binary", |b| b.iter(|| model.write_binary(dir.path()).unwrap()));
+
     let path = dir.path().join("transforms.json");
     group.bench_function("nerfstudio", |b| {
         b.iter(|| {
@@ -116,11 +120,13 @@ fn tables(c: &mut Criterion) {
     let dir = tempfile::tempdir().unwrap();
     let (image, table) = semantic();
     let stuff = [Class::CEILING, Class::FLOOR, Class::WALL];
+
     let mut group = c.benchmark_group("pack");
     group.throughput(Throughput::Elements(1));
     group.bench_function("coco, an image of 1080²", |b| {
         b.iter(|| coco_panoptic(black_box(&image), &table, &stuff).unwrap());
     });
+
     let (_, segments) = coco_panoptic(&image, &table, &stuff).unwrap();
     let images: Vec<CocoImage> = (1..=IMAGES as u32)
         .map(|id| CocoImage {
@@ -140,6 +146,7 @@ fn tables(c: &mut Criterion) {
                 .unwrap()
         });
     });
+
     let rows: Vec<ImageRow> = (0..IMAGES as u32)
         .map(|i| ImageRow {
             area: 1,
@@ -167,11 +174,12 @@ fn tables(c: &mut Criterion) {
             photograph: None,
         })
         .collect();
+
     let path = dir.path().join("images.parquet");
     group.bench_function("parquet", |b| b.iter(|| write_image_index(&path, &Class::S3DIS, &rows).unwrap()));
 }
 
-/// The array of a room as loaders of S3DIS read it: seven 64-bit floats a point.
+/// The array of a room as loaders of S3DIS read it: seven 64-bit floats for each point.
 fn npy(c: &mut Criterion) {
     const ROWS: usize = 500_000;
     let dir = tempfile::tempdir().unwrap();

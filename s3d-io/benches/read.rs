@@ -1,9 +1,8 @@
-//! How fast are scans read, in bytes of their files a second (PLY meshes in faces a second too): OBJ with its
-//! texture, glTF, PLY in all encodings, with and without labels, points of the S3DIS tree?
+//! How fast are scans read, in bytes of their files a second? OBJ with its texture, glTF, PLY in all
+//! encodings with and without labels (in faces a second too), and points of the S3DIS tree.
 //!
-//! The inputs are made here, with fixed seeds, so that figures compare between machines;
-//! `S3D_BENCH_MESH=rgb.obj` adds a real mesh. Files lie in a temporary folder and are warm in the system's
-//! cache.
+//! The inputs are made here with fixed seeds, so that figures can be compared between machines.
+//! `S3D_BENCH_MESH=rgb.obj` adds a real mesh. Files lie in a temporary folder, in the cache of the system.
 #![allow(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -16,7 +15,7 @@ use std::fs;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
-/// A small generator of numbers from 0 to 1, so that the files never change.
+/// A generator of numbers from 0 to 1 with a fixed sequence.
 struct Numbers(u64);
 
 impl Numbers {
@@ -29,7 +28,7 @@ impl Numbers {
     }
 }
 
-/// A bumpy floor of `n` × `n` squares, two triangles each, textured by one JPEG of 1024².
+/// Writes a bumpy floor of `n` × `n` squares of two triangles each, with one JPEG texture of 1024².
 fn write_obj(dir: &Path, n: usize) -> PathBuf {
     let mut random = Numbers(7);
     let image = ImageBuffer::from_fn(1024, 1024, |x, y| {
@@ -37,14 +36,17 @@ fn write_obj(dir: &Path, n: usize) -> PathBuf {
     });
     image.save(dir.join("floor.jpg")).unwrap();
     fs::write(dir.join("floor.mtl"), "newmtl floor\nKd 1 1 1\nmap_Kd floor.jpg\n").unwrap();
+
     let mut obj = String::from("mtllib floor.mtl\nusemtl floor\n");
     for i in 0..=n {
         for j in 0..=n {
-            let (x, z) = (i as f64 * 0.02, j as f64 * 0.02);
+            let x = i as f64 * 0.02;
+            let z = j as f64 * 0.02;
             writeln!(obj, "v {x:.6} {:.6} {z:.6}", random.next() * 0.01).unwrap();
             writeln!(obj, "vt {:.6} {:.6}", i as f64 / n as f64, j as f64 / n as f64).unwrap();
         }
     }
+
     for i in 0..n {
         for j in 0..n {
             let a = i * (n + 1) + j + 1;
@@ -57,7 +59,7 @@ fn write_obj(dir: &Path, n: usize) -> PathBuf {
     path
 }
 
-/// The same floor as a `.glb` without texture.
+/// Writes the same floor as a `.glb` without a texture.
 fn write_glb(dir: &Path, n: usize) -> PathBuf {
     let mut random = Numbers(7);
     let mut bin = Vec::new();
@@ -68,7 +70,8 @@ fn write_glb(dir: &Path, n: usize) -> PathBuf {
             }
         }
     }
-    let (vertices, positions) = ((n + 1) * (n + 1), bin.len());
+    let vertices = (n + 1) * (n + 1);
+    let positions = bin.len();
     for i in 0..n {
         for j in 0..n {
             let a = (i * (n + 1) + j) as u32;
@@ -76,7 +79,9 @@ fn write_glb(dir: &Path, n: usize) -> PathBuf {
             bin.extend([a, b, d, a, d, c].iter().flat_map(|v| v.to_le_bytes()));
         }
     }
-    let (count, indices) = (6 * n * n, bin.len() - positions);
+
+    let count = 6 * n * n;
+    let indices = bin.len() - positions;
     let mut json = format!(
         r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}}}], "bufferViews": [
         {{"buffer": 0, "byteLength": {positions}}}, {{"buffer": 0, "byteOffset": {positions}, "byteLength": {indices}}}],
@@ -88,6 +93,7 @@ fn write_glb(dir: &Path, n: usize) -> PathBuf {
     while json.len() % 4 != 0 {
         json.push(' ');
     }
+
     let mut glb = b"glTF".to_vec();
     for word in [2, (28 + json.len() + bin.len()) as u32, json.len() as u32] {
         glb.extend(word.to_le_bytes());
@@ -102,8 +108,8 @@ fn write_glb(dir: &Path, n: usize) -> PathBuf {
     path
 }
 
-/// The same floor as a `.ply` with colours; `encoding` as the header names it, `labels` a class and an object
-/// a face.
+/// Writes the same floor as a `.ply` with colours. `encoding` is its name in the header; with `labels`, each
+/// face has a class and an object.
 fn write_ply(dir: &Path, n: usize, encoding: &str, labels: bool) -> PathBuf {
     let mut random = Numbers(7);
     let columns = if labels {
@@ -120,11 +126,13 @@ fn write_ply(dir: &Path, n: usize, encoding: &str, labels: bool) -> PathBuf {
         2 * n * n
     )
     .into_bytes();
+
     let bytes = |bytes: [u8; 4]| match encoding {
         "binary_big_endian" => [bytes[3], bytes[2], bytes[1], bytes[0]],
         _ => bytes,
     };
     let ascii = encoding == "ascii";
+
     for i in 0..=n {
         for j in 0..=n {
             let position = [i as f32 * 0.02, random.next() as f32 * 0.01, j as f32 * 0.02];
@@ -138,6 +146,7 @@ fn write_ply(dir: &Path, n: usize, encoding: &str, labels: bool) -> PathBuf {
             }
         }
     }
+
     for i in 0..n {
         for j in 0..n {
             let a = (i * (n + 1) + j) as u32;
@@ -154,12 +163,13 @@ fn write_ply(dir: &Path, n: usize, encoding: &str, labels: bool) -> PathBuf {
             }
         }
     }
+
     let path = dir.join(format!("floor_{n}_{encoding}{}.ply", if labels { "_labels" } else { "" }));
     fs::write(&path, file).unwrap();
     path
 }
 
-/// `n` points as the published tree writes them.
+/// Writes `n` points as the published tree has them.
 fn write_points(dir: &Path, n: usize) -> PathBuf {
     let mut random = Numbers(7);
     let mut text = String::new();

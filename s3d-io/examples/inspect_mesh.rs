@@ -1,7 +1,7 @@
-//! What is in a mesh file, as the data set's tools see it: size, area, textures, and what had to be mended.
+//! Prints the content of a mesh file as the tools of the data set see it: size, area, textures and repairs.
 //!
-//! `cargo run --release -p s3d-io --example inspect_mesh -- scan/rgb.obj [y|z]`, the axis that points up: y
-//! unless said.
+//! `cargo run --release -p s3d-io --example inspect_mesh -- scan/rgb.obj [y|z]`. The last word is the axis
+//! that points up, y by default.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for the terminal")]
 
 use s3d_io::mesh::{UpAxis, read_mesh};
@@ -19,6 +19,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+
     let start = Instant::now();
     let file = match read_mesh(path, up) {
         Ok(file) => file,
@@ -27,8 +28,11 @@ fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
-    let (mesh, seconds) = (&file.mesh, start.elapsed().as_secs_f64());
-    let (size, parts) = (mesh.aabb().size(), mesh.parts());
+
+    let seconds = start.elapsed().as_secs_f64();
+    let mesh = &file.mesh;
+    let parts = mesh.parts();
+    let size = mesh.aabb().size();
     println!("{} read in {seconds:.3} s", path.display());
     println!("  vertices   {}", mesh.positions().len());
     println!(
@@ -54,6 +58,7 @@ fn main() -> ExitCode {
             "at corners"
         }
     );
+
     let textured = mesh.materials().iter().filter(|m| m.texture.is_some()).count();
     println!("  materials  {}, {textured} of them textured", mesh.materials().len());
     for (texture, file) in mesh.textures().iter().zip(&file.texture_files) {

@@ -1,5 +1,5 @@
-//! How long does a mesh with its textures take to load, and how much memory? One line of JSON for
-//! docs/performance/load_peers.py, which holds it against other readers.
+//! Measures how long a mesh with its textures takes to load, and how much memory. Prints one line of JSON for
+//! docs/performance/load_peers.py, which compares it with other readers.
 //!
 //! `cargo run --release -p s3d-io --example load_mesh -- scan/rgb.obj`; `RAYON_NUM_THREADS` sets the threads.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
@@ -10,12 +10,14 @@ use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).ok_or("usage: load_mesh FILE.obj|.gltf|.glb")?;
-    let (before, start) = (user_seconds().unwrap_or(0.0), Instant::now());
+    let before = user_seconds().unwrap_or(0.0);
+    let start = Instant::now();
     let file = read_mesh(Path::new(&path), UpAxis::Y)?;
     let wall = start.elapsed().as_secs_f64();
-    // Elsewhere than on Linux: the wall's, and no memory.
+    // Systems other than Linux have no processor time and no memory here; the wall time counts instead.
     let user = user_seconds().map_or(wall, |after| after - before);
-    let (faces, textures) = (file.mesh.faces().len(), file.mesh.textures().len());
+    let faces = file.mesh.faces().len();
+    let textures = file.mesh.textures().len();
     let mib = peak_mib().unwrap_or(0.0);
     println!(
         "RESULT {{\"wall\": {wall:.4}, \"user\": {user:.4}, \"faces\": {faces}, \"textures\": {textures}, \
@@ -24,10 +26,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The time that this process has spent in its own code, as Linux tells it, in hundredths of a second.
+/// Returns the user time of this process in seconds, which Linux tells in hundredths.
 fn user_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The third field follows the name, which is in parentheses; user time is the 14th.
+    // The third field follows the name, which is in parentheses. User time is the 14th.
     let ticks: f64 = stat.rsplit_once(')')?.1.split_whitespace().nth(11)?.parse().ok()?;
     Some(ticks / 100.0)
 }

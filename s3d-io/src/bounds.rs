@@ -3,7 +3,7 @@
 use s3d_geom::Aabb;
 use s3d_geom::glam::DVec3;
 
-/// A box in `f64`, which holds the digits of any frame.
+/// A box in `f64`, which keeps the digits of any frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {
     pub(crate) min: DVec3,
@@ -26,7 +26,7 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Whether it is a box of finite numbers.
+    /// Returns whether the box has finite numbers, and is not [`EMPTY`](Self::EMPTY).
     pub(crate) fn is_some(&self) -> bool {
         self.min.is_finite() && self.max.is_finite() && self.min.cmple(self.max).all()
     }
@@ -43,11 +43,12 @@ impl Bounds {
         Self { min: self.min - offset, max: self.max - offset }
     }
 
-    /// The farthest that a coordinate is from 0.
+    /// Returns the largest distance of a coordinate from 0.
     pub(crate) fn farthest_m(&self) -> f64 {
         self.min.abs().max(self.max.abs()).max_element()
     }
 
+    /// Returns the distance between two boxes; 0 if they touch.
     pub(crate) fn distance_m(&self, other: &Self) -> f64 {
         (self.min - other.max)
             .max(other.min - self.max)

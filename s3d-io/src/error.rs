@@ -1,4 +1,4 @@
-//! What can go wrong with a file, and whose fault it is.
+//! The errors of reading and writing files.
 
 use s3d_geom::MeshError;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use thiserror::Error;
 /// The result of reading or writing a file.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Where in a file something is wrong.
+/// The place of a fault in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Place {
@@ -21,24 +21,25 @@ pub enum Place {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused: the file is not there, may not be read or written, or the disk is full.
+    /// The operating system refused: the file does not exist, may not be read or written, or the disk is
+    /// full.
     #[error("{path}: cannot {action}: {source}", path = path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried: "read", "write", "create the folder"…
+        /// The action that failed: "read", "write", "create the folder"…
         action: &'static str,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// The file does not hold what it should: the sentence says what is wrong and, where it can, what to do.
+    /// The content of the file is wrong. The message says what is wrong and, if possible, what to do.
     #[error("{path}{place}: {message}", path = path.display(), place = place_suffix(*place))]
     Format {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in the file.
         place: Place,
-        /// What is wrong with it, with the offending value.
+        /// What is wrong, with the offending value.
         message: String,
     },
     /// The file is well-formed, but its mesh cannot be used.
@@ -49,7 +50,8 @@ pub enum Error {
         /// What is wrong with the mesh.
         source: MeshError,
     },
-    /// The file uses something that this reader does not support: the sentence names it and a way out.
+    /// The file uses something that this reader does not support. The message names it, and what to do
+    /// instead.
     #[error("{path}: {message}", path = path.display())]
     Unsupported {
         /// The file.
@@ -67,33 +69,33 @@ fn place_suffix(place: Place) -> String {
 }
 
 impl Error {
-    /// An [`Error::Io`] for `path`.
+    /// Returns an [`Error::Io`] for `path`.
     pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
         Self::Io { path: path.to_owned(), action, source }
     }
 
-    /// An [`Error::Format`] for the file as a whole.
+    /// Returns an [`Error::Format`] for the whole file.
     pub fn format(path: &Path, message: impl Into<String>) -> Self {
         Self::Format { path: path.to_owned(), place: Place::File, message: message.into() }
     }
 
-    /// An [`Error::Format`] for a line, counted from 1.
+    /// Returns an [`Error::Format`] for a line, counted from 1.
     pub fn line(path: &Path, line: u64, message: impl Into<String>) -> Self {
         Self::Format { path: path.to_owned(), place: Place::Line(line), message: message.into() }
     }
 
-    /// An [`Error::Unsupported`] for `path`.
+    /// Returns an [`Error::Unsupported`] for `path`.
     pub fn unsupported(path: &Path, message: impl Into<String>) -> Self {
         Self::Unsupported { path: path.to_owned(), message: message.into() }
     }
 
-    /// An [`Error::Unsupported`] for a format whose reader was left out of this build.
+    /// Returns an [`Error::Unsupported`] for a format whose reader is not in this build.
     pub(crate) fn not_built_in(path: &Path, feature: &str) -> Self {
         let message = format!("is read by s3d-io's cargo feature `{feature}`, which this build is without");
         Self::unsupported(path, message)
     }
 
-    /// What is wrong, without the file: "line 3: …", "cannot read: …".
+    /// Returns the message without the file: "line 3: …", "cannot read: …".
     pub fn message(&self) -> String {
         match self {
             Self::Io { action, source, .. } => format!("cannot {action}: {source}"),
@@ -103,7 +105,7 @@ impl Error {
         }
     }
 
-    /// The file that it is about.
+    /// Returns the file that the error is about.
     pub fn path(&self) -> &Path {
         match self {
             Self::Io { path, .. } | Self::Format { path, .. } | Self::Mesh { path, .. } => path,

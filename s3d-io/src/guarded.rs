@@ -1,5 +1,5 @@
-//! Calls of decoders that are not ours and panic on damaged files: exr, e57, laz and image do, on the files
-//! in `tests/fixtures/fuzz`, which `tests/findings.rs` feeds again.
+//! Calls of other crates' decoders that panic on damaged files. exr, e57, laz and image panic on the files in
+//! `tests/fixtures/fuzz`, which `tests/findings.rs` feeds to them again.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,7 +8,7 @@ thread_local! {
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// What `f` gives, or `None` if it panicked.
+/// Returns the result of `f`, or `None` if it panicked.
 pub(crate) fn guarded<T>(f: impl FnOnce() -> T) -> Option<T> {
     DEPTH.set(DEPTH.get() + 1);
     let result = catch_unwind(AssertUnwindSafe(f));
@@ -16,9 +16,9 @@ pub(crate) fn guarded<T>(f: impl FnOnce() -> T) -> Option<T> {
     result.ok()
 }
 
-/// Whether a panic of this thread, now, is caught inside this crate and becomes an [`Error`](crate::Error):
-/// some readers call decoders that panic on damaged files. For panic hooks, which are called all the same:
-/// they may stay silent then.
+/// Returns whether this crate would catch a panic of this thread now and turn it into an
+/// [`Error`](crate::Error), because some readers call decoders that panic on damaged files. Panic hooks are
+/// called all the same; they can ask this function and stay silent.
 pub fn panic_is_caught() -> bool {
     DEPTH.get() > 0
 }

@@ -1,4 +1,5 @@
-//! An annotated cloud takes no memory for its points: a test of its own process, whose peak the system tells.
+//! An annotated cloud takes no memory for its points. The test runs in a process of its own, whose peak
+//! memory the system reports.
 #![allow(clippy::print_stderr, reason = "says why it measures nothing")]
 
 use s3d_geom::Aabb;
@@ -9,7 +10,7 @@ use s3d_label::Class;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 
-/// The largest memory of this process so far, in bytes; `None` where the system does not tell.
+/// The largest memory of this process so far, in bytes. Returns `None` if the system does not report it.
 fn peak() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
@@ -46,6 +47,7 @@ fn a_cloud_of_one_instance_is_boxed_and_voxelised_in_little_memory() {
     };
     let area = Annotations::open(std::slice::from_ref(&path), &options).unwrap();
     let instance = &area.rooms[0].instances[0];
+
     let mut bbox = Aabb::EMPTY;
     let mut reader = InstanceReader::new(BLOCK);
     let (mut points, _) = reader
@@ -56,7 +58,9 @@ fn a_cloud_of_one_instance_is_boxed_and_voxelised_in_little_memory() {
         .unwrap();
     assert_eq!(points.len(), u64::from(POINTS));
     assert_eq!(bbox.to_array(), [0.0, 0.0, 0.0, 999.0, 776.0, 599.0]);
-    let (json, npz) = (dir.path().join("i.json"), dir.path().join("i.npz"));
+
+    let json = dir.path().join("i.json");
+    let npz = dir.path().join("i.npz");
     let mut writer = InstanceWriter::create(&json, &npz).unwrap();
     let record = InstanceRecord {
         label: "floor_1_office_1_1",
@@ -73,11 +77,11 @@ fn a_cloud_of_one_instance_is_boxed_and_voxelised_in_little_memory() {
     assert!(fs::metadata(&npz).unwrap().len() > 4 * u64::from(POINTS));
 
     let (Some(before), Some(after)) = (before, peak()) else {
-        eprintln!("not measured: the system tells no peak memory");
+        eprintln!("not measured: the system reports no peak memory");
         return;
     };
-    // Blocks, and indices that wait by voxel: about 20 MB. The positions alone are 36 MB, with colours,
-    // voxels and the copies that grouping takes 100.
+    // Blocks and waiting indices of voxels take about 20 MB. The positions alone are 36 MB; with colours,
+    // voxels and the copies for grouping they are 100 MB.
     let more = (after - before) >> 20;
     assert!(more < 32, "{more} MiB for {POINTS} points in blocks of {BLOCK}");
 }

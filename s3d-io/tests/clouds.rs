@@ -1,5 +1,5 @@
-//! Files of annotated points that numpy, laspy, plyfile, pye57 and ScanNet's layout gave: see
-//! fixtures/clouds/README.md.
+//! Reads files of annotated points that numpy, laspy, plyfile and pye57 wrote, and one in ScanNet's layout:
+//! see fixtures/clouds/README.md.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{DVec3, Vec3, vec3};
@@ -33,7 +33,7 @@ fn open(name: &str, options: &AnnotationOptions) -> Result<Annotations> {
     Annotations::open(&[fixture(name)], options)
 }
 
-/// The points that the script wrote, less `offset`, by class and number.
+/// The points that the fixtures' script wrote, less `offset`, by class and number.
 fn expected(offset: DVec3) -> BTreeMap<(usize, u32), PointCloud> {
     let mut all: BTreeMap<(usize, u32), PointCloud> = BTreeMap::new();
     for i in 0..60u8 {
@@ -48,14 +48,15 @@ fn expected(offset: DVec3) -> BTreeMap<(usize, u32), PointCloud> {
     all
 }
 
-/// Every room's instances with their points.
+/// The instances of the only room, with their points.
 fn contents(annotations: &Annotations, room: &str) -> BTreeMap<(usize, u32), PointCloud> {
     assert_eq!(annotations.rooms.len(), 1, "{annotations:?}");
     assert_eq!(annotations.rooms[0].room.to_string(), room);
+
     let read = |i: &s3d_io::cloud::AnnotatedInstance| {
         let mut cloud = PointCloud::default();
         assert_eq!(i.read(&mut cloud).unwrap().count, 0);
-        // The pose of an E57 scan is a product of rounded numbers: what should be 0 is 1e-16.
+        // The pose of an E57 scan is a product of rounded numbers: 0 comes out as 1e-16.
         for p in &mut cloud.positions {
             *p = Vec3::select(p.abs().cmplt(Vec3::splat(1e-12)), Vec3::ZERO, *p);
         }
@@ -101,7 +102,8 @@ fn names_of_classes_need_no_table() {
         assert!(found.warnings.is_empty(), "{:?}", found.warnings);
         assert_eq!(found.rooms[0].instances[0].are_vertices(), name.starts_with("scene"));
     }
-    // ScanNet's word has its meaning from the table of its categories; the user's goes before.
+
+    // The reader's table of categories gives ScanNet's word its class; the user's table comes first.
     let classes = BTreeMap::from([("office chair".to_owned(), None)]);
     let found = open("scene0000_00", &AnnotationOptions { classes, ..options.clone() }).unwrap();
     assert_eq!(contents(&found, "office_1").len(), 8);
@@ -109,7 +111,11 @@ fn names_of_classes_need_no_table() {
 
 #[test]
 fn words_and_numbers_mean_what_the_taxonomy_says() {
-    let of = |name: &str, taxonomy: &str| {
+    /// The classes of a file's instances under a built-in taxonomy, each with its class of S3DIS.
+    fn classes_of(
+        name: &str,
+        taxonomy: &str,
+    ) -> std::result::Result<Vec<(&'static str, &'static str)>, String> {
         let taxonomy = Taxonomy::built_in(taxonomy).unwrap();
         let room = taxonomy.room("bedroom_1").ok();
         let options = AnnotationOptions { taxonomy, room, ..Default::default() };
@@ -117,29 +123,25 @@ fn words_and_numbers_mean_what_the_taxonomy_says() {
         assert_eq!(found.taxonomy, options.taxonomy);
         assert_eq!(found.rooms[0].room.to_string(), "bedroom_1");
         let classes: BTreeSet<Class> = found.rooms[0].instances.iter().map(|i| i.class).collect();
-        Ok::<_, String>(
-            classes
-                .into_iter()
-                .map(|c| (c.name(), c.s3dis().name()))
-                .collect::<Vec<_>>(),
-        )
-    };
-    // "floor", "wall" and "office chair"; S3DIS has its words from a table of the reader.
+        Ok(classes.into_iter().map(|c| (c.name(), c.s3dis().name())).collect())
+    }
+
+    // "floor", "wall" and "office chair". The reader has a table of words for S3DIS.
     let words = [("wall", "wall"), ("floor", "floor"), ("chair", "chair")];
-    assert_eq!(of("scene0000_00", "scannet20").unwrap(), words);
-    assert_eq!(of("scene0000_00", "nyu40").unwrap(), words);
+    assert_eq!(classes_of("scene0000_00", "scannet20").unwrap(), words);
+    assert_eq!(classes_of("scene0000_00", "nyu40").unwrap(), words);
     let own = [("wall", "wall"), ("floor", "floor"), ("officeChair", "chair")];
-    assert_eq!(of("scene0000_00", "scannet200").unwrap(), own);
-    // 2, 6 and 19 are numbers: NYU's floor, sofa and mirror, of which ScanNet's benchmark leaves out the
-    // last.
+    assert_eq!(classes_of("scene0000_00", "scannet200").unwrap(), own);
+
+    // 2, 6 and 19 are NYU's floor, sofa and mirror. ScanNet's benchmark leaves out the last.
     for name in NUMBERED {
         let nyu = [("floor", "floor"), ("sofa", "sofa"), ("mirror", "clutter")];
-        assert_eq!(of(name, "nyu40").unwrap(), nyu, "{name}");
-        assert_eq!(of(name, "scannet20").unwrap(), nyu[..2], "{name}");
+        assert_eq!(classes_of(name, "nyu40").unwrap(), nyu, "{name}");
+        assert_eq!(classes_of(name, "scannet20").unwrap(), nyu[..2], "{name}");
         let matterport = [("floor", "floor"), ("picture", "clutter"), ("stool", "chair")];
-        assert_eq!(of(name, "matterport40").unwrap(), matterport, "{name}");
+        assert_eq!(classes_of(name, "matterport40").unwrap(), matterport, "{name}");
         let scannet = [("chair", "chair"), ("couch", "sofa"), ("monitor", "clutter")];
-        assert_eq!(of(name, "scannet200").unwrap(), scannet, "{name}");
+        assert_eq!(classes_of(name, "scannet200").unwrap(), scannet, "{name}");
     }
 }
 
@@ -152,10 +154,12 @@ fn plain_arrays_are_rooms_of_s3dis_or_what_is_said() {
         "{:?}",
         found.warnings
     );
+
     let columns = "x y z r g b instance class".split(' ').map(str::to_owned).collect();
     let message =
         open("Area_1_office_1.npy", &AnnotationOptions { columns, ..Default::default() }).unwrap_err();
     assert!(message.to_string().contains("\"10\" (15 points), \"11\" (15 points)"), "{message}");
+
     let columns = vec!["x".to_owned()];
     let message =
         open("Area_1_office_1.npy", &AnnotationOptions { columns, ..Default::default() }).unwrap_err();
@@ -165,22 +169,25 @@ fn plain_arrays_are_rooms_of_s3dis_or_what_is_said() {
 #[test]
 fn columns_can_be_named() {
     let point_source = AnnotationOptions { instance_column: Some("point_source_id".into()), ..options() };
-    // In the 1.4 files it is 0 everywhere.
+    // In the 1.4 files point_source_id is 0 everywhere.
     assert_eq!(contents(&open("1_4_format_7.laz", &point_source).unwrap(), "office_1").len(), 3);
     assert_eq!(
         contents(&open("1_2_format_3.las", &point_source).unwrap(), "office_1"),
         expected(DVec3::ZERO)
     );
+
     let swapped = AnnotationOptions {
         class_column: Some("ext:classification".into()),
         instance_column: Some("ext:instance".into()),
         ..options()
     };
     assert_eq!(contents(&open("two_scans.e57", &swapped).unwrap(), "office_1"), expected(DVec3::ZERO));
+
     let rooms = AnnotationOptions { room_column: Some("instance".into()), ..options() };
     let found = open("little.ply", &rooms).unwrap();
     let names: Vec<String> = found.rooms.iter().map(|r| r.room.to_string()).collect();
     assert_eq!(names, ["office_10", "office_11", "office_12", "office_13"]);
+
     for (name, there) in [("1_4_format_7.las", "quality instance"), ("ascii.ply", "label instance")] {
         let gone = AnnotationOptions { class_column: Some("gone".into()), ..options() };
         let message = open(name, &gone).unwrap_err().to_string();
@@ -189,6 +196,7 @@ fn columns_can_be_named() {
             "{message}"
         );
     }
+
     let no_label = AnnotationOptions { class_column: Some("label".into()), ..options() };
     let message = open("big.ply", &no_label).unwrap_err().to_string();
     assert!(message.contains("its columns are x y z r g b scalar_Classification object_id"), "{message}");
@@ -199,15 +207,18 @@ fn classes_without_a_meaning_stop_or_are_left_out_or_are_clutter() {
     let mut known = options();
     known.classes.remove("19");
     let message = open("ascii.ply", &known).unwrap_err().to_string();
-    assert!(message.contains("ascii.ply: classes that are none of the 13: \"19\" (20 points)."), "{message}");
+    let words = "ascii.ply: classes that are not among the 13: \"19\" (20 points).";
+    assert!(message.contains(words), "{message}");
+
     let skip = AnnotationOptions { on_fault: OnFault::Skip, ..known.clone() };
     let found = open("ascii.ply", &skip).unwrap();
     assert_eq!(contents(&found, "office_1").len(), 8);
     assert!(
-        found.warnings[0].contains("20 points left out, whose class is none: \"19\""),
+        found.warnings[0].contains("20 points of unknown classes left out: \"19\""),
         "{:?}",
         found.warnings
     );
+
     let clutter = AnnotationOptions { unknown_as_clutter: true, ..known };
     let found = open("ascii.ply", &clutter).unwrap();
     let all = contents(&found, "office_1");
@@ -220,6 +231,7 @@ fn rooms_must_be_known() {
     let none = AnnotationOptions { room: None, ..options() };
     let message = open("ascii.ply", &none).unwrap_err().to_string();
     assert!(message.contains("60 points are in no room: name it, as in room = \"office_1\""), "{message}");
+
     let columns = AnnotationOptions { room: None, room_column: Some("instance".into()), ..options() };
     let message = open("ascii.ply", &columns).unwrap_err().to_string();
     assert!(message.contains("\"10\" (15 points)") && message.contains("what type of room"), "{message}");
@@ -244,6 +256,7 @@ fn a_temporary_file_gives_what_memory_gives() {
         assert_eq!(both[&key].positions, [&cloud.positions[..], &cloud.positions[..]].concat());
         assert_eq!(both[&key].colors, [&cloud.colors[..], &cloud.colors[..]].concat());
     }
+
     drop(found);
     assert_eq!(std::fs::read_dir(spool_dir.path()).unwrap().count(), 0);
     let gone = AnnotationOptions {
@@ -254,13 +267,13 @@ fn a_temporary_file_gives_what_memory_gives() {
     assert!(matches!(open("little.ply", &gone), Err(Error::Io { .. })));
 }
 
-/// All files that hold a fixture; the ones that are opened, with their folder.
+/// All fixtures, as they are opened: files, and the folder of a scan.
 fn all() -> Vec<PathBuf> {
     let others = ["structured.npy", "Area_1_office_1.npy", "names.npz", "scene0000_00"];
     NUMBERED.iter().chain(&others).map(|name| fixture(name)).collect()
 }
 
-/// Opens a damaged copy of a file: an error that names it, or points.
+/// Opens a damaged copy of a file. It gives points, or an error that names it.
 fn open_damaged(original: &Path, bytes: &[u8], what: &str) {
     let dir = tempfile::tempdir().unwrap();
     let name = original.file_name().unwrap();
@@ -329,6 +342,7 @@ fn what_is_no_annotation_says_what_is_read() {
         "{message}"
     );
     let missing = Annotations::open(&[dir.path().join("a.laz")], &AnnotationOptions::default());
+
     assert!(matches!(missing, Err(Error::Io { .. })));
     for name in ["a.las", "a.laz", "a.ply", "a.npy", "a.npz", "a.e57", "a.aggregation.json"] {
         let path = dir.path().join(name);
@@ -338,8 +352,7 @@ fn what_is_no_annotation_says_what_is_read() {
     }
 }
 
-/// laspy reads such files too: what the records say is not needed for the points, or is in those that are
-/// there.
+/// laspy reads such files too: the points do not need the missing records.
 #[test]
 fn headers_that_miscount_their_records_do_not_hide_the_points() {
     for name in ["1_2_format_3.las", "1_2_format_2.laz", "1_4_format_7.las", "1_4_format_7.laz"] {
@@ -350,6 +363,7 @@ fn headers_that_miscount_their_records_do_not_hide_the_points() {
         let more = [records + 1, records + 500, u32::MAX].map(|n| (100, n.to_le_bytes().to_vec()));
         let is_1_4 = good[25] == 4;
         let beyond = [(235, extended), (235, far)].into_iter().filter(|_| is_1_4);
+
         for (at, bytes) in more.into_iter().chain(beyond) {
             let mut bad = good.clone();
             bad[at..at + bytes.len()].copy_from_slice(&bytes);

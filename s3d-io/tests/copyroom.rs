@@ -1,4 +1,4 @@
-//! The readers on a real scan, if it is there.
+//! Tests the readers on a real scan, if it is there.
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
 use s3d_geom::glam::{DVec3, Vec3};
@@ -50,13 +50,14 @@ fn the_parts_of_the_scan_fit_together() {
     assert!(tree.warnings.is_empty(), "{:?}", tree.warnings);
     assert_eq!(tree.rooms.len(), 1);
     assert_eq!(tree.rooms[0].room.to_string(), "copyRoom_1");
-    let (mut all, mut instances) = (PointCloud::default(), PointCloud::default());
+    let mut all = PointCloud::default();
+    let mut instances = PointCloud::default();
     read_points(&tree.rooms[0].path.join("copyRoom_1.txt"), &mut all).unwrap();
     for instance in &tree.rooms[0].instances {
         read_points(&instance.path, &mut instances).unwrap();
     }
     assert_eq!((all.len(), instances.len()), (147_961, 147_961));
-    // The points lie on the mesh, give or take their noise.
+    // The points lie on the mesh, up to their noise.
     assert!(
         all.positions
             .iter()
@@ -64,7 +65,8 @@ fn the_parts_of_the_scan_fit_together() {
     );
 }
 
-/// tobj alone, cut into 1,163 models, has the same triangles in the same order, but for those left out.
+/// tobj alone, which cuts the mesh into 1,163 models, reads the same triangles in the same order, except for
+/// those that are left out here.
 #[test]
 fn the_mesh_is_what_tobj_reads() {
     let Some(path) = scan() else { return };
@@ -72,14 +74,17 @@ fn the_mesh_is_what_tobj_reads() {
     let mesh = read_mesh(&scene.mesh[0], UpAxis::Z).unwrap().mesh;
     let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
     let (models, _) = tobj::load_obj(&scene.mesh[0], &options).unwrap();
+
     let corner = |m: &tobj::Mesh, i: usize| {
-        let (v, t) = (m.indices[i] as usize * 3, m.texcoord_indices[i] as usize * 2);
+        let v = m.indices[i] as usize * 3;
+        let t = m.texcoord_indices[i] as usize * 2;
         ([m.positions[v], m.positions[v + 1], m.positions[v + 2]], [m.texcoords[t], m.texcoords[t + 1]])
     };
     let has_area = |t: &&[([f32; 3], [f32; 2])]| {
         let [a, b, c] = [t[0].0, t[1].0, t[2].0].map(|p| Vec3::from_array(p).as_dvec3());
         (b - a).cross(c - a) != DVec3::ZERO
     };
+
     let all: Vec<_> = models
         .iter()
         .flat_map(|m| (0..m.mesh.indices.len()).map(move |i| corner(&m.mesh, i)))
@@ -90,6 +95,7 @@ fn the_mesh_is_what_tobj_reads() {
         corners.sort_unstable();
         seen.insert(corners)
     };
+
     let expected: Vec<_> = all
         .chunks(3)
         .filter(has_area)
@@ -97,6 +103,7 @@ fn the_mesh_is_what_tobj_reads() {
         .flatten()
         .copied()
         .collect();
+
     let parts = mesh.parts();
     let found = parts.faces.iter().flatten().zip(parts.face_uvs.iter().flatten());
     let found: Vec<_> = found

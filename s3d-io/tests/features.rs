@@ -1,11 +1,11 @@
-//! A build with OBJ alone: textured meshes are read, and other formats name the feature that reads them.
-//! `.ci/features` runs it so; where all is built in, nothing is left to test.
+//! Tests a build with OBJ alone: textured meshes are read, and other formats name the feature that reads
+//! them. `.ci/features` runs it. If all features are built in, it tests nothing.
 #![cfg(all(feature = "obj", not(any(feature = "gltf", feature = "ply"))))]
 
 use s3d_io::{mesh::UpAxis, mesh::read_mesh};
 use std::fs;
 
-/// A pixel: 200, 100, 50.
+/// A PNG with one pixel: 200, 100, 50.
 const PNG: &[u8] = b"\x89PNG\x0d\x0a\x1a\x0a\x00\x00\x00\x0dIHDR\x00\x00\x00\x01\x00\x00\x00\x01\x08\x02\x00\x00\x00\x90wS\xde\x00\x00\x00\x0cIDATx\x9cc8\x91b\x04\x00\x03V\x01_\xe8\x17\x84R\x00\x00\x00\x00IEND\xaeB`\x82";
 
 #[test]

@@ -1,5 +1,5 @@
-//! What fuzzing found in the readers, fed to them again: each file in `fixtures/fuzz/TARGET` once ended the
-//! program, kept it busy, or made it take memory without measure. See `../fuzz/README.md`.
+//! Feeds the findings of fuzzing to the readers again. Each file in `fixtures/fuzz/TARGET` once ended the
+//! program, kept it busy, or made it take memory without bound. See `../fuzz/README.md`.
 
 mod feed;
 
@@ -28,8 +28,8 @@ fn every_finding_is_read_or_refused() {
     assert!(fed > 0, "{} holds no finding", findings.display());
 }
 
-/// Files that are cut off anywhere, and some with a byte changed: quick and without a nightly compiler, a
-/// little of what the fuzz targets do.
+/// Files that are cut off anywhere, and files with a byte changed: a small and quick part of what the fuzz
+/// targets do, without a nightly compiler.
 #[test]
 fn cut_and_changed_fixtures_are_read_or_refused() {
     let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds");

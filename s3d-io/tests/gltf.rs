@@ -1,5 +1,5 @@
-//! glTF beyond the ordinary: instances of meshes, extensions that have geometry, and files that are valid but
-//! not as the gltf crate's types want them. Some are seeds of the fuzz target too.
+//! Reads unusual glTF: instances of meshes, extensions that hold geometry, and files that are valid but do
+//! not fit the gltf crate's types. Some of them are seeds of the fuzz target too.
 #![cfg(feature = "gltf")]
 
 use base64::Engine;
@@ -21,18 +21,23 @@ fn seed(name: &str) -> Vec<u8> {
     fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/gltf").join(name)).unwrap()
 }
 
-/// A file with these accessors, each over a view of its own: bytes, component, type, number and the rest.
+/// Makes a file with these accessors, each over its own view: bytes, component type, type, count and further
+/// JSON.
 fn gltf(accessors: &[(Vec<u8>, u32, &str, usize, &str)], rest: &str) -> String {
-    let (mut data, mut views, mut json) = (Vec::new(), Vec::new(), Vec::new());
+    let mut data = Vec::new();
+    let mut views = Vec::new();
+    let mut json = Vec::new();
     for (view, (bytes, component, kind, count, more)) in accessors.iter().enumerate() {
         data.resize(data.len().next_multiple_of(4), 0);
-        let (at, length) = (data.len(), bytes.len());
+        let at = data.len();
+        let length = bytes.len();
         data.extend(bytes);
         views.push(format!(r#"{{"buffer": 0, "byteOffset": {at}, "byteLength": {length}}}"#));
         json.push(format!(
             r#"{{"bufferView": {view}, "componentType": {component}, "type": "{kind}", "count": {count}{more}}}"#
         ));
     }
+
     format!(
         r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}, "uri": "data:;base64,{}"}}],
         "bufferViews": [{}], "accessors": [{}], {rest}}}"#,
@@ -65,7 +70,7 @@ fn instancing(attributes: &str) -> String {
 fn instances_are_placed_by_translation_rotation_and_scale() {
     let translations = (floats(&[[0.0, 0.0, 0.0], [0.0, 5.0, 0.0], [0.0, 0.0, 7.0]]), 5126, "VEC3", 3, "");
     let scales = (floats(&[[1.0; 3], [2.0, 3.0, 1.0], [-1.0, 1.0, 1.0]]), 5126, "VEC3", 3, "");
-    // None, a quarter turn around z, none; as floats and as normalized integers of both sizes.
+    // No turn, a quarter turn around z, no turn; as floats, and as normalized integers of both sizes.
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let turns = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, half, half], [0.0, 0.0, 0.0, 1.0]];
     let bytes: Vec<u8> = turns
@@ -78,6 +83,7 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
         .flatten()
         .flat_map(|v| ((v * 32767.0).round() as i16).to_le_bytes())
         .collect();
+
     let normalized = r#", "normalized": true"#;
     for turns in [
         (floats(&turns), 5126, "VEC4", 3, ""),
@@ -90,12 +96,12 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
             .unwrap()
             .mesh;
         assert_eq!(mesh.faces().len(), 3);
-        // In the place of the node, which is outermost.
+        // Instances are placed in the frame of their node.
         let expected = [
             [vec3(10.0, 0.0, 0.0), vec3(11.0, 0.0, 0.0), vec3(10.0, 1.0, 0.0)],
             // Scaled first, then turned.
             [vec3(10.0, 5.0, 0.0), vec3(10.0, 7.0, 0.0), vec3(7.0, 5.0, 0.0)],
-            // Mirrored: its front stays in front.
+            // Mirrored. Its front stays in front.
             [vec3(10.0, 0.0, 7.0), vec3(10.0, 1.0, 7.0), vec3(9.0, 0.0, 7.0)],
         ];
         for (face, corners) in (0..).zip(expected) {
@@ -116,7 +122,9 @@ fn instances_that_cannot_be_are_refused() {
         r#"{}, "extensionsRequired": ["EXT_mesh_gpu_instancing"]"#,
         instancing(r#"{"TRANSLATION": 4}"#)
     );
+
     let claim = ", {\"componentType\": 5126, \"type\": \"VEC3\", \"count\": 1000000}], \"meshes\"";
+
     for (rest, words) in [
         (instancing(r#"{"TRANSLATION": 1, "SCALE": 2}"#), "3 of SCALE, but 2 of TRANSLATION"),
         (instancing(r#"{"TRANSLATION": 1, "ROTATION": 3}"#), "instance 0 has a transform"),
@@ -170,6 +178,7 @@ fn coarser_levels_and_hidden_nodes_are_left_out() {
         .map(|f| file.mesh.triangle(f)[0].x)
         .collect();
     assert_eq!(at, [0.0, 5.0]);
+
     let told = file.warnings.join("\n");
     assert!(
         told.contains("1 node and what is below left out: hidden") && told.contains("2 nodes left out"),
@@ -202,23 +211,26 @@ fn extensions_that_have_geometry_are_refused_by_name_wherever_they_are() {
         (mesh("NEEDLE_progressive"), "NEEDLE_progressive"),
         (root("CESIUM_RTC"), "CESIUM_RTC"),
     ] {
-        // They stand in no list of the file's.
+        // The file lists these extensions nowhere else.
         let message = read(&rest).unwrap_err().to_string();
         assert!(
             message.contains(&format!("has the extension {name}, which changes its geometry")),
             "{message}"
         );
     }
-    // With a form without compression beside it, that is read.
+
+    // Compressed geometry is no fault if there is a plain form beside it.
     assert!(
         read(&primitive("KHR_draco_mesh_compression"))
             .unwrap()
             .warnings
             .is_empty()
     );
+
     let file = read(&primitive("XYZ_thing")).unwrap();
     assert!(file.warnings.concat().contains("not read: XYZ_thing"), "{:?}", file.warnings);
-    // Faces without data, whose vertices have some.
+
+    // Faces without data, with vertices that have some.
     let indices = r#"{"componentType": 5123, "type": "SCALAR", "count": 3}"#;
     let json = gltf(&[triangle()], &primitive("KHR_draco_mesh_compression"))
         .replacen("\"count\": 3}]", &format!("\"count\": 3}}, {indices}]"), 1)
@@ -227,7 +239,7 @@ fn extensions_that_have_geometry_are_refused_by_name_wherever_they_are() {
     assert!(message.contains("its faces are in the extension KHR_draco_mesh_compression"), "{message}");
 }
 
-/// What is neither geometry nor material nor texture stops nothing.
+/// Anything that is neither geometry nor material nor texture stops nothing.
 #[test]
 fn odd_but_valid_files_are_read() {
     let plain = format!(r#"{MESH}, "nodes": [{{"mesh": 0}}]"#);
@@ -240,7 +252,7 @@ fn odd_but_valid_files_are_read() {
         ),
         with(r#""animations": 5, "cameras": [{"type": "none"}], "skins": [{}], "extras": "a text""#),
         with(r#""scene": 1, "scenes": [{"name": "nothing"}, {"nodes": [0], "extras": 7}]"#),
-        // Without a default scene the first that has something.
+        // Without a default scene, the first scene with nodes counts.
         with(r#""scenes": [{"name": "nothing"}, {"nodes": [0.0]}]"#),
         with(r#""scenes": [{"name": "nothing"}]"#),
         good.replace("\"count\": 3", "\"count\": 3.0")
@@ -256,7 +268,8 @@ fn odd_but_valid_files_are_read() {
         let file = read_bytes("a.gltf", json.as_bytes()).unwrap_or_else(|e| panic!("{e}: {json}"));
         assert_eq!(file.mesh.faces().len(), 1, "{json}");
     }
-    // What is needed is looked at as before, and a fault has its line where it can be told.
+
+    // Needed parts are checked as strictly as before. A fault has its line if the line is known.
     let fault = |json: String| read_bytes("a.gltf", json.as_bytes()).unwrap_err().to_string();
     let no_type = fault(good.replace(", \"componentType\": 5126", ""));
     assert!(
@@ -268,6 +281,7 @@ fn odd_but_valid_files_are_read() {
             .replace("\"mesh\": 0", "\"mesh\": 0, \"extras\": 7"),
     );
     assert!(both.contains("missing field `componentType`"), "{both}");
+
     assert!(fault(with("\"scene\": -1")).contains("expected index"));
     let nothing = fault(good.replace("\"version\": \"2.0\"", "\"version\": \"\""));
     assert!(

@@ -1,5 +1,5 @@
-//! Files that other projects keep to test their readers, valid and broken: each loads or is refused as
-//! `hard_inputs.txt` says, soon, and without a panic.
+//! Reads files with which other projects test their readers, valid and broken. Each loads or is refused as
+//! `hard_inputs.txt` says, in a short time and without a panic.
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
@@ -20,13 +20,13 @@ fn folder() -> Option<PathBuf> {
     None
 }
 
-/// What became of a file, in the words of the list, and all warnings or the message.
+/// Returns the outcome of a file in the words of the list, with its warnings or its error.
 fn outcome(path: &Path) -> (String, Vec<String>) {
     let (sender, receiver) = mpsc::channel();
     let file = path.to_owned();
-    // A thread that panics drops its sender; one that hangs keeps it.
+    // A thread that panics drops its sender; a thread that hangs keeps it.
     thread::spawn(move || {
-        // Nobody listens any more if it took too long.
+        // The receiver is gone if the thread took too long.
         let _ = sender.send(read_mesh(&file, UpAxis::Y).map_err(|e| e.to_string()));
     });
     let shown = path.display().to_string();
@@ -71,11 +71,13 @@ fn every_file_has_the_outcome_that_its_content_asks_for() {
                 .expect("path | outcome | words")
         })
         .collect();
+
     let mut differences = Vec::new();
     for [name, expected, words] in &listed {
         let path = folder.join(name);
         let (found, texts) = outcome(&path);
-        // Warnings that start with another file's path are listed with its folder as DIR.
+        // In the list, DIR stands for the folder of the file. Warnings may start with the path of another
+        // file there.
         let words = words.replace("DIR", &path.parent().unwrap().display().to_string());
         let fits = match (*expected, words.as_str()) {
             ("refused", words) => texts.iter().any(|t| t.contains(words)),
@@ -86,6 +88,7 @@ fn every_file_has_the_outcome_that_its_content_asks_for() {
             differences.push(format!("{name}: {found}, {texts:?}"));
         }
     }
+
     let mut all = Vec::new();
     meshes_below(&folder, &mut all);
     all.sort();
@@ -95,10 +98,11 @@ fn every_file_has_the_outcome_that_its_content_asks_for() {
             differences.push(format!("{name} is not in the list: {:?}", outcome(&path)));
         }
     }
+
     assert!(differences.is_empty(), "\n{}", differences.join("\n"));
 }
 
-/// Files of other formats, given a name that says they are meshes of ours.
+/// Files of other formats whose names have an ending of ours.
 #[test]
 fn files_of_other_formats_under_our_names_are_refused() {
     let Some(folder) = folder() else { return };
@@ -119,7 +123,7 @@ fn files_of_other_formats_under_our_names_are_refused() {
     }
 }
 
-/// Every tenth byte of every readable file is a place to cut it off.
+/// Every readable file is cut off at a hundred places.
 #[test]
 fn cut_files_load_or_are_refused() {
     let Some(folder) = folder() else { return };
@@ -143,8 +147,8 @@ fn cut_files_load_or_are_refused() {
                 found.starts_with("faces") || found == "refused",
                 "{name} cut at {length}: {found} {texts:?}"
             );
-            // JSON, chunks and headers say how long they are; OBJ does not. The last words of an ASCII file
-            // may lose digits and stay numbers, but a file is never cut there.
+            // JSON, chunks and headers tell their length; OBJ does not. The last words of an ASCII file may
+            // lose digits and stay numbers, but no file is cut there.
             assert!(name.ends_with(".obj") || found == "refused", "{name} cut at {length}: {found}");
         }
     }

@@ -1,5 +1,5 @@
-//! Headers that claim more than their files can hold, each in an otherwise sound file: an error that says so,
-//! at once.
+//! Headers that claim more than their files can hold, each in an otherwise sound file, are refused at once
+//! with an error that says so.
 
 use s3d_geom::Raster;
 use s3d_io::Result;
@@ -45,6 +45,7 @@ fn sizes_of_images_are_held_against_their_files() {
         png[29..33].copy_from_slice(&crc.to_be_bytes());
         png
     };
+
     let rgb = encode_rgb8(&Raster::filled(8, 8, [1, 2, 3]), Content::Photo, Compression::Fast);
     let gray = encode_gray16(&Raster::filled(8, 8, 7), Compression::Fast);
     let rgb = file(&dir, "rgb.png", &claim(rgb, 20_000));
@@ -94,9 +95,11 @@ fn meshes_that_are_placed_without_end_are_refused() {
         )
     };
     let read = |text: &str| read_mesh(&file(&dir, "m.gltf", text.as_bytes()), UpAxis::Y);
+
     let large = "{\"bufferView\":0,\"componentType\":5126,\"count\":11000000,\"type\":\"VEC3\"}";
     says(read(&gltf(100, large)), "places 100 meshes of more than 1073741824 vertices");
     says(read(&gltf(2, large)), "11000000 elements of 12 bytes");
+
     let zeros = "{\"componentType\":5126,\"count\":1048577,\"type\":\"MAT4\",\"sparse\":{\"count\":1,\
                  \"indices\":{\
                  \"bufferView\":0,\"componentType\":5125},\"values\":{\"bufferView\":0}}}";

@@ -1,6 +1,6 @@
-//! What real glTF, OBJ and PLY files hold, a smallest file for each: the same two triangles of a square, told
-//! in all ways that the formats have, must come out as the same mesh; what is not read is refused by name,
-//! with a way out.
+//! Tests what real glTF, OBJ and PLY files hold, with the smallest file for each. The same two triangles of a
+//! square are written in every way that the formats have, and must be read as the same mesh. Anything that is
+//! not read is refused by name, with a way out.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -27,7 +27,7 @@ fn read_file(name: &str, bytes: &[u8], others: &[(&str, &[u8])]) -> Result<MeshF
     read_mesh(&path, UpAxis::Z)
 }
 
-/// The triangles as the corners that they have, each starting with its smallest.
+/// Returns the corners of each triangle, starting with the smallest.
 fn triangles(mesh: &TriMesh) -> Vec<[[i32; 3]; 3]> {
     let mut all: Vec<_> = (0..mesh.faces().len() as u32)
         .map(|f| {
@@ -45,7 +45,7 @@ fn square() -> Vec<[[i32; 3]; 3]> {
     triangles(&TriMesh::from_faces(CORNERS.to_vec(), SQUARE.to_vec()).unwrap())
 }
 
-/// A glTF under construction: a buffer, views and accessors over it.
+/// A glTF file under construction: a buffer, with views and accessors over it.
 #[derive(Default)]
 struct Gltf {
     data: Vec<u8>,
@@ -58,14 +58,15 @@ impl Gltf {
         while !self.data.len().is_multiple_of(4) {
             self.data.push(0);
         }
-        let (at, length) = (self.data.len(), bytes.len());
+        let at = self.data.len();
+        let length = bytes.len();
         self.views
             .push(format!(r#"{{"buffer": 0, "byteOffset": {at}, "byteLength": {length}}}"#));
         self.data.extend(bytes);
         self.views.len() - 1
     }
 
-    /// `more` is added to the accessor's JSON.
+    /// Adds an accessor over its own view. `more` is added to its JSON.
     fn accessor(&mut self, bytes: &[u8], kind: &str, component: u32, count: usize, more: &str) -> usize {
         let view = self.view(bytes);
         self.accessors.push(format!(
@@ -84,7 +85,7 @@ impl Gltf {
         self.floats(&CORNERS.map(|c| c.to_array()))
     }
 
-    /// The JSON with its buffer's `uri`, as JSON too.
+    /// Returns the JSON. `uri` is the JSON of the buffer's URI.
     fn json(&self, uri: &str, rest: &str) -> String {
         format!(
             r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}{uri}}}], "bufferViews": [{}],
@@ -110,7 +111,8 @@ impl Gltf {
 #[test]
 fn indices_of_8_16_and_32_bits_strips_fans_and_no_indices() {
     let list = [0u32, 1, 2, 0, 2, 3];
-    let (strip, fan) = ([1u32, 2, 0, 3], [0u32, 1, 2, 3]);
+    let strip = [1u32, 2, 0, 3];
+    let fan = [0u32, 1, 2, 3];
     for (indices, mode) in [(&list[..], 4), (&strip[..], 5), (&fan[..], 6)] {
         for (component, size) in [(5121, 1), (5123, 2), (5125, 4)] {
             let mut f = Gltf::default();
@@ -122,6 +124,7 @@ fn indices_of_8_16_and_32_bits_strips_fans_and_no_indices() {
             assert_eq!(triangles(&file.mesh), square(), "{component}, mode {mode}");
             assert!(file.warnings.is_empty());
         }
+
         let mut f = Gltf::default();
         let corners: Vec<[f32; 3]> = indices.iter().map(|&i| CORNERS[i as usize].to_array()).collect();
         let p = f.floats(&corners);
@@ -132,7 +135,7 @@ fn indices_of_8_16_and_32_bits_strips_fans_and_no_indices() {
 
 #[test]
 fn sparse_and_quantized_positions() {
-    // All corners at the origin, but for three that are told apart.
+    // All corners are at the origin, except for three sparse ones.
     let mut f = Gltf::default();
     let places = f.view(&[1, 2, 3]);
     let values: Vec<u8> = CORNERS[1..]
@@ -150,7 +153,7 @@ fn sparse_and_quantized_positions() {
     let file = f.mesh(&format!(r#"{{"attributes": {{"POSITION": 0}}, "indices": {i}}}"#));
     assert_eq!(triangles(&file.mesh), square());
 
-    // KHR_mesh_quantization: 16-bit positions, scaled back by the node; its second axis runs backwards.
+    // KHR_mesh_quantization: positions of 8 or 16 bits, scaled back by the node.
     for (component, normalized, whole) in [(5122u32, true, 32_767i32), (5123, false, 1000), (5120, true, 127)]
     {
         let mut f = Gltf::default();
@@ -181,8 +184,10 @@ fn nested_and_mirroring_nodes_and_instances() {
     let mut f = Gltf::default();
     let p = f.corners();
     let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
-    // The square as it is; twice mirrored in x is as it is too; once mirrored it is beside, and still faces
-    // +Z; a half turn about Z by a matrix below a move. A second mesh of two primitives below the first.
+
+    // The square as it is; mirrored twice in x, so that it stays; mirrored once, so that it lies beside and
+    // still faces +Z; turned by half about Z with a matrix, below a node that moves it. Then a second mesh of
+    // two primitives.
     let file = f
         .read(&format!(
             r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}},
@@ -196,6 +201,7 @@ fn nested_and_mirroring_nodes_and_instances() {
             "scenes": [{{"nodes": [0, 3, 5]}}], "scene": 0"#
         ))
         .unwrap();
+
     let mesh = &file.mesh;
     let lows: Vec<Vec3> = [0, 2, 4, 6]
         .map(|f| mesh.triangle(f).into_iter().reduce(Vec3::min).unwrap())
@@ -205,7 +211,8 @@ fn nested_and_mirroring_nodes_and_instances() {
         [vec3(10.0, 0.0, 0.0), vec3(-1.0, 0.0, 0.0), vec3(29.0, -1.0, 0.0), vec3(0.0, 0.0, 9.0)]
     );
     assert!((0..mesh.faces().len() as u32).all(|f| mesh.normal(f) == Vec3::Z));
-    // The first primitive has four vertices and no indices: one triangle, which repeats one of the second.
+    // The first primitive has four vertices and no indices: one triangle, which repeats a triangle of the
+    // second primitive.
     assert_eq!((mesh.faces().len(), file.repeated_faces), (8, 1));
     assert!(file.warnings.iter().any(|w| w.contains("1 corner too many")), "{:?}", file.warnings);
 }
@@ -218,7 +225,8 @@ fn vertex_colours_of_every_type() {
         let width = if alpha { 4 } else { 3 };
         for component in [5121u32, 5123, 5126] {
             let mut f = Gltf::default();
-            let (p, i) = (f.corners(), f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, ""));
+            let p = f.corners();
+            let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
             let numbers = linear
                 .iter()
                 .flat_map(|c| [c[0], c[1], c[2], 0.25].into_iter().take(width));
@@ -234,10 +242,11 @@ fn vertex_colours_of_every_type() {
             } else {
                 r#", "normalized": true"#
             };
+
             let c = f.accessor(&bytes, kind, component, 4, more);
             let file =
                 f.mesh(&format!(r#"{{"attributes": {{"POSITION": {p}, "COLOR_0": {c}}}, "indices": {i}}}"#));
-            // Light of a half is 188 in sRGB.
+            // Half of the light is 188 in sRGB.
             assert_eq!(
                 file.mesh.parts().colors,
                 [[255, 0, 0], [0, 255, 0], [0, 0, 255], [188; 3]],
@@ -250,11 +259,13 @@ fn vertex_colours_of_every_type() {
 #[test]
 fn buffers_beside_the_file_and_in_it() {
     let mut f = Gltf::default();
-    let (p, i) = (f.corners(), f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, ""));
+    let p = f.corners();
+    let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
     let rest = format!(
         r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}}],
         "nodes": [{{"mesh": 0}}]"#
     );
+
     let beside: [(&str, &[u8]); 1] = [("öl & 100% wood.bin", &f.data)];
     for uri in ["%C3%B6l%20&%20100%25%20wood.bin", "öl & 100% wood.bin"] {
         let json = f.json(&format!(r#", "uri": "{uri}""#), &rest);
@@ -262,6 +273,7 @@ fn buffers_beside_the_file_and_in_it() {
         assert_eq!(triangles(&file.mesh), square());
         assert!(file.companions.len() == 1 && file.companions[0].ends_with(beside[0].0));
     }
+
     let mut json = f.json("", &rest);
     while !json.len().is_multiple_of(4) {
         json.push(' ');
@@ -275,7 +287,7 @@ fn buffers_beside_the_file_and_in_it() {
     assert!(file.warnings.is_empty(), "{:?}", file.warnings);
 }
 
-/// An extension that compresses is refused by name wherever a file names it, and the message says what to do.
+/// An extension that compresses is refused by name, wherever a file names it. The message says what to do.
 #[test]
 fn compression_is_refused_by_name_with_the_way_out() {
     let refused = |json: String| read_file("a.gltf", json.as_bytes(), &[]).unwrap_err().to_string();
@@ -292,7 +304,8 @@ fn compression_is_refused_by_name_with_the_way_out() {
         assert!(message.contains(&format!("extension {extension}, which is not read; ")), "{message}");
         assert!(message.contains(words), "{message}");
     }
-    // Used, but not required: the vertices are nowhere else all the same.
+
+    // The extension is used, but not required. The vertices are nowhere else.
     let message = refused(
         r#"{"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_draco_mesh_compression"],
         "nodes": [{"mesh": 0}],
@@ -305,6 +318,7 @@ fn compression_is_refused_by_name_with_the_way_out() {
         message.contains("KHR_draco_mesh_compression, which is not read; export without Draco"),
         "{message}"
     );
+
     let message = refused(
         r#"{"asset": {"version": "2.0"}, "extensionsUsed": ["EXT_meshopt_compression"],
         "buffers": [{"byteLength": 4, "extensions": {"EXT_meshopt_compression": {"fallback": true}}}]}"#
@@ -316,7 +330,8 @@ fn compression_is_refused_by_name_with_the_way_out() {
 #[test]
 fn textures_of_extensions_are_replaced_with_a_warning() {
     let mut f = Gltf::default();
-    let (p, i) = (f.corners(), f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, ""));
+    let p = f.corners();
+    let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
     let uv = f.floats(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
     for (extension, way_out) in
         [("KHR_texture_basisu", "ktxdecompress"), ("EXT_texture_webp", "gltf-transform png")]
@@ -346,9 +361,11 @@ fn texture_transforms_and_sets() {
         image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
         bytes.into_inner()
     };
+
     let mut f = Gltf::default();
-    let (p, i) = (f.corners(), f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, ""));
-    // 16-bit coordinates, normalized, in the second set.
+    let p = f.corners();
+    let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
+    // 16-bit normalized coordinates, in the second set.
     let uv: Vec<u8> = [[0u16, 0], [65_535, 0], [65_535, 65_535], [0, 65_535]]
         .as_flattened()
         .iter()
@@ -369,6 +386,7 @@ fn texture_transforms_and_sets() {
             "nodes": [{{"mesh": 0}}]"#
         ))
         .unwrap();
+
     let FaceColor::Texture(0, texture, uvs) = file.mesh.color_of(0) else { panic!("{:?}", file.warnings) };
     assert_eq!(texture.image.pixels(), [[9, 8, 7]]);
     let expected: [Vec2; 3] = [vec2(0.25, 0.5), vec2(0.75, 0.5), vec2(0.75, 0.25)];
@@ -403,7 +421,7 @@ fn obj_files_of_every_dialect() {
         let file = read_file("a b.obj", obj.as_bytes(), &[]).unwrap();
         let mut expected = square();
         if name == "negative indices" {
-            // The second face starts behind another vertex: −5 is the first again.
+            // The second face follows another vertex, so −5 is the first vertex again.
             expected = triangles(&file.mesh);
             assert_eq!(file.mesh.faces(), [[0, 1, 2], [0, 2, 3]], "{name}");
         }
@@ -424,6 +442,7 @@ fn obj_materials_repeated_spaced_and_missing() {
          usemtl dark oak\nf 1 2 5\nusemtl gone\nf 1 4 5\n"
     );
     let library: (&str, &[u8]) = ("my scan (1).mtl", b"newmtl dark oak\nKd 1 0 0\nnewmtl wall\nKd 0 1 0\n");
+
     let file = read_file("a.obj", obj.as_bytes(), &[library]).unwrap();
     let names: Vec<&str> = file.mesh.materials().iter().map(|m| m.name.as_str()).collect();
     assert_eq!(names, ["dark oak", "wall", "gone"]);
@@ -431,7 +450,8 @@ fn obj_materials_repeated_spaced_and_missing() {
     assert_eq!([of(0), of(1), of(2), of(3)], [0, 1, 0, 2]);
     assert!(matches!(file.mesh.color_of(2), FaceColor::Flat([255, 0, 0])));
     assert_eq!(file.warnings, ["1 material in no library and drawn gray, the first is `gone`"]);
-    // Without the library the mesh is read all the same.
+
+    // The mesh is read even without the library.
     let file = read_file("a.obj", obj.as_bytes(), &[]).unwrap();
     assert_eq!(file.mesh.faces().len(), 4);
     assert!(file.warnings[0].contains("my scan (1).mtl"), "{:?}", file.warnings);
@@ -439,7 +459,7 @@ fn obj_materials_repeated_spaced_and_missing() {
     assert_eq!(MeshLabels::from_materials(&file.mesh, &Default::default()), None);
 }
 
-/// As the published areas have it: labels are the names of materials, switched to and fro.
+/// The published areas have labels as the names of materials, which alternate.
 #[test]
 fn a_published_semantic_obj_has_labels() {
     let vertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n";
@@ -453,12 +473,13 @@ fn a_published_semantic_obj_has_labels() {
     let MeshLabels::Names { labels, faces } = labels else { panic!("{labels:?}") };
     let names: Vec<String> = labels.iter().map(ToString::to_string).collect();
     assert_eq!(names, ["chair_3_office_5_1", "wall_10_hallway_2_1"]);
-    // The face without area took its label along.
+    // The face without area is left out with its label.
     assert_eq!(faces, [0, u32::MAX, 1, 0]);
     assert!(warnings.is_empty());
 }
 
-/// PLY meshes of other libraries in the columns of known data sets; how they were made is told beside them.
+/// PLY meshes that other libraries wrote with the columns of known data sets. The README beside them tells
+/// how they were made.
 #[test]
 fn ply_files_of_other_libraries_with_the_columns_of_data_sets() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/ply");
@@ -477,12 +498,13 @@ fn ply_files_of_other_libraries_with_the_columns_of_data_sets() {
         ("open3d_ascii.ply", None),
         ("open3d_binary.ply", None),
     ];
+
     for (name, expected) in expected {
         let file = read_mesh(&folder.join(name), UpAxis::Z).unwrap();
         let mesh = &file.mesh;
         assert_eq!((mesh.positions().len(), mesh.faces().len()), (8, 12), "{name}");
         assert!((mesh.total_area() - 2.0 * (6.0 + 7.5 + 5.0)).abs() < 1e-5, "{name}");
-        // Its sides look outwards, and colours are those of the corners.
+        // All sides face outwards, and the colours belong to the corners.
         assert!((0..12).all(|f| {
             let middle: Vec3 = mesh.triangle(f).iter().sum::<Vec3>() / 3.0;
             mesh.normal(f).dot(middle - vec3(1.5, 1.0, 1.25)) > 0.0
@@ -491,6 +513,7 @@ fn ply_files_of_other_libraries_with_the_columns_of_data_sets() {
             let expected = (*position / vec3(3.0, 2.0, 2.5) * 255.0).as_u8vec3().to_array();
             assert_eq!(*color, expected, "{name}");
         }
+
         let found = file.labels.as_ref().map(|labels| match labels {
             MeshLabels::Numbers { element, class, instance } => {
                 let column = |c: &Option<LabelColumn>| c.clone().map(|c| (c.name, c.values));
@@ -502,7 +525,8 @@ fn ply_files_of_other_libraries_with_the_columns_of_data_sets() {
         assert_eq!(found, expected, "{name}");
         assert!(file.warnings.is_empty(), "{name}: {:?}", file.warnings);
     }
-    // The numbers of segments and materials are there for who asks for them.
+
+    // The numbers of segments and materials can be asked for.
     let options = MeshOptions { instance_column: Some("segment_id".into()), ..MeshOptions::default() };
     let file = read_mesh_with(&folder.join("matterport_region.ply"), UpAxis::Z, &options).unwrap();
     let Some(MeshLabels::Numbers { instance: Some(instance), class: Some(_), .. }) = file.labels else {

@@ -1,5 +1,5 @@
-//! `pointcloud.mat`: files that h5py made in the published layout (see `fixtures/pointcloud_mat`), our own
-//! read back, and files that are damaged.
+//! `pointcloud.mat`: files that h5py wrote in the published layout (see `fixtures/pointcloud_mat`), our own
+//! files read back, and damaged files.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::{Vec3, vec3};
@@ -25,7 +25,7 @@ fn expected(at: Vec3, n: usize) -> PointCloud {
     cloud
 }
 
-/// Room, object and points of all objects.
+/// Room, name and points of all objects.
 fn contents(area: &MatArea) -> Vec<(String, String, PointCloud)> {
     let mut all = Vec::new();
     for room in &area.rooms {
@@ -92,7 +92,7 @@ fn write(path: &Path, objects: &[(&str, &str, PointCloud)]) {
     assert_eq!(bytes, std::fs::metadata(path).unwrap().len());
 }
 
-/// More objects than a node of names holds, and than a node of nodes: 36 rooms of 40 objects.
+/// Writes 36 rooms of 40 objects: more than a node of names holds, and more than a node of nodes.
 #[test]
 fn what_is_written_is_read() {
     let dir = tempfile::tempdir().unwrap();
@@ -106,6 +106,7 @@ fn what_is_written_is_read() {
             objects.push((room.as_str(), name.as_str(), expected(vec3(r as f32, o as f32, 0.1), n)));
         }
     }
+
     write(&path, &objects);
     let area = MatArea::open(&path).unwrap();
     assert!(area.rooms.iter().all(|r| r.alignment_deg == Some(30.0)));
@@ -114,6 +115,7 @@ fn what_is_written_is_read() {
     for ((room, name, cloud), read) in objects.iter().zip(&read) {
         assert_eq!((*room, *name, cloud), (read.0.as_str(), read.1.as_str(), &read.2));
     }
+
     let again = dir.path().join("again.mat");
     write(&again, &objects);
     assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&again).unwrap());
@@ -127,8 +129,9 @@ fn one_room_one_object_or_none() {
     let door = ("hallway_2", "door_1", expected(Vec3::ZERO, 3));
     write(&path, &[("office_1", "chair_1", PointCloud::default()), door.clone()]);
     let read = contents(&MatArea::open(&path).unwrap());
-    // An object without points is left out, and a room without objects.
+    // An object without points is left out, and so is a room without objects.
     assert_eq!(read, [(door.0.to_owned(), door.1.to_owned(), door.2)]);
+
     write(&path, &[]);
     assert!(MatArea::open(&path).unwrap().rooms.is_empty());
 }
@@ -163,10 +166,11 @@ fn other_files_are_refused_by_what_they_are() {
     let path = dir.path().join("pointcloud.mat");
     let single = std::fs::read(fixture("single.mat")).unwrap();
     let cut = single[..single.len() - 100].to_vec();
-    // The dataset that was called Disjoint_Space is called something else.
+    // The array `Disjoint_Space` gets another name.
     let mut renamed = single.clone();
     let at = renamed.windows(15).position(|w| w == b"Disjoint_Space\0").unwrap();
     renamed[at] = b'X';
+
     for (bytes, words) in [
         (&b""[..], "no HDF5 file"),
         (b"MATLAB 5.0 MAT-file, Platform: GLNXA64", "version 5"),
@@ -188,6 +192,7 @@ fn a_field_that_is_missing_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("pointcloud.mat");
     let single = std::fs::read(fixture("single.mat")).unwrap();
+
     let mut without = single.clone();
     for at in single
         .windows(8)
@@ -197,13 +202,14 @@ fn a_field_that_is_missing_is_named() {
     {
         without[at..at + 6].copy_from_slice(b"pointy");
     }
+
     std::fs::write(&path, without).unwrap();
     let message = MatArea::open(&path).unwrap_err().to_string();
     assert!(message.contains("Disjoint_Space(1).object(1): has no field points"), "{message}");
 }
 
-/// Bytes changed here and there, and files cut off: an answer or an error, in bounded memory, and never a
-/// panic.
+/// Files with some bytes changed, and files cut off: each gives an area or an error, in bounded memory and
+/// without a panic.
 #[test]
 fn damaged_files_never_panic() {
     let dir = tempfile::tempdir().unwrap();
@@ -215,7 +221,9 @@ fn damaged_files_never_panic() {
             .wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % below
     };
-    let (mut read, mut refused) = (0, 0);
+    let mut read = 0;
+    let mut refused = 0;
+
     for name in ["area.mat", "cells.mat", "single.mat", "latest.mat"] {
         let good = std::fs::read(fixture(name)).unwrap();
         for round in 0..150 {
@@ -227,11 +235,13 @@ fn damaged_files_never_panic() {
             if round % 10 == 0 {
                 bytes.truncate(random(bytes.len()));
             }
+
             std::fs::write(&path, &bytes).unwrap();
             let Ok(area) = MatArea::open(&path) else {
                 refused += 1;
                 continue;
             };
+
             for object in area.rooms.iter().flat_map(|r| &r.objects) {
                 let mut cloud = PointCloud::default();
                 match object.read(&mut cloud) {

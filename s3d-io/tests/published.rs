@@ -1,4 +1,4 @@
-//! A folder in the published layout, made by our own writers, read as input.
+//! Reads a folder in the published layout, which our own writers made, as input.
 
 use s3d_geom::glam::{DAffine3, DQuat, DVec3, Vec3, dvec3, vec3};
 use s3d_geom::{Camera, NO_INDEX, PointCloud, Pose, TriMesh};
@@ -64,7 +64,8 @@ fn everything_is_found_and_comes_back() {
     for (location, (n, room)) in found.locations.iter().zip([(4.0, "hallway_1"), (1.0, "office_5")]) {
         assert_eq!(location.room.unwrap().to_string(), room);
         assert_eq!(location.location.pose.location, original(n).location);
-        let (is, should) = (location.location.pose.world_from_camera, original(n).world_from_camera);
+        let is = location.location.pose.world_from_camera;
+        let should = original(n).world_from_camera;
         assert!(is.abs_diff_eq(should, 1e-12), "{is} {should}");
     }
 
@@ -74,6 +75,7 @@ fn everything_is_found_and_comes_back() {
     let labels: Vec<String> = read.labels.iter().map(|l| l.to_string()).collect();
     assert_eq!(labels, NAMES[1..]);
     assert_eq!(read.label_of_face, [0, 0, 1, 1, NO_INDEX]);
+
     let annotations = found.annotations(&read).unwrap();
     let mut cloud = PointCloud::default();
     annotations.rooms[0].instances[1].read(&mut cloud).unwrap();
@@ -90,6 +92,7 @@ fn an_area_can_be_moved() {
     let options = PublishedOptions { area: None, world_from_area };
     let found = PublishedArea::open_with(&dir.path().join("area_5b"), &options).unwrap();
     assert_eq!(found.area, 5);
+
     let moved = &found.locations[0].location.pose;
     assert!(
         moved
@@ -98,6 +101,7 @@ fn an_area_can_be_moved() {
     );
     let turned = DQuat::from_rotation_z(1.0) * original(4.0).forward();
     assert!(moved.forward().abs_diff_eq(turned, 1e-12));
+
     let read = found.read_mesh().unwrap();
     for (is, was) in read.file.mesh.positions().iter().zip(mesh().positions()) {
         assert!(
@@ -137,7 +141,7 @@ fn what_is_missing_is_named() {
     let dir = tempfile::tempdir().unwrap();
     area(dir.path());
     let folder = dir.path().join("area_3");
-    // Without labels it is an area like any other.
+    // An area without labels is still an area.
     fs::remove_file(folder.join("3d/semantic.obj")).unwrap();
     let found = PublishedArea::open(&folder).unwrap();
     assert!(
@@ -148,9 +152,11 @@ fn what_is_missing_is_named() {
     );
     let mesh = found.read_mesh().unwrap();
     assert!(mesh.labels.is_empty() && mesh.label_of_face.is_empty() && mesh.file.mesh.faces().len() == 5);
+
     fs::remove_file(folder.join("3d/rgb.obj")).unwrap();
     let message = PublishedArea::open(&folder).unwrap_err().to_string();
     assert!(message.contains("has no 3d/rgb.obj, the textured mesh"), "{message}");
+
     let dir = tempfile::tempdir().unwrap();
     area(dir.path());
     let folder = dir.path().join("area_3");
@@ -160,11 +166,13 @@ fn what_is_missing_is_named() {
     fs::write(&pose, "{\"camera_uuid\": 1}").unwrap();
     let message = PublishedArea::open(&folder).unwrap_err().to_string();
     assert!(message.contains("_hallway_1_") && message.contains("line 1"), "{message}");
+
     fs::remove_dir_all(folder.join("pano")).unwrap();
     assert_eq!(PublishedArea::open(&folder).unwrap().locations.len(), 1);
     fs::remove_dir_all(folder.join("data")).unwrap();
     let message = PublishedArea::open(&folder).unwrap_err().to_string();
     assert!(message.contains("without poses there are no scan locations"), "{message}");
+
     fs::rename(&folder, dir.path().join("third")).unwrap();
     let message = PublishedArea::open(&dir.path().join("third")).unwrap_err().to_string();
     assert!(message.contains("as in area_3 or area_5a"), "{message}");
@@ -184,6 +192,7 @@ fn labels_of_another_mesh_are_refused() {
         .unwrap_err()
         .to_string();
     assert!(message.contains("5 of the 5 faces") && message.contains("semantic.obj"), "{message}");
+
     s3d_io::mesh::write_semantic_obj(&folder.join("3d"), &mesh(), &[0; 5], &NAMES.map(str::to_owned))
         .unwrap();
     let message = PublishedArea::open(&folder)

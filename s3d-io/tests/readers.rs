@@ -1,5 +1,5 @@
-//! What takes a reader or a writer gives what is read or written by path, and its errors name what it is told
-//! to.
+//! Functions that take a reader or a writer give the same as those that take a path, and their errors name
+//! the file as they were told.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::vec3;
@@ -42,6 +42,7 @@ fn annotations_of_any_format_come_from_a_reader() {
     };
     let names =
         ["1_2_format_3.las", "1_4_format_7.laz", "ascii.ply", "big.ply", "columns.npz", "two_scans.e57"];
+
     for name in names {
         let path = fixture(&format!("clouds/{name}"));
         let by_path = Annotations::open(std::slice::from_ref(&path), &options).unwrap();
@@ -49,7 +50,8 @@ fn annotations_of_any_format_come_from_a_reader() {
         let by_reader = Annotations::from_reader(bytes, Path::new(name), &options).unwrap();
         assert!(!by_path.rooms.is_empty(), "{name}");
         assert_eq!(contents(&by_reader), contents(&by_path), "{name}");
-        // The points may also wait in a temporary file, for which the reader is read once more.
+
+        // If the points wait in a temporary file, the reader is read once more.
         let few = AnnotationOptions { points_in_memory: 1, ..options.clone() };
         let bytes = Cursor::new(fs::read(&path).unwrap());
         let spooled = Annotations::from_reader(bytes, Path::new(name), &few).unwrap();
@@ -69,6 +71,7 @@ fn a_mat_file_is_written_to_and_read_from_memory() {
     let path = folder.path().join("pointcloud.mat");
     let positions: Vec<_> = (0..50u8).map(|i| vec3(f32::from(i), 0.5, -1.0)).collect();
     let colors = vec![[1, 2, 3]; 50];
+
     let mut by_path = MatWriter::create(&path, "Area_1").unwrap();
     let mut in_memory = MatWriter::new(Cursor::new(Vec::new()), Path::new("a.mat"), "Area_1").unwrap();
     by_path.room("office_1", 45).unwrap();
@@ -77,6 +80,7 @@ fn a_mat_file_is_written_to_and_read_from_memory() {
     in_memory.room("office_1", 45).unwrap();
     in_memory.object("chair_1", "chair_1_office_1_1").unwrap();
     in_memory.append(&positions, &colors).unwrap();
+
     let error = in_memory.append(&[vec3(f32::NAN, 0.0, 0.0)], &[[0; 3]]).unwrap_err();
     assert_eq!(error.path(), Path::new("a.mat"));
     by_path.finish().unwrap();
@@ -104,6 +108,7 @@ fn points_are_written_to_and_read_from_memory() {
     in_memory.append(&cloud, &[7, 8, 9]).unwrap();
     let bytes = in_memory.into_inner().unwrap();
     assert_eq!(bytes, fs::read(&path).unwrap());
+
     let mut points = Vec::new();
     let mut reader = LabelledPoints::new(Cursor::new(bytes), Path::new("p.ply")).unwrap();
     assert!(reader.read(10, &mut points).unwrap());
@@ -145,7 +150,7 @@ fn meshes_come_from_a_reader_with_the_files_beside_their_name() {
     for (name, text) in [("a.ply", ply), ("a.OBJ", obj)] {
         let path = folder.path().join(name);
         let options = MeshOptions::default();
-        // Only the files beside it are there yet.
+        // Only the files beside it exist so far.
         let by_reader = read_mesh_from(text.as_bytes(), &path, UpAxis::Z, &options).unwrap();
         fs::write(&path, text).unwrap();
         let by_path = read_mesh(&path, UpAxis::Z).unwrap();

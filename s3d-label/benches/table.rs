@@ -1,11 +1,11 @@
-//! How long it takes to build, write and read the label table of a data set, up to ten times the published
-//! size.
+//! The time to build, write and read the label table of a data set, up to ten times the published size.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_label::{Class, Label, LabelTable, Room, RoomType, number_area};
 use std::hint::black_box;
 
-/// As many labels, spread over six areas as evenly as their rooms and classes allow, in a fixed disorder.
+/// Returns about `count` labels in a fixed random order, spread evenly over the rooms and classes of six
+/// areas.
 fn labels(count: u32) -> Vec<Label> {
     let mut labels = Vec::new();
     for area in 1..=6 {
@@ -33,6 +33,7 @@ fn bench(c: &mut Criterion) {
         let labels = labels(count);
         let table = LabelTable::from_labels(labels.iter().copied()).unwrap();
         let names = table.names();
+
         group.throughput(Throughput::Elements(labels.len() as u64));
         group.bench_with_input(BenchmarkId::new("from_labels", count), &labels, |b, labels| {
             b.iter(|| LabelTable::from_labels(black_box(labels).iter().copied()).unwrap());

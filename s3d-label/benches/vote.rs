@@ -1,11 +1,11 @@
-//! How many points a second can vote, when they come instance by instance as in an annotated tree, and when
-//! they come in any order; and what it costs to read the winners.
+//! The number of points per second that vote, in the order of an annotated tree (instance by instance) and in
+//! any order; and the cost of reading the winners.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_label::{LabelId, Votes};
 use std::hint::black_box;
 
-/// A fixed stream of pseudo-random numbers.
+/// Returns the next number of a fixed pseudo-random stream.
 fn next(state: &mut u64) -> u64 {
     *state = state
         .wrapping_mul(6_364_136_223_846_793_005)
@@ -13,7 +13,7 @@ fn next(state: &mut u64) -> u64 {
     *state >> 33
 }
 
-/// Points of instances that cover 40 faces each and share a quarter of them with the next instance.
+/// Returns points of instances that cover 40 faces each and share a quarter of them with the next instance.
 fn points(count: usize, faces: u32) -> Vec<(u32, LabelId)> {
     let mut state = 1;
     let per_instance = count * 30 / faces as usize;
@@ -43,6 +43,7 @@ fn bench(c: &mut Criterion) {
         group.bench_with_input(BenchmarkId::new("by_instance", count), &points, |b, points| {
             b.iter(|| vote(black_box(points), faces));
         });
+
         let votes = vote(&points, faces);
         let mut state = 2;
         for i in (1..points.len()).rev() {
@@ -51,6 +52,7 @@ fn bench(c: &mut Criterion) {
         group.bench_with_input(BenchmarkId::new("any_order", count), &points, |b, points| {
             b.iter(|| vote(black_box(points), faces));
         });
+
         group.throughput(Throughput::Elements(u64::from(faces)));
         group.bench_with_input(BenchmarkId::new("label_of_face", faces), &votes, |b, votes| {
             b.iter(|| black_box(votes).label_of_face());

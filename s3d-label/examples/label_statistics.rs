@@ -1,5 +1,5 @@
-//! Prints what a data set holds — instances of each class and rooms of each type, by area — from its label
-//! table.
+//! Prints the instances of each class and the rooms of each type, by area, from the label table of a data
+//! set.
 //!
 //! `cargo run --example label_statistics -- path/to/semantic_labels.json`
 #![allow(clippy::print_stdout)] // It is a program.
@@ -27,7 +27,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .ok_or("usage: label_statistics path/to/semantic_labels.json")?;
     let names: Vec<String> = serde_json::from_str(&std::fs::read_to_string(path)?)?;
     let table = LabelTable::from_names(&names)?;
-    let (classes, rooms) = (ClassCounts::from_table(&table), RoomCounts::from_table(&table));
+    let classes = ClassCounts::from_table(&table);
+    let rooms = RoomCounts::from_table(&table);
     print_table(Class::S3DIS.map(Class::name), &classes.areas, classes.total());
     print_table(RoomType::S3DIS.map(RoomType::name), &rooms.areas, rooms.total());
     Ok(())

@@ -7,8 +7,8 @@ use s3d_label::{Class, LabelTable, Room, number_area};
 use std::error::Error;
 use std::path::Path;
 
-/// The instances of one room: `Annotations/chair_3.txt` is the third chair. Files of unknown classes are
-/// reported and left out.
+/// Returns the instances of a room: `Annotations/chair_3.txt` is the third chair. Files of unknown classes
+/// are reported and left out.
 fn instances(folder: &Path) -> std::io::Result<Vec<(Class, u32)>> {
     let mut found = Vec::new();
     for file in std::fs::read_dir(folder)? {
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .file_name()
         .and_then(|name| name.to_str())
         .and_then(|name| name.strip_prefix("Area_"));
-    // The halves of area 5 are one area in labels.
+    // In labels, the halves of area 5 are one area.
     let area = area
         .map(|number| number.trim_end_matches(['a', 'b']))
         .and_then(|number| number.parse().ok());
@@ -51,6 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             found.extend(of_room.into_iter().map(|(class, number)| (room, class, number)));
         }
     }
+
     let table = LabelTable::from_labels(number_area(area, found)?.into_iter().map(|i| i.label))?;
     println!("{}", serde_json::to_string(&table.names())?);
     Ok(())

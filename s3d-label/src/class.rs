@@ -4,10 +4,10 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// A class of object: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are S3DIS's
-/// 13 classes; [`Taxonomy::class`](crate::Taxonomy::class) finds those of other taxonomies.
+/// A class of objects: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are the 13
+/// classes of S3DIS. [`Taxonomy::class`](crate::Taxonomy::class) finds the classes of other taxonomies.
 ///
-/// `Ord` is the order of the taxonomy; for S3DIS that of formats.md, "What is written".
+/// `Ord` is the order of the taxonomy. The order of S3DIS is in formats.md, "What is written".
 ///
 /// ```
 /// use s3d_label::Class;
@@ -19,19 +19,19 @@ use thiserror::Error;
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Class {
     index: u8,
-    /// What it counts as: a place in [`Class::S3DIS`].
+    /// The place in [`Class::S3DIS`] of the class that it counts as.
     s3dis: u8,
-    /// One word wide, since labels are many, and stand in errors.
+    /// A reference of one word, since there are many labels, and errors contain them.
     name: &'static &'static str,
 }
 
-/// A word that should be a class of a taxonomy and is none.
+/// A word that is not a class of the taxonomy.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{word:?} is no class; the classes are {classes}")]
 pub struct UnknownClass {
     /// The word.
     pub word: String,
-    /// The classes of the taxonomy, with blanks between them.
+    /// The classes of the taxonomy, separated by blanks.
     pub classes: String,
 }
 
@@ -66,23 +66,23 @@ s3dis! {
 }
 
 impl Class {
-    /// The class at `index` of a taxonomy, which counts as the class of S3DIS at `s3dis`.
+    /// Makes the class at `index` of a taxonomy, which counts as the class of S3DIS at `s3dis`.
     pub(crate) const fn new(index: u8, s3dis: u8, name: &'static &'static str) -> Self {
         Self { index, s3dis, name }
     }
 
-    /// The class as it is spelled in names of labels: letters and digits.
+    /// Returns the spelling of the class in names of labels: letters and digits.
     pub const fn name(self) -> &'static str {
         self.name
     }
 
-    /// Its place in its taxonomy, from 0: the bin of a histogram of classes.
+    /// Returns the place in the taxonomy, from 0, which is also the bin in a histogram of classes.
     pub const fn index(self) -> usize {
         self.index as usize
     }
 
-    /// Which class of S3DIS it counts as, where only these will do: for loaders of S3DIS, and for what is a
-    /// floor or a wall. [`Class::CLUTTER`] if it is like none of the others.
+    /// Returns the class of S3DIS that it counts as; [`Class::CLUTTER`] if no other fits. Loaders of S3DIS
+    /// need these classes, and so do questions such as "is it a floor?".
     pub fn s3dis(self) -> Self {
         Self::S3DIS
             .get(usize::from(self.s3dis))
@@ -106,7 +106,7 @@ impl fmt::Display for Class {
 impl FromStr for Class {
     type Err = UnknownClass;
 
-    /// The class of S3DIS that is spelled `word`, to the letter.
+    /// Finds the class of S3DIS with exactly the name `word`.
     fn from_str(word: &str) -> Result<Self, UnknownClass> {
         let unknown = || UnknownClass { word: word.to_owned(), classes: names(&Self::S3DIS) };
         Self::S3DIS
@@ -116,7 +116,7 @@ impl FromStr for Class {
     }
 }
 
-/// The names of classes, for a message.
+/// Joins the names of classes, for a message.
 pub(crate) fn names(classes: &[Class]) -> String {
     classes.iter().map(|class| *class.name).collect::<Vec<_>>().join(" ")
 }

@@ -1,10 +1,10 @@
-//! Annotated instances: what is known of one without its points.
+//! Summaries of annotated instances.
 
 use crate::{Class, LabelId, LabelTable, Room};
 use glam::Vec3;
 use s3d_geom::Aabb;
 
-/// One annotated instance, summed up.
+/// A summary of an annotated instance, without its points.
 ///
 /// ```
 /// use s3d_geom::glam::{Vec3, vec3};
@@ -18,20 +18,21 @@ use s3d_geom::Aabb;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InstanceSummary {
-    /// Its index in the label table.
+    /// The index in the label table.
     pub label: LabelId,
-    /// The room that it is in.
+    /// The room of the instance.
     pub room: Room,
-    /// What it is.
+    /// The class of the instance.
     pub class: Class,
-    /// How many points it has, at least 1.
+    /// The number of points, at least 1.
     pub points: u64,
-    /// The tightest axis-aligned box around them, world metres: `[xmin, ymin, zmin, xmax, ymax, zmax]`.
+    /// The tightest axis-aligned box around the points, in world metres: `[xmin, ymin, zmin, xmax, ymax,
+    /// zmax]`.
     pub bbox: [f32; 6],
 }
 
 impl InstanceSummary {
-    /// The summary of `points` (world metres) with the label at `id`; `None` if there is no point.
+    /// Summarises `points` (world metres) with the label at `id`. Returns `None` if there is no point.
     ///
     /// # Panics
     /// If the table has no label at `id`.
@@ -44,6 +45,7 @@ impl InstanceSummary {
         let label = table
             .get(id)
             .unwrap_or_else(|| panic!("label {id} of a table of {}", table.len()));
+
         let mut count = 0;
         let bbox = Aabb::from_points(points.into_iter().inspect(|_| count += 1));
         (count > 0).then(|| Self {
@@ -55,14 +57,15 @@ impl InstanceSummary {
         })
     }
 
-    /// The summary of this instance's points and more of them; of a scan that comes in pieces.
+    /// Joins two summaries of points of the same instance, for a scan that comes in pieces.
     ///
     /// # Panics
     /// If `other` is another instance.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         assert_eq!(self.label, other.label, "two different instances");
-        let ([a, b, c, d, e, f], [x, y, z, u, v, w]) = (self.bbox, other.bbox);
+        let [a, b, c, d, e, f] = self.bbox;
+        let [x, y, z, u, v, w] = other.bbox;
         let bbox = [a.min(x), b.min(y), c.min(z), d.max(u), e.max(v), f.max(w)];
         Self { points: self.points + other.points, bbox, ..self }
     }

@@ -7,15 +7,14 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// The name of the null label: of what has no class. Index 0 of every label table.
+/// The name of the null label, which stands for "no class". It has index 0 in every label table.
 pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 
 /// One instance of a class in an area, written `class_instanceNum_roomType_roomNum_areaNum`, as in
 /// `board_3_hallway_4_6`. Source: formats.md, "What is written".
 ///
-/// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, the underscore included, so
-/// that `beam_10_…` stands before `beam_1_…`; then by room, which only matters between two labels of the same
-/// instance.
+/// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, with the underscore, so
+/// `beam_10_…` comes before `beam_1_…`. Then by room, which only matters for two labels of the same instance.
 ///
 /// ```
 /// use s3d_label::{Class, Label, LabelError};
@@ -30,21 +29,21 @@ pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Label {
-    /// What it is.
+    /// The class of the instance.
     pub class: Class,
-    /// Its number among the instances of its class in the area, from 1.
+    /// The number among the instances of this class in the area, from 1.
     pub instance: u32,
-    /// The room that it is in.
+    /// The room of the instance.
     pub room: Room,
     /// The area, from 1. Areas 5a and 5b are both 5.
     pub area: u32,
 }
 
-/// Why a word is no label.
+/// The reason why a word is not a label.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LabelError {
-    /// It has not five fields.
+    /// The word does not have five fields.
     #[error(
         "{name:?} is no label: it has {count} fields between underscores, not the five of \
          class_instance_roomType_room_area"
@@ -52,45 +51,45 @@ pub enum LabelError {
     Fields {
         /// The word.
         name: String,
-        /// How many fields it has.
+        /// The number of fields.
         count: usize,
     },
-    /// Its first field is no class.
+    /// The first field is not a class.
     #[error("{name:?} is no label: {source}")]
     Class {
         /// The word.
         name: String,
-        /// What is wrong with the field.
+        /// The error of the field.
         source: UnknownClass,
     },
-    /// Its third field is no type of room.
+    /// The third field is not a room type.
     #[error("{name:?} is no label: {source}")]
     RoomType {
         /// The word.
         name: String,
-        /// What is wrong with the field.
+        /// The error of the field.
         source: UnknownRoomType,
     },
-    /// A field that should be a number is none.
+    /// A field is not a number.
     #[error("{name:?} is no label: its {field} {word:?} is no number from 1 without leading zeros")]
     Number {
         /// The word.
         name: String,
-        /// Which field: "instance", "room" or "area".
+        /// The field: "instance", "room" or "area".
         field: &'static str,
-        /// What stands there.
+        /// The content of the field.
         word: String,
     },
-    /// It is the null label, where only the label of an instance will do.
+    /// The word is the null label, but the label of an instance is needed.
     #[error("{NULL_NAME:?} is the null label: it names no instance")]
     Null,
 }
 
-/// The label of S3DIS that `name` spells, `None` for the null label ([`NULL_NAME`]). See
-/// [`Taxonomy::parse_name`] for other classes and room types.
+/// Parses the name of a label of S3DIS. Returns `None` for the null label ([`NULL_NAME`]).
+/// [`Taxonomy::parse_name`] is for other taxonomies.
 ///
 /// # Errors
-/// [`LabelError`] says which field is wrong.
+/// [`LabelError`] names the field that is wrong.
 ///
 /// ```
 /// use s3d_label::{Class, NULL_NAME, parse_name};
@@ -103,19 +102,21 @@ pub fn parse_name(name: &str) -> Result<Option<Label>, LabelError> {
 }
 
 impl Taxonomy {
-    /// The label that `name` spells with this taxonomy's classes and room types, `None` for the null label
-    /// ([`NULL_NAME`]).
+    /// Parses the name of a label with the classes and room types of this taxonomy. Returns `None` for the
+    /// null label ([`NULL_NAME`]).
     ///
     /// # Errors
-    /// [`LabelError`] says which field is wrong.
+    /// [`LabelError`] names the field that is wrong.
     pub fn parse_name(&self, name: &str) -> Result<Option<Label>, LabelError> {
         if name == NULL_NAME {
             return Ok(None);
         }
+
         let fields: Vec<&str> = name.split('_').collect();
         let &[class, instance, room_type, room, area] = fields.as_slice() else {
             return Err(LabelError::Fields { name: name.to_owned(), count: fields.len() });
         };
+
         let number = |field, word: &str| {
             number_from_digits(word).ok_or_else(|| LabelError::Number {
                 name: name.to_owned(),
@@ -136,12 +137,12 @@ impl Taxonomy {
 }
 
 impl Label {
-    /// How the published order compares two instances; equal if they are the same instance, whatever their
-    /// rooms.
+    /// Compares two instances by the published order. The result is equal for labels of the same instance,
+    /// even if their rooms differ.
     pub(crate) fn cmp_key(&self, other: &Self) -> Ordering {
         let instance = |label: &Self| Digits::new(label.instance, Some(b'_'));
         let area = |label: &Self| Digits::new(label.area, None);
-        // The underscore counts where one name is the start of the other: `shower_` and `showerCurtain_`.
+        // The underscore matters if one name is the start of the other: `shower_` and `showerCurtain_`.
         let class = |label: &Self| label.class.name().bytes().chain([b'_']);
         (class(self).cmp(class(other)))
             .then_with(|| instance(self).as_bytes().cmp(instance(other).as_bytes()))
@@ -170,25 +171,25 @@ impl fmt::Display for Label {
 impl FromStr for Label {
     type Err = LabelError;
 
-    /// As [`parse_name`], but the null label is an error.
+    /// Parses like [`parse_name`], but the null label is an error.
     fn from_str(name: &str) -> Result<Self, LabelError> {
         parse_name(name)?.ok_or(LabelError::Null)
     }
 }
 
-/// A number's decimal digits without an allocation: labels are compared as strings, and often.
+/// The decimal digits of a number, without an allocation. Labels are compared as strings, and often.
 struct Digits {
     bytes: [u8; 11],
     start: usize,
 }
 
 impl Digits {
-    /// The digits of `number`, then `last`.
+    /// Writes the digits of `number`, then `last`.
     fn new(mut number: u32, last: Option<u8>) -> Self {
         let mut bytes = [0; 11];
         let mut start = bytes.len();
         let mut places = bytes.iter_mut().rev();
-        // Ten digits and the last byte: there is a place for each.
+        // There is room for ten digits and the last byte.
         let mut put = |byte| {
             if let Some(place) = places.next() {
                 *place = byte;
@@ -219,7 +220,7 @@ pub(crate) mod tests {
     use crate::RoomType;
     use proptest::prelude::*;
 
-    /// Mostly small numbers, so that strings share their starts and instances meet again.
+    /// Makes mostly small numbers, so that strings share their starts and instances repeat.
     fn any_number() -> impl Strategy<Value = u32> {
         prop_oneof![4 => 1u32..130, 1 => 1u32..]
     }

@@ -1,13 +1,25 @@
-//! Labels of the 2D-3D-S data set (Armeni et al. 2017): what they are called, in which order they are
-//! numbered, and how the points of a scan give them to the faces of a mesh.
+//! Labels of the 2D-3D-S data set (Armeni et al. 2017): their names, their published order, and the vote that
+//! gives them to the faces of a mesh.
 //!
-//! The nouns: the [`Taxonomy`], which says which classes and types of rooms there are (S3DIS's, those of
-//! other data sets, or one's own); [`Class`], [`Room`] and [`Label`] with its name; the [`LabelTable`], which
-//! numbers the labels of a data set in the published order ([`LabelId`]); [`number_area`], which turns the
-//! numbers of an annotated tree into those of labels; the [`Labeler`], which takes labelled points block by
-//! block and gives the [`FaceLabels`] of a mesh (or [`vote`], for points that are all there), the [`Votes`]
-//! behind them and the [`VoteReport`] on these; [`ClassCounts`] and [`RoomCounts`], the paper's tables of
-//! statistics.
+//! # Names
+//!
+//! A [`Taxonomy`] lists the classes and room types of a data set: S3DIS, another data set, or your own. A
+//! [`Label`] is an instance of a [`Class`] in a [`Room`], with a name such as `chair_3_office_5_1`.
+//!
+//! # Numbers
+//!
+//! [`number_area`] turns the instance numbers of an annotated tree, which run per room, into the numbers of
+//! labels, which run per area. A [`LabelTable`] gives every label of a data set its [`LabelId`], in the
+//! published order. [`ClassCounts`] and [`RoomCounts`] are the tables of statistics of the paper.
+//!
+//! # Vote
+//!
+//! A [`Labeler`] takes labelled points block by block, and [`vote`] takes them all at once. Each point votes
+//! for its nearest face. The result is the [`FaceLabels`] of the mesh, with all [`Votes`] and a
+//! [`VoteReport`]. [`fill_labels`] labels faces without a vote, and [`Disputes`] shows where labels are not
+//! clear.
+//!
+//! # Example
 //!
 //! ```
 //! use s3d_geom::{TriMesh, glam::{Vec3, vec3}};
@@ -23,10 +35,11 @@
 //!     ["<UNK>_0_<UNK>_0_0", "chair_1_office_1_5", "chair_2_office_2_5", "wall_1_office_1_5"]
 //! );
 //!
-//! // Three points of the wall and one of a chair vote for a mesh of two faces.
+//! // Three points of the wall and one point of a chair vote for a mesh of two faces.
 //! let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE];
 //! let mesh = TriMesh::from_faces(corners, vec![[0, 1, 2], [1, 3, 2]])?;
-//! let (wall, chair) = (LabelId(3), LabelId(1));
+//! let wall = LabelId(3);
+//! let chair = LabelId(1);
 //! let points = [[0.1, 0.1], [0.2, 0.1], [0.1, 0.3], [0.3, 0.3]].map(|[x, y]| vec3(x, y, 0.002));
 //! let labels = vote(&mesh, &points, &[wall, chair, wall, wall])?;
 //! assert_eq!(labels.label_of_face(), [wall, LabelId::NULL]);
@@ -34,13 +47,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With the cargo feature `serde`, classes, rooms and labels are data by their names, a table is the list of
-//! its names, and votes, reports, summaries and statistics are structs of their fields. What is read is
-//! checked: a name that is none, or a table out of order, is refused. Names are S3DIS's, or those of the
-//! taxonomy that reads ([`Taxonomy::reading`](crate::Taxonomy)). The feature `vote`, on by default, is
-//! the [`Labeler`] with what belongs to it.
+//! # Features
+//!
+//! `vote`, on by default, has the [`Labeler`] and everything under "Vote".
+//!
+//! `serde` serializes classes, rooms and labels as their names, a table as the list of its names, and votes,
+//! reports, summaries and statistics as structs. Values read are checked: an invalid name or a table out of
+//! order is refused. Names are read as names of S3DIS, or of another taxonomy within
+//! [`Taxonomy::reading`](crate::Taxonomy).
 
-// Nothing panics but what a caller did wrong, which "Panics" tells: names and numbers come from files.
+// Only a caller's mistake panics, and a section "Panics" names it. Names and numbers may come from files.
 #![cfg_attr(
     not(test),
     deny(

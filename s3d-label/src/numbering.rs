@@ -1,25 +1,24 @@
-//! From the numbers of an annotated tree, which run per room, to the instance numbers of labels, which run
-//! per area.
+//! Numbers instances per area. An annotated tree numbers them per room.
 
 use crate::{Class, Label, Room};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
-/// An annotated instance with the label that it gets.
+/// An annotated instance with its label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NumberedInstance {
-    /// The room that it is in.
+    /// The room of the instance.
     pub room: Room,
-    /// What it is.
+    /// The class of the instance.
     pub class: Class,
-    /// Its number among the instances of its class in the room: the 3 of `chair_3.txt`.
+    /// The number among the instances of this class in the room: the 3 of `chair_3.txt`.
     pub number_in_room: u32,
-    /// Its label, with its number among the instances of its class in the area.
+    /// The label, with the number among the instances of this class in the area.
     pub label: Label,
 }
 
-/// Why instances cannot be numbered.
+/// The reason why instances cannot be numbered.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NumberingError {
@@ -37,13 +36,15 @@ pub enum NumberingError {
     },
 }
 
-/// Gives each instance of an area, known by its room, class and number in that room, its label.
+/// Gives a label to each instance of an area. An instance is its room, its class and its number in the room.
 ///
-/// Instance numbers run per class over the area, from 1 without gaps: through the rooms in their order (by
-/// type, then by number; see [`RoomType`](crate::RoomType)), and in a room by the number there. Areas 1 to 4
-/// of the published table are numbered just so; in area 5, which was joined from 5a and 5b, and in area 6 a
-/// few rooms stand elsewhere. The result is in that order too — room, class, number in the room — whatever
-/// the order of the input. Source: formats.md, "What is written" and "S3DIS tree".
+/// Instance numbers run per class over the area, from 1 without gaps. They follow the order of the rooms (by
+/// type, then by number; see [`RoomType`](crate::RoomType)), and within a room the number there. Areas 1 to 4
+/// of the published table are numbered exactly so. In area 5, which was joined from 5a and 5b, and in area 6,
+/// a few rooms are at other places.
+///
+/// The result is sorted by room, class and number in the room, whatever the order of the input. Source:
+/// formats.md, "What is written" and "S3DIS tree".
 ///
 /// # Errors
 /// [`NumberingError::Duplicate`] if an instance is there twice.
@@ -66,6 +67,7 @@ pub fn number_area(
     if let Some(&[(room, class, number_in_room), _]) = instances.array_windows().find(|[a, b]| a == b) {
         return Err(NumberingError::Duplicate { area, room, class, number_in_room });
     }
+
     let mut last: BTreeMap<Class, u32> = BTreeMap::new();
     Ok(instances
         .into_iter()

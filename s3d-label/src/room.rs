@@ -1,28 +1,28 @@
-//! Types of rooms, and rooms.
+//! Room types and rooms.
 
 use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// A type of room: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are S3DIS's 11
-/// types; [`Taxonomy::room_type`](crate::Taxonomy::room_type) finds those of other taxonomies.
+/// A room type: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are the 11 room
+/// types of S3DIS. [`Taxonomy::room_type`](crate::Taxonomy::room_type) finds the room types of other
+/// taxonomies.
 ///
-/// `Ord` follows the names in the alphabet, whatever their case, so that `WC` is last: the order in which the
-/// published instance numbers run.
+/// `Ord` is alphabetical and ignores case, so `WC` is last. The published instance numbers run in this order.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct RoomType {
     index: u8,
-    /// What it counts as: a place in [`RoomType::S3DIS`]; beyond that, nothing.
+    /// The place in [`RoomType::S3DIS`] of the type that it counts as. A larger number means none.
     s3dis: u8,
-    /// One word wide, since labels are many, and stand in errors.
+    /// A reference of one word, since there are many labels, and errors contain them.
     name: &'static &'static str,
 }
 
-/// What stands in names in place of a room where none is known.
+/// The room in names if no room is known.
 pub const UNKNOWN_ROOM: &str = "unknown_1";
 
-/// A room of an area: its type and its number among the area's rooms of that type. Written `office_3`.
+/// A room of an area: its type, and its number among the rooms of that type in the area. Written `office_3`.
 ///
 /// `Ord`: by type (see [`RoomType`]), then by number.
 ///
@@ -36,46 +36,46 @@ pub const UNKNOWN_ROOM: &str = "unknown_1";
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Room {
-    /// What kind of room it is.
+    /// The type of the room.
     pub room_type: RoomType,
-    /// Its number, from 1.
+    /// The number of the room, from 1.
     pub number: u32,
 }
 
-/// A word that should be a type of room of a taxonomy and is none.
+/// A word that is not a room type of the taxonomy.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{word:?} is no type of room; the types are {types}")]
 pub struct UnknownRoomType {
     /// The word.
     pub word: String,
-    /// The types of the taxonomy, with blanks between them.
+    /// The room types of the taxonomy, separated by blanks.
     pub types: String,
 }
 
-/// Why a word names no room.
+/// The reason why a word is not a room.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RoomError {
-    /// It is not two words joined by one underscore.
+    /// The word does not have two parts, joined by one underscore.
     #[error("{word:?} is no room: a room is a type and a number, as in \"office_3\"")]
     Form {
         /// The word.
         word: String,
     },
-    /// Its first half is no type of room.
+    /// The first part is not a room type.
     #[error("{word:?} is no room: {source}")]
     Type {
         /// The word.
         word: String,
-        /// What is wrong with its first half.
+        /// The error of the first part.
         source: UnknownRoomType,
     },
-    /// Its second half is no number from 1.
+    /// The second part is not a number from 1.
     #[error("{word:?} is no room: {number:?} is no number from 1 without leading zeros")]
     Number {
         /// The word.
         word: String,
-        /// Its second half.
+        /// The second part.
         number: String,
     },
 }
@@ -109,22 +109,22 @@ s3dis! {
 }
 
 impl RoomType {
-    /// The type at `index` of a taxonomy, which counts as the type of S3DIS at `s3dis`.
+    /// Makes the type at `index` of a taxonomy, which counts as the type of S3DIS at `s3dis`.
     pub(crate) const fn new(index: u8, s3dis: u8, name: &'static &'static str) -> Self {
         Self { index, s3dis, name }
     }
 
-    /// The type as it is spelled in names of rooms: letters.
+    /// Returns the spelling of the type in names of rooms: letters.
     pub const fn name(self) -> &'static str {
         self.name
     }
 
-    /// Its place in its taxonomy, from 0.
+    /// Returns the place in the taxonomy, from 0.
     pub const fn index(self) -> usize {
         self.index as usize
     }
 
-    /// Which type of S3DIS it counts as, `None` if none is like it.
+    /// Returns the type of S3DIS that it counts as, or `None` if none fits.
     pub fn s3dis(self) -> Option<Self> {
         Self::S3DIS.get(usize::from(self.s3dis)).copied()
     }
@@ -161,13 +161,13 @@ impl fmt::Display for RoomType {
 impl FromStr for RoomType {
     type Err = UnknownRoomType;
 
-    /// The type of S3DIS that is spelled `word`, to the letter.
+    /// Finds the type of S3DIS with exactly the name `word`.
     fn from_str(word: &str) -> Result<Self, UnknownRoomType> {
         find_type(&Self::S3DIS, word)
     }
 }
 
-/// The type of `types` that is spelled `word`, to the letter.
+/// Finds the type in `types` with exactly the name `word`.
 pub(crate) fn find_type(types: &[RoomType], word: &str) -> Result<RoomType, UnknownRoomType> {
     types
         .iter()
@@ -188,13 +188,13 @@ impl fmt::Display for Room {
 impl FromStr for Room {
     type Err = RoomError;
 
-    /// The room whose type is one of S3DIS's.
+    /// Parses a room with a type of S3DIS.
     fn from_str(word: &str) -> Result<Self, RoomError> {
         parse_room(&RoomType::S3DIS, word)
     }
 }
 
-/// The room that `word` spells, with one of these types.
+/// Parses a room with one of these types.
 pub(crate) fn parse_room(types: &[RoomType], word: &str) -> Result<Room, RoomError> {
     let (room_type, number) = match word.split_once('_') {
         Some((room_type, number)) if !number.contains('_') => (room_type, number),
@@ -207,8 +207,7 @@ pub(crate) fn parse_room(types: &[RoomType], word: &str) -> Result<Room, RoomErr
     Ok(Room { room_type, number })
 }
 
-/// The number that `digits` spell in the only way that names allow: from 1, decimal, no sign, no leading
-/// zero.
+/// Parses a number in the only form that names allow: decimal, from 1, without sign and leading zeros.
 pub(crate) fn number_from_digits(digits: &str) -> Option<u32> {
     let plain = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
     if plain { digits.parse().ok() } else { None }

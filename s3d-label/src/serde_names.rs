@@ -1,4 +1,4 @@
-//! Names as data: what is written as a word, and read back from it.
+//! Names as data: classes, rooms and labels are written as words and read back.
 
 use crate::{Class, Label, LabelTable, Room, RoomType, Taxonomy};
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
@@ -7,11 +7,11 @@ use std::cell::RefCell;
 use std::fmt;
 
 thread_local! {
-    /// What names are read by in this thread; the last is the innermost call's.
+    /// The taxonomies by which this thread reads names. The last one belongs to the innermost call.
     static TAXONOMIES: RefCell<Vec<Taxonomy>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Takes the last taxonomy away again, also if reading panics.
+/// Removes the last taxonomy when it is dropped, also if reading panics.
 struct Scope;
 
 impl Drop for Scope {
@@ -21,8 +21,8 @@ impl Drop for Scope {
 }
 
 impl Taxonomy {
-    /// Reads data with `serde`, in which names of classes, rooms and labels are this taxonomy's. Outside of
-    /// such a call they are S3DIS's: data formats hand a reader nothing but the data.
+    /// Reads data with `serde` whose classes, rooms and labels belong to this taxonomy. Outside of such a
+    /// call, they belong to S3DIS, since a data format gives a reader nothing but the data.
     pub fn reading<T>(&self, read: impl FnOnce() -> T) -> T {
         TAXONOMIES.with_borrow_mut(|all| all.push(self.clone()));
         let _scope = Scope;
@@ -30,12 +30,12 @@ impl Taxonomy {
     }
 }
 
-/// What names are read by.
+/// Returns the taxonomy by which names are read now.
 pub(crate) fn taxonomy() -> Taxonomy {
     TAXONOMIES.with_borrow(|all| all.last().cloned()).unwrap_or_default()
 }
 
-/// Reads a word that a `T` is parsed from.
+/// A visitor that reads a word and parses it.
 struct Word<F> {
     expecting: &'static str,
     parse: F,

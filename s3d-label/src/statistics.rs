@@ -1,12 +1,12 @@
-//! The paper's tables of what a data set holds: instances of each class and rooms of each type, by area.
+//! The statistics tables of the paper: instances of each class and rooms of each type, by area.
 
 use crate::{Class, LabelTable, Room, RoomType};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How many instances of each class each area holds.
+/// The number of instances of each class, by area.
 ///
-/// The paper's table of object classes; it counts every cell one higher than the published labels do
-/// (docs/paper.md, "Objects by class").
+/// This is the paper's table of object classes. The paper counts every cell one higher than the published
+/// labels do (docs/paper.md, "Objects by class").
 ///
 /// ```
 /// use s3d_label::{Class, ClassCounts, LabelTable};
@@ -20,8 +20,8 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClassCounts {
-    /// Each area with its counts, by area; a count stands at its class's [`Class::index`]. All areas have as
-    /// many as the taxonomy has classes.
+    /// The areas with their counts, ascending by area. The counts have one entry per class of the taxonomy,
+    /// at [`Class::index`].
     pub areas: Vec<(u32, Vec<u64>)>,
 }
 
@@ -38,26 +38,26 @@ impl ClassCounts {
         Self { areas: areas.into_iter().collect() }
     }
 
-    /// The instances of `class` in `area`, 0 in an area that the table does not know.
+    /// Returns the number of instances of `class` in `area`, 0 for an area that is not in the table.
     pub fn of(&self, area: u32, class: Class) -> u64 {
         of(&self.areas, area, class.index())
     }
 
-    /// The instances of each class over all areas; empty without an area.
+    /// Returns the number of instances of each class over all areas; empty if there is no area.
     pub fn total(&self) -> Vec<u64> {
         total(&self.areas)
     }
 }
 
-/// How many rooms of each type each area holds: the rooms that have at least one instance.
+/// The number of rooms of each type, by area. Only rooms with at least one instance count.
 ///
-/// The paper's table of rooms; its total of area 5 (55) is not the sum of its row (68; docs/paper.md, "Rooms
-/// by type").
+/// This is the paper's table of rooms. The paper's total of area 5 (55) is not the sum of its row (68;
+/// docs/paper.md, "Rooms by type").
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoomCounts {
-    /// Each area with its counts, by area; a count stands at its type's [`RoomType::index`]. All areas have
-    /// as many as the taxonomy has room types.
+    /// The areas with their counts, ascending by area. The counts have one entry per room type of the
+    /// taxonomy, at [`RoomType::index`].
     pub areas: Vec<(u32, Vec<u64>)>,
 }
 
@@ -75,12 +75,12 @@ impl RoomCounts {
         Self { areas: areas.into_iter().collect() }
     }
 
-    /// The rooms of `room_type` in `area`, 0 in an area that the table does not know.
+    /// Returns the number of rooms of `room_type` in `area`, 0 for an area that is not in the table.
     pub fn of(&self, area: u32, room_type: RoomType) -> u64 {
         of(&self.areas, area, room_type.index())
     }
 
-    /// The rooms of each type over all areas; empty without an area.
+    /// Returns the number of rooms of each type over all areas; empty if there is no area.
     pub fn total(&self) -> Vec<u64> {
         total(&self.areas)
     }
@@ -126,6 +126,7 @@ mod tests {
             (1, 0, 0)
         );
         assert_eq!((classes.total()[Class::CHAIR.index()], classes.total().iter().sum::<u64>()), (3, 6));
+
         let rooms = RoomCounts::from_table(&table);
         assert_eq!((rooms.of(1, RoomType::OFFICE), rooms.of(5, RoomType::OFFICE)), (2, 1));
         assert_eq!((rooms.of(5, RoomType::WC), rooms.of(9, RoomType::WC)), (1, 0));

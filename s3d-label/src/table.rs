@@ -1,31 +1,31 @@
-//! The label table: from indices to labels and back.
+//! The label table, which maps indices to labels and back.
 
 use crate::{Class, Label, LabelError, NULL_NAME, Taxonomy};
 use std::cmp::Ordering;
 use std::fmt;
 use thiserror::Error;
 
-/// The most entries a label table can have, the null label included.
+/// The largest number of entries of a label table, with the null label.
 ///
 /// A semantic image writes an index as a colour, and the colour (13, 13, 13) means that the ray hit nothing
-/// (formats.md, "What is written"): every index stays below 13·65536 + 13·256 + 13.
+/// (formats.md, "What is written"). So every index is below 13·65536 + 13·256 + 13.
 pub const MAX_LABELS: usize = 13 * 65_536 + 13 * 256 + 13;
 
-/// An index into a label table: what a semantic image stores, and what a point votes for.
+/// An index into a label table. Semantic images store it, and points vote for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
 pub struct LabelId(pub u32);
 
 impl LabelId {
-    /// The index of the null label: no class.
+    /// The index of the null label, which stands for "no class".
     pub const NULL: Self = Self(0);
 
-    /// Whether it is the null label's.
+    /// Returns true for the index of the null label.
     pub const fn is_null(self) -> bool {
         self.0 == 0
     }
 
-    /// The index as a position in a slice.
+    /// Returns the index as a position in a slice.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
@@ -37,8 +37,8 @@ impl fmt::Display for LabelId {
     }
 }
 
-/// The labels of a data set in the published order: index 0 is the null label, the rest is sorted as
-/// [`Label`]'s `Ord` sorts. Source: formats.md, "What is written".
+/// The labels of a data set in the published order. Index 0 is the null label; the others are sorted by `Ord`
+/// of [`Label`]. Source: formats.md, "What is written".
 ///
 /// ```
 /// use s3d_label::{Class, LabelId, LabelTable, NULL_NAME};
@@ -53,66 +53,66 @@ impl fmt::Display for LabelId {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LabelTable {
     taxonomy: Taxonomy,
-    /// Sorted; the label of index i is at i − 1.
+    /// The labels, sorted. The label with index i is at i − 1.
     labels: Vec<Label>,
 }
 
-/// Why labels make no table.
+/// The reason why labels are not a table.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TableError {
     /// The first entry is not the null label.
     #[error("index 0 of a label table is {NULL_NAME:?}, not {found:?}")]
     NoNull {
-        /// What stands there; nothing in an empty table.
+        /// The first entry; an empty string in an empty table.
         found: String,
     },
-    /// An entry is no label.
+    /// An entry is not a label.
     #[error("index {index}: {source}")]
     Name {
-        /// Its index.
+        /// The index of the entry.
         index: usize,
-        /// What is wrong with it.
+        /// The error of the entry.
         source: LabelError,
     },
-    /// The null label stands before the end of the labels.
+    /// The null label comes before the last label.
     #[error("index {index}: the null label again, though labels follow")]
     Null {
-        /// Its index.
+        /// The index of the null label.
         index: usize,
     },
-    /// An entry stands behind one that it should stand before.
+    /// An entry comes after an entry that it should precede.
     #[error(
         "index {index}: {label} stands behind {before}; labels are sorted by class_instance_, then by area, \
          as strings"
     )]
     Order {
-        /// Its index.
+        /// The index of the label.
         index: usize,
         /// The label.
         label: Label,
         /// The label at the index before.
         before: Label,
     },
-    /// Two labels are the same instance: class, instance number and area are those of another.
+    /// Two labels are the same instance: they have the same class, instance number and area.
     #[error("index {index}: {label} is the same instance as {other} at index {first}")]
     Duplicate {
-        /// The index of the second of the two (of a table that is being built: the one it would have).
+        /// The index of the second label. In a table that is being built, it is the index that it would have.
         index: usize,
-        /// The second.
+        /// The second label.
         label: Label,
-        /// The index of the first.
+        /// The index of the first label.
         first: usize,
-        /// The first.
+        /// The first label.
         other: Label,
     },
-    /// A label holds a number 0, so that its name would be none.
+    /// A label contains the number 0, which names do not allow.
     #[error("{label} cannot stand in a table: instances, rooms and areas are numbered from 1")]
     Zero {
         /// The label.
         label: Label,
     },
-    /// A label's class or type of room is another taxonomy's.
+    /// The class or room type of a label belongs to another taxonomy.
     #[error("{label} is no label of {taxonomy}: its class or its type of room is another taxonomy's")]
     Foreign {
         /// The label.
@@ -120,43 +120,44 @@ pub enum TableError {
         /// The name of the taxonomy.
         taxonomy: String,
     },
-    /// There are more labels than colours to write them with.
+    /// There are more labels than colours for them.
     #[error("{count} labels (the null label included): a semantic image can tell {MAX_LABELS} apart")]
     TooMany {
-        /// How many there are.
+        /// The number of labels, with the null label.
         count: usize,
     },
 }
 
 impl LabelTable {
-    /// The table of `labels` of S3DIS, in whatever order they come. [`Taxonomy::table`] is for others.
+    /// Makes a table of labels of S3DIS, given in any order. [`Taxonomy::table`] is for other taxonomies.
     ///
     /// # Errors
-    /// As [`Taxonomy::table`].
+    /// The errors of [`Taxonomy::table`].
     pub fn from_labels(labels: impl IntoIterator<Item = Label>) -> Result<Self, TableError> {
         Taxonomy::s3dis().table(labels)
     }
 
-    /// Reads a table of labels of S3DIS. [`Taxonomy::table_from_names`] is for others.
+    /// Reads a table of labels of S3DIS from its names. [`Taxonomy::table_from_names`] is for other
+    /// taxonomies.
     ///
     /// # Errors
-    /// As [`Taxonomy::table_from_names`].
+    /// The errors of [`Taxonomy::table_from_names`].
     pub fn from_names(names: &[String]) -> Result<Self, TableError> {
         Taxonomy::s3dis().table_from_names(names)
     }
 
-    /// What its classes and room types are.
+    /// Returns the taxonomy of the labels.
     pub fn taxonomy(&self) -> &Taxonomy {
         &self.taxonomy
     }
 }
 
 impl Taxonomy {
-    /// The table of `labels`, in whatever order they come.
+    /// Makes a table of `labels`, given in any order.
     ///
     /// # Errors
-    /// [`TableError::Duplicate`] if two are the same instance, [`TableError::Zero`] for a number 0,
-    /// [`TableError::TooMany`] above [`MAX_LABELS`], [`TableError::Foreign`] for a class or type of room of
+    /// [`TableError::Duplicate`] if two labels are the same instance, [`TableError::Zero`] for a number 0,
+    /// [`TableError::TooMany`] above [`MAX_LABELS`], [`TableError::Foreign`] for a class or room type of
     /// another taxonomy.
     pub fn table(&self, labels: impl IntoIterator<Item = Label>) -> Result<LabelTable, TableError> {
         let mut labels: Vec<Label> = labels.into_iter().collect();
@@ -173,6 +174,7 @@ impl Taxonomy {
         if let Some(&label) = labels.iter().find(|l| !is_ours(l)) {
             return Err(TableError::Foreign { label, taxonomy: self.name().to_owned() });
         }
+
         labels.sort_unstable();
         let mut pairs = (1..).zip(labels.array_windows());
         if let Some((first, &[other, label])) = pairs.find(|(_, [a, b])| a.cmp_key(b).is_eq()) {
@@ -181,16 +183,16 @@ impl Taxonomy {
         LabelTable { taxonomy: self.clone(), labels }.checked_count()
     }
 
-    /// Reads a table from its names, index by index, as `semantic_labels.json` holds them. Null labels behind
-    /// the last label are padding and dropped.
+    /// Reads a table from its names, which are in the order of their indices, as in `semantic_labels.json`.
+    /// Null labels after the last label are padding, and are dropped.
     ///
     /// # Errors
-    /// [`TableError`] says at which index the order, a name or a duplicate is wrong; the first such index
-    /// counts.
+    /// [`TableError`] for the first index with a wrong order, an invalid name or a duplicate.
     pub fn table_from_names(&self, names: &[String]) -> Result<LabelTable, TableError> {
         if names.first().is_none_or(|name| name != NULL_NAME) {
             return Err(TableError::NoNull { found: names.first().cloned().unwrap_or_default() });
         }
+
         let last = names.iter().rposition(|name| name != NULL_NAME).unwrap_or(0);
         let mut labels: Vec<Label> = Vec::with_capacity(last);
         for (index, name) in names.iter().enumerate().take(last + 1).skip(1) {
@@ -198,10 +200,11 @@ impl Taxonomy {
                 .parse_name(name)
                 .map_err(|source| TableError::Name { index, source })?
                 .ok_or(TableError::Null { index })?;
+
             if let Some(&before) = labels.last()
                 && before.cmp_key(&label) != Ordering::Less
             {
-                // The labels so far are sorted: a duplicate of any of them is found by bisection.
+                // The labels so far are sorted, so a duplicate is found by bisection.
                 let same = labels.binary_search_by(|l| l.cmp_key(&label)).ok();
                 return Err(match same.and_then(|i| Some((i, *labels.get(i)?))) {
                     Some((i, other)) => TableError::Duplicate { index, label, first: i + 1, other },
@@ -224,34 +227,34 @@ impl LabelTable {
         }
     }
 
-    /// The index of `label`, `None` if it is not in the table.
+    /// Returns the index of `label`, or `None` if it is not in the table.
     pub fn id_of(&self, label: &Label) -> Option<LabelId> {
         self.labels.binary_search(label).ok().map(|i| LabelId(i as u32 + 1))
     }
 
-    /// The label at an index, `None` for the null label and for indices out of range.
+    /// Returns the label at an index, or `None` for the null label and for an index out of range.
     pub fn get(&self, id: LabelId) -> Option<&Label> {
         self.labels.get(id.index().checked_sub(1)?)
     }
 
-    /// The class at an index, `None` for the null label and for indices out of range.
+    /// Returns the class at an index, or `None` for the null label and for an index out of range.
     pub fn class_of(&self, id: LabelId) -> Option<Class> {
         self.get(id).map(|label| label.class)
     }
 
-    /// The name at an index: [`NULL_NAME`] for the null label and for indices out of range.
+    /// Returns the name at an index, or [`NULL_NAME`] for the null label and for an index out of range.
     pub fn name_of(&self, id: LabelId) -> String {
         self.get(id).map_or_else(|| NULL_NAME.to_owned(), Label::to_string)
     }
 
-    /// All names, each at its index: the content of `semantic_labels.json`.
+    /// Returns all names, each at its index: the content of `semantic_labels.json`.
     pub fn names(&self) -> Vec<String> {
         std::iter::once(NULL_NAME.to_owned())
             .chain(self.labels.iter().map(Label::to_string))
             .collect()
     }
 
-    /// All labels with their indices, in order; without the null label.
+    /// Iterates over all labels with their indices, in order, without the null label.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (LabelId, &Label)> {
         self.labels
             .iter()
@@ -259,7 +262,7 @@ impl LabelTable {
             .map(|(i, label)| (LabelId(i as u32 + 1), label))
     }
 
-    /// Number of entries, the null label included: at least 1.
+    /// Returns the number of entries, with the null label: at least 1.
     #[allow(clippy::len_without_is_empty)] // The null label is always there.
     pub fn len(&self) -> usize {
         self.labels.len() + 1
@@ -272,7 +275,7 @@ mod tests {
     use crate::label::tests::any_label;
     use proptest::prelude::*;
 
-    /// Labels of the published table in its order, chosen where plain string or number order would differ.
+    /// Labels of the published table in its order. A plain order by string or number would differ.
     const PUBLISHED: [&str; 16] = [
         NULL_NAME,
         "beam_10_hallway_6_1",
@@ -296,7 +299,7 @@ mod tests {
         names.iter().map(|&name| name.to_owned()).collect()
     }
 
-    /// A fixed permutation of 0..n.
+    /// Returns the items in a fixed random order.
     fn shuffled<T: Clone>(items: &[T]) -> Vec<T> {
         let mut items = items.to_vec();
         let mut state = 1u64;

@@ -1,17 +1,19 @@
-//! How the walls of rooms run.
+//! The direction of the walls of rooms.
 
 use crate::{Class, LabelId, LabelTable, Room};
 use s3d_geom::glam::Vec3;
 use s3d_geom::{TriMesh, dominant_wall_direction_deg};
 use std::collections::BTreeMap;
 
-/// The dominant horizontal direction of the walls of each room, whole degrees in [0, 90) from +X towards +Y
-/// (see [`dominant_wall_direction_deg`]). Of a room without a face that is labelled as wall
-/// ([`Class::s3dis`]), all faces count. A room none of whose faces stands upright has the direction 0; a room
-/// without a labelled face is not there. `mesh` is one area's.
+/// Returns the dominant horizontal direction of the walls of each room, in whole degrees in [0, 90) from +X
+/// towards +Y (see [`dominant_wall_direction_deg`]). `mesh` is the mesh of one area.
+///
+/// Walls are the faces whose class counts as wall ([`Class::s3dis`]). If a room has no direction from walls,
+/// all its other faces are taken. If none of these is upright, the direction is 0. A room without a labelled
+/// face is not in the result.
 ///
 /// # Panics
-/// If `label_of_face` has not one label a face.
+/// If `label_of_face` does not have one label per face.
 ///
 /// ```
 /// use s3d_geom::{TriMesh, glam::{Vec3, vec3}};
@@ -28,7 +30,8 @@ pub fn wall_directions_deg(
     table: &LabelTable,
     label_of_face: &[LabelId],
 ) -> BTreeMap<Room, u32> {
-    assert_eq!(label_of_face.len(), mesh.faces().len(), "not one label a face");
+    assert_eq!(label_of_face.len(), mesh.faces().len(), "not one label per face");
+
     let mut rooms: BTreeMap<Room, Faces> = BTreeMap::new();
     for (face, label) in (0u32..).zip(label_of_face) {
         if let Some(label) = table.get(*label) {
@@ -47,7 +50,7 @@ pub fn wall_directions_deg(
         .collect()
 }
 
-/// Normals and areas of a room's faces.
+/// The normals and areas of the faces of a room.
 #[derive(Default)]
 struct Faces {
     walls: Vec<(Vec3, f64)>,

@@ -1,13 +1,13 @@
-//! Holds the crate against the published `semantic_labels.json`, where the shared folder with it is there.
+//! Compares the crate with the published `semantic_labels.json`, if the shared folder with it is there.
 
 use s3d_label::{Class, ClassCounts, Label, LabelId, LabelTable, Room, RoomCounts, RoomType, number_area};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The published names; `None`, with a word to whoever reads the log, where the file is missing.
+/// Returns the published names. If the file is missing, it writes a line to the log and returns `None`.
 fn published_names() -> Option<Vec<String>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/spec/semantic_labels.json");
-    #[allow(clippy::print_stderr)] // A test that is skipped says so.
+    #[allow(clippy::print_stderr)] // For the line in the log.
     let Ok(text) = std::fs::read_to_string(&path) else {
         eprintln!("skipped: there is no {}", path.display());
         return None;
@@ -50,7 +50,8 @@ fn instance_numbers_of_areas_1_to_4_follow_from_rooms_and_numbers_in_rooms() {
     let Some(names) = published_names() else { return };
     let published = labels(&names);
     for area in 1..=4 {
-        // The number in a room: how many of its class and room have at most its instance number.
+        // The number in a room is the rank of the instance number among the labels of the same class and
+        // room.
         let mut by_room: BTreeMap<(Room, Class), Vec<Label>> = BTreeMap::new();
         for &label in published.iter().filter(|l| l.area == area) {
             by_room.entry((label.room, label.class)).or_default().push(label);
@@ -62,6 +63,7 @@ fn instance_numbers_of_areas_1_to_4_follow_from_rooms_and_numbers_in_rooms() {
                 expected.insert((room, class, i as u32 + 1), label);
             }
         }
+
         let numbered = number_area(area, expected.keys().copied()).unwrap();
         assert_eq!(numbered.len(), expected.len());
         for i in numbered {

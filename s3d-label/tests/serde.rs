@@ -1,4 +1,4 @@
-//! Labels, tables and reports as JSON: what is written comes back, and what cannot be is refused.
+//! Labels, tables and reports as JSON: values are read back equal, and invalid values are refused.
 
 use proptest::prelude::*;
 use s3d_label::{
@@ -12,7 +12,7 @@ use std::fmt::Debug;
 fn comes_back<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
     let json = serde_json::to_string(value).unwrap();
     assert_eq!(&serde_json::from_str::<T>(&json).expect(&json), value);
-    // A reader's words are not borrowed.
+    // A reader cannot lend words.
     assert_eq!(&serde_json::from_reader::<_, T>(json.as_bytes()).expect(&json), value);
 }
 
@@ -75,12 +75,14 @@ fn names_are_those_of_the_taxonomy_that_reads() {
         (label, label.room, label.class, table.clone(), report.clone())
     );
     assert!(read().unwrap_err().to_string().contains("\"bed\" is no class"));
-    // The innermost call counts, and nothing of it is left after a panic.
+
+    // The innermost call counts, and a panic leaves nothing behind.
     let inner = taxonomy.reading(|| Taxonomy::s3dis().reading(read));
     assert!(inner.is_err());
     let _ = std::panic::catch_unwind(|| taxonomy.reading(|| panic!("as a reader should not")));
     assert!(read().is_err());
-    // A class of the same name is another one.
+
+    // A class of another taxonomy with the same name is a different class.
     let wall = taxonomy.reading(|| serde_json::from_str::<Class>("\"wall\"")).unwrap();
     assert_eq!((wall.index(), wall == Class::WALL, wall.s3dis()), (0, false, Class::WALL));
 }

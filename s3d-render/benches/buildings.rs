@@ -1,10 +1,12 @@
-//! What do faces cost that are not seen? A view of 1080² and a candidate view (every 4th pixel) from the
-//! first room of a building, as it grows from 1 to 64 rooms of 25,000 faces behind each other; and a view of
-//! 3 rooms as their faces grow from 30 thousand to 10 million. `Throughput` is in pixels: a flat curve is one
-//! in which hidden faces cost nothing.
+//! What do hidden faces cost?
 //!
-//! `S3D_BENCH_FACES` limits the faces of the second (default 3 million: ten take a gigabyte and a minute to
-//! prepare).
+//! The first group times a view of 1080² and a candidate view (every 4th pixel) from the first room of a
+//! building, which grows from 1 to 64 rooms of 25,000 faces behind each other. The second group times a view
+//! of 3 rooms whose faces grow from 30 thousand to 10 million. `Throughput` is in pixels: in a flat curve,
+//! hidden faces cost nothing.
+//!
+//! `S3D_BENCH_FACES` limits the faces of the second group. The default is 3 million: ten million take a
+//! gigabyte, and a minute to prepare.
 #![allow(missing_docs)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -13,7 +15,7 @@ use s3d_geom::{Camera, Pose, TriMesh};
 use s3d_render::{Caster, Hits, Scene};
 use s3d_synth::scenes::scan_like_rooms;
 
-/// A dozen views all around.
+/// Returns a dozen views all around.
 fn views() -> Vec<Camera> {
     let level = Pose::level(dvec3(3.0, 2.5, 1.5), 0.13);
     let view =
@@ -27,7 +29,8 @@ fn bench(c: &mut Criterion, group: &str, size: usize, mesh: &TriMesh) {
     let mut group = c.benchmark_group(group);
     group.sample_size(10);
     let scene = Scene::new(mesh);
-    let (mut caster, mut hits) = (Caster::new(&scene), Hits::default());
+    let mut caster = Caster::new(&scene);
+    let mut hits = Hits::default();
     let views = views();
     for (name, stride) in [("views", 1), ("candidates, every 4th pixel", 4)] {
         group.throughput(Throughput::Elements(views.len() as u64 * u64::from(1080 / stride).pow(2)));

@@ -1,9 +1,9 @@
 //! How long does the RGB image of a view take from pictures, and how long does it take to make a location's
 //! cube map?
 //!
-//! Nine views of 1080² and a panorama of 4096 × 2048 from a cube map of 2,176² pixels a face, with and
-//! without holes; that cube map from 18 captures of 1280 × 1024 pixels, from a sky box of 1,024² and from a
-//! panorama of 4096 × 2048.
+//! Measured with nine views of 1080² and a panorama of 4096 × 2048, from a cube map of 2,176² pixels a
+//! face with and without holes. The cube map is made from 18 captures of 1280 × 1024 pixels, from a sky box
+//! of 1,024² and from a panorama of 4096 × 2048.
 
 mod common;
 
@@ -17,7 +17,8 @@ use s3d_render::{
 
 fn picture(width: u32, height: u32) -> Raster<[u8; 3]> {
     let pixel = |k: u32| {
-        let (x, y) = (k % width, k / width);
+        let x = k % width;
+        let y = k / width;
         let grain = (x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77)) >> 27;
         [(100 + grain) as u8, (x / 8 % 200) as u8, (y / 8 % 200 + grain) as u8]
     };
@@ -41,7 +42,8 @@ fn captures(pose: &Pose) -> Vec<Capture> {
 
 fn pictures(c: &mut Criterion) {
     let mesh = s3d_synth::scenes::classroom(285_000);
-    let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+    let scene = Scene::new(&mesh);
+    let mip_maps = MipMaps::new(&mesh);
     let pose = Pose::level(s3d_synth::scenes::CLASSROOM_LOCATION, 0.13);
     let mut group = c.benchmark_group("pictures");
     group.sample_size(10);
@@ -56,7 +58,7 @@ fn pictures(c: &mut Criterion) {
         b.iter(|| CubeMap::from_equirectangular(&panorama, 0.0, &pose, None));
     });
     let options = StitchOptions::default();
-    group.bench_function("cube map from 18 captures, with their mip_maps", |b| {
+    group.bench_function("cube map from 18 captures, with their mip maps", |b| {
         b.iter(|| stitch(shots.clone(), &pose, None, &options));
     });
     group.bench_function("the same with parallax", |b| {
@@ -73,6 +75,7 @@ fn pictures(c: &mut Criterion) {
             .map(|camera| (camera, s3d_render::cast(&scene, &camera)))
             .collect();
         group.throughput(Throughput::Elements(shots.iter().map(|(_, hits)| hits.face.len() as u64).sum()));
+
         let mut out = Raster::filled(1, 1, [0; 3]);
         let filter = TextureFilter::default();
         for (name, cube, unseen) in [
@@ -88,6 +91,7 @@ fn pictures(c: &mut Criterion) {
                 });
             });
         }
+
         group.bench_function(format!("rgb, {what}, textures"), |b| {
             b.iter(|| {
                 for (camera, hits) in &shots {

@@ -1,9 +1,9 @@
 //! How many rays and pixels a second does one core render: visibility, then each modality made from it? And
-//! what does the visibility pass buy over single rays?
+//! how much faster is the visibility pass than single rays?
 //!
-//! A generated room of 250,000 faces, a scan-like mesh of 300,000 in several rooms, and the real scan beside
-//! the project if it is there; `S3D_BENCH_MESH` names another OBJ file (Y up), looked at from the middle of
-//! its box.
+//! Measured with a generated room of 250,000 faces, a scan-like mesh of 300,000 faces in several rooms, and
+//! the real scan next to the project if it is there. `S3D_BENCH_MESH` names another OBJ file (Y up), which is
+//! seen from the middle of its box.
 
 mod common;
 
@@ -35,12 +35,15 @@ fn rays(c: &mut Criterion) {
     group.sample_size(10);
     for (name, mesh, location) in &meshes() {
         let scene = Scene::new(mesh);
-        let (mut caster, mut hits) = (Caster::new(&scene), Hits::default());
+        let mut caster = Caster::new(&scene);
+        let mut hits = Hits::default();
+
         let views = common::views(*location, 1080);
         group.throughput(Throughput::Elements(views.len() as u64 * 1080 * 1080));
         group.bench_function(BenchmarkId::new("perspective, 9 views", name), |b| {
             b.iter(|| views.iter().for_each(|v| caster.cast_into(v, 1, &mut hits)));
         });
+
         group.throughput(Throughput::Elements(1080 * 1080 / 36));
         group.bench_function(BenchmarkId::new("perspective, one ray at a time, every 6th", name), |b| {
             b.iter(|| s3d_render::cast_ray_by_ray(&scene, &views[0], 6));
@@ -49,11 +52,13 @@ fn rays(c: &mut Criterion) {
         group.bench_function(BenchmarkId::new("perspective, 9 views, every 4th", name), |b| {
             b.iter(|| views.iter().for_each(|v| caster.cast_into(v, 4, &mut hits)));
         });
+
         let panorama = Camera::equirectangular(Pose::level(*location, 0.4), 4096);
         group.throughput(Throughput::Elements(4096 * 2048));
         group.bench_function(BenchmarkId::new("panorama", name), |b| {
             b.iter(|| caster.cast_into(&panorama, 1, &mut hits));
         });
+
         group.throughput(Throughput::Elements(mesh.faces().len() as u64));
         group.bench_function(BenchmarkId::new("build the scene (faces)", name), |b| {
             b.iter(|| Scene::new(mesh))
@@ -70,10 +75,12 @@ fn channels(c: &mut Criterion) {
         let mip_maps = MipMaps::new(mesh);
         let per_face: Vec<u32> = (0..mesh.faces().len() as u32).collect();
         let colors: Vec<[u8; 3]> = per_face.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
+
         let cameras = [
             ("1080²", common::views(*location, 1080)[0]),
             ("panorama", Camera::equirectangular(Pose::level(*location, 0.4), 4096)),
         ];
+
         for (what, camera) in &cameras {
             let hits = s3d_render::cast(&scene, camera);
             group.throughput(Throughput::Elements(hits.face.len() as u64));
@@ -91,7 +98,7 @@ fn channels(c: &mut Criterion) {
                 b.iter(|| s3d_render::color_per_face_image(&hits, &colors));
             });
         }
-        group.bench_function(BenchmarkId::new("build the mip_maps", name), |b| b.iter(|| MipMaps::new(mesh)));
+        group.bench_function(BenchmarkId::new("build the mip maps", name), |b| b.iter(|| MipMaps::new(mesh)));
     }
     group.finish();
 }

@@ -1,11 +1,11 @@
-//! Renders a view and a panorama of a mesh and writes every modality as PNG:
+//! Renders a view and a panorama of a mesh, and writes every modality as PNG:
 //!
 //! ```text
 //! cargo run --release -p s3d-render --example look -- FOLDER [MESH.obj X Y Z [YAW_DEG]]
 //! ```
 //!
-//! The mesh is an OBJ file with Y up, looked at from (X, Y, Z) in the Z-up world; without one, a generated
-//! room.
+//! The mesh is an OBJ file with Y up, seen from (X, Y, Z) in the Z-up world. Without one, a generated room is
+//! rendered.
 
 #[path = "../benches/common/mod.rs"]
 mod common;
@@ -37,6 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("view", Camera::perspective(pose, 75f64.to_radians(), 1080, 1080)),
         ("pano", Camera::equirectangular(pose, 4096)),
     ];
+
     for (name, camera) in &views {
         let hits = s3d_render::cast(&scene, camera);
         let save = |what: &str, image: &Raster<[u8; 3]>| {
@@ -47,10 +48,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         save("rgb", &s3d_render::rgb_image(&scene, &mip_maps, &hits, camera))?;
         save("normal", &s3d_render::normal_image(&scene, &hits, camera, Normals::Flat))?;
         save("face", &s3d_render::index_image(&hits, &per_face))?;
+
         let depth = s3d_render::depth_image(&hits);
         let bytes: Vec<u8> = depth.pixels().iter().flat_map(|d| d.to_ne_bytes()).collect();
         let path = folder.join(format!("{name}_depth.png"));
         image::save_buffer(path, &bytes, depth.width(), depth.height(), image::ColorType::L16)?;
+
         let bytes: Vec<u8> = hits.depth.pixels().iter().flat_map(|d| d.to_le_bytes()).collect();
         std::fs::write(folder.join(format!("{name}_depth.f32")), bytes)?;
         eprintln!("{name}: {:.1} % of the pixels see the mesh", 100.0 * s3d_render::coverage(&hits));

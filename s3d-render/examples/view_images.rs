@@ -1,13 +1,12 @@
-//! How long a view's six images take from its hits, again and again, for a comparison of two states of the
-//! project:
+//! Times the six images of a view, made from its hits again and again, to compare two states of the project:
 //!
 //! ```text
 //! cargo run --release -p s3d-render --example view_images -- scan-like|copyroom|office|fine-textures
 //! ```
 //!
-//! For every line that comes in it makes the images of nine views of 1080² and prints a line: the
-//! milliseconds of each. So `docs/performance/states.py` can let two programs take turns, a fraction of a
-//! second each, which a busy machine disturbs alike. The scenes are those of the bench `shade`.
+//! For every input line it makes the images of nine views of 1080², and prints a line with the milliseconds
+//! of each. With that, `docs/performance/states.py` lets two programs take turns of a fraction of a second,
+//! so that a busy machine disturbs both alike. The scenes are the same as in the bench `shade`.
 
 #[path = "../benches/common/mod.rs"]
 mod common;
@@ -25,7 +24,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .nth(1)
         .ok_or("usage: view_images scan-like|copyroom|office|fine-textures")?;
     let (mesh, location) = common::shaded_scene(&name).ok_or_else(|| format!("no scene {name} here"))?;
-    let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+
+    let scene = Scene::new(&mesh);
+    let mip_maps = MipMaps::new(&mesh);
     let index: Vec<u32> = (0..mesh.faces().len() as u32).collect();
     let color: Vec<[u8; 3]> = index.iter().map(|f| [*f as u8, (f >> 8) as u8, 7]).collect();
     let shading = Shading {
@@ -36,11 +37,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         index_of_face: &index,
         color_of_face: &color,
     };
+
     let views = common::views(location, 1080);
     let shots: Vec<(Camera, Hits)> = views
         .into_iter()
         .map(|camera| (camera, cast(&scene, &camera)))
         .collect();
+
     let mut images = ViewImages::default();
     for line in std::io::stdin().lines() {
         line?;

@@ -1,27 +1,27 @@
-//! How fast the visibility pass is, and what it saw, for a comparison with other ray casters:
+//! Measures the visibility pass and writes what it sees, for a comparison with other ray casters:
 //!
 //! ```text
 //! cargo run --release -p s3d-render --example visibility -- MESH X Y Z
 //!     [--up y|z] [--rounds N] [--threads N] [--dump DIR]
 //! ```
 //!
-//! MESH is an OBJ file (Y up unless said otherwise) or `scan-like:FACES`, a generated scan. From (X, Y, Z) in
-//! the Z-up world it casts 72 views of 1080² (24 yaws at the pitches 0°, −15° and 15°, 75° wide) and a
-//! panorama of 4096 × 2048, face and depth of every pixel written, and prints the rays per second of user
-//! time and of wall time: the median of the rounds. The location is rounded to `f32` first, so that ray
-//! casters of `f32` start at the very same point.
+//! MESH is an OBJ file (Y up, unless `--up z`) or `scan-like:FACES`, a generated scan. From (X, Y, Z) in the
+//! Z-up world the program casts 72 views of 1080² (24 yaws at the pitches 0°, −15° and 15°, 75° wide)
+//! and a panorama of 4096 × 2048. It writes the face and depth of every pixel, and prints the rays per
+//! second of user time and of wall time: the median of the rounds. The location is rounded to `f32` first, so
+//! that ray casters of `f32` start at the same point.
 //!
-//! With `--dump` it also writes what `docs/performance/embree_cast.cpp` needs to cast the same rays and
-//! compare, all little-endian:
+//! With `--dump` it also writes the data that `docs/performance/embree_cast.cpp` needs to cast the same rays
+//! and compare. All files are little-endian:
 //!
 //! - `dump.txt`: vertices, faces, views, their width and height, the panorama's width and height, the origin.
 //! - `positions.f32`, `faces.u32`: three numbers a vertex or face.
-//! - `views.f64`: a view in nine numbers, `corner`, `x_step`, `y_step`. The direction of pixel (i, j) is
+//! - `views.f64`: nine numbers a view, `corner`, `x_step` and `y_step`. The direction of pixel (i, j) is
 //!   corner + x_step·(i + ½) + y_step·(j + ½).
-//! - `columns.f64`, `rows.f64`: of the panorama, cosine and sine of the azimuth c of each column and of the
-//!   latitude r of each row. The direction is (r.cos·c.cos, r.cos·c.sin, r.sin).
-//! - `view_00.face`, `view_00.depth`, …, `pano.face`, `pano.depth`: `u32` and `f32` by row; 4,294,967,295 and
-//!   infinity where nothing is hit.
+//! - `columns.f64`, `rows.f64`: for the panorama, the cosine and sine of the azimuth c of each column and of
+//!   the latitude r of each row. The direction is (r.cos·c.cos, r.cos·c.sin, r.sin).
+//! - `view_00.face`, `view_00.depth`, …, `pano.face`, `pano.depth`: `u32` and `f32` by row; 4,294,967,295
+//!   and infinity where nothing is hit.
 
 #[path = "../benches/common/mod.rs"]
 mod common;
@@ -38,7 +38,7 @@ use std::time::Instant;
 const USAGE: &str =
     "usage: visibility MESH.obj|scan-like:FACES X Y Z [--up y|z] [--rounds N] [--threads N] [--dump DIR]";
 
-/// So many panoramas a round, so that the kernel's clock of 10 ms is fine enough.
+/// The number of panoramas a round: enough for the kernel's clock of 10 ms.
 const PANORAMAS: usize = 8;
 
 struct Options {
@@ -58,6 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         None if options.z_up => common::z_up(&common::read_obj(Path::new(&options.mesh))),
         None => common::read_obj(Path::new(&options.mesh)),
     };
+
     let started = Instant::now();
     let scene = Scene::new(&mesh);
     println!(
@@ -72,25 +73,33 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(folder) = &options.dump {
         dump(folder, &scene, &views, &panorama)?;
     }
+
     let panoramas = vec![panorama; PANORAMAS];
-    let (mut of_views, mut of_panoramas) = (Vec::new(), Vec::new());
+    let mut view_rates = Vec::new();
+    let mut panorama_rates = Vec::new();
     for _ in 0..options.rounds {
-        of_views.push(round(&scene, &views, options.threads)?);
-        of_panoramas.push(round(&scene, &panoramas, options.threads)?);
+        view_rates.push(round(&scene, &views, options.threads)?);
+        panorama_rates.push(round(&scene, &panoramas, options.threads)?);
     }
-    for (what, mut rates) in [("views", of_views), ("panorama", of_panoramas)] {
+
+    for (what, mut rates) in [("views", view_rates), ("panorama", panorama_rates)] {
         let mut median = |which: fn(&Rates) -> f64| {
             rates.sort_by(|a, b| which(a).total_cmp(&which(b)));
             which(&rates[rates.len() / 2])
         };
-        let (core, wall) = (median(|r| r.core), median(|r| r.wall));
+        let core = median(|r| r.core);
+        let wall = median(|r| r.wall);
         println!("{what}: {core:.2} Mray/s a core, {wall:.2} Mray/s on {} thread(s)", options.threads);
     }
     Ok(())
 }
 
 fn options() -> Result<Options, Box<dyn Error>> {
-    let (mut plain, mut z_up, mut rounds, mut threads, mut dump) = (Vec::new(), false, 3, 1, None);
+    let mut plain = Vec::new();
+    let mut z_up = false;
+    let mut rounds = 3;
+    let mut threads = 1;
+    let mut dump = None;
     let mut args = std::env::args().skip(1);
     while let Some(arg) = args.next() {
         if !arg.starts_with("--") {
@@ -106,10 +115,12 @@ fn options() -> Result<Options, Box<dyn Error>> {
             _ => return Err(USAGE.into()),
         }
     }
+
     let [mesh, x, y, z] = <[String; 4]>::try_from(plain).map_err(|_| USAGE)?;
     if rounds == 0 || threads == 0 {
         return Err(USAGE.into());
     }
+
     let coordinate = |text: &str| text.parse::<f32>().map(f64::from);
     let origin = dvec3(coordinate(&x)?, coordinate(&y)?, coordinate(&z)?);
     Ok(Options { mesh, origin, z_up, rounds, threads, dump })
@@ -118,37 +129,42 @@ fn options() -> Result<Options, Box<dyn Error>> {
 fn views(origin: DVec3) -> Vec<Camera> {
     let level = Pose::level(origin, 0.0);
     let view = |k: usize| {
-        let (from_x, pitch) = (7.3 + 15.0 * (k % 24) as f64, [0f64, -15.0, 15.0][k / 24]);
+        let from_x = 7.3 + 15.0 * (k % 24) as f64;
+        let pitch = [0f64, -15.0, 15.0][k / 24];
         let pose = level.turned((from_x - 90.0).to_radians(), pitch.to_radians());
         Camera::perspective(pose, 75f64.to_radians(), 1080, 1080)
     };
     (0..72).map(view).collect()
 }
 
-/// Millions of rays a second.
+/// Rates in millions of rays a second: of user time, and of wall time.
 struct Rates {
     core: f64,
     wall: f64,
 }
 
-/// Casts all images on some threads, each with memory of its own that it keeps from image to image.
+/// Casts all images on some threads. Each thread has memory of its own, which it keeps from image to image.
 fn round(scene: &Scene<'_>, cameras: &[Camera], threads: usize) -> Result<Rates, Box<dyn Error>> {
     let next = AtomicUsize::new(0);
     let work = || {
-        let (mut caster, mut hits) = (Caster::new(scene), Hits::default());
+        let mut caster = Caster::new(scene);
+        let mut hits = Hits::default();
         while let Some(camera) = cameras.get(next.fetch_add(1, Ordering::Relaxed)) {
             caster.cast_into(camera, 1, &mut hits);
             std::hint::black_box(&hits);
         }
     };
-    let (wall, user) = (Instant::now(), user_seconds()?);
+
+    let started = Instant::now();
+    let user_before = user_seconds()?;
     std::thread::scope(|scope| {
         for _ in 1..threads {
             scope.spawn(work);
         }
         work();
     });
-    let (wall, user) = (wall.elapsed().as_secs_f64(), user_seconds()? - user);
+    let wall = started.elapsed().as_secs_f64();
+    let user = user_seconds()? - user_before;
     let rays: f64 = cameras
         .iter()
         .map(|c| f64::from(c.width) * f64::from(c.height) * 1e-6)
@@ -156,7 +172,7 @@ fn round(scene: &Scene<'_>, cameras: &[Camera], threads: usize) -> Result<Rates,
     Ok(Rates { core: rays / user, wall: rays / wall })
 }
 
-/// User time of this process, from Linux's accounts of it.
+/// Returns the user time of this process, in seconds, from Linux's accounts.
 fn user_seconds() -> Result<f64, Box<dyn Error>> {
     let stat = std::fs::read_to_string("/proc/self/stat")?;
     // After the name in parentheses, utime is field 14 of the line, in ticks of 10 ms.
@@ -169,6 +185,7 @@ fn user_seconds() -> Result<f64, Box<dyn Error>> {
     Ok(ticks as f64 / 100.0)
 }
 
+/// Writes the files of `--dump`.
 fn dump(folder: &Path, scene: &Scene<'_>, views: &[Camera], panorama: &Camera) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
     let mesh = scene.mesh();
@@ -187,6 +204,7 @@ fn dump(folder: &Path, scene: &Scene<'_>, views: &[Camera], panorama: &Camera) -
         origin.z
     );
     std::fs::write(folder.join("dump.txt"), numbers)?;
+
     let write = |name: &str, bytes: Vec<u8>| std::fs::write(folder.join(name), bytes);
     let doubles = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect();
     let corners = mesh.positions().iter().flat_map(Vec3::to_array);

@@ -1,9 +1,9 @@
-//! The RGB image without stair-steps: where surfaces end or turn, more places of a pixel count.
+//! Removes stair-steps from the RGB image: a pixel at an edge is sampled in several places.
 //!
-//! One ray through the centre is what every modality has, so that they are registered. Within a surface the
-//! texture's filter makes its colour smooth; where another surface begins, several places of the pixel tell
-//! how much it shows of each. Each surface's colour is taken once, in the middle of its places, since its
-//! filter sees a whole pixel.
+//! All modalities see one ray through the centre of each pixel, so that they are registered. Within a
+//! surface, the texture filter makes colours smooth. Where another surface begins, several places of the
+//! pixel tell the share of each surface. The colour of each surface is taken once, at the mean of its places,
+//! since the texture filter covers a whole pixel.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::ray::caster::RayCaster;
@@ -15,20 +15,23 @@ use crate::shade::pixel_color::PixelByPixel;
 use glam::{DVec2, DVec3, dvec2};
 use s3d_geom::{Camera, Raster, Rays, TriMesh};
 
-/// Neighbours whose surfaces meet at more than this angle, 15°, are at an edge.
+/// Two neighbouring pixels are at an edge if their surfaces meet at an angle of more than 15°: its cosine.
 const FLAT: f32 = 0.966;
 
-/// Or one of which lies farther than this from the other's plane, as a share of its distance.
+/// Two neighbouring pixels are at an edge if one point lies farther than this from the plane of the other, as
+/// a share of its distance.
 const STEP: f64 = 0.01;
 
-/// Neighbours whose colours differ by no more than this in any channel make no stair-step that could be seen.
+/// Neighbours make no visible stair-step if no channel of their colours differs by more than this.
 const CONTRAST: u8 = 8;
 
-/// Replaces the colour of each pixel at an edge by those of all faces that it shows, each by its share of
-/// `samples` places, spread alike in each pixel. `image` is that of [`crate::rgb_image_with`] for the same
-/// arguments. At an edge is a pixel one of whose four neighbours shows nothing, or another colour (by more
-/// than 8 of 255 in a channel) of another material or of a face that lies behind it, before it, or turned
-/// away by more than 15°. Pixels that show nothing stay.
+/// Replaces the colour of each pixel at an edge by the mean colour of the faces in it. Each face counts by
+/// its share of `samples` places, which are spread alike in each pixel. `image` is the image that
+/// [`crate::rgb_image_with`] makes from the same arguments.
+///
+/// A pixel is at an edge if one of its four neighbours shows nothing, or if a neighbour differs by more than
+/// 8 of 255 in a channel and sees another material, or a face that lies behind, in front, or is turned away
+/// by more than 15°. Pixels that show nothing keep their colour.
 ///
 /// # Panics
 /// If `hits` and `image` are not of the camera's size.
@@ -44,13 +47,16 @@ pub fn sample_edges(
     let size = (camera.width, camera.height);
     assert_eq!((hits.face.width(), hits.face.height()), size, "the hits are of another camera");
     assert_eq!((image.width(), image.height()), size, "the image is of another camera");
+
     if samples < 2 {
         return;
     }
+
     let rays = camera.rays();
-    let pairs = vec![Pair::NONE; PAIRS];
+    let pairs = vec![FacePair::NONE; PAIRS];
     let edges = Edges { mesh: scene.mesh(), hits, colors: image.pixels(), rays: &rays, pairs }
         .find(camera.is_panorama());
+
     let mut sampler = Sampler {
         mesh: scene.mesh(),
         hits,
@@ -63,6 +69,7 @@ pub fn sample_edges(
         near: Vec::with_capacity(9),
         shown: Vec::with_capacity(9),
     };
+
     let width = camera.width as usize;
     for (pixel, color) in image
         .pixels_mut()
@@ -74,58 +81,63 @@ pub fn sample_edges(
     }
 }
 
-/// Places in a pixel, 0 to 1: each in a row and a column of its own, which follow the golden ratio.
+/// Returns places in a pixel, 0 to 1. Each has a row and a column of its own; the columns follow the golden
+/// ratio.
 fn places(samples: u32) -> Vec<DVec2> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let turn = |k: u32| (f64::from(k) * GOLDEN).fract();
     let mut columns: Vec<u32> = (0..samples).collect();
     columns.sort_by(|a, b| turn(*a).total_cmp(&turn(*b)));
+
     let middle = |k: u32| (f64::from(k) + 0.5) / f64::from(samples);
+
     (0..samples)
         .zip(columns)
         .map(|(row, column)| dvec2(middle(column), middle(row)))
         .collect()
 }
 
-/// How many pairs of faces are remembered, a power of two: neighbours meet in many pixels.
+/// The number of pairs of faces that are remembered, a power of two: neighbours meet in many pixels.
 const PAIRS: usize = 4096;
 
-/// What is known of two faces whose pixels are neighbours.
+/// The relation of two faces whose pixels are neighbours.
 #[derive(Clone, Copy)]
-struct Pair {
+struct FacePair {
     faces: [u32; 2],
     meeting: Meeting,
 }
 
 #[derive(Clone, Copy, PartialEq)]
 enum Meeting {
-    /// An edge, wherever they meet.
+    /// There is an edge wherever they meet.
     Edge,
-    /// They go on into each other.
+    /// One continues the other.
     Smooth,
-    /// They look the same way: how far apart they are tells.
+    /// They face the same way: the distance between their planes decides.
     Parallel,
 }
 
-impl Pair {
+impl FacePair {
     const NONE: Self = Self { faces: [NO_FACE; 2], meeting: Meeting::Edge };
 }
 
-/// Which pixels are at an edge.
+/// Finds the pixels at edges.
 struct Edges<'a> {
     mesh: &'a TriMesh,
     hits: &'a Hits,
-    /// What the pixels' centres show.
+    /// The colours at the pixels' centres.
     colors: &'a [[u8; 3]],
     rays: &'a Rays,
-    pairs: Vec<Pair>,
+    pairs: Vec<FacePair>,
 }
 
 impl Edges<'_> {
-    /// By pixel; in a panorama the last column is beside the first.
+    /// Returns whether each pixel is at an edge. If `wraps`, the last column is beside the first.
     fn find(mut self, wraps: bool) -> Vec<bool> {
         let faces = self.hits.face.pixels();
-        let (width, height) = (self.hits.face.width() as usize, self.hits.face.height() as usize);
+        let width = self.hits.face.width() as usize;
+        let height = self.hits.face.height() as usize;
+
         let mut edges = vec![false; faces.len()];
         for y in 0..height {
             let row = y * width;
@@ -135,12 +147,15 @@ impl Edges<'_> {
                 if is_beside && faces[i] != faces[right] && self.is_edge(i, right) {
                     (edges[i], edges[right]) = (true, true);
                 }
+                // The neighbour below.
+
                 let below = i + width;
                 if below < faces.len() && faces[i] != faces[below] && self.is_edge(i, below) {
                     (edges[i], edges[below]) = (true, true);
                 }
             }
         }
+
         edges
             .iter_mut()
             .zip(faces)
@@ -148,31 +163,38 @@ impl Edges<'_> {
         edges
     }
 
-    /// Whether an edge passes between two pixels that show different faces.
+    /// Tells whether an edge passes between two pixels that show different faces.
     fn is_edge(&mut self, i: usize, j: usize) -> bool {
         let faces = self.hits.face.pixels();
-        let (f, g) = (faces[i], faces[j]);
+        let f = faces[i];
+        let g = faces[j];
         if f == NO_FACE || g == NO_FACE {
             return true;
         }
-        let (color, other) = (self.colors[i], self.colors[j]);
+        let color = self.colors[i];
+        let other = self.colors[j];
         if color.iter().zip(other).all(|(a, b)| a.abs_diff(b) <= CONTRAST) {
             return false;
         }
+
         let place = (f ^ g.wrapping_mul(0x9e37_79b1)) as usize % PAIRS;
         if self.pairs[place].faces != [f, g] {
-            self.pairs[place] = Pair { faces: [f, g], meeting: meeting(self.mesh, f, g) };
+            self.pairs[place] = FacePair { faces: [f, g], meeting: meeting(self.mesh, f, g) };
         }
+
         match self.pairs[place].meeting {
             Meeting::Edge => true,
             Meeting::Smooth => false,
             Meeting::Parallel => {
-                let (width, depth) = (self.hits.face.width(), self.hits.depth.pixels());
+                let width = self.hits.face.width();
+                let depth = self.hits.depth.pixels();
                 let point = |i: usize| {
-                    let (x, y) = (i as u32 % width, i as u32 / width);
+                    let x = i as u32 % width;
+                    let y = i as u32 / width;
                     self.rays.at(x, y) * f64::from(depth[i])
                 };
-                let (p, q) = (point(i), point(j));
+                let p = point(i);
+                let q = point(j);
                 let off = |face| self.mesh.normal(face).as_dvec3().dot(q - p).abs();
                 off(f).min(off(g)) > STEP * p.length().min(q.length())
             }
@@ -180,12 +202,13 @@ impl Edges<'_> {
     }
 }
 
-/// How two faces meet, as far as it does not depend on where.
+/// Returns how two faces meet, as far as it does not depend on the pixels.
 fn meeting(mesh: &TriMesh, f: u32, g: u32) -> Meeting {
     if mesh.material_of(f) != mesh.material_of(g) || mesh.normal(f).dot(mesh.normal(g)).abs() < FLAT {
         return Meeting::Edge;
     }
-    let (a, b) = (mesh.triangle(f), mesh.triangle(g));
+    let a = mesh.triangle(f);
+    let b = mesh.triangle(g);
     if a.iter().any(|corner| b.contains(corner)) {
         Meeting::Smooth
     } else {
@@ -193,10 +216,10 @@ fn meeting(mesh: &TriMesh, f: u32, g: u32) -> Meeting {
     }
 }
 
-/// A face before the camera, ready to be met by many rays.
+/// A face in front of the camera, prepared for many rays.
 #[derive(Clone, Copy)]
 struct Front {
-    /// A direction meets the face if it is on the inner side of each.
+    /// A direction hits the face if it is on the inner side of each plane.
     sides: [DVec3; 3],
     plane: Plane,
 }
@@ -207,8 +230,8 @@ impl Front {
         Some(Self { sides: [b.cross(c), c.cross(a), a.cross(b)], plane })
     }
 
-    /// How far along `direction` it is met. Rounding decides at its rim: what meets no face there is asked
-    /// exactly.
+    /// Returns the multiple of `direction` that lies on the face. Rounding decides at the rim of the face: a
+    /// ray that misses all faces there is cast exactly.
     fn distance(&self, direction: DVec3) -> Option<f64> {
         let is_inside = self.sides.iter().all(|side| side.dot(direction) >= 0.0);
         if is_inside {
@@ -228,17 +251,19 @@ struct Sampler<'a, 'm> {
     colors: PixelByPixel<'a>,
     caster: RayCaster<'a, 'm>,
     fronts: FaceCache<Option<Front>>,
-    /// The faces of the pixel at hand and of those around it.
+    /// The faces of the current pixel and of the pixels around it.
     near: Vec<(u32, Option<Front>)>,
-    /// The faces that it shows: in how many places, and the sum of those.
+    /// The faces that the current pixel shows: the number of their places, and the sum of these places.
     shown: Vec<(u32, u32, DVec2)>,
 }
 
 impl Sampler<'_, '_> {
-    /// The colour of a pixel whose centre has the colour `center`.
+    /// Returns the mean colour of a pixel whose centre has the colour `center`.
     fn color(&mut self, x: u32, y: u32, center: [u8; 3]) -> [u8; 3] {
         self.gather(x, y);
         self.shown.clear();
+        // Which face each place shows.
+
         for k in 0..self.places.len() {
             let place = self.places[k];
             let direction = self.direction(x, y, place);
@@ -251,7 +276,10 @@ impl Sampler<'_, '_> {
                 None => self.shown.push((face, 1, place)),
             }
         }
-        let (mut sum, mut seen) = ([0u32; 3], 0);
+
+        // The colour of each face, in the middle of its places.
+        let mut sum = [0u32; 3];
+        let mut seen = 0;
         for i in 0..self.shown.len() {
             let (face, count, places) = self.shown[i];
             let color = if face == self.hits.face.at(x, y) {
@@ -263,6 +291,7 @@ impl Sampler<'_, '_> {
             sum = std::array::from_fn(|c| sum[c] + count * u32::from(color[c]));
             seen += count;
         }
+
         if seen == 0 {
             return center;
         }
@@ -272,7 +301,7 @@ impl Sampler<'_, '_> {
         }
     }
 
-    /// Through a place of a pixel.
+    /// Returns the direction of the ray through a place of a pixel.
     fn direction(&self, x: u32, y: u32, place: DVec2) -> DVec3 {
         let at = dvec2(f64::from(x), f64::from(y)) + place;
         match self.rays {
@@ -281,9 +310,11 @@ impl Sampler<'_, '_> {
         }
     }
 
-    /// Takes the faces of a pixel and of those around it: few rays between their centres meet another first.
+    /// Collects the faces of a pixel and of the pixels around it. Few rays between their centres hit another
+    /// face first.
     fn gather(&mut self, x: u32, y: u32) {
-        let (width, height) = (self.camera.width, self.camera.height);
+        let width = self.camera.width;
+        let height = self.camera.height;
         self.near.clear();
         for v in y.saturating_sub(1)..=(y + 1).min(height - 1) {
             let row = self.hits.face.row(v);
@@ -296,7 +327,7 @@ impl Sampler<'_, '_> {
         }
     }
 
-    /// The nearest of the gathered faces; the lowest of equally near ones.
+    /// Returns the nearest of the collected faces. The lowest index wins a tie.
     fn nearest(&self, direction: DVec3) -> Option<u32> {
         let hit =
             |(face, front): &(u32, Option<Front>)| front.as_ref()?.distance(direction).map(|t| (*face, t));
@@ -313,8 +344,8 @@ mod tests {
     use glam::vec3;
     use s3d_geom::{Material, MeshParts, Pose, TriMesh};
 
-    /// A white wall at y = 4 and, a metre before it, a black board whose lower edge rises by one in ten;
-    /// beside the wall is nothing.
+    /// A white wall at y = 4. A metre in front of it is a black board whose lower edge rises by one in ten.
+    /// There is nothing beside the wall.
     fn board() -> TriMesh {
         let quad = |y: f32, [a, b, c, d]: [(f32, f32); 4]| [a, b, c, d].map(|(x, z)| vec3(x, y, z));
         let wall = quad(4.0, [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)]);
@@ -332,7 +363,8 @@ mod tests {
 
     fn images(camera: &Camera, samples: u32) -> (Raster<[u8; 3]>, Raster<[u8; 3]>, Hits) {
         let mesh = board();
-        let (scene, textures) = (Scene::new(&mesh), MipMaps::new(&mesh));
+        let scene = Scene::new(&mesh);
+        let textures = MipMaps::new(&mesh);
         let hits = cast(&scene, camera);
         let plain = rgb_image(&scene, &textures, &hits, camera);
         let mut image = plain.clone();
@@ -352,16 +384,18 @@ mod tests {
         assert_eq!(plain.pixels(), image.pixels());
     }
 
-    /// The board's lower edge is z = x / 10, at x = −1 to 1: how much of each pixel the board covers is
-    /// known.
+    /// The board's lower edge is z = x / 10 for x from −1 to 1, so the share of each pixel that the board
+    /// covers is known.
     #[test]
     fn edges_have_the_mean_of_what_their_pixels_show() {
         let camera = Camera::perspective(pose(), 0.5, 64, 64);
         let f = camera.focal_px().x;
         let (plain, image, hits) = images(&camera, 16);
-        let (mut worst, mut before, mut between) = (0.0f64, 0.0f64, 0);
+        let mut worst = 0.0f64;
+        let mut before = 0.0f64;
+        let mut between = 0;
         for (x, y) in (8..56).flat_map(|x| (20..44).map(move |y| (x, y))) {
-            // The share of the pixel above the line, by 32 × 32 places.
+            // The share of the pixel above the line, from 32 × 32 places.
             let covered = (0..1024).filter(|k| {
                 let at = dvec2(
                     f64::from(x) + (f64::from(k % 32) + 0.5) / 32.0,
@@ -370,14 +404,17 @@ mod tests {
                 let p = (at - 32.0) / f * 3.0;
                 -p.y > p.x / 10.0
             });
+
             let share = covered.count() as f64 / 1024.0;
             let expected = 240.0 - 200.0 * share;
             worst = worst.max((f64::from(image.at(x, y)[0]) - expected).abs());
             before = before.max((f64::from(plain.at(x, y)[0]) - expected).abs());
             between += u32::from(![40, 240].contains(&image.at(x, y)[0]));
         }
+
         assert!(before > 80.0 && worst < 20.0 && between > 30, "{before} {worst} {between}");
-        // What shows nothing stays, and what shows something is not black.
+
+        // Pixels that show nothing keep their colour, and no pixel that shows a face is black.
         let seen = |face: &u32| *face != NO_FACE;
         assert!(
             image
@@ -403,6 +440,7 @@ mod tests {
                 .filter(|(a, b)| a != b)
                 .count();
             assert!(differs > 10, "{differs}");
+
             for (x, y) in (1..camera.width - 1).flat_map(|x| (1..camera.height - 1).map(move |y| (x, y))) {
                 let face = hits.face.at(x, y);
                 let around = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];

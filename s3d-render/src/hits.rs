@@ -1,11 +1,12 @@
-//! What the pixels of an image see.
+//! The face and the depth that each pixel of an image sees.
 
 use s3d_geom::Raster;
 
-/// In place of a face: the pixel's ray hits nothing.
+/// Stands for "no face": the pixel's ray hits nothing.
 pub const NO_FACE: u32 = u32::MAX;
 
-/// What the pixels of an image see. All modalities of a view are made from it, so they agree pixel for pixel.
+/// The face and the depth that each pixel of an image sees. All images of a view are made from the same hits,
+/// so they agree pixel for pixel.
 ///
 /// ```
 /// use s3d_geom::{Camera, Pose, TriMesh, glam::{dvec3, vec3}};
@@ -22,34 +23,37 @@ pub const NO_FACE: u32 = u32::MAX;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hits {
-    /// The face that each pixel's ray hits first, [`NO_FACE`] where it hits nothing.
+    /// The face that each pixel's ray hits first; [`NO_FACE`] where it hits nothing.
     pub face: Raster<u32>,
-    /// How far away it is in metres, as the multiple of the ray's direction that
-    /// [`Camera::rays`](s3d_geom::Camera::rays) gives: z along the optical axis in a perspective view, the
-    /// distance in a panorama. Infinite where nothing is hit.
+    /// The depth of each pixel in metres: the multiple of the ray's direction that
+    /// [`Camera::rays`](s3d_geom::Camera::rays) gives. That is z along the optical axis in a perspective
+    /// view, and the distance in a panorama. Infinite where nothing is hit.
     pub depth: Raster<f32>,
 }
 
 impl Default for Hits {
-    /// Of no pixel.
+    /// Returns hits without pixels.
     fn default() -> Self {
         Self { face: Raster::from_vec(0, 0, Vec::new()), depth: Raster::from_vec(0, 0, Vec::new()) }
     }
 }
 
 impl Hits {
-    /// Makes room for an image; what is in it is anything.
+    /// Makes room for an image. The values of the pixels are unspecified afterwards.
     pub(crate) fn resize(&mut self, width: u32, height: u32) {
         if (self.face.width(), self.face.height()) == (width, height) {
             return;
         }
+
         let n = width as usize * height as usize;
         let Hits { face, depth } = std::mem::take(self);
-        let (mut faces, mut depths) = (face.into_vec(), depth.into_vec());
-        // A panorama's memory is not for a view to keep.
+        let mut faces = face.into_vec();
+        let mut depths = depth.into_vec();
+        // A panorama's memory is too much for a view to keep.
         if faces.capacity() > 4 * n {
             (faces, depths) = (Vec::new(), Vec::new());
         }
+
         faces.resize(n, NO_FACE);
         depths.resize(n, f32::INFINITY);
         *self = Self {

@@ -1,33 +1,13 @@
 //! Watertight rendering of scans on the CPU: one hit a pixel serves every modality.
 //!
-//! - [`Scene`]: a mesh and the tree over its faces.
-//! - [`Hits`]: the face and the depth that each pixel of a camera sees; [`cast`] makes them, [`Caster`] many
-//!   in a row.
-//! - [`MipMaps`]: the textures of a mesh, ready to be filtered.
-//! - [`ViewImages`]: colour, depth, normals, indices and points of a view; [`view_images_into`] makes them
-//!   from hits.
-//! - [`CubeMap`]: what pictures show all around a place, made from a sky box, a panorama or captures that
-//!   overlap ([`stitch()`]).
+//! # From a mesh to images
 //!
-//! **Mesh and camera → hits.** Exact: no pinhole, no leak, no dependence on the order of faces or on the
-//! processor. [`cast_strided`] casts a part of the pixels, to score a view; [`cast_ray`] a single ray;
-//! [`Sight`] tells what is hidden from a place.
-//!
-//! **Hits → images** of the data set (formats.md, "What is written"): [`rgb_image`], [`depth_image`],
-//! [`normal_image`], [`xyz_image`], [`index_image`], [`color_per_face_image`]; or all of them in one walk
-//! over the hits, in less time and the same to the bit: [`view_images_into`]. A semantic image is an index
-//! image: this crate stores faces and knows no labels. Functions that end in `_into` write to an image that
-//! is there.
-//!
-//! **Pictures → colours.** [`picture_image`] colours hits from a [`CubeMap`] instead of from textures.
-//!
-//! Everything that makes one image runs on the calling thread: callers render many images at once. The
-//! instructions of the processor are chosen when the program runs, and give the same bytes; the environment
-//! variable `S3D_SIMD` holds them down: see [`SimdLevel`].
-//!
-//! # Example
-//!
-//! A floor and a view of it, as colour, depth, normals, points and indices of faces.
+//! - [`Scene`] is a mesh with a tree over its faces. [`MipMaps`] are the textures of the mesh, ready to be
+//!   filtered. Both are built once and shared by threads.
+//! - [`cast`] makes the [`Hits`] of a camera: the face and the depth that each pixel sees. A [`Caster`] makes
+//!   hits for many cameras and keeps its memory between them.
+//! - [`view_images_into`] turns hits into [`ViewImages`]: colour, depth, normals, points and indices of
+//!   faces.
 //!
 //! ```
 //! use s3d_geom::{Camera, NormalAxes, Pose, TriMesh, glam::{dvec3, vec3}};
@@ -40,7 +20,8 @@
 //! let mesh = TriMesh::from_faces(corners, vec![[0, 1, 2]])?;
 //! let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 90f64.to_radians(), 64, 64);
 //!
-//! let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+//! let scene = Scene::new(&mesh);
+//! let mip_maps = MipMaps::new(&mesh);
 //! let hits = cast(&scene, &camera);
 //! let shading = Shading {
 //!     scene: &scene,
@@ -62,9 +43,35 @@
 //! assert_eq!(images.depth.at(32, 0), MISSING_DEPTH); // the sky
 //! # Ok::<(), s3d_geom::MeshError>(())
 //! ```
+//!
+//! # Visibility
+//!
+//! Hits are exact: there are no pinholes and no leaks, and neither the order of faces nor the processor
+//! changes a hit. [`cast_strided`] casts some of the pixels, to score a view. [`cast_ray`] casts a single
+//! ray. [`Sight`] tells whether a point is hidden from a place.
+//!
+//! # Images
+//!
+//! The data set defines the images (formats.md, "What is written"). A function makes each of them:
+//! [`rgb_image`], [`depth_image`], [`normal_image`], [`xyz_image`], [`index_image`] and
+//! [`color_per_face_image`]. [`view_images_into`] makes the same bytes in one walk over the hits, in less
+//! time. A semantic image is an index image: this crate stores faces and knows no labels. [`sample_edges`]
+//! removes stair-steps from a colour image. A function that ends in `_into` writes to an image that exists
+//! already.
+//!
+//! # Colours from pictures
+//!
+//! A [`CubeMap`] holds the pictures taken at a place. It is made from a sky box, a panorama or overlapping
+//! captures ([`stitch()`]). [`picture_image`] colours hits from it instead of from textures.
+//!
+//! # Threads and processors
+//!
+//! A function that makes one image runs on the calling thread: callers render many images at once. The
+//! vector instructions are chosen when the program runs, and all give the same bytes. The environment
+//! variable `S3D_SIMD` limits them: see [`SimdLevel`].
 
-// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what TriMesh::new and
-// Camera checked.
+// Only a caller's mistake panics, and `# Panics` names it. Loops rely on the indices that `TriMesh::new` and
+// `Camera` have checked.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)

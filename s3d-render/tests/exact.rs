@@ -1,5 +1,5 @@
-//! The visibility pass against single exact rays, pixel by pixel: random soups, slivers, duplicates, faces
-//! through the camera and behind it; and whole images of a scan-like mesh and of a real scan.
+//! The visibility pass compared with single exact rays, pixel by pixel: random soups, slivers, duplicates,
+//! faces through and behind the camera; and whole images of a scan-like mesh and of a real scan.
 
 use proptest::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3, dvec3, vec3};
@@ -8,13 +8,16 @@ use s3d_render::{Caster, Hits, NO_FACE, Scene, cast_ray_brute_force, cast_ray_by
 use s3d_synth::scenes::scan_like;
 use std::path::Path;
 
-/// The same face everywhere, and a depth at most one step of the last place away.
+/// Checks that the faces are the same everywhere, and that depths differ by at most one step of the last
+/// place.
 fn check_same(image: &Hits, exact: &Hits) -> Result<(), String> {
     let width = exact.face.width();
     for (k, (&a, &b)) in image.face.pixels().iter().zip(exact.face.pixels()).enumerate() {
-        let (x, y) = (k as u32 % width, k as u32 / width);
+        let x = k as u32 % width;
+        let y = k as u32 / width;
         if a != b {
-            let (t, u) = (image.depth.at(x, y), exact.depth.at(x, y));
+            let t = image.depth.at(x, y);
+            let u = exact.depth.at(x, y);
             return Err(format!("pixel ({x}, {y}): face {a} at {t}, not {b} at {u}"));
         }
     }
@@ -49,8 +52,8 @@ fn camera(pose: Pose, kind: u8) -> Camera {
         3 => Camera::equirectangular(pose, 200),
         4 => Camera::equirectangular(pose, 260),
         5 => Camera::equirectangular(pose, 50),
-        // As a phone has it; a crop far off the axis; pixels that are far from square, either way; the axis
-        // in a corner, wide; and telephoto.
+        // A phone's camera; a crop far off the axis; pixels that are far from square, either way; a wide view
+        // with the axis in a corner; a telephoto view.
         6 => pinhole(pose, [40.0, 43.0], [19.5, 13.0], [37, 23]),
         7 => pinhole(pose, [60.0, 60.0], [-150.0, 90.0], [50, 41]),
         8 => pinhole(pose, [900.0, 9.0], [33.0, 20.0], [64, 40]),
@@ -64,14 +67,14 @@ fn pinhole(pose: Pose, focal: [f64; 2], center: [f64; 2], [width, height]: [u32;
     Camera::pinhole(pose, focal.into(), center.into(), width, height).unwrap()
 }
 
-/// How many there are of them.
+/// The number of kinds of cameras.
 const KINDS: u8 = 12;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(160))]
 
-    /// On a lattice faces share edges, overlap, lie in line with the camera and contain it; along the axes
-    /// rays meet corners and edges exactly.
+    /// On a lattice, faces share edges, overlap, lie in line with the camera and contain it. Rays along the
+    /// axes meet corners and edges exactly.
     #[test]
     fn lattices(
         points in prop::collection::vec(prop::array::uniform3(-3i8..=3), 3..40),
@@ -85,7 +88,8 @@ proptest! {
         prop_assert_eq!(check(&mesh, &camera, stride), Ok(()));
     }
 
-    /// Anywhere, near and far, with duplicates in the other winding, and slivers from each face's edge.
+    /// Faces are anywhere, near and far, with duplicates of the other winding, and slivers at each face's
+    /// edge.
     #[test]
     fn soups(
         points in prop::collection::vec(prop::array::uniform3(-3.0..3.0f32), 3..40),
@@ -100,6 +104,7 @@ proptest! {
         let n = positions.len();
         let mut faces: Vec<[u32; 3]> =
             picks.chunks_exact(3).map(|f| [0, 1, 2].map(|k| f[k].index(n) as u32)).collect();
+
         for k in 0..faces.len() {
             let [a, b, c] = faces[k];
             let at = |v: u32| positions[v as usize];
@@ -111,12 +116,13 @@ proptest! {
                 faces.push([c, b, a]);
             }
         }
+
         let Ok(mesh) = TriMesh::from_faces(positions, faces) else { return Ok(()) };
         let origin = far.as_dvec3() + DVec3::from(at) * f64::from(scale);
         prop_assert_eq!(check(&mesh, &camera(Pose::level(origin, 0.2).turned(yaw, pitch), kind), 1), Ok(()));
     }
 
-    /// From a hair's breadth off a face, beside a corner, on an edge.
+    /// The camera is a hair's breadth off a face, beside a corner, or on an edge.
     #[test]
     fn very_near(
         points in prop::collection::vec(prop::array::uniform3(-3.0..3.0f32), 3..20),
@@ -159,11 +165,12 @@ fn the_pass_is_what_trying_every_face_gives() {
     }
 }
 
-/// Whole images, one caster for all of them.
+/// Checks whole images, with one caster for all of them.
 fn check_images(mesh: &TriMesh, location: DVec3) {
     let scene = Scene::new(mesh);
     let mut caster = Caster::new(&scene);
     let level = Pose::level(location, 0.13);
+
     let mut cameras: Vec<Camera> = (0..6)
         .map(|k| {
             Camera::perspective(
@@ -177,10 +184,12 @@ fn check_images(mesh: &TriMesh, location: DVec3) {
     cameras.push(Camera::equirectangular(level, 512));
     cameras.push(pinhole(level, [210.0, 214.0], [171.3, 90.8], [320, 180]));
     cameras.push(pinhole(level.turned(2.0, -0.3), [400.0, 100.0], [-80.0, 300.0], [180, 320]));
-    // From a few millimetres off a surface, too.
+
+    // Some cameras are a few millimetres off a surface.
     let near = mesh.triangle(7).map(|p| p.as_dvec3()).iter().sum::<DVec3>() / 3.0 + DVec3::splat(1e-3);
     cameras.push(Camera::perspective(Pose::level(near, 2.0), 1.5, 135, 135));
     cameras.push(Camera::equirectangular(Pose::level(near, 0.0), 256));
+
     for camera in &cameras {
         let image = caster.cast(camera);
         assert_eq!(check_same(&image, &cast_ray_by_ray(&scene, camera, 1)), Ok(()));
@@ -233,7 +242,8 @@ fn memory_that_was_used_changes_nothing() {
         Camera::perspective(Pose::level(dvec3(f64::NAN, 0.0, 0.0), 0.0), 1.2, 33, 80),
         Camera::perspective(pose, 1.2, 100, 80),
     ];
-    let (mut caster, mut hits) = (Caster::new(&scene), Hits::default());
+    let mut caster = Caster::new(&scene);
+    let mut hits = Hits::default();
     for camera in &cameras {
         caster.cast_into(camera, 1, &mut hits);
         assert_eq!(hits, s3d_render::cast(&scene, camera));
@@ -244,12 +254,14 @@ fn memory_that_was_used_changes_nothing() {
 
 #[test]
 fn an_image_may_be_as_thin_as_it_likes() {
-    // Two rows of faces, the nearer around row 65,535 of 70,000 and the farther below it, in groups of their
-    // own.
-    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    // Two rows of faces, in clusters of their own: the nearer around row 65,535 of 70,000, the farther below
+    // it.
+    let mut positions = Vec::new();
+    let mut faces = Vec::new();
     for (y, top, bottom) in [(0.1, -3.0, -3.1), (0.2, -6.4, -6.8)] {
         for k in -50i32..50 {
-            let (x, first) = (k as f32 * 0.01, positions.len() as u32);
+            let x = k as f32 * 0.01;
+            let first = positions.len() as u32;
             positions.extend([vec3(x - 0.02, y, top), vec3(x + 0.02, y, top), vec3(x, y, bottom)]);
             faces.push([first, first + 1, first + 2]);
         }

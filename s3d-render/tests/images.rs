@@ -1,4 +1,4 @@
-//! Whole images: what is cast a tile at a time is what single rays give, pixel for pixel.
+//! Whole images: casting them at once gives the same as single rays, pixel for pixel.
 
 #[path = "../benches/common/mod.rs"]
 mod common;
@@ -14,7 +14,7 @@ fn same(fast: &Hits, exact: &Hits, what: &str) {
         .iter()
         .zip(exact.face.pixels())
         .zip(fast.depth.pixels().iter().zip(exact.depth.pixels()));
-    // Depth may be rounded the other way.
+    // Rounding may put a depth one step off.
     let close = |s: f32, t: f32| (i64::from(s.to_bits()) - i64::from(t.to_bits())).abs() <= 1;
     let differ = pixels
         .enumerate()
@@ -59,7 +59,7 @@ fn a_real_scan() {
     check(&mesh, &around(location, 1080), 7);
 }
 
-/// All kinds of cameras: wide, narrow, tiny, upside down, panoramas narrower than a tile.
+/// Returns cameras of all kinds: wide, narrow, tiny, upside down, and panoramas narrower than a tile.
 fn odd_cameras(location: DVec3) -> Vec<Camera> {
     let pose = Pose::level(location, 0.0).turned(2.0, 0.7);
     let mut cameras = vec![
@@ -114,7 +114,7 @@ fn far_from_the_worlds_origin() {
 
 #[test]
 fn coplanar_faces_and_layers_closer_than_rounding() {
-    // Walls over one another: the same, mirrored, and a hair farther.
+    // Walls over one another: equal, mirrored, and slightly farther.
     let mut corners = Vec::new();
     for y in [2.0, 2.0, 2.000_001, 2.000_01, 2.000_04, 2.001, 1.999_999_9] {
         corners.extend([vec3(-1.0, y, -1.0), vec3(1.0, y, -0.9), vec3(0.1, y, 1.0)]);
@@ -130,7 +130,7 @@ fn coplanar_faces_and_layers_closer_than_rounding() {
 
 #[test]
 fn triangles_at_random() {
-    // Interpenetrating, with corners at the camera and faces through it.
+    // The faces interpenetrate; some have corners at the camera, and some go through it.
     let mut state = 7u32;
     let mut random = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -169,7 +169,8 @@ fn strides_pick_pixels_of_the_whole_image() {
         assert_eq!((some.face.width(), some.face.height()), (count(50), count(37)));
         for y in 0..some.face.height() {
             for x in 0..some.face.width() {
-                let (i, j) = (stride / 2 + x * stride, stride / 2 + y * stride);
+                let i = stride / 2 + x * stride;
+                let j = stride / 2 + y * stride;
                 assert_eq!(some.face.at(x, y), all.face.at(i, j));
                 assert_eq!(some.depth.at(x, y), all.depth.at(i, j));
             }

@@ -9,8 +9,9 @@ use s3d_render::{
     Hits, MipMaps, Modalities, NO_FACE, Normals, Scene, Shading, TextureFilter, view_images_into,
 };
 
-/// A room of 4 × 4 × 3 m around (0, 0, 1.5); two faces a wall, whose index / 2 is: 0 floor, 1 ceiling, 2 wall
-/// at +Y, 3 at −Y, 4 at +X, 5 at −X. Wound to face inwards, textured with (0, 0) to (1, 1) a wall.
+/// Returns a room of 4 × 4 × 3 m around (0, 0, 1.5). It has two faces a wall; the index of a face / 2 is 0
+/// for the floor, 1 for the ceiling, and for the walls 2 at +Y, 3 at −Y, 4 at +X, 5 at −X. The faces are
+/// wound to face inwards, and textured with (0, 0) to (1, 1) a wall.
 fn room_parts() -> MeshParts {
     let corner = |x: f32, y: f32, z: f32| vec3(2.0 * x, 2.0 * y, 1.5 + 1.5 * z);
     let walls = [
@@ -56,19 +57,22 @@ fn rgb(mesh: &TriMesh, camera: &Camera) -> Raster<[u8; 3]> {
 
 #[test]
 fn a_wall_ahead_has_one_depth_and_the_papers_normal() {
-    let (mesh, camera) = (room(), view(0.0, 0.0));
+    let mesh = room();
+    let camera = view(0.0, 0.0);
     let scene = Scene::new(&mesh);
     let hits = s3d_render::cast(&scene, &camera);
     let depth = s3d_render::depth_image(&hits);
     let normal = s3d_render::normal_image(&scene, &hits, &camera, Normals::Flat);
     let wall = |w: u32| move |f: u32| f / 2 == w;
+
     // The wall at +Y is 2.5 m ahead: z-depth does not depend on the pixel.
     for (k, &face) in hits.face.pixels().iter().enumerate().filter(|(_, f)| wall(2)(**f)) {
         assert_eq!(hits.depth.pixels()[k], 2.5, "{face}");
         assert_eq!(depth.pixels()[k], 1280);
         assert_eq!(normal.pixels()[k], [128, 128, 255]);
     }
-    // Right and left walls face left and right; the floor faces up (green is down), the ceiling down.
+
+    // The right and left walls face left and right. The floor faces up (green is down), and the ceiling down.
     for (w, expected) in [(4, [0, 128, 128]), (5, [255, 128, 128]), (0, [128, 0, 128]), (1, [128, 255, 128])]
     {
         let k = hits
@@ -80,6 +84,7 @@ fn a_wall_ahead_has_one_depth_and_the_papers_normal() {
         assert_eq!(normal.pixels()[k], expected, "wall {w}");
     }
     assert!(!hits.face.pixels().iter().any(|&f| wall(3)(f)), "what lies behind is not seen");
+
     // +X is to the right, +Z is up.
     assert!(wall(4)(hits.face.at(99, 40)) && wall(5)(hits.face.at(0, 40)));
     assert_eq!(s3d_render::coverage(&hits), 1.0);
@@ -94,11 +99,13 @@ fn a_panorama_is_not_mirrored_and_holds_distances() {
     let wall = |x: u32, y: u32| hits.face.at(x, y) / 2;
     assert_eq!([wall(128, 64), wall(192, 64), wall(64, 64), wall(0, 64), wall(255, 64)], [2, 4, 5, 3, 3]);
     assert_eq!([wall(10, 0), wall(200, 127)], [1, 0]);
+
     let normal = s3d_render::normal_image(&scene, &hits, &camera, Normals::Flat);
     // (R, G, B) = (X, −Z, Y) of the world, towards the camera.
     assert_eq!(normal.at(128, 64), [128, 128, 0]);
     assert_eq!(normal.at(192, 64), [0, 128, 128]);
     assert_eq!(normal.at(0, 127), [128, 0, 128]);
+
     for (x, y) in [(128, 64), (192, 60), (20, 3), (99, 111)] {
         let d = camera.rays().at(x, y);
         let t = [
@@ -123,6 +130,7 @@ fn coordinates_project_back_to_their_pixels() {
         let hits = s3d_render::cast(&scene, &camera);
         let xyz = s3d_render::xyz_image(&hits, &camera);
         let half = s3d_render::xyz_image_half(&hits, &camera);
+
         for y in 0..camera.height {
             for x in 0..camera.width {
                 let p = Vec3::from(xyz.at(x, y)).as_dvec3();
@@ -132,7 +140,7 @@ fn coordinates_project_back_to_their_pixels() {
                     .max((pixel.y - f64::from(y) - 0.5).abs());
                 assert!(off < 1e-3, "{pixel} for ({x}, {y})");
                 assert!((depth - f64::from(hits.depth.at(x, y))).abs() < 1e-5);
-                // On a wall, to the rounding of f32; to that of half floats.
+                // Each point is on a wall, to the rounding of f32; half floats add their own rounding.
                 let wall = [2.0 - p.x.abs(), 2.0 - p.y.abs(), 1.5 - (p.z - 1.5).abs()];
                 assert!(wall.iter().any(|w| w.abs() < 1e-6), "{p}");
                 for k in 0..3 {
@@ -147,16 +155,18 @@ fn coordinates_project_back_to_their_pixels() {
 
 #[test]
 fn what_is_missing_is_missing_everywhere() {
-    // One wall, looked at past its edge.
+    // One wall, seen past its edge.
     let parts = room_parts();
     let mut mesh = MeshParts { faces: parts.faces[4..6].to_vec(), face_uvs: vec![], ..parts };
     mesh.colors = vec![[0; 3]; mesh.positions.len()];
     let mesh = TriMesh::new(mesh).unwrap();
+
     let scene = Scene::new(&mesh);
     let camera = view(0.9, 0.2);
     let hits = s3d_render::cast(&scene, &camera);
     let share = s3d_render::coverage(&hits);
     assert!(share > 0.05 && share < 0.95);
+
     let rgb = s3d_render::rgb_image(&scene, &MipMaps::new(&mesh), &hits, &camera);
     let depth = s3d_render::depth_image(&hits);
     let [flat, smooth] =
@@ -164,7 +174,9 @@ fn what_is_missing_is_missing_everywhere() {
     let index = s3d_render::index_image(&hits, &[0, 0x01_02_03]);
     let pretty = s3d_render::color_per_face_image(&hits, &[[7, 8, 9], [0, 0, 1]]);
     let bytes = s3d_render::byte_per_face_image(&hits, &[7, 9], 255);
-    let (xyz, half) = (s3d_render::xyz_image(&hits, &camera), s3d_render::xyz_image_half(&hits, &camera));
+    let xyz = s3d_render::xyz_image(&hits, &camera);
+    let half = s3d_render::xyz_image_half(&hits, &camera);
+
     for (k, &face) in hits.face.pixels().iter().enumerate() {
         let missing = face == NO_FACE;
         assert_eq!(hits.depth.pixels()[k].is_infinite(), missing);
@@ -212,6 +224,7 @@ fn opencv_axes_turn_the_third_channel_of_views_and_nothing_of_panoramas() {
     let scene = Scene::new(&mesh);
     let pose = Pose::level(dvec3(0.3, -0.2, 0.1), 0.7).turned(0.2, -0.3);
     let pinhole = Camera::pinhole(pose, dvec2(30.0, 34.0), dvec2(9.0, 21.0), 40, 30).unwrap();
+
     for camera in [Camera::perspective(pose, 1.2, 40, 30), pinhole, Camera::equirectangular(pose, 40)] {
         let hits = s3d_render::cast(&scene, &camera);
         for normals in [Normals::Flat, Normals::Smooth] {
@@ -223,7 +236,9 @@ fn opencv_axes_turn_the_third_channel_of_views_and_nothing_of_panoramas() {
                 assert_eq!(paper, opencv);
                 continue;
             }
-            let (mut seen, mut towards) = (0, 0);
+
+            let mut seen = 0;
+            let mut towards = 0;
             for (p, o) in paper.pixels().iter().zip(opencv.pixels()) {
                 assert_eq!(p[..2], o[..2]);
                 if *p == [128; 3] {
@@ -268,13 +283,14 @@ fn vectors_of_normals_are_what_bytes_round() {
             let mut bytes = Raster::filled(0, 0, [0; 3]);
             s3d_render::normal_image_into(&scene, &hits, &camera, normals, axes, &mut bytes);
             let vectors = s3d_render::normal_vectors(&scene, &hits, &camera, normals, axes);
+
             for ((byte, n), face) in bytes.pixels().iter().zip(vectors.pixels()).zip(hits.face.pixels()) {
                 if *face == NO_FACE {
                     assert!(*byte == s3d_render::MISSING_NORMAL && n.iter().all(|n| n.is_nan()));
                     continue;
                 }
                 assert!((n.iter().map(|n| n * n).sum::<f32>() - 1.0).abs() < 1e-5);
-                // Half a step, and what 32 bits round.
+                // The bounds are half a step, and the rounding of 32 bits.
                 let far = |k: usize| (127.5 + 127.5 * f64::from(n[k]) - f64::from(byte[k])).abs();
                 assert!((0..3).all(|k| far(k) < 0.5 + 1e-4), "{n:?} {byte:?}");
             }
@@ -284,18 +300,20 @@ fn vectors_of_normals_are_what_bytes_round() {
 
 #[test]
 fn smooth_normals_are_interpolated_and_never_point_away() {
-    // The wall at +Y bulges: its corner normals lean outwards, the second time beyond what the camera can
+    // The wall at +Y bulges: its corner normals lean outwards; in the second case beyond what the camera can
     // see.
     for lean in [0.5, 2.0] {
         let mut parts = room_parts();
         parts.normals = vec![vec3(-lean, -1.0, 0.0).normalize(), vec3(lean, -1.0, 0.0).normalize()];
         parts.face_normals = vec![[NO_INDEX; 3]; 12];
         (parts.face_normals[4], parts.face_normals[5]) = ([0, 1, 1], [0, 1, 0]);
+
         let mesh = TriMesh::new(parts).unwrap();
         let scene = Scene::new(&mesh);
         let camera = view(0.0, 0.0);
         let hits = s3d_render::cast(&scene, &camera);
         let image = s3d_render::normal_image(&scene, &hits, &camera, Normals::Smooth);
+
         let mut reds = Vec::new();
         for y in 0..camera.height {
             for x in 0..camera.width {
@@ -308,16 +326,18 @@ fn smooth_normals_are_interpolated_and_never_point_away() {
                 }
             }
         }
+
         assert!(reds.len() > 30 && reds[0] < 90 && reds[reds.len() - 1] > 160, "{reds:?}");
         assert!(lean > 1.0 || reds.is_sorted(), "{reds:?}");
     }
 }
 
-/// Red grows to the right, green upwards, blue marks the lower left.
+/// Returns a chart: red grows to the right, green upwards, and blue marks the lower left.
 fn chart(size: u32) -> Raster<[u8; 3]> {
     let step = 256 / size;
     let pixel = |k: u32| {
-        let (x, y) = (k % size, size - 1 - k / size);
+        let x = k % size;
+        let y = size - 1 - k / size;
         [(x * step) as u8, (y * step) as u8, if x < size / 4 && y < size / 4 { 200 } else { 20 }]
     };
     Raster::from_vec(size, size, (0..size * size).map(pixel).collect())
@@ -358,7 +378,7 @@ fn checker(size: u32) -> Raster<[u8; 3]> {
 fn a_distant_checkerboard_is_grey() {
     for (size, wrap) in [(1024, Wrap::Repeat), (1023, Wrap::Mirror), (777, Wrap::Clamp)] {
         let mesh = textured(checker(size), wrap);
-        // Less than one pixel for 16 of the texture's.
+        // A pixel covers more than 16 texels.
         for camera in [
             Camera::perspective(Pose::level(EYE, 0.3), 75f64.to_radians(), 32, 32),
             Camera::equirectangular(Pose::level(EYE, 0.3), 64),
@@ -372,8 +392,8 @@ fn a_distant_checkerboard_is_grey() {
 
 #[test]
 fn a_floor_seen_at_an_angle_keeps_what_runs_along_it() {
-    // Stripes that run away from the camera, 4 pixels of the texture each: at a grazing angle plain mipmaps
-    // blur them.
+    // The stripes run away from the camera and are 4 texels wide: at a grazing angle plain mip maps blur
+    // them.
     let pixel = |k: u32| {
         if (k % 512 / 4).is_multiple_of(2) {
             [250; 3]
@@ -381,12 +401,14 @@ fn a_floor_seen_at_an_angle_keeps_what_runs_along_it() {
             [10; 3]
         }
     };
+
     let mesh = textured(Raster::from_vec(512, 512, (0..512 * 512).map(pixel).collect()), Wrap::Clamp);
     let pose = Pose::level(dvec3(0.0, -1.9, 0.25), 0.0);
     let camera = Camera::perspective(pose, 50f64.to_radians(), 400, 400);
     let scene = Scene::new(&mesh);
     let hits = s3d_render::cast(&scene, &camera);
     let mip_maps = MipMaps::new(&mesh);
+
     let contrast = |max_taps: u32| {
         let filter = s3d_render::TextureFilter { max_taps };
         let image = s3d_render::rgb_image_with(&scene, &mip_maps, &hits, &camera, &filter);
@@ -397,7 +419,9 @@ fn a_floor_seen_at_an_angle_keeps_what_runs_along_it() {
         assert!(row.len() > 100);
         row.iter().max().unwrap() - row.iter().min().unwrap()
     };
-    let (sharp, blurred) = (contrast(8), contrast(1));
+
+    let sharp = contrast(8);
+    let blurred = contrast(1);
     assert!(sharp > 150 && blurred < sharp / 2, "{sharp} {blurred}");
 }
 
@@ -408,7 +432,7 @@ fn colours_without_a_texture() {
     parts.face_materials = vec![0; 12];
     let flat = TriMesh::new(parts.clone()).unwrap();
     assert!(rgb(&flat, &view(0.2, 0.0)).pixels().iter().all(|p| *p == [200, 10, 0]));
-    // Each wall's corners: black to white from its bottom to its top.
+    // The corners of each wall go from black at the bottom to white at the top.
     parts.colors = (0..24).map(|k| if k % 4 < 2 { [0; 3] } else { [255; 3] }).collect();
     let camera = view(0.0, 0.0);
     let image = rgb(&TriMesh::new(parts).unwrap(), &camera);
@@ -435,15 +459,18 @@ fn an_index_beyond_24_bits_is_a_callers_mistake() {
     let _ = s3d_render::index_image(&hits, &[1 << 24; 12]);
 }
 
-/// The fast image against the one of single pixels: no channel may differ by more than 1, but in a few pixels
-/// where rounding decides how many samples are taken.
+/// Compares the fast image with the image of single pixels. Channels may differ by at most 1, except in a few
+/// pixels where rounding decides how many samples are taken.
 fn close(mesh: &TriMesh, camera: &Camera, max_taps: u32) {
-    let (scene, mip_maps) = (Scene::new(mesh), MipMaps::new(mesh));
+    let scene = Scene::new(mesh);
+    let mip_maps = MipMaps::new(mesh);
     let hits = s3d_render::cast(&scene, camera);
     let filter = s3d_render::TextureFilter { max_taps };
     let fast = s3d_render::rgb_image_with(&scene, &mip_maps, &hits, camera, &filter);
     let exact = s3d_render::rgb_image_pixel_by_pixel(&scene, &mip_maps, &hits, camera, &filter);
-    let (mut differ, mut samples_differ) = (0, 0);
+
+    let mut differ = 0;
+    let mut samples_differ = 0;
     for (k, (f, e)) in fast.pixels().iter().zip(exact.pixels()).enumerate() {
         let most = (0..3).map(|c| f[c].abs_diff(e[c])).max().unwrap_or(0);
         assert!(most <= 20, "pixel {k} of {camera:?}: {f:?} for {e:?}");
@@ -452,10 +479,12 @@ fn close(mesh: &TriMesh, camera: &Camera, max_taps: u32) {
         assert_eq!(*f == [0; 3], hits.face.pixels()[k] == NO_FACE);
     }
     assert!(samples_differ <= 1 + fast.len() / 20_000, "{samples_differ} pixels of {camera:?}");
-    // Single rays through pixels' centres are those pixels.
+
+    // Single rays through the centres of pixels give the same colours.
     let mut rays_differ = 0;
     for (k, e) in exact.pixels().iter().enumerate().step_by(13) {
-        let (face, width) = (hits.face.pixels()[k], camera.width as usize);
+        let face = hits.face.pixels()[k];
+        let width = camera.width as usize;
         if face == NO_FACE {
             continue;
         }
@@ -464,7 +493,8 @@ fn close(mesh: &TriMesh, camera: &Camera, max_taps: u32) {
         rays_differ += usize::from((0..3).any(|c| color[c].abs_diff(e[c]) > 1));
     }
     assert!(rays_differ <= 1 + fast.len() / 20_000, "{rays_differ} rays of {camera:?}");
-    // A colour is off by 0.1 at most, and so seldom rounded otherwise.
+
+    // A colour is off by 0.1 at most, and so it is seldom rounded differently.
     assert!(differ * 10 <= fast.len(), "{differ} of {} pixels are rounded otherwise", fast.len());
 }
 
@@ -488,6 +518,7 @@ fn rgb_is_what_single_pixels_give() {
         let pixel = |k: u32| k.wrapping_mul(0x9E37_79B1).rotate_left(k % 23).to_le_bytes();
         Raster::from_vec(size, size, (0..size * size).map(|k| std::array::from_fn(|c| pixel(k)[c])).collect())
     };
+
     for (size, wrap) in [
         (512, Wrap::Repeat),
         (301, Wrap::Mirror),
@@ -505,7 +536,7 @@ fn rgb_is_what_single_pixels_give() {
                 close(&mesh, &camera, 8);
             }
             close(&mesh, &all_kinds(EYE)[0], 1);
-            // With the eye nearly on the floor.
+            // The eye is nearly on the floor.
             close(&mesh, &all_kinds(dvec3(-1.5, 1.0, 0.004))[0], 8);
         }
     }
@@ -541,27 +572,33 @@ fn rgb_of_scans_is_what_single_pixels_give() {
     }
 }
 
-/// What formats.md says of the other images, a pixel at a time.
+/// Compares the other images with formats.md, one pixel at a time.
 #[test]
 fn images_are_what_single_pixels_give() {
     let mesh = s3d_synth::scenes::scan_like(20_000, 5);
-    let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+    let scene = Scene::new(&mesh);
+    let mip_maps = MipMaps::new(&mesh);
     let faces = mesh.faces().len() as u32;
     let index: Vec<u32> = (0..faces).map(|f| f * 631 % (1 << 24)).collect();
     let color: Vec<[u8; 3]> = (0..faces).map(|f| [f as u8, (f >> 8) as u8, 7]).collect();
     let mut all = s3d_render::ViewImages::default();
     let mut again = s3d_render::xyz_image_half(&s3d_render::cast(&scene, &view(0.0, 0.0)), &view(0.0, 0.0));
+
     for camera in all_kinds(dvec3(3.0, 2.5, 1.5)) {
         let hits = s3d_render::cast(&scene, &camera);
         let depth = s3d_render::depth_image(&hits);
         let normal = s3d_render::normal_image(&scene, &hits, &camera, Normals::Flat);
         let indices = s3d_render::index_image(&hits, &index);
         let colors = s3d_render::color_per_face_image(&hits, &color);
-        let (xyz, half) = (s3d_render::xyz_image(&hits, &camera), s3d_render::xyz_image_half(&hits, &camera));
+        let xyz = s3d_render::xyz_image(&hits, &camera);
+        let half = s3d_render::xyz_image_half(&hits, &camera);
+
         let rays = camera.rays();
         for k in 0..hits.face.len() {
-            let (i, j) = (k as u32 % camera.width, k as u32 / camera.width);
-            let (face, t) = (hits.face.pixels()[k], f64::from(hits.depth.pixels()[k]));
+            let i = k as u32 % camera.width;
+            let j = k as u32 / camera.width;
+            let face = hits.face.pixels()[k];
+            let t = f64::from(hits.depth.pixels()[k]);
             assert_eq!(depth.pixels()[k], (t * 512.0 + 0.5) as u16);
             let p = camera.pose.location + rays.at(i, j) * t;
             let p = if t.is_finite() {
@@ -571,6 +608,7 @@ fn images_are_what_single_pixels_give() {
             };
             assert_eq!(xyz.pixels()[k], p, "({i}, {j})");
             assert_eq!(half.pixels()[k], p.map(half::f16::from_f32), "({i}, {j})");
+
             if face == NO_FACE {
                 assert_eq!(
                     (normal.pixels()[k], indices.pixels()[k], colors.pixels()[k]),
@@ -578,6 +616,7 @@ fn images_are_what_single_pixels_give() {
                 );
                 continue;
             }
+
             let [a, b, c] = mesh.triangle(face).map(|p| p.as_dvec3());
             let n = (b - a).cross(c - a).normalize();
             let n = if n.dot(a - camera.pose.location) > 0.0 { -n } else { n };
@@ -586,7 +625,8 @@ fn images_are_what_single_pixels_give() {
             let [_, r, g, b] = index[face as usize].to_be_bytes();
             assert_eq!((indices.pixels()[k], colors.pixels()[k]), ([r, g, b], color[face as usize]));
         }
-        // Into what holds the images of another camera.
+
+        // The images are reused from the camera before.
         let shading = Shading {
             scene: &scene,
             mip_maps: &mip_maps,
@@ -604,6 +644,7 @@ fn images_are_what_single_pixels_give() {
         assert_eq!(all.rgb, s3d_render::rgb_image(&scene, &mip_maps, &hits, &camera));
         s3d_render::xyz_image_half_into(&hits, &camera, &mut again);
         assert_eq!(again, half);
+
         let mut other = depth.map(|_| 7);
         s3d_render::depth_image_into(&hits, &mut other);
         assert_eq!(other, depth);
@@ -613,11 +654,12 @@ fn images_are_what_single_pixels_give() {
 #[test]
 fn an_image_that_is_used_again_is_as_a_new_one() {
     let mesh = textured(chart(64), Wrap::Clamp);
-    let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+    let scene = Scene::new(&mesh);
+    let mip_maps = MipMaps::new(&mesh);
     let filter = s3d_render::TextureFilter::default();
     let mut again = Raster::filled(5, 5, [9; 3]);
     for camera in all_kinds(EYE) {
-        // The second time it holds the image of the turned camera.
+        // The second time, the image of the unturned camera is overwritten.
         for camera in [camera, Camera { pose: camera.pose.turned(1.0, 0.0), ..camera }] {
             let hits = s3d_render::cast(&scene, &camera);
             s3d_render::rgb_image_into(&scene, &mip_maps, &hits, &camera, &filter, &mut again);

@@ -1,11 +1,11 @@
-//! What it costs to score and to select the views of a location, an area, and the published data set (1,413
+//! The cost of scoring and selecting the views of a location, an area, and the published data set (1,413
 //! locations with 72 candidates each).
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_sample::{Pool, PoolItem, Selection, entropy, select, select_pooled};
 use std::hint::black_box;
 
-/// Histograms of views that see 1 to 9 classes, from a fixed stream of pseudo-random numbers.
+/// Returns histograms of views that see 1 to 9 classes, from a fixed stream of pseudo-random numbers.
 fn histograms(count: usize) -> Vec<[u64; 13]> {
     let mut state = 5u64;
     let mut next = || {
@@ -43,6 +43,7 @@ fn bench(c: &mut Criterion) {
             })
             .collect();
         let options = Selection::default();
+
         group.throughput(Throughput::Elements(scores.len() as u64));
         group.bench_with_input(BenchmarkId::new("entropy", locations), &histograms, |b, histograms| {
             b.iter(|| black_box(histograms).iter().map(|h| entropy(h)).sum::<f64>());
@@ -50,6 +51,7 @@ fn bench(c: &mut Criterion) {
         group.bench_with_input(BenchmarkId::new("one_pool", locations), &scores, |b, scores| {
             b.iter(|| select(black_box(scores), &options, 42));
         });
+
         for pool in [Pool::Dataset, Pool::Location] {
             let id = BenchmarkId::new(format!("pooled_by_{pool}"), locations);
             group.bench_with_input(id, &items, |b, items| {

@@ -1,4 +1,4 @@
-//! How many candidate views can be drawn a second: is a stream of its own for every view affordable?
+//! The number of candidate views drawn per second: is one random stream per view affordable?
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use s3d_sample::{CANDIDATES_PER_LOCATION, ViewDistribution, draw_view};

@@ -1,5 +1,6 @@
 //! Scores and selects views. Each line of the standard input is `area,location,view` and 13 counts of pixels,
-//! one for each class; it is printed with the entropy of the counts, and 1 if the view stays or 0 if it goes.
+//! one for each class. The program prints the line with the entropy of the counts, and 1 if the view stays or
+//! 0 if it goes.
 //!
 //! `cargo run --example select_views -- dataset|area|location [SEED] < counts.csv`
 #![allow(clippy::print_stdout)] // It is a program.

@@ -1,13 +1,16 @@
-//! The score of a view: how evenly it sees what there is to be seen, the semantic classes in the paper.
+//! The score of a view: how evenly its pixels are spread over the semantic classes.
 
-/// The Shannon entropy of a histogram of classes, in nats: 0 if one class has all pixels, ln of the number of
-/// classes if all have the same number. Pixels without a class are not in the histogram; without any pixel
-/// the entropy is 0. Source: formats.md, "Views".
+/// Returns the Shannon entropy of a histogram of classes, in nats.
+///
+/// The entropy is 0 if one class has all pixels, and the logarithm of the number of classes if all have the
+/// same number of pixels. Pixels without a class are not in the histogram. The entropy of an empty histogram
+/// is 0. Source: formats.md, "Views".
 ///
 /// ```
 /// // As many pixels of wall as of floor.
 /// let mut histogram = [0; 13];
-/// (histogram[1], histogram[2]) = (500, 500);
+/// histogram[1] = 500;
+/// histogram[2] = 500;
 /// assert_eq!(s3d_sample::entropy(&histogram), 2f64.ln());
 /// ```
 pub fn entropy(histogram: &[u64]) -> f64 {
@@ -16,7 +19,7 @@ pub fn entropy(histogram: &[u64]) -> f64 {
         let share = n as f64 / total as f64;
         sum - share * libm::log(share)
     });
-    // Rounding may lead past the ends; and −0 is no score.
+    // Rounding may leave the range. Adding 0 turns −0 into 0.
     sum.clamp(0.0, libm::log(histogram.len().max(1) as f64)) + 0.0
 }
 
@@ -34,7 +37,9 @@ mod tests {
         assert_eq!(entropy(&[u64::MAX; 13]), libm::log(13.0));
         assert_eq!((entropy(&[]), entropy(&[5]), entropy(&[3, 3])), (0.0, 0.0, libm::log(2.0)));
         let mut some = [0; 13];
-        (some[0], some[5], some[12]) = (1, 2, 1);
+        some[0] = 1;
+        some[5] = 2;
+        some[12] = 1;
         assert!((entropy(&some) - 1.5 * 2f64.ln()).abs() < 1e-15);
     }
 

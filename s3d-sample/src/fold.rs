@@ -1,9 +1,9 @@
 //! The three folds of areas for cross-validation.
 
-/// A split of areas into those to train on and those to test on.
+/// A split of areas into training areas and test areas.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Fold {
-    /// Its number, 1 to 3.
+    /// The number of the fold, 1 to 3.
     pub number: u32,
     /// The areas to train on, ascending.
     pub train: Vec<u32>,
@@ -11,16 +11,15 @@ pub struct Fold {
     pub test: Vec<u32>,
 }
 
-/// The published folds over areas 1 to 6: number, training areas, test areas. Source: formats.md, "What is
+/// The published folds of areas 1 to 6: number, training areas, test areas. Source: formats.md, "What is
 /// written".
 const PUBLISHED: [(u32, &[u32], &[u32]); 3] =
     [(1, &[1, 2, 3, 4, 6], &[5]), (2, &[1, 3, 5, 6], &[2, 4]), (3, &[2, 4, 5], &[1, 3, 6])];
 
-/// The published folds, cut down to the areas that are there.
+/// Returns the published folds, cut down to the areas in `present_areas`.
 ///
-/// Areas that are not in `present_areas` are dropped from both sides, and a fold that has a side left empty
-/// is dropped with its number; areas that the published folds do not know belong to no fold. Order and
-/// repetitions in `present_areas` do not matter.
+/// A fold whose training or test side would be empty is left out; the others keep their numbers. Areas other
+/// than 1 to 6 belong to no fold. The order of `present_areas` and repetitions in it do not matter.
 ///
 /// ```
 /// let folds = s3d_sample::folds(&[1, 5]);
@@ -28,17 +27,23 @@ const PUBLISHED: [(u32, &[u32], &[u32]); 3] =
 /// assert_eq!((&folds[0].train[..], &folds[0].test[..]), (&[1][..], &[5][..]));
 /// ```
 pub fn folds(present_areas: &[u32]) -> Vec<Fold> {
-    let present = |areas: &[u32]| {
-        areas
-            .iter()
-            .copied()
-            .filter(|a| present_areas.contains(a))
-            .collect::<Vec<_>>()
-    };
     PUBLISHED
         .iter()
-        .map(|&(number, train, test)| Fold { number, train: present(train), test: present(test) })
+        .map(|&(number, train, test)| Fold {
+            number,
+            train: common(train, present_areas),
+            test: common(test, present_areas),
+        })
         .filter(|fold| !fold.train.is_empty() && !fold.test.is_empty())
+        .collect()
+}
+
+/// Returns the members of `areas` that are in `present_areas` too.
+fn common(areas: &[u32], present_areas: &[u32]) -> Vec<u32> {
+    areas
+        .iter()
+        .copied()
+        .filter(|area| present_areas.contains(area))
         .collect()
 }
 
@@ -50,11 +55,12 @@ mod tests {
     #[test]
     fn all_areas_give_the_published_folds() {
         let folds = folds(&[6, 5, 4, 3, 2, 1, 1]);
-        let of = |i: usize| (folds[i].number, folds[i].train.clone(), folds[i].test.clone());
-        assert_eq!(folds.len(), 3);
-        assert_eq!(of(0), (1, vec![1, 2, 3, 4, 6], vec![5]));
-        assert_eq!(of(1), (2, vec![1, 3, 5, 6], vec![2, 4]));
-        assert_eq!(of(2), (3, vec![2, 4, 5], vec![1, 3, 6]));
+        let expected = [
+            Fold { number: 1, train: vec![1, 2, 3, 4, 6], test: vec![5] },
+            Fold { number: 2, train: vec![1, 3, 5, 6], test: vec![2, 4] },
+            Fold { number: 3, train: vec![2, 4, 5], test: vec![1, 3, 6] },
+        ];
+        assert_eq!(folds, expected);
     }
 
     #[test]

@@ -1,20 +1,33 @@
 //! The choice of camera views for a registered data set of an indoor scan, as 2D-3D-S (Armeni et al. 2017)
-//! made it.
+//! made it. Numbers in, numbers out: the crate knows no renderer, no labels and no files.
 //!
-//! At every scan location, candidate [`View`]s are drawn ([`draw_view`]); a renderer counts the classes that
-//! each sees; the [`entropy`] of the counts is its score; and [`select_pooled`] keeps the better ones of a
-//! [`Pool`]. [`folds`] splits areas for cross-validation. This crate sees numbers only: it knows no renderer
-//! and no labels.
+//! # Draw
 //!
-//! Where there are no scan locations, [`poisson_disk`] spreads some.
+//! [`draw_view`] draws the candidate [`View`]s of a scan location from a [`ViewDistribution`]. A scan without
+//! scan locations gets some from [`poisson_disk`], which spreads points evenly.
 //!
-//! Everything random follows from one seed and from the name of what it is drawn for, never from threads or
-//! order.
+//! # Score
+//!
+//! A renderer counts the pixels of each class in a view. The score of the view is the [`entropy`] of these
+//! counts.
+//!
+//! # Select
+//!
+//! [`select_pooled`] keeps the views with the higher scores. A [`Pool`] says which views compete with each
+//! other, and a [`Selection`] how many stay. [`folds`] splits the areas for cross-validation.
+//!
+//! # One seed
+//!
+//! Every random number follows from one seed and the name of the thing it is drawn for. Neither threads nor
+//! order change it.
+//!
+//! # Example
 //!
 //! ```
 //! use s3d_sample::{Pool, PoolItem, Selection, ViewDistribution, draw_view, entropy, select_pooled};
 //!
-//! let (seed, camera) = (42, "8eb9955b866b4b5f74abb1071416c628");
+//! let seed = 42;
+//! let camera = "8eb9955b866b4b5f74abb1071416c628";
 //! let views: Vec<_> = (0..72).map(|i| draw_view(&ViewDistribution::default(), seed, camera, i)).collect();
 //! assert!(views.iter().all(|view| (10.0..=75.0).contains(&view.fov_rad.to_degrees().round())));
 //!
@@ -30,8 +43,8 @@
 //! assert_eq!(stays.iter().filter(|&&stays| stays).count(), 52);
 //! ```
 
-// Nothing panics but what a caller did wrong, which "Panics" tells. Loops index by what they ordered
-// themselves.
+// Only a caller's mistake panics, and a section "Panics" names it. Loops take their indices from ranges and
+// permutations of their own.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)

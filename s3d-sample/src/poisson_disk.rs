@@ -1,15 +1,15 @@
-//! Poisson-disk patterns: points that keep their distance, and leave no place for another.
+//! Poisson-disk patterns: points that keep a distance from each other and leave no room for another point.
 
 use crate::stream::stream;
 use rand::Rng;
 use std::collections::HashMap;
 
-/// Chooses among `points` (metres) some of which no two are nearer than `distance_m`, so that every other
-/// point is nearer than that to a chosen one. Returns their indices, in the order in which they were chosen.
+/// Chooses some of `points` (metres) that are at least `distance_m` apart. Returns their indices, in the
+/// order in which they were chosen.
 ///
-/// The points are offered in a random order that `seed` and `name` decide alone. Dense points give the
-/// pattern of dart throwing (Cook 1986) on what they cover. Takes time and memory in proportion to their
-/// number.
+/// Every point that is not chosen is nearer than `distance_m` to a chosen one. The points are tried in a
+/// random order, which depends on `seed` and `name` alone. Dense points give the pattern of dart throwing
+/// (Cook 1986) over the region that they cover. Time and memory are proportional to the number of points.
 ///
 /// # Panics
 /// If `distance_m` is not above 0, or a point is not finite.
@@ -23,8 +23,9 @@ pub fn poisson_disk(points: &[[f64; 3]], distance_m: f64, seed: u64, name: &str)
     poisson_disk_where(points, distance_m, seed, name, |_, _| true)
 }
 
-/// As [`poisson_disk`], but two points count as near only if `is_near` says so too, which is asked for pairs
-/// of indices that are nearer than `distance_m`. So points on both sides of a wall need not keep apart.
+/// Works like [`poisson_disk`], but two points only have to keep apart if `is_near` returns true for their
+/// indices. It is called for pairs that are nearer than `distance_m`. Points on two sides of a wall, for
+/// instance, may then be close together.
 ///
 /// # Panics
 /// If `distance_m` is not above 0, or a point is not finite.
@@ -45,19 +46,21 @@ pub fn poisson_disk_where(
 ) -> Vec<usize> {
     assert!(distance_m > 0.0, "a distance of {distance_m} m");
     assert!(points.iter().flatten().all(|c| c.is_finite()), "a point that is not finite");
+
+    // The shuffle of Fisher and Yates, from the end. The bias of the remainder is 2⁻³² at most.
     let mut order: Vec<usize> = (0..points.len()).collect();
     let mut rng = stream(*b"disk", seed, name, 0);
-    // Fisher and Yates, from the end; the bias of the remainder is 2⁻³² at most.
     for last in (1..order.len()).rev() {
         order.swap(last, (rng.next_u64() % (last as u64 + 1)) as usize);
     }
-    // A cell is as wide as the distance, so that whoever is too near is in one of 27 cells.
-    let cell = |p: &[f64; 3]| p.map(|c| (c / distance_m).floor() as i64);
+
+    // A cell is as wide as the distance, so points that are too near lie in the 27 cells around a point.
     let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
     let mut chosen = Vec::new();
     for index in order {
         let point = &points[index];
-        let at = cell(point);
+        let at = point.map(|c| (c / distance_m).floor() as i64);
+
         let is_too_near = |other: &usize| {
             let d2: f64 = (0..3).map(|k| (points[*other][k] - point[k]).powi(2)).sum();
             d2 < distance_m * distance_m && is_near(*other, index)
@@ -71,11 +74,13 @@ pub fn poisson_disk_where(
                 })
             })
         });
+
         if !near {
             cells.entry(at).or_default().push(index);
             chosen.push(index);
         }
     }
+
     chosen
 }
 

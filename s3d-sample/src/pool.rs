@@ -1,4 +1,4 @@
-//! Selection of views that are known by name, from pools of any extent.
+//! Selection of views by name, within the data set, an area or a location.
 
 use crate::stream::stream;
 use crate::{Selection, select};
@@ -7,7 +7,7 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Which views compete with each other. Source: formats.md, "Views".
+/// The views that compete with each other. Source: formats.md, "Views".
 ///
 /// ```
 /// use s3d_sample::Pool;
@@ -18,21 +18,32 @@ use thiserror::Error;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Pool {
-    /// All of the data set: the paper's, by its counts.
+    /// All views of the data set. The paper did this, by its counts.
     #[default]
     Dataset,
-    /// Those of an area.
+    /// The views of an area.
     Area,
-    /// Those of a scan location.
+    /// The views of a scan location.
     Location,
 }
 
-/// A word that should be a pool and is none.
+/// A word that is not the name of a pool.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{word:?} is no pool; the pools are dataset area location")]
 pub struct UnknownPool {
     /// The word.
     pub word: String,
+}
+
+impl Pool {
+    /// The area and location that name the pool of `item`; 0 and empty if the pool spans several.
+    fn key<'a>(self, item: &PoolItem<'a>) -> (u32, &'a str) {
+        match self {
+            Self::Dataset => (0, ""),
+            Self::Area => (item.area, ""),
+            Self::Location => (item.area, item.location),
+        }
+    }
 }
 
 impl fmt::Display for Pool {
@@ -58,7 +69,7 @@ impl FromStr for Pool {
     }
 }
 
-/// A scored view and where it was drawn.
+/// A scored view and the place where it was drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoolItem<'a> {
     /// The area.
@@ -67,7 +78,7 @@ pub struct PoolItem<'a> {
     pub location: &'a str,
     /// The number of the view among the location's candidates.
     pub view: u32,
-    /// Its score, such as an [`entropy`](crate::entropy); finite and not negative.
+    /// The score, such as an [`entropy`](crate::entropy); finite and not negative.
     pub score: f64,
 }
 
@@ -77,19 +88,20 @@ impl PoolItem<'_> {
     }
 }
 
-/// Selects views pool by pool: whether each of `items` stays.
+/// Selects views pool by pool. Returns for each of `items` whether it stays.
 ///
-/// In a pool, views are in the order of (area, location, view), locations as UTF-8 bytes, and [`select`]
-/// decides by that order; its seed is drawn from a stream of the pool's own, keyed by `seed`, the area (0 for
-/// the data set) and the location (empty but for [`Pool::Location`]). So whether a view stays depends on the
-/// members of its pool and on `seed`, and neither on other pools nor on the order of `items`.
+/// Within a pool, [`select`] gets the views sorted by area, location (as UTF-8 bytes) and view. Its seed
+/// comes from a random stream of the pool, whose key is `seed`, the area (0 for the data set) and the
+/// location (empty except for [`Pool::Location`]). Whether a view stays therefore depends on `seed` and the
+/// members of its pool. It does not depend on other pools or the order of `items`.
 ///
 /// # Panics
-/// If a view is there twice, and as [`select`] does.
+/// If a view is there twice, or if [`select`] panics.
 #[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
 pub fn select_pooled(items: &[PoolItem<'_>], pool: Pool, options: &Selection, seed: u64) -> Vec<bool> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     order.sort_unstable_by(|&a, &b| items[a].name().cmp(&items[b].name()));
+
     if let Some(pair) = order
         .windows(2)
         .find(|pair| items[pair[0]].name() == items[pair[1]].name())
@@ -97,23 +109,18 @@ pub fn select_pooled(items: &[PoolItem<'_>], pool: Pool, options: &Selection, se
         let (area, location, view) = items[pair[0]].name();
         panic!("view {view} of location {location} in area {area} is there twice");
     }
-    let key = |i: usize| {
-        let PoolItem { area, location, .. } = items[i];
-        match pool {
-            Pool::Dataset => (0, ""),
-            Pool::Area => (area, ""),
-            Pool::Location => (area, location),
-        }
-    };
+
     let mut stays = vec![false; items.len()];
-    for members in order.chunk_by(|&a, &b| key(a) == key(b)) {
-        let (area, location) = key(members[0]);
+    for members in order.chunk_by(|&a, &b| pool.key(&items[a]) == pool.key(&items[b])) {
+        let (area, location) = pool.key(&items[members[0]]);
         let pool_seed = stream(*b"pool", seed, location, area).next_u64();
+
         let scores: Vec<f64> = members.iter().map(|&i| items[i].score).collect();
         for (&i, stay) in members.iter().zip(select(&scores, options, pool_seed)) {
             stays[i] = stay;
         }
     }
+
     stays
 }
 
@@ -124,7 +131,7 @@ mod tests {
 
     const LOCATIONS: [&str; 5] = ["a", "b", "c", "d", "e"];
 
-    /// Two areas with the same names of locations, 72 views each.
+    /// Returns two areas with the same location names, 72 views per location.
     fn items() -> Vec<PoolItem<'static>> {
         let mut items = Vec::new();
         for area in 1..=2 {

@@ -1,9 +1,9 @@
-//! Which of a pool of scored views to keep.
+//! The selection of views by score, within one pool.
 
 use crate::stream::{stream, uniform_above_zero};
 use thiserror::Error;
 
-/// What shares of a pool to keep. Source: formats.md, "Views".
+/// The shares of a pool that stay and go. Source: formats.md, "Views".
 ///
 /// ```
 /// use s3d_sample::Selection;
@@ -15,23 +15,23 @@ use thiserror::Error;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
-    /// The share with the lowest scores, which goes.
+    /// The share of the views that goes for having the lowest scores.
     pub discard: f64,
-    /// The share with the highest scores, which stays.
+    /// The share of the views that stays for having the highest scores.
     pub keep: f64,
-    /// The share of the rest that stays, drawn at random, higher scores rather than lower ones.
+    /// The share of the remaining views that stays. They are drawn at random; higher scores are more likely.
     pub half_of_rest: f64,
 }
 
 impl Default for Selection {
-    /// The paper's: 15 % go, 60 % stay; and half of the 25 % between, 72.5 % in all. Of the published views
-    /// 69.3 % stayed (docs/paper.md, "Which views").
+    /// The shares of the paper: 15 % go, 60 % stay, and half of the remaining 25 % stay too, which makes
+    /// 72.5 %. In the published data 69.3 % of the views stayed (docs/paper.md, "Which views").
     fn default() -> Self {
         Self { discard: 0.15, keep: 0.60, half_of_rest: 0.5 }
     }
 }
 
-/// Shares that no [`Selection`] can have.
+/// Shares that are not valid in a [`Selection`].
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error(
     "shares {discard} to discard, {keep} to keep and {half_of_rest} of the rest: each is 0 to 1, the first \
@@ -46,7 +46,7 @@ pub struct SelectionError {
     pub half_of_rest: f64,
 }
 
-/// How many views of a pool go, stay, and are drawn from the rest.
+/// The numbers of views that go, stay, and are drawn from the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Counts {
     discard: usize,
@@ -55,14 +55,15 @@ struct Counts {
 }
 
 impl Selection {
-    /// Whether views can be selected by it.
+    /// Checks the shares.
     ///
     /// # Errors
-    /// [`SelectionError`] if a share is not 0 to 1, or the first two are more than all.
+    /// [`SelectionError`] if a share is not 0 to 1, or if `discard` and `keep` are more than 1 together.
     pub fn check(&self) -> Result<(), SelectionError> {
         let &Self { discard, keep, half_of_rest } = self;
         let shares = [discard, keep, half_of_rest, discard + keep];
-        // Shares such as 0.15 and 0.85 may sum to a little more than 1.
+
+        // The sum of shares such as 0.15 and 0.85 may round to a little more than 1.
         let ok = shares.iter().all(|share| (0.0..=1.0 + SLACK).contains(share));
         if ok {
             Ok(())
@@ -71,53 +72,57 @@ impl Selection {
         }
     }
 
-    /// The share of a pool that stays in all: 0.725 by default.
+    /// Returns the whole share of a pool that stays: 0.725 by default.
     pub fn share(&self) -> f64 {
         self.keep + self.half_of_rest * (1.0 - self.discard - self.keep).max(0.0)
     }
 
-    /// How many of a pool of `n` views go for the lowest scores; the others that go are not drawn from the
-    /// rest.
+    /// Returns how many views of a pool of `n` go for having the lowest scores. The draw from the rest leaves
+    /// out more.
     pub fn discarded(&self, n: usize) -> usize {
         self.counts(n).discard
     }
 
-    /// How many of a pool of `n` views stay for the highest scores; the others that stay are drawn from the
-    /// rest.
+    /// Returns how many views of a pool of `n` stay for having the highest scores. The draw from the rest
+    /// adds more.
     pub fn certain(&self, n: usize) -> usize {
         self.counts(n).keep
     }
 
     fn counts(&self, n: usize) -> Counts {
-        let of = |share: f64| share * n as f64 + SLACK;
-        let discard = (of(self.discard).floor() as usize).min(n);
-        let keep = ((of(self.keep) + 0.5).floor() as usize).min(n - discard);
-        let stay = ((of(self.share()) + 0.5).floor() as usize).clamp(keep, n - discard);
+        let discard = (share_of(n, self.discard).floor() as usize).min(n);
+        let keep = ((share_of(n, self.keep) + 0.5).floor() as usize).min(n - discard);
+        let stay = ((share_of(n, self.share()) + 0.5).floor() as usize).clamp(keep, n - discard);
         Counts { discard, keep, draw: stay - keep }
     }
 }
 
-/// What a share of a count may miss by rounding: 0.15 · 20 counts as 3.
+/// The rounding error allowed in a share of a count: 0.15 · 20 counts as 3.
 const SLACK: f64 = 1e-9;
+
+fn share_of(n: usize, share: f64) -> f64 {
+    share * n as f64 + SLACK
+}
 
 /// The deviation of the half-normal weight of the middle scores.
 const WEIGHT_SIGMA: f64 = 0.5;
 
-/// Selects from one pool of views: whether each of `scores` stays.
+/// Selects from one pool of views. Returns for each of `scores` whether its view stays.
 ///
-/// Of n views, the `discard`·n with the lowest scores go (rounded down) and the `keep`·n with the highest
-/// stay (rounded to the nearest, halves up). From the rest so many are drawn that [`Selection::share`]·n
-/// stay in all (rounded likewise): 72.5 % of any pool, to half a view. Of two equal scores the one with the
-/// smaller index counts as the higher.
+/// In a pool of n views, the `discard`·n views with the lowest scores go (rounded down), and the `keep`·n
+/// views with the highest scores stay (rounded to the nearest, halves up). A draw from the rest fills up to
+/// [`Selection::share`]·n views (rounded likewise), so 72.5 % of any pool stay, to half a view. If two scores
+/// are equal, the smaller index counts as the higher score.
 ///
-/// The draw is without replacement. "Half-normal with mean 1 and deviation ½ on the entropy scaled to
-/// \[0, 1\]" is read as the lower half of that normal distribution: a view of score e has the weight
-/// exp(−(s − 1)² / (2·½²)), with s = e / (the pool's highest score), 1 at the top and e⁻² = 0.135
-/// at s = 0. (If all scores are 0, all weights are equal.) By the method of Efraimidis and Spirakis (2006),
-/// view i gets the key ln(uᵢ) / weightᵢ, and the largest keys stay; uᵢ, in (0, 1], is from the i-th 64
-/// bits of a ChaCha8 stream keyed by `seed`. So the draw has one result, in whatever order keys are computed,
-/// but it knows a view by its index: see [`select_pooled`](crate::select_pooled) for views that are known by
-/// name.
+/// The draw is without replacement. The paper says "half-normal with mean 1 and deviation ½ on the entropy
+/// scaled to \[0, 1\]". We take the lower half of that normal distribution: a view of score e has the weight
+/// exp(−(s − 1)² / (2·½²)), where s is e divided by the highest score of the pool. The weight is 1 at s = 1
+/// and e⁻² = 0.135 at s = 0. If all scores are 0, all weights are equal.
+///
+/// By the method of Efraimidis and Spirakis (2006), view i gets the key ln(uᵢ) / weightᵢ, and the views with
+/// the largest keys stay. The number uᵢ, in (0, 1], comes from the i-th 64 bits of a ChaCha8 stream keyed by
+/// `seed`. The result therefore does not depend on the order in which keys are computed, but it depends on
+/// the index of a view. [`select_pooled`](crate::select_pooled) selects views by name instead.
 ///
 /// # Panics
 /// If a score is negative or not finite, or [`Selection::check`] fails.
@@ -139,6 +144,7 @@ pub fn select(scores: &[f64], options: &Selection, seed: u64) -> Vec<bool> {
     if let Some(i) = scores.iter().position(|s| !(s.is_finite() && *s >= 0.0)) {
         panic!("score {i} is {}: scores are finite and not negative", scores[i]);
     }
+
     let counts = options.counts(scores.len());
     let mut ranked: Vec<usize> = (0..scores.len()).collect();
     ranked.sort_unstable_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
@@ -148,13 +154,17 @@ pub fn select(scores: &[f64], options: &Selection, seed: u64) -> Vec<bool> {
     let middle = &rest[..rest.len() - counts.discard];
     top.iter().for_each(|&i| stays[i] = true);
 
+    // The draw from the middle.
     let highest = ranked.first().map_or(0.0, |&i| scores[i]);
     let mut rng = stream(*b"pick", seed, "", 0);
     let uniforms: Vec<f64> = scores.iter().map(|_| uniform_above_zero(&mut rng)).collect();
-    let key = |i: usize| libm::log(uniforms[i]) / weight(scores[i], highest);
-    let mut drawn: Vec<(f64, usize)> = middle.iter().map(|&i| (key(i), i)).collect();
+    let mut drawn: Vec<(f64, usize)> = middle
+        .iter()
+        .map(|&i| (libm::log(uniforms[i]) / weight(scores[i], highest), i))
+        .collect();
     drawn.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     drawn[..counts.draw].iter().for_each(|&(_, i)| stays[i] = true);
+
     stays
 }
 
@@ -197,8 +207,8 @@ mod tests {
             assert_eq!(Selection::default().discarded(n), (0.15 * n as f64 + 1e-9) as usize);
             let mut ranked: Vec<usize> = (0..n).collect();
             ranked.sort_by(|&a, &b| scores[b].partial_cmp(&scores[a]).unwrap().then(a.cmp(&b)));
-            let (top, bottom) =
-                ((0.6 * n as f64 + 0.5 + 1e-9) as usize, n - (0.15 * n as f64 + 1e-9) as usize);
+            let top = (0.6 * n as f64 + 0.5 + 1e-9) as usize;
+            let bottom = n - (0.15 * n as f64 + 1e-9) as usize;
             assert!(ranked[..top].iter().all(|&i| stays[i]), "{n}");
             assert!(!ranked[bottom..].iter().any(|&i| stays[i]), "{n}");
         }
@@ -217,8 +227,8 @@ mod tests {
         assert_eq!(select(&[0.0, 2.0, 1.0], &Selection::default(), 1), [false, true, true]);
     }
 
-    /// The plain way: the probability that each item is among `draw` that are drawn one after the other, each
-    /// time in proportion to the weights of those left.
+    /// The plain reference: the probability of each item to be among `draw` items that are drawn one after
+    /// the other, each in proportion to the weights of the items left.
     fn inclusion(weights: &[f64], draw: usize) -> Vec<f64> {
         fn go(weights: &[f64], taken: &mut Vec<usize>, draw: usize, p: f64, out: &mut [f64]) {
             if draw == 0 {
@@ -236,6 +246,7 @@ mod tests {
                 }
             }
         }
+
         let mut out = vec![0.0; weights.len()];
         go(weights, &mut Vec::new(), draw, 1.0, &mut out);
         out
@@ -243,7 +254,7 @@ mod tests {
 
     #[test]
     fn the_middle_is_drawn_as_one_after_the_other() {
-        // 20 views: ranks 12 to 16 are the middle, 3 of its 5 stay.
+        // 20 views. Ranks 12 to 16 are the middle, and 3 of its 5 views stay.
         let mut scores = vec![2.0; 12];
         scores.extend([1.9, 1.4, 0.9, 0.4, 0.1]);
         scores.extend([0.0; 3]);
@@ -252,6 +263,7 @@ mod tests {
             .map(|e| f64::exp(-(e / 2.0 - 1.0f64).powi(2) / 0.5))
             .collect();
         let expected = inclusion(&weights, 3);
+
         let seeds = 20_000;
         let mut counts = [0u32; 5];
         for seed in 0..seeds {
@@ -259,6 +271,7 @@ mod tests {
             assert_eq!(kept(&stays), 15);
             (0..5).for_each(|i| counts[i] += u32::from(stays[12 + i]));
         }
+
         for (&count, &p) in counts.iter().zip(&expected) {
             let deviation = (p * (1.0 - p) * seeds as f64).sqrt();
             let off = (f64::from(count) - p * seeds as f64) / deviation;
@@ -270,14 +283,15 @@ mod tests {
     #[test]
     fn higher_scores_of_the_middle_stay_more_often() {
         let scores: Vec<f64> = (0..1000).map(f64::from).collect();
-        let (mut lower, mut upper) = (0, 0);
+        let mut lower = 0;
+        let mut upper = 0;
         for seed in 0..50 {
             let stays = select(&scores, &Selection::default(), seed);
             lower += kept(&stays[150..275]);
             upper += kept(&stays[275..400]);
         }
         assert_eq!(lower + upper, 50 * 125);
-        // By chance alone, each is 3125 with a deviation below 40.
+        // With equal weights each would be 3125, with a deviation below 40.
         assert!(upper > 3125 + 160, "{upper}");
     }
 
@@ -311,7 +325,7 @@ mod tests {
         let scores: Vec<f64> = (0..72).map(|i| f64::from(i * 29 % 72) / 30.0).collect();
         let stays = select(&scores, &Selection::default(), 42);
         let drawn: Vec<i32> = (0..72).filter(|&i| stays[i as usize] && i * 29 % 72 < 29).collect();
-        // Computed by a second program from the description at select.
+        // Computed by a second program, from the description of `select`.
         assert_eq!(drawn, [8, 13, 28, 53, 55, 58, 63, 68, 70]);
         assert_ne!(select(&scores, &Selection::default(), 43), stays);
     }
@@ -327,7 +341,8 @@ mod tests {
             let counts = options.counts(scores.len());
             prop_assert_eq!(kept(&stays), counts.keep + counts.draw);
             prop_assert_eq!(&select(&scores, &options, seed), &stays);
-            // None of the lowest stays, and none of the highest goes.
+
+            // None of the lowest scores stays, and none of the highest goes.
             let mut sorted = scores.clone();
             sorted.sort_by(f64::total_cmp);
             for (score, stays) in scores.iter().zip(&stays) {

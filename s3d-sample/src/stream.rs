@@ -1,16 +1,16 @@
 //! Streams of random numbers, each for one unit of work.
 //!
-//! A number is never drawn from a generator that several units share: each unit's generator follows from the
-//! seed and the unit's name alone, so that neither threads nor order nor what else is drawn can change it.
+//! Units never share a generator. The generator of a unit follows from the seed and the name of the unit
+//! alone, so threads, order and other draws cannot change its numbers.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The random numbers of the unit of work that `purpose`, `seed`, `name` and `number` name.
+/// Returns the generator of the unit of work that `purpose`, `seed`, `name` and `number` name.
 ///
-/// A ChaCha generator of 8 rounds, counter and nonce 0, with the 32-byte key: `seed` (8 bytes), `number` (4
-/// bytes), `purpose` (4 bytes), the FNV-1a hash of `name`'s UTF-8 (16 bytes); integers little-endian. This
-/// layout is part of what a seed means: to change it changes every data set.
+/// It is ChaCha with 8 rounds, counter and nonce 0. The 32-byte key holds `seed` (8 bytes), `number` (4
+/// bytes), `purpose` (4 bytes) and the FNV-1a hash of `name` in UTF-8 (16 bytes); integers are little-endian.
+/// A change of this layout changes every data set.
 pub(crate) fn stream(purpose: [u8; 4], seed: u64, name: &str, number: u32) -> ChaCha8Rng {
     let mut key = [0; 32];
     key[..8].copy_from_slice(&seed.to_le_bytes());
@@ -20,7 +20,7 @@ pub(crate) fn stream(purpose: [u8; 4], seed: u64, name: &str, number: u32) -> Ch
     ChaCha8Rng::from_seed(key)
 }
 
-/// The 128-bit FNV-1a hash (draft-eastlake-fnv). ChaCha spreads its bits; it has only to tell names apart.
+/// The 128-bit FNV-1a hash (draft-eastlake-fnv). It only has to tell names apart: ChaCha spreads the bits.
 fn fnv1a_128(bytes: &[u8]) -> u128 {
     const OFFSET_BASIS: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = (1 << 88) + 0x13b;
@@ -29,23 +29,23 @@ fn fnv1a_128(bytes: &[u8]) -> u128 {
         .fold(OFFSET_BASIS, |hash, &byte| (hash ^ u128::from(byte)).wrapping_mul(PRIME))
 }
 
-/// Uniform in [0, 1): the upper 53 bits of the next 64, as a fraction.
+/// Draws a number uniform in [0, 1): the upper 53 bits of the next 64, as a fraction.
 pub(crate) fn uniform(rng: &mut ChaCha8Rng) -> f64 {
     fraction(rng.next_u64() >> 11)
 }
 
-/// Uniform in (0, 1]: for logarithms.
+/// Draws a number uniform in (0, 1], for logarithms.
 pub(crate) fn uniform_above_zero(rng: &mut ChaCha8Rng) -> f64 {
     fraction((rng.next_u64() >> 11) + 1)
 }
 
 fn fraction(bits: u64) -> f64 {
-    // At most 2⁵³, so exact.
+    // `bits` is at most 2⁵³, so the conversion is exact.
     bits as f64 / (1u64 << 53) as f64
 }
 
-/// Normal with mean 0 and deviation 1, by Box and Muller: two uniform numbers a call, of which the first
-/// gives the radius; the second normal number that they could give is not used.
+/// Draws a normal number with mean 0 and deviation 1 by the method of Box and Muller. A call takes two
+/// uniform numbers; the first gives the radius. The second normal number that they could give is not used.
 pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * libm::log(uniform_above_zero(rng))).sqrt();
     radius * libm::cos(2.0 * std::f64::consts::PI * uniform(rng))

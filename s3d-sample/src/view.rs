@@ -5,10 +5,10 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
 use thiserror::Error;
 
-/// How many candidate views a scan location has: 3 × 24. Source: formats.md, "Views".
+/// The number of candidate views of a scan location: 3 × 24. Source: formats.md, "Views".
 pub const CANDIDATES_PER_LOCATION: u32 = 72;
 
-/// From what views are drawn. The yaw is always uniform, the roll always 0. Source: formats.md, "Views".
+/// The distribution of views. The yaw is always uniform, the roll always 0. Source: formats.md, "Views".
 ///
 /// ```
 /// use s3d_sample::ViewDistribution;
@@ -22,25 +22,26 @@ pub const CANDIDATES_PER_LOCATION: u32 = 72;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewDistribution {
-    /// The deviation of the pitch, whose mean is 0; 0 to 360 degrees.
+    /// The standard deviation of the pitch, 0 to 360 degrees. The mean is 0.
     pub pitch_sigma_deg: f64,
-    /// The widest horizontal angle of view, the mode of the half-normal distribution; below 180 degrees.
+    /// The widest horizontal angle of view, below 180 degrees. It is the mode of the half-normal
+    /// distribution.
     pub fov_max_deg: f64,
-    /// The deviation of the normal distribution whose amount is taken from the widest angle; 0 to 360
-    /// degrees.
+    /// The standard deviation σ of the angle of view, `fov_max_deg − |N(0, σ)|`; 0 to 360 degrees.
     pub fov_sigma_deg: f64,
-    /// The narrowest angle: anything below is drawn again. Above 0.
+    /// The narrowest horizontal angle of view, above 0 degrees. A smaller angle is drawn again.
     pub fov_min_deg: f64,
 }
 
 impl Default for ViewDistribution {
-    /// The paper's: pitch N(0, 15°), angle of view 75° − |N(0, 30°)|; and at least 10°, which is ours.
+    /// The distribution of the paper: pitch N(0, 15°) and angle of view 75° − |N(0, 30°)|. The lower limit of
+    /// 10° is our addition.
     fn default() -> Self {
         Self { pitch_sigma_deg: 15.0, fov_max_deg: 75.0, fov_sigma_deg: 30.0, fov_min_deg: 10.0 }
     }
 }
 
-/// Why no view can be drawn from a [`ViewDistribution`].
+/// The reason why no view can be drawn from a [`ViewDistribution`].
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum DistributionError {
@@ -66,10 +67,10 @@ pub enum DistributionError {
 }
 
 impl ViewDistribution {
-    /// Whether views can be drawn from it.
+    /// Checks that views can be drawn.
     ///
     /// # Errors
-    /// [`DistributionError`] names the first field that is wrong.
+    /// [`DistributionError`] for the first field that is out of range.
     pub fn check(&self) -> Result<(), DistributionError> {
         let sigmas = [("pitch_sigma_deg", self.pitch_sigma_deg), ("fov_sigma_deg", self.fov_sigma_deg)];
         for (name, value) in sigmas {
@@ -77,7 +78,9 @@ impl ViewDistribution {
                 return Err(DistributionError::Sigma { name, value });
             }
         }
-        let (min, max) = (self.fov_min_deg, self.fov_max_deg);
+
+        let min = self.fov_min_deg;
+        let max = self.fov_max_deg;
         if min > 0.0 && min <= max && max < 180.0 {
             Ok(())
         } else {
@@ -86,8 +89,8 @@ impl ViewDistribution {
     }
 }
 
-/// A view from a scan location, relative to its original camera: `E(final) = E(original) · Ry(yaw) ·
-/// Rx(pitch)`, no roll. Source: formats.md, "Views".
+/// A view from a scan location, relative to the original camera of the location: `E(final) = E(original) ·
+/// Ry(yaw) · Rx(pitch)`, without roll. Source: formats.md, "Views".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Turn about the vertical, in [−π, π).
@@ -100,11 +103,13 @@ pub struct View {
 
 /// Draws view `number` of the scan location whose camera has the uuid `location`.
 ///
-/// The view depends on nothing but the arguments: each has a stream of random numbers of its own (ChaCha8;
-/// its key is `seed` in 8 bytes, `number` in 4, `view` in ASCII, and the 128-bit FNV-1a hash of `location`,
-/// little-endian). From it come in turn the yaw, uniform in [−180°, 180°); the pitch, normal by Box and
-/// Muller, drawn again (2 in 10⁹) if the camera would tip over, at 90° or more up or down; and the angle of
-/// view, `fov_max − |normal|`, drawn again below `fov_min`.
+/// The view depends on the arguments alone, because every view has its own stream of random numbers. The
+/// stream is ChaCha8, with the key `seed` in 8 bytes, `number` in 4, `view` in ASCII, and the 128-bit FNV-1a
+/// hash of `location`, all little-endian. It gives, in this order:
+/// - the yaw, uniform in [−180°, 180°);
+/// - the pitch, normal by the method of Box and Muller. It is drawn again (2 in 10⁹) if the camera would tip
+///   over, at 90° or more up or down;
+/// - the angle of view, `fov_max − |normal|`. It is drawn again below `fov_min`.
 ///
 /// # Panics
 /// If [`ViewDistribution::check`] fails.
@@ -123,8 +128,10 @@ pub fn draw_view(dist: &ViewDistribution, seed: u64, location: &str, number: u32
     if let Err(error) = dist.check() {
         panic!("{error}");
     }
+
     let mut rng = stream(*b"view", seed, location, number);
     let yaw_rad = yaw_from_uniform(uniform(&mut rng));
+
     let pitch_sigma_rad = dist.pitch_sigma_deg.to_radians();
     let pitch_rad = loop {
         let pitch_rad = pitch_sigma_rad * normal(&mut rng);
@@ -132,6 +139,7 @@ pub fn draw_view(dist: &ViewDistribution, seed: u64, location: &str, number: u32
             break pitch_rad;
         }
     };
+
     let range_deg = dist.fov_max_deg - dist.fov_min_deg;
     let fov_deg = dist.fov_max_deg - half_normal_within(&mut rng, dist.fov_sigma_deg, range_deg);
     View { yaw_rad, pitch_rad, fov_rad: fov_deg.max(dist.fov_min_deg).to_radians() }
@@ -141,15 +149,15 @@ fn yaw_from_uniform(u: f64) -> f64 {
     -PI + 2.0 * PI * u
 }
 
-/// |N(0, `sigma`)|, drawn again above `range`.
+/// Draws |N(0, `sigma`)|, again if it is above `range`.
 fn half_normal_within(rng: &mut ChaCha8Rng, sigma: f64, range: f64) -> f64 {
     if sigma == 0.0 {
         return 0.0;
     }
     loop {
         let x = if range < sigma {
-            // The same distribution without the many draws that a short range would reject, endless for an
-            // empty one.
+            // The same distribution, by a method that rejects few draws. The other would reject most draws
+            // for a short range, and all for an empty one.
             let x = range * uniform(rng);
             let density = libm::exp(-0.5 * (x / sigma) * (x / sigma));
             if uniform_above_zero(rng) <= density {
@@ -174,8 +182,8 @@ mod tests {
 
     const DRAWS: u32 = 40_000;
 
-    /// The largest distance between the distribution of `values` and its exact `cdf`, in units of 1/√n.
-    /// Kolmogorov's distribution exceeds 1.9495 with probability 0.001.
+    /// Returns the largest distance between the distribution of `values` and the exact distribution `cdf`, in
+    /// units of 1/√n. Kolmogorov's distribution exceeds 1.9495 with probability 0.001.
     fn kolmogorov(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
         values.sort_by(f64::total_cmp);
         let n = values.len() as f64;
@@ -192,7 +200,7 @@ mod tests {
         0.5 * (1.0 + libm::erf(x / SQRT_2))
     }
 
-    /// The distribution of `max − |N(0, sigma)|` where that is at least `min`.
+    /// The distribution of `max − |N(0, sigma)|`, given that it is at least `min`.
     fn fov_cdf(dist: &ViewDistribution, fov_deg: f64) -> f64 {
         let within = |x: f64| libm::erf(x / (dist.fov_sigma_deg * SQRT_2));
         1.0 - within(dist.fov_max_deg - fov_deg) / within(dist.fov_max_deg - dist.fov_min_deg)
@@ -237,8 +245,8 @@ mod tests {
         assert!(kolmogorov(fov, |x| fov_cdf(&untruncated, x)) > CRITICAL);
     }
 
-    /// Whether two columns are independent: χ² over 8 × 8 cells of equal probability. 49 degrees of freedom:
-    /// above 85.35 with probability 0.001.
+    /// Returns the χ² statistic of independence of two columns, over 8 × 8 cells of equal probability. With
+    /// 49 degrees of freedom it exceeds 85.35 with probability 0.001.
     fn chi_square(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
         let mut cells = [0u32; 64];
         let mut n = 0.0;
@@ -264,11 +272,13 @@ mod tests {
             let pitch = normal_cdf(v.pitch_rad.to_degrees() / dist.pitch_sigma_deg);
             [(v.yaw_rad + PI) / (2.0 * PI), pitch, fov_cdf(&dist, v.fov_rad.to_degrees())]
         };
+
         let here: Vec<[f64; 3]> = draws(&dist, 1).iter().map(ranks).collect();
         let next_seed: Vec<[f64; 3]> = draws(&dist, 2).iter().map(ranks).collect();
         let next_place: Vec<[f64; 3]> = (0..DRAWS)
             .map(|i| ranks(&draw_view(&dist, 1, "8eb9955b866b4b5f74abb1071416c629", i)))
             .collect();
+
         for a in 0..3 {
             for b in 0..3 {
                 let with = |other: &[[f64; 3]]| chi_square(here.iter().zip(other).map(|(x, y)| (x[a], y[b])));
@@ -287,8 +297,8 @@ mod tests {
     #[test]
     fn draws_are_the_same_for_ever() {
         // Yaw, pitch and angle of view in millionths of a degree, computed by a second program from the
-        // description at draw_view. Other values mean that every seed means another data set: if that is
-        // wanted, say so in the changelog.
+        // description of `draw_view`. Other values mean that every seed gives another data set. A change that
+        // wants that says so in the changelog.
         let dist = ViewDistribution::default();
         let micro =
             |v: View| [v.yaw_rad, v.pitch_rad, v.fov_rad].map(|rad| (rad.to_degrees() * 1e6).round() as i64);
@@ -347,7 +357,8 @@ mod tests {
             pitch in 0f64..=360.0, sigma in 0f64..=360.0, a in 0.1f64..179.9, b in 0.1f64..179.9,
             seed: u64, location in ".{0,40}", number: u32,
         ) {
-            let (min, max) = (a.min(b), a.max(b));
+            let min = a.min(b);
+            let max = a.max(b);
             let dist = ViewDistribution {
                 pitch_sigma_deg: pitch, fov_max_deg: max, fov_sigma_deg: sigma, fov_min_deg: min,
             };

@@ -1,30 +1,57 @@
-//! Which vector instructions a program uses, decided in one place.
+//! Chooses the vector instructions of a program, in one place.
 //!
-//! [`level`] is the highest that the processor has, and at most what the environment variable `S3D_SIMD`
-//! names. [`dispatch!`] runs work with it: the work is compiled once for each level, and given a value
-//! ([`Scalar`], [`Avx2`], [`Avx512`]) that exists only where the processor has what it stands for. What the
-//! work calls in its loops is `#[inline(always)]`, or it is compiled for any processor, and called.
+//! # Levels
 //!
-//! Own code, since libraries that offer this (`fearless_simd`, `pulp`) bring registers of their own, which
-//! cost time in the kernels that count: see `docs/performance.md`.
+//! [`level`] returns the highest [`Level`] that the processor has. The environment variable `S3D_SIMD` can
+//! hold it down: see [`SimdLevel`]. All levels give the same bytes.
+//!
+//! # Dispatch
+//!
+//! [`dispatch!`] compiles an expression once for each level and runs it at one. The expression gets a proof
+//! ([`Scalar`], [`Avx2`], [`Avx512`]): a value that exists only if the processor has these instructions.
+//!
+//! Every function that the expression calls in a loop must be `#[inline(always)]`. Otherwise the compiler may
+//! compile it for any processor and call it.
+//!
+//! ```
+//! use s3d_simd::{Level, dispatch, level};
+//!
+//! #[inline(always)]
+//! fn sum(values: &[u32]) -> u32 {
+//!     values.iter().sum()
+//! }
+//!
+//! let values: Vec<u32> = (0..1000).collect();
+//! assert_eq!(dispatch!(level(), _simd => sum(&values)), 499_500);
+//!
+//! // A test holds every level against the plain one.
+//! for level in Level::all() {
+//!     assert_eq!(dispatch!(level, _simd => sum(&values)), 499_500);
+//! }
+//! ```
+//!
+//! # Why not a library
+//!
+//! Libraries that offer this (`fearless_simd`, `pulp`) bring register types of their own, which cost time in
+//! our hottest kernels: see `docs/performance.md`.
 
 use std::fmt;
 use std::sync::OnceLock;
 
-/// The environment variable that holds kernels to a level: see [`SimdLevel`].
+/// The environment variable that limits the level: see [`SimdLevel`].
 const VARIABLE: &str = "S3D_SIMD";
 
-/// Vector instructions. All levels give the same bytes.
+/// A level of vector instructions. All levels give the same bytes.
 ///
-/// The highest that the processor has is used. The environment variable `S3D_SIMD`, read when the first
-/// kernel runs, holds the program to a lower one: `scalar` or `avx2`. A level that the processor lacks, and
-/// any other value, changes nothing.
+/// A program uses the highest level that the processor has. The environment variable `S3D_SIMD`, read when
+/// the first kernel runs, limits it to a lower one: `scalar` or `avx2`. A level that the processor lacks
+/// changes nothing, nor does any other value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum SimdLevel {
-    /// What every processor of the target has.
+    /// The instructions that every processor of the target has.
     Scalar,
-    /// x86-64-v3: AVX2 and what comes with it.
+    /// x86-64-v3: AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
     Avx2,
     /// x86-64-v4 and AVX512-VNNI.
     Avx512,
@@ -33,7 +60,7 @@ pub enum SimdLevel {
 impl SimdLevel {
     const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
 
-    /// The level in use.
+    /// Returns the level in use.
     ///
     /// ```
     /// assert!(["scalar", "avx2", "avx512"].contains(&s3d_simd::SimdLevel::used().name()));
@@ -42,7 +69,7 @@ impl SimdLevel {
         level().name()
     }
 
-    /// As `S3D_SIMD` takes it.
+    /// Returns the name of the level, as in `S3D_SIMD`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
@@ -67,14 +94,14 @@ pub struct Scalar;
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(());
 
-/// Proof that the processor has what [`Avx2`] stands for, and AVX-512 F, BW, DQ, VL and VNNI.
+/// Proof that the processor has the instructions of [`Avx2`], and AVX-512 F, BW, DQ, VL and VNNI.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
 pub struct Avx512(());
 
 #[cfg(target_arch = "x86_64")]
 impl Avx2 {
-    /// The proof, if the processor has it all.
+    /// Returns the proof, or `None` if the processor lacks any of these instructions.
     pub fn detect() -> Option<Self> {
         use std::arch::is_x86_feature_detected as has;
         let all = has!("avx2")
@@ -102,7 +129,7 @@ impl Avx2 {
 
 #[cfg(target_arch = "x86_64")]
 impl Avx512 {
-    /// The proof, if the processor has it all.
+    /// Returns the proof, or `None` if the processor lacks any of these instructions.
     pub fn detect() -> Option<Self> {
         use std::arch::is_x86_feature_detected as has;
         let all = Avx2::detect().is_some()
@@ -114,7 +141,7 @@ impl Avx512 {
         all.then_some(Self(()))
     }
 
-    /// Whoever has these has those.
+    /// Returns the proof of the lower level, which this one includes.
     #[inline(always)]
     pub fn avx2(self) -> Avx2 {
         Avx2(())
@@ -138,7 +165,7 @@ impl Avx512 {
 /// A level and the proof that the processor has it.
 #[derive(Clone, Copy, Debug)]
 pub enum Level {
-    /// The plain form, which defines results.
+    /// The plain form, which defines the results.
     Scalar(Scalar),
     /// See [`Avx2`].
     #[cfg(target_arch = "x86_64")]
@@ -149,7 +176,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// Its name.
+    /// Returns the level without its proof.
     pub fn name(self) -> SimdLevel {
         match self {
             Self::Scalar(_) => SimdLevel::Scalar,
@@ -160,14 +187,18 @@ impl Level {
         }
     }
 
-    /// The highest that the processor has and that is not above `most`.
+    /// Returns the highest level that the processor has, but not above `most`.
     fn best(most: SimdLevel) -> Self {
         #[cfg(target_arch = "x86_64")]
         {
-            if let (true, Some(proof)) = (most >= SimdLevel::Avx512, Avx512::detect()) {
+            if most >= SimdLevel::Avx512
+                && let Some(proof) = Avx512::detect()
+            {
                 return Self::Avx512(proof);
             }
-            if let (true, Some(proof)) = (most >= SimdLevel::Avx2, Avx2::detect()) {
+            if most >= SimdLevel::Avx2
+                && let Some(proof) = Avx2::detect()
+            {
                 return Self::Avx2(proof);
             }
         }
@@ -175,7 +206,7 @@ impl Level {
         Self::Scalar(Scalar)
     }
 
-    /// This one, or AVX2 where that is lower: for what gains nothing from wider registers.
+    /// Returns this level, but AVX2 instead of AVX-512: for work that gains nothing from wider registers.
     #[inline]
     pub fn without_avx512(self) -> Self {
         match self {
@@ -185,8 +216,8 @@ impl Level {
         }
     }
 
-    /// All levels that the processor has, whatever the environment says: tests hold each to the first, the
-    /// plain one.
+    /// Returns all levels that the processor has, whatever the environment says. The plain level is the
+    /// first. For tests, which hold each level against the plain one.
     pub fn all() -> Vec<Self> {
         let mut levels: Vec<Self> = SimdLevel::ALL.into_iter().map(Self::best).collect();
         levels.dedup_by_key(|level| level.name());
@@ -194,21 +225,21 @@ impl Level {
     }
 }
 
-/// The level that a value of [`VARIABLE`] allows at most.
+/// Returns the highest level that a value of [`VARIABLE`] allows.
 fn allowed(value: Option<&str>) -> SimdLevel {
     let named = |level: &SimdLevel| value == Some(level.name());
     SimdLevel::ALL.into_iter().find(named).unwrap_or(SimdLevel::Avx512)
 }
 
-/// The level in use.
+/// Returns the level in use, with its proof.
 #[inline]
 pub fn level() -> Level {
     static LEVEL: OnceLock<Level> = OnceLock::new();
     *LEVEL.get_or_init(|| Level::best(allowed(std::env::var(VARIABLE).ok().as_deref())))
 }
 
-/// Asks for the cache line in which `thing` begins: it is on its way from memory while there is something else
-/// to do. Changes no result; does nothing on processors other than x86-64.
+/// Prefetches the cache line in which `thing` begins, so that it arrives from memory while the program does
+/// something else. It changes no result, and does nothing on processors other than x86-64.
 #[inline(always)]
 pub fn prefetch<T>(thing: &T) {
     #[cfg(target_arch = "x86_64")]
@@ -222,9 +253,10 @@ pub fn prefetch<T>(thing: &T) {
     let _ = thing;
 }
 
-/// `dispatch!(level, simd => work)` is `work`, an expression, compiled for each [`Level`] and run for one.
-/// In it `simd` is the level's proof. Every function that `work` calls in its loops must be
-/// `#[inline(always)]`.
+/// Runs an expression at a [`Level`]: `dispatch!(level, simd => work)` is the value of `work`.
+///
+/// The expression is compiled once for each level. In it, `simd` is the proof of the level. Every function
+/// that `work` calls in its loops must be `#[inline(always)]`.
 #[macro_export]
 macro_rules! dispatch {
     ($level:expr, $simd:ident => $work:expr) => {

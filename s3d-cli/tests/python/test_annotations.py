@@ -124,7 +124,7 @@ def test_las_offset_and_unlabelled_points(export, points, reference, tmp_path):
     # Without a room in the file, what is not said stops.
     table = '[annotations]\npath = "all.laz"\nclass = "label"\noffset_m = [1000, -2000, 3]\nroom = "office_1"\n'
     message = export(table, code=1)
-    assert "all.laz" in message and "classes that are none of the 13" in message and "[annotations.classes]" in message
+    assert "all.laz" in message and "classes that are not among the 13" in message and "[annotations.classes]" in message
     only = [(c, 100 * r + k) for r in range(len(names)) for k, c in enumerate(CLASSES)]
     keys = "".join(f'"{code}" = "{c if code < 100 else ""}"\n' for c, code in only) + '"999" = ""\n'
     found = export(table + "[annotations.classes]\n" + keys)

@@ -1,4 +1,4 @@
-//! From the bits of a stream to bytes.
+//! Decodes the bits of a stream into bytes.
 
 use super::table::{
     Alphabet, DISTANCE_BITS, DISTANCE_SIZE, Entry, LENGTHS_BITS, LENGTHS_SIZE, LITLEN_BITS, LITLEN_SIZE,
@@ -7,12 +7,12 @@ use super::table::{
 use crate::Error;
 use crate::alphabet::LONGEST_MATCH;
 
-/// Bytes of the stream that a round of the fast loop may look at: two words.
+/// The number of bytes of the stream that a round of the fast loop may read: two words.
 const INPUT: usize = 16;
-/// Bytes that it may write, some of which are overwritten later: literals, and a match with what its last
-/// pattern writes beyond it.
+/// The number of bytes that a round may write: literals, a match, and the excess of its last pattern, which
+/// is overwritten later.
 const OUTPUT: usize = 8 + LONGEST_MATCH + PATTERN;
-/// Bytes that are written at once.
+/// The number of bytes that are written at once.
 const PATTERN: usize = 32;
 
 /// The order in which the lengths of the codes of code lengths are stored (3.2.7).
@@ -21,26 +21,26 @@ const ORDER: [usize; 19] = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 
 type Litlen = Table<LITLEN_SIZE>;
 type Distance = Table<DISTANCE_SIZE>;
 
-/// A stream, and how far it is read.
+/// A stream that is being read.
 pub(super) struct Decoder<'a> {
     stream: &'a [u8],
-    /// The byte that is read next.
+    /// The place of the next byte to read.
     at: usize,
-    /// The next bits, lowest first: `count` of them, and above them, if anything, those that follow.
+    /// The next bits, lowest first. `count` of them are valid. The bits above are 0 or the bits that follow.
     bits: u64,
     count: u32,
     out: &'a mut [u8],
-    /// The byte that is written next.
+    /// The place of the next byte to write.
     to: usize,
 }
 
 impl<'a> Decoder<'a> {
-    /// Behind the head (RFC 1950, 2.2).
+    /// Reads the header (RFC 1950, 2.2).
     pub(super) fn new(stream: &'a [u8], out: &'a mut [u8]) -> Result<Self, Error> {
         let Some(([method, flags], _)) = stream.split_first_chunk() else { return Err(ends_early()) };
         if method & 0x0f != 8 || method >> 4 > 7 || !u16::from_be_bytes([*method, *flags]).is_multiple_of(31)
         {
-            return Err(Error::damaged("it does not begin like one"));
+            return Err(Error::damaged("its header is invalid"));
         }
         if flags & 0x20 != 0 {
             return Err(Error::damaged("it wants a dictionary"));
@@ -48,21 +48,24 @@ impl<'a> Decoder<'a> {
         Ok(Self { stream, at: 2, bits: 0, count: 0, out, to: 0 })
     }
 
-    /// Whether the block that begins is the last one, and of which kind it is.
+    /// Reads the first bits of a block. Returns whether it is the last one, and its kind.
     pub(super) fn block(&mut self) -> Result<(bool, u64), Error> {
         let bits = self.take(3)?;
         Ok((bits & 1 != 0, bits >> 1))
     }
 
-    /// Fills `bits` as far as the stream goes.
+    /// Fills `bits`, as far as the stream goes.
     #[inline(always)]
     fn fill(&mut self) {
         if self.at + 8 <= self.stream.len() {
             return fill(self.stream, &mut self.at, &mut self.bits, &mut self.count);
         }
-        while let (true, Some(byte)) = (self.count < 56, self.stream.get(self.at)) {
+        while self.count < 56
+            && let Some(byte) = self.stream.get(self.at)
+        {
             self.bits |= u64::from(*byte) << self.count;
-            (self.at, self.count) = (self.at + 1, self.count + 8);
+            self.at += 1;
+            self.count += 8;
         }
     }
 
@@ -79,29 +82,32 @@ impl<'a> Decoder<'a> {
         Ok(())
     }
 
-    /// A block that is not compressed (3.2.4).
+    /// Reads a block that is not compressed (3.2.4).
     pub(super) fn stored(&mut self) -> Result<(), Error> {
         self.align();
-        let (len, check) = (self.take(16)?, self.take(16)?);
+        let len = self.take(16)?;
+        let check = self.take(16)?;
         if len != check ^ 0xffff {
-            return Err(Error::damaged("a length that is not what it says it is"));
+            return Err(Error::damaged("the length of a stored block does not match its complement"));
         }
         self.align();
         let len = len as usize;
         let bytes = self.stream.get(self.at..self.at + len).ok_or_else(ends_early)?;
         let Some(out) = self.out.get_mut(self.to..self.to + len) else { return Err(self.too_long()) };
         out.copy_from_slice(bytes);
-        (self.at, self.to) = (self.at + len, self.to + len);
+        self.at += len;
+        self.to += len;
         Ok(())
     }
 
-    /// Goes to where the next byte begins.
+    /// Goes to the next whole byte.
     fn align(&mut self) {
         self.at -= (self.count / 8) as usize;
-        (self.bits, self.count) = (0, 0);
+        self.bits = 0;
+        self.count = 0;
     }
 
-    /// The codes of a block (3.2.7).
+    /// Reads the codes of a block (3.2.7), and builds their tables.
     pub(super) fn code_lengths(
         &mut self,
         litlen: &mut Litlen,
@@ -111,14 +117,16 @@ impl<'a> Decoder<'a> {
         let distance_count = self.take(5)? as usize + 1;
         let codes = self.take(4)? as usize + 4;
         if litlen_count > 286 || distance_count > 30 {
-            return Err(Error::damaged("more symbols than there are"));
+            return Err(Error::damaged("a block with more codes than there are symbols"));
         }
+
         let mut of_lengths = [0; 19];
         for symbol in &ORDER[..codes] {
             of_lengths[*symbol] = self.take(3)? as u8;
         }
         let mut table = Table::<LENGTHS_SIZE>::new(Alphabet::Lengths);
         table.build(&of_lengths)?;
+
         let mut lengths = [0; 286 + 30];
         let all = litlen_count + distance_count;
         let mut next = 0;
@@ -130,7 +138,7 @@ impl<'a> Decoder<'a> {
             let (length, repeats) = match symbol {
                 16 => {
                     let Some(last) = next.checked_sub(1) else {
-                        return Err(Error::damaged("a repetition of nothing"));
+                        return Err(Error::damaged("a repetition before the first code length"));
                     };
                     (lengths[last], 3 + self.take(2)? as usize)
                 }
@@ -139,11 +147,12 @@ impl<'a> Decoder<'a> {
                 length => (length, 1),
             };
             if repeats > all - next {
-                return Err(Error::damaged("lengths of more codes than there are"));
+                return Err(Error::damaged("more code lengths than codes"));
             }
             lengths[next..next + repeats].fill(length);
             next += repeats;
         }
+
         if lengths[256] == 0 {
             return Err(Error::damaged("a block without an end"));
         }
@@ -151,7 +160,7 @@ impl<'a> Decoder<'a> {
         distances.build(&lengths[litlen_count..all])
     }
 
-    /// The content of a block of these codes.
+    /// Decodes the content of a block with these codes.
     #[inline(always)]
     pub(super) fn compressed(&mut self, litlen: &Litlen, distances: &Distance) -> Result<(), Error> {
         loop {
@@ -165,19 +174,25 @@ impl<'a> Decoder<'a> {
         }
     }
 
-    /// Decodes as long as the ends are far off. Whether the block ends.
+    /// Decodes until the end of the stream or of the output is near. Returns true at the end of the block.
     #[inline(always)]
     fn fast(&mut self, litlen: &Litlen, distances: &Distance) -> Result<bool, Error> {
         let stream = self.stream;
         let out = &mut *self.out;
-        let (mut at, mut bits, mut count, mut to) = (self.at, self.bits, self.count, self.to);
-        let (input_end, output_end) = (stream.len() - INPUT, out.len() - OUTPUT);
+        let mut at = self.at;
+        let mut bits = self.bits;
+        let mut count = self.count;
+        let mut to = self.to;
+        let input_end = stream.len() - INPUT;
+        let output_end = out.len() - OUTPUT;
         let mut ends = Ok(false);
+
+        // A round begins with 56 bits, and with the entry of the first of them.
         fill(stream, &mut at, &mut bits, &mut count);
         let mut entry = litlen.first(bits, LITLEN_BITS);
-        // A round begins with 56 bits, and with what the first of them say.
         while at <= input_end && to <= output_end {
-            // Three of up to eleven bits, and a code with extra bits of up to twenty.
+            // The bits are enough for three entries of literals of up to eleven bits each, and a length of up
+            // to twenty bits with its extra bits.
             for _ in 0..3 {
                 if !entry.is_literal() {
                     break;
@@ -193,6 +208,8 @@ impl<'a> Decoder<'a> {
                 fill(stream, &mut at, &mut bits, &mut count);
                 continue;
             }
+
+            // A longer code, the end of the block, or no code.
             if entry.is_special() {
                 bits >>= entry.bits();
                 count -= entry.bits();
@@ -221,10 +238,12 @@ impl<'a> Decoder<'a> {
                     break;
                 }
             }
+
             let length = entry.value(bits);
             bits >>= entry.bits();
             count -= entry.bits();
             fill(stream, &mut at, &mut bits, &mut count);
+
             let mut place = distances.first(bits, DISTANCE_BITS);
             if place.is_special() {
                 if place.is_second_table() {
@@ -244,18 +263,22 @@ impl<'a> Decoder<'a> {
                 ends = Err(Error::damaged(TOO_FAR));
                 break;
             }
-            // The next entry is on its way while bytes are copied.
+
+            // The next entry is loaded while bytes are copied.
             fill(stream, &mut at, &mut bits, &mut count);
             entry = litlen.first(bits, LITLEN_BITS);
             copy(out, to, distance, length);
             to += length;
         }
-        (self.at, self.bits, self.count, self.to) = (at, bits, count, to);
+
+        self.at = at;
+        self.bits = bits;
+        self.count = count;
+        self.to = to;
         ends
     }
 
-    /// Decodes one symbol, or two literals, be the ends as near as they may. Whether it is the end of the
-    /// block.
+    /// Decodes one symbol, or two literals, however near the ends are. Returns true at the end of the block.
     fn one(&mut self, litlen: &Litlen, distances: &Distance) -> Result<bool, Error> {
         let entry = self.entry(litlen, LITLEN_BITS)?;
         if entry.is_literal() {
@@ -268,6 +291,7 @@ impl<'a> Decoder<'a> {
             self.to += literals;
             return Ok(false);
         }
+
         if entry.is_special() {
             self.consume(entry.bits())?;
             return if entry.is_end() {
@@ -276,6 +300,7 @@ impl<'a> Decoder<'a> {
                 Err(Error::damaged(NO_CODE))
             };
         }
+
         let length = self.value(entry)?;
         let entry = self.entry(distances, DISTANCE_BITS)?;
         if entry.is_special() {
@@ -288,6 +313,7 @@ impl<'a> Decoder<'a> {
         if length > self.out.len() - self.to {
             return Err(self.too_long());
         }
+
         for place in self.to..self.to + length {
             self.out[place] = self.out[place - distance];
         }
@@ -295,7 +321,7 @@ impl<'a> Decoder<'a> {
         Ok(false)
     }
 
-    /// What the next bits say, which are not consumed but for the index into a first table.
+    /// Returns the entry of the next bits. If it is in a second table, the index into the first is consumed.
     fn entry<const N: usize>(&mut self, table: &Table<N>, index_bits: u32) -> Result<Entry, Error> {
         self.fill();
         let entry = table.first(self.bits, index_bits);
@@ -312,7 +338,7 @@ impl<'a> Decoder<'a> {
         Ok(value)
     }
 
-    /// The checksum behind the last block (RFC 1950, 2.2).
+    /// Returns the checksum after the last block (RFC 1950, 2.2).
     pub(super) fn finish(mut self) -> Result<u32, Error> {
         self.align();
         if self.to < self.out.len() {
@@ -334,7 +360,7 @@ fn ends_early() -> Error {
     Error::damaged("it ends early")
 }
 
-/// At least 56 bits, where the stream has a word more.
+/// Fills `bits` to at least 56 bits. The stream must have a word more.
 #[inline(always)]
 fn fill(stream: &[u8], at: &mut usize, bits: &mut u64, count: &mut u32) {
     *bits |= word(stream, *at) << *count;
@@ -354,20 +380,20 @@ fn put(out: &mut [u8], at: usize, word: u64) {
     out[at..at + 8].copy_from_slice(&word.to_le_bytes());
 }
 
-/// How bytes that repeat are made a pattern.
+/// The numbers that turn repeating bytes into a pattern.
 #[derive(Clone, Copy)]
 struct Repeat {
-    /// The bits of the bytes that repeat.
+    /// The bits of the repeating bytes.
     mask: u64,
-    /// A factor that repeats them over a word.
+    /// The factor that repeats them over a word.
     factor: u64,
-    /// Bits of a word after which the next one begins.
+    /// The number of bits of a word after which the next word begins.
     shift: u32,
-    /// Bytes of a pattern that are whole repetitions.
+    /// The number of bytes of a pattern that are whole repetitions.
     step: usize,
 }
 
-/// By distance below 8.
+/// For each distance below 8.
 const REPEAT: [Repeat; 8] = {
     let mut table = [Repeat { mask: 0, factor: 0, shift: 0, step: PATTERN }; 8];
     let mut distance = 1;
@@ -385,10 +411,11 @@ const REPEAT: [Repeat; 8] = {
     table
 };
 
-/// A match: `length` bytes that are those `distance` before. Up to [`PATTERN`] bytes behind it are overwritten.
+/// Copies a match: `length` bytes from `distance` before. Up to [`PATTERN`] bytes after it are overwritten.
 #[inline(always)]
 fn copy(out: &mut [u8], to: usize, distance: usize, length: usize) {
     let from = to - distance;
+
     if distance >= PATTERN {
         let mut done = 0;
         while done < length {
@@ -412,6 +439,7 @@ fn copy(out: &mut [u8], to: usize, distance: usize, length: usize) {
             *word = last.to_le_bytes();
             last = (last >> shift & mask).wrapping_mul(factor);
         }
+
         let mut done = 0;
         while done < length {
             out[to + done..to + done + PATTERN].copy_from_slice(&pattern);

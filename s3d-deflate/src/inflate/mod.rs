@@ -1,7 +1,7 @@
-//! Inflating (RFC 1951, in the wrapping of RFC 1950) into memory whose size is known.
+//! Inflating (RFC 1951, in the zlib format of RFC 1950) into memory whose size is known.
 //!
-//! Own code, since the libraries in Rust take longer for most of what images are compressed to. Milliseconds
-//! of a core an image of 1080² of a real scan and of the built-in scene (`cargo bench -p s3d-io --bench
+//! Why not a library: the libraries in Rust take longer for most compressed images. These are milliseconds of
+//! a core per image of 1080², of a real scan and of the built-in scene (`cargo bench -p s3d-io --bench
 //! inflate`):
 //!
 //! | image | this | fdeflate | zlib-rs |
@@ -11,8 +11,8 @@
 //! | normals | 0.56, 0.26 | 1.21, 2.19 | 0.97, 1.54 |
 //! | labels | 0.36, 0.25 | 0.41, 0.26 | 0.34, 0.21 |
 //!
-//! A look-up gives up to two literals; the next look-up is on its way while a match is copied; a match of a
-//! small distance is a pattern that is made in registers, and written without being read again.
+//! A look-up returns up to two literals. The next look-up is under way while a match is copied. A match at a
+//! small distance is a pattern that is made in registers, so the output is not read again.
 
 mod decode;
 mod table;
@@ -43,37 +43,38 @@ pub struct Inflater {
 }
 
 impl Default for Inflater {
-    /// With its own memory: 18 kB.
+    /// Makes an inflater with memory of its own, 18 kB.
     fn default() -> Self {
         Self { litlen: Table::new(Alphabet::Litlen), distances: Table::new(Alphabet::Distance) }
     }
 }
 
 impl Inflater {
-    /// Fills `out` with what a zlib stream holds, which must be as many bytes. What follows the stream is
-    /// not looked at.
+    /// Fills `out` with the content of a zlib stream, which must have exactly as many bytes. Bytes after the
+    /// stream are ignored.
     ///
     /// # Errors
-    /// [`Error::Stream`] if the stream is damaged, by its checksum too, ends early, wants a dictionary, or
-    /// holds fewer or more bytes; `out` may be overwritten in part.
+    /// [`Error::Stream`] if the stream is damaged, has a wrong checksum, ends early, wants a dictionary, or
+    /// has fewer or more bytes. `out` may be overwritten in part then.
     pub fn zlib(&mut self, stream: &[u8], out: &mut [u8]) -> Result<(), Error> {
         let sum = self.inflate(stream, out)?;
         if sum == simd_adler32::adler32(&&*out) {
             Ok(())
         } else {
-            Err(Error::damaged("its checksum is another"))
+            Err(Error::damaged("its checksum is wrong"))
         }
     }
 
-    /// As [`Self::zlib`], but for the checksum: for streams in files that have another, as PNG's.
+    /// Fills `out` like [`Self::zlib`], without checking the checksum. For streams in files with a checksum
+    /// of their own, such as PNG.
     ///
     /// # Errors
-    /// As [`Self::zlib`].
+    /// The errors of [`Self::zlib`], except for a wrong checksum.
     pub fn zlib_without_checksum(&mut self, stream: &[u8], out: &mut [u8]) -> Result<(), Error> {
         self.inflate(stream, out).map(drop)
     }
 
-    /// The checksum that the stream claims.
+    /// Inflates, and returns the checksum that the stream claims.
     fn inflate(&mut self, stream: &[u8], out: &mut [u8]) -> Result<u32, Error> {
         let level = s3d_simd::level().without_avx512();
         s3d_simd::dispatch!(level, _simd => self.run(stream, out))
@@ -111,10 +112,11 @@ mod tests {
     use proptest::prelude::*;
     use s3d_simd::{Level, dispatch};
 
-    /// What every level makes of a stream; they must agree.
+    /// Inflates at every level of instructions. All results must agree.
     fn inflate(stream: &[u8], len: usize) -> Result<Vec<u8>, Error> {
         let made = Level::all().into_iter().map(|level| {
-            let (mut inflater, mut out) = (Inflater::default(), vec![0; len]);
+            let mut inflater = Inflater::default();
+            let mut out = vec![0; len];
             let done = dispatch!(level, _simd => inflater.run(stream, &mut out));
             done.map(|_| out)
         });
@@ -123,7 +125,7 @@ mod tests {
         made[0].clone()
     }
 
-    /// What fdeflate makes of it.
+    /// Inflates with fdeflate.
     fn by_fdeflate(stream: &[u8], len: usize) -> Option<Vec<u8>> {
         let mut out = vec![0; len];
         let mut decompressor = fdeflate::Decompressor::new();
@@ -146,7 +148,7 @@ mod tests {
         out
     }
 
-    /// Pieces of noise of some number of values, repeated at some distance.
+    /// Makes pieces of noise of some number of values, repeated at some distance.
     fn data() -> impl Strategy<Value = Vec<u8>> {
         let piece = (0usize..700, prop_oneof![1usize..40, 1usize..40_000], 1u32..256, 0usize..90);
         (proptest::collection::vec(piece, 0..40), any::<u32>()).prop_map(|(pieces, mut state)| {
@@ -178,7 +180,7 @@ mod tests {
             prop_assert_eq!(inflate(&stream, data.len()), Ok(data));
         }
 
-        /// Damaged streams: what fdeflate refuses is refused, and what both read is the same.
+        /// A damaged stream that fdeflate refuses is refused. Streams that both read are read alike.
         #[test]
         fn damage_is_found_as_fdeflate_finds_it(
             data in data(),
@@ -189,7 +191,7 @@ mod tests {
             more in -3isize..4,
         ) {
             let mut stream = by_zlib_rs(&data, level);
-            // Near the beginning are the codes.
+            // The codes are near the beginning.
             let near = stream.len().min(if cuts { 60 } else { usize::MAX });
             changes.iter().for_each(|(at, to)| stream[at.index(near)] = *to);
             if cuts {
@@ -204,10 +206,11 @@ mod tests {
 
     #[test]
     fn nothing_is_refused_that_fdeflate_reads() {
-        // One change at every place of short streams. Sets of codes that are not whole are refused by one,
-        // and single codes by the other.
+        // Short streams with one bit changed at every place. Each of the two implementations is stricter in
+        // one respect: about incomplete codes, or about single codes.
         let data: Vec<u8> = (0..2000u32).map(|i| (i * i / 97) as u8).collect();
-        let (mut both, mut other) = (0, 0);
+        let mut both = 0;
+        let mut other = 0;
         for level in [0, 1, 9] {
             let stream = by_zlib_rs(&data, level);
             for at in 0..stream.len() {
@@ -248,12 +251,13 @@ mod tests {
     #[test]
     fn checksums_are_looked_at_where_they_are_wanted() {
         let mut stream = by_zlib_rs(b"abcabcabc", 6);
-        let (mut inflater, mut out) = (Inflater::default(), [0; 9]);
+        let mut inflater = Inflater::default();
+        let mut out = [0; 9];
         inflater.zlib(&stream, &mut out).unwrap();
         assert_eq!(&out, b"abcabcabc");
         *stream.last_mut().unwrap() ^= 1;
         let message = inflater.zlib(&stream, &mut out).unwrap_err().to_string();
-        assert_eq!(message, "a damaged zlib stream: its checksum is another");
+        assert_eq!(message, "a damaged zlib stream: its checksum is wrong");
         out.fill(0);
         inflater.zlib_without_checksum(&stream, &mut out).unwrap();
         assert_eq!(&out, b"abcabcabc");
@@ -264,7 +268,7 @@ mod tests {
         let stream = by_zlib_rs(b"abc", 6);
         let message = |head: [u8; 2]| inflate(&[&head, &stream[2..]].concat(), 3).unwrap_err().to_string();
         for head in [[0x79, 0x01], [0x78, 0x02], [0x88, 0x1c]] {
-            assert_eq!(message(head), "a damaged zlib stream: it does not begin like one");
+            assert_eq!(message(head), "a damaged zlib stream: its header is invalid");
         }
         assert_eq!(message([0x78, 0x20]), "a damaged zlib stream: it wants a dictionary");
         assert_eq!(inflate(&[], 0).unwrap_err().to_string(), "a damaged zlib stream: it ends early");

@@ -1,34 +1,37 @@
 //! Tables that decode prefix codes. Source: RFC 1951, 3.2.2 and 3.2.5.
 //!
-//! The next bits of the stream, lowest first, are an index into a table; codes that are longer than the
-//! index go on in a second table, which begins behind the first.
+//! The next bits of the stream, lowest first, are an index into a table. Codes longer than the index continue
+//! in a second table, which is stored after the first.
 
 use crate::Error;
 use crate::alphabet::CodeLengths;
 
-/// Bits of an index into the table of literals and lengths, and its entries with those of second tables:
-/// less than 2,400 where no code has more than 15 bits, and a power of two, so that an index can be masked.
+/// The number of bits of an index into the table of literals and lengths.
 pub(super) const LITLEN_BITS: u32 = 11;
+/// The size of the table of literals and lengths, with second tables. Less than 2,400 entries are used, since
+/// no code has more than 15 bits. A power of two, so that an index can be masked.
 pub(super) const LITLEN_SIZE: usize = 4096;
-/// The same of distances: at most 402.
+/// The number of bits of an index into the table of distances.
 pub(super) const DISTANCE_BITS: u32 = 8;
+/// The size of the table of distances. At most 402 entries are used.
 pub(super) const DISTANCE_SIZE: usize = 512;
-/// And of the codes of code lengths, which have up to seven bits.
+/// The number of bits of an index into the table of code lengths, whose codes have up to seven bits.
 pub(super) const LENGTHS_BITS: u32 = 7;
+/// The size of the table of code lengths.
 pub(super) const LENGTHS_SIZE: usize = 128;
 
 /// The longest code, in bits.
 const LONGEST: usize = 15;
 
-/// What the bits of an index stand for.
+/// The meaning of the bits of an index. All lengths are in bits.
 ///
 /// | bits | literals | length or distance | second table |
 /// |---|---|---|---|
-/// | 0–7 | bits of all codes | bits of the code and the extra bits | bits of the index |
-/// | 8–12 | how many: 1 or 2 | bits of the code | bits of its index |
+/// | 0–7 | length of all codes | length of the code and the extra bits | length of the first index |
+/// | 8–12 | number of literals, 1 or 2 | length of the code | length of the second index |
 /// | 13, 14 | | 13: end of the block; 14: no symbol | 13 and 14 |
 /// | 15 | set | | |
-/// | 16–31 | the first, the second | the least | where it begins |
+/// | 16–31 | the first, the second | the smallest value | the place of the table |
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub(super) struct Entry(u32);
 
@@ -42,7 +45,7 @@ impl Entry {
         self.0 & LITERAL != 0
     }
 
-    /// Whether it is neither a literal nor a length or distance.
+    /// Returns true if the entry is neither literals nor a length or distance.
     #[inline(always)]
     pub(super) fn is_special(self) -> bool {
         self.0 & (END | NONE) != 0
@@ -58,32 +61,33 @@ impl Entry {
         self.0 & (END | NONE) == END
     }
 
-    /// How many bits of the stream it takes.
+    /// Returns the number of bits of the stream that the entry takes.
     #[inline(always)]
     pub(super) fn bits(self) -> u32 {
         self.0 & 0x3f
     }
 
-    /// How many literals it is, if any.
+    /// Returns the number of literals.
     #[inline(always)]
     pub(super) fn literals(self) -> usize {
         (self.0 >> 8 & 3) as usize
     }
 
-    /// The literals, the first first. Of codes of code lengths, the symbol.
+    /// Returns the literals in order. In a table of code lengths, the first byte is the symbol.
     #[inline(always)]
     pub(super) fn bytes(self) -> [u8; 2] {
         ((self.0 >> 16) as u16).to_le_bytes()
     }
 
-    /// The length or distance, of which `bits` begin with its code.
+    /// Returns the length or distance. `bits` begin with its code.
     #[inline(always)]
     pub(super) fn value(self, bits: u64) -> usize {
         let extra = (bits & !(u64::MAX << self.bits())) >> (self.0 >> 8 & 0x1f);
         (self.0 >> 16) as usize + extra as usize
     }
 
-    /// The index into the second table and all of this: what `bits` say after those of the first index.
+    /// Returns the place in the whole table of an entry of the second table. `bits` are the bits after the
+    /// first index.
     #[inline(always)]
     fn place(self, bits: u64) -> usize {
         (self.0 >> 16) as usize + (bits & !(u64::MAX << (self.0 >> 8 & 0x1f))) as usize
@@ -93,22 +97,15 @@ impl Entry {
         Self(LITERAL | 1 << 8 | byte << 16)
     }
 
-    /// Values from `least` on, that many extra bits.
+    /// Makes an entry of values from `least` on, with `extra` extra bits.
     fn value_from(least: u32, extra: u32) -> Self {
         Self(least << 16 | extra)
     }
 
-    /// The same behind a code of so many bits.
+    /// Adds the number of bits of the code.
     fn behind(self, code: u32) -> Self {
-        Self(
-            self.0
-                + code
-                + if self.0 & (LITERAL | END | NONE) == 0 {
-                    code << 8
-                } else {
-                    0
-                },
-        )
+        let is_value = self.0 & (LITERAL | END | NONE) == 0;
+        Self(self.0 + code + if is_value { code << 8 } else { 0 })
     }
 
     fn second_table(first: usize, bits: u32, index: u32) -> Self {
@@ -116,19 +113,19 @@ impl Entry {
     }
 }
 
-/// What symbols stand for.
+/// The meaning of symbols.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Alphabet {
     Litlen,
     Distance,
-    /// Of code lengths: the symbols themselves.
+    /// Code lengths: the symbols stand for themselves.
     Lengths,
 }
 
 impl Alphabet {
     fn entry(self, symbol: usize) -> Entry {
         let symbol = symbol as u32;
-        // As `alphabet::length_symbol` and `distance_symbol`, backwards.
+        // The reverse of `alphabet::length_symbol` and `distance_symbol`.
         match (self, symbol) {
             (Self::Lengths, _) | (Self::Litlen, 0..=255) => Entry::literal(symbol),
             (Self::Litlen, 256) => Entry(END),
@@ -156,6 +153,31 @@ impl Alphabet {
     }
 }
 
+/// Returns the number of codes of the longest length that are not used.
+fn codes_left(counts: &[u32; LONGEST + 1]) -> Result<i64, Error> {
+    let mut left = 1i64;
+    for count in &counts[1..] {
+        left = 2 * left - i64::from(*count);
+        if left < 0 {
+            return Err(Error::damaged("too many codes of a length"));
+        }
+    }
+    Ok(left)
+}
+
+/// Returns the symbols that have a code, in the order of the lengths of their codes.
+fn symbols_by_length(lengths: &[u8], counts: &[u32; LONGEST + 1]) -> [u16; 320] {
+    let mut next = [0usize; LONGEST + 2];
+    (1..=LONGEST).for_each(|length| next[length + 1] = next[length] + counts[length] as usize);
+    let mut sorted = [0u16; 320];
+    for (symbol, length) in (0..).zip(lengths).filter(|(_, length)| **length > 0) {
+        let place = &mut next[usize::from(*length) & LONGEST];
+        sorted[*place] = symbol;
+        *place += 1;
+    }
+    sorted
+}
+
 /// A table of `N` entries, a power of two.
 pub(super) struct Table<const N: usize> {
     alphabet: Alphabet,
@@ -168,19 +190,19 @@ impl<const N: usize> Table<N> {
         Self { alphabet, entries: Box::new([Entry(NONE); N]), is_fixed: false }
     }
 
-    /// The entry that the next bits of the stream are the index of.
+    /// Returns the entry whose index is the next bits of the stream.
     #[inline(always)]
     pub(super) fn first(&self, bits: u64, index_bits: u32) -> Entry {
         self.entries[bits as usize & ((1 << index_bits) - 1) & (N - 1)]
     }
 
-    /// The entry in a second table, `bits` being those after the first index.
+    /// Returns the entry in a second table. `bits` are the bits after the first index.
     #[inline(always)]
     pub(super) fn second(&self, entry: Entry, bits: u64) -> Entry {
         self.entries[entry.place(bits) & (N - 1)]
     }
 
-    /// Of the codes of blocks with fixed codes.
+    /// Builds the table for blocks with fixed codes.
     pub(super) fn build_fixed(&mut self) -> Result<(), Error> {
         if self.is_fixed {
             return Ok(());
@@ -193,7 +215,7 @@ impl<const N: usize> Table<N> {
         Ok(())
     }
 
-    /// Of codes with these lengths, by symbol; 0 is none.
+    /// Builds the table for codes with these lengths, by symbol. A symbol of length 0 has no code.
     pub(super) fn build(&mut self, lengths: &[u8]) -> Result<(), Error> {
         self.is_fixed = false;
         let mut counts = [0u32; LONGEST + 1];
@@ -201,40 +223,31 @@ impl<const N: usize> Table<N> {
             .iter()
             .for_each(|length| counts[usize::from(*length) & LONGEST] += 1);
         counts[0] = 0;
-        // How many codes of each length are left over by shorter ones.
-        let mut left = 1i64;
-        for count in &counts[1..] {
-            left = 2 * left - i64::from(*count);
-            if left < 0 {
-                return Err(Error::damaged("more codes than there can be"));
-            }
-        }
+
         let codes: u32 = counts.iter().sum();
-        // A single distance may have a code of one bit, and none no code.
+        let left = codes_left(&counts)?;
+        // A single distance may have a code of one bit. Without distances, there may be no code.
         let is_single = self.alphabet == Alphabet::Distance && (codes == 0 || (codes == 1 && counts[1] == 1));
         if left > 0 && !is_single {
-            return Err(Error::damaged("fewer codes than there must be"));
+            return Err(Error::damaged("an incomplete set of codes"));
         }
-        // Symbols by length of their codes.
-        let mut next = [0usize; LONGEST + 2];
-        (1..=LONGEST).for_each(|length| next[length + 1] = next[length] + counts[length] as usize);
-        let mut sorted = [0u16; 320];
-        for (symbol, length) in (0..).zip(lengths).filter(|(_, length)| **length > 0) {
-            let place = &mut next[usize::from(*length) & LONGEST];
-            sorted[*place] = symbol;
-            *place += 1;
-        }
+
+        let sorted = symbols_by_length(lengths, &counts);
         let index_bits = self.alphabet.index_bits();
         let size = 1usize << index_bits;
         if is_single {
             self.entries[..size].fill(Entry(NONE));
         }
+
         let mut symbols = sorted[..codes as usize].iter();
-        // The code with its bits in the order of the stream, and how many entries are made, over and over
-        // again what shorter codes made.
-        let (mut code, mut made) = (0usize, 1usize);
+        // The code, with its bits in the order of the stream.
+        let mut code = 0usize;
+        // The number of entries that are filled. Doubling them repeats the entries of shorter codes.
+        let mut made = 1usize;
+        // The prefix of the current second table, its place and the number of bits of its index.
         let mut second = (usize::MAX, 0, 0);
         let mut end = size;
+
         for length in 1..=LONGEST as u32 {
             let first = length.min(index_bits);
             while made < 1 << first {
@@ -244,12 +257,13 @@ impl<const N: usize> Table<N> {
             for n in (0..counts[length as usize]).rev() {
                 let Some(symbol) = symbols.next() else { break };
                 let entry = self.alphabet.entry(usize::from(*symbol));
+
                 if length <= index_bits {
                     self.entries[code] = entry.behind(length);
                 } else {
                     let prefix = code & (size - 1);
                     if prefix != second.0 {
-                        // As many bits as the codes take that are left in it.
+                        // The index has as many bits as the remaining codes with this prefix need.
                         let mut bits = length - index_bits;
                         let mut room = (1i64 << bits) - i64::from(n + 1);
                         while room > 0 && index_bits + bits < LONGEST as u32 {
@@ -260,27 +274,30 @@ impl<const N: usize> Table<N> {
                         self.entries[prefix] = Entry::second_table(end, bits, index_bits);
                         end += 1 << bits;
                     }
+
                     let (_, begin, bits) = second;
                     let entry = entry.behind(length - index_bits);
                     let step = 1 << (length - index_bits);
                     let places = (begin + (code >> index_bits)..begin + (1 << bits)).step_by(step);
                     places.for_each(|place| self.entries[place] = entry);
                 }
-                // The next code: one is added at its last bit, which is the highest here.
+
+                // The next code: add one at its last bit, which is the highest here.
                 let zeros = code ^ ((1 << length) - 1);
                 code = zeros
                     .checked_ilog2()
                     .map_or(0, |bit| code & ((1 << bit) - 1) | 1 << bit);
             }
         }
+
         if self.alphabet == Alphabet::Litlen {
             self.pair_literals();
         }
         Ok(())
     }
 
-    /// Makes entries of two literals where an index has room for both codes. From the last, since each looks
-    /// at one before it that stands for one literal yet.
+    /// Makes entries of two literals, for indices with room for both codes. It starts from the last, because
+    /// each entry reads an earlier one, which must still be a single literal.
     fn pair_literals(&mut self) {
         for index in (0..1usize << LITLEN_BITS).rev() {
             let one = self.entries[index];

@@ -1,7 +1,8 @@
-//! PNG's filters: each byte less what its neighbours let expect. Source: the PNG specification, section 9.
+//! The filters of PNG, which subtract from each byte a prediction from its neighbours. Source: the PNG
+//! specification, section 9.
 //!
-//! Why not the `png` crate's adaptive filter: it makes normals 42 % larger and nothing smaller, takes twice
-//! the time, and filtered bytes cannot be had from that crate (README, "Filters").
+//! Why not the adaptive filter of the `png` crate: it makes normals 42 % larger and nothing smaller, and
+//! takes twice the time. The crate also does not return filtered bytes (README, "Filters").
 
 mod unfilter;
 
@@ -10,32 +11,32 @@ pub use unfilter::unfilter;
 use crate::Error;
 use crate::simd::{Compare, Kernel, dispatch};
 
-/// What a byte is expected to be.
+/// The prediction of a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Filter {
-    /// Nothing is expected: the bytes stay.
+    /// No prediction: the bytes stay.
     None,
-    /// As the pixel above.
+    /// The byte of the pixel above.
     Up,
-    /// As that of the neighbours to the left, above and between them that is nearest to the plane through
-    /// them.
+    /// One of the bytes of the pixels to the left, above and above left: the one nearest to left + above −
+    /// above left.
     Paeth,
 }
 
-/// The lines of an image, `line` bytes each and `pixel` bytes a pixel, filtered: for each line the filter's
-/// number and then its bytes.
+/// Filters the lines of an image, with `line` bytes per line and `pixel` bytes per pixel. Returns for each
+/// line the number of the filter and then its bytes.
 ///
 /// ```
 /// use s3d_deflate::png::{Filter, filter};
 ///
-/// // Two lines of three pixels of one byte: a plane, 3 a column and 10 a line.
+/// // Two lines of three pixels of one byte: a plane that grows by 3 per column and 10 per line.
 /// assert_eq!(filter(&[5, 8, 11, 15, 18, 21], 3, 1, Filter::Up)?, [2, 5, 8, 11, 2, 10, 10, 10]);
 /// # Ok::<(), s3d_deflate::Error>(())
 /// ```
 ///
 /// # Errors
-/// [`Error::PartialLine`] if `bytes` are not whole lines, or a line not whole pixels.
+/// [`Error::PartialLine`] if `bytes` are not whole lines, or a line is not whole pixels.
 pub fn filter(bytes: &[u8], line: usize, pixel: usize, filter: Filter) -> Result<Vec<u8>, Error> {
     if line == 0 || !bytes.len().is_multiple_of(line) {
         return Err(Error::PartialLine { len: bytes.len(), line });
@@ -46,9 +47,11 @@ pub fn filter(bytes: &[u8], line: usize, pixel: usize, filter: Filter) -> Result
     Ok(dispatch(Filtering { bytes, line, pixel, filter }))
 }
 
-/// Whether a filtered line, the filter's number and then its bytes, is that of `line`, of which the line `above`
-/// stands above: zeros at the top of an image. It is known of the filters that [`Filter`] names; of PNG's others
-/// it is `false`. A fraction of the time of [`unfilter`], and of a comparison after it.
+/// Returns true if `filtered` (the number of the filter and then its bytes) is the filtered form of `line`.
+///
+/// `above` is the line above; at the top of an image it is zeros. The filters of [`Filter`] are known; for
+/// the other filters of PNG the result is `false`. This takes a fraction of the time of [`unfilter`] and a
+/// comparison.
 ///
 /// ```
 /// use s3d_deflate::png::{Filter, filter, is_filtered};
@@ -97,7 +100,8 @@ impl Kernel for Comparison<'_> {
         if !is_paeth {
             return as_above(line.len());
         }
-        // Without a left neighbour, the one above is the nearest.
+
+        // Without a left neighbour, the prediction is the pixel above.
         let mut differ = u8::from(!as_above(pixel));
         let heres = filtered[pixel..].iter().zip(&line[pixel..]).zip(&above[pixel..]);
         for (((filtered, here), &above), (&left, &corner)) in heres.zip(line.iter().zip(above)) {
@@ -122,6 +126,7 @@ impl Kernel for Filtering<'_> {
     fn run<C: Compare>(self, _: C) -> Vec<u8> {
         let Self { bytes, line, pixel, filter } = self;
         let mut out = vec![0; bytes.len() / line * (line + 1)];
+
         let first = vec![0; line];
         let mut above = first.as_slice();
         for (here, out) in bytes.chunks_exact(line).zip(out.chunks_exact_mut(line + 1)) {
@@ -147,7 +152,7 @@ impl Kernel for Filtering<'_> {
 
 #[inline(always)]
 fn paeth(here: &[u8], above: &[u8], pixel: usize, out: &mut [u8]) {
-    // Without a left neighbour, the one above is the nearest.
+    // Without a left neighbour, the prediction is the pixel above.
     for ((o, h), a) in out.iter_mut().zip(here).zip(above).take(pixel) {
         *o = h.wrapping_sub(*a);
     }
@@ -158,13 +163,14 @@ fn paeth(here: &[u8], above: &[u8], pixel: usize, out: &mut [u8]) {
     }
 }
 
+/// Returns the prediction of Paeth's filter.
 #[inline(always)]
 fn expected(left: u8, above: u8, corner: u8) -> u8 {
-    // How far the plane's value, left + above − corner, is from each of them: in bytes, of which twice as many go
-    // into a register as of 16 bits.
-    let distance = |a: u8, b: u8| a.max(b).wrapping_sub(a.min(b));
-    let (from_left, from_above) = (distance(above, corner), distance(left, corner));
-    // Where both lie on one side of the corner, it is at least as far as each of them.
+    // The distances of left + above − corner from the three neighbours, in bytes: twice as many go into a
+    // register as numbers of 16 bits.
+    let from_left = distance(above, corner);
+    let from_above = distance(left, corner);
+    // If both are on one side of the corner, the corner is at least as far as each of them.
     let is_far = (above >= corner) == (left >= corner);
     let from_corner = if is_far {
         u8::MAX
@@ -176,6 +182,11 @@ fn expected(left: u8, above: u8, corner: u8) -> u8 {
     if from_left == least { left } else { nearer }
 }
 
+#[inline(always)]
+fn distance(a: u8, b: u8) -> u8 {
+    a.max(b).wrapping_sub(a.min(b))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,11 +194,12 @@ mod tests {
 
     #[test]
     fn a_ramp_leaves_its_start_and_its_slope() {
-        // Two lines of three pixels of one byte: a plane, 3 a column and 10 a line.
+        // Two lines of three pixels of one byte: a plane that grows by 3 per column and 10 per line.
         let plane = [5, 8, 11, 15, 18, 21];
         assert_eq!(filter(&plane, 3, 1, Filter::None).unwrap(), [0, 5, 8, 11, 0, 15, 18, 21]);
         assert_eq!(filter(&plane, 3, 1, Filter::Up).unwrap(), [2, 5, 8, 11, 2, 10, 10, 10]);
-        // By Paeth: from above; then 3 more than the left, as that is nearest to 18 of 15, 8 and 5.
+        // By Paeth, the first byte follows from above. The next is 3 more than the left one, 15, which is
+        // nearer to 18 than 8 and 5.
         assert_eq!(filter(&plane, 3, 1, Filter::Paeth).unwrap(), [4, 5, 3, 3, 4, 10, 3, 3]);
     }
 
@@ -211,7 +223,7 @@ mod tests {
 
     #[test]
     fn ties_go_to_the_left_and_then_above() {
-        // left + above − corner is as far from both of them.
+        // left + above − corner is equally far from two of them.
         assert_eq!(expected(10, 10, 10), 10);
         assert_eq!(expected(12, 8, 10), 10);
         assert_eq!(expected(20, 10, 15), 15);
@@ -241,7 +253,8 @@ mod tests {
                     known.map(|((f, row), above)| is_filtered(f, row, above, pixel)).collect::<Vec<_>>()
                 };
                 prop_assert_eq!(all(&lines), [true; 4]);
-                // Another byte, first and last of a line.
+
+                // Change the first and the last byte of a line.
                 for place in [1, line] {
                     let place = at * (line + 1) + place;
                     lines[place] = lines[place].wrapping_add(by);

@@ -1,16 +1,18 @@
-//! Filters taken off again. Source: the PNG specification, section 9.
+//! Removing the filters of PNG. Source: the PNG specification, section 9.
 //!
-//! In a line by Paeth each pixel waits for the one before. Lines that follow one another go together instead,
-//! each a pixel behind the line above it: 16 bytes at a time, without a branch, about ten times as fast.
+//! In a line with Paeth's filter, each pixel waits for the pixel before. So several successive lines are
+//! restored together, each a pixel behind the line above it: 16 bytes at a time, without a branch, about ten
+//! times as fast.
 
 use super::expected;
 use crate::Error;
 use crate::simd::{Compare, Kernel, dispatch};
 
-/// Takes the filters off some lines of an image, in place: as [`filter`](super::filter) makes them, for each
-/// line the filter's number, which stays, and then `line` bytes of `pixel` bytes a pixel. `above` is the line
-/// before the first, without filter and number; at the top of an image there is none. All five filters of PNG
-/// are known.
+/// Removes the filters from some lines of an image, in place. All five filters of PNG are known.
+///
+/// The lines are in the form that [`filter`](super::filter) returns: for each line the number of the filter,
+/// which stays, and then `line` bytes, `pixel` bytes per pixel. `above` is the unfiltered line before the
+/// first, without a number; at the top of an image it is `None`.
 ///
 /// ```
 /// use s3d_deflate::png::{Filter, filter, unfilter};
@@ -23,8 +25,8 @@ use crate::simd::{Compare, Kernel, dispatch};
 /// ```
 ///
 /// # Errors
-/// [`Error::PartialLine`] if `lines` are not whole lines, `above` is not one, or a line is not whole pixels;
-/// [`Error::UnknownFilter`], and then nothing is changed.
+/// [`Error::PartialLine`] if `lines` are not whole lines, `above` is not one line, or a line is not whole
+/// pixels; [`Error::UnknownFilter`] if the number of a filter is above 4. Nothing is changed then.
 pub fn unfilter(lines: &mut [u8], above: Option<&[u8]>, line: usize, pixel: usize) -> Result<(), Error> {
     if line == 0 || !lines.len().is_multiple_of(line + 1) {
         return Err(Error::PartialLine { len: lines.len(), line: line + 1 });
@@ -35,6 +37,7 @@ pub fn unfilter(lines: &mut [u8], above: Option<&[u8]>, line: usize, pixel: usiz
     if let Some(number) = lines.iter().step_by(line + 1).find(|number| **number > 4) {
         return Err(Error::UnknownFilter { number: *number });
     }
+
     let nothing;
     let mut above = match above {
         Some(above) if above.len() == line => above,
@@ -44,6 +47,7 @@ pub fn unfilter(lines: &mut [u8], above: Option<&[u8]>, line: usize, pixel: usiz
             &nothing
         }
     };
+
     let together = match pixel {
         2 | 3 => 8,
         _ => usize::MAX,
@@ -64,7 +68,7 @@ pub fn unfilter(lines: &mut [u8], above: Option<&[u8]>, line: usize, pixel: usiz
     Ok(())
 }
 
-/// One line by any filter, byte by byte: what the fast form is held to.
+/// Restores one line with any filter, byte by byte. Tests compare the fast form with this one.
 fn single(line: &mut [u8], above: &[u8], pixel: usize) {
     let Some((number, line)) = line.split_first_mut() else { return };
     let left = |line: &[u8], i: usize| i.checked_sub(pixel).map_or(0, |i| line[i]);
@@ -84,7 +88,7 @@ fn single(line: &mut [u8], above: &[u8], pixel: usize) {
     }
 }
 
-/// The neighbours of the pixels that are next in lines that go together.
+/// The neighbours of the next pixels of lines that are restored together.
 #[derive(Clone, Copy)]
 struct Wave<const B: usize> {
     left: [u8; B],
@@ -92,24 +96,24 @@ struct Wave<const B: usize> {
 }
 
 impl<const B: usize> Wave<B> {
-    /// The next pixel of each line, `L` lanes each; `above` is what lies above the first line's.
+    /// Returns the next pixel of each line, in `L` lanes per line. `above` is the pixel above the next pixel
+    /// of the first line.
     #[inline(always)]
     fn step<const L: usize>(&mut self, above: u32, filtered: [u8; B]) -> [u8; B] {
-        // What a line's pixel was a step ago is now above the next line's.
+        // The pixel of a line a step ago is now above the pixel of the next line.
         let mut up = [0; B];
         up[L..].copy_from_slice(&self.left[..B - L]);
         up[..L].copy_from_slice(&above.to_le_bytes()[..L]);
         let mut next = [0; B];
         for i in 0..B {
-            let (left, above, corner) = (self.left[i], up[i], self.corner[i]);
-            next[i] = expected(left, above, corner).wrapping_add(filtered[i]);
+            next[i] = expected(self.left[i], up[i], self.corner[i]).wrapping_add(filtered[i]);
         }
         *self = Self { left: next, corner: up };
         next
     }
 }
 
-/// `R` lines by Paeth, of pixels of `P` bytes in `L` of `B` lanes.
+/// `R` lines with Paeth's filter. Pixels have `P` bytes, and take `L` of `B` lanes.
 struct Lines<'a, const P: usize, const L: usize, const R: usize, const B: usize> {
     lines: &'a mut [u8],
     above: &'a [u8],
@@ -135,10 +139,12 @@ fn wave<const P: usize, const L: usize, const R: usize, const B: usize>(lines: &
         rest = others;
         line[1..].as_chunks_mut().0
     });
+
+    // At the beginning and the end, not every line has a pixel. Before its first pixel, a line has zeros.
     let mut wave = Wave { left: [0; B], corner: [0; B] };
-    // At first and in the end not every line has a pixel. Before its first, a line has zeros.
     let first = (R - 1).min(width);
     (0..first).for_each(|at| edge::<P, L, R, B>(&mut wave, &mut rows, above, at));
+
     if width >= R {
         let steps = width - first;
         let mut lag = R;
@@ -147,7 +153,8 @@ fn wave<const P: usize, const L: usize, const R: usize, const B: usize>(lines: &
             &mut row[lag..][..steps]
         });
         let above = &above[first..][..steps];
-        // A copy, which stays in registers.
+
+        // A local copy stays in registers.
         let mut here = wave;
         for x in 0..steps {
             let mut filtered = [0; B];
@@ -161,10 +168,11 @@ fn wave<const P: usize, const L: usize, const R: usize, const B: usize>(lines: &
         }
         wave = here;
     }
+
     (first.max(width)..width + R - 1).for_each(|at| edge::<P, L, R, B>(&mut wave, &mut rows, above, at));
 }
 
-/// A step in which the line `r` has its pixel `at - r`, if there is one.
+/// Makes a step in which line `r` is at its pixel `at - r`, if it has one.
 #[inline(always)]
 fn edge<const P: usize, const L: usize, const R: usize, const B: usize>(
     wave: &mut Wave<B>,
@@ -186,7 +194,7 @@ fn edge<const P: usize, const L: usize, const R: usize, const B: usize>(
     }
 }
 
-/// A pixel of two or three bytes.
+/// Loads a pixel of two or three bytes.
 #[inline(always)]
 fn load<const P: usize>(pixel: &[u8; P]) -> u32 {
     let low = u32::from(u16::from_le_bytes([pixel[0], pixel[1]]));
@@ -199,7 +207,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// One line after the other.
+    /// Restores one line after the other.
     fn plain(lines: &mut [u8], line: usize, pixel: usize) {
         let mut above = vec![0; line];
         for line in lines.chunks_exact_mut(line + 1) {
@@ -212,7 +220,7 @@ mod tests {
         #[test]
         fn the_fast_form_is_the_plain_one(
             (pixel, width, lines) in (1usize..5, 1usize..30, 1usize..24).prop_flat_map(|(pixel, width, n)| {
-                // Paeth more often than others, and neighbours that are alike.
+                // Paeth's filter is more frequent than the others, and some lines have similar neighbours.
                 let line = (prop_oneof![3 => Just(4u8), 1 => 0u8..5], prop_oneof![Just(3u8), Just(255u8)])
                     .prop_flat_map(move |(number, most)| {
                         proptest::collection::vec(0..=most, pixel * width)
@@ -229,7 +237,8 @@ mod tests {
             let mut whole = lines.clone();
             unfilter(&mut whole, None, line, pixel).unwrap();
             prop_assert_eq!(&whole, &expected);
-            // In two parts.
+
+            // The same in two parts.
             let mut parts = lines;
             let (first, second) = parts.split_at_mut((cut * (line + 1)).min(expected.len()));
             unfilter(first, None, line, pixel).unwrap();

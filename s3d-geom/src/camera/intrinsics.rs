@@ -1,17 +1,17 @@
-//! Focal lengths, principal points and angles of view: what a camera is but for its pose.
+//! Focal lengths, principal points and angles of view.
 
 use super::{Camera, CameraError, Pose, Projection};
 use glam::{DVec2, dvec2};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 impl Camera {
-    /// A pinhole camera with focal lengths and principal point in pixels (the centre of the first pixel at
-    /// (½, ½)), as photographs have it after their lens was taken out.
+    /// Makes a pinhole camera from focal lengths and the principal point in pixels. The centre of the first
+    /// pixel is at (½, ½). An undistorted photograph has such a camera.
     ///
     /// ```
     /// use s3d_geom::{Camera, Pose, glam::{dvec2, dvec3}};
     ///
-    /// // Looks along +Y. What lies straight ahead is seen in the principal point, not in the middle.
+    /// // The camera looks along +Y. A point straight ahead is at the principal point, not in the middle.
     /// let pose = Pose::level(dvec3(0.0, 0.0, 1.5), 0.0);
     /// let camera = Camera::pinhole(pose, dvec2(500.0, 510.0), dvec2(300.0, 250.0), 640, 480)?;
     /// let (pixel, depth_m) = camera.project(dvec3(0.0, 4.0, 1.5)).unwrap();
@@ -36,11 +36,11 @@ impl Camera {
         Self { pose, projection, width, height }.checked()
     }
 
-    /// A pinhole camera from the matrices of computer vision, row by row: K, and world → camera in OpenCV's
-    /// axes, as [`Camera::k_matrix`] and [`Pose::rt_matrix`] give them.
+    /// Makes a pinhole camera from the matrices of computer vision, row by row: K, and RT, which is world →
+    /// camera in OpenCV's axes. [`Camera::k_matrix`] and [`Pose::rt_matrix`] return the same matrices.
     ///
     /// # Errors
-    /// [`CameraError::Intrinsics`] if K has a skew or another last row; as [`Camera::pinhole`] and
+    /// [`CameraError::Intrinsics`] if K has a skew or another last row; the errors of [`Camera::pinhole`] and
     /// [`Pose::from_rt`].
     pub fn from_k_rt(
         k: [[f64; 3]; 3],
@@ -52,8 +52,8 @@ impl Camera {
         Self::pinhole(Pose::from_rt(rt)?, dvec2(fx, fy), dvec2(cx, cy), width, height)
     }
 
-    /// A pinhole camera with square pixels and its centre in the middle, of the vertical angle of view
-    /// `fov_y_rad`.
+    /// Makes a pinhole camera with square pixels, the principal point in the middle, and the vertical angle
+    /// of view `fov_y_rad`.
     ///
     /// # Errors
     /// [`CameraError::NoPixels`], [`CameraError::AngleOfView`].
@@ -71,7 +71,7 @@ impl Camera {
         Self { pose, projection: Projection::Perspective { fov_rad }, width, height }.checked()
     }
 
-    /// The camera itself, if it is one.
+    /// Returns the camera if its image size and projection are valid.
     pub(super) fn checked(self) -> Result<Self, CameraError> {
         let Self { width, height, .. } = self;
         if width == 0 || height == 0 {
@@ -91,14 +91,14 @@ impl Camera {
         }
     }
 
-    /// Whether it is a panorama: all other cameras are pinholes.
+    /// Returns true for a panorama. All other cameras are pinholes.
     pub fn is_panorama(&self) -> bool {
         self.projection == Projection::Equirectangular
     }
 
-    /// The horizontal angle of view that the pose file states: a panorama's is π/2, as in the published
-    /// files. A pinhole's is that between the left and the right edge of its image, in the plane of the
-    /// optical axis.
+    /// Returns the horizontal angle of view for the pose file. For a pinhole, this is the angle between the
+    /// left and the right edge of the image, in the plane of the optical axis. For a panorama it is π/2, as
+    /// in the published files.
     pub fn fov_rad(&self) -> f64 {
         match self.projection {
             Projection::Perspective { fov_rad } => fov_rad,
@@ -110,8 +110,8 @@ impl Camera {
         }
     }
 
-    /// Focal lengths in pixels, along the image's width and its height. Of an angle of view both are (W/2) /
-    /// tan(fov/2).
+    /// Returns the focal lengths in pixels, along the width and the height of the image. A camera with an
+    /// angle of view has (W/2) / tan(fov/2) along both.
     pub fn focal_px(&self) -> DVec2 {
         match self.projection {
             Projection::Pinhole { focal_px, .. } => focal_px,
@@ -119,7 +119,8 @@ impl Camera {
         }
     }
 
-    /// The principal point in pixels from the image's top left corner: the middle, unless it is given.
+    /// Returns the principal point in pixels from the top left corner of the image. It is the middle, unless
+    /// it was given.
     pub fn center_px(&self) -> DVec2 {
         match self.projection {
             Projection::Pinhole { center_px, .. } => center_px,
@@ -127,14 +128,15 @@ impl Camera {
         }
     }
 
-    /// `camera_k_matrix`, row by row: focal lengths and the principal point.
+    /// Returns `camera_k_matrix` of the pose files, row by row: the focal lengths and the principal point.
     pub fn k_matrix(&self) -> [[f64; 3]; 3] {
-        let (f, c) = (self.focal_px(), self.center_px());
+        let f = self.focal_px();
+        let c = self.center_px();
         [[f.x, 0.0, c.x], [0.0, f.y, c.y], [0.0, 0.0, 1.0]]
     }
 }
 
-/// Finite and above 0, and so is its inverse.
+/// Returns true if both focal lengths and their inverses are finite and above 0.
 fn is_focal_length(focal_px: DVec2) -> bool {
     focal_px.is_finite() && focal_px.recip().is_finite() && focal_px.min_element() > 0.0
 }
@@ -161,8 +163,10 @@ mod tests {
             let point = camera.pose.location + direction * t;
             let (pixel, depth) = camera.project(point).unwrap();
             prop_assert!(pixel.abs_diff_eq(dvec2(x, y), 1e-6) && (depth - t).abs() < 1e-9 * t);
-            // K · RT · point, as anybody else computes it.
-            let (k, rt) = (camera.k_matrix(), camera.pose.rt_matrix());
+
+            // K · RT · point, as other programs compute it.
+            let k = camera.k_matrix();
+            let rt = camera.pose.rt_matrix();
             let v = DVec3::from_array(rt.map(|r| r[0] * point.x + r[1] * point.y + r[2] * point.z + r[3]));
             let v = DVec3::from_array(k.map(|r| DVec3::from_array(r).dot(v)));
             prop_assert!((v.truncate() / v.z).abs_diff_eq(dvec2(x, y), 1e-6));
@@ -184,7 +188,7 @@ mod tests {
         }
     }
 
-    /// An angle of view is the same camera as its focal length, to the last bit.
+    /// A camera from an angle of view equals the camera from its focal length, to the last bit.
     #[test]
     fn a_centred_pinhole_is_the_perspective_camera() {
         for (fov, width, height) in [(1.2, 64, 32), (0.3, 1080, 1080), (2.9, 33, 517)] {
@@ -206,7 +210,7 @@ mod tests {
         assert!((tall.focal_px() - 300.0 / 0.6f64.tan()).abs().max_element() < 1e-9);
         let half_rad = tall.direction(150.0, 0.0).angle_between(tall.pose.forward());
         assert!((half_rad - 0.6).abs() < 1e-7, "{half_rad}");
-        // The left edge 45° off the axis, the right edge on it.
+        // The left edge is 45° off the axis, and the right edge is on it.
         let off = Camera::pinhole(pose(), dvec2(100.0, 50.0), dvec2(100.0, 0.0), 100, 10).unwrap();
         assert!((off.fov_rad() - PI / 4.0).abs() < 1e-12);
     }
@@ -214,7 +218,8 @@ mod tests {
     #[test]
     fn what_is_no_camera_is_refused() {
         let camera = |f, c, w, h| Camera::pinhole(pose(), f, c, w, h).unwrap_err();
-        let (f, c) = (dvec2(100.0, 100.0), dvec2(5.0, 5.0));
+        let f = dvec2(100.0, 100.0);
+        let c = dvec2(5.0, 5.0);
         assert_eq!(camera(f, c, 0, 3), CameraError::NoPixels { width: 0, height: 3 });
         for focal in [dvec2(0.0, 1.0), dvec2(1.0, -1.0), dvec2(1.0, f64::INFINITY), dvec2(1e-320, 1.0)] {
             assert_eq!(camera(focal, c, 9, 9), CameraError::FocalLength(focal));

@@ -1,19 +1,19 @@
-//! Lenses: pinholes with OpenCV's distortion.
+//! Lenses with OpenCV's radial and tangential distortion.
 
 use glam::{DVec2, DVec3, dvec2, dvec3};
 
-/// The intrinsics of a real camera: a pinhole behind a lens that bends straight lines.
+/// The intrinsics of a real camera: a pinhole with a lens that bends straight lines.
 ///
-/// A direction (x, y, z) in OpenCV's axes (x right, y down, z forward) is divided by z, bent,
+/// A direction (x, y, z) in OpenCV's axes (x right, y down, z forward) is divided by z, distorted to
 ///
 /// ```text
 /// r² = x² + y²,   q = 1 + k₁r² + k₂r⁴ + k₃r⁶
 /// x' = x·q + 2p₁xy + p₂(r² + 2x²),   y' = y·q + p₁(r² + 2y²) + 2p₂xy
 /// ```
 ///
-/// and comes to the pixel (fx·x' + cx, fy·y' + cy). The picture's top left corner is (0, 0) and the centre of
-/// pixel (i, j) is at (i + ½, j + ½), as everywhere. Source: OpenCV's `projectPoints`; formats.md, "The
-/// scanner's pictures".
+/// and projected to the pixel (fx·x' + cx, fy·y' + cy). The top left corner of the picture is (0, 0), and the
+/// centre of pixel (i, j) is at (i + ½, j + ½), as everywhere. Source: OpenCV's `projectPoints`; formats.md,
+/// "The scanner's pictures".
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -24,7 +24,7 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 /// ```
 /// use s3d_geom::{Lens, glam::{dvec2, dvec3}};
 ///
-/// // k₁ < 0 draws what is off the axis to the middle.
+/// // k₁ < 0 moves points off the axis towards the middle.
 /// let lens =
 ///     Lens::new([640, 480], dvec2(500.0, 500.0), dvec2(320.0, 240.0), [-0.1, 0.0, 0.0, 0.0, 0.0]).unwrap();
 /// let pixel = lens.project(dvec3(1.0, 0.0, 2.0)).unwrap();
@@ -38,26 +38,28 @@ pub struct Lens {
     center_px: DVec2,
     /// k₁ k₂ p₁ p₂ k₃.
     distortion: [f64; 5],
-    /// The r² from which on q·r falls: what is farther out would be seen in the wrong place.
+    /// The r² up to which q·r grows. Directions farther off the axis would appear in the wrong place.
     #[cfg_attr(feature = "serde", serde(skip_serializing))]
     last_r2: f64,
 }
 
-/// The r² at which the search for the end of a lens stops: 84° off the axis.
+/// The r² at which the search for the largest r² stops: 84° off the axis.
 const FARTHEST_R2: f64 = 100.0;
 
 impl Lens {
-    /// A lens with the focal lengths and the principal point in pixels, and OpenCV's k₁ k₂ p₁ p₂ k₃. `None`
-    /// if a number is not finite, a size is 0, a focal length is not above 0, or no direction comes to the
-    /// middle of the picture.
+    /// Makes a lens from the focal lengths and the principal point in pixels, and OpenCV's k₁ k₂ p₁ p₂ k₃.
+    ///
+    /// Returns `None` if a number is not finite, a size is 0, a focal length is not above 0, or no direction
+    /// is projected to the middle of the picture.
     pub fn new(size: [u32; 2], focal_px: DVec2, center_px: DVec2, distortion: [f64; 5]) -> Option<Self> {
         let finite =
             focal_px.is_finite() && center_px.is_finite() && distortion.iter().all(|k| k.is_finite());
         if !finite || focal_px.min_element() <= 0.0 || size.contains(&0) {
             return None;
         }
+
+        // Searches where the derivative of r·q(r²) becomes negative. Steps are small where most lenses end.
         let [k1, k2, _, _, k3] = distortion;
-        // The derivative of r·q(r²), by steps that are small where lenses end.
         let mut last_r2 = 0.0;
         while last_r2 < FARTHEST_R2 {
             let s = last_r2 + 0.002 + 0.01 * last_r2;
@@ -66,71 +68,80 @@ impl Lens {
             }
             last_r2 = s;
         }
+
         let lens = Self { size, focal_px, center_px, distortion, last_r2 };
         lens.direction(dvec2(f64::from(size[0]), f64::from(size[1])) * 0.5)
             .is_some()
             .then_some(lens)
     }
 
-    /// Width of the picture in pixels.
+    /// Returns the width of the picture in pixels.
     pub fn width(&self) -> u32 {
         self.size[0]
     }
 
-    /// Height of the picture in pixels.
+    /// Returns the height of the picture in pixels.
     pub fn height(&self) -> u32 {
         self.size[1]
     }
 
-    /// Focal lengths in pixels, to the right and downwards.
+    /// Returns the focal lengths in pixels, to the right and downwards.
     pub fn focal_px(&self) -> DVec2 {
         self.focal_px
     }
 
-    /// The principal point in pixels from the picture's top left corner.
+    /// Returns the principal point in pixels from the top left corner of the picture.
     pub fn center_px(&self) -> DVec2 {
         self.center_px
     }
 
-    /// OpenCV's k₁ k₂ p₁ p₂ k₃.
+    /// Returns OpenCV's k₁ k₂ p₁ p₂ k₃.
     pub fn distortion(&self) -> [f64; 5] {
         self.distortion
     }
 
-    /// Where a direction in OpenCV's axes, of any length, comes to in the picture's plane. `None` behind the
-    /// camera, and so far out that the polynomial folds back.
+    /// Projects a direction of any length, in OpenCV's axes, to the plane of the picture, in pixels. Returns
+    /// `None` if the direction points behind the camera, or so far off the axis that the polynomial folds
+    /// back.
     #[inline]
     pub fn project(&self, direction: DVec3) -> Option<DVec2> {
         if direction.z <= 0.0 {
             return None;
         }
-        let (x, y) = (direction.x / direction.z, direction.y / direction.z);
+        let x = direction.x / direction.z;
+        let y = direction.y / direction.z;
         (x * x + y * y <= self.last_r2).then(|| self.focal_px * self.bent(x, y) + self.center_px)
     }
 
     #[inline]
     fn bent(&self, x: f64, y: f64) -> DVec2 {
         let [k1, k2, p1, p2, k3] = self.distortion;
-        let (xx, yy, xy) = (x * x, y * y, x * y);
+        let xx = x * x;
+        let yy = y * y;
+        let xy = x * y;
         let r2 = xx + yy;
         let q = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
         dvec2(x * q + 2.0 * p1 * xy + p2 * (r2 + 2.0 * xx), y * q + p1 * (r2 + 2.0 * yy) + 2.0 * p2 * xy)
     }
 
-    /// The direction, with z = 1, that comes to a place of the picture's plane: Newton's method, exact to
-    /// 1e-12. `None` if there is none.
+    /// Returns the direction, with z = 1 in OpenCV's axes, that is projected to `pixel`. Returns `None` if
+    /// there is none. Newton's method, exact to 1e-12.
     pub fn direction(&self, pixel: DVec2) -> Option<DVec3> {
+        let [k1, k2, p1, p2, k3] = self.distortion;
         let goal = (pixel - self.center_px) / self.focal_px;
         let mut at = goal;
-        let [k1, k2, p1, p2, k3] = self.distortion;
+
         for _ in 0..50 {
             let error = self.bent(at.x, at.y) - goal;
             if error.abs().max_element() < 1e-13 {
                 break;
             }
-            let (x, y, r2) = (at.x, at.y, at.length_squared());
+
+            // The Jacobian. dq is twice the derivative of q by r².
+            let x = at.x;
+            let y = at.y;
+            let r2 = at.length_squared();
             let q = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-            // The derivative of q by r², twice.
             let dq = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
             let xx = q + x * x * dq + 2.0 * p1 * y + 6.0 * p2 * x;
             let xy = x * y * dq + 2.0 * p1 * x + 2.0 * p2 * y;
@@ -141,17 +152,18 @@ impl Lens {
             }
             at -= dvec2(yy * error.x - xy * error.y, xx * error.y - xy * error.x) / det;
         }
+
         let close = (self.bent(at.x, at.y) - goal).abs().max_element() < 1e-9;
         (close && at.length_squared() <= self.last_r2).then(|| dvec3(at.x, at.y, 1.0))
     }
 
-    /// How far from the axis the picture sees at most, as the tangent of the angle.
+    /// Returns the tangent of the largest angle off the axis that the picture shows.
     pub fn reach(&self) -> f64 {
         let radius = |pixel| self.direction(pixel).map_or(self.last_r2, |d| d.x * d.x + d.y * d.y);
         self.border(16).map(radius).fold(0.0, f64::max).sqrt()
     }
 
-    /// Places along the picture's border, `steps` a side.
+    /// Returns places along the border of the picture, `steps` per side.
     fn border(&self, steps: u32) -> impl Iterator<Item = DVec2> {
         let size = dvec2(f64::from(self.size[0]), f64::from(self.size[1]));
         (0..steps).flat_map(move |k| {
@@ -178,7 +190,8 @@ mod as_data {
         type Error = &'static str;
 
         fn try_from(Lens { size, focal_px, center_px, distortion }: Lens) -> Result<Self, &'static str> {
-            Self::new(size, focal_px, center_px, distortion).ok_or("a lens that comes to no picture")
+            Self::new(size, focal_px, center_px, distortion)
+                .ok_or("no direction is projected to the middle of the picture")
         }
     }
 }
@@ -216,13 +229,13 @@ mod tests {
 
     #[test]
     fn what_a_polynomial_folds_back_is_not_seen() {
-        // q·r has its highest point at r² = 1 / (3 · 0.3).
+        // q·r is largest at r² = 1 / (3 · 0.3).
         let lens = lens([-0.3, 0.0, 0.0, 0.0, 0.0]).unwrap();
         assert_eq!(lens.direction(DVec2::ZERO), None, "no direction comes to the corner");
         assert!((1.0..1.1).contains(&lens.reach()), "{}", lens.reach());
         assert!(lens.project(dvec3(1.0, 0.0, 1.0)).is_some());
         assert_eq!(lens.project(dvec3(1.1, 0.0, 1.0)), None);
-        // Without that rule it would come to the middle.
+        // Without that limit it would be projected to the middle.
         assert!(lens.bent(1.8, 0.0).x < 0.1);
         assert_eq!(lens.project(dvec3(0.0, 0.0, -1.0)), None);
         assert_eq!(lens.project(dvec3(1.0, 0.0, 0.0)), None);
@@ -231,7 +244,7 @@ mod tests {
     #[test]
     fn lenses_that_cannot_be_are_refused() {
         assert_eq!(lens([f64::NAN, 0.0, 0.0, 0.0, 0.0]), None);
-        // Its picture would end before its middle.
+        // The polynomial folds back before the middle of the picture.
         let off =
             Lens::new([640, 480], dvec2(500.0, 500.0), dvec2(-400.0, 240.0), [-3.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(off, None);

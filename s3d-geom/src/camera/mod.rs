@@ -19,25 +19,25 @@ pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
 use glam::{DMat3, DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::PI;
 
-/// How a camera maps directions to pixels.
+/// The mapping from directions to pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Projection {
-    /// A pinhole with square pixels and its centre in the middle.
+    /// A pinhole with square pixels and the principal point in the middle.
     Perspective {
         /// The full horizontal angle of view, in (0, π).
         fov_rad: f64,
     },
-    /// A pinhole in general: pixels need not be square, nor the optical axis in the middle of the image.
+    /// A general pinhole: any pixel proportions, any principal point.
     Pinhole {
-        /// Focal lengths in pixels, along the image's width and its height; both above 0.
+        /// Focal lengths in pixels, along the width and the height of the image; both above 0.
         focal_px: DVec2,
-        /// Where the optical axis meets the image, in pixels from its top left corner; may lie outside.
+        /// The principal point, in pixels from the top left corner of the image. It may lie outside.
         center_px: DVec2,
     },
-    /// A panorama: columns are longitudes, growing to the right, rows are latitudes, from +90° at the top to
-    /// −90°. Its centre column looks along the pose's forward axis projected to the horizon; up is the
-    /// world's +Z whatever the pose's tilt.
+    /// A panorama. Columns are longitudes, growing to the right. Rows are latitudes, from +90° at the top to
+    /// −90°. The centre column looks along the forward axis of the pose, projected to the horizon. Up is +Z
+    /// of the world, whatever the tilt of the pose.
     Equirectangular,
 }
 
@@ -45,17 +45,20 @@ pub enum Projection {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum NormalAxes {
-    /// As in the paper: right, down and towards the camera, so that what faces the camera is (0, 0, 1).
+    /// The axes of the paper: right, down and towards the camera. A surface that faces the camera has the
+    /// normal (0, 0, 1).
     #[default]
     Paper,
-    /// OpenCV's: right, down and forward, so that what faces the camera is (0, 0, −1). A panorama's X, −Z, Y
-    /// of the world are such axes already, those of a level camera that looks along +Y, and are the same
-    /// under both.
+    /// The axes of OpenCV: right, down and forward. A surface that faces the camera has the normal (0, 0,
+    /// −1).
+    ///
+    /// A panorama has the axes X, −Z, Y of the world under both choices. They are OpenCV's axes for a level
+    /// camera that looks along +Y.
     OpenCv,
 }
 
 impl NormalAxes {
-    /// Its name: `paper` or `opencv`.
+    /// Returns the name: `paper` or `opencv`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
@@ -63,7 +66,7 @@ impl NormalAxes {
         }
     }
 
-    /// The axes that are called `word`.
+    /// Returns the axes with the name `word`.
     pub fn from_name(word: &str) -> Option<Self> {
         [Self::Paper, Self::OpenCv].into_iter().find(|axes| axes.name() == word)
     }
@@ -80,8 +83,8 @@ impl NormalAxes {
 /// ```
 /// use s3d_geom::{Camera, Pose, glam::dvec3};
 ///
-/// // It looks along +Y: a point ahead and to the right (+X) is right of the middle, whatever lies behind
-/// // is nowhere.
+/// // The camera looks along +Y. A point ahead and to the right (+X) is right of the middle. A point behind
+/// // the camera is not in the image.
 /// let camera = Camera::perspective(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 90f64.to_radians(), 200, 100);
 /// let (pixel, depth) = camera.project(dvec3(1.0, 2.0, 1.5)).unwrap();
 /// assert!((pixel.x - 150.0).abs() < 1e-9 && (pixel.y - 50.0).abs() < 1e-9 && (depth - 2.0).abs() < 1e-9);
@@ -91,9 +94,9 @@ impl NormalAxes {
 /// assert!(back.abs_diff_eq(dvec3(1.0, 2.0, 1.5), 1e-9));
 /// ```
 pub struct Camera {
-    /// Where the camera is and how it is turned.
+    /// The place and rotation of the camera.
     pub pose: Pose,
-    /// How directions become pixels.
+    /// The mapping from directions to pixels.
     pub projection: Projection,
     /// Image width in pixels, at least 1.
     pub width: u32,
@@ -102,7 +105,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A pinhole camera of `width` × `height` pixels with the horizontal angle of view `fov_rad`.
+    /// Makes a pinhole camera of `width` × `height` pixels with the horizontal angle of view `fov_rad`.
     ///
     /// # Panics
     /// If a size is 0 or the angle is not between 0 and π.
@@ -112,7 +115,7 @@ impl Camera {
         Self { pose, projection: Projection::Perspective { fov_rad }, width, height }
     }
 
-    /// A panorama of `width` × `width / 2` pixels.
+    /// Makes a panorama of `width` × `width / 2` pixels.
     ///
     /// # Panics
     /// If `width` is odd or 0.
@@ -121,13 +124,18 @@ impl Camera {
         Self { pose, projection: Projection::Equirectangular, width, height: width / 2 }
     }
 
-    /// The directions of the camera's rays, precomputed. Cheap enough to make once an image.
+    /// Precomputes the ray directions of the camera. Call it once per image.
     pub fn rays(&self) -> Rays {
-        let (w, h) = (f64::from(self.width), f64::from(self.height));
+        let w = f64::from(self.width);
+        let h = f64::from(self.height);
         match self.projection {
             Projection::Perspective { .. } | Projection::Pinhole { .. } => {
-                let (f, c) = (self.focal_px(), self.center_px());
-                let (right, down, forward) = (self.pose.right(), -self.pose.up(), self.pose.forward());
+                let f = self.focal_px();
+                let c = self.center_px();
+                let right = self.pose.right();
+                let down = -self.pose.up();
+                let forward = self.pose.forward();
+
                 Rays::Perspective {
                     x_step: right / f.x,
                     y_step: down / f.y,
@@ -135,53 +143,61 @@ impl Camera {
                 }
             }
             Projection::Equirectangular => {
-                let azimuth = self.pose.azimuth_rad();
                 // Longitude grows to the right, azimuth to the left.
+                let azimuth = self.pose.azimuth_rad();
                 let columns = (0..self.width)
                     .map(|u| {
                         let (sin, cos) = libm::sincos(azimuth - ((f64::from(u) + 0.5) / w - 0.5) * 2.0 * PI);
                         dvec2(cos, sin)
                     })
                     .collect();
+
                 let rows = (0..self.height)
                     .map(|v| {
                         let (sin, cos) = libm::sincos((0.5 - (f64::from(v) + 0.5) / h) * PI);
                         dvec2(cos, sin)
                     })
                     .collect();
+
                 Rays::Equirectangular { columns, rows }
             }
         }
     }
 
-    /// The direction through the point (x, y) of the image, in the world. Perspective: its component along
-    /// the optical axis is 1, so that a multiple of it is a z-depth. Panorama: a unit vector.
+    /// Returns the world direction through the point (x, y) of the image. The direction of a pinhole has the
+    /// component 1 along the optical axis, so its multiple by a z-depth ends at the surface. The direction of
+    /// a panorama is a unit vector.
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
         match self.projection {
             Projection::Perspective { .. } | Projection::Pinhole { .. } => {
-                let (f, c) = (self.focal_px(), self.center_px());
-                let (a, b) = ((x - c.x) / f.x, (y - c.y) / f.y);
+                let f = self.focal_px();
+                let c = self.center_px();
+                let a = (x - c.x) / f.x;
+                let b = (y - c.y) / f.y;
                 self.pose.right() * a - self.pose.up() * b + self.pose.forward()
             }
             Projection::Equirectangular => {
                 let azimuth = self.pose.azimuth_rad() - (x / f64::from(self.width) - 0.5) * 2.0 * PI;
                 let latitude = (0.5 - y / f64::from(self.height)) * PI;
-                let ((sin_a, cos_a), (sin_l, cos_l)) = (libm::sincos(azimuth), libm::sincos(latitude));
+                let (sin_a, cos_a) = libm::sincos(azimuth);
+                let (sin_l, cos_l) = libm::sincos(latitude);
                 dvec3(cos_l * cos_a, cos_l * sin_a, sin_l)
             }
         }
     }
 
-    /// Where `point` (world) appears in the image, and its depth: z along the optical axis in a perspective
-    /// view, the distance in a panorama. `None` for what lies behind a perspective camera, or in the camera's
-    /// centre.
+    /// Projects `point` (world) to the image. Returns its pixel coordinates and its depth in metres: z along
+    /// the optical axis for a pinhole, the distance for a panorama. Returns `None` if the point is behind a
+    /// pinhole camera or in the centre of the camera.
     pub fn project(&self, point: DVec3) -> Option<(DVec2, f64)> {
-        let (w, h) = (f64::from(self.width), f64::from(self.height));
+        let w = f64::from(self.width);
+        let h = f64::from(self.height);
         let d = point - self.pose.location;
         match self.projection {
             Projection::Perspective { .. } | Projection::Pinhole { .. } => {
                 let v: DVec3 = self.pose.opencv_from_world() * d;
-                let (f, c) = (self.focal_px(), self.center_px());
+                let f = self.focal_px();
+                let c = self.center_px();
                 (v.z > 0.0).then(|| (dvec2(c.x + f.x * v.x / v.z, c.y + f.y * v.y / v.z), v.z))
             }
             Projection::Equirectangular => {
@@ -194,14 +210,14 @@ impl Camera {
         }
     }
 
-    /// World → the axes in which normals of this camera's images are written (formats.md, "What is written"):
-    /// the channels R G B are right, down and towards the camera in a perspective view, and X, −Z, Y of the
-    /// world in a panorama.
+    /// Returns the rotation from the world to the axes in which normal images of this camera are written
+    /// (formats.md, "What is written"). The channels R G B are right, down and towards the camera for a
+    /// pinhole, and X, −Z, Y of the world for a panorama.
     pub fn normal_image_from_world(&self) -> DMat3 {
         self.normal_axes_from_world(NormalAxes::Paper)
     }
 
-    /// As [`Camera::normal_image_from_world`], with a choice of axes.
+    /// Returns the same as [`Camera::normal_image_from_world`], for a choice of axes.
     pub fn normal_axes_from_world(&self, axes: NormalAxes) -> DMat3 {
         match self.projection {
             Projection::Perspective { .. } | Projection::Pinhole { .. } => {
@@ -214,29 +230,29 @@ impl Camera {
     }
 }
 
-/// The ray directions of a camera, by pixel; see [`Camera::rays`].
+/// The ray directions of a camera, by pixel. [`Camera::rays`] makes them.
 #[derive(Clone, Debug)]
 pub enum Rays {
-    /// direction = origin + x_step·(i + ½) + y_step·(j + ½); its component along the optical axis is 1.
+    /// The direction is origin + x_step·(i + ½) + y_step·(j + ½). Its component along the optical axis is 1.
     Perspective {
-        /// What one pixel to the right adds.
+        /// The step from a pixel to the next on the right.
         x_step: DVec3,
-        /// What one pixel down adds.
+        /// The step from a pixel to the next below.
         y_step: DVec3,
-        /// The direction through the image's top left corner.
+        /// The direction through the top left corner of the image.
         origin: DVec3,
     },
-    /// direction = (cos lat · column, sin lat); a unit vector.
+    /// The direction is (cos lat · column, sin lat), a unit vector.
     Equirectangular {
-        /// Cosine and sine of each column's azimuth.
+        /// Cosine and sine of the azimuth of each column.
         columns: Vec<DVec2>,
-        /// Cosine and sine of each row's latitude.
+        /// Cosine and sine of the latitude of each row.
         rows: Vec<DVec2>,
     },
 }
 
 impl Rays {
-    /// The direction through the centre of pixel (i, j); see [`Camera::direction`] for its length.
+    /// Returns the direction through the centre of pixel (i, j), with the length of [`Camera::direction`].
     ///
     /// # Panics
     /// In a panorama, if the pixel is outside the image.
@@ -247,7 +263,8 @@ impl Rays {
                 *origin + *x_step * (f64::from(i) + 0.5) + *y_step * (f64::from(j) + 0.5)
             }
             Rays::Equirectangular { columns, rows } => {
-                let (c, r) = (columns[i as usize], rows[j as usize]);
+                let c = columns[i as usize];
+                let r = rows[j as usize];
                 dvec3(r.x * c.x, r.x * c.y, r.y)
             }
         }
@@ -289,9 +306,10 @@ mod tests {
     proptest! {
         #[test]
         fn pixels_come_back(i in 0u32..64, j in 0u32..32, t in 0.1..50.0f64, pano in any::<bool>()) {
-            let c = match pano {
-                true => Camera::equirectangular(pose(), 64),
-                false => Camera::perspective(pose(), 1.2, 64, 32),
+            let c = if pano {
+                Camera::equirectangular(pose(), 64)
+            } else {
+                Camera::perspective(pose(), 1.2, 64, 32)
             };
             let d = c.rays().at(i, j);
             prop_assert!(d.abs_diff_eq(c.direction(f64::from(i) + 0.5, f64::from(j) + 0.5), 1e-12));
@@ -336,8 +354,8 @@ mod tests {
         assert_eq!(panorama.normal_axes_from_world(NormalAxes::OpenCv), panorama.normal_image_from_world());
     }
 
-    /// A genuine pose of the published data set (Area 3): K, original rotation and final rotation agree with
-    /// the rest.
+    /// A genuine pose of the published data set (Area 3): K, the original rotation and the final rotation
+    /// agree with the rest.
     #[test]
     fn a_genuine_pose_is_reproduced() {
         let original = dvec3(1.57489812374115, 0.0024619516916573048, 0.7112205624580383);
@@ -351,6 +369,7 @@ mod tests {
         assert!(crate::euler_from_rotation(view.world_from_camera).abs_diff_eq(last, 1e-6));
         let turn = view.world_from_camera * from.world_from_camera.transpose();
         assert!(crate::euler_from_rotation(turn).abs_diff_eq(between, 1e-6));
+
         let rt = view.rt_matrix();
         let expected = [
             [-0.7075634002685547, -0.7066466212272644, 0.0021539656445384026, 13.17724323272705],
@@ -362,6 +381,7 @@ mod tests {
                 assert!((a - b).abs() < 2e-6, "{a} {b}");
             }
         }
+
         let camera = Camera::perspective(view, 1.1030245194845198, 1080, 1080);
         assert!((camera.focal_px() - 877.7806396484375).abs().max_element() < 3e-5);
     }

@@ -1,20 +1,19 @@
-//! The lens of a photograph, whichever model it has.
+//! The lens of a photograph, of either model.
 
 use super::{Camera, CameraError, FisheyeLens, Lens, Pose};
 use glam::{DVec2, DVec3};
 
-/// What takes directions to the pixels of a photograph: a lens of either of OpenCV's models. A pinhole is a
-/// [`Lens`] that bends nothing.
+/// The lens of a photograph, of either of OpenCV's models. A pinhole is a [`Lens`] without distortion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PhotoLens {
-    /// k₁ k₂ p₁ p₂ k₃.
+    /// The model with k₁ k₂ p₁ p₂ k₃.
     Straight(Lens),
-    /// k₁ k₂ k₃ k₄ of the angle.
+    /// The fisheye model, with k₁ k₂ k₃ k₄.
     Fisheye(FisheyeLens),
 }
 
 impl PhotoLens {
-    /// Width and height of the photograph in pixels.
+    /// Returns the width and height of the photograph in pixels.
     pub fn size(&self) -> [u32; 2] {
         match self {
             Self::Straight(lens) => [lens.width(), lens.height()],
@@ -22,7 +21,7 @@ impl PhotoLens {
         }
     }
 
-    /// Focal lengths in pixels, to the right and downwards.
+    /// Returns the focal lengths in pixels, to the right and downwards.
     pub fn focal_px(&self) -> DVec2 {
         match self {
             Self::Straight(lens) => lens.focal_px(),
@@ -30,7 +29,7 @@ impl PhotoLens {
         }
     }
 
-    /// The principal point in pixels from the photograph's top left corner.
+    /// Returns the principal point in pixels from the top left corner of the photograph.
     pub fn center_px(&self) -> DVec2 {
         match self {
             Self::Straight(lens) => lens.center_px(),
@@ -38,11 +37,11 @@ impl PhotoLens {
         }
     }
 
-    /// A pinhole of the same focal lengths and principal point, whose image is `width` pixels wide and has
-    /// the photograph's proportions.
+    /// Makes a pinhole camera with the same focal lengths and principal point. Its image is `width` pixels
+    /// wide and has the proportions of the photograph.
     ///
     /// # Errors
-    /// As [`Camera::pinhole`].
+    /// The errors of [`Camera::pinhole`].
     pub fn pinhole(&self, pose: Pose, width: u32) -> Result<Camera, CameraError> {
         let [w, h] = self.size().map(f64::from);
         let height = (h * f64::from(width) / w).round().max(1.0) as u32;
@@ -50,8 +49,8 @@ impl PhotoLens {
         Camera::pinhole(pose, self.focal_px() * scale, self.center_px() * scale, width, height)
     }
 
-    /// Where a direction in OpenCV's axes (x right, y down, z forward), of any length, comes to in the plane
-    /// of the photograph. `None` if no place is that of this direction.
+    /// Projects a direction of any length, in OpenCV's axes (x right, y down, z forward), to the plane of the
+    /// photograph, in pixels. Returns `None` if the lens does not see the direction.
     #[inline]
     pub fn project(&self, direction: DVec3) -> Option<DVec2> {
         match self {
@@ -60,7 +59,7 @@ impl PhotoLens {
         }
     }
 
-    /// As [`project`](Self::project), of places within the photograph.
+    /// Projects like [`project`](Self::project). Also returns `None` if the place is outside the photograph.
     #[inline]
     pub fn pixel(&self, direction: DVec3) -> Option<DVec2> {
         let [width, height] = self.size();
@@ -69,8 +68,7 @@ impl PhotoLens {
         self.project(direction).filter(is_within)
     }
 
-    /// The direction, of any length, that comes to a place of the photograph's plane. `None` if there is
-    /// none.
+    /// Returns the direction, of any length, that is projected to `pixel`. Returns `None` if there is none.
     pub fn direction(&self, pixel: DVec2) -> Option<DVec3> {
         match self {
             Self::Straight(lens) => lens.direction(pixel),
@@ -86,7 +84,9 @@ mod tests {
 
     #[test]
     fn places_beside_the_photograph_are_none_of_its_pixels() {
-        let (size, f, c) = ([640, 480], dvec2(300.0, 310.0), dvec2(321.0, 239.0));
+        let size = [640, 480];
+        let f = dvec2(300.0, 310.0);
+        let c = dvec2(321.0, 239.0);
         let straight = PhotoLens::Straight(Lens::new(size, f, c, [0.1, 0.0, 0.001, 0.0, 0.0]).unwrap());
         let fisheye = PhotoLens::Fisheye(FisheyeLens::new(size, f, c, [0.01, 0.0, 0.0, 0.0]).unwrap());
         for lens in [straight, fisheye] {

@@ -1,22 +1,21 @@
-//! Where a camera stands and how it is turned, in the convention of the published data set.
+//! The place and rotation of a camera, in the convention of the published data set.
 //!
-//! Camera axes here are Blender's: x right, y up, looking along −z. Angles are Blender's XYZ Euler angles,
-//! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "What is written" (settled on genuine pose
-//! files).
+//! Camera axes are Blender's: x right, y up, looking along −z. Angles are Blender's XYZ Euler angles,
+//! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "What is written" (checked on genuine pose files).
 
 use crate::CameraError;
 use glam::{DMat3, DQuat, DVec3, dvec3};
 use std::f64::consts::FRAC_PI_2;
 
-/// The rotation Rz·Ry·Rx of three angles in radians.
+/// Returns the rotation Rz·Ry·Rx of three angles in radians.
 pub fn rotation_from_euler(angles_rad: DVec3) -> DMat3 {
     DMat3::from_rotation_z(angles_rad.z)
         * DMat3::from_rotation_y(angles_rad.y)
         * DMat3::from_rotation_x(angles_rad.x)
 }
 
-/// Three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in
-/// [−π/2, π/2]. Where the two outer axes coincide (y = ±π/2) z is 0.
+/// Returns the three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in
+/// [−π/2, π/2]. If the two outer axes coincide (y = ±π/2), z is 0.
 pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
     let m = |row: usize, col: usize| rotation.col(col)[row];
     let cos_y = libm::hypot(m(0, 0), m(1, 0));
@@ -28,7 +27,7 @@ pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
     }
 }
 
-/// The place and direction of a camera.
+/// The place and rotation of a camera.
 ///
 /// ```
 /// use s3d_geom::{Pose, euler_from_rotation, glam::{DVec3, dvec3}};
@@ -46,35 +45,36 @@ pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
-    /// Where the camera is, world metres, Z-up.
+    /// The place of the camera, in world metres, Z-up.
     pub location: DVec3,
-    /// Camera (x right, y up, z backwards) → world: E(final) of the pose files. Orthonormal.
+    /// The rotation from the camera (x right, y up, z backwards) to the world: E(final) of the pose files.
+    /// Orthonormal.
     pub world_from_camera: DMat3,
 }
 
 impl Pose {
-    /// The pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°), so that
-    /// the identity looks along +Y with +Z up.
+    /// Returns the pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°). The
+    /// identity therefore looks along +Y with +Z up.
     pub fn from_scanner(location: DVec3, world_from_scanner: DQuat) -> Self {
         let turn = DMat3::from_quat(world_from_scanner.normalize());
         Self { location, world_from_camera: turn * DMat3::from_rotation_x(FRAC_PI_2) }
     }
 
-    /// A level camera (+Z up) that looks along the heading `yaw_rad`, 0 along +Y, growing to the left
-    /// (towards −X).
+    /// Returns the pose of a level camera (+Z up) with the heading `yaw_rad`, which is 0 along +Y and grows
+    /// to the left (towards −X).
     pub fn level(location: DVec3, yaw_rad: f64) -> Self {
         Self::from_scanner(location, DQuat::from_rotation_z(yaw_rad))
     }
 
-    /// The pose of an OpenCV camera (x right, y down, z forward), from world → camera, 3 × 4, row by row:
-    /// what [`Pose::rt_matrix`] gives.
+    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix world → camera, 3 ×
+    /// 4, row by row. [`Pose::rt_matrix`] returns the same matrix.
     ///
     /// # Errors
-    /// As [`Pose::from_opengl`].
+    /// The errors of [`Pose::from_opengl`].
     pub fn from_rt(camera_from_world: [[f64; 4]; 3]) -> Result<Self, CameraError> {
         let [x, y, z] = camera_from_world.map(|[x, y, z, _]| dvec3(x, y, z));
         let shift = DVec3::from_array(camera_from_world.map(|[.., t]| t));
-        // The rows are the camera's axes in the world.
+        // The rows are the axes of the camera in the world.
         let pose = Self::from_axes(DVec3::ZERO, x, -y, -z)?;
         let location = -(pose.opencv_from_world().transpose() * shift);
         if location.is_finite() {
@@ -84,23 +84,26 @@ impl Pose {
         }
     }
 
-    /// The pose of an OpenCV camera (x right, y down, z forward), from camera → world, 4 × 4, row by row.
+    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix camera → world, 4 ×
+    /// 4, row by row.
     ///
     /// # Errors
-    /// As [`Pose::from_opengl`].
+    /// The errors of [`Pose::from_opengl`].
     pub fn from_opencv(world_from_camera: [[f64; 4]; 4]) -> Result<Self, CameraError> {
         let [right, down, forward, location] = columns(world_from_camera)?;
         Self::from_axes(location, right, -down, -forward)
     }
 
-    /// The pose of an OpenGL camera (x right, y up, z backwards; Blender's and nerfstudio's too), from camera
-    /// → world, 4 × 4, row by row. Axes that are off by less than a thousandth, as rounded files have
-    /// them, are made perpendicular; the viewing direction is kept.
+    /// Returns the pose of an OpenGL camera (x right, y up, z backwards) from its matrix camera → world, 4 ×
+    /// 4, row by row. Blender and nerfstudio have the same axes.
+    ///
+    /// Axes from rounded files, which are off by less than a thousandth, are made perpendicular. The viewing
+    /// direction is kept.
     ///
     /// # Errors
     /// [`CameraError::NotFinite`]; [`CameraError::Transposed`], [`CameraError::LastRow`],
-    /// [`CameraError::Scaled`], [`CameraError::Sheared`] or [`CameraError::Mirrored`] if it is no rotation
-    /// with a shift.
+    /// [`CameraError::Scaled`], [`CameraError::Sheared`] or [`CameraError::Mirrored`] if the matrix is not a
+    /// rotation with a translation.
     ///
     /// ```
     /// use s3d_geom::{CameraError, Pose, glam::DVec3};
@@ -109,7 +112,7 @@ impl Pose {
     /// let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]];
     /// let along_y = Pose::look_at(DVec3::Z * 1.5, DVec3::new(0.0, 9.0, 1.5), DVec3::Z)?;
     /// assert_eq!(Pose::from_opengl(rows)?, along_y);
-    /// // Read by columns, the place stands in the last row.
+    /// // A matrix read by columns has the place in its last row.
     /// let transposed = std::array::from_fn(|i| std::array::from_fn(|j| rows[j][i]));
     /// assert_eq!(Pose::from_opengl(transposed), Err(CameraError::Transposed));
     /// # Ok::<(), CameraError>(())
@@ -119,7 +122,8 @@ impl Pose {
         Self::from_axes(location, right, up, back)
     }
 
-    /// The camera at `eye` that looks at `target`; `up` points to the top of the image as far as it can.
+    /// Returns the pose of a camera at `eye` that looks at `target`. The top of the image is as near to `up`
+    /// as possible.
     ///
     /// # Errors
     /// [`CameraError::NotFinite`]; [`CameraError::TargetAtEye`]; [`CameraError::UpAlongView`].
@@ -137,13 +141,15 @@ impl Pose {
         Ok(Self { location: eye, world_from_camera: DMat3::from_cols(right, back.cross(right), back) })
     }
 
-    /// From the camera's axes in the world, which may be rounded.
+    /// Returns the pose with these axes of the camera in the world, which may be rounded.
     fn from_axes(location: DVec3, right: DVec3, up: DVec3, back: DVec3) -> Result<Self, CameraError> {
-        /// How far axes may be from perpendicular and of length 1: files hold seven decimals, or fewer.
+        /// The tolerance for angles and lengths of the axes. Files hold seven decimals or fewer.
         const MOST_SKEW: f64 = 1e-3;
+
         if ![location, right, up, back].iter().all(|v| v.is_finite()) {
             return Err(CameraError::NotFinite);
         }
+
         let length = right.length();
         let skew = [
             up.length() - length,
@@ -161,56 +167,57 @@ impl Pose {
         if (length - 1.0).abs() > MOST_SKEW {
             return Err(CameraError::Scaled(length));
         }
+
         let back = back.normalize();
         let right = (right - back * right.dot(back)).normalize();
         Ok(Self { location, world_from_camera: DMat3::from_cols(right, back.cross(right), back) })
     }
 
-    /// The view at `yaw_rad` to the left of this pose and `pitch_rad` above it, without roll:
-    /// E(final) = E(original)·Ry(yaw)·Rx(pitch).
+    /// Returns the pose turned by `yaw_rad` to the left and `pitch_rad` upwards, without roll: E(final) =
+    /// E(original)·Ry(yaw)·Rx(pitch).
     #[must_use]
     pub fn turned(&self, yaw_rad: f64, pitch_rad: f64) -> Self {
         let turn = DMat3::from_rotation_y(yaw_rad) * DMat3::from_rotation_x(pitch_rad);
         Self { location: self.location, world_from_camera: self.world_from_camera * turn }
     }
 
-    /// Yaw and pitch, in radians, that [`Pose::turned`] takes from this pose to `view`, as far as one without
-    /// roll can.
+    /// Returns the yaw and pitch, in radians, with which [`Pose::turned`] leads from this pose to `view`. If
+    /// `view` has a roll, it is ignored.
     pub fn yaw_pitch_to(&self, view: &Pose) -> (f64, f64) {
         let turn = self.world_from_camera.transpose() * view.world_from_camera;
-        // Ry(yaw)·Rx(pitch) has the columns (cos y, 0, −sin y), …; its middle row is
-        // (0, cos p, −sin p).
+        // The first column of Ry(yaw)·Rx(pitch) is (cos y, 0, −sin y), and the middle row is (0, cos p, −sin
+        // p).
         (libm::atan2(-turn.x_axis.z, turn.x_axis.x), libm::atan2(-turn.z_axis.y, turn.y_axis.y))
     }
 
-    /// The level camera (+Z up) at the same place with the same heading ([`Pose::azimuth_rad`]).
+    /// Returns the level pose (+Z up) at the same place, with the same heading ([`Pose::azimuth_rad`]).
     #[must_use]
     pub fn leveled(&self) -> Self {
         Self::level(self.location, self.azimuth_rad() - FRAC_PI_2)
     }
 
-    /// The direction of the image's right, in the world; a unit vector.
+    /// Returns the direction to the right of the image, in the world; a unit vector.
     pub fn right(&self) -> DVec3 {
         self.world_from_camera.x_axis
     }
 
-    /// The direction of the image's top, in the world; a unit vector.
+    /// Returns the direction to the top of the image, in the world; a unit vector.
     pub fn up(&self) -> DVec3 {
         self.world_from_camera.y_axis
     }
 
-    /// The viewing direction in the world; a unit vector.
+    /// Returns the viewing direction in the world; a unit vector.
     pub fn forward(&self) -> DVec3 {
         -self.world_from_camera.z_axis
     }
 
-    /// World → camera in OpenCV's axes (x right, y down, z forward), without the translation:
+    /// Returns the rotation from the world to OpenCV's axes of the camera (x right, y down, z forward):
     /// D·E(final)ᵀ.
     pub fn opencv_from_world(&self) -> DMat3 {
         DMat3::from_cols(self.right(), -self.up(), self.forward()).transpose()
     }
 
-    /// `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C], world →
+    /// Returns `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C], world →
     /// camera, 3 × 4.
     pub fn rt_matrix(&self) -> [[f64; 4]; 3] {
         let r = self.opencv_from_world();
@@ -218,8 +225,9 @@ impl Pose {
         std::array::from_fn(|i| [r.x_axis[i], r.y_axis[i], r.z_axis[i], t[i]])
     }
 
-    /// The heading of the viewing direction in the horizontal plane: radians from +X towards +Y. A camera
-    /// that looks straight up or down has the heading of its image's lower or upper edge.
+    /// Returns the heading of the viewing direction in the horizontal plane, in radians from +X towards +Y.
+    /// If the camera looks straight up or down, the heading is the direction of the bottom or the top of its
+    /// image.
     pub fn azimuth_rad(&self) -> f64 {
         let f = self.forward();
         if libm::hypot(f.x, f.y) > 1e-9 {
@@ -231,7 +239,7 @@ impl Pose {
     }
 }
 
-/// The columns of a 4 × 4 matrix without their last numbers, which are 0 0 0 1.
+/// Returns the columns of a 4 × 4 matrix without the last row, which must be 0 0 0 1.
 fn columns(rows: [[f64; 4]; 4]) -> Result<[DVec3; 4], CameraError> {
     const LAST: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
     let column = |j: usize| rows.map(|row| row[j]);
@@ -270,7 +278,7 @@ mod tests {
         }
     }
 
-    /// Camera → world, 4 × 4, of axes whose signs are given.
+    /// Returns the matrix camera → world, 4 × 4, with the axes multiplied by the given signs.
     fn rows(pose: &Pose, [x, y, z]: [f64; 3]) -> [[f64; 4]; 4] {
         let m = pose.world_from_camera;
         let row = |i: usize| [x * m.x_axis[i], y * m.y_axis[i], z * m.z_axis[i], pose.location[i]];
@@ -289,12 +297,14 @@ mod tests {
                 other.location.abs_diff_eq(pose.location, tolerance)
                     && other.world_from_camera.abs_diff_eq(pose.world_from_camera, tolerance)
             };
+
             let opengl = rows(&pose, [1.0, 1.0, 1.0]);
             prop_assert!(close_to(Pose::from_opengl(opengl).unwrap(), 1e-12));
             prop_assert!(close_to(Pose::from_opencv(rows(&pose, [1.0, -1.0, -1.0])).unwrap(), 1e-12));
             prop_assert!(close_to(Pose::from_rt(pose.rt_matrix()).unwrap(), 1e-12));
-            // The axes of one kind are no less a rotation in the other: that a picture shows.
+            // The axes of one convention are a rotation in the other too, so only a picture shows a mix-up.
             prop_assert!(!close_to(Pose::from_opencv(opengl).unwrap(), 0.1));
+
             let mut rounded = opengl;
             (0..9).for_each(|k| rounded[k / 3][k % 3] += off[k]);
             let back = Pose::from_opengl(rounded).unwrap();
@@ -333,6 +343,7 @@ mod tests {
         assert_eq!(with(|rows| rows[1][3] = f64::NEG_INFINITY), CameraError::NotFinite);
         assert_eq!(with(|rows| rows[1][1] += 0.1), CameraError::Sheared);
         assert_eq!(with(|rows| *rows = [[0.0; 4], [0.0; 4], [0.0; 4], rows[3]]), CameraError::Sheared);
+
         let times = |rows: &mut [[f64; 4]; 4], by: [f64; 3]| {
             rows[..3]
                 .iter_mut()
@@ -343,12 +354,14 @@ mod tests {
         assert_eq!(Pose::from_opengl(rows), Err(CameraError::Mirrored));
         times(&mut rows, [2.0, 2.0, -2.0]);
         assert!(matches!(Pose::from_opengl(rows), Err(CameraError::Scaled(s)) if (s - 2.0).abs() < 1e-9));
+
         let mut rt = pose.rt_matrix();
         rt[1] = rt[1].map(|v| -v);
         assert_eq!(Pose::from_rt(rt), Err(CameraError::Mirrored));
         rt[0][3] = f64::NAN;
         rt[1] = rt[1].map(|v| -v);
         assert_eq!(Pose::from_rt(rt), Err(CameraError::NotFinite));
+
         let look = |target, up| Pose::look_at(DVec3::ONE, target, up).unwrap_err();
         assert_eq!(look(DVec3::ONE, DVec3::Z), CameraError::TargetAtEye);
         assert_eq!(look(DVec3::ZERO, DVec3::ONE), CameraError::UpAlongView);

@@ -1,19 +1,24 @@
-//! Meshes put together from parts.
+//! Joining meshes.
 
 use crate::{DEFAULT_COLOR, Material, MeshParts, MeshReport, NO_INDEX, TriMesh};
 
 impl MeshParts {
-    /// Adds the vertices, faces, materials and textures of `other` after its own. Every face keeps its
-    /// attributes; a column that only one of the two has is filled up with [`NO_INDEX`], and a missing vertex
-    /// colour with the colour of the vertex's material (of its last face, if they differ) or
-    /// [`DEFAULT_COLOR`].
+    /// Appends the vertices, faces, materials and textures of `other`. Every face keeps its attributes.
+    ///
+    /// If only one of the two has a column, the column of the other is filled with [`NO_INDEX`]. A missing
+    /// vertex colour becomes the colour of the last material among the faces at the vertex, or
+    /// [`DEFAULT_COLOR`] if none has a material.
     pub fn append(&mut self, mut other: MeshParts) {
         if self.colors.is_empty() != other.colors.is_empty() {
             self.fill_colors();
             other.fill_colors();
         }
-        let (vertices, uvs, normals) = (self.positions.len(), self.uvs.len(), self.normals.len());
-        let (materials, textures) = (self.materials.len(), self.textures.len());
+
+        let vertices = self.positions.len();
+        let uvs = self.uvs.len();
+        let normals = self.normals.len();
+        let materials = self.materials.len();
+        let textures = self.textures.len();
         let faces = [self.faces.len(), other.faces.len()];
 
         self.positions.append(&mut other.positions);
@@ -21,6 +26,7 @@ impl MeshParts {
         self.uvs.append(&mut other.uvs);
         self.normals.append(&mut other.normals);
         self.textures.append(&mut other.textures);
+
         self.materials.extend(
             other
                 .materials
@@ -29,16 +35,20 @@ impl MeshParts {
         );
         self.faces
             .extend(other.faces.into_iter().map(|f| f.map(|v| shifted(v, vertices))));
-        let corners = |offset| move |f: [u32; 3]| f.map(|i| shifted(i, offset));
-        append_column(&mut self.face_uvs, other.face_uvs, faces, [NO_INDEX; 3], corners(uvs));
-        append_column(&mut self.face_normals, other.face_normals, faces, [NO_INDEX; 3], corners(normals));
-        append_column(&mut self.face_materials, other.face_materials, faces, NO_INDEX, |m| {
-            shifted(m, materials)
+
+        append_column(&mut self.face_uvs, other.face_uvs, faces, [NO_INDEX; 3], |corners| {
+            corners.map(|uv| shifted(uv, uvs))
+        });
+        append_column(&mut self.face_normals, other.face_normals, faces, [NO_INDEX; 3], |corners| {
+            corners.map(|normal| shifted(normal, normals))
+        });
+        append_column(&mut self.face_materials, other.face_materials, faces, NO_INDEX, |material| {
+            shifted(material, materials)
         });
         append_column(&mut self.face_tags, other.face_tags, faces, NO_INDEX, |tag| tag);
     }
 
-    /// All `parts` as one, in order; see [`MeshParts::append`].
+    /// Joins all `parts` in order, as [`MeshParts::append`] does.
     pub fn merge(parts: impl IntoIterator<Item = MeshParts>) -> Self {
         let mut all = Self::default();
         for part in parts {
@@ -47,7 +57,7 @@ impl MeshParts {
         all
     }
 
-    /// Turns every face around, so that its front becomes its back. Corner normals stay as they are.
+    /// Turns every face around, so that its front becomes its back. Corner normals do not change.
     pub fn flip(&mut self) {
         let columns = [&mut self.faces, &mut self.face_uvs, &mut self.face_normals];
         columns.into_iter().flatten().for_each(|corners| corners.swap(1, 2));
@@ -67,10 +77,10 @@ impl MeshParts {
 }
 
 impl TriMesh {
-    /// Both meshes as one; see [`MeshParts::append`]. Their reports are added up.
+    /// Joins two meshes as [`MeshParts::append`] does, and adds up their reports.
     ///
     /// # Panics
-    /// If they have more vertices, texture coordinates or normals together than 32 bits count.
+    /// If the meshes together have 2³² − 1 or more vertices, texture coordinates, normals or faces.
     #[must_use]
     pub fn join(self, other: Self) -> Self {
         let [a, b] = [self.report(), other.report()];
@@ -78,6 +88,7 @@ impl TriMesh {
         for (n, more) in lengths(self.parts()).into_iter().zip(lengths(other.parts())) {
             assert!(n + more < NO_INDEX as usize, "{n} and {more} are more than 32 bits count");
         }
+
         let mut parts = self.into_parts();
         parts.append(other.into_parts());
         let report = MeshReport {
@@ -101,13 +112,14 @@ fn append_column<T: Clone>(
     other: Vec<T>,
     faces: [usize; 2],
     missing: T,
-    f: impl Fn(T) -> T,
+    shift: impl Fn(T) -> T,
 ) {
     if own.is_empty() && other.is_empty() {
         return;
     }
+
     own.resize(faces[0], missing.clone());
-    own.extend(other.into_iter().map(f));
+    own.extend(other.into_iter().map(shift));
     own.resize(faces[0] + faces[1], missing);
 }
 
@@ -125,7 +137,8 @@ mod tests {
             parts.face_uvs.push([NO_INDEX; 3]);
             TriMesh::new(parts).unwrap()
         };
-        let (a, b) = (with_sliver(0.0), with_sliver(5.0));
+        let a = with_sliver(0.0);
+        let b = with_sliver(5.0);
         let all = a.clone().join(b.clone());
         assert_eq!((all.faces().len(), all.report().zero_area_faces), (4, 2));
         assert_eq!([all.triangle(1), all.triangle(2)], [a.triangle(1), b.triangle(0)]);

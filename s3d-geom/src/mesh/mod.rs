@@ -1,4 +1,4 @@
-//! Textured triangle meshes, checked once, where they are made.
+//! Textured triangle meshes, checked once, by their constructor.
 
 mod merge;
 mod repeated;
@@ -11,82 +11,83 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use thiserror::Error;
 
-/// In place of an index: this face (or corner) has none.
+/// Stands for a missing index: the face (or corner) has none.
 pub const NO_INDEX: u32 = u32::MAX;
 
-/// The grey of faces that have neither texture, nor vertex colours, nor a material.
+/// The grey of faces without texture, vertex colours and material.
 pub const DEFAULT_COLOR: [u8; 3] = [204; 3];
 
-/// How a group of faces looks.
+/// The appearance of a group of faces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Material {
-    /// Its name in the file.
+    /// The name of the material in the file.
     pub name: String,
-    /// Its colour where there is no texture, sRGB.
+    /// The colour of faces without a texture, sRGB.
     pub color: [u8; 3],
-    /// Which of the mesh's textures lies on it.
+    /// The index of the texture in [`TriMesh::textures`], if there is one.
     pub texture: Option<u32>,
 }
 
-/// The columns of a mesh, before they are checked; see [`TriMesh::new`].
+/// The columns of a mesh, before [`TriMesh::new`] checks them.
 ///
-/// World frame: metres, Z-up, right-handed. A column that is not there is empty.
+/// World frame: metres, Z-up, right-handed. A missing column is empty.
 #[derive(Clone, Debug, Default)]
 pub struct MeshParts {
     /// Vertex positions.
     pub positions: Vec<Vec3>,
-    /// Three indices into `positions` a face; counter-clockwise seen from the front.
+    /// Three indices into `positions` per face, counter-clockwise seen from the front.
     pub faces: Vec<[u32; 3]>,
-    /// Vertex colours, sRGB: none, or one a position.
+    /// Vertex colours, sRGB: none, or one per position.
     pub colors: Vec<[u8; 3]>,
     /// Texture coordinates, (0, 0) at the bottom left of the image.
     pub uvs: Vec<Vec2>,
-    /// Three indices into `uvs` a face, or [`NO_INDEX`] three times; none, or one a face.
+    /// Three indices into `uvs`, or [`NO_INDEX`] three times: no entry, or one per face.
     pub face_uvs: Vec<[u32; 3]>,
     /// Unit normals of corners.
     pub normals: Vec<Vec3>,
-    /// Three indices into `normals` a face, or [`NO_INDEX`] three times; none, or one a face.
+    /// Three indices into `normals`, or [`NO_INDEX`] three times: no entry, or one per face.
     pub face_normals: Vec<[u32; 3]>,
     /// The materials.
     pub materials: Vec<Material>,
-    /// Which of `materials` a face has, or [`NO_INDEX`]; none, or one a face.
+    /// An index into `materials`, or [`NO_INDEX`]: no entry, or one per face.
     pub face_materials: Vec<u32>,
     /// The textures.
     pub textures: Vec<Texture>,
-    /// A number of the caller's for each face, such as its place in a file, by which columns of the caller's
-    /// own can follow when faces are dropped; none, or one a face.
+    /// A number of the caller's choice, such as the place of a face in a file: no entry, or one per face. It
+    /// tells which faces are left when some are dropped.
     pub face_tags: Vec<u32>,
 }
 
-/// What [`TriMesh::new`] mended.
+/// The repairs that [`TriMesh::new`] made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MeshReport {
-    /// Faces of zero area, which were dropped.
+    /// The number of faces dropped for having no area.
     pub zero_area_faces: usize,
-    /// Corner normals or texture coordinates that were not finite; their faces lost that attribute.
+    /// The number of faces that lost their corner normals or texture coordinates, since one was not finite.
+    /// A face that lost both counts twice.
     pub non_finite_attributes: usize,
 }
 
-/// Why columns make no mesh.
+/// The reason why columns are not a mesh.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// There is no face, or none with an area.
+    /// There is no face, or no face with an area.
     #[error("the mesh has no face with an area ({faces} faces in the file)")]
     Empty {
-        /// Faces before zero-area ones were dropped.
+        /// The number of faces before those without an area were dropped.
         faces: usize,
     },
-    /// A used vertex is NaN or infinite.
+    /// A vertex of a face is NaN or infinite.
     #[error("vertex {vertex} is not finite: {position}")]
     NonFinite {
         /// Index of the vertex, from 0.
         vertex: u32,
-        /// Its position.
+        /// The position of the vertex.
         position: Vec3,
     },
-    /// An index points past its column.
+    /// An index is past the end of its column.
     #[error("face {face} names {what} {index}, but there are only {count}")]
     OutOfRange {
         /// Index of the face, from 0.
@@ -95,27 +96,27 @@ pub enum MeshError {
         what: &'static str,
         /// The index, from 0.
         index: u32,
-        /// The column's length.
+        /// The length of the column.
         count: usize,
     },
-    /// A column has neither no entry nor one for each.
+    /// A column is neither empty nor has one entry per vertex or face.
     #[error("{what}: {count} entries for {expected}")]
     Length {
         /// The column.
         what: &'static str,
-        /// Its length.
+        /// The length of the column.
         count: usize,
-        /// The length of what it belongs to.
+        /// The number of vertices or faces.
         expected: usize,
     },
 }
 
-/// Where a face takes its colour from.
+/// The source of the colour of a face.
 #[derive(Clone, Copy, Debug)]
 pub enum FaceColor<'a> {
-    /// From a texture (its index in [`TriMesh::textures`]) at these coordinates of its corners.
+    /// A texture, after its index in [`TriMesh::textures`], and the texture coordinates of the corners.
     Texture(u32, &'a Texture, [Vec2; 3]),
-    /// From the colours of its corners.
+    /// The colours of the corners.
     Corners([[u8; 3]; 3]),
     /// One colour all over.
     Flat([u8; 3]),
@@ -129,7 +130,7 @@ pub enum FaceColor<'a> {
 /// ```
 /// use s3d_geom::{FaceColor, MeshError, MeshParts, TriMesh, glam::{Vec3, vec3}};
 ///
-/// // Columns of three faces, of which the last has no area and is dropped.
+/// // Columns of three faces. The last has no area and is dropped.
 /// let mesh = TriMesh::new(MeshParts {
 ///     positions: vec![Vec3::ZERO, Vec3::X, vec3(1.0, 1.0, 0.0), Vec3::Y],
 ///     faces: vec![[0, 1, 2], [0, 2, 3], [0, 0, 1]],
@@ -151,121 +152,64 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
-    /// Checks the columns, and drops the faces of zero area (exactly zero in `f64`: slivers stay).
+    /// Checks the columns and drops the faces without an area. The area must be exactly zero in `f64`:
+    /// slivers stay.
     ///
     /// # Errors
-    /// [`MeshError`] for an index out of range, a used vertex that is not finite, a column of the wrong
+    /// [`MeshError`] for an index out of range, a vertex of a face that is not finite, a column of the wrong
     /// length, or no face left.
     pub fn new(mut parts: MeshParts) -> Result<Self, MeshError> {
-        let n = parts.faces.len();
-        let length = |what, count: usize, expected| {
-            if count == 0 || count == expected {
-                Ok(())
-            } else {
-                Err(MeshError::Length { what, count, expected })
-            }
-        };
-        length("vertex colours", parts.colors.len(), parts.positions.len())?;
-        length("texture coordinates of faces", parts.face_uvs.len(), n)?;
-        length("normals of faces", parts.face_normals.len(), n)?;
-        length("materials of faces", parts.face_materials.len(), n)?;
-        length("tags of faces", parts.face_tags.len(), n)?;
+        check_lengths(&parts)?;
+        check_indices(&parts)?;
 
-        let in_range = |face, what, index: u32, count: usize| {
-            if (index as usize) < count {
-                Ok(())
-            } else {
-                Err(MeshError::OutOfRange { face, what, index, count })
-            }
-        };
-        for (f, corners) in parts.faces.iter().enumerate() {
-            for &v in corners {
-                in_range(f, "vertex", v, parts.positions.len())?;
-                let position = parts.positions[v as usize];
-                if !position.is_finite() {
-                    return Err(MeshError::NonFinite { vertex: v, position });
-                }
-            }
-        }
-        for (what, columns, count) in [
-            ("texture coordinate", &parts.face_uvs, parts.uvs.len()),
-            ("normal", &parts.face_normals, parts.normals.len()),
-        ] {
-            for (f, corners) in columns.iter().enumerate() {
-                if *corners != [NO_INDEX; 3] {
-                    corners.iter().try_for_each(|&i| in_range(f, what, i, count))?;
-                }
-            }
-        }
-        for (f, &m) in parts.face_materials.iter().enumerate() {
-            if m != NO_INDEX {
-                in_range(f, "material", m, parts.materials.len())?;
-                if let Some(t) = parts.materials[m as usize].texture {
-                    in_range(f, "texture", t, parts.textures.len())?;
-                }
-            }
-        }
+        let non_finite_attributes =
+            drop_non_finite(&mut parts.face_uvs, |uv| parts.uvs[uv as usize].is_finite())
+                + drop_non_finite(&mut parts.face_normals, |n| parts.normals[n as usize].is_finite());
 
-        let mut report = MeshReport::default();
-        for corners in &mut parts.face_uvs {
-            if *corners != [NO_INDEX; 3] && corners.iter().any(|&i| !parts.uvs[i as usize].is_finite()) {
-                *corners = [NO_INDEX; 3];
-                report.non_finite_attributes += 1;
-            }
-        }
-        for corners in &mut parts.face_normals {
-            if *corners != [NO_INDEX; 3] && corners.iter().any(|&i| !parts.normals[i as usize].is_finite()) {
-                *corners = [NO_INDEX; 3];
-                report.non_finite_attributes += 1;
-            }
-        }
-
+        let faces = parts.faces.len();
         let has_area: Vec<bool> = parts
             .faces
             .par_iter()
             .map(|f| area_vector(f.map(|v| parts.positions[v as usize])) != DVec3::ZERO)
             .collect();
-        report.zero_area_faces = has_area.iter().filter(|&&keep| !keep).count();
-        if report.zero_area_faces == n {
-            return Err(MeshError::Empty { faces: n });
+        let zero_area_faces = has_area.iter().filter(|&&keep| !keep).count();
+        if zero_area_faces == faces {
+            return Err(MeshError::Empty { faces });
         }
-        if report.zero_area_faces > 0 {
-            keep_where(&mut parts.faces, &has_area);
-            keep_where(&mut parts.face_uvs, &has_area);
-            keep_where(&mut parts.face_normals, &has_area);
-            keep_where(&mut parts.face_materials, &has_area);
-            keep_where(&mut parts.face_tags, &has_area);
+        if zero_area_faces > 0 {
+            parts.keep_faces(&has_area);
         }
-        Ok(Self { parts, report })
+
+        Ok(Self { parts, report: MeshReport { zero_area_faces, non_finite_attributes } })
     }
 
-    /// A mesh of positions and faces alone.
+    /// Makes a mesh of positions and faces alone.
     ///
     /// # Errors
-    /// As [`TriMesh::new`].
+    /// The errors of [`TriMesh::new`].
     pub fn from_faces(positions: Vec<Vec3>, faces: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         Self::new(MeshParts { positions, faces, ..MeshParts::default() })
     }
 
-    /// A mesh of columns that were part of a checked one.
+    /// Makes a mesh of columns that are checked already.
     pub(crate) fn from_checked(parts: MeshParts, report: MeshReport) -> Self {
         Self { parts, report }
     }
 
-    /// What was mended when the mesh was made.
+    /// Returns the repairs that were made when the mesh was made.
     pub fn report(&self) -> MeshReport {
         self.report
     }
 
-    /// The columns, to make another mesh from.
+    /// Turns the mesh into its columns, to make another mesh from.
     pub fn into_parts(self) -> MeshParts {
         self.parts
     }
 
-    /// The mesh with other tags.
+    /// Returns the mesh with other tags.
     ///
     /// # Panics
-    /// If `tags` is neither empty nor has one entry a face.
+    /// If `tags` is neither empty nor has one entry per face.
     #[must_use]
     pub fn with_face_tags(mut self, tags: Vec<u32>) -> Self {
         let faces = self.parts.faces.len();
@@ -274,10 +218,10 @@ impl TriMesh {
         self
     }
 
-    /// The mesh with other colours of its vertices. Faces with a texture keep that.
+    /// Returns the mesh with other vertex colours. Faces with a texture keep it.
     ///
     /// # Panics
-    /// If `colors` is neither empty nor has one entry a vertex.
+    /// If `colors` is neither empty nor has one entry per vertex.
     #[must_use]
     pub fn with_vertex_colors(mut self, colors: Vec<[u8; 3]>) -> Self {
         let vertices = self.parts.positions.len();
@@ -290,47 +234,47 @@ impl TriMesh {
         self
     }
 
-    /// The column [`MeshParts::face_tags`], which the mesh has no more after that.
+    /// Takes the column [`MeshParts::face_tags`] out of the mesh.
     #[must_use]
     pub fn take_face_tags(&mut self) -> Vec<u32> {
         std::mem::take(&mut self.parts.face_tags)
     }
 
-    /// The columns.
+    /// Returns the columns.
     pub fn parts(&self) -> &MeshParts {
         &self.parts
     }
 
-    /// Vertex positions, world metres.
+    /// Returns the vertex positions, in world metres.
     pub fn positions(&self) -> &[Vec3] {
         &self.parts.positions
     }
 
-    /// Three indices into [`TriMesh::positions`] a face.
+    /// Returns three indices into [`TriMesh::positions`] per face.
     pub fn faces(&self) -> &[[u32; 3]] {
         &self.parts.faces
     }
 
-    /// The materials.
+    /// Returns the materials.
     pub fn materials(&self) -> &[Material] {
         &self.parts.materials
     }
 
-    /// The textures.
+    /// Returns the textures.
     pub fn textures(&self) -> &[Texture] {
         &self.parts.textures
     }
 
-    /// The corners of face `face`.
+    /// Returns the corners of face `face`.
     ///
     /// # Panics
-    /// If there is no such face; so do the other methods that take one.
+    /// If there is no such face. The other methods that take a face panic likewise.
     #[inline]
     pub fn triangle(&self, face: u32) -> [Vec3; 3] {
         self.parts.faces[face as usize].map(|v| self.parts.positions[v as usize])
     }
 
-    /// Index of the material of face `face`, if it has one.
+    /// Returns the index of the material of face `face`, if it has one.
     #[inline]
     pub fn material_of(&self, face: u32) -> Option<u32> {
         self.parts
@@ -340,13 +284,14 @@ impl TriMesh {
             .filter(|&m| m != NO_INDEX)
     }
 
-    /// Where face `face` takes its colour from: its texture if it has one and coordinates to look it up, else
-    /// its corners' colours, else its material's, else [`DEFAULT_COLOR`].
+    /// Returns the source of the colour of face `face`. It is the first of these that the face has: a texture
+    /// with texture coordinates, the vertex colours, the colour of its material, [`DEFAULT_COLOR`].
     pub fn color_of(&self, face: u32) -> FaceColor<'_> {
         let p = &self.parts;
         let material = self.material_of(face).map(|m| &p.materials[m as usize]);
-        if let (Some(texture), Some(corners)) =
-            (material.and_then(|m| m.texture), p.face_uvs.get(face as usize).filter(|c| **c != [NO_INDEX; 3]))
+        let face_uvs = p.face_uvs.get(face as usize).filter(|uvs| **uvs != [NO_INDEX; 3]);
+        if let Some(texture) = material.and_then(|m| m.texture)
+            && let Some(corners) = face_uvs
         {
             let uvs = corners.map(|i| p.uvs[i as usize]);
             return FaceColor::Texture(texture, &p.textures[texture as usize], uvs);
@@ -357,7 +302,7 @@ impl TriMesh {
         FaceColor::Flat(material.map_or(DEFAULT_COLOR, |m| m.color))
     }
 
-    /// The normals at the corners of face `face`, if the mesh has them.
+    /// Returns the normals at the corners of face `face`, if it has them.
     #[inline]
     pub fn corner_normals(&self, face: u32) -> Option<[Vec3; 3]> {
         let corners = self
@@ -368,22 +313,22 @@ impl TriMesh {
         Some(corners.map(|i| self.parts.normals[i as usize]))
     }
 
-    /// The unit normal of face `face`, by its winding.
+    /// Returns the unit normal of face `face`, from its winding.
     pub fn normal(&self, face: u32) -> Vec3 {
         area_vector(self.triangle(face)).normalize().as_vec3()
     }
 
-    /// The area of face `face` in m².
+    /// Returns the area of face `face`, in m².
     pub fn area(&self, face: u32) -> f64 {
         area_vector(self.triangle(face)).length()
     }
 
-    /// The area of all faces in m².
+    /// Returns the area of all faces, in m².
     pub fn total_area(&self) -> f64 {
         (0..self.parts.faces.len() as u32).map(|f| self.area(f)).sum()
     }
 
-    /// The box of all faces.
+    /// Returns the box around all faces.
     pub fn aabb(&self) -> Aabb {
         Aabb::from_points(
             self.parts
@@ -395,13 +340,96 @@ impl TriMesh {
     }
 }
 
-/// Half the cross product of two edges: along the normal, as long as the area in m².
+impl MeshParts {
+    /// Keeps the faces whose entry in `keep` is true, with their attributes.
+    fn keep_faces(&mut self, keep: &[bool]) {
+        keep_where(&mut self.faces, keep);
+        keep_where(&mut self.face_uvs, keep);
+        keep_where(&mut self.face_normals, keep);
+        keep_where(&mut self.face_materials, keep);
+        keep_where(&mut self.face_tags, keep);
+    }
+}
+
+fn check_lengths(parts: &MeshParts) -> Result<(), MeshError> {
+    let vertices = parts.positions.len();
+    let faces = parts.faces.len();
+    for (what, count, expected) in [
+        ("vertex colours", parts.colors.len(), vertices),
+        ("texture coordinates of faces", parts.face_uvs.len(), faces),
+        ("normals of faces", parts.face_normals.len(), faces),
+        ("materials of faces", parts.face_materials.len(), faces),
+        ("tags of faces", parts.face_tags.len(), faces),
+    ] {
+        if count != 0 && count != expected {
+            return Err(MeshError::Length { what, count, expected });
+        }
+    }
+    Ok(())
+}
+
+fn check_indices(parts: &MeshParts) -> Result<(), MeshError> {
+    for (face, corners) in parts.faces.iter().enumerate() {
+        for &vertex in corners {
+            check_index(face, "vertex", vertex, parts.positions.len())?;
+            let position = parts.positions[vertex as usize];
+            if !position.is_finite() {
+                return Err(MeshError::NonFinite { vertex, position });
+            }
+        }
+    }
+
+    for (what, column, count) in [
+        ("texture coordinate", &parts.face_uvs, parts.uvs.len()),
+        ("normal", &parts.face_normals, parts.normals.len()),
+    ] {
+        for (face, corners) in column.iter().enumerate() {
+            if *corners != [NO_INDEX; 3] {
+                corners
+                    .iter()
+                    .try_for_each(|&index| check_index(face, what, index, count))?;
+            }
+        }
+    }
+
+    for (face, &material) in parts.face_materials.iter().enumerate() {
+        if material != NO_INDEX {
+            check_index(face, "material", material, parts.materials.len())?;
+            if let Some(texture) = parts.materials[material as usize].texture {
+                check_index(face, "texture", texture, parts.textures.len())?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_index(face: usize, what: &'static str, index: u32, count: usize) -> Result<(), MeshError> {
+    if (index as usize) < count {
+        Ok(())
+    } else {
+        Err(MeshError::OutOfRange { face, what, index, count })
+    }
+}
+
+/// Takes the attribute away from faces that have one that is not finite. Returns the number of these faces.
+fn drop_non_finite(column: &mut [[u32; 3]], is_finite: impl Fn(u32) -> bool) -> usize {
+    let mut dropped = 0;
+    for corners in column {
+        if *corners != [NO_INDEX; 3] && corners.iter().any(|&index| !is_finite(index)) {
+            *corners = [NO_INDEX; 3];
+            dropped += 1;
+        }
+    }
+    dropped
+}
+
+/// Returns half the cross product of two edges. It points along the normal, and its length is the area in m².
 pub(crate) fn area_vector([a, b, c]: [Vec3; 3]) -> DVec3 {
     let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
     (b - a).cross(c - a) * 0.5
 }
 
-pub(crate) fn keep_where<T>(column: &mut Vec<T>, keep: &[bool]) {
+fn keep_where<T>(column: &mut Vec<T>, keep: &[bool]) {
     let mut flags = keep.iter();
     column.retain(|_| *flags.next().unwrap_or(&true));
 }

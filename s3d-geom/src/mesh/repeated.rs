@@ -1,13 +1,14 @@
-//! Faces that lie in a mesh more than once.
+//! Removing repeated faces.
 
-use super::keep_where;
 use crate::{MeshParts, TriMesh};
 use rayon::prelude::*;
 
 impl TriMesh {
-    /// The mesh without the faces that repeat an earlier one — the same three corners in space, in any order
-    /// — and how many there were. Scans and two-sided models hold such faces. A repeated face is never the
-    /// first that a ray or a point meets, and it would be sampled twice as densely as the rest.
+    /// Removes the faces that repeat an earlier one: the same three corners in space, in any order. Returns
+    /// the mesh and the number of faces removed.
+    ///
+    /// Scans and two-sided models have such faces. A ray or a point always meets the earlier face first, and
+    /// the sampler would draw twice as many points from the pair as from other surfaces.
     #[must_use]
     pub fn without_repeated_faces(self) -> (Self, usize) {
         let count = self.faces().len();
@@ -16,32 +17,30 @@ impl TriMesh {
             .map(|f| (hash(corners(&self, f)), f))
             .collect();
         by_hash.par_sort_unstable();
+
         let mut keep = vec![true; count];
         for group in by_hash.chunk_by(|a, b| a.0 == b.0) {
-            // Almost always one face. Others are repeated if their corners are, whatever their hashes say.
+            // A group is almost always one face. If not, the corners decide, not the hashes.
             for (i, &(_, face)) in group.iter().enumerate() {
                 keep[face as usize] = !group[..i]
                     .iter()
                     .any(|&(_, first)| corners(&self, first) == corners(&self, face));
             }
         }
+
         let repeated = keep.iter().filter(|k| !**k).count();
         if repeated == 0 {
             return (self, 0);
         }
+
         let report = self.report();
         let mut parts: MeshParts = self.into_parts();
-        keep_where(&mut parts.faces, &keep);
-        keep_where(&mut parts.face_uvs, &keep);
-        keep_where(&mut parts.face_normals, &keep);
-        keep_where(&mut parts.face_materials, &keep);
-        keep_where(&mut parts.face_tags, &keep);
+        parts.keep_faces(&keep);
         (Self::from_checked(parts, report), repeated)
     }
 }
 
-/// The corners of a face as bits, sorted: equal for faces with the same corners. Zeros of either sign are
-/// one.
+/// Returns the corners of a face as bits, sorted: equal for faces with the same corners. 0 and −0 are equal.
 fn corners(mesh: &TriMesh, face: u32) -> [[u32; 3]; 3] {
     let mut corners = mesh.triangle(face).map(|p| p.to_array().map(|c| (c + 0.0).to_bits()));
     corners.sort_unstable();
@@ -64,7 +63,8 @@ mod tests {
 
     #[test]
     fn the_first_of_equal_faces_stays() {
-        // Face 1 is face 0 turned over, face 3 is face 2 on vertices of its own, face 4 shares an edge only.
+        // Face 1 is face 0 turned over. Face 3 is face 2 with vertices of its own. Face 4 only shares an
+        // edge.
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, vec3(-0.0, 0.0, 0.0), Vec3::X, Vec3::Z];
         let faces = vec![[0, 1, 2], [2, 1, 0], [0, 1, 3], [5, 6, 4], [1, 2, 3]];
         let mut parts = MeshParts { positions, faces, ..MeshParts::default() };

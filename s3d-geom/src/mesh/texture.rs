@@ -1,26 +1,26 @@
-//! Textures: an image, how it repeats, and its value at a texture coordinate.
+//! Textures: images, their repetition, and their colour at a texture coordinate.
 
 use crate::Raster;
 use glam::Vec2;
 
-/// What a texture shows beyond its edge.
+/// The content of a texture beyond its edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
-    /// The image again.
+    /// The image repeats.
     #[default]
     Repeat,
-    /// The image mirrored, then the image again.
+    /// The image repeats, and every other copy is mirrored.
     Mirror,
-    /// The edge's pixel.
+    /// The pixels of the edge continue.
     Clamp,
 }
 
 impl Wrap {
-    /// The column (or row) in `0..size` that stands for column `i` of the endless texture.
+    /// Returns the column (or row) of the image, in `0..size`, that is at column `i` of the endless texture.
     #[inline(always)]
     pub fn index(self, i: i64, size: u32) -> u32 {
         let n = i64::from(size);
-        // Most are within the image, and a division takes as long as the rest of a look-up.
+        // Most columns are within the image, and a division takes as long as the rest of a look-up.
         if (0..n).contains(&i) {
             return i as u32;
         }
@@ -35,7 +35,7 @@ impl Wrap {
         j as u32
     }
 
-    /// The columns that stand for `i` and `i + 1`.
+    /// Returns the columns of the image for `i` and `i + 1`.
     #[inline(always)]
     fn pair(self, i: i64, size: u32) -> (u32, u32) {
         let first = self.index(i, size);
@@ -48,7 +48,8 @@ impl Wrap {
     }
 }
 
-/// `i` modulo `n`, from 0 to n − 1. In 32 bits where they do, as that is a division of half the time or less.
+/// Returns `i` modulo `n`, from 0 to n − 1. It divides in 32 bits if the numbers fit, which takes half the
+/// time or less.
 #[inline(always)]
 fn remainder(i: i64, n: i64) -> i64 {
     match (i32::try_from(i), i32::try_from(n)) {
@@ -59,8 +60,8 @@ fn remainder(i: i64, n: i64) -> i64 {
 
 /// An 8-bit colour image laid over faces by texture coordinates.
 ///
-/// Coordinates are OBJ's: (0, 0) is the **bottom** left corner of the image, (1, 1) the top right. Colours
-/// are interpolated as they are encoded (sRGB), as the viewers of the field do.
+/// Texture coordinates are as in OBJ: (0, 0) is the **bottom** left corner of the image, (1, 1) the top
+/// right. Colours are interpolated in their encoding (sRGB), as common mesh viewers do.
 ///
 /// ```
 /// use s3d_geom::{Raster, Texture, Wrap, glam::vec2};
@@ -76,21 +77,21 @@ pub struct Texture {
     pub name: String,
     /// The image, top row first, R G B. At least 1 × 1.
     pub image: Raster<[u8; 3]>,
-    /// How the image repeats along u (to the right) and v (upwards).
+    /// The repetition along u (to the right) and v (upwards).
     pub wrap: [Wrap; 2],
 }
 
 impl Texture {
-    /// The colour at `uv`, bilinear between the four nearest pixels, 0 to 255 a channel. A coordinate that is
-    /// not finite gives the corner pixel's colour.
+    /// Returns the colour at `uv`, bilinear between the four nearest pixels, 0 to 255 per channel. If a
+    /// coordinate is not finite, the first column or row of the image is taken.
     #[inline(always)]
     pub fn sample(&self, uv: Vec2) -> [f32; 3] {
         sample_bilinear(&self.image, self.wrap, uv)
     }
 }
 
-/// The colour of `image` at `uv`, bilinear between the four nearest pixels, 0 to 255 a channel; conventions
-/// as in [`Texture`]. An image without pixels is black.
+/// Returns the colour of `image` at `uv`, bilinear between the four nearest pixels, 0 to 255 per channel, by
+/// the conventions of [`Texture`]. An image without pixels is black.
 #[inline(always)]
 pub fn sample_bilinear(image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: Vec2) -> [f32; 3] {
     if image.width() == 0 || image.height() == 0 {
@@ -99,36 +100,39 @@ pub fn sample_bilinear(image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: Vec2) -> [f
     Quad::new(image, wrap, uv).color(image.pixels())
 }
 
-/// The four pixels around a place of an image, and where the place is between them.
+/// The four pixels around a place in an image, and the position of the place between them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Quad {
     /// Indices of the pixels: upper left, upper right, lower left, lower right.
     pub(crate) at: [usize; 4],
-    /// To the right and downwards, from 0 to 1.
+    /// The position to the right and downwards, from 0 to 1.
     fraction: [f32; 2],
 }
 
 impl Quad {
-    /// Around `uv` of an image that has pixels; conventions as in [`Texture`].
+    /// Finds the pixels around `uv`, by the conventions of [`Texture`]. The image must have pixels.
     #[inline(always)]
     pub(crate) fn new(image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: Vec2) -> Self {
-        let (w, h) = (image.width(), image.height());
-        // f64 keeps the fraction of a pixel when a coordinate repeats many times; `as i64` saturates and takes
-        // NaN to 0.
+        let w = image.width();
+        let h = image.height();
+
+        // f64 keeps the fraction of a pixel even if the image repeats many times.
         let x = f64::from(uv.x) * f64::from(w) - 0.5;
         let y = (1.0 - f64::from(uv.y)) * f64::from(h) - 0.5;
-        let (x, y) = (if x.is_finite() { x } else { 0.0 }, if y.is_finite() { y } else { 0.0 });
-        let (xf, yf) = (x.floor(), y.floor());
-        let fraction = [(x - xf) as f32, (y - yf) as f32];
-        let (xi, yi) = (xf.clamp(-1e15, 1e15) as i64, yf.clamp(-1e15, 1e15) as i64);
-        let (x0, x1) = wrap[0].pair(xi, w);
-        // v grows upwards and rows downwards: mirroring and repeating are the same seen from either side.
-        let (y0, y1) = wrap[1].pair(yi, h);
+        let x = if x.is_finite() { x } else { 0.0 };
+        let y = if y.is_finite() { y } else { 0.0 };
+        let left = x.floor();
+        let top = y.floor();
+        let fraction = [(x - left) as f32, (y - top) as f32];
+
+        // v grows upwards and rows downwards, but repeating and mirroring are symmetric.
+        let (x0, x1) = wrap[0].pair(left.clamp(-1e15, 1e15) as i64, w);
+        let (y0, y1) = wrap[1].pair(top.clamp(-1e15, 1e15) as i64, h);
         let index = |x: u32, y: u32| y as usize * w as usize + x as usize;
         Self { at: [index(x0, y0), index(x1, y0), index(x0, y1), index(x1, y1)], fraction }
     }
 
-    /// The interpolated colour, 0 to 255 a channel. `pixels` are those of the image that it was made for.
+    /// Returns the interpolated colour, 0 to 255 per channel. `pixels` are the pixels of the same image.
     #[inline(always)]
     pub(crate) fn color(&self, pixels: &[[u8; 3]]) -> [f32; 3] {
         let [fx, fy] = self.fraction;
@@ -164,7 +168,7 @@ mod tests {
 
     #[test]
     fn wrap_modes_differ_beyond_the_edge() {
-        // Half a pixel left of the left edge: repeat blends with the right column, the others see the edge
+        // Half a pixel left of the left edge, `Repeat` blends with the right column. The others take the edge
         // twice.
         let at = vec2(0.0, 0.75);
         assert_eq!(two_by_two(Wrap::Repeat).sample(at)[0], 50.0);

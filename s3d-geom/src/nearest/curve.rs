@@ -1,21 +1,21 @@
-//! Points in the order of a curve that fills space.
+//! Points in the order of a space-filling curve.
 
 use crate::Aabb;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// How many points [`along_a_curve`] puts in order at most.
+/// The largest number of points that [`along_a_curve`] sorts.
 pub(crate) const MOST_POINTS: usize = 1 << 20;
 
-/// Cells to a side of a cube around the points, less one.
+/// The last cell along a side of the cube around the points.
 const LAST_CELL: f32 = 16_383.0;
 
-/// The indices of points in an order in which neighbours are near each other: by the cells of a cube around
-/// them, along Z-order. Points that are not finite come anywhere. Works on all threads of the current rayon
-/// pool.
+/// Writes the indices of points into `order`, sorted so that neighbours in the order are near each other: in
+/// Z-order of the cells of a cube around the points. Points that are not finite may be anywhere in the order.
+/// Runs on all threads of the current rayon pool.
 ///
 /// # Panics
-/// If there are more than [`MOST_POINTS`].
+/// If there are more than [`MOST_POINTS`] points.
 pub(crate) fn along_a_curve(points: &[Vec3], order: &mut Vec<u64>) {
     assert!(points.len() <= MOST_POINTS, "{} points", points.len());
     let bounds = Aabb::from_points(points.iter().copied().filter(|p| p.is_finite()));
@@ -25,19 +25,21 @@ pub(crate) fn along_a_curve(points: &[Vec3], order: &mut Vec<u64>) {
     } else {
         0.0
     };
+
     order.clear();
     order.extend(points.iter().zip(0..).map(|(&point, at)| {
-        // The conversion takes what is not finite to some number in range.
+        // The conversion gives a number in range for any `f32`.
         let [x, y, z] = ((point - bounds.min) * scale)
             .to_array()
             .map(|c| spread(c.clamp(0.0, LAST_CELL) as u16));
         (x | y << 1 | z << 2) << 20 | at
     }));
+
     order.par_sort_unstable();
     order.par_iter_mut().for_each(|key| *key &= MOST_POINTS as u64 - 1);
 }
 
-/// The bits of `x`, two zeros after each.
+/// Returns the bits of `x`, with two zeros between neighbours.
 #[inline]
 fn spread(x: u16) -> u64 {
     let mut x = u64::from(x);

@@ -1,4 +1,5 @@
-//! A bounding volume hierarchy over the faces of a mesh, eight boxes or triangles at a time.
+//! A bounding volume hierarchy over the faces of a mesh, with eight boxes per node and eight triangles per
+//! leaf.
 
 use super::surroundings::Surroundings;
 use super::triangle::{SortedTriangle, to_box};
@@ -13,57 +14,57 @@ use std::time::Duration;
 
 /// The hierarchy.
 pub(crate) struct FaceTree {
-    /// The root first.
+    /// The nodes; the root is the first.
     nodes: Vec<Node8>,
     leaves: Vec<Triangles8>,
     pub(crate) surroundings: Surroundings,
 }
 
-/// Up to eight boxes and what is in them.
+/// Up to eight boxes and their children.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 struct Node8 {
     low: [[f32; 8]; 3],
     high: [[f32; 8]; 3],
-    /// Below [`LEAF`] a node, else that plus a leaf.
+    /// The index of a node, or [`LEAF`] plus the index of a leaf.
     children: [u32; 8],
     count: u32,
 }
 
 const LEAF: u32 = 1 << 31;
 
-/// Triangles that a leaf holds at most.
+/// The largest number of triangles in a leaf.
 const LEAF_SIZE: usize = 8;
 
-/// Leaves that one task makes at least.
+/// The smallest number of leaves that one task makes.
 const LEAVES_OF_TASK: usize = 256;
 
 /// The nearest triangle.
 #[derive(Clone, Copy)]
 pub(crate) struct Best {
-    /// The leaf that it is in: a good guess for a point near this one.
+    /// The leaf with the triangle: a good guess for a nearby point.
     pub(crate) leaf: u32,
     pub(crate) face: u32,
     pub(crate) distance_squared: f64,
     pub(crate) point: DVec3,
 }
 
-/// A search, and memory for it.
+/// A search, with reusable memory.
 pub(crate) struct Search<'t> {
     tree: &'t FaceTree,
     near: [f32; 3],
     exact: DVec3,
     best: Best,
-    /// What is farther than this (squared) is not the nearest: the distance to something and more than the
-    /// rounding of the bounds, which is below 1e-6 of them, or 1e-44 where numbers get that small.
+    /// A squared distance. A triangle whose bound is larger is not the nearest: the value includes the
+    /// rounding of the bounds, which is below 1e-6 of them, or 1e-44 for numbers as small.
     prune_beyond: f32,
-    /// Boxes to look into, with their squared distance.
+    /// The boxes to open, with their squared distances.
     open: Vec<(f32, u32)>,
-    /// Triangles that may be the nearest: the least squared distance, leaf and lane.
+    /// The triangles that may be the nearest: lower bound of the squared distance, leaf, lane.
     candidates: Vec<(f32, u32, u32)>,
-    /// As `open`, for a far point.
+    /// The boxes to open in a search for a far point.
     open_far: Vec<(f64, u32)>,
-    /// Triangles whose exact distance was taken.
+    /// The number of triangles whose exact distance was computed.
     #[cfg(test)]
     pub(crate) measured: usize,
 }
@@ -74,7 +75,8 @@ impl FaceTree {
         let sizes = faces_below(&bvh);
         let surroundings = Surroundings::new(mesh.aabb());
         let mut tree = Self { nodes: vec![Node8::new()], leaves: Vec::new(), surroundings };
-        // A node of ours, and the one of theirs that it opens.
+
+        // Pairs of a node of this tree and the node of `bvh` that it opens.
         let mut open = vec![(0, 0)];
         let mut leaves = Vec::new();
         while let Some((own, theirs)) = open.pop() {
@@ -90,27 +92,35 @@ impl FaceTree {
                 tree.nodes[own].push(bvh.nodes[child].aabb(), id);
             }
         }
-        let triangle = |face: u32| (face, SortedTriangle::new(mesh.triangle(face)));
-        let leaf = |members: Vec<_>| Triangles8::new(&members);
-        let leaves = leaves.par_iter().with_min_len(LEAVES_OF_TASK);
+
         tree.leaves = leaves
-            .map(|&of| leaf(faces_of(&bvh, of).map(triangle).collect()))
+            .par_iter()
+            .with_min_len(LEAVES_OF_TASK)
+            .map(|&node| {
+                let triangles: Vec<_> = faces_of(&bvh, node)
+                    .map(|face| (face, SortedTriangle::new(mesh.triangle(face))))
+                    .collect();
+                Triangles8::new(&triangles)
+            })
             .collect();
         tree
     }
 
-    /// Where a search for points of `around` may start that finds nothing farther than the root of
-    /// `reach_squared`: leaves, or nodes above them if these get many.
+    /// Collects in `starts` where to start the search for points in `around`, if no triangle farther than the
+    /// root of `reach_squared` is asked for. The starts are leaves, or nodes above them if there are many.
     #[inline(always)]
     pub(crate) fn starts_near(&self, around: Aabb, reach_squared: f32, starts: &mut Starts) {
-        let (low, high) = (around.min.to_array(), around.max.to_array());
+        let low = around.min.to_array();
+        let high = around.max.to_array();
         starts.nodes.clear();
         starts.open.clear();
         starts.open.push(0);
+
         let mut next = 0;
         while next < starts.open.len() {
             let node = &self.nodes[starts.open[next] as usize];
             next += 1;
+
             let squares = node.distances_squared(low, high);
             let mut within = at_most(&squares, reach_squared * ENOUGH) & node.lanes();
             while within != 0 {
@@ -132,13 +142,13 @@ impl FaceTree {
     }
 }
 
-/// More than rounding takes from a squared distance.
+/// A factor that makes up for the rounding of a squared distance.
 const ENOUGH: f32 = 1.00001;
 
-/// Nodes that are opened for a group of points.
+/// The largest number of nodes that are opened for a group of points.
 const MOST_OPENED: usize = 24;
 
-/// Where searches start: [`FaceTree::starts_near`].
+/// The starts of searches, from [`FaceTree::starts_near`].
 #[derive(Default)]
 pub(crate) struct Starts {
     nodes: Vec<Node8>,
@@ -162,17 +172,18 @@ impl<'t> Search<'t> {
         }
     }
 
-    /// Finds the triangle nearest to `point`, the smallest face among equally near ones. The search begins in
-    /// the leaf `guess`, which costs or saves time and changes nothing else: what is pruned is farther than
-    /// the best, not as far.
+    /// Finds the triangle nearest to `point`. The smallest face wins a tie.
+    ///
+    /// The search begins in the leaf `guess`. The guess changes the time only, since a triangle as far as the
+    /// best is never pruned.
     #[inline(always)]
     pub(crate) fn nearest(&mut self, point: Vec3, guess: u32) -> Best {
         self.nearest_below(&self.tree.nodes[..1], point, guess);
         self.best
     }
 
-    /// The same for a point of the box and starts of [`FaceTree::starts_near`], if it is no farther than what
-    /// they reach.
+    /// Finds the triangle nearest to `point`, which must be in the box of [`FaceTree::starts_near`]. Returns
+    /// `None` if it may be farther than the reach of `starts`.
     #[inline(always)]
     pub(crate) fn nearest_from(
         &mut self,
@@ -185,14 +196,15 @@ impl<'t> Search<'t> {
         (self.prune_beyond <= reach_squared).then_some(self.best)
     }
 
-    /// The same for a point far from the mesh, whose bounds are `f64`. They need no room for rounding: a
-    /// triangle's distance is never below that to a box around it ([`SortedTriangle::closest`]).
+    /// Finds the triangle nearest to a point far from the mesh, with bounds in `f64`. They need no tolerance:
+    /// the distance of a triangle is never below the distance of its box ([`SortedTriangle::closest`]).
     pub(crate) fn nearest_far(&mut self, point: DVec3, guess: u32) -> Best {
         self.exact = point;
         self.best.distance_squared = f64::INFINITY;
         self.best.face = NO_INDEX;
         self.open_far.clear();
         self.open_far.extend([(0.0, 0), (0.0, LEAF + guess)]);
+
         while let Some((bound, child)) = self.open_far.pop() {
             if bound > self.best.distance_squared {
                 continue;
@@ -206,7 +218,7 @@ impl<'t> Search<'t> {
         self.best
     }
 
-    /// Opens the boxes of a node within reach, the nearest on top.
+    /// Puts the boxes of a node that are within reach on the stack, the nearest on top.
     fn enter_far(&mut self, node: usize) {
         let node = &self.tree.nodes[node];
         let bottom = self.open_far.len();
@@ -230,6 +242,7 @@ impl<'t> Search<'t> {
         }
     }
 
+    /// Searches from `guess` and `starts`; the result is in `best`.
     #[inline(always)]
     fn nearest_below(&mut self, starts: &[Node8], point: Vec3, guess: u32) {
         self.near = point.to_array();
@@ -239,6 +252,7 @@ impl<'t> Search<'t> {
         self.prune_beyond = f32::INFINITY;
         self.open.clear();
         self.candidates.clear();
+
         self.visit(guess);
         for start in starts {
             self.enter(start);
@@ -253,6 +267,8 @@ impl<'t> Search<'t> {
                 self.enter(&self.tree.nodes[child as usize]);
             }
         }
+
+        // `prune_beyond` is smallest now, so few candidates are left to measure.
         for i in 0..self.candidates.len() {
             let (bound, leaf, lane) = self.candidates[i];
             if bound <= self.prune_beyond {
@@ -261,7 +277,7 @@ impl<'t> Search<'t> {
         }
     }
 
-    /// Opens the boxes of a node within reach, the nearest on top.
+    /// Puts the boxes of a node that are within reach on the stack, the nearest on top.
     #[inline(always)]
     fn enter(&mut self, node: &Node8) {
         let squares = node.distances_squared(self.near, self.near);
@@ -279,7 +295,7 @@ impl<'t> Search<'t> {
         }
     }
 
-    /// Looks at the triangles of a leaf.
+    /// Bounds the triangles of a leaf, and keeps those within reach as candidates.
     #[inline(always)]
     fn visit(&mut self, leaf: u32) {
         let triangles = &self.tree.leaves[leaf as usize];
@@ -293,13 +309,13 @@ impl<'t> Search<'t> {
             if most < f32::INFINITY {
                 self.candidates.push((bounds.least[lane as usize], leaf, lane));
             } else {
-                // Nothing is known of these, and something has to be.
+                // Without an upper bound, the exact distance has to give one.
                 self.measure(leaf, lane as usize);
             }
         }
     }
 
-    /// The exact distance of a triangle.
+    /// Computes the exact distance of a triangle, and keeps it if it is the best.
     #[inline(always)]
     fn measure(&mut self, leaf: u32, lane: usize) {
         #[cfg(test)]
@@ -334,13 +350,13 @@ impl Node8 {
         self.count += 1;
     }
 
-    /// The lanes that hold a box, as bits.
+    /// Returns the lanes that hold a box, as bits.
     #[inline(always)]
     fn lanes(&self) -> u32 {
         (1 << self.count) - 1
     }
 
-    /// Takes over a child of another node.
+    /// Adds a child of another node.
     #[inline(always)]
     fn copy(&mut self, node: &Node8, lane: usize) {
         let own = self.count as usize;
@@ -352,7 +368,7 @@ impl Node8 {
         self.count += 1;
     }
 
-    /// The squared distances from the boxes to that between `low` and `high`, up to rounding.
+    /// Returns the squared distances from the boxes to the box from `low` to `high`, up to rounding.
     #[inline(always)]
     fn distances_squared(&self, low: [f32; 3], high: [f32; 3]) -> [f32; 8] {
         let mut squares = [0.0; 8];
@@ -360,15 +376,17 @@ impl Node8 {
             let outside = |axis: usize| {
                 max(max(self.low[axis][lane] - high[axis], low[axis] - self.high[axis][lane]), 0.0)
             };
-            let (x, y, z) = (outside(0), outside(1), outside(2));
+            let x = outside(0);
+            let y = outside(1);
+            let z = outside(2);
             *square = x * x + y * y + z * z;
         }
         squares
     }
 }
 
-/// The nodes below `node`, or it alone if it is to be a leaf: its children, of which the largest are opened
-/// as long as there are no more than eight.
+/// Returns up to eight nodes below `node`, or `node` itself if it becomes a leaf. Starting from `node`, the
+/// node with the largest surface is replaced by its two children until there are eight.
 fn eight_below(bvh: &Bvh2, sizes: &[usize], node: usize) -> Vec<usize> {
     let mut below = vec![node];
     while below.len() < 8 {
@@ -382,7 +400,7 @@ fn eight_below(bvh: &Bvh2, sizes: &[usize], node: usize) -> Vec<usize> {
     below
 }
 
-/// The nodes at and below `node`, each before those below it.
+/// Iterates over `node` and the nodes below it, parents first.
 fn nodes_from(bvh: &Bvh2, node: usize) -> impl Iterator<Item = (usize, &Bvh2Node)> {
     let mut open = vec![node];
     std::iter::from_fn(move || {
@@ -406,7 +424,7 @@ fn faces_of(bvh: &Bvh2, node: usize) -> impl Iterator<Item = u32> {
         })
 }
 
-/// How many faces are below each node.
+/// Returns the number of faces below each node.
 fn faces_below(bvh: &Bvh2) -> Vec<usize> {
     let mut sizes = vec![0; bvh.nodes.len()];
     let order: Vec<usize> = nodes_from(bvh, 0).map(|(at, _)| at).collect();
@@ -422,10 +440,10 @@ fn faces_below(bvh: &Bvh2) -> Vec<usize> {
     sizes
 }
 
-/// Beyond this the builder's surface areas would overflow.
+/// The largest coordinate whose surface areas do not overflow in the builder.
 const LARGEST_COORDINATE: f32 = 1e15;
 
-/// The hierarchy of two boxes a node that ours is made from. Its leaves hold a face each.
+/// Builds the binary hierarchy from which [`FaceTree`] is made. Each of its leaves holds one face.
 fn build_bvh(mesh: &TriMesh) -> Bvh2 {
     let bounds = mesh.aabb();
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
@@ -434,19 +452,23 @@ fn build_bvh(mesh: &TriMesh) -> Bvh2 {
     } else {
         1.0
     };
+
     let triangles: Vec<Triangle> = (0..mesh.faces().len() as u32)
         .map(|face| {
             let [v0, v1, v2] = mesh.triangle(face).map(|p| Vec3A::from(p * scale));
             Triangle { v0, v1, v2 }
         })
         .collect();
-    // Ours gathers leaves itself: theirs need not.
+
+    // `FaceTree` forms the leaves itself, so the builder need not.
     let params = BvhBuildParams {
         max_prims_per_leaf: 1,
         post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
         ..BvhBuildParams::medium_build()
     };
     let mut bvh = build_bvh2_from_tris(&triangles, params, &mut Duration::default());
+
+    // Boxes of scaled triangles are replaced by the exact ones.
     if scale != 1.0 {
         for node in bvh.nodes.iter_mut().filter(|node| node.is_leaf()) {
             let members = node.first_index as usize..(node.first_index + node.prim_count) as usize;

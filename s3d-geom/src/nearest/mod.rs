@@ -1,14 +1,13 @@
 //! The face of a mesh that is nearest to a point.
 //!
-//! Source: formats.md, "What is written": an annotated point votes for its nearest face, and a point equally
-//! near to several faces for the smallest face index.
+//! Source: formats.md, "What is written": an annotated point votes for its nearest face. If several faces are
+//! equally near, it votes for the smallest face index.
 //!
-//! All arithmetic that decides is `f64`, on corners in the order of their coordinates. So faces that share an
-//! edge or a corner get bit by bit the same distance there, whatever their winding and the indices of their
-//! vertices.
+//! All arithmetic that decides is in `f64`, on corners sorted by their coordinates. Faces that share an edge
+//! or a corner therefore get the same distance there to the bit, whatever their winding and vertex indices.
 //!
-//! A lookup costs about the same wherever the point is. Where it is very far ([`surroundings`]), the nearest
-//! face is that of a nearer point in the same direction.
+//! A lookup costs about the same for any point. For a very far point ([`surroundings`]), the nearest face of
+//! a nearer point in the same direction is returned.
 
 mod curve;
 mod face_tree;
@@ -25,15 +24,15 @@ use rayon::prelude::*;
 use surroundings::Surroundings;
 use triangle::SortedTriangle;
 
-/// The face of a mesh nearest to a point, and the point of it.
+/// The face of a mesh nearest to a point, and its nearest place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Nearest {
-    /// The face; the smallest index among equally near ones. [`NO_INDEX`] for a point that is not finite.
+    /// The index of the face; the smallest index wins a tie. [`NO_INDEX`] if the point is not finite.
     pub face: u32,
-    /// How far it is, in metres. Infinite for a point that is not finite.
+    /// The distance in metres. Infinite if the point is not finite.
     pub distance_m: f32,
-    /// The face's nearest point. The point itself if that is not finite.
+    /// The nearest place on the face. The point itself if it is not finite.
     pub point: Vec3,
 }
 
@@ -42,7 +41,7 @@ impl Nearest {
         Self { face: NO_INDEX, distance_m: f32::INFINITY, point }
     }
 
-    /// What a search from `query` has found for `point`.
+    /// The result for `point` of a search that started from `query`.
     fn found(point: Vec3, query: DVec3, face: u32, distance_squared: f64, nearest: DVec3) -> Self {
         let distance_m = match point.as_dvec3() {
             exact if exact == query => distance_squared.sqrt(),
@@ -52,24 +51,28 @@ impl Nearest {
     }
 }
 
-/// Finds the nearest face by looking at all of them: the reference for [`NearestFaces`], which gives the
-/// same.
+/// Finds the nearest face by measuring all faces. This is the reference for [`NearestFaces`], which returns
+/// the same.
 pub fn nearest_brute_force(mesh: &TriMesh, point: Vec3) -> Nearest {
     if !point.is_finite() {
         return Nearest::none(point);
     }
     let query = Surroundings::new(mesh.aabb()).looked_up_from(point);
-    let (mut best, mut nearest, mut face) = (f64::INFINITY, query, 0);
+    let mut face = 0;
+    let mut least_squared = f64::INFINITY;
+    let mut nearest = query;
     for candidate in 0..mesh.faces().len() as u32 {
-        let found = SortedTriangle::new(mesh.triangle(candidate)).closest(query);
-        if found.0 < best {
-            (best, nearest, face) = (found.0, found.1, candidate);
+        let (distance_squared, place) = SortedTriangle::new(mesh.triangle(candidate)).closest(query);
+        if distance_squared < least_squared {
+            face = candidate;
+            least_squared = distance_squared;
+            nearest = place;
         }
     }
-    Nearest::found(point, query, face, best, nearest)
+    Nearest::found(point, query, face, least_squared, nearest)
 }
 
-/// A bounding volume hierarchy over the faces of a mesh, to find the nearest of them to any number of points,
+/// A bounding volume hierarchy over the faces of a mesh. It finds the faces nearest to any number of points,
 /// from any number of threads.
 ///
 /// ```
@@ -91,26 +94,29 @@ impl<'m> NearestFaces<'m> {
         Self { mesh, tree: FaceTree::new(mesh) }
     }
 
-    /// The mesh.
+    /// Returns the mesh.
     pub fn mesh(&self) -> &'m TriMesh {
         self.mesh
     }
 
-    /// The face nearest to `point` (world metres), exactly as [`nearest_brute_force`] has it.
+    /// Returns the face nearest to `point` (world metres), exactly as [`nearest_brute_force`] does.
     pub fn nearest(&self, point: Vec3) -> Nearest {
         let mut nearest = [Nearest::none(point)];
         wide::run(Lookup { tree: &self.tree, points: &[point], order: &[0], out: &mut nearest });
         nearest[0]
     }
 
-    /// The nearest faces of many points, in their order, into `out`, whose content they replace. Works on all
-    /// threads of the current rayon pool. The points may come in any order: they are looked up in one in
-    /// which neighbours follow each other, up to a million at a time, and the nearer these are, the faster.
-    /// Beside `out` this takes 28 MB at most.
+    /// Writes the nearest faces of many points into `out`, in the order of the points. The old content of
+    /// `out` is replaced.
+    ///
+    /// Runs on all threads of the current rayon pool, and takes at most 28 MB besides `out`. The points may
+    /// be in any order: up to a million at a time are sorted so that neighbours follow each other, which is
+    /// faster.
     pub fn nearest_many(&self, points: &[Vec3], out: &mut Vec<Nearest>) {
         out.resize(points.len(), Nearest::none(Vec3::ZERO));
         let mut order = Vec::new();
         let mut found = vec![Nearest::none(Vec3::ZERO); points.len().min(MOST_POINTS)];
+
         for (points, out) in points.chunks(MOST_POINTS).zip(out.chunks_mut(MOST_POINTS)) {
             along_a_curve(points, &mut order);
             order
@@ -126,10 +132,10 @@ impl<'m> NearestFaces<'m> {
     }
 }
 
-/// Points that one task looks up.
+/// The number of points that one task looks up.
 const CHUNK: usize = 1024;
 
-/// Looks up some points, given by their indices.
+/// A lookup of some points, given by their indices.
 struct Lookup<'a> {
     tree: &'a FaceTree,
     points: &'a [Vec3],
@@ -142,11 +148,16 @@ impl Work for Lookup<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let (mut search, mut starts) = (Search::new(self.tree), Starts::default());
-        let (mut guess, mut farthest_m) = (0, f32::INFINITY);
+        let mut search = Search::new(self.tree);
+        let mut starts = Starts::default();
+        let mut guess = 0;
+        let mut farthest_m = f32::INFINITY;
+
         for (group, out) in self.order.chunks(GROUP).zip(self.out.chunks_mut(GROUP)) {
             let points = group.iter().map(|&at| self.points[at as usize]);
             let around = Aabb::from_points(points.clone().filter(|p| p.is_finite()));
+
+            // Far points are searched with bounds in `f64`.
             let surroundings = &self.tree.surroundings;
             if !surroundings.are_near(around) {
                 for (point, out) in points.zip(out) {
@@ -160,18 +171,21 @@ impl Work for Lookup<'_> {
                 }
                 continue;
             }
-            // A guess, too: most points are as far from the mesh as those before.
+
+            // The reach is a guess: most points are as far from the mesh as the points before.
             let reach_m = 1.25 * farthest_m + 0.1 * around.size().max_element();
             let reach_squared = reach_m * reach_m;
             if reach_squared < f32::INFINITY {
                 self.tree.starts_near(around, reach_squared, &mut starts);
             }
+
             farthest_m = 0.0;
             for (point, out) in points.zip(out) {
                 if !point.is_finite() {
                     *out = Nearest::none(point);
                     continue;
                 }
+
                 let near = if reach_squared < f32::INFINITY {
                     search.nearest_from(&starts, reach_squared, point, guess)
                 } else {
@@ -179,6 +193,7 @@ impl Work for Lookup<'_> {
                 };
                 let best = near.unwrap_or_else(|| search.nearest(point, guess));
                 guess = best.leaf;
+
                 let distance_m = best.distance_squared.sqrt() as f32;
                 farthest_m = farthest_m.max(distance_m);
                 *out = Nearest { face: best.face, distance_m, point: best.point.as_vec3() };
@@ -187,7 +202,7 @@ impl Work for Lookup<'_> {
     }
 }
 
-/// Points that share where their searches start.
+/// The number of points whose searches share their starts.
 const GROUP: usize = 16;
 
 #[cfg(test)]
@@ -200,7 +215,7 @@ mod tests {
         TriMesh::from_faces(positions, faces).unwrap()
     }
 
-    /// Holds the hierarchy against the reference, one by one and in bulk.
+    /// Compares the hierarchy with the reference, one by one and in bulk.
     fn check(mesh: &TriMesh, points: &[Vec3]) {
         let faces = NearestFaces::new(mesh);
         let mut many = Vec::new();
@@ -212,7 +227,8 @@ mod tests {
         }
     }
 
-    /// An n × n grid of squares, two triangles each, over z = `height(x, y)`, its vertices `step` apart.
+    /// Returns an n × n grid of squares, two triangles each, over z = `height(x, y)`. Its vertices are `step`
+    /// apart.
     fn grid(n: u32, step: f32, height: impl Fn(f32, f32) -> f32) -> TriMesh {
         let at = |i: u32, j: u32| i * (n + 1) + j;
         let positions = (0..=n).flat_map(|i| (0..=n).map(move |j| (i as f32 * step, j as f32 * step)));
@@ -230,7 +246,7 @@ mod tests {
         prop::collection::vec(point(scale), 1..n)
     }
 
-    /// Triangles anywhere; with a coarse lattice, many share corners, edges and planes, or coincide.
+    /// Makes triangles anywhere. On a coarse lattice, many share corners, edges and planes, or coincide.
     fn soup(n: usize, lattice: Option<f32>) -> impl Strategy<Value = TriMesh> {
         prop::collection::vec([point(2.0), point(2.0), point(2.0)], 1..n).prop_filter_map(
             "no area",
@@ -303,7 +319,7 @@ mod tests {
         }
     }
 
-    /// Points around `from`, up to `spread` off on each axis.
+    /// Returns points around `from`, up to `spread` away on each axis.
     fn points_at(from: Vec3, spread: f32, n: u32) -> Vec<Vec3> {
         let off = |i: u32, k: u32| ((i * k) % 101) as f32 / 50.0 - 1.0;
         (0..n)
@@ -393,7 +409,8 @@ mod tests {
                     let p = vec3(f32::from(i) / 32.0, f32::from(j) / 32.0, z);
                     let touching = |t: [Vec3; 3]| {
                         let b = crate::Aabb::from_points(t);
-                        let (u, v) = (p.x - b.min.x, p.y - b.min.y);
+                        let u = p.x - b.min.x;
+                        let v = p.y - b.min.y;
                         let lower = t.iter().any(|c| *c == vec3(b.max.x, b.min.y, 0.5));
                         p.x >= b.min.x
                             && p.x <= b.max.x
@@ -424,7 +441,9 @@ mod tests {
 
     #[test]
     fn coinciding_faces_give_the_first() {
-        let (a, b, c) = (vec3(0.3, 0.1, 0.7), vec3(2.1, 0.2, 1.1), vec3(0.9, 1.7, 0.4));
+        let a = vec3(0.3, 0.1, 0.7);
+        let b = vec3(2.1, 0.2, 1.1);
+        let c = vec3(0.9, 1.7, 0.4);
         let doubled = mesh(
             vec![c, a, b, Vec3::ONE * 9.0, b, a, c, vec3(9.0, 9.0, 8.0), vec3(9.0, 8.0, 9.0)],
             vec![[3, 7, 8], [2, 0, 1], [1, 0, 2], [4, 5, 6], [6, 4, 5]],
@@ -475,7 +494,8 @@ mod tests {
         assert_eq!(with(1), with(2));
     }
 
-    /// Points on the faces of a mesh, off by up to `off` metres, every 37th far off and every 101st nowhere.
+    /// Returns points on the faces of a mesh, moved off by up to twice `off` metres. Every 37th is far off,
+    /// and every 101st is NaN.
     fn around(mesh: &TriMesh, points: u64, off: f32) -> Vec<Vec3> {
         let mut cloud = crate::PointCloud::default();
         crate::SurfaceSampler::new(mesh, crate::Density::Total(points), 3).sample(0..points, &mut cloud);

@@ -1,18 +1,20 @@
-//! How far a point is from a mesh as a whole, and what follows for the search.
+//! The distance of a point from a mesh as a whole, which decides how to search.
 //!
-//! Bounds in `f32` are off by a share of the distance. From far enough away, that is more than the mesh is
-//! large: they tell no face from another, and a search by them looks at all. There `f64` decides
-//! ([`super::face_tree::Search::nearest_far`]). Beyond a million times the mesh's size it does not help
-//! either; a point is then looked up from where its line to the middle of the mesh comes that near, so that
-//! it costs the same from any distance.
+//! Bounds in `f32` are off by a share of the distance. Far from the mesh, that is more than the size of the
+//! mesh: the bounds do not tell faces apart, and the search would measure all of them. There `f64` decides
+//! ([`super::face_tree::Search::nearest_far`]). Beyond a million times the size of the mesh, `f64` does not
+//! help either. Such a point is moved along its line to the middle of the mesh until it is that near, so a
+//! lookup costs the same from any distance.
 
 use crate::Aabb;
 use glam::{DVec3, Vec3};
 
-/// `f32` tells faces apart up to so many times the mesh's size: it is off by less than 1e-4 of the size.
+/// The distance, in sizes of the mesh, up to which `f32` tells faces apart. It is off by less than 1e-4 of
+/// the size there.
 const NEAR: f32 = 16.0;
 
-/// `f64` does up to so many: it is off by less than 1e-9 of the size.
+/// The distance, in sizes of the mesh, up to which `f64` tells faces apart. It is off by less than 1e-9 of
+/// the size there.
 const FARTHEST: f64 = 1e6;
 
 /// The surroundings of a mesh.
@@ -24,10 +26,11 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Of a mesh with these bounds.
+    /// Returns the surroundings of a mesh with these bounds.
     pub(crate) fn new(bounds: Aabb) -> Self {
         let margin = Vec3::splat(NEAR * bounds.size().length());
-        let (low, high) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+        let low = bounds.min.as_dvec3();
+        let high = bounds.max.as_dvec3();
         Self {
             near: Aabb { min: bounds.min - margin, max: bounds.max + margin },
             center: (low + high) * 0.5,
@@ -35,13 +38,13 @@ impl Surroundings {
         }
     }
 
-    /// Whether bounds in `f32` do for all points of a box.
+    /// Returns true if bounds in `f32` are enough for all points of a box.
     #[inline(always)]
     pub(crate) fn are_near(&self, points: Aabb) -> bool {
         points.min.cmpge(self.near.min).all() && points.max.cmple(self.near.max).all()
     }
 
-    /// From where a point is looked up: from itself, unless it is too far.
+    /// Returns the place from which a point is looked up: the point itself, unless it is too far.
     pub(crate) fn looked_up_from(&self, point: Vec3) -> DVec3 {
         let away = point.as_dvec3() - self.center;
         let distance_m = away.length();

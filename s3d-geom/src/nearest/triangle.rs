@@ -1,63 +1,70 @@
-//! The point of a triangle nearest to another, so that triangles that share an edge or a corner agree on it.
+//! The point of a triangle nearest to a given point. Triangles that share an edge or a corner agree on it.
 
 use glam::{DVec3, Vec3, Vec3A};
 
-/// Triangles thinner than this, relative to their longest edge, have no normal to speak of: they are measured
-/// by their edges, which is off by less than the rounding of `f32` coordinates.
+/// Triangles thinner than this, relative to their longest edge, have no reliable normal. They are measured by
+/// their edges; the error is below the rounding of `f32` coordinates.
 const THINNEST: f64 = 1e-8;
 
 /// A triangle with its corners in ascending order of (x, y, z).
 ///
-/// The same positions give the same arithmetic, whatever a face's winding and first corner; and an edge runs
-/// in the same direction in all its triangles.
+/// The same positions give the same arithmetic, whatever the winding and the first corner of a face. An edge
+/// runs in the same direction in all its triangles.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SortedTriangle([Vec3A; 3]);
 
 impl SortedTriangle {
     /// Sorts finite corners.
     pub(crate) fn new(corners: [Vec3; 3]) -> Self {
-        // Adding 0 takes −0 to 0, so that equal positions are equal bits.
+        // Adding 0 turns −0 into 0, so that equal positions have equal bits.
         let mut corners = corners.map(|p| p + Vec3::ZERO);
         corners
             .sort_unstable_by(|p, q| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z)));
         Self(corners.map(Vec3A::from))
     }
 
-    /// Takes corners that [`SortedTriangle::corners`] gave.
+    /// Makes a triangle from the corners that [`SortedTriangle::corners`] returned.
     #[inline(always)]
     pub(crate) fn from_sorted(corners: [Vec3A; 3]) -> Self {
         Self(corners)
     }
 
-    /// The corners in ascending order.
+    /// Returns the corners in ascending order.
     pub(crate) fn corners(&self) -> [Vec3A; 3] {
         self.0
     }
 
-    /// The length of the longest edge, and the square of the normal, which is as long as twice the area.
+    /// Returns the length of the longest edge, and the squared length of the normal, which is twice the area.
     pub(crate) fn longest_and_normal_squared(&self) -> (f64, f64) {
         let [a, b, c] = self.0.map(|p| p.as_dvec3());
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         (longest, (b - a).cross(c - a).length_squared())
     }
 
-    /// The squared distance to `point` and the nearest point. The distance is never below that to the
-    /// bounding box.
+    /// Returns the squared distance to `point`, and the nearest point of the triangle. The distance is never
+    /// below the distance to the bounding box.
     pub(crate) fn closest(&self, point: DVec3) -> (f64, DVec3) {
         let [a, b, c] = self.0.map(|p| p.as_dvec3());
-        let (ab, ac, bc) = (b - a, c - a, c - b);
+        let ab = b - a;
+        let ac = c - a;
+        let bc = c - b;
         let normal = ab.cross(ac);
         let normal_squared = normal.length_squared();
         let longest = ab.length_squared().max(ac.length_squared()).max(bc.length_squared());
         let thin = normal_squared <= THINNEST * THINNEST * longest * longest;
 
-        // Barycentric coordinates of the foot on the plane, times the normal's square; the signs tell on
-        // which side of each edge it is. (C. Ericson, "Real-Time Collision Detection", 5.1.5, has the
-        // derivation.)
-        let (ap, bp, cp) = (point - a, point - b, point - c);
-        let (ab_a, ac_a) = (ab.dot(ap), ac.dot(ap));
-        let (ab_b, ac_b) = (ab.dot(bp), ac.dot(bp));
-        let (ab_c, ac_c) = (ab.dot(cp), ac.dot(cp));
+        // The barycentric coordinates of the foot of the perpendicular on the plane, times the square of the
+        // normal. The signs tell on which side of each edge the foot is. (C. Ericson, "Real-Time Collision
+        // Detection", 5.1.5, has the derivation.)
+        let ap = point - a;
+        let bp = point - b;
+        let cp = point - c;
+        let ab_a = ab.dot(ap);
+        let ac_a = ac.dot(ap);
+        let ab_b = ab.dot(bp);
+        let ac_b = ac.dot(bp);
+        let ab_c = ab.dot(cp);
+        let ac_c = ac.dot(cp);
         let weight_a = difference_of_products(ab_b, ac_c, ab_c, ac_b);
         let weight_b = difference_of_products(ab_c, ac_a, ab_a, ac_c);
         let weight_c = difference_of_products(ab_a, ac_b, ab_b, ac_a);
@@ -70,6 +77,8 @@ impl SortedTriangle {
             let foot = (a * weight_a + b * weight_b + c * weight_c) / (weight_a + weight_b + weight_c);
             return (distance_squared, foot);
         }
+
+        // Outside, the nearest point is on an edge that has the foot on its outer side.
         let mut best = (f64::INFINITY, point);
         for (weight, from, to) in [(weight_c, a, b), (weight_b, a, c), (weight_a, b, c)] {
             if thin || weight <= 0.0 {
@@ -83,11 +92,12 @@ impl SortedTriangle {
     }
 }
 
-/// The squared distance from `point` to the edge, whose ends are in ascending order, and the nearest point.
+/// Returns the squared distance from `point` to an edge, and the nearest point. The ends of the edge are in
+/// ascending order.
 fn closest_on_edge(point: DVec3, from: DVec3, to: DVec3) -> (f64, DVec3) {
     let edge = to - from;
     let along = edge.dot(point - from);
-    // At its ends the distance is that to the corner, the same for every edge that ends there.
+    // At an end, the distance to the corner is the same for every edge that ends there.
     if along <= 0.0 {
         return ((point - from).length_squared(), from);
     }
@@ -100,14 +110,15 @@ fn closest_on_edge(point: DVec3, from: DVec3, to: DVec3) -> (f64, DVec3) {
     (aside.length_squared().max(to_box(point, from.min(to), from.max(to))), from + edge * t)
 }
 
-/// The squared distance from `point` to a box.
+/// Returns the squared distance from `point` to a box.
 pub(crate) fn to_box(point: DVec3, low: DVec3, high: DVec3) -> f64 {
     (low - point).max(point - high).max(DVec3::ZERO).length_squared()
 }
 
-/// a·b − c·d with the right sign, zero exactly where the products are equal.
+/// Returns a·b − c·d with the right sign. It is zero if and only if the products are equal.
 fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
-    let (ab, cd) = (a * b, c * d);
+    let ab = a * b;
+    let cd = c * d;
     let difference = ab - cd;
     if difference.abs() > 1e-15 * (ab.abs() + cd.abs()) {
         difference
@@ -116,15 +127,18 @@ fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     }
 }
 
-/// a·b − `product`, exactly, where `product` is the rounded a·b (Dekker's product).
+/// Returns a·b − `product` exactly, where `product` is the rounded a·b (Dekker's product).
 fn rounding_of_product(a: f64, b: f64, product: f64) -> f64 {
-    let split = |x: f64| {
-        let scaled = 134_217_729.0 * x;
-        let high = scaled - (scaled - x);
-        (high, x - high)
-    };
-    let ((ah, al), (bh, bl)) = (split(a), split(b));
+    let (ah, al) = split(a);
+    let (bh, bl) = split(b);
     ((ah * bh - product) + ah * bl + al * bh) + al * bl
+}
+
+/// Splits a number into two halves of its digits (Veltkamp's split).
+fn split(x: f64) -> (f64, f64) {
+    let scaled = 134_217_729.0 * x;
+    let high = scaled - (scaled - x);
+    (high, x - high)
 }
 
 #[cfg(test)]
@@ -135,7 +149,8 @@ mod tests {
 
     #[test]
     fn the_rounding_of_a_product_is_exact() {
-        let (a, b) = (1.0 + f64::EPSILON, 1.0 - f64::EPSILON);
+        let a = 1.0 + f64::EPSILON;
+        let b = 1.0 - f64::EPSILON;
         // (1 + ε)(1 − ε) = 1 − ε².
         assert_eq!(rounding_of_product(a, b, a * b), -f64::EPSILON * f64::EPSILON);
         assert_eq!(difference_of_products(a, b, 1.0, 1.0), -f64::EPSILON * f64::EPSILON);
@@ -159,7 +174,7 @@ mod tests {
         }
     }
 
-    /// The smallest distance to a fine grid of points of the triangle: an upper bound, and not far above.
+    /// Returns the smallest distance to a fine grid of points on the triangle, a close upper bound.
     fn by_grid([a, b, c]: [Vec3; 3], point: DVec3) -> f64 {
         let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
         let n = 60;
@@ -202,8 +217,8 @@ mod tests {
             [a, b, c, d] in [corner(), corner(), corner(), corner()],
             t in 0.0..1.0f64,
         ) {
-            // Nearest to the edge, or an end of it, from both: opposite to the inner bisector of the two
-            // triangles.
+            // The point is opposite to the inner bisector of the two triangles, so the edge or one of its
+            // ends is nearest in both.
             let [ad, bd, cd, dd] = [a, b, c, d].map(|p| p.as_dvec3());
             let away = |p: DVec3| (p - ad).reject_from(bd - ad).normalize();
             prop_assume!(away(cd).is_finite() && away(dd).is_finite());

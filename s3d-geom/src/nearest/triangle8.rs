@@ -1,52 +1,53 @@
-//! Eight triangles at once: a lower bound of their distances, so that few need the exact one.
+//! Lower bounds of the distances of eight triangles at once, so that few exact distances are needed.
 //!
-//! **The bound.** Seen from the point, let the corners of a triangle T be a, b and c. For every direction q,
-//! all of T lies at least min(q·a, q·b, q·c)/|q| along it, so T is no nearer than that; for q the nearest
-//! point of T, it is the distance itself. A good q is found with plain `f32` arithmetic, region by region;
-//! wherever rounding takes it, the bound holds, and only the arithmetic of the bound has to be accounted for:
-//! - Corners seen from the point are rounded by 2⁻²⁴ of their length, three-term dot products by 3·2⁻²⁴
-//!   |q||v|. With R ≥ |v| for all corners v, that is below 3e-7 R of the distance; 1e-6 R is taken off.
-//! - The reference is not the distance but [`SortedTriangle::closest`], in `f64`. Where it takes the foot on
-//!   the plane, it may have taken a foot outside of a thin triangle for one inside: its weights, the areas of
-//!   three small triangles times the triangle's own, are off by at most 32·2⁻⁵³ L²R², L being the longest
-//!   edge, and n², their sum, is all the smaller for it. Barycentric coordinates that are off by η move the
-//!   foot by up to 4 η L, so the reference may be below the distance by 128·2⁻⁵³ L³R²/n². That is taken off,
-//!   too: `thinness` is 2⁻⁴⁵ L³/n².
-//! - Other roundings of the reference are below 1e-7 R (see [`SortedTriangle`]: thinner triangles than 1e-8
-//!   are measured by their edges).
+//! **The bound.** Take the point as the origin, and let a, b and c be the corners of a triangle T. For every
+//! direction q, all of T lies at least min(q·a, q·b, q·c)/|q| along q, so T is no nearer than that. If q is
+//! the nearest point of T, the bound is the distance itself. A good q is found region by region in plain
+//! `f32` arithmetic. The bound holds for any q, so only the rounding of the bound itself counts:
+//! - Corners relative to the point are rounded by 2⁻²⁴ of their length, dot products of three terms by 3·2⁻²⁴
+//!   |q||v|. With R ≥ |v| for all corners v, this changes the distance by less than 3e-7 R. The code
+//!   subtracts 1e-6 R.
+//! - The reference is not the distance but [`SortedTriangle::closest`], in `f64`. It may take a foot of the
+//!   perpendicular outside of a thin triangle for one inside. Its weights are the areas of three small
+//!   triangles times the area of the triangle. They are off by at most 32·2⁻⁵³ L²R², where L is the longest
+//!   edge, and their sum n² is small for a thin triangle. An error of η in barycentric coordinates moves the
+//!   foot by up to 4 η L, so the reference may be below the distance by 128·2⁻⁵³ L³R²/n². The code subtracts
+//!   that too: `thinness` is 2⁻⁴⁵ L³/n².
+//! - Other roundings of the reference are below 1e-7 R. (Triangles thinner than 1e-8 are measured by their
+//!   edges: see [`SortedTriangle`].)
 //!
-//! Where numbers get so large or small that they overflow or lose digits, the bound is 0.
+//! If numbers are so large or small that they overflow or lose digits, the bound is 0.
 
 use super::triangle::SortedTriangle;
 use crate::wide::{max, min};
 use glam::Vec3A;
 
-/// Edges shorter than this give no bound, as their squares have few digits left.
+/// Edges shorter than this give no bound, because their squares have few digits left.
 const SMALLEST: f64 = 1e-12;
 
 /// Up to eight triangles, lane by lane.
 #[derive(Clone, Debug)]
 #[repr(C, align(32))]
 pub(crate) struct Triangles8 {
-    /// Corners a, b and c, each x, y and z; the last triangle fills lanes that are left.
+    /// The corners a, b and c, each as x, y and z. The last triangle fills the unused lanes.
     corners: [[[f32; 8]; 3]; 3],
     /// Twice the longest edge.
     reach: [f32; 8],
-    /// See above.
+    /// 2⁻⁴⁵ L³/n²: see the module.
     thinness: [f32; 8],
     faces: [u32; 8],
     count: u32,
 }
 
-/// What the squared distances are at least and at most, but for a rounding of 1e-6 of them.
+/// Lower and upper bounds of the squared distances, each rounded by up to 1e-6 of itself.
 pub(crate) struct Bounds {
     pub(crate) least: [f32; 8],
-    /// Infinite where nothing is known.
+    /// Infinite if nothing is known.
     pub(crate) most: [f32; 8],
 }
 
 impl Triangles8 {
-    /// Takes one to eight triangles with their faces.
+    /// Packs one to eight triangles with their face indices.
     pub(crate) fn new(triangles: &[(u32, SortedTriangle)]) -> Self {
         let mut out = Self {
             corners: [[[0.0; 8]; 3]; 3],
@@ -55,6 +56,7 @@ impl Triangles8 {
             faces: [0; 8],
             count: triangles.len() as u32,
         };
+
         for lane in 0..8 {
             let (face, triangle) = triangles[lane.min(triangles.len() - 1)];
             for (rows, corner) in out.corners.iter_mut().zip(triangle.corners()) {
@@ -62,6 +64,7 @@ impl Triangles8 {
                     row[lane] = value;
                 }
             }
+
             let (longest, normal_squared) = triangle.longest_and_normal_squared();
             out.reach[lane] = (2.0001 * longest) as f32;
             let thinness = (longest.powi(3) / normal_squared * 2f64.powi(-45)) as f32;
@@ -71,19 +74,19 @@ impl Triangles8 {
         out
     }
 
-    /// The lanes that hold a triangle of their own, as bits.
+    /// Returns the lanes that hold a triangle of their own, as bits.
     #[inline(always)]
     pub(crate) fn lanes(&self) -> u32 {
         (1 << self.count) - 1
     }
 
-    /// The face of a lane.
+    /// Returns the face index of a lane.
     #[inline(always)]
     pub(crate) fn face(&self, lane: usize) -> u32 {
         self.faces[lane]
     }
 
-    /// The triangle of a lane.
+    /// Returns the triangle of a lane.
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> SortedTriangle {
         SortedTriangle::from_sorted(
@@ -93,7 +96,7 @@ impl Triangles8 {
         )
     }
 
-    /// Bounds of the squared distances that [`SortedTriangle::closest`] gives.
+    /// Returns bounds of the squared distances that [`SortedTriangle::closest`] would return.
     #[inline(always)]
     pub(crate) fn bounds(&self, [px, py, pz]: [f32; 3]) -> Bounds {
         let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = &self.corners;
@@ -104,19 +107,25 @@ impl Triangles8 {
             let c = [cx[i] - px, cy[i] - py, cz[i] - pz];
             let ab = sub(b, a);
             let ac = sub(c, a);
-            let (a_ab, a_ac) = (dot(a, ab), dot(a, ac));
-            let (ab_ab, ab_ac, ac_ac) = (dot(ab, ab), dot(ab, ac), dot(ac, ac));
+            let a_ab = dot(a, ab);
+            let a_ac = dot(a, ac);
+            let ab_ab = dot(ab, ab);
+            let ab_ac = dot(ab, ac);
+            let ac_ac = dot(ac, ac);
 
-            // The nearest points of the edges, as a + s ab + t ac; of the best the weights are kept.
+            // The nearest point of the edges, as a + s ab + t ac. `least` leaves out the constant a·a.
             let on_ab = clamp01(-a_ab / ab_ab);
             let mut least = on_ab * (2.0 * a_ab + on_ab * ab_ab);
-            let (mut s, mut t) = (on_ab, 0.0);
+            let mut s = on_ab;
+            let mut t = 0.0;
+
             let on_ac = clamp01(-a_ac / ac_ac);
             let to_ac = on_ac * (2.0 * a_ac + on_ac * ac_ac);
             let nearer = to_ac < least;
             least = if nearer { to_ac } else { least };
             s = if nearer { 0.0 } else { s };
             t = if nearer { on_ac } else { t };
+
             let bc_bc = ab_ab + ac_ac - 2.0 * ab_ac;
             let b_bc = a_ac - a_ab + ab_ac - ab_ab;
             let on_bc = clamp01(-b_bc / bc_bc);
@@ -124,7 +133,8 @@ impl Triangles8 {
             let nearer = to_bc < least;
             s = if nearer { 1.0 - on_bc } else { s };
             t = if nearer { on_bc } else { t };
-            // The foot on the plane, if it is inside.
+
+            // The foot of the perpendicular on the plane, if it is inside.
             let area = ab_ab * ac_ac - ab_ac * ab_ac;
             let foot_s = ab_ac * a_ac - ac_ac * a_ab;
             let foot_t = ab_ac * a_ab - ab_ab * a_ac;
@@ -137,10 +147,12 @@ impl Triangles8 {
                 [a[0] + s * ab[0] + t * ac[0], a[1] + s * ab[1] + t * ac[1], a[2] + s * ab[2] + t * ac[2]];
             let q_q = dot(q, q);
             let along = min(dot(q, a), min(dot(q, b), dot(q, c)));
-            // No corner is farther than that, as q is on the triangle or within half an edge of it.
+
+            // q is on the triangle or within half an edge of it, so no corner is farther than `radius`.
             let length = q[0].abs() + q[1].abs() + q[2].abs();
             let radius = length + self.reach[i];
             let off = radius * (1e-6 + self.thinness[i] * radius);
+
             let safe = along - length * off;
             let bound = safe * (safe / q_q);
             let trusted = (safe > 0.0) & (q_q > 1e-30) & (radius < 1e15);
@@ -162,7 +174,7 @@ fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// Between 0 and 1; 0 for NaN.
+/// Limits a number to 0 to 1. NaN becomes 0.
 #[inline(always)]
 fn clamp01(x: f32) -> f32 {
     min(max(x, 0.0), 1.0)
@@ -174,7 +186,7 @@ mod tests {
     use glam::{Vec3, vec3};
     use proptest::prelude::*;
 
-    /// The bounds of one triangle, and its exact squared distance.
+    /// Returns the lower bound, the exact squared distance, and the upper bound of one triangle.
     fn of(corners: [Vec3; 3], point: Vec3) -> (f32, f64, f32) {
         let triangle = SortedTriangle::new(corners);
         let bounds = Triangles8::new(&[(0, triangle)]).bounds(point.to_array());
@@ -197,7 +209,7 @@ mod tests {
     fn bounds_are_close() {
         let corners = [Vec3::ZERO, vec3(0.1, 0.0, 0.0), vec3(0.0, 0.1, 0.02)];
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-        // Above the inside, off an edge, off a corner; 5 mm and 1 m away.
+        // Points above the inside, beside an edge and beside a corner; 5 mm and 1 m away.
         let edge_off = vec3(0.0, -1.0, 0.0);
         for (foot, off) in [
             ((corners[0] + corners[1] + corners[2]) / 3.0, normal),

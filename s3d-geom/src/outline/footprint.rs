@@ -1,26 +1,25 @@
 //! The floor outline of a room, from its points.
 //!
-//! An alpha shape (Edelsbrunner, Kirkpatrick and Seidel, "On the shape of a set of points in the plane",
-//! 1983): the triangles of a Delaunay triangulation whose circumscribed circle is small, so that the outline
-//! follows corners and pillars and still spans the gaps under furniture.
+//! The outline is an alpha shape (Edelsbrunner, Kirkpatrick and Seidel, "On the shape of a set of points in
+//! the plane", 1983): the triangles of a Delaunay triangulation whose circumscribed circle is small. It
+//! follows corners and pillars but closes the gaps under furniture.
 
-use super::polygon::Polygon;
-use super::polygon::{edges, signed_area};
+use super::polygon::{Polygon, edges, signed_area};
 use glam::{DVec2, Vec2, Vec3, dvec2};
 use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// How a footprint is drawn.
+/// The parameters of a footprint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FootprintOptions {
-    /// Points are thinned to a few in each cell of a square grid this wide, in metres.
+    /// The width of the cells of a square grid, in metres. Each cell keeps a few of its points.
     pub cell_m: f64,
-    /// Triangles whose circumscribed circle has at most this radius, in metres, belong to the floor: gaps up
-    /// to twice as wide are closed, and a corner that juts into the room is cut off where the circle touches
-    /// its sides (half the radius's square at a right angle).
+    /// The largest radius of the circumscribed circle of a triangle of the floor, in metres. Gaps up to twice
+    /// as wide are closed. A corner that juts into the room is cut off where the circle touches its sides; a
+    /// right angle loses half the square of the radius.
     pub alpha_m: f64,
 }
 
@@ -31,9 +30,10 @@ impl Default for FootprintOptions {
     }
 }
 
-/// Collects the points of a room, any number of them, and draws its footprint.
+/// Collects any number of points of a room, and draws the footprint of the room.
 ///
-/// Memory grows with the floor and not with the points. The order of the points does not matter.
+/// Memory grows with the area of the floor, not with the number of points. The order of the points does not
+/// matter.
 ///
 /// ```
 /// use s3d_geom::{FootprintBuilder, FootprintOptions, glam::vec3};
@@ -51,20 +51,20 @@ impl Default for FootprintOptions {
 #[derive(Clone, Debug)]
 pub struct FootprintBuilder {
     options: FootprintOptions,
-    /// Where in `cells` a grid cell is.
+    /// For each grid cell with a point, its place in `cells`.
     index: HashMap<[i64; 2], usize, BuildHasherDefault<CellHasher>>,
     cells: Vec<Cell>,
-    /// The cell of the last point: the next one is often in it.
+    /// The cell of the last point. The next point is often in the same cell.
     last: Option<([i64; 2], usize)>,
 }
 
-/// The points of a grid cell that are farthest out: left, right, down and up.
+/// The outermost points of a grid cell: left, right, down and up.
 #[derive(Clone, Copy, Debug)]
 struct Cell([Vec2; 4]);
 
 impl Cell {
     fn add(&mut self, p: Vec2) {
-        // Equals go by the other coordinate, so that the order of points does not matter.
+        // The other coordinate breaks ties, so that the order of points does not matter.
         let by_x = (p.x, p.y);
         let by_y = (p.y, p.x);
         let [left, right, down, up] = &mut self.0;
@@ -83,8 +83,8 @@ impl Cell {
     }
 }
 
-/// Hashes a grid cell: a multiplication a coordinate. Clouds of hundreds of millions of points look cells up,
-/// and nobody gains from cells that collide.
+/// Hashes a grid cell with one multiplication per coordinate. It is fast, for clouds of hundreds of millions
+/// of points. It need not resist attacks, since nobody gains from colliding cells.
 #[derive(Clone, Copy, Debug, Default)]
 struct CellHasher(u64);
 
@@ -102,12 +102,12 @@ impl Hasher for CellHasher {
         }
     }
 
-    // The length of a key, which is the same for all.
+    // Ignores the length of a key, which is the same for all.
     fn write_usize(&mut self, _length: usize) {}
 }
 
 impl FootprintBuilder {
-    /// Starts without a point.
+    /// Starts without points.
     ///
     /// # Panics
     /// If an option is not a positive, finite length.
@@ -118,12 +118,12 @@ impl FootprintBuilder {
         Self { options, index: HashMap::default(), cells: Vec::new(), last: None }
     }
 
-    /// Takes a point of the room, world metres, at any height. A point that is not finite is left out.
+    /// Adds a point of the room, in world metres, at any height. A point that is not finite is left out.
     pub fn add(&mut self, point: Vec3) {
         if !point.is_finite() {
             return;
         }
-        // Adding 0 takes −0 to 0.
+        // Adding 0 turns −0 into 0.
         let p = point.truncate() + Vec2::ZERO;
         let key = [p.x, p.y].map(|c| (f64::from(c) / self.options.cell_m).floor() as i64);
         let cell = match self.last {
@@ -142,7 +142,7 @@ impl FootprintBuilder {
         let mut points: Vec<Vec2> = Vec::with_capacity(2 * self.cells.len());
         for (&[i, j], &cell) in &self.index {
             let outermost = self.cells[cell].0;
-            // The outline runs through cells that have a free neighbour; for the others one point is enough.
+            // The outline runs through cells with an empty neighbour. For the others one point is enough.
             let is_surrounded = (-1..=1)
                 .flat_map(|di| (-1..=1).map(move |dj| [i.saturating_add(di), j.saturating_add(dj)]))
                 .all(|neighbor| self.index.contains_key(&neighbor));
@@ -158,20 +158,21 @@ impl FootprintBuilder {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Footprint {
-    /// Its connected parts in world x and y, metres. Outer rings run counter-clockwise, holes clockwise; each
-    /// starts with its smallest corner by (x, y), by which rings and parts are sorted as well.
+    /// The connected parts, in world x and y, metres. Outer rings run counter-clockwise, holes clockwise.
+    /// Each ring starts with its smallest corner by (x, y). Parts and holes are sorted by that corner.
     pub polygons: Vec<Polygon>,
     /// The area in m².
     pub area_m2: f64,
 }
 
 impl Footprint {
-    /// Whether the place (x, y) is on the floor.
+    /// Returns true if the place (x, y) is on the floor.
     pub fn contains(&self, x: f64, y: f64) -> bool {
         self.polygons.iter().any(|p| p.contains(dvec2(x, y)))
     }
 
-    /// How far the place (x, y) is from the floor, in metres: 0 on it, infinite if there is none.
+    /// Returns the distance of the place (x, y) from the floor, in metres: 0 on the floor, infinite if there
+    /// is no floor.
     pub fn distance(&self, x: f64, y: f64) -> f64 {
         self.polygons
             .iter()
@@ -180,7 +181,7 @@ impl Footprint {
     }
 }
 
-/// A point that remembers its place as `f64`.
+/// A point of the triangulation that keeps its exact place.
 #[derive(Clone, Copy, Debug)]
 struct Site(DVec2);
 
@@ -194,24 +195,55 @@ impl HasPosition for Site {
 type Edge<'a> = DirectedEdgeHandle<'a, Site, (), (), ()>;
 type Face<'a> = FaceHandle<'a, InnerTag, Site, (), (), ()>;
 
-/// The alpha shape of finite points without duplicates.
+/// Returns the alpha shape of finite points without duplicates.
 fn alpha_shape(points: &[Vec2], alpha: f64) -> Footprint {
     let sites = points.iter().map(|p| Site(p.as_dvec2())).collect();
-    // Finite `f32` coordinates, none between 0 and spade's smallest: there is nothing that could fail.
+    // This cannot fail: coordinates are finite `f32`, and none lies between 0 and the smallest that spade
+    // takes.
     let Ok(delaunay) = DelaunayTriangulation::<Site>::bulk_load(sites) else {
         return Footprint::default();
     };
-    let mut part_of: Vec<Option<usize>> = vec![None; delaunay.num_all_faces()];
     let is_floor: Vec<bool> = delaunay
         .all_faces()
         .map(|f| f.as_inner().is_some_and(|f| circumradius(f) <= alpha))
         .collect();
+    let (part_of, parts) = connected_parts(&delaunay, &is_floor);
 
+    let mut polygons = vec![Polygon::default(); parts];
+    let mut is_traced = vec![false; delaunay.num_directed_edges()];
+    for start in delaunay.directed_edges().filter(|&edge| is_border(edge, &is_floor)) {
+        let Some(part) = part_of[start.face().index()].filter(|_| !is_traced[start.fix().index()]) else {
+            continue;
+        };
+        for ring in simple_rings(border_walk(start, &is_floor, &mut is_traced)) {
+            // A connected part has one ring around it. Its other rings are holes.
+            if signed_area(&ring) > 0.0 {
+                polygons[part].outer = ring;
+            } else {
+                polygons[part].holes.push(ring);
+            }
+        }
+    }
+
+    for polygon in &mut polygons {
+        polygon.holes.sort_unstable_by(|a, b| by_place(a[0], b[0]));
+    }
+    polygons.sort_unstable_by(|a, b| by_place(a.outer[0], b.outer[0]));
+
+    // The sum starts from 0, since `sum` of nothing is −0.
+    let area_m2 = polygons.iter().map(Polygon::area).fold(0.0, |sum, area| sum + area);
+    Footprint { polygons, area_m2 }
+}
+
+/// Finds the connected parts of the floor. Returns the part of each face, and the number of parts.
+fn connected_parts(delaunay: &DelaunayTriangulation<Site>, is_floor: &[bool]) -> (Vec<Option<usize>>, usize) {
+    let mut part_of: Vec<Option<usize>> = vec![None; delaunay.num_all_faces()];
     let mut parts = 0;
     for start in delaunay.inner_faces() {
         if !is_floor[start.index()] || part_of[start.index()].is_some() {
             continue;
         }
+
         let mut todo = vec![start];
         while let Some(face) = todo.pop() {
             if part_of[face.index()].replace(parts).is_none() {
@@ -226,49 +258,37 @@ fn alpha_shape(points: &[Vec2], alpha: f64) -> Footprint {
         }
         parts += 1;
     }
-
-    let mut polygons = vec![Polygon::default(); parts];
-    let is_border = |edge: Edge<'_>| is_floor[edge.face().index()] && !is_floor[edge.rev().face().index()];
-    let mut is_traced = vec![false; delaunay.num_directed_edges()];
-    for start in delaunay.directed_edges().filter(|&edge| is_border(edge)) {
-        let Some(part) = part_of[start.face().index()].filter(|_| !is_traced[start.fix().index()]) else {
-            continue;
-        };
-        let mut walk = Vec::new();
-        let mut edge = start;
-        while !std::mem::replace(&mut is_traced[edge.fix().index()], true) {
-            walk.push(edge.from().data().0);
-            // Around the end of the edge, across the floor to its left, to where the floor ends.
-            edge = edge.next();
-            while !is_border(edge) {
-                edge = edge.rev().next();
-            }
-        }
-        for ring in simple_rings(walk) {
-            // A connected part has one outline around it; the others are around holes.
-            if signed_area(&ring) > 0.0 {
-                polygons[part].outer = ring;
-            } else {
-                polygons[part].holes.push(ring);
-            }
-        }
-    }
-    for polygon in &mut polygons {
-        polygon.holes.sort_unstable_by(|a, b| by_place(a[0], b[0]));
-    }
-    polygons.sort_unstable_by(|a, b| by_place(a.outer[0], b.outer[0]));
-    // From 0 on: the sum of nothing is −0.
-    let area_m2 = polygons.iter().map(Polygon::area).fold(0.0, |sum, area| sum + area);
-    Footprint { polygons, area_m2 }
+    (part_of, parts)
 }
 
-/// Cuts a closed walk that passes a place more than once there, and starts each ring with its smallest
-/// corner.
+/// Returns true if the floor is on the left of the edge and not on its right.
+fn is_border(edge: Edge<'_>, is_floor: &[bool]) -> bool {
+    is_floor[edge.face().index()] && !is_floor[edge.rev().face().index()]
+}
+
+/// Follows the border of the floor from the edge `start` until it closes. Marks its edges in `is_traced`.
+fn border_walk(start: Edge<'_>, is_floor: &[bool], is_traced: &mut [bool]) -> Vec<DVec2> {
+    let mut walk = Vec::new();
+    let mut edge = start;
+    while !std::mem::replace(&mut is_traced[edge.fix().index()], true) {
+        walk.push(edge.from().data().0);
+
+        // Turn around the end of the edge, across the floor on its left, to the next border.
+        edge = edge.next();
+        while !is_border(edge, is_floor) {
+            edge = edge.rev().next();
+        }
+    }
+    walk
+}
+
+/// Cuts a closed walk into rings that pass no place twice. Each ring starts with its smallest corner.
 fn simple_rings(walk: Vec<DVec2>) -> Vec<Vec<DVec2>> {
     let mut rings = Vec::new();
     let mut open: Vec<DVec2> = Vec::with_capacity(walk.len());
     let mut place_of: HashMap<[u64; 2], usize> = HashMap::with_capacity(walk.len());
     let key = |p: DVec2| [p.x.to_bits(), p.y.to_bits()];
+
     for p in walk {
         if let Some(&place) = place_of.get(&key(p)) {
             let ring = open.split_off(place);
@@ -281,6 +301,7 @@ fn simple_rings(walk: Vec<DVec2>) -> Vec<Vec<DVec2>> {
         open.push(p);
     }
     rings.push(open);
+
     for ring in &mut rings {
         let smallest = (0..ring.len()).min_by(|&i, &j| by_place(ring[i], ring[j])).unwrap_or(0);
         ring.rotate_left(smallest);
@@ -304,7 +325,7 @@ mod tests {
     use glam::vec3;
     use proptest::prelude::*;
 
-    /// Numbers in [0, 1) that look random.
+    /// Returns pseudo-random numbers in [0, 1).
     fn random(seed: u64) -> impl Iterator<Item = f64> {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         std::iter::repeat_with(move || {
@@ -315,7 +336,8 @@ mod tests {
         })
     }
 
-    /// Points at random over [0, size]², those that `keep` takes, as dense as a scan (2,500 a square metre).
+    /// Returns random points over [0, size]² for which `keep` is true, as dense as a scan (2,500 per square
+    /// metre).
     fn scan(size: f64, keep: impl Fn(f64, f64) -> bool) -> Vec<Vec3> {
         let n = (size * size * 2500.0) as usize;
         let mut numbers = random(7);
@@ -333,7 +355,7 @@ mod tests {
         builder.finish()
     }
 
-    /// What every footprint keeps to.
+    /// Checks the properties of every footprint.
     fn check_form(f: &Footprint) {
         assert!((f.polygons.iter().map(Polygon::area).sum::<f64>() - f.area_m2).abs() < 1e-12);
         for polygon in &f.polygons {
@@ -376,7 +398,7 @@ mod tests {
     fn an_l_keeps_its_inner_corner() {
         let f = footprint(&scan(6.0, |x, y| x <= 2.0 || y <= 2.0));
         check_form(&f);
-        // The inner corner is cut off: α²/2 = 0.125 m².
+        // The inner corner loses α²/2 = 0.125 m².
         assert!((f.area_m2 - 20.0).abs() < 0.2, "{}", f.area_m2);
         assert!(!f.contains(2.5, 2.5) && f.contains(1.9, 5.0));
     }
@@ -432,7 +454,7 @@ mod tests {
     #[test]
     fn rings_that_touch_are_parted() {
         let at = |points: &[[f64; 2]]| points.iter().map(|&[x, y]| dvec2(x, y)).collect::<Vec<_>>();
-        // Around a square, and around a hole in its corner (1, 1), in one go.
+        // One walk around a square and around a hole that touches its corner (1, 1).
         let walk = at(&[[1.0, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.6, 0.2], [0.2, 0.6]]);
         assert_eq!(
             simple_rings(walk),
@@ -450,7 +472,8 @@ mod tests {
     }
 
     proptest! {
-        /// On a coarse lattice, where shapes touch in corners and circles pass through many points.
+        /// The points are on a coarse lattice, where shapes touch in corners and circles pass through many
+        /// points.
         #[test]
         fn any_points_make_sound_polygons(places in prop::collection::vec((0..14u8, 0..14u8), 0..120)) {
             let points: Vec<Vec3> =

@@ -1,4 +1,4 @@
-//! Outlines in a plane: polygons and their triangles, the floors of rooms, the direction of walls.
+//! Polygons and their triangles, the floors of rooms, and the direction of walls.
 
 mod footprint;
 mod polygon;

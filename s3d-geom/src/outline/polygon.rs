@@ -1,32 +1,33 @@
-//! Polygons with holes, and polygons cut into triangles of their own corners.
+//! Polygons with holes, and the triangulation of polygons.
 
 use glam::{DVec2, DVec3, Vec3};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation, handles::FixedVertexHandle};
 use std::ops::Range;
 use thiserror::Error;
 
-/// Coordinates beyond this are refused: products of them would overflow.
+/// The largest coordinate. Products of larger ones would overflow.
 const LARGEST_COORDINATE: f64 = 1e60;
 
-/// A face of more corners is refused: where they lie without order, the time that cutting takes grows faster
-/// than their number. It is half a second then.
+/// The largest number of corners of a face. If corners are in no order, the time for a triangulation grows
+/// faster than their number; it is half a second for this many.
 const MOST_CORNERS: usize = 1 << 14;
 
-/// Why an outline cannot be cut into triangles. Corners count from 0; in a [`Polygon`], those of the holes
-/// follow those of the outer ring.
+/// The reason why an outline cannot be cut into triangles.
+///
+/// Corners count from 0. In a [`Polygon`], the corners of the holes follow the corners of the outer ring.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum PolygonError {
     /// An outline has fewer than three corners.
     #[error("an outline of {corners} corners encloses nothing")]
     TooFewCorners {
-        /// How many there are.
+        /// The number of corners.
         corners: usize,
     },
-    /// A face has more corners than are cut.
+    /// A face has more than 16,384 corners.
     #[error("an outline of {corners} corners; faces have up to 16,384")]
     TooManyCorners {
-        /// How many there are.
+        /// The number of corners.
         corners: usize,
     },
     /// A corner is NaN, infinite or astronomically far away.
@@ -35,25 +36,25 @@ pub enum PolygonError {
         /// The corner.
         corner: usize,
     },
-    /// All corners lie on a line or in a point, or the outline runs back over itself.
+    /// All corners are on a line or in a point, or the outline runs back over itself.
     #[error("the outline encloses no area")]
     ZeroArea,
     /// Two edges cross.
     #[error("the outline crosses itself at the edge from corner {from} to corner {to}")]
     SelfIntersection {
-        /// A corner at one end of one of the edges.
+        /// The corner at one end of one of the edges.
         from: usize,
-        /// The corner at its other end.
+        /// The corner at the other end of this edge.
         to: usize,
     },
-    /// No edges cross, but the outline turns over where it touches itself, or a hole is not where a hole may
-    /// be.
+    /// No edges cross, but the outline turns over where it touches itself, or a hole is outside of the outer
+    /// ring or inside another hole.
     #[error("parts of the outline overlap, or a hole is not inside")]
     Overlap,
 }
 
-/// A polygon with holes, in a plane. A hole lies within the outer ring and outside of the other holes; rings
-/// may touch in corners. The closing edge, from the last corner to the first, goes without saying.
+/// A polygon with holes, in a plane. Holes lie within the outer ring and outside of each other; rings may
+/// touch in corners. An edge from the last corner to the first closes each ring.
 ///
 /// ```
 /// use s3d_geom::{Polygon, PolygonError, glam::{DVec2, dvec2}};
@@ -76,12 +77,12 @@ pub struct Polygon {
 }
 
 impl Polygon {
-    /// The area within the outer ring and outside of the holes, in square units.
+    /// Returns the area within the outer ring and outside of the holes, in square units.
     pub fn area(&self) -> f64 {
         signed_area(&self.outer).abs() - self.holes.iter().map(|h| signed_area(h).abs()).sum::<f64>()
     }
 
-    /// Whether `point` is inside, or on the outline as far as `f64` can tell.
+    /// Returns true if `point` is inside or, as far as `f64` can tell, on the outline.
     pub fn contains(&self, point: DVec2) -> bool {
         let mut inside = false;
         for (a, b) in self.rings().flat_map(edges) {
@@ -89,8 +90,8 @@ impl Polygon {
             if side == 0.0 && (point - a).dot(point - b) <= 0.0 {
                 return true;
             }
-            // A ray to the right crosses edges that start below or at its height and end above it, or the
-            // other way.
+            // A ray to the right crosses an edge with one end above the ray and the other at its height or
+            // below.
             if (a.y > point.y) != (b.y > point.y) && (side > 0.0) == (b.y > a.y) {
                 inside = !inside;
             }
@@ -98,31 +99,25 @@ impl Polygon {
         inside
     }
 
-    /// How far `point` is from the polygon: 0 inside, infinite if there is no polygon.
+    /// Returns the distance of `point` from the polygon: 0 inside, infinite if the polygon has no corners.
     pub fn distance(&self, point: DVec2) -> f64 {
         if self.contains(point) {
             return 0.0;
         }
-        let squared = |(a, b): (DVec2, DVec2)| {
-            let edge = b - a;
-            let t = (edge.dot(point - a) / edge.length_squared()).clamp(0.0, 1.0);
-            // An edge without length has no t, but its end.
-            (point - a - if t.is_nan() { DVec2::ZERO } else { edge * t }).length_squared()
-        };
         self.rings()
             .flat_map(edges)
-            .map(squared)
+            .map(|(a, b)| squared_distance_to_edge(point, a, b))
             .fold(f64::INFINITY, f64::min)
             .sqrt()
     }
 
-    /// Cuts the polygon into counter-clockwise triangles whose corners are its own: indices into the outer
-    /// ring, followed by the holes in their order. A constrained Delaunay triangulation. Corners at the same
-    /// place are one: triangles name the first.
+    /// Cuts the polygon into counter-clockwise triangles of its own corners, by a constrained Delaunay
+    /// triangulation. Returns three indices per triangle: the corners of the outer ring count first, then the
+    /// corners of the holes in order. Of corners at the same place, triangles use the first.
     ///
     /// # Errors
-    /// [`PolygonError`] for a ring of fewer than three corners, a corner that is no number, no area, or rings
-    /// that cross themselves, each other, or are not nested as they should be.
+    /// [`PolygonError`] for a ring of fewer than three corners, a corner that is not finite or too far away,
+    /// no area, rings that cross themselves or each other, or a hole that is not inside.
     pub fn triangulate(&self) -> Result<Vec<[u32; 3]>, PolygonError> {
         let points: Vec<DVec2> = self.rings().flatten().copied().collect();
         let mut rings = Vec::with_capacity(1 + self.holes.len());
@@ -139,16 +134,23 @@ impl Polygon {
     }
 }
 
-/// Cuts a face of any number of corners into triangles of the same corners and winding, as indices into
-/// `corners`.
+fn squared_distance_to_edge(point: DVec2, a: DVec2, b: DVec2) -> f64 {
+    let edge = b - a;
+    let t = (edge.dot(point - a) / edge.length_squared()).clamp(0.0, 1.0);
+    // t is NaN for an edge without length. Its end is the nearest point.
+    (point - a - if t.is_nan() { DVec2::ZERO } else { edge * t }).length_squared()
+}
+
+/// Cuts a face into triangles of the same corners and winding. Returns three indices into `corners` per
+/// triangle.
 ///
-/// The face is looked at along its mean normal (Newell's), so that it may be concave and somewhat bent.
-/// Corners on a straight line and repeated corners are fine, and so is an outline that runs to a hole and
-/// back over the same edge.
+/// The face is projected along its mean normal (Newell's), so it may be concave and somewhat bent. Corners on
+/// a straight line and repeated corners are allowed. So is an outline that runs to a hole and back over the
+/// same edge.
 ///
 /// # Errors
-/// [`PolygonError`] for fewer than three corners or more than 16,384, a corner that is no number, no area, or
-/// an outline that crosses itself as seen along the normal.
+/// [`PolygonError`] for fewer than three corners or more than 16,384, a corner that is not finite or too far
+/// away, no area, or an outline that crosses itself as seen along the normal.
 pub fn triangulate_face(corners: &[Vec3]) -> Result<Vec<[u32; 3]>, PolygonError> {
     if corners.len() < 3 {
         return Err(PolygonError::TooFewCorners { corners: corners.len() });
@@ -159,7 +161,8 @@ pub fn triangulate_face(corners: &[Vec3]) -> Result<Vec<[u32; 3]>, PolygonError>
     if let Some(corner) = corners.iter().position(|p| !p.is_finite()) {
         return Err(PolygonError::OutOfRange { corner });
     }
-    // Relative to the first corner, far from the origin as near it.
+
+    // Relative to the first corner, digits are as good far from the origin as near it.
     let origin = corners[0].as_dvec3();
     let local: Vec<DVec3> = corners.iter().map(|p| p.as_dvec3() - origin).collect();
     let normal = edges(&local).map(|(a, b)| a.cross(b)).sum::<DVec3>();
@@ -169,9 +172,12 @@ pub fn triangulate_face(corners: &[Vec3]) -> Result<Vec<[u32; 3]>, PolygonError>
     if corners.len() == 3 {
         return Ok(vec![[0, 1, 2]]);
     }
+
     let (right, up) = normal.any_orthonormal_pair();
     let up = if right.cross(up).dot(normal) < 0.0 { -up } else { up };
     let flat: Vec<DVec2> = local.iter().map(|p| DVec2::new(p.dot(right), p.dot(up))).collect();
+
+    // A convex quad is cut along its shorter diagonal.
     if let &[a, b, c, d] = flat.as_slice()
         && [(a, b, c), (b, c, d), (c, d, a), (d, a, b)]
             .iter()
@@ -184,22 +190,23 @@ pub fn triangulate_face(corners: &[Vec3]) -> Result<Vec<[u32; 3]>, PolygonError>
             vec![[0, 1, 3], [1, 2, 3]]
         });
     }
+
     triangulate_rings(&flat, std::slice::from_ref(&(0..flat.len())), signed_area(&flat))
 }
 
-/// The area of a ring, positive if it runs counter-clockwise.
+/// Returns the area of a ring, positive if it runs counter-clockwise.
 pub(crate) fn signed_area(ring: &[DVec2]) -> f64 {
     let origin = ring.first().copied().unwrap_or_default();
     edges(ring).map(|(a, b)| (a - origin).perp_dot(b - origin)).sum::<f64>() * 0.5
 }
 
-/// The edges of a closed ring.
+/// Iterates over the edges of a closed ring.
 pub(crate) fn edges<T: Copy>(ring: &[T]) -> impl Iterator<Item = (T, T)> {
     ring.iter().copied().zip(ring.iter().copied().cycle().skip(1))
 }
 
-/// Triangulates what lies within an odd number of rings, which must have the area `area`. The triangles run
-/// counter-clockwise, start with their smallest index, and are sorted.
+/// Triangulates the region that lies within an odd number of rings, and checks that it has the area `area`.
+/// The triangles run counter-clockwise, start with their smallest index, and are sorted.
 fn triangulate_rings(
     points: &[DVec2],
     rings: &[Range<usize>],
@@ -208,8 +215,9 @@ fn triangulate_rings(
     if let Some(ring) = rings.iter().find(|ring| ring.len() < 3) {
         return Err(PolygonError::TooFewCorners { corners: ring.len() });
     }
+
+    // Corners at the same place are one vertex: vertex → its first corner, and corner → vertex.
     let mut cdt = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
-    // Vertex → its first corner, and corner → vertex.
     let mut first_corner: Vec<usize> = Vec::with_capacity(points.len());
     let mut vertices = Vec::with_capacity(points.len());
     for (corner, p) in points.iter().enumerate() {
@@ -225,12 +233,12 @@ fn triangulate_rings(
         vertices.push(vertex);
     }
 
-    // An edge that rings take an even number of times (there and back, to a hole) does not part inside from
-    // outside.
+    // An edge that rings take an even number of times, such as there and back to a hole, is no border between
+    // inside and outside.
     let mut borders: Vec<[usize; 2]> = Vec::with_capacity(points.len());
     for ring in rings {
         for (from, to) in edges(&vertices[ring.clone()]).filter(|(from, to)| from != to) {
-            // Several where it passes through corners; none if it crosses another border.
+            // The edge has several parts if it passes through corners, and none if it crosses another border.
             let parts = cdt.try_add_constraint(from, to);
             if parts.is_empty() {
                 return Err(PolygonError::SelfIntersection {
@@ -251,7 +259,7 @@ fn triangulate_rings(
         .map(|same| same[0])
         .collect();
 
-    // From the outer face inwards, a border at a time.
+    // Walk from the outer face inwards. Every border crossed changes between outside and inside.
     let mut inside: Vec<Option<bool>> = vec![None; cdt.num_all_faces()];
     inside[cdt.outer_face().index()] = Some(false);
     let hull = cdt.convex_hull().map(|edge| (edge.rev().face(), edge, false));
@@ -283,19 +291,22 @@ fn triangulate_rings(
     if triangles.is_empty() {
         return Err(PolygonError::ZeroArea);
     }
-    // Rings that turn over, or holes that are not inside, cover more than their area.
+
+    // Rings that turn over and holes that are not inside cover another area than `area`.
     let extent = points
         .iter()
         .fold(0.0, |e: f64, p| e.max((p - points[0]).abs().max_element()));
     if (covered - area).abs() > 1e-9 * extent * extent {
         return Err(PolygonError::Overlap);
     }
+
     triangles.sort_unstable();
     Ok(triangles)
 }
 
 fn ends(from: FixedVertexHandle, to: FixedVertexHandle) -> [usize; 2] {
-    let (from, to) = (from.index(), to.index());
+    let from = from.index();
+    let to = to.index();
     [from.min(to), from.max(to)]
 }
 
@@ -320,7 +331,7 @@ mod tests {
         (b - a).cross(c - a) / 2.0
     }
 
-    /// Turns the ring every way, and checks that triangles have its winding, its area and its corners.
+    /// Tilts the ring several ways, and checks that its triangles have its winding, area and corners.
     fn check_face(ring: &[DVec2]) {
         let tilts = [
             DMat3::IDENTITY,
@@ -446,22 +457,25 @@ mod tests {
         assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), Err(PolygonError::ZeroArea));
         assert_eq!(of(&[[1.0, 1.0]; 5]), Err(PolygonError::ZeroArea));
         assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0]]), Err(PolygonError::ZeroArea));
+
         // There and back, with a bend.
         assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 0.0]]), Err(PolygonError::ZeroArea));
         assert_eq!(
             of(&[[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0]]),
             Err(PolygonError::OutOfRange { corner: 1 })
         );
-        // A bow tie, lopsided so that its halves do not cancel.
+
+        // A bow tie whose halves differ, so that their areas do not cancel.
         assert!(matches!(
             of(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]]),
             Err(PolygonError::SelfIntersection { .. })
         ));
-        // The same, touching itself in a corner.
+        // A bow tie that touches itself in a corner.
         assert_eq!(
             of(&[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.0, 0.0], [1.0, 1.0], [0.0, 2.0]]),
             Err(PolygonError::Overlap)
         );
+
         // A pentagram goes around its middle twice.
         let star: Vec<[f64; 2]> = (0..5)
             .map(|i| {
@@ -491,6 +505,7 @@ mod tests {
         ] {
             assert_eq!((p.contains(dvec2(x, y)), p.distance(dvec2(x, y))), (inside, distance), "at {x}, {y}");
         }
+
         let corners: Vec<DVec2> = p.outer.iter().chain(p.holes.iter().flatten()).copied().collect();
         let triangles = p.triangulate().unwrap();
         let mut area = 0.0;
@@ -530,7 +545,7 @@ mod tests {
         assert_eq!(dot.distance(dvec2(1.0, 3.0)), 2.0);
     }
 
-    /// Corners at ascending angles: a simple outline, concave as a rule.
+    /// Makes corners at ascending angles: a simple outline, usually concave.
     fn star() -> impl Strategy<Value = Vec<DVec2>> {
         prop::collection::vec(0.2..3.0f64, 3..40).prop_map(|radii| {
             let n = radii.len() as f64;
@@ -568,7 +583,7 @@ mod tests {
             prop_assert_eq!(p.distance(point) == 0.0, covered);
         }
 
-        /// Any corners at all, on a lattice so that edges meet, overlap and cross.
+        /// The corners are anywhere on a lattice, so that edges meet, overlap and cross.
         #[test]
         fn wild_outlines_never_panic(corners in prop::collection::vec((0..5i8, 0..5i8, 0..2i8), 0..14)) {
             let corners: Vec<Vec3> =
@@ -577,7 +592,7 @@ mod tests {
                     .map(|&(x, y, z)| vec3(f32::from(x), f32::from(y), f32::from(z) * 0.25))
                     .collect();
             if let Ok(triangles) = triangulate_face(&corners) {
-                // What the triangles cover, seen along the normal, is what the outline encloses.
+                // Seen along the normal, the triangles cover the area that the outline encloses.
                 let normal =
                     edges(&corners).map(|(a, b)| a.as_dvec3().cross(b.as_dvec3())).sum::<DVec3>() / 2.0;
                 let covered: DVec3 = triangles.iter().map(|&t| triangle_area(&corners, t)).sum();

@@ -1,17 +1,17 @@
-//! The direction in which the walls of a room run.
+//! The dominant direction of the walls of a room.
 
 use glam::Vec3;
 
-/// Faces whose unit normal has a smaller |z| are walls.
+/// A face is a wall if |z| of its unit normal is smaller.
 const STEEPEST: f32 = 0.3;
 
-/// The dominant horizontal direction of the walls among faces given by unit normal and area: degrees in [0,
-/// 90) from +X towards +Y, by which a room is turned about Z to have its walls parallel to the axes. `None`
-/// without a near-vertical face.
+/// Returns the dominant horizontal direction of the walls among faces, in degrees in [0, 90) from +X towards
+/// +Y. Returns `None` if no face is nearly vertical.
 ///
-/// Walls that meet at a right angle count as one direction. The peak of a histogram keeps clutter out; around
-/// the peak the mean by area refines it. Faces whose normal is not finite or whose area is not positive are
-/// left out. Source: formats.md, "What is written" (the alignment angle).
+/// Each face is given by its unit normal and area. A room turned about Z by the direction has its walls
+/// parallel to the axes. Walls that meet at a right angle count as one direction. The direction is the mean
+/// by area around the peak of a histogram, which keeps clutter out. Faces whose normal is not finite or whose
+/// area is not positive are left out. Source: formats.md, "What is written" (the alignment angle).
 ///
 /// ```
 /// use s3d_geom::{dominant_wall_direction_deg, glam::Vec3};
@@ -32,17 +32,20 @@ pub fn dominant_wall_direction_deg(walls: impl Iterator<Item = (Vec3, f64)>) -> 
     if walls.is_empty() {
         return None;
     }
+
     let mut area_at = [0.0; 90];
     for &(angle, area) in &walls {
         area_at[angle as usize % 90] += area;
     }
-    // A wall's noise spreads over a few degrees: the peak is that of five of them together.
+
+    // The noise of a wall spreads over a few degrees, so the peak is over the sum of five.
     let area_around = |degree: usize| (88..93).map(|off| area_at[(degree + off) % 90]).sum::<f64>();
     let peak = (1..90).fold(0, |best, d| if area_around(d) > area_around(best) { d } else { best });
 
     let mut direction = peak as f64 + 0.5;
     for reach in [4.0, 3.0, 3.0] {
-        let (mut moment, mut total) = (0.0, 0.0);
+        let mut moment = 0.0;
+        let mut total = 0.0;
         for &(angle, area) in &walls {
             let off = (angle - direction + 45.0).rem_euclid(90.0) - 45.0;
             if off.abs() <= reach {
@@ -54,7 +57,8 @@ pub fn dominant_wall_direction_deg(walls: impl Iterator<Item = (Vec3, f64)>) -> 
             direction += moment / total;
         }
     }
-    // The remainder of a tiny negative number is 90.
+
+    // The remainder of a tiny negative number rounds to 90.
     let direction = direction.rem_euclid(90.0);
     Some(if direction < 90.0 { direction } else { 0.0 })
 }
@@ -70,12 +74,12 @@ mod tests {
         (vec3(c as f32, s as f32, 0.0), area)
     }
 
-    /// A number in [−1, 1) that looks random.
+    /// Returns a pseudo-random number in [−1, 1).
     fn noise(i: u32) -> f64 {
         f64::from(i.wrapping_mul(2_654_435_761) >> 8) / f64::from(1u32 << 23) - 1.0
     }
 
-    /// How far apart two directions are, modulo 90.
+    /// Returns the difference of two directions, modulo 90.
     fn apart(a: f64, b: f64) -> f64 {
         ((a - b + 45.0).rem_euclid(90.0) - 45.0).abs()
     }
@@ -101,7 +105,7 @@ mod tests {
     fn noise_and_clutter_do_not_move_it() {
         for truth in [0.0, 0.4, 12.7, 45.0, 60.2, 89.6] {
             let walls = (0..2000).map(|i| wall(truth + 90.0 * f64::from(i % 4) + 1.5 * noise(i), 0.01));
-            // As much again in every direction, and a leaning wall cabinet.
+            // Clutter of the same area in every direction, and a cabinet at an angle.
             let clutter = (0..2000).map(|i| wall(180.0 * noise(i + 5000), 0.01));
             let cabinet = [wall(truth + 20.0, 5.0)];
             let angle = dominant_wall_direction_deg(walls.chain(clutter).chain(cabinet)).unwrap();

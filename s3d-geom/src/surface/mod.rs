@@ -1,6 +1,6 @@
-//! Dense, uniform sampling of a mesh's surface into a coloured cloud.
+//! Dense, uniform sampling of the surface of a mesh into a coloured cloud.
 //!
-//! The published clouds are made like this: densely and uniformly from the textured mesh.
+//! The published clouds were made like this: densely and uniformly from the textured mesh.
 
 mod patch;
 
@@ -13,34 +13,37 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// How many points to draw.
+/// The number of points to draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Density {
-    /// Points a square metre of the sampled faces; the total is rounded to the nearest whole number, half up.
+    /// Points per square metre of the sampled faces. The total is rounded to the nearest whole number, half
+    /// up.
     PerM2(f64),
-    /// Points in all.
+    /// The total number of points.
     Total(u64),
 }
 
-/// More points than this are not drawn: beyond it `f64` no longer tells neighbouring points apart.
+/// The largest number of points. Beyond it, `f64` does not tell neighbouring points apart.
 const MAX_POINTS: u64 = 1 << 52;
 
-/// Random words that a point takes: its place along the cumulative area, and two in its triangle.
+/// The random words of a point: one for its place along the cumulative area, two for its place in the
+/// triangle.
 const WORDS: u128 = 3;
 
-/// Points that one task draws.
+/// The number of points that one task draws.
 const CHUNK: usize = 4096;
 
-/// Points that are placed before the first one's colour is looked up: its pixels come from memory meanwhile.
+/// The number of points that are placed before their colours are looked up. Meanwhile the pixels arrive from
+/// memory.
 const BLOCK: usize = 256;
 
-/// Points spread evenly over the surface of a mesh, to be drawn piece by piece.
+/// Draws points evenly from the surface of a mesh, in pieces of any size.
 ///
-/// Point i of N lies at (i + uᵢ)/N of the cumulative area of the faces, uᵢ random in [0, 1), and anywhere in
-/// its triangle with equal probability. So the points come face by face in the order of the faces, every
-/// stretch of surface has its share of points to within two, and any range of them can be drawn alone. The
-/// random numbers of a point depend on the seed and its index only.
+/// Point i of N is at (i + uᵢ)/N of the cumulative area of the faces, where uᵢ is random in [0, 1). Its place
+/// in the triangle is uniform. The points are therefore in the order of the faces, every stretch of surface
+/// has its share of points to within two, and any range of points can be drawn alone. The random numbers of a
+/// point depend on the seed and its index only.
 ///
 /// ```
 /// use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh, glam::Vec3};
@@ -56,14 +59,14 @@ const BLOCK: usize = 256;
 pub struct SurfaceSampler<'m> {
     mesh: &'m TriMesh,
     faces: Vec<u32>,
-    /// Where each face ends along the cumulative area, counted in points: ascending, the last is N.
+    /// For each face, its end along the cumulative area, counted in points. Ascending; the last is infinite.
     ends: Vec<f64>,
     len: u64,
     rng: ChaCha8Rng,
 }
 
 impl<'m> SurfaceSampler<'m> {
-    /// Samples all faces, in their order.
+    /// Samples all faces, in order.
     ///
     /// # Panics
     /// If a density is negative or not finite.
@@ -71,11 +74,11 @@ impl<'m> SurfaceSampler<'m> {
         Self::over_faces(mesh, (0..mesh.faces().len() as u32).collect(), density, seed)
     }
 
-    /// Samples the given faces alone; points come in that order of faces. No face, no point. A face that is
-    /// named twice is sampled twice.
+    /// Samples only `faces`, in their order. A face listed twice is sampled twice. Without faces, there are
+    /// no points.
     ///
     /// # Panics
-    /// If a density is negative or not finite, or if there is no such face.
+    /// If a density is negative or not finite, or if the mesh does not have one of `faces`.
     pub fn over_faces(mesh: &'m TriMesh, faces: Vec<u32>, density: Density, seed: u64) -> Self {
         let mut area = 0.0;
         let mut ends: Vec<f64> = Vec::with_capacity(faces.len());
@@ -83,15 +86,17 @@ impl<'m> SurfaceSampler<'m> {
             area += mesh.area(face);
             ends.push(area);
         }
+
         let wanted = match density {
             Density::PerM2(per_m2) => {
-                assert!(per_m2.is_finite() && per_m2 >= 0.0, "a density of {per_m2} points a square metre");
+                assert!(per_m2.is_finite() && per_m2 >= 0.0, "a density of {per_m2} points per square metre");
                 // The conversion saturates.
                 (area * per_m2 + 0.5).floor() as u64
             }
             Density::Total(total) => total,
         };
         let len = if faces.is_empty() { 0 } else { wanted.min(MAX_POINTS) };
+
         for end in &mut ends {
             *end *= len as f64 / area;
         }
@@ -101,33 +106,34 @@ impl<'m> SurfaceSampler<'m> {
         Self { mesh, faces, ends, len, rng: ChaCha8Rng::seed_from_u64(seed) }
     }
 
-    /// Number of points in all, at most 2⁵².
+    /// Returns the number of all points, at most 2⁵².
     pub fn len(&self) -> u64 {
         self.len
     }
 
-    /// Whether there is no point to draw.
+    /// Returns true if there is no point to draw.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// The sampled faces, in the order of the points.
+    /// Returns the sampled faces, in the order of the points.
     pub fn faces(&self) -> &[u32] {
         &self.faces
     }
 
-    /// How many points lie on the faces before `position` in [`SurfaceSampler::faces`]: those that come
-    /// first. The points of the faces `a..b` of that list are `points_before(a)..points_before(b)`.
+    /// Returns the number of points on the faces before `position` in [`SurfaceSampler::faces`]. The points
+    /// of the faces `a..b` of that list are `points_before(a)..points_before(b)`.
     ///
     /// # Panics
-    /// If `position` is beyond the end of the list; the end itself is fine.
+    /// If `position` is greater than the length of the list.
     pub fn points_before(&self, position: usize) -> u64 {
         if position == 0 || self.len == 0 {
             assert!(position <= self.faces.len(), "position {position} of {}", self.faces.len());
             return 0;
         }
+
+        // Point i is in [i, i + 1], so only the points next to the boundary have to be computed.
         let end = self.ends[position - 1];
-        // Point i lies in [i, i + 1], so that only the points next to the boundary have to be looked at.
         let guess = (end.floor() as u64).min(self.len);
         let mut rng = self.rng.clone();
         let mut before = guess.saturating_sub(1);
@@ -141,12 +147,14 @@ impl<'m> SurfaceSampler<'m> {
         before
     }
 
-    /// Draws the points `range` into `out`, whose content they replace: positions, colours and faces. Works
-    /// on all threads of the current rayon pool; the points are the same for any number of them and however a
-    /// range is split.
+    /// Draws the points `range` into `out`: positions, colours and faces. The old content of `out` is
+    /// replaced.
+    ///
+    /// Runs on all threads of the current rayon pool. The points are the same for any number of threads and
+    /// any split into ranges.
     ///
     /// # Panics
-    /// If the range goes beyond [`SurfaceSampler::len`], or is longer than memory can be.
+    /// If the range ends beyond [`SurfaceSampler::len`], or is too long for memory.
     #[expect(clippy::expect_used, reason = "a caller's mistake: see Panics")]
     pub fn sample(&self, range: Range<u64>, out: &mut PointCloud) {
         assert!(range.end <= self.len, "points {range:?} of {}", self.len);
@@ -166,7 +174,7 @@ impl<'m> SurfaceSampler<'m> {
     }
 }
 
-/// Draws the points from `first` on, as many as the slices hold.
+/// A draw of points from `first` on, as many as the slices hold.
 struct Draw<'a> {
     sampler: &'a SurfaceSampler<'a>,
     first: u64,
@@ -183,6 +191,7 @@ impl Work for Draw<'_> {
         let Draw { sampler, first, positions, colors, faces } = self;
         let mut rng = sampler.rng.clone();
         rng.set_word_pos(u128::from(first) * WORDS);
+
         let mut position = usize::MAX;
         let mut patch = None;
         let mut awaited = Vec::with_capacity(BLOCK);
@@ -195,6 +204,8 @@ impl Work for Draw<'_> {
             for (k, ((point, color), face)) in positions.iter_mut().zip(&mut *colors).zip(faces).enumerate() {
                 let place = place(&mut rng, i);
                 i += 1;
+
+                // The first face is searched; later ones follow.
                 if position == usize::MAX {
                     position = sampler.ends.partition_point(|&end| end <= place);
                 }
@@ -202,6 +213,7 @@ impl Work for Draw<'_> {
                     position += 1;
                     patch = None;
                 }
+
                 let patch = patch.get_or_insert_with(|| Patch::new(sampler.mesh, sampler.faces[position]));
                 let weights = barycentric(unit(&mut rng), unit(&mut rng));
                 *point = patch.point(weights);
@@ -214,6 +226,7 @@ impl Work for Draw<'_> {
                     }
                 }
             }
+
             for (k, texels) in awaited.drain(..) {
                 colors[k] = texels.rounded();
             }
@@ -221,20 +234,20 @@ impl Work for Draw<'_> {
     }
 }
 
-/// Uniform in [0, 1).
+/// Draws a number uniform in [0, 1).
 #[inline(always)]
 fn unit(rng: &mut ChaCha8Rng) -> f64 {
     f64::from(rng.next_u32()) * (1.0 / 4_294_967_296.0)
 }
 
-/// Where point `i` lies along the cumulative area, counted in points: in [i, i + 1], ascending with i. `rng`
-/// stands at the point's first word.
+/// Returns the place of point `i` along the cumulative area, counted in points: in [i, i + 1], ascending with
+/// i. `rng` is at the first word of the point.
 #[inline(always)]
 fn place(rng: &mut ChaCha8Rng, i: u64) -> f64 {
     i as f64 + unit(rng)
 }
 
-/// Takes the unit square to a triangle, uniformly: the upper half of the square is folded onto the lower.
+/// Maps the unit square uniformly to a triangle, by folding the upper half of the square onto the lower.
 #[inline(always)]
 fn barycentric(u: f64, v: f64) -> [f64; 3] {
     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
@@ -248,7 +261,7 @@ mod tests {
     use glam::{Vec2, vec2, vec3};
     use proptest::prelude::*;
 
-    /// A fan of triangles of very different areas around the origin, tilted.
+    /// Returns a tilted fan of triangles around the origin, with very different areas.
     fn fan(spokes: u32) -> TriMesh {
         let mut positions = vec![Vec3::ZERO];
         for i in 0..=spokes {
@@ -310,7 +323,8 @@ mod tests {
         );
         let mesh = mesh.unwrap();
         let cloud = draw(&SurfaceSampler::new(&mesh, Density::Total(64_000), 3));
-        // Every edge in 8: 64 triangles of equal area, 36 of them upright and 28 upside down.
+
+        // Every edge is cut in 8. This makes 64 triangles of equal area, 36 upright and 28 upside down.
         let mut counts = [0.0; 64];
         let [a, b, c] = mesh.triangle(0).map(|p| p.as_dvec3());
         let n = (b - a).cross(c - a);
@@ -319,11 +333,13 @@ mod tests {
             let u = (d.cross(c - a).dot(n) / n.length_squared() * 8.0).clamp(0.0, 7.999_999);
             let v = ((b - a).cross(d).dot(n) / n.length_squared() * 8.0).clamp(0.0, 7.999_999);
             let upside_down = u.fract() + v.fract() > 1.0;
-            // The 28 that are upside down fill the places above the diagonal.
-            let (i, j) = (u as usize, v as usize);
+            // The triangles upside down fill the 28 places above the diagonal.
+            let i = u as usize;
+            let j = v as usize;
             let bin = if upside_down { (7 - i) * 8 + (7 - j) } else { i * 8 + j };
             counts[bin] += 1.0;
         }
+
         // 63 degrees of freedom, 5 %: 82.53.
         let x = chi_square(&counts, &[1000.0; 64]);
         assert!(x < 82.53, "{x}: {counts:?}");
@@ -423,7 +439,7 @@ mod tests {
         SurfaceSampler::new(&fan(1), Density::Total(10), 0).sample(5..11, &mut PointCloud::default());
     }
 
-    /// Two triangles that make the unit square, with texture coordinates `scale` times as large.
+    /// Returns the unit square as two triangles, with texture coordinates `scale` times as large.
     fn textured_square(image: Raster<[u8; 3]>, wrap: Wrap, scale: f32) -> TriMesh {
         TriMesh::new(MeshParts {
             positions: vec![Vec3::ZERO, Vec3::X, vec3(1.0, 1.0, 0.0), Vec3::Y],
@@ -440,7 +456,7 @@ mod tests {
 
     #[test]
     fn colours_follow_a_gradient() {
-        // Red grows by 2 a pixel to the right, green by 3 downwards.
+        // Red grows by 2 per pixel to the right, green by 3 per pixel downwards.
         let pixels = (0..64).flat_map(|y| (0..64).map(move |x| [2 * x as u8, 3 * y as u8, 77]));
         let image = Raster::from_vec(64, 64, pixels.collect());
         let cloud =
@@ -456,7 +472,7 @@ mod tests {
 
     #[test]
     fn colours_wrap_as_the_texture_says() {
-        // Four columns; far from their borders a point sees one of them.
+        // The texture has four columns. Far from their borders, a point has the colour of one.
         let image = Raster::from_vec(4, 1, vec![[10; 3], [20; 3], [30; 3], [40; 3]]);
         for (wrap, expected) in [
             (Wrap::Repeat, [10, 20, 30, 40, 10, 20, 30, 40]),
@@ -499,7 +515,7 @@ mod tests {
         let mesh = textured_square(image, Wrap::Clamp, 1.0);
         let patch = Patch::new(&mesh, 0);
         assert!(matches!(patch.color, FaceColor::Texture(_, _, [_, Vec2::X, _])));
-        // The texture's middle, where it is exactly ½.
+        // The middle of the texture, where the colour is exactly ½.
         assert_eq!(patch.color([0.5, 0.0, 0.5]).rounded(), [1; 3]);
         assert_eq!(mesh.textures()[0].sample(vec2(0.5, 0.5)), [0.5; 3]);
     }
@@ -514,7 +530,8 @@ mod tests {
             let sampler = SurfaceSampler::new(&mesh, Density::Total(total), 8);
             let mut at: Vec<u64> = cuts.iter().map(|c| (c * total as f64) as u64).chain([0, total]).collect();
             at.sort_unstable();
-            let (mut all, mut piece) = (PointCloud::default(), PointCloud::default());
+            let mut all = PointCloud::default();
+            let mut piece = PointCloud::default();
             for w in at.windows(2) {
                 sampler.sample(w[0]..w[1], &mut piece);
                 all.positions.extend(&piece.positions);

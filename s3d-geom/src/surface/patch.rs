@@ -1,4 +1,4 @@
-//! A face that points are put on, and what colours they get there.
+//! A face to be sampled, and the colours of its points.
 
 use crate::mesh::texture::Quad;
 use crate::{FaceColor, Texture, TriMesh};
@@ -15,7 +15,8 @@ impl<'m> Patch<'m> {
         Self { corners: mesh.triangle(face).map(|p| p.as_dvec3()), color: mesh.color_of(face) }
     }
 
-    /// In `f64`, so that a point is off its face by the rounding of its coordinates only.
+    /// Returns the point with these weights of the corners. It is computed in `f64`, so only the rounding of
+    /// its coordinates moves it off the face.
     #[inline(always)]
     pub(super) fn point(&self, [wa, wb, wc]: [f64; 3]) -> Vec3 {
         let [a, b, c] = self.corners;
@@ -41,13 +42,14 @@ impl<'m> Patch<'m> {
 
 /// The colour of a point.
 pub(super) enum PointColor<'m> {
-    /// Between four pixels of a texture, which may have to come from memory.
+    /// A place between four pixels of a texture, which may have to come from memory.
     Texels(Quad, &'m [[u8; 3]]),
+    /// A colour that needs no texture.
     Known([u8; 3]),
 }
 
 impl PointColor<'_> {
-    /// Asks for the pixels.
+    /// Prefetches the pixels.
     #[inline(always)]
     pub(super) fn prefetch(&self) {
         if let Self::Texels(quad, pixels) = self {

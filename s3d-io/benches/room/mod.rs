@@ -1,5 +1,5 @@
-//! The images of a furnished room made from a fixed seed: uneven walls as a scan has them, seen at an angle,
-//! a texture with noise, a few dozen instances.
+//! Images of a furnished room, made from a fixed seed: uneven walls as a scan has them, seen at an angle, a
+//! texture with noise, and a few dozen instances.
 
 use s3d_geom::Raster;
 use s3d_geom::glam::{Vec3, vec3};
@@ -8,7 +8,7 @@ use s3d_io::image::pretty_color;
 /// Width and height of the images, in pixels.
 pub(crate) const SIZE: u32 = 1080;
 
-/// What a pixel of the room sees.
+/// What a pixel of the room shows.
 #[derive(Clone, Copy)]
 struct Seen {
     xyz: Vec3,
@@ -17,7 +17,7 @@ struct Seen {
     instance: u32,
 }
 
-/// Noise of the pixel, −1 to 1, from a hash.
+/// Returns the noise of a pixel, −1 to 1, from a hash.
 pub(crate) fn noise(x: u32, y: u32) -> f32 {
     let mut h = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77);
     h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
@@ -25,8 +25,8 @@ pub(crate) fn noise(x: u32, y: u32) -> f32 {
     ((h ^ (h >> 15)) >> 8) as f32 / (1 << 23) as f32 - 1.0
 }
 
-/// A surface's unevenness: how far it stands out where a triangle of a grid of 4 cm is hit, metres, and by
-/// how much that changes along both axes of the grid.
+/// Returns the unevenness of a surface: its height in metres over a triangle of a grid of 4 cm, and the
+/// slopes along both axes of the grid.
 fn uneven(u: f32, v: f32) -> (f32, [f32; 2]) {
     let (u, v) = (u / 0.04, v / 0.04);
     let (i, j) = (u.floor(), v.floor());
@@ -40,7 +40,8 @@ fn uneven(u: f32, v: f32) -> (f32, [f32; 2]) {
     (corner(0, 0) + s * ds + t * dt, [ds / 0.04, dt / 0.04])
 }
 
-/// A box-shaped room of 6 × 5 × 3 m with balls on the floor and boards on the walls, seen from inside.
+/// Renders a box-shaped room of 6 × 5 × 3 m, with balls on the floor and boards on the walls, seen from
+/// inside.
 fn room() -> Raster<Seen> {
     let eye = vec3(3.1, 0.7, 1.5);
     let corner = vec3(6.0, 5.0, 3.0);
@@ -50,8 +51,10 @@ fn room() -> Raster<Seen> {
     let pixel = |x: u32, y: u32| {
         let (a, b) = ((x as f32 + 0.5) / SIZE as f32 - 0.5, (y as f32 + 0.5) / SIZE as f32 - 0.5);
         let d = vec3(1.3 * a + 0.2, 1.0 - 0.2 * a, -1.3 * b - 0.1);
+
         let mut t = f32::INFINITY;
         let (mut normal, mut instance) = (Vec3::Z, 0);
+
         for axis in 0..3 {
             for (side, wall) in [(0.0, 1), (corner[axis], 2)] {
                 let s = (side - eye[axis]) / d[axis];
@@ -61,18 +64,21 @@ fn room() -> Raster<Seen> {
                 }
             }
         }
+
         let at = eye + d * t;
         let axis = normal.abs().max_position();
         let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
         let (height, slope) = uneven(at[a], at[b]);
-        // To first order: the ray meets the surface so much earlier.
+        // To first order, the ray hits the surface earlier by this much.
         t -= height / normal.dot(-d);
         normal[a] -= slope[0];
         normal[b] -= slope[1];
         normal = normal.normalize();
+
         if instance >= 3 && at.z > 0.8 && at.z < 2.0 {
             instance = 100 + (at.x * 1.5) as u32;
         }
+
         for (i, &(center, radius)) in balls.iter().enumerate() {
             let (o, dd) = (eye - center, d.length_squared());
             let h = o.dot(d);
@@ -93,18 +99,18 @@ fn room() -> Raster<Seen> {
 /// The room's images, pixel for pixel.
 pub(crate) struct Images {
     pub(crate) photo: Raster<[u8; 3]>,
-    /// 512ths of a metre.
+    /// In 1/512 of a metre.
     pub(crate) depth: Raster<u16>,
     pub(crate) normals: Raster<[u8; 3]>,
-    /// Instances as numbers.
+    /// The numbers of instances.
     pub(crate) labels: Raster<[u8; 3]>,
-    /// A colour an instance.
+    /// A colour for each instance.
     pub(crate) pretty: Raster<[u8; 3]>,
-    /// World coordinates, metres.
+    /// World coordinates in metres.
     pub(crate) xyz: Raster<[f32; 3]>,
 }
 
-/// Makes them.
+/// Makes the images of the room.
 pub(crate) fn images() -> Images {
     let room = room();
     let mut i = 0;

@@ -1,10 +1,10 @@
-//! The pictures of a COLMAP model: `images.txt` or `images.bin`. Their cameras: `colmap_cameras`. Source:
-//! COLMAP's documentation, "Output Format".
+//! The pictures of a COLMAP model, `images.txt` or `images.bin`. Their cameras are in `colmap_cameras`.
+//! Source: COLMAP's documentation, "Output Format".
 //!
-//! Own code: lines of ten words, or the same in binary, are eighty lines to read.
+//! Own code: lines of ten words, and the same in binary, take eighty lines to read.
 //!
-//! A picture's pose is world → camera in OpenCV's axes (x right, y down, z forward): a quaternion w x y z and
-//! a translation.
+//! A picture's pose is the transform from the world to the camera in OpenCV's axes (x right, y down, z
+//! forward): a quaternion w x y z and a translation.
 
 use crate::camera::colmap_cameras::read_beside;
 use crate::camera::located::{fault, pose_from_opencv, rotation};
@@ -17,7 +17,8 @@ use s3d_geom::Pose;
 use s3d_geom::glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
 
-/// The file of pictures of the model in `dir`: itself, or in `0`, `sparse/0` or `sparse` below it.
+/// Returns the list of pictures of the model in `dir`. It is in `dir`, or in `0`, `sparse/0` or `sparse`
+/// below it.
 pub(crate) fn find(dir: &Path) -> Option<PathBuf> {
     ["", "0", "sparse/0", "sparse"]
         .iter()
@@ -25,32 +26,34 @@ pub(crate) fn find(dir: &Path) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-/// A picture, and the number of its camera.
+/// The number of a camera, and a picture that was taken with it.
 type Picture = (u32, PosedCamera);
 
-/// Reads `images.txt` or `images.bin`; the ending says which.
+/// Reads `images.txt` or `images.bin`; the extension says which.
 pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
     Ok(read_pictures(path)?.into_iter().map(|(_, picture)| picture).collect())
 }
 
-/// Reads them and the list of cameras beside it. The pictures lie in a folder `images` beside the model, or
-/// beside the folder `sparse` or `sparse/0` that it is in. Returns the path of the list of cameras, too.
+/// Reads the pictures, and the list of cameras beside them. The pictures' files are in a folder `images`
+/// beside the model, or beside the folder `sparse` or `sparse/0` that holds it. Also returns the path of the
+/// list of cameras.
 pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, PathBuf)> {
     let pictures = read_pictures(path)?;
     let (file, cameras) = read_beside(path)?;
     let folders = path.ancestors().skip(1).take(3).map(|dir| dir.join("images"));
     let folder = folders.into_iter().find(|dir| dir.is_dir());
-    let with_camera = |(id, mut picture): Picture| {
+    let mut with_cameras = Vec::with_capacity(pictures.len());
+    for (id, mut picture) in pictures {
         let (size, optics) = cameras.get(&id).ok_or_else(|| {
             let name = quote(picture.name.as_bytes());
             fault(path, picture.line, format!("{name}: its camera {id} is not in {}", file.display()))
         })?;
-        (picture.size, picture.optics) = (Some(*size), Some(*optics));
+        picture.size = Some(*size);
+        picture.optics = Some(*optics);
         picture.picture = folder.as_ref().map(|folder| folder.join(&picture.name));
-        Ok(picture)
-    };
-    let cameras = pictures.into_iter().map(with_camera).collect::<Result<_>>()?;
-    Ok((cameras, file))
+        with_cameras.push(picture);
+    }
+    Ok((with_cameras, file))
 }
 
 fn read_pictures(path: &Path) -> Result<Vec<Picture>> {
@@ -62,8 +65,9 @@ fn read_pictures(path: &Path) -> Result<Vec<Picture>> {
     }
 }
 
-/// Two lines a picture: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, and its points, which may be none.
-/// Some programs leave the empty lines out: what follows a picture are its points only if it looks like them.
+/// Reads two lines for each picture: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, and its points, which
+/// may be none. Some programs leave empty lines out. So the line after a picture is only taken as points if
+/// it looks like points.
 fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<Picture>> {
     const FORM: &str = "a picture is IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and the line after it may \
                         hold its points, X Y POINT3D_ID each";
@@ -74,28 +78,35 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<Picture>> {
         if text.starts_with(b"#") {
             continue;
         }
+
         if std::mem::take(&mut may_be_points) && are_points(text) || text.is_empty() {
             continue;
         }
+
         let text = std::str::from_utf8(text).map_err(|_| Error::line(path, line, "is no text in UTF-8"))?;
+
         let mut rest = text;
         let mut fields = [""; 9];
         for field in &mut fields {
             let (head, tail) = rest
                 .split_once(|c: char| c.is_ascii_whitespace())
                 .ok_or_else(|| Error::line(path, line, format!("{}: {FORM}", quote(text.as_bytes()))))?;
-            (*field, rest) = (head, tail.trim_start());
+            *field = head;
+            rest = tail.trim_start();
         }
+
         let mut numbers = [0.0; 7];
         for (number, field) in numbers.iter_mut().zip(&fields[1..8]) {
             *number = field.parse().map_err(|_| {
                 Error::line(path, line, format!("{} is no number: {FORM}", quote(field.as_bytes())))
             })?;
         }
+
         let [.., camera] = fields;
         let camera = camera.parse().map_err(|_| {
             Error::line(path, line, format!("{} is no number of a camera: {FORM}", quote(camera.as_bytes())))
         })?;
+
         let pose = pose(numbers).map_err(|m| Error::line(path, line, m))?;
         pictures.push((camera, picture(rest.to_owned(), pose, line)));
         may_be_points = true;
@@ -103,46 +114,35 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<Vec<Picture>> {
     Ok(pictures)
 }
 
-/// Whether a line consists of numbers, three a point, or is empty. A picture has ten words, of which the name
-/// is seldom a number.
+/// Returns whether a line is empty or consists of numbers, three for each point. A picture has ten words, and
+/// its name is seldom a number.
 fn are_points(line: &[u8]) -> bool {
-    let is_number = |b: &u8| matches!(b, b'0'..=b'9' | b'.' | b'-' | b'+' | b'e' | b'E');
-    let (mut words, mut in_word) = (0u64, false);
+    let mut words = 0u64;
+    let mut in_word = false;
     for byte in line {
-        if !is_number(byte) && !byte.is_ascii_whitespace() {
+        if !is_of_number(byte) && !byte.is_ascii_whitespace() {
             return false;
         }
-        words += u64::from(is_number(byte) && !in_word);
-        in_word = is_number(byte);
+        words += u64::from(is_of_number(byte) && !in_word);
+        in_word = is_of_number(byte);
     }
-    words % 3 == 0
+    words.is_multiple_of(3)
 }
 
-/// Little-endian: a count; for each picture its id (4 bytes), seven numbers (8 each), its camera (4), a name
-/// that ends at a zero, a count of points (8) and 24 bytes each.
+/// Returns whether a byte can be part of a number.
+fn is_of_number(byte: &u8) -> bool {
+    matches!(byte, b'0'..=b'9' | b'.' | b'-' | b'+' | b'e' | b'E')
+}
+
+/// Reads the binary form, little-endian: a count, then for each picture its id (4 bytes), seven numbers (8
+/// each), the number of its camera (4), a name that ends with a zero byte, a count of points (8) and 24 bytes
+/// for each point.
 fn read_binary(path: &Path, bytes: &[u8]) -> Result<Vec<Picture>> {
     let mut rest = bytes;
     let mut pictures = Vec::new();
-    let cut_off =
-        |n: u64| Error::format(path, format!("ends in picture {n}: it was cut off, or is no images.bin"));
-    let count = u64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(0))?);
+    let count = u64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(path, 0))?);
     for n in 1..=count {
-        let mut record = || -> Option<([f64; 7], u32, &[u8])> {
-            take::<4>(&mut rest)?;
-            let mut numbers = [0.0; 7];
-            for number in &mut numbers {
-                *number = f64::from_le_bytes(take(&mut rest)?);
-            }
-            let camera = u32::from_le_bytes(take(&mut rest)?);
-            let end = rest.iter().position(|&b| b == 0)?;
-            let (name, behind) = rest.split_at_checked(end)?;
-            rest = behind.get(1..)?;
-            let points = u64::from_le_bytes(take(&mut rest)?);
-            let length = usize::try_from(points).ok()?.checked_mul(24)?;
-            rest = rest.get(length..)?;
-            Some((numbers, camera, name))
-        };
-        let (numbers, camera, name) = record().ok_or_else(|| cut_off(n))?;
+        let (numbers, camera, name) = take_picture(&mut rest).ok_or_else(|| cut_off(path, n))?;
         let name = String::from_utf8_lossy(name).into_owned();
         let pose = pose(numbers).map_err(|m| Error::format(path, format!("picture {n}, {name:?}: {m}")))?;
         pictures.push((camera, picture(name, pose, 0)));
@@ -150,16 +150,42 @@ fn read_binary(path: &Path, bytes: &[u8]) -> Result<Vec<Picture>> {
     Ok(pictures)
 }
 
+/// Takes the next picture: the numbers of its pose, the number of its camera and its name. Returns `None` if
+/// the bytes end before.
+fn take_picture<'a>(rest: &mut &'a [u8]) -> Option<([f64; 7], u32, &'a [u8])> {
+    take::<4>(rest)?;
+    let mut numbers = [0.0; 7];
+    for number in &mut numbers {
+        *number = f64::from_le_bytes(take(rest)?);
+    }
+    let camera = u32::from_le_bytes(take(rest)?);
+
+    let end = rest.iter().position(|&b| b == 0)?;
+    let (name, behind) = rest.split_at_checked(end)?;
+    *rest = behind.get(1..)?;
+
+    let points = u64::from_le_bytes(take(rest)?);
+    let length = usize::try_from(points).ok()?.checked_mul(24)?;
+    *rest = rest.get(length..)?;
+    Some((numbers, camera, name))
+}
+
+fn cut_off(path: &Path, picture: u64) -> Error {
+    Error::format(path, format!("ends in picture {picture}: it was cut off, or is no images.bin"))
+}
+
 fn picture(name: String, pose: Pose, line: u64) -> PosedCamera {
     PosedCamera { name, pose, size: None, optics: None, picture: None, line }
 }
 
+/// Takes the next `N` bytes.
 pub(crate) fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk::<N>()?;
     *rest = tail;
     Some(*head)
 }
 
+/// Returns the pose of a camera from the quaternion and the translation of its file. The error is a sentence.
 fn pose([qw, qx, qy, qz, tx, ty, tz]: [f64; 7]) -> std::result::Result<Pose, String> {
     if ![qw, qx, qy, qz, tx, ty, tz].iter().all(|v| v.is_finite()) {
         return Err("a number of its pose is not finite".into());
@@ -176,7 +202,7 @@ mod tests {
     use super::*;
     use s3d_geom::glam::DQuat;
 
-    /// The line of a picture whose camera has `pose`.
+    /// Returns the numbers in the line of a picture that was taken at `pose`.
     fn numbers(pose: &Pose) -> [f64; 7] {
         let r = pose.opencv_from_world();
         let q = DQuat::from_mat3(&r);
@@ -289,11 +315,13 @@ mod tests {
                 .unwrap();
             assert!(e.to_string().contains(words), "{e}");
         }
+
         let bytes = binary(&[some_pose(0.0), some_pose(1.0)]);
         for length in [0, 7, 8, 60, 80, bytes.len() - 1] {
             let e = read_binary(Path::new("images.bin"), &bytes[..length]).err().unwrap();
             assert!(e.to_string().contains("cut off"), "{e}");
         }
+
         let mut lying = bytes.clone();
         lying[..8].copy_from_slice(&u64::MAX.to_le_bytes());
         assert!(

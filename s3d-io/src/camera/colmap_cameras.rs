@@ -7,14 +7,13 @@ use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use crate::fs::quote::quote;
-use s3d_geom::glam::{DVec2, dvec2};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Size and optics of a camera.
+/// The size (width, height, pixels) and the optics of a camera.
 pub(crate) type Intrinsics = ([u32; 2], Optics);
 
-/// COLMAP's models by number: name, and how many parameters.
+/// The camera models of COLMAP, in the order of their numbers: the name, and the number of parameters.
 const MODELS: [(&str, usize); 12] = [
     ("SIMPLE_PINHOLE", 3),
     ("PINHOLE", 4),
@@ -30,7 +29,7 @@ const MODELS: [(&str, usize); 12] = [
     ("RAD_TAN_THIN_PRISM_FISHEYE", 16),
 ];
 
-/// The cameras beside a list of images, by their numbers, and the file that lists them.
+/// Returns the list of cameras beside a list of images, and its cameras by their numbers.
 pub(crate) fn read_beside(images: &Path) -> Result<(PathBuf, HashMap<u32, Intrinsics>)> {
     let is_binary = images.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"));
     let path = images.with_file_name(if is_binary { "cameras.bin" } else { "cameras.txt" });
@@ -51,19 +50,22 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
         if text.is_empty() || text.starts_with(b"#") {
             continue;
         }
+
         let fault = |message: String| Error::line(path, line, message);
         let words = std::str::from_utf8(text).map_err(|_| fault("is no text in UTF-8".into()))?;
         let mut words = words.split_ascii_whitespace();
         let mut next = || words.next().ok_or_else(|| fault(format!("{}: {FORM}", quote(text))));
-        let (id, model, width, height) = (next()?, next()?, next()?, next()?);
+        let [id, model, width, height] = [next()?, next()?, next()?, next()?];
         let whole = |word: &str| word.parse::<u32>().map_err(|_| fault(format!("{word:?}: {FORM}")));
-        let (id, size) = (whole(id)?, [whole(width)?, whole(height)?]);
+        let id = whole(id)?;
+        let size = [whole(width)?, whole(height)?];
         let numbers: Vec<f64> = words
             .map(|word| {
                 word.parse()
                     .map_err(|_| fault(format!("{word:?} is no number: {FORM}")))
             })
             .collect::<Result<_>>()?;
+
         let intrinsics = intrinsics(model, size, &numbers).map_err(fault)?;
         if cameras.insert(id, intrinsics).is_some() {
             return Err(fault(format!("there is a camera {id} already")));
@@ -72,33 +74,28 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
     Ok(cameras)
 }
 
-/// Little-endian: a count; for each camera its number (4 bytes), its model's (4), width and height (8 each)
-/// and the parameters (8 each).
+/// Reads the binary form, little-endian: a count, then for each camera its number (4 bytes), the number of
+/// its model (4), width and height (8 each) and the parameters (8 each).
 fn read_binary(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
     let mut rest = bytes;
     let mut cameras = HashMap::new();
-    let cut_off =
-        |n: u64| Error::format(path, format!("ends in camera {n}: it was cut off, or is no cameras.bin"));
-    let count = u64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(0))?);
+    let count = u64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(path, 0))?);
     for n in 1..=count {
-        let mut head = || -> Option<(u32, u32, [u64; 2])> {
-            let (id, model) = (take(&mut rest)?, take(&mut rest)?);
-            let size = [take(&mut rest)?, take(&mut rest)?].map(u64::from_le_bytes);
-            Some((u32::from_le_bytes(id), u32::from_le_bytes(model), size))
-        };
-        let (id, model, size) = head().ok_or_else(|| cut_off(n))?;
+        let (id, model, size) = take_head(&mut rest).ok_or_else(|| cut_off(path, n))?;
         let fault = |message: String| Error::format(path, format!("camera {id}: {message}"));
         let (model, parameters) = *usize::try_from(model)
             .ok()
             .and_then(|model| MODELS.get(model))
             .ok_or_else(|| fault(format!("its model has the number {model}, which is none of COLMAP's")))?;
+
         let mut numbers = Vec::with_capacity(parameters);
         for _ in 0..parameters {
-            numbers.push(f64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(n))?));
+            numbers.push(f64::from_le_bytes(take(&mut rest).ok_or_else(|| cut_off(path, n))?));
         }
-        // What does not fit is as wrong as 0.
+        // A side that does not fit is as wrong as 0.
         let size = size.map(|side| u32::try_from(side).unwrap_or(0));
         let intrinsics = intrinsics(model, size, &numbers).map_err(fault)?;
+
         if cameras.insert(id, intrinsics).is_some() {
             return Err(fault("there is one of this number already".into()));
         }
@@ -106,11 +103,26 @@ fn read_binary(path: &Path, bytes: &[u8]) -> Result<HashMap<u32, Intrinsics>> {
     Ok(cameras)
 }
 
+/// Takes the number of the next camera, the number of its model, and its width and height. Returns `None` if
+/// the bytes end before.
+fn take_head(rest: &mut &[u8]) -> Option<(u32, u32, [u64; 2])> {
+    let id = u32::from_le_bytes(take(rest)?);
+    let model = u32::from_le_bytes(take(rest)?);
+    let size = [take(rest)?, take(rest)?].map(u64::from_le_bytes);
+    Some((id, model, size))
+}
+
+fn cut_off(path: &Path, camera: u64) -> Error {
+    Error::format(path, format!("ends in camera {camera}: it was cut off, or is no cameras.bin"))
+}
+
+/// Returns the size and the optics of a camera, from its model and parameters. The error is a sentence.
 fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Result<Intrinsics, String> {
     let [width, height] = size;
     if width == 0 || height == 0 {
         return Err(format!("a picture of {width} × {height} pixels"));
     }
+
     let known = MODELS.iter().find(|(name, _)| *name == model);
     let (_, count) =
         known.ok_or_else(|| format!("{} is no camera model of COLMAP", quote(model.as_bytes())))?;
@@ -120,26 +132,28 @@ fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Resu
     if !numbers.iter().all(|v| v.is_finite()) {
         return Err(format!("a parameter of {model} is not finite"));
     }
-    let pinhole = |focal_px: DVec2, cx: f64, cy: f64, distortion| Optics::Pinhole {
-        focal_px,
-        center_px: Some(dvec2(cx, cy)),
-        distortion,
-    };
-    let one = DVec2::splat;
-    let (opencv, fisheye) = (Distortion::opencv, Distortion::Fisheye);
+
     let optics = match (model, numbers) {
-        ("SIMPLE_PINHOLE", &[f, cx, cy]) => pinhole(one(f), cx, cy, Distortion::None),
-        ("PINHOLE", &[fx, fy, cx, cy]) => pinhole(dvec2(fx, fy), cx, cy, Distortion::None),
-        ("SIMPLE_RADIAL", &[f, cx, cy, k]) => pinhole(one(f), cx, cy, opencv([k, 0.0, 0.0, 0.0, 0.0])),
-        ("RADIAL", &[f, cx, cy, k1, k2]) => pinhole(one(f), cx, cy, opencv([k1, k2, 0.0, 0.0, 0.0])),
+        ("SIMPLE_PINHOLE", &[f, cx, cy]) => pinhole([f, f], [cx, cy], Distortion::None),
+        ("PINHOLE", &[fx, fy, cx, cy]) => pinhole([fx, fy], [cx, cy], Distortion::None),
+        ("SIMPLE_RADIAL", &[f, cx, cy, k]) => {
+            pinhole([f, f], [cx, cy], Distortion::opencv([k, 0.0, 0.0, 0.0, 0.0]))
+        }
+        ("RADIAL", &[f, cx, cy, k1, k2]) => {
+            pinhole([f, f], [cx, cy], Distortion::opencv([k1, k2, 0.0, 0.0, 0.0]))
+        }
         ("OPENCV", &[fx, fy, cx, cy, k1, k2, p1, p2]) => {
-            pinhole(dvec2(fx, fy), cx, cy, opencv([k1, k2, p1, p2, 0.0]))
+            pinhole([fx, fy], [cx, cy], Distortion::opencv([k1, k2, p1, p2, 0.0]))
         }
         ("OPENCV_FISHEYE", &[fx, fy, cx, cy, k1, k2, k3, k4]) => {
-            pinhole(dvec2(fx, fy), cx, cy, fisheye([k1, k2, k3, k4]))
+            pinhole([fx, fy], [cx, cy], Distortion::Fisheye([k1, k2, k3, k4]))
         }
-        ("SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, k]) => pinhole(one(f), cx, cy, fisheye([k, 0.0, 0.0, 0.0])),
-        ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => pinhole(one(f), cx, cy, fisheye([k1, k2, 0.0, 0.0])),
+        ("SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, k]) => {
+            pinhole([f, f], [cx, cy], Distortion::Fisheye([k, 0.0, 0.0, 0.0]))
+        }
+        ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => {
+            pinhole([f, f], [cx, cy], Distortion::Fisheye([k1, k2, 0.0, 0.0]))
+        }
         _ => {
             return Err(format!(
                 "the camera model {model} is not supported: undistort the pictures with colmap \
@@ -147,6 +161,7 @@ fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Resu
             ));
         }
     };
+
     if let Optics::Pinhole { focal_px, .. } = optics
         && focal_px.min_element() <= 0.0
     {
@@ -155,9 +170,15 @@ fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Resu
     Ok((size, optics))
 }
 
+fn pinhole(focal_px: [f64; 2], center_px: [f64; 2], distortion: Distortion) -> Optics {
+    Optics::Pinhole { focal_px: focal_px.into(), center_px: Some(center_px.into()), distortion }
+}
+
 #[cfg(test)]
 mod tests {
+
     use super::*;
+    use s3d_geom::glam::dvec2;
 
     const ALL: &str = "# Camera list\n1 PINHOLE 640 480 500 510 320 240\n\
                        2 SIMPLE_PINHOLE 640 480 500 320 240\n\
@@ -166,7 +187,7 @@ mod tests {
                        6 OPENCV_FISHEYE 640 480 500 510 320 240 0.1 -0.2 0.03 0.04\n\
                        7 RADIAL 640 480 500 320 240 0 0\n";
 
-    /// The same in binary.
+    /// Returns the cameras of `text` in binary.
     fn binary(text: &str) -> Vec<u8> {
         let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
         let mut bytes = (lines.len() as u64).to_le_bytes().to_vec();
@@ -223,6 +244,7 @@ mod tests {
                 .to_string();
             assert!(e.contains(words), "{e}");
         }
+
         let bytes = binary(ALL);
         for length in [0, 9, 30, bytes.len() - 1] {
             let e = read_binary(Path::new("cameras.bin"), &bytes[..length])
@@ -230,6 +252,7 @@ mod tests {
                 .to_string();
             assert!(e.contains("cut off"), "{e}");
         }
+
         let mut odd = bytes;
         odd[12] = 77;
         let e = read_binary(Path::new("cameras.bin"), &odd).unwrap_err().to_string();

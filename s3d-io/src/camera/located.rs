@@ -1,4 +1,4 @@
-//! Pictures with a pose, as reconstruction programs list them, and the scan locations that they stand for.
+//! Pictures with poses, as reconstruction programs list them, and the scan locations that they give.
 
 use crate::camera::posed::PosedCamera;
 use crate::camera::table::{FARTHEST_M, ScanLocation};
@@ -9,7 +9,7 @@ use s3d_geom::glam::{DQuat, DVec3, DVec4};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Two pictures of one location may be this far apart: the number of decimals that programs write.
+/// The distance that two pictures of one location may have, because programs write few decimals.
 const SAME_PLACE_M: f64 = 0.01;
 
 /// Refuses a camera that is too far from the origin for a building.
@@ -23,7 +23,7 @@ pub(crate) fn check_place(path: &Path, camera: &PosedCamera) -> Result<()> {
     Err(fault(path, camera.line, message))
 }
 
-/// An error at a line, if there is one.
+/// Returns an error at a line, or about the whole file if `line` is 0.
 pub(crate) fn fault(path: &Path, line: u64, message: String) -> Error {
     match line {
         0 => Error::format(path, message),
@@ -31,10 +31,11 @@ pub(crate) fn fault(path: &Path, line: u64, message: String) -> Error {
     }
 }
 
-/// The scan locations of a list of pictures. A location is where a picture was taken, its camera level and
-/// with the picture's heading, since views are drawn around the horizon. Its uuid is the first run of 32
-/// hexadecimal digits in the picture's name, or else follows from the name; pictures of one uuid are one
-/// location, which has the first one's heading.
+/// Returns the scan locations of a list of pictures.
+///
+/// A location is where a picture was taken. Its camera is level and has the picture's heading, because views
+/// are drawn around the horizon. Its uuid is the first run of 32 hexadecimal digits in the picture's name, or
+/// follows from the name. Pictures of one uuid are one location, with the heading of the first.
 pub(crate) fn locations_of(path: &Path, pictures: Vec<PosedCamera>) -> Result<Vec<ScanLocation>> {
     let mut locations: Vec<ScanLocation> = Vec::new();
     let mut index: HashMap<String, usize> = HashMap::new();
@@ -43,6 +44,7 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<PosedCamera>) -> Result<Ve
         let PosedCamera { name, pose, line, .. } = picture;
         let at = pose.location;
         let uuid = uuid_in(&name).unwrap_or_else(|| uuid_from_name(&name));
+
         match index.get(&uuid) {
             None => {
                 index.insert(uuid.clone(), locations.len());
@@ -54,7 +56,7 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<PosedCamera>) -> Result<Ve
                     .map_or(0.0, |first| first.pose.location.distance(at));
                 if distance > SAME_PLACE_M {
                     let message = format!(
-                        "{}: uuid {uuid} is another picture's too, which was taken {distance:.3} m away",
+                        "{}: another picture with the uuid {uuid} was taken {distance:.3} m away",
                         quote(name.as_bytes())
                     );
                     return Err(fault(path, line, message));
@@ -62,32 +64,34 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<PosedCamera>) -> Result<Ve
             }
         }
     }
+
     if locations.is_empty() {
         return Err(Error::format(path, "lists no picture, so there is no scan location"));
     }
     Ok(locations)
 }
 
-/// The first run of exactly 32 hexadecimal digits, in lower case; hyphens of a uuid's usual form do not
-/// count.
+/// Returns the first run of exactly 32 hexadecimal digits, in lower case. The hyphens of a uuid's usual form
+/// do not count.
 fn uuid_in(name: &str) -> Option<String> {
     name.split(|c: char| !c.is_ascii_hexdigit() && c != '-')
         .map(|run| run.replace('-', "").to_ascii_lowercase())
         .find(|run| run.len() == 32)
 }
 
-/// A uuid of 32 hexadecimal digits that follows from a name alone (XXH3, 128 bits): the same on every
-/// machine.
+/// Returns a uuid of 32 hexadecimal digits that follows from a name alone (XXH3, 128 bits). It is the same on
+/// every machine.
 pub fn uuid_from_name(name: &str) -> String {
     format!("{:032x}", xxhash_rust::xxh3::xxh3_128(name.as_bytes()))
 }
 
-/// A camera in OpenCV's axes (x right, y down, z forward) at `location`, from its three axes in the world.
+/// Returns the pose of a camera at `location`, from the world directions of OpenCV's axes (x right, y down, z
+/// forward).
 pub(crate) fn pose_from_opencv(location: DVec3, right: DVec3, down: DVec3, forward: DVec3) -> Pose {
     Pose { location, world_from_camera: s3d_geom::glam::DMat3::from_cols(right, -down, -forward) }
 }
 
-/// The rotation of a quaternion x y z w of any length.
+/// Returns the rotation of a quaternion x y z w of any length. The error is a sentence.
 pub(crate) fn rotation(xyzw: [f64; 4]) -> std::result::Result<DQuat, String> {
     let q = DVec4::from_array(xyzw)
         .try_normalize()
@@ -119,7 +123,7 @@ mod tests {
         assert!(
             made.len() == 32 && made.bytes().all(|b| b.is_ascii_hexdigit()) && made != uuid_from_name("")
         );
-        // Part of what a data set is named by: it never changes.
+        // Files of data sets are named by it, so it never changes.
         assert_eq!(uuid_from_name(""), "99aa06d3014798d86001c324468d497f");
     }
 

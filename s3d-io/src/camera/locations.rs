@@ -1,4 +1,4 @@
-//! Scan locations, from any list of cameras that is read.
+//! Scan locations, from any supported list of cameras.
 
 use crate::camera::matterport::{PictureFolder, read_matterport_locations};
 use crate::camera::posed::PosedCamera;
@@ -9,62 +9,38 @@ use s3d_geom::Pose;
 use s3d_geom::glam::{DAffine3, DMat3};
 use std::path::{Path, PathBuf};
 
-/// What is read, for messages.
+/// The supported forms, for messages.
 const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files \
                      (*.json), the raw captures of a Matterport, a COLMAP model (images.txt or images.bin) \
                      or a transforms.json";
 
 /// Reads the scan locations of `path`, a file or a folder:
 ///
-/// - `.csv`, or any ending that is not named here: the table that [`read_cameras`] reads;
+/// - `.csv`, or any extension that is not named here: the table that [`read_cameras`] reads;
 /// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a
 ///   COLMAP model;
-/// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and its kin;
+/// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and related programs;
 /// - a folder of pose files of images, as published: where the scanner stood and how it was turned;
 /// - a folder with the raw captures of a Matterport: see [`read_matterport_locations`].
 ///
-/// The pictures of a COLMAP model and of a `transforms.json` give scan locations where they were taken:
-/// level, with the picture's heading, one for each uuid in their names. `world_from_file` takes the file's
-/// frame to the world (metres, Z-up): turns, shifts and scales.
+/// Each picture of a COLMAP model or a `transforms.json` gives a scan location where it was taken, level and
+/// with the picture's heading. There is one for each uuid in the names. `world_from_file` is the transform
+/// from the file's frame to the world (metres, Z-up): a rotation, a shift and a scale.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these
-/// in it.
+/// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder that holds none of
+/// these.
 pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocation>> {
-    let turned = |mut pictures: Vec<PosedCamera>| {
-        pictures
-            .iter_mut()
-            .for_each(|p| p.pose = moved(&p.pose, world_from_file));
-        pictures
-    };
     if path.is_dir() {
-        if let Some(images) = colmap::find(path) {
-            return located::locations_of(&images, turned(colmap::read(&images)?));
-        }
-        if let Some(transforms) = has_transforms(path) {
-            return located::locations_of(&transforms, turned(nerfstudio::read(&transforms)?));
-        }
-        let found = poses::read(&[path.to_owned()], world_from_file, &Default::default())?;
-        if !found.is_empty() {
-            return Ok(found.into_iter().map(|(_, published)| published.location).collect());
-        }
-        if PictureFolder::open(path)?.uuids().is_empty() {
-            return Err(Error::unsupported(path, format!("holds no scan locations: {FORMS}")));
-        }
-        let mut locations = read_matterport_locations(path)?;
-        locations
-            .iter_mut()
-            .for_each(|l| l.pose = moved(&l.pose, world_from_file));
-        // They have no lines.
-        locations.iter_mut().for_each(|l| l.line = 0);
-        return Ok(locations);
+        return read_folder(path, world_from_file);
     }
     if is_colmap_images(path) {
-        return located::locations_of(path, turned(colmap::read(path)?));
+        return picture_locations(path, colmap::read(path)?, world_from_file);
     }
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-        return located::locations_of(path, turned(nerfstudio::read(path)?));
+        return picture_locations(path, nerfstudio::read(path)?, world_from_file);
     }
+
     let mut locations = read_cameras(path)?;
     locations
         .iter_mut()
@@ -72,22 +48,61 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
     Ok(locations)
 }
 
-/// Whether a file is the list of pictures of a COLMAP model.
+fn read_folder(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocation>> {
+    if let Some(images) = colmap::find(path) {
+        return picture_locations(&images, colmap::read(&images)?, world_from_file);
+    }
+    if let Some(transforms) = has_transforms(path) {
+        return picture_locations(&transforms, nerfstudio::read(&transforms)?, world_from_file);
+    }
+
+    let found = poses::read(&[path.to_owned()], world_from_file, &Default::default())?;
+    if !found.is_empty() {
+        return Ok(found.into_iter().map(|(_, published)| published.location).collect());
+    }
+
+    if PictureFolder::open(path)?.uuids().is_empty() {
+        return Err(Error::unsupported(path, format!("holds no scan locations: {FORMS}")));
+    }
+    let mut locations = read_matterport_locations(path)?;
+    for location in &mut locations {
+        location.pose = moved(&location.pose, world_from_file);
+        // Captures have no lines.
+        location.line = 0;
+    }
+    Ok(locations)
+}
+
+/// Returns the scan locations of the pictures in the list `path`.
+fn picture_locations(
+    path: &Path,
+    mut pictures: Vec<PosedCamera>,
+    world_from_file: &DAffine3,
+) -> Result<Vec<ScanLocation>> {
+    pictures
+        .iter_mut()
+        .for_each(|p| p.pose = moved(&p.pose, world_from_file));
+    located::locations_of(path, pictures)
+}
+
+/// Returns whether a file is the list of pictures of a COLMAP model.
 pub(crate) fn is_colmap_images(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default();
     name.eq_ignore_ascii_case("images.txt") || name.eq_ignore_ascii_case("images.bin")
 }
 
-/// The `transforms.json` in a folder.
+/// Returns the `transforms.json` in a folder, if there is one.
 pub(crate) fn has_transforms(dir: &Path) -> Option<PathBuf> {
     Some(dir.join("transforms.json")).filter(|path| path.is_file())
 }
 
-/// A pose of a file's frame in the world. The frame may be scaled, all axes alike.
+/// Returns the pose in the world, from the pose in a file's frame. The frame may be scaled, by one factor for
+/// all axes.
 pub(crate) fn moved(pose: &Pose, world_from_file: &DAffine3) -> Pose {
     if *world_from_file == DAffine3::IDENTITY {
         return *pose;
     }
+
     let m = world_from_file.matrix3;
     let scale = m.x_axis.length();
     let turn = DMat3::from_cols(m.x_axis / scale, m.y_axis / scale, m.z_axis / scale);
@@ -128,6 +143,7 @@ mod tests {
             assert!(read(p).unwrap()[0].pose.forward().abs_diff_eq(DVec3::Y, 1e-12));
         }
         assert_eq!(read("cameras.csv").unwrap()[0].pose.location, dvec3(1.0, 2.0, 3.0));
+
         let pose = |uuid: &str| {
             let pose = Pose::level(dvec3(1.0, -2.0, 1.5), 0.3);
             let camera = s3d_geom::Camera::equirectangular(pose, 64);
@@ -141,11 +157,13 @@ mod tests {
         let poses = read("poses").unwrap();
         assert_eq!((poses.len(), poses[0].uuid.as_str()), (2, uuids[1]));
         assert!(poses[1].pose.location.abs_diff_eq(dvec3(1.0, -2.0, 1.5), 1e-12));
+
         fs::create_dir(at("raw")).unwrap();
         let capture = "1 0 0 7\n0 0 1 8\n0 -1 0 9\n0 0 0 1";
         fs::write(at(&format!("raw/{}_pose_1_0.txt", uuids[0])), capture).unwrap();
         let raw = read("raw").unwrap();
         assert_eq!((raw.len(), raw[0].pose.location), (1, dvec3(7.0, 8.0, 9.0)));
+
         let message = read("empty").unwrap_err().to_string();
         assert!(message.contains("empty") && message.contains("images.txt"), "{message}");
         assert!(matches!(read("gone"), Err(Error::Io { .. })));

@@ -1,7 +1,7 @@
 //! The scanner's own pictures: raw Matterport captures, sky boxes and equirectangular photographs.
 //!
-//! Source: formats.md, "The scanner's pictures". A folder's files are looked up in it and in the folders
-//! in it, as Matterport3D has colours, poses and intrinsics apart (`matterport_color_images/`…).
+//! Source: formats.md, "The scanner's pictures". Files are looked up in a folder and in the folders in it,
+//! because Matterport3D keeps colours, poses and intrinsics in separate ones (`matterport_color_images/`…).
 
 use crate::camera::picture::{check_picture, read_picture};
 use crate::camera::table::ScanLocation;
@@ -14,39 +14,39 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// How far a matrix may be from a rotation, and its last row from 0 0 0 1: what eight digits leave, and
-/// scanners that round to four.
+/// The largest error of a rotation matrix, and of a last row that should be 0 0 0 1. It allows for eight
+/// digits, and for scanners that round to four.
 const ROTATION_ERROR: f64 = 2e-3;
 
-/// Farther from the origin nothing was scanned, in metres.
+/// The farthest that a camera may be from the origin, metres.
 const FARTHEST_M: f64 = 1e7;
 
-/// The number of the camera that looks level; 0 looks up, 2 down.
+/// The number of the camera that looks level. Camera 0 looks up, camera 2 down.
 const LEVEL: u32 = 1;
 
-/// Captures of a location: three cameras at six stops.
+/// The number of captures of a location: three cameras at six stops.
 pub const CAPTURES_A_LOCATION: usize = 18;
 
-/// A folder of pictures, its files known by name. Nothing else of it is read.
+/// A folder of pictures. Its files are found by name; nothing else in it is read.
 #[derive(Clone, Debug)]
 pub struct PictureFolder {
     path: PathBuf,
-    /// By lower-case name; the first by path where several have one.
+    /// The files by lower-case name. The first path wins if several files have one name.
     files: BTreeMap<String, PathBuf>,
 }
 
-/// A capture: its picture's file, and where and with which lens it was taken.
+/// A capture: the file of its picture, its lens and its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaptureFile {
-    /// Which of the scanner's cameras: 0 looks up, 1 level, 2 down.
+    /// The number of the scanner's camera: 0 looks up, 1 level, 2 down.
     pub camera: u32,
-    /// Which stop of its turn, 0 to 5.
+    /// The stop of the scanner's turn, 0 to 5.
     pub yaw: u32,
     /// The picture.
     pub color: PathBuf,
     /// The camera's lens.
     pub lens: Lens,
-    /// Where the camera was and how it was turned; in the project's axes (x right, y up, looking along −z).
+    /// The camera's position and rotation, in this project's axes (x right, y up, looking along −z).
     pub pose: Pose,
 }
 
@@ -54,7 +54,7 @@ impl CaptureFile {
     /// Reads the picture.
     ///
     /// # Errors
-    /// As [`read_picture`]; [`Error::Format`] if it is not of the lens's size.
+    /// Like [`read_picture`]; [`Error::Format`] if the size is not the lens's.
     pub fn read(&self) -> Result<Raster<[u8; 3]>> {
         let image = read_picture(&self.color)?;
         check_size(&self.color, (image.width(), image.height()), &self.lens)?;
@@ -77,7 +77,7 @@ fn check_size(path: &Path, (w, h): (u32, u32), lens: &Lens) -> Result<()> {
 }
 
 impl PictureFolder {
-    /// Lists a folder and the folders in it.
+    /// Lists a folder, and the folders in it.
     ///
     /// # Errors
     /// [`Error::Io`] if one cannot be read.
@@ -86,11 +86,12 @@ impl PictureFolder {
         let mut folders = Vec::new();
         for entry in list(path)? {
             if entry.is_dir() {
-                folders.push(entry)
+                folders.push(entry);
             } else {
-                remember(&mut files, entry)
+                remember(&mut files, entry);
             }
         }
+
         for folder in folders {
             list(&folder)?
                 .into_iter()
@@ -100,15 +101,17 @@ impl PictureFolder {
         Ok(Self { path: path.to_owned(), files })
     }
 
-    /// The folder.
+    /// Returns the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
+    /// Returns the path of a file; the case of `name` does not matter.
     fn find(&self, name: &str) -> Option<&PathBuf> {
         self.files.get(&name.to_ascii_lowercase())
     }
 
+    /// Returns the path of a picture, from its name without the extension.
     fn picture(&self, stem: &str) -> Option<PathBuf> {
         ["jpg", "jpeg", "png"]
             .iter()
@@ -116,7 +119,8 @@ impl PictureFolder {
             .cloned()
     }
 
-    /// The locations that have a level capture's pose, by name: 32 lower-case hexadecimal digits.
+    /// Returns the names of the locations that have a capture's pose: 32 lower-case hexadecimal digits each,
+    /// sorted.
     pub fn uuids(&self) -> Vec<String> {
         let uuids = self.files.keys().filter_map(|name| {
             let (uuid, rest) = name.split_at_checked(32)?;
@@ -126,8 +130,8 @@ impl PictureFolder {
         uuids.collect::<BTreeSet<_>>().into_iter().collect()
     }
 
-    /// The six pictures of a location's sky box, in their order: 0 up, 1 right, 2 back, 3 left, 4 front, 5
-    /// down. `Err` names what is missing.
+    /// Returns the six pictures of a location's sky box in their order: 0 up, 1 right, 2 back, 3 left, 4
+    /// front, 5 down. The error names the missing files.
     pub fn sky_box(&self, uuid: &str) -> std::result::Result<[PathBuf; 6], String> {
         let stem = |k: usize| format!("{uuid}_skybox{k}_sami");
         let found: [Option<PathBuf>; 6] = std::array::from_fn(|k| self.picture(&stem(k)));
@@ -140,29 +144,32 @@ impl PictureFolder {
         }
     }
 
-    /// A location's equirectangular photograph: `{uuid}.jpg` or `.png`, or as the data set was published,
-    /// `camera_{uuid}_…_frame_equirectangular_domain_rgb.png`. `Err` names what is missing.
+    /// Returns a location's equirectangular photograph: `{uuid}.jpg` or `.png`, or the name of the published
+    /// data set, `camera_{uuid}_…_frame_equirectangular_domain_rgb.png`. The error names the missing files.
     pub fn panorama(&self, uuid: &str) -> std::result::Result<PathBuf, String> {
-        let published = || {
-            let from = format!("camera_{uuid}_");
-            let names = self
-                .files
-                .range(from.clone()..)
-                .take_while(|(name, _)| name.starts_with(&from));
-            let mut ours = names.filter(|(name, _)| name.contains("_frame_equirectangular_domain_rgb."));
-            ours.next().map(|(_, path)| path.clone())
-        };
-        self.picture(uuid).or_else(published).ok_or_else(|| {
+        let found = self.picture(uuid).or_else(|| self.published_panorama(uuid));
+        found.ok_or_else(|| {
             format!("{uuid}.jpg, {uuid}.png or camera_{uuid}_…_frame_equirectangular_domain_rgb.png")
         })
     }
 
-    /// A location's captures, by camera and stop, with their poses and lenses; none if it has none.
+    fn published_panorama(&self, uuid: &str) -> Option<PathBuf> {
+        let start = format!("camera_{uuid}_");
+        self.files
+            .range(start.clone()..)
+            .take_while(|(name, _)| name.starts_with(&start))
+            .find(|(name, _)| name.contains("_frame_equirectangular_domain_rgb."))
+            .map(|(_, path)| path.clone())
+    }
+
+    /// Returns a location's captures with their poses and lenses, by camera and stop. There may be none.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`], with the line, for a pose that is no 4×4 matrix of a rotation and a
-    /// translation and for intrinsics that are not eleven numbers of a lens; for a picture without pose or
-    /// intrinsics, for a pose without a picture, and for a picture that is not of its lens's size.
+    /// [`Error::Io`]; [`Error::Format`] if
+    /// - a pose is not the 4×4 matrix of a rotation and a translation (with the line);
+    /// - intrinsics are not the eleven numbers of a lens (with the line);
+    /// - a picture has no pose or no intrinsics, or a pose has no picture;
+    /// - a picture's size is not its lens's.
     pub fn captures(&self, uuid: &str) -> Result<Vec<CaptureFile>> {
         let mut captures = Vec::new();
         for camera in 0..3 {
@@ -181,6 +188,7 @@ impl PictureFolder {
                         return Err(Error::format(pose, format!("has no picture: {name} is not there")));
                     }
                 };
+
                 let lens = match lens {
                     Some(lens) => lens,
                     None => {
@@ -191,6 +199,7 @@ impl PictureFolder {
                         *lens.insert(read_intrinsics(path)?)
                     }
                 };
+
                 check_size(&color, check_picture(&color)?, &lens)?;
                 captures.push(CaptureFile { camera, yaw, color, lens, pose: read_capture_pose(pose)? });
             }
@@ -214,7 +223,7 @@ fn remember(files: &mut BTreeMap<String, PathBuf>, path: PathBuf) {
     }
 }
 
-/// The numbers of a text file, each with its line.
+/// Returns the numbers of a text file, each with its line.
 pub(crate) fn numbers(bytes: &[u8], path: &Path) -> Result<Vec<(u64, f64)>> {
     let bytes = text_of(bytes, path)?;
     let text = std::str::from_utf8(&bytes).map_err(|_| Error::format(path, "is no text"))?;
@@ -230,70 +239,77 @@ pub(crate) fn numbers(bytes: &[u8], path: &Path) -> Result<Vec<(u64, f64)>> {
     Ok(numbers)
 }
 
-/// Reads the intrinsics of a camera: `width height fx fy cx cy k1 k2 p1 p2 k3`, OpenCV's model, origin at the
-/// picture's top left corner.
+/// Reads the intrinsics of a camera: `width height fx fy cx cy k1 k2 p1 p2 k3`, in OpenCV's model. The origin
+/// is the picture's top left corner.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if they are not eleven numbers, or of no lens.
+/// [`Error::Io`]; [`Error::Format`] if they are not eleven numbers, or no lens has them.
 pub fn read_intrinsics(path: &Path) -> Result<Lens> {
     parse_intrinsics(&read_file(path)?, path)
 }
 
-/// As [`read_intrinsics`], from the file's bytes; errors call it `name`.
+/// Reads like [`read_intrinsics`], from the file's bytes. Errors call the file `name`.
 ///
 /// # Errors
-/// As [`read_intrinsics`].
+/// Like [`read_intrinsics`].
 pub fn parse_intrinsics(bytes: &[u8], name: &Path) -> Result<Lens> {
-    let path = name;
-    let numbers = numbers(bytes, path)?;
+    let numbers = numbers(bytes, name)?;
     let Ok(lines_and_values) = <[(u64, f64); 11]>::try_from(numbers.as_slice()) else {
         let line = numbers.last().map_or(1, |n| n.0);
         let message =
             format!("{} numbers; intrinsics are width height fx fy cx cy k1 k2 p1 p2 k3", numbers.len());
-        return Err(Error::line(path, line, message));
+        return Err(Error::line(name, line, message));
     };
     let lines = lines_and_values.map(|n| n.0);
     let [width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3] = lines_and_values.map(|n| n.1);
-    let side = |v: f64| (v.fract() == 0.0 && (1.0..=65_535.0).contains(&v)).then_some(v as u32);
+
     let (Some(w), Some(h)) = (side(width), side(height)) else {
-        return Err(Error::line(path, lines[0], format!("a picture of {width} × {height} pixels")));
+        return Err(Error::line(name, lines[0], format!("a picture of {width} × {height} pixels")));
     };
     Lens::new([w, h], DVec2::new(fx, fy), DVec2::new(cx, cy), [k1, k2, p1, p2, k3]).ok_or_else(|| {
         let message = format!(
             "no lens: fx {fx} fy {fy} cx {cx} cy {cy}, distortion {k1} {k2} {p1} {p2} {k3} (focal lengths \
-             are above 0, and the middle of the picture is seen)"
+             must be above 0, and some direction must come to the middle of the picture)"
         );
-        Error::line(path, lines[2], message)
+        Error::line(name, lines[2], message)
     })
 }
 
-/// Reads the pose of a capture: a 4×4 matrix, row by row, from the camera (x right, y down, z forward) to the
-/// world (metres, Z-up).
+/// Returns the side of a picture in pixels, if the number is one.
+fn side(number: f64) -> Option<u32> {
+    (number.fract() == 0.0 && (1.0..=65_535.0).contains(&number)).then_some(number as u32)
+}
+
+/// Reads the pose of a capture: a 4×4 matrix, row by row, from the camera (x right, y down, z forward) to
+/// the world (metres, Z-up).
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`], with the line where it can tell one, if there are not sixteen numbers,
-/// the last row is not 0 0 0 1, the 3×3 part is no rotation, or the place is farther than 10,000 km away.
+/// [`Error::Io`]; [`Error::Format`], with the line if there is one, if there are not sixteen numbers, the
+/// last row is not 0 0 0 1, the 3×3 part is no rotation, or the camera is more than 10,000 km from the
+/// origin.
 pub fn read_capture_pose(path: &Path) -> Result<Pose> {
     parse_capture_pose(&read_file(path)?, path)
 }
 
-/// As [`read_capture_pose`], from the file's bytes; errors call it `name`.
+/// Reads like [`read_capture_pose`], from the file's bytes. Errors call the file `name`.
 ///
 /// # Errors
-/// As [`read_capture_pose`].
+/// Like [`read_capture_pose`].
 pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
-    let path = name;
-    let numbers = numbers(bytes, path)?;
+    let numbers = numbers(bytes, name)?;
     let Ok(lines_and_values) = <[(u64, f64); 16]>::try_from(numbers.as_slice()) else {
         let line = numbers.last().map_or(1, |n| n.0);
-        return Err(Error::line(path, line, format!("{} numbers; a 4×4 matrix has 16", numbers.len())));
+        return Err(Error::line(name, line, format!("{} numbers; a 4×4 matrix has 16", numbers.len())));
     };
-    let (lines, m) = (lines_and_values.map(|n| n.0), lines_and_values.map(|n| n.1));
+    let lines = lines_and_values.map(|n| n.0);
+    let m = lines_and_values.map(|n| n.1);
+
     let last = [m[12], m[13], m[14], m[15] - 1.0];
     if last.iter().any(|v| v.abs() > ROTATION_ERROR) {
         let message = format!("the last row is {} {} {} {}, not 0 0 0 1", m[12], m[13], m[14], m[15]);
-        return Err(Error::line(path, lines[12], message));
+        return Err(Error::line(name, lines[12], message));
     }
+
     let rows = [[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]].map(DVec3::from_array);
     let turn = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
     let square = turn.transpose() * turn;
@@ -302,34 +318,36 @@ pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
         .fold(0.0, |a: f64, v| a.max(v.abs()));
     if off > ROTATION_ERROR {
         let message = format!(
-            "the upper left 3×3 part is no rotation: its axes are off by {off:.4} of being square and of \
-             length 1"
+            "the upper left 3×3 part is no rotation: its axes are off by {off:.4} from length 1 and right \
+             angles"
         );
-        return Err(Error::line(path, lines[0], message));
+        return Err(Error::line(name, lines[0], message));
     }
     if turn.determinant() < 0.0 {
         let message = "the upper left 3×3 part mirrors: its determinant is −1, a rotation's is 1";
-        return Err(Error::line(path, lines[0], message));
+        return Err(Error::line(name, lines[0], message));
     }
+
     let location = DVec3::new(m[3], m[7], m[11]);
     if location.abs().max_element() > FARTHEST_M {
         let message = format!("the camera is at {location}: are these metres?");
-        return Err(Error::line(path, lines[3], message));
+        return Err(Error::line(name, lines[3], message));
     }
-    // What rounding left off a rotation is taken out: the viewing direction stays.
+
+    // Makes a rotation of the rounded matrix. The viewing direction stays.
     let forward = turn.z_axis.normalize();
     let right = (turn.x_axis - forward * forward.dot(turn.x_axis)).normalize();
     let down = forward.cross(right);
     Ok(Pose { location, world_from_camera: DMat3::from_cols(right, -down, -forward) })
 }
 
-/// The scan locations of a folder of raw captures, by uuid: of each the mean place of its level camera
-/// (camera 1), and as E(original) that camera's pose at stop 0, tilt included. [`ScanLocation::line`] counts
-/// them from 1.
+/// Reads the scan locations of a folder of raw captures, by uuid. A location lies at the mean position of its
+/// level camera (camera 1). Its E(original) is the pose of that camera at stop 0, tilt included.
+/// [`ScanLocation::line`] counts the locations from 1.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] for the folder if there is no location in it, for a pose as
-/// [`read_capture_pose`] says, and for a location whose `_pose_1_0.txt` is not there.
+/// [`Error::Io`]; [`Error::Format`] for the folder if it has no location, for a pose that
+/// [`read_capture_pose`] refuses, and for a location without `_pose_1_0.txt`.
 pub fn read_matterport_locations(dir: &Path) -> Result<Vec<ScanLocation>> {
     let folder = PictureFolder::open(dir)?;
     let uuids = folder.uuids();
@@ -337,6 +355,7 @@ pub fn read_matterport_locations(dir: &Path) -> Result<Vec<ScanLocation>> {
         let message = "has no captures: no file is called {uuid}_pose_{camera}_{yaw}.txt";
         return Err(Error::format(dir, message));
     }
+
     let mut locations = Vec::new();
     for (line, uuid) in (1..).zip(uuids) {
         let mut poses = Vec::new();
@@ -351,8 +370,9 @@ pub fn read_matterport_locations(dir: &Path) -> Result<Vec<ScanLocation>> {
                 return Err(Error::format(dir, message));
             }
         }
+
         let center = poses.iter().map(|p| p.location).sum::<DVec3>() / poses.len() as f64;
-        // The first is there: without it there was an error.
+        // There is a first one: without it there was an error.
         let pose = poses.first().map(|first| Pose { location: center, ..*first });
         locations.extend(pose.map(|pose| ScanLocation { uuid, pose, line }));
     }
@@ -467,6 +487,7 @@ mod tests {
             assert!(message.contains(words) && message.contains("i.txt"), "{to}: {message}");
         }
     }
+
     const OPENCV: [f64; 2] = [1031.6669137336373, 218.8259578271295];
 
     #[test]
@@ -475,12 +496,14 @@ mod tests {
         folder.picture(&format!("colors/{UUID}_i1_0.png"), 8, 6);
         folder.text(&format!("poses/{UUID}_pose_1_0.txt"), ALONG_X);
         let lens = folder.text(&format!("lenses/{UUID}_intrinsics_1.txt"), "8 6 5 5 4 3 0 0 0 0 0");
+
         let captures = folder.open().captures(UUID).unwrap();
         assert_eq!(captures.len(), 1);
         assert_eq!((captures[0].camera, captures[0].yaw), (1, 0));
         assert_eq!(captures[0].read().unwrap().at(3, 3), [9, 8, 7]);
         assert_eq!(folder.open().uuids(), [UUID]);
         assert_eq!(folder.open().captures(&"f".repeat(32)).unwrap(), []);
+
         let fails = |words: &str| {
             let message = folder.open().captures(UUID).unwrap_err().to_string();
             assert!(message.contains(words), "{message}");
@@ -503,6 +526,7 @@ mod tests {
     #[test]
     fn locations_stand_at_the_level_cameras_mean() {
         let folder = Folder::new();
+
         let message = |f: &Folder| read_matterport_locations(f.0.path()).unwrap_err().to_string();
         assert!(message(&folder).contains("has no captures"));
         let other = "ffffffffffffffffffffffffffffffff";

@@ -1,8 +1,8 @@
-//! Lists of cameras: scan locations, cameras of photographs or of views to render; and the scanner's own
-//! pictures.
+//! Lists of cameras, and the scanner's own pictures. The cameras are scan locations, photographs, or views to
+//! render.
 //!
-//! A [`ScanLocation`] is where the scanner stood and how it was turned. [`read_scan_locations`] reads them
-//! from any list:
+//! A [`ScanLocation`] is where the scanner stood and how it was turned. [`read_scan_locations`] reads any of
+//! these lists:
 //!
 //! | path | what it is |
 //! |---|---|
@@ -12,17 +12,16 @@
 //! | a folder of `*.json` | pose files of a published area |
 //! | a folder of Matterport captures | [`read_matterport_locations`] |
 //!
-//! Pictures of a model become locations where they were taken. A location lies at most 10,000 km from the
-//! origin, and a uuid stands in a list once.
+//! The pictures of a model give locations where they were taken. A location lies at most 10,000 km from the
+//! origin, and a list has each uuid once.
 //!
-//! [`read_posed_cameras`] reads cameras as they are, each a [`PosedCamera`] with what is known of its size,
-//! focal lengths and lens: `transforms.json`, COLMAP models, ScanNet's poses, Polycam's keyframes,
-//! trajectories of TUM, tables.
+//! [`read_posed_cameras`] reads cameras as they are. Each [`PosedCamera`] has a pose, and the size, focal
+//! lengths and lens if the list tells them. It reads `transforms.json`, COLMAP models, ScanNet's poses,
+//! Polycam's keyframes, trajectories of TUM and tables.
 //!
-//! [`PictureFolder`] finds the pictures of each location, whatever form they have: raw captures
-//! ([`CaptureFile`], with lens and pose), sky boxes, panoramas. [`read_picture`] reads one, PNG or JPEG.
-//! Source: formats.md,
-//! "Scan locations" and "The scanner's pictures".
+//! A [`PictureFolder`] finds the pictures of each location: raw captures ([`CaptureFile`], with lens and
+//! pose), sky boxes or panoramas. [`read_picture`] reads a PNG or JPEG file. Source: formats.md, "Scan
+//! locations" and "The scanner's pictures".
 //!
 //! ```
 //! use s3d_geom::glam::DAffine3;
@@ -42,6 +41,7 @@ mod located;
 mod locations;
 mod matterport;
 mod nerfstudio;
+mod numbered;
 mod picture;
 mod polycam;
 mod posed;

@@ -1,8 +1,8 @@
 //! The pictures of a `transforms.json`, as nerfstudio, Polycam, Record3D and instant-ngp write it. Source:
 //! nerfstudio's documentation, "Data conventions".
 //!
-//! A frame's `transform_matrix` is camera → world, 4 × 4, in OpenGL's axes: x right, y up, z backwards. What
-//! the camera is stands in the frame, or once for all frames.
+//! A frame's `transform_matrix` is camera → world, 4 × 4, in OpenGL's axes: x right, y up, z backwards.
+//! The camera's intrinsics stand in each frame, or once for all frames.
 
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
@@ -13,15 +13,18 @@ use serde::Deserialize;
 use std::f64::consts::PI;
 use std::path::Path;
 
+const IDENTITY: [[f64; 4]; 4] =
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
 #[derive(Deserialize)]
 struct Document {
     frames: Vec<FrameEntry>,
     #[serde(flatten)]
     camera: CameraKeys,
-    /// What was done to the cameras: turned and shifted, then scaled.
+    /// The rotation and shift that were applied to the cameras, followed by `applied_scale`.
     applied_transform: Option<Vec<Vec<f64>>>,
     applied_scale: Option<f64>,
-    /// What was subtracted from the coordinates of the mesh before `s3d render` saw it.
+    /// The offset that had been subtracted from the mesh's coordinates when its images were rendered.
     world_offset_m: Option<[f64; 3]>,
 }
 
@@ -33,7 +36,7 @@ struct FrameEntry {
     camera: CameraKeys,
 }
 
-/// What the file says of a camera, by its keys.
+/// The keys that describe a camera.
 #[derive(Default, Deserialize)]
 struct CameraKeys {
     camera_model: Option<String>,
@@ -53,8 +56,8 @@ struct CameraKeys {
     p2: Option<f64>,
 }
 
-/// Reads the pictures of a `transforms.json` and where they were taken. A world in other units has matrices
-/// with a scale, which is left out.
+/// Reads the pictures of a `transforms.json` and their poses. The matrices of a world in other units have a
+/// scale, which is dropped.
 pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
     let Document { frames, .. } = read_json(path)?;
     let mut pictures = Vec::with_capacity(frames.len());
@@ -67,32 +70,10 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
     Ok(pictures)
 }
 
-/// Reads the cameras of a `transforms.json`, in the frame that they had before its `applied_transform`.
+/// Reads the cameras of a `transforms.json`. Their poses are in the frame before its `applied_transform`.
 pub(crate) fn read_posed(path: &Path) -> Result<Vec<PosedCamera>> {
     let document: Document = read_json(path)?;
-    let fault = |what: &str, message: String| Error::format(path, format!("{what}: {message}"));
-    let applied = match &document.applied_transform {
-        None => Pose::from_opengl([
-            [1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0, 0.0],
-            [0.0, 0.0, 0.0, 1.0],
-        ]),
-        Some(rows) => Pose::from_opengl(square(rows).map_err(|m| fault("applied_transform", m))?),
-    };
-    let applied = applied.map_err(|e| fault("applied_transform", e.to_string()))?;
-    let scale = document.applied_scale.unwrap_or(1.0);
-    if !(scale > 0.0 && scale.is_finite()) {
-        return Err(fault("applied_scale", format!("{scale} is no scale")));
-    }
-    let offset_m = document.world_offset_m.map_or(DVec3::ZERO, DVec3::from_array);
-    let before = |pose: Pose| {
-        let turn = applied.world_from_camera.transpose();
-        Pose {
-            location: turn * (pose.location / scale - applied.location) + offset_m,
-            world_from_camera: turn * pose.world_from_camera,
-        }
-    };
+    let applied = Applied::new(&document, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut cameras = Vec::with_capacity(document.frames.len());
     for (i, FrameEntry { file_path: name, transform_matrix, camera }) in
@@ -104,9 +85,8 @@ pub(crate) fn read_posed(path: &Path) -> Result<Vec<PosedCamera>> {
         let keys = camera.or(&document.camera);
         let size = keys.size().map_err(fault)?;
         let optics = keys.optics().map_err(fault)?;
-        // A world that was not moved keeps its last digits.
-        let is_moved = document.applied_transform.is_some() || scale != 1.0 || offset_m != DVec3::ZERO;
-        let pose = if is_moved { before(pose) } else { pose };
+        let pose = applied.undo(pose);
+
         let picture = Some(folder.join(&name));
         cameras.push(PosedCamera { name, pose, size, optics, picture, line: 0 });
     }
@@ -117,7 +97,47 @@ fn at_frame(path: &Path, i: usize, name: &str, message: &str) -> Error {
     Error::format(path, format!("frames[{i}], {name:?}: {message}"))
 }
 
-/// A matrix of 4 × 4 numbers, or of 3 × 4 without its last row.
+/// What the writer of a file did to its world: turned, shifted and scaled it, after an offset was subtracted.
+struct Applied {
+    pose: Pose,
+    scale: f64,
+    offset_m: DVec3,
+    /// Whether anything was done.
+    is_moved: bool,
+}
+
+impl Applied {
+    fn new(document: &Document, path: &Path) -> Result<Self> {
+        let fault = |key: &str, message: String| Error::format(path, format!("{key}: {message}"));
+        let rows = match &document.applied_transform {
+            None => IDENTITY,
+            Some(rows) => square(rows).map_err(|m| fault("applied_transform", m))?,
+        };
+        let pose = Pose::from_opengl(rows).map_err(|e| fault("applied_transform", e.to_string()))?;
+
+        let scale = document.applied_scale.unwrap_or(1.0);
+        if !(scale > 0.0 && scale.is_finite()) {
+            return Err(fault("applied_scale", format!("{scale} is no scale")));
+        }
+        let offset_m = document.world_offset_m.map_or(DVec3::ZERO, DVec3::from_array);
+        let is_moved = document.applied_transform.is_some() || scale != 1.0 || offset_m != DVec3::ZERO;
+        Ok(Self { pose, scale, offset_m, is_moved })
+    }
+
+    /// Returns a pose in the world as it was before. A world that was not moved keeps its last digits.
+    fn undo(&self, pose: Pose) -> Pose {
+        if !self.is_moved {
+            return pose;
+        }
+        let turn = self.pose.world_from_camera.transpose();
+        Pose {
+            location: turn * (pose.location / self.scale - self.pose.location) + self.offset_m,
+            world_from_camera: turn * pose.world_from_camera,
+        }
+    }
+}
+
+/// Returns a matrix of 4 × 4 numbers, from its rows or from the first three. The error is a sentence.
 fn square(rows: &[Vec<f64>]) -> std::result::Result<[[f64; 4]; 4], String> {
     let full = rows
         .iter()
@@ -130,7 +150,7 @@ fn square(rows: &[Vec<f64>]) -> std::result::Result<[[f64; 4]; 4], String> {
     }
 }
 
-/// The same with axes of length 1, if all have one length.
+/// Returns the matrix with axes of length 1, if all axes have the same length.
 fn unscaled(rows: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
     let [[a, ..], [b, ..], [c, ..], _] = rows;
     let length = DVec3::new(a, b, c).length();
@@ -140,7 +160,7 @@ fn unscaled(rows: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
 }
 
 impl CameraKeys {
-    /// What is said here, and what is not from `shared`.
+    /// Returns the keys of a frame. Keys that it does not have are taken from `shared`.
     fn or(self, shared: &Self) -> Self {
         Self {
             camera_model: self.camera_model.or_else(|| shared.camera_model.clone()),
@@ -161,40 +181,22 @@ impl CameraKeys {
         }
     }
 
+    /// Returns the width and height of the pictures, pixels; `None` if the keys do not tell. The error is a
+    /// sentence.
     fn size(&self) -> std::result::Result<Option<[u32; 2]>, String> {
         let (Some(w), Some(h)) = (self.w, self.h) else { return Ok(None) };
-        let side = |v: f64| (v.fract() == 0.0 && (1.0..=1e9).contains(&v)).then_some(v as u32);
         match (side(w), side(h)) {
             (Some(w), Some(h)) => Ok(Some([w, h])),
             _ => Err(format!("a picture of {w} × {h} pixels")),
         }
     }
 
+    /// Returns how directions become pixels; `None` if the keys do not tell. The error is a sentence.
     fn optics(&self) -> std::result::Result<Option<Optics>, String> {
-        let [k1, k2, k3, k4, p1, p2] =
-            [self.k1, self.k2, self.k3, self.k4, self.p1, self.p2].map(|k| k.unwrap_or(0.0));
-        let distortion = match self.camera_model.as_deref() {
-            Some("EQUIRECTANGULAR") => return Ok(Some(Optics::Equirectangular)),
-            Some("OPENCV_FISHEYE") => Distortion::Fisheye([k1, k2, k3, k4]),
-            None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => {
-                if k4 != 0.0 {
-                    return Err(format!(
-                        "k4 is {k4}: of OPENCV cameras only k1, k2, k3, p1, p2 are supported"
-                    ));
-                }
-                Distortion::opencv([k1, k2, p1, p2, k3])
-            }
-            Some(other) => {
-                return Err(format!(
-                    "the camera_model {other:?} is not supported: OPENCV, OPENCV_FISHEYE, PINHOLE and \
-                     EQUIRECTANGULAR are"
-                ));
-            }
-        };
-        // The focal length that an angle of view of `size` pixels means.
-        let of_angle = |size: Option<f64>, angle: Option<f64>| {
-            size.zip(angle).map(|(size, angle)| 0.5 * size / libm::tan(0.5 * angle))
-        };
+        if self.camera_model.as_deref() == Some("EQUIRECTANGULAR") {
+            return Ok(Some(Optics::Equirectangular));
+        }
+        let distortion = self.distortion()?;
         let angles = [self.camera_angle_x, self.camera_angle_y];
         if let Some(angle) = angles
             .into_iter()
@@ -203,20 +205,53 @@ impl CameraKeys {
         {
             return Err(format!("an angle of view of {angle} rad: it must be between 0 and π"));
         }
-        let fx = self.fl_x.or_else(|| of_angle(self.w, self.camera_angle_x));
-        let fy = self.fl_y.or_else(|| of_angle(self.h, self.camera_angle_y));
+
+        // One focal length stands for both, and an angle of view for a focal length.
+        let fx = self.fl_x.or_else(|| focal_length(self.w, self.camera_angle_x));
+        let fy = self.fl_y.or_else(|| focal_length(self.h, self.camera_angle_y));
         let (Some(fx), Some(fy)) = (fx.or(fy), fy.or(fx)) else {
             return Ok(self.camera_angle_x.map(|fov_rad| Optics::AngleOfView { fov_rad }));
         };
-        let is_focal = |f: f64| f > 0.0 && f.is_finite();
-        if !is_focal(fx) || !is_focal(fy) {
+        if ![fx, fy].iter().all(|f| *f > 0.0 && f.is_finite()) {
             return Err(format!("focal lengths of {fx} and {fy} px: both must be above 0"));
         }
-        let middle = |size: Option<f64>| size.map(|size| 0.5 * size);
-        let (cx, cy) = (self.cx.or_else(|| middle(self.w)), self.cy.or_else(|| middle(self.h)));
+
+        let cx = self.cx.or(self.w.map(|w| 0.5 * w));
+        let cy = self.cy.or(self.h.map(|h| 0.5 * h));
         let center_px: Option<DVec2> = cx.zip(cy).map(|(cx, cy)| dvec2(cx, cy));
         Ok(Some(Optics::Pinhole { focal_px: dvec2(fx, fy), center_px, distortion }))
     }
+
+    fn distortion(&self) -> std::result::Result<Distortion, String> {
+        let [k1, k2, k3, k4, p1, p2] =
+            [self.k1, self.k2, self.k3, self.k4, self.p1, self.p2].map(|k| k.unwrap_or(0.0));
+        match self.camera_model.as_deref() {
+            Some("OPENCV_FISHEYE") => Ok(Distortion::Fisheye([k1, k2, k3, k4])),
+            None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => {
+                if k4 != 0.0 {
+                    return Err(format!(
+                        "k4 is {k4}: OPENCV cameras are supported with k1, k2, k3, p1 and p2 alone"
+                    ));
+                }
+                Ok(Distortion::opencv([k1, k2, p1, p2, k3]))
+            }
+            Some(other) => Err(format!(
+                "the camera_model {other:?} is not supported: OPENCV, OPENCV_FISHEYE, PINHOLE and \
+                 EQUIRECTANGULAR are"
+            )),
+        }
+    }
+}
+
+/// Returns the side of a picture in pixels, if the number is one.
+fn side(number: f64) -> Option<u32> {
+    (number.fract() == 0.0 && (1.0..=1e9).contains(&number)).then_some(number as u32)
+}
+
+/// Returns the focal length of an angle of view that spans `size` pixels.
+fn focal_length(size: Option<f64>, angle_rad: Option<f64>) -> Option<f64> {
+    size.zip(angle_rad)
+        .map(|(size, angle_rad)| 0.5 * size / libm::tan(0.5 * angle_rad))
 }
 
 #[cfg(test)]
@@ -333,6 +368,7 @@ mod tests {
         assert_eq!(keys("").unwrap().optics, None);
         let panorama = keys(r#""camera_model": "EQUIRECTANGULAR", "w": 8, "h": 4,"#).unwrap();
         assert_eq!(panorama.optics, Some(Optics::Equirectangular));
+
         for (text, words) in [
             (r#""camera_model": "ORTHOPHOTO","#, "the camera_model \"ORTHOPHOTO\" is not supported"),
             (r#""w": 10.5, "h": 4,"#, "a picture of 10.5 × 4"),

@@ -10,22 +10,22 @@ use s3d_geom::Raster;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// The bytes at the end of a picture in which the mark of its end is looked for. Cameras write a little
-/// behind it.
+/// The bytes at the end of a file in which a picture's end mark is looked for. Cameras write a little after
+/// the mark.
 const TAIL: u64 = 1024;
 
 /// Reads a PNG or JPEG file of any kind as 8-bit R G B.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is no such image or is damaged.
+/// [`Error::Io`]; [`Error::Format`] if the file is not such an image, or is damaged.
 pub fn read_picture(path: &Path) -> Result<Raster<[u8; 3]>> {
     decode_picture(read_file(path)?, path)
 }
 
-/// As [`read_picture`], from the file's bytes; errors call it `name`.
+/// Reads like [`read_picture`], from the file's bytes. Errors call the file `name`.
 ///
 /// # Errors
-/// As [`read_picture`].
+/// Like [`read_picture`].
 pub fn decode_picture(bytes: Vec<u8>, name: &Path) -> Result<Raster<[u8; 3]>> {
     let texture = decode_texture(bytes).map_err(|fault| match fault {
         TextureFault::TooLarge(message) => Error::unsupported(name, message),
@@ -34,52 +34,58 @@ pub fn decode_picture(bytes: Vec<u8>, name: &Path) -> Result<Raster<[u8; 3]>> {
     Ok(texture.image)
 }
 
-/// Width and height of a PNG or JPEG file, from its first bytes.
+/// Returns the width and height of a PNG or JPEG file in pixels, from its header.
 ///
 /// # Errors
-/// As [`read_picture`].
+/// Like [`read_picture`].
 pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
     let file = BufReader::new(open_file(path)?);
     let reader = ImageReader::new(file)
         .with_guessed_format()
         .map_err(|e| Error::io(path, "read", e))?;
-    let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
-    let size = guarded(|| reader.into_dimensions()).ok_or_else(|| failed("its header is damaged"))?;
-    size.map_err(|e| failed(&e.to_string()))
+    let size =
+        guarded(|| reader.into_dimensions()).ok_or_else(|| unreadable(path, "its header is damaged"))?;
+    size.map_err(|e| unreadable(path, &e.to_string()))
 }
 
-/// How a PNG or JPEG file asks to be turned before it is shown, as EXIF numbers it: 1 as it is, 3 upside
-/// down, 6 and 8 on a side; 2, 4, 5 and 7 mirrored, too. 1 where nothing is said. [`read_picture`] gives
-/// pixels as they are stored, which is what programs that reconstruct from photographs see.
+/// Returns how a PNG or JPEG file asks to be turned before it is shown, as EXIF numbers it: 1 as it is, 3
+/// upside down, 6 and 8 on a side; 2, 4, 5 and 7 are also mirrored. Returns 1 if the file does not say.
+///
+/// [`read_picture`] returns the pixels as they are stored, because programs that reconstruct from photographs
+/// do the same.
 ///
 /// # Errors
-/// As [`read_picture`].
+/// Like [`read_picture`].
 pub fn read_picture_turn(path: &Path) -> Result<u8> {
     let file = BufReader::new(open_file(path)?);
     let reader = ImageReader::new(file)
         .with_guessed_format()
         .map_err(|e| Error::io(path, "read", e))?;
-    let failed = |why: &str| Error::format(path, format!("is no picture that can be read: {why}"));
-    let turn =
-        guarded(|| reader.into_decoder()?.orientation()).ok_or_else(|| failed("its header is damaged"))?;
-    turn.map(Orientation::to_exif).map_err(|e| failed(&e.to_string()))
+    let turn = guarded(|| reader.into_decoder()?.orientation())
+        .ok_or_else(|| unreadable(path, "its header is damaged"))?;
+    turn.map(Orientation::to_exif)
+        .map_err(|e| unreadable(path, &e.to_string()))
 }
 
-/// As [`read_picture_size`], of a picture that is there to its end: one that does not look so is decoded, and
-/// is an error if rows of it are missing. Quick for all others.
+/// Returns the size like [`read_picture_size`], and checks that the picture is complete.
+///
+/// A file without an end mark is decoded, and is an error if rows are missing. The check is quick for all
+/// other files.
 ///
 /// # Errors
-/// As [`read_picture`].
+/// Like [`read_picture`].
 pub fn check_picture(path: &Path) -> Result<(u32, u32)> {
     let size = read_picture_size(path)?;
     let failed = |e| Error::io(path, "read", e);
+
     let mut file = open_file(path)?;
     let length = file.metadata().map_err(failed)?.len();
     let mut tail = Vec::new();
     file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))
         .map_err(failed)?;
     file.read_to_end(&mut tail).map_err(failed)?;
-    // The last chunk of a PNG, the last mark of a JPEG.
+
+    // A PNG ends with the chunk IEND, a JPEG with the mark FF D9.
     let has_end = tail.windows(4).any(|w| w == b"IEND") || tail.windows(2).any(|w| w == b"\xff\xd9");
     if !has_end {
         read_picture(path)?;
@@ -87,12 +93,16 @@ pub fn check_picture(path: &Path) -> Result<(u32, u32)> {
     Ok(size)
 }
 
+fn unreadable(path: &Path, why: &str) -> Error {
+    Error::format(path, format!("is no picture that can be read: {why}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use image::{DynamicImage, ImageBuffer, ImageFormat, Rgb};
 
-    /// The JPEG with an EXIF block that says how it is to be turned.
+    /// Returns the JPEG with an EXIF block that says how it is to be turned.
     fn turned(jpeg: &[u8], turn: u8) -> Vec<u8> {
         let tiff =
             [b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".as_slice(), &[turn, 0, 0, 0, 0, 0, 0]];
@@ -108,15 +118,17 @@ mod tests {
         let image = DynamicImage::from(ImageBuffer::from_pixel(24, 16, Rgb([50u8, 60, 70])));
         image.save_with_format(&path, ImageFormat::Jpeg).unwrap();
         assert_eq!(read_picture_turn(&path).unwrap(), 1);
+
         let plain = std::fs::read(&path).unwrap();
         for turn in 1..=8 {
             std::fs::write(&path, turned(&plain, turn)).unwrap();
             assert_eq!(read_picture_turn(&path).unwrap(), turn);
-            // Pixels are those that are stored.
+            // The pixels are returned as they are stored.
             assert_eq!(check_picture(&path).unwrap(), (24, 16));
             let read = read_picture(&path).unwrap();
             assert_eq!((read.width(), read.height()), (24, 16));
         }
+
         image.save_with_format(&path, ImageFormat::Png).unwrap();
         assert_eq!(read_picture_turn(&path).unwrap(), 1);
         std::fs::write(&path, b"none").unwrap();
@@ -145,7 +157,7 @@ mod tests {
             for fault in [check_picture(&path).unwrap_err(), read_picture(&path).unwrap_err()] {
                 assert!(fault.to_string().contains(words), "{fault}");
             }
-            // What only seems to have no end is read: much is written behind it.
+            // A file that only seems to have no end is decoded: much is written after the end here.
             std::fs::write(&path, [&whole[..], &[1; 2 * TAIL as usize]].concat()).unwrap();
             assert_eq!(check_picture(&path).unwrap(), (64, 32));
         }

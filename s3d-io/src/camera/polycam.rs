@@ -1,10 +1,11 @@
-//! The photographs of a capture as Polycam exports its raw data: `keyframes/corrected_images/N.jpg` and
-//! `keyframes/corrected_cameras/N.json`, or, where the capture was not optimized, `images` and `cameras`.
-//! Source: Polycam's polyform, README, "Polycam's data format".
+//! The photographs in the raw data of a Polycam capture: `keyframes/corrected_images/N.jpg` and
+//! `keyframes/corrected_cameras/N.json`, or `images` and `cameras` if the capture was not optimized. Source:
+//! Polycam's polyform, README, "Polycam's data format".
 //!
-//! A file of `cameras` has fx, fy, cx, cy, width, height and the first three rows of camera → world, t_00 to
-//! t_23, in ARKit's axes: the world's +Y points up, the camera looks along its −Z.
+//! A file of `cameras` has fx, fy, cx, cy, width, height and the first three rows of camera → world, t_00
+//! to t_23, in ARKit's axes: the world's +Y points up, the camera looks along its −Z.
 
+use crate::camera::numbered::numbered_files;
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
 use crate::fs::json::read_json;
@@ -13,7 +14,7 @@ use s3d_geom::glam::{DMat3, DVec3, dvec2};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Cameras and their photographs, the better first.
+/// The folders of cameras and of their photographs, the better ones first.
 const FOLDERS: [(&str, &str); 2] = [("corrected_cameras", "corrected_images"), ("cameras", "images")];
 
 #[derive(Deserialize)]
@@ -38,32 +39,25 @@ struct Keyframe {
     t_23: f64,
 }
 
-/// What Polycam turned the mesh by, and not the cameras: column by column.
+/// The transform that Polycam applied to the mesh and not to the cameras, column by column.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct MeshInfo {
     alignment_transform: Option<Vec<f64>>,
 }
 
-/// The files of the cameras of a capture in `dir`, which may be its folder `keyframes`, by number, and the
-/// folder of their photographs.
+/// Returns the files of a capture's cameras, sorted by number, and the folder of their photographs. `dir` is
+/// the folder of the capture, or its folder `keyframes`.
 pub(crate) fn find(dir: &Path) -> Result<Option<(Vec<PathBuf>, PathBuf)>> {
     for keyframes in [dir.join("keyframes"), dir.to_owned()] {
         for (cameras, images) in FOLDERS {
-            let (folder, images) = (keyframes.join(cameras), keyframes.join(images));
+            let folder = keyframes.join(cameras);
+            let images = keyframes.join(images);
             if !folder.is_dir() || !images.is_dir() {
                 continue;
             }
-            let failed = |e| Error::io(&folder, "read the folder", e);
-            let mut files = Vec::new();
-            for entry in std::fs::read_dir(&folder).map_err(failed)? {
-                let path = entry.map_err(failed)?.path();
-                let number = path.file_stem().and_then(|stem| stem.to_str()?.parse::<u64>().ok());
-                if let (Some(number), true) = (number, path.extension().is_some_and(|e| e == "json")) {
-                    files.push((number, path));
-                }
-            }
-            files.sort();
+
+            let files = numbered_files(&folder, "json")?;
             if !files.is_empty() {
                 return Ok(Some((files.into_iter().map(|(_, path)| path).collect(), images)));
             }
@@ -72,57 +66,71 @@ pub(crate) fn find(dir: &Path) -> Result<Option<(Vec<PathBuf>, PathBuf)>> {
     Ok(None)
 }
 
-/// The cameras that [`find`] found, in the frame of the capture's mesh turned Z-up, and the files that were
-/// read.
+/// Reads the cameras that [`find`] found, in the frame of the capture's mesh turned Z-up. Also returns the
+/// files that were read.
 pub(crate) fn read(files: Vec<PathBuf>, images: &Path) -> Result<(Vec<PosedCamera>, Vec<PathBuf>)> {
     let info = images.join("../../mesh_info.json");
     let aligned = if info.is_file() { alignment(&info)? } else { None };
-    // (x, y, z) becomes (x, −z, y).
+    // Takes (x, y, z) to (x, −z, y).
     let z_up = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y);
+
     let mut cameras = Vec::with_capacity(files.len());
     for path in &files {
-        let k: Keyframe = read_json(path)?;
-        let rows = [
-            [k.t_00, k.t_01, k.t_02, k.t_03],
-            [k.t_10, k.t_11, k.t_12, k.t_13],
-            [k.t_20, k.t_21, k.t_22, k.t_23],
-            [0.0, 0.0, 0.0, 1.0],
-        ];
-        let mut pose = Pose::from_opengl(rows).map_err(|e| Error::format(path, e.to_string()))?;
+        let keyframe: Keyframe = read_json(path)?;
+        let mut camera = keyframe.camera(path, images)?;
+        let pose = &mut camera.pose;
         if let Some(by) = &aligned {
             pose.location = by.world_from_camera * pose.location + by.location;
             pose.world_from_camera = by.world_from_camera * pose.world_from_camera;
         }
         pose.location = z_up * pose.location;
         pose.world_from_camera = z_up * pose.world_from_camera;
-        let is_focal = |f: f64| f > 0.0 && f.is_finite();
-        if !is_focal(k.fx) || !is_focal(k.fy) || !k.cx.is_finite() || !k.cy.is_finite() {
-            let message = format!("focal lengths of {} and {} px, centre ({}, {})", k.fx, k.fy, k.cx, k.cy);
-            return Err(Error::format(path, message));
-        }
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let picture = ["jpg", "png"].map(|ending| images.join(format!("{name}.{ending}")));
-        let [first, _] = &picture;
-        let picture = picture.iter().find(|path| path.is_file()).unwrap_or(first).clone();
-        let optics = Optics::Pinhole {
-            focal_px: dvec2(k.fx, k.fy),
-            center_px: Some(dvec2(k.cx, k.cy)),
-            distortion: Distortion::None,
-        };
-        cameras.push(PosedCamera {
-            name,
-            pose,
-            size: Some([k.width, k.height]),
-            optics: Some(optics),
-            picture: Some(picture),
-            line: 0,
-        });
+        cameras.push(camera);
     }
+
     let info = aligned.is_some().then_some(info);
     Ok((cameras, files.into_iter().chain(info).collect()))
 }
 
-/// What takes the cameras' frame to the mesh's, if the file says so.
+impl Keyframe {
+    /// Returns the camera of the file `path`, in ARKit's axes.
+    fn camera(&self, path: &Path, images: &Path) -> Result<PosedCamera> {
+        let rows = [
+            [self.t_00, self.t_01, self.t_02, self.t_03],
+            [self.t_10, self.t_11, self.t_12, self.t_13],
+            [self.t_20, self.t_21, self.t_22, self.t_23],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        let pose = Pose::from_opengl(rows).map_err(|e| Error::format(path, e.to_string()))?;
+
+        let Self { fx, fy, cx, cy, .. } = *self;
+        let are_focal = [fx, fy].iter().all(|f| *f > 0.0 && f.is_finite());
+        if !are_focal || !cx.is_finite() || !cy.is_finite() {
+            let message = format!("focal lengths of {fx} and {fy} px, centre ({cx}, {cy})");
+            return Err(Error::format(path, message));
+        }
+        let optics = Optics::Pinhole {
+            focal_px: dvec2(fx, fy),
+            center_px: Some(dvec2(cx, cy)),
+            distortion: Distortion::None,
+        };
+
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let jpeg = images.join(format!("{name}.jpg"));
+        let png = images.join(format!("{name}.png"));
+        let picture = if !jpeg.is_file() && png.is_file() { png } else { jpeg };
+        Ok(PosedCamera {
+            name,
+            pose,
+            size: Some([self.width, self.height]),
+            optics: Some(optics),
+            picture: Some(picture),
+            line: 0,
+        })
+    }
+}
+
+/// Returns the transform from the cameras' frame to the mesh's, if the file has one.
 fn alignment(path: &Path) -> Result<Option<Pose>> {
     let MeshInfo { alignment_transform } = read_json(path)?;
     let Some(columns) = alignment_transform else { return Ok(None) };
@@ -182,6 +190,7 @@ mod tests {
             assert_eq!((*focal_px, center_px.unwrap()), (dvec2(700.5, 701.5), dvec2(510.25, 384.5)));
             assert_eq!(*distortion, Distortion::None);
         }
+
         // A capture that was not optimized has the other two alone.
         let plain = capture(&["cameras", "images"]);
         assert!(find(plain.path()).unwrap().unwrap().1.ends_with("keyframes/images"));
@@ -204,6 +213,7 @@ mod tests {
         // (1, 2, 3) → (3, 2, −1) + (10, 20, 30) = (13, 22, 29), Y-up; −Z → −X.
         assert_eq!(found[0].pose.location, dvec3(13.0, -29.0, 22.0));
         assert_eq!((found[0].pose.forward(), files.len()), (-DVec3::X, 3));
+
         write(r#"{"faceCount": 5}"#);
         assert_eq!(cameras().unwrap().0[0].pose.location, dvec3(1.0, -3.0, 2.0));
         for (text, words) in [

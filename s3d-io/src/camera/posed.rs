@@ -1,25 +1,24 @@
-//! Cameras with poses: what photographs were taken with, or what is to be rendered.
+//! Cameras with poses: of photographs, or of views to render.
 
 use s3d_geom::glam::{DVec2, DVec3, dvec2};
 use s3d_geom::{Camera, CameraError, FisheyeLens, Lens, PhotoLens, Pose};
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// A camera of a list: see [`read_posed_cameras`](crate::camera::read_posed_cameras).
+/// A camera of a list that [`read_posed_cameras`](crate::camera::read_posed_cameras) reads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PosedCamera {
-    /// Its name in the list: a picture's file, a time stamp, any word.
+    /// The name in the list: the file of a picture, a time stamp, or any word.
     pub name: String,
-    /// Where it is and how it is turned.
+    /// The position and rotation.
     pub pose: Pose,
-    /// Width and height of its picture in pixels, if the list tells.
+    /// The width and height of the picture in pixels, if the list tells them.
     pub size: Option<[u32; 2]>,
-    /// How directions become pixels, if the list tells.
+    /// How directions become pixels, if the list tells it.
     pub optics: Option<Optics>,
-    /// The picture that was taken with it, if the list names one. Whether the file is there was not looked
-    /// at.
+    /// The picture that was taken with the camera, if the list names one. The file may not exist.
     pub picture: Option<PathBuf>,
-    /// Its line in the list, from 1; 0 if the list has no lines.
+    /// The line in the list, from 1; 0 if the list has no lines.
     pub line: u64,
 }
 
@@ -30,9 +29,10 @@ pub enum Optics {
     Pinhole {
         /// Focal lengths in pixels.
         focal_px: DVec2,
-        /// The principal point in pixels from the top left corner of the picture; its middle if `None`.
+        /// The principal point in pixels from the top left corner of the picture. `None`: the middle of the
+        /// picture.
         center_px: Option<DVec2>,
-        /// What the lens bends.
+        /// The distortion of the lens.
         distortion: Distortion,
     },
     /// A pinhole with square pixels and its centre in the middle.
@@ -44,20 +44,21 @@ pub enum Optics {
     Equirectangular,
 }
 
-/// What a lens bends, in OpenCV's terms.
+/// The distortion of a lens, in OpenCV's terms.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Distortion {
-    /// Nothing: a pinhole's picture.
+    /// None: the lens is a pinhole.
     #[default]
     None,
-    /// k₁ k₂ p₁ p₂ k₃, as [`Lens`](s3d_geom::Lens) has them.
+    /// k₁ k₂ p₁ p₂ k₃, as in [`Lens`](s3d_geom::Lens).
     OpenCv([f64; 5]),
-    /// k₁ k₂ k₃ k₄ of a fisheye lens: θ (1 + k₁θ² + k₂θ⁴ + k₃θ⁶ + k₄θ⁸) is the distance from the axis.
+    /// k₁ k₂ k₃ k₄ of a fisheye lens: θ (1 + k₁θ² + k₂θ⁴ + k₃θ⁶ + k₄θ⁸) is the
+    /// distance from the axis.
     Fisheye([f64; 4]),
 }
 
 impl Distortion {
-    /// OpenCV's numbers; nothing if all are 0.
+    /// Returns the distortion of OpenCV's numbers: none if all are 0.
     pub(crate) fn opencv(numbers: [f64; 5]) -> Self {
         if numbers == [0.0; 5] {
             Self::None
@@ -67,28 +68,29 @@ impl Distortion {
     }
 }
 
-/// What is said beside a list of cameras: instead of what it says, or where it says nothing.
+/// What a caller knows beside a list of cameras. It replaces what the list says, or fills in what it does not
+/// say.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GivenIntrinsics {
-    /// Width of the images in pixels.
+    /// The width of the images in pixels.
     pub width: Option<u32>,
-    /// Height of the images in pixels.
+    /// The height of the images in pixels.
     pub height: Option<u32>,
     /// How directions become pixels in images of that size.
     pub optics: Option<Optics>,
 }
 
-/// Why a camera of a list has no images.
+/// Why there can be no images of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IntrinsicsError {
-    /// Neither the list nor its reader's caller tells the size.
+    /// Neither the list nor the caller tells the size.
     #[error("the size of its images is not known")]
     NoSize,
-    /// Neither tells focal lengths or an angle of view.
+    /// Neither the list nor the caller tells focal lengths or an angle of view.
     #[error("neither its focal lengths nor its angle of view are known")]
     NoOptics,
-    /// A panorama is twice as wide as high.
+    /// The size is not a panorama's, which is twice as wide as high.
     #[error("a panorama is twice as wide as high, not {width} × {height} pixels")]
     PanoramaSize {
         /// Width in pixels.
@@ -96,13 +98,13 @@ pub enum IntrinsicsError {
         /// Height in pixels.
         height: u32,
     },
-    /// Panoramas here are level.
+    /// Only level panoramas are supported.
     #[error("it is a panorama that is tilted by {tilt_deg:.1}°: only level ones are supported")]
     TiltedPanorama {
-        /// Degrees between its way up and the world's.
+        /// The angle between the panorama's up and the world's, degrees.
         tilt_deg: f64,
     },
-    /// A photograph has another shape than its camera's pictures.
+    /// The photograph has another shape than the list tells.
     #[error(
         "the photograph has {} × {} pixels, and its camera is for {} × {}",
         found[0], found[1], told[0], told[1]
@@ -110,39 +112,41 @@ pub enum IntrinsicsError {
     OtherSize {
         /// Width and height of the photograph.
         found: [u32; 2],
-        /// Those that the list tells.
+        /// Width and height that the list tells.
         told: [u32; 2],
     },
-    /// The principal point lies beside the photograph.
+    /// The principal point lies outside of the photograph.
     #[error(
         "the principal point ({}, {}) lies outside of the photograph of {} × {} pixels: is the camera for a \
-         picture of \
-         another size?", center_px.x, center_px.y, size[0], size[1]
+         picture of another size?",
+        center_px.x, center_px.y, size[0], size[1]
     )]
     CenterOutside {
-        /// In pixels of the photograph.
+        /// The principal point in pixels of the photograph.
         center_px: DVec2,
         /// Width and height of the photograph.
         size: [u32; 2],
     },
-    /// Photographs are taken through lenses.
-    #[error("it is a panorama: photographs are those of cameras with focal lengths")]
+    /// A photograph has a lens, and a panorama has none.
+    #[error("it is a panorama: photographs need a camera with focal lengths")]
     NoLens,
-    /// Its numbers make no lens.
+    /// No lens has these numbers.
     #[error(
         "no direction comes to the middle of its picture: focal lengths, principal point or distortion are \
          wrong"
     )]
     BadLens,
-    /// It cannot be.
+    /// No camera has these numbers.
     #[error(transparent)]
     Camera(#[from] CameraError),
 }
 
 impl PosedCamera {
-    /// The camera that takes its picture, without what its lens bends. `given` goes before what the list
-    /// says. Where a size alone is given, the picture is scaled to it: focal lengths and principal point
-    /// follow, and so does the height if only a width is given, or the other way round.
+    /// Returns the camera that takes the picture, without the distortion of its lens.
+    ///
+    /// `given` goes before what the list says. If only a size is given, the picture is scaled to it, with its
+    /// focal lengths and principal point. If only the width is given, the height follows, and the other way
+    /// round.
     ///
     /// # Errors
     /// [`IntrinsicsError`].
@@ -150,6 +154,7 @@ impl PosedCamera {
         let [width, height] = self.size_with(given)?;
         let pose = self.pose;
         let size = dvec2(f64::from(width), f64::from(height));
+
         let from_list = self.optics.map(|optics| match (optics, self.size) {
             (Optics::Pinhole { focal_px, center_px, distortion }, Some([w, h])) => {
                 let scale = size / dvec2(f64::from(w), f64::from(h));
@@ -158,6 +163,7 @@ impl PosedCamera {
             }
             _ => optics,
         });
+
         match given.optics.or(from_list).ok_or(IntrinsicsError::NoOptics)? {
             Optics::Pinhole { focal_px, center_px, .. } => {
                 let center_px = center_px.unwrap_or(size * 0.5);
@@ -171,7 +177,7 @@ impl PosedCamera {
                 Ok(Camera::perspective(pose, fov_rad, width, height))
             }
             Optics::Equirectangular => {
-                /// As much as a rounded matrix is off.
+                /// The tilt that rounding can give a level pose, degrees.
                 const LEVEL_DEG: f64 = 0.1;
                 if width != height.saturating_mul(2) {
                     return Err(IntrinsicsError::PanoramaSize { width, height });
@@ -185,16 +191,16 @@ impl PosedCamera {
         }
     }
 
-    /// The lens that its photograph of `found` pixels was taken through. Intrinsics of another size are
-    /// scaled, as photographs are before they are handed on; those of an unknown size are for the photograph
-    /// itself.
+    /// Returns the lens that a photograph of `found` pixels (width, height) was taken through. Intrinsics for
+    /// another size are scaled, because photographs are scaled before they are handed on. Intrinsics without
+    /// a size are for the photograph itself.
     ///
     /// # Errors
-    /// [`IntrinsicsError`]; [`OtherSize`](IntrinsicsError::OtherSize) for a photograph of other proportions,
-    /// beyond a pixel of rounding.
+    /// [`IntrinsicsError`]; [`OtherSize`](IntrinsicsError::OtherSize) if the proportions differ by more than
+    /// a pixel of rounding.
     pub fn photo_lens(&self, found: [u32; 2]) -> Result<PhotoLens, IntrinsicsError> {
         let told = self.size.unwrap_or(found);
-        let [size, of] = [found, told].map(|[w, h]| dvec2(f64::from(w), f64::from(h)));
+        let [size, told_size] = [found, told].map(|[w, h]| dvec2(f64::from(w), f64::from(h)));
         if found.contains(&0) || told.contains(&0) {
             return Err(CameraError::NoPixels {
                 width: found[0].min(told[0]),
@@ -202,11 +208,13 @@ impl PosedCamera {
             }
             .into());
         }
-        let scale = size / of;
-        let off = [(size.y - of.y * scale.x).abs(), (size.x - of.x * scale.y).abs()];
+
+        let scale = size / told_size;
+        let off = [(size.y - told_size.y * scale.x).abs(), (size.x - told_size.x * scale.y).abs()];
         if off.iter().all(|off| *off > 1.0) {
             return Err(IntrinsicsError::OtherSize { found, told });
         }
+
         let (focal_px, center_px, distortion) = match self.optics.ok_or(IntrinsicsError::NoOptics)? {
             Optics::Pinhole { focal_px, center_px, distortion } => {
                 (focal_px * scale, center_px.map_or(size * 0.5, |c| c * scale), distortion)
@@ -220,6 +228,7 @@ impl PosedCamera {
         if center_px.cmplt(DVec2::ZERO).any() || center_px.cmpgt(size).any() {
             return Err(IntrinsicsError::CenterOutside { center_px, size: found });
         }
+
         let lens = match distortion {
             Distortion::None => Lens::new(found, focal_px, center_px, [0.0; 5]).map(PhotoLens::Straight),
             Distortion::OpenCv(k) => Lens::new(found, focal_px, center_px, k).map(PhotoLens::Straight),
@@ -228,16 +237,12 @@ impl PosedCamera {
         lens.ok_or(IntrinsicsError::BadLens)
     }
 
-    /// The size of its images.
+    /// Returns the width and height of the images in pixels.
     fn size_with(&self, given: &GivenIntrinsics) -> Result<[u32; 2], IntrinsicsError> {
-        let scaled = |side: u32, by: u32, of: u32| {
-            let scaled = f64::from(side) * f64::from(by) / f64::from(of.max(1));
-            (scaled.round() as u32).max(1)
-        };
         let size = match (given.width, given.height, self.size) {
             (Some(width), Some(height), _) => [width, height],
-            (Some(width), None, Some([w, h])) => [width, scaled(h, width, w)],
-            (None, Some(height), Some([w, h])) => [scaled(w, height, h), height],
+            (Some(width), None, Some([w, h])) => [width, scaled_side(h, width, w)],
+            (None, Some(height), Some([w, h])) => [scaled_side(w, height, h), height],
             (None, None, Some(size)) => size,
             _ => return Err(IntrinsicsError::NoSize),
         };
@@ -249,10 +254,16 @@ impl PosedCamera {
         }
     }
 
-    /// Whether a lens bends its picture, which its [`camera`](Self::camera) does not.
+    /// Returns whether a lens distorts the picture. [`camera`](Self::camera) leaves the distortion out.
     pub fn is_distorted(&self) -> bool {
         matches!(self.optics, Some(Optics::Pinhole { distortion, .. }) if distortion != Distortion::None)
     }
+}
+
+/// Returns a side of a picture in pixels, scaled by `to` / `from`. It is at least 1.
+fn scaled_side(side: u32, to: u32, from: u32) -> u32 {
+    let scaled = f64::from(side) * f64::from(to) / f64::from(from.max(1));
+    (scaled.round() as u32).max(1)
 }
 
 #[cfg(test)]
@@ -285,9 +296,11 @@ mod tests {
             let small = posed.camera(&given).unwrap();
             assert_eq!((small.width, small.height), (480, 270));
             // The corner of the picture stays the corner, and so does everything else.
-            let (a, b) = (full.direction(1920.0, 40.0), small.direction(480.0, 10.0));
+            let a = full.direction(1920.0, 40.0);
+            let b = small.direction(480.0, 10.0);
             assert!(a.abs_diff_eq(b, 1e-12), "{a} {b}");
         }
+
         let given = GivenIntrinsics {
             optics: Some(Optics::AngleOfView { fov_rad: 1.0 }),
             ..sized(Some(100), Some(70))
@@ -302,7 +315,7 @@ mod tests {
         assert_eq!(posed(None, Some(PHONE)).camera(&none), Err(IntrinsicsError::NoSize));
         assert_eq!(posed(None, None).camera(&sized(Some(8), None)), Err(IntrinsicsError::NoSize));
         assert_eq!(posed(Some([8, 8]), None).camera(&none), Err(IntrinsicsError::NoOptics));
-        // Focal lengths are those of the size that is given, where the list has none.
+        // The focal lengths are for the given size if the list has none.
         let camera = posed(None, Some(PHONE)).camera(&sized(Some(1920), Some(1080))).unwrap();
         assert_eq!(camera.focal_px(), dvec2(1600.0, 1604.0));
         let flat = posed(Some([8, 8]), Some(Optics::AngleOfView { fov_rad: 4.0 })).camera(&none);
@@ -317,13 +330,14 @@ mod tests {
         let full = lens([1920, 1080]).unwrap();
         // A third of the size, rounded: the corner stays the corner.
         let small = lens([641, 360]).unwrap();
-        let (a, b) =
-            (full.direction(dvec2(1800.0, 90.0)), small.direction(dvec2(1800.0 * 641.0 / 1920.0, 30.0)));
-        assert!(a.unwrap().abs_diff_eq(b.unwrap(), 1e-9));
+        let a = full.direction(dvec2(1800.0, 90.0)).unwrap();
+        let b = small.direction(dvec2(1800.0 * 641.0 / 1920.0, 30.0)).unwrap();
+        assert!(a.abs_diff_eq(b, 1e-9));
         for found in [[1080, 1920], [1920, 1088], [640, 480]] {
             assert_eq!(lens(found), Err(IntrinsicsError::OtherSize { found, told: [1920, 1080] }));
         }
-        // Intrinsics without a size are the photograph's; a centre beside it says that they are not.
+
+        // Intrinsics without a size are for the photograph. A principal point outside says that they are not.
         let unsized_camera = PosedCamera { size: None, ..camera.clone() };
         assert_eq!(unsized_camera.photo_lens([1920, 1080]), Ok(full));
         let outside = unsized_camera.photo_lens([640, 480]).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! Cameras with poses, from any list of them that is read.
+//! Cameras with poses, from any supported list.
 
 use crate::camera::locations::{has_transforms, is_colmap_images, moved};
 use crate::camera::posed::PosedCamera;
@@ -9,7 +9,7 @@ use crate::fs::open::read_file;
 use s3d_geom::glam::DAffine3;
 use std::path::{Path, PathBuf};
 
-/// What is read, for messages.
+/// The supported forms, for messages.
 const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), a \
                      folder of ScanNet's poses (pose/0.txt) or of Polycam's keyframes, a trajectory of lines \
                      `timestamp tx ty tz qx qy qz qw`, or a CSV table";
@@ -17,15 +17,15 @@ const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and 
 /// The cameras of a list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PosedCameras {
-    /// In the list's order; at least one.
+    /// The cameras in the list's order; at least one.
     pub cameras: Vec<PosedCamera>,
-    /// How many entries were left out since the list itself says that their pose is not known.
+    /// The number of entries that were left out, because the list says that their pose is not known.
     pub untracked: usize,
     /// The files that were read.
     pub files: Vec<PathBuf>,
 }
 
-/// What a list was read as.
+/// A list as it was read.
 struct ReadList {
     cameras: Vec<PosedCamera>,
     untracked: usize,
@@ -34,31 +34,32 @@ struct ReadList {
     named: PathBuf,
 }
 
-/// Reads the cameras of `path`, a file or a folder. What it is shows in its name and its first line:
+/// Reads the cameras of `path`, a file or a folder. The name and the first line tell which form it has:
 ///
-/// - `transforms.json`, any other `.json`, or a folder that holds one: the frames of nerfstudio and its kin,
-///   brought back to the world before their `applied_transform`;
+/// - `transforms.json`, any other `.json`, or a folder that holds one: the frames of nerfstudio and related
+///   programs, in the world before their `applied_transform`;
 /// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a
-///   COLMAP model, with its `cameras` beside them;
+///   COLMAP model, with the list of `cameras` beside it;
 /// - a folder with ScanNet's `pose/0.txt`, or that folder itself; `intrinsic/intrinsic_color.txt` and the
-///   first picture in `color` tell what the camera is;
+///   first picture in `color` give the optics and the size;
 /// - a folder with Polycam's `keyframes`, or that folder itself: the corrected cameras, if there are some;
-/// - any other file whose first line has a comma: a table like that of scan locations (see
-///   [`read_cameras`](crate::camera::read_cameras)), in which `width,height` and `fov` or `fx,fy,cx,cy` may
-///   stand;
+/// - any other file whose first line has a comma: a table of scan locations (see
+///   [`read_cameras`](crate::camera::read_cameras)), which may also have `width,height` and `fov` or
+///   `fx,fy,cx,cy`;
 /// - any other file: a trajectory of TUM's benchmark.
 ///
-/// `world_from_file` takes the file's frame to the world (metres, Z-up): turns, shifts and scales. Whether
-/// each camera's size and optics are known is for [`PosedCamera::camera`] to say.
+/// `world_from_file` is the transform from the file's frame to the world (metres, Z-up): a rotation, a shift
+/// and a scale. Size and optics of a camera may be unknown: [`PosedCamera::camera`] tells.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder with nothing of these
-/// in it.
+/// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder that holds none of
+/// these.
 pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<PosedCameras> {
     let ReadList { mut cameras, untracked, files, named: file } = read(path)?;
     cameras
         .iter_mut()
         .for_each(|camera| camera.pose = moved(&camera.pose, world_from_file));
+
     cameras
         .iter()
         .try_for_each(|camera| located::check_place(&file, camera))?;
@@ -73,31 +74,12 @@ pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<Pos
     Ok(PosedCameras { cameras, untracked, files })
 }
 
-/// The cameras of a list in its own frame.
+/// Reads the cameras of a list in its own frame.
 fn read(path: &Path) -> Result<ReadList> {
-    let known = |cameras, files: Vec<PathBuf>| {
-        let named = files.first().cloned().unwrap_or_default();
-        ReadList { cameras, untracked: 0, files, named }
-    };
     if path.is_dir() {
-        if let Some(images) = colmap::find(path) {
-            let (cameras, intrinsics) = colmap::read_posed(&images)?;
-            return Ok(known(cameras, vec![images, intrinsics]));
-        }
-        if let Some(transforms) = has_transforms(path) {
-            let cameras = nerfstudio::read_posed(&transforms)?;
-            return Ok(known(cameras, vec![transforms]));
-        }
-        if let Some((scan, files)) = scannet::find(path)? {
-            let (cameras, untracked, files) = scannet::read(&scan, files)?;
-            return Ok(ReadList { cameras, untracked, files, named: path.to_owned() });
-        }
-        if let Some((files, images)) = polycam::find(path)? {
-            let (cameras, files) = polycam::read(files, &images)?;
-            return Ok(ReadList { cameras, untracked: 0, files, named: path.to_owned() });
-        }
-        return Err(Error::unsupported(path, format!("holds no list of cameras: {FORMS}")));
+        return read_folder(path);
     }
+
     let mut files = vec![path.to_owned()];
     let cameras = if is_colmap_images(path) {
         let (cameras, intrinsics) = colmap::read_posed(path)?;
@@ -118,7 +100,36 @@ fn read(path: &Path) -> Result<ReadList> {
             tum::read(path, &text)?
         }
     };
-    Ok(known(cameras, files))
+
+    Ok(ReadList::of_files(cameras, files))
+}
+
+fn read_folder(path: &Path) -> Result<ReadList> {
+    if let Some(images) = colmap::find(path) {
+        let (cameras, intrinsics) = colmap::read_posed(&images)?;
+        return Ok(ReadList::of_files(cameras, vec![images, intrinsics]));
+    }
+    if let Some(transforms) = has_transforms(path) {
+        let cameras = nerfstudio::read_posed(&transforms)?;
+        return Ok(ReadList::of_files(cameras, vec![transforms]));
+    }
+    if let Some((scan, files)) = scannet::find(path)? {
+        let (cameras, untracked, files) = scannet::read(&scan, files)?;
+        return Ok(ReadList { cameras, untracked, files, named: path.to_owned() });
+    }
+    if let Some((files, images)) = polycam::find(path)? {
+        let (cameras, files) = polycam::read(files, &images)?;
+        return Ok(ReadList { cameras, untracked: 0, files, named: path.to_owned() });
+    }
+    Err(Error::unsupported(path, format!("holds no list of cameras: {FORMS}")))
+}
+
+impl ReadList {
+    /// Returns the list that was read from `files`. Messages name the first.
+    fn of_files(cameras: Vec<PosedCamera>, files: Vec<PathBuf>) -> Self {
+        let named = files.first().cloned().unwrap_or_default();
+        Self { cameras, untracked: 0, files, named }
+    }
 }
 
 #[cfg(test)]
@@ -150,6 +161,7 @@ mod tests {
         fs::write(at("trajectory.txt"), format!("# time\n0.5 1 2 3 {} 0 0 {half}\n", -half)).unwrap();
         fs::write(at("table.txt"), "\n# a table\nname,x,y,z,yaw\nfirst,1,2,3,0\n").unwrap();
         fs::write(at("plain.csv"), "first,1,2,3,0,0,0,1\n").unwrap();
+
         let read = |p: &str| read_posed_cameras(&at(p), &DAffine3::IDENTITY).unwrap();
         for (path, name) in [
             ("colmap", "a.jpg"),
@@ -169,6 +181,7 @@ mod tests {
             assert!(camera.pose.forward().abs_diff_eq(DVec3::Y, 1e-12), "{path}: {camera:?}");
             assert!(camera.pose.up().abs_diff_eq(DVec3::Z, 1e-12), "{path}: {camera:?}");
         }
+
         let message = |p: &str| read_posed_cameras(&at(p), &DAffine3::IDENTITY).unwrap_err().to_string();
         assert!(message("empty").contains("holds no list of cameras: cameras are a transforms.json"));
         fs::write(at("scan/pose/0.txt"), "-inf -inf -inf -inf\n".repeat(4)).unwrap();

@@ -11,18 +11,18 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A scan location, and the room that the files say it is in.
+/// A scan location, and the room that its pose files name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PublishedLocation {
-    /// The place; its line is 0.
+    /// The location. Its line is 0.
     pub location: ScanLocation,
     /// The room, if the pose file names one.
     pub room: Option<Room>,
 }
 
-/// What is read of a pose file: the published ones differ in the rest.
+/// The fields of a pose file that are read. The published files differ in the others.
 #[derive(Deserialize)]
-struct PoseOf {
+struct PoseFields {
     camera_uuid: Option<String>,
     point_uuid: Option<String>,
     camera_original_rotation: [f64; 3],
@@ -30,47 +30,36 @@ struct PoseOf {
     room: Option<String>,
 }
 
-/// The scan locations of the pose files in `folders`, by uuid, each with the file that tells of it: one of
-/// each location's files is read, that in the first folder. `world_from_file` turns, shifts and scales.
-/// Rooms are those of `taxonomy`. Folders
-/// that are not there do not count.
+/// Returns the scan locations of the pose files in `folders`, sorted by uuid, each with its file. One file is
+/// read for each location, from the first folder that has one. `world_from_file` turns, shifts and scales.
+/// Rooms are looked up in `taxonomy`. A folder may be missing.
 pub(crate) fn read(
     folders: &[PathBuf],
     world_from_file: &DAffine3,
     taxonomy: &Taxonomy,
 ) -> Result<Vec<(PathBuf, PublishedLocation)>> {
-    let mut files: BTreeMap<String, (PathBuf, PoseOf)> = BTreeMap::new();
-    for folder in folders {
-        for file in json_files(folder)? {
-            let name = file.file_name().unwrap_or_default().to_string_lossy();
-            if ImageName::parse(&name).is_some_and(|n| files.contains_key(&n.uuid)) {
-                continue;
-            }
-            let pose: PoseOf = read_json(&file)?;
-            let uuid = pose.camera_uuid.as_ref().or(pose.point_uuid.as_ref());
-            let Some(uuid) = uuid.filter(|u| is_valid_uuid(u)).cloned() else {
-                return Err(Error::format(&file, "has no camera_uuid of letters and digits"));
-            };
-            files.entry(uuid).or_insert((file, pose));
-        }
-    }
+    let files = files_by_uuid(folders)?;
     let m = world_from_file.matrix3;
     let turn = m * (1.0 / libm::cbrt(m.determinant()));
+
     let mut found = Vec::new();
     let mut in_lower_case: BTreeMap<String, String> = BTreeMap::new();
     for (uuid, (file, pose)) in files {
+        // Files are named by the uuid.
         if let Some(other) = in_lower_case.insert(uuid.to_ascii_lowercase(), uuid.clone()) {
             let message = format!(
-                "its camera_uuid {uuid} differs from {other} of another file in case only; where case does \
-                 not count, files of both would have one name: rename one"
+                "its camera_uuid {uuid} differs from {other} of another file in case only; many file systems \
+                 would take the files of both for the same: rename one"
             );
             return Err(Error::format(&file, message));
         }
+
         let location = DVec3::from_array(pose.camera_location);
         let angles = DVec3::from_array(pose.camera_original_rotation);
         if !angles.is_finite() || location.abs().max_element() > FARTHEST_M || !location.is_finite() {
             return Err(Error::format(&file, format!("has its camera at {location}, turned by {angles}")));
         }
+
         let room = pose.room.as_deref().and_then(|name| room_of(name, taxonomy));
         let pose = Pose {
             location: world_from_file.transform_point3(location),
@@ -81,18 +70,40 @@ pub(crate) fn read(
     Ok(found)
 }
 
-/// The room of "office_5_3", of which the last field is the area.
+/// Reads one pose file for each uuid, from the first folder that has one.
+fn files_by_uuid(folders: &[PathBuf]) -> Result<BTreeMap<String, (PathBuf, PoseFields)>> {
+    let mut files = BTreeMap::new();
+    for folder in folders {
+        for file in json_files(folder)? {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            if ImageName::parse(&name).is_some_and(|n| files.contains_key(&n.uuid)) {
+                continue;
+            }
+
+            let pose: PoseFields = read_json(&file)?;
+            let uuid = pose.camera_uuid.as_ref().or(pose.point_uuid.as_ref());
+            let Some(uuid) = uuid.filter(|u| is_valid_uuid(u)).cloned() else {
+                return Err(Error::format(&file, "has no camera_uuid of letters and digits"));
+            };
+            files.entry(uuid).or_insert((file, pose));
+        }
+    }
+    Ok(files)
+}
+
+/// Returns the room in a name such as "office_5_3". Its last field is the area.
 fn room_of(name: &str, taxonomy: &Taxonomy) -> Option<Room> {
     taxonomy.room(name.rsplit_once('_')?.0).ok()
 }
 
-/// The `.json` files of a folder by name; none if there is no such folder.
+/// Returns the `.json` files of a folder, sorted by name; none if there is no such folder.
 fn json_files(dir: &Path) -> Result<Vec<PathBuf>> {
     let failed = |e| Error::io(dir, "read the folder", e);
     let entries = match std::fs::read_dir(dir) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries.map_err(failed)?,
     };
+
     let mut files = Vec::new();
     for entry in entries {
         let path = entry.map_err(failed)?.path();

@@ -2,6 +2,7 @@
 //! `intrinsic/intrinsic_color.txt`. Source: ScanNet's README, "SensReader".
 
 use crate::camera::matterport::{numbers, parse_capture_pose};
+use crate::camera::numbered::{NumberedFiles, numbered_files};
 use crate::camera::picture::read_picture_size;
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
@@ -10,36 +11,24 @@ use crate::fs::open::read_file;
 use s3d_geom::glam::dvec2;
 use std::path::{Path, PathBuf};
 
-/// Files by the number that each is named by.
-type NumberedFiles = Vec<(u64, PathBuf)>;
-
-/// The folder of a scan with a folder `pose` that holds `0.txt` or another number; `dir` may be that folder
-/// itself.
+/// Returns the folder of a scan, and the files of its poses: those in its folder `pose` that are named by a
+/// number, such as `0.txt`. `dir` is the folder of the scan or its folder `pose`.
 pub(crate) fn find(dir: &Path) -> Result<Option<(PathBuf, NumberedFiles)>> {
     let is_pose = dir.file_name().is_some_and(|name| name == "pose");
     for (scan, poses) in [(dir.to_owned(), dir.join("pose")), (dir.join(".."), dir.to_owned())] {
         if !poses.is_dir() || (poses == *dir && !is_pose) {
             continue;
         }
-        let failed = |e| Error::io(&poses, "read the folder", e);
-        let mut files = Vec::new();
-        for entry in std::fs::read_dir(&poses).map_err(failed)? {
-            let path = entry.map_err(failed)?.path();
-            let number = path.file_stem().and_then(|stem| stem.to_str()?.parse::<u64>().ok());
-            if let (Some(number), true) = (number, path.extension().is_some_and(|e| e == "txt")) {
-                files.push((number, path));
-            }
-        }
+        let files = numbered_files(&poses, "txt")?;
         if !files.is_empty() {
-            files.sort();
             return Ok(Some((scan, files)));
         }
     }
     Ok(None)
 }
 
-/// The cameras of a scan that [`find`] found, by number; how many poses are left out since ScanNet marks
-/// them as not known: they hold −∞; and the files that were read.
+/// Reads the cameras of a scan that [`find`] found, by number. Also returns the number of poses that are left
+/// out, because ScanNet marks them as unknown by −∞, and the files that were read.
 pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera>, usize, Vec<PathBuf>)> {
     let intrinsics = scan.join("intrinsic").join("intrinsic_color.txt");
     let optics = if intrinsics.exists() {
@@ -47,8 +36,10 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
     } else {
         None
     };
-    let (mut cameras, mut untracked) = (Vec::new(), 0);
+    let mut cameras = Vec::new();
+    let mut untracked = 0;
     let mut read: Vec<PathBuf> = optics.iter().map(|_| intrinsics.clone()).collect();
+
     for (number, path) in files {
         let bytes = read_file(&path)?;
         read.push(path.clone());
@@ -61,6 +52,7 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
         let picture = picture.into_iter().find(|path| path.is_file());
         cameras.push(PosedCamera { name: number.to_string(), pose, size: None, optics, picture, line: 0 });
     }
+
     // All pictures of a scan are of one size.
     if let Some(picture) = cameras.iter().find_map(|camera| camera.picture.as_deref()) {
         let (width, height) = read_picture_size(picture)?;
@@ -71,7 +63,7 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
     Ok((cameras, untracked, read))
 }
 
-/// Whether a matrix holds an infinity or no number.
+/// Returns whether a matrix holds an infinity or NaN.
 fn is_unknown(bytes: &[u8]) -> bool {
     let words = bytes
         .split(u8::is_ascii_whitespace)
@@ -81,7 +73,7 @@ fn is_unknown(bytes: &[u8]) -> bool {
         .any(|number| !number.is_finite())
 }
 
-/// K in the upper left of a 4 × 4 or 3 × 3 matrix.
+/// Reads the optics from the intrinsic matrix K: a 3 × 3 matrix, or the upper left of a 4 × 4 matrix.
 fn optics(path: &Path) -> Result<Optics> {
     let numbers: Vec<f64> = numbers(&read_file(path)?, path)?
         .into_iter()
@@ -95,6 +87,7 @@ fn optics(path: &Path) -> Result<Optics> {
             return Err(Error::format(path, message));
         }
     };
+
     if fx <= 0.0 || fy <= 0.0 {
         return Err(Error::format(path, format!("focal lengths of {fx} and {fy} px: both must be above 0")));
     }
@@ -110,7 +103,7 @@ mod tests {
 
     const K: &str = "1170.1 0.0 647.7 0.0\n0.0 1170.2 483.7 0.0\n0 0 1 0\n0 0 0 1\n";
 
-    /// Poses 10, 2 and 3, of which the last is not known.
+    /// Returns a scan with the poses 10, 2 and 3. Pose 3 is not known.
     fn scan() -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);

@@ -11,48 +11,51 @@ use s3d_geom::glam::{DVec3, dvec2};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// A location farther than this from the origin is no place in a building.
+/// The farthest that a location may be from the origin, metres.
 pub(crate) const FARTHEST_M: f64 = 1e7;
 
 /// The columns of a table without a header, in this order.
 const COLUMNS: [&str; 8] = ["uuid", "x", "y", "z", "qx", "qy", "qz", "qw"];
 
-/// The columns that turn a camera: one of these sets, of which `pitch` may be missing.
+/// The columns that turn a camera. A table has one of these sets; `pitch` may be missing.
 const TURNS: [&[&str]; 3] = [&["qx", "qy", "qz", "qw"], &["look_x", "look_y", "look_z"], &["yaw", "pitch"]];
 
-/// The columns of a camera's size and optics, which may be missing, and their cells empty.
+/// The columns of a camera's size and optics. They may be missing, and their cells may be empty.
 const CAMERA: [&str; 7] = ["width", "height", "fov", "fx", "fy", "cx", "cy"];
 
-/// A place from which the scanner looked around.
+/// The columns that a header needs, for messages.
+const FORM: &str = "uuid or name, x,y,z, and qx,qy,qz,qw or look_x,look_y,look_z or yaw,pitch";
+
+/// A place where the scanner stood.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanLocation {
-    /// Its name: 32 lower-case hexadecimal digits.
+    /// The name: 32 lower-case hexadecimal digits.
     pub uuid: String,
-    /// Where it is, world metres, and how its camera is turned: E(original) of formats.md, "What is
+    /// The position in world metres, and the rotation of the camera: E(original) of formats.md, "What is
     /// written".
     pub pose: Pose,
-    /// Its line in the table, from 1; 0 if it comes from a file without lines.
+    /// The line in the table, from 1; 0 if the location comes from a file without lines.
     pub line: u64,
 }
 
-/// Reads a table of scan locations: CSV with the columns `uuid,x,y,z,qx,qy,qz,qw`, metres in the Z-up world
-/// and the scanner's rotation, of any length but zero, as a quaternion.
+/// Reads a table of scan locations: CSV with the columns `uuid,x,y,z,qx,qy,qz,qw`. Positions are in metres in
+/// the Z-up world. The quaternion is the scanner's rotation, of any length but zero.
 ///
-/// A first line with names gives their order; without one it is that order. With names, `name` may stand for
-/// `uuid`, and for the quaternion a place to look at (`look_x,look_y,look_z`) or a heading in degrees
-/// (`yaw`, and perhaps `pitch`). A uuid may be in upper case and hyphenated; where no location has one, their
-/// names ("scan_0") are turned into uuids by [`uuid_from_name`]. Lines that start with `#` and empty lines do
-/// not count. Source: formats.md, "Scan locations".
+/// The first line may name the columns, in any order. Then `name` may stand for `uuid`. A place to look at
+/// (`look_x,look_y,look_z`) or a heading in degrees (`yaw`, and perhaps `pitch`) may stand for the
+/// quaternion. A uuid may be in upper case and hyphenated. If no location has a uuid, [`uuid_from_name`]
+/// makes them from the names ("scan_0"). Lines that start with `#` and empty lines do not count. Source:
+/// formats.md, "Scan locations".
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`], with the line, for a wrong number of fields, a name that is no uuid
-/// beside others that are, one that is there twice, a number that is not finite, a quaternion of zeros; for
-/// the file, if it has no location.
+/// [`Error::Io`]; [`Error::Format`] with the line, for a wrong number of fields, a name that is no uuid among
+/// uuids, a name that occurs twice, a number that is not finite, or a quaternion of zeros; [`Error::Format`]
+/// for the file if it has no location.
 pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
     parse_cameras(&read_file(path)?, path)
 }
 
-/// As [`read_cameras`], from the file's bytes; errors call it `name`.
+/// Reads like [`read_cameras`], from the file's bytes. Errors call the file `name`.
 ///
 /// ```
 /// use s3d_io::camera::parse_cameras;
@@ -65,10 +68,9 @@ pub fn read_cameras(path: &Path) -> Result<Vec<ScanLocation>> {
 /// ```
 ///
 /// # Errors
-/// As [`read_cameras`].
+/// Like [`read_cameras`].
 pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
-    let path = name;
-    let rows = read_rows(path, bytes)?;
+    let rows = read_rows(name, bytes)?;
     let written: Vec<String> = rows
         .iter()
         .map(|row| {
@@ -79,58 +81,57 @@ pub fn parse_cameras(bytes: &[u8], name: &Path) -> Result<Vec<ScanLocation>> {
                 .collect()
         })
         .collect();
-    let uuids = written.iter().filter(|name| is_uuid(name)).count();
-    if let (true, Some((row, _))) = (uuids > 0, rows.iter().zip(&written).find(|(_, name)| !is_uuid(name))) {
+
+    // Either all names are uuids or none.
+    let has_uuids = written.iter().any(|name| is_uuid(name));
+    let other = rows.iter().zip(&written).find(|(_, name)| !is_uuid(name));
+    if has_uuids && let Some((row, _)) = other {
         let message = format!("{:?} is no uuid of 32 hexadecimal digits, as others here are", row.name);
-        return Err(Error::line(path, row.line, message));
+        return Err(Error::line(name, row.line, message));
     }
+
     let mut lines: HashMap<String, u64> = HashMap::new();
     let mut locations = Vec::with_capacity(rows.len());
-    for (PosedCamera { name, pose, line, .. }, written) in rows.into_iter().zip(written) {
-        let uuid = if uuids > 0 { written } else { uuid_from_name(&name) };
+    for (PosedCamera { name: location, pose, line, .. }, written) in rows.into_iter().zip(written) {
+        let uuid = if has_uuids { written } else { uuid_from_name(&location) };
         if let Some(first) = lines.insert(uuid.clone(), line) {
-            let name = if uuids > 0 { &uuid } else { &name };
-            return Err(Error::line(path, line, format!("location {name} is on line {first} already")));
+            let location = if has_uuids { &uuid } else { &location };
+            return Err(Error::line(name, line, format!("location {location} is on line {first} already")));
         }
         locations.push(ScanLocation { uuid, pose, line });
     }
     Ok(locations)
 }
 
-/// The cameras of a table. Names are as they are written, and may be there twice.
+/// Reads the cameras of a table. Names are as they are written, and may occur twice.
 pub(crate) fn read_rows(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
     let bytes = text_of(bytes, path)?;
     let mut rows = Vec::new();
     let mut header: Option<Header> = None;
-    // Line by line: csv counts the comments and empty lines before a record to the record.
+    // Read line by line, because csv counts comments and empty lines before a record to the record.
     for (line, text) in (1..).zip(bytes.split(|&b| b == b'\n')) {
         let text = text.trim_ascii();
         if text.is_empty() || text.starts_with(b"#") {
             continue;
         }
+
         let record = fields(text).map_err(|e| Error::line(path, line, e.to_string()))?;
         let header = match &header {
             Some(header) => header,
-            None => {
-                let is_name = |field: &[u8]| {
-                    [&b"uuid"[..], b"name", b"x"]
-                        .iter()
-                        .any(|n| field.eq_ignore_ascii_case(n))
-                };
-                if record.iter().any(is_name) {
-                    let read = Header::new(&record).map_err(|message| Error::line(path, line, message))?;
-                    header = Some(read);
-                    continue;
-                }
-                header.insert(Header::plain())
+            None if has_names(&record) => {
+                header = Some(Header::new(&record).map_err(|message| Error::line(path, line, message))?);
+                continue;
             }
+            None => header.insert(Header::plain()),
         };
+
         if record.len() != header.columns.len() {
             let columns = header.columns.join(",");
             let message =
                 format!("{} fields; a location has {}: {columns}", record.len(), header.columns.len());
             return Err(Error::line(path, line, message));
         }
+
         let row = Row { record: &record, header };
         rows.push(row.camera(line).map_err(|message| Error::line(path, line, message))?);
     }
@@ -140,13 +141,22 @@ pub(crate) fn read_rows(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
     Ok(rows)
 }
 
+/// Returns whether a table's first line names its columns.
+fn has_names(record: &ByteRecord) -> bool {
+    record.iter().any(|field| {
+        [&b"uuid"[..], b"name", b"x"]
+            .iter()
+            .any(|n| field.eq_ignore_ascii_case(n))
+    })
+}
+
 fn is_uuid(text: &str) -> bool {
     text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
 }
 
-/// The fields of a line, without white space around them.
+/// Returns the fields of a line, without white space around them.
 fn fields(text: &[u8]) -> csv::Result<ByteRecord> {
-    // Making a reader takes a hundred times as long as cutting a line without quotes.
+    // Making a reader takes a hundred times as long as splitting a line without quotes.
     if !text.contains(&b'"') {
         return Ok(text.split(|b| *b == b',').map(<[u8]>::trim_ascii).collect());
     }
@@ -159,7 +169,7 @@ fn fields(text: &[u8]) -> csv::Result<ByteRecord> {
     Ok(record)
 }
 
-/// How a table's cameras are turned.
+/// The columns that say how a table's cameras are turned.
 #[derive(Clone, Copy)]
 enum Turn {
     Quaternion([usize; 4]),
@@ -167,70 +177,88 @@ enum Turn {
     Heading { yaw: usize, pitch: Option<usize> },
 }
 
-/// Which columns a table has, and where.
+/// The columns of a table, and their places.
 struct Header {
     columns: Vec<String>,
     name: usize,
     place: [usize; 3],
     turn: Turn,
-    /// Those of [`CAMERA`].
+    /// The places of the columns [`CAMERA`].
     camera: [Option<usize>; 7],
 }
 
 impl Header {
-    /// Of a table without one.
+    /// Returns the header of a table that has none.
     fn plain() -> Self {
         let columns = COLUMNS.map(str::to_owned).to_vec();
         let turn = Turn::Quaternion([4, 5, 6, 7]);
         Self { columns, name: 0, place: [1, 2, 3], turn, camera: [None; 7] }
     }
 
+    /// Reads the names of a table's columns. The error is a sentence.
     fn new(record: &ByteRecord) -> std::result::Result<Self, String> {
-        const FORM: &str = "uuid or name, x,y,z, and qx,qy,qz,qw or look_x,look_y,look_z or yaw,pitch";
         let columns: Vec<String> = record
             .iter()
             .map(|field| String::from_utf8_lossy(field).to_ascii_lowercase())
             .collect();
-        let find = |name: &str| columns.iter().position(|column| column == name);
-        let needed = |name: &str| {
-            find(name).ok_or_else(|| format!("the header has no column {name}; it needs {FORM}"))
-        };
-        let name = find("uuid").map_or_else(|| find("name").ok_or(()), Ok);
-        let name = name.map_err(|()| format!("the header has no column uuid or name; it needs {FORM}"))?;
-        let place = [needed("x")?, needed("y")?, needed("z")?];
-        let kinds: Vec<&&[&str]> = TURNS
-            .iter()
-            .filter(|names| names.iter().any(|n| find(n).is_some()))
-            .collect();
-        let turn = match kinds.as_slice() {
-            [["qx", ..]] => Turn::Quaternion([needed("qx")?, needed("qy")?, needed("qz")?, needed("qw")?]),
-            [["look_x", ..]] => Turn::Target([needed("look_x")?, needed("look_y")?, needed("look_z")?]),
-            [_] => Turn::Heading { yaw: needed("yaw")?, pitch: find("pitch") },
-            [] => return Err(format!("the header does not say how cameras are turned; it needs {FORM}")),
-            _ => return Err(format!("the header says twice how cameras are turned; it needs {FORM}")),
-        };
-        let known = |column: &str| {
-            let all = COLUMNS
-                .iter()
-                .chain(["name"].iter())
-                .chain(TURNS.iter().copied().flatten())
-                .chain(&CAMERA);
-            all.into_iter().any(|name| *name == column)
-        };
+        let name = find(&columns, "uuid")
+            .or_else(|| find(&columns, "name"))
+            .ok_or_else(|| format!("the header has no column uuid or name; it needs {FORM}"))?;
+        let place = [needed(&columns, "x")?, needed(&columns, "y")?, needed(&columns, "z")?];
+        let turn = Turn::of_columns(&columns)?;
+
         for (i, column) in columns.iter().enumerate() {
-            if !known(column) || (i != name && ["uuid", "name"].contains(&column.as_str())) {
+            if !is_known(column) || (i != name && ["uuid", "name"].contains(&column.as_str())) {
                 let more = CAMERA.join(",");
                 return Err(format!(
                     "the header has a column {column:?}; it needs {FORM}, and may have {more}"
                 ));
             }
-            if find(column) != Some(i) {
+            if find(&columns, column) != Some(i) {
                 return Err(format!("the header has two columns {column}"));
             }
         }
-        let camera = CAMERA.map(find);
+        let camera = CAMERA.map(|name| find(&columns, name));
         Ok(Self { columns, name, place, turn, camera })
     }
+}
+
+impl Turn {
+    /// Finds the columns that turn a camera. The error is a sentence.
+    fn of_columns(columns: &[String]) -> std::result::Result<Self, String> {
+        let sets: Vec<&&[&str]> = TURNS
+            .iter()
+            .filter(|names| names.iter().any(|name| find(columns, name).is_some()))
+            .collect();
+        let needed = |name: &str| needed(columns, name);
+        match sets.as_slice() {
+            [["qx", ..]] => {
+                Ok(Self::Quaternion([needed("qx")?, needed("qy")?, needed("qz")?, needed("qw")?]))
+            }
+            [["look_x", ..]] => Ok(Self::Target([needed("look_x")?, needed("look_y")?, needed("look_z")?])),
+            [_] => Ok(Self::Heading { yaw: needed("yaw")?, pitch: find(columns, "pitch") }),
+            [] => Err(format!("the header does not say how cameras are turned; it needs {FORM}")),
+            _ => Err(format!("the header says twice how cameras are turned; it needs {FORM}")),
+        }
+    }
+}
+
+fn find(columns: &[String], name: &str) -> Option<usize> {
+    columns.iter().position(|column| column == name)
+}
+
+fn needed(columns: &[String], name: &str) -> std::result::Result<usize, String> {
+    find(columns, name).ok_or_else(|| format!("the header has no column {name}; it needs {FORM}"))
+}
+
+/// Returns whether a table may have a column of this name.
+fn is_known(column: &str) -> bool {
+    COLUMNS
+        .iter()
+        .chain(["name"].iter())
+        .chain(TURNS.iter().copied().flatten())
+        .chain(&CAMERA)
+        .any(|name| *name == column)
 }
 
 /// A line of a table.
@@ -257,6 +285,7 @@ impl Row<'_> {
         Ok(DVec3::new(x?, y?, z?))
     }
 
+    /// Returns the camera of the line. The error is a sentence.
     fn camera(&self, line: u64) -> std::result::Result<PosedCamera, String> {
         let name = self.text(self.header.name).into_owned();
         if name.is_empty() {
@@ -269,48 +298,58 @@ impl Row<'_> {
                 "({x}, {y}, {z}) is more than {FARTHEST_M} m from the origin: are these metres?"
             ));
         }
-        let pose = match self.header.turn {
+
+        let pose = self.pose(at)?;
+        let (size, optics) = self.intrinsics()?;
+        Ok(PosedCamera { name, pose, size, optics, picture: None, line })
+    }
+
+    /// Returns the pose of the camera, which is at `at`.
+    fn pose(&self, at: DVec3) -> std::result::Result<Pose, String> {
+        match self.header.turn {
             Turn::Quaternion(columns) => {
                 let [x, y, z, w] = columns.map(|column| self.number(column));
-                Pose::from_scanner(at, rotation([x?, y?, z?, w?])?)
+                Ok(Pose::from_scanner(at, rotation([x?, y?, z?, w?])?))
             }
             Turn::Target(columns) => {
                 let target = self.vector(columns)?;
-                // Straight up or down the top of the image is north, as that of a heading of 0 is.
+                // In an image straight up or down the top is north, as for a heading of 0.
                 let flat = (target - at).truncate().length() < 1e-9 * (target - at).length();
                 let up = if flat {
                     DVec3::Y * (at.z - target.z).signum()
                 } else {
                     DVec3::Z
                 };
-                Pose::look_at(at, target, up).map_err(|e| e.to_string())?
+                Pose::look_at(at, target, up).map_err(|e| e.to_string())
             }
             Turn::Heading { yaw, pitch } => {
                 let pitch_deg = pitch.map_or(Ok(0.0), |column| self.number(column))?;
-                Pose::level(at, self.number(yaw)?.to_radians()).turned(0.0, pitch_deg.to_radians())
+                Ok(Pose::level(at, self.number(yaw)?.to_radians()).turned(0.0, pitch_deg.to_radians()))
             }
-        };
-        let (size, optics) = self.intrinsics()?;
-        Ok(PosedCamera { name, pose, size, optics, picture: None, line })
+        }
     }
 
-    fn intrinsics(&self) -> std::result::Result<(Option<[u32; 2]>, Option<Optics>), String> {
-        // An empty cell is as good as no column.
-        let cell = |column: Option<usize>| match column {
+    /// Returns the number in a cell; `None` if the cell is empty or there is no such column.
+    fn optional(&self, column: Option<usize>) -> std::result::Result<Option<f64>, String> {
+        match column {
             Some(column) if !self.text(column).is_empty() => self.number(column).map(Some),
             _ => Ok(None),
-        };
-        let [width, height, fov, fx, fy, cx, cy] = self.header.camera.map(cell);
+        }
+    }
+
+    /// Returns size and optics, where the line tells them.
+    fn intrinsics(&self) -> std::result::Result<(Option<[u32; 2]>, Option<Optics>), String> {
+        let [width, height, fov, fx, fy, cx, cy] = self.header.camera.map(|column| self.optional(column));
         let size = match (width?, height?) {
             (None, None) => None,
             (Some(width), Some(height)) => {
-                let side = |v: f64| (v.fract() == 0.0 && (1.0..=1e9).contains(&v)).then_some(v as u32);
                 let size = side(width).zip(side(height));
                 let (width, height) = size.ok_or_else(|| format!("an image of {width} × {height} pixels"))?;
                 Some([width, height])
             }
             _ => return Err("width and height go together".to_owned()),
         };
+
         let optics = match (fov?, fx?, fy?, cx?, cy?) {
             (None, None, None, None, None) => None,
             (Some(deg), None, None, None, None) if deg > 0.0 && deg < 180.0 => {
@@ -329,8 +368,14 @@ impl Row<'_> {
             }
             _ => return Err("a camera has fov, or fx and perhaps fy, cx and cy".to_owned()),
         };
+
         Ok((size, optics))
     }
+}
+
+/// Returns the side of a picture in pixels, if the number is one.
+fn side(number: f64) -> Option<u32> {
+    (number.fract() == 0.0 && (1.0..=1e9).contains(&number)).then_some(number as u32)
 }
 
 #[cfg(test)]
@@ -355,6 +400,7 @@ mod tests {
         assert_eq!(plain[0].pose, Pose::from_scanner(dvec3(1.0, 2.0, 3.0), DQuat::IDENTITY));
         assert_eq!((plain[1].uuid.as_str(), plain[1].line), ("508160ba5d80a2e365609578a09bab8b", 4));
         assert!(plain[1].pose.forward().abs_diff_eq(-DVec3::Y, 1e-12));
+
         let header = read(&format!("\u{feff}X,y,z,uuid,qw,qx,qy,qz\n1,2,3,{A},1,0,0,0\n")).unwrap();
         assert_eq!(header[0].pose, plain[0].pose);
     }
@@ -377,7 +423,7 @@ mod tests {
         let look =
             read("look_x,name,x,y,z,look_y,look_z\n4,a,1,2,3,2,3\n1,b,1,2,3,2,0\n1,c,1,2,3,2,9\n").unwrap();
         assert!(look[0].pose.forward().abs_diff_eq(DVec3::X, 1e-12) && look[0].pose.up() == DVec3::Z);
-        // As a camera at heading 0 that is tilted down, and up.
+        // Like cameras at heading 0 that are tilted down and up.
         for (location, pitch_deg) in [(&look[1], -90f64), (&look[2], 90.0)] {
             let tilted = Pose::level(DVec3::ZERO, 0.0).turned(0.0, pitch_deg.to_radians());
             assert!(
@@ -387,6 +433,7 @@ mod tests {
                     .abs_diff_eq(tilted.world_from_camera, 1e-12)
             );
         }
+
         let yaw = read("name,x,y,z,yaw,pitch\na,1,2,3,90,-30\n").unwrap();
         let expected = Pose::level(dvec3(1.0, 2.0, 3.0), 90f64.to_radians()).turned(0.0, -30f64.to_radians());
         assert_eq!((yaw[0].pose, &yaw[0].uuid), (expected, &uuid_from_name("a")));
@@ -394,6 +441,7 @@ mod tests {
             read("yaw,name,x,y,z\n0,a,1,2,3\n").unwrap()[0].pose,
             Pose::level(dvec3(1.0, 2.0, 3.0), 0.0)
         );
+
         for (text, words) in [
             ("name,x,y,z\n", "does not say how cameras are turned"),
             ("name,x,y,z,yaw,qx,qy,qz,qw\n", "says twice"),
@@ -428,7 +476,7 @@ mod tests {
             (None, pinhole(500.0, 510.0, Some(dvec2(320.0, 240.0))))
         );
         assert_eq!(cameras[2].optics, pinhole(500.0, 500.0, None));
-        // Names may be there twice: who makes files of them sees to it.
+        // Names may occur twice: a caller that makes files of them must check.
         assert_eq!(rows("name,x,y,z,yaw\na,0,0,1,0\na,0,0,1,0\n").unwrap().len(), 2);
         for (row, words) in [
             ("a,0,0,1,0,640,,,,,,", "line 2: width and height go together"),

@@ -1,4 +1,4 @@
-//! Trajectories as the RGB-D benchmark of TUM has them: `timestamp tx ty tz qx qy qz qw` a line. Source: its
+//! Trajectories in the form of TUM's RGB-D benchmark: `timestamp tx ty tz qx qy qz qw` a line. Source: its
 //! page "File Formats".
 //!
 //! A pose is camera → world in OpenCV's axes (x right, y down, z forward).
@@ -10,7 +10,7 @@ use crate::fs::quote::quote;
 use s3d_geom::glam::{DMat3, DVec3};
 use std::path::Path;
 
-/// Reads a trajectory from its bytes. A camera's name is its time as it is written.
+/// Reads a trajectory from its bytes. A camera's name is its time, as it is written.
 pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
     const FORM: &str =
         "a line of a trajectory is timestamp tx ty tz qx qy qz qw; a table of cameras has commas";
@@ -20,6 +20,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
         if text.is_empty() || text.starts_with(b"#") {
             continue;
         }
+
         let fault = |message: String| Error::line(path, line, message);
         let form = || fault(format!("{}: {FORM}", quote(text)));
         let words: Vec<&str> = std::str::from_utf8(text)
@@ -27,14 +28,17 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
             .split_ascii_whitespace()
             .collect();
         let [name, numbers @ ..] = words.as_slice() else { return Err(form()) };
+
         let numbers: Option<Vec<f64>> = numbers.iter().map(|word| word.parse().ok()).collect();
         let is_time = name.parse::<f64>().is_ok_and(f64::is_finite);
         let Some(&[x, y, z, qx, qy, qz, qw]) = numbers.as_deref().filter(|_| is_time) else {
             return Err(form());
         };
+
         if ![x, y, z, qx, qy, qz, qw].iter().all(|v| v.is_finite()) {
             return Err(fault("a number of the pose is not finite".into()));
         }
+
         let turn = DMat3::from_quat(rotation([qx, qy, qz, qw]).map_err(fault)?);
         let pose = pose_from_opencv(DVec3::new(x, y, z), turn.x_axis, turn.y_axis, turn.z_axis);
         let name = (*name).to_owned();
@@ -51,8 +55,8 @@ mod tests {
 
     #[test]
     fn a_trajectory_is_read() {
-        // As the benchmark writes it. Both look along +Y: the first level, the second with its right side
-        // down.
+        // In the benchmark's form. Both cameras look along +Y: the first level, the second with its right
+        // side down.
         let text = "# ground truth trajectory\n# timestamp tx ty tz qx qy qz qw\n\
                     1305031098.6659 1.3563 0.6305 1.6380 -0.70710678 0 0 0.70710678\n\n\
                     1305031098.6758 0 0 0 -0.5 0.5 0.5 0.5\r\n";

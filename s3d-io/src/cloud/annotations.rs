@@ -1,4 +1,4 @@
-//! Annotated points of any source: rooms, their instances, and the points of one instance at a time.
+//! Annotated points of any source: rooms, their instances, and the points of each instance.
 
 use crate::cloud::s3dis::tree::OnFault;
 use crate::error::{Error, Result};
@@ -13,42 +13,42 @@ use std::sync::Arc;
 /// How annotated points are read, whatever the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnnotationOptions {
-    /// Which classes and types of rooms there are, what they are called, and what numbers mean.
+    /// The classes and types of rooms, their names, and the meaning of class numbers.
     pub taxonomy: Taxonomy,
-    /// What to do at a name, a line or a record that is not as it should be, and at a class that is none.
+    /// What to do about a faulty name, line or record, and about an unknown class.
     pub on_fault: OnFault,
-    /// Whether a class that is unknown, and not in [`AnnotationOptions::classes`], is taken for clutter:
-    /// [`Taxonomy::clutter`], if there is such a class.
+    /// Whether unknown classes that are not in [`AnnotationOptions::classes`] count as clutter, if the
+    /// taxonomy has such a class ([`Taxonomy::clutter`]).
     pub unknown_as_clutter: bool,
-    /// Which class a name or number in the files means; `None`: points of it are left out, as if they were
-    /// not annotated. Names are compared to the letter, numbers as decimals: `"2"`.
+    /// The class that a name or number in the files stands for. `None`: its points are left out, as if they
+    /// were not annotated. Names are case-sensitive; numbers are written as decimals: `"2"`.
     pub classes: BTreeMap<String, Option<Class>>,
-    /// The room of points whose file names none. With a column of room *numbers*, the type of these rooms.
+    /// The room of points whose file names none. If a column holds room *numbers*, the type of these rooms.
     pub room: Option<Room>,
-    /// The name of the column of classes; `None`: what the format calls it.
+    /// The name of the column of classes. `None`: one of the usual names.
     pub class_column: Option<String>,
-    /// The name of the column of instance numbers; `None`: what the format calls it, or none.
+    /// The name of the column of instance numbers. `None`: one of the usual names, if there is such a column.
     pub instance_column: Option<String>,
-    /// The name of the column of rooms; `None`: there is none.
+    /// The name of the column of rooms. `None`: there is no such column.
     pub room_column: Option<String>,
-    /// The names of the columns of a file that has none (a plain NPY array), from the first; empty: `x y z r
-    /// g b class` and, if there is one more, `instance`.
+    /// The names of the columns, in order, for a file that does not name them (a plain NPY array). Empty: `x
+    /// y z r g b class` and, if there is one more column, `instance`.
     pub columns: Vec<String>,
-    /// What is subtracted from coordinates in `f64` before they are rounded to `f32`: metres. For
-    /// georeferenced clouds.
+    /// The offset that is subtracted from coordinates in `f64`, before they are rounded to `f32`: metres.
+    /// For georeferenced clouds.
     pub offset_m: DVec3,
-    /// The box of the mesh that they belong to, world metres: points that all lie far from it
-    /// ([`FrameGap`](crate::cloud::FrameGap)) are refused, as soon as that is known. `None`: anywhere.
+    /// The box of the mesh that the points belong to, in world metres. A file whose points all lie far from
+    /// it ([`FrameGap`](crate::cloud::FrameGap)) is refused as soon as that is known. `None`: no check.
     pub mesh_bounds: Option<Aabb>,
-    /// A cloud with more points than this waits in a temporary file to be read by instance, and not in memory
-    /// (15 bytes a point).
+    /// The most points of a cloud that are sorted by instance in memory (15 bytes a point). A larger cloud is
+    /// sorted in a temporary file.
     pub points_in_memory: u64,
-    /// The folder for such a file; `None`: the system's.
+    /// The folder for this temporary file. `None`: the system's folder for temporary files.
     pub spool_dir: Option<PathBuf>,
 }
 
 impl Default for AnnotationOptions {
-    /// Faults stop, classes are S3DIS's by name, and 20 million points (300 MB) fit in memory.
+    /// Stops at faults, takes S3DIS's classes by name, and keeps up to 20 million points (300 MB) in memory.
     fn default() -> Self {
         Self {
             taxonomy: Taxonomy::s3dis(),
@@ -71,76 +71,75 @@ impl Default for AnnotationOptions {
 /// The annotated instances of an area, by room.
 #[derive(Clone, Debug)]
 pub struct Annotations {
-    /// Which taxonomy the classes and rooms are of.
+    /// The taxonomy of the classes and rooms.
     pub taxonomy: Taxonomy,
     /// The rooms, by type and number, each once. At least one.
     pub rooms: Vec<AnnotatedRoom>,
-    /// What was left out or taken for something else: a sentence each, for the user.
+    /// What was left out or reinterpreted: a sentence each, for the user.
     pub warnings: Vec<String>,
 }
 
-/// A room and what stands in it.
+/// A room and its instances.
 #[derive(Clone, Debug)]
 pub struct AnnotatedRoom {
-    /// Which room it is.
+    /// The room.
     pub room: Room,
     /// Its instances, by class and number, each once. At least one.
     pub instances: Vec<AnnotatedInstance>,
 }
 
-/// An annotated instance, whose points wait where they are until they are read.
+/// An annotated instance. Its points stay at their source until they are read.
 #[derive(Clone, Debug)]
 pub struct AnnotatedInstance {
-    /// What it is.
+    /// Its class.
     pub class: Class,
-    /// Its number among the room's instances of its class, from 1.
+    /// Its number among the room's instances of the same class, from 1.
     pub number: u32,
     points: Arc<dyn InstancePoints>,
 }
 
-/// What was left out while points were read with [`OnFault::Skip`].
+/// The lines or records left out while points were read with [`OnFault::Skip`].
 #[derive(Debug, Default)]
 pub struct Skipped {
-    /// How many lines or records.
+    /// The number of lines or records left out.
     pub count: u64,
-    /// What was wrong with the first of them, with its place.
+    /// The fault of the first of them, and its place.
     pub first: Option<Error>,
 }
 
-/// Where the points of one instance are.
+/// The source of one instance's points.
 pub(crate) trait InstancePoints: Debug + Send + Sync {
-    /// Appends the instance's points to `out`: positions, a colour for each (black if the file has none), and
-    /// faces if they are known.
+    /// Appends the instance's points to `out`: positions, a colour each (black if the file has none), and the
+    /// face of each point if it is known.
     fn read(&self, out: &mut PointCloud) -> Result<Skipped>;
 
-    /// The file that holds them.
+    /// The file that holds the points.
     fn path(&self) -> &Path;
 
-    /// Which instance of that file they are, for messages; empty if it holds no other.
+    /// The instance's name within the file, for messages. Empty if the file holds no other instance.
     fn part(&self) -> String;
 
-    /// Whether they are the vertices of a mesh.
+    /// Whether the points are the vertices of a mesh.
     fn are_vertices(&self) -> bool {
         false
     }
 
-    /// The same points, to be read block by block.
+    /// Opens the same points, to be read block by block.
     fn open(&self) -> Result<Box<dyn PointBlocks + '_>>;
 
-    /// The folder for a copy of the points, if reading them a second time would take longer than reading
-    /// that.
+    /// The folder for a copy of the points, if a copy would be faster to read a second time than the source.
     fn copy_to(&self) -> Option<PathBuf> {
         None
     }
 }
 
-/// The points of an instance as their source reads them.
+/// The points of an instance, in blocks as their source reads them.
 pub(crate) trait PointBlocks: Send {
-    /// Appends the next points to `out`: about as many as asked for, or fewer if there are no more. `false`:
-    /// these were the last.
+    /// Appends about `points` more points to `out`, or the rest if fewer are left. Returns `false` after the
+    /// last block.
     fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool>;
 
-    /// What was left out so far.
+    /// The lines or records left out so far.
     fn skipped(&mut self) -> Skipped;
 }
 
@@ -149,16 +148,16 @@ impl AnnotatedInstance {
         Self { class, number, points }
     }
 
-    /// Appends the instance's points to `out`: world metres, Z-up, a colour for each (black if the file has
-    /// none). [`PointCloud::faces`] comes to have an entry a point if it is known already which face each
-    /// point belongs to. Points of a file, and the order of points, are the same each time.
+    /// Appends the instance's points to `out`: world metres, Z-up, a colour each (black if the file has
+    /// none). If the source knows the face of each point, [`PointCloud::faces`] gets an entry a point. Every
+    /// call gives the same points in the same order.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] with the line for a point that is none, unless it is to be skipped.
-    /// `out` may then hold the points before it.
+    /// [`Error::Io`]; [`Error::Format`] with the line or record of an invalid point, unless such points are
+    /// skipped. After an error, `out` may hold the points read so far.
     ///
     /// # Panics
-    /// If `out` has points without colours, or with faces where these points have none.
+    /// If `out` has points without colours, or with faces although these points have none.
     pub fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
         self.points.read(out)
     }
@@ -171,20 +170,21 @@ impl AnnotatedInstance {
         self.points.copy_to()
     }
 
-    /// Whether its points are the vertices of a mesh. Where that is the scene's own, a vertex is equally near
-    /// to all faces around it, and should vote for each of them.
+    /// Whether its points are the vertices of a mesh. In the scene's own mesh, a vertex is equally near to
+    /// all faces around it, and should vote for each of them.
     pub fn are_vertices(&self) -> bool {
         self.points.are_vertices()
     }
 
-    /// The file that its points are in.
+    /// The file that holds its points.
     pub fn path(&self) -> &Path {
         self.points.path()
     }
 
-    /// Where its points are, for messages: the file, and which instance in it if it holds several.
+    /// The source of its points, for messages: the file, and the instance's name in it if it holds several.
     pub fn source(&self) -> String {
-        let (path, part) = (self.path().display(), self.points.part());
+        let path = self.path().display();
+        let part = self.points.part();
         if part.is_empty() {
             path.to_string()
         } else {

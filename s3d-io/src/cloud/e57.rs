@@ -29,24 +29,25 @@ impl<'a> E57Cloud<'a> {
     }
 }
 
-/// Where in the values of a point things are.
+/// One scan of the file: what each value of its points is.
 struct Scan<'a> {
     prototype: &'a [Record],
     columns: Columns,
-    /// Range, azimuth and elevation in place of x, y and z.
+    /// Whether the coordinates are range, azimuth and elevation in place of x, y and z.
     is_spherical: bool,
-    /// 1: a direction only; 2: nothing.
+    /// The column of invalid states. 1: the point has a direction only; 2: it has nothing.
     invalid: Option<usize>,
+    /// The column that marks points without a colour.
     colorless: Option<usize>,
     /// The smallest and the largest value of each colour.
     limits: [(f64, f64); 3],
     rotation: DQuat,
     translation: DVec3,
-    /// The room that the scan is named after.
+    /// The room, if the scan is named after one.
     room: Option<String>,
 }
 
-/// The attribute's name as a user writes it: without the namespace's prefix if `bare`.
+/// The name of an attribute as users write it, without the namespace's prefix if `bare`.
 fn name_of(name: &RecordName, bare: bool) -> String {
     match name {
         RecordName::CartesianX => "x".to_owned(),
@@ -79,71 +80,39 @@ fn name_of(name: &RecordName, bare: bool) -> String {
 impl<'a> Scan<'a> {
     fn new(path: &Path, options: &AnnotationOptions, cloud: &'a PointCloud) -> Result<Self> {
         let prototype = &cloud.prototype[..];
-        let find = |name: &RecordName| prototype.iter().position(|r| r.name == *name);
         let is_spherical = !cloud.has_cartesian();
         if is_spherical && !cloud.has_spherical() {
             return Err(Error::format(path, "has a scan without coordinates"));
         }
-        // An attribute can be named with its prefix (`ext:label`) or without.
-        let asked = [&options.class_column, &options.instance_column, &options.room_column];
-        let with_prefix = asked.into_iter().flatten().any(|a| a.contains(':'));
-        let mut names: Vec<String> = prototype.iter().map(|r| name_of(&r.name, !with_prefix)).collect();
-        if is_spherical {
-            for (record, name) in prototype.iter().zip(&mut names) {
-                let stands_for = match record.name {
-                    RecordName::SphericalRange => "x",
-                    RecordName::SphericalAzimuth => "y",
-                    RecordName::SphericalElevation => "z",
-                    _ => continue,
-                };
-                stands_for.clone_into(name);
-            }
-        }
-        let columns = Columns::choose(path, &names, options).map_err(|e| match e {
-            Error::Format { message, .. } if message.contains("no column of classes") => Error::format(
-                path,
-                format!(
-                    "{message}. E57 itself knows no classes: export the labelled points with an attribute \
-                     for them, or as LAS or PLY"
-                ),
-            ),
-            e => e,
-        })?;
-        let limits = columns.color.map_or([(0.0, 255.0); 3], |channels| {
-            let of_file = cloud.color_limits.as_ref();
-            let stated = [
-                of_file.and_then(|l| Some((l.red_min.as_ref()?, l.red_max.as_ref()?))),
-                of_file.and_then(|l| Some((l.green_min.as_ref()?, l.green_max.as_ref()?))),
-                of_file.and_then(|l| Some((l.blue_min.as_ref()?, l.blue_max.as_ref()?))),
-            ];
-            let limits = |(stated, channel): (Option<(&RecordValue, &RecordValue)>, usize)| {
-                let kind = &prototype.get(channel)?.data_type;
-                let stated = stated.and_then(|(a, b)| Some((a.to_f64(kind).ok()?, b.to_f64(kind).ok()?)));
-                stated.or(range_of(kind)).filter(|(a, b)| b > a)
-            };
-            let [r, g, b] = channels;
-            let [of_r, of_g, of_b] = stated;
-            [(of_r, r), (of_g, g), (of_b, b)].map(|channel| limits(channel).unwrap_or((0.0, 255.0)))
-        });
+        let columns = columns_of(path, options, prototype, is_spherical)?;
+        let limits = columns
+            .color
+            .map_or([(0.0, 255.0); 3], |channels| color_limits(cloud, channels));
+
         let (rotation, translation) = pose_of(cloud);
         if !rotation.is_finite() || rotation.length() < 0.5 {
             let q = cloud.transform.clone().unwrap_or_default().rotation;
             return Err(Error::format(path, format!("has a scan whose pose has no rotation: {q:?}")));
         }
+
         let room = cloud
             .name
             .clone()
             .filter(|name| name.parse::<s3d_label::Room>().is_ok());
+
         Ok(Self {
             prototype,
             columns,
             is_spherical,
-            invalid: find(if is_spherical {
-                &RecordName::SphericalInvalidState
-            } else {
-                &RecordName::CartesianInvalidState
-            }),
-            colorless: find(&RecordName::IsColorInvalid),
+            invalid: attribute_index(
+                prototype,
+                if is_spherical {
+                    &RecordName::SphericalInvalidState
+                } else {
+                    &RecordName::CartesianInvalidState
+                },
+            ),
+            colorless: attribute_index(prototype, &RecordName::IsColorInvalid),
             limits,
             rotation: rotation.normalize(),
             translation,
@@ -151,7 +120,7 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// A number of a point; not a number if there is none.
+    /// Value `i` of a point as a number. Returns NaN if it has none.
     fn float(&self, values: &RawValues, i: usize) -> f64 {
         let value = values.get(i).zip(self.prototype.get(i));
         value
@@ -166,7 +135,7 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Whether the point has no place.
+    /// Whether the point has no position.
     fn is_invalid(&self, values: &RawValues) -> bool {
         self.invalid.is_some_and(|i| self.float(values, i) != 0.0)
     }
@@ -174,8 +143,10 @@ impl<'a> Scan<'a> {
     fn position(&self, values: &RawValues) -> DVec3 {
         let [a, b, c] = self.columns.position.map(|i| self.float(values, i));
         let local = if self.is_spherical {
-            let (azimuth_sin, azimuth_cos) = (libm::sin(b), libm::cos(b));
-            let (elevation_sin, elevation_cos) = (libm::sin(c), libm::cos(c));
+            let azimuth_sin = libm::sin(b);
+            let azimuth_cos = libm::cos(b);
+            let elevation_sin = libm::sin(c);
+            let elevation_cos = libm::cos(c);
             a * dvec3(elevation_cos * azimuth_cos, elevation_cos * azimuth_sin, elevation_sin)
         } else {
             dvec3(a, b, c)
@@ -188,10 +159,10 @@ impl<'a> Scan<'a> {
         if self.colorless.is_some_and(|i| self.float(values, i) != 0.0) {
             return [0; 3];
         }
-        let scaled = |channel: usize, (min, max): (f64, f64)| {
-            ((self.float(values, channel) - min) / (max - min)).clamp(0.0, 1.0)
-        };
-        let ([r, g, b], [of_r, of_g, of_b]) = (channels, self.limits);
+        let scaled =
+            |i: usize, (min, max): (f64, f64)| ((self.float(values, i) - min) / (max - min)).clamp(0.0, 1.0);
+        let [r, g, b] = channels;
+        let [of_r, of_g, of_b] = self.limits;
         match color([scaled(r, of_r), scaled(g, of_g), scaled(b, of_b)], true, ColorRange::Narrow) {
             Color::Rgb(rgb) => rgb,
             Color::Wider | Color::Beyond(_) => [0; 3],
@@ -199,7 +170,69 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// The values that a type can have.
+/// The place of an attribute among the values of a point.
+fn attribute_index(prototype: &[Record], name: &RecordName) -> Option<usize> {
+    prototype.iter().position(|r| r.name == *name)
+}
+
+/// Chooses the columns. Users name an attribute with its prefix (`ext:label`) or without.
+fn columns_of(
+    path: &Path,
+    options: &AnnotationOptions,
+    prototype: &[Record],
+    is_spherical: bool,
+) -> Result<Columns> {
+    let asked = [&options.class_column, &options.instance_column, &options.room_column];
+    let with_prefix = asked.into_iter().flatten().any(|a| a.contains(':'));
+    let mut names: Vec<String> = prototype.iter().map(|r| name_of(&r.name, !with_prefix)).collect();
+    if is_spherical {
+        for (record, name) in prototype.iter().zip(&mut names) {
+            let stands_for = match record.name {
+                RecordName::SphericalRange => "x",
+                RecordName::SphericalAzimuth => "y",
+                RecordName::SphericalElevation => "z",
+                _ => continue,
+            };
+            stands_for.clone_into(name);
+        }
+    }
+
+    Columns::choose(path, &names, options).map_err(|e| match e {
+        Error::Format { message, .. } if message.contains("no column of classes") => Error::format(
+            path,
+            format!(
+                "{message}. E57 itself knows no classes: export the labelled points with an attribute for \
+                 them, or as LAS or PLY"
+            ),
+        ),
+        e => e,
+    })
+}
+
+/// The smallest and the largest value of each colour channel: as the scan states them, else as the channel's
+/// type allows, else 0 to 255.
+fn color_limits(cloud: &PointCloud, channels: [usize; 3]) -> [(f64, f64); 3] {
+    let limits = cloud.color_limits.as_ref();
+    let [r, g, b] = channels;
+    let stated = [
+        (r, limits.and_then(|l| Some((l.red_min.as_ref()?, l.red_max.as_ref()?)))),
+        (g, limits.and_then(|l| Some((l.green_min.as_ref()?, l.green_max.as_ref()?)))),
+        (b, limits.and_then(|l| Some((l.blue_min.as_ref()?, l.blue_max.as_ref()?)))),
+    ];
+    stated.map(|(channel, stated)| channel_limits(cloud, channel, stated).unwrap_or((0.0, 255.0)))
+}
+
+fn channel_limits(
+    cloud: &PointCloud,
+    channel: usize,
+    stated: Option<(&RecordValue, &RecordValue)>,
+) -> Option<(f64, f64)> {
+    let kind = &cloud.prototype.get(channel)?.data_type;
+    let stated = stated.and_then(|(min, max)| Some((min.to_f64(kind).ok()?, max.to_f64(kind).ok()?)));
+    stated.or(range_of(kind)).filter(|(min, max)| max > min)
+}
+
+/// The smallest and the largest value of a type.
 fn range_of(kind: &RecordDataType) -> Option<(f64, f64)> {
     match kind {
         RecordDataType::Integer { min, max } => Some((*min as f64, *max as f64)),
@@ -211,7 +244,7 @@ fn range_of(kind: &RecordDataType) -> Option<(f64, f64)> {
     }
 }
 
-/// What `f` gives, or a sentence if it panicked: the decoder is not ours, and a damaged file must not end the
+/// Calls `f`, and returns an error if it panics: the decoder is not ours, and a damaged file must not end the
 /// program.
 fn guarded<T>(path: &Path, f: impl FnOnce() -> T) -> Result<T> {
     crate::guarded::guarded(f).ok_or_else(|| Error::format(path, "its points are damaged"))
@@ -231,21 +264,24 @@ impl Cloud for E57Cloud<'_> {
         if scans.is_empty() {
             return Err(Error::format(path, "holds no scan"));
         }
+
         if let Some(bounds) = bounds_of(&scans) {
             reading.claims(bounds);
         }
-        let (mut number, mut invalid) = (0, 0u64);
+        let mut number = 0;
+        let mut invalid = 0u64;
         for cloud in &scans {
             let scan = Scan::new(path, self.options, cloud)?;
             let bits: u64 = cloud.prototype.iter().map(|r| bits_of(&r.data_type)).sum();
-            // A point that takes no bit would come without end.
+            // Points of no bits would never end.
             if u128::from(cloud.records) * u128::from(bits.max(1)) > u128::from(size) * 8 {
                 let message =
                     format!("claims {} points in {size} bytes: the file is cut short", cloud.records);
                 return Err(Error::format(path, message));
             }
+
             let mut points = guarded(path, || reader.pointcloud_raw(cloud))?.map_err(|e| self.error(&e))?;
-            let c = scan.columns;
+            let columns = scan.columns;
             while let Some(values) = guarded(path, || points.next())? {
                 let values = values
                     .map_err(|e| Error::format(path, format!("cannot be read after point {number}: {e}")))?;
@@ -254,12 +290,13 @@ impl Cloud for E57Cloud<'_> {
                     invalid += 1;
                     continue;
                 }
+
                 let row = Row {
                     position: scan.position(&values),
                     color: scan.color(&values),
-                    class: scan.value(&values, c.class),
-                    instance: c.instance.map_or(Value::None, |i| scan.value(&values, i)),
-                    room: match (c.room, &scan.room, self.options.room) {
+                    class: scan.value(&values, columns.class),
+                    instance: columns.instance.map_or(Value::None, |i| scan.value(&values, i)),
+                    room: match (columns.room, &scan.room, self.options.room) {
                         (Some(i), _, _) => scan.value(&values, i),
                         (None, Some(name), None) => Value::Name(name),
                         _ => Value::None,
@@ -268,15 +305,18 @@ impl Cloud for E57Cloud<'_> {
                 reading.push(number, &row)?;
             }
         }
+
         if invalid > 0 {
-            let of = format!("{invalid} of {number} points are marked invalid, left out");
-            reading.notes.push(format!("{}: {of}", path.display()));
+            reading.notes.push(format!(
+                "{}: {invalid} of {number} points are marked invalid, left out",
+                path.display()
+            ));
         }
         Ok(true)
     }
 }
 
-/// The box of all scans at their places, if each says where its points are.
+/// The box around all scans in world coordinates. Returns `None` if one of them does not state its box.
 fn bounds_of(scans: &[PointCloud]) -> Option<Bounds> {
     scans
         .iter()
@@ -293,14 +333,15 @@ fn bounds_of(scans: &[PointCloud]) -> Option<Bounds> {
         })
 }
 
-/// Turn, of any length, and place of a scan.
+/// The rotation of a scan, as a quaternion of any length, and its translation.
 fn pose_of(scan: &PointCloud) -> (DQuat, DVec3) {
     let pose = scan.transform.clone().unwrap_or_default();
-    let (q, t) = (pose.rotation, pose.translation);
+    let q = pose.rotation;
+    let t = pose.translation;
     (DQuat::from_xyzw(q.x, q.y, q.z, q.w), dvec3(t.x, t.y, t.z))
 }
 
-/// The bits that a value takes.
+/// The number of bits that a value takes.
 fn bits_of(kind: &RecordDataType) -> u64 {
     match kind {
         RecordDataType::Single { .. } => 32,

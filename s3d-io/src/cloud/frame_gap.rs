@@ -1,4 +1,4 @@
-//! Points and a mesh whose frames differ: they lie so far apart that nothing of the one belongs to the other.
+//! Detects points and a mesh in different frames: they lie too far apart to belong together.
 
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
@@ -7,15 +7,15 @@ use s3d_geom::glam::DVec3;
 use std::fmt;
 use std::path::Path;
 
-/// Points that lie no farther from the mesh than this, or than the mesh is large, may be of the same frame:
-/// of a part of a building that was not meshed, for instance.
+/// Points no farther from the mesh than this, or than the mesh's own size, may share its frame: they may show
+/// a part of the building that was not meshed, for instance.
 const SAME_FRAME_M: f64 = 100.0;
 
-/// Farther apart than this, and than ten times the mesh's size, no two parts of one scan are: the first
-/// points tell, whatever follows.
+/// Parts of one scan are never farther apart than this or ten times the mesh's size, whichever is larger. If
+/// the first points are, the frames differ, whatever follows.
 const OTHER_FRAME_M: f64 = 10_000.0;
 
-/// How far points and a mesh are apart, and what would bring them together. Displayed, it is a sentence.
+/// The gap between points and a mesh, and the offset that would close it. Its `Display` is a sentence.
 ///
 /// ```
 /// use s3d_geom::{Aabb, glam::{DVec3, Vec3, dvec3}};
@@ -31,21 +31,19 @@ const OTHER_FRAME_M: f64 = 10_000.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FrameGap {
-    /// The smallest and the largest coordinates of the points, in the mesh's frame as far as it was known:
-    /// less what was subtracted from them.
+    /// The smallest and the largest coordinates of the points, after the offset known so far was subtracted.
     pub points: [DVec3; 2],
-    /// Those of the mesh.
+    /// The smallest and the largest coordinates of the mesh.
     pub mesh: [DVec3; 2],
     /// The distance between the two boxes, metres.
     pub distance_m: f64,
-    /// What would have to be subtracted from the points as their file has them; as round as their boxes
-    /// allow.
+    /// The offset to subtract from the points as their file has them. It is as round as the boxes allow.
     pub offset_m: DVec3,
 }
 
 impl FrameGap {
-    /// The gap between a mesh and points between two corners, from which `offset_m` is subtracted; `None` if
-    /// there is no gap, or one that may be part of the scan: up to 100 m, or as much as the mesh is large.
+    /// Measures the gap between `mesh` and points between two corners, from which `offset_m` is subtracted.
+    /// Returns `None` for gaps that one scan may have: up to 100 m, or up to the mesh's own size.
     pub fn between(points: [DVec3; 2], offset_m: DVec3, mesh: Aabb) -> Option<Self> {
         let [min, max] = points;
         Self::of(Bounds { min, max }, offset_m, mesh.into(), SAME_FRAME_M, 1.0)
@@ -72,46 +70,53 @@ impl FrameGap {
 
 impl fmt::Display for FrameGap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let corner = |p: DVec3| format!("({:.2}, {:.2}, {:.2})", p.x, p.y, p.z);
-        let [[a, b], [c, d]] = [self.points.map(corner), self.mesh.map(corner)];
+        let [points_min, points_max] = self.points.map(corner_text);
+        let [mesh_min, mesh_max] = self.mesh.map(corner_text);
         write!(
             f,
-            "{:.0} m from the mesh: they are between {a} and {b}, the mesh between {c} and {d}",
+            "{:.0} m from the mesh: they are between {points_min} and {points_max}, the mesh between \
+             {mesh_min} and {mesh_max}",
             self.distance_m
         )
     }
 }
 
-/// Three numbers as TOML has them.
+/// A corner of a box, for messages.
+fn corner_text(p: DVec3) -> String {
+    format!("({:.2}, {:.2}, {:.2})", p.x, p.y, p.z)
+}
+
+/// Formats a vector as a TOML array.
 fn list(v: DVec3) -> String {
     let [x, y, z] = v.to_array().map(|v| format!("{v:?}"));
     format!("[{x}, {y}, {z}]")
 }
 
-/// What takes the middle of the points to that of the mesh. An offset is a round number as a rule: on each
-/// axis it is the roundest by which neither box goes farther beyond the other than their sizes make it.
+/// Returns the offset from the middle of the mesh to the middle of the points, rounded. Offsets are round
+/// numbers as a rule: each axis gets the roundest one that leaves neither box farther beyond the other than
+/// their sizes already make it.
 fn fitting_offset(points: Bounds, mesh: Bounds) -> DVec3 {
     let exact = points.center() - mesh.center();
-    let room = (points.size() - mesh.size()).abs() * 0.5 + 0.05;
+    let slack = (points.size() - mesh.size()).abs() * 0.5 + 0.05;
     DVec3::from_array(std::array::from_fn(|axis| {
-        let (exact, room) = (exact[axis], room[axis]);
+        let exact = exact[axis];
+        let slack = slack[axis];
         let steps = [1e6, 1e5, 1e4, 1e3, 1e2, 1e1, 1.0];
-        let round = |step: f64| (exact / step).round() * step;
         let found = steps
             .into_iter()
-            .map(round)
-            .find(|rounded| (rounded - exact).abs() <= room);
+            .map(|step| (exact / step).round() * step)
+            .find(|rounded| (rounded - exact).abs() <= slack);
         // Adding 0 turns −0 into 0.
         found.unwrap_or((exact * 1e3).round() / 1e3) + 0.0
     }))
 }
 
-/// Watches the points of a cloud while they are read.
+/// Watches the points of a cloud while they are read, for points in another frame than the mesh.
 #[derive(Debug)]
 pub(crate) struct FrameWatch {
     mesh: Bounds,
     offset: DVec3,
-    /// What the file's header says of its points.
+    /// The box that the file's header gives for its points.
     header: Option<Bounds>,
     seen: Bounds,
     /// Whether the first points have been looked at.
@@ -123,7 +128,7 @@ impl FrameWatch {
         Self { mesh: mesh.into(), offset, header: None, seen: Bounds::EMPTY, begun: false }
     }
 
-    /// Takes what the header says of all points. It counts only where the first points agree with it.
+    /// Takes the header's box of all points. It counts only if the first points agree with it.
     pub(crate) fn header(&mut self, bounds: Bounds) {
         self.header = Some(bounds).filter(Bounds::is_some);
     }
@@ -133,34 +138,38 @@ impl FrameWatch {
         self.seen = self.seen.with(position);
     }
 
-    /// Looks at the points so far, `path`'s first ones.
+    /// Checks the points seen after the first block of `path`; later calls do nothing.
     ///
     /// # Errors
-    /// [`Error::Format`] if they tell that the file has another frame than the mesh.
+    /// [`Error::Format`] if they show that the file has another frame than the mesh.
     pub(crate) fn after_block(&mut self, path: &Path) -> Result<()> {
         if std::mem::replace(&mut self.begun, true) {
             return Ok(());
         }
-        let gap = |points, gap_m, sizes| FrameGap::of(points, self.offset, self.mesh, gap_m, sizes);
-        if gap(self.seen, SAME_FRAME_M, 1.0).is_none() {
+        if self.gap(self.seen, SAME_FRAME_M, 1.0).is_none() {
             return Ok(());
         }
-        let whole = self.header.and_then(|header| gap(header, SAME_FRAME_M, 1.0));
-        match whole.or_else(|| gap(self.seen, OTHER_FRAME_M, 10.0)) {
+
+        let of_all = self.header.and_then(|header| self.gap(header, SAME_FRAME_M, 1.0));
+        match of_all.or_else(|| self.gap(self.seen, OTHER_FRAME_M, 10.0)) {
             Some(gap) => Err(refusal(path, &gap)),
             None => Ok(()),
         }
     }
 
-    /// Looks at all points of `path`.
+    /// Checks all points of `path`.
     ///
     /// # Errors
     /// [`Error::Format`] if they all lie far from the mesh.
     pub(crate) fn at_end(&self, path: &Path) -> Result<()> {
-        match FrameGap::of(self.seen, self.offset, self.mesh, SAME_FRAME_M, 1.0) {
+        match self.gap(self.seen, SAME_FRAME_M, 1.0) {
             Some(gap) => Err(refusal(path, &gap)),
             None => Ok(()),
         }
+    }
+
+    fn gap(&self, points: Bounds, gap_m: f64, sizes: f64) -> Option<FrameGap> {
+        FrameGap::of(points, self.offset, self.mesh, gap_m, sizes)
     }
 }
 
@@ -193,14 +202,14 @@ mod tests {
     fn the_offset_is_as_round_as_the_boxes_allow() {
         let [low, high] = [room().min, room().max].map(|p| p.as_dvec3());
         assert_eq!(offset([low + UTM, high + UTM]), UTM);
-        // Noise, and a part of the room, which may lie anywhere in it.
+        // With noise; and with a part of the room, which may lie anywhere in it.
         assert_eq!(offset([low + UTM + 0.01, high + UTM - 0.02]), UTM);
         let part = offset([low + UTM, low + UTM + dvec3(4.0, 4.0, 3.0)]);
         assert_eq!(part, dvec3(512_300.0, 5_412_340.0, 340.0));
         // No round numbers.
         let odd = dvec3(512_345.678, 5_400_000.0, 0.0);
         assert!((offset([low + odd, high + odd]) - odd).abs().max_element() < 1e-6);
-        // The mesh is the one that is far.
+        // The mesh is far from the origin.
         let mesh = Aabb { min: room().min + vec3(5e5, 0.0, 0.0), max: room().max + vec3(5e5, 0.0, 0.0) };
         let gap = FrameGap::between([low, high], DVec3::ZERO, mesh).unwrap();
         assert_eq!(gap.offset_m, dvec3(-500_000.0, 0.0, 0.0));
@@ -235,22 +244,24 @@ mod tests {
 
     #[test]
     fn the_first_points_tell_where_nothing_else_can_follow() {
-        let watch = |first: DVec3, header: Option<Bounds>| {
+        /// Whether the first points are refused, and whether the whole file is.
+        fn refused(first: DVec3, header: Option<Bounds>) -> (bool, bool) {
             let mut watch = FrameWatch::new(room(), DVec3::ZERO);
             header.into_iter().for_each(|header| watch.header(header));
             watch.see(first);
             watch.see(first + 1.0);
             (watch.after_block(Path::new("a.las")).is_err(), watch.at_end(Path::new("a.las")).is_err())
-        };
+        }
+
         let other = dvec3(900.0, 0.0, 0.0);
-        assert_eq!(watch(DVec3::ONE, None), (false, false));
-        assert_eq!(watch(UTM, None), (true, true));
-        // More may follow, nearer; unless the header says otherwise.
-        assert_eq!(watch(other, None), (false, true));
-        assert_eq!(watch(other, Some(Bounds { min: other, max: other + 9.0 })), (true, true));
-        assert_eq!(watch(other, Some(Bounds { min: DVec3::ZERO, max: other + 9.0 })), (false, true));
-        // A header that is wrong is not believed.
-        assert_eq!(watch(DVec3::ONE, Some(Bounds { min: UTM, max: UTM })), (false, false));
-        assert_eq!(watch(UTM, Some(Bounds { min: DVec3::ZERO, max: DVec3::ONE })), (true, true));
+        assert_eq!(refused(DVec3::ONE, None), (false, false));
+        assert_eq!(refused(UTM, None), (true, true));
+        // Nearer points may follow, unless the header says otherwise.
+        assert_eq!(refused(other, None), (false, true));
+        assert_eq!(refused(other, Some(Bounds { min: other, max: other + 9.0 })), (true, true));
+        assert_eq!(refused(other, Some(Bounds { min: DVec3::ZERO, max: other + 9.0 })), (false, true));
+        // A wrong header does not count.
+        assert_eq!(refused(DVec3::ONE, Some(Bounds { min: UTM, max: UTM })), (false, false));
+        assert_eq!(refused(UTM, Some(Bounds { min: DVec3::ZERO, max: DVec3::ONE })), (true, true));
     }
 }

@@ -1,9 +1,9 @@
-//! Annotated points of any format, and writers of points.
+//! Reads annotated points of any format, and writes points.
 //!
-//! [`Annotations::open`] finds the rooms of an area and their instances in files and folders of any of these
-//! formats, and [`AnnotatedInstance::read`] gives the points of one: world metres, Z-up, with a colour each.
-//! [`InstanceReader`] reads them block by block, so that instances of any size need little memory.
-//! [`AnnotationOptions`] name columns, classes and rooms where a file does not; [`Annotations::from_reader`]
+//! [`Annotations::open`] finds the rooms of an area and their instances, in files and folders of the formats
+//! below. [`AnnotatedInstance::read`] reads the points of one instance: world metres, Z-up, a colour each.
+//! [`InstanceReader`] reads them block by block, so instances of any size need little memory.
+//! [`AnnotationOptions`] name columns, classes and rooms where a file does not. [`Annotations::from_reader`]
 //! takes any reader.
 //!
 //! | format | its labels |
@@ -15,13 +15,12 @@
 //! | a mesh | labels of its faces or vertices: [`Annotations::of_mesh`], [`Annotations::from_face_labels`] |
 //! | memory | [`AnnotatedPoints`] |
 //!
-//! A table of points may name 10,000 classes and rooms and a million instances at most. Coordinates become
-//! `f32`: for georeferenced clouds, [`AnnotationOptions::offset_m`] is subtracted before.
+//! A table of points may name up to 10,000 classes, 10,000 rooms and a million instances. Coordinates become
+//! `f32`; for georeferenced clouds, [`AnnotationOptions::offset_m`] is subtracted first.
 //!
-//! Writers take points piece by piece, to a path (whole or not at all) or to any `Write`: [`PlyPointWriter`],
-//! read back by [`LabelledPoints`], [`S3disAreaWriter`], [`MatWriter`], and [`NpyWriter`] for arrays, read back
-//! by [`NpyArray`] and [`NpzArchive`]. Source:
-//! formats.md, "Annotations".
+//! Writers take points piece by piece. They write to a path (the whole file or none) or to any `Write`:
+//! [`PlyPointWriter`], read back by [`LabelledPoints`]; [`S3disAreaWriter`]; [`MatWriter`]; and [`NpyWriter`]
+//! for arrays, read back by [`NpyArray`] and [`NpzArchive`]. Source: formats.md, "Annotations".
 //!
 //! ```
 //! use s3d_geom::PointCloud;

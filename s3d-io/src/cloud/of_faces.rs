@@ -1,4 +1,4 @@
-//! The labels of a mesh's faces as a source of annotations.
+//! Annotations from labels of a mesh's faces.
 
 use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, Annotations, InstancePoints, PointBlocks, Skipped,
@@ -14,27 +14,26 @@ use std::sync::Arc;
 /// A face and its corners.
 type Face = (u32, [Vec3; 3]);
 
-/// Points stand no farther apart than this on a face, metres, as far as [`MOST_ROWS`] allows.
+/// The largest distance between neighbouring points of a face, metres, as far as [`MOST_ROWS`] allows.
 const SPACING_M: f32 = 0.05;
-/// Parts that an edge is cut into.
+/// The most parts that an edge is cut into.
 const MOST_ROWS: u32 = 256;
 
 impl Annotations {
-    /// The annotations that say of each face of `mesh` what `label_of_face` does: its place in `labels`, or
-    /// [`NO_INDEX`].
+    /// Makes annotations from labels of faces: `label_of_face` has an index into `labels` for each face of
+    /// `mesh`, or [`NO_INDEX`].
     ///
-    /// The points of an instance are the corners of its faces and places about 5 cm apart on them, black, and
-    /// each says which face it is of ([`PointCloud::faces`]): no other face gets its vote. Instances are
-    /// numbered in each room in the order of their numbers in the area. `path` is the file that messages
-    /// name.
+    /// The points of an instance are the corners of its faces and places about 5 cm apart on them. They are
+    /// black, and each knows its face ([`PointCloud::faces`]), so no other face gets its vote. The instances
+    /// of a room are numbered in the order of their numbers in the area. Messages name the file `path`.
     ///
-    /// Labels of classes other than S3DIS's need their taxonomy: assign [`Annotations::taxonomy`].
+    /// Labels of other classes than S3DIS's need their taxonomy: assign [`Annotations::taxonomy`].
     ///
     /// # Errors
     /// [`Error::Format`] for `path` if no face has a label.
     ///
     /// # Panics
-    /// If `label_of_face` has not one entry a face, or one that is no index into `labels`.
+    /// If `label_of_face` has another length than the faces, or an entry that is no index into `labels`.
     pub fn from_face_labels(
         path: &Path,
         mesh: &TriMesh,
@@ -43,16 +42,15 @@ impl Annotations {
     ) -> Result<Self> {
         let count = mesh.faces().len();
         assert_eq!(label_of_face.len(), count, "{count} faces need as many labels");
+
         let mut faces: BTreeMap<(Room, Class, u32), Vec<Face>> = BTreeMap::new();
         for (face, place) in (0u32..).zip(label_of_face).filter(|(_, place)| **place != NO_INDEX) {
-            #[expect(
-                clippy::indexing_slicing,
-                reason = "the labels of faces are places in `labels`: see Panics"
-            )]
+            #[expect(clippy::indexing_slicing, reason = "entries are indices into `labels`: see Panics")]
             let label = labels[*place as usize];
             let key = (label.room, label.class, label.instance);
             faces.entry(key).or_default().push((face, mesh.triangle(face)));
         }
+
         let mut rooms: Vec<AnnotatedRoom> = Vec::new();
         for ((room, class, instance), faces) in faces {
             if rooms.last().is_none_or(|r| r.room != room) {
@@ -64,6 +62,7 @@ impl Annotations {
             let points = FacePoints { path: path.to_owned(), part, faces };
             instances.push(AnnotatedInstance::new(class, number, Arc::new(points)));
         }
+
         if rooms.is_empty() {
             return Err(Error::format(path, "labels no face"));
         }
@@ -98,8 +97,8 @@ impl InstancePoints for FacePoints {
     }
 }
 
-/// The points of an instance's faces, block by block; all points of a face are in one, which may be longer by
-/// them.
+/// The points of an instance's faces, block by block. All points of a face are in one block, which may be
+/// longer than asked for by the points of one face.
 struct FaceBlocks<'a> {
     /// The faces that are left.
     faces: &'a [Face],
@@ -127,16 +126,17 @@ impl PointBlocks for FaceBlocks<'_> {
     }
 }
 
-/// The middles of the n × n congruent triangles that a face is cut into.
+/// Appends the middles of the n × n congruent triangles that a face is cut into.
 fn push_inner([a, b, c]: [Vec3; 3], positions: &mut Vec<Vec3>) {
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
     let rows = ((longest / SPACING_M).ceil() as u32).clamp(1, MOST_ROWS);
-    let (u, v) = ((b - a) / rows as f32, (c - a) / rows as f32);
+    let u = (b - a) / rows as f32;
+    let v = (c - a) / rows as f32;
     for i in 0..rows {
         for j in 0..rows - i {
             let corner = a + u * i as f32 + v * j as f32;
             positions.push(corner + (u + v) / 3.0);
-            // The one that points the other way, if there is place for it.
+            // The triangle that points the other way, if there is room for it.
             if i + j + 1 < rows {
                 positions.push(corner + (u + v) * (2.0 / 3.0));
             }
@@ -160,12 +160,14 @@ mod tests {
             label(Class::WALL, 4, "office_2"),
             label(Class::WALL, 5, "WC_1"),
         ];
+
         let path = Path::new("semantic.obj");
         let found = Annotations::from_face_labels(path, &mesh, &labels, &[0, 1, NO_INDEX]).unwrap();
         assert_eq!((found.rooms.len(), found.rooms[0].instances.len()), (1, 2));
         let [four, nine] = &found.rooms[0].instances[..] else { panic!() };
         assert_eq!((four.number, nine.number), (1, 2));
         assert_eq!(nine.source(), "semantic.obj, wall_9_office_2");
+
         let mut cloud = PointCloud::default();
         four.read(&mut cloud).unwrap();
         assert_eq!((cloud.len(), &cloud.faces[..]), (4, &[1; 4][..]));
@@ -177,6 +179,7 @@ mod tests {
         assert!(cloud.positions.iter().all(inside));
         let center = cloud.positions[7..].iter().sum::<Vec3>() / (29.0 * 29.0);
         assert!(center.abs_diff_eq(vec3(1.0 / 3.0, 1.0 / 3.0, 0.0), 1e-5), "{center}");
+
         let none = Annotations::from_face_labels(path, &mesh, &labels, &[NO_INDEX; 3]);
         assert!(none.unwrap_err().to_string().contains("semantic.obj: labels no face"));
     }

@@ -1,4 +1,4 @@
-//! Points that a caller has as a source of annotations.
+//! Annotations from points in memory.
 
 use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, Annotations, InstancePoints, PointBlocks, Skipped,
@@ -10,26 +10,26 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What messages name instead of a file.
+/// Stands for a file's path in messages.
 const PLACE: &str = "annotations in memory";
 
 /// The points of one instance.
 #[derive(Clone, Debug)]
 pub struct AnnotatedPoints {
-    /// The room that it stands in.
+    /// The room of the instance.
     pub room: Room,
-    /// What it is.
+    /// Its class.
     pub class: Class,
-    /// Its number among the room's instances of its class, from 1.
+    /// Its number among the room's instances of the same class, from 1.
     pub number: u32,
-    /// Its points, world metres, Z-up. Colours are black if there are none; with [`PointCloud::faces`] each
-    /// point votes for the face that it says, else for the nearest.
+    /// Its points, world metres, Z-up. Without colours they are black. With [`PointCloud::faces`] each point
+    /// votes for its own face, otherwise for the nearest one.
     pub points: PointCloud,
 }
 
 impl Annotations {
-    /// The annotations that these points are, in any order. If their classes are not S3DIS's, assign
-    /// [`Annotations::taxonomy`].
+    /// Makes annotations of these points, which may come in any order. If their classes are not S3DIS's,
+    /// assign [`Annotations::taxonomy`].
     ///
     /// ```
     /// use s3d_geom::{PointCloud, glam::vec3};
@@ -44,13 +44,14 @@ impl Annotations {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Format`] if there is no instance, one without points, one twice, one with the number 0, or
-    /// one with coordinates that are not finite or with other numbers of colours or faces than of points.
+    /// [`Error::Format`] if there is no instance; and for an instance that is there twice, has the number 0,
+    /// no points or a coordinate that is not finite, or whose colours or faces are not as many as its points.
     pub fn from_points(instances: impl IntoIterator<Item = AnnotatedPoints>) -> Result<Self> {
         let mut rooms: BTreeMap<Room, BTreeMap<(Class, u32), PointCloud>> = BTreeMap::new();
         for AnnotatedPoints { room, class, number, mut points } in instances {
-            let name = || format!("{class}_{number} of {room}");
-            let refuse = |what: &str| Err(Error::format(Path::new(PLACE), format!("{}: {what}", name())));
+            let refuse = |what: &str| {
+                Err(Error::format(Path::new(PLACE), format!("{class}_{number} of {room}: {what}")))
+            };
             if points.colors.is_empty() {
                 points.colors.resize(points.positions.len(), [0; 3]);
             }
@@ -61,7 +62,9 @@ impl Annotations {
                 return refuse("has no points");
             }
             if points.colors.len() != points.len() || ![0, points.len()].contains(&points.faces.len()) {
-                return refuse("has not one colour and one face, or none, for each of its points");
+                return refuse(
+                    "needs one colour a point or none at all, and one face a point or none at all",
+                );
             }
             if !points.positions.iter().all(|p| p.is_finite()) {
                 return refuse("has coordinates that are not finite");
@@ -70,9 +73,11 @@ impl Annotations {
                 return refuse("is there twice");
             }
         }
+
         if rooms.is_empty() {
             return Err(Error::format(Path::new(PLACE), "there is no instance"));
         }
+
         let rooms = rooms.into_iter().map(|(room, instances)| {
             let instances = instances.into_iter().map(|((class, number), points)| {
                 let part = format!("{class}_{number} of {room}");
@@ -119,7 +124,7 @@ impl PointBlocks for BlocksInMemory<'_> {
         let PointCloud { positions, colors, faces } = self.points;
         let end = self.next.saturating_add(points).min(positions.len());
         let range = self.next..end;
-        // The lengths were compared when the points were taken.
+        // `from_points` compared the lengths.
         out.positions
             .extend_from_slice(positions.get(range.clone()).unwrap_or_default());
         out.colors
@@ -155,10 +160,13 @@ mod tests {
         let found = Annotations::from_points(given).unwrap();
         let names: Vec<String> = found.rooms.iter().map(|r| r.room.to_string()).collect();
         assert_eq!(names.len(), 2);
+
         let office = found.rooms.iter().find(|r| r.instances.len() == 2).unwrap();
         let chair = office.instances.iter().find(|i| i.class == Class::CHAIR).unwrap();
         assert_eq!(chair.number, 7);
-        let (mut whole, mut blocks) = (PointCloud::default(), PointCloud::default());
+        let mut whole = PointCloud::default();
+        let mut blocks = PointCloud::default();
+
         chair.read(&mut whole).unwrap();
         let mut source = chair.open().unwrap();
         assert!(source.read_block(2, &mut blocks).unwrap());
@@ -174,6 +182,7 @@ mod tests {
         assert!(refused(vec![]).contains("no instance"));
         assert!(refused(vec![instance("WC_1", Class::WALL, 0, 1)]).contains("count from 1"));
         assert!(refused(vec![instance("WC_1", Class::WALL, 1, 0)]).contains("wall_1 of WC_1: has no points"));
+
         let twice = instance("WC_1", Class::WALL, 1, 1);
         assert!(refused(vec![twice.clone(), twice.clone()]).contains("twice"));
         let mut bad = twice.clone();

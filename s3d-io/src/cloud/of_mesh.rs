@@ -1,9 +1,9 @@
-//! The labels that came with a mesh as a source of annotations.
+//! Annotations from the labels that came with a mesh.
 
 use crate::cloud::annotations::{AnnotationOptions, Annotations};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::meaning::{Group, Meaning};
-use crate::cloud::table::rows::{NO_INSTANCE, NO_TAG, Reading, Tags};
+use crate::cloud::table::rows::{CloudTags, NO_INSTANCE, NO_TAG, Reading};
 use crate::error::{Error, Result};
 use crate::mesh::file::MeshFile;
 use crate::mesh::labels::{MeshLabels, NO_LABEL};
@@ -13,20 +13,21 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 impl Annotations {
-    /// The annotations that came with a mesh: see [`MeshLabels`].
+    /// Takes the annotations that came with a mesh: see [`MeshLabels`].
     ///
-    /// Numbers of faces or vertices mean what [`AnnotationOptions::classes`] says; the room is
-    /// [`AnnotationOptions::room`], or else that which the mesh's file is named after (`office_3.ply`). Faces
-    /// of one room, class and object number are one instance; those without a number are one a class and
-    /// room. Without such numbers the names of materials are labels (`chair_3_office_5_1`), if those of half
-    /// the faces are. Points are those of [`Annotations::from_face_labels`].
+    /// [`AnnotationOptions::classes`] gives the meaning of the numbers of faces or vertices. The room is
+    /// [`AnnotationOptions::room`], or else the one that the mesh's file is named after (`office_3.ply`).
+    /// Faces of one room, class and object number are one instance; faces without a number are one instance a
+    /// class and room. Without such numbers, the names of materials are labels (`chair_3_office_5_1`) if at
+    /// least half of the faces have a material named so. The points are the ones of
+    /// [`Annotations::from_face_labels`].
     ///
     /// # Errors
-    /// [`Error::Format`] if the mesh has no labels, if there are none of classes, and for classes and rooms
-    /// without a meaning, unless they are to be skipped.
+    /// [`Error::Format`] if the mesh has no labels or no classes, and for classes and rooms without a
+    /// meaning, unless they are skipped.
     ///
     /// # Panics
-    /// If the mesh has no [`MeshFile::sources`].
+    /// If [`MeshFile::sources`] is empty.
     #[expect(clippy::indexing_slicing, reason = "a mesh of no file is a caller's mistake: see Panics")]
     pub fn of_mesh(file: &MeshFile, options: &AnnotationOptions) -> Result<Self> {
         let path = &file.sources[0].path;
@@ -35,11 +36,12 @@ impl Annotations {
             None => MeshLabels::from_materials(&file.mesh, &options.taxonomy).ok_or_else(|| {
                 Error::format(
                     path,
-                    "came without labels: neither has it a column of classes of faces or vertices (name it \
-                     with class = \"…\"), nor are its materials named as labels, as in chair_3_office_5_1",
+                    "came without labels: it has no column of classes of faces or vertices (name it with \
+                     class = \"…\"), and its materials are not named as labels, as in chair_3_office_5_1",
                 )
             })?,
         };
+
         let (labels, faces) = match labels {
             MeshLabels::Names { labels, faces } => (labels, faces),
             MeshLabels::Numbers { class, instance, .. } => {
@@ -51,6 +53,7 @@ impl Annotations {
                 of_numbers(file, &class.values, instance.as_deref(), options, &mut warnings)?
             }
         };
+
         let mut found = Self::from_face_labels(path, &file.mesh, &labels, &faces)?;
         found.taxonomy = options.taxonomy.clone();
         found.warnings = warnings;
@@ -58,7 +61,7 @@ impl Annotations {
     }
 }
 
-/// What columns of numbers mean: labels, and for each face its place among them.
+/// The labels that columns of numbers stand for, and for each face an index into them.
 #[expect(clippy::indexing_slicing, reason = "columns have an entry a face; groups are counted here")]
 fn of_numbers(
     file: &MeshFile,
@@ -69,15 +72,16 @@ fn of_numbers(
 ) -> Result<(Vec<Label>, Vec<u32>)> {
     let clouds: Vec<Source> = file.sources.iter().map(|s| Source(s.path.clone())).collect();
     let clouds: Vec<&dyn Cloud> = clouds.iter().map(|c| c as &dyn Cloud).collect();
-    let (mut class_tags, mut room_tags) = (Tags::new(), Tags::new());
+    let mut tags = CloudTags::new();
     let mut groups: Vec<Group> = Vec::new();
     let mut index: HashMap<(u32, u32, i64), u32> = HashMap::new();
     let mut group_of = vec![NO_INDEX; classes.len()];
+
     for (source, cloud) in clouds.iter().enumerate() {
         let path = cloud.path();
         let too_many = || Error::format(path, "has too many different classes: is the column another one?");
         let room = match options.room.or(cloud.room(&options.taxonomy)) {
-            Some(room) => room_tags.name(&room.to_string()).ok_or_else(too_many)?,
+            Some(room) => tags.rooms.name(&room.to_string()).ok_or_else(too_many)?,
             None => NO_TAG,
         };
         for face in file.faces_of(source) {
@@ -85,7 +89,7 @@ fn of_numbers(
             if class == NO_LABEL {
                 continue;
             }
-            let class = class_tags.number(class).ok_or_else(too_many)?;
+            let class = tags.classes.number(class).ok_or_else(too_many)?;
             let instance = instances
                 .map_or(NO_LABEL, |column| column[face as usize])
                 .max(NO_INSTANCE);
@@ -103,21 +107,22 @@ fn of_numbers(
             "has a column of classes, but no face with a class",
         ));
     }
-    let meaning = Meaning::new(&clouds, options, &groups, &class_tags, &room_tags, warnings)?;
+    let meaning = Meaning::new(&clouds, options, &groups, &tags, warnings)?;
     // The area does not matter here: instances are numbered by room.
     let labels = meaning
         .instances
         .iter()
         .map(|i| Label { class: i.class, instance: i.number, room: i.room, area: 1 })
         .collect();
-    let place = |group: u32| match group {
+
+    let label_of = |group: u32| match group {
         NO_INDEX => NO_INDEX,
         group => meaning.instance_of[group as usize].map_or(NO_INDEX, |i| i as u32),
     };
-    Ok((labels, group_of.into_iter().map(place).collect()))
+    Ok((labels, group_of.into_iter().map(label_of).collect()))
 }
 
-/// A mesh's file, as what names its room and as what messages name.
+/// A mesh's file, which may name its room and is named in messages.
 struct Source(PathBuf);
 
 impl Cloud for Source {
@@ -141,16 +146,18 @@ mod tests {
     use std::fmt::Write as _;
     use std::fs;
 
-    /// A strip of quads in the plane, each with a class and an object: a PLY file.
+    /// A PLY file with a strip of quads in a plane, each with a class and an object.
     fn strip(labels: &[(i64, i64)], of_vertices: bool) -> String {
         let n = labels.len();
         let columns = "property int label\nproperty int instance\n";
-        let (v, f) = if of_vertices { (columns, "") } else { ("", columns) };
+        let v = if of_vertices { columns } else { "" };
+        let f = if of_vertices { "" } else { columns };
         let mut ply = format!(
             "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
              {v}element face {n}\nproperty list uchar int vertex_indices\n{f}end_header\n",
             4 * n
         );
+
         for (i, (class, instance)) in labels.iter().enumerate() {
             for (x, y) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
                 let _ = write!(ply, "{} {y} 0", 2 * i + x);
@@ -165,6 +172,7 @@ mod tests {
                 );
             }
         }
+
         for (i, (class, instance)) in labels.iter().enumerate() {
             let c = 4 * i;
             let _ = write!(ply, "4 {c} {} {} {}", c + 1, c + 2, c + 3);
@@ -178,6 +186,7 @@ mod tests {
                 }
             );
         }
+
         ply
     }
 
@@ -197,7 +206,7 @@ mod tests {
         let found =
             Annotations::of_mesh(&file, &AnnotationOptions { taxonomy, ..Default::default() }).unwrap();
         let [room] = &found.rooms[..] else { panic!("{found:?}") };
-        // 0 is unannotated, and the ceiling, 22, none of the benchmark's.
+        // 0 is unannotated; 22, the ceiling, is not among the benchmark's classes.
         let names: Vec<&str> = room.instances.iter().map(|i| i.class.name()).collect();
         assert_eq!(
             (room.room.to_string().as_str(), &names[..]),
@@ -208,6 +217,7 @@ mod tests {
     #[test]
     fn numbers_of_faces_and_of_vertices_are_labels() {
         let dir = tempfile::tempdir().unwrap();
+
         for of_vertices in [false, true] {
             let path = dir.path().join("scan.ply");
             fs::write(&path, strip(&[(2, -1), (5, 40), (5, 3), (0, 1), (2, -1), (5, 40)], of_vertices))
@@ -216,6 +226,7 @@ mod tests {
             let found = Annotations::of_mesh(&file, &options()).unwrap();
             let [room] = &found.rooms[..] else { panic!("{found:?}") };
             assert_eq!(room.room.to_string(), "office_7");
+
             let seen: Vec<(Class, u32, Vec<u32>)> = room
                 .instances
                 .iter()
@@ -236,7 +247,7 @@ mod tests {
     fn files_named_after_rooms_are_rooms() {
         let dir = tempfile::tempdir().unwrap();
         let paths = ["office_1.ply", "WC_2.ply"].map(|name| dir.path().join(name));
-        // The other lies a metre higher.
+        // The second file's room lies a metre higher.
         fs::write(&paths[0], strip(&[(2, 1), (5, 1)], false)).unwrap();
         fs::write(&paths[1], strip(&[(2, 1), (5, 1)], false).replace(" 0\n", " 1\n")).unwrap();
         let file = read_meshes(&paths, UpAxis::Z).unwrap();
@@ -256,6 +267,7 @@ mod tests {
                 .unwrap_err()
                 .to_string()
         };
+
         let good = strip(&[(2, 1), (9, 1)], false);
         assert!(message(&good, &options()).contains('9'));
         let no_room = AnnotationOptions { room: None, ..options() };

@@ -1,4 +1,4 @@
-//! Annotations, from any files that are read.
+//! Opens annotations in files of any format.
 
 use crate::bounds::Bounds;
 use crate::cloud::annotations::{
@@ -6,9 +6,9 @@ use crate::cloud::annotations::{
 };
 use crate::cloud::frame_gap::{FrameGap, refusal};
 use crate::cloud::s3dis::points::PointReader;
-use crate::cloud::s3dis::tree::{AnnotationTree, OnFault, TreeOptions};
+use crate::cloud::s3dis::tree::{AnnotationTree, InstanceFile, OnFault, TreeOptions};
 use crate::cloud::table::cloud::Cloud;
-use crate::cloud::table::read::read_flat;
+use crate::cloud::table::read::read_tables;
 use crate::error::{Error, Result};
 use crate::fs::source::Source;
 use s3d_geom::glam::DVec3;
@@ -18,11 +18,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl Annotations {
-    /// Finds the annotated instances of an area in `paths`: what is found in several of them is put together.
+    /// Finds the annotated instances of an area in `paths`, and puts the rooms of all paths together.
     ///
     /// | path | annotations |
     /// |---|---|
-    /// | a folder | the S3DIS tree of an area, as [`AnnotationTree`] takes it |
+    /// | a folder | the S3DIS tree of an area, see [`AnnotationTree`] |
     /// | `….mat` | `pointcloud.mat` of a published area, see [`MatArea`](crate::cloud::MatArea) |
     /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh |
     /// | `.ply` | vertices with properties for class and instance; ASCII or binary |
@@ -32,28 +32,28 @@ impl Annotations {
     /// | `.e57` | several scans with their poses; attributes of extensions for classes and instances |
     ///
     /// The points of a tree are read when they are asked for, an instance at a time. All other files hold
-    /// *clouds*: rows of points, each of which says what it belongs to. All clouds of an area are read as
-    /// one, and grouped:
+    /// *clouds*: rows of points, each with its own class, instance and room. All clouds of an area are read
+    /// as one, and grouped:
     ///
-    /// - **class**: [`AnnotationOptions::classes`] tells what a number or a name means; names of the 13
-    ///   classes mean themselves, and the usual words of ScanNet's annotators the nearest of the 13. The
+    /// - **class**: [`AnnotationOptions::classes`] gives the meaning of a number or a name. Names of the 13
+    ///   classes mean themselves, and the usual words of ScanNet's annotators mean the nearest of the 13. The
     ///   numbers of a plain NPY array are S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes
-    ///   are named. A class without a meaning stops with a list of them.
-    /// - **instance**: points of one room and class with one number are one. Two classes of the file that
-    ///   mean the same are kept apart, since many files number per class. Points without a number, or with a
-    ///   negative one, are one instance a class and room. Instances are numbered per class and room from 1 in
-    ///   the order of their numbers in the file.
-    /// - **room**: what the column says (a name, or the number of a room of [`AnnotationOptions::room`]'s
-    ///   type), or else [`AnnotationOptions::room`], or else the room that a file is named after:
-    ///   `office_3.ply`, `Area_1_office_3.npy`, or an E57 scan.
+    ///   are named. Classes without a meaning are an error that lists them.
+    /// - **instance**: points of one room and class with one number are one instance. Two classes of the file
+    ///   that mean the same are kept apart, since many files number per class. Points without a number, or
+    ///   with a negative one, are one instance a class and room. Instances are numbered per class and room
+    ///   from 1 in the order of their numbers in the file.
+    /// - **room**: the column of rooms says it (a name, or the number of a room of
+    ///   [`AnnotationOptions::room`]'s type), or else [`AnnotationOptions::room`], or else the name of the
+    ///   file (`office_3.ply`, `Area_1_office_3.npy`) or of the E57 scan.
     ///
-    /// Colours of 16 bits or as floats become 8 bits: 16-bit numbers count as 8-bit ones if no number in the
-    /// file is above 255, floats from 0 to 1 if none is above 1.
+    /// Colours become 8-bit. 16-bit numbers count as 8-bit ones if no number in the file is above 255. Floats
+    /// count as 0 to 1 if no number in the file is above 1, and else as 0 to 255.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] for a path of another kind, for what the kind's reader finds wrong,
-    /// for a room that two sources tell of, and if no room is found. With [`OnFault::Skip`] single names,
-    /// lines and classes are left out instead and [`Annotations::warnings`] tells of them.
+    /// [`Error::Io`]; [`Error::Format`] for a path of another kind, for the faults that the format's reader
+    /// finds, for a room that is in two sources, and if no room is found. With [`OnFault::Skip`] single
+    /// names, lines and classes are left out instead, and [`Annotations::warnings`] reports them.
     ///
     /// # Panics
     /// If `paths` is empty.
@@ -62,6 +62,7 @@ impl Annotations {
         let taxonomy = options.taxonomy.clone();
         let mut all = Self { taxonomy, rooms: Vec::new(), warnings: Vec::new() };
         let mut clouds: Vec<Box<dyn Cloud + '_>> = Vec::new();
+
         for path in paths {
             if path.is_dir() && !is_scannet(path) {
                 all.join(Self::from_tree(path, options)?)?;
@@ -78,16 +79,17 @@ impl Annotations {
                 clouds.push(open_cloud(path, options)?);
             }
         }
+
         if !clouds.is_empty() {
             let clouds: Vec<&dyn Cloud> = clouds.iter().map(|c| &**c).collect();
-            all.join(read_flat(&clouds, options)?)?;
+            all.join(read_tables(&clouds, options)?)?;
         }
         Ok(all)
     }
 
-    /// As [`Annotations::open`], from a reader of one file's bytes, which is read as often as it takes: a
-    /// `.mat`, or a table of points (`.ply`, `.npy`, `.npz`, `.las`, `.laz`, `.e57`). The ending of `name`
-    /// says which, and errors call the file so.
+    /// Reads annotations like [`Annotations::open`], from the bytes of one file, which are read as often as
+    /// necessary: a `.mat`, or a table of points (`.ply`, `.npy`, `.npz`, `.las`, `.laz`, `.e57`). The
+    /// extension of `name` tells the format; errors call the file `name`.
     ///
     /// ```
     /// use s3d_io::cloud::{AnnotationOptions, Annotations};
@@ -104,7 +106,7 @@ impl Annotations {
     /// ```
     ///
     /// # Errors
-    /// As [`Annotations::open`].
+    /// The errors of [`Annotations::open`].
     pub fn from_reader(
         reader: impl Read + Seek + Send + 'static,
         name: &Path,
@@ -114,7 +116,7 @@ impl Annotations {
         if is_mat(name) {
             return Self::mat(source, options);
         }
-        read_flat(&[&*table(source, options)?], options)
+        read_tables(&[&*table(source, options)?], options)
     }
 
     #[cfg(feature = "mat")]
@@ -127,14 +129,14 @@ impl Annotations {
         Err(Error::not_built_in(source.name(), "mat"))
     }
 
-    /// The gap between the points and a mesh with these bounds, if the first points of the instances all lie
-    /// far from it. `offset_m` is what was subtracted from them.
+    /// Returns the gap between the points and a mesh with these bounds, if the first points of the instances
+    /// all lie far from it. `offset_m` is the offset that was subtracted from the points.
     pub fn frame_gap(&self, offset_m: DVec3, mesh: Aabb) -> Option<FrameGap> {
         let instances: Vec<&AnnotatedInstance> = self.rooms.iter().flat_map(|r| &r.instances).collect();
         let mut points = Bounds::EMPTY;
         for instance in sampled(&instances) {
             let mut cloud = PointCloud::default();
-            // What cannot be read is told of when all is read.
+            // Points that cannot be read are reported when all points are read.
             if let Ok(mut blocks) = instance.open() {
                 let _ = blocks.read_block(SAMPLED_POINTS, &mut cloud);
             }
@@ -149,9 +151,8 @@ impl Annotations {
         for room in other.rooms {
             match self.rooms.binary_search_by_key(&room.room, |r| r.room) {
                 Ok(i) => {
-                    let source = |r: &AnnotatedRoom| r.instances.first().map(AnnotatedInstance::source);
-                    let first = self.rooms.get(i).and_then(source).unwrap_or_default();
-                    let second = source(&room).unwrap_or_default();
+                    let first = self.rooms.get(i).and_then(source_of).unwrap_or_default();
+                    let second = source_of(&room).unwrap_or_default();
                     let path = room.instances.first().map_or(Path::new(""), AnnotatedInstance::path);
                     let message = format!("{} is in two sources, {first} and {second}", room.room);
                     return Err(Error::format(path, message));
@@ -163,7 +164,7 @@ impl Annotations {
         Ok(())
     }
 
-    /// The S3DIS tree of an area.
+    /// Opens the S3DIS tree of an area.
     fn from_tree(dir: &Path, options: &AnnotationOptions) -> Result<Self> {
         let columns = [&options.class_column, &options.instance_column, &options.room_column];
         if columns.iter().any(|c| c.is_some()) || options.room.is_some() {
@@ -173,7 +174,9 @@ impl Annotations {
                  are for clouds",
             ));
         }
-        let (on_fault, offset_m) = (options.on_fault, options.offset_m);
+
+        let on_fault = options.on_fault;
+        let offset_m = options.offset_m;
         let spool_dir = options.spool_dir.clone().map(Arc::new);
         let tree = AnnotationTree::open_with(
             dir,
@@ -184,6 +187,8 @@ impl Annotations {
                 classes: options.classes.clone(),
             },
         )?;
+
+        // A tree in another frame than the mesh is refused before its points are read.
         if let Some(mesh) = options.mesh_bounds {
             let files: Vec<&Path> = tree
                 .rooms
@@ -193,64 +198,68 @@ impl Annotations {
                 .collect();
             refuse_far_tree(dir, &files, offset_m, mesh)?;
         }
+
+        let instance_of = |file: InstanceFile| {
+            let points = TextPoints { path: file.path, on_fault, offset_m, spool_dir: spool_dir.clone() };
+            AnnotatedInstance::new(file.class, file.number, Arc::new(points))
+        };
         let rooms = tree.rooms.into_iter().map(|room| AnnotatedRoom {
             room: room.room,
-            instances: room
-                .instances
-                .into_iter()
-                .map(|i| {
-                    let points =
-                        TextPoints { path: i.path, on_fault, offset_m, spool_dir: spool_dir.clone() };
-                    AnnotatedInstance::new(i.class, i.number, Arc::new(points))
-                })
-                .collect(),
+            instances: room.instances.into_iter().map(instance_of).collect(),
         });
-        let (taxonomy, rooms) = (options.taxonomy.clone(), rooms.collect());
-        Ok(Self { taxonomy, rooms, warnings: tree.warnings })
+        let rooms = rooms.collect();
+        Ok(Self { taxonomy: options.taxonomy.clone(), rooms, warnings: tree.warnings })
     }
 }
 
-/// Files of a tree, or instances, whose first points tell where all are.
+/// The source of a room's points, for messages.
+fn source_of(room: &AnnotatedRoom) -> Option<String> {
+    room.instances.first().map(AnnotatedInstance::source)
+}
+
+/// The number of a tree's files, or of instances, whose first points show the frame of all.
 const SAMPLED: usize = 32;
-/// Points of each.
+/// The number of points that are read from each of them.
 const SAMPLED_POINTS: usize = 256;
 
-/// Some of many, from the first to the last.
+/// About [`SAMPLED`] elements of many, evenly spaced from the first.
 fn sampled<T>(all: &[T]) -> impl Iterator<Item = &T> {
     all.iter().step_by(all.len().div_ceil(SAMPLED).max(1))
 }
 
-/// Refuses a tree if the first points of its files lie far from the mesh. Faults in them are told of when
-/// all are read.
+/// Refuses a tree if the first points of its files lie far from the mesh. Faults in the files are reported
+/// when all points are read.
 fn refuse_far_tree(dir: &Path, files: &[&Path], offset_m: DVec3, mesh: Aabb) -> Result<()> {
-    let sample = |offset_m: DVec3| {
-        let mut cloud = PointCloud::default();
-        for file in sampled(files) {
-            if let Ok(reader) = PointReader::open_with(file, OnFault::Skip) {
-                let _ = reader.with_offset(offset_m).read_chunk(SAMPLED_POINTS, &mut cloud);
-            }
-        }
-        bounds_of(&cloud, offset_m)
-    };
-    let rough = sample(offset_m);
+    let rough = sampled_bounds(files, offset_m);
     if FrameGap::between(rough, offset_m, mesh).is_none() {
         return Ok(());
     }
-    // Near their own middle the points keep all digits.
+    // Relative to their own middle the points keep all digits.
     let near = ((rough[0] + rough[1]) * 0.5).round();
-    match FrameGap::between(sample(near), offset_m, mesh) {
+    match FrameGap::between(sampled_bounds(files, near), offset_m, mesh) {
         Some(gap) => Err(refusal(dir, &gap)),
         None => Ok(()),
     }
 }
 
-/// The smallest and the largest coordinates of points from which an offset was subtracted, as they were.
+/// The smallest and the largest coordinates of the first points of some files, read with an offset.
+fn sampled_bounds(files: &[&Path], offset_m: DVec3) -> [DVec3; 2] {
+    let mut cloud = PointCloud::default();
+    for file in sampled(files) {
+        if let Ok(reader) = PointReader::open_with(file, OnFault::Skip) {
+            let _ = reader.with_offset(offset_m).read_chunk(SAMPLED_POINTS, &mut cloud);
+        }
+    }
+    bounds_of(&cloud, offset_m)
+}
+
+/// The smallest and the largest coordinates of points before an offset was subtracted from them.
 fn bounds_of(cloud: &PointCloud, offset_m: DVec3) -> [DVec3; 2] {
     let bounds = Bounds::of(cloud.positions.iter().map(|p| p.as_dvec3() + offset_m));
     [bounds.min, bounds.max]
 }
 
-/// The reader of a cloud, by the file's name.
+/// Chooses the reader of a cloud by the file's name.
 fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn Cloud + 'a>> {
     let what = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
     let name = path
@@ -267,7 +276,7 @@ fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn
     table(Source::file(path), options)
 }
 
-/// The reader of a table of points in one file, by its name.
+/// Chooses the reader of a table of points by the file's extension.
 #[cfg_attr(
     not(any(feature = "ply", feature = "npy", feature = "las", feature = "e57")),
     allow(unused_variables)
@@ -297,7 +306,7 @@ fn table(source: Source, options: &AnnotationOptions) -> Result<Box<dyn Cloud + 
     }
 }
 
-/// The feature that reads clouds with this ending.
+/// The feature that reads clouds with this extension.
 fn feature_of(extension: &str) -> Option<&'static str> {
     match extension {
         "ply" => Some("ply"),
@@ -312,10 +321,13 @@ fn is_mat(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat"))
 }
 
-/// Whether a folder is a scan of ScanNet, and no S3DIS tree.
+/// Whether a folder is a scan of ScanNet rather than an S3DIS tree.
 fn is_scannet(dir: &Path) -> bool {
-    let named = |e: std::fs::DirEntry| e.file_name().to_string_lossy().ends_with(".aggregation.json");
-    std::fs::read_dir(dir).is_ok_and(|entries| entries.flatten().any(named))
+    std::fs::read_dir(dir).is_ok_and(|entries| {
+        entries
+            .flatten()
+            .any(|e| e.file_name().to_string_lossy().ends_with(".aggregation.json"))
+    })
 }
 
 /// A file of the S3DIS tree.
@@ -379,7 +391,7 @@ mod tests {
         Annotations::open(&paths, options)
     }
 
-    /// Each instance's name and points.
+    /// Each instance's name and number of points.
     fn contents(annotations: &Annotations) -> Vec<(String, usize)> {
         let mut all = Vec::new();
         for room in &annotations.rooms {
@@ -401,9 +413,11 @@ mod tests {
         ]);
         let both = open(&[&a, &b], &AnnotationOptions::default()).unwrap();
         assert_eq!(contents(&both), [("office_1 wall_2".into(), 2), ("office_2 wall_1".into(), 1)]);
+
         let wall = &both.rooms[0].instances[0];
         assert!(wall.path().ends_with("office_1/Annotations/wall_2.txt"));
         assert_eq!(wall.source(), wall.path().display().to_string());
+
         let message = open(&[&a, &a], &AnnotationOptions::default()).unwrap_err().to_string();
         assert!(
             message.contains("office_2 is in two sources") && message.ends_with("Annotations/wall_1.txt"),
@@ -420,6 +434,7 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(message.contains("wall_1.txt, line 2"), "{message}");
+
         let skip = AnnotationOptions { on_fault: OnFault::Skip, ..AnnotationOptions::default() };
         let lenient = open(&[&a], &skip).unwrap();
         let mut cloud = PointCloud::default();
@@ -454,6 +469,7 @@ mod tests {
         let message = open(&[&a], &near).unwrap_err().to_string();
         let offset = "write offset_m = [500000.0, 5400000.0, 300.0] under [annotations]";
         assert!(message.contains(offset) && message.contains("5423096 m"), "{message}");
+
         let moved = AnnotationOptions { offset_m: DVec3::new(500_000.0, 5_400_000.0, 300.0), ..near };
         let found = open(&[&a], &moved).unwrap();
         let mut cloud = PointCloud::default();

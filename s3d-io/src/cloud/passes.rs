@@ -1,5 +1,4 @@
-//! The points of an instance, gone through several times in blocks, so that an instance of any size needs
-//! little memory.
+//! Passes over the points of an instance in blocks, so that instances of any size need little memory.
 
 use crate::cloud::annotations::{AnnotatedInstance, PointBlocks, Skipped};
 use crate::error::{Error, Result};
@@ -9,23 +8,24 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
-/// Points that can be gone through in blocks, as often as is asked for, each time in the same order.
+/// Points that can be read in blocks any number of times, each time in the same order.
 pub trait PointPasses {
-    /// How many there are.
+    /// The number of points.
     fn len(&self) -> u64;
 
-    /// Whether there is none.
+    /// Whether there are no points.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// All of them, if they are in memory.
+    /// All positions, if they are in memory.
     fn in_memory(&self) -> Option<&[Vec3]>;
 
     /// Hands all positions to `each`, block after block: world metres.
     ///
     /// # Errors
-    /// What `each` returns, which ends the pass; [`Error::Io`] and [`Error::Format`] of the points' own file.
+    /// The errors of `each`, which end the pass; [`Error::Io`] and [`Error::Format`] from the points' own
+    /// file.
     fn pass(&mut self, each: &mut dyn FnMut(&[Vec3]) -> Result<()>) -> Result<()>;
 }
 
@@ -43,8 +43,8 @@ impl PointPasses for &[Vec3] {
     }
 }
 
-/// Reads the points of instances in blocks, one instance after another. It holds three blocks, whose memory
-/// it keeps.
+/// Reads the points of instances in blocks, one instance after another. It holds three blocks and keeps their
+/// memory.
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -68,15 +68,15 @@ impl PointPasses for &[Vec3] {
 /// ```
 pub struct InstanceReader<'a> {
     block_points: usize,
-    /// The block at hand, and the next.
+    /// The current block, and the next.
     now: PointCloud,
     next: PointCloud,
-    /// An instance that is begun already, and its first block.
+    /// An instance whose first block has been read ahead, into `first`.
     ahead: Option<(&'a AnnotatedInstance, Result<Begun<'a>>)>,
     first: PointCloud,
 }
 
-/// The points of an instance of which the first block has been read.
+/// An instance whose first block has been read.
 struct Begun<'a> {
     source: Box<dyn PointBlocks + 'a>,
     more: bool,
@@ -91,34 +91,35 @@ impl<'a> Begun<'a> {
     }
 }
 
-/// The points of an instance that [`InstanceReader::read`] has gone through once, to be gone through again.
+/// The points of an instance that [`InstanceReader::read`] has read once, to be read again.
 pub struct InstancePasses<'r, 'a> {
     instance: &'a AnnotatedInstance,
     reader: &'r mut InstanceReader<'a>,
     len: u64,
-    /// The positions, if reading the instance's own file again would take longer.
+    /// A copy of the positions, if reading the instance's own file again would take longer.
     copy: Option<PositionFile>,
 }
 
 impl<'a> InstanceReader<'a> {
-    /// A reader of blocks of that many points; 15 bytes each, and 4 more if their faces are known.
+    /// Creates a reader of blocks of `block_points` points: 15 bytes each, and 4 more if their faces are
+    /// known.
     ///
     /// # Panics
-    /// If it is 0.
+    /// If `block_points` is 0.
     pub fn new(block_points: usize) -> Self {
         assert!(block_points > 0, "blocks of no points");
         let (now, next, first) = Default::default();
         Self { block_points, now, next, ahead: None, first }
     }
 
-    /// Hands all points of an instance to `each`, block after block, with what [`AnnotatedInstance::read`]
-    /// gives of each, and whether the block is all of them; not even one block if it has no point. The next
-    /// block is read meanwhile, on another thread of the current rayon pool; during the last that is the
-    /// first block of `then`, the instance that is going to be read after this one. Returns the points, to be
-    /// gone through again, and what was left out.
+    /// Hands all points of an instance to `each`, block after block, with all that
+    /// [`AnnotatedInstance::read`] gives; the flag tells whether the block is the whole instance. An instance
+    /// without points gives no block. Meanwhile the next block is read on another thread of the current rayon
+    /// pool; during the last block, this is the first block of `then`, the instance to be read after this
+    /// one. Returns the points, to be read again, and the lines or records left out.
     ///
     /// # Errors
-    /// What `each` returns, which ends the reading; as [`AnnotatedInstance::read`].
+    /// The errors of `each`, which end the reading, and of [`AnnotatedInstance::read`].
     pub fn read<E: From<Error> + Send>(
         &mut self,
         instance: &'a AnnotatedInstance,
@@ -127,6 +128,7 @@ impl<'a> InstanceReader<'a> {
     ) -> std::result::Result<(InstancePasses<'_, 'a>, Skipped), E> {
         let Self { block_points, now, next, ahead, first } = self;
         let points = *block_points;
+
         let Begun { mut source, mut more } = match ahead.take() {
             Some((begun, of)) if std::ptr::eq(begun, instance) => {
                 std::mem::swap(now, first);
@@ -134,10 +136,12 @@ impl<'a> InstanceReader<'a> {
             }
             _ => Begun::new(instance, points, now)?,
         };
-        let (mut len, mut copy) = (0, None);
+        let mut len = 0;
+        let mut copy = None;
         if more && let Some(dir) = instance.copy_to() {
             copy = Some(PositionFile::create(dir)?);
         }
+
         while !now.is_empty() {
             let is_whole = len == 0 && !more;
             len += now.len() as u64;
@@ -145,6 +149,7 @@ impl<'a> InstanceReader<'a> {
                 copy.iter_mut().try_for_each(|file| file.append(&now.positions))?;
                 each(now, is_whole)
             };
+
             if !more {
                 let begin = || then.map(|then| (then, Begun::new(then, points, first)));
                 let (begun, done) = rayon::join(begin, done);
@@ -152,6 +157,7 @@ impl<'a> InstanceReader<'a> {
                 *ahead = begun;
                 break;
             }
+
             next.clear();
             let (read, done) = rayon::join(|| source.read_block(points, next), done);
             done?;
@@ -161,6 +167,7 @@ impl<'a> InstanceReader<'a> {
             }
             std::mem::swap(now, next);
         }
+
         copy.iter_mut().try_for_each(PositionFile::finish)?;
         let skipped = source.skipped();
         drop(source);
@@ -205,7 +212,7 @@ impl PointPasses for InstancePasses<'_, '_> {
 struct PositionFile {
     file: BufWriter<File>,
     points: u64,
-    /// The folder that it is in, for messages.
+    /// The folder of the file, for messages.
     dir: PathBuf,
 }
 
@@ -236,6 +243,7 @@ impl PositionFile {
         let mut file = self.file.get_ref();
         file.seek(SeekFrom::Start(0)).map_err(failed)?;
         let mut file = BufReader::with_capacity(1 << 16, file);
+
         let mut left = self.points;
         while left > 0 {
             let n = left.min(block_points as u64);
@@ -263,7 +271,7 @@ mod tests {
     use std::fmt::Write as _;
     use std::fs;
 
-    /// A tree with an instance of `points` points, and the same as a cloud: structured rows of an NPY file.
+    /// The same instance of `points` points twice: in a tree, and in a cloud, an ASCII PLY file.
     fn instances(dir: &std::path::Path, points: u32) -> [AnnotatedInstance; 2] {
         let folder = dir.join("Area_1/office_1/Annotations");
         fs::create_dir_all(&folder).unwrap();
@@ -273,17 +281,21 @@ mod tests {
              property float z\n\
              property uchar class\nend_header\n"
         );
+
         for i in 0..points {
             let _ = writeln!(text, "{i} 0.5 -{i} 1 2 3");
             let _ = writeln!(ply, "{i} 0.5 -{i} 1");
         }
+
         fs::write(folder.join("wall_1.txt"), text).unwrap();
         fs::write(dir.join("office_1.ply"), ply).unwrap();
+
         let options = AnnotationOptions {
             classes: [("1".to_owned(), Some(s3d_label::Class::WALL))].into(),
             points_in_memory: 3,
             ..AnnotationOptions::default()
         };
+
         let tree = Annotations::open(&[dir.join("Area_1")], &AnnotationOptions::default()).unwrap();
         let cloud = Annotations::open(&[dir.join("office_1.ply")], &options).unwrap();
         [tree, cloud].map(|a| a.rooms[0].instances[0].clone())
@@ -296,6 +308,7 @@ mod tests {
             for instance in instances(dir.path(), points) {
                 let mut whole = PointCloud::default();
                 instance.read(&mut whole).unwrap();
+
                 let mut reader = InstanceReader::new(8);
                 let mut first = PointCloud::default();
                 let mut most = 0;
@@ -308,10 +321,12 @@ mod tests {
                         Ok::<(), Error>(())
                     })
                     .unwrap();
+
                 assert_eq!(first, whole);
                 assert!(most <= 8 && skipped.count == 0);
                 assert_eq!(passes.len(), u64::from(points));
                 assert_eq!(passes.in_memory().is_some(), points <= 8);
+
                 for _ in 0..2 {
                     let mut again: Vec<Vec3> = Vec::new();
                     passes
@@ -335,7 +350,7 @@ mod tests {
             let mut whole = PointCloud::default();
             tree.read(&mut whole).unwrap();
             let mut reader = InstanceReader::new(6);
-            // What was said to follow, what was not, and nothing.
+            // An instance that was announced, one that was not, and nothing.
             for (instance, then) in [
                 (&tree, Some(&cloud)),
                 (&cloud, Some(&cloud)),

@@ -16,7 +16,7 @@ use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// What the annotators' words mean. Words that are not here are none of the 13 classes.
+/// The classes of the annotators' words. Other words are in none of the 13 classes.
 const CATEGORIES: [(Class, &[&str]); 12] = [
     (Class::CEILING, &["ceiling"]),
     (Class::FLOOR, &["floor", "carpet", "rug", "mat", "doormat", "yoga mat"]),
@@ -124,14 +124,14 @@ struct Aggregation {
 #[serde(rename_all = "camelCase")]
 struct SegmentGroup {
     object_id: Option<i64>,
-    /// The same number; some files have one of the two.
+    /// The same number. Some files have only one of the two.
     id: Option<i64>,
     label: String,
     segments: Vec<i64>,
 }
 
 impl SegmentGroup {
-    /// Its number, from 0.
+    /// The number of the object, from 0.
     fn object(&self) -> Option<i64> {
         self.object_id.or(self.id).filter(|n| *n >= 0)
     }
@@ -161,26 +161,14 @@ impl ScannetCloud {
     /// [`Error::Format`] if a file is missing, or the folder holds several scans.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let aggregation = if path.is_dir() {
-            let mut found = aggregations(path).unwrap_or_default();
-            // `X_vh_clean.aggregation.json` is of the finer mesh, if there are both: the coarser one is what
-            // ScanNet's own labels are on.
-            if found.len() > 1 {
-                found.retain(|p| !name_of(p).ends_with("_vh_clean.aggregation.json"));
-            }
-            match &found[..] {
-                [one] => one.clone(),
-                _ => {
-                    let message =
-                        "holds several *.aggregation.json: name the one, or give each scan a folder";
-                    return Err(Error::format(path, message));
-                }
-            }
+            aggregation_in(path)?
         } else {
             path.to_owned()
         };
         let dir = aggregation.parent().unwrap_or(Path::new("")).to_owned();
         let document: Aggregation = read_json(&aggregation)?;
-        // "scannet.scene0000_00_vh_clean_2.0.010000.segs.json"
+
+        // The file names its segments, as in "scannet.scene0000_00_vh_clean_2.0.010000.segs.json".
         let named = document.segments_file.as_deref().unwrap_or_default();
         let named = named.rsplit(['/', '\\']).next().unwrap_or_default();
         let candidates = [named, named.strip_prefix("scannet.").unwrap_or(named)];
@@ -191,11 +179,10 @@ impl ScannetCloud {
             .find(|p| p.is_file())
             .or_else(|| sole(&dir, |name| name.starts_with(&stem) && name.ends_with(".segs.json")))
             .ok_or_else(|| {
-                Error::format(
-                    &aggregation,
-                    format!("the segments that it is about are not beside it: {named:?}"),
-                )
+                let message = format!("the segments that it is about are not beside it: {named:?}");
+                Error::format(&aggregation, message)
             })?;
+
         let segments_name = name_of(&segments);
         let mesh = longest(&dir, |name| {
             name.strip_suffix(".ply")
@@ -209,7 +196,24 @@ impl ScannetCloud {
     }
 }
 
-/// The only file with such a name.
+/// The `*.aggregation.json` of a folder.
+fn aggregation_in(dir: &Path) -> Result<PathBuf> {
+    let mut found = aggregations(dir).unwrap_or_default();
+    // `X_vh_clean.aggregation.json` belongs to the finer mesh. ScanNet's own labels are on the coarser mesh,
+    // so that one is taken if there are both.
+    if found.len() > 1 {
+        found.retain(|p| !name_of(p).ends_with("_vh_clean.aggregation.json"));
+    }
+    match &found[..] {
+        [one] => Ok(one.clone()),
+        _ => {
+            let message = "holds several *.aggregation.json: name the one, or give each scan a folder";
+            Err(Error::format(dir, message))
+        }
+    }
+}
+
+/// The only file with a name that fits. Returns `None` if there are several.
 fn sole(dir: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
     let mut all = std::fs::read_dir(dir)
         .ok()?
@@ -219,13 +223,42 @@ fn sole(dir: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
     all.next().is_none().then_some(first)
 }
 
-/// The file with the longest such name.
+/// The file with the longest name that fits.
 fn longest(dir: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
     let all = std::fs::read_dir(dir)
         .ok()?
         .filter_map(|e| Some(e.ok()?.path()))
         .filter(|p| fits(&name_of(p)));
     all.max_by_key(|p| (name_of(p).len(), name_of(p)))
+}
+
+impl ScannetCloud {
+    /// The index of the object that each segment belongs to.
+    fn objects_of_segments(
+        &self,
+        aggregation: &Aggregation,
+        reading: &mut Reading<'_>,
+    ) -> Result<HashMap<i64, usize>> {
+        let mut object_of: HashMap<i64, usize> = HashMap::new();
+        let mut twice = 0;
+        for (i, group) in aggregation.seg_groups.iter().enumerate() {
+            if group.object().is_none() {
+                let message = format!("has an object without a number from 0: {:?}", group.label);
+                return Err(Error::format(&self.aggregation, message));
+            }
+            for segment in &group.segments {
+                // The last object wins, as in ScanNet's own scripts.
+                twice += usize::from(object_of.insert(*segment, i).is_some_and(|other| other != i));
+            }
+        }
+        if twice > 0 {
+            reading.notes.push(format!(
+                "{}: {twice} segments belong to several objects; each is taken for the last one's",
+                self.aggregation.display()
+            ));
+        }
+        Ok(object_of)
+    }
 }
 
 impl Cloud for ScannetCloud {
@@ -248,24 +281,8 @@ impl Cloud for ScannetCloud {
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
         let aggregation: Aggregation = read_json(&self.aggregation)?;
         let segments = read_json::<Segments>(&self.segments)?.seg_indices;
-        let mut object_of: HashMap<i64, usize> = HashMap::new();
-        let mut twice = 0;
-        for (i, group) in aggregation.seg_groups.iter().enumerate() {
-            if group.object().is_none() {
-                let message = format!("has an object without a number from 0: {:?}", group.label);
-                return Err(Error::format(&self.aggregation, message));
-            }
-            for segment in &group.segments {
-                // As in ScanNet's own scripts, the last object has it.
-                twice += usize::from(object_of.insert(*segment, i).is_some_and(|other| other != i));
-            }
-        }
-        if twice > 0 {
-            reading.notes.push(format!(
-                "{}: {twice} segments belong to several objects; each is taken for the last one's",
-                self.aggregation.display()
-            ));
-        }
+        let object_of = self.objects_of_segments(&aggregation, reading)?;
+
         let (mut reader, element, _) = open_vertices(&Source::file(&self.mesh))?;
         if element.count != segments.len() as u64 {
             return Err(Error::format(
@@ -278,6 +295,7 @@ impl Cloud for ScannetCloud {
                 ),
             ));
         }
+
         let position = ["x", "y", "z"].map(|name| element.find_scalar(&[name]));
         let [Some(x), Some(y), Some(z)] = position else {
             return Err(Error::format(&self.mesh, "has no vertices with x, y and z"));
@@ -287,6 +305,7 @@ impl Cloud for ScannetCloud {
             _ => None,
         };
         reader.want([x, y, z].into_iter().chain(rgb.into_iter().flatten()));
+
         let mut batch = PlyBatch::default();
         while reader.read_batch(&mut batch)? {
             for row in 0..batch.len() {
@@ -296,6 +315,7 @@ impl Cloud for ScannetCloud {
                 let Some(group) = object.and_then(|object| aggregation.seg_groups.get(*object)) else {
                     continue;
                 };
+
                 let color = match color_of(&element, &batch, rgb, row, colors) {
                     Color::Rgb(rgb) => rgb,
                     Color::Wider => return Ok(false),
@@ -304,6 +324,7 @@ impl Cloud for ScannetCloud {
                         continue;
                     }
                 };
+
                 let number = |p: usize| batch.scalars(p).get(row).copied().unwrap_or(f64::NAN);
                 let point = Row {
                     position: DVec3::from_array([x, y, z].map(number)),
@@ -315,6 +336,7 @@ impl Cloud for ScannetCloud {
                 reading.push(vertex + 1, &point)?;
             }
         }
+
         if object_of.is_empty() {
             let message =
                 format!("has no object: nothing of {} is annotated", quote(name_of(&self.mesh).as_bytes()));

@@ -1,4 +1,4 @@
-//! `conventions.json`: what the numbers of a data set mean, for programs. Source: formats.md.
+//! `conventions.json`: the meaning of a data set's numbers, for programs. Source: formats.md.
 
 use crate::dataset::domain::Domain;
 use crate::error::{Error, Result};
@@ -13,7 +13,8 @@ use std::path::Path;
 use std::str::FromStr;
 use thiserror::Error as ThisError;
 
-/// What a depth image's numbers count. 65,535 is missing in either, and so is what is beyond 65,534 of them.
+/// The unit of depth images. In both units 65,535 means a missing depth, and depths beyond 65,534 units are
+/// missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DepthUnits {
     /// 512ths of a metre, as published: up to 128 m.
@@ -24,7 +25,7 @@ pub enum DepthUnits {
 }
 
 impl DepthUnits {
-    /// Its name: `512` or `mm`.
+    /// Returns the unit's name: `512` or `mm`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Per512 => "512",
@@ -32,7 +33,7 @@ impl DepthUnits {
         }
     }
 
-    /// How many make a metre.
+    /// Returns how many units make a metre.
     pub const fn per_m(self) -> f64 {
         match self {
             Self::Per512 => 512.0,
@@ -40,13 +41,13 @@ impl DepthUnits {
         }
     }
 
-    /// A pixel's depth in metres; `None` where it is missing.
+    /// Returns a pixel's depth in metres; `None` if it is missing.
     pub fn metres(self, value: u16) -> Option<f64> {
         (value != u16::MAX).then(|| f64::from(value) / self.per_m())
     }
 }
 
-/// How world coordinates are stored.
+/// The type of stored world coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum XyzType {
     /// Half floats, as published: steps of 1.6 cm at 20 m from the origin.
@@ -54,12 +55,12 @@ pub enum XyzType {
     Half,
     /// 32-bit floats.
     Float,
-    /// Not at all: they follow from depth and pose.
+    /// Coordinates are not stored: they follow from depth and pose.
     None,
 }
 
 impl XyzType {
-    /// Its name: `half`, `float` or `none`.
+    /// Returns the type's name: `half`, `float` or `none`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Half => "half",
@@ -69,18 +70,18 @@ impl XyzType {
     }
 }
 
-/// A word that names no option.
+/// The error for a word that names no option.
 #[derive(Clone, Debug, PartialEq, Eq, ThisError)]
 #[error("{word:?} is none of {valid}")]
 pub struct UnknownWord {
     /// The word.
     pub word: String,
-    /// What it might be.
+    /// The words that are known.
     pub valid: &'static str,
 }
 
 impl fmt::Display for Conventions {
-    /// In a line, as messages have it.
+    /// Writes the choices in one line, for messages.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { depth_units, normal_axes, xyz } = self;
         let axes = normal_axes.name();
@@ -120,11 +121,11 @@ impl fmt::Display for XyzType {
     }
 }
 
-/// What was subtracted from the coordinates of a scan to make those of the world, metres, by the number of
-/// the area; areas from which nothing was are not in it.
+/// The offset that was subtracted from the coordinates of each area's scan to make world coordinates, metres,
+/// by the number of the area. Areas without an offset are not in it.
 pub type WorldOffsets = BTreeMap<u32, [f64; 3]>;
 
-/// Which of the conventions that a data set may choose it has; the default is the published one.
+/// The choices among the conventions that a data set can make. The default is the published data set's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conventions {
     /// The unit of depth images.
@@ -136,8 +137,8 @@ pub struct Conventions {
 }
 
 impl Conventions {
-    /// Writes `conventions.json`, these choices, the frames of areas, and all that is the same in every data
-    /// set, and returns its size in bytes.
+    /// Writes `conventions.json`: these choices, the offsets of areas, and everything that is the same in
+    /// every data set. Returns its size in bytes.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -159,6 +160,7 @@ impl Conventions {
             NormalAxes::Paper => "towards the camera",
             NormalAxes::OpenCv => "forward, away from the camera",
         };
+
         json!({
             "conventions": 1,
             "world": { "unit": "m", "up": "+Z", "handedness": "right" },
@@ -242,12 +244,12 @@ impl Conventions {
     }
 }
 
-/// Which conventions the data set has whose `conventions.json` is at `path`. The published data has no such
-/// file: its conventions are [`Conventions::default`].
+/// Reads the conventions of a data set from its `conventions.json`. The published data set has no such file;
+/// its conventions are [`Conventions::default`].
 ///
 /// # Errors
-/// [`Error::Io`], also if there is no such file; [`Error::Format`] if it is something else or names a
-/// convention that is not known here.
+/// [`Error::Io`], also if there is no such file; [`Error::Format`] if it is something else, or names an
+/// unknown convention.
 pub fn read_conventions(path: &Path) -> Result<Conventions> {
     #[derive(Deserialize)]
     struct File {
@@ -268,18 +270,21 @@ pub fn read_conventions(path: &Path) -> Result<Conventions> {
         #[serde(rename = "type")]
         kind: String,
     }
+
     let file: File = crate::fs::json::read_json(path)?;
     let units = [DepthUnits::Per512, DepthUnits::Millimetres];
     let per_m = file.depth.units_per_m;
     let depth_units = units.into_iter().find(|u| u.per_m() == per_m).ok_or_else(|| {
         Error::format(path, format!("depth of {per_m} units a metre is not known: 512 and 1000 are"))
     })?;
+
     let normal_axes = NormalAxes::from_name(&file.normal.axes).ok_or_else(|| {
         Error::format(
             path,
             format!("normals in {:?} axes are not known: paper and opencv are", file.normal.axes),
         )
     })?;
+
     let xyz = file
         .global_xyz
         .kind
@@ -288,8 +293,8 @@ pub fn read_conventions(path: &Path) -> Result<Conventions> {
     Ok(Conventions { depth_units, normal_axes, xyz })
 }
 
-/// What was subtracted from the coordinates of each area's scan, as the `conventions.json` at `path` says;
-/// nothing if there is no such file.
+/// Reads the offset that was subtracted from the coordinates of each area's scan, from the `conventions.json`
+/// at `path`. There are none if there is no such file.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if the file is something else.
@@ -304,6 +309,7 @@ pub fn read_world_offsets(path: &Path) -> Result<WorldOffsets> {
         #[serde(default)]
         offset_m: WorldOffsets,
     }
+
     if !path.try_exists().map_err(|e| Error::io(path, "look for", e))? {
         return Ok(WorldOffsets::new());
     }

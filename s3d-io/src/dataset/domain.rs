@@ -1,11 +1,11 @@
-//! What an image of the data set shows. Source: formats.md, "What is written".
+//! What the images of the data set show. Source: formats.md, "What is written".
 
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// What a file shows: a modality, which the data set calls a domain. All are images but the pose.
-/// CONTRIBUTING.md has what a new one needs.
+/// What a file shows: a modality, which the data set calls a domain. All of them are images except the pose.
+/// CONTRIBUTING.md lists what a new one needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Domain {
     /// Colour.
@@ -16,9 +16,10 @@ pub enum Domain {
     Normal,
     /// Indices into `semantic_labels.json`.
     Semantic,
-    /// A colour per instance, for looking at.
+    /// A colour for each instance, to look at.
     SemanticPretty,
-    /// Places of classes in the taxonomy, as an image with a palette. Not in the published data set.
+    /// The places of classes in the taxonomy, as an image with a palette. It is not in the published data
+    /// set.
     SemanticClass,
     /// World coordinates.
     GlobalXyz,
@@ -26,7 +27,7 @@ pub enum Domain {
     Pose,
 }
 
-/// A word that names no domain.
+/// The error for a word that names no domain.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("no modality is called {word:?}; there are {}", names())]
 pub struct UnknownDomain {
@@ -35,7 +36,8 @@ pub struct UnknownDomain {
 }
 
 impl Domain {
-    /// All of them, in the order of formats.md: that of options, of manifests, and of the columns of tables.
+    /// All domains in the order of formats.md, which is the order of options, of manifests and of the columns
+    /// of tables.
     pub const ALL: [Self; 8] = [
         Self::Rgb,
         Self::Depth,
@@ -47,7 +49,7 @@ impl Domain {
         Self::Pose,
     ];
 
-    /// Those of the published data set, in their order: what is written if nobody says otherwise.
+    /// The domains of the published data set in the same order. They are written by default.
     pub const PUBLISHED: [Self; 7] = [
         Self::Rgb,
         Self::Depth,
@@ -58,12 +60,12 @@ impl Domain {
         Self::Pose,
     ];
 
-    /// Whether it shows labels.
+    /// Returns whether the domain shows labels.
     pub fn is_semantic(self) -> bool {
         matches!(self, Self::Semantic | Self::SemanticPretty | Self::SemanticClass)
     }
 
-    /// Its folder, by which users name it too: "normal".
+    /// Returns the name of the domain's folder, "normal". Users name the domain by it too.
     pub fn folder(self) -> &'static str {
         match self {
             Self::Rgb => "rgb",
@@ -77,12 +79,13 @@ impl Domain {
         }
     }
 
-    /// What stands at the end of its files' names: "normals". The folder's name for all other domains.
+    /// Returns the last word in the names of the domain's files: "normals". For all other domains it is the
+    /// folder's name.
     pub fn suffix(self) -> &'static str {
         if self == Self::Normal { "normals" } else { self.folder() }
     }
 
-    /// The ending of its files, without the dot.
+    /// Returns the extension of the domain's files, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Rgb | Self::Depth | Self::Normal => "png",
@@ -102,14 +105,14 @@ impl fmt::Display for Domain {
 impl FromStr for Domain {
     type Err = UnknownDomain;
 
-    /// From the name of the folder.
+    /// Finds the domain by the name of its folder.
     fn from_str(word: &str) -> Result<Self, UnknownDomain> {
         let found = Self::ALL.into_iter().find(|d| d.folder() == word);
         found.ok_or_else(|| UnknownDomain { word: word.to_owned() })
     }
 }
 
-/// All of them in a sentence.
+/// Returns the names of all domains, as a sentence lists them.
 fn names() -> String {
     let [others @ .., last] = Domain::ALL.map(Domain::folder);
     format!("{} and {last}", others.join(", "))

@@ -1,4 +1,4 @@
-//! How the points of the annotations voted for each face: `votes.npz`.
+//! The votes of the annotated points for each face: `votes.npz`.
 
 use crate::dataset::npz::{NpzReader, NpzWriter, bytes, numbers};
 use crate::error::{Error, Result};
@@ -7,7 +7,8 @@ use crate::fs::open::open_file;
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
-/// The arrays of `votes.npz`, each with an entry a face of `rgb.obj` and `semantic.obj`, in their order.
+/// The arrays of `votes.npz`. Each has an entry for each face of `rgb.obj` and `semantic.obj`, in their
+/// order.
 ///
 /// ```
 /// use s3d_io::dataset::{FaceVoteColumns, read_face_votes, write_face_votes};
@@ -29,18 +30,18 @@ use std::path::Path;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaceVoteColumns {
-    /// Index of the face's label in `semantic_labels.json`: of the one with most votes. Without votes it is
+    /// The label with the most votes, by its index in `semantic_labels.json`. For a face without votes it is
     /// 0, or the label that the face was filled with.
     pub label: Vec<u32>,
-    /// Its votes.
+    /// The number of votes for `label`.
     pub votes: Vec<u32>,
-    /// All votes.
+    /// The number of all votes.
     pub total: Vec<u32>,
-    /// Index of the label with the second most votes; 0 if all were for one.
+    /// The label with the second most votes, by its index; 0 if all votes were for one label.
     pub runner_up: Vec<u32>,
-    /// Its votes.
+    /// The number of votes for `runner_up`.
     pub runner_up_votes: Vec<u32>,
-    /// How far the farthest voter is from the face, metres; 0 without votes.
+    /// The distance of the farthest voter from the face, metres; 0 without votes.
     pub farthest_m: Vec<f32>,
 }
 
@@ -56,8 +57,8 @@ impl FaceVoteColumns {
     }
 }
 
-/// Writes the archive, whole or not at all: `<u4` arrays, and `farthest_m` in `<f4`. Returns its size in
-/// bytes.
+/// Writes the archive, whole or not at all: arrays of type `<u4`, and `farthest_m` of type `<f4`. Returns its
+/// size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -67,32 +68,36 @@ impl FaceVoteColumns {
 pub fn write_face_votes(path: &Path, columns: &FaceVoteColumns) -> Result<u64> {
     let faces = columns.farthest_m.len();
     assert!(columns.counts().iter().all(|(_, column)| column.len() == faces), "columns of one length");
-    let write = |file: AtomicFile| -> io::Result<AtomicFile> {
-        let mut archive = NpzWriter::new(file);
-        for (name, column) in columns.counts() {
-            archive.array(name, "<u4", &[faces as u64], bytes(column.iter().copied(), u32::to_le_bytes))?;
-        }
-        let farthest = bytes(columns.farthest_m.iter().copied(), f32::to_le_bytes);
-        archive.array("farthest_m", "<f4", &[faces as u64], farthest)?;
-        archive.finish()
-    };
-    write(AtomicFile::create(path)?)
+    let file = AtomicFile::create(path)?;
+    write_archive(file, columns)
         .map_err(|e| Error::io(path, "write", e))?
         .commit()
 }
 
-/// Reads what [`write_face_votes`] wrote.
+fn write_archive(file: AtomicFile, columns: &FaceVoteColumns) -> io::Result<AtomicFile> {
+    let faces = columns.farthest_m.len() as u64;
+    let mut archive = NpzWriter::new(file);
+    for (name, column) in columns.counts() {
+        archive.array(name, "<u4", &[faces], bytes(column.iter().copied(), u32::to_le_bytes))?;
+    }
+    let farthest = bytes(columns.farthest_m.iter().copied(), f32::to_le_bytes);
+    archive.array("farthest_m", "<f4", &[faces], farthest)?;
+    archive.finish()
+}
+
+/// Reads an archive that [`write_face_votes`] wrote.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is no such archive, damaged, or its arrays have different lengths.
+/// [`Error::Io`]; [`Error::Format`] if it is not such an archive, is damaged, or its arrays have different
+/// lengths.
 pub fn read_face_votes(path: &Path) -> Result<FaceVoteColumns> {
     read_face_votes_from(open_file(path)?, path)
 }
 
-/// As [`read_face_votes`], from a reader of the archive; errors call it `name`.
+/// Reads like [`read_face_votes`], from a reader of the archive. Errors call the file `name`.
 ///
 /// # Errors
-/// As [`read_face_votes`].
+/// Like [`read_face_votes`].
 pub fn read_face_votes_from(reader: impl Read + Seek, name: &Path) -> Result<FaceVoteColumns> {
     let mut archive = NpzReader::new(reader, name)?;
     let mut column =
@@ -107,6 +112,7 @@ pub fn read_face_votes_from(reader: impl Read + Seek, name: &Path) -> Result<Fac
         runner_up_votes: counts("runner_up_votes")?,
         farthest_m,
     };
+
     let faces = columns.farthest_m.len();
     match columns.counts().iter().find(|(_, column)| column.len() != faces) {
         None => Ok(columns),
@@ -138,12 +144,14 @@ mod tests {
         };
         assert_eq!(write_face_votes(&path, &columns).unwrap(), std::fs::metadata(&path).unwrap().len());
         assert_eq!(read_face_votes(&path).unwrap(), columns);
+
         let whole = std::fs::read(&path).unwrap();
         for cut in [0, 10, whole.len() / 2, whole.len() - 1] {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let message = read_face_votes(&path).unwrap_err().to_string();
             assert!(message.contains("votes.npz"), "{message}");
         }
+
         let mut other = whole;
         let at = other.windows(4).position(|w| *w == (7u32 * 4).to_le_bytes()).unwrap();
         other[at] ^= 1;

@@ -13,51 +13,50 @@ use std::path::{Path, PathBuf};
 /// The first line.
 const HEADER: &str = "path,bytes,xxh3_128";
 
-/// A longer line is none of ours.
+/// The longest line in bytes. A longer line is not one of these lists.
 const LONGEST_LINE: u64 = 1 << 16;
 
 /// A file of a data set.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct FileRecord {
-    /// Its path from the data set's folder, with `/` between names.
+    /// The path from the data set's folder, with `/` between names.
     pub path: String,
-    /// Its size.
+    /// The size.
     pub bytes: u64,
-    /// The checksum of its content.
+    /// The checksum of the content.
     pub xxh3_128: Checksum,
 }
 
 impl FileRecord {
-    /// The record of the file `path` with this content, in a data set in `root`; the file itself is not
-    /// looked at.
+    /// Returns the record of a file with the path `path` and this content, in a data set in `root`. The file
+    /// itself is not read.
     ///
     /// # Errors
-    /// [`Error::Format`] if the path does not lie below `root`, or is not in UTF-8, as no path of a data set
-    /// is.
+    /// [`Error::Format`] if the path does not lie below `root`, is not UTF-8, or cannot stand in a list.
     pub fn of_bytes(root: &Path, path: &Path, content: &[u8]) -> Result<Self> {
         Ok(Self { path: relative(root, path)?, bytes: content.len() as u64, xxh3_128: Checksum::of(content) })
     }
 
-    /// The record of a file that is there, which is read.
+    /// Returns the record of a file that exists. The file is read.
     ///
     /// # Errors
-    /// As [`FileRecord::of_bytes`]; [`Error::Io`].
+    /// Like [`FileRecord::of_bytes`]; [`Error::Io`].
     pub fn of_file(root: &Path, path: &Path) -> Result<Self> {
         let relative = relative(root, path)?;
         let (bytes, xxh3_128) = checksum_of_file(path)?;
         Ok(Self { path: relative, bytes, xxh3_128 })
     }
 
-    /// Where the file lies in a data set in `root`.
+    /// Returns the path of the file in a data set in `root`.
     pub fn path_in(&self, root: &Path) -> PathBuf {
         root.join(&self.path)
     }
 
-    /// Whether the file in the data set in `root` is a regular one of the size that was recorded; it is not
+    /// Checks that the file in the data set in `root` is a regular file of the recorded size. The file is not
     /// read.
     ///
     /// # Errors
-    /// [`Error::Io`] if it is not there; [`Error::Format`] if it is another.
+    /// [`Error::Io`] if it does not exist; [`Error::Format`] if it differs.
     pub fn check_size(&self, root: &Path) -> Result<()> {
         let path = self.path_in(root);
         let found = regular_size(&path)?;
@@ -68,11 +67,11 @@ impl FileRecord {
         }
     }
 
-    /// Whether the file in the data set in `root` is the one that was recorded. It is read, unless its size
-    /// tells already.
+    /// Checks that the file in the data set in `root` is the recorded one. The file is read, unless its size
+    /// differs.
     ///
     /// # Errors
-    /// As [`FileRecord::check_size`].
+    /// Like [`FileRecord::check_size`].
     pub fn check(&self, root: &Path) -> Result<()> {
         self.check_size(root)?;
         let path = self.path_in(root);
@@ -80,23 +79,23 @@ impl FileRecord {
         self.check_found(&path, found)
     }
 
-    /// As [`FileRecord::check`], with the bytes that were read of the file.
+    /// Checks like [`FileRecord::check`], with the bytes that were read from the file.
     ///
     /// # Errors
-    /// [`Error::Format`] if it is another.
+    /// [`Error::Format`] if it differs.
     pub fn check_bytes(&self, root: &Path, bytes: &[u8]) -> Result<()> {
         self.check_found(&self.path_in(root), (bytes.len() as u64, Checksum::of(bytes)))
     }
 
-    /// What is wrong with the file in the data set in `root`, by [`FileRecord::check`].
+    /// Returns what [`FileRecord::check`] finds wrong with the file in the data set in `root`.
     pub fn fault(&self, root: &Path) -> Option<String> {
         self.check(root).err().map(|e| e.to_string())
     }
 
-    /// The content of the file in the data set in `root`, if it is the one that was recorded.
+    /// Returns the content of the file in the data set in `root`, if it is the recorded one.
     ///
     /// # Errors
-    /// As [`FileRecord::check`].
+    /// Like [`FileRecord::check`].
     pub fn read(&self, root: &Path) -> Result<Vec<u8>> {
         self.check_size(root)?;
         let path = self.path_in(root);
@@ -105,10 +104,10 @@ impl FileRecord {
         Ok(bytes)
     }
 
-    /// Opens the file in the data set in `root` to be read piece by piece; see [`CheckedFile`].
+    /// Opens the file in the data set in `root`, to read it piece by piece. See [`CheckedFile`].
     ///
     /// # Errors
-    /// As [`FileRecord::check_size`].
+    /// Like [`FileRecord::check_size`].
     pub fn open(&self, root: &Path) -> Result<CheckedFile> {
         self.check_size(root)?;
         let file = open_file(&self.path_in(root))?;
@@ -134,20 +133,20 @@ impl FileRecord {
         format!("is damaged: other content than was written (checksum {found}, not {})", self.xxh3_128)
     }
 
-    /// Its line in the file, without the line feed.
+    /// Returns the line of the list, without the line feed.
     pub fn to_line(&self) -> String {
         format!("{},{},{}", self.path, self.bytes, self.xxh3_128)
     }
 }
 
-/// The size of a regular file.
+/// Returns the size of a regular file in bytes.
 fn regular_size(path: &Path) -> Result<u64> {
     must_be_regular(path)?;
     Ok(std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len())
 }
 
-/// A recorded file that is read piece by piece. The read that finds its end fails if the file was not the one
-/// that was recorded.
+/// A recorded file that is read piece by piece. The read that finds the end fails if the file is not the
+/// recorded one.
 #[derive(Debug)]
 pub struct CheckedFile {
     file: File,
@@ -169,7 +168,7 @@ impl Read for CheckedFile {
     }
 }
 
-/// The path of `path` below `root` as lists have it.
+/// Returns the path of `path` below `root`, in the form of the lists.
 fn relative(root: &Path, path: &Path) -> Result<String> {
     let below = path.strip_prefix(root).ok().and_then(|p| {
         let names: Option<Vec<&str>> = p.iter().map(|name| name.to_str()).collect();
@@ -182,7 +181,7 @@ fn relative(root: &Path, path: &Path) -> Result<String> {
     }
 }
 
-/// Refuses what leads out of the folder, or cannot stand in a line.
+/// Refuses a path that leads out of the folder, or that cannot stand in a line. The error is a sentence.
 fn check_path(path: &str) -> std::result::Result<(), String> {
     let fault = |why: &str| Err(format!("{path:?} is no path of a file in the folder: {why}"));
     if path.is_empty() {
@@ -200,10 +199,10 @@ fn check_path(path: &str) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// Writes the list, sorted by path, and returns the list's own size and checksum.
+/// Writes the list, sorted by path. Returns the list's own size and checksum.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if a path is there twice, or leads out of the folder.
+/// [`Error::Io`]; [`Error::Format`] if a path occurs twice, or leads out of the folder.
 pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Checksum)> {
     let mut sorted: Vec<&FileRecord> = records.iter().collect();
     sorted.sort_by(|a, b| a.path.as_bytes().cmp(b.path.as_bytes()));
@@ -213,6 +212,7 @@ pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Chec
     if let Some([double, _]) = sorted.array_windows().find(|[a, b]| a.path == b.path) {
         return Err(Error::format(path, format!("{:?} would be in it twice", double.path)));
     }
+
     let mut text = String::from(HEADER);
     text.push('\n');
     for record in sorted {
@@ -223,33 +223,34 @@ pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Chec
     Ok((text.len() as u64, Checksum::of(text.as_bytes())))
 }
 
-/// Reads a list as [`write_file_list`] writes it, and nothing else.
+/// Reads a list that [`write_file_list`] wrote, and nothing else.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the line: another header, a line that is no path, size and checksum,
-/// a path that leads out of the folder, one that does not sort behind the one before, sizes whose sum does
-/// not fit in 64 bits, a last line without a line feed.
+/// [`Error::Io`]; [`Error::Format`] with the line, if
+/// - the header is another, or the last line has no line feed;
+/// - a line is no path, size and checksum;
+/// - a path leads out of the folder, or does not sort behind the one before;
+/// - the sum of the sizes does not fit in 64 bits.
 pub fn read_file_list(path: &Path) -> Result<Vec<FileRecord>> {
     parse_file_list(BufReader::new(open_file(path)?), path)
 }
 
-/// As [`read_file_list`], from a reader of the list; errors call it `name`.
+/// Reads like [`read_file_list`], from a reader of the list. Errors call the file `name`.
 ///
 /// # Errors
-/// As [`read_file_list`].
+/// Like [`read_file_list`].
 pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileRecord>> {
-    let path = name;
-    let failed = |e| Error::io(path, "read", e);
     let mut records: Vec<FileRecord> = Vec::new();
     let mut known: BTreeSet<String> = BTreeSet::new();
     let mut total = 0u64;
+
     let mut line = Vec::new();
     for number in 1u64.. {
-        let fault = |message: String| Err(Error::line(path, number, message));
+        let fault = |message: String| Err(Error::line(name, number, message));
         line.clear();
         let read = Read::take(&mut lines, LONGEST_LINE)
             .read_until(b'\n', &mut line)
-            .map_err(failed)?;
+            .map_err(|e| Error::io(name, "read", e))?;
         if read == 0 {
             return if number == 1 {
                 fault("is empty".to_owned())
@@ -257,18 +258,21 @@ pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileR
                 Ok(records)
             };
         }
+
         let Some(text) = line.strip_suffix(b"\n") else {
             return fault("is cut off: it does not end with a line feed".to_owned());
         };
         let Ok(text) = std::str::from_utf8(text) else {
             return fault("is no text in UTF-8".to_owned());
         };
+
         if number == 1 {
             if text != HEADER {
                 return fault(format!("should be {HEADER:?}"));
             }
             continue;
         }
+
         let record = match parse_line(text) {
             Ok(record) => record,
             Err(message) => return fault(message),
@@ -279,15 +283,16 @@ pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileR
         {
             return fault(format!("{:?} does not sort behind the path before it", record.path));
         }
-        // Two names that a file system without upper and lower case takes for one.
+        // A file system that ignores case takes two such names for one.
         if !known.insert(record.path.to_lowercase()) {
             return fault(format!(
                 "{:?} differs from an earlier path by upper and lower case alone",
                 record.path
             ));
         }
+
         let Some(sum) = total.checked_add(record.bytes) else {
-            return fault("with the files before it more bytes than 64 bits can count".to_owned());
+            return fault("with the files before it there are more bytes than 64 bits can count".to_owned());
         };
         total = sum;
         records.push(record);
@@ -302,6 +307,7 @@ fn parse_line(text: &str) -> std::result::Result<FileRecord, String> {
     else {
         return Err(format!("has {} fields instead of path, bytes and checksum", text.split(',').count()));
     };
+
     check_path(path)?;
     let size: Option<u64> = bytes.parse().ok().filter(|size: &u64| size.to_string() == bytes);
     let size = size.ok_or_else(|| format!("{bytes:?} is no number of bytes"))?;
@@ -338,6 +344,7 @@ mod tests {
         assert!(text.starts_with("path,bytes,xxh3_128\nZ,0,99aa06d3014798d86001c324468d497f\n"), "{text}");
         write_file_list(&path, &[]).unwrap();
         assert_eq!(read_file_list(&path).unwrap(), []);
+
         records.push(record("Z", b""));
         assert!(
             write_file_list(&path, &records)
@@ -375,6 +382,7 @@ mod tests {
                 told.contains("a/b/c.txt: ") && told.contains(words)
             })
         };
+
         write_bytes(&path, b"contend").unwrap();
         assert!(record.check_size(root).is_ok() && told("other content than was written"));
         write_bytes(&path, b"parcel").unwrap();
@@ -383,6 +391,7 @@ mod tests {
         assert!(record.check_size(root).is_err() && told("cannot read"));
         create_dir(&path).unwrap();
         assert!(record.check_size(root).is_err() && told("is a folder"));
+
         for (root, path) in [("x", "y"), ("x", "x"), ("x", "x/../y"), ("x", "x/a,b")] {
             assert!(FileRecord::of_bytes(Path::new(root), Path::new(path), b"").is_err(), "{path}");
         }
@@ -428,6 +437,7 @@ mod tests {
             let message = read_file_list(&path).unwrap_err().to_string();
             assert!(message.contains(words) && message.contains("files.csv"), "{text:?}: {message}");
         }
+
         write_bytes(&path, b"path,bytes,xxh3_128\n\xff,0,0\n").unwrap();
         assert!(
             read_file_list(&path)

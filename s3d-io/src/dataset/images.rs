@@ -1,4 +1,4 @@
-//! The images of a data set on the disk: which there are, and which of their files.
+//! The images of a data set on the disk, and their files.
 
 use crate::dataset::domain::Domain;
 use crate::dataset::layout::{Frame, ImageName, Layout, image_stem, is_valid_uuid};
@@ -14,53 +14,55 @@ use std::path::{Path, PathBuf};
 /// An image of a data set: one view or panorama with the files that show it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DatasetImage {
-    /// Number of its area.
+    /// The number of the area.
     pub area: u32,
     /// The scan location.
     pub uuid: String,
     /// Type and number of the room: "office_3".
     pub room: String,
-    /// Which of the location's images.
+    /// The number of the image among the location's images, or the panorama.
     pub frame: Frame,
-    /// The domains in which it has a file, in the order of [`Domain::ALL`].
+    /// The domains in which the image has a file, in the order of [`Domain::ALL`].
     pub domains: Vec<Domain>,
 }
 
 impl DatasetImage {
-    /// Its name without the domain: `camera_{uuid}_{room}_frame_{frame}`. Unique in its area.
+    /// Returns the name without the domain: `camera_{uuid}_{room}_frame_{frame}`. It is unique in an area.
     pub fn stem(&self) -> String {
         image_stem(&self.uuid, &self.room, self.frame)
     }
 
-    /// Whether it has a file of this domain.
+    /// Returns whether the image has a file of this domain.
     pub fn has(&self, domain: Domain) -> bool {
         self.domains.contains(&domain)
     }
 
-    /// Where its file of a domain lies, whether it is there or not.
+    /// Returns the path of the image's file of a domain. The file need not exist.
     pub fn path(&self, layout: &Layout, domain: Domain) -> PathBuf {
         layout.image_path(self.area, &self.uuid, &self.room, self.frame, domain)
     }
 
-    /// The same below the root of the data set, with `/` on every system: `area_1/data/rgb/camera_….png`.
+    /// Returns the path below the root of the data set, with `/` on every system:
+    /// `area_1/data/rgb/camera_….png`.
     pub fn relative_path(&self, domain: Domain) -> String {
         let name = ImageName { uuid: self.uuid.clone(), room: self.room.clone(), frame: self.frame, domain };
         format!("area_{}/{}/{}/{name}", self.area, self.frame.folder(), domain.folder())
     }
 
-    /// Width and height in pixels, from the head of its first PNG file; `None` if it has none.
+    /// Returns width and height in pixels, from the header of the image's first PNG file; `None` if it has
+    /// none.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if that is no PNG file.
+    /// [`Error::Io`]; [`Error::Format`] if the file is not PNG.
     pub fn size(&self, layout: &Layout) -> Result<Option<(u32, u32)>> {
         let first = self.domains.iter().find(|d| d.extension() == "png");
         first.map(|d| read_png_size(&self.path(layout, *d))).transpose()
     }
 }
 
-/// The images of an area, found by the names of their files: by scan location and room (as text), views by
-/// number and the panorama last. Files with other names are passed over. An area without images gives an
-/// empty list.
+/// Returns the images of an area, found by the names of their files. They are sorted by scan location and
+/// room (as text), then views by number, the panorama last. Files with other names are skipped. An area
+/// without images gives an empty list.
 ///
 /// # Errors
 /// [`Error::Io`] if a folder cannot be read.
@@ -73,6 +75,7 @@ pub fn dataset_images(layout: &Layout, area: u32) -> Result<Vec<DatasetImage>> {
                 Err(e) if e.kind() == ErrorKind::NotFound => continue,
                 entries => entries.map_err(|e| Error::io(&folder, "read", e))?,
             };
+
             for entry in entries {
                 let file_name = entry.map_err(|e| Error::io(&folder, "read", e))?.file_name();
                 let Some(name) = file_name.to_str().and_then(ImageName::parse) else { continue };
@@ -85,26 +88,28 @@ pub fn dataset_images(layout: &Layout, area: u32) -> Result<Vec<DatasetImage>> {
             }
         }
     }
-    let image = |((uuid, room, frame), domains)| DatasetImage { area, uuid, room, frame, domains };
-    Ok(found.into_iter().map(image).collect())
+
+    let images = found.into_iter();
+    Ok(images
+        .map(|((uuid, room, frame), domains)| DatasetImage { area, uuid, room, frame, domains })
+        .collect())
 }
 
-/// Checks that every image has a file in each domain in which another of its area and kind (view or panorama)
-/// has one.
+/// Checks that the images of an area and kind (view or panorama) all have files in the same domains.
 ///
 /// # Errors
-/// [`Error::Format`] that names the first file that is missing.
+/// [`Error::Format`] that names the first missing file.
 pub fn check_images_complete(layout: &Layout, images: &[DatasetImage]) -> Result<()> {
-    let kind = |image: &DatasetImage| (image.area, image.frame == Frame::Panorama);
     let mut domains: BTreeMap<(u32, bool), Vec<Domain>> = BTreeMap::new();
     for image in images {
         let all = domains.entry(kind(image)).or_default();
-        image.domains.iter().for_each(|d| {
-            if !all.contains(d) {
-                all.push(*d);
+        for domain in &image.domains {
+            if !all.contains(domain) {
+                all.push(*domain);
             }
-        });
+        }
     }
+
     for image in images {
         let missing = domains
             .get(&kind(image))
@@ -121,22 +126,27 @@ pub fn check_images_complete(layout: &Layout, images: &[DatasetImage]) -> Result
     Ok(())
 }
 
-/// A candidate view, as `views.json` tells of it. The fields bear the file's names.
+/// Returns the area of an image, and whether it is a panorama.
+fn kind(image: &DatasetImage) -> (u32, bool) {
+    (image.area, image.frame == Frame::Panorama)
+}
+
+/// A candidate view of `views.json`. The fields have the names of the file's keys.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViewRecord {
     /// The scan location.
     pub camera_uuid: String,
-    /// From 0: what its draw is keyed by.
+    /// The candidate's number, from 0. It keys the random draw.
     pub candidate: u32,
-    /// Heading relative to the location's original camera, to the left.
+    /// The heading relative to the location's original camera, to the left.
     pub yaw_rad: f64,
-    /// Above the original camera's horizon.
+    /// The angle above the original camera's horizon.
     pub pitch_rad: f64,
-    /// The angle of view.
+    /// The horizontal angle of view.
     pub fov_rad: f64,
-    /// Shannon entropy of the classes of its pixels, nats, as it was scored for the selection.
+    /// The Shannon entropy of the classes of the view's pixels, nats, as it was scored for the selection.
     pub entropy: f64,
-    /// The number in its files' names, if it was kept.
+    /// The number in the names of the view's files, if the view was kept.
     pub frame_num: Option<u32>,
 }
 
@@ -148,35 +158,35 @@ pub fn read_views(path: &Path) -> Result<Vec<ViewRecord>> {
     read_json(path)
 }
 
-/// A photograph that became a view, as `frames.json` tells of it. The fields bear the file's names. Its view
-/// is [`Frame::View`] 0 of a camera of its own.
+/// A photograph that became a view, in `frames.json`. The fields have the names of the file's keys. The view
+/// is [`Frame::View`] 0 of its own camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhotographRecord {
-    /// The camera of its view: follows from the number of the area and the name.
+    /// The view's camera. It follows from the number of the area and the name.
     pub camera_uuid: String,
-    /// What the list of photographs calls it.
+    /// The photograph's name in the list of photographs.
     pub name: String,
-    /// Type and number of the room that it was taken in.
+    /// Type and number of the room in which it was taken.
     pub room: String,
-    /// Width of its view in pixels.
+    /// The width of the view in pixels.
     pub width: u32,
-    /// Height of its view in pixels.
+    /// The height of the view in pixels.
     pub height: u32,
-    /// The share of the view's pixels that lie outside of the photograph: 0, 0, 0 in its colours.
+    /// The share of the view's pixels that lie outside of the photograph. Their colour is 0, 0, 0.
     pub masked: f64,
     /// The share of the view's pixels that see the mesh.
     pub seen: f64,
-    /// How well the edges of photograph and mesh agree: the correlation of both, at most 1. Nothing where
-    /// there are no edges.
+    /// The agreement of the edges in photograph and mesh: their correlation, at most 1. `None` if there are
+    /// no edges.
     pub agreement: Option<f64>,
-    /// The same of photograph and mesh displaced against each other: what chance gives.
+    /// The agreement of photograph and mesh when they are displaced against each other: what chance gives.
     pub chance: Option<f64>,
 }
 
 /// Reads `area_N/frames.json`.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if the file holds something else, or a uuid that is none.
+/// [`Error::Io`]; [`Error::Format`] if the file holds something else, or an invalid uuid.
 pub fn read_photographs(path: &Path) -> Result<Vec<PhotographRecord>> {
     let records: Vec<PhotographRecord> = read_json(path)?;
     match records.iter().find(|r| !is_valid_uuid(&r.camera_uuid)) {
@@ -185,10 +195,10 @@ pub fn read_photographs(path: &Path) -> Result<Vec<PhotographRecord>> {
     }
 }
 
-/// Width and height of a PNG file, from its first 24 bytes.
+/// Returns width and height of a PNG file in pixels, from its first 24 bytes.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is no PNG file or has no pixel.
+/// [`Error::Io`]; [`Error::Format`] if the file is not PNG, or has no pixel.
 pub fn read_png_size(path: &Path) -> Result<(u32, u32)> {
     let mut head = Vec::with_capacity(24);
     let file = open_file(path)?;
@@ -198,6 +208,7 @@ pub fn read_png_size(path: &Path) -> Result<(u32, u32)> {
     let Ok(head) = <[u8; 24]>::try_from(head) else {
         return Err(Error::format(path, "the PNG file ends too early"));
     };
+
     let width = u32::from_be_bytes([head[16], head[17], head[18], head[19]]);
     let height = u32::from_be_bytes([head[20], head[21], head[22], head[23]]);
     if head[..8] != *b"\x89PNG\r\n\x1a\n" || head[12..16] != *b"IHDR" {
@@ -240,6 +251,7 @@ mod tests {
         for name in ["Thumbs.db", ".s3d-x.part", "camera_a_WC_2_frame_equirectangular_domain_rgb.png"] {
             write_bytes(&folder.join(name), b"").unwrap();
         }
+
         let images = dataset_images(&layout, 2).unwrap();
         let names: Vec<_> = images.iter().map(|i| (i.uuid.as_str(), i.frame)).collect();
         assert_eq!(

@@ -5,15 +5,15 @@ use crate::fs::json::{read_json, write_json};
 use s3d_label::NULL_NAME;
 use std::path::Path;
 
-/// How many entries a table must have for loaders that look a pixel up as `table[G * 256 + B]` before they
-/// find that R is not 0: the colour of missing pixels, (13, 13, 13), is such an index too.
+/// The number of entries that a table needs for loaders that look a pixel up as `table[G * 256 + B]` before
+/// they see that R is not 0. The colour of missing pixels, (13, 13, 13), is such an index too.
 pub const PADDED_LABELS: usize = 13 * 256 + 13 + 1;
 
-/// The most labels of instances in a table for such loaders: they see 16 bits of an index.
+/// The largest number of instance labels in a table for such loaders: they see 16 bits of an index.
 pub const MAX_LABELS_OF_LOADERS: usize = 65_535;
 
-/// Appends null labels until there are `entries` names. Whoever reads a table takes null labels at its end
-/// for padding.
+/// Appends null labels until there are `entries` names. Readers of a table take null labels at its end for
+/// padding.
 pub fn pad_labels(names: &mut Vec<String>, entries: usize) {
     names.resize(names.len().max(entries), NULL_NAME.to_owned());
 }
@@ -30,7 +30,7 @@ pub fn write_labels(path: &Path, names: &[String]) -> Result<u64> {
 /// Reads the names of labels.
 ///
 /// # Errors
-/// [`crate::Error::Io`]; [`crate::Error::Format`] if the file is no JSON array of strings.
+/// [`crate::Error::Io`]; [`crate::Error::Format`] if the file is not a JSON array of strings.
 pub fn read_labels(path: &Path) -> Result<Vec<String>> {
     read_json(path)
 }

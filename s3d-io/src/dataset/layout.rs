@@ -1,9 +1,9 @@
-//! Every path and every name of the data set. Source: formats.md, "What is written".
+//! All paths and names of the data set. Source: formats.md, "What is written".
 //!
-//! Loaders of the field find a file's fellows by replacing `rgb` in its **whole path** by another domain's
-//! name, and its room and scan location by splitting its name at `_`. So below the root `rgb` stands in a
-//! path only where a domain stands (besides `3d/rgb.obj` and its fellows, which are named as published), and
-//! no part holds an underscore.
+//! The usual loaders find the other files of an image by replacing `rgb` in the **whole path** by another
+//! domain's name. They find its room and scan location by splitting its name at `_`. So below the root `rgb`
+//! occurs in a path only for the domain (except for the meshes, `3d/rgb.obj` and its materials, which have
+//! their published names), and no part of a name contains an underscore.
 
 use crate::dataset::domain::Domain;
 #[cfg(feature = "json")]
@@ -11,8 +11,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Which image of a scan location: `frame_…` in a file's name, `frame_num` in a pose file (a number, or the
-/// word).
+/// The number of an image among the images of a scan location, or the panorama. It is `frame_…` in a file's
+/// name and `frame_num` in a pose file (a number, or the word).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Frame {
     /// A perspective view, counted from 0.
@@ -24,7 +24,7 @@ pub enum Frame {
 const PANORAMA: &str = "equirectangular";
 
 impl Frame {
-    /// The folder of an area that holds such images: "data" or "pano".
+    /// Returns the folder of an area that holds such images: "data" or "pano".
     pub fn folder(self) -> &'static str {
         match self {
             Self::View(_) => "data",
@@ -87,14 +87,14 @@ fn parse_frame(word: &str) -> Option<Frame> {
     }
 }
 
-/// Whether `uuid` can stand in file names: 1 to 64 ASCII letters, digits and hyphens, and nowhere "rgb".
+/// Returns whether `uuid` can stand in file names: 1 to 64 ASCII letters, digits and hyphens, without "rgb".
 pub fn is_valid_uuid(uuid: &str) -> bool {
     (1..=64).contains(&uuid.len())
         && uuid.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-')
         && !uuid.to_ascii_lowercase().contains("rgb")
 }
 
-/// Whether `room` can stand in file names: letters, an underscore, a number, as in "office_3".
+/// Returns whether `room` can stand in file names: letters, an underscore and a number, as in "office_3".
 pub fn is_valid_room(room: &str) -> bool {
     room.split_once('_').is_some_and(|(kind, number)| {
         let letters = !kind.is_empty() && kind.bytes().all(|b| b.is_ascii_alphabetic());
@@ -102,10 +102,10 @@ pub fn is_valid_room(room: &str) -> bool {
     }) && !room.to_ascii_lowercase().contains("rgb")
 }
 
-/// The name of an image without its domain: `camera_{uuid}_{roomType}_{roomNum}_frame_{frame}`.
+/// Returns the name of an image without its domain: `camera_{uuid}_{roomType}_{roomNum}_frame_{frame}`.
 ///
 /// # Panics
-/// If not [`is_valid_uuid`] or not [`is_valid_room`]: whoever reads them from a file checks them there.
+/// If not [`is_valid_uuid`] or not [`is_valid_room`]. Callers that read them from a file check them first.
 pub fn image_stem(uuid: &str, room: &str, frame: Frame) -> String {
     assert!(is_valid_uuid(uuid), "{uuid:?} cannot stand in a file's name as a scan location");
     assert!(is_valid_room(room), "{room:?} cannot stand in a file's name as a room");
@@ -119,14 +119,15 @@ pub struct ImageName {
     pub uuid: String,
     /// Type and number of the room: "office_3".
     pub room: String,
-    /// Which of the location's images.
+    /// The number of the image among the location's images, or the panorama.
     pub frame: Frame,
-    /// What it shows.
+    /// What the file shows.
     pub domain: Domain,
 }
 
 impl ImageName {
-    /// Takes a file name (without folders) apart; `None` if it is none of an image or a pose of the data set.
+    /// Parses a file name (without folders). Returns `None` if it is not the name of an image or pose of the
+    /// data set.
     pub fn parse(file_name: &str) -> Option<Self> {
         let (stem, domain) = file_name.split_once("_domain_")?;
         let domain = Domain::ALL.into_iter().find(|d| {
@@ -143,17 +144,17 @@ impl ImageName {
         })
     }
 
-    /// The name without the domain, the same for all domains of an image.
+    /// Returns the name without the domain. It is the same for all domains of an image.
     ///
     /// # Panics
-    /// As [`image_stem`].
+    /// Like [`image_stem`].
     pub fn stem(&self) -> String {
         image_stem(&self.uuid, &self.room, self.frame)
     }
 }
 
 impl fmt::Display for ImageName {
-    /// The file name.
+    /// Writes the file name.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { uuid, room, frame, domain } = self;
         write!(f, "camera_{uuid}_{room}_frame_{frame}_domain_{}.{}", domain.suffix(), domain.extension())
@@ -163,31 +164,31 @@ impl fmt::Display for ImageName {
 /// The loaders for which a data set may have a [profile](Layout::profile_dir).
 pub const PROFILES: [&str; 4] = ["mmdet3d", "open3d-ml", "pointcept", "pointnet"];
 
-/// Where everything of a data set lies. Makes paths only: it neither reads nor creates anything.
+/// The places of all files of a data set. It only makes paths: it neither reads nor creates anything.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
     root: PathBuf,
 }
 
 impl Layout {
-    /// The data set in the folder `root`.
+    /// Returns the layout of a data set in the folder `root`.
     pub fn new(root: impl Into<PathBuf>) -> Self {
         Self { root: root.into() }
     }
 
-    /// The folder that holds all.
+    /// Returns the data set's folder.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Whether "rgb" stands in the root itself, so that loaders that replace it in whole paths find nothing:
-    /// worth a warning.
+    /// Returns whether "rgb" occurs in the root itself. Loaders that replace it in whole paths then find
+    /// nothing, which is worth a warning.
     pub fn root_misleads_loaders(&self) -> bool {
         self.root.to_string_lossy().contains("rgb")
     }
 
-    /// What a data set of these areas has in its folder: the folders of the areas and of their S3DIS trees,
-    /// and its tables; the manifest last. Anything else there is somebody else's.
+    /// Returns the entries of the folder of a data set with these areas: the folders of the areas and of
+    /// their S3DIS trees, and the tables; the manifest last. Any other entry does not belong to the data set.
     pub fn entries(&self, areas: &[u32]) -> Vec<PathBuf> {
         let mut entries: Vec<PathBuf> = areas
             .iter()
@@ -206,7 +207,8 @@ impl Layout {
         entries
     }
 
-    /// Folders that hold nothing but [entries](Self::entries): to be removed when they are empty.
+    /// Returns the folders that hold nothing but [entries](Self::entries). They can be removed when they are
+    /// empty.
     pub fn shared_dirs(&self) -> Vec<PathBuf> {
         vec![self.s3dis_dir(), self.schema_dir(), self.assets_dir(), self.lists_dir(), self.profiles_dir()]
     }
@@ -226,10 +228,11 @@ impl Layout {
         self.area_dir(area).join(frame.folder()).join(domain.folder())
     }
 
-    /// The file of one domain of one image: `uuid` of the scan location, `room` as in "office_3".
+    /// Returns the file of one domain of one image. `uuid` is the scan location, `room` is written as in
+    /// "office_3".
     ///
     /// # Panics
-    /// As [`image_stem`].
+    /// Like [`image_stem`].
     pub fn image_path(&self, area: u32, uuid: &str, room: &str, frame: Frame, domain: Domain) -> PathBuf {
         let stem = image_stem(uuid, room, frame);
         let name = format!("{stem}_domain_{}.{}", domain.suffix(), domain.extension());
@@ -261,12 +264,12 @@ impl Layout {
         self.mesh_dir(area).join("instances.json")
     }
 
-    /// `area_1/3d/instances.npz`: the same and the points of each voxel, for numpy.
+    /// `area_1/3d/instances.npz`: the same with the points of each voxel, for numpy.
     pub fn instances_npz(&self, area: u32) -> PathBuf {
         self.mesh_dir(area).join("instances.npz")
     }
 
-    /// `area_1/3d/votes.npz`: how the votes for each face went, for numpy.
+    /// `area_1/3d/votes.npz`: the votes for each face, for numpy.
     pub fn votes_npz(&self, area: u32) -> PathBuf {
         self.mesh_dir(area).join("votes.npz")
     }
@@ -321,12 +324,12 @@ impl Layout {
         self.assets_dir().join("taxonomy.json")
     }
 
-    /// `assets/class_legend.csv`: what the numbers and colours of `semantic_class` images mean.
+    /// `assets/class_legend.csv`: the meaning of the numbers and colours of `semantic_class` images.
     pub fn class_legend_csv(&self) -> PathBuf {
         self.assets_dir().join("class_legend.csv")
     }
 
-    /// `assets/class_legend.png`: the same to look at.
+    /// `assets/class_legend.png`: the same legend to look at.
     pub fn class_legend_png(&self) -> PathBuf {
         self.assets_dir().join("class_legend.png")
     }
@@ -351,7 +354,7 @@ impl Layout {
         self.schema_dir().join("manifest.schema.json")
     }
 
-    /// `conventions.json`: what the numbers mean, for programs.
+    /// `conventions.json`: the meaning of the numbers, for programs.
     pub fn conventions(&self) -> PathBuf {
         self.root.join("conventions.json")
     }
@@ -372,63 +375,63 @@ impl Layout {
         self.lists_dir().join("all.txt")
     }
 
-    /// `profiles`: what single loaders want, a folder each.
+    /// `profiles`: a folder for each loader with the files that it needs.
     pub fn profiles_dir(&self) -> PathBuf {
         self.root.join("profiles")
     }
 
-    /// `profiles/pointnet`: what the loader of this name wants.
+    /// `profiles/pointnet`: the files that the loader of this name needs.
     pub fn profile_dir(&self, name: &str) -> PathBuf {
         self.profiles_dir().join(name)
     }
 
-    /// `splits.json`: which areas to train on and which to test on.
+    /// `splits.json`: the areas to train on and the areas to test on.
     pub fn splits(&self) -> PathBuf {
         self.root.join("splits.json")
     }
 
-    /// `manifest.json`: what was made, from what, with which options.
+    /// `manifest.json`: what was made, from what, and with which options.
     pub fn manifest(&self) -> PathBuf {
         self.root.join("manifest.json")
     }
 
-    /// `files.csv`: every other file but the manifest, with its size and checksum.
+    /// `files.csv`: all other files except the manifest, with their sizes and checksums.
     pub fn file_list(&self) -> PathBuf {
         self.root.join("files.csv")
     }
 
-    /// `.s3d`: what an export keeps while it is unfinished. No [entry](Self::entries) of a data set: it is
-    /// gone when the data set is complete.
+    /// `.s3d`: the state of an unfinished export. It is no [entry](Self::entries) of a data set, and is
+    /// removed when the data set is complete.
     pub fn work_dir(&self) -> PathBuf {
         self.root.join(".s3d")
     }
 
-    /// `.s3d/lock`: who holds its lock exports into the folder.
+    /// `.s3d/lock`: the process that holds its lock exports into the folder.
     pub fn lock(&self) -> PathBuf {
         self.work_dir().join("lock")
     }
 
-    /// `.s3d/request.json`: what is exported, from what, with which options.
+    /// `.s3d/request.json`: what is exported, from what, and with which options.
     pub fn request(&self) -> PathBuf {
         self.work_dir().join("request.json")
     }
 
-    /// `.s3d/failed`: there if the export ended by an error that trying again does not mend.
+    /// `.s3d/failed`: exists if the export ended with an error that another try would not fix.
     pub fn failed(&self) -> PathBuf {
         self.work_dir().join("failed")
     }
 
-    /// `.s3d/journal`: which work is done; a file for each process that did some.
+    /// `.s3d/journal`: the work that is done, with a file for each process.
     pub fn journal_dir(&self) -> PathBuf {
         self.work_dir().join("journal")
     }
 
-    /// `statistics.md`: counts, to read.
+    /// `statistics.md`: counts, for people.
     pub fn statistics_md(&self) -> PathBuf {
         self.root.join("statistics.md")
     }
 
-    /// `statistics.json`: counts, to compute with.
+    /// `statistics.json`: counts, for programs.
     pub fn statistics_json(&self) -> PathBuf {
         self.root.join("statistics.json")
     }
@@ -445,9 +448,10 @@ mod tests {
         let path = Layout::new("root").image_path(3, UUID, "office_5", Frame::View(41), Domain::Normal);
         let name = format!("camera_{UUID}_office_5_frame_41_domain_normals.png");
         assert_eq!(path, Path::new("root/area_3/data/normal").join(&name));
-        // What loaders take from it.
+        // The words that loaders take from it.
         let fields: Vec<&str> = name.split('_').collect();
         assert_eq!((fields[1], fields[2], fields[3]), (UUID, "office", "5"));
+
         let pano = Layout::new("root").image_path(3, UUID, "office_5", Frame::Panorama, Domain::GlobalXyz);
         let name = format!("camera_{UUID}_office_5_frame_equirectangular_domain_global_xyz.exr");
         assert_eq!(pano, Path::new("root/area_3/pano/global_xyz").join(name));
@@ -497,8 +501,8 @@ mod tests {
         assert!(!is_valid_room("office") && !is_valid_room("open_space_1") && is_valid_room("WC_1"));
     }
 
-    /// A loader swaps `rgb` for another domain in the whole path, or for the empty word to find the
-    /// modality's root.
+    /// A loader replaces `rgb` by another domain in the whole path, or by nothing to find the folder of the
+    /// modality.
     #[test]
     fn rgb_stands_in_a_path_only_for_the_domain() {
         let layout = Layout::new("root");

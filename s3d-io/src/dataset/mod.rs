@@ -1,18 +1,18 @@
-//! What a data set is made of besides images, meshes and points: names, poses, labels, instances, splits,
+//! The parts of a data set besides images, meshes and points: names, poses, labels, instances, splits and
 //! lists.
 //!
-//! - Names: [`Layout`] knows where every file lies; [`ImageName`] takes the name of an image apart, into scan
-//!   location, room, [`Frame`] and [`Domain`]. They need no cargo feature.
-//! - [`dataset_images`] lists the images that are there, with the domains of each ([`DatasetImage`]).
-//! - [`PoseFile`]: the camera of an image, as `*.json`.
-//! - [`read_labels`], [`write_labels`]: `semantic_labels.json`. Loaders of the field hold at most
+//! - Names: a [`Layout`] knows the path of every file. An [`ImageName`] is the name of an image, parsed into
+//!   scan location, room, [`Frame`] and [`Domain`]. They need no cargo feature.
+//! - [`dataset_images`] lists the images on the disk, with the domains of each ([`DatasetImage`]).
+//! - [`PoseFile`]: the camera of an image, `*.json`.
+//! - [`read_labels`], [`write_labels`]: `semantic_labels.json`. The usual loaders handle at most
 //!   [`MAX_LABELS_OF_LOADERS`].
-//! - [`read_taxonomy_json`], [`write_taxonomy_json`]: `taxonomy.json`, where the classes are not S3DIS's.
-//! - [`InstanceWriter`]: boxes and voxels of instances, as `instances.json` and `instances.npz`;
-//!   [`read_instances`], [`read_instance_arrays`].
+//! - [`read_taxonomy_json`], [`write_taxonomy_json`]: `taxonomy.json`, if the classes are not S3DIS's.
+//! - [`InstanceWriter`]: boxes and voxels of instances, `instances.json` and `instances.npz`. They are read
+//!   by [`read_instances`] and [`read_instance_arrays`].
 //! - [`Split`]: folds of areas; [`write_image_list`]: lists of images.
-//! - [`FileRecord`]: `files.csv`, sizes and checksums of all files.
-//! - [`Conventions`]: what the numbers mean, `conventions.json`.
+//! - [`FileRecord`]: `files.csv`, the sizes and checksums of all files.
+//! - [`Conventions`]: `conventions.json`, the meaning of the numbers.
 //!
 //! Source: formats.md, "What is written".
 //!

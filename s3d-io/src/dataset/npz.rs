@@ -1,4 +1,4 @@
-//! Archives of numpy's arrays, as they are written beside a data set's tables.
+//! Archives of numpy arrays, which are written beside a data set's tables.
 
 use crate::cloud::npy::write::npy_header;
 use crate::error::{Error, Result};
@@ -7,7 +7,7 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
-/// The bytes of an array's values.
+/// Returns the bytes of an array's values.
 pub(super) fn bytes<T, const N: usize>(
     values: impl Iterator<Item = T>,
     to_le_bytes: impl Fn(T) -> [u8; N],
@@ -25,12 +25,12 @@ impl<W: Write + Seek> NpzWriter<W> {
         Self { zip: ZipWriter::new(file) }
     }
 
-    /// What it was written to, complete.
+    /// Completes the archive, and returns the writer.
     pub(super) fn finish(self) -> io::Result<W> {
         Ok(self.zip.finish()?)
     }
 
-    /// Appends an array of a numpy type (`"<u4"`) that is in memory.
+    /// Appends an array in memory. `kind` is a numpy type (`"<u4"`).
     pub(super) fn array(
         &mut self,
         name: &str,
@@ -83,8 +83,8 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
         Ok(Self { path, zip })
     }
 
-    /// The header of an array, and its values to be read. The archive's own checksum is looked at where these
-    /// end.
+    /// Returns the header of an array, and a reader of its values. The archive's checksum is compared at the
+    /// end of the values.
     pub(super) fn array(&mut self, name: &str) -> Result<(Vec<u8>, impl Read + '_)> {
         let path = self.path;
         let mut entry = self
@@ -92,7 +92,8 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
             .by_name(&format!("{name}.npy"))
             .map_err(|e| Error::format(path, format!("the array {name:?}: {e}")))?;
         let other = |_| Error::format(path, format!("{name:?} is no NPY array"));
-        let (mut start, mut length) = ([0; 8], [0; 2]);
+        let mut start = [0; 8];
+        let mut length = [0; 2];
         entry.read_exact(&mut start).map_err(other)?;
         entry.read_exact(&mut length).map_err(other)?;
         let mut text = vec![0; usize::from(u16::from_le_bytes(length))];
@@ -100,7 +101,8 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
         Ok(([&start[..], &length, &text].concat(), entry))
     }
 
-    /// The values of an array of this type; `shape` tells its shape from how many bytes there are.
+    /// Returns the bytes of an array's values, after a check of its type and shape. Both are told from the
+    /// number of bytes.
     pub(super) fn whole(
         &mut self,
         name: &str,
@@ -111,8 +113,7 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
         let (header, mut values) = self.array(name)?;
         let mut bytes = Vec::new();
         values.read_to_end(&mut bytes).map_err(|e| damaged(path, name, &e))?;
-        let (kind, shape) = (kind(bytes.len()), shape(bytes.len()));
-        check_header(path, name, &header, &kind, &shape)?;
+        check_header(path, name, &header, &kind(bytes.len()), &shape(bytes.len()))?;
         Ok(bytes)
     }
 }
@@ -129,7 +130,7 @@ pub(super) fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, s
     Err(Error::format(path, format!("the array {name:?} is not of type {kind} and shape {shape:?}")))
 }
 
-/// The values of an array's bytes.
+/// Returns the values in an array's bytes.
 pub(super) fn numbers<T, const N: usize>(bytes: &[u8], from_le_bytes: impl Fn([u8; N]) -> T) -> Vec<T> {
     bytes.as_chunks().0.iter().map(|b| from_le_bytes(*b)).collect()
 }
@@ -145,8 +146,7 @@ mod tests {
             archive.start("point_index", size).unwrap();
             archive.zip.write_all(b"abc").unwrap();
             let bytes = archive.zip.finish().unwrap().into_inner();
-            // The local header: version 4.5 is needed, the sizes are elsewhere, namely in an extra field of
-            // the kind 1.
+            // In the local header, version 4.5 is needed, and the sizes are in an extra field of the kind 1.
             assert_eq!(bytes[..4], *b"PK\x03\x04");
             let extra = 30 + "point_index.npy".len();
             let sizes = if is_large { [0xff; 8] } else { [3, 0, 0, 0, 3, 0, 0, 0] };

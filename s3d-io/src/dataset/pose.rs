@@ -1,17 +1,17 @@
-//! Pose files: where the camera of an image is. Source: formats.md, "What is written".
+//! Pose files: the cameras of images. Source: formats.md, "What is written".
 
 use crate::dataset::layout::Frame;
 use crate::error::Result;
 use crate::fs::atomic::write_bytes;
 use crate::fs::json::read_json;
-use s3d_geom::glam::{DVec3, dvec3};
+use s3d_geom::glam::{DMat3, DVec3, dvec3};
 use s3d_geom::{Camera, Pose, euler_from_rotation, rotation_from_euler};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// The contents of a pose file. The fields bear the file's names and are written in this order.
+/// The contents of a pose file. The fields have the names of the file's keys, and are written in this order.
 ///
-/// Rotations are Blender's XYZ Euler angles in radians, E = Rz·Ry·Rx; lengths are metres, in the world's
+/// Rotations are Blender's XYZ Euler angles in radians, E = Rz·Ry·Rx. Lengths are metres in the world's
 /// frame (Z-up).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "RawPoseFile")]
@@ -20,35 +20,36 @@ pub struct PoseFile {
     pub camera_k_matrix: [[f64; 3]; 3],
     /// The horizontal angle of view; π/2 for a panorama.
     pub field_of_view_rads: f64,
-    /// Camera (looking along −Z, +Y up) → world as the scanner stood.
+    /// The rotation of the scanner: camera (looking along −Z, +Y up) → world.
     pub camera_original_rotation: [f64; 3],
-    /// What turns the original rotation into the final one, in the world: E(final) = E(this)·E(original).
+    /// The rotation from the original rotation to the final one, in the world: E(final) =
+    /// E(this)·E(original).
     pub rotation_from_original_to_point: [f64; 3],
-    /// Camera (looking along −Z, +Y up) → world of this image.
+    /// The rotation of this image: camera (looking along −Z, +Y up) → world.
     pub final_camera_rotation: [f64; 3],
-    /// The same again, under a misspelt key that a published loader reads.
+    /// The same rotation, under a misspelt key that a published loader reads.
     pub camera_rotation_final: [f64; 3],
-    /// The camera's place.
+    /// The camera's position.
     pub camera_location: [f64; 3],
     /// World → camera in OpenCV's axes (x right, y down, z forward), 3 × 4.
     pub camera_rt_matrix: [[f64; 4]; 3],
     /// The scan location.
     pub camera_uuid: String,
-    /// The same.
+    /// The scan location again.
     pub point_uuid: String,
-    /// Number of the view; the word "equirectangular" for a panorama. (formats.md leaves the panorama open;
-    /// the word is what stands in the file's name.)
+    /// The number of the view; the word "equirectangular" for a panorama. (formats.md leaves the panorama
+    /// open; the word is the one in the file's name.)
     pub frame_num: Frame,
     /// Type, number and area of the room: "office_5_3".
     pub room: String,
-    /// What was subtracted from the scan's coordinates to make those of the world, metres; not there if
-    /// nothing was.
+    /// The offset that was subtracted from the scan's coordinates to make world coordinates, metres. `None`,
+    /// and no key in the file, if there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub world_offset_m: Option<[f64; 3]>,
 }
 
-/// What files may hold: the published ones have no `camera_rotation_final`, and a matrix may have its fourth
-/// row.
+/// The keys that a file may hold. The published files have no `camera_rotation_final`, and a matrix may have
+/// its fourth row.
 #[derive(Deserialize)]
 struct RawPoseFile {
     camera_k_matrix: [[f64; 3]; 3],
@@ -77,6 +78,7 @@ impl TryFrom<RawPoseFile> for PoseFile {
             &[a, b, c] | &[a, b, c, [0.0, 0.0, 0.0, 1.0]] => [a, b, c],
             rows => return Err(format!("camera_rt_matrix has {} rows, not 3", rows.len())),
         };
+
         Ok(Self {
             camera_k_matrix: raw.camera_k_matrix,
             field_of_view_rads: raw.field_of_view_rads,
@@ -96,20 +98,18 @@ impl TryFrom<RawPoseFile> for PoseFile {
 }
 
 impl PoseFile {
-    /// The pose file of an image of `camera` from the scan location `uuid`, where the scanner stood as
-    /// `original`, in the room `room` (type, number and area: "office_5_3").
+    /// Returns the pose file of an image of `camera`. The scan location `uuid`, where the scanner stood as
+    /// `original`, is in the room `room` (type, number and area: "office_5_3").
     pub fn new(camera: &Camera, original: &Pose, uuid: &str, room: &str, frame_num: Frame) -> Self {
         let last = camera.pose.world_from_camera;
         let between = last * original.world_from_camera.transpose();
-        // Adding 0 turns −0 into 0.
-        let angles = |rotation| (euler_from_rotation(rotation) + DVec3::ZERO).to_array();
         Self {
             camera_k_matrix: camera.k_matrix(),
             field_of_view_rads: camera.fov_rad(),
-            camera_original_rotation: angles(original.world_from_camera),
-            rotation_from_original_to_point: angles(between),
-            final_camera_rotation: angles(last),
-            camera_rotation_final: angles(last),
+            camera_original_rotation: euler_angles(original.world_from_camera),
+            rotation_from_original_to_point: euler_angles(between),
+            final_camera_rotation: euler_angles(last),
+            camera_rotation_final: euler_angles(last),
             camera_location: camera.pose.location.to_array(),
             camera_rt_matrix: camera.pose.rt_matrix().map(|row| row.map(|v| v + 0.0)),
             camera_uuid: uuid.to_owned(),
@@ -120,12 +120,12 @@ impl PoseFile {
         }
     }
 
-    /// The pose of the image's camera.
+    /// Returns the pose of the image's camera.
     pub fn pose(&self) -> Pose {
         self.pose_of(self.final_camera_rotation)
     }
 
-    /// The pose of the scanner.
+    /// Returns the pose of the scanner.
     pub fn original(&self) -> Pose {
         self.pose_of(self.camera_original_rotation)
     }
@@ -135,7 +135,8 @@ impl PoseFile {
         Pose { location, world_from_camera: rotation_from_euler(dvec3(x, y, z)) }
     }
 
-    /// The file's bytes: JSON on one line, keys in the order of the fields, numbers that come back exactly.
+    /// Returns the file's bytes: JSON on one line, keys in the order of the fields. The numbers can be read
+    /// back exactly.
     #[expect(
         clippy::expect_used,
         reason = "only maps with other keys than strings, and own serializers, can fail"
@@ -155,10 +156,15 @@ impl PoseFile {
     }
 }
 
-/// Reads a pose file, ours or a published one.
+/// Returns Euler angles without −0: adding 0 turns it into 0.
+fn euler_angles(rotation: DMat3) -> [f64; 3] {
+    (euler_from_rotation(rotation) + DVec3::ZERO).to_array()
+}
+
+/// Reads a pose file of this crate or of the published data set.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io); [`Error::Format`](crate::Error::Format) if it is no JSON, a key is
+/// [`Error::Io`](crate::Error::Io); [`Error::Format`](crate::Error::Format) if it is not JSON, or a key is
 /// missing or holds something else.
 pub fn read_pose(path: &Path) -> Result<PoseFile> {
     read_json(path)
@@ -169,7 +175,7 @@ mod tests {
     use super::*;
     use s3d_geom::glam::DQuat;
 
-    /// A pose file of the published data set (Area 3), as it is but for the order of its keys.
+    /// A pose file of the published data set (Area 3). Only the order of its keys is changed.
     const GENUINE: &str = r#"{
         "camera_k_matrix": [[877.7806396484375, 0.0, 540.0], [0.0, 877.7806396484375, 540.0], [0.0, 0.0, 1.0]],
         "field_of_view_rads": 1.1030245194845198,
@@ -187,7 +193,7 @@ mod tests {
         "room": "office_5_3"
     }"#;
 
-    /// From location, original rotation, yaw, pitch and angle of view everything else comes out.
+    /// Checks that location, original rotation, yaw, pitch and angle of view give everything else.
     fn assert_reproduced(genuine: &PoseFile) {
         let original = genuine.original();
         let (yaw, pitch) = original.yaw_pitch_to(&genuine.pose());
@@ -199,8 +205,7 @@ mod tests {
         };
         close(ours.camera_k_matrix.as_flattened(), genuine.camera_k_matrix.as_flattened(), 3e-5);
         // The translation is a sum of products with single-precision rotations and 22 m.
-        let rt = (ours.camera_rt_matrix, genuine.camera_rt_matrix);
-        close(rt.0.as_flattened(), rt.1.as_flattened(), 2e-6);
+        close(ours.camera_rt_matrix.as_flattened(), genuine.camera_rt_matrix.as_flattened(), 2e-6);
         close(&ours.final_camera_rotation, &genuine.final_camera_rotation, 1e-6);
         close(&ours.camera_rotation_final, &genuine.final_camera_rotation, 1e-6);
         close(&ours.camera_original_rotation, &genuine.camera_original_rotation, 1e-6);

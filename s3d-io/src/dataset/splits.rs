@@ -1,4 +1,4 @@
-//! `splits.json`: which areas to train on and which to test on. Source: formats.md, "What is written".
+//! `splits.json`: the areas to train on and the areas to test on. Source: formats.md, "What is written".
 
 use crate::error::Result;
 use crate::fs::atomic::write_whole;
@@ -6,14 +6,14 @@ use crate::fs::json::{read_json, write_json};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// One fold of the cross-validation. The fields bear the file's names.
+/// A fold of the cross-validation. The fields have the names of the file's keys.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Split {
-    /// Its number, from 1.
+    /// The fold's number, from 1.
     pub fold: u32,
-    /// Numbers of the areas to train on.
+    /// The numbers of the areas to train on.
     pub train_areas: Vec<u32>,
-    /// Numbers of the areas to test on.
+    /// The numbers of the areas to test on.
     pub test_areas: Vec<u32>,
 }
 
@@ -22,8 +22,8 @@ struct Splits {
     folds: Vec<Split>,
 }
 
-/// Writes the folds, `{"folds": [{"fold": 1, "train_areas": [1, …], "test_areas": [5]}, …]}`, and returns the
-/// file's size in bytes.
+/// Writes the folds, `{"folds": [{"fold": 1, "train_areas": [1, …], "test_areas": [5]}, …]}`, and returns
+/// the file's size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
@@ -40,9 +40,9 @@ pub fn read_splits(path: &Path) -> Result<Vec<Split>> {
     Ok(folds)
 }
 
-/// Writes a list of images, a line each, as depth loaders such as UniFuse's read it: the colour image and the
-/// depth image, paths relative to the data set's folder with `/`, between them one space. Returns the file's
-/// size in bytes.
+/// Writes a list of images that depth loaders such as UniFuse's read. A line holds the colour image and the
+/// depth image, with a space between them. Their paths are relative to the data set's folder, with `/`.
+/// Returns the file's size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).

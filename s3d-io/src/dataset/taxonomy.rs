@@ -1,11 +1,11 @@
-//! `assets/taxonomy.json`: the classes and types of rooms of a data set that has others than S3DIS.
+//! `assets/taxonomy.json`: the classes and types of rooms of a data set that does not use S3DIS's.
 
 use crate::error::{Error, Result};
 use crate::fs::json::{read_json, write_json};
 use s3d_label::{Taxonomy, TaxonomyDefinition};
 use std::path::Path;
 
-/// Writes what a taxonomy is made of, and returns the file's size in bytes.
+/// Writes the definition of a taxonomy, and returns the file's size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -16,16 +16,16 @@ pub fn write_taxonomy_json(path: &Path, taxonomy: &Taxonomy) -> Result<u64> {
 /// Reads a taxonomy in JSON.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the line if the file is no JSON or has other fields, with the entry
-/// for what is no taxonomy.
+/// [`Error::Io`]; [`Error::Format`], with the line if the file is not JSON or has other fields, with the
+/// entry if it is not a taxonomy.
 pub fn read_taxonomy_json(path: &Path) -> Result<Taxonomy> {
     taxonomy(path, read_json(path)?)
 }
 
-/// As [`read_taxonomy_json`]; S3DIS's if there is no such file, as in data sets that have S3DIS's classes.
+/// Reads like [`read_taxonomy_json`]. Returns S3DIS's taxonomy if there is no such file.
 ///
 /// # Errors
-/// As [`read_taxonomy_json`].
+/// Like [`read_taxonomy_json`].
 pub fn read_taxonomy_json_or_s3dis(path: &Path) -> Result<Taxonomy> {
     match path.try_exists() {
         Ok(false) => Ok(Taxonomy::s3dis()),
@@ -33,7 +33,7 @@ pub fn read_taxonomy_json_or_s3dis(path: &Path) -> Result<Taxonomy> {
     }
 }
 
-/// The taxonomy of a definition that a file holds.
+/// Returns the taxonomy of a definition in the file `path`.
 pub(crate) fn taxonomy(path: &Path, definition: TaxonomyDefinition) -> Result<Taxonomy> {
     Taxonomy::new(definition).map_err(|e| Error::format(path, e.to_string()))
 }

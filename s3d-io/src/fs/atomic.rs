@@ -6,15 +6,15 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// Bytes that are collected before the system is called.
+/// The size of the write buffer, bytes.
 const BUFFER: usize = 1 << 18;
 
 /// A file that takes its name only when it is complete.
 ///
-/// It is written under a temporary name (a dot and random letters) in the folder of the final one, and
-/// [`AtomicFile::commit`] renames it, over an older file if there is one. Dropped without that, it leaves
-/// nothing behind. Nobody who lists the folder meets half a file under the final name, even when the process
-/// is killed; a crash of the whole machine is not guarded against (nothing is synced to the disk).
+/// It is written under a temporary name (a dot and random letters) in the folder of the final file.
+/// [`AtomicFile::commit`] renames it, over an older file if there is one. A file that is dropped before that
+/// leaves nothing behind. The final name never shows half a file, even if the process is killed. A crash of
+/// the whole machine is not guarded against, because nothing is synced to the disk.
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
@@ -22,20 +22,22 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Starts the file that will be `path`. Its folder must be there.
+    /// Starts the file that will be `path`. Its folder must exist.
     ///
     /// # Errors
-    /// [`Error::Io`] with `path` if no file can be made in its folder, or a device or pipe has its name.
+    /// [`Error::Io`] with `path` if no file can be made in its folder, or `path` is a device or a pipe.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
         if std::fs::metadata(&path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
             let source = io::Error::new(io::ErrorKind::InvalidInput, "it is a device or a pipe, no file");
             return Err(Error::io(&path, "replace", source));
         }
+
         let folder = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
+
         let mut builder = tempfile::Builder::new();
         builder.prefix(".s3d-").suffix(".part");
         let usual = usual_permissions();
@@ -46,7 +48,7 @@ impl AtomicFile {
         Ok(Self { path, writer: BufWriter::with_capacity(BUFFER, temporary) })
     }
 
-    /// The final name.
+    /// Returns the final name.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -54,7 +56,7 @@ impl AtomicFile {
     /// Gives the file its final name, and returns its size in bytes.
     ///
     /// # Errors
-    /// [`Error::Io`] if the rest cannot be written or the file cannot be renamed; it is removed then.
+    /// [`Error::Io`] if the rest cannot be written or the file cannot be renamed; the file is removed then.
     pub fn commit(self) -> Result<u64> {
         let Self { path, writer } = self;
         let io = |e| Error::io(&path, "write", e);
@@ -66,7 +68,7 @@ impl AtomicFile {
         Ok(bytes)
     }
 
-    /// Writes `bytes`; as [`Write::write_all`], but the error names the file.
+    /// Writes all of `bytes`, like [`Write::write_all`]. The error names the file.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -93,8 +95,8 @@ impl Seek for AtomicFile {
     }
 }
 
-/// Temporary files are made for their owner alone; these become ordinary files, which the umask decides
-/// about.
+/// Returns the permissions of an ordinary file before the umask. Temporary files would be private to their
+/// owner.
 #[cfg(unix)]
 fn usual_permissions() -> Option<Permissions> {
     use std::os::unix::fs::PermissionsExt;
@@ -109,7 +111,7 @@ fn usual_permissions() -> Option<Permissions> {
 /// Writes a file through `write`, whole or not at all, and returns its size in bytes.
 ///
 /// # Errors
-/// [`Error::Io`] with `path`, for an error of `write` too.
+/// [`Error::Io`] with `path`; an error of `write` is wrapped in one too.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<u64> {
     let mut file = AtomicFile::create(path)?;
     write(&mut file).map_err(|e| Error::io(path, "write", e))?;
@@ -124,7 +126,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<u64> {
     write_whole(path, |w| w.write_all(bytes))
 }
 
-/// Makes the folder `path` and those above it. It may be there already.
+/// Makes the folder `path` and its parents, if they do not exist yet.
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -150,10 +152,12 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.txt");
         assert_eq!(write_bytes(&path, b"old").unwrap(), 3);
+
         let mut file = AtomicFile::create(&path).unwrap();
         file.put(b"____new").unwrap();
         file.seek(SeekFrom::Start(0)).unwrap();
         file.put(b"very").unwrap();
+
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(file.commit().unwrap(), 7);
         assert_eq!(std::fs::read(&path).unwrap(), b"verynew");
@@ -172,6 +176,7 @@ mod tests {
         assert_eq!(e.path(), path);
         assert!(e.to_string().ends_with("a.txt: cannot write: the disk is on fire"), "{e}");
         assert!(names(dir.path()).is_empty());
+
         drop(AtomicFile::create(&path).unwrap());
         assert!(names(dir.path()).is_empty());
 
@@ -188,10 +193,13 @@ mod tests {
     #[test]
     fn permissions_are_those_of_any_other_file() {
         use std::os::unix::fs::PermissionsExt;
+
         let dir = tempfile::tempdir().unwrap();
-        let (ours, plain) = (dir.path().join("ours"), dir.path().join("plain"));
+        let ours = dir.path().join("ours");
+        let plain = dir.path().join("plain");
         write_bytes(&ours, b"").unwrap();
         std::fs::write(&plain, b"").unwrap();
+
         let mode = |path| std::fs::metadata(path).unwrap().permissions().mode();
         assert_eq!(mode(&ours), mode(&plain));
     }

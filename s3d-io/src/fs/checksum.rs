@@ -1,7 +1,7 @@
 //! Checksums of files: XXH3 of 128 bits, written as `xxhsum -H2` prints it.
 //!
-//! They tell a file that changed by accident — half of it written, a flipped bit, zeros after a power loss —
-//! from the one that was written. They are no proof against somebody who changes files on purpose.
+//! They detect accidental changes: half a file, a flipped bit, zeros after a power loss. They do not protect
+//! against somebody who changes files on purpose.
 
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
@@ -13,15 +13,15 @@ use std::str::FromStr;
 use thiserror::Error;
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
-/// Bytes that are read at a time.
+/// The size of the read buffer, bytes.
 const BUFFER: usize = 1 << 18;
 
-/// XXH3 of 128 bits, with seed 0, of a file's content. As text it is 32 lower-case hexadecimal digits, the
-/// highest first.
+/// The 128-bit XXH3 hash of a file's content, with seed 0. As text it is 32 lower-case hexadecimal digits,
+/// the most significant first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Checksum(pub u128);
 
-/// A text that is no checksum.
+/// The error for text that is not a checksum.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{text:?} is no checksum of 32 lower-case hexadecimal digits")]
 pub struct BadChecksum {
@@ -30,13 +30,13 @@ pub struct BadChecksum {
 }
 
 impl Checksum {
-    /// That of these bytes.
+    /// Returns the checksum of `bytes`.
     pub fn of(bytes: &[u8]) -> Self {
         Self(xxh3_128(bytes))
     }
 }
 
-/// Takes the checksum of bytes that come piece by piece, and counts them.
+/// Computes the checksum of bytes that arrive in pieces, and counts them.
 #[derive(Clone)]
 pub struct ChecksumOfParts {
     state: Box<Xxh3Default>,
@@ -58,33 +58,33 @@ impl Default for ChecksumOfParts {
 }
 
 impl ChecksumOfParts {
-    /// Goes on with these bytes.
+    /// Adds the next bytes.
     pub fn add(&mut self, bytes: &[u8]) {
         self.state.update(bytes);
         self.bytes += bytes.len() as u64;
     }
 
-    /// How many bytes there were, and their checksum.
+    /// Returns the number of bytes so far, and their checksum.
     pub fn finish(&self) -> (u64, Checksum) {
         (self.bytes, Checksum(self.state.digest128()))
     }
 }
 
-/// Size in bytes and checksum of a file, of which little is in memory at a time.
+/// Returns a file's size in bytes and its checksum. The file is read in small blocks.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] for what is no regular file.
+/// [`Error::Io`]; [`Error::Format`] if it is not a regular file.
 pub fn checksum_of_file(path: &Path) -> Result<(u64, Checksum)> {
-    let failed = |e| Error::io(path, "read", e);
     let mut file = open_file(path)?;
     let mut buffer = vec![0; BUFFER];
     let mut parts = ChecksumOfParts::default();
+
     loop {
         match file.read(&mut buffer) {
             Ok(0) => return Ok(parts.finish()),
             Ok(n) => parts.add(buffer.get(..n).unwrap_or_default()),
             Err(e) if e.kind() == ErrorKind::Interrupted => {}
-            Err(e) => return Err(failed(e)),
+            Err(e) => return Err(Error::io(path, "read", e)),
         }
     }
 }
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::fs::atomic::write_bytes;
 
-    /// What `xxhsum -H2` prints for files of these contents.
+    /// The contents of files, and the checksums that `xxhsum -H2` prints for them.
     const PUBLISHED: [(&[u8], &str); 2] =
         [(b"", "99aa06d3014798d86001c324468d497f"), (b"a", "a96faf705af16834e6c632b61e964e1f")];
 
@@ -147,14 +147,17 @@ mod tests {
         let bytes: Vec<u8> = (0..3 * BUFFER as u32 + 17)
             .map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8)
             .collect();
+
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("file");
         write_bytes(&path, &bytes).unwrap();
         let whole = (bytes.len() as u64, Checksum::of(&bytes));
         assert_eq!(checksum_of_file(&path).unwrap(), whole);
+
         let mut parts = ChecksumOfParts::default();
         bytes.chunks(1001).for_each(|chunk| parts.add(chunk));
         assert_eq!(parts.finish(), whole);
+
         let message = checksum_of_file(&dir.path().join("gone")).unwrap_err().to_string();
         assert!(message.contains("gone: cannot read"), "{message}");
     }

@@ -1,25 +1,27 @@
-//! Text files in UTF-8 and UTF-16, told apart by the mark in front.
+//! Text files in UTF-8 and UTF-16, told apart by their byte order marks.
 //!
-//! Spreadsheets save tables in UTF-16, and Windows' shell writes it wherever a command's output is sent to a
-//! file. Readers here know UTF-8 alone, and get that: what has no mark stays as it is, whatever it is.
+//! Spreadsheets save tables in UTF-16, and the Windows shell writes UTF-16 when a command's output is sent to
+//! a file. The readers of this crate know UTF-8 only, so text is converted for them. Bytes without a mark
+//! stay as they are.
 
 use crate::error::Error;
 use std::borrow::Cow;
 use std::io::{ErrorKind, Read, Result};
 use std::path::Path;
 
-/// Bytes that are decoded at a time.
+/// The size of a block that is decoded at once, bytes.
 const BLOCK: usize = 1 << 16;
 
-/// What a file can begin with to say how it is written.
+/// The byte order marks.
 const UTF8: &[u8] = b"\xef\xbb\xbf";
 const UTF16_LE: &[u8] = b"\xff\xfe";
 const UTF16_BE: &[u8] = b"\xfe\xff";
 
-/// The number that two bytes of UTF-16 are.
+/// Turns two bytes into a code unit of UTF-16.
 type Unit = fn([u8; 2]) -> u16;
 
-/// The encoding that a mark in front names, and the mark's length; `None`: as it is.
+/// Returns how the code units of a text are read, and the length of its byte order mark. `None` means that
+/// the bytes stay as they are.
 fn encoding_of(start: &[u8]) -> (Option<Unit>, usize) {
     if start.starts_with(UTF8) {
         (None, UTF8.len())
@@ -32,12 +34,13 @@ fn encoding_of(start: &[u8]) -> (Option<Unit>, usize) {
     }
 }
 
-/// The bytes of a text file in UTF-8, without a mark in front. What is no UTF-16 although its mark says so
-/// becomes U+FFFD, which no number and no name has.
+/// Returns the bytes of a text file in UTF-8, without a byte order mark. Invalid UTF-16 becomes U+FFFD, which
+/// no number and no name has.
 pub(crate) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     let (unit, mark) = encoding_of(bytes);
     let rest = bytes.get(mark..).unwrap_or_default();
     let Some(unit) = unit else { return Cow::Borrowed(rest) };
+
     let mut text = String::with_capacity(rest.len() / 2);
     let (pairs, odd) = rest.as_chunks::<2>();
     let chars = char::decode_utf16(pairs.iter().map(|pair| unit(*pair)));
@@ -48,21 +51,21 @@ pub(crate) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text.into_bytes())
 }
 
-/// As [`utf8`], of a file that errors call `path`.
+/// Converts like [`utf8`]. Errors name the file `path`.
 ///
 /// # Errors
-/// [`Error::Format`] if it begins as no text does.
+/// [`Error::Format`] if there are zero bytes near the start: then it is not text.
 pub(crate) fn text_of<'a>(bytes: &'a [u8], path: &Path) -> crate::error::Result<Cow<'a, [u8]>> {
     let text = utf8(bytes);
     if text.iter().take(4096).any(|b| *b == 0) {
-        let message = "is no text: it holds zero bytes. If it is text in UTF-16, save it with its mark in \
-                       front, or in UTF-8";
+        let message = "is no text: it holds zero bytes. If it is text in UTF-16, save it with a byte order \
+                       mark, or in UTF-8";
         return Err(Error::format(path, message));
     }
     Ok(text)
 }
 
-/// As [`utf8`], of bytes that are given up: those of UTF-8 stay where they are.
+/// Converts like [`utf8`]. Takes the bytes, so that UTF-8 is not copied.
 pub(crate) fn into_utf8(mut bytes: Vec<u8>) -> Vec<u8> {
     match encoding_of(&bytes) {
         (None, 0) => bytes,
@@ -74,16 +77,16 @@ pub(crate) fn into_utf8(mut bytes: Vec<u8>) -> Vec<u8> {
     }
 }
 
-/// A reader of a text file as [`utf8`] gives it, block by block.
+/// Reads a text file block by block, converted as by [`utf8`].
 #[derive(Debug)]
 pub(crate) struct Utf8Reader<R> {
     file: R,
-    /// `None` until the first bytes were looked at.
+    /// `None` until the first bytes are read.
     encoding: Option<Option<Unit>>,
-    /// Bytes to hand on: `ready[next..]`.
+    /// The decoded bytes. `ready[next..]` are not yet handed on.
     ready: Vec<u8>,
     next: usize,
-    /// Bytes of UTF-16 that wait for the rest of their character.
+    /// The start of a UTF-16 character whose rest is not yet read.
     waiting: Vec<u8>,
 }
 
@@ -92,7 +95,7 @@ impl<R: Read> Utf8Reader<R> {
         Self { file, encoding: None, ready: Vec::new(), next: 0, waiting: Vec::new() }
     }
 
-    /// Looks at the first bytes.
+    /// Finds the encoding from the first bytes.
     fn begin(&mut self) -> Result<()> {
         let mut start = Vec::new();
         self.file.by_ref().take(UTF8.len() as u64).read_to_end(&mut start)?;
@@ -100,17 +103,18 @@ impl<R: Read> Utf8Reader<R> {
         start.drain(..mark);
         self.encoding = Some(unit);
         if unit.is_some() {
-            self.waiting = start
+            self.waiting = start;
         } else {
-            self.ready = start
+            self.ready = start;
         }
         Ok(())
     }
 
-    /// Decodes the next bytes of a file in UTF-16; `ready` is empty at its end only.
+    /// Decodes the next bytes of a file in UTF-16. Leaves `ready` empty only at the end of the file.
     fn decode(&mut self, unit: Unit) -> Result<()> {
-        (self.next, self.ready) = (0, std::mem::take(&mut self.ready));
+        self.next = 0;
         self.ready.clear();
+
         while self.ready.is_empty() {
             let before = self.waiting.len();
             self.waiting.resize(before + BLOCK, 0);
@@ -122,7 +126,9 @@ impl<R: Read> Utf8Reader<R> {
             };
             self.waiting.truncate(before + *read.as_ref().unwrap_or(&0));
             let at_end = read? == 0;
-            // The first half of a character that takes two waits for the second, as does half of a number.
+
+            // A character of two code units may be cut: its first half waits for the second. So does half a
+            // code unit.
             let mut whole = self.waiting.len() & !1;
             let last = whole
                 .checked_sub(2)
@@ -130,11 +136,13 @@ impl<R: Read> Utf8Reader<R> {
             if !at_end && last.is_some_and(|pair| (0xd800..0xdc00).contains(&unit(*pair))) {
                 whole -= 2;
             }
+
             let (pairs, _) = self.waiting.get(..whole).unwrap_or_default().as_chunks::<2>();
             for c in char::decode_utf16(pairs.iter().map(|pair| unit(*pair))) {
                 let c = c.unwrap_or(char::REPLACEMENT_CHARACTER);
                 self.ready.extend_from_slice(c.encode_utf8(&mut [0; 4]).as_bytes());
             }
+
             self.waiting.drain(..whole);
             if at_end {
                 if !self.waiting.is_empty() {
@@ -171,7 +179,7 @@ pub(crate) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A text as a file of each encoding holds it.
+    /// Returns `text` as the files of all four encodings hold it.
     pub(crate) fn encoded(text: &str) -> [Vec<u8>; 4] {
         let utf16 = |unit: fn(u16) -> [u8; 2]| -> Vec<u8> {
             [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(unit).collect()
@@ -180,7 +188,7 @@ pub(crate) mod tests {
         [text.into(), marked, utf16(u16::to_le_bytes), utf16(u16::to_be_bytes)]
     }
 
-    /// Hands on a few bytes at a time.
+    /// Hands on only a few bytes at a time.
     struct Slowly<'a>(&'a [u8], usize);
 
     impl Read for Slowly<'_> {

@@ -9,7 +9,7 @@ use std::path::Path;
 /// Writes `value` as a JSON file and returns the file's size in bytes.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if `value` holds what JSON cannot say.
+/// [`Error::Io`]; [`Error::Format`] if JSON cannot express `value`.
 #[cfg(feature = "write")]
 pub fn write_json<T: serde::Serialize + ?Sized>(path: &Path, value: &T) -> Result<u64> {
     let mut json = serde_json::to_vec_pretty(value).map_err(|e| Error::format(path, e.to_string()))?;
@@ -17,10 +17,10 @@ pub fn write_json<T: serde::Serialize + ?Sized>(path: &Path, value: &T) -> Resul
     crate::fs::atomic::write_bytes(path, &json)
 }
 
-/// Reads a whole JSON file as a `T`.
+/// Reads a JSON file as a `T`.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the line if the file is no JSON or no `T`.
+/// [`Error::Io`]; [`Error::Format`] with the line if the file is not JSON, or does not fit `T`.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let bytes = read_file(path)?;
     serde_json::from_slice(&utf8(&bytes)).map_err(|e| Error::line(path, e.line() as u64, e.to_string()))

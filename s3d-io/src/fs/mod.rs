@@ -1,10 +1,11 @@
-//! Files: written whole or not at all, brought to the disk, checked by their checksums; JSON.
+//! Files: written whole or not at all, synced to the disk, checked by their checksums; JSON.
 //!
-//! [`AtomicFile`] takes its name only when it is complete; [`write_bytes`] and [`write_whole`] write one in a
-//! call. [`sync_data_set`] brings a whole data set to the disk and [`SyncAhead`] does so while it is written.
-//! A [`Checksum`] is XXH3 of 128 bits. [`read_json`] and [`write_json`] name the file, and the line, in their
-//! errors. [`open_file`] and [`read_file`] are what all readers of this crate open files with: they refuse
-//! pipes and devices, which may never end. [`portable_file_name`] makes a file's name of any text.
+//! An [`AtomicFile`] takes its name only when it is complete; [`write_bytes`] and [`write_whole`] write one
+//! in a single call. [`sync_data_set`] syncs a whole data set to the disk, and [`SyncAhead`] does so while it
+//! is written. A [`Checksum`] is a 128-bit XXH3 hash. [`read_json`] and [`write_json`] name the file in their
+//! errors, and `read_json` the line. All readers of this crate open files through [`open_file`] and
+//! [`read_file`], which refuse pipes and devices, because those may never end. [`portable_file_name`] turns
+//! any text into a file name.
 //!
 //! ```
 //! use s3d_io::fs::{Checksum, checksum_of_file, write_bytes};

@@ -1,25 +1,21 @@
-//! File names that every system takes.
+//! File names that every system accepts.
 
 use std::collections::HashSet;
 
-/// The most characters of a portable name: file systems take 255 bytes, and a temporary file's name is
-/// longer.
+/// The length of the longest portable name, in characters. File systems allow 255 bytes, and the name of a
+/// temporary file is longer than the final one.
 const MAX_NAME: usize = 128;
 
-/// A file name of ASCII letters, digits, `-`, `.` and `_`, not hidden; anything else becomes `_`. One that
-/// Windows keeps for a device (`con.png`) gets a `_` in front; a long one is cut before its ending. Empty if
-/// nothing is left of `name`.
+/// Returns `name` as a file name that every system accepts.
+///
+/// It consists of ASCII letters, digits, `-`, `.` and `_`, and is not hidden. Any other character becomes
+/// `_`. A name that Windows reserves for a device (`con.png`) gets a `_` in front. A long name is cut before
+/// its extension. The result is empty if nothing is left of `name`.
 pub fn portable_file_name(name: &str) -> String {
-    let safe = |c: char| {
-        if c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_') {
-            c
-        } else {
-            '_'
-        }
-    };
-    let clean: String = name.chars().map(safe).collect();
+    let clean: String = name.chars().map(portable_char).collect();
     // Windows drops dots at the end.
     let clean = clean.trim_matches('.');
+
     let device = clean.split('.').next().unwrap_or_default().to_ascii_lowercase();
     let numbered = device.strip_prefix("com").or(device.strip_prefix("lpt"));
     let is_device = matches!(device.as_str(), "con" | "prn" | "aux" | "nul")
@@ -29,6 +25,7 @@ pub fn portable_file_name(name: &str) -> String {
     } else {
         clean.to_owned()
     };
+
     let (stem, ending) = clean.split_at(
         clean
             .rfind('.')
@@ -39,15 +36,24 @@ pub fn portable_file_name(name: &str) -> String {
     format!("{stem}{ending}")
 }
 
+fn portable_char(c: char) -> char {
+    if c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_') {
+        c
+    } else {
+        '_'
+    }
+}
+
 /// Hands out names that differ in more than case.
 #[derive(Debug, Default)]
 pub struct UniqueNames(HashSet<String>);
 
 impl UniqueNames {
-    /// `name`, or with a number before its ending if it was there already.
+    /// Returns `name`. If it was handed out before, it gets a number before its extension.
     pub fn add(&mut self, name: &str) -> String {
         let dot = name.rfind('.');
         let (stem, ending) = dot.and_then(|dot| name.split_at_checked(dot)).unwrap_or((name, ""));
+
         let mut candidate = name.to_owned();
         let mut number = 2;
         while !self.0.insert(candidate.to_lowercase()) {

@@ -1,15 +1,15 @@
-//! Files to read: the one place that opens them. Pipes and devices are refused before they are opened, since
-//! even that may never end.
+//! Files that are opened to be read. All readers open them here. Pipes and devices are refused before they
+//! are opened, because even opening one may wait for ever.
 
 use crate::error::{Error, Result};
 use std::fs;
 use std::path::Path;
 
-/// The content of a regular file, or of what a link leads to.
+/// Returns the content of a regular file. Links are followed.
 ///
 /// # Errors
-/// [`Error::Io`] if it is not there or may not be read; [`Error::Format`] for a folder, a pipe, a socket or a
-/// device: opening one may wait for ever, and reading one may never end.
+/// [`Error::Io`] if it does not exist or may not be read; [`Error::Format`] if it is a folder, a pipe, a
+/// socket or a device. Opening one of these may wait for ever, and reading one may never end.
 pub fn read_file(path: &Path) -> Result<Vec<u8>> {
     must_be_regular(path)?;
     fs::read(path).map_err(|e| Error::io(path, "read", e))
@@ -26,16 +26,16 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>> {
 /// ```
 ///
 /// # Errors
-/// As [`read_file`].
+/// Like [`read_file`].
 pub fn open_file(path: &Path) -> Result<fs::File> {
     must_be_regular(path)?;
     fs::File::open(path).map_err(|e| Error::io(path, "read", e))
 }
 
-/// Stops at what is there and is no regular file, before anything opens it.
+/// Refuses a path that exists and is not a regular file, without opening it.
 ///
 /// # Errors
-/// As [`read_file`].
+/// Like [`read_file`].
 pub(crate) fn must_be_regular(path: &Path) -> Result<()> {
     let what = fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
     if what.is_file() {
@@ -70,7 +70,8 @@ mod tests {
         );
         assert!(matches!(open_file(&dir.path().join("gone")), Err(Error::Io { .. })));
     }
-    /// Each of these would wait for somebody to write into the pipe.
+
+    /// Each of these readers would wait for somebody to write into the pipe.
     #[cfg(unix)]
     #[test]
     fn a_pipe_is_refused_at_once() {

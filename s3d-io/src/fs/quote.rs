@@ -1,24 +1,26 @@
 //! Pieces of input in messages.
 
-/// The most characters of a line that a message repeats.
+/// The length of the longest quotation, in characters.
 const LONGEST: usize = 60;
 
-/// `text` between backticks, as a message quotes it: without control characters, and cut after 60 characters.
+/// Returns `text` between backticks, for a message. Control characters are replaced, and text is cut after 60
+/// characters.
 pub(crate) fn quote(text: &[u8]) -> String {
-    // A line may be megabytes long: four bytes a character are enough to fill the quotation.
+    // A line may be megabytes long. Characters take up to four bytes, so this much fills the quotation.
     let head = String::from_utf8_lossy(text.get(..4 * LONGEST + 4).unwrap_or(text));
     let mut quoted: String = head
         .chars()
         .take(LONGEST)
         .map(|c| if c.is_control() { '\u{fffd}' } else { c })
         .collect();
+
     if head.chars().count() > LONGEST || text.len() > 4 * LONGEST + 4 {
         quoted.push('…');
     }
     format!("`{quoted}`")
 }
 
-/// "1 face", "2 faces", "2 meshes", "2 vertices".
+/// Returns a number with its noun: "1 face", "2 faces", "2 meshes", "2 vertices".
 pub(crate) fn count(n: usize, noun: &str) -> String {
     match noun.strip_suffix("ex") {
         _ if n == 1 => format!("1 {noun}"),

@@ -1,4 +1,4 @@
-//! Bytes that are read as often as it takes: of a file, or of a reader that a caller has.
+//! Bytes that can be read several times, from a file or from a caller's reader.
 
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
@@ -8,18 +8,18 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What a [`Source`] can be made from.
+/// A reader that a [`Source`] can be made from.
 pub(crate) trait ReadSeek: Read + Seek + Send {}
 
 impl<R: Read + Seek + Send> ReadSeek for R {}
 
 type Shared = Arc<Mutex<Box<dyn ReadSeek>>>;
 
-/// Where the bytes of a file are, under the name that errors give it.
+/// The source of a file's bytes, and the name that errors give it.
 #[derive(Clone)]
 pub(crate) struct Source {
     name: PathBuf,
-    /// The reader that a caller has; without one, the file called so.
+    /// The caller's reader. If `None`, the file `name` is read.
     reader: Option<Shared>,
 }
 
@@ -42,8 +42,8 @@ impl Source {
         &self.name
     }
 
-    /// The bytes from the first, and how many they are. Each time it is another reader, with a place of its
-    /// own.
+    /// Returns a new reader that starts at the first byte, and the number of bytes. Every reader has its own
+    /// position.
     pub(crate) fn open(&self) -> Result<(Bytes, u64)> {
         let io = |e| Error::io(&self.name, "read", e);
         match &self.reader {
@@ -64,7 +64,7 @@ impl Source {
     }
 }
 
-/// The bytes of a [`Source`]. Reading few at a time is slow.
+/// Reads the bytes of a [`Source`]. Small reads are slow.
 pub(crate) enum Bytes {
     File(File),
     Shared { reader: Shared, at: u64 },
@@ -121,7 +121,8 @@ mod tests {
         file.write_all(b"0123456789").unwrap();
         let value = Source::reader(Path::new("digits"), Cursor::new(b"0123456789".to_vec()));
         for source in [Source::file(file.path()), value] {
-            let ((mut a, size), (mut b, _)) = (source.open().unwrap(), source.open().unwrap());
+            let (mut a, size) = source.open().unwrap();
+            let (mut b, _) = source.open().unwrap();
             let mut two = [0; 2];
             assert_eq!((size, a.seek(SeekFrom::Start(3)).unwrap()), (10, 3));
             b.read_exact(&mut two).unwrap();

@@ -1,27 +1,27 @@
-//! What is written is on the disk.
+//! Syncs written files to the disk.
 
 use crate::error::{Error, Result};
 use crate::fs::open::must_be_regular;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
-/// How long [`SyncAhead`] rests.
+/// The pause of [`SyncAhead`] between two syncs.
 const REST: Duration = Duration::from_secs(1);
 
-/// Returns when all that was written below the folder `root` is on the disk, so that a power loss later takes
-/// nothing of it away. `files` are the files that count.
+/// Waits until everything that was written below the folder `root` is on the disk, so that a later power loss
+/// takes nothing away. `files` are the files that matter.
 ///
-/// Files are renamed to their names without being synced one by one, which would make an export of hundreds
-/// of thousands of small files wait for the disk at each. On Linux one call (`syncfs`) brings the whole file
-/// system's data out at the end; elsewhere, and where the file system does not know that call, every file is
+/// Files are renamed to their final names without being synced one by one, because an export of hundreds of
+/// thousands of small files would wait for the disk at each. On Linux one call (`syncfs`) writes out the
+/// whole file system at the end. Elsewhere, and on file systems that do not know the call, every file is
 /// synced in turn, and then the folders.
 ///
 /// # Errors
-/// [`Error::Io`]: the disk did not take the data after all.
+/// [`Error::Io`] if the disk does not take the data.
 pub fn sync_data_set(root: &Path, files: &[PathBuf]) -> Result<()> {
     if sync_file_system(root).map_err(|e| Error::io(root, "bring to the disk", e))? {
         return Ok(());
@@ -29,49 +29,43 @@ pub fn sync_data_set(root: &Path, files: &[PathBuf]) -> Result<()> {
     sync_one_by_one(root, files)
 }
 
-/// Brings what is written below a folder to the disk while more is written, so that little is left for
-/// [`sync_data_set`] to wait for. Where the system has no call for that it does nothing.
+/// Syncs the files below a folder while more are written, so that [`sync_data_set`] has little left to wait
+/// for. It does nothing on systems without a call that syncs a file system.
 #[derive(Debug)]
 pub struct SyncAhead {
     root: PathBuf,
-    /// Closed when it should end.
+    /// Dropped to end the thread.
     open: Sender<()>,
     thread: Option<JoinHandle<io::Result<()>>>,
 }
 
 impl SyncAhead {
-    /// Begins, on a thread of its own that waits for the disk nearly all the time. Dropped, it ends soon.
+    /// Starts a thread that waits for the disk nearly all the time. It ends soon after the value is dropped.
     pub fn start(root: &Path) -> Self {
         let (open, is_open) = mpsc::channel();
         let folder = root.to_owned();
-        let work = move || {
-            while is_open.recv_timeout(REST) != Err(RecvTimeoutError::Disconnected) {
-                if !sync_file_system(&folder)? {
-                    break;
-                }
-            }
-            Ok(())
-        };
-        // Without a thread all is left for the end.
+        let work = move || sync_until_closed(&folder, &is_open);
+        // Without a thread, everything is left for the final sync.
         let thread = Builder::new().name("sync".to_owned()).spawn(work).ok();
         Self { root: root.to_owned(), open, thread }
     }
 
-    /// Begins a sync at once, or when that under way is done, and does not wait for it.
+    /// Starts a sync now, or after the current one, and does not wait for it.
     pub fn sync_now(&self) {
-        // A thread that is gone has failed, which the end tells.
+        // A thread that is gone has failed; `end` returns its error.
         let _ = self.open.send(());
     }
 
-    /// Ends, when what is under way is done.
+    /// Ends the thread after its current sync.
     ///
     /// # Errors
-    /// [`Error::Io`]: the disk did not take something. The system tells that once, so that no sync after this
-    /// would.
+    /// [`Error::Io`] if the disk did not take something. The system reports that once only, so a later sync
+    /// would not.
     pub fn end(self) -> Result<()> {
         let Self { root, open, thread } = self;
         drop(open);
         let Some(thread) = thread else { return Ok(()) };
+
         let ended = thread
             .join()
             .unwrap_or_else(|_| Err(io::Error::other("the thread that syncs panicked")));
@@ -79,10 +73,20 @@ impl SyncAhead {
     }
 }
 
-/// Brings one file to the disk, and its name.
+/// Syncs the file system of `folder` again and again, until the channel is closed.
+fn sync_until_closed(folder: &Path, is_open: &Receiver<()>) -> io::Result<()> {
+    while is_open.recv_timeout(REST) != Err(RecvTimeoutError::Disconnected) {
+        if !sync_file_system(folder)? {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Syncs one file and its name to the disk.
 ///
 /// # Errors
-/// [`Error::Io`]: it is not there, or the disk did not take it after all.
+/// [`Error::Io`] if it does not exist, or the disk does not take it.
 pub fn sync_file(path: &Path) -> Result<()> {
     sync_content(path)?;
     if let Some(folder) = path.parent() {
@@ -93,6 +97,7 @@ pub fn sync_file(path: &Path) -> Result<()> {
 
 fn sync_one_by_one(root: &Path, files: &[PathBuf]) -> Result<()> {
     files.iter().try_for_each(|path| sync_content(path))?;
+
     let mut folders: Vec<&Path> = files.iter().filter_map(|path| path.parent()).collect();
     folders.sort();
     folders.dedup();
@@ -105,25 +110,27 @@ fn sync_content(path: &Path) -> Result<()> {
         Error::Io { source, .. } => Error::io(path, "bring to the disk", source),
         no_file => no_file,
     })?;
-    // Windows syncs through handles that may write alone.
+
+    // Windows syncs only through handles that may write.
     let opened = if cfg!(windows) {
         File::options().write(true).open(path)
     } else {
         File::open(path)
     };
+
     let synced = opened.and_then(|file| file.sync_all());
     synced.map_err(|e| Error::io(path, "bring to the disk", e))
 }
 
-/// Not every system lets folders be opened (Windows does not); where it does not, names are as safe as it
-/// makes them.
+/// Syncs the names in a folder, if the system lets folders be opened. Windows does not; names are as safe
+/// there as the system makes them.
 fn sync_folder(path: &Path) {
     if let Ok(folder) = File::open(path) {
         let _ = folder.sync_all();
     }
 }
 
-/// Whether the file system took all that was written in one call.
+/// Syncs the whole file system with one call. Returns `false` if it does not know the call.
 #[cfg(target_os = "linux")]
 fn sync_file_system(root: &Path) -> io::Result<bool> {
     use rustix::io::Errno;
@@ -134,7 +141,7 @@ fn sync_file_system(root: &Path) -> io::Result<bool> {
     }
 }
 
-/// There is no such call; a folder that is not there is told of all the same.
+/// Returns `false`: there is no such call. A folder that does not exist is an error here too.
 #[cfg(not(target_os = "linux"))]
 fn sync_file_system(root: &Path) -> io::Result<bool> {
     std::fs::metadata(root).map(|_| false)
@@ -165,13 +172,14 @@ mod tests {
         write_bytes(&path, b"a").unwrap();
         ahead.sync_now();
         ahead.end().unwrap();
+
         let ahead = SyncAhead::start(&dir.path().join("gone"));
         ahead.sync_now();
         let message = ahead.end().unwrap_err().to_string();
         assert!(message.contains("gone: cannot bring to the disk"), "{message}");
     }
 
-    /// What other systems do runs here too.
+    /// The way of other systems is tested here too.
     #[test]
     fn files_are_synced_one_by_one_and_one_that_is_gone_is_named() {
         let dir = tempfile::tempdir().unwrap();

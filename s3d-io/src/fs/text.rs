@@ -8,21 +8,22 @@ pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// The number that a word spells, finite or not, rounded once as `str::parse` does.
+/// Returns the number that a word spells, finite or not. It is rounded once, as by `str::parse`.
 #[inline]
 pub(crate) fn number(word: &[u8]) -> Option<f32> {
     short_number(word).or_else(|| std::str::from_utf8(word).ok()?.parse().ok())
 }
 
-/// Powers of ten that `f64` holds exactly.
+/// The powers of ten that `f64` holds exactly.
 const POWERS: [f64; 15] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14];
 
-/// The number of a word that is a plain decimal fraction of up to 15 characters after the sign, as nearly all
-/// are.
+/// Returns the number of a plain decimal fraction that has up to 15 characters after the sign, as nearly all
+/// have.
 ///
-/// Digits and power are exact in `f64`, so their quotient is rounded once. Rounding that to `f32` gives what
-/// rounding the fraction itself would, unless it lies just between two: no other value has the fraction on
-/// the other side of it.
+/// The digits and the power of ten are exact in `f64`, so their quotient is rounded once. Rounding the
+/// quotient to `f32` gives the `f32` nearest to the fraction, unless the quotient lies exactly halfway
+/// between two `f32` values: in all other cases fraction and quotient lie on the same side of the halfway
+/// point.
 #[inline]
 fn short_number(word: &[u8]) -> Option<f32> {
     let negative = word.first() == Some(&b'-');
@@ -30,7 +31,9 @@ fn short_number(word: &[u8]) -> Option<f32> {
     if written.len() > 15 {
         return None;
     }
-    let (mut digits, mut point) = (0u64, written.len());
+
+    let mut digits = 0u64;
+    let mut point = written.len();
     for (at, &byte) in written.iter().enumerate() {
         match byte {
             b'0'..=b'9' => digits = digits * 10 + u64::from(byte - b'0'),
@@ -38,11 +41,13 @@ fn short_number(word: &[u8]) -> Option<f32> {
             _ => return None,
         }
     }
+
     let decimals = (written.len() - point).saturating_sub(1);
-    // A point alone, or nothing, is no number. A point at the end is no matter.
+    // A point alone, or nothing, is no number. A point at the end is allowed.
     if written.len() == usize::from(written.contains(&b'.')) {
         return None;
     }
+
     let value = digits as f64 / POWERS.get(decimals)?;
     let between = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
     (!between).then_some(if negative { -value } else { value } as f32)
@@ -92,6 +97,7 @@ mod tests {
                 "{word}: {found}"
             );
         }
+
         for word in ["", "-", ".", "-.", "1.2.3", "1,5", "--1", "0x10", "1_0", "1.5f", "\u{661}"] {
             assert_eq!(number(word.as_bytes()), None, "{word}");
         }

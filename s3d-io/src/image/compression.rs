@@ -1,13 +1,13 @@
-//! How much time compression may take.
+//! How much time the compression of images may take.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// How much time the compression of images may take. What is read back is the same.
+/// How much time the compression of images may take. The pixels are the same for all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Compression {
-    /// As [`Balanced`](Self::Balanced), but less time for colours and labels, which get up to a quarter
-    /// larger.
+    /// Like [`Balanced`](Self::Balanced), but with less time for colours and labels, whose files get up to a
+    /// quarter larger.
     Fast,
     /// About as small as libpng's level 6 and OpenEXR's ZIP, in about a tenth of their time.
     #[default]
@@ -17,10 +17,10 @@ pub enum Compression {
 }
 
 impl Compression {
-    /// All of them, the fastest first.
+    /// All levels, the fastest first.
     pub const ALL: [Self; 3] = [Self::Fast, Self::Balanced, Self::Small];
 
-    /// Its name: `fast`, `balanced` or `small`.
+    /// Returns its name: `fast`, `balanced` or `small`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Fast => "fast",

@@ -1,8 +1,8 @@
-//! OpenEXR images of world coordinates.
+//! Reads and writes OpenEXR images of world coordinates.
 //!
-//! The `exr` crate writes the header and the table of blocks. Blocks are prepared and compressed here, by
-//! s3d-deflate (its README has the figures): same format (ZIP, 16 lines a block), and no larger than the
-//! crate makes it (`more_time_makes_smaller_files_no_larger_than_the_plain_writers`).
+//! The exr crate writes the header and the table of blocks. s3d-deflate prepares and compresses the blocks
+//! (its README has the figures). The format is the same (ZIP, 16 lines a block), and files are no larger than
+//! the crate's (`more_time_makes_smaller_files_no_larger_than_the_plain_writers`).
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::write_bytes;
@@ -22,17 +22,18 @@ use s3d_geom::Raster;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Lines in a block of the compression "ZIP". It is the format's number.
+/// The number of lines in a block of the compression "ZIP", by the format.
 const BLOCK_LINES: u32 = 16;
 
-/// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
+/// The most pixels of an image that is read: 16 times a panorama of the data set's double size.
 const MAX_PIXELS: usize = 1 << 30;
-/// The most pixels that a byte of a file stands for: deflate, which shrinks best of the format's ways, makes
-/// 1,032 of it, and a pixel has three samples of two bytes at least.
+/// The most pixels that a byte of a file can hold. Deflate, the densest compression of the format, shrinks at
+/// most 1,032 times, and a pixel has at least three samples of two bytes.
 const MAX_PIXELS_PER_BYTE: usize = 1032 / 6;
 
-/// World coordinates as the bytes of an OpenEXR file of half floats: channels R G B = X Y Z in metres, (0, 0,
-/// 0) where there is nothing; scan lines from the top, ZIP. Source: formats.md, "What is written".
+/// Encodes world coordinates as an OpenEXR file of half floats. The channels R G B are X Y Z in metres, (0,
+/// 0, 0) where nothing was seen. Scan lines run from the top; the compression is ZIP. Source: formats.md,
+/// "What is written".
 ///
 /// # Panics
 /// If the image has no pixel.
@@ -40,8 +41,8 @@ pub fn encode_xyz_half(image: &Raster<[f16; 3]>, compression: Compression) -> Ve
     encode(image, SampleType::F16, f16::to_le_bytes, compression)
 }
 
-/// As [`encode_xyz_half`], but of 32-bit floats: exact, and some twenty times as large on surfaces that
-/// halves turn into steps.
+/// Encodes like [`encode_xyz_half`], as 32-bit floats. They are exact, but the file is some twenty times as
+/// large on surfaces that half floats turn into steps.
 ///
 /// # Panics
 /// If the image has no pixel.
@@ -49,7 +50,7 @@ pub fn encode_xyz_float(image: &Raster<[f32; 3]>, compression: Compression) -> V
     encode(image, SampleType::F32, f32::to_le_bytes, compression)
 }
 
-/// Writes an OpenEXR file of half floats, whole or not at all, and returns its size in bytes; see
+/// Writes an OpenEXR file of half floats, whole or not at all, and returns its size in bytes. See
 /// [`encode_xyz_half`].
 ///
 /// # Errors
@@ -61,7 +62,7 @@ pub fn write_xyz_half(path: &Path, image: &Raster<[f16; 3]>, compression: Compre
     write_bytes(path, &encode_xyz_half(image, compression))
 }
 
-/// Writes an OpenEXR file of 32-bit floats, whole or not at all, and returns its size in bytes; see
+/// Writes an OpenEXR file of 32-bit floats, whole or not at all, and returns its size in bytes. See
 /// [`encode_xyz_float`].
 ///
 /// # Errors
@@ -82,7 +83,8 @@ fn encode<T: Copy, const N: usize>(
 ) -> Vec<u8> {
     assert!(!image.is_empty(), "an OpenEXR image needs pixels: {} × {}", image.width(), image.height());
     let size = (image.width() as usize, image.height() as usize);
-    // Channels are stored in the order of their names.
+
+    // The format stores channels in the order of their names.
     let channels = ["B", "G", "R"].map(|name| ChannelDescription::named(name, sample_type));
     let header = Header::new("".into(), size, channels.into_iter().collect())
         .with_attributes(LayerAttributes::default())
@@ -116,10 +118,10 @@ struct BlockCompressor {
 }
 
 impl BlockCompressor {
-    /// For lines of `width` pixels with three samples of `sample` bytes.
+    /// Prepares for lines of `width` pixels with three samples of `sample` bytes.
     #[expect(clippy::expect_used, reason = "a writer: the settings are those of a constructor")]
     fn new(width: usize, sample: usize, compression: Compression) -> Self {
-        // Even and odd bytes are apart, so a line comes back after half its bytes.
+        // The bytes of a block are split into even and odd ones, so a line repeats after half its bytes.
         let line = 3 * sample * width / 2;
         let search = match compression {
             Compression::Fast | Compression::Balanced => Search::floats(line, sample),
@@ -129,7 +131,7 @@ impl BlockCompressor {
         Self { block: ZipBlock::default(), compressed: Vec::new(), deflater }
     }
 
-    /// The contents of the block of whole rows of `width` pixels (R G B), compressed unless that makes it
+    /// Returns the content of a block: whole rows of `width` pixels (R G B), compressed unless that makes it
     /// longer.
     #[expect(clippy::expect_used, reason = "a writer: an image consists of whole rows")]
     fn compress<T: Copy, const N: usize>(
@@ -160,26 +162,25 @@ pub fn read_xyz(path: &Path) -> Result<Raster<[f32; 3]>> {
     decode_xyz(&read_file(path)?, path)
 }
 
-/// As [`read_xyz`], from the file's bytes; errors call it `name`.
+/// Decodes like [`read_xyz`], from the file's bytes. Errors name the file by `name`.
 ///
 /// # Errors
-/// As [`read_xyz`].
+/// Like [`read_xyz`].
 pub fn decode_xyz(bytes: &[u8], name: &Path) -> Result<Raster<[f32; 3]>> {
     let path = name;
-    let too_large = |width: usize, height: usize| {
-        Error::unsupported(path, format!("{width} × {height} pixels are more than {MAX_PIXELS}"))
-    };
     let meta = exr::meta::MetaData::read_from_buffered(bytes, false).map_err(|e| unreadable(path, &e))?;
     for header in &meta.headers {
-        let (width, height) = (header.layer_size.x(), header.layer_size.y());
+        let [width, height] = [header.layer_size.x(), header.layer_size.y()];
         if width.checked_mul(height).is_none_or(|n| n > MAX_PIXELS) {
-            return Err(too_large(width, height));
+            let message = format!("{width} × {height} pixels are more than {MAX_PIXELS}");
+            return Err(Error::unsupported(path, message));
         }
         if is_too_short(header, bytes) {
             let message = format!("claims {width} × {height} pixels in {} bytes", bytes.len());
             return Err(Error::format(path, message));
         }
     }
+
     if let Some(halves) = decode_xyz_half(bytes) {
         return Ok(halves.map(|point| point.map(f16::to_f32)));
     }
@@ -190,7 +191,7 @@ fn unreadable(path: &Path, error: &exr::error::Error) -> Error {
     Error::format(path, format!("no readable OpenEXR file of R G B: {error}"))
 }
 
-/// Whatever the `exr` crate reads; of a file whose header was checked.
+/// Decodes any file that the exr crate reads. Its header was checked.
 fn decode_any(bytes: &[u8], path: &Path) -> Result<Raster<[f32; 3]>> {
     use exr::prelude::{ReadChannels, ReadLayers, Vec2};
     let read = || {
@@ -199,7 +200,7 @@ fn decode_any(bytes: &[u8], path: &Path) -> Result<Raster<[f32; 3]>> {
             .largest_resolution_level()
             .rgb_channels(
                 |size: Vec2<usize>, _| {
-                    // The header was checked: its sides fit.
+                    // The header was checked, so the sides fit.
                     let [width, height] = [size.x(), size.y()].map(|side| u32::try_from(side).unwrap_or(0));
                     Raster::filled(width, height, [0f32; 3])
                 },
@@ -216,20 +217,21 @@ fn decode_any(bytes: &[u8], path: &Path) -> Result<Raster<[f32; 3]>> {
             .non_parallel()
             .from_buffered(Cursor::new(bytes))
     };
+
     let damaged = || Error::format(path, "no readable OpenEXR file of R G B: its blocks are damaged");
     let image = guarded(read).ok_or_else(damaged)?.map_err(|e| unreadable(path, &e))?;
     Ok(image.layer_data.channel_data.pixels)
 }
 
-/// Whether a file has more pixels than its bytes could stand for.
+/// Returns whether a file claims more pixels than its bytes can hold.
 fn is_too_short(header: &Header, bytes: &[u8]) -> bool {
     let pixels = header.layer_size.x().checked_mul(header.layer_size.y());
     pixels.is_none_or(|pixels| pixels > MAX_PIXELS.min(bytes.len().saturating_mul(MAX_PIXELS_PER_BYTE)))
 }
 
-/// World coordinates in half floats, from the bytes of a file as [`encode_xyz_half`] makes it, in a fraction of
-/// the time that [`decode_xyz`] takes for other files. `None` if it is of another kind or damaged: that reads
-/// whatever can be read, and tells what is wrong.
+/// Decodes world coordinates in half floats from a file as [`encode_xyz_half`] makes it. This takes a
+/// fraction of the time that [`decode_xyz`] takes for other files. Returns `None` if the file is of another
+/// kind or damaged; [`decode_xyz`] reads those, or tells what is wrong.
 ///
 /// ```
 /// use s3d_geom::Raster;
@@ -246,34 +248,27 @@ pub fn decode_xyz_half(bytes: &[u8]) -> Option<Raster<[f16; 3]>> {
 
 fn decode_blocks(bytes: &[u8]) -> Option<Raster<[f16; 3]>> {
     let reader = exr::block::read(Cursor::new(bytes), false).ok()?;
+
     let [header] = reader.headers() else { return None };
-    let is_half = |(channel, name): (&ChannelDescription, &str)| {
-        channel.name == *name
-            && channel.sample_type == SampleType::F16
-            && (channel.sampling.x(), channel.sampling.y()) == (1, 1)
-    };
-    let channels = &header.channels.list;
-    let is_usual = channels.len() == 3
-        && channels.iter().zip(["B", "G", "R"]).all(is_half)
-        && header.compression == Method::ZIP16
-        && header.blocks == BlockDescription::ScanLines
-        && header.own_attributes.layer_position == exr::math::Vec2(0, 0)
-        && !header.deep;
-    if !is_usual || is_too_short(header, bytes) {
+    if !is_usual(header) || is_too_short(header, bytes) {
         return None;
     }
-    let (width, height) = (header.layer_size.x(), header.layer_size.y());
+
+    let [width, height] = [header.layer_size.x(), header.layer_size.y()];
     let mut image = Raster::filled(u32::try_from(width).ok()?, u32::try_from(height).ok()?, [f16::ZERO; 3]);
     let mut chunks = reader.all_chunks(false).ok()?;
-    let (mut block, mut inflater) = (ZipBlock::default(), Inflater::default());
+    let mut block = ZipBlock::default();
+    let mut inflater = Inflater::default();
     for (index, pixels) in image.pixels_mut().chunks_mut(width * BLOCK_LINES as usize).enumerate() {
         let CompressedBlock::ScanLine(lines) = chunks.next()?.ok()?.compressed_block else { return None };
         if lines.y_coordinate != i32::try_from(index).ok()?.checked_mul(BLOCK_LINES as i32)? {
             return None;
         }
-        let (bytes, len) = (&lines.compressed_pixels_le, 3 * size_of::<f16>() * pixels.len());
+
+        let bytes = &lines.compressed_pixels_le;
+        let len = 3 * size_of::<f16>() * pixels.len();
         if bytes.len() == len {
-            // As they are, line by line and channel by channel.
+            // The block is stored uncompressed, line by line and channel by channel.
             for (row, line) in pixels.chunks_mut(width).zip(bytes.chunks(6 * width)) {
                 let (blue, rest) = line.as_chunks::<2>().0.split_at(width);
                 let (green, red) = rest.split_at(width);
@@ -283,11 +278,32 @@ fn decode_blocks(bytes: &[u8]) -> Option<Raster<[f16; 3]>> {
             }
             continue;
         }
+
         let differences = block.differences_mut(len);
         inflater.zlib(bytes, differences).ok()?;
         block.get(pixels, width, f16::from_le_bytes).ok()?;
     }
     chunks.next().is_none().then_some(image)
+}
+/// Returns whether a header is like the one that [`encode_xyz_half`] writes.
+fn is_usual(header: &Header) -> bool {
+    let channels = &header.channels.list;
+    channels.len() == 3
+        && channels
+            .iter()
+            .zip(["B", "G", "R"])
+            .all(|(channel, name)| is_half(channel, name))
+        && header.compression == Method::ZIP16
+        && header.blocks == BlockDescription::ScanLines
+        && header.own_attributes.layer_position == exr::math::Vec2(0, 0)
+        && !header.deep
+}
+
+fn is_half(channel: &ChannelDescription, name: &str) -> bool {
+    channel.name == *name
+        && channel.sample_type == SampleType::F16
+        && channel.sampling.x() == 1
+        && channel.sampling.y() == 1
 }
 
 #[cfg(test)]
@@ -302,7 +318,7 @@ mod tests {
         read(&path)
     }
 
-    /// The plain way: the crate's own writer.
+    /// Encodes with the exr crate's own writer.
     fn reference_half(image: &Raster<[f16; 3]>) -> Vec<u8> {
         use exr::prelude::*;
         let at = |p: Vec2<usize>| {
@@ -325,10 +341,11 @@ mod tests {
         file.into_inner()
     }
 
-    /// A floor and a wall, in metres.
+    /// Makes a floor and a wall, in metres.
     fn room(width: u32, height: u32) -> Raster<[f32; 3]> {
         let pixel = |i: u32| {
-            let (x, y) = ((i % width) as f32 / width as f32, (i / width) as f32 / height as f32);
+            let x = (i % width) as f32 / width as f32;
+            let y = (i / width) as f32 / height as f32;
             if y < 0.5 {
                 [4.0 * x - 2.0, 3.0, 2.8 - 3.0 * y]
             } else {
@@ -348,7 +365,7 @@ mod tests {
                 let bytes = encode_xyz_half(&halves, compression);
                 let read = in_file(&bytes, read_xyz).unwrap();
                 assert_eq!(read, halves.map(|p| p.map(f16::to_f32)));
-                // The reader of our own files and the crate's.
+                // Our reader and the exr crate's agree.
                 assert_eq!(decode_any(&bytes, Path::new("a.exr")).unwrap(), read);
                 assert_eq!(decode_xyz_half(&bytes), Some(halves.clone()), "{w} × {h}");
                 assert_eq!(decode_xyz_half(&encode_xyz_float(&floats, compression)), None);
@@ -358,7 +375,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
-        /// Noise does not compress: such blocks are stored as they are.
+        /// Noise does not compress, so its blocks are stored.
         #[test]
         fn any_values_come_back((w, h, data) in (1u32..40, 1u32..40).prop_flat_map(|(w, h)| {
             (Just(w), Just(h), proptest::collection::vec(any::<[u16; 3]>(), (w * h) as usize))
@@ -378,13 +395,15 @@ mod tests {
     #[test]
     fn the_header_is_what_the_plain_writer_makes() {
         let image = room(100, 50).map(|p| p.map(f16::from_f32));
-        let (ours, plain) = (encode_xyz_half(&image, Compression::Balanced), reference_half(&image));
+        let ours = encode_xyz_half(&image, Compression::Balanced);
+        let plain = reference_half(&image);
         let header = |bytes: &[u8]| {
             let meta = exr::meta::MetaData::read_from_buffered(bytes, true).unwrap();
             let [header] = meta.headers.as_slice() else { panic!("one layer") };
             header.clone()
         };
-        let (a, b) = (header(&ours), header(&plain));
+        let a = header(&ours);
+        let b = header(&plain);
         assert_eq!(a.channels, b.channels);
         assert_eq!(a.channels.list.iter().map(|c| c.name.to_string()).collect::<Vec<_>>(), ["B", "G", "R"]);
         assert_eq!((a.compression, a.line_order, a.blocks), (b.compression, b.line_order, b.blocks));

@@ -1,8 +1,8 @@
-//! Where the images are that a mesh names.
+//! Finds the images that a mesh names.
 
 use std::path::{Path, PathBuf};
 
-/// `name` as a path below `folder`, with either slash.
+/// Returns `name` as a path below `folder`. Backslashes count as slashes if there is no such file.
 pub(crate) fn resolve(folder: &Path, name: &str) -> PathBuf {
     let as_written = folder.join(name);
     if as_written.is_file() {
@@ -12,8 +12,9 @@ pub(crate) fn resolve(folder: &Path, name: &str) -> PathBuf {
     }
 }
 
-/// Where the image `name` is: below the library's folder, below the OBJ file's, or, as other machines' paths
-/// are worth nothing here, by its last part beside either. `true` if it is where `name` says.
+/// Finds the image `name`: below the folder of the library, or below the folder of the mesh. If it is in
+/// neither, the last part of the name is searched in both, since paths of other machines mean nothing here.
+/// Also returns whether the image is where `name` says.
 pub(crate) fn find_image(name: &str, library: &Path, folder: &Path) -> Option<(PathBuf, bool)> {
     let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
     [(name, library, true), (name, folder, true), (last, library, false), (last, folder, false)]

@@ -1,4 +1,4 @@
-//! Whether a JPEG is there to its end. Its decoder draws the rows that are missing in grey, without a word.
+//! Finds JPEG files that are cut off. The decoder draws missing rows in grey, without an error.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -9,36 +9,43 @@ use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-/// What the decoder draws where there is nothing.
+/// The grey that the decoder draws for missing rows.
 const NOTHING: u8 = 128;
 
-/// So many zeros at the end of a file are none of a picture.
+/// The fewest zeros at the end of a file that cannot belong to a picture.
 const FILL: usize = 32;
 
-/// As many bytes as the decoder reads ahead.
+/// The number of bytes that the decoder reads ahead.
 const AHEAD: usize = 16;
 
-/// What is missing of a JPEG that became `image`: a sentence, to follow its name.
+/// Describes what is missing of a JPEG that was decoded to `image`: a sentence that follows its name. Returns
+/// `None` for a whole picture.
 ///
-/// Nothing is decoded again if the file ends with its end and `image` does not look as if it came too early.
+/// The file is decoded once more only if it does not end with its end mark, or if the last row of `image`
+/// looks empty.
 pub(crate) fn missing(bytes: &[u8], image: &Raster<[u8; 3]>) -> Option<String> {
     let JpegEnd { at, is_progressive } = end(bytes);
     let data = match at {
-        // Scans that are missing leave no trace in the last row.
+        // Missing scans leave no trace in the last row.
         Some(_) if is_progressive || !ends_alike(image) => return None,
-        // Behind its end a decoder finds zeros as long as it wants. Without, it finds that it is there.
+        // The decoder reads zeros after an end mark, without an error. The mark is cut off, so that it
+        // notices the end.
         Some(at) => [bytes.get(..at).unwrap_or(bytes), &[0; AHEAD]].concat(),
         None => bytes.to_vec(),
     };
     if decode(&data, true).is_some() {
         return None;
     }
+
     let height = usize::try_from(image.height()).ok()?;
     let rows = decode(&data, false).map_or(0, |samples| {
         let row = samples.len().checked_div(height).unwrap_or(0).max(1);
-        let is_nothing = |row: &&[u8]| row.iter().all(|sample| *sample == NOTHING);
-        height.saturating_sub(samples.rchunks(row).take_while(is_nothing).count())
+        let missing = samples
+            .rchunks(row)
+            .take_while(|row| row.iter().all(|sample| *sample == NOTHING));
+        height.saturating_sub(missing.count())
     });
+
     Some(match at {
         Some(_) => format!("is damaged: about {rows} of its {height} rows are there"),
         None if is_progressive && rows > 0 => {
@@ -48,8 +55,8 @@ pub(crate) fn missing(bytes: &[u8], image: &Raster<[u8; 3]>) -> Option<String> {
     })
 }
 
-/// Whether the last row repeats itself, as one does that is made of nothing but zeros. At its ends it need
-/// not.
+/// Returns whether the last row repeats itself, as a row does that is decoded from zeros. Its two ends do not
+/// count.
 fn ends_alike(image: &Raster<[u8; 3]>) -> bool {
     const BLOCK: usize = 16;
     let width = usize::try_from(image.width()).unwrap_or(usize::MAX).max(1);
@@ -58,8 +65,8 @@ fn ends_alike(image: &Raster<[u8; 3]>) -> bool {
     middle.iter().zip(middle.iter().skip(BLOCK)).all(|(a, b)| a == b)
 }
 
-/// A JPEG without the zeros that stand for the rest of one that was cut off, as a download leaves it that
-/// was given its size at once. To the decoder they would be a picture.
+/// Returns a JPEG without the zeros at its end. A download that reserves its size and is cut off leaves them,
+/// and the decoder would take them for a picture.
 pub(crate) fn without_fill(bytes: &[u8]) -> &[u8] {
     let zeros = bytes.iter().rev().take_while(|b| **b == 0).count();
     if zeros < FILL || end(bytes).at.is_some() {
@@ -71,16 +78,16 @@ pub(crate) fn without_fill(bytes: &[u8]) -> &[u8] {
 /// How a JPEG ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct JpegEnd {
-    /// Where the mark of its end is.
+    /// The position of the end mark, if there is one.
     at: Option<usize>,
-    /// Whether its rows come all at once, ever finer.
+    /// Whether the picture is progressive: each scan refines all rows.
     is_progressive: bool,
 }
 
-/// Follows the segments of a JPEG to its end. Source: ITU-T T.81, annex B.
+/// Follows the segments of a JPEG to its end mark. Source: ITU-T T.81, annex B.
 fn end(bytes: &[u8]) -> JpegEnd {
     let mut is_progressive = false;
-    // Behind the mark of the start.
+    // The start mark comes first.
     let mut rest = bytes.get(2..).unwrap_or_default();
     while let Some(at) = memchr(0xff, rest) {
         let from = rest.get(at..).unwrap_or_default();
@@ -90,9 +97,9 @@ fn end(bytes: &[u8]) -> JpegEnd {
             0xd9 => {
                 return JpegEnd { at: Some(bytes.len().saturating_sub(from.len())), is_progressive };
             }
-            // Fill; the next byte tells.
+            // A fill byte; the next byte is the mark.
             0xff => {}
-            // What stands for a byte of the picture, and marks without a segment.
+            // An escaped byte of the picture, or a mark without a segment.
             0x00 | 0x01 | 0xd0..=0xd8 => rest = after,
             _ => {
                 is_progressive |= mark == 0xc2;
@@ -104,7 +111,7 @@ fn end(bytes: &[u8]) -> JpegEnd {
     JpegEnd { at: None, is_progressive }
 }
 
-/// The samples; `None` if something is missing and `strict`, or nothing can be decoded.
+/// Decodes the samples. Returns `None` if nothing can be decoded, or if `strict` and something is missing.
 fn decode(bytes: &[u8], strict: bool) -> Option<Vec<u8>> {
     let options = DecoderOptions::default()
         .set_strict_mode(strict)
@@ -123,7 +130,7 @@ mod tests {
     use std::io::Cursor;
     use std::path::Path;
 
-    /// A picture of noise, every row of which takes its bytes.
+    /// Encodes a picture of noise, so that every row takes its share of the bytes.
     fn noise(width: u32, height: u32) -> Vec<u8> {
         let mut bytes = Vec::new();
         let image = ImageBuffer::from_fn(width, height, |x, y| {
@@ -147,9 +154,9 @@ mod tests {
         assert_eq!(fault(whole.clone()), None);
         for percent in [5, 20, 50, 80, 95] {
             let cut = whole[..whole.len() * percent / 100].to_vec();
-            // What downloads that were given their size at once have behind it.
+            // A download that reserved its size leaves zeros at the end.
             let filled = [&cut[..], &vec![0; whole.len() - cut.len()]].concat();
-            // What tools that mend put behind it.
+            // Repair tools add an end mark.
             let ended = [&cut[..], b"\xff\xd9"].concat();
             for (bytes, word) in [(cut, "cut off"), (filled, "cut off"), (ended, "damaged")] {
                 let message = fault(bytes).unwrap_or_else(|| panic!("{percent} %, {word}"));
@@ -164,9 +171,9 @@ mod tests {
     fn what_is_whole_is_read_whatever_is_behind_it() {
         let whole = noise(64, 64);
         assert_eq!(fault([&whole[..], b"SEFH of a camera"].concat()), None);
-        // The mark of the end alone is lost.
+        // Only the end mark is lost.
         assert_eq!(fault(whole[..whole.len() - 2].to_vec()), None);
-        // Pictures of one colour, grey as nothing is among them, take next to no bytes a row.
+        // Pictures of one colour, even the grey of missing rows, take next to no bytes a row.
         for (width, height) in [(1, 1), (8, 8), (9, 200), (64, 64), (200, 17)] {
             for color in [[128u8; 3], [0; 3], [250, 3, 90]] {
                 let image = DynamicImage::from(ImageBuffer::from_pixel(width, height, Rgb(color)));
@@ -177,7 +184,7 @@ mod tests {
         }
     }
 
-    /// Of one, three and four channels, and progressive.
+    /// With one, three and four channels, and progressive.
     #[test]
     fn every_kind_of_jpeg_is_told() {
         let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/texture");

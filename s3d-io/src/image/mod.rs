@@ -1,8 +1,8 @@
 //! The images of a data set: 8-bit colour and 16-bit gray PNG, OpenEXR of world coordinates.
 //!
-//! `encode_…` makes a file's bytes, `decode_…` takes them, `write_…` and `read_…` do so with a path. Readers
-//! take no other kind of image than the one they are named after, as channels may be numbers, which must not
-//! be converted. An image has at most 2³⁰ pixels.
+//! `encode_…` returns a file's bytes and `decode_…` takes them; `write_…` and `read_…` do the same
+//! with a path. A reader refuses any kind of image that its name does not say: channels may be numbers, which
+//! must not be converted. An image has at most 2³⁰ pixels.
 //!
 //! | kind | samples | of a data set |
 //! |---|---|---|
@@ -11,8 +11,8 @@
 //! | [`encode_gray16`] | 16 bits | `depth` |
 //! | [`encode_xyz_half`], [`encode_xyz_float`] | 3 × 16 or 32 bits, floats | `global_xyz` |
 //!
-//! [`Compression`] chooses between time and size, and [`Content`] tells what kind of picture it is. The bytes
-//! depend on nothing else, and are the same on every machine. Source: formats.md, "What is written".
+//! [`Compression`] chooses between time and size, and [`Content`] says what the image shows. The bytes depend
+//! on nothing else, and are the same on every machine. Source: formats.md, "What is written".
 //!
 //! ```
 //! use s3d_geom::Raster;

@@ -1,4 +1,4 @@
-//! Texture images: PNG and JPEG files to 8-bit colour.
+//! Decodes texture images, PNG and JPEG, to 8-bit colour.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -10,41 +10,41 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Lim
 use rayon::prelude::*;
 use s3d_geom::Raster;
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The longest side of a texture in pixels.
 const MAX_SIDE: u32 = 65_535;
-/// The most pixels of a texture: 32,768 × 16,384, twice what graphics cards take, and 1.6 GB once it is
-/// decoded. A file of half a megabyte can claim seven times as many.
+/// The most pixels of a texture: 32,768 × 16,384. That is twice as much as graphics cards take, and 1.6 GB
+/// once it is decoded. A file of half a megabyte can claim seven times as many.
 const MAX_PIXELS: u64 = 1 << 29;
-/// The most pixels of all textures of a file together, 26 GB of them: 2,048 textures of 2,048 × 2,048.
+/// The most pixels of all textures of a file together: 2,048 textures of 2,048 × 2,048, 26 GB of them.
 const MAX_PIXELS_TOGETHER: u64 = 1 << 33;
-/// No PNG or JPEG holds more pixels than this in a byte: deflate shrinks at most 1,032 times, a pixel of a
-/// bit or more.
+/// The most pixels that a byte of a PNG or JPEG can hold: deflate shrinks at most 1,032 times, and a pixel
+/// has at least one bit.
 const MAX_PIXELS_PER_BYTE: u64 = 8 * 1_032;
 
-/// The encoded image of a texture as it was found, so that an export can copy it unchanged.
+/// The encoded image of a texture as its file has it, so that an export can copy it unchanged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TextureFile {
-    /// What it is, told by its content and not by its name: `"png"` or `"jpg"`.
+    /// The format, `"png"` or `"jpg"`, told by the content and not by the name.
     pub extension: &'static str,
-    /// The file's bytes.
+    /// The bytes of the file.
     pub bytes: Vec<u8>,
 }
 
-/// A decoded texture beside the bytes that it was decoded from.
+/// A decoded texture, with the bytes from which it was decoded.
 #[derive(Clone, Debug)]
 pub(crate) struct LoadedTexture {
     pub(crate) image: Raster<[u8; 3]>,
     pub(crate) file: TextureFile,
 }
 
-/// Why an image is not decoded: a sentence, to follow its name.
+/// Why an image is not decoded: a sentence that follows its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum TextureFault {
-    /// It is none, or damaged. A mesh can be drawn without it.
+    /// It is damaged, or no image. The mesh can be drawn without it.
     Unreadable(String),
-    /// It, or all images of the mesh together, would take more memory than any do.
+    /// It is too large for the memory, alone or together with the other images of the mesh.
     TooLarge(String),
 }
 
@@ -55,17 +55,16 @@ impl std::fmt::Display for TextureFault {
     }
 }
 
-/// Decodes a PNG or JPEG of any kind — gray, palette, with alpha, 16 bits — to 8-bit R G B. Alpha is left
-/// out.
+/// Decodes a PNG or JPEG of any kind (gray, palette, with alpha, 16 bits) to 8-bit RGB. Alpha is dropped.
 pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTexture, TextureFault> {
     let (format, extension, size) = size_of_texture(&bytes)?;
-    // The decoders are not ours: some panic at what is damaged.
+    // The decoders belong to other crates, and some panic on damaged images.
     let is_jpeg = format == ImageFormat::Jpeg;
     let encoded = if is_jpeg { without_fill(&bytes) } else { &bytes };
     let image = guarded(|| decode(encoded, format, size))
         .unwrap_or_else(|| Err("its content is damaged".into()))
         .map_err(|e| TextureFault::Unreadable(format!("cannot be decoded: {e}")))?;
-    if let Some(what) = Some(encoded).filter(|_| is_jpeg).and_then(|jpeg| missing(jpeg, &image)) {
+    if is_jpeg && let Some(what) = missing(encoded, &image) {
         return Err(TextureFault::Unreadable(what));
     }
     Ok(LoadedTexture { image, file: TextureFile { extension, bytes } })
@@ -76,28 +75,29 @@ fn decode(
     format: ImageFormat,
     [width, height]: [u32; 2],
 ) -> std::result::Result<Raster<[u8; 3]>, String> {
-    let undecodable = |e: image::ImageError| e.to_string();
     let pixels = u64::from(width).saturating_mul(u64::from(height));
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    // The size is plausible by now; the library's own limit would refuse textures of 16,384² pixels.
+    // The size was checked. The library's own limit would refuse textures of 16,384² pixels.
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(pixels.saturating_mul(16).saturating_add(64 << 20));
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(undecodable)?;
+
+    let decoder = reader.into_decoder().map_err(|e| e.to_string())?;
     let rgb = if decoder.color_type() == ColorType::Rgb8 {
-        // Most are: they are decoded to where they stay.
+        // Most images are of this kind, and are decoded without a copy.
         let count = usize::try_from(pixels).map_err(|_| format!("has {pixels} pixels, too many"))?;
         let mut rgb = vec![[0; 3]; count];
-        decoder.read_image(rgb.as_flattened_mut()).map_err(undecodable)?;
+        decoder.read_image(rgb.as_flattened_mut()).map_err(|e| e.to_string())?;
         rgb
     } else {
-        let rgb = DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgb8();
-        rgb.into_raw().as_chunks().0.to_vec()
+        let image = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
+        image.into_rgb8().into_raw().as_chunks().0.to_vec()
     };
     Ok(Raster::from_vec(width, height, rgb))
 }
 
-/// What an image is and how large, by its first bytes; the size is one that the file can hold.
+/// Returns the format, its extension, and the width and height, from the first bytes. The file can hold an
+/// image of this size.
 fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static str, [u32; 2]), TextureFault> {
     let (format, extension) = match image::guess_format(bytes) {
         Ok(ImageFormat::Png) => (ImageFormat::Png, "png"),
@@ -108,12 +108,14 @@ fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static s
         }
         Err(_) => return Err(TextureFault::Unreadable("is no PNG or JPEG image".into())),
     };
+
     let size = guarded(|| ImageReader::with_format(Cursor::new(bytes), format).into_dimensions());
     let (width, height) = match size {
         Some(Ok(size)) => size,
         Some(Err(e)) => return Err(TextureFault::Unreadable(format!("cannot be decoded: {e}"))),
         None => return Err(TextureFault::Unreadable("cannot be decoded: its header is damaged".into())),
     };
+
     let pixels = u64::from(width).saturating_mul(u64::from(height));
     if pixels == 0 || width > MAX_SIDE || height > MAX_SIDE {
         let message = format!("is {width} × {height} pixels large; a side has 1 to {MAX_SIDE}");
@@ -136,36 +138,50 @@ fn name_of(format: ImageFormat) -> &'static str {
     format.extensions_str().first().copied().unwrap_or("different")
 }
 
-/// Reads and decodes image files, in parallel, each as [`decode_texture`] does. Beside each its fault, if it
-/// has one that a mesh can be drawn with.
+/// Reads and decodes image files in parallel. A fault that the mesh can be drawn with stands in the place of
+/// its image.
 ///
 /// # Errors
-/// [`Error::Unsupported`] for an image that is too large, and if they are together.
+/// [`Error::Unsupported`] if an image is too large, or all images together are.
 pub(crate) fn read_textures(paths: &[PathBuf]) -> Result<Vec<std::result::Result<LoadedTexture, String>>> {
-    // One at a time: sizes differ, and a thread that is done takes the next. The files' bytes stay, so they
-    // are all read before the first image is decoded.
-    let read = |path: &PathBuf| match read_file(path) {
-        Ok(bytes) => Ok((size_of_texture(&bytes), bytes)),
-        Err(Error::Io { source, .. }) => Err(format!("cannot be read: {source}")),
-        Err(other) => Err(other.to_string()),
-    };
-    let files: Vec<_> = paths.par_iter().with_max_len(1).map(read).collect();
+    // A thread takes one file at a time, since sizes differ. The bytes stay in memory with the images, so all
+    // files are read before the first image is decoded.
+    let files: Vec<_> = paths
+        .par_iter()
+        .with_max_len(1)
+        .map(|path| encoded_texture(path))
+        .collect();
+
     let mut together = Together::default();
     for (path, file) in paths.iter().zip(&files) {
         let size = match file {
-            Ok((Ok((_, _, [width, height])), _)) => together.add(*width, *height),
+            Ok((Ok([width, height]), _)) => together.add(*width, *height),
             Ok((Err(TextureFault::TooLarge(message)), _)) => Err(message.clone()),
             Ok((Err(TextureFault::Unreadable(_)), _)) | Err(_) => Ok(()),
         };
         size.map_err(|message| Error::unsupported(path, message))?;
     }
-    let decode = |file: std::result::Result<(_, Vec<u8>), String>| {
-        decode_texture(file?.1).map_err(|fault| fault.to_string())
-    };
-    Ok(files.into_par_iter().with_max_len(1).map(decode).collect())
+
+    let textures = files.into_par_iter().with_max_len(1).map(|file| {
+        let (_, bytes) = file?;
+        decode_texture(bytes).map_err(|fault| fault.to_string())
+    });
+    Ok(textures.collect())
 }
 
-/// How many pixels the textures of a file have.
+/// The size of an image, or its fault, and the bytes of its file.
+type EncodedTexture = (std::result::Result<[u32; 2], TextureFault>, Vec<u8>);
+
+/// Reads an image file, and the size in its header. The error is a sentence that follows its name.
+fn encoded_texture(path: &Path) -> std::result::Result<EncodedTexture, String> {
+    match read_file(path) {
+        Ok(bytes) => Ok((size_of_texture(&bytes).map(|(_, _, size)| size), bytes)),
+        Err(Error::Io { source, .. }) => Err(format!("cannot be read: {source}")),
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+/// How many textures a file has, and how many pixels.
 #[derive(Default)]
 pub(crate) struct Together {
     pixels: u64,
@@ -173,7 +189,7 @@ pub(crate) struct Together {
 }
 
 impl Together {
-    /// Adds a texture, before there is memory for it; a sentence if that makes too many.
+    /// Counts a texture, before memory is reserved for it. The error is a sentence that follows its name.
     pub(crate) fn add(&mut self, width: u32, height: u32) -> std::result::Result<(), String> {
         self.pixels = self
             .pixels
@@ -183,8 +199,8 @@ impl Together {
             return Ok(());
         }
         Err(format!(
-            "is the texture that makes {} of them with {} pixels: all textures of a file have \
-             {MAX_PIXELS_TOGETHER} at most; scale them down, or cut the scene in parts",
+            "is texture {} of the file, and the textures up to it have {} pixels together, more than \
+             {MAX_PIXELS_TOGETHER}: scale them down, or cut the scene in parts",
             self.textures, self.pixels
         ))
     }
@@ -195,7 +211,6 @@ pub(crate) mod tests {
     use super::*;
     use image::{ImageBuffer, Luma, LumaA, Rgb, Rgba};
     use std::fs;
-    use std::path::Path;
 
     pub(crate) fn png_of(image: DynamicImage) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -203,7 +218,7 @@ pub(crate) mod tests {
         bytes
     }
 
-    /// A 2 × 1 PNG: the colours `a` and `b`.
+    /// Encodes a 2 × 1 PNG of the colours `a` and `b`.
     pub(crate) fn two_pixels(a: [u8; 3], b: [u8; 3]) -> Vec<u8> {
         png_of(ImageBuffer::from_fn(2, 1, |x, _| Rgb(if x == 0 { a } else { b })).into())
     }
@@ -244,7 +259,8 @@ pub(crate) mod tests {
         assert!(fault(claim(20_000)).contains("claims 20000 × 20000"));
     }
 
-    /// A header that claims this number of pixels a side (with its checksum), and next to nothing behind it.
+    /// Makes a header that claims this number of pixels on each side (with its checksum), and next to no
+    /// content.
     fn claim(side: u32) -> Vec<u8> {
         let mut claim = two_pixels([1; 3], [2; 3]);
         claim[16..20].copy_from_slice(&side.to_be_bytes());
@@ -280,7 +296,7 @@ pub(crate) mod tests {
             together
                 .add(1, 1)
                 .unwrap_err()
-                .starts_with("is the texture that makes 2049 of them")
+                .starts_with("is texture 2049 of the file")
         );
         assert!(Together { pixels: u64::MAX, textures: 1 }.add(9, 9).is_err());
     }
@@ -314,7 +330,7 @@ pub(crate) mod tests {
         let mut paths: Vec<PathBuf> = entries.map(|e| e.unwrap().path()).collect();
         paths.sort();
         for (path, texture) in paths.iter().zip(read_textures(&paths).unwrap()) {
-            // Names of the suite that start with x are broken on purpose.
+            // The suite's names that start with x are broken on purpose.
             let broken = path.file_name().unwrap().to_str().unwrap().starts_with('x');
             assert_eq!(texture.is_err(), broken, "{}: {:?}", path.display(), texture.map(|_| ()));
         }

@@ -20,7 +20,7 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
-    /// The word for it: `y` or `z`.
+    /// Returns its word: `y` or `z`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Y => "y",
@@ -28,7 +28,7 @@ impl UpAxis {
         }
     }
 
-    /// A point or direction of the file in the world's axes (Z-up).
+    /// Turns a point or direction of the file into the world's axes (Z-up).
     pub fn world_from_file(self, v: Vec3) -> Vec3 {
         match self {
             Self::Y => vec3(v.x, -v.z, v.y),
@@ -36,7 +36,7 @@ impl UpAxis {
         }
     }
 
-    /// The same as a matrix.
+    /// Returns [`UpAxis::world_from_file`] as a matrix.
     pub fn rotation(self) -> DMat3 {
         let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| self.world_from_file(axis).as_dvec3());
         DMat3::from_cols(x, y, z)
@@ -58,23 +58,23 @@ impl std::str::FromStr for UpAxis {
 /// A mesh as it was read, in world metres, Z-up.
 #[derive(Clone, Debug)]
 pub struct MeshFile {
-    /// The mesh. Its faces stand in the order of the file.
+    /// The mesh. Its faces keep the order of the file.
     pub mesh: TriMesh,
-    /// For each texture of the mesh its encoded image, or `None` if the decoded one was altered.
+    /// The encoded image of each texture of the mesh. `None` if the decoded image was changed.
     pub texture_files: Vec<Option<TextureFile>>,
-    /// What was mended, left out or replaced: a sentence each, for the user.
+    /// What was repaired, left out or replaced: one sentence each, for the user.
     pub warnings: Vec<String>,
-    /// Labels that the file gives its faces or vertices, if it does; aligned with those of `mesh`.
+    /// The labels of its faces or vertices, if the file has any. They are aligned with the faces or vertices
+    /// of `mesh`.
     pub labels: Option<MeshLabels>,
-    /// The files that the mesh comes from, and where in it each begins.
+    /// The files that the mesh comes from, and where each begins in the mesh.
     pub sources: Vec<MeshSource>,
-    /// The other files that were read for it: libraries of materials, textures, buffers. Those that it names
-    /// and that are not there are not among them.
+    /// The other files that were read: material libraries, textures, buffers. Missing files are not listed.
     pub companions: Vec<PathBuf>,
-    /// What was subtracted from the positions of its files, in the world's axes: add it to a position to have
-    /// that of the scan. Source: [`MeshOptions::origin`].
+    /// The offset that was subtracted from the positions of the file, in the world's axes, in metres. Add it
+    /// to a position to get the position in the scan. Source: [`MeshOptions::origin`].
     pub offset_m: DVec3,
-    /// The unit that a comment in the (first) file says it is in.
+    /// The unit that a comment in the (first) file names.
     pub unit_said: Option<LengthUnit>,
     /// How many faces of the file had more than three corners.
     pub polygons_triangulated: usize,
@@ -83,33 +83,31 @@ pub struct MeshFile {
 }
 
 impl MeshFile {
-    /// A mesh that no file holds, under the name that messages and the manifest call it.
+    /// Makes a mesh that no file holds. Messages and the manifest call it `name`.
     pub fn in_memory(name: &str, mesh: TriMesh) -> Self {
         let texture_files = vec![None; mesh.textures().len()];
         Self { texture_files, ..Self::new(Path::new(name), mesh) }
     }
 
-    /// A mesh of the file `path`, with nothing else to say about it.
+    /// Makes a mesh of the file `path`, without textures, labels or warnings.
     pub(crate) fn new(path: &Path, mesh: TriMesh) -> Self {
-        let (texture_files, warnings, labels, companions) = Default::default();
-        let sources = vec![MeshSource { path: path.to_owned(), first_face: 0, first_vertex: 0 }];
-        let (polygons_triangulated, repeated_faces) = (0, 0);
+        let source = MeshSource { path: path.to_owned(), first_face: 0, first_vertex: 0 };
         Self {
             mesh,
-            texture_files,
-            warnings,
-            labels,
-            sources,
-            companions,
+            texture_files: Vec::new(),
+            warnings: Vec::new(),
+            labels: None,
+            sources: vec![source],
+            companions: Vec::new(),
             offset_m: DVec3::ZERO,
             unit_said: None,
-            polygons_triangulated,
-            repeated_faces,
+            polygons_triangulated: 0,
+            repeated_faces: 0,
         }
     }
 
-    /// The faces that come from `sources[source]`. Numbers of objects may mean different objects in different
-    /// files.
+    /// Returns the faces that come from `sources[source]`. The same object number may mean different objects
+    /// in different files.
     ///
     /// # Panics
     /// If there is no such source.
@@ -122,7 +120,7 @@ impl MeshFile {
         self.sources[source].first_face..end
     }
 
-    /// Leaves out the faces that repeat an earlier one; labels follow the tags of the mesh, which are
+    /// Leaves out the faces that repeat an earlier one. Labels follow the face tags of the mesh, which are
     /// returned.
     pub(crate) fn tidy(mut self) -> (Self, Vec<u32>) {
         let (mut mesh, repeated) = self.mesh.without_repeated_faces();
@@ -130,6 +128,7 @@ impl MeshFile {
         if let Some(labels) = self.labels.as_mut().filter(|_| !tags.is_empty()) {
             labels.pick_faces(&tags);
         }
+
         self.mesh = mesh;
         self.repeated_faces += repeated;
         if repeated > 0 {
@@ -141,7 +140,7 @@ impl MeshFile {
     }
 }
 
-/// A file that a mesh comes from. Its faces and vertices go on to where those of the next file begin.
+/// A file that a mesh comes from. Its faces and vertices end where the next file's begin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MeshSource {
     /// The file.
@@ -175,10 +174,10 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// All of them.
+    /// All units.
     pub const ALL: [Self; 5] = [Self::Metre, Self::Centimetre, Self::Millimetre, Self::Foot, Self::Inch];
 
-    /// The word for it: `m`, `cm`, `mm`, `ft` or `in`.
+    /// Returns its word: `m`, `cm`, `mm`, `ft` or `in`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Metre => "m",
@@ -189,7 +188,7 @@ impl LengthUnit {
         }
     }
 
-    /// How many metres it is.
+    /// Returns its length in metres.
     pub const fn metres(self) -> f64 {
         match self {
             Self::Metre => 1.0,
@@ -200,7 +199,7 @@ impl LengthUnit {
         }
     }
 
-    /// The unit that programs mean by a word, such as `meters`, `Inches` or `cm`.
+    /// Returns the unit that a program means by a word such as `meters`, `Inches` or `cm`.
     pub(crate) fn of_word(word: &str) -> Option<Self> {
         Some(match word.to_ascii_lowercase().trim_end_matches('s') {
             "m" | "meter" | "metre" => Self::Metre,
@@ -233,20 +232,21 @@ impl std::str::FromStr for LengthUnit {
 /// How a mesh is read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshOptions {
-    /// The property of a PLY file's faces or vertices that tells what they are; by default one of the names
-    /// that scanners and data sets use, such as `label`, `class` and `category_id`, if it is there.
+    /// The name of the PLY property that holds the class of a face or vertex. By default the first of the
+    /// names that scanners and data sets use, such as `label`, `class` and `category_id`.
     pub class_column: Option<String>,
-    /// The property that tells which object they belong to; by default one such as `object_id` and
-    /// `instance`, if it is there.
+    /// The name of the PLY property that holds the object of a face or vertex. By default the first of the
+    /// usual names, such as `object_id` and `instance`.
     pub instance_column: Option<String>,
-    /// Which place becomes the origin.
+    /// Which point becomes the origin.
     pub origin: MeshOrigin,
-    /// The unit of the coordinates. `None`: that which a comment in the head of the file says, as modellers
-    /// write `# File units = inches` into OBJ files; else metres.
+    /// The unit of the coordinates. By default the unit that a comment in the head of the file names, as
+    /// modellers write `# File units = inches` into OBJ files, or else metres.
     pub units: Option<LengthUnit>,
 }
 
-/// Makes the mesh of parts in the file's unit, and tells in `warnings` what was mended.
+/// Checks the parts, whose positions are in the file's unit, and makes the mesh. Adds what was repaired to
+/// `warnings`.
 pub(crate) fn checked_mesh(
     mut parts: MeshParts,
     frame: FileFrame,

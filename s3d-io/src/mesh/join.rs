@@ -1,4 +1,4 @@
-//! Meshes in several files, joined to one.
+//! Joins meshes of several files into one.
 
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, MeshOptions, MeshSource, UpAxis};
@@ -9,43 +9,48 @@ use s3d_geom::{NO_INDEX, TriMesh};
 use std::path::{Path, PathBuf};
 
 /// Reads the meshes of `paths` and joins them in this order: vertices, faces, materials and textures of the
-/// first file, then those of the second… Each texture stays one of its own, whatever its name. Warnings name
-/// their file, if there are several.
+/// first file, then of the second, and so on. Every texture stays separate, even if two have the same name.
+/// If there are several files, each warning names its file.
 ///
-/// A column that only some files have is filled up as [`s3d_geom::MeshParts::append`] tells; vertex labels
-/// become labels of faces if other files label faces, and what a file does not label has [`NO_LABEL`]. The
-/// origin that is found for the first file is that of all, and so is the unit that it says.
+/// A column that only some files have is filled up as [`s3d_geom::MeshParts::append`] describes. Vertex
+/// labels become face labels if another file labels faces. Faces and vertices of a file without labels have
+/// [`NO_LABEL`]. All files share the origin that is found for the first one, and the unit that it names.
 ///
 /// # Errors
-/// As [`read_mesh_with`] for each file; [`Error::Format`] if `paths` is empty or the meshes have too many
+/// Like [`read_mesh_with`] for each file; [`Error::Format`] if `paths` is empty or the meshes have too many
 /// vertices together.
 pub fn read_meshes(paths: &[PathBuf], up: UpAxis) -> Result<MeshFile> {
     read_meshes_with(paths, up, &MeshOptions::default())
 }
 
-/// As [`read_meshes`], with the names of the columns of labels.
+/// Reads like [`read_meshes`], with other options than the default.
 ///
 /// # Errors
-/// As [`read_meshes`].
+/// Like [`read_meshes`].
 pub fn read_meshes_with(paths: &[PathBuf], up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::format(Path::new(""), "a scene needs at least one mesh"));
     };
+
     let mut joined = read_mesh_with(first, up, options)?;
     if others.is_empty() {
         return Ok(joined);
     }
+
+    // The other files share the origin and the unit of the first.
     name_warnings(&mut joined.warnings, first);
     let options = MeshOptions {
         origin: MeshOrigin::behind(joined.offset_m),
         units: options.units.or(joined.unit_said),
         ..options.clone()
     };
+
     for path in others {
         let mut next = read_mesh_with(path, up, &options)?;
         name_warnings(&mut next.warnings, path);
         joined = join(joined, next)?;
     }
+
     let faces = joined.mesh.faces().len() as u32;
     joined.mesh = joined.mesh.with_face_tags((0..faces).collect());
     let (mut joined, kept) = joined.tidy();
@@ -55,10 +60,8 @@ pub fn read_meshes_with(paths: &[PathBuf], up: UpAxis, options: &MeshOptions) ->
     Ok(joined)
 }
 
-/// The mesh `next` behind `joined`.
+/// Appends the mesh `next` to `joined`.
 fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
-    let sizes =
-        |m: &TriMesh| [m.positions().len(), m.parts().uvs.len(), m.parts().normals.len(), m.faces().len()];
     let together = sizes(&joined.mesh)
         .into_iter()
         .zip(sizes(&next.mesh))
@@ -69,7 +72,9 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
                        scene in parts";
         return Err(Error::format(path, message));
     }
-    let [first_face, first_vertex] = [joined.mesh.faces().len() as u32, joined.mesh.positions().len() as u32];
+
+    let first_face = joined.mesh.faces().len() as u32;
+    let first_vertex = joined.mesh.positions().len() as u32;
     let labels = match (joined.labels, next.labels) {
         (None, None) => None,
         (a, b) => Some(joined_labels((a, &joined.mesh), (b, &next.mesh))),
@@ -80,6 +85,7 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
         first_face: first_face + s.first_face,
         first_vertex: first_vertex + s.first_vertex,
     }));
+
     Ok(MeshFile {
         unit_said: joined.unit_said,
         mesh: joined.mesh.join(next.mesh),
@@ -94,43 +100,73 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
     })
 }
 
+/// The numbers of vertices, texture coordinates, normals and faces.
+fn sizes(mesh: &TriMesh) -> [usize; 4] {
+    let parts = mesh.parts();
+    [mesh.positions().len(), parts.uvs.len(), parts.normals.len(), mesh.faces().len()]
+}
+
 type Labelled<'a> = (Option<MeshLabels>, &'a TriMesh);
 
-/// The labels of two meshes, one behind the other: of vertices where both have them for vertices, else of
-/// faces. Files have numbers, never names.
+/// Joins the labels of two meshes. They stay vertex labels if neither mesh labels its faces. Files have
+/// numbers, never names.
 fn joined_labels(a: Labelled<'_>, b: Labelled<'_>) -> MeshLabels {
-    let of_faces =
-        |labels: &Option<MeshLabels>| labels.as_ref().is_some_and(|l| l.element() == LabelElement::Face);
-    let element = if of_faces(&a.0) || of_faces(&b.0) {
+    let element = if labels_faces(&a.0) || labels_faces(&b.0) {
         LabelElement::Face
     } else {
         LabelElement::Vertex
     };
-    let columns = |(labels, mesh): Labelled<'_>| {
-        let (n, labels) = match element {
+    let a = LabelColumns::new(a, element);
+    let b = LabelColumns::new(b, element);
+    MeshLabels::Numbers {
+        element,
+        class: joined_column((a.class, a.rows), (b.class, b.rows)),
+        instance: joined_column((a.instance, a.rows), (b.instance, b.rows)),
+    }
+}
+
+fn labels_faces(labels: &Option<MeshLabels>) -> bool {
+    labels.as_ref().is_some_and(|l| l.element() == LabelElement::Face)
+}
+
+/// The label columns of a mesh.
+struct LabelColumns {
+    /// The number of faces or vertices.
+    rows: usize,
+    class: Option<LabelColumn>,
+    instance: Option<LabelColumn>,
+}
+
+impl LabelColumns {
+    /// Takes the labels of a mesh as labels of its faces or vertices.
+    fn new((labels, mesh): Labelled<'_>, element: LabelElement) -> Self {
+        let (rows, labels) = match element {
             LabelElement::Face => (mesh.faces().len(), labels.map(|l| l.into_faces(mesh))),
             LabelElement::Vertex => (mesh.positions().len(), labels),
         };
         match labels {
-            Some(MeshLabels::Numbers { class, instance, .. }) => (n, [class, instance]),
-            _ => (n, [None, None]),
+            Some(MeshLabels::Numbers { class, instance, .. }) => Self { rows, class, instance },
+            _ => Self { rows, class: None, instance: None },
         }
-    };
-    let ((n, a), (m, b)) = (columns(a), columns(b));
-    let join = |a: Option<LabelColumn>, b: Option<LabelColumn>| {
-        let name = a.as_ref().or(b.as_ref())?.name.clone();
-        let mut values = a.map_or_else(|| vec![NO_LABEL; n], |c| c.values);
-        values.extend(b.map_or_else(|| vec![NO_LABEL; m], |c| c.values));
-        Some(LabelColumn { name, values })
-    };
-    let ([class_a, instance_a], [class_b, instance_b]) = (a, b);
-    MeshLabels::Numbers { element, class: join(class_a, class_b), instance: join(instance_a, instance_b) }
+    }
 }
 
+/// Appends a column to another; each comes with its number of rows. A missing column counts as [`NO_LABEL`].
+fn joined_column(
+    (a, rows_a): (Option<LabelColumn>, usize),
+    (b, rows_b): (Option<LabelColumn>, usize),
+) -> Option<LabelColumn> {
+    let name = a.as_ref().or(b.as_ref())?.name.clone();
+    let mut values = a.map_or_else(|| vec![NO_LABEL; rows_a], |c| c.values);
+    values.extend(b.map_or_else(|| vec![NO_LABEL; rows_b], |c| c.values));
+    Some(LabelColumn { name, values })
+}
+
+/// Puts the file's name in front of its warnings.
 fn name_warnings(warnings: &mut [String], path: &Path) {
     let shown = path.display().to_string();
     for warning in warnings {
-        // Those about a library name a file already.
+        // Warnings about a library name a file already.
         if !warning.starts_with(&shown) {
             *warning = format!("{shown}: {warning}");
         }
@@ -178,7 +214,7 @@ mod tests {
             fs::create_dir(&folder).unwrap();
             fs::write(folder.join("wall.png"), two_pixels(color, color)).unwrap();
             fs::write(folder.join("wall.mtl"), "newmtl wall\nmap_Kd wall.png\n").unwrap();
-            // The third face repeats the first, and so does the only one of the last file.
+            // The third face repeats the first. The only face of the last file repeats it too.
             let obj = format!(
                 "mtllib wall.mtl\nv 0 0 {z}\nv 1 0 {z}\nv 0 1 {z}\nv 1 1 {z}\nvt 0 0\nusemtl wall\n\
                  f 1/1 2/1 3/1\nf 2/1 4/1 3/1\nf 3/1 2/1 1/1\n"
@@ -196,6 +232,7 @@ mod tests {
             assert_eq!((texture.name.as_str(), texture.image.pixels()[0]), ("wall.png", pixel));
         }
         assert!(matches!(file.mesh.color_of(4), FaceColor::Flat(_)));
+
         assert_eq!(file.texture_files.iter().flatten().count(), 2);
         assert_eq!((0..3).map(|s| file.faces_of(s)).collect::<Vec<_>>(), [0..2, 2..4, 4..5]);
         assert_eq!(file.sources.iter().map(|s| s.first_vertex).collect::<Vec<_>>(), [0, 4, 8]);
@@ -220,6 +257,7 @@ mod tests {
             dir.path().join(name)
         })
         .to_vec();
+
         let file = read_meshes(&paths, UpAxis::Z).unwrap();
         let Some(MeshLabels::Numbers { element: LabelElement::Face, class, instance }) = &file.labels else {
             panic!()
@@ -228,7 +266,7 @@ mod tests {
         assert_eq!(values(instance), ("object_id", vec![40, 50, NO_LABEL, NO_LABEL, NO_LABEL]));
         assert!(file.warnings.is_empty(), "{:?}", file.warnings);
 
-        // The second time all its faces repeat earlier ones.
+        // When a file is read a second time, all its faces repeat earlier ones.
         let twice = [paths[1].clone(), paths[2].clone(), paths[1].clone()];
         let file = read_meshes(&twice, UpAxis::Z).unwrap();
         let Some(MeshLabels::Numbers { element: LabelElement::Vertex, class, instance: None }) = &file.labels
@@ -239,7 +277,7 @@ mod tests {
         assert_eq!(values(class).1, [6, 7, 7, 7, none, none, none, 6, 7, 7, 7]);
         assert_eq!((0..3).map(|s| file.faces_of(s)).collect::<Vec<_>>(), [0..2, 2..3, 3..3]);
 
-        // Faces that go take their labels along.
+        // A face that is left out takes its label along.
         let file = read_meshes(&[paths[0].clone(), paths[2].clone(), paths[0].clone()], UpAxis::Z).unwrap();
         let Some(MeshLabels::Numbers { class, .. }) = &file.labels else { panic!() };
         assert_eq!((values(class).1, file.mesh.faces().len()), (vec![4, 5, none], 3));

@@ -1,14 +1,14 @@
-//! Labels that came with a mesh: numbers of its faces or vertices, or the names of its materials.
+//! Labels that come with a mesh: numbers of its faces or vertices, or the names of its materials.
 
 use crate::fs::quote::{count, quote};
 use s3d_geom::{NO_INDEX, TriMesh};
 use s3d_label::{Label, Taxonomy};
 use std::collections::HashMap;
 
-/// In place of a number: this face or vertex has none.
+/// The number of a face or vertex that has no label.
 pub const NO_LABEL: i64 = i64::MIN;
 
-/// What of a mesh has labels.
+/// The part of a mesh that has labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LabelElement {
     /// Its faces.
@@ -22,36 +22,37 @@ pub enum LabelElement {
 pub struct LabelColumn {
     /// The property's name as the file writes it, such as `category_id`.
     pub name: String,
-    /// One a face or vertex of the mesh; [`NO_LABEL`] where there is none.
+    /// One number for each face or vertex of the mesh; [`NO_LABEL`] if it has none.
     pub values: Vec<i64>,
 }
 
-/// Labels that came with a mesh, aligned with its faces or vertices as they are after all checks.
+/// Labels that come with a mesh, aligned with its faces or vertices after all checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MeshLabels {
-    /// Numbers, whose meaning is told elsewhere: by a table of classes. At least one of the columns is there.
+    /// Numbers, whose meaning a table of classes tells. At least one of the two columns is there.
     Numbers {
-        /// What they belong to.
+        /// The part of the mesh that has them.
         element: LabelElement,
-        /// What a face or vertex is.
+        /// The class of each face or vertex.
         class: Option<LabelColumn>,
-        /// Which object it belongs to.
+        /// The object that each face or vertex belongs to.
         instance: Option<LabelColumn>,
     },
-    /// Labels of the data set for each face, as the published `semantic.obj` has them. Made by
+    /// A label of the data set for each face, as the published `semantic.obj` has them. Made by
     /// [`MeshLabels::from_materials`].
     Names {
-        /// The different labels, in the order in which the mesh's materials name them.
+        /// The different labels, in the order in which the materials of the mesh name them.
         labels: Vec<Label>,
-        /// One a face: its place in `labels`, or [`NO_INDEX`] for the null label.
+        /// For each face its index into `labels`, or [`NO_INDEX`] for the null label.
         faces: Vec<u32>,
     },
 }
 
 impl MeshLabels {
-    /// Labels of faces from the names of their materials (`usemtl chair_3_office_5_1`), and a warning for
-    /// names that are none; `None` if fewer than half of the faces have such a name, or none of them. The
-    /// null label `<UNK>_0_<UNK>_0_0` is a name too. Source: formats.md, "What is written".
+    /// Takes the labels of faces from the names of their materials (`usemtl chair_3_office_5_1`). Returns
+    /// them with warnings about names that are no label. Returns `None` if fewer than half of the faces have
+    /// such a name, or if no name is a label. The null label `<UNK>_0_<UNK>_0_0` counts as a name. Source:
+    /// formats.md, "What is written".
     ///
     /// ```
     /// use s3d_geom::{Material, MeshParts, TriMesh, glam::Vec3};
@@ -69,6 +70,7 @@ impl MeshLabels {
     /// # Ok::<(), s3d_geom::MeshError>(())
     /// ```
     pub fn from_materials(mesh: &TriMesh, taxonomy: &Taxonomy) -> Option<(Self, Vec<String>)> {
+        // For each material, whether its name is a label, and which.
         let mut labels = Vec::new();
         let mut known: HashMap<Label, u32> = HashMap::new();
         let mut is_name = Vec::new();
@@ -85,12 +87,13 @@ impl MeshLabels {
                 })
             })
             .collect();
+
         let mut named = 0;
         let mut others = vec![0usize; places.len()];
         let mut without = 0;
         let faces: Vec<u32> = (0..mesh.faces().len() as u32)
             .map(|face| match mesh.material_of(face).map(|m| m as usize) {
-                Some(m) if is_name.get(m).copied().unwrap_or(false) => {
+                Some(m) if is_name.get(m) == Some(&true) => {
                     named += 1;
                     places.get(m).copied().unwrap_or(NO_INDEX)
                 }
@@ -104,15 +107,18 @@ impl MeshLabels {
                 }
             })
             .collect();
+
+        // Ordinary material names are no labels.
         if labels.is_empty() || 2 * named < faces.len() {
             return None;
         }
+
         let mut warnings = Vec::new();
         if let Some((material, _)) = mesh.materials().iter().zip(&others).find(|(_, n)| **n > 0) {
             let name = quote(material.name.as_bytes());
             let n = count(others.iter().sum(), "face");
             warnings.push(format!(
-                "{n} without a label: the names of their materials are none, the first is {name}"
+                "{n} without a label: the names of their materials are no labels, the first is {name}"
             ));
         }
         if without > 0 {
@@ -121,7 +127,7 @@ impl MeshLabels {
         Some((Self::Names { labels, faces }, warnings))
     }
 
-    /// What the labels belong to.
+    /// Returns the part of the mesh that has labels.
     pub fn element(&self) -> LabelElement {
         match self {
             Self::Numbers { element, .. } => *element,
@@ -129,39 +135,25 @@ impl MeshLabels {
         }
     }
 
-    /// The same as labels of faces: a face has the number that two or three of its corners have, and that of
-    /// its first corner if all differ. [`NO_LABEL`] counts as a number.
+    /// Turns vertex labels into face labels. A face takes the number that two or three of its corners share,
+    /// or the number of its first corner if all differ. [`NO_LABEL`] counts as a number.
     ///
     /// # Panics
-    /// If the labels are not those of `mesh`.
+    /// If the labels belong to another mesh.
     #[must_use]
-    #[expect(clippy::indexing_slicing, reason = "labels of another mesh are a caller's mistake: see Panics")]
     pub fn into_faces(self, mesh: &TriMesh) -> Self {
         match self {
-            Self::Numbers { element: LabelElement::Vertex, class, instance } => {
-                let of_faces = |column: LabelColumn| LabelColumn {
-                    values: mesh
-                        .faces()
-                        .iter()
-                        .map(|corners| {
-                            let [a, b, c] = corners.map(|v| column.values[v as usize]);
-                            if b == c { b } else { a }
-                        })
-                        .collect(),
-                    name: column.name,
-                };
-                Self::Numbers {
-                    element: LabelElement::Face,
-                    class: class.map(of_faces),
-                    instance: instance.map(of_faces),
-                }
-            }
+            Self::Numbers { element: LabelElement::Vertex, class, instance } => Self::Numbers {
+                element: LabelElement::Face,
+                class: class.map(|column| majority_of_corners(column, mesh)),
+                instance: instance.map(|column| majority_of_corners(column, mesh)),
+            },
             faces => faces,
         }
     }
 
-    /// Makes columns of faces of those of other faces, such as the polygons of a file: `tags` tells for each
-    /// face its place among them, or [`NO_INDEX`] for a face without a label.
+    /// Replaces columns of faces by columns of other faces: `tags` gives for each new face the index of its
+    /// old one, such as a polygon of the file, or [`NO_INDEX`] for a face without a label.
     pub(crate) fn pick_faces(&mut self, tags: &[u32]) {
         match self {
             Self::Numbers { element: LabelElement::Face, class, instance } => {
@@ -175,15 +167,28 @@ impl MeshLabels {
     }
 }
 
+/// Returns for each face the number of most of its corners, or of its first corner.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "labels of another mesh are a caller's mistake: see Panics of `into_faces`"
+)]
+fn majority_of_corners(column: LabelColumn, mesh: &TriMesh) -> LabelColumn {
+    let of_face = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|vertex| column.values[vertex as usize]);
+        if b == c { b } else { a }
+    };
+    LabelColumn { values: mesh.faces().iter().map(of_face).collect(), name: column.name }
+}
+
 fn picked<T: Copy>(values: &[T], tags: &[u32], missing: T) -> Vec<T> {
     tags.iter()
         .map(|&tag| values.get(tag as usize).copied().unwrap_or(missing))
         .collect()
 }
 
-/// Names of properties that hold classes, in the order in which they are looked for; case is no matter.
-/// Matterport3D (`category_id`), ScanNet and SceneNN (`label`), 3RScan (`globalId`, `NYU40`), CloudCompare
-/// (`scalar_…`) and what people write by hand.
+/// The names of properties that hold classes, in the order of search, in upper or lower case. They are used
+/// by Matterport3D (`category_id`), ScanNet and SceneNN (`label`), 3RScan (`globalId`, `NYU40`), CloudCompare
+/// (`scalar_…`) and by people who write files by hand.
 pub(crate) const CLASS_NAMES: [&str; 22] = [
     "label",
     "class",
@@ -209,8 +214,9 @@ pub(crate) const CLASS_NAMES: [&str; 22] = [
     "scalar_semantic",
 ];
 
-/// Names of properties that hold objects. Replica and Habitat (`object_id` of faces), 3RScan and MultiScan
-/// (`objectId`). Matterport3D's `segment_id` and `material_id` are none: an object has many segments.
+/// The names of properties that hold objects. Replica and Habitat use `object_id` of faces, 3RScan and
+/// MultiScan `objectId`. Matterport3D's `segment_id` and `material_id` are not among them, since an object
+/// has many segments.
 pub(crate) const INSTANCE_NAMES: [&str; 14] = [
     "instance",
     "instance_id",
@@ -261,7 +267,7 @@ mod tests {
         assert_eq!(faces, [1, NO_INDEX, 0, NO_INDEX]);
         assert_eq!(
             warnings,
-            ["1 face without a label: the names of their materials are none, the first is `default`"]
+            ["1 face without a label: the names of their materials are no labels, the first is `default`"]
         );
         let (_, warnings) =
             MeshLabels::from_materials(&mesh(&names, vec![2, 1, 0, NO_INDEX]), &Taxonomy::s3dis()).unwrap();

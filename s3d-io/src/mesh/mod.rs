@@ -1,10 +1,10 @@
 //! Meshes with their textures and labels: OBJ, glTF and PLY.
 //!
-//! [`read_mesh`] reads one file and [`read_meshes`] joins several; the name's ending tells the format. What
-//! comes out is a [`MeshFile`]: the mesh in world metres, Z-up, the encoded textures as they were found,
-//! [`MeshLabels`] if the file labels its faces or vertices, and warnings of what was mended.
-//! [`read_mesh_from`] takes any reader. A mesh far from its origin, as in UTM, is brought near to it before
-//! positions become `f32` if [`MeshOptions::origin`] says so.
+//! [`read_mesh`] reads one file and [`read_meshes`] joins several. The name's ending tells the format. The
+//! result is a [`MeshFile`]: the mesh in world metres, Z-up, its encoded textures as the file has them,
+//! [`MeshLabels`] if the file labels its faces or vertices, and warnings of everything that was repaired.
+//! [`read_mesh_from`] takes any reader. A mesh far from its origin, as in UTM, can be moved near to it before
+//! its positions are rounded to `f32`: [`MeshOptions::origin`].
 //!
 //! | ending | what is read |
 //! |---|---|
@@ -12,12 +12,13 @@
 //! | `.gltf`, `.glb` | glTF 2.0: triangles of the default scene, base colours and their textures |
 //! | `.ply` | ASCII and binary, either byte order: polygons, strips, colours, texture coordinates, labels |
 //!
-//! Vertices and faces keep the file's order, polygons are cut into triangles, and faces that repeat an
-//! earlier one are left out. Textures are PNG or JPEG of at most 2²⁹ pixels each; vertices and faces are
-//! counted by 32 bits. What is compressed (Draco, meshopt, KTX2) is refused, with a way out.
+//! Vertices and faces keep the file's order. Polygons are cut into triangles, and a face that repeats an
+//! earlier one is left out. Textures are PNG or JPEG of at most 2²⁹ pixels each; vertices and faces are
+//! counted by 32 bits. Compressed meshes and textures (Draco, meshopt, KTX2) are refused with a message that
+//! names a way out.
 //!
-//! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set into a folder, [`RgbObj`] and
-//! [`SemanticObj`] into any writer. Source: formats.md, "Meshes".
+//! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set into a folder; [`RgbObj`] and
+//! [`SemanticObj`] write them into any writer. Source: formats.md, "Meshes".
 //!
 //! ```
 //! use s3d_io::mesh::{UpAxis, read_mesh};

@@ -1,33 +1,34 @@
-//! Where the origin of a mesh is put.
+//! Moves the origin of a mesh.
 //!
-//! Positions are `f32`, which step by half a metre at 5,400 km, where the northings of surveys are. So files
-//! are read in `f64`, and an offset is subtracted before positions are rounded.
+//! Positions are `f32`. At 5,400 km, the size of the northings of surveys, they step by half a metre. So
+//! files are read in `f64`, and an offset is subtracted before positions are rounded.
 
 use crate::bounds::Bounds;
 use crate::mesh::file::{LengthUnit, UpAxis};
 use s3d_geom::glam::{DVec3, Vec3};
 
-/// Farther from the origin than this, metres, `f32` steps by more than a tenth of a millimetre.
+/// The distance from the origin, in metres, beyond which `f32` steps by more than a tenth of a millimetre.
 const FAR_M: f64 = 1024.0;
 
-/// An offset that is found is a multiple of this, metres.
+/// Any offset that is found is a multiple of this, in metres.
 const ROUND_M: f64 = 100.0;
 
-/// Which place becomes the origin of a mesh that is read.
+/// The point that becomes the origin of a mesh when it is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MeshOrigin {
-    /// The file's.
+    /// The origin of the file.
     #[default]
     OfFile,
-    /// The file's, unless the mesh goes farther than 1,024 m from it: then the place next to the middle of
-    /// its box whose coordinates are multiples of 100 m, if that halves the distance at least.
+    /// The origin of the file, unless the mesh reaches farther than 1,024 m from it. Then the point nearest
+    /// to the centre of its box whose coordinates are multiples of 100 m, if this at least halves the
+    /// distance.
     Near,
-    /// This place of the file's frame, in the world's axes: metres, Z-up.
+    /// This point, in metres, in the world's axes (Z-up).
     At(DVec3),
 }
 
 impl MeshOrigin {
-    /// What is subtracted from a mesh that comes behind others, from which `offset_m` was.
+    /// Returns the origin of a mesh that is joined to others, from which `offset_m` was subtracted.
     pub(crate) fn behind(offset_m: DVec3) -> Self {
         if offset_m == DVec3::ZERO {
             Self::OfFile
@@ -36,7 +37,7 @@ impl MeshOrigin {
         }
     }
 
-    /// Whether positions that may be as large as `largest_m` are needed in `f64`.
+    /// Returns whether positions of up to `largest_m` metres must be read in `f64`.
     pub(crate) fn needs_exact(self, largest_m: f64) -> bool {
         match self {
             Self::OfFile => false,
@@ -45,7 +46,7 @@ impl MeshOrigin {
         }
     }
 
-    /// What is subtracted from positions, in the world's axes, of a mesh whose faces have these corners.
+    /// Returns the offset to subtract from the positions of a mesh with these corners, in the world's axes.
     pub(crate) fn offset_m(self, corners: impl IntoIterator<Item = DVec3>) -> DVec3 {
         match self {
             Self::OfFile => DVec3::ZERO,
@@ -55,7 +56,7 @@ impl MeshOrigin {
     }
 }
 
-/// What becomes of a file's coordinates, beside their axes.
+/// How the coordinates of a file become metres near the origin. The axes are another matter: [`UpAxis`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FileFrame {
     origin: MeshOrigin,
@@ -67,32 +68,34 @@ impl FileFrame {
         Self { origin, unit }
     }
 
-    /// Whether positions that may be as large as `largest`, in the file's unit, are needed in `f64`.
+    /// Returns whether positions of up to `largest`, in the file's unit, must be read in `f64`.
     pub(crate) fn needs_exact(self, largest: f64) -> bool {
         self.origin.needs_exact(largest * self.unit.metres())
     }
 
-    /// What is subtracted from positions, metres in the world's axes, of a mesh whose faces have these
-    /// corners in the file's unit.
+    /// Returns the offset to subtract, in metres in the world's axes. The corners of the faces are in the
+    /// file's unit.
     pub(crate) fn offset_m(self, corners: impl IntoIterator<Item = DVec3>) -> DVec3 {
         self.origin
             .offset_m(corners.into_iter().map(|corner| corner * self.unit.metres()))
     }
 
-    /// An offset in the file's unit.
+    /// Converts an offset to the file's unit.
     pub(crate) fn in_units(self, offset_m: DVec3) -> DVec3 {
         offset_m / self.unit.metres()
     }
 
-    /// Takes positions from the file's unit to metres.
+    /// Converts positions from the file's unit to metres.
     pub(crate) fn scale(self, positions: &mut [Vec3]) {
         if self.unit != LengthUnit::Metre {
-            let metres = |p: Vec3| (p.as_dvec3() * self.unit.metres()).as_vec3();
-            positions.iter_mut().for_each(|p| *p = metres(*p));
+            for position in positions {
+                *position = (position.as_dvec3() * self.unit.metres()).as_vec3();
+            }
         }
     }
 }
 
+/// Returns the multiple of 100 m that is nearest to the centre, if the box is far and this brings it near.
 fn found(bounds: Bounds) -> DVec3 {
     if !bounds.is_some() || bounds.farthest_m() <= FAR_M {
         return DVec3::ZERO;
@@ -106,7 +109,7 @@ fn found(bounds: Bounds) -> DVec3 {
     }
 }
 
-/// The largest number among coordinates that are numbers.
+/// Returns the largest absolute coordinate that is a number.
 pub(crate) fn largest(positions: &[Vec3]) -> f64 {
     f64::from(
         positions
@@ -117,7 +120,7 @@ pub(crate) fn largest(positions: &[Vec3]) -> f64 {
 }
 
 impl UpAxis {
-    /// As [`UpAxis::world_from_file`], in `f64`.
+    /// Turns like [`UpAxis::world_from_file`], in `f64`.
     pub(crate) fn exact_world_from_file(self, v: DVec3) -> DVec3 {
         match self {
             Self::Y => DVec3::new(v.x, -v.z, v.y),
@@ -125,7 +128,7 @@ impl UpAxis {
         }
     }
 
-    /// The other way round.
+    /// Turns a vector of the world back into the file's axes, in `f64`.
     pub(crate) fn exact_file_from_world(self, v: DVec3) -> DVec3 {
         match self {
             Self::Y => DVec3::new(v.x, v.z, -v.y),
@@ -150,7 +153,7 @@ mod tests {
         assert_eq!(offset([1030.0, -9.0, 4.0], [1060.0, 9.0, 7.0]), [1000.0, 0.0, 0.0]);
         assert_eq!(offset([5e5, 5.4e6, 300.0], [500_012.0, 5_400_009.0, 303.0]), [5e5, 5.4e6, 300.0]);
         assert_eq!(offset([-7160.0, 0.0, 0.0], [-7150.0, 9.0, 3.0]), [-7200.0, 0.0, 0.0]);
-        // A whole district around the origin.
+        // A district around the origin.
         assert_eq!(offset([-3000.0, -2000.0, 0.0], [3500.0, 2500.0, 90.0]), [0.0; 3]);
         assert_eq!(MeshOrigin::Near.offset_m([]), DVec3::ZERO);
         assert_eq!(MeshOrigin::At(DVec3::X).offset_m([]), DVec3::X);
@@ -158,7 +161,7 @@ mod tests {
 
     const UTM: DVec3 = dvec3(500_000.0, 5_400_000.0, 300.0);
 
-    /// A flight of steps, each a millimetre wide, at some place, Z-up; the first vertex is in no face.
+    /// Makes a flight of steps, each a millimetre wide, at some place, Z-up. The first vertex is in no face.
     fn steps(at: DVec3) -> Vec<DVec3> {
         let step = |i: u32| at + dvec3(f64::from(i / 2) / 1024.0, f64::from(i % 2), f64::from(i / 4) / 512.0);
         std::iter::once(DVec3::ZERO).chain((0..40).map(step)).collect()
@@ -184,7 +187,7 @@ mod tests {
         text.into_bytes()
     }
 
-    /// Two thirds of `at` are in the parent's matrix, the rest in the node's translation.
+    /// Two thirds of `at` are in the matrix of the parent, the rest in the translation of the node.
     fn gltf(at: DVec3) -> Vec<u8> {
         use base64::Engine;
         let mut data: Vec<u8> = steps(DVec3::ZERO)
@@ -192,11 +195,13 @@ mod tests {
             .flat_map(|p| p.as_vec3().to_array())
             .flat_map(f32::to_le_bytes)
             .collect();
+
         let vertices = data.len();
         data.extend(faces().flatten().flat_map(|i| (i as u16).to_le_bytes()));
         // No float holds the digits of these places.
         let a = (at * 0.625).floor() + 0.070_312_5;
         let b = at - a;
+
         format!(
             r#"{{"asset": {{"version": "2.0"}}, "nodes": [
             {{"children": [1], "matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, {:?},{:?},{:?},1]}},
@@ -238,12 +243,12 @@ mod tests {
                 let found = read(name, &far, up, origin).unwrap();
                 assert_eq!(found.offset_m, UTM, "{name}");
                 assert_eq!(found.mesh.faces(), expected.mesh.faces(), "{name}");
-                // All vertices but the first, which was at the origin of its file.
+                // All vertices but the first, which lies at the origin of the file.
                 assert_eq!(found.mesh.positions()[1..], expected.mesh.positions()[1..], "{name} {up:?}");
             }
             let near = read(name, &home, up, MeshOrigin::Near).unwrap();
             assert_eq!((near.offset_m, near.mesh.positions()), (DVec3::ZERO, expected.mesh.positions()));
-            // As the file has them, they collapse.
+            // At the coordinates of the file, the faces collapse.
             let lost = read(name, &far, up, MeshOrigin::OfFile).map_or(0, |file| file.mesh.faces().len());
             assert!(lost < 38, "{name}: {lost}");
         }
@@ -293,7 +298,7 @@ mod tests {
                 assert_eq!((a.as_dvec3() * 0.0254).as_vec3(), *b, "{name}");
             }
             assert_eq!((scaled.offset_m, scaled.mesh.faces().len()), (DVec3::ZERO, 38), "{name}");
-            // 12.7 km away, in steps of a millionth of an inch, as exact as near the origin.
+            // The mesh is 12.7 km away, in steps of a millionth of an inch, and as exact as near the origin.
             let far = read(name, &file(UTM), Some(inches), MeshOrigin::Near);
             assert_eq!(far.offset_m, dvec3(12_700.0, 137_200.0, 0.0), "{name}");
             let at = UTM * 0.0254 - far.offset_m;

@@ -1,4 +1,4 @@
-//! Meshes of any format that is read.
+//! Reads a mesh of any known format.
 
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
@@ -6,10 +6,59 @@ use crate::mesh::file::{MeshFile, MeshOptions, UpAxis};
 use std::io::Read;
 use std::path::Path;
 
-/// Reads a mesh and its textures; the name's ending says how: `.obj`, `.gltf`, `.glb` or `.ply`, in any case.
+/// A mesh format.
+struct MeshFormat {
+    /// The endings of its files, in lower case, without the dot.
+    endings: &'static [&'static str],
+    /// The cargo feature that reads it.
+    feature: &'static str,
+    /// Its reader. `None` if this build is without the feature.
+    read: Option<Reader>,
+}
+
+type Reader = fn(OpenMesh<'_>, &Path, UpAxis, &MeshOptions) -> Result<MeshFile>;
+
+/// The formats that are read. The endings in messages, and the feature that a smaller build names, come from
+/// here.
+const FORMATS: [MeshFormat; 3] = [
+    MeshFormat {
+        endings: &["obj"],
+        feature: "obj",
+        #[cfg(feature = "obj")]
+        read: Some(|file, path, up, options| {
+            crate::mesh::obj::read::read_bytes(file.into_bytes(path)?, path, up, options)
+        }),
+        #[cfg(not(feature = "obj"))]
+        read: None,
+    },
+    MeshFormat {
+        endings: &["gltf", "glb"],
+        feature: "gltf",
+        #[cfg(feature = "gltf")]
+        read: Some(|file, path, up, options| {
+            crate::mesh::gltf::read::read_bytes(file.into_bytes(path)?, path, up, options)
+        }),
+        #[cfg(not(feature = "gltf"))]
+        read: None,
+    },
+    MeshFormat {
+        endings: &["ply"],
+        feature: "ply",
+        #[cfg(feature = "ply")]
+        read: Some(|file, path, up, options| {
+            crate::mesh::ply::read::read(file.reader, file.size, path, up, options)
+        }),
+        #[cfg(not(feature = "ply"))]
+        read: None,
+    },
+];
+
+/// Reads a mesh and its textures. The name's ending tells the format: `.obj`, `.gltf`, `.glb` or `.ply`, in
+/// upper or lower case.
 ///
-/// A texture that is missing or cannot be decoded, a face without area, of fewer than three corners or with
-/// the corners of an earlier one and the like do not stop it: they become [`MeshFile::warnings`].
+/// A small fault does not stop the reader: it becomes one of [`MeshFile::warnings`]. Such faults are a
+/// texture that is missing or cannot be decoded, and a face that has no area, has fewer than three corners,
+/// or has the corners of an earlier face.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for any other ending and for features of a format that are not read, [`Error::Io`],
@@ -18,23 +67,24 @@ pub fn read_mesh(path: &Path, up: UpAxis) -> Result<MeshFile> {
     read_mesh_with(path, up, &MeshOptions::default())
 }
 
-/// As [`read_mesh`], with another origin or unit, and the names of the columns of labels. Only PLY files have
-/// such columns.
+/// Reads like [`read_mesh`], with another origin or unit, or with named label columns. Only PLY files have
+/// label columns.
 ///
 /// # Errors
-/// As [`read_mesh`]; [`Error::Format`] too if a column that is asked for is not there or holds a number that
-/// is not whole.
+/// Like [`read_mesh`], and [`Error::Format`] if a named column is not there or holds a number that is not
+/// whole.
 pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let open = || {
         let file = open_file(path)?;
         let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
-        Ok((file, size))
+        Ok(OpenMesh { reader: Box::new(file), size })
     };
     read(open, path, up, options)
 }
 
-/// As [`read_mesh_with`], from a reader of the file's bytes. The ending of `name` says how, errors call the
-/// file so, and the libraries, textures and buffers that it names are looked for in the folder of `name`.
+/// Reads like [`read_mesh_with`], from any reader. `name` has three uses: its ending tells the format, errors
+/// name the file by it, and the libraries, textures and buffers that the mesh names are searched in its
+/// folder.
 ///
 /// ```
 /// use s3d_io::mesh::{UpAxis, read_mesh_from};
@@ -47,15 +97,14 @@ pub fn read_mesh_with(path: &Path, up: UpAxis, options: &MeshOptions) -> Result<
 /// ```
 ///
 /// # Errors
-/// As [`read_mesh_with`].
+/// Like [`read_mesh_with`].
 pub fn read_mesh_from(reader: impl Read, name: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
-    read(|| Ok((reader, 0)), name, up, options)
+    read(|| Ok(OpenMesh { reader: Box::new(reader), size: 0 }), name, up, options)
 }
 
-/// Reads the mesh that `open` gives the bytes of, and how many they are (0: not known).
-#[cfg_attr(not(feature = "ply"), allow(unused_variables))]
-fn read<R: Read>(
-    open: impl FnOnce() -> Result<(R, u64)>,
+/// Reads the file that `open` opens. A file of an unknown format is not opened.
+fn read<'r>(
+    open: impl FnOnce() -> Result<OpenMesh<'r>>,
     path: &Path,
     up: UpAxis,
     options: &MeshOptions,
@@ -65,41 +114,49 @@ fn read<R: Read>(
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
-    let file: Result<MeshFile> = match ending.as_str() {
-        #[cfg(feature = "obj")]
-        "obj" => crate::mesh::obj::read::read_bytes(whole(open, path)?, path, up, options),
-        #[cfg(feature = "gltf")]
-        "gltf" | "glb" => crate::mesh::gltf::read::read_bytes(whole(open, path)?, path, up, options),
-        #[cfg(feature = "ply")]
-        "ply" => {
-            let (file, bytes) = open()?;
-            crate::mesh::ply::read::read(file, bytes, path, up, options)
-        }
-        "" => Err(Error::unsupported(path, "has no ending; meshes are read from .obj, .gltf, .glb and .ply")),
-        _ if let Some(feature) = feature_of(&ending) => Err(Error::not_built_in(path, feature)),
-        _ => {
-            let message = format!(".{ending} is not read; meshes are .obj, .gltf, .glb or .ply");
-            Err(Error::unsupported(path, message))
-        }
+    let Some(format) = FORMATS.iter().find(|format| format.endings.contains(&ending.as_str())) else {
+        return Err(Error::unsupported(path, unknown_ending(&ending)));
     };
-    Ok(file?.tidy().0)
+    let Some(reader) = format.read else {
+        return Err(Error::not_built_in(path, format.feature));
+    };
+
+    let file = reader(open()?, path, up, options)?;
+    Ok(file.tidy().0)
 }
 
-/// All bytes that `open` gives.
-fn whole<R: Read>(open: impl FnOnce() -> Result<(R, u64)>, path: &Path) -> Result<Vec<u8>> {
-    let (mut reader, size) = open()?;
-    let mut bytes = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
-    reader.read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
-    Ok(bytes)
+/// A mesh file that is open.
+struct OpenMesh<'r> {
+    reader: Box<dyn Read + 'r>,
+    /// How many bytes the file has. 0 if that is not known.
+    size: u64,
 }
 
-/// The feature that reads files with this ending.
-fn feature_of(ending: &str) -> Option<&'static str> {
+impl OpenMesh<'_> {
+    /// Reads the whole file.
+    fn into_bytes(mut self, path: &Path) -> Result<Vec<u8>> {
+        let mut bytes = Vec::with_capacity(usize::try_from(self.size).unwrap_or(0));
+        self.reader
+            .read_to_end(&mut bytes)
+            .map_err(|e| Error::io(path, "read", e))?;
+        Ok(bytes)
+    }
+}
+
+/// Says that no format has this ending, and which endings are known.
+fn unknown_ending(ending: &str) -> String {
+    let known: Vec<String> = FORMATS
+        .iter()
+        .flat_map(|format| format.endings)
+        .map(|ending| format!(".{ending}"))
+        .collect();
+    let known = match known.as_slice() {
+        [others @ .., last] => format!("{} or {last}", others.join(", ")),
+        [] => String::new(),
+    };
     match ending {
-        "obj" => Some("obj"),
-        "gltf" | "glb" => Some("gltf"),
-        "ply" => Some("ply"),
-        _ => None,
+        "" => format!("has no ending; meshes are {known}"),
+        _ => format!(".{ending} is not read; meshes are {known}"),
     }
 }
 
@@ -111,7 +168,8 @@ mod tests {
     fn other_formats_are_refused_by_name() {
         for (name, word) in [("scan.fbx", ".fbx"), ("scan", "no ending"), ("a.b/scan.PLYX", ".ply")] {
             let message = read_mesh(Path::new(name), UpAxis::Y).unwrap_err().to_string();
-            assert!(message.contains(word) && message.contains(".obj, .gltf"), "{message}");
+            assert!(message.contains(word), "{message}");
+            assert!(message.ends_with("meshes are .obj, .gltf, .glb or .ply"), "{message}");
         }
         assert!(matches!(read_mesh(Path::new("gone.OBJ"), UpAxis::Y), Err(Error::Io { .. })));
     }

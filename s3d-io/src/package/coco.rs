@@ -1,4 +1,4 @@
-//! COCO's panoptic annotations: an image of segment numbers, and a list of what each segment is.
+//! Writes COCO's panoptic annotations: an image of segment numbers, and a list that describes the segments.
 
 #![expect(
     clippy::indexing_slicing,
@@ -15,41 +15,30 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
 
-/// What is no pixel of a surface in a semantic image. Source: formats.md, "What is written".
+/// The colour of pixels in a semantic image that show no surface. Source: formats.md, "What is written".
 const MISSING: [u8; 3] = [13; 3];
 
-/// Segments that stand for all of a class in an image have numbers from here on, above those of all labels.
+/// The first number of segments that cover all of a class in an image. It is larger than any label index.
 const FIRST_STUFF_ID: u32 = 0x00ff_0000;
 
-/// A category. The fields bear the file's names.
+/// A category. The fields are named as in the file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CocoCategory {
     /// [`Taxonomy::id`]: for S3DIS 1 to 13, in the order of its classes.
     pub id: u32,
-    /// The class's name.
+    /// The name of the class.
     pub name: &'static str,
-    /// "structure" for what a building is made of, "furniture", or "clutter", by the class of S3DIS that it
-    /// counts as.
+    /// "structure" for parts of the building, "furniture", or "clutter". It follows the S3DIS class that the
+    /// class counts as.
     pub supercategory: &'static str,
-    /// 1 if each instance is a segment, 0 if all of the class in an image is one.
+    /// 1 if each instance is a segment, 0 if all of the class in an image is one segment.
     pub isthing: u8,
-    /// For looking at.
+    /// The colour of the class, for display.
     pub color: [u8; 3],
 }
 
-/// The categories, one a class; `stuff` are the classes whose instances are not told apart.
+/// Returns the categories, one for each class. The instances of the classes in `stuff` are not told apart.
 pub fn coco_categories(taxonomy: &Taxonomy, stuff: &[Class]) -> Vec<CocoCategory> {
-    let supercategory = |class: Class| match class.s3dis() {
-        Class::CEILING
-        | Class::FLOOR
-        | Class::WALL
-        | Class::BEAM
-        | Class::COLUMN
-        | Class::WINDOW
-        | Class::DOOR => "structure",
-        Class::TABLE | Class::CHAIR | Class::SOFA | Class::BOOKCASE | Class::BOARD => "furniture",
-        _ => "clutter",
-    };
     let category = |&class: &Class| CocoCategory {
         id: taxonomy.id(class),
         name: class.name(),
@@ -60,30 +49,44 @@ pub fn coco_categories(taxonomy: &Taxonomy, stuff: &[Class]) -> Vec<CocoCategory
     taxonomy.classes().iter().map(category).collect()
 }
 
-/// A segment of an image. The fields bear the file's names.
+fn supercategory(class: Class) -> &'static str {
+    match class.s3dis() {
+        Class::CEILING
+        | Class::FLOOR
+        | Class::WALL
+        | Class::BEAM
+        | Class::COLUMN
+        | Class::WINDOW
+        | Class::DOOR => "structure",
+        Class::TABLE | Class::CHAIR | Class::SOFA | Class::BOOKCASE | Class::BOARD => "furniture",
+        _ => "clutter",
+    }
+}
+
+/// A segment of an image. The fields are named as in the file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CocoSegment {
-    /// Its number in the image: the index of its label, which is the same in all images of the data set; of a
-    /// class that is stuff 16,711,680 and its category.
+    /// Its number in the image. For an instance the index of its label, which is the same in all images of
+    /// the data set; for stuff 16,711,680 plus the number of the category.
     pub id: u32,
-    /// Its class's: [`CocoCategory::id`].
+    /// The category of its class: [`CocoCategory::id`].
     pub category_id: u32,
-    /// Its pixels.
+    /// How many pixels it has.
     pub area: u64,
     /// x, y, width and height of the box around its pixels.
     pub bbox: [u32; 4],
-    /// 0.
+    /// Always 0.
     pub iscrowd: u8,
 }
 
 impl CocoSegment {
-    /// Whether it stands for all of a class in the image, and not for an instance.
+    /// Returns whether it covers all of a class in the image, rather than one instance.
     pub fn is_stuff(&self) -> bool {
         self.id >= FIRST_STUFF_ID
     }
 }
 
-/// A pixel whose label is in no table.
+/// A pixel whose label is beyond the table.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("pixel ({x}, {y}) has label {index}, but there are {labels} labels")]
 pub struct UnknownLabelIndex {
@@ -91,15 +94,15 @@ pub struct UnknownLabelIndex {
     pub x: u32,
     /// Row.
     pub y: u32,
-    /// The index.
+    /// The label index of the pixel.
     pub index: u32,
-    /// The labels that there are.
+    /// How many labels there are.
     pub labels: usize,
 }
 
-/// The panoptic image of a semantic image, a segment's number as R + 256·G + 65536·B (which is not the order
-/// of our semantic images) and 0 where nothing was seen or what was seen has no label; and its segments, by
-/// number.
+/// Makes the panoptic image of a semantic image, and its segments in the order of their numbers. A pixel
+/// holds the number of its segment as R + 256·G + 65536·B, which is not the byte order of our semantic
+/// images. It is 0 where nothing was seen, or a surface without a label.
 ///
 /// # Errors
 /// [`UnknownLabelIndex`].
@@ -111,8 +114,9 @@ pub fn coco_panoptic(
     let width = semantic.width() as usize;
     let mut segments: BTreeMap<u32, Extent> = BTreeMap::new();
     let mut pixels = Vec::with_capacity(semantic.len());
-    // A label's segment; labels repeat from row to row.
+    // The segment of each label. A label repeats from row to row.
     let mut known: BTreeMap<[u8; 3], Option<(u32, u32)>> = BTreeMap::from([(MISSING, None)]);
+
     for (y, row) in semantic.pixels().chunks(width.max(1)).enumerate() {
         let mut x = 0;
         for run in row.chunk_by(|a, b| a == b) {
@@ -122,7 +126,9 @@ pub fn coco_panoptic(
                 None => {
                     let index = u32::from_be_bytes([0, label[0], label[1], label[2]]);
                     if index as usize >= table.len() {
-                        let (x, y, labels) = (x as u32, y as u32, table.len());
+                        let labels = table.len();
+                        let x = x as u32;
+                        let y = y as u32;
                         return Err(UnknownLabelIndex { x, y, index, labels });
                     }
                     let segment = table.class_of(LabelId(index)).map(|class| {
@@ -134,23 +140,23 @@ pub fn coco_panoptic(
                     segment
                 }
             };
+
             if let Some((id, category)) = segment {
-                segments.entry(id).or_insert_with(|| Extent::new(category)).add(
-                    x as u32,
-                    y as u32,
-                    run.len() as u32,
-                );
+                let extent = segments.entry(id).or_insert_with(|| Extent::new(category));
+                extent.add(x as u32, y as u32, run.len() as u32);
             }
+
             let [r, g, b, _] = segment.map_or(0, |s| s.0).to_le_bytes();
             pixels.resize(pixels.len() + run.len(), [r, g, b]);
             x += run.len();
         }
     }
+
     let image = Raster::from_vec(semantic.width(), semantic.height(), pixels);
     Ok((image, segments.into_iter().map(|(id, extent)| extent.segment(id)).collect()))
 }
 
-/// What a segment covers.
+/// The pixels of a segment: how many, and the box around them.
 struct Extent {
     category_id: u32,
     area: u64,
@@ -163,7 +169,7 @@ impl Extent {
         Self { category_id, area: 0, x: (u32::MAX, 0), y: (u32::MAX, 0) }
     }
 
-    /// Adds pixels of a row.
+    /// Adds `count` pixels of row `y`, from `x` on.
     fn add(&mut self, x: u32, y: u32, count: u32) {
         self.area += u64::from(count);
         self.x = (self.x.0.min(x), self.x.1.max(x + count));
@@ -176,21 +182,21 @@ impl Extent {
     }
 }
 
-/// An image and its annotation.
+/// An image with its segments.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CocoImage {
-    /// Number of the image, in the data set.
+    /// The number of the image in the data set.
     pub id: u32,
-    /// The image below the folder of images, and the panoptic image below its own: COCO gives both the same
-    /// name.
+    /// The path of the image below the folder of images, and of the panoptic image below its folder. COCO
+    /// gives both the same name.
     pub file_name: String,
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Its segments.
+    /// The segments of the image.
     pub segments: Vec<CocoSegment>,
-    /// The masks of some of them, by their numbers: of those that are instances.
+    /// The masks of its instances, by segment number.
     pub masks: BTreeMap<u32, CocoMask>,
 }
 
@@ -209,6 +215,7 @@ pub fn write_coco(
     struct Info<'a> {
         description: &'a str,
     }
+
     #[derive(Serialize)]
     struct Image<'a> {
         id: u32,
@@ -216,12 +223,14 @@ pub fn write_coco(
         width: u32,
         height: u32,
     }
+
     #[derive(Serialize)]
     struct Annotation<'a> {
         image_id: u32,
         file_name: &'a str,
         segments_info: &'a [CocoSegment],
     }
+
     #[derive(Serialize)]
     struct File<'a> {
         info: Info<'a>,
@@ -229,6 +238,7 @@ pub fn write_coco(
         annotations: Vec<Annotation<'a>>,
         categories: &'a [CocoCategory],
     }
+
     let file = File {
         info: Info { description },
         images: images
@@ -241,6 +251,7 @@ pub fn write_coco(
             .collect(),
         categories,
     };
+
     write_whole(path, |out| {
         serde_json::to_writer(&mut *out, &file)?;
         out.write_all(b"\n")
@@ -283,7 +294,7 @@ mod tests {
         assert_eq!(ids, [0, wall, wall, wall, 2, 0, wall, 2, 0, 0, 2, 2]);
         let segment = |id, category_id, area, bbox| CocoSegment { id, category_id, area, bbox, iscrowd: 0 };
         assert_eq!(segments, [segment(2, 9, 4, [0, 1, 4, 2]), segment(wall, 3, 4, [1, 0, 3, 2])]);
-        // Each wall by itself.
+        // Each wall is a segment of its own.
         let (_, segments) = coco_panoptic(&semantic, &table(), &[]).unwrap();
         assert_eq!(segments.iter().map(|s| (s.id, s.area)).collect::<Vec<_>>(), [(2, 4), (4, 3), (5, 1)]);
     }
@@ -313,8 +324,11 @@ mod tests {
                     .flat_map(|y| (0..image.width()).map(move |x| (x, y)))
                     .filter(|(x, y)| id_of(image.at(*x, *y)) == s.id)
                     .collect();
-                let (x0, x1) = (at.iter().map(|p| p.0).min().unwrap(), at.iter().map(|p| p.0).max().unwrap());
-                let (y0, y1) = (at.iter().map(|p| p.1).min().unwrap(), at.iter().map(|p| p.1).max().unwrap());
+
+                let x0 = at.iter().map(|p| p.0).min().unwrap();
+                let x1 = at.iter().map(|p| p.0).max().unwrap();
+                let y0 = at.iter().map(|p| p.1).min().unwrap();
+                let y1 = at.iter().map(|p| p.1).max().unwrap();
                 prop_assert_eq!((s.area, s.bbox), (at.len() as u64, [x0, y0, x1 - x0 + 1, y1 - y0 + 1]));
                 seen += s.area;
             }
@@ -353,7 +367,7 @@ mod tests {
             (&json["categories"][8]["name"], &json["categories"][8]["id"]),
             (&"chair".into(), &9.into())
         );
-        // Stuff has numbers that no label has, and that fit three bytes.
+        // The numbers of stuff belong to no label, and fit into three bytes.
         assert!(FIRST_STUFF_ID as usize > s3d_label::MAX_LABELS && FIRST_STUFF_ID + 13 < 1 << 24);
     }
 }

@@ -1,5 +1,5 @@
-//! COCO's annotations of instances: a box and a mask for each thing in an image. This is what `pycocotools`
-//! reads; it knows no panoptic annotations.
+//! Writes COCO's instance annotations: a box and a mask for each thing in an image. `pycocotools` reads
+//! these, but no panoptic annotations.
 
 use crate::error::Result;
 use crate::fs::atomic::write_whole;
@@ -9,20 +9,22 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The pixels of a segment as COCO's compressed run lengths. The fields bear the file's names.
+/// The pixels of a segment as COCO's compressed run lengths. The fields are named as in the file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CocoMask {
-    /// Height and width of the image.
+    /// The height and width of the image.
     pub size: [u32; 2],
-    /// How many pixels are not of the segment, then how many are, and so on, column by column; as text.
+    /// How many pixels lie outside the segment, then how many inside, and so on, column by column; encoded as
+    /// text.
     pub counts: String,
 }
 
-/// The masks of the segments of a panoptic image (see [`coco_panoptic`](crate::package::coco_panoptic)) whose
-/// numbers are `wanted`.
+/// Makes the masks of the segments with `wanted` numbers, from a panoptic image (see
+/// [`coco_panoptic`](crate::package::coco_panoptic)).
 pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> BTreeMap<u32, CocoMask> {
-    let (width, height) = (panoptic.width(), panoptic.height());
-    // By segment: its runs so far, and where the last one ends.
+    let width = panoptic.width();
+    let height = panoptic.height();
+    // For each segment its runs so far, and the end of the last run inside it.
     let mut runs: BTreeMap<u32, (Vec<u32>, u32)> = BTreeMap::new();
     let mut add = |id: u32, start: u32, end: u32| {
         if id != 0 && start < end && wanted(id) {
@@ -31,19 +33,24 @@ pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> B
             *last = end;
         }
     };
-    let (mut at, mut start, mut current) = (0, 0, 0);
+
+    let mut at = 0;
+    let mut start = 0;
+    let mut current = 0;
     for x in 0..width {
         for y in 0..height {
             let [r, g, b] = panoptic.at(x, y);
             let id = u32::from_le_bytes([r, g, b, 0]);
             if id != current {
                 add(current, start, at);
-                (start, current) = (at, id);
+                start = at;
+                current = id;
             }
             at += 1;
         }
     }
     add(current, start, at);
+
     let mask = |(id, (mut counts, end)): (u32, (Vec<u32>, u32))| {
         if end < at {
             counts.push(at - end);
@@ -53,8 +60,9 @@ pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> B
     runs.into_iter().map(mask).collect()
 }
 
-/// Run lengths as text: from the fourth on each less the one two before, in groups of five bits, the lowest
-/// first; a sixth bit says that more follow, and 48 makes it a letter. The last group has the sign.
+/// Encodes run lengths as text. Each length from the fourth on is replaced by its difference from the length
+/// two before. A number is split into groups of five bits, the lowest first. A sixth bit says that another
+/// group follows, and adding 48 makes the group a letter. The last group carries the sign.
 fn text_of(counts: &[u32]) -> String {
     let mut text = String::new();
     let earlier = [None; 3].into_iter().chain(counts.iter().skip(1).map(Some));
@@ -73,8 +81,8 @@ fn text_of(counts: &[u32]) -> String {
     text
 }
 
-/// Writes an annotation file of instances (`info`, `images`, `annotations`, `categories`): those segments of
-/// images that have [`CocoImage::masks`], and those categories that are things. Returns its size in bytes.
+/// Writes an instance annotation file (`info`, `images`, `annotations`, `categories`). It has the segments
+/// that have a mask in [`CocoImage::masks`], and the categories that are things. Returns its size in bytes.
 ///
 /// # Errors
 /// [`crate::Error::Io`].
@@ -88,6 +96,7 @@ pub fn write_coco_instances(
     struct Info<'a> {
         description: &'a str,
     }
+
     #[derive(Serialize)]
     struct Image<'a> {
         id: u32,
@@ -95,6 +104,7 @@ pub fn write_coco_instances(
         width: u32,
         height: u32,
     }
+
     #[derive(Serialize)]
     struct Annotation<'a> {
         id: u64,
@@ -105,6 +115,7 @@ pub fn write_coco_instances(
         iscrowd: u8,
         segmentation: &'a CocoMask,
     }
+
     #[derive(Serialize)]
     struct File<'a> {
         info: Info<'a>,
@@ -112,6 +123,7 @@ pub fn write_coco_instances(
         annotations: Vec<Annotation<'a>>,
         categories: Vec<&'a CocoCategory>,
     }
+
     let pairs = images.iter().flat_map(|image| {
         image
             .segments
@@ -122,6 +134,7 @@ pub fn write_coco_instances(
         let CocoSegment { category_id, bbox, area, iscrowd, .. } = *segment;
         Annotation { id, image_id, category_id, bbox, area, iscrowd, segmentation }
     };
+
     let file = File {
         info: Info { description },
         images: images
@@ -131,6 +144,7 @@ pub fn write_coco_instances(
         annotations: (1..).zip(pairs).map(annotation).collect(),
         categories: categories.iter().filter(|category| category.isthing == 1).collect(),
     };
+
     write_whole(path, |out| {
         serde_json::to_writer(&mut *out, &file)?;
         out.write_all(b"\n")
@@ -142,10 +156,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The run lengths that a text stands for.
+    /// Decodes the run lengths of a text.
     fn counts_of(text: &str) -> Vec<u32> {
         let mut counts: Vec<i64> = Vec::new();
-        let (mut value, mut shift) = (0i64, 0);
+        let mut value = 0i64;
+        let mut shift = 0;
         for letter in text.bytes().map(|b| b - 48) {
             value |= i64::from(letter & 31) << shift;
             shift += 5;
@@ -155,7 +170,8 @@ mod tests {
                 }
                 let before = counts.len().checked_sub(2).filter(|i| *i > 0).map_or(0, |i| counts[i]);
                 counts.push(value + before);
-                (value, shift) = (0, 0);
+                value = 0;
+                shift = 0;
             }
         }
         counts.into_iter().map(|count| u32::try_from(count).unwrap()).collect()

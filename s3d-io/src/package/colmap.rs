@@ -1,7 +1,7 @@
-//! COLMAP models: cameras, images and points, for reconstruction and Gaussian splatting.
+//! Writes COLMAP models: cameras, images and points, for reconstruction and Gaussian splatting.
 //!
-//! COLMAP's conventions are ours: metres, world → camera in axes x right, y down, z forward, and the centre
-//! of the first pixel at (½, ½).
+//! COLMAP shares our conventions: metres; world → camera with the axes x right, y down, z forward; the
+//! centre of the first pixel at (½, ½).
 
 #![expect(clippy::indexing_slicing, reason = "a writer: its tables are its own")]
 
@@ -12,23 +12,23 @@ use s3d_geom::glam::{DMat3, DQuat, DVec3};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// An image of a model, with a pinhole camera of its own.
+/// An image of a model, with its own pinhole camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColmapImage {
-    /// Its file, relative to the folder of images that COLMAP is given. No space, no line feed.
+    /// Its file, relative to COLMAP's folder of images. The name may not hold white space.
     pub name: String,
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Focal lengths and principal point in pixels, row by row, as in a pose file.
+    /// The matrix of focal lengths and principal point in pixels, row by row, as in a pose file.
     pub k: [[f64; 3]; 3],
     /// World → camera, 3 × 4, as in a pose file.
     pub rt: [[f64; 4]; 3],
 }
 
 impl ColmapImage {
-    /// World → camera as a quaternion (w, x, y, z) of length 1 with w ≥ 0, and a translation.
+    /// Returns world → camera as a quaternion (w, x, y, z) of length 1 with w ≥ 0, and a translation.
     pub fn pose(&self) -> ([f64; 4], [f64; 3]) {
         let row = |i: usize| DVec3::new(self.rt[i][0], self.rt[i][1], self.rt[i][2]);
         let camera_from_world = DMat3::from_cols(row(0), row(1), row(2)).transpose();
@@ -38,14 +38,14 @@ impl ColmapImage {
         ([q.w, q.x, q.y, q.z].map(|v| v + 0.0), [0, 1, 2].map(|i| self.rt[i][3] + 0.0))
     }
 
-    /// fx, fy, cx, cy.
+    /// Returns fx, fy, cx, cy.
     fn intrinsics(&self) -> [f64; 4] {
         [self.k[0][0], self.k[1][1], self.k[0][2], self.k[1][2]]
     }
 }
 
-/// A model: a file of cameras, one of images, one of points, each as text or binary. Images and cameras have
-/// the numbers 1, 2, … of their order; points likewise, with no tracks and error 0.
+/// A model: a file each of cameras, images and points, as text or binary. Images and their cameras have the
+/// numbers 1, 2, … in order, and so have points. Points have no tracks and the error 0.
 ///
 /// ```
 /// use s3d_geom::PointCloud;
@@ -65,12 +65,13 @@ pub struct ColmapModel<'a> {
 }
 
 impl<'a> ColmapModel<'a> {
-    /// A model of these images and points.
+    /// Makes a model of these images and points.
     ///
     /// # Panics
-    /// If `points` has colours, but not one a point; if a name holds whitespace.
+    /// If `points` has colours but not one for each point, or if a name holds white space.
     pub fn new(images: &'a [ColmapImage], points: &'a PointCloud) -> Self {
-        let (count, colors) = (points.len(), points.colors.len());
+        let count = points.len();
+        let colors = points.colors.len();
         assert!(colors == 0 || colors == count, "{colors} colours for {count} points");
         for image in images {
             let bad = image.name.is_empty() || image.name.contains(|c: char| c.is_whitespace() || c == '\0');
@@ -79,8 +80,8 @@ impl<'a> ColmapModel<'a> {
         Self { images, points }
     }
 
-    /// Writes `cameras.txt`, `images.txt` and `points3D.txt` into the folder `dir`, which is made if it is
-    /// not there.
+    /// Writes `cameras.txt`, `images.txt` and `points3D.txt` into the folder `dir`, which is created if it
+    /// does not exist.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -92,7 +93,7 @@ impl<'a> ColmapModel<'a> {
         Ok(())
     }
 
-    /// Writes the same in COLMAP's binary form: `cameras.bin`, `images.bin`, `points3D.bin`.
+    /// Writes the model in COLMAP's binary form: `cameras.bin`, `images.bin` and `points3D.bin`.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -107,7 +108,7 @@ impl<'a> ColmapModel<'a> {
     /// Writes the content of `cameras.txt`.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Returns the errors of `out`.
     pub fn cameras_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "# CAMERA_ID MODEL WIDTH HEIGHT fx fy cx cy")?;
         for (i, image) in self.images.iter().enumerate() {
@@ -120,7 +121,7 @@ impl<'a> ColmapModel<'a> {
     /// Writes the content of `images.txt`.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Returns the errors of `out`.
     pub fn images_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and an empty line: no 2D points")?;
         for (i, image) in self.images.iter().enumerate() {
@@ -134,7 +135,7 @@ impl<'a> ColmapModel<'a> {
     /// Writes the content of `points3D.txt`.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Returns the errors of `out`.
     pub fn points_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "# POINT3D_ID X Y Z R G B ERROR")?;
         for (i, p) in self.points.positions.iter().enumerate() {
@@ -147,9 +148,9 @@ impl<'a> ColmapModel<'a> {
     /// Writes the content of `cameras.bin`.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Returns the errors of `out`.
     pub fn cameras_binary(&self, out: &mut dyn Write) -> io::Result<()> {
-        /// COLMAP's number of the model PINHOLE.
+        /// COLMAP's number of the camera model PINHOLE.
         const PINHOLE: i32 = 1;
         out.write_all(&(self.images.len() as u64).to_le_bytes())?;
         for (i, image) in self.images.iter().enumerate() {
@@ -165,7 +166,7 @@ impl<'a> ColmapModel<'a> {
     /// Writes the content of `images.bin`.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Returns the errors of `out`.
     pub fn images_binary(&self, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&(self.images.len() as u64).to_le_bytes())?;
         for (i, image) in self.images.iter().enumerate() {
@@ -185,7 +186,7 @@ impl<'a> ColmapModel<'a> {
     /// Writes the content of `points3D.bin`.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Returns the errors of `out`.
     pub fn points_binary(&self, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&(self.points.len() as u64).to_le_bytes())?;
         for (i, p) in self.points.positions.iter().enumerate() {
@@ -243,7 +244,7 @@ mod tests {
         }
     }
 
-    /// COLMAP's own formula, from its numbers.
+    /// Projects a point by COLMAP's formula.
     fn project(q: [f64; 4], t: [f64; 3], [fx, fy, cx, cy]: [f64; 4], point: DVec3) -> (f64, f64, f64) {
         let p = DQuat::from_xyzw(q[1], q[2], q[3], q[0]) * point + DVec3::from_array(t);
         (fx * p.x / p.z + cx, fy * p.y / p.z + cy, p.z)
@@ -283,6 +284,7 @@ mod tests {
         let model = ColmapModel::new(&images, &points);
         model.write_text(dir.path()).unwrap();
         model.write_binary(dir.path()).unwrap();
+
         let lines = |name: &str| -> Vec<Vec<String>> {
             let text = std::fs::read_to_string(dir.path().join(name)).unwrap();
             let lines = text.lines().filter(|l| !l.starts_with('#'));
@@ -294,7 +296,8 @@ mod tests {
         let f = |b: &[u8], at: usize| f64::from_le_bytes(b[at..at + 8].try_into().unwrap());
         let int = |b: &[u8], at: usize| u32::from_le_bytes(b[at..at + 4].try_into().unwrap());
 
-        let (text, binary) = (lines("cameras.txt"), bytes("cameras.bin"));
+        let text = lines("cameras.txt");
+        let binary = bytes("cameras.bin");
         assert_eq!((text.len(), int(&binary, 0), binary.len()), (40, 40, 8 + 40 * 56));
         for (i, line) in text.iter().enumerate() {
             let at = 8 + i * 56;
@@ -308,7 +311,8 @@ mod tests {
             }
         }
 
-        let (text, binary) = (lines("images.txt"), bytes("images.bin"));
+        let text = lines("images.txt");
+        let binary = bytes("images.bin");
         assert_eq!(text.len(), 80);
         let mut at = 8;
         for (i, pair) in text.chunks(2).enumerate() {
@@ -326,7 +330,8 @@ mod tests {
         }
         assert_eq!(at, binary.len());
 
-        let (text, binary) = (lines("points3D.txt"), bytes("points3D.bin"));
+        let text = lines("points3D.txt");
+        let binary = bytes("points3D.bin");
         assert_eq!(text[0], ["1", "1.5", "-2.25", "0.1", "1", "2", "3", "0"]);
         assert_eq!(text[1][1..4], ["0", "0.0000001", "12"]);
         assert_eq!((text.len(), binary.len()), (2, 8 + 2 * (8 + 24 + 3 + 8 + 8)));

@@ -1,4 +1,4 @@
-//! Packages of a data set for other programs.
+//! Writes packages of a data set for other programs.
 //!
 //! | package | what is written |
 //! |---|---|
@@ -8,8 +8,8 @@
 //! | COCO | panoptic annotations: [`coco_panoptic`], [`write_coco`] |
 //! | Parquet | a table of all images: [`write_image_index`] |
 //!
-//! The same input gives the same bytes. The images come from
-//! [`dataset_images`](crate::dataset::dataset_images); nothing here reads them.
+//! The same input gives the same bytes. [`dataset_images`](crate::dataset::dataset_images) lists the images;
+//! this module reads none of them.
 //!
 //! ```
 //! use s3d_io::package::TarWriter;

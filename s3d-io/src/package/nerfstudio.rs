@@ -1,7 +1,7 @@
-//! `transforms.json`: what nerfstudio, and others after instant-ngp, read cameras from.
+//! Writes `transforms.json`, from which nerfstudio and other successors of instant-ngp read cameras.
 //!
-//! Its cameras have OpenGL's axes, which are Blender's and our poses': x right, y up, looking along −z.
-//! Distances are metres, Z-up; the transform that was applied to the world is the identity.
+//! Its cameras have the axes of OpenGL, Blender and our poses: x right, y up, looking along −z. Distances
+//! are metres, and the world is Z-up. The transform that was applied to the world is the identity.
 
 use crate::dataset::pose::PoseFile;
 use crate::error::Result;
@@ -10,49 +10,50 @@ use s3d_geom::{Camera, Pose};
 use serde::Serialize;
 use std::path::Path;
 
-/// Which camera all images of a file have.
+/// The kind of camera, which all images of a file share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NerfstudioCamera {
-    /// A pinhole, a focal length an image.
+    /// A pinhole camera. Each image has its own focal length.
     Perspective,
     /// A panorama.
     Equirectangular,
 }
 
-/// An image of `transforms.json`. The fields bear the file's names; lengths of the camera are pixels, the
-/// centre of the first pixel at (½, ½).
+/// An image of `transforms.json`. The fields are named as in the file. The lengths of the camera are pixels,
+/// and the centre of the first pixel is at (½, ½).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NerfstudioFrame {
     /// The image, relative to the folder of the file.
     pub file_path: String,
-    /// Its depth, a 16-bit PNG file in units that `--depth-unit-scale-factor` turns into metres; along the
-    /// optical axis, in panoramas the distance.
+    /// Its depth, a 16-bit PNG file. nerfstudio's option `--depth-unit-scale-factor` converts the numbers to
+    /// metres. They are depths along the optical axis, and in panoramas distances.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth_file_path: Option<String>,
-    /// Its mask, an 8-bit gray PNG file: 0 where the image has nothing to say. All images of a file have one,
-    /// or none.
+    /// Its mask, an 8-bit gray PNG file: 0 for pixels to ignore. Either all images of a file have a mask, or
+    /// none has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mask_path: Option<String>,
-    /// Focal length along x; a panorama's height.
+    /// The focal length along x; for a panorama its height.
     pub fl_x: f64,
-    /// Focal length along y; a panorama's height.
+    /// The focal length along y; for a panorama its height.
     pub fl_y: f64,
-    /// Principal point.
+    /// The principal point along x.
     pub cx: f64,
-    /// Principal point.
+    /// The principal point along y.
     pub cy: f64,
-    /// Width.
+    /// The width of the image.
     pub w: u32,
-    /// Height.
+    /// The height of the image.
     pub h: u32,
     /// Camera → world, 4 × 4.
     pub transform_matrix: [[f64; 4]; 4],
 }
 
 impl NerfstudioFrame {
-    /// An image of a camera.
+    /// Makes an image of a camera.
     pub fn new(file_path: String, camera: &Camera) -> Self {
-        let (w, h) = (camera.width, camera.height);
+        let w = camera.width;
+        let h = camera.height;
         if camera.is_panorama() {
             return Self::panorama(file_path, &camera.pose, (w, h));
         }
@@ -61,15 +62,15 @@ impl NerfstudioFrame {
         Self { file_path, depth_file_path: None, mask_path: None, fl_x, fl_y, cx, cy, w, h, transform_matrix }
     }
 
-    /// A view, from its pose file.
+    /// Makes an image of a view, from its pose file.
     pub fn perspective(file_path: String, pose: &PoseFile, (w, h): (u32, u32)) -> Self {
         let [[fl_x, _, cx], [_, fl_y, cy], _] = pose.camera_k_matrix;
         let transform_matrix = matrix(&pose.pose());
         Self { file_path, depth_file_path: None, mask_path: None, fl_x, fl_y, cx, cy, w, h, transform_matrix }
     }
 
-    /// A panorama, from its pose file. Panoramas of the data set are level whatever the scanner's tilt: the
-    /// camera's turn is its heading alone.
+    /// Makes an image of a panorama, from its pose file. Panoramas of the data set are level even if the
+    /// scanner is tilted, so only the heading of the pose counts.
     ///
     /// # Panics
     /// If the image is not twice as wide as high.
@@ -104,8 +105,8 @@ fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
     [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Writes a `transforms.json` and returns its size in bytes. `ply_file_path` names a cloud in world
-/// coordinates, relative to the file's folder, from which Gaussian splatting begins.
+/// Writes a `transforms.json` and returns its size in bytes. `ply_file_path` names a point cloud in world
+/// coordinates, relative to the folder of the file, with which Gaussian splatting begins.
 ///
 /// # Errors
 /// [`crate::Error::Io`]; [`crate::Error::Format`] if a number is not finite.
@@ -123,12 +124,14 @@ pub fn write_nerfstudio(
         ply_file_path: Option<&'a str>,
         frames: &'a [NerfstudioFrame],
     }
+
     if let Some(f) = frames.iter().find(|f| !is_finite(f)) {
         return Err(crate::error::Error::format(
             path,
             format!("the camera of {} is not finite", f.file_path),
         ));
     }
+
     let camera_model = match camera {
         NerfstudioCamera::Perspective => "OPENCV",
         NerfstudioCamera::Equirectangular => "EQUIRECTANGULAR",
@@ -154,7 +157,7 @@ mod tests {
     use s3d_geom::glam::{DMat4, DQuat, DVec3, dvec3};
     use std::f64::consts::PI;
 
-    /// A scanner that stands a little askew.
+    /// Returns the pose of a scanner that stands a little askew.
     fn original() -> Pose {
         Pose::from_scanner(dvec3(1.0, -2.0, 1.5), DQuat::from_rotation_z(0.4) * DQuat::from_rotation_x(0.05))
     }
@@ -163,11 +166,13 @@ mod tests {
         PoseFile::new(camera, &original(), "a1b2", "WC_1_4", frame)
     }
 
-    /// nerfstudio's rays, from its documentation: in the camera's axes, for a pixel.
+    /// Returns the ray of a pixel in the camera's axes, by nerfstudio's documentation.
     fn ray(frame: &NerfstudioFrame, panorama: bool, x: f64, y: f64) -> DVec3 {
-        let (a, b) = ((x - frame.cx) / frame.fl_x, -(y - frame.cy) / frame.fl_y);
+        let a = (x - frame.cx) / frame.fl_x;
+        let b = -(y - frame.cy) / frame.fl_y;
         let direction = if panorama {
-            let (theta, phi) = (-PI * a, PI * (0.5 - b));
+            let theta = -PI * a;
+            let phi = PI * (0.5 - b);
             dvec3(-theta.sin() * phi.sin(), phi.cos(), -theta.cos() * phi.sin())
         } else {
             dvec3(a, b, -1.0)
@@ -185,7 +190,9 @@ mod tests {
             let frame =
                 NerfstudioFrame::perspective("a".into(), &pose_file(&camera, Frame::View(0)), (64, 32));
             prop_assert!(ray(&frame, false, x, y).abs_diff_eq(camera.direction(x, y), 1e-9));
-            let (focal, center) = (glam::dvec2(40.0, 50.0 + y), glam::dvec2(x, -3.0));
+
+            let focal = glam::dvec2(40.0, 50.0 + y);
+            let center = glam::dvec2(x, -3.0);
             let pinhole = Camera::pinhole(original().turned(yaw, pitch), focal, center, 64, 32).unwrap();
             let frame = NerfstudioFrame::new("a".into(), &pinhole);
             prop_assert!(ray(&frame, false, x, y).abs_diff_eq(pinhole.direction(x, y), 1e-9));
@@ -216,6 +223,7 @@ mod tests {
             write_nerfstudio(&path, NerfstudioCamera::Perspective, ply, frames).unwrap();
             read_json::<serde_json::Value>(&path).unwrap()
         };
+
         let json = write(std::slice::from_ref(&frame), None);
         assert!(json.get("ply_file_path").is_none() && json["frames"][0].get("depth_file_path").is_none());
         frame.depth_file_path = Some("depths/a.png".into());

@@ -1,4 +1,4 @@
-//! A table of all images of a data set as one Parquet file.
+//! Writes a table of all images of a data set as one Parquet file.
 
 #![expect(clippy::indexing_slicing, reason = "a writer: its columns are its own")]
 
@@ -18,64 +18,65 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Rows that are in one piece of the file, and in memory as columns.
+/// The number of rows in a row group, of which one is in memory as columns at a time.
 const GROUP: usize = 1 << 16;
 
-/// An image, a row of the table. What is not known of it is null there.
+/// An image, which is a row of the table. Unknown values are null in the table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImageRow {
-    /// Number of its area.
+    /// The number of its area.
     pub area: u32,
-    /// The scan location.
+    /// The UUID of its scan location.
     pub camera_uuid: String,
-    /// Such as "office_3".
+    /// Its room, such as "office_3".
     pub room: String,
-    /// Such as "office".
+    /// The type of its room, such as "office".
     pub room_type: String,
-    /// Such as 3.
+    /// The number of its room, such as 3.
     pub room_number: u32,
     /// The number of a view; `None` for a panorama.
     pub frame_num: Option<u32>,
-    /// Its files below the root of the data set, in the order of [`Domain::ALL`].
+    /// The paths of its files below the root of the data set, in the order of [`Domain::ALL`].
     pub files: [Option<String>; Domain::ALL.len()],
     /// Width and height in pixels.
     pub size: Option<[u32; 2]>,
     /// The angle of view; π/2 for a panorama, as in its pose file.
     pub fov_rad: Option<f64>,
-    /// Heading and elevation of a view, relative to the scanner's camera.
+    /// The heading and elevation of a view, relative to the scanner's camera.
     pub yaw_pitch_rad: Option<[f64; 2]>,
-    /// Where the camera is: world metres.
+    /// The position of the camera, in world metres.
     pub location: Option<[f64; 3]>,
-    /// Focal lengths and principal point in pixels, row by row.
+    /// The matrix of focal lengths and principal point in pixels, row by row.
     pub k: Option<[f64; 9]>,
     /// World → camera in OpenCV's axes, 3 × 4, row by row.
     pub rt: Option<[f64; 12]>,
-    /// The entropy by which a view was selected, nats.
+    /// The entropy by which a view was selected, in nats.
     pub selection_entropy: Option<f64>,
-    /// The share of pixels in which something was seen.
+    /// The share of pixels that show a surface.
     pub coverage: Option<f64>,
-    /// What the pixels of its semantic image show.
+    /// The content of its semantic image.
     pub semantic: Option<SemanticRow>,
-    /// The least, the mean and the greatest depth, metres, of the pixels that have one.
+    /// The least, the mean and the greatest depth in metres, over the pixels that have a depth.
     pub depth_m: Option<[f64; 3]>,
-    /// The name of the photograph that it is the view of. If no image is one, the table has no such column.
+    /// The name of its photograph, if the view shows one. If no image has a photograph, the table has no
+    /// such column.
     pub photograph: Option<String>,
 }
 
-/// What the pixels of an image show.
+/// What the pixels of a semantic image show.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SemanticRow {
     /// The share of pixels of each class, at its [`Class::index`].
     pub shares: Vec<f64>,
-    /// The share of pixels in which something without a label was seen.
+    /// The share of pixels that show a surface without a label.
     pub unlabelled: f64,
-    /// Shannon entropy of the classes, nats.
+    /// The Shannon entropy of the classes, in nats.
     pub entropy: f64,
-    /// How many instances are seen.
+    /// How many instances are visible.
     pub instances: u32,
 }
 
-/// A column: its name, and the values of some rows.
+/// The values of a column for some rows.
 enum Column {
     Int(Vec<Option<i32>>),
     Float(Vec<Option<f64>>),
@@ -83,7 +84,7 @@ enum Column {
     List(Vec<Option<Vec<f64>>>),
 }
 
-/// The columns of some rows. Those that are never null are `required`.
+/// Returns the columns of some rows: the name, whether it is never null, and the values.
 fn columns(classes: &[Class], rows: &[ImageRow], with_photographs: bool) -> Vec<(String, bool, Column)> {
     let mut all = Vec::new();
     macro_rules! column {
@@ -91,8 +92,7 @@ fn columns(classes: &[Class], rows: &[ImageRow], with_photographs: bool) -> Vec<
             all.push(($name, $required, Column::$kind(rows.iter().map($value).collect())))
         };
     }
-    let text = |t: &str| ByteArray::from(t.as_bytes().to_vec());
-    let int = |v: u32| v as i32;
+
     column!("area".to_owned(), true, Int, |r| Some(int(r.area)));
     column!("camera_uuid".to_owned(), true, Text, |r| Some(text(&r.camera_uuid)));
     column!("room".to_owned(), true, Text, |r| Some(text(&r.room)));
@@ -102,12 +102,14 @@ fn columns(classes: &[Class], rows: &[ImageRow], with_photographs: bool) -> Vec<
         Some(text(if r.frame_num.is_some() { "view" } else { "panorama" }))
     });
     column!("frame_num".to_owned(), false, Int, |r| r.frame_num.map(int));
+
     for (i, domain) in Domain::ALL.into_iter().enumerate() {
         column!(domain.folder().to_owned(), false, Text, |r| r.files[i].as_deref().map(text));
     }
     for (i, name) in ["width", "height"].into_iter().enumerate() {
         column!(name.to_owned(), false, Int, |r| r.size.map(|s| int(s[i])));
     }
+
     column!("fov_rad".to_owned(), false, Float, |r| r.fov_rad);
     for (i, name) in ["yaw_rad", "pitch_rad"].into_iter().enumerate() {
         column!(name.to_owned(), false, Float, |r| r.yaw_pitch_rad.map(|v| v[i]));
@@ -120,6 +122,7 @@ fn columns(classes: &[Class], rows: &[ImageRow], with_photographs: bool) -> Vec<
     column!("selection_entropy".to_owned(), false, Float, |r| r.selection_entropy);
     column!("entropy".to_owned(), false, Float, |r| r.semantic.as_ref().map(|s| s.entropy));
     column!("coverage".to_owned(), false, Float, |r| r.coverage);
+
     for class in classes {
         column!(format!("share_{class}"), false, Float, |r| {
             r.semantic.as_ref().and_then(|s| s.shares.get(class.index()).copied())
@@ -136,7 +139,15 @@ fn columns(classes: &[Class], rows: &[ImageRow], with_photographs: bool) -> Vec<
     all
 }
 
-/// The schema, in Parquet's own words.
+fn text(text: &str) -> ByteArray {
+    ByteArray::from(text.as_bytes().to_vec())
+}
+
+fn int(value: u32) -> i32 {
+    value as i32
+}
+
+/// Returns the schema in Parquet's notation.
 fn schema(columns: &[(String, bool, Column)]) -> String {
     let mut text = String::from("message images {\n");
     for (name, required, column) in columns {
@@ -155,15 +166,15 @@ fn schema(columns: &[(String, bool, Column)]) -> String {
     text
 }
 
-/// Writes the table of images, a row an image in the order given, and returns the file's size in bytes.
-/// Columns:
+/// Writes the table of images, a row for each image in the given order, and returns the size of the file in
+/// bytes.
 ///
-/// `area`, `camera_uuid`, `room`, `room_type`, `room_number`, `kind` ("view" or "panorama"), `frame_num`
-/// (null for panoramas); the path of each modality below the data set's folder, named as its folder (`rgb`,
-/// `depth`, `normal`, …); `width`, `height`, `fov_rad`, `yaw_rad`, `pitch_rad`, `x`, `y`, `z`; `k` (9
-/// numbers) and `rt` (12), row by row; `selection_entropy`, `entropy`, `coverage`, `share_CLASS` of each of
-/// `classes`, `share_unlabelled` (with these they make the coverage), `instances`; `depth_min_m`,
-/// `depth_mean_m`, `depth_max_m`; and `photograph`, if there are some. See [`ImageRow`].
+/// The columns are `area`, `camera_uuid`, `room`, `room_type`, `room_number`, `kind` ("view" or "panorama")
+/// and `frame_num` (null for panoramas); the path of each modality below the folder of the data set, with the
+/// name of its folder (`rgb`, `depth`, `normal`, …); `width`, `height`, `fov_rad`, `yaw_rad`, `pitch_rad`,
+/// `x`, `y`, `z`; `k` (9 numbers) and `rt` (12), row by row; `selection_entropy`, `entropy`, `coverage`,
+/// `share_CLASS` for each of `classes`, `share_unlabelled` (all shares add up to the coverage), `instances`;
+/// `depth_min_m`, `depth_mean_m`, `depth_max_m`; and `photograph`, if any image has one. See [`ImageRow`].
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -173,7 +184,7 @@ pub fn write_image_index(path: &Path, classes: &[Class], rows: &[ImageRow]) -> R
     file.commit()
 }
 
-/// As [`write_image_index`], to any writer; errors call it `name`.
+/// Writes like [`write_image_index`], to any writer. Errors name the file by `name`.
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -184,13 +195,8 @@ pub fn write_image_index_to(
     rows: &[ImageRow],
 ) -> Result<()> {
     let path = name;
-    let failed = |e: ParquetError| match e {
-        ParquetError::External(e) => match e.downcast::<std::io::Error>() {
-            Ok(e) => Error::io(path, "write", *e),
-            Err(e) => Error::io(path, "write", std::io::Error::other(e)),
-        },
-        e => Error::io(path, "write", std::io::Error::other(e)),
-    };
+    let failed = |e| write_error(path, e);
+
     let about =
         "A row an image. Paths are below the data set's folder; metres, radians, nats; shares of all pixels.";
     let properties = WriterProperties::builder()
@@ -198,10 +204,12 @@ pub fn write_image_index_to(
         .set_created_by(concat!("s3d version ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_key_value_metadata(Some(vec![KeyValue::new("description".to_owned(), about.to_owned())]))
         .build();
+
     let with_photographs = rows.iter().any(|r| r.photograph.is_some());
     let schema = parse_message_type(&schema(&columns(classes, &[], with_photographs))).map_err(failed)?;
     let mut writer =
         SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
+
     for rows in rows.chunks(GROUP) {
         let mut group = writer.next_row_group().map_err(failed)?;
         for (_, required, column) in columns(classes, rows, with_photographs) {
@@ -216,16 +224,25 @@ pub fn write_image_index_to(
     Ok(())
 }
 
-/// Writes the values of a column that are there, and the levels that say which those are.
+fn write_error(path: &Path, e: ParquetError) -> Error {
+    let e = match e {
+        ParquetError::External(e) => match e.downcast::<std::io::Error>() {
+            Ok(e) => *e,
+            Err(e) => std::io::Error::other(e),
+        },
+        e => std::io::Error::other(e),
+    };
+    Error::io(path, "write", e)
+}
+
+/// Writes the values of a column, and the definition levels that tell nulls from values.
 fn write_column(
     out: &mut SerializedColumnWriter<'_>,
     required: bool,
     column: Column,
 ) -> std::result::Result<(), ParquetError> {
-    fn split<T>(values: Vec<Option<T>>) -> (Vec<i16>, Vec<T>) {
-        (values.iter().map(|v| i16::from(v.is_some())).collect(), values.into_iter().flatten().collect())
-    }
     let levels = |levels: &Vec<i16>| (!required).then(|| levels.clone());
+
     match column {
         Column::Int(values) => {
             let (there, values) = split(values);
@@ -243,8 +260,12 @@ fn write_column(
                 .write_batch(&values, levels(&there).as_deref(), None)?;
         }
         Column::List(lists) => {
-            // Definition 0: no list, 1: an empty one, 2: an element. Repetition 0 begins a list.
-            let (mut definition, mut repetition, mut values) = (Vec::new(), Vec::new(), Vec::new());
+            // The definition level is 0 for null, 1 for an empty list and 2 for an element. The repetition
+            // level 0 begins a list.
+            let mut definition = Vec::new();
+            let mut repetition = Vec::new();
+            let mut values = Vec::new();
+
             for list in lists {
                 let list_definition = i16::from(list.is_some());
                 let list = list.unwrap_or_default();
@@ -256,11 +277,18 @@ fn write_column(
                 repetition.extend((0..list.len().max(1)).map(|i| i16::from(i > 0)));
                 values.extend(list);
             }
+
             out.typed::<DoubleType>()
                 .write_batch(&values, Some(&definition), Some(&repetition))?;
         }
     }
     Ok(())
+}
+
+/// Splits off the values that are not null. The level of a value is 1 and the level of a null is 0.
+fn split<T>(values: Vec<Option<T>>) -> (Vec<i16>, Vec<T>) {
+    let levels = values.iter().map(|v| i16::from(v.is_some())).collect();
+    (levels, values.into_iter().flatten().collect())
 }
 
 #[cfg(test)]
@@ -332,6 +360,7 @@ mod tests {
         assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
         let table = read(&path);
         assert_eq!((table.0.len(), table.1.len()), (7 + 8 + 2 + 1 + 2 + 3 + 2 + 3 + 13 + 2 + 3 + 1, 3));
+
         let text = |t: &str| Field::Str(t.to_owned());
         for (i, row) in rows.iter().enumerate() {
             assert_eq!(*field(&table, i, "area"), Field::Int(row.area as i32));
@@ -364,6 +393,7 @@ mod tests {
                 }
             }
         }
+
         assert_eq!(*field(&table, 0, "height"), Field::Int(540));
         assert_eq!(*field(&table, 2, "instances"), Field::Int(17));
     }
@@ -374,7 +404,8 @@ mod tests {
         let rows: Vec<ImageRow> = (0..GROUP as u32 + 10)
             .map(|i| if i % 7 == 0 { bare() } else { row(i) })
             .collect();
-        let (a, b) = (dir.path().join("a.parquet"), dir.path().join("b.parquet"));
+        let a = dir.path().join("a.parquet");
+        let b = dir.path().join("b.parquet");
         write_image_index(&a, &Class::S3DIS, &rows).unwrap();
         write_image_index(&b, &Class::S3DIS, &rows).unwrap();
         assert_eq!(std::fs::read(&a).unwrap(), std::fs::read(&b).unwrap());

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+/// The table as it is written.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct AnnotationTable {
@@ -28,62 +29,52 @@ pub(crate) struct AnnotationTable {
 }
 
 impl AnnotationTable {
-    /// The key that names files, and the files as they are written; none if the mesh's own labels are meant.
+    /// Returns the key that names the files, and the files as written. There are none if the labels of the
+    /// mesh itself are meant. The error is a sentence.
     pub(crate) fn paths(&self) -> std::result::Result<(&'static str, &[PathBuf]), String> {
         match (&self.path, &self.paths, self.mesh) {
             (Some(path), None, false) => Ok(("annotations.path", std::slice::from_ref(path))),
             (None, Some(paths), false) if !paths.is_empty() => Ok(("annotations.paths", paths)),
             (None, None, true) => Ok(("annotations.mesh", &[])),
             _ => {
-                Err("annotations needs one of path, paths (a list of at least one) and mesh = true (its own \
-                      labels)"
-                    .into())
+                let message = "annotations needs one of path, paths (a list of at least one) and mesh = true \
+                               (the labels of the mesh itself)";
+                Err(message.into())
             }
         }
     }
 
-    /// Whether they say what is subtracted from coordinates.
+    /// Returns whether the table says what is subtracted from coordinates.
     pub(crate) fn has_offset(&self) -> bool {
         self.offset_m.is_some()
     }
 
-    /// How they are read.
+    /// Returns how the annotations are read. Words mean what `taxonomy` says. The error is a sentence.
     pub(crate) fn options(&self, taxonomy: &Taxonomy) -> std::result::Result<AnnotationOptions, String> {
-        let room: Option<Room> = match &self.room {
-            Some(name) => Some(
-                taxonomy
-                    .room_of_word(name)
-                    .map_err(|e| format!("annotations.room: {e}"))?,
-            ),
-            None => None,
-        };
+        let room: Option<Room> = self
+            .room
+            .as_ref()
+            .map(|name| taxonomy.room_of_word(name))
+            .transpose()
+            .map_err(|e| format!("annotations.room: {e}"))?;
+
         let mut classes = BTreeMap::new();
         for (key, word) in &self.classes {
-            let class: Option<Class> = match word.as_str() {
-                "" => None,
-                word => match taxonomy.meaning(word) {
-                    Some(meant) => meant,
-                    None => {
-                        let unknown = taxonomy
-                            .class(word)
-                            .map_err(|e| format!("annotations.classes.{key:?}: {e}"));
-                        Some(unknown?)
-                    }
-                },
-            };
-            classes.insert(key.clone(), class);
+            classes.insert(key.clone(), class_of_word(key, word, taxonomy)?);
         }
+
         let offset_m = self.offset_m.unwrap_or_default();
         if !offset_m.iter().all(|v| v.is_finite()) {
             return Err(format!("annotations.offset_m = {offset_m:?} is not finite"));
         }
         if self.unknown_as_clutter && taxonomy.clutter().is_none() {
             return Err(format!(
-                "annotations.unknown_as_clutter = true: the taxonomy {} has no class for it: say which it \
-                 is, with clutter = \"…\" in the taxonomy",
+                "annotations.unknown_as_clutter = true: the taxonomy {} has no class for clutter: name it \
+                 there, with clutter = \"…\"",
                 taxonomy.name()
             ));
         }
+
         Ok(AnnotationOptions {
             taxonomy: taxonomy.clone(),
             unknown_as_clutter: self.unknown_as_clutter,
@@ -97,4 +88,18 @@ impl AnnotationTable {
             ..AnnotationOptions::default()
         })
     }
+}
+
+/// Returns the class that the table gives to a key of the annotations; `None` means unlabelled.
+fn class_of_word(key: &str, word: &str, taxonomy: &Taxonomy) -> std::result::Result<Option<Class>, String> {
+    if word.is_empty() {
+        return Ok(None);
+    }
+    if let Some(meant) = taxonomy.meaning(word) {
+        return Ok(meant);
+    }
+    taxonomy
+        .class(word)
+        .map(Some)
+        .map_err(|e| format!("annotations.classes.{key:?}: {e}"))
 }

@@ -5,23 +5,24 @@ use s3d_geom::glam::{DAffine3, DMat3, DMat4, DVec3};
 use serde::Deserialize;
 use std::path::PathBuf;
 
-/// Where an area's scan locations come from.
+/// The source of an area's scan locations.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraSource {
-    /// A list of them: see [`read_scan_locations`](crate::camera::read_scan_locations).
+    /// They are read from a list by [`read_scan_locations`](crate::camera::read_scan_locations).
     Listed {
         /// The file or folder.
         path: PathBuf,
-        /// Takes its frame to the world's (metres, Z-up): turns, shifts and scales.
+        /// The transform from the list's frame to the world (metres, Z-up): a rotation, a shift and a scale.
         world_from_file: DAffine3,
     },
-    /// They are to be put on the floor, no two of a room nearer than this, metres.
+    /// They are to be placed on the floor.
     Placed {
-        /// Above 0, finite.
+        /// The smallest distance between two locations of a room, metres. Above 0, finite.
         distance_m: f64,
     },
 }
 
+/// The table as it is written.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CamerasTable {
@@ -32,7 +33,7 @@ pub(crate) struct CamerasTable {
 }
 
 impl CamerasTable {
-    /// What it asks for; a message if that cannot be.
+    /// Returns the source that the table describes. The error is a sentence.
     pub(crate) fn source(self) -> std::result::Result<CameraSource, String> {
         match (self.path, self.place) {
             (Some(_), Some(_)) => Err("path and place exclude each other".into()),
@@ -53,7 +54,8 @@ impl CamerasTable {
     }
 }
 
-/// The rows of a 4 × 4 matrix as what it does: turn, shift and scale, nothing else.
+/// Returns the transform that has these rows. It may turn, shift and scale, nothing else. The error is a
+/// sentence.
 pub(crate) fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, String> {
     const FORM: &str = "transform is no rotation with a scale and a shift: its rows are [x, y, z, shift], \
                         the last [0, 0, 0, 1]";
@@ -64,6 +66,7 @@ pub(crate) fn similarity(rows: [[f64; 4]; 4]) -> std::result::Result<DAffine3, S
     let is_finite = rows.iter().flatten().all(|v| v.is_finite());
     let is_similar = (m.transpose() * m)
         .abs_diff_eq(DMat3::from_diagonal(DVec3::splat(scale * scale)), 1e-4 * scale * scale);
+
     if !is_finite || rows[3] != [0.0, 0.0, 0.0, 1.0] || scale <= 0.0 || !is_similar {
         return Err(FORM.into());
     }

@@ -1,33 +1,35 @@
 //! The table `[frames]` of a `scene.toml`.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::mesh::file::UpAxis;
 use crate::scene::cameras::similarity;
+use crate::scene::folder::SceneFolder;
 use s3d_geom::glam::DAffine3;
 use serde::Deserialize;
 use std::num::NonZeroU32;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// Photographs with poses, each of which becomes a view.
+/// A list of photographs with poses. Each photograph becomes a view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameSource {
-    /// The list of them: see [`read_posed_cameras`](crate::camera::read_posed_cameras).
+    /// The list. It is read by [`read_posed_cameras`](crate::camera::read_posed_cameras).
     pub path: PathBuf,
-    /// The folder that the names in the list are in, if not where the list's form has it.
+    /// The folder of the pictures that the list names. `None`: where the form of the list expects them.
     pub images: Option<PathBuf>,
-    /// Takes the list's frame to the world's (metres, Z-up): turns, shifts and scales.
+    /// The transform from the list's frame to the world (metres, Z-up): a rotation, a shift and a scale.
     pub world_from_file: DAffine3,
-    /// Every which photograph of the list is taken; the first is.
+    /// The step through the list: 1 takes every photograph, 2 every second, starting with the first.
     pub every: NonZeroU32,
-    /// How many of those at most, evenly spread.
+    /// The largest number of photographs. If there are more after `every`, some are taken, evenly spread.
     pub max: Option<NonZeroU32>,
-    /// Width of the views in pixels; that of the photographs if `None`. Their height follows.
+    /// The width of the views in pixels. `None`: the width of the photographs. The height follows.
     pub width: Option<u32>,
 }
 
-/// The widths that views of photographs may have.
+/// The widths that views of photographs may have, pixels.
 const WIDTHS: std::ops::RangeInclusive<u32> = 8..=16_384;
 
+/// The table as it is written.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FramesTable {
@@ -40,23 +42,27 @@ pub(crate) struct FramesTable {
     width: Option<u32>,
 }
 
-/// Finds what a key of the scene file names, which should be of a kind.
-type Find<'f> = &'f dyn Fn(&str, &Path, &str, fn(&Path) -> bool) -> Result<PathBuf>;
-
 impl FramesTable {
-    /// What it asks for, its files found; an error about the scene file if that cannot be.
-    pub(crate) fn source(self, found: Find<'_>, fault: &dyn Fn(String) -> Error) -> Result<FrameSource> {
-        let fault = |message: String| fault(format!("[frames]: {message}"));
+    /// Returns the source that the table describes. Its files are looked up in `folder`.
+    ///
+    /// # Errors
+    /// [`Error::Format`](crate::Error::Format) for the scene file if a file does not exist or a value is
+    /// wrong.
+    pub(crate) fn source(self, folder: SceneFolder<'_>) -> Result<FrameSource> {
         let Self { path, images, up, transform, every, max, width } = self;
+        let fault = |message: String| folder.fault(format!("[frames]: {message}"));
         if let Some(width) = width.filter(|width| !WIDTHS.contains(width)) {
-            let (least, most) = (WIDTHS.start(), WIDTHS.end());
+            let least = WIDTHS.start();
+            let most = WIDTHS.end();
             return Err(fault(format!("width = {width}: must be from {least} to {most} pixels")));
         }
+
         let given = transform.map_or(Ok(DAffine3::IDENTITY), similarity).map_err(fault)?;
-        let path = found("frames.path", &path, "", Path::exists)?;
-        let find_images = |images: PathBuf| found("frames.images", &images, "folder", Path::is_dir);
-        let images = images.map(find_images).transpose()?;
         let world_from_file = given * DAffine3::from_mat3(up.unwrap_or(UpAxis::Z).rotation());
+        let path = folder.any("frames.path", &path)?;
+        let images = images
+            .map(|images| folder.folder("frames.images", &images))
+            .transpose()?;
         Ok(FrameSource { path, images, world_from_file, every: every.unwrap_or(NonZeroU32::MIN), max, width })
     }
 }
@@ -89,6 +95,7 @@ mod tests {
         assert!(all.images.unwrap().ends_with("photos"));
         assert_eq!((all.every.get(), all.max.unwrap().get(), all.width), (7, 3, Some(640)));
         assert_eq!(all.world_from_file.transform_vector3(DVec3::Y), DVec3::Z);
+
         for (table, words) in [
             ("path = \"gone\"", "frames.path = \"gone\""),
             ("every = 2", "missing field `path`"),

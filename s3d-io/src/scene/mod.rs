@@ -1,11 +1,12 @@
-//! Scenes: what one area is made from, as `scene.toml` or as a published area.
+//! Scenes: the parts that one area is made from, named by a `scene.toml` or found in a published area.
 //!
-//! [`read_scene`] reads the names of an area's mesh, annotations and scan locations, and how they are read
-//! ([`SceneFile`]); the files themselves are read by [`mesh`](crate::mesh), [`cloud`](crate::cloud) and
-//! [`camera`](crate::camera). [`PublishedArea`] finds the same in the folder of a published area, or of an
-//! export. [`PictureSource`] tells what the colours of images are taken from, [`FrameSource`] which
-//! photographs become views. [`read_taxonomy`] reads the classes that a scene may have in place of S3DIS's. A
-//! key that is not known is an error, with its line. Source: formats.md, "The scene file".
+//! [`read_scene`] reads a [`SceneFile`]: the names of an area's mesh, annotations and scan locations, and how
+//! they are read. The files themselves are read by [`mesh`](crate::mesh), [`cloud`](crate::cloud) and
+//! [`camera`](crate::camera). [`PublishedArea`] finds the same parts in the folder of a published area, or of
+//! an export. A [`PictureSource`] says which of the scanner's pictures give images their colours, and a
+//! [`FrameSource`] which photographs become views. [`read_taxonomy`] reads the classes of a scene that does
+//! not use the classes of S3DIS. An unknown key is an error with its line. Source: formats.md, "The scene
+//! file".
 //!
 //! ```
 //! use s3d_io::scene::parse_scene;
@@ -30,16 +31,21 @@
 
 mod annotations;
 mod cameras;
+mod document;
 mod file;
+mod folder;
 mod frames;
 mod other_kind;
 mod published;
 mod rgb;
 mod taxonomy;
+#[cfg(test)]
+mod tests;
 mod toml_fault;
 
 pub use cameras::CameraSource;
-pub use file::{MeshColors, SceneFile, parse_scene, read_scene};
+pub use document::{parse_scene, read_scene};
+pub use file::{MeshColors, SceneFile};
 pub use frames::FrameSource;
 pub use published::{PublishedArea, PublishedMesh, PublishedOptions};
 pub use rgb::{PictureKind, PictureOptions, PictureSource, SkyBoxCaps, UnseenColor};

@@ -1,13 +1,13 @@
-//! What users give in place of a scene file.
+//! Files that users give in place of a scene file.
 
 use std::path::Path;
 
-/// What a scene is, for who gives something else.
+/// The explanation of a scene, for users who give something else.
 pub(crate) const SCENE: &str = "a scene is a text file, scene.toml, that names the parts of a scan: `area = \
                                 1`, `[mesh]` with `path = \"scan.obj\"`, `[annotations]` with a path, \
                                 `[cameras]` with a path or `place = 2.0`, each on a line";
 
-/// What a file is that users give in place of a scene, by its ending.
+/// Returns what a file is that is given in place of a scene, by its extension; `None` if it may be a scene.
 pub(crate) fn other_kind(path: &Path) -> Option<&'static str> {
     Some(match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
         "obj" | "gltf" | "glb" | "stl" | "fbx" | "dae" | "off" | "usd" | "usdz" => "a mesh, not a scene",

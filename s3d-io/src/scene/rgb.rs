@@ -1,4 +1,4 @@
-//! The `rgb` of a `scene.toml`: what the colours of images are taken from.
+//! The entry `rgb` of a `scene.toml`: the source of the colours of images.
 
 use serde::de;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
@@ -9,28 +9,28 @@ use std::path::PathBuf;
 /// Pictures of the scanner as the source of colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureSource {
-    /// What the pictures are.
+    /// The kind of the pictures.
     pub kind: PictureKind,
-    /// The folder that they lie in.
+    /// The folder of the pictures.
     pub path: PathBuf,
-    /// How they are put together.
+    /// How the pictures become colours.
     pub options: PictureOptions,
 }
 
-/// What the scanner's pictures are. Source: formats.md, "The scanner's pictures".
+/// The kind of the scanner's pictures. Source: formats.md, "The scanner's pictures".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PictureKind {
-    /// Six square pictures a location.
+    /// Six square pictures for each location.
     SkyBox,
-    /// Raw captures of real cameras, up to 18 a location.
+    /// Raw captures of real cameras, up to 18 for each location.
     Captures,
-    /// An equirectangular photograph a location.
+    /// One equirectangular photograph for each location.
     Panorama,
 }
 
 impl PictureKind {
-    /// Its name in a scene file, and the folder that is meant where none is named.
+    /// Returns the name in a scene file. It is also the default name of the folder.
     pub fn name(self) -> &'static str {
         match self {
             Self::SkyBox => "skybox",
@@ -49,17 +49,18 @@ impl fmt::Display for PictureKind {
 /// How pictures become the colours of images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureOptions {
-    /// Width of a face of the cube map in pixels; what the pictures' own size asks for, if it is not said.
+    /// The width of a face of the cube map in pixels. `None`: the width that suits the pictures.
     pub size: Option<u32>,
-    /// What a place shows that no picture shows.
+    /// The colour of places that no picture shows.
     pub unseen: UnseenColor,
-    /// Captures: whether the mesh is used to take the parallax between the cameras out.
+    /// Captures: whether the mesh is used to remove the parallax between the cameras.
     pub parallax: bool,
-    /// Captures: whether their exposures are brought together.
+    /// Captures: whether the exposures are matched to each other.
     pub gains: bool,
-    /// Panorama: how far its centre column looks to the left of the location's original camera, degrees.
+    /// Panorama: the angle from the heading of the location's original camera to the centre column, to the
+    /// left, degrees.
     pub yaw_deg: f64,
-    /// Sky box: with which side the upper and the lower picture meet.
+    /// Sky box: the side that the upper and the lower picture meet.
     pub caps: SkyBoxCaps,
 }
 
@@ -76,21 +77,22 @@ impl Default for PictureOptions {
     }
 }
 
-/// What a place shows that no picture shows.
+/// The colour of places that no picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UnseenColor {
     /// The mesh's own colour.
     Mesh,
-    /// What is seen around it.
+    /// The colours that are seen around the place.
     Nearby,
 }
 
-/// With which side the lower edge of a sky box's upper picture meets, and the upper edge of its lower one.
+/// The side of a sky box that the lower edge of its upper picture meets, and the upper edge of its lower
+/// picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SkyBoxCaps {
-    /// What the edges say.
+    /// The side is found from the edges.
     Detect,
     /// Picture 4.
     Front,
@@ -102,7 +104,7 @@ pub enum SkyBoxCaps {
     Left,
 }
 
-/// What is written: the source's name alone, or a table.
+/// The entry as it is written: the name of the source alone, or a table.
 #[derive(Debug)]
 pub(crate) struct RgbEntry(RgbTable);
 
@@ -129,6 +131,17 @@ enum Source {
     Panorama,
 }
 
+impl Source {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Texture => "texture",
+            Self::SkyBox => "skybox",
+            Self::Captures => "captures",
+            Self::Panorama => "panorama",
+        }
+    }
+}
+
 impl<'de> Deserialize<'de> for RgbEntry {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Visitor;
@@ -136,8 +149,7 @@ impl<'de> Deserialize<'de> for RgbEntry {
             type Value = RgbEntry;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(
-                    "\"texture\", \"skybox\", \"captures\", \"panorama\", or a table with `source` \
-                             and `path`",
+                    "\"texture\", \"skybox\", \"captures\", \"panorama\", or a table with `source` and `path`",
                 )
             }
             fn visit_str<E: de::Error>(self, word: &str) -> Result<RgbEntry, E> {
@@ -153,19 +165,14 @@ impl<'de> Deserialize<'de> for RgbEntry {
 }
 
 impl RgbEntry {
-    /// The pictures, their folder as it is written; `None` for the mesh's texture. `Err` is a sentence.
+    /// Returns the source of pictures, with the folder as it is written; `None` for the mesh's texture. The
+    /// error is a sentence.
     pub(crate) fn pictures(self) -> Result<Option<PictureSource>, String> {
         let RgbTable { source, path, size, unseen, parallax, gains, yaw_deg, caps } = self.0;
-        let of = |is_there: bool, key: &str, kind: Source, whose: &str| {
-            if is_there && source != kind {
-                return Err(format!("rgb.{key} belongs to source = \"{whose}\""));
-            }
-            Ok(())
-        };
-        of(parallax.is_some(), "parallax", Source::Captures, "captures")?;
-        of(gains.is_some(), "gains", Source::Captures, "captures")?;
-        of(yaw_deg.is_some(), "yaw_deg", Source::Panorama, "panorama")?;
-        of(caps.is_some(), "caps", Source::SkyBox, "skybox")?;
+        check_key(parallax.is_some(), "parallax", source, Source::Captures)?;
+        check_key(gains.is_some(), "gains", source, Source::Captures)?;
+        check_key(yaw_deg.is_some(), "yaw_deg", source, Source::Panorama)?;
+        check_key(caps.is_some(), "caps", source, Source::SkyBox)?;
         if size.is_some_and(|size| !(32..=8192).contains(&size)) {
             return Err(format!(
                 "rgb.size = {}: a face of the cube map has 32 to 8192 pixels",
@@ -175,6 +182,7 @@ impl RgbEntry {
         if yaw_deg.is_some_and(|yaw| !(-360.0..=360.0).contains(&yaw)) {
             return Err(format!("rgb.yaw_deg = {} is no angle from −360 to 360", yaw_deg.unwrap_or(0.0)));
         }
+
         let kind = match source {
             Source::Texture if path.is_some() || size.is_some() || unseen.is_some() => {
                 return Err("rgb.source = \"texture\" has no path and no other key: it is the mesh's".into());
@@ -184,6 +192,7 @@ impl RgbEntry {
             Source::Captures => PictureKind::Captures,
             Source::Panorama => PictureKind::Panorama,
         };
+
         let default = PictureOptions::default();
         let options = PictureOptions {
             size,
@@ -193,6 +202,15 @@ impl RgbEntry {
             yaw_deg: yaw_deg.unwrap_or(default.yaw_deg),
             caps: caps.unwrap_or(default.caps),
         };
+
         Ok(Some(PictureSource { kind, path: path.unwrap_or_else(|| kind.name().into()), options }))
     }
+}
+
+/// Returns an error, a sentence, if the table has a key that belongs to another source.
+fn check_key(is_there: bool, key: &str, source: Source, owner: Source) -> Result<(), String> {
+    if is_there && source != owner {
+        return Err(format!("rgb.{key} belongs to source = \"{}\"", owner.name()));
+    }
+    Ok(())
 }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer, de};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What is written: a name or a file, or the taxonomy itself.
+/// The entry as it is written: a name, a file, or the taxonomy itself.
 pub(crate) enum TaxonomyEntry {
     Named(String),
     Here(TaxonomyDefinition),
@@ -24,8 +24,8 @@ impl<'de> Deserialize<'de> for TaxonomyEntry {
             type Value = TaxonomyEntry;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(
-                    "the name of a taxonomy, a file such as \"my_classes.toml\", or a table with \
-                             `name` and `classes`",
+                    "the name of a taxonomy, a file such as \"my_classes.toml\", or a table with `name` and \
+                     `classes`",
                 )
             }
             fn visit_str<E: de::Error>(self, word: &str) -> std::result::Result<TaxonomyEntry, E> {
@@ -43,19 +43,23 @@ impl<'de> Deserialize<'de> for TaxonomyEntry {
 }
 
 impl TaxonomyEntry {
-    /// The taxonomy that a scene at `path` means, and the file that it is read from, if it is one.
+    /// Returns the taxonomy that a scene at `path` means, and the file that it was read from, if there is
+    /// one.
     pub(crate) fn taxonomy(self, path: &Path) -> Result<(Taxonomy, Option<PathBuf>)> {
         let word = match self {
             Self::Named(word) => word,
             Self::Here(definition) => return Ok((taxonomy(path, definition)?, None)),
         };
+
         if let Some(known) = Taxonomy::built_in(&word) {
             return Ok((known, None));
         }
+
         let file = path.parent().unwrap_or(Path::new("")).join(&word);
         if file.is_file() {
             return Ok((read_taxonomy(&file)?, Some(file)));
         }
+
         let known = Taxonomy::BUILT_IN.join(", ");
         let message = format!(
             "taxonomy = {word:?} is neither one of {known}, nor a file: {} is not there",
@@ -69,7 +73,7 @@ impl TaxonomyEntry {
 ///
 /// ```toml
 /// name = "hotel"                    # what the taxonomy is called
-/// clutter = "other"                 # the class for words that nobody knows; left out: there is none
+/// clutter = "other"                 # the class of unknown words; left out: there is none
 /// [[classes]]
 /// name = "bed"                      # letters and digits
 /// id = 4                            # left out: the place in the list, from 1
@@ -88,8 +92,8 @@ impl TaxonomyEntry {
 /// ```
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] with the line for what is no TOML and for unknown keys, with the entry
-/// for what is no taxonomy.
+/// [`Error::Io`]; [`Error::Format`], with the line if the file is not TOML or has unknown keys, with the
+/// entry if it is not a taxonomy.
 pub fn read_taxonomy(path: &Path) -> Result<Taxonomy> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return read_taxonomy_json(path);
@@ -99,10 +103,10 @@ pub fn read_taxonomy(path: &Path) -> Result<Taxonomy> {
     parse_taxonomy(std::str::from_utf8(&text_of(&bytes, path)?).map_err(no_text)?, path)
 }
 
-/// As [`read_taxonomy`], from the text of a TOML file. Errors call it `path`.
+/// Reads like [`read_taxonomy`], from the text of a TOML file. Errors call the file `path`.
 ///
 /// # Errors
-/// As [`read_taxonomy`].
+/// Like [`read_taxonomy`].
 pub fn parse_taxonomy(text: &str, path: &Path) -> Result<Taxonomy> {
     taxonomy(path, toml::from_str(text).map_err(|e| toml_fault(&e, text, path))?)
 }

@@ -1,9 +1,9 @@
-//! Any bytes, fed to every reader of this crate: what the fuzz targets run (`../fuzz`), and the test of what
-//! they found.
+//! Feeds any bytes to every reader of this crate. The fuzz targets (`../fuzz`) use it, and so does the test
+//! of their findings.
 //!
-//! Each entry of [`FEEDS`] writes the bytes to a file, or a few, in a folder of its own, and reads that as an
-//! export would. Whether it can be read does not matter; it must end, without a panic, in memory that the
-//! file's size warrants, and an error must name a file.
+//! Each entry of [`FEEDS`] writes the bytes to one or several files in a folder of its own, and reads these
+//! as an export would. It does not matter whether they can be read. Reading must end, without a panic, in
+//! memory that the file's size warrants, and an error must name a file.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DAffine3;
@@ -19,7 +19,7 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// What a name of a fuzz target means: puts `data` in the folder and reads it.
+/// Puts bytes into a folder and reads them.
 pub(crate) type Feed = fn(&Path, &[u8]);
 
 /// Every reader, by the name of its fuzz target.
@@ -50,7 +50,7 @@ pub(crate) const FEEDS: [(&str, Feed); 21] = [
 /// A triangle with a texture, whose library is `m.mtl`.
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl wall\nf 1/1 2/1 3/1\n";
 
-/// A message about a file must name it, and stay one that can be read.
+/// Checks that an error names a file in the folder and has a message.
 fn check<T>(dir: &Path, result: Result<T>) -> Option<T> {
     match result {
         Ok(value) => Some(value),
@@ -68,7 +68,8 @@ fn file(dir: &Path, name: &str, data: &[u8]) -> PathBuf {
     path
 }
 
-/// What a mesh promises: indices in range, finite corners, a column an element or none.
+/// Checks what a mesh promises: indices in range, finite corners, and columns that are empty or have one
+/// entry an element.
 fn check_mesh(dir: &Path, result: Result<MeshFile>) -> Option<MeshFile> {
     let file = check(dir, result)?;
     let mesh = &file.mesh;
@@ -83,7 +84,7 @@ fn check_mesh(dir: &Path, result: Result<MeshFile>) -> Option<MeshFile> {
     Some(file)
 }
 
-/// Annotations whose classes are numbers, and whose room is said.
+/// Options for class numbers, with a room.
 fn numbered() -> AnnotationOptions {
     let classes =
         [("2", Some(Class::FLOOR)), ("6", Some(Class::WALL)), ("19", Some(Class::CHAIR)), ("1", None)];
@@ -98,8 +99,7 @@ fn numbered() -> AnnotationOptions {
     }
 }
 
-/// Annotations as they are read by default, then with all that can be forgiven and too many points for
-/// memory.
+/// Reads annotations twice: strictly, and with every fault skipped and too many points for memory.
 fn annotations(dir: &Path, path: &Path) {
     let skip = AnnotationOptions { on_fault: OnFault::Skip, points_in_memory: 16, ..numbered() };
     for options in [numbered(), skip] {
@@ -122,12 +122,12 @@ fn obj(dir: &Path, data: &[u8]) {
     }
 }
 
-/// Reads a mesh as scenes do: brought near the origin if it is far.
+/// Reads a mesh as scenes do: moved near the origin if it is far from it.
 fn near(path: &Path, up: UpAxis) -> Result<MeshFile> {
     read_mesh_with(path, up, &MeshOptions { origin: MeshOrigin::Near, ..MeshOptions::default() })
 }
 
-/// A library, and whatever images it names.
+/// A library of materials, and the images that it names.
 fn mtl(dir: &Path, data: &[u8]) {
     file(dir, "m.mtl", data);
     check_mesh(dir, read_mesh(&file(dir, "mesh.obj", OBJ.as_bytes()), UpAxis::Z));
@@ -142,7 +142,7 @@ fn texture(dir: &Path, data: &[u8]) {
     check(dir, read_picture_turn(&image));
 }
 
-/// Binary glTF and the JSON form by what the bytes begin with.
+/// Binary glTF or its JSON form, by the first bytes.
 fn gltf(dir: &Path, data: &[u8]) {
     let name = if data.starts_with(b"glTF") {
         "mesh.glb"
@@ -174,7 +174,7 @@ fn s3dis(dir: &Path, data: &[u8]) {
     }
 }
 
-/// The byte in front tells which of several readers of small files gets the rest.
+/// The first byte chooses one of `n` readers of small files. Returns its number and the other bytes.
 fn choice(data: &[u8], n: u8) -> (u8, &[u8]) {
     data.split_first().map_or((0, data), |(first, rest)| (first % n, rest))
 }
@@ -193,8 +193,8 @@ fn cameras(dir: &Path, data: &[u8]) {
     }
 }
 
-/// Cameras with what is known of them: a table, COLMAP's cameras as text and binary, a transforms.json, a
-/// trajectory, a pose and intrinsics of ScanNet.
+/// Cameras with intrinsics: a table, COLMAP's cameras as text and binary, a transforms.json, a trajectory, a
+/// pose and intrinsics of ScanNet.
 fn posed_cameras(dir: &Path, data: &[u8]) {
     let (which, data) = choice(data, 7);
     let folder = |name: &str| {
@@ -202,6 +202,7 @@ fn posed_cameras(dir: &Path, data: &[u8]) {
         fs::create_dir_all(&folder).expect("the folder can be written");
         folder
     };
+
     let path = match which {
         0 => file(dir, "table.csv", data),
         1 => {
@@ -218,7 +219,7 @@ fn posed_cameras(dir: &Path, data: &[u8]) {
             file(dir, "images.bin", &image)
         }
         3 => {
-            // A keyframe of Polycam's, and what its mesh was turned by, are JSON too.
+            // A keyframe of Polycam and the turn of its mesh are JSON too.
             folder("capture/keyframes/images");
             file(&folder("capture/keyframes/cameras"), "1.json", data);
             file(&dir.join("capture"), "mesh_info.json", data);
@@ -227,19 +228,22 @@ fn posed_cameras(dir: &Path, data: &[u8]) {
         }
         4 => file(dir, "trajectory.txt", data),
         _ => {
-            let (pose, intrinsics) = (folder("pose"), folder("intrinsic").join("intrinsic_color.txt"));
+            let pose = folder("pose");
+            let intrinsics = folder("intrinsic").join("intrinsic_color.txt");
             let good = b"1 0 0 1\n0 0 1 2\n0 -1 0 3\n0 0 0 1\n";
             file(&pose, "0.txt", if which == 5 { data } else { good });
             fs::write(intrinsics, if which == 5 { b"9 0 4 0 9 3 0 0 1" } else { data }).expect("written");
             pose
         }
     };
+
     let Some(found) = check(dir, read_posed_cameras(&path, &DAffine3::IDENTITY)) else { return };
     assert!(!found.cameras.is_empty());
     let half = GivenIntrinsics { width: Some(64), height: Some(32), optics: None };
     for camera in &found.cameras {
         let _ = camera.photo_lens([640, 480]);
     }
+
     for camera in &found.cameras {
         assert!(camera.pose.location.is_finite());
         for given in [GivenIntrinsics::default(), half] {
@@ -292,7 +296,7 @@ fn json(dir: &Path, data: &[u8]) {
     }
 }
 
-/// A scene whose files are there, so that reading gets past looking for them.
+/// A scene whose files exist, so that reading gets past looking for them.
 fn scene(dir: &Path, data: &[u8]) {
     fs::create_dir_all(dir.join("a")).expect("the folder can be written");
     for name in ["m.obj", "c.csv"] {
@@ -301,7 +305,7 @@ fn scene(dir: &Path, data: &[u8]) {
     check(dir, read_scene(&file(dir, "scene.toml", data)));
 }
 
-/// A taxonomy as TOML and as JSON: one that is read is written, and read again as itself.
+/// A taxonomy as TOML or JSON. One that can be read is written, and must come back equal.
 fn taxonomy(dir: &Path, data: &[u8]) {
     let name = if data.starts_with(b"{") {
         "classes.json"
@@ -309,6 +313,7 @@ fn taxonomy(dir: &Path, data: &[u8]) {
         "classes.toml"
     };
     let Some(found) = check(dir, read_taxonomy(&file(dir, name, data))) else { return };
+
     let again = dir.join("taxonomy.json");
     write_taxonomy_json(&again, &found).expect("what was read can be written");
     assert!(read_taxonomy_json(&again).is_ok_and(|read| read == found), "another taxonomy comes back");
@@ -320,7 +325,7 @@ fn taxonomy(dir: &Path, data: &[u8]) {
     );
 }
 
-/// An array, or an archive of arrays, by what the bytes begin with.
+/// An array, or an archive of arrays, by the first bytes.
 fn npy(dir: &Path, data: &[u8]) {
     let name = if data.starts_with(b"PK") {
         "cloud.npz"
@@ -339,20 +344,21 @@ fn npy(dir: &Path, data: &[u8]) {
     }
 }
 
-/// The first of an array's numbers: an archive may unpack to any number of them.
+/// Reads the first numbers of an array. An archive may unpack to any number of them.
 fn numbers(mut array: NpyArray<impl Read>) {
-    let (mut integers, mut floats) = (Vec::new(), Vec::new());
+    let mut integers = Vec::new();
+    let mut floats = Vec::new();
     for _ in 0..4 {
         let _ = (array.read_integers(&mut integers), array.read_floats(&mut floats));
     }
 }
 
-/// LAS and LAZ: the header tells which it is, whatever the name.
+/// LAS or LAZ: the header tells which it is, whatever the name.
 fn las(dir: &Path, data: &[u8]) {
     annotations(dir, &file(dir, "cloud.las", data));
 }
 
-/// The checksums of pages are made right, so that what is in them is looked at.
+/// An E57 file. The checksums of its pages are corrected, so that their contents are read.
 fn e57(dir: &Path, data: &[u8]) {
     let mut data = data.to_vec();
     let page = data
@@ -366,14 +372,14 @@ fn e57(dir: &Path, data: &[u8]) {
     annotations(dir, &file(dir, "cloud.e57", &data));
 }
 
-/// The checksum of Castagnoli.
+/// CRC-32C, Castagnoli's checksum.
 fn crc32c(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0u32, |crc, &b| {
         (0..8).fold(crc ^ u32::from(b), |c, _| if c & 1 == 1 { 0x82f6_3b78 ^ (c >> 1) } else { c >> 1 })
     })
 }
 
-/// ScanNet's two lists, a zero byte between them, beside a mesh of four vertices.
+/// ScanNet's two lists, with a zero byte between them, beside a mesh of four vertices.
 fn scannet(dir: &Path, data: &[u8]) {
     const PLY: &[u8] =
         b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
@@ -412,7 +418,7 @@ fn exr(dir: &Path, data: &[u8]) {
     check(dir, read_xyz(&file(dir, "image.exr", data)));
 }
 
-/// What is read as a list of files is written again byte for byte.
+/// A list of files. One that can be read must be written byte for byte.
 fn file_list(dir: &Path, data: &[u8]) {
     if let Some(records) = check(dir, read_file_list(&file(dir, "files.csv", data))) {
         let again = dir.join("again.csv");

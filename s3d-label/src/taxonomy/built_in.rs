@@ -1,11 +1,11 @@
-//! The taxonomies of known data sets, from tables beside this file that say where they come from.
+//! The taxonomies of known data sets, from tables beside this file. The tables name their sources.
 
 use crate::taxonomy::definition::{ClassDefinition, Kind, RoomTypeDefinition, TaxonomyDefinition};
 use crate::taxonomy::{Taxonomy, TaxonomyError};
 use std::sync::LazyLock;
 
-/// The classes of the benchmark among those of NYU: BenchmarkScripts/ScanNet200/scannet200_constants.py of
-/// github.com/ScanNet/ScanNet.
+/// The classes of NYU that the benchmark of ScanNet has. Source:
+/// BenchmarkScripts/ScanNet200/scannet200_constants.py of github.com/ScanNet/ScanNet.
 const SCANNET20: [u32; 20] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 24, 28, 33, 34, 36, 39];
 
 pub(super) fn s3dis() -> Taxonomy {
@@ -31,22 +31,26 @@ pub(super) fn find(name: &str) -> Option<Taxonomy> {
     OTHERS.iter().find(|taxonomy| taxonomy.name() == name).cloned()
 }
 
-#[expect(clippy::expect_used, reason = "constants, all of which a test makes")]
+#[expect(clippy::expect_used, reason = "the definitions are constants, and a test makes all of them")]
 fn make(definition: TaxonomyDefinition) -> Taxonomy {
     let made: Result<Taxonomy, TaxonomyError> = Taxonomy::any(definition);
     made.expect("a taxonomy that is built in")
 }
 
-/// The definition in a table; its head says what the columns are.
+/// Reads the definition in a table. The head of the table describes the columns.
 fn table(name: &str, text: &str) -> TaxonomyDefinition {
     let mut all = TaxonomyDefinition { name: name.to_owned(), ..Default::default() };
     for line in text.lines().filter(|line| !line.starts_with('#')) {
         let mut fields = line.split('\t').map(str::to_owned);
         let mut field = || fields.next().unwrap_or_default();
-        let (id, name, color, kind, counts_as, aliases) =
-            (field(), field(), field(), field(), field(), field());
-        let counts_as = Some(counts_as).filter(|word| !word.is_empty());
+        let id = field();
+        let name = field();
+        let color = field();
+        let kind = field();
+        let counts_as = Some(field()).filter(|word| !word.is_empty());
+        let aliases = field();
         let aliases = aliases.split('|').filter(|word| !word.is_empty()).map(str::to_owned);
+
         match (name.as_str(), kind.as_str()) {
             ("-", _) => all.aliases.extend(aliases.map(|word| (word, String::new()))),
             ("*", _) => all.clutter = counts_as,
@@ -70,7 +74,8 @@ fn table(name: &str, text: &str) -> TaxonomyDefinition {
     all
 }
 
-/// Of NYU's classes those that ScanNet's benchmark has. What the others are called means no class, as there.
+/// Returns the classes of NYU that the benchmark of ScanNet has. Words for other classes mean "no class", as
+/// in the benchmark.
 fn scannet20(nyu40: &TaxonomyDefinition, scannet200: &TaxonomyDefinition) -> TaxonomyDefinition {
     let (classes, others): (Vec<_>, Vec<_>) = nyu40
         .classes

@@ -1,77 +1,77 @@
-//! What a taxonomy is made of, as a file holds it.
+//! The definition of a taxonomy, as a file contains it.
 
 use std::collections::BTreeMap;
 
-/// A taxonomy as it is written down. [`Taxonomy::new`](crate::Taxonomy::new) checks it and fills in what is
-/// left out.
+/// The definition of a taxonomy. [`Taxonomy::new`](crate::Taxonomy::new) checks it and fills in omitted
+/// values.
 ///
-/// Names hold letters (those of classes also digits, behind a letter), and 40 characters at most: labels are
-/// joined of them by underscores.
+/// Names consist of letters and have at most 40 characters. Names of classes may also contain digits, after a
+/// letter. Labels join names by underscores.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct TaxonomyDefinition {
-    /// What it is called; not `s3dis`, which is built in.
+    /// The name of the taxonomy; not `s3dis`, which is built in.
     pub name: String,
-    /// The class for words that nobody knows, where these are not refused. Left out: there is none, unless a
-    /// class is called `clutter`.
+    /// The class for unknown words, if they are not refused. If omitted, it is the class `clutter`, if there
+    /// is one.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub clutter: Option<String>,
     /// The classes, in the order of their indices.
     pub classes: Vec<ClassDefinition>,
-    /// The types of rooms. Left out: S3DIS's 11.
+    /// The room types. If omitted, they are the 11 of S3DIS.
     #[cfg_attr(feature = "serde", serde(default))]
     pub rooms: Vec<RoomTypeDefinition>,
-    /// Further words, and the class that each means; `""`: none (unlabelled). Numbers are written as
-    /// decimals.
+    /// Further words with the class that each means, or `""` for "no class" (unlabelled). Numbers are written
+    /// as decimals.
     #[cfg_attr(feature = "serde", serde(default))]
     pub aliases: BTreeMap<String, String>,
 }
 
-/// A class as it is written down.
+/// The definition of a class.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ClassDefinition {
-    /// How it is spelled in labels.
+    /// The spelling in labels.
     pub name: String,
-    /// Its number in the data set, 0 to 65,535. Left out: the place in the list, from 1.
+    /// The number in the data set, 0 to 65,535. If omitted, it is the place in the list, from 1.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub id: Option<u32>,
-    /// Red, green and blue. Left out: one that no other class has.
+    /// Red, green and blue. If omitted, it is a colour that no other class has.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub color: Option<[u8; 3]>,
-    /// Left out: stuff if it counts as ceiling, floor or wall.
+    /// Thing or stuff. If omitted, it is stuff for a class that counts as ceiling, floor or wall, else thing.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub kind: Option<Kind>,
-    /// Other words for it, such as those of a data set.
+    /// Other words for the class, such as the words of a data set.
     #[cfg_attr(feature = "serde", serde(default))]
     pub aliases: Vec<String>,
-    /// Which class of S3DIS it counts as, or which class of this taxonomy it shares that with. Left out: the
-    /// class of S3DIS with the same name, or else `clutter`.
+    /// The class of S3DIS that it counts as, or a class of this taxonomy that counts as the same. If omitted,
+    /// it is the class of S3DIS with the same name, or else `clutter`.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub counts_as: Option<String>,
 }
 
-/// Whether instances of a class are told apart.
+/// The kind of a class: countable or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum Kind {
-    /// They are, as with chairs.
+    /// Instances are told apart, as with chairs.
     Thing,
-    /// They are not, as with floors.
+    /// Instances are not told apart, as with floors.
     Stuff,
 }
 
-/// A type of room as it is written down.
+/// The definition of a room type.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct RoomTypeDefinition {
-    /// How it is spelled in names of rooms.
+    /// The spelling in names of rooms.
     pub name: String,
-    /// Other words for it.
+    /// Other words for the room type.
     #[cfg_attr(feature = "serde", serde(default))]
     pub aliases: Vec<String>,
-    /// Which type of S3DIS it counts as, or which type of this taxonomy it shares that with. Left out: the
-    /// type of S3DIS with the same name, or else none.
+    /// The room type of S3DIS that it counts as, or a room type of this taxonomy that counts as the same. If
+    /// omitted, it is the room type of S3DIS with the same name, or else none.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub counts_as: Option<String>,
 }

@@ -1,74 +1,74 @@
-//! What can be wrong with a taxonomy.
+//! Errors in the definition of a taxonomy.
 
 use crate::taxonomy::MAX_CLASSES;
 use thiserror::Error;
 
-/// Why a definition is no taxonomy. `what` is "class" or "type of room".
+/// The reason why a definition is not a taxonomy. `what` is "class" or "type of room".
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TaxonomyError {
-    /// It has the name of the one that cannot be replaced.
+    /// The definition has the name of S3DIS, which cannot be replaced.
     #[error("a taxonomy of one's own cannot be called \"s3dis\", which is built in: give it another name")]
     Reserved,
-    /// It has no class.
+    /// The definition has no class.
     #[error(
         "has no classes: a class is written [[classes]], and on lines of their own name = \"bed\" and what \
          else is known"
     )]
     Empty,
-    /// It has more classes or types of rooms than an image with a palette has colours.
+    /// The definition has more classes or room types than an image with a palette has colours.
     #[error(
         "has {count} of the kind \"{what}\", and at most {MAX_CLASSES} fit in an image with a palette: join \
          some"
     )]
     TooMany {
-        /// Of what.
+        /// The kind.
         what: &'static str,
-        /// How many.
+        /// The number of entries.
         count: usize,
     },
-    /// A name that would make labels that cannot be taken apart.
+    /// A name is not allowed, because labels with it could not be taken apart.
     #[error(
         "{what} {place}: {name:?} is no name: names have letters (those of classes also digits, behind a \
          letter), 40 characters at most, and nowhere \"rgb\"; \"unknown\" is no type of room. Write \
          \"showerCurtain\", and other spellings as aliases"
     )]
     Name {
-        /// Of what.
+        /// The kind.
         what: &'static str,
-        /// Which entry, from 1; 0 for the name of the taxonomy.
+        /// The number of the entry, from 1; 0 for the name of the taxonomy.
         place: usize,
         /// The name.
         name: String,
     },
-    /// A word is the name or an alias of two.
+    /// A word is the name or an alias of two entries.
     #[error(
         "{word:?} is a word for {first} and for {second}: which {what} is meant would be open; take it from \
          one of them"
     )]
     Word {
-        /// Of what.
+        /// The kind.
         what: &'static str,
         /// The word.
         word: String,
-        /// The name of the one.
+        /// The name of the first entry.
         first: String,
-        /// The name of the other; "none" for unlabelled.
+        /// The name of the second entry; "none" for unlabelled.
         second: String,
     },
-    /// A name is there twice, or twice but for upper and lower case, which file systems do not tell apart.
+    /// Two names are the same, or differ only in case, which some file systems ignore.
     #[error(
         "{what} {place}: {name:?} has the name of {what} {first}: names differ, and in more than upper and \
          lower case"
     )]
     SameName {
-        /// Of what.
+        /// The kind.
         what: &'static str,
-        /// The entry, from 1.
+        /// The number of the second entry, from 1.
         place: usize,
-        /// Its name.
+        /// The name of the second entry.
         name: String,
-        /// The entry before it, from 1.
+        /// The number of the first entry, from 1.
         first: usize,
     },
     /// Two classes have the same number.
@@ -76,12 +76,12 @@ pub enum TaxonomyError {
     Id {
         /// The number.
         id: u32,
-        /// The name of the one.
+        /// The name of the first class.
         first: String,
-        /// The name of the other.
+        /// The name of the second class.
         second: String,
     },
-    /// A number of a class that does not fit into COCO's images.
+    /// The number of a class does not fit into the images of COCO.
     #[error("class {name:?} has the id {id}: ids go from 0 to 65,535")]
     LargeId {
         /// The name of the class.
@@ -97,28 +97,28 @@ pub enum TaxonomyError {
     Color {
         /// The colour.
         color: [u8; 3],
-        /// The name of the one.
+        /// The name of the first class.
         first: String,
-        /// The name of the other.
+        /// The name of the second class.
         second: String,
     },
-    /// A word that should be a class or a type of room is none.
+    /// A word is not a class or not a room type.
     #[error("{place} means {word:?}, which is no {what}: there are {names}")]
     Unknown {
-        /// Of what.
+        /// The kind.
         what: &'static str,
-        /// Where it stands.
+        /// The entry with the word.
         place: String,
         /// The word.
         word: String,
-        /// What there is.
+        /// The valid names.
         names: String,
     },
     /// Classes count as one another in a circle.
     #[error("counts_as goes in a circle, so that these count as nothing: {}; let one of them count as a \
              {what} of S3DIS", names.join(" counts as "))]
     Circle {
-        /// Of what.
+        /// The kind.
         what: &'static str,
         /// The names along the circle; the first is also the last.
         names: Vec<String>,

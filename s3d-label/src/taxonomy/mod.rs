@@ -1,4 +1,4 @@
-//! Taxonomies: which classes and types of rooms there are, and what is known of each.
+//! Taxonomies: the classes and room types of a data set.
 
 mod built_in;
 mod definition;
@@ -15,12 +15,11 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
-/// The most classes that a taxonomy can have: an image with a palette has 256 colours, and the last means
-/// that nothing was hit.
+/// The largest number of classes in a taxonomy. An image with a palette has 256 colours, and the last one
+/// means that nothing was hit.
 pub const MAX_CLASSES: usize = 255;
 
-/// The classes and types of rooms of a data set: S3DIS's, those of another data set, or a user's own. Cheap
-/// to clone.
+/// The classes and room types of a data set: S3DIS, another data set, or your own. Cheap to clone.
 ///
 /// ```
 /// use s3d_label::{Class, Taxonomy};
@@ -39,18 +38,18 @@ pub const MAX_CLASSES: usize = 255;
 pub struct Taxonomy(Arc<Parts>);
 
 struct Parts {
-    /// With everything that was left out filled in.
+    /// The definition, with omitted values filled in.
     definition: TaxonomyDefinition,
     classes: Vec<Class>,
     details: Vec<Details>,
     room_types: Vec<RoomType>,
-    /// Names and aliases; `None`: they mean no class.
+    /// The class of each name and alias, or `None` for a word that means "no class".
     words: HashMap<String, Option<Class>>,
     room_words: HashMap<String, RoomType>,
     clutter: Option<Class>,
 }
 
-/// What is known of a class beside its name.
+/// The properties of a class besides its name.
 struct Details {
     id: u32,
     color: [u8; 3],
@@ -61,58 +60,59 @@ impl Taxonomy {
     /// The name of the taxonomy of S3DIS.
     pub const S3DIS: &str = "s3dis";
 
-    /// The names of the taxonomies that are built in.
+    /// The names of the built-in taxonomies.
     pub const BUILT_IN: [&str; 5] = [Self::S3DIS, "nyu40", "scannet20", "scannet200", "matterport40"];
 
-    /// The 13 classes and 11 types of rooms of S3DIS, without aliases.
+    /// Returns the taxonomy of S3DIS: 13 classes and 11 room types, without aliases.
     pub fn s3dis() -> Self {
         built_in::s3dis()
     }
 
-    /// One of [`Taxonomy::BUILT_IN`], by its name.
+    /// Returns one of [`Taxonomy::BUILT_IN`] by its name.
     pub fn built_in(name: &str) -> Option<Self> {
         built_in::find(name)
     }
 
-    /// Its name.
+    /// Returns the name of the taxonomy.
     pub fn name(&self) -> &str {
         &self.0.definition.name
     }
 
-    /// Whether it is that of S3DIS, which a data set need not name.
+    /// Returns true for the taxonomy of S3DIS, which a data set need not name.
     pub fn is_s3dis(&self) -> bool {
         self.name() == Self::S3DIS
     }
 
-    /// What it was made of, with everything that was left out filled in.
+    /// Returns the definition, with omitted values filled in.
     pub fn definition(&self) -> &TaxonomyDefinition {
         &self.0.definition
     }
 
-    /// Its classes, each at its [`Class::index`].
+    /// Returns the classes, each at its [`Class::index`].
     pub fn classes(&self) -> &[Class] {
         &self.0.classes
     }
 
-    /// Its types of rooms, each at its [`RoomType::index`].
+    /// Returns the room types, each at its [`RoomType::index`].
     pub fn room_types(&self) -> &[RoomType] {
         &self.0.room_types
     }
 
-    /// The number of a class in its data set, and its category in COCO's files.
+    /// Returns the number of a class in its data set, which is also its category in the files of COCO.
     ///
     /// # Panics
-    /// If the class is another taxonomy's, which has more classes. So do the others that take a class.
+    /// If the class belongs to another taxonomy, with more classes. The other methods that take a class panic
+    /// likewise.
     pub fn id(&self, class: Class) -> u32 {
         self.details(class).id
     }
 
-    /// The colour of a class.
+    /// Returns the colour of a class.
     pub fn color(&self, class: Class) -> [u8; 3] {
         self.details(class).color
     }
 
-    /// Whether the instances of a class are not told apart: floors, walls and the like.
+    /// Returns true if the instances of a class are not told apart, such as floors and walls.
     pub fn is_stuff(&self, class: Class) -> bool {
         self.details(class).is_stuff
     }
@@ -122,15 +122,15 @@ impl Taxonomy {
         &self.0.details[class.index()]
     }
 
-    /// The class for what has a name that nobody knows; `None` if the taxonomy has none.
+    /// Returns the class for objects with an unknown name, or `None` if the taxonomy has no such class.
     pub fn clutter(&self) -> Option<Class> {
         self.0.clutter
     }
 
-    /// The class that is spelled `name`, to the letter.
+    /// Finds the class with exactly this name.
     ///
     /// # Errors
-    /// [`UnknownClass`].
+    /// [`UnknownClass`] if there is none.
     pub fn class(&self, name: &str) -> Result<Class, UnknownClass> {
         let found = self
             .0
@@ -142,14 +142,14 @@ impl Taxonomy {
         found.ok_or_else(|| UnknownClass { word: name.to_owned(), classes: names(self.classes()) })
     }
 
-    /// The class that a word of a data set means, by its name or an alias: `Some(None)` if it means no class
-    /// (unlabelled), `None` if nobody knows it.
+    /// Returns the class that a word of a data set means, by name or alias. Returns `Some(None)` if the word
+    /// means "no class" (unlabelled), and `None` if the word is unknown.
     pub fn meaning(&self, word: &str) -> Option<Option<Class>> {
         self.0.words.get(word).copied()
     }
 
-    /// The class that a number of a data set means: by an alias or its [`Taxonomy::id`]. Numbers mean nothing
-    /// in S3DIS, whose files hold names.
+    /// Returns the class that a number of a data set means, by an alias or its [`Taxonomy::id`]. The result
+    /// is as in [`Taxonomy::meaning`]. Numbers are unknown in S3DIS, whose files have names.
     pub fn meaning_of_number(&self, number: i64) -> Option<Option<Class>> {
         if self.is_s3dis() {
             return None;
@@ -161,26 +161,26 @@ impl Taxonomy {
         self.meaning(&number.to_string()).or_else(by_id)
     }
 
-    /// The type of room that is spelled `name`, to the letter.
+    /// Finds the room type with exactly this name.
     ///
     /// # Errors
-    /// [`UnknownRoomType`].
+    /// [`UnknownRoomType`] if there is none.
     pub fn room_type(&self, name: &str) -> Result<RoomType, UnknownRoomType> {
         find_type(self.room_types(), name)
     }
 
-    /// The room that is spelled `name`: a type and a number, as in `office_3`.
+    /// Parses the name of a room: a type and a number, as in `office_3`.
     ///
     /// # Errors
-    /// [`RoomError`].
+    /// [`RoomError`] if the name is not a room.
     pub fn room(&self, name: &str) -> Result<Room, RoomError> {
         parse_room(self.room_types(), name)
     }
 
-    /// As [`Taxonomy::room`], but its type may also be an alias.
+    /// Parses a room like [`Taxonomy::room`], but the type may also be an alias.
     ///
     /// # Errors
-    /// [`RoomError`].
+    /// [`RoomError`] if the word is not a room.
     pub fn room_of_word(&self, word: &str) -> Result<Room, RoomError> {
         let by_alias = |(alias, number): (&str, &str)| {
             let room_type = *self.0.room_words.get(alias)?;
@@ -190,10 +190,10 @@ impl Taxonomy {
             .or_else(|e| word.rsplit_once('_').and_then(by_alias).ok_or(e))
     }
 
-    /// As [`Taxonomy::parse_name`], but the null label is an error.
+    /// Parses a label like [`Taxonomy::parse_name`], but the null label is an error.
     ///
     /// # Errors
-    /// [`LabelError`].
+    /// [`LabelError`] if the name is not the label of an instance.
     pub fn label(&self, name: &str) -> Result<Label, LabelError> {
         self.parse_name(name)?.ok_or(LabelError::Null)
     }

@@ -1,4 +1,4 @@
-//! From a definition to a taxonomy: every check, and what is left out.
+//! Makes a taxonomy from a definition: checks it, and fills in omitted values.
 
 use crate::color::pretty_color;
 use crate::taxonomy::definition::{ClassDefinition, Kind, RoomTypeDefinition, TaxonomyDefinition};
@@ -7,22 +7,22 @@ use crate::{Class, RoomType};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The most characters of a name: file names hold one of a class or a room, and more.
+/// The largest number of characters of a name. File names contain the name of a class or a room, and more.
 const MAX_NAME: usize = 40;
 
 const CLASS: &str = "class";
 const ROOM_TYPE: &str = "type of room";
 
-/// What stands for "counts as no type of S3DIS".
+/// Stands for a room type that counts as no type of S3DIS.
 const NOTHING: u8 = u8::MAX;
 
 impl Taxonomy {
-    /// Checks a definition and fills in what it leaves out.
+    /// Checks a definition and fills in omitted values.
     ///
-    /// Names stay in memory as long as the process: a word once, however often taxonomies are made of it.
+    /// Names stay in memory until the process ends: each word once, however many taxonomies use it.
     ///
     /// # Errors
-    /// [`TaxonomyError`] says which entry is wrong, and how to mend it.
+    /// [`TaxonomyError`] names the entry that is wrong, and says how to repair it.
     pub fn new(definition: TaxonomyDefinition) -> Result<Self, TaxonomyError> {
         if definition.name == Self::S3DIS {
             return Err(TaxonomyError::Reserved);
@@ -30,7 +30,7 @@ impl Taxonomy {
         Self::any(definition)
     }
 
-    /// As [`Taxonomy::new`], whatever its name.
+    /// Makes a taxonomy like [`Taxonomy::new`], with any name.
     pub(super) fn any(mut definition: TaxonomyDefinition) -> Result<Self, TaxonomyError> {
         check_name(CLASS, 0, &definition.name)?;
         if definition.classes.is_empty() {
@@ -42,76 +42,110 @@ impl Taxonomy {
         }
         let classes = resolve_classes(&mut definition.classes)?;
         let room_types = resolve_room_types(&mut definition.rooms)?;
-        let named = |word: &str, place: String| {
-            let find = classes.iter().copied().find(|class| class.name() == word);
-            find.ok_or_else(|| TaxonomyError::Unknown {
-                what: CLASS,
-                place,
-                word: word.to_owned(),
-                names: crate::class::names(&classes),
-            })
-        };
 
-        let mut words: HashMap<String, Option<Class>> = HashMap::new();
-        let name_of = |class: &Option<Class>| class.map_or("none", Class::name).to_owned();
-        let mut add = |word: &str, class: Option<Class>| match words.insert(word.to_owned(), class) {
-            Some(other) if other != class => Err(TaxonomyError::Word {
-                what: CLASS,
-                word: word.to_owned(),
-                first: name_of(&other),
-                second: name_of(&class),
-            }),
-            _ => Ok(()),
-        };
-        for (class, entry) in classes.iter().zip(&definition.classes) {
-            for word in std::iter::once(&entry.name).chain(&entry.aliases) {
-                add(word, Some(*class))?;
-            }
-        }
-        for (word, meant) in &definition.aliases {
-            let meant = match meant.as_str() {
-                "" => None,
-                name => Some(named(name, format!("the alias {word:?}"))?),
-            };
-            add(word, meant)?;
-        }
-
-        for (class, entry) in classes.iter().zip(&definition.classes) {
-            let id = entry.id.unwrap_or_default().to_string();
-            if let Some(other) = words.get(&id).filter(|other| **other != Some(*class)) {
-                let (first, second) = (format!("{class} (its id)"), name_of(other));
-                return Err(TaxonomyError::Word { what: CLASS, word: id, first, second });
-            }
-        }
-
+        let words = class_words(&classes, &definition)?;
         let clutter = match &definition.clutter {
-            Some(word) => Some(named(word, "clutter".to_owned())?),
+            Some(word) => Some(class_named(&classes, word, || "clutter".to_owned())?),
             None => classes
                 .iter()
                 .copied()
                 .find(|class| class.name() == Class::CLUTTER.name()),
         };
         definition.clutter = clutter.map(|class| class.name().to_owned());
+        let room_words = room_words(&room_types, &definition.rooms)?;
 
-        let mut room_words: HashMap<String, RoomType> = HashMap::new();
-        for (room_type, entry) in room_types.iter().zip(&definition.rooms) {
-            for word in std::iter::once(&entry.name).chain(&entry.aliases) {
-                if let Some(other) = room_words.insert(word.clone(), *room_type).filter(|t| t != room_type) {
-                    return Err(TaxonomyError::Word {
-                        what: ROOM_TYPE,
-                        word: word.clone(),
-                        first: other.name().to_owned(),
-                        second: room_type.name().to_owned(),
-                    });
-                }
-            }
-        }
         let details = definition.classes.iter().map(details).collect();
         Ok(Self(Arc::new(Parts { definition, classes, details, room_types, words, room_words, clutter })))
     }
 }
 
-/// The details of an entry that is filled in.
+/// Returns the class of each name and alias. `None` stands for a word that means "no class".
+fn class_words(
+    classes: &[Class],
+    definition: &TaxonomyDefinition,
+) -> Result<HashMap<String, Option<Class>>, TaxonomyError> {
+    let mut words: HashMap<String, Option<Class>> = HashMap::new();
+    for (class, entry) in classes.iter().zip(&definition.classes) {
+        for word in std::iter::once(&entry.name).chain(&entry.aliases) {
+            add_word(&mut words, word, Some(*class))?;
+        }
+    }
+    for (word, meant) in &definition.aliases {
+        let meant = match meant.as_str() {
+            "" => None,
+            name => Some(class_named(classes, name, || format!("the alias {word:?}"))?),
+        };
+        add_word(&mut words, word, meant)?;
+    }
+
+    // The number of a class must not be an alias of another class.
+    for (class, entry) in classes.iter().zip(&definition.classes) {
+        let id = entry.id.unwrap_or_default().to_string();
+        if let Some(other) = words.get(&id).filter(|other| **other != Some(*class)) {
+            let first = format!("{class} (its id)");
+            return Err(TaxonomyError::Word { what: CLASS, word: id, first, second: name_or_none(*other) });
+        }
+    }
+    Ok(words)
+}
+
+fn add_word(
+    words: &mut HashMap<String, Option<Class>>,
+    word: &str,
+    class: Option<Class>,
+) -> Result<(), TaxonomyError> {
+    match words.insert(word.to_owned(), class) {
+        Some(other) if other != class => Err(TaxonomyError::Word {
+            what: CLASS,
+            word: word.to_owned(),
+            first: name_or_none(other),
+            second: name_or_none(class),
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn name_or_none(class: Option<Class>) -> String {
+    class.map_or("none", Class::name).to_owned()
+}
+
+/// Finds the class `word`. `place` names the entry with the word, for the error.
+fn class_named(
+    classes: &[Class],
+    word: &str,
+    place: impl FnOnce() -> String,
+) -> Result<Class, TaxonomyError> {
+    let found = classes.iter().copied().find(|class| class.name() == word);
+    found.ok_or_else(|| TaxonomyError::Unknown {
+        what: CLASS,
+        place: place(),
+        word: word.to_owned(),
+        names: crate::class::names(classes),
+    })
+}
+
+/// Returns the room type of each name and alias.
+fn room_words(
+    room_types: &[RoomType],
+    entries: &[RoomTypeDefinition],
+) -> Result<HashMap<String, RoomType>, TaxonomyError> {
+    let mut words: HashMap<String, RoomType> = HashMap::new();
+    for (room_type, entry) in room_types.iter().zip(entries) {
+        for word in std::iter::once(&entry.name).chain(&entry.aliases) {
+            if let Some(other) = words.insert(word.clone(), *room_type).filter(|t| t != room_type) {
+                return Err(TaxonomyError::Word {
+                    what: ROOM_TYPE,
+                    word: word.clone(),
+                    first: other.name().to_owned(),
+                    second: room_type.name().to_owned(),
+                });
+            }
+        }
+    }
+    Ok(words)
+}
+
+/// Returns the details of a complete entry.
 fn details(entry: &ClassDefinition) -> Details {
     Details {
         id: entry.id.unwrap_or_default(),
@@ -120,7 +154,7 @@ fn details(entry: &ClassDefinition) -> Details {
     }
 }
 
-/// The classes of a taxonomy; its entries are filled in.
+/// Makes the classes of a taxonomy, and fills in omitted values of the entries.
 fn resolve_classes(entries: &mut [ClassDefinition]) -> Result<Vec<Class>, TaxonomyError> {
     let names: Vec<String> = entries.iter().map(|entry| entry.name.clone()).collect();
     check_names(CLASS, &names)?;
@@ -163,7 +197,7 @@ fn resolve_classes(entries: &mut [ClassDefinition]) -> Result<Vec<Class>, Taxono
     Ok(classes)
 }
 
-/// The types of rooms of a taxonomy.
+/// Makes the room types of a taxonomy.
 fn resolve_room_types(entries: &mut [RoomTypeDefinition]) -> Result<Vec<RoomType>, TaxonomyError> {
     let names: Vec<String> = entries.iter().map(|entry| entry.name.clone()).collect();
     check_names(ROOM_TYPE, &names)?;
@@ -176,8 +210,8 @@ fn resolve_room_types(entries: &mut [RoomTypeDefinition]) -> Result<Vec<RoomType
 }
 
 fn check_name(what: &'static str, place: usize, name: &str) -> Result<(), TaxonomyError> {
+    // In the name of an image, the name of a room ends where digits begin.
     let is_room = what == ROOM_TYPE;
-    // In the names of images a room ends where digits begin.
     let plain = name.bytes().all(|b| {
         if is_room {
             b.is_ascii_alphabetic()
@@ -186,8 +220,9 @@ fn check_name(what: &'static str, place: usize, name: &str) -> Result<(), Taxono
         }
     });
     let starts = name.bytes().next().is_some_and(|b| b.is_ascii_alphabetic());
+
+    // "unknown" is the room in names if no room is known. Loaders look for "rgb" in paths.
     let lower = name.to_ascii_lowercase();
-    // "unknown" stands in names where no room is known; loaders look for "rgb" in paths.
     let taken = lower.contains("rgb") || is_room && lower == "unknown";
     if plain && starts && name.len() <= MAX_NAME && !taken {
         return Ok(());
@@ -209,7 +244,7 @@ fn check_names(what: &'static str, names: &[String]) -> Result<(), TaxonomyError
     Ok(())
 }
 
-/// Follows what each entry counts as to a place in `s3dis`. `None`: it counts as nothing there.
+/// Follows `counts_as` of each entry to a place in `s3dis`. `None` if the entry counts as nothing there.
 fn counts_as_s3dis(
     what: &'static str,
     names: &[String],
@@ -227,11 +262,12 @@ fn counts_as_s3dis(
         .map(String::as_str)
         .zip(counts_as.iter().map(Option::as_deref))
         .collect();
+
     let follow = |start: &str| {
         let mut way = vec![start.to_owned()];
         let mut name = start;
         loop {
-            // That an entry counts as its own name means the one of S3DIS with this name.
+            // An entry that counts as its own name means the entry of S3DIS with this name.
             match entries
                 .get(name)
                 .copied()
@@ -258,10 +294,11 @@ fn counts_as_s3dis(
             }
         }
     };
+
     names.iter().map(|name| follow(name)).collect()
 }
 
-/// The word for as long as the process lives.
+/// Returns the word with a lifetime as long as the process.
 fn intern(word: &str) -> &'static &'static str {
     static WORDS: Mutex<BTreeMap<&'static str, &'static &'static str>> = Mutex::new(BTreeMap::new());
     let mut words = WORDS.lock().unwrap_or_else(PoisonError::into_inner);

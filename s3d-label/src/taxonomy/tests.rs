@@ -33,7 +33,8 @@ fn all_that_are_built_in_can_be_made_and_made_again() {
         let colors: BTreeSet<[u8; 3]> = taxonomy.classes().iter().map(|c| taxonomy.color(*c)).collect();
         assert_eq!(colors.len(), classes);
         assert!(taxonomy.clutter().is_some());
-        // What is filled in makes the same taxonomy.
+
+        // The complete definition makes the same taxonomy.
         assert_eq!(Taxonomy::any(taxonomy.definition().clone()).unwrap(), taxonomy);
         for (i, class) in taxonomy.classes().iter().enumerate() {
             assert_eq!((class.index(), taxonomy.class(class.name())), (i, Ok(*class)));
@@ -41,13 +42,15 @@ fn all_that_are_built_in_can_be_made_and_made_again() {
             let by_number = (name != "s3dis").then_some(Some(*class));
             assert_eq!(taxonomy.meaning_of_number(taxonomy.id(*class).into()), by_number);
         }
-        // The 11 types of S3DIS are in all of them, so that a scene can name a room without thinking of this.
+
+        // All taxonomies have the 11 room types of S3DIS, so that a scene can name a room under any of them.
         assert!(
             RoomType::S3DIS
                 .iter()
                 .all(|t| taxonomy.room_type(t.name()).unwrap().s3dis() == Some(*t))
         );
     }
+
     assert_eq!(Taxonomy::built_in("coco"), None);
     let s3dis = Taxonomy::default();
     assert_eq!((s3dis.classes(), s3dis.room_types()), (&Class::S3DIS[..], &RoomType::S3DIS[..]));
@@ -70,7 +73,7 @@ fn facts_of_the_data_sets() {
     assert_eq!(find("nyu40", "refridgerator"), Some((24, "refrigerator", [255, 127, 14], "clutter")));
     assert_eq!(find("nyu40", "office chair"), Some((5, "chair", [188, 189, 34], "chair")));
     assert_eq!(find("scannet20", "otherfurniture"), Some((39, "otherFurniture", [82, 84, 163], "clutter")));
-    // A class of NYU that ScanNet's benchmark leaves out.
+    // The benchmark of ScanNet leaves out this class of NYU.
     assert_eq!(find("scannet20", "ceiling"), None);
     assert_eq!(Taxonomy::built_in("scannet20").unwrap().meaning_of_number(22), Some(None));
     assert_eq!(find("scannet200", "toilet paper dispenser").unwrap().0, 163);
@@ -95,6 +98,7 @@ fn what_is_left_out_is_filled_in() {
     definition.aliases = [("rug", ""), ("cot", "bed"), ("9", "bed")]
         .map(|(a, b)| (a.to_owned(), b.to_owned()))
         .into();
+
     let taxonomy = Taxonomy::new(definition).unwrap();
     let seen: Vec<_> = taxonomy
         .classes()
@@ -108,6 +112,7 @@ fn what_is_left_out_is_filled_in() {
         ("lamp", 4, false, "board"),
     ];
     assert_eq!(seen, expected);
+
     let colors = [2, 1, 3, 4].map(crate::pretty_color);
     assert!(taxonomy.classes().iter().map(|c| taxonomy.color(*c)).eq(colors));
     let bed = taxonomy.class("bed").unwrap();
@@ -117,7 +122,7 @@ fn what_is_left_out_is_filled_in() {
     );
     assert_eq!([9, 1, 7].map(|n| taxonomy.meaning_of_number(n)), [Some(Some(bed)), Some(Some(bed)), None]);
     assert_eq!((taxonomy.clutter(), taxonomy.room_types()), (None, &RoomType::S3DIS[..]));
-    // An alias is no name: labels are spelled in one way.
+    // An alias is not a name: labels have one spelling.
     assert!(taxonomy.class("cot").is_err());
 }
 
@@ -125,7 +130,7 @@ fn what_is_left_out_is_filled_in() {
 fn a_class_counts_as_one_of_s3dis_even_under_its_own_name() {
     let taxonomy = Taxonomy::new(of(vec![counts_as("table", "table"), counts_as("desk", "table")])).unwrap();
     assert!(taxonomy.classes().iter().all(|c| c.s3dis() == Class::TABLE));
-    // The class of the taxonomy comes before that of S3DIS.
+    // The class of the taxonomy takes precedence over the class of S3DIS.
     let taxonomy = Taxonomy::new(of(vec![counts_as("table", "board"), counts_as("desk", "table")])).unwrap();
     assert!(taxonomy.classes().iter().all(|c| c.s3dis() == Class::BOARD));
 }
@@ -151,7 +156,7 @@ fn labels_sort_as_their_names_do() {
 
 #[test]
 fn labels_of_another_taxonomy_make_no_table() {
-    // Both have a wall, but at other places.
+    // Both taxonomies have a wall, but at different places.
     for label in ["beam_1_office_1_1", "wall_1_office_1_1"] {
         let table = Taxonomy::built_in("scannet20").unwrap().table([label.parse().unwrap()]);
         assert!(
@@ -173,6 +178,7 @@ fn every_fault_has_a_clear_word() {
     let pairs = |list: &[(&str, &str)]| -> BTreeMap<String, String> {
         list.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect()
     };
+
     for (message, part) in [
         (with(|t| t.name = "s3dis".into()), "give it another name"),
         (with(|t| t.name = "my list".into()), "class 0: \"my list\" is no name"),
@@ -226,6 +232,7 @@ fn every_fault_has_a_clear_word() {
     ] {
         assert!(message.contains(part), "{message} — {part}");
     }
+
     let mut definition = of(vec![class("bed")]);
     definition.aliases = pairs(&[("cot", "bedd")]);
     assert!(

@@ -3,11 +3,11 @@
 use s3d_geom::TriMesh;
 use s3d_geom::glam::Vec3;
 
-/// Which faces have a corner at a place, by bisection of a sorted list: 16 bytes for each corner of each
+/// An index of the faces that have a corner at a place: a sorted list, with 16 bytes for each corner of each
 /// face.
 #[derive(Clone, Debug)]
 pub(crate) struct Corners {
-    /// The bits of a corner's place, and a face; sorted, each pair once.
+    /// Pairs of the bits of the place of a corner, and a face; sorted, each pair once.
     faces: Vec<([u32; 3], u32)>,
 }
 
@@ -22,7 +22,7 @@ impl Corners {
         Self { faces }
     }
 
-    /// The faces that have a corner at `position`, to the bit; ascending.
+    /// Iterates over the faces that have a corner at exactly `position`, ascending.
     pub(crate) fn faces_at(&self, position: Vec3) -> impl Iterator<Item = u32> {
         let key = key(position);
         let start = self.faces.partition_point(|(k, _)| *k < key);
@@ -34,7 +34,7 @@ impl Corners {
     }
 }
 
-/// The place to the bit; adding 0 takes −0 to 0.
+/// Returns the bits of a place. Adding 0 turns −0 into 0.
 fn key(position: Vec3) -> [u32; 3] {
     (position + 0.0).to_array().map(f32::to_bits)
 }

@@ -1,42 +1,42 @@
-//! Where labels dispute a surface.
+//! Surfaces whose labels are disputed.
 
 use crate::{Class, FaceLabels, LabelId, LabelTable};
 use s3d_geom::glam::DVec3;
 use s3d_geom::{Aabb, TriMesh, face_patches};
 use std::collections::BTreeMap;
 
-/// A face is disputed if its label won less than this share of its votes.
+/// A face is disputed if its label has less than this share of the votes.
 const CLEAR: f64 = 0.75;
 
 /// Two classes that share the votes of faces.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ClassDispute {
-    /// The two, in the order of the taxonomy; the same twice if it is two instances of a class.
+    /// The two classes, in the order of the taxonomy. Two instances of a class give the same class twice.
     pub classes: [Class; 2],
-    /// How many faces they dispute.
+    /// The number of disputed faces.
     pub faces: u64,
-    /// Square metres of these.
+    /// The area of these faces, in m².
     pub area_m2: f64,
 }
 
-/// Disputed faces of the same two labels that hang together by their corners.
+/// Disputed faces with the same two labels that are connected by their corners.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DisputedPatch {
-    /// The two labels: first the one that won more of its surface.
+    /// The two labels. The first won more of the surface.
     pub labels: [LabelId; 2],
-    /// How many faces it has.
+    /// The number of faces.
     pub faces: u64,
-    /// Square metres.
+    /// The area, in m².
     pub area_m2: f64,
-    /// Its centre of area, in the mesh's frame.
+    /// The centroid, in the frame of the mesh.
     pub center: DVec3,
-    /// Its box.
+    /// The box around the patch.
     pub bbox: Aabb,
 }
 
-/// Where labels dispute a surface: which classes, and in which places most.
+/// The disputed surfaces of a mesh, by classes and by places.
 ///
 /// ```
 /// use s3d_geom::{TriMesh, glam::Vec3};
@@ -57,9 +57,9 @@ pub struct DisputedPatch {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Disputes {
-    /// Those with most surface first.
+    /// The pairs of classes, the largest area first.
     pub classes: Vec<ClassDispute>,
-    /// The largest first.
+    /// The connected patches, the largest area first.
     pub patches: Vec<DisputedPatch>,
 }
 
@@ -67,17 +67,17 @@ pub struct Disputes {
 struct Disputed {
     face: u32,
     winner: LabelId,
-    /// Winner and runner-up, the smaller first.
+    /// The winner and the runner-up, the smaller first.
     pair: [LabelId; 2],
     area_m2: f64,
 }
 
 impl Disputes {
-    /// Of the faces of a mesh that were voted for: those whose label won less than three quarters of the
-    /// votes. Corners are the same where their coordinates are.
+    /// Finds the faces whose label has less than three quarters of the votes. Faces without a vote do not
+    /// count. Corners are the same if their coordinates are equal.
     ///
     /// # Panics
-    /// If the labels are those of a mesh with more faces.
+    /// If the labels belong to a mesh with more faces.
     pub fn of(mesh: &TriMesh, labels: &FaceLabels, table: &LabelTable) -> Self {
         let faces = (0u32..).zip(labels.iter());
         let disputed: Vec<Disputed> = faces
@@ -120,7 +120,9 @@ fn patches(mesh: &TriMesh, disputed: &[Disputed]) -> Vec<DisputedPatch> {
 }
 
 fn patch(mesh: &TriMesh, faces: &[&Disputed]) -> DisputedPatch {
-    let (mut area_m2, mut weighted, mut bbox) = (0.0, DVec3::ZERO, Aabb::EMPTY);
+    let mut area_m2 = 0.0;
+    let mut weighted = DVec3::ZERO;
+    let mut bbox = Aabb::EMPTY;
     let mut won_m2: BTreeMap<LabelId, f64> = BTreeMap::new();
     for face in faces {
         let corners = mesh.triangle(face.face);
@@ -129,6 +131,7 @@ fn patch(mesh: &TriMesh, faces: &[&Disputed]) -> DisputedPatch {
         bbox = bbox.union(Aabb::from_points(corners));
         *won_m2.entry(face.winner).or_default() += face.area_m2;
     }
+
     let [a, b] = faces.first().map_or([LabelId::NULL; 2], |face| face.pair);
     let won = |label| won_m2.get(&label).copied().unwrap_or(0.0);
     let labels = if won(a) >= won(b) { [a, b] } else { [b, a] };
@@ -141,11 +144,13 @@ mod tests {
     use crate::Votes;
     use s3d_geom::glam::{Vec3, dvec3, vec3};
 
-    /// A strip of squares of 1 m along x, two faces each; corners are not shared.
+    /// Returns a strip of squares of 1 m along x, two faces each. Squares do not share vertices.
     fn strip(squares: usize) -> TriMesh {
-        let (mut positions, mut faces) = (Vec::new(), Vec::new());
+        let mut positions = Vec::new();
+        let mut faces = Vec::new();
         for i in 0..squares {
-            let (x, n) = (i as f32, 4 * i as u32);
+            let x = i as f32;
+            let n = 4 * i as u32;
             positions.extend([vec3(x, 0., 0.), vec3(x + 1., 0., 0.), vec3(x + 1., 1., 0.), vec3(x, 1., 0.)]);
             faces.extend([[n, n + 1, n + 2], [n, n + 2, n + 3]]);
         }
@@ -164,17 +169,19 @@ mod tests {
                 votes.add(2 * square + 1, LabelId(label), 0.0);
             }
         };
-        // Chair 1 and wall: squares 0 to 2, of which the wall wins two, and 6 on its own.
+
+        // Chair 1 and the wall dispute squares 0 to 2, of which the wall wins two, and square 6.
         for (square, chair, wall) in [(0, 3, 2), (1, 2, 3), (2, 2, 3), (6, 3, 2)] {
             vote(square, 1, chair);
             vote(square, 3, wall);
         }
-        // Two chairs: square 3. Clear: squares 4 and 7; square 5 has no votes.
+        // Two chairs dispute square 3. Squares 4 and 7 are clear. Square 5 has no votes.
         vote(3, 1, 2);
         vote(3, 2, 2);
         vote(4, 3, 4);
         vote(4, 1, 1);
         vote(7, 3, 1);
+
         let disputes = Disputes::of(&mesh, &FaceLabels::new(votes), &table);
         let classes: Vec<_> = disputes
             .classes
@@ -182,6 +189,7 @@ mod tests {
             .map(|d| (d.classes, d.faces, d.area_m2))
             .collect();
         assert_eq!(classes, [([Class::WALL, Class::CHAIR], 8, 4.0), ([Class::CHAIR, Class::CHAIR], 2, 1.0)]);
+
         let patches: Vec<_> = disputes
             .patches
             .iter()

@@ -1,8 +1,8 @@
-//! What a vote says of each face.
+//! The result of a vote for each face.
 
 use crate::{FaceVotes, LabelId, LabelTable, VoteError, VoteReport, Votes};
 
-/// The labels of a mesh's faces, and how clearly each was voted for.
+/// The labels of the faces of a mesh, with the votes behind them.
 ///
 /// ```
 /// use s3d_label::{FaceLabels, LabelId, LabelTable, Votes};
@@ -27,51 +27,51 @@ pub struct FaceLabels {
 }
 
 impl FaceLabels {
-    /// The labels that win, from all votes.
+    /// Finds the winning labels.
     pub fn new(votes: Votes) -> Self {
         Self { label_of_face: votes.label_of_face(), votes }
     }
 
-    /// The label of each face of the mesh: the most frequent among its votes, the smallest of equally
-    /// frequent ones, and [`LabelId::NULL`] without a vote.
+    /// Returns the label of each face of the mesh: the label with the most votes. The smallest label wins a
+    /// tie. [`LabelId::NULL`] if the face has no vote.
     pub fn label_of_face(&self) -> &[LabelId] {
         &self.label_of_face
     }
 
-    /// The same; drops the votes.
+    /// Returns the label of each face, and drops the votes.
     pub fn into_label_of_face(self) -> Vec<LabelId> {
         self.label_of_face
     }
 
-    /// How many faces the mesh has, those without a vote included.
+    /// Returns the number of faces of the mesh, with or without votes.
     pub fn len(&self) -> usize {
         self.label_of_face.len()
     }
 
-    /// Whether the mesh has no face.
+    /// Returns true if the mesh has no face.
     pub fn is_empty(&self) -> bool {
         self.label_of_face.is_empty()
     }
 
-    /// How the vote for a face went: winner, runner-up, distances. `None` if nobody voted for the face, and
-    /// if there is no such face.
+    /// Returns the result of the vote for a face: winner, runner-up, distances. Returns `None` if no point
+    /// voted for the face, or if there is no such face.
     pub fn votes_of(&self, face: u32) -> Option<FaceVotes> {
         ((face as usize) < self.len())
             .then(|| self.votes.of_face(face))
             .flatten()
     }
 
-    /// The same of each face, in their order.
+    /// Iterates over the results of all faces, in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Option<FaceVotes>> {
         (0..self.len() as u32).map(|face| self.votes.of_face(face))
     }
 
-    /// All votes: also those for other labels than winner and runner-up, and how many points each label has.
+    /// Returns all votes, with votes for further labels, and the number of points of each label.
     pub fn votes(&self) -> &Votes {
         &self.votes
     }
 
-    /// Sums the votes up by room and by class, for labels of `table`.
+    /// Sums up the votes by room and by class, for labels of `table`.
     ///
     /// # Errors
     /// [`VoteError::NoSuchLabel`] if there are votes for a label that is not in the table.

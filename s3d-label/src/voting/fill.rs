@@ -1,4 +1,4 @@
-//! Labels for faces without a vote: those of the labelled surface next to them.
+//! Labels for faces without a vote, from the labelled surface next to them.
 
 use crate::LabelId;
 use s3d_geom::glam::{DVec3, Vec3};
@@ -6,34 +6,35 @@ use s3d_geom::{NearestFaces, TriMesh};
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BinaryHeap, HashMap, HashSet};
 
-/// The cosine of 45°: where faces meet at a larger angle, one thing ends and another begins.
+/// The cosine of 45°, the largest angle at which a surface continues. At a sharper edge another thing begins.
 const SMOOTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// A step from one piece of surface to another that is no higher is no step: 5 mm.
+/// The largest step between two pieces of surface that are flush: 5 mm.
 const FLUSH_M: f64 = 0.005;
 
-/// A face whose surroundings have more cells than this is taken without looking at each.
+/// A face with more cells around it counts as near, without a look at each cell.
 const MOST_CELLS: f64 = 1000.0;
 
-/// Gives each face with [`LabelId::NULL`] the label of the nearest labelled surface, if its middle is no
-/// farther from it than `within_m` metres, and returns the indices of these faces, ascending.
+/// Labels the faces with [`LabelId::NULL`] like the nearest labelled surface, if their middles are at most
+/// `within_m` metres away. Returns the indices of the faces that got a label, ascending.
 ///
-/// First along the surface: from face to face across edges that they share (by the places of their corners)
-/// and at which their normals differ by no more than 45°, so that no label goes around a sharp edge. The way
-/// leads from the edge of the labelled surface through the middles of edges and faces. What no such way
-/// reaches, for the mesh is in pieces there, takes the label of the nearest labelled face by straight line
-/// if that is flush with it: normals differ by no more than 45°, and it lies no more than 5 mm above or
-/// below. Among equally near labels the smallest wins, so that the result is the same for any number of
-/// threads.
+/// A label first spreads along the surface, from face to face across shared edges (edges are shared if the
+/// places of their corners are equal). It does not cross an edge at which normals differ by more than 45°, so
+/// it does not go around a sharp edge. The length of a way counts from the edge of the labelled surface
+/// through the middles of edges and faces.
+///
+/// The mesh may be in pieces. A face that no way reaches takes the label of the nearest labelled face by
+/// straight line, if the two are flush: normals differ by at most 45°, and the face is at most 5 mm above or
+/// below. If two labels are equally near, the smaller wins. The result is the same for any number of threads.
 ///
 /// # Panics
-/// If there is not one label a face, or `within_m` is not a number.
+/// If there is not one label per face, or `within_m` is NaN.
 ///
 /// ```
 /// use s3d_geom::{TriMesh, glam::vec3};
 /// use s3d_label::{LabelId, fill_labels};
 ///
-/// // A strip of two squares of 10 cm, two faces each; a wall stands on its far end.
+/// // A strip of two squares of 10 cm, two faces each, with a wall at its far end.
 /// let corner = |i: u32| vec3(0.1 * (i / 2) as f32, 0.1 * (i % 2) as f32, 0.0);
 /// let mut corners: Vec<_> = (0..6).map(corner).collect();
 /// corners.push(vec3(0.2, 0.0, 0.1));
@@ -47,12 +48,14 @@ const MOST_CELLS: f64 = 1000.0;
 /// # Ok::<(), s3d_geom::MeshError>(())
 /// ```
 pub fn fill_labels(mesh: &TriMesh, label_of_face: &mut [LabelId], within_m: f64) -> Vec<u32> {
-    assert_eq!(mesh.faces().len(), label_of_face.len(), "one label a face");
+    assert_eq!(mesh.faces().len(), label_of_face.len(), "one label per face");
     assert!(!within_m.is_nan(), "within_m is not a number");
+
     let mut filled = along_the_surface(mesh, label_of_face, within_m);
     let reached: HashSet<u32> = filled.iter().map(|(face, _)| *face).collect();
     filled.extend(across_gaps(mesh, label_of_face, &reached, within_m));
     filled.sort_unstable();
+
     for &(face, label) in &filled {
         if let Some(place) = label_of_face.get_mut(face as usize) {
             *place = label;
@@ -71,28 +74,29 @@ fn middle(mesh: &TriMesh, face: u32) -> DVec3 {
     mesh.triangle(face).map(|c| c.as_dvec3()).iter().sum::<DVec3>() / 3.0
 }
 
-/// The unit normal, in more digits than the mesh has it.
+/// Returns the unit normal in `f64`. The mesh has it in `f32`.
 fn normal(mesh: &TriMesh, face: u32) -> DVec3 {
     let [a, b, c] = mesh.triangle(face).map(|c| c.as_dvec3());
     (b - a).cross(c - a).normalize_or_zero()
 }
 
-/// An edge by the places of its ends, the smaller first.
+/// An edge, as the places of its ends, the smaller first.
 type Edge = [[u32; 3]; 2];
 
-/// The edges of a face, each with whether it runs from the smaller end to the larger, and its middle.
+/// Returns the edges of a face, whether the face runs from the smaller end to the larger, and the middles.
 fn edges(mesh: &TriMesh, face: u32) -> [(Edge, bool, DVec3); 3] {
     // Adding 0 turns −0 into 0.
     let key = |p: Vec3| (p + 0.0).to_array().map(f32::to_bits);
     let [a, b, c] = mesh.triangle(face);
     [[a, b], [b, c], [c, a]].map(|[from, to]| {
-        let (start, end) = (key(from), key(to));
+        let start = key(from);
+        let end = key(to);
         let edge = if start < end { [start, end] } else { [end, start] };
         (edge, start < end, (from.as_dvec3() + to.as_dvec3()) / 2.0)
     })
 }
 
-/// A way to a face, the shortest first.
+/// A way to a face. The shortest way is the smallest.
 #[derive(PartialEq)]
 struct Way {
     length_m: f64,
@@ -115,22 +119,24 @@ impl PartialOrd for Way {
     }
 }
 
-/// What the shortest ways over smooth edges lead to, in the order of their lengths: Dijkstra's algorithm.
+/// Returns the faces that the shortest ways over smooth edges reach, with their labels, in the order of the
+/// lengths. This is Dijkstra's algorithm.
 fn along_the_surface(mesh: &TriMesh, label_of_face: &[LabelId], within_m: f64) -> Vec<(u32, LabelId)> {
-    // Of each edge of an unlabelled face: the unlabelled faces at it, and which way they run along it.
+    // For each edge, the unlabelled faces at it, and their directions along it.
     let mut at_edge: HashMap<Edge, Vec<(u32, bool)>> = HashMap::new();
     for (face, _) in faces_with(label_of_face, true) {
         for (edge, forwards, _) in edges(mesh, face) {
             at_edge.entry(edge).or_default().push((face, forwards));
         }
     }
+
     let mut ways: BinaryHeap<Reverse<Way>> = BinaryHeap::new();
-    // All ways on from a face that is reached with a label: from its edge if it was labelled before.
+    // Adds the ways on from a face with a label. They start at its edge if it was labelled before.
     let go_on = |ways: &mut BinaryHeap<Reverse<Way>>, from: u32, label: LabelId, so_far: Option<f64>| {
         for (edge, forwards, at) in edges(mesh, from) {
             let start_m = so_far.map_or(0.0, |m| m + at.distance(middle(mesh, from)));
             for &(face, other_forwards) in at_edge.get(&edge).into_iter().flatten() {
-                // Two faces that are wound alike run along their edge in opposite directions.
+                // Two faces with the same orientation run along their edge in opposite directions.
                 let turned = if forwards == other_forwards { -1.0 } else { 1.0 };
                 if face == from || turned * normal(mesh, from).dot(normal(mesh, face)) < SMOOTH {
                     continue;
@@ -142,6 +148,7 @@ fn along_the_surface(mesh: &TriMesh, label_of_face: &[LabelId], within_m: f64) -
             }
         }
     };
+
     for (face, label) in faces_with(label_of_face, false) {
         go_on(&mut ways, face, label, None);
     }
@@ -156,7 +163,8 @@ fn along_the_surface(mesh: &TriMesh, label_of_face: &[LabelId], within_m: f64) -
     filled
 }
 
-/// What lies flush beside labelled faces, of those that are not reached along the surface.
+/// Returns the faces that are flush with a labelled face nearby, with their labels. Faces in `reached` are
+/// left out.
 fn across_gaps(
     mesh: &TriMesh,
     label_of_face: &[LabelId],
@@ -168,7 +176,8 @@ fn across_gaps(
         .filter(|face| !reached.contains(face))
         .map(|face| (face, middle(mesh, face)))
         .collect();
-    // A hierarchy of all faces would be large: one of those is enough that have something left near them.
+
+    // A hierarchy of all labelled faces would be large. Only those near a face that is left are needed.
     let cell_m = within_m.max(0.01);
     let cell = |p: DVec3| (p / cell_m).floor().as_i64vec3();
     let cells: HashSet<_> = left.iter().map(|(_, at)| cell(*at)).collect();
@@ -181,6 +190,7 @@ fn across_gaps(
             || (min.x..=max.x)
                 .any(|x| (min.y..=max.y).any(|y| (min.z..=max.z).any(|z| cells.contains(&(x, y, z).into()))))
     };
+
     let labelled: Vec<(u32, LabelId)> = faces_with(label_of_face, false)
         .filter(|(face, _)| !left.is_empty() && is_near(*face))
         .collect();
@@ -188,8 +198,9 @@ fn across_gaps(
     let faces = (0..labelled.len() as u32)
         .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
         .collect();
-    // Every face has an area, since they are those of a mesh; without one there is nothing to be near to.
+    // Faces of a mesh have areas, so this only fails without faces. Then nothing is near.
     let Ok(part) = TriMesh::from_faces(positions, faces) else { return Vec::new() };
+
     let mut nearest = Vec::new();
     let middles: Vec<Vec3> = left.iter().map(|(_, at)| at.as_vec3()).collect();
     NearestFaces::new(&part).nearest_many(&middles, &mut nearest);
@@ -209,7 +220,8 @@ mod tests {
     use proptest::prelude::*;
     use s3d_geom::glam::vec3;
 
-    /// A horizontal strip of squares of 10 cm along x from `x_m`, two faces each; corners are not shared.
+    /// Returns a horizontal strip of squares of 10 cm along x from `x_m`, two faces each. Faces do not share
+    /// vertices.
     fn strip(squares: usize, x_m: f32, z_m: f32) -> Vec<[Vec3; 3]> {
         let square = |i: usize| {
             let at = |dx: usize, y: f32| vec3(x_m + 0.1 * (i + dx) as f32, y, z_m);
@@ -236,9 +248,10 @@ mod tests {
     fn two_labels_meet_in_the_middle_and_a_short_way_ends_early() {
         let strip = strip(6, 0.0, 0.0);
         let mut labels = [0; 12];
-        (labels[0], labels[1], labels[10], labels[11]) = (4, 4, 2, 2);
+        labels[..2].fill(4);
+        labels[10..].fill(2);
         assert_eq!(filled(&strip, &labels, 9.0), [4, 4, 4, 4, 4, 4, 2, 2, 2, 2, 2, 2]);
-        // The first face beyond is 3.7 cm away, and the next 8.4.
+        // The first face beyond is 3.7 cm away, the next 8.4 cm.
         assert_eq!(filled(&strip, &labels, 0.05), [4, 4, 0, 4, 0, 0, 0, 0, 2, 0, 2, 2]);
         assert_eq!(filled(&strip, &labels, 0.0), labels);
         assert_eq!(filled(&strip, &[0; 12], 9.0), [0; 12]);
@@ -246,7 +259,7 @@ mod tests {
 
     #[test]
     fn no_label_goes_around_a_sharp_edge() {
-        // Two squares of floor, and one that stands on the end of them, bent by 40° and by 50°.
+        // Two squares of floor, and one at their end, bent by 40° and by 50°.
         for (degrees, expected) in [(40.0f32, [3, 3, 3, 3, 3, 3]), (50.0, [3, 3, 3, 3, 0, 0])] {
             let (sin, cos) = degrees.to_radians().sin_cos();
             let mut faces = strip(3, 0.0, 0.0);
@@ -254,7 +267,7 @@ mod tests {
                 *corner = vec3(0.2 + 0.1 * cos, corner.y, 0.1 * sin);
             }
             assert_eq!(filled(&faces, &[3, 3, 0, 0, 0, 0], 1.0), expected, "{degrees}°");
-            // A face that is wound the other way is at the same angle.
+            // A face with the other winding is at the same angle.
             faces[2].swap(0, 1);
             assert_eq!(filled(&faces, &[3, 3, 0, 0, 0, 0], 1.0), expected, "{degrees}°, turned");
         }
@@ -275,7 +288,7 @@ mod tests {
         assert_eq!(filled(&board, &[5, 5, 0, 0], 1.0), [5, 5, 0, 0]);
     }
 
-    /// Triangles on a coarse lattice, each with a label or none.
+    /// Makes triangles on a coarse lattice, each with a label or none.
     fn any_labelled() -> impl Strategy<Value = (TriMesh, Vec<LabelId>)> {
         let corner = || (0..5i8, 0..5i8, 0..2i8);
         prop::collection::vec(([corner(), corner(), corner()], 0..6u32), 1..40).prop_filter_map(
@@ -291,7 +304,8 @@ mod tests {
         )
     }
 
-    /// The length of the shortest way to each face, and its label, by shortening ways until none can be.
+    /// The plain reference: the length of the shortest way to each face, and its label. It shortens ways
+    /// until none can be shortened.
     fn shortest_ways(mesh: &TriMesh, labels: &[LabelId]) -> Vec<(f64, LabelId)> {
         let count = labels.len() as u32;
         let start = |l: &LabelId| (if l.is_null() { f64::INFINITY } else { 0.0 }, *l);
@@ -311,6 +325,7 @@ mod tests {
                 }
             }
         }
+
         for _ in 0..count {
             for &(a, b, at) in &pairs {
                 let (so_far, label) = ways[a];

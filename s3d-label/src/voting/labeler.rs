@@ -1,4 +1,4 @@
-//! From labelled points to labels of faces.
+//! Labels the faces of a mesh from labelled points.
 
 use super::corners::Corners;
 use crate::{FaceLabels, LabelId, MAX_LABELS, VoteOptions, Votes};
@@ -6,58 +6,57 @@ use s3d_geom::glam::Vec3;
 use s3d_geom::{Nearest, NearestFaces, TriMesh};
 use thiserror::Error;
 
-/// Points whose nearest faces are in memory at once: 20 MB.
+/// The number of points whose nearest faces are in memory at once. They take 20 MB.
 const CHUNK_POINTS: usize = 1 << 20;
 
-/// Why points cannot vote.
+/// The reason why points cannot vote.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum VoteError {
-    /// A point is NaN or infinite: no face is nearest to it.
+    /// A point is NaN or infinite, so it has no nearest face.
     #[error("point {point} is not finite: {position}")]
     NonFinite {
-        /// Its index in the block, from 0.
+        /// The index of the point in the block, from 0.
         point: usize,
-        /// Where it is, world metres.
+        /// The position of the point, in world metres.
         position: Vec3,
     },
-    /// A point belongs to a face that the mesh has not.
+    /// A point belongs to a face that is not in the mesh.
     #[error("a point is of face {face}; the mesh has {face_count}")]
     NoSuchFace {
         /// The index of the face, from 0.
         face: u32,
-        /// How many faces the mesh has.
+        /// The number of faces of the mesh.
         face_count: usize,
     },
-    /// There is not one label a point.
+    /// There is not one label per point.
     #[error("{labels} labels for {points} points")]
     Length {
-        /// How many points there are.
+        /// The number of points.
         points: usize,
-        /// How many labels there are.
+        /// The number of labels.
         labels: usize,
     },
-    /// A label is none of the table, or none that any table can have ([`MAX_LABELS`]).
+    /// A label is not in the table, or larger than any table can have ([`MAX_LABELS`]).
     #[error("label {label} of a table of {labels}")]
     NoSuchLabel {
         /// The label.
         label: LabelId,
-        /// How many labels there are, the null label included.
+        /// The number of labels, with the null label.
         labels: usize,
     },
 }
 
-/// Labels the faces of a mesh by votes of labelled points, which come block by block.
+/// Labels the faces of a mesh by votes of labelled points, block by block.
 ///
-/// Each point votes for its nearest face, and a face takes the label with the most votes. A block is of any
-/// size, the points of an instance may be spread over any number of blocks, and blocks may come in any order:
-/// the result is the same, for any number of threads too. Nothing is kept of a point but its vote, so a scan
-/// of any size needs little memory (see [`Votes`]; 20 bytes for each point of a block, 20 MB at most).
-/// Nearest faces are looked up on all threads of the current rayon pool; votes are counted on the thread that
-/// hands in the block.
+/// Each point votes for its nearest face, and a face takes the label with the most votes. Blocks have any
+/// size and come in any order, and the points of an instance may be in any number of blocks. The result is
+/// the same, for any number of threads. If a block is refused, none of its points votes. Points with the
+/// label [`LabelId::NULL`] do not vote and are only counted.
 ///
-/// A block that is refused has not voted. Points with the label [`LabelId::NULL`] do not vote; they are only
-/// counted. Source: formats.md, "What is written": voting.
+/// Only the vote of a point is kept, so a scan of any size needs little memory: see [`Votes`], and 20 bytes
+/// for each point of a block, at most 20 MB. Nearest faces are looked up on all threads of the current rayon
+/// pool. Votes are counted on the calling thread. Source: formats.md, "What is written": voting.
 ///
 /// ```
 /// use s3d_geom::{NearestFaces, TriMesh, glam::{Vec3, vec3}};
@@ -67,7 +66,8 @@ pub enum VoteError {
 /// let corners = vec![Vec3::ZERO, Vec3::X, vec3(1.0, 1.0, 0.0), Vec3::Y];
 /// let mesh = TriMesh::from_faces(corners, vec![[0, 1, 2], [0, 2, 3]])?;
 /// let nearest_faces = NearestFaces::new(&mesh);
-/// let (floor, chair) = (LabelId(2), LabelId(1));
+/// let floor = LabelId(2);
+/// let chair = LabelId(1);
 /// let mut labeler = Labeler::new(&nearest_faces);
 /// labeler.add_points(&[vec3(0.8, 0.2, 0.01), vec3(0.9, 0.5, 0.03)], floor)?;
 /// labeler.add_points(&[vec3(0.7, 0.1, 0.2)], chair)?;
@@ -83,30 +83,31 @@ pub enum VoteError {
 pub struct Labeler<'m> {
     nearest_faces: &'m NearestFaces<'m>,
     votes: Votes,
-    /// Made when the first vertices come.
+    /// Made when the first vertices are added.
     corners: Option<Corners>,
-    /// Of a chunk of points, and the vertices among a chunk that are at no corner; kept for their memory.
+    /// The nearest faces of a chunk of points; kept for its memory.
     nearest: Vec<Nearest>,
+    /// The vertices of a chunk that are not at a corner; kept for its memory.
     others: Vec<Vec3>,
 }
 
 impl<'m> Labeler<'m> {
-    /// Without a vote yet, for the mesh of `nearest_faces`.
+    /// Starts without votes, for the mesh of `nearest_faces`.
     pub fn new(nearest_faces: &'m NearestFaces<'m>) -> Self {
         Self::with_options(nearest_faces, VoteOptions::default())
     }
 
-    /// The same, with another distance from which on a point is far.
+    /// Starts without votes, for the mesh of `nearest_faces`, with these options.
     ///
     /// # Panics
-    /// If `far_m` is not a number.
+    /// If `far_m` is NaN.
     pub fn with_options(nearest_faces: &'m NearestFaces<'m>, options: VoteOptions) -> Self {
         let votes = Votes::with_options(nearest_faces.mesh().faces().len(), options);
         Self { nearest_faces, votes, corners: None, nearest: Vec::new(), others: Vec::new() }
     }
 
-    /// Points (world metres) with the same label, such as those of an instance: each votes for its nearest
-    /// face.
+    /// Adds points (world metres) with the same label, such as the points of an instance. Each votes for its
+    /// nearest face.
     ///
     /// # Errors
     /// [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
@@ -122,7 +123,7 @@ impl<'m> Labeler<'m> {
         Ok(())
     }
 
-    /// Points (world metres) with a label each: each votes for its nearest face.
+    /// Adds points (world metres) with a label each. Each votes for its nearest face.
     ///
     /// # Errors
     /// [`VoteError::Length`], [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
@@ -145,9 +146,9 @@ impl<'m> Labeler<'m> {
         Ok(())
     }
 
-    /// Annotations that are vertices of the mesh itself (world metres), with the same label: each votes for
-    /// every face that has a corner at exactly that place. All of them are equally near, and the smallest
-    /// index alone would leave the others without a vote. A point where no face has a corner votes for its
+    /// Adds annotated vertices of the mesh itself (world metres), with the same label. Each votes for every
+    /// face that has a corner at exactly that place. All these faces are equally near; a vote for the
+    /// smallest index alone would leave the others without one. A point that is not at a corner votes for its
     /// nearest face.
     ///
     /// # Errors
@@ -155,6 +156,7 @@ impl<'m> Labeler<'m> {
     pub fn add_vertices(&mut self, vertices: &[Vec3], label: LabelId) -> Result<(), VoteError> {
         check_points(vertices)?;
         check_label(label)?;
+
         let corners = self
             .corners
             .get_or_insert_with(|| Corners::new(self.nearest_faces.mesh()));
@@ -170,6 +172,7 @@ impl<'m> Labeler<'m> {
                     self.others.push(*vertex);
                 }
             }
+
             self.nearest_faces.nearest_many(&self.others, &mut self.nearest);
             self.nearest
                 .iter()
@@ -178,8 +181,8 @@ impl<'m> Labeler<'m> {
         Ok(())
     }
 
-    /// Points with the same label that are known to lie on faces, as the mesh's own labels do: each votes for
-    /// its face, at a distance of 0.
+    /// Adds points with the same label whose faces are known, such as the labels of the mesh itself. Each
+    /// votes for its face, at a distance of 0.
     ///
     /// # Errors
     /// [`VoteError::NoSuchFace`] and [`VoteError::NoSuchLabel`].
@@ -193,18 +196,18 @@ impl<'m> Labeler<'m> {
         Ok(())
     }
 
-    /// The votes so far.
+    /// Returns the votes so far.
     pub fn votes(&self) -> &Votes {
         &self.votes
     }
 
-    /// The labels of all faces, from the votes so far.
+    /// Returns the labels of all faces, from the votes so far.
     pub fn finish(self) -> FaceLabels {
         FaceLabels::new(self.votes)
     }
 }
 
-/// Labels the faces of `mesh` by the votes of `points` (world metres) with a label each, all at once.
+/// Labels the faces of `mesh` by the votes of `points` (world metres), which have a label each.
 ///
 /// # Errors
 /// [`VoteError::Length`], [`VoteError::NonFinite`] and [`VoteError::NoSuchLabel`].
@@ -237,7 +240,7 @@ fn check_points(points: &[Vec3]) -> Result<(), VoteError> {
     }
 }
 
-/// A label beyond what a table can have would take memory for all labels before it.
+/// Refuses a label that no table can have. It would take memory for all labels before it.
 fn check_label(label: LabelId) -> Result<(), VoteError> {
     if label.index() < MAX_LABELS {
         Ok(())
@@ -255,8 +258,8 @@ mod tests {
     use s3d_geom::nearest_brute_force;
     use std::collections::BTreeMap;
 
-    /// Triangles on a coarse lattice, so that they share corners and edges, and points are equally near to
-    /// several.
+    /// Makes triangles on a coarse lattice, so that they share corners and edges, and points are equally near
+    /// to several faces.
     fn any_mesh() -> impl Strategy<Value = TriMesh> {
         let corner = || (0..4i8, 0..4i8, 0..3i8);
         prop::collection::vec([corner(), corner(), corner()], 1..25).prop_filter_map("no area", |triangles| {
@@ -269,14 +272,14 @@ mod tests {
         })
     }
 
-    /// Points, among them some on the lattice, with a label each.
+    /// Makes points, some of them on the lattice, with a label each.
     fn any_points() -> impl Strategy<Value = Vec<(Vec3, LabelId)>> {
         let any = (-1.0..5.0f32, -1.0..5.0f32, -1.0..4.0f32).prop_map(Vec3::from);
         let lattice = (0..5i8, 0..5i8, 0..4i8).prop_map(|(x, y, z)| vec3(x.into(), y.into(), z.into()));
         prop::collection::vec((prop_oneof![any, lattice], (0..5u32).prop_map(LabelId)), 0..80)
     }
 
-    /// The votes of each face, by looking at all faces for each point and at all points for each face.
+    /// The plain reference: measures all faces for each point, and reads all points for each face.
     fn recount(mesh: &TriMesh, points: &[(Vec3, LabelId)]) -> Vec<Option<FaceVotes>> {
         let voters: Vec<(LabelId, u32, f32)> = points
             .iter()
@@ -284,14 +287,16 @@ mod tests {
             .map(|(point, label)| (*label, nearest_brute_force(mesh, *point)))
             .map(|(label, nearest)| (label, nearest.face, nearest.distance_m))
             .collect();
+
         let of_face = |face: u32| {
             let here: Vec<_> = voters.iter().filter(|(_, f, _)| *f == face).collect();
             let mut counts: BTreeMap<LabelId, u64> = BTreeMap::new();
             here.iter()
                 .for_each(|(label, ..)| *counts.entry(*label).or_default() += 1);
             let mut ranking: Vec<(LabelId, u64)> = counts.into_iter().collect();
-            // Stable: equal ones stay in the order of their labels.
+            // The sort is stable: labels with equally many votes stay in order.
             ranking.sort_by_key(|(_, votes)| std::cmp::Reverse(*votes));
+
             let (label, votes) = *ranking.first()?;
             let (runner_up, runner_up_votes) = ranking.get(1).copied().unwrap_or_default();
             let sum_m: f64 = here.iter().map(|(.., distance_m)| f64::from(*distance_m)).sum();
@@ -354,9 +359,10 @@ mod tests {
             let mut cuts: Vec<usize> = cuts.into_iter().map(|cut| cut.min(points.len())).collect();
             cuts.extend([0, points.len()]);
             cuts.sort_unstable();
+
             let mut labeler = Labeler::new(&nearest_faces);
             let in_pieces = on_threads(threads, || {
-                // From the last block to the first, and of every other block one label after another.
+                // Blocks come from the last to the first. Every other block comes label by label.
                 for (i, cut) in cuts.windows(2).rev().enumerate() {
                     let block = cut[0]..cut[1];
                     if i % 2 == 0 {
@@ -370,6 +376,7 @@ mod tests {
                 }
                 labeler.finish()
             });
+
             prop_assert_eq!(in_pieces.label_of_face(), whole.label_of_face());
             prop_assert_eq!(votes_of_faces(&in_pieces), votes_of_faces(&whole));
             for label in (0..5).map(LabelId) {
@@ -424,7 +431,9 @@ mod tests {
         let mesh = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
         let nearest_faces = NearestFaces::new(&mesh);
         let mut labeler = Labeler::new(&nearest_faces);
-        let (good, bad) = (Vec3::ONE, vec3(0.0, f32::NAN, 0.0));
+        let good = Vec3::ONE;
+        let bad = vec3(0.0, f32::NAN, 0.0);
+
         for refused in
             [labeler.add_points(&[good, bad], LabelId(1)), labeler.add_vertices(&[good, bad], LabelId(1))]
         {
@@ -434,6 +443,7 @@ mod tests {
             labeler.add_labelled_points(&[good, good], &[LabelId(1)]),
             Err(VoteError::Length { points: 2, labels: 1 })
         );
+
         let huge = LabelId(u32::MAX);
         let no_label = Err(VoteError::NoSuchLabel { label: huge, labels: MAX_LABELS });
         assert_eq!(labeler.add_points(&[good], huge), no_label);

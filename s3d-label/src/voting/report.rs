@@ -1,33 +1,34 @@
-//! How well the points of a scan vote for the faces of its mesh.
+//! Statistics of the votes of a scan for the faces of its mesh.
 
 use crate::{Class, FaceVotes, LabelTable, Room, VoteError, Votes};
 use std::collections::BTreeMap;
 
 /// A row of a [`VoteReport`]: the votes of one room, one class, or all.
 ///
-/// A point belongs to the room and class of its own label, a face to those of the label that won it.
+/// A point belongs to the room and class of its own label. A face belongs to the room and class of the
+/// winner.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VoteRow {
-    /// Points that voted.
+    /// The number of points that voted.
     pub points: u64,
-    /// Of these, those farther from every face than [`VoteOptions::far_m`](crate::VoteOptions::far_m).
+    /// The number of these points that are farther than [`VoteOptions::far_m`](crate::VoteOptions::far_m)
+    /// from every face.
     pub far_points: u64,
-    /// Faces with at least one vote.
+    /// The number of faces with at least one vote.
     pub faces: u64,
-    /// The votes that these faces got, for whatever label.
+    /// The number of votes for these faces, for any label.
     pub face_votes: u64,
-    /// Faces with votes for more than one label: the winner's share is below 1. Those of the next two columns
-    /// too.
+    /// The number of faces with votes for more than one label. It includes the faces of the next two columns.
     pub contested: u64,
-    /// Faces whose winner's share is below ¾.
+    /// The number of faces whose winner has less than ¾ of the votes.
     pub contested_below_three_quarters: u64,
-    /// Faces whose winner's share is below ½.
+    /// The number of faces whose winner has less than ½ of the votes.
     pub contested_below_half: u64,
 }
 
 impl VoteRow {
-    /// Votes a face, over the faces with a vote; 0 if there is none.
+    /// Returns the mean number of votes per face with a vote; 0 if there is none.
     pub fn mean_votes_per_face(&self) -> f64 {
         if self.faces == 0 {
             0.0
@@ -39,8 +40,10 @@ impl VoteRow {
     fn add_face(&mut self, face: &FaceVotes) {
         self.faces += 1;
         self.face_votes += face.total;
-        // u128: a share is compared without rounding, and no product overflows.
-        let (winner, votes) = (u128::from(face.votes), u128::from(face.total));
+
+        // With u128, shares are compared without rounding, and no product overflows.
+        let winner = u128::from(face.votes);
+        let votes = u128::from(face.total);
         self.contested += u64::from(winner < votes);
         self.contested_below_three_quarters += u64::from(4 * winner < 3 * votes);
         self.contested_below_half += u64::from(2 * winner < votes);
@@ -59,7 +62,7 @@ impl VoteRow {
 /// votes.add(0, LabelId(1), 0.0);
 /// let report = VoteReport::new(&votes, &table)?;
 /// assert_eq!((report.total.points, report.total.far_points, report.faces_without_vote), (3, 1, 1));
-/// // The face is the wall's, by less than three quarters of its votes.
+/// // The wall wins the face, with less than three quarters of the votes.
 /// let walls = report.classes[Class::WALL.index()].1;
 /// assert_eq!((walls.faces, walls.face_votes, walls.contested_below_three_quarters), (1, 3, 1));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -69,17 +72,17 @@ impl VoteRow {
 pub struct VoteReport {
     /// The distance beyond which a point is far, in metres.
     pub far_m: f32,
-    /// Faces of the mesh.
+    /// The number of faces of the mesh.
     pub face_count: u64,
-    /// Faces that no point voted for. They have no label, so that they belong to no room and no class.
+    /// The number of faces without a vote. They have no label, so they belong to no room and no class.
     pub faces_without_vote: u64,
-    /// Points that had no label and so did not vote.
+    /// The number of points without a label, which did not vote.
     pub unlabeled_points: u64,
     /// All rooms together.
     pub total: VoteRow,
-    /// Every room of the table with its area, in the order of (area, room).
+    /// All rooms of the table with their areas, sorted by area and room.
     pub rooms: Vec<(u32, Room, VoteRow)>,
-    /// Every class, each at its [`Class::index`].
+    /// All classes, each at its [`Class::index`].
     #[cfg_attr(feature = "serde", serde(deserialize_with = "as_data::classes"))]
     pub classes: Vec<(Class, VoteRow)>,
 }
@@ -96,6 +99,7 @@ impl VoteReport {
         if largest.index() >= table.len() {
             return Err(no_such_label(largest));
         }
+
         let mut total = VoteRow::default();
         let mut rooms: BTreeMap<(u32, Room), VoteRow> = BTreeMap::new();
         let mut classes: Vec<(Class, VoteRow)> = table
@@ -104,6 +108,7 @@ impl VoteReport {
             .iter()
             .map(|class| (*class, VoteRow::default()))
             .collect();
+
         for (id, label) in table.iter() {
             let tally = votes.points_of(id);
             let room = rooms.entry((label.area, label.room)).or_default();
@@ -112,6 +117,7 @@ impl VoteReport {
                 row.far_points += tally.far;
             }
         }
+
         let mut faces_without_vote = 0;
         for face in 0..votes.face_count() as u32 {
             let Some(of_face) = votes.of_face(face) else {
@@ -124,6 +130,7 @@ impl VoteReport {
                 row.add_face(&of_face);
             }
         }
+
         Ok(Self {
             far_m: votes.options().far_m,
             face_count: votes.face_count() as u64,
@@ -164,7 +171,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn table() -> LabelTable {
-        // 1: chair of office_2, 2: chair of office_1, 3: table of office_1, 4: wall of WC_1 in area 2.
+        // Label 1 is a chair of office_2, 2 a chair of office_1, 3 a table of office_1, 4 a wall of WC_1 in
+        // area 2.
         let names = ["chair_1_office_2_1", "chair_2_office_1_1", "table_1_office_1_1", "wall_1_WC_1_2"];
         LabelTable::from_labels(names.map(|name| name.parse().unwrap())).unwrap()
     }
@@ -210,7 +218,9 @@ mod tests {
                 .collect::<Vec<_>>(),
             ["1 office_1", "1 office_2", "2 WC_1"]
         );
-        // Faces 0, 1 (table) and 4 (chair) lie in office_1; the points of its three labels voted anywhere.
+
+        // Faces 0, 1 (table) and 4 (chair) belong to office_1. The points of its two labels voted for any
+        // face.
         let office_1 = VoteRow {
             points: 19,
             far_points: 2,

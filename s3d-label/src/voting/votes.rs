@@ -3,86 +3,88 @@
 #![expect(
     clippy::indexing_slicing,
     clippy::expect_used,
-    reason = "every point of a scan votes here: faces are a caller's (see Panics), heads point to entries"
+    reason = "speed, since every point of a scan votes here: the caller gives valid faces (see Panics), and \
+              heads are places of entries"
 )]
 
 use crate::LabelId;
 
-/// In place of an index into the entries: the list ends here.
+/// Stands for an index into the entries at the end of a list.
 const END: u32 = u32::MAX;
 
-/// What is counted beside the votes themselves.
+/// The options of a vote.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VoteOptions {
-    /// A point farther from its nearest face than this, in metres, is counted as far. It votes all the same.
+    /// A point farther than this from its nearest face, in metres, counts as far. It still votes.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "as_data::number"))]
     pub far_m: f32,
 }
 
 impl Default for VoteOptions {
-    /// 5 cm: more than a scanner's noise, less than the depth of a shelf.
+    /// 5 cm: more than the noise of a scanner, less than the depth of a shelf.
     fn default() -> Self {
         Self { far_m: 0.05 }
     }
 }
 
-/// The points of one label, wherever they voted.
+/// The points of a label over all faces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PointTally {
-    /// How many there are.
+    /// The number of points.
     pub points: u64,
-    /// How many are farther from their face than [`VoteOptions::far_m`].
+    /// The number of points farther from their face than [`VoteOptions::far_m`].
     pub far: u64,
 }
 
-/// How the vote for the label of one face went. There is at least one vote.
+/// The result of the vote for a face. There is at least one vote.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FaceVotes {
-    /// The most frequent label, the smallest of equally frequent ones.
+    /// The label with the most votes. The smallest label wins a tie.
     pub label: LabelId,
-    /// Its votes, at least 1.
+    /// The number of votes for the label, at least 1.
     pub votes: u64,
-    /// The second most frequent label, the smallest of equally frequent ones; [`LabelId::NULL`] if all votes
+    /// The label with the second most votes. The smallest label wins a tie. [`LabelId::NULL`] if all votes
     /// agree.
     pub runner_up: LabelId,
-    /// Its votes, at most [`votes`](Self::votes); 0 if all votes agree.
+    /// The number of votes for the runner-up, at most [`votes`](Self::votes); 0 if all votes agree.
     pub runner_up_votes: u64,
-    /// The votes for all labels together.
+    /// The number of votes for all labels together.
     pub total: u64,
-    /// How far the farthest voter is from the face, metres. Infinite if a distance was no number.
+    /// The distance of the farthest voter from the face, in metres. Infinite if a distance was NaN.
     pub farthest_m: f32,
-    /// The mean distance of the voters from the face, metres. Distances are summed in whole nanometres, so
-    /// that the sum is the same for any order; infinite if the sum is above 1.8·10¹⁰ m.
+    /// The mean distance of the voters from the face, in metres. Distances are summed in whole nanometres, so
+    /// the order does not matter. Infinite if the sum is above 1.8·10¹⁰ m.
     pub mean_m: f32,
 }
 
 impl FaceVotes {
-    /// By how many votes the label won; 0 in a tie.
+    /// Returns the number of votes by which the label won; 0 in a tie.
     pub fn margin(&self) -> u64 {
         self.votes - self.runner_up_votes
     }
 
-    /// The winner's share of the votes, in (0, 1].
+    /// Returns the share of the votes of the winner, in (0, 1].
     pub fn share(&self) -> f64 {
         self.votes as f64 / self.total as f64
     }
 }
 
-/// Counts, for each face of a mesh, the labels of the points to which it is the nearest.
+/// Counts the votes for each face of a mesh. A point votes for its nearest face, with its label.
 ///
-/// Points stream through [`Votes::add`], one at a time and in any order; nothing of them is kept but counts.
-/// Several counts over the same faces [`merge`](Votes::merge) into one. Every result is the same for any
-/// order of points and merges. Memory: 16 bytes a face, and 16 bytes for each pair of a face and a label that
-/// occurs. Source: formats.md, "What is written": voting. A [`Labeler`](crate::Labeler) finds the faces of
-/// points and counts them here.
+/// [`Votes::add`] takes the points one at a time, in any order, and keeps only counts. Several counts over
+/// the same faces can be [merged](Votes::merge). The result does not depend on the order of points and
+/// merges. Memory: 16 bytes per face, and 16 bytes for each pair of a face and a label that occurs. A
+/// [`Labeler`](crate::Labeler) finds the faces of points and counts them here. Source: formats.md, "What is
+/// written": voting.
 ///
 /// ```
 /// use s3d_label::{LabelId, Votes};
 ///
-/// let (wall, door) = (LabelId(3), LabelId(1));
+/// let wall = LabelId(3);
+/// let door = LabelId(1);
 /// let mut votes = Votes::new(2);
 /// for (label, distance_m) in [(wall, 0.002), (door, 0.001), (wall, 0.006)] {
 ///     votes.add(0, label, distance_m);
@@ -97,18 +99,18 @@ pub struct Votes {
     options: VoteOptions,
     faces: Vec<Face>,
     entries: Vec<Entry>,
-    /// By label index; as long as the largest index that occurred asks for.
+    /// The points of each label, up to the largest label that occurred.
     tallies: Vec<PointTally>,
     unlabeled: u64,
 }
 
-/// Where a face's list of entries starts, and how far its voters are.
+/// The votes for a face: a list of entries, and the distances of its voters.
 #[derive(Clone, Copy, Debug)]
 struct Face {
     /// The first entry, or [`END`].
     head: u32,
     farthest_m: f32,
-    /// In whole nanometres, as their sum is the same in any order; `u64::MAX` where that is too small.
+    /// The sum of the distances in whole nanometres, which is the same in any order. `u64::MAX` on overflow.
     sum_nm: u64,
 }
 
@@ -116,7 +118,7 @@ impl Face {
     const EMPTY: Self = Self { head: END, farthest_m: 0.0, sum_nm: 0 };
 }
 
-/// The votes for one label of one face, and where the next of that face is.
+/// The votes for one label of a face, and the place of the next entry of the face.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     votes: u64,
@@ -125,15 +127,15 @@ struct Entry {
 }
 
 impl Votes {
-    /// No votes yet, for a mesh of `face_count` faces.
+    /// Starts without votes, for a mesh of `face_count` faces.
     pub fn new(face_count: usize) -> Self {
         Self::with_options(face_count, VoteOptions::default())
     }
 
-    /// No votes yet, for a mesh of `face_count` faces.
+    /// Starts without votes, for a mesh of `face_count` faces, with these options.
     ///
     /// # Panics
-    /// If `far_m` is not a number.
+    /// If `far_m` is NaN.
     pub fn with_options(face_count: usize, options: VoteOptions) -> Self {
         assert!(!options.far_m.is_nan(), "no distance is farther than {} m", options.far_m);
         Self {
@@ -145,12 +147,12 @@ impl Votes {
         }
     }
 
-    /// A point with `label` votes for `face`, which is `distance_m` metres away, at least 0 (a distance that
-    /// is not a number counts as infinite). A point without a label ([`LabelId::NULL`]) does not vote: it is
-    /// only counted, in [`Votes::unlabeled_points`].
+    /// Adds the vote of a point with `label` for `face`. The face is `distance_m` metres away, at least 0;
+    /// NaN counts as infinite. A point without a label ([`LabelId::NULL`]) does not vote and is only counted,
+    /// in [`Votes::unlabeled_points`].
     ///
     /// # Panics
-    /// If there is no face `face`, or above 2³² − 1 pairs of a face and a label.
+    /// If there is no face `face`, or if there are more than 2³² − 1 pairs of a face and a label.
     #[inline]
     pub fn add(&mut self, face: u32, label: LabelId, distance_m: f32) {
         assert!((face as usize) < self.faces.len(), "face {face} of {}", self.faces.len());
@@ -158,25 +160,27 @@ impl Votes {
             self.unlabeled += 1;
             return;
         }
+
         let distance_m = if distance_m.is_nan() { f32::INFINITY } else { distance_m };
         let far = u64::from(distance_m > self.options.far_m);
         self.tally(label, PointTally { points: 1, far });
         let of_face = &mut self.faces[face as usize];
         of_face.farthest_m = of_face.farthest_m.max(distance_m);
-        // A cast takes what is too large for a u64 to the largest one.
+        // The cast saturates.
         of_face.sum_nm = of_face
             .sum_nm
             .saturating_add((f64::from(distance_m) * 1e9 + 0.5) as u64);
         self.count(face, label, 1);
     }
 
-    /// Takes over the votes of `other`, as if its points had been added here.
+    /// Adds the votes of `other`, as if its points had been added here.
     ///
     /// # Panics
     /// If `other` has another number of faces or other options.
     pub fn merge(&mut self, other: &Self) {
         assert_eq!(self.faces.len(), other.faces.len(), "votes for meshes of different size");
         assert_eq!(self.options, other.options, "votes counted under different options");
+
         self.unlabeled += other.unlabeled;
         for (label, &tally) in other.tallies.iter().enumerate() {
             self.tally(LabelId(label as u32), tally);
@@ -205,22 +209,25 @@ impl Votes {
 
     fn count(&mut self, face: u32, label: LabelId, votes: u64) {
         let head = self.faces[face as usize].head;
-        let (mut before, mut at) = (END, head);
+        let mut before = END;
+        let mut at = head;
         while at != END {
             let entry = self.entries[at as usize];
             if entry.label == label {
                 self.entries[at as usize].votes += votes;
                 if before != END {
-                    // To the front: points come instance by instance, so that the next one probably has this
-                    // label.
+                    // Move the entry to the front. Points come instance by instance, so the next one probably
+                    // has this label.
                     self.entries[before as usize].next = entry.next;
                     self.entries[at as usize].next = head;
                     self.faces[face as usize].head = at;
                 }
                 return;
             }
-            (before, at) = (at, entry.next);
+            before = at;
+            at = entry.next;
         }
+
         let new = u32::try_from(self.entries.len()).ok().filter(|&i| i != END);
         self.faces[face as usize].head = new.expect("too many pairs of a face and a label");
         self.entries.push(Entry { votes, label, next: head });
@@ -231,32 +238,32 @@ impl Votes {
         std::iter::successors(entry(self.faces[face as usize].head), move |e| entry(e.next))
     }
 
-    /// Number of faces, those without a vote included.
+    /// Returns the number of faces, with or without votes.
     pub fn face_count(&self) -> usize {
         self.faces.len()
     }
 
-    /// The options that the votes are counted under.
+    /// Returns the options of the vote.
     pub fn options(&self) -> VoteOptions {
         self.options
     }
 
-    /// The points of `label`, over all faces.
+    /// Returns the points of `label`, over all faces.
     pub fn points_of(&self, label: LabelId) -> PointTally {
         self.tallies.get(label.index()).copied().unwrap_or_default()
     }
 
-    /// The largest label that any point voted for, [`LabelId::NULL`] if there is no vote.
+    /// Returns the largest label with a vote, or [`LabelId::NULL`] if there is no vote.
     pub fn largest_label(&self) -> LabelId {
         LabelId(self.tallies.len().saturating_sub(1) as u32)
     }
 
-    /// Points that came without a label.
+    /// Returns the number of points without a label.
     pub fn unlabeled_points(&self) -> u64 {
         self.unlabeled
     }
 
-    /// The labels that a face was voted, by index, each with its votes.
+    /// Returns the labels with votes for a face, ascending, each with its number of votes.
     ///
     /// # Panics
     /// If there is no face `face`.
@@ -266,29 +273,33 @@ impl Votes {
         votes
     }
 
-    /// How the vote for a face went; `None` if nobody voted for the face.
+    /// Returns the result of the vote for a face, or `None` if no point voted for it.
     ///
     /// # Panics
     /// If there is no face `face`.
     pub fn of_face(&self, face: u32) -> Option<FaceVotes> {
         let is_before = |a: (u64, LabelId), b: (u64, LabelId)| a.0 > b.0 || (a.0 == b.0 && a.1 < b.1);
-        let none = (0, LabelId::NULL);
-        let (mut first, mut second, mut total) = (none, none, 0);
+        let mut first = (0, LabelId::NULL);
+        let mut second = (0, LabelId::NULL);
+        let mut total = 0;
         for Entry { votes, label, .. } in self.entries_of(face) {
             total += votes;
             let entry = (votes, label);
             if is_before(entry, first) {
-                (first, second) = (entry, first);
+                second = first;
+                first = entry;
             } else if is_before(entry, second) {
                 second = entry;
             }
         }
+
         let Face { farthest_m, sum_nm, .. } = self.faces[face as usize];
         let mean_m = if sum_nm == u64::MAX {
             f64::INFINITY
         } else {
             sum_nm as f64 / total as f64 * 1e-9
         };
+
         (total > 0).then_some(FaceVotes {
             label: first.1,
             votes: first.0,
@@ -300,8 +311,8 @@ impl Votes {
         })
     }
 
-    /// The label of each face: the most frequent among its votes, the smallest of equally frequent ones, and
-    /// [`LabelId::NULL`] without a vote.
+    /// Returns the label of each face: the label with the most votes. The smallest label wins a tie.
+    /// [`LabelId::NULL`] if the face has no vote.
     pub fn label_of_face(&self) -> Vec<LabelId> {
         (0..self.faces.len() as u32)
             .map(|face| self.of_face(face).map_or(LabelId::NULL, |votes| votes.label))
@@ -313,7 +324,7 @@ impl Votes {
 mod as_data {
     use serde::{Deserialize, Deserializer, de::Error};
 
-    /// Formats other than JSON have numbers that are none.
+    /// Reads a number that is not NaN, which formats other than JSON can hold.
     pub(super) fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
         let number = f32::deserialize(deserializer)?;
         if number.is_nan() {
@@ -330,7 +341,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    /// The plain way: every vote in a map, every face's labels looked through.
+    /// The plain reference: a map of all votes for each face.
     fn reference(face_count: usize, points: &[(u32, u32)]) -> Vec<LabelId> {
         let mut counts: Vec<BTreeMap<u32, u64>> = vec![BTreeMap::new(); face_count];
         for &(face, label) in points.iter().filter(|(_, label)| *label != 0) {
@@ -349,7 +360,7 @@ mod tests {
     fn votes(face_count: usize, points: &[(u32, u32)]) -> Votes {
         let mut votes = Votes::new(face_count);
         for &(face, label) in points {
-            // Distances that no f32 sums without rounding.
+            // An `f32` cannot sum these distances without rounding.
             votes.add(face, LabelId(label), 0.1 + 0.013 * (label + 7 * face) as f32);
         }
         votes

@@ -1,5 +1,5 @@
-//! Meshes that the benches, examples and tests share: those of s3d-synth, and a plain reader of textured OBJ
-//! files.
+//! Meshes that the benches, examples and tests share: the scenes of s3d-synth, and a plain reader of textured
+//! OBJ files.
 #![allow(dead_code, unreachable_pub)]
 
 use s3d_geom::glam::{DVec3, dvec3, vec2, vec3};
@@ -7,11 +7,12 @@ use s3d_geom::{Camera, Material, MeshParts, NO_INDEX, Pose, Raster, Texture, Tri
 use s3d_synth::scenes::{CLASSROOM_LOCATION, classroom, scan_like};
 use std::path::{Path, PathBuf};
 
-/// Reads the v, vt and f lines of an OBJ file with Y up, and the picture `map_Kd` of the material file beside
-/// it.
+/// Reads the v, vt and f lines of an OBJ file with Y up, and the picture `map_Kd` of the material file next
+/// to it.
 pub fn read_obj(path: &Path) -> TriMesh {
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let mut parts = MeshParts::default();
+
     for line in text.lines() {
         let mut words = line.split_whitespace();
         let tag = words.next();
@@ -34,12 +35,14 @@ pub fn read_obj(path: &Path) -> TriMesh {
             _ => {}
         }
     }
+
     let picture = std::fs::read_to_string(path.with_extension("mtl"))
         .ok()
         .and_then(|text| {
             let line = text.lines().find(|l| l.trim_start().starts_with("map_Kd"))?;
             Some(path.with_file_name(line.split_whitespace().nth(1)?))
         });
+
     if let Some(picture) = picture {
         let image = image::open(&picture)
             .unwrap_or_else(|e| panic!("{}: {e}", picture.display()))
@@ -50,19 +53,21 @@ pub fn read_obj(path: &Path) -> TriMesh {
         parts.materials = vec![Material { name: "picture".into(), color: [128; 3], texture: Some(0) }];
         parts.face_materials = vec![0; parts.faces.len()];
     }
+
     TriMesh::new(parts).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// The real scan beside the project, if it is there: its OBJ file and the place of its first scanner.
+/// Returns the real scan next to the project: its OBJ file and the place of its first scanner. Returns `None`
+/// if it is not there.
 pub fn real_scan() -> Option<(PathBuf, DVec3)> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scans/copyroom/rgb.obj");
     path.exists().then_some((path, dvec3(13.1, 9.65, 1.4)))
 }
 
-/// The scenes that images are made of to see how long that takes, and where one stands in them: `scan-like`,
-/// generated; `copyroom`, the real scan beside the project; `office`, the OBJ file with Z up that
-/// `S3D_BENCH_OFFICE` names; and `fine-textures`, with about three of their pixels for one of the image's:
-/// the filter has work to do. `None` if it is not there.
+/// Returns a scene whose images are timed, and the place of the viewer. `scan-like` is generated. `copyroom`
+/// is the real scan next to the project. `office` is the OBJ file with Z up that `S3D_BENCH_OFFICE` names.
+/// `fine-textures` has about three texels for one pixel of the image, which keeps the filter busy. Returns
+/// `None` if the scene is not there.
 pub fn shaded_scene(name: &str) -> Option<(TriMesh, DVec3)> {
     match name {
         "scan-like" => Some((scan_like(300_000, 1), dvec3(3.0, 2.5, 1.5))),
@@ -76,19 +81,20 @@ pub fn shaded_scene(name: &str) -> Option<(TriMesh, DVec3)> {
     }
 }
 
-/// A mesh of [`read_obj`] whose file had Z up.
+/// Turns a mesh of [`read_obj`] whose file has Z up.
 pub fn z_up(mesh: &TriMesh) -> TriMesh {
     let mut parts = mesh.clone().into_parts();
     parts.positions.iter_mut().for_each(|p| *p = vec3(p.x, p.z, -p.y));
     TriMesh::new(parts).expect("it was a mesh")
 }
 
-/// Views all around from one place: level, up and down.
+/// Returns views all around from one place: level, up and down.
 pub fn views(location: DVec3, size: u32) -> Vec<Camera> {
     let level = Pose::level(location, 0.13);
     (0..9)
         .map(|k| {
-            let (yaw, pitch) = ((k as f64) * 0.7, [0.0, 0.26, -0.26][k % 3]);
+            let yaw = (k as f64) * 0.7;
+            let pitch = [0.0, 0.26, -0.26][k % 3];
             Camera::perspective(level.turned(yaw, pitch), [75f64, 60.0, 40.0][k / 3].to_radians(), size, size)
         })
         .collect()

@@ -1,8 +1,9 @@
-//! Cube maps: what is seen all around from one place. [`CubeMap`] says in which order and directions.
+//! Cube maps: the pictures all around a place. [`CubeMap`] documents the order and the directions of the
+//! faces.
 //!
-//! A face is stored with a border of a 32nd of its width on every side, which shows what its neighbours show
-//! there. So a face can be filtered as any texture is, at every reduction down to a face of 32 pixels, and no
-//! seam shows.
+//! A face is stored with a border of a 32nd of its width on every side, which shows the same as its
+//! neighbours there. So a face can be filtered like any texture, in every reduction down to a face of 32
+//! pixels, and no seam shows.
 
 use crate::picture::fill::fill_unseen;
 use crate::shade::filter::MipLevels;
@@ -11,23 +12,23 @@ use glam::{DMat3, DVec2, DVec3, dvec2};
 use rayon::prelude::*;
 use s3d_geom::{Pose, Raster, Texture, Wrap};
 
-/// How many times its border a face is wide.
+/// The ratio of a face's width to its border.
 const BORDERS: u32 = 32;
 
-/// The widest face.
+/// The width of the widest face.
 const MAX_SIZE: u32 = 8192;
 
 /// The axes of a face in the cube's frame, which is the original camera's in OpenCV's axes: x right, y down,
 /// z forward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FaceAxes {
-    /// For the face's right, its down and its forward: which axis of the frame, and its sign.
+    /// Each is an axis of the frame, and its sign.
     pub(crate) right: (usize, i8),
     pub(crate) down: (usize, i8),
     pub(crate) forward: (usize, i8),
 }
 
-/// By number of the face.
+/// The axes by number of the face.
 pub(crate) const AXES: [FaceAxes; 6] = [
     FaceAxes { right: (0, 1), down: (2, 1), forward: (1, -1) },
     FaceAxes { right: (2, -1), down: (1, 1), forward: (0, 1) },
@@ -37,14 +38,14 @@ pub(crate) const AXES: [FaceAxes; 6] = [
     FaceAxes { right: (0, 1), down: (2, -1), forward: (1, 1) },
 ];
 
+/// Returns an axis with its sign as a vector.
 fn axis((axis, sign): (usize, i8)) -> DVec3 {
     let mut v = DVec3::ZERO;
     v[axis] = f64::from(sign);
     v
 }
 
-/// The face that a direction in the cube's frame goes through; of two at the same angle, the one of the
-/// earlier axis.
+/// Returns the face that a direction in the cube's frame goes through. The earlier axis wins a tie.
 #[inline]
 pub(crate) fn face_of(d: DVec3) -> usize {
     let a = d.abs();
@@ -59,8 +60,8 @@ pub(crate) fn face_of(d: DVec3) -> usize {
     }
 }
 
-/// The place on a face's plane, −1 to 1 to the right and downwards within the face, of a direction in the
-/// cube's frame.
+/// Returns the place of a direction in the cube's frame on a face's plane: −1 to 1 to the right and
+/// downwards within the face.
 #[inline]
 pub(crate) fn place_on(face: usize, d: DVec3) -> DVec2 {
     let along = |(axis, sign): (usize, i8)| d[axis] * f64::from(sign);
@@ -70,11 +71,11 @@ pub(crate) fn place_on(face: usize, d: DVec3) -> DVec2 {
 
 /// The picture all around a place, in six faces of 90° each.
 ///
-/// The faces have the order and the names of the scanner's sky boxes (formats.md, "The scanner's
-/// pictures"): 0 up, 1 right, 2 back, 3 left, 4 front, 5 down, relative to the location's original camera
-/// E(original). Faces 1 to 4 are what that camera sees when it turns on the spot, and 0 and 5 what it sees
-/// when it looks straight up or down from the front: the lower edge of *up* and the upper edge of *down* meet
-/// *front*. Every face is seen from inside, its first row at its top.
+/// The faces have the order and the names of the scanner's sky boxes (formats.md, "The scanner's pictures"):
+/// 0 up, 1 right, 2 back, 3 left, 4 front, 5 down, relative to the location's original camera E(original).
+/// That camera sees faces 1 to 4 when it turns on the spot. It sees faces 0 and 5 when it looks straight up
+/// or down from the front: the lower edge of *up* and the upper edge of *down* meet *front*. Every face is
+/// seen from inside, its first row at its top.
 ///
 /// ```
 /// use s3d_geom::{Pose, Raster, glam::DVec3};
@@ -98,24 +99,24 @@ pub struct CubeMap {
     pose: Pose,
     size: u32,
     border: u32,
-    /// With their borders.
+    /// The faces with their borders.
     faces: Vec<Texture>,
     reductions: Vec<Vec<Raster<[u8; 3]>>>,
-    /// By face, with its border. `None` if all of a face is shown.
+    /// The seen parts of each face with its border; `None` if pictures show all of it.
     seen: Vec<Option<Seen>>,
 }
 
-/// What pictures show of a face.
+/// The parts of a face that pictures show.
 #[derive(Clone, Debug)]
 struct Seen {
-    /// 255 what a picture shows, 0 what none does.
+    /// 255 for a pixel that a picture shows, else 0.
     mask: Raster<u8>,
-    /// By block of [`BLOCK`] pixels squared, whether all of it and of the pixels around it is shown: of most of a
-    /// face nothing else need be asked.
+    /// Whether pictures show all of a block of [`BLOCK`] pixels squared and of the pixels around it. In most
+    /// of a face, this is the only question.
     whole: Raster<bool>,
 }
 
-/// Width of a block of [`Seen`].
+/// The width of a block of [`Seen`].
 const BLOCK: u32 = 16;
 
 impl Seen {
@@ -136,7 +137,7 @@ impl Seen {
     }
 }
 
-/// A pixel of a cube map before it is made: a colour of 0 to 255 a channel, or nothing.
+/// A pixel of a cube map in the making: a colour of 0 to 255 a channel, or nothing.
 pub(crate) type Texel = Option<[f32; 3]>;
 
 /// The most rows of a [`Band`].
@@ -146,44 +147,45 @@ pub(crate) const BAND: u32 = 32;
 pub(crate) struct Band<'a> {
     pub(crate) face: usize,
     pub(crate) first_row: u32,
-    /// Of a row, in pixels.
+    /// The width of a row in pixels.
     pub(crate) width: usize,
-    /// Row after row.
+    /// The colours, row after row.
     pub(crate) colors: &'a mut [[u8; 3]],
     /// 255 where a picture shows the pixel, else 0.
     pub(crate) seen: &'a mut [u8],
 }
 
 impl Band<'_> {
-    /// The colours of each row, and what is seen of it.
+    /// Iterates over the rows: their colours, and which pixels are seen.
     pub(crate) fn rows(&mut self) -> impl Iterator<Item = (&mut [[u8; 3]], &mut [u8])> {
         self.colors.chunks_mut(self.width).zip(self.seen.chunks_mut(self.width))
     }
 }
 
-/// The width of a face of `size` pixels with its border.
+/// Returns the width of a face of `size` pixels with its border.
 pub(crate) fn stored_width(size: u32) -> u32 {
     size + 2 * (size / BORDERS)
 }
 
 impl CubeMap {
-    /// The size of a face that [`CubeMap`]s can have and that is at least `wanted`: a multiple of 32 up to
+    /// Returns the smallest possible size of a face that is at least `wanted`: a multiple of 32, at most
     /// 8,192.
     pub fn fitting_size(wanted: f64) -> u32 {
         let parts = (wanted / f64::from(BORDERS)).clamp(1.0, f64::from(MAX_SIZE / BORDERS));
         libm::ceil(parts - 1e-9) as u32 * BORDERS
     }
 
-    /// A cube map around `pose` (E(original)) with faces of `size` pixels, each pixel from `texel`, which is
-    /// given the face, the column and row in the face with its border, and the direction in the cube's frame.
-    /// On all threads of the current pool.
+    /// Makes a cube map around `pose` (E(original)) with faces of `size` pixels. `texel` returns each pixel
+    /// from the face, the column and row in the face with its border, and the direction in the cube's frame.
+    /// Runs on all threads of the current rayon pool.
     pub(crate) fn build(
         pose: Pose,
         size: u32,
         texel: impl Fn(usize, u32, u32, DVec3) -> Texel + Sync,
     ) -> Self {
         Self::build_bands(pose, size, |mut band| {
-            let (face, first_row) = (band.face, band.first_row);
+            let face = band.face;
+            let first_row = band.first_row;
             for (y, (row, seen)) in (first_row..).zip(band.rows()) {
                 for (x, (pixel, seen)) in (0..).zip(row.iter_mut().zip(seen)) {
                     if let Some(color) = texel(face, x, y, direction_of(face, size, x, y)) {
@@ -195,11 +197,13 @@ impl CubeMap {
         })
     }
 
-    /// A cube map around `pose` (E(original)) with faces of `size` pixels, made in bands of [`BAND`] rows by
-    /// `paint`, which finds them black and unseen. On all threads of the current pool.
+    /// Makes a cube map around `pose` (E(original)) with faces of `size` pixels, in bands of [`BAND`] rows.
+    /// `paint` gets each band black and unseen. Runs on all threads of the current rayon pool.
     pub(crate) fn build_bands(pose: Pose, size: u32, paint: impl Fn(Band<'_>) + Sync) -> Self {
         let size = Self::fitting_size(f64::from(size));
-        let (border, width) = (size / BORDERS, stored_width(size));
+        let border = size / BORDERS;
+        let width = stored_width(size);
+
         let mut faces = Vec::with_capacity(6);
         let mut seen = Vec::with_capacity(6);
         for face in 0..6 {
@@ -217,11 +221,14 @@ impl CubeMap {
             faces.push(colors);
             seen.push(mask.pixels().iter().any(|&m| m != 255).then(|| Seen::new(mask)));
         }
+
+        // Holes are filled before the faces are reduced.
         faces.par_iter_mut().zip(&seen).for_each(|(face, seen)| {
             if let Some(seen) = seen {
                 fill_unseen(face, &seen.mask);
             }
         });
+
         let reductions = faces
             .iter()
             .map(|face| std::iter::successors(halved(face), halved).collect())
@@ -233,8 +240,8 @@ impl CubeMap {
         Self { pose, size, border, faces, reductions, seen }
     }
 
-    /// Every pixel of a map with faces of `size`: its face, its column and row there, and its direction in
-    /// the cube's frame.
+    /// Iterates over every pixel of a map with faces of `size`: its face, its column and row there, and its
+    /// direction in the cube's frame.
     pub(crate) fn directions(size: u32) -> impl Iterator<Item = (usize, u32, u32, DVec3)> {
         let width = stored_width(size);
         let at = move |face: usize, k: u32| (face, k % width, k / width);
@@ -242,17 +249,17 @@ impl CubeMap {
         all.map(move |(face, x, y)| (face, x, y, direction_of(face, size, x, y)))
     }
 
-    /// The place and direction of the camera that it is relative to.
+    /// Returns the pose of the camera that the map is relative to.
     pub fn pose(&self) -> &Pose {
         &self.pose
     }
 
-    /// Width and height of a face in pixels.
+    /// Returns the width and height of a face in pixels.
     pub fn size(&self) -> u32 {
         self.size
     }
 
-    /// The number of bytes that it takes.
+    /// Returns the size in memory, in bytes.
     pub fn bytes(&self) -> usize {
         let colors = self
             .faces
@@ -268,7 +275,7 @@ impl CubeMap {
         3 * colors.map(Raster::len).sum::<usize>() + seen
     }
 
-    /// The share of the pixels that pictures show, borders included: 1 if there is no hole.
+    /// Returns the share of the pixels that pictures show, borders included: 1 if there is no hole.
     pub fn coverage(&self) -> f64 {
         let all = self.faces.iter().map(|face| face.image.len()).sum::<usize>();
         let masks = self.seen.iter().flatten().flat_map(|seen| seen.mask.pixels());
@@ -276,18 +283,19 @@ impl CubeMap {
         (all - holes) as f64 / all as f64
     }
 
-    /// A face without its border, as a sky box has it.
+    /// Returns a face without its border, like a picture of a sky box.
     ///
     /// # Panics
-    /// If there is no such face: 0 to 5.
+    /// If `face` is not 0 to 5.
     pub fn face(&self, face: usize) -> Raster<[u8; 3]> {
-        let (from, to) = (self.border, self.border + self.size);
+        let from = self.border;
+        let to = self.border + self.size;
         let image = &self.faces[face].image;
         let rows = (from..to).flat_map(|y| &image.row(y)[from as usize..to as usize]);
         Raster::from_vec(self.size, self.size, rows.copied().collect())
     }
 
-    /// The pixels of all faces with their borders, and how much of each a picture shows: 0 or 255.
+    /// Iterates over the pixels of all faces with their borders, and whether a picture shows them: 0 or 255.
     #[cfg(test)]
     pub(crate) fn texels(&self) -> impl Iterator<Item = ([u8; 3], u8)> {
         self.faces.iter().enumerate().flat_map(move |(face, texture)| {
@@ -301,44 +309,45 @@ impl CubeMap {
         })
     }
 
-    /// World → the cube's frame.
+    /// Returns the turn from the world to the cube's frame.
     pub(crate) fn frame_from_world(&self) -> DMat3 {
         self.pose.opencv_from_world()
     }
 
-    /// The stored faces at all their levels, for the fast filter.
+    /// Returns the stored faces at all their levels, for the fast filter.
     pub(crate) fn levels(&self) -> [MipLevels<'_>; 6] {
         std::array::from_fn(|face| MipLevels::new(&self.faces[face], &self.reductions[face]))
     }
 
-    /// What is added to the place on a face's plane, and what it is multiplied by then, to come to pixels of
-    /// the stored face.
+    /// Returns the offset and the factor that turn a place on a face's plane into pixels of the stored face:
+    /// the offset is added first.
     pub(crate) fn pixels_of_place(&self) -> (f64, f64) {
         let half = 0.5 * f64::from(self.size);
         ((f64::from(self.border) + half) / half, half)
     }
 
-    /// Whether there are holes.
+    /// Tells whether there are holes.
     pub(crate) fn has_holes(&self) -> bool {
         self.seen.iter().any(Option::is_some)
     }
 
-    /// Whether there are holes in a face or its border.
+    /// Tells whether there are holes in a face or its border.
     pub(crate) fn has_holes_in(&self, face: usize) -> bool {
         self.seen[face].is_some()
     }
 
-    /// How much of what is at a place of a stored face, in pixels, a picture shows: 0 to 255, bilinear.
+    /// Returns how much of a place of a stored face, in pixels, a picture shows: 0 to 255, bilinear.
     #[inline]
     pub(crate) fn seen_at(&self, face: usize, x: f32, y: f32) -> u8 {
         let Some(Seen { mask, whole }) = &self.seen[face] else { return 255 };
-        // In the middle of a block, or beside it.
+        // A place in or beside a block without holes.
         let block = |place: f32| (place as u32 / BLOCK).min(whole.width() - 1);
         if whole.at(block(x), block(y)) {
             return 255;
         }
+
         let last = mask.width() as i32 - 1;
-        // Never below −½ nor NaN beyond what a cast brings to 0.
+        // `x` and `y` are at least −½, or NaN, which a cast brings to 0.
         let (x, y) = (x - 0.5, y - 0.5);
         let (xf, yf) = (x.floor(), y.floor());
         let (px, py) = (((x - xf) * 256.0) as u32, ((y - yf) * 256.0) as u32);
@@ -351,22 +360,25 @@ impl CubeMap {
         ((upper * (256 - py) + lower * py) >> 16) as u8
     }
 
-    /// The colour in a direction of the world, 0 to 255 a channel, over the footprint whose sides are `x` and
-    /// `y` (how the direction changes to the next pixel), and how much of it a picture shows, 0 to 255. The
-    /// plain form of [`crate::picture_image`].
+    /// Returns the colour in a direction of the world, 0 to 255 a channel, and how much of it a picture
+    /// shows, 0 to 255. The footprint has the sides `x` and `y`: the changes of the direction to the next
+    /// pixels. [`crate::picture_image`] does the same faster.
     pub fn sample(&self, direction: DVec3, x: DVec3, y: DVec3, filter: &TextureFilter) -> ([f32; 3], u8) {
         let turn = self.frame_from_world();
         let d = turn * direction;
         let face = face_of(d);
         let at = place_on(face, d);
         let forward = axis(AXES[face].forward);
+
         // (u / m)' = (u' − u / m · m') / m
         let depth = d.dot(forward);
         let slope = |v: DVec3| {
             let v = turn * v;
-            let (right, down) = (v.dot(axis(AXES[face].right)), v.dot(axis(AXES[face].down)));
+            let right = v.dot(axis(AXES[face].right));
+            let down = v.dot(axis(AXES[face].down));
             (dvec2(right, down) - at * v.dot(forward)) / depth
         };
+
         let (offset, scale) = self.pixels_of_place();
         let width = f64::from(self.faces[face].image.width());
         let flip = dvec2(1.0, -1.0);
@@ -379,26 +391,26 @@ impl CubeMap {
     }
 }
 
-/// Where the middle of column or row `i` of a face with its border is on the face's plane: −1 to 1 within the
-/// face.
+/// Returns the position of the centre of column or row `i` of a face with its border on the face's plane:
+/// −1 to 1 within the face.
 pub(crate) fn place_of(size: u32, i: u32) -> f64 {
     (f64::from(i) + 0.5 - f64::from(size / BORDERS)) / (0.5 * f64::from(size)) - 1.0
 }
 
-/// A face's right, down and forward in the cube's frame.
+/// Returns a face's right, down and forward in the cube's frame.
 pub(crate) fn axes_of(face: usize) -> [DVec3; 3] {
     let FaceAxes { right, down, forward } = AXES[face];
     [right, down, forward].map(axis)
 }
 
-/// The direction, in the cube's frame and with a depth of 1 on the face, of the centre of a pixel of a face
-/// with its border.
+/// Returns the direction of the centre of a pixel of a face with its border, in the cube's frame and with a
+/// depth of 1 on the face.
 pub(crate) fn direction_of(face: usize, size: u32, x: u32, y: u32) -> DVec3 {
     let [right, down, forward] = axes_of(face);
     right * place_of(size, x) + down * place_of(size, y) + forward
 }
 
-/// The cameras that see the faces with their borders, pixel for pixel, from `pose`.
+/// Returns the cameras at `pose` that see the faces with their borders, pixel for pixel.
 pub(crate) fn face_cameras(pose: &Pose, size: u32) -> [s3d_geom::Camera; 6] {
     let width = stored_width(size);
     let fov = 2.0 * libm::atan(f64::from(width) / f64::from(size));
@@ -416,7 +428,7 @@ pub(crate) mod tests {
     use glam::{DQuat, dvec3};
     use proptest::prelude::*;
 
-    /// A colour for each direction of the world, smooth and different everywhere.
+    /// Returns a colour for each direction of the world, smooth and different everywhere.
     pub(crate) fn color_of(direction: DVec3) -> [f32; 3] {
         let d = direction.normalize();
         [d.x, d.y, d.z].map(|c| (127.5 + 100.0 * c) as f32)
@@ -436,7 +448,7 @@ pub(crate) mod tests {
     }
 
     proptest! {
-        /// Seams included: the second direction has two or three components that are nearly equal.
+        /// Seams are included: the second direction has two or three components that are nearly equal.
         #[test]
         fn every_direction_has_its_colour(
             d in prop::array::uniform3(-1.0..1.0f64), tilt in -0.01..0.01f64, far in any::<bool>(),
@@ -454,7 +466,8 @@ pub(crate) mod tests {
             prop_assert!(close(color, color_of(d), 1.0) && seen == 255, "{color:?} {:?}", color_of(d));
             // A footprint of eight pixels.
             let (x, y) = d.normalize().any_orthonormal_pair();
-            let (x, y) = (x * d.length() * (8.0 / 128.0), y * d.length() * (8.0 / 128.0));
+            let x = x * d.length() * (8.0 / 128.0);
+            let y = y * d.length() * (8.0 / 128.0);
             let (color, _) = cube.sample(d, x, y, &TextureFilter::default());
             prop_assert!(close(color, color_of(d), 2.0), "{color:?} {:?}", color_of(d));
         }
@@ -462,7 +475,7 @@ pub(crate) mod tests {
 
     #[test]
     fn whole_blocks_change_nothing_that_is_seen() {
-        // Few holes, one of them at a corner.
+        // There are few holes, one of them at a corner.
         let hole = |x: u32, y: u32| (x / 3, y / 5) == (30, 7) || (x, y) == (0, 0) || (x, y) == (48, 63);
         let cube = CubeMap::build(pose(), 96, |face, x, y, _| (face != 2 || !hole(x, y)).then_some([9.0; 3]));
         let plain = |x: f64, y: f64| {
@@ -470,15 +483,19 @@ pub(crate) mod tests {
                 let [x, y] = [x, y].map(|v| v.clamp(0.0, 101.0) as u32);
                 if hole(x, y) { 0.0 } else { 255.0 }
             };
-            let (x, y) = (x - 0.5, y - 0.5);
-            let (fx, fy) = (x - x.floor(), y - y.floor());
+            let x = x - 0.5;
+            let y = y - 0.5;
+            let fx = x - x.floor();
+            let fy = y - y.floor();
             let row = |y| at(x.floor(), y) * (1.0 - fx) + at(x.floor() + 1.0, y) * fx;
             row(y.floor()) * (1.0 - fy) + row(y.floor() + 1.0) * fy
         };
         let mut part = 0;
         for k in 0..400 * 400 {
-            let (x, y) = (f64::from(k % 400) * 0.255, f64::from(k / 400) * 0.255);
-            let (seen, expected) = (cube.seen_at(2, x as f32, y as f32), plain(x, y));
+            let x = f64::from(k % 400) * 0.255;
+            let y = f64::from(k / 400) * 0.255;
+            let seen = cube.seen_at(2, x as f32, y as f32);
+            let expected = plain(x, y);
             assert!((f64::from(seen) - expected).abs() <= 3.0, "({x}, {y}): {seen}, {expected}");
             part += u32::from(seen < 255);
             assert_eq!(cube.seen_at(1, x as f32, y as f32), 255);
@@ -500,7 +517,8 @@ pub(crate) mod tests {
         ];
         for (face, (yaw, pitch)) in turns.into_iter().enumerate() {
             let camera = s3d_geom::Camera::perspective(pose().turned(yaw, pitch), FRAC_PI_2, 64, 64);
-            let (image, rays) = (cube.face(face), camera.rays());
+            let image = cube.face(face);
+            let rays = camera.rays();
             for (x, y) in (0..64 * 64).map(|k| (k % 64, k / 64)) {
                 let color = image.at(x, y).map(f32::from);
                 assert!(close(color, color_of(rays.at(x, y)), 0.51), "face {face} at ({x}, {y})");
@@ -530,7 +548,7 @@ pub(crate) mod tests {
     #[test]
     fn holes_are_told_and_filled() {
         let world = pose().opencv_from_world().transpose();
-        // Nothing below 45°.
+        // Nothing is seen below 45°.
         let below = |d: DVec3| (world * d).normalize().z < -std::f64::consts::FRAC_1_SQRT_2;
         let cube = CubeMap::build(pose(), 64, |_, _, _, d| (!below(d)).then(|| color_of(world * d)));
         let tiny = DVec3::splat(1e-9);
@@ -539,7 +557,7 @@ pub(crate) mod tests {
         let (color, seen) = sample(dvec3(0.3, 0.0, -1.0));
         assert!(seen == 0 && color[2] > 20.0, "{color:?}");
         assert!((0.8..0.9).contains(&cube.coverage()), "{}", cube.coverage());
-        // The rim is half seen.
+        // The rim is partly seen.
         assert!((0..100).any(|k| (1..255).contains(&sample(dvec3(1.0, 0.0, -0.9 - 0.002 * f64::from(k))).1)));
     }
 }

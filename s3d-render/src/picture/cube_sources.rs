@@ -1,4 +1,4 @@
-//! Cube maps from sky boxes, and pictures that cube maps are made from.
+//! Cube maps from sky boxes, and the pictures from which cube maps are made.
 
 use crate::picture::cube_map::{CubeMap, direction_of, face_of, place_on};
 use crate::shade::filter::MipLevels;
@@ -6,28 +6,28 @@ use crate::shade::mip_maps::{MipMap, TextureFilter, halved};
 use glam::{DVec2, dvec2};
 use s3d_geom::{Pose, Raster, Texture, Wrap};
 
-/// Which way the upper and the lower picture of a sky box are turned: with which side picture the lower edge
-/// of the one and the upper edge of the other meet.
+/// How the upper and the lower picture of a sky box are turned. Names the side picture that the lower edge of
+/// the upper one and the upper edge of the lower one meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum SkyBoxTurn {
-    /// What agrees best along the edges, each for itself; *front* if nothing agrees better.
+    /// The turn that agrees best along the edges, for each of the two pictures by itself. *Front* wins a tie.
     ///
-    /// Viewers of Matterport's sky boxes (Matterport3DSimulator, PanoBasic) have them meet *right*; taken
-    /// literally, formats.md has them meet *front*. Pictures tell.
+    /// Viewers of Matterport's sky boxes (Matterport3DSimulator, PanoBasic) turn them to meet *right*. Taken
+    /// literally, formats.md turns them to meet *front*. The pictures themselves decide.
     #[default]
     Detect,
-    /// With picture 4.
+    /// They meet picture 4.
     Front,
-    /// With picture 1.
+    /// They meet picture 1.
     Right,
-    /// With picture 2.
+    /// They meet picture 2.
     Back,
-    /// With picture 3.
+    /// They meet picture 3.
     Left,
 }
 
 impl SkyBoxTurn {
-    /// How many quarter turns from *front* to the right.
+    /// Returns the number of quarter turns from *front* to the right.
     fn quarters(self) -> Option<u32> {
         match self {
             Self::Detect => None,
@@ -40,8 +40,9 @@ impl SkyBoxTurn {
 }
 
 impl CubeMap {
-    /// From the six pictures of a sky box, in the order of the faces and all of one size, with faces of
-    /// `size` pixels, or of the pictures' own. Pictures of a multiple of 32 pixels are taken as they are.
+    /// Makes a cube map from the six pictures of a sky box, in the order of the faces and all of one size.
+    /// The faces have `size` pixels, or the size of the pictures. Pictures whose size is a multiple of 32
+    /// pixels are copied unchanged.
     ///
     /// # Panics
     /// If there are not six square pictures of one size of at least 1 pixel.
@@ -54,10 +55,12 @@ impl CubeMap {
         let n = pictures[0].width();
         let square = pictures.iter().all(|p| (p.width(), p.height()) == (n, n));
         assert!(square && n > 0, "a sky box is six square pictures of one size");
+
         let quarters = [0, 5].map(|face| turn.quarters().unwrap_or_else(|| agreeing_turn(&pictures, face)));
         let turned = [turned(pictures[0], quarters[0]), turned(pictures[5], (4 - quarters[1]) % 4)];
         let [_, right, back, left, front, _] = pictures;
         let pictures = [&turned[0], right, back, left, front, &turned[1]];
+
         let size = Self::fitting_size(f64::from(size.unwrap_or(n)));
         let source = if size < n {
             SourceMipMap::new
@@ -65,18 +68,22 @@ impl CubeMap {
             SourceMipMap::without_reductions
         };
         let mip_maps = pictures.map(|p| source(p.clone(), [Wrap::Clamp; 2]));
-        let (width, step) = (f64::from(n), f64::from(n) / f64::from(size));
+        let width = f64::from(n);
+        let step = width / f64::from(size);
+
         let color = |d| {
             let face = face_of(d);
             let at = (place_on(face, d) + 1.0) * (0.5 * width);
             mip_maps[face].sample(at, dvec2(step, 0.0), dvec2(0.0, step), &TextureFilter::default())
         };
+
         Self::build_bands(*pose, size, |mut band| {
-            let (face, first_row) = (band.face, band.first_row);
+            let face = band.face;
+            let first_row = band.first_row;
             let border = (band.width - size as usize) / 2;
             for (y, (row, seen)) in (first_row as usize..).zip(band.rows()) {
                 seen.fill(255);
-                // What a picture of this size shows is taken as it is.
+                // A picture of this size is copied inside the border.
                 let inside = border..border + n as usize;
                 let taken = if size == n && inside.contains(&y) { inside } else { 0..0 };
                 if !taken.is_empty() {
@@ -91,49 +98,56 @@ impl CubeMap {
     }
 }
 
-/// The quarter turns of the upper (0) or lower (5) picture with which its edges agree best with those of the
-/// sides.
+/// Returns the quarter turns of the upper (0) or lower (5) picture with which its edges agree best with the
+/// edges of the side pictures.
 fn agreeing_turn(pictures: &[&Raster<[u8; 3]>; 6], face: usize) -> u32 {
     let n = pictures[0].width();
-    let difference = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| u64::from(a[k].abs_diff(b[k]))).sum::<u64>();
     let cost = |quarters: u32| -> u64 {
         let quarters = if face == 0 { quarters } else { (4 - quarters) % 4 };
         let cap = |x, y| turned_at(pictures[face], quarters, x, y);
         (0..n)
             .map(|i| {
                 let last = n - 1;
-                // Along the edge with the front from left to right, then right, back and left, each as its
-                // own picture goes.
+                // The edge that meets the front picture from left to right, then the edges that meet the
+                // right, back and left pictures, each in its picture's order.
                 let (edge, row) = if face == 0 {
                     ([cap(i, last), cap(last, last - i), cap(last - i, 0), cap(0, i)], 0)
                 } else {
                     ([cap(i, 0), cap(last, i), cap(last - i, last), cap(0, last - i)], last)
                 };
                 let sides = [4, 1, 2, 3].map(|side| pictures[side].at(i, row));
-                edge.into_iter().zip(sides).map(|(a, b)| difference(a, b)).sum::<u64>()
+                edge.into_iter()
+                    .zip(sides)
+                    .map(|(a, b)| color_distance(a, b))
+                    .sum::<u64>()
             })
             .sum()
     };
     (0..4).min_by_key(|&quarters| cost(quarters)).unwrap_or(0)
 }
 
-/// The picture turned so that what was its lower edge becomes its right one, `quarters` times.
+/// Returns the sum of the differences of two colours.
+fn color_distance(a: [u8; 3], b: [u8; 3]) -> u64 {
+    (0..3).map(|k| u64::from(a[k].abs_diff(b[k]))).sum::<u64>()
+}
+
+/// Returns the picture turned `quarters` times, so that its lower edge becomes its right one each time.
 fn turned(picture: &Raster<[u8; 3]>, quarters: u32) -> Raster<[u8; 3]> {
     let n = picture.width();
     let rows = (0..n).flat_map(|y| (0..n).map(move |x| turned_at(picture, quarters, x, y)));
     Raster::from_vec(n, n, rows.collect())
 }
 
-/// What [`turned`] has at (x, y).
+/// Returns the pixel of [`turned`] at (x, y).
 fn turned_at(picture: &Raster<[u8; 3]>, quarters: u32, mut x: u32, mut y: u32) -> [u8; 3] {
     for _ in 0..quarters {
-        // What is at (x, y) now was at (n − 1 − y, x): (right, middle) was (middle, bottom).
+        // The pixel at (x, y) was at (n − 1 − y, x): (right, middle) was (middle, bottom).
         (x, y) = (picture.width() - 1 - y, x);
     }
     picture.at(x, y)
 }
 
-/// A source picture at every size, sampled at pixels of its full one.
+/// A source picture at every size, sampled in pixels of its full size.
 pub(crate) struct SourceMipMap {
     full: Texture,
     reductions: Vec<Raster<[u8; 3]>>,
@@ -145,21 +159,24 @@ impl SourceMipMap {
         Self { reductions, ..Self::without_reductions(image, wrap) }
     }
 
-    /// For footprints of at most a pixel.
+    /// Returns a picture for footprints of at most a pixel.
     fn without_reductions(image: Raster<[u8; 3]>, wrap: [Wrap; 2]) -> Self {
         Self { full: Texture { name: String::new(), image, wrap }, reductions: Vec::new() }
     }
 
-    /// For the fast filter.
+    /// Returns the levels for the fast filter.
     pub(crate) fn levels(&self) -> MipLevels<'_> {
         MipLevels::new(&self.full, &self.reductions)
     }
 
-    /// The colour around a place in pixels (y down), over the footprint with the sides `x` and `y` in pixels.
+    /// Returns the colour around a place in pixels (y down), over the footprint with the sides `x` and `y` in
+    /// pixels.
     #[inline]
     pub(crate) fn sample(&self, at: DVec2, x: DVec2, y: DVec2, filter: &TextureFilter) -> [f32; 3] {
         let size = dvec2(f64::from(self.full.image.width()), f64::from(self.full.image.height()));
-        let (uv, x, y) = (at / size, x / size, y / size);
+        let uv = at / size;
+        let x = x / size;
+        let y = y / size;
         let mip_map = MipMap::new(&self.full, &self.reductions);
         mip_map.sample(dvec2(uv.x, 1.0 - uv.y), dvec2(x.x, -x.y), dvec2(y.x, -y.y), filter)
     }
@@ -179,7 +196,7 @@ mod tests {
         Raster::from_vec(camera.width, camera.height, (0..camera.width * camera.height).map(pixel).collect())
     }
 
-    /// Up and down after a turn by so many quarters to the right.
+    /// Returns a sky box whose upper and lower pictures are turned to the right by `quarters`.
     fn sky_box(quarters: u32, size: u32) -> Vec<Raster<[u8; 3]>> {
         let heading = -f64::from(quarters) * FRAC_PI_2;
         let turns = [
@@ -195,7 +212,7 @@ mod tests {
             .into()
     }
 
-    /// The largest difference to the right colour, all around.
+    /// Returns the largest difference from the expected colour, in all directions.
     fn error(cube: &CubeMap) -> f32 {
         let tiny = DVec3::splat(1e-9);
         let directions = (0..4000).map(|k| {
@@ -260,7 +277,7 @@ mod tests {
             let photo = taken(&Camera::equirectangular(pose().turned(yaw, 0.0), 512));
             let cube = CubeMap::from_equirectangular(&photo, yaw, &pose(), None);
             assert_eq!(cube.size(), 224, "512 · 1.25 / π, in steps of 32");
-            // A turn about an axis 0.03 rad off the vertical is no turn of the heading by as much.
+            // A turn about an axis 0.03 rad off the vertical turns the heading by a slightly different angle.
             let bound = if yaw == 0.0 { 2.0 } else { 4.0 };
             assert!(error(&cube) < bound, "{yaw}: {}", error(&cube));
         }

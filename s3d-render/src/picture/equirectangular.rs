@@ -1,8 +1,8 @@
-//! Cube maps from equirectangular photographs, eight pixels of a row at a time.
+//! Makes cube maps from equirectangular photographs, eight pixels of a row at a time.
 //!
-//! Longitudes and latitudes are arc tangents in `f32`, off by less than 5e-7: in a photograph of 8,192
-//! columns less than a 1000th of a pixel. Near the poles, where a pixel sees many columns, pixels are made
-//! one by one in `f64`, as [`Photograph::color`] makes any.
+//! Longitudes and latitudes are arc tangents in `f32` with an error below 5e-7: less than a 1000th of a pixel
+//! in a photograph of 8,192 columns. Near the poles, where a pixel sees many columns, pixels are made one by
+//! one in `f64` by [`Photograph::color`].
 
 use crate::picture::cube_map::{Band, CubeMap, axes_of, direction_of, place_of, stored_width};
 use crate::picture::cube_sources::SourceMipMap;
@@ -16,23 +16,23 @@ use s3d_geom::{Pose, Raster, Wrap};
 use s3d_simd::{Level, level};
 use std::f64::consts::{PI, TAU};
 
-/// Near its poles a pixel sees many columns of a photograph and few rows: as many samples as keep the rows
-/// apart.
+/// Near the poles a pixel sees many columns of a photograph and few rows, so it takes as many samples as keep
+/// the rows apart.
 const AT_POLES: TextureFilter = TextureFilter { max_taps: 256 };
 
-/// The most columns that a pixel sees where eight are made together. With more samples the weights of the
-/// fast filter, which are rounded down, would darken them.
+/// The most columns that a pixel may see if eight pixels are made together. More samples would darken them,
+/// since the weights of the fast filter are rounded down.
 const FEW_COLUMNS: u32 = 16;
 
 impl CubeMap {
-    /// From an equirectangular photograph, whose columns are longitudes growing to the right and whose rows
-    /// are latitudes from +90° at the top to −90°, upright in the world (+Z up). Its centre column looks
-    /// along the forward axis of `pose` projected to the horizon, turned by `yaw_rad` to the left:
-    /// formats.md's panoramas have 0. With faces of `size` pixels, or of as many as keep what the photograph
-    /// shows.
+    /// Makes a cube map from an equirectangular photograph. Its columns are longitudes that grow to the
+    /// right, its rows are latitudes from +90° at the top to −90°, and it is upright in the world (+Z
+    /// up). Its centre column looks along the forward axis of `pose` projected to the horizon, turned by
+    /// `yaw_rad` to the left; formats.md's panoramas have 0. The faces have `size` pixels, or as many as keep
+    /// the detail of the photograph.
     ///
     /// # Panics
-    /// If the photograph has no pixel.
+    /// If the photograph has no pixels.
     pub fn from_equirectangular(
         photo: &Raster<[u8; 3]>,
         yaw_rad: f64,
@@ -51,15 +51,16 @@ impl CubeMap {
     }
 }
 
-/// A photograph of which a cube map is made.
+/// A photograph that becomes a cube map.
 struct Photograph {
     mip_map: SourceMipMap,
-    /// Its columns and rows.
+    /// The numbers of columns and rows.
     size: [f64; 2],
     pose: Pose,
-    /// The cube's frame → the axes of the photograph: its centre column looks along +X, and +Z is up.
+    /// Turns the cube's frame into the axes of the photograph: its centre column looks along +X, and +Z is
+    /// up.
     turn: DMat3,
-    /// Of the cube's faces.
+    /// The size of the cube's faces.
     face_size: u32,
 }
 
@@ -76,22 +77,25 @@ impl Photograph {
         }
     }
 
-    /// The colour in a direction of the cube's frame with a depth of 1 on its face, over a pixel.
+    /// Returns the colour over a pixel in a direction of the cube's frame; the direction has a depth of 1 on
+    /// its face.
     fn color(&self, d: DVec3) -> [f32; 3] {
-        // A pixel at the depth 1 and the distance r is seen under the angle 2/size · 1/r, across even 1/r².
+        // A pixel at the depth 1 and the distance r is seen under the angle 2/size · 1/r, in one direction
+        // even 1/r².
         let angle = 2.0 / f64::from(self.face_size);
-        let (v, [w, h]) = (self.turn * d, self.size);
+        let v = self.turn * d;
+        let [w, h] = self.size;
         let flat = libm::hypot(v.x, v.y);
         let place = dvec2(0.5 - libm::atan2(v.y, v.x) / TAU, 0.5 - libm::atan2(v.z, flat) / PI);
-        // A circle of latitude shortens towards the pole, where a pixel sees many columns.
+        // A circle of latitude shortens towards the pole, so that a pixel sees many columns there.
         let around = (angle / flat).min(TAU) / TAU * w;
         let along = angle / d.length() / PI * h;
         self.mip_map
             .sample(place * dvec2(w, h), dvec2(around, 0.0), dvec2(0.0, along), &AT_POLES)
     }
 
-    /// One pixel after another: for photographs so large that the lanes' numbers would not do, and what
-    /// tests hold the lanes against.
+    /// Makes the cube map one pixel after another: for photographs that are too large for the numbers of the
+    /// lanes, and as the reference in tests.
     fn pixel_by_pixel(&self) -> CubeMap {
         CubeMap::build(self.pose, self.face_size, |_, _, _, d| Some(self.color(d)))
     }
@@ -109,7 +113,7 @@ impl Photograph {
 struct PhotographKernel<'a> {
     photo: &'a Photograph,
     levels: &'a MipLevels<'a>,
-    /// By column, and eight more: where it is on a face's plane.
+    /// The position of each column on a face's plane, and eight more.
     places: &'a [f32],
     band: Band<'a>,
 }
@@ -122,9 +126,11 @@ impl Kernel for PhotographKernel<'_> {
         let l = simd.shade();
         let Self { photo, levels, places, mut band } = self;
         let (face, first_row, size) = (band.face, band.first_row, photo.face_size);
+
         let [right, down, forward] = axes_of(face);
         let three = |v: DVec3| [l.splat(v.x as f32), l.splat(v.y as f32), l.splat(v.z as f32)];
         let per_column = three(photo.turn * right);
+
         let [w, h] = photo.size;
         let (columns, rows) = (l.splat(w as f32), l.splat(h as f32));
         let (per_turn, per_half) = (l.splat((w / TAU) as f32), l.splat((h / PI) as f32));
@@ -133,17 +139,20 @@ impl Kernel for PhotographKernel<'_> {
         let along_per_angle = l.splat((h * angle / PI) as f32);
         let (zero, half, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
         let mut footprints = Footprints::new(2 * LANES);
+
         for (y, (row, seen)) in (first_row..).zip(band.rows()) {
             seen.fill(255);
             let place = place_of(size, y);
             let start = three(photo.turn * (forward + down * place));
             let rest = l.splat((1.0 + place * place) as f32);
+
             for i in (0..row.len()).step_by(LANES) {
                 let place = eight(l, places, i);
                 let mut v = [zero; 3];
                 for k in 0..3 {
                     v[k] = l.add(l.mul(per_column[k], place), start[k]);
                 }
+
                 let flat = l.sqrt(l.add(l.mul(v[0], v[0]), l.mul(v[1], v[1])));
                 let around = l.div(around_per_angle, flat);
                 if l.greater(l.splat(FEW_COLUMNS as f32), around) != 0xFF {
@@ -153,14 +162,16 @@ impl Kernel for PhotographKernel<'_> {
                     }
                     continue;
                 }
+
                 let distance = l.sqrt(l.add(l.mul(place, place), rest));
                 let along = l.div(along_per_angle, distance);
                 let longitude = l.mul(atan2(l, v[1], v[0]), per_turn);
                 let latitude = l.mul(atan2(l, v[2], flat), per_half);
                 let values = [l.sub(l.mul(half, columns), longitude), l.sub(l.mul(half, rows), latitude)];
                 let seen = Interpolated { values, x: [around, zero], y: [zero, along], doubtful: 0 };
+
                 footprints.store(l, 0, &seen, false);
-                // Of those that may be wide.
+                // All of these pixels may have wide footprints; `wide` tells which do.
                 let wide = l.greater(l.max(around, along), one);
                 let sum = levels.sums(l, &footprints, 0, (0xFF, wide), FEW_COLUMNS);
                 let packed = packed(l, l.channels(sum));
@@ -177,10 +188,10 @@ impl Kernel for PhotographKernel<'_> {
     }
 }
 
-/// The angle of (x, y) from the first axis, −π to π, off by less than 5e-7; 0 of (0, 0).
+/// Returns the angle of (x, y) from the first axis, −π to π, with an error below 5e-7; 0 for (0, 0).
 #[inline(always)]
 fn atan2<L: ShadeLanes>(l: L, y: L::F, x: L::F) -> L::F {
-    // The least greatest error of a·p(a²) for 0 ≤ a ≤ 1: 4e-8.
+    // The coefficients minimise the largest error of a·p(a²) for 0 ≤ a ≤ 1: 4e-8.
     const COEFFICIENTS: [f32; 8] = [
         -0.004_056_03,
         0.021_868_023,
@@ -211,7 +222,7 @@ mod tests {
     use crate::simd::shade_lanes::Plain;
     use proptest::prelude::*;
 
-    /// Noise, turned, and once so small that pixels see several rows.
+    /// Returns noise, turned, as two photographs; in the second case pixels of the cube see several rows.
     fn photographs() -> [Photograph; 2] {
         let pixel = |k: u32| {
             let mut h = k.wrapping_mul(0x9E37_79B1);
@@ -232,8 +243,9 @@ mod tests {
                 assert_eq!(*seen, 255);
                 (0..3).any(|k| color[k].abs_diff(plain[k]) > 1)
             });
-            // Where rounding decides how many samples there are.
-            let (far, all) = (far.count(), cube.texels().count());
+            // Pixels differ where rounding decides how many samples there are.
+            let far = far.count();
+            let all = cube.texels().count();
             assert!(far * 1_000 <= all, "{far} of {all}");
         }
     }
@@ -251,7 +263,8 @@ mod tests {
     proptest! {
         #[test]
         fn arc_tangents_are_right(x in -2.0..2.0f32, y in -2.0..2.0f32, small in prop::array::uniform2(0..30)) {
-            let (x, y) = (x * 0.5f32.powi(small[0]), y * 0.5f32.powi(small[1]));
+            let x = x * 0.5f32.powi(small[0]);
+            let y = y * 0.5f32.powi(small[1]);
             for (x, y) in [(x, y), (x, x), (x, 0.0), (0.0, y)] {
                 let got = atan2(Plain, [y; LANES], [x; LANES])[0];
                 let expected = libm::atan2(f64::from(y), f64::from(x));

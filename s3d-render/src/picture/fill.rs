@@ -1,11 +1,13 @@
-//! Holes in an image, filled from their rims.
+//! Fills the holes of an image from their rims.
 
 use s3d_geom::Raster;
 
-/// Gives every pixel of `image` whose `seen` is 0 a colour from those around it: the nearer, the more.
-/// Neighbours of holes can then be filtered without a rim. An image of which nothing is seen stays as it is.
+/// Gives every pixel of `image` whose `seen` is 0 a colour from the pixels around it; nearer pixels count
+/// more. Neighbours of holes can then be filtered without a visible rim. An image of which nothing is seen
+/// stays as it is.
 pub(crate) fn fill_unseen(image: &mut Raster<[u8; 3]>, seen: &Raster<u8>) {
-    let (w, h) = (image.width(), image.height());
+    let w = image.width();
+    let h = image.height();
     let half = filled(half_of(w, h, |at| match seen.pixels()[at] {
         0 => [0.0; 4],
         _ => {
@@ -13,6 +15,7 @@ pub(crate) fn fill_unseen(image: &mut Raster<[u8; 3]>, seen: &Raster<u8>) {
             [r, g, b, 1.0]
         }
     }));
+
     for y in 0..h {
         for x in 0..w {
             let at = y as usize * w as usize + x as usize;
@@ -26,9 +29,11 @@ pub(crate) fn fill_unseen(image: &mut Raster<[u8; 3]>, seen: &Raster<u8>) {
     }
 }
 
-/// Colours with weights 0 or 1; what has none takes it from the image at half the size, bilinearly.
+/// Fills an image of colours with the weights 0 or 1: a pixel without weight takes the colour of the image at
+/// half the size, bilinearly.
 fn filled(mut image: Raster<[f32; 4]>) -> Raster<[f32; 4]> {
-    let (w, h) = (image.width(), image.height());
+    let w = image.width();
+    let h = image.height();
     if (w <= 1 && h <= 1) || image.pixels().iter().all(|c| c[3] > 0.0) {
         return image;
     }
@@ -44,9 +49,10 @@ fn filled(mut image: Raster<[f32; 4]>) -> Raster<[f32; 4]> {
     image
 }
 
-/// An image of w × h at half the size: means of what has a weight.
+/// Halves an image of w × h: each pixel is the mean of the pixels with a weight.
 fn half_of(w: u32, h: u32, color: impl Fn(usize) -> [f32; 4]) -> Raster<[f32; 4]> {
-    let (half_w, half_h) = (w.div_ceil(2), h.div_ceil(2));
+    let half_w = w.div_ceil(2);
+    let half_h = h.div_ceil(2);
     let mut half = Vec::with_capacity(half_w as usize * half_h as usize);
     for y in 0..half_h {
         for x in 0..half_w {
@@ -63,23 +69,28 @@ fn half_of(w: u32, h: u32, color: impl Fn(usize) -> [f32; 4]) -> Raster<[f32; 4]
     Raster::from_vec(half_w, half_h, half)
 }
 
-/// What an image at half the size has at pixel (x, y) of the full one: three quarters of the pixel that
-/// covers it, a quarter of the next one on its side, in either direction.
+/// Returns the colour of an image at half the size for pixel (x, y) of the full one. In either direction, the
+/// pixel that covers it counts three quarters, and the next one on its side a quarter.
 fn between(half: &Raster<[f32; 4]>, x: u32, y: u32) -> [f32; 4] {
-    let next = |i: u32, n: u32| {
-        if i % 2 == 1 {
-            (i / 2 + 1).min(n - 1)
-        } else {
-            (i / 2).saturating_sub(1)
-        }
-    };
-    let (x0, x1, y0, y1) = (x / 2, next(x, half.width()), y / 2, next(y, half.height()));
+    let x0 = x / 2;
+    let x1 = next_half(x, half.width());
+    let y0 = y / 2;
+    let y1 = next_half(y, half.height());
     let corners = [half.at(x0, y0), half.at(x1, y0), half.at(x0, y1), half.at(x1, y1)];
     let mut color = [0.0; 4];
     for (corner, weight) in corners.into_iter().zip([0.5625, 0.1875, 0.1875, 0.0625]) {
         (0..4).for_each(|k| color[k] += weight * corner[k]);
     }
     color
+}
+
+/// Returns the pixel of a half-size row of `n` pixels that is next to pixel `i` of the full row.
+fn next_half(i: u32, n: u32) -> u32 {
+    if i % 2 == 1 {
+        (i / 2 + 1).min(n - 1)
+    } else {
+        (i / 2).saturating_sub(1)
+    }
 }
 
 #[cfg(test)]
@@ -89,7 +100,7 @@ mod tests {
 
     #[test]
     fn a_hole_takes_the_colours_of_its_rim() {
-        // Left 10, right 110, a hole in between.
+        // 10 on the left, 110 on the right, a hole in between.
         let seen = Raster::from_vec(
             16,
             4,

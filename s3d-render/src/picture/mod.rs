@@ -1,4 +1,4 @@
-//! Colours from pictures: cube maps, what they are made from, and how an image samples them.
+//! Colours from pictures: cube maps, their sources, and the images that sample them.
 
 pub(crate) mod cube_map;
 pub(crate) mod cube_sources;

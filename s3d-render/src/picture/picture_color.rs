@@ -1,9 +1,9 @@
-//! The RGB image from pictures: colours of a cube map where the mesh is seen.
+//! Makes the RGB image from pictures: where the mesh is seen, the colours of a cube map.
 //!
-//! As in [`crate::shade::color`] eight pixels go together, and their footprints are filtered by
-//! [`crate::shade::filter`]: a face of the cube is a texture whose coordinates are ratios of linear functions
-//! of the ray's direction. Those directions are unit vectors, or of unit depth, so that `f32` does without an
-//! anchor: a place in a face of 4,096 pixels is off by less than a 500th of a pixel.
+//! As in [`crate::shade::color`], eight pixels are handled together, and [`crate::shade::filter`] filters
+//! their footprints. A face of the cube is a texture whose coordinates are ratios of linear functions of the
+//! ray's direction. These directions have unit length or unit depth, so that `f32` suffices without an
+//! anchor: in a face of 4,096 pixels, the error is less than a 500th of a pixel.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::picture::cube_map::{AXES, CubeMap, FaceAxes};
@@ -15,24 +15,26 @@ use crate::shade::filter::{Footprints, MipLevels};
 use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
 use crate::simd::{Kernel, Simd, dispatch};
-use glam::DVec3;
+use glam::{DMat3, DVec2, DVec3};
 use s3d_geom::{Camera, Raster, Rays};
 use s3d_simd::level;
+use std::f64::consts::{PI, TAU};
 
-/// What a pixel of the mesh shows that no picture shows.
+/// The colour of a pixel that sees the mesh where no picture shows it.
 #[derive(Clone, Copy, Debug)]
 pub enum Unseen<'a> {
     /// The mesh's own colour.
     Mesh(&'a Scene<'a>, &'a MipMaps),
-    /// What pictures show around the hole, blurred into it.
+    /// The colours of the pictures around the hole, blurred into it.
     Nearby,
 }
 
-/// The colours of the pixels that see the mesh, from pictures; black where there is no mesh, and there alone:
-/// a dark pixel is at least (1, 1, 1). The camera stands where the cube map was made, or parallax shows.
+/// Returns the colours of the pixels that see the mesh, from pictures. A pixel is black if and only if it
+/// sees no mesh: a dark pixel is at least (1, 1, 1). The camera must stand where the cube map was made, or
+/// parallax shows.
 ///
 /// # Panics
-/// If the hits are not of the camera's size, or the mip_maps are another mesh's.
+/// If the hits are not of the camera's size, or `mip_maps` are another mesh's.
 pub fn picture_image(
     cube: &CubeMap,
     unseen: Unseen<'_>,
@@ -45,10 +47,10 @@ pub fn picture_image(
     out
 }
 
-/// As [`picture_image`], into an image that is used again.
+/// Writes the image of [`picture_image`] into an existing image.
 ///
 /// # Panics
-/// As [`picture_image`].
+/// As for [`picture_image`].
 pub fn picture_image_into(
     cube: &CubeMap,
     unseen: Unseen<'_>,
@@ -59,20 +61,24 @@ pub fn picture_image_into(
 ) {
     assert_size(hits, camera);
     fit(out, &hits.face, [0; 3]);
+
     let Unseen::Mesh(scene, mip_maps) = unseen else {
         dispatch(PictureKernel { cube, hits, camera, filter, out, shown: None });
         return;
     };
+
     if !cube.has_holes() {
         dispatch(PictureKernel { cube, hits, camera, filter, out, shown: None });
         return;
     }
+
     let mut shown = Raster::filled(out.width(), out.height(), 255u8);
     dispatch(PictureKernel { cube, hits, camera, filter, out, shown: Some(&mut shown) });
     if shown.pixels().iter().all(|&s| s == 255) {
         return;
     }
-    // The mesh where it shows.
+
+    // Colour the mesh where it shows through the holes.
     let mut face = hits.face.clone();
     for (face, _) in face
         .pixels_mut()
@@ -82,6 +88,7 @@ pub fn picture_image_into(
     {
         *face = NO_FACE;
     }
+
     let mut mesh = Raster::filled(0, 0, [0; 3]);
     rgb_of_faces_into(level(), scene, mip_maps, &face, camera, filter, &mut mesh);
     for ((pixel, &mesh), &shown) in out.pixels_mut().iter_mut().zip(mesh.pixels()).zip(shown.pixels()) {
@@ -91,7 +98,7 @@ pub fn picture_image_into(
     }
 }
 
-/// `shown` 255ths of `picture`, the rest of `mesh`; not black if one of them is not.
+/// Mixes `shown` 255ths of `picture` with the rest of `mesh`. The result is not black unless both are.
 fn mixed(picture: [u8; 3], mesh: [u8; 3], shown: u8) -> [u8; 3] {
     let shown = u32::from(shown);
     let color: [u8; 3] = std::array::from_fn(|k| {
@@ -110,7 +117,7 @@ struct PictureKernel<'a> {
     camera: &'a Camera,
     filter: &'a TextureFilter,
     out: &'a mut Raster<[u8; 3]>,
-    /// How much of a pixel a picture shows, if that is asked.
+    /// How much of each pixel a picture shows, if that is wanted.
     shown: Option<&'a mut Raster<u8>>,
 }
 
@@ -129,21 +136,21 @@ impl Kernel for PictureKernel<'_> {
     }
 }
 
-/// The directions of an image's pixels in the cube's frame: what belongs to a column and what to a row, in a
-/// panorama multiplied, and added.
+/// The directions of an image's pixels in the cube's frame, as a part by column and a part by row. In a
+/// panorama, the column's part is multiplied by a factor of the row first; then the row's part is added.
 struct CubeRays {
-    /// By axis and column; two groups more.
+    /// By axis and column, with room for two more groups.
     columns: [Vec<f32>; 3],
-    /// How `columns` change from column to column.
+    /// The change of `columns` from column to column.
     slopes: [Vec<f32>; 3],
     rows: Vec<RowFactors>,
-    /// Whether it is a panorama's.
+    /// Whether the image is a panorama.
     is_panorama: bool,
 }
 
 #[derive(Clone, Copy)]
 struct RowFactors {
-    /// What columns are multiplied by, and what is added then; 1 in a perspective view.
+    /// The factor of the columns and the vector that is added; the factor is 1 in a perspective view.
     scale: f32,
     add: [f32; 3],
     /// The same for the change from row to row.
@@ -158,62 +165,71 @@ fn narrow(v: DVec3) -> [f32; 3] {
 impl CubeRays {
     fn new(cube: &CubeMap, camera: &Camera) -> Self {
         let turn = cube.frame_from_world();
-        let (w, h) = (camera.width, camera.height);
-        let spread = |values: &dyn Fn(u32) -> DVec3| -> [Vec<f32>; 3] {
-            let all: Vec<[f32; 3]> = (0..w).map(|i| narrow(values(i))).collect();
-            std::array::from_fn(|k| {
-                // The last column again beyond the end, so that the padding has a direction too.
-                let last = all.last().map_or(0.0, |c| c[k]);
-                all.iter()
-                    .map(|c| c[k])
-                    .chain(std::iter::repeat_n(last, 2 * LANES))
-                    .collect()
-            })
-        };
+        let size = [camera.width, camera.height];
         match camera.rays() {
             Rays::Perspective { x_step, y_step, origin } => {
-                let (x, y, o) = (turn * x_step, turn * y_step, turn * origin);
-                let row = |j: u32| RowFactors {
-                    scale: 1.0,
-                    add: narrow(o + y * (f64::from(j) + 0.5)),
-                    slope_scale: 0.0,
-                    slope_add: narrow(y),
-                };
-                Self {
-                    columns: spread(&|i| x * (f64::from(i) + 0.5)),
-                    is_panorama: false,
-                    slopes: spread(&|_| x),
-                    rows: (0..h).map(row).collect(),
-                }
+                Self::of_view(size, turn * x_step, turn * y_step, turn * origin)
             }
-            Rays::Equirectangular { columns, rows } => {
-                use std::f64::consts::{PI, TAU};
-                let up = turn * DVec3::Z;
-                let (right, down) = (TAU / f64::from(w), PI / f64::from(h));
-                let row = |j: u32| {
-                    let r = rows[j as usize];
-                    // Longitude grows to the right and azimuth to the left; latitude falls.
-                    RowFactors {
-                        scale: r.x as f32,
-                        add: narrow(up * r.y),
-                        slope_scale: (r.y * down) as f32,
-                        slope_add: narrow(up * (-r.x * down)),
-                    }
-                };
-                let column = |i: u32| turn * columns[i as usize].extend(0.0);
-                let slope = |i: u32| {
-                    let c = columns[i as usize];
-                    turn * DVec3::new(c.y, -c.x, 0.0) * right
-                };
-                Self {
-                    columns: spread(&column),
-                    is_panorama: true,
-                    slopes: spread(&slope),
-                    rows: (0..h).map(row).collect(),
-                }
-            }
+            Rays::Equirectangular { columns, rows } => Self::of_panorama(size, turn, &columns, &rows),
         }
     }
+
+    /// Returns the directions of a perspective view, from the steps and the origin in the cube's frame.
+    fn of_view([width, height]: [u32; 2], x_step: DVec3, y_step: DVec3, origin: DVec3) -> Self {
+        let row = |j: u32| RowFactors {
+            scale: 1.0,
+            add: narrow(origin + y_step * (f64::from(j) + 0.5)),
+            slope_scale: 0.0,
+            slope_add: narrow(y_step),
+        };
+        Self {
+            columns: by_axis(width, |i| x_step * (f64::from(i) + 0.5)),
+            slopes: by_axis(width, |_| x_step),
+            rows: (0..height).map(row).collect(),
+            is_panorama: false,
+        }
+    }
+
+    /// Returns the directions of a panorama, from the unit vectors of its columns and rows in the world.
+    fn of_panorama([width, height]: [u32; 2], turn: DMat3, columns: &[DVec2], rows: &[DVec2]) -> Self {
+        let up = turn * DVec3::Z;
+        let right = TAU / f64::from(width);
+        let down = PI / f64::from(height);
+
+        // Longitude grows to the right and azimuth to the left; latitude falls.
+        let row = |j: u32| {
+            let r = rows[j as usize];
+            RowFactors {
+                scale: r.x as f32,
+                add: narrow(up * r.y),
+                slope_scale: (r.y * down) as f32,
+                slope_add: narrow(up * (-r.x * down)),
+            }
+        };
+        let slope = |i: u32| {
+            let c = columns[i as usize];
+            turn * DVec3::new(c.y, -c.x, 0.0) * right
+        };
+        Self {
+            columns: by_axis(width, |i| turn * columns[i as usize].extend(0.0)),
+            slopes: by_axis(width, slope),
+            rows: (0..height).map(row).collect(),
+            is_panorama: true,
+        }
+    }
+}
+
+/// Returns the vectors of some columns by axis. The last column is repeated beyond the end, so that the
+/// padding has a direction, too.
+fn by_axis(columns: u32, vector: impl Fn(u32) -> DVec3) -> [Vec<f32>; 3] {
+    let all: Vec<[f32; 3]> = (0..columns).map(|i| narrow(vector(i))).collect();
+    std::array::from_fn(|k| {
+        let last = all.last().map_or(0.0, |c| c[k]);
+        all.iter()
+            .map(|c| c[k])
+            .chain(std::iter::repeat_n(last, 2 * LANES))
+            .collect()
+    })
 }
 
 impl PictureKernel<'_> {
@@ -233,6 +249,7 @@ impl PictureKernel<'_> {
             shown: vec![255; width + 2 * LANES],
             wants_shown: shown.is_some(),
         };
+
         for (j, faces) in hits.face.rows().enumerate() {
             painter.shown.fill(255);
             painter.row::<PANORAMA>(grid, j, faces);
@@ -251,7 +268,7 @@ impl PictureKernel<'_> {
     }
 }
 
-/// A direction of the cube's frame along a face's right, down and forward.
+/// Splits a direction of the cube's frame along a face's right, down and forward.
 #[inline(always)]
 fn on_face<L: ShadeLanes>(l: L, face: usize, v: &[L::F; 3]) -> [L::F; 3] {
     let FaceAxes { right, down, forward } = AXES[face];
@@ -271,9 +288,9 @@ struct PicturePainter<'a, L> {
     cube: &'a CubeMap,
     levels: &'a [MipLevels<'a>; 6],
     max_taps: u32,
-    /// From places on a face's plane to pixels: what is added, then multiplied.
+    /// The offset and the factor from places on a face's plane to pixels: the offset is added first.
     place: (f64, f64),
-    /// Of one group.
+    /// The footprints of one group.
     footprints: Footprints,
     colors: Vec<[u8; 3]>,
     shown: Vec<u8>,
@@ -281,16 +298,19 @@ struct PicturePainter<'a, L> {
 }
 
 impl<L: ShadeLanes> PicturePainter<'_, L> {
+    /// Colours a row.
     #[inline(always)]
     fn row<const PANORAMA: bool>(&mut self, grid: &CubeRays, j: usize, faces: &[u32]) {
         let l = self.lanes;
         let row = grid.rows[j];
         let (scale, slope_scale) = (l.splat(row.scale), l.splat(row.slope_scale));
+
         for i in (0..faces.len()).step_by(LANES) {
             let group = &faces[i..faces.len().min(i + LANES)];
             if group.iter().all(|&face| face == NO_FACE) {
                 continue;
             }
+
             let mut direction = [l.splat(0.0); 3];
             let (mut along, mut down) = (direction, direction);
             for k in 0..3 {
@@ -311,7 +331,7 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
         }
     }
 
-    /// The pixels from `i` on, the first `some` of them in the image.
+    /// Colours the pixels from `i` on. The first `some` of them are in the image.
     #[inline(always)]
     fn group(&mut self, i: usize, some: usize, direction: &[L::F; 3], along: &[L::F; 3], down: &[L::F; 3]) {
         let l = self.lanes;
@@ -320,10 +340,11 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
         for c in [&mut x, &mut y, &mut z] {
             *c = l.max(*c, l.sub(zero, *c));
         }
-        // As `face_of` has it: of equal ones the earlier.
+        // The earlier axis wins a tie, as in `face_of`.
         let is_x = !(l.greater(y, x) | l.greater(z, x)) & 0xFF;
         let is_y = !is_x & !l.greater(z, y) & 0xFF;
         let is_z = !is_x & !is_y & 0xFF;
+
         let mut left = 0xFFu32;
         while left != 0 {
             let lane = 1 << left.trailing_zeros();
@@ -334,6 +355,7 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
             } else {
                 (2, is_z)
             };
+
             let negative = l.greater(zero, direction[axis]);
             let (face, these) = if negative & lane != 0 {
                 ([3, 0, 2][axis], whole & negative)
@@ -346,7 +368,7 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
         }
     }
 
-    /// Those pixels of a group that are among `these`, which all look through one face. `directions` and
+    /// Colours the pixels of a group that are in `these`; all of them look through one face. `directions` and
     /// their changes to the next column and row are in the face's axes.
     #[inline(always)]
     fn face(&mut self, face: usize, i: usize, some: usize, these: u32, directions: &[[L::F; 3]; 3]) {
@@ -356,6 +378,7 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
         let place = [l.mul(right, inverse), l.mul(down, inverse)];
         let (offset, scale) = (l.splat(self.place.0 as f32), l.splat(self.place.1 as f32));
         let per_step = l.mul(inverse, scale);
+
         // (u / m)' = (u' − u / m · m') / m
         let (mut values, mut x, mut y) = (place, place, place);
         for k in 0..2 {
@@ -363,10 +386,12 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
             x[k] = l.mul(l.sub(along[k], l.mul(place[k], along[2])), per_step);
             y[k] = l.mul(l.sub(below[k], l.mul(place[k], below[2])), per_step);
         }
+
         let seen = Interpolated { values, x, y, doubtful: 0 };
         let levels = &self.levels[face];
         self.footprints.store(l, 0, &seen, false);
         let colors = levels.colors(l, &self.footprints, 0, (these, these), self.max_taps);
+
         let to = self.colors[i..].as_flattened_mut().first_chunk_mut();
         if let (0xFF, Some(to)) = (these, to) {
             l.store_pixels(&colors, to);
@@ -378,6 +403,7 @@ impl<L: ShadeLanes> PicturePainter<'_, L> {
                 }
             }
         }
+
         if self.wants_shown && self.cube.has_holes_in(face) {
             let [mut x, mut y] = [[0.0; LANES]; 2];
             l.store(values[0], &mut x);
@@ -409,7 +435,7 @@ mod tests {
         )
     }
 
-    /// Noise, and a hole below.
+    /// Returns a cube map of noise; if `hole`, with a hole below.
     fn noise(hole: bool) -> CubeMap {
         CubeMap::build(pose(), 256, |face, x, y, d| {
             let mut h = (face as u32 * 7919 + x * 104_729 + y * 1_299_709).wrapping_mul(0x9E37_79B1);
@@ -423,7 +449,7 @@ mod tests {
         [
             Camera::perspective(pose().turned(0.3, -0.4), 1.2, 301, 203),
             Camera::perspective(pose().turned(2.0, -0.6), 0.2, 67, 65),
-            // Far smaller than the cube map.
+            // Much smaller than the cube map.
             Camera::perspective(pose().turned(-0.8, 0.2), 2.4, 37, 31),
             Camera::pinhole(pose(), glam::dvec2(90.0, 140.0), glam::dvec2(-9.0, 71.5), 130, 99).unwrap(),
             Camera::equirectangular(pose(), 256),
@@ -431,7 +457,7 @@ mod tests {
         ]
     }
 
-    /// A room without its ceiling.
+    /// Returns a room without its ceiling.
     fn open_room() -> TriMesh {
         let mut parts = furnished_room(3).into_parts();
         let high = |f: &[u32; 3]| f.iter().all(|&v| parts.positions[v as usize].z > 2.4);
@@ -456,14 +482,17 @@ mod tests {
         for camera in cameras() {
             let hits = cast(&scene, &camera);
             let image = picture_image(&cube, Unseen::Nearby, &hits, &camera, &filter);
-            let (mut far, mut seen) = (0, 0);
+            let mut far = 0;
+            let mut seen = 0;
             for (x, y) in (0..camera.width * camera.height).map(|k| (k % camera.width, k / camera.width)) {
-                let (fx, fy) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+                let fx = f64::from(x) + 0.5;
+                let fy = f64::from(y) + 0.5;
                 let pixel = image.at(x, y);
                 if hits.face.at(x, y) == NO_FACE {
                     assert_eq!(pixel, [0; 3]);
                     continue;
                 }
+
                 let around = |dx: f64, dy: f64| camera.direction(fx + dx, fy + dy);
                 let (along, down) =
                     (around(0.5, 0.0) - around(-0.5, 0.0), around(0.0, 0.5) - around(0.0, -0.5));
@@ -472,7 +501,8 @@ mod tests {
                 seen += 1;
                 far += usize::from((0..3).any(|k| (f32::from(pixel[k]) - color[k]).abs() > 1.6));
             }
-            // Where rounding decides how many samples there are, or on which face a seam's pixel is.
+            // Pixels differ where rounding decides how many samples there are, or to which face a pixel at a
+            // seam belongs.
             assert!(seen > 500 && far * 200 <= seen, "{far} of {seen} in {camera:?}");
         }
     }
@@ -480,7 +510,8 @@ mod tests {
     #[test]
     fn holes_show_the_mesh_or_what_is_around() {
         let mesh = furnished_room(3);
-        let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+        let scene = Scene::new(&mesh);
+        let mip_maps = MipMaps::new(&mesh);
         let camera = Camera::equirectangular(pose(), 256);
         let hits = cast(&scene, &camera);
         let filter = TextureFilter::default();
@@ -501,13 +532,16 @@ mod tests {
     fn every_level_of_instructions_gives_the_same_bytes() {
         let mesh = open_room();
         let scene = Scene::new(&mesh);
-        let (cube, filter) = (noise(true), TextureFilter::default());
+        let cube = noise(true);
+        let filter = TextureFilter::default();
         for camera in cameras() {
             let hits = cast(&scene, &camera);
             let images = Level::all().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 let mut shown = Raster::filled(camera.width, camera.height, 0);
-                let (cube, hits, filter) = (&cube, &hits, &filter);
+                let cube = &cube;
+                let hits = &hits;
+                let filter = &filter;
                 let shown_out = Some(&mut shown);
                 let kernel =
                     PictureKernel { cube, hits, camera: &camera, filter, out: &mut out, shown: shown_out };

@@ -1,14 +1,14 @@
-//! Cube maps from captures: pictures of real cameras that overlap, from about one place.
+//! Makes cube maps from captures: overlapping pictures of real cameras, from about one place.
 //!
-//! A pixel of the cube takes the mean of the captures that see it, each with a weight that falls smoothly to
-//! 0 towards the border of its picture, so that no seam shows. Before that, each capture's exposure is
-//! brought to that of the others: one factor a channel, by least squares over what they see in common.
+//! A pixel of the cube is the mean of the captures that see it. Each capture has a weight that falls smoothly
+//! to 0 towards the border of its picture, so that no seam shows. Before that, the exposures of the captures
+//! are matched: one factor a channel, by least squares over the parts that captures share.
 //!
-//! **Parallax.** The cameras of a scanner turn about its axis and stand some centimetres from it, and from
-//! each other. With the mesh of the scene a pixel of the cube looks up the point that it sees, and takes it
-//! from those captures in which no other surface hides it. Without, or where there is no mesh, all stand at
-//! the centre: off by their distance from it over the distance of what is seen, 2 cm at 2 m being ten pixels
-//! of 1,000 a radian.
+//! **Parallax.** The cameras of a scanner turn about its axis, and stand some centimetres from it and from
+//! each other. With the mesh of the scene, a pixel of the cube looks up the point that it sees, and takes its
+//! colour from the captures in which no other surface hides the point. Without the mesh, or beside it, all
+//! cameras are taken to stand at the centre. The error is then their distance from the centre over the
+//! distance of the point: 2 cm at 2 m are ten pixels of 1,000 a radian.
 
 use crate::picture::cube_map::{CubeMap, face_cameras};
 use crate::picture::cube_sources::SourceMipMap;
@@ -21,39 +21,40 @@ use rayon::prelude::*;
 use s3d_geom::{Camera, Lens, Pose, Raster, Wrap};
 use s3d_simd::{Level, level};
 
-/// How far behind the nearest surface a point may be and still be seen: a part of its depth, and metres.
+/// How far behind the nearest surface a visible point may be: a part of its depth, and metres.
 const BEHIND: (f32, f32) = (0.01, 0.02);
 
-/// Pixels across the images that tell what hides what.
+/// The width in pixels of the depth images that tell which points are hidden.
 const DEPTH_WIDTH: u32 = 640;
 
-/// A face of the cube in which captures are compared.
+/// The width of a cube face in pixels when captures are compared.
 const GAIN_SIZE: u32 = 64;
 
-/// How far a factor may well be from 1, and how far colours of one thing are apart in two captures, 0 to 255.
+/// The standard deviation of a factor from 1, and the standard deviation of one point's colour between two
+/// captures, 0 to 255.
 const GAIN_DEVIATION: f64 = 1.0;
 const COLOR_DEVIATION: f64 = 10.0;
 
-/// Darker and brighter colours tell nothing of exposure.
+/// The colours that tell anything about exposure: not too dark and not too bright.
 const TELLING: std::ops::RangeInclusive<f32> = 8.0..=247.0;
 
 /// A picture and the camera that took it.
 #[derive(Clone, Debug)]
 pub struct Capture {
-    /// The picture, of the lens's size.
+    /// The picture; it has the lens's size.
     pub image: Raster<[u8; 3]>,
     /// The camera's lens.
     pub lens: Lens,
-    /// Where the camera was; in the project's axes, as all poses.
+    /// The place and direction of the camera in the project's axes.
     pub pose: Pose,
 }
 
 /// How captures become a cube map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StitchOptions {
-    /// Width of a face in pixels; what keeps the sharpest capture's pixels if it is not said.
+    /// The width of a face in pixels. `None` keeps the resolution of the sharpest capture.
     pub size: Option<u32>,
-    /// Whether exposures are brought together.
+    /// Whether exposures are matched.
     pub gains: bool,
 }
 
@@ -63,12 +64,12 @@ impl Default for StitchOptions {
     }
 }
 
-/// The cube map around `pose` (E(original) of the location) of captures taken about there. With `scene`
-/// parallax is taken into account; see the module. What no capture sees is a hole. On all threads of the
-/// current pool.
+/// Makes the cube map around `pose` (E(original) of the location) from captures taken near it. With `scene`,
+/// parallax is taken into account, as the module explains. Directions that no capture sees are holes. Runs on
+/// all threads of the current rayon pool.
 ///
 /// # Panics
-/// If there is no capture, or a picture is not of its lens's size.
+/// If there is no capture, or a picture does not have its lens's size.
 pub fn stitch(
     captures: Vec<Capture>,
     pose: &Pose,
@@ -84,7 +85,7 @@ pub fn stitch(
     }
 }
 
-/// All that the pixels of the cube are made from.
+/// The data from which the pixels of the cube are made.
 struct Stitch {
     pose: Pose,
     size: u32,
@@ -102,17 +103,20 @@ impl Stitch {
             .map(|c| c.lens.focal_px().max_element())
             .fold(0.0, f64::max);
         let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
+
         let world_from_frame = pose.opencv_from_world().transpose();
         let views: Vec<PreparedCapture> = captures
             .into_par_iter()
             .map(|c| PreparedCapture::new(c, pose, scene))
             .collect();
+
         let gains = if options.gains && views.len() > 1 {
             let depths = SceneDepths::new(pose, GAIN_SIZE, scene);
             gains(&views, GAIN_SIZE, &depths, world_from_frame)
         } else {
             vec![[1.0; 3]; views.len()]
         };
+
         let depths = SceneDepths::new(pose, size, scene);
         Self { pose: *pose, size, world_from_frame, views, gains, depths }
     }
@@ -130,13 +134,14 @@ impl Stitch {
         })
     }
 
-    /// The same in `f64`, one pixel after another: for pictures that do not suit the lanes, and what
-    /// tests hold them against.
+    /// Makes the same cube map in `f64`, one pixel after another: for pictures that do not suit the lanes,
+    /// and as the reference in tests.
     fn pixel_by_pixel(&self) -> CubeMap {
         CubeMap::build(self.pose, self.size, |face, x, y, d| {
             let depth = self.depths.depth(face, x, y);
             let ray = CubeRay { direction: self.world_from_frame * d, depth, size: self.size, whole: false };
-            let (mut sum, mut total) = ([0.0f32; 3], 0.0f32);
+            let mut sum = [0.0f32; 3];
+            let mut total = 0.0f32;
             for (view, gain) in self.views.iter().zip(&self.gains) {
                 if let Some((color, weight)) = view.sees(&ray) {
                     (0..3).for_each(|k| sum[k] += weight * gain[k] * color[k]);
@@ -148,7 +153,7 @@ impl Stitch {
     }
 }
 
-/// The depths of the scene behind each pixel of the cube, infinite where there is nothing.
+/// The depths of the scene behind each pixel of the cube, infinite where there is none.
 struct SceneDepths(Option<Vec<Raster<f32>>>);
 
 impl SceneDepths {
@@ -168,30 +173,30 @@ impl SceneDepths {
     }
 }
 
-/// What a pixel of the cube looks at.
+/// The ray of a pixel of the cube.
 struct CubeRay {
-    /// In the world, with a depth of 1 on its face.
+    /// The direction in the world, with a depth of 1 on its face.
     direction: DVec3,
-    /// How far on that direction there is a surface, if that is known.
+    /// The depth of the surface in that direction, if it is known.
     depth: Option<f64>,
-    /// Of the cube's faces.
+    /// The size of the cube's faces.
     size: u32,
-    /// Whether a capture counts only if all of the pixel is within its picture.
+    /// Whether a capture counts only if its picture contains all of the pixel.
     whole: bool,
 }
 
-/// A capture, prepared.
+/// A prepared capture.
 struct PreparedCapture {
     picture: SourceMipMap,
     lens: Lens,
     /// World → the camera's OpenCV axes.
     camera_from_world: DMat3,
-    /// From the camera to the cube's centre, world.
+    /// From the camera to the cube's centre, in the world.
     center: DVec3,
     forward: DVec3,
-    /// The tangent of the angle from its axis beyond which it sees nothing.
+    /// The tangent of the largest angle from the axis at which the camera sees anything.
     reach: f64,
-    /// How deep it sees into the scene.
+    /// How deep the camera sees into the scene.
     limits: Option<DepthLimits>,
 }
 
@@ -203,12 +208,14 @@ impl PreparedCapture {
             (lens.width(), lens.height()),
             "a picture has its lens's size"
         );
+
         let reach = lens.reach();
         let limits = scene.map(|scene| {
             let camera = Camera::perspective(own, 2.0 * libm::atan(1.01 * reach), DEPTH_WIDTH, DEPTH_WIDTH);
             let limits = depth_limits(&cast(scene, &camera).depth);
             DepthLimits { limits, focal: camera.focal_px().x as f32 }
         });
+
         Self {
             picture: SourceMipMap::new(image, [Wrap::Clamp; 2]),
             lens,
@@ -232,20 +239,24 @@ impl PreparedCapture {
         }
     }
 
-    /// The colour that the capture has of what a ray sees, and its weight.
+    /// Returns the colour that the capture shows along a ray, and its weight. Returns `None` if it does not
+    /// show it.
     fn sees(&self, ray: &CubeRay) -> Option<([f32; 3], f32)> {
         let direction = match (&self.limits, ray.depth) {
             (Some(_), Some(depth)) => self.center + ray.direction * depth,
             _ => ray.direction,
         };
-        let (depth, length_2) = (self.forward.dot(direction), direction.length_squared());
+        let depth = self.forward.dot(direction);
+        let length_2 = direction.length_squared();
         if depth <= 0.0 || length_2 > (1.0 + self.reach * self.reach) * depth * depth {
             return None;
         }
+
         let v = self.camera_from_world * direction;
         let pixel = self.lens.project(v)?;
-        // A pixel of the cube is 2/size wide at the depth 1; distortion hardly changes how much of the
-        // picture that is.
+
+        // A pixel of the cube is 2/size wide at the depth 1. Distortion hardly changes the part of the
+        // picture that it covers.
         let step = ray.direction.length() * 2.0 / f64::from(ray.size) / ray.direction.length_squared();
         let along = self.lens.focal_px() * (step * length_2.sqrt() / v.z);
         let size = dvec2(f64::from(self.lens.width()), f64::from(self.lens.height()));
@@ -257,9 +268,11 @@ impl PreparedCapture {
         if !(pixel.cmpgt(border) & pixel.cmplt(size - border)).all() {
             return None;
         }
+
         if ray.depth.is_some() && self.is_hidden(v) {
             return None;
         }
+
         // 1 in the middle of the picture and 0 at its border, along either axis.
         let inner = 1.0 - (2.0 * pixel / size - 1.0) * (2.0 * pixel / size - 1.0);
         let weight = inner.x * inner.y;
@@ -269,21 +282,24 @@ impl PreparedCapture {
         Some((color, (weight * weight) as f32))
     }
 
-    /// Whether something is in front of the point at `v`, in the camera's axes.
+    /// Tells whether something is in front of the point `v`, in the camera's axes.
     fn is_hidden(&self, v: DVec3) -> bool {
         let Some(DepthLimits { limits, focal }) = &self.limits else { return false };
         let middle = 0.5 * f64::from(limits.width());
         let at = dvec2(v.x, v.y) * (f64::from(*focal) / v.z) + middle;
         let last = f64::from(limits.width() - 1);
-        let (x, y) = (at.x.clamp(0.0, last) as u32, at.y.clamp(0.0, last) as u32);
+        let x = at.x.clamp(0.0, last) as u32;
+        let y = at.y.clamp(0.0, last) as u32;
         v.z > f64::from(limits.at(x, y))
     }
 }
 
-/// By the upper left one of four neighbouring pixels of a depth image: how deep a point between them may be
-/// and be seen. That is what is behind the farthest: at an edge both sides may be seen.
+/// Returns, for every four neighbouring pixels of a depth image, how deep a visible point between them may
+/// be. A point is hidden if it is behind the farthest of the four, so that both sides of an edge count as
+/// visible. Indexed by the upper left pixel.
 fn depth_limits(depths: &Raster<f32>) -> Raster<f32> {
-    let (columns, rows) = (depths.width() - 1, depths.height() - 1);
+    let columns = depths.width() - 1;
+    let rows = depths.height() - 1;
     let mut limits = Vec::with_capacity(columns as usize * rows as usize);
     for y in 0..rows {
         for (upper, lower) in depths.row(y).windows(2).zip(depths.row(y + 1).windows(2)) {
@@ -294,24 +310,67 @@ fn depth_limits(depths: &Raster<f32>) -> Raster<f32> {
     Raster::from_vec(columns, rows, limits)
 }
 
-/// A factor a capture and channel that brings colours of what several see together: the least sum, over the
-/// pairs that overlap, of (gᵢ·meanᵢ − gⱼ·meanⱼ)² and of (1 − g)², each by its deviation and the number of
-/// pixels.
+/// Returns a factor for each capture and channel that matches their exposures. The factors minimise the sum,
+/// over the pairs of captures that overlap, of (gᵢ·meanᵢ − gⱼ·meanⱼ)² and of (1 − g)². Each
+/// term is weighted by its deviation and the number of pixels.
 fn gains(views: &[PreparedCapture], size: u32, rays: &SceneDepths, world_from_frame: DMat3) -> Vec<[f32; 3]> {
     let n = views.len();
-    // By pair: pixels and the sums of the colours of the first.
+    let sums = shared_colors(views, size, rays, world_from_frame);
+
+    let mut gains = vec![[1.0f32; 3]; n];
+    for k in 0..3 {
+        let mut matrix = vec![0.0; n * n];
+        let mut right = vec![0.0; n];
+        // One equation a capture.
+        for i in 0..n {
+            // A capture that overlaps no other keeps its exposure.
+            matrix[i * n + i] += 1e-6;
+            right[i] += 1e-6;
+            for j in (0..n).filter(|&j| j != i) {
+                let (count, sum) = sums[i * n + j];
+                if count == 0.0 {
+                    continue;
+                }
+                let own = sum[k] / count;
+                let other = sums[j * n + i].1[k] / count;
+                let weight = count / (COLOR_DEVIATION * COLOR_DEVIATION);
+                let prior = count / (GAIN_DEVIATION * GAIN_DEVIATION);
+                matrix[i * n + i] += 2.0 * weight * own * own + prior;
+                matrix[i * n + j] -= 2.0 * weight * own * other;
+                right[i] += prior;
+            }
+        }
+
+        for (gain, solved) in gains.iter_mut().zip(solve(matrix, right)) {
+            gain[k] = solved.clamp(0.25, 4.0) as f32;
+        }
+    }
+    gains
+}
+
+/// The number of pixels that a pair of captures shares, and the sum of the first capture's colours there.
+type SharedColors = (f64, [f64; 3]);
+
+/// Returns the shared colours of each pair of captures, row by row.
+fn shared_colors(
+    views: &[PreparedCapture],
+    size: u32,
+    rays: &SceneDepths,
+    world_from_frame: DMat3,
+) -> Vec<SharedColors> {
+    let n = views.len();
     let mut sums = vec![(0.0f64, [0.0f64; 3]); n * n];
     let colors = CubeMap::directions(size).map(|(face, x, y, d)| {
         let ray =
             CubeRay { direction: world_from_frame * d, depth: rays.depth(face, x, y), size, whole: true };
         views.iter().map(|v| v.sees(&ray).map(|(c, _)| c)).collect::<Vec<_>>()
     });
+
     for seen in colors {
-        let telling = |c: &[f32; 3]| c.iter().all(|v| TELLING.contains(v));
         let seen: Vec<(usize, [f32; 3])> = seen
             .into_iter()
             .enumerate()
-            .filter_map(|(i, c)| Some((i, c.filter(telling)?)))
+            .filter_map(|(i, c)| Some((i, c.filter(is_telling)?)))
             .collect();
         for &(i, color) in &seen {
             for &(j, _) in seen.iter().filter(|(j, _)| *j != i) {
@@ -321,37 +380,18 @@ fn gains(views: &[PreparedCapture], size: u32, rays: &SceneDepths, world_from_fr
             }
         }
     }
-    let mut gains = vec![[1.0f32; 3]; n];
-    for k in 0..3 {
-        let mut matrix = vec![0.0; n * n];
-        let mut right = vec![0.0; n];
-        for i in 0..n {
-            // A capture that overlaps none keeps its exposure.
-            matrix[i * n + i] += 1e-6;
-            right[i] += 1e-6;
-            for j in (0..n).filter(|&j| j != i) {
-                let (count, sum) = sums[i * n + j];
-                if count == 0.0 {
-                    continue;
-                }
-                let (own, other) = (sum[k] / count, sums[j * n + i].1[k] / count);
-                let weight = count / (COLOR_DEVIATION * COLOR_DEVIATION);
-                let prior = count / (GAIN_DEVIATION * GAIN_DEVIATION);
-                matrix[i * n + i] += 2.0 * weight * own * own + prior;
-                matrix[i * n + j] -= 2.0 * weight * own * other;
-                right[i] += prior;
-            }
-        }
-        for (gain, solved) in gains.iter_mut().zip(solve(matrix, right)) {
-            gain[k] = solved.clamp(0.25, 4.0) as f32;
-        }
-    }
-    gains
+    sums
 }
 
-/// The solution of a system with a symmetric, positive definite matrix, row by row.
+/// Tells whether a colour tells anything about exposure.
+fn is_telling(color: &[f32; 3]) -> bool {
+    color.iter().all(|v| TELLING.contains(v))
+}
+
+/// Solves a system with a symmetric, positive definite matrix, given row by row.
 fn solve(mut matrix: Vec<f64>, mut right: Vec<f64>) -> Vec<f64> {
     let n = right.len();
+
     for i in 0..n {
         for row in i + 1..n {
             let factor = matrix[row * n + i] / matrix[i * n + i];
@@ -361,10 +401,12 @@ fn solve(mut matrix: Vec<f64>, mut right: Vec<f64>) -> Vec<f64> {
             right[row] -= factor * right[i];
         }
     }
+
     for i in (0..n).rev() {
         let known: f64 = (i + 1..n).map(|j| matrix[i * n + j] * right[j]).sum();
         right[i] = (right[i] - known) / matrix[i * n + i];
     }
+
     right
 }
 
@@ -378,7 +420,7 @@ mod tests {
     use glam::{DQuat, dvec3};
     use proptest::prelude::*;
 
-    /// Eighteen captures as a scanner takes them, from one place, of `seen`.
+    /// Returns eighteen captures of `seen`, as a scanner takes them from one place.
     fn captures(seen: impl Fn(usize, DVec3) -> [f32; 3]) -> Vec<Capture> {
         let lens = Lens::new(
             [160, 128],
@@ -405,6 +447,7 @@ mod tests {
             .collect()
     }
 
+    /// Returns directions that are spread over the sphere.
     fn directions() -> impl Iterator<Item = DVec3> {
         (0..3000).map(|k| {
             let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 3000.0;
@@ -423,7 +466,7 @@ mod tests {
         assert_eq!(cube.size(), 224, "twice the focal length");
         for d in directions() {
             let (color, seen) = sample(&cube, d);
-            // Straight up and down no camera looks.
+            // No camera looks straight up or down.
             if seen == 255 {
                 assert!(close(color, color_of(d), 1.5), "{d}: {color:?} {:?}", color_of(d));
             } else {
@@ -452,7 +495,8 @@ mod tests {
             let (low, high) = seen.fold((255.0f32, 0.0f32), |(l, h), c| (l.min(c), h.max(c)));
             high - low
         };
-        let (before, after) = (spread(false), spread(true));
+        let before = spread(false);
+        let after = spread(true);
         assert!(before > 30.0 && after < 4.0, "{before} {after}");
     }
 
@@ -475,7 +519,7 @@ mod tests {
         }
     }
 
-    /// Noise, each picture darker or brighter than the others and beside the centre.
+    /// Returns captures of noise. Each is darker or brighter than the others, and taken beside the centre.
     fn noisy_captures() -> Vec<Capture> {
         let all = captures(|_, _| [0.0; 3]).into_iter().enumerate();
         all.map(|(n, mut capture)| {
@@ -491,7 +535,8 @@ mod tests {
         .collect()
     }
 
-    /// With the scene and without; sharper than the captures, about as sharp, and coarser.
+    /// Checks stitching with the scene and without it, and sharper than the captures, about as sharp, and
+    /// coarser.
     fn in_many_ways(mut check: impl FnMut(&Stitch)) {
         let mesh = s3d_synth::scenes::furnished_room(5);
         let scene = Scene::new(&mesh);
@@ -504,15 +549,18 @@ mod tests {
     #[test]
     fn eight_pixels_at_a_time_give_what_single_ones_do() {
         in_many_ways(|stitch| {
-            let (cube, plain) = (stitch.in_lanes(&stitch.lanes(), level()), stitch.pixel_by_pixel());
-            let (mut pixels, mut far, mut differ) = (0, 0, 0);
+            let cube = stitch.in_lanes(&stitch.lanes(), level());
+            let plain = stitch.pixel_by_pixel();
+            let mut pixels = 0;
+            let mut far = 0;
+            let mut differ = 0;
             for ((color, seen), (plain, plain_seen)) in cube.texels().zip(plain.texels()) {
                 let off = (0..3).map(|k| color[k].abs_diff(plain[k])).max().unwrap_or(0);
                 pixels += 1;
                 differ += usize::from(seen != plain_seen);
                 far += usize::from(seen == plain_seen && seen == 255 && off > 1);
             }
-            // Where a capture ends and where one surface hides another rounding decides.
+            // Rounding decides where a capture ends, and where one surface hides another.
             assert!(differ * 20_000 <= pixels && far * 2_000 <= pixels, "{differ}, {far} of {pixels}");
         });
     }
@@ -527,13 +575,16 @@ mod tests {
         });
     }
 
-    /// Cameras beside the centre, and a thing in the room: with the mesh each pixel is where the mesh has it.
+    /// The cameras stand beside the centre, and a thing is in the room. With the mesh, each pixel is in its
+    /// place.
     #[test]
     fn parallax_is_taken_out_with_the_mesh() {
         let mesh = s3d_synth::scenes::furnished_room(5);
-        let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+        let scene = Scene::new(&mesh);
+        let mip_maps = MipMaps::new(&mesh);
         let center = Pose::from_scanner(dvec3(2.2, 2.1, 1.4), DQuat::from_rotation_z(0.4));
         let lens = Lens::new([320, 256], dvec2(215.0, 215.0), dvec2(160.0, 128.0), [0.0; 5]).unwrap();
+
         let shots: Vec<Capture> = (0..18usize)
             .map(|k| {
                 let turned =
@@ -546,9 +597,11 @@ mod tests {
                 Capture { image, lens, pose: own }
             })
             .collect();
+
         let view = Camera::perspective(center.turned(0.5, -0.3), 1.2, 240, 240);
         let hits = cast(&scene, &view);
         let direct = rgb_image(&scene, &mip_maps, &hits, &view);
+
         let error = |scene: Option<&Scene<'_>>| {
             let cube = stitch(shots.clone(), &center, scene, &StitchOptions::default());
             let filter = TextureFilter::default();
@@ -556,7 +609,9 @@ mod tests {
             let squares = image.pixels().as_flattened().iter().zip(direct.pixels().as_flattened());
             squares.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum::<f64>() / (3.0 * 240.0 * 240.0)
         };
-        let (without, with) = (error(None), error(Some(&scene)));
+
+        let without = error(None);
+        let with = error(Some(&scene));
         assert!(with < 0.25 * without, "mean square {without} without the mesh, {with} with it");
     }
 }

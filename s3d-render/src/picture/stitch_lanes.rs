@@ -1,10 +1,9 @@
-//! Captures blended into a band of a cube map, eight pixels of a row at a time.
+//! Blends captures into a band of a cube map, eight pixels of a row at a time.
 //!
-//! In tiles of [`TILE`] columns: which captures may see a tile follows from the angle between the middle of
-//! the tile and the axis of the capture. Each pixel of the tile is then projected into each of these captures
-//! in `f32`, where a place in a picture of 1,280 pixels is off by less than a 1000th of a pixel; the weighted
-//! colours are added in the order of the captures. `Stitch::pixel_by_pixel`
-//! is the same in `f64`.
+//! The band is cut into tiles of [`TILE`] columns. The angle between the middle of a tile and the axis of a
+//! capture tells whether the capture may see the tile. Each pixel of the tile is then projected into each
+//! such capture in `f32`: in a picture of 1,280 pixels, the error is less than a 1000th of a pixel. The
+//! weighted colours are added in the order of the captures. `Stitch::pixel_by_pixel` does the same in `f64`.
 
 use crate::picture::cube_map::{BAND, Band, axes_of, place_of};
 use crate::shade::filter::MipLevels;
@@ -13,14 +12,14 @@ use crate::simd::{Kernel, Simd};
 use glam::{DMat3, DVec3};
 use s3d_geom::{Lens, Raster};
 
-/// Columns of a tile.
+/// The number of columns in a tile.
 const TILE: usize = 64;
 
-/// What is in front of a capture, seen by a camera with the capture's axes.
+/// The surfaces in front of a capture, as seen by a camera with the capture's axes.
 pub(crate) struct DepthLimits {
-    /// By the upper left one of four neighbouring pixels: how deep a point between them may be and be seen.
+    /// How deep a visible point between four neighbouring pixels may be, indexed by the upper left one.
     pub(crate) limits: Raster<f32>,
-    /// The camera's focal length in its pixels.
+    /// The focal length of that camera in its pixels.
     pub(crate) focal: f32,
 }
 
@@ -32,37 +31,38 @@ pub(crate) struct LaneCapture<'a> {
     pub(crate) turn: DMat3,
     /// From the camera to the cube's centre, in the camera's axes.
     pub(crate) center: DVec3,
-    /// The tangent of the angle from its axis beyond which it sees nothing.
+    /// The tangent of the largest angle from the axis at which the camera sees anything.
     pub(crate) reach: f64,
     pub(crate) limits: Option<&'a DepthLimits>,
-    /// What its colours are multiplied by.
+    /// The factors of its colours.
     pub(crate) gain: [f32; 3],
 }
 
 impl LaneCapture<'_> {
-    /// Whether places in its picture fit the numbers here, and one sample covers what a pixel of the cube
-    /// sees of it: its pixels are nearly square.
+    /// Tells whether the lanes suit the capture: places in its picture fit the numbers, and its pixels are
+    /// nearly square, so that one sample covers the part of the picture that a pixel of the cube sees.
     pub(crate) fn is_usable(&self) -> bool {
         let focal = self.lens.focal_px();
         self.levels.is_usable() && focal.max_element() < 1.5 * focal.min_element()
     }
 
-    /// Whether it may see something of a tile with the middle `direction`, of length 1 in the cube's frame,
-    /// whose pixels are up to `angle` from it and whose points are at least 1 / `inverse_depth` away.
+    /// Tells whether the capture may see a part of a tile. The middle of the tile is `direction`, of length 1
+    /// in the cube's frame; its pixels are up to `angle` from the middle, and its points are at least 1 /
+    /// `inverse_depth` away.
     fn may_see(&self, direction: DVec3, angle: f64, inverse_depth: f64) -> bool {
         let off_axis = libm::acos((self.turn * direction).z.clamp(-1.0, 1.0));
         let parallax = libm::asin((self.center.length() * inverse_depth).min(1.0));
-        // The margin is far more than what rounding does.
+        // The margin is much larger than rounding errors.
         off_axis <= libm::atan(self.reach) + angle + parallax + 1e-5
     }
 }
 
-/// The pixels of a band that captures see, blended.
+/// Blends the captures that see the pixels of a band.
 pub(crate) struct BlendKernel<'a> {
     pub(crate) captures: &'a [LaneCapture<'a>],
-    /// Of the cube's faces, without their borders.
+    /// The size of the cube's faces, without their borders.
     pub(crate) size: u32,
-    /// How deep the scene is behind each pixel of the face with its border, infinite where there is nothing.
+    /// The depth of the scene behind each pixel of the face with its border, infinite where there is none.
     pub(crate) depths: Option<&'a Raster<f32>>,
     pub(crate) band: Band<'a>,
 }
@@ -70,20 +70,20 @@ pub(crate) struct BlendKernel<'a> {
 /// Some columns of a band.
 struct Tile {
     first: usize,
-    /// How many columns, without those that fill up the last eight.
+    /// The number of columns, without those that pad the last eight.
     columns: usize,
     rows: usize,
-    /// By row and column: 1 over the depth behind the pixel, 0 if there is nothing.
+    /// 1 over the depth behind each pixel, by row and column; 0 if there is none.
     inverse_depths: [[f32; TILE]; BAND as usize],
-    /// By column: where it is on the face's plane.
+    /// The position of each column on the face's plane.
     places: [f32; TILE],
 }
 
-/// Weighted sums over captures for the pixels of a tile's row.
+/// The weighted sums over captures for the pixels of a tile's row.
 struct Sums {
     colors: [[f32; TILE]; 3],
     weights: [f32; TILE],
-    /// How wide the pixels are, as the tangent of an angle.
+    /// The widths of the pixels, as the tangent of an angle.
     angles: [f32; TILE],
 }
 
@@ -109,7 +109,7 @@ impl Kernel for BlendKernel<'_> {
 }
 
 impl BlendKernel<'_> {
-    /// The tile from column `first` on, and the largest of its inverse depths.
+    /// Returns the tile from column `first` on, and the largest of its inverse depths.
     fn tile(&self, first: usize) -> (Tile, f32) {
         let (columns, rows) = (TILE.min(self.band.width - first), self.band.colors.len() / self.band.width);
         let mut tile = Tile {
@@ -132,7 +132,7 @@ impl BlendKernel<'_> {
         (tile, nearest)
     }
 
-    /// Adds the numbers of those captures that may see something of a tile.
+    /// Adds the numbers of the captures that may see a part of a tile.
     fn captures_of(&self, tile: &Tile, nearest: f32, near: &mut Vec<usize>) {
         let [right, down, forward] = axes_of(self.band.face);
         let at = |x: usize, y: usize| {
@@ -149,15 +149,18 @@ impl BlendKernel<'_> {
         near.extend((0..self.captures.len()).filter(may_see));
     }
 
+    /// Blends the captures `near` into a row of a tile.
     #[inline(always)]
     fn row<L: ShadeLanes>(&mut self, l: L, tile: &Tile, row: usize, near: &[usize]) {
         let y = place_of(self.size, self.band.first_row + row as u32);
         let mut sums = Sums { colors: [[0.0; TILE]; 3], weights: [0.0; TILE], angles: [0.0; TILE] };
+
         let (step, rest) = (l.splat((2.0 / f64::from(self.size)) as f32), l.splat((y * y + 1.0) as f32));
         for i in (0..tile.columns).step_by(LANES) {
             let x = eight(l, &tile.places, i);
             put(l, &mut sums.angles, i, l.div(step, l.sqrt(l.add(l.mul(x, x), rest))));
         }
+
         for &k in near {
             let capture = &self.captures[k];
             if let Some(limits) = capture.limits {
@@ -166,6 +169,7 @@ impl BlendKernel<'_> {
                 self.add::<L, false>(l, tile, row, y, capture, None, &mut sums);
             }
         }
+
         let (mut colors, mut seen) = ([[0; 3]; TILE], [0; TILE]);
         let most = l.splat(255.0);
         for i in (0..tile.columns).step_by(LANES) {
@@ -179,6 +183,7 @@ impl BlendKernel<'_> {
             for (color, sums) in color.iter_mut().zip(&sums.colors) {
                 *color = l.min(l.mul(eight(l, sums, i), inverse), most);
             }
+
             let packed = packed(l, color);
             for k in 0..LANES {
                 seen[i + k] = if shown >> k & 1 == 1 { 255 } else { 0 };
@@ -187,13 +192,14 @@ impl BlendKernel<'_> {
                 l.store_pixels(&packed, to);
             }
         }
+
         let from = row * self.band.width + tile.first;
         let to = from..from + tile.columns;
         self.band.colors[to.clone()].copy_from_slice(&colors[..tile.columns]);
         self.band.seen[to].copy_from_slice(&seen[..tile.columns]);
     }
 
-    /// Adds what a capture shows of a tile's row, which is at `y` on the face's plane.
+    /// Adds the colours that a capture shows of a tile's row, which is at `y` on the face's plane.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "what a row is and where its sums go")]
     fn add<L: ShadeLanes, const DEPTHS: bool>(
@@ -215,7 +221,8 @@ impl BlendKernel<'_> {
         for i in (0..tile.columns).step_by(LANES) {
             let place = eight(l, &tile.places, i);
             let inverse_depth = eight(l, &tile.inverse_depths[row], i);
-            // The point that the pixel sees over its depth, from the camera.
+
+            // The point that the pixel sees, divided by its depth, relative to the camera.
             let mut v = [zero; 3];
             for k in 0..3 {
                 v[k] = l.add(l.mul(per_column[k], place), start[k]);
@@ -223,6 +230,7 @@ impl BlendKernel<'_> {
                     v[k] = l.add(v[k], l.mul(center[k], inverse_depth));
                 }
             }
+
             let forward = l.div(one, v[2]);
             let (x, y) = (l.mul(v[0], forward), l.mul(v[1], forward));
             let r2 = l.add(l.mul(x, x), l.mul(y, y));
@@ -231,6 +239,7 @@ impl BlendKernel<'_> {
                 continue;
             }
             let at = lens.project(l, x, y, r2);
+
             // From −1 at one border of the picture to 1 at the other.
             let across = l.sub(l.mul(at[0], lens.twice_per_size[0]), one);
             let down = l.sub(l.mul(at[1], lens.twice_per_size[1]), one);
@@ -241,6 +250,7 @@ impl BlendKernel<'_> {
             if these == 0 {
                 continue;
             }
+
             if let (true, Some(limits)) = (DEPTHS, limits) {
                 let limit = limits.at(l, x, y);
                 these &= !(l.greater(v[2], l.mul(limit, inverse_depth)) & l.greater(inverse_depth, zero));
@@ -248,10 +258,12 @@ impl BlendKernel<'_> {
                     continue;
                 }
             }
+
             // 1 in the middle of the picture and 0 at its border, along either axis.
             let weight = l.mul(l.sub(one, l.mul(across, across)), l.sub(one, l.mul(down, down)));
             let weight = l.select(these, l.mul(weight, weight), zero);
             let width = l.mul(lens.focal, l.mul(eight(l, &sums.angles, i), l.sqrt(l.add(r2, one))));
+
             let color = l.channels(capture.levels.round_sums(l, (at[0], at[1]), width, these));
             let weights = l.add(eight(l, &sums.weights, i), weight);
             put(l, &mut sums.weights, i, weights);
@@ -265,13 +277,13 @@ impl BlendKernel<'_> {
 }
 
 impl DepthLimits {
-    /// Around eight places of the plane at a depth of 1.
+    /// Returns the limits around eight places of the plane at a depth of 1.
     #[inline(always)]
     fn at<L: ShadeLanes>(&self, l: L, x: L::F, y: L::F) -> L::F {
         let (columns, rows) = (self.limits.width(), self.limits.height());
         let (focal, zero) = (l.splat(self.focal), l.splat(0.0));
         let index = |place: L::F, count: u32| {
-            // The camera's middle is between the middle two of one pixel more.
+            // The picture has one column more than `limits`: the axis goes through the middle of `limits`.
             let at = l.add(l.mul(place, focal), l.splat(0.5 * count as f32));
             l.truncate(l.min(l.max(at, zero), l.splat((count - 1) as f32)))
         };
@@ -302,7 +314,7 @@ struct LensLanes<F> {
     most_r2: F,
     /// 2 over the picture's size.
     twice_per_size: [F; 2],
-    /// The middle of the picture's last column and row.
+    /// The centres of the picture's last column and row.
     last: [F; 2],
 }
 
@@ -326,13 +338,13 @@ impl<F: Copy> LensLanes<F> {
         }
     }
 
-    /// [`Lens::project`] of (x, y, 1), r² = x² + y².
+    /// Projects (x, y, 1) like [`Lens::project`]; r² = x² + y².
     #[inline(always)]
     fn project<L: ShadeLanes<F = F>>(&self, l: L, x: F, y: F, r2: F) -> [F; 2] {
         let [k1, k2, k3] = self.radial;
         let q = l.add(k1, l.mul(r2, l.add(k2, l.mul(r2, k3))));
         let q = l.add(l.splat(1.0), l.mul(r2, q));
-        // 2xy and r² + 2x², r² + 2y².
+        // 2xy, r² + 2x² and r² + 2y².
         let (two_xx, two_yy) = (l.mul(l.add(x, x), x), l.mul(l.add(y, y), y));
         let xy = l.mul(x, y);
         let ([p1, p2], [twice_p1, twice_p2]) = (self.decentering, self.tangential);

@@ -1,8 +1,8 @@
-//! The faces of a cluster in a perspective view, set up eight at a time.
+//! Sets up the faces of a cluster in a perspective view, eight at a time.
 //!
-//! One face after another is a chain of divisions, and of branches that nobody foresees: is it in the window,
-//! is it small, how wide is it? So all faces of a cluster are set up first, in arrays and without a branch,
-//! sorted by how they are drawn, and then drawn kind by kind.
+//! Setting up one face after another is a chain of divisions and of unpredictable branches: whether the face
+//! is in the window, whether it is small, and how wide it is. So all faces of a cluster are set up first, in
+//! arrays and without branches. They are then sorted by how they are drawn, and drawn kind by kind.
 
 #![expect(
     clippy::unwrap_used,
@@ -15,31 +15,32 @@ use crate::raster::{high, low, max, min};
 use crate::scene::clusters::MAX_FACES;
 use crate::simd::raster_lanes::LANES;
 
-/// An edge that is shorter, in pixels, has no direction to speak of: see the module `pinhole`.
+/// An edge shorter than this, in pixels, has no reliable direction: see the module `pinhole`.
 const SHORT: f64 = 1e-3;
 
-/// Pixels around a face's corners that it may yet touch, as far as is known.
+/// The distance in pixels around a face's corners that the face may still cover, given rounding.
 const MARGIN: f64 = 1e-4;
 
-/// Faces that are set up together.
+/// The number of faces that are set up together.
 pub(crate) const GROUP: usize = 8;
 
 /// How a face is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DrawKind {
-    /// Covers no centre of a pixel.
+    /// The face covers no centre of a pixel.
     Nothing = 0,
-    /// In one chunk of at most 8 columns.
+    /// The face fits in one chunk of at most 8 columns.
     Narrow,
-    /// In one chunk.
+    /// The face fits in one chunk.
     Small,
-    /// In one chunk, with care.
+    /// The face fits in one chunk that is drawn with care.
     Careful,
-    /// In two chunks side by side.
+    /// The face fits in two chunks side by side.
     Wide,
-    /// Tile by tile.
+    /// The face is drawn tile by tile.
     Large,
-    /// By its planes in space: behind the camera, too far out, or with next to no area.
+    /// The face is drawn from its planes in space: it is behind the camera, too far out, or has almost no
+    /// area.
     InSpace,
 }
 
@@ -58,7 +59,7 @@ impl FacesByKind {
         Self { lists: [[0; MAX_FACES]; KINDS], counts: [0; KINDS] }
     }
 
-    /// Sorts faces, given by what kind each is.
+    /// Sorts faces by their kinds.
     #[inline(always)]
     pub(crate) fn sort(&mut self, kinds: &[u32]) {
         self.counts = [0; KINDS];
@@ -69,7 +70,7 @@ impl FacesByKind {
         }
     }
 
-    /// The places of the faces of a kind.
+    /// Iterates over the places of the faces of a kind.
     #[inline(always)]
     pub(crate) fn faces(&self, kind: DrawKind) -> impl Iterator<Item = usize> {
         let list = &self.lists[kind as usize][..self.counts[kind as usize]];
@@ -77,11 +78,11 @@ impl FacesByKind {
     }
 }
 
-/// What is known of each face of a cluster.
+/// The set-up of each face of a cluster.
 pub(crate) struct FaceBatch {
     /// 1/z of the corners.
     q: [Values<f64>; 3],
-    /// First and last column and row of pixels, cut off at the window.
+    /// The first and last column and row of pixels, clipped to the window.
     left: Values<u32>,
     right: Values<u32>,
     top: Values<u32>,
@@ -90,9 +91,9 @@ pub(crate) struct FaceBatch {
     at: [Values<f64>; 4],
     across: [Values<f64>; 4],
     down: [Values<f64>; 4],
-    /// The same from the first column and row on.
+    /// The functions at the first column and row.
     chunk_at: [Values<f32>; 4],
-    /// No value of 1/t in a face's chunk, or its two, is farther off.
+    /// A bound on the error of 1/t in the one or two chunks of a face.
     error: Values<f32>,
     kind: Values<u32>,
     by_kind: FacesByKind,
@@ -116,7 +117,8 @@ impl FaceBatch {
         }
     }
 
-    /// Sets up faces, given by the places of their corners, in a window of a size.
+    /// Sets up the faces of a cluster, given by the places of their corners, in a window of `width` ×
+    /// `height`.
     #[inline(always)]
     pub(crate) fn set_up(&mut self, faces: &[[u8; 4]], corners: &PinholeCorners, width: f64, height: f64) {
         for first in (0..faces.len()).step_by(GROUP) {
@@ -135,7 +137,7 @@ impl FaceBatch {
     ) {
         let (mut xs, mut ys, mut qs) = ([[0.0; GROUP]; 3], [[0.0; GROUP]; 3], [[0.0; GROUP]; 3]);
         for i in 0..GROUP {
-            // The last group is filled up with the last face: nobody looks at it.
+            // The last group is filled up with the last face; these entries are never read.
             let places = faces[(first + i).min(faces.len() - 1)];
             for k in 0..3 {
                 let place = usize::from(places[k]);
@@ -144,7 +146,8 @@ impl FaceBatch {
                 qs[k][i] = corners.inverse_z[place];
             }
         }
-        // Arrays of their own, so that all faces of the group go together.
+
+        // Each result has an array of its own, so that the compiler sets up all faces of the group at once.
         let (mut lefts, mut rights) = ([0.0; GROUP], [0.0; GROUP]);
         let (mut tops, mut bottoms) = ([0.0; GROUP], [0.0; GROUP]);
         let (mut ats, mut acrosses, mut downs) = ([[0.0; GROUP]; 4], [[0.0; GROUP]; 4], [[0.0; GROUP]; 4]);
@@ -152,6 +155,8 @@ impl FaceBatch {
         let mut errors = [0.0; GROUP];
         let mut kinds = [DrawKind::Nothing as u32; GROUP];
         let mut any = 0;
+
+        // The pixels around each face.
         for i in 0..GROUP {
             let x = [xs[0][i], xs[1][i], xs[2][i]];
             let y = [ys[0][i], ys[1][i], ys[2][i]];
@@ -164,17 +169,20 @@ impl FaceBatch {
             any |= u32::from(covers | !in_front);
             (lefts[i], rights[i], tops[i], bottoms[i]) = (left, right, top, bottom);
         }
-        // Where faces are smaller than pixels, many groups have nothing to draw.
+
+        // If faces are smaller than pixels, many groups have nothing to draw.
         if any == 0 {
             return put(&mut self.kind, first, &kinds);
         }
+
+        // Edge functions, 1/t and the kind of each face.
         for i in 0..GROUP {
             let x = [xs[0][i], xs[1][i], xs[2][i]];
             let y = [ys[0][i], ys[1][i], ys[2][i]];
             let q = [qs[0][i], qs[1][i], qs[2][i]];
             let (left, right, top, bottom) = (lefts[i], rights[i], tops[i], bottoms[i]);
 
-            // Edge k is opposite to corner k, from corner k + 1 to k + 2.
+            // Edge k is opposite to corner k: it runs from corner k + 1 to corner k + 2.
             let across = [y[1] - y[2], y[2] - y[0], y[0] - y[1]];
             let down = [x[2] - x[1], x[0] - x[2], x[1] - x[0]];
             let at = [
@@ -187,7 +195,8 @@ impl FaceBatch {
                 across[1].abs() + down[1].abs(),
                 across[2].abs() + down[2].abs(),
             ];
-            // Twice the area: what the edge functions add up to, anywhere.
+
+            // Twice the area: the sum of the edge functions, anywhere.
             let area = across[0] * (x[0] - x[1]) + down[0] * (y[0] - y[1]);
             let scale = 1.0 / area;
             let sign = if area > 0.0 { 1.0 } else { -1.0 };
@@ -197,15 +206,16 @@ impl FaceBatch {
             let across = [across[0] * factor[0], across[1] * factor[1], across[2] * factor[2], sum(across)];
             let down = [down[0] * factor[0], down[1] * factor[1], down[2] * factor[2], sum(down)];
 
-            // The chunk from the first column and row on.
+            // The functions at the first column and row.
             let chunk_at = [
                 (at[0] + across[0] * left + down[0] * top) as f32,
                 (at[1] + across[1] * left + down[1] * top) as f32,
                 (at[2] + across[2] * left + down[2] * top) as f32,
                 (at[3] + across[3] * left + down[3] * top) as f32,
             ];
-            // A second chunk begins sixteen columns on: its terms are bounded by those of one that is twice
-            // as wide.
+
+            // A second chunk begins sixteen columns on. The bounds of a chunk that is twice as wide cover its
+            // terms.
             let small = right - left < LANES as f64;
             let bounds = if small { 15.0 } else { 31.0 };
             let spread = (across[3] as f32).abs() * bounds
@@ -213,6 +223,7 @@ impl FaceBatch {
                 + chunk_at[3].abs();
             let error = INVERSE_T_ROUNDING * spread;
 
+            // The kind, without branches: each line overrides the ones before it.
             let trusted = error < TRUSTED * low(q) as f32;
             let kind = if right - left < (LANES / 2) as f64 {
                 DrawKind::Narrow as u32
@@ -249,6 +260,7 @@ impl FaceBatch {
                 chunk_ats[k][i] = chunk_at[k];
             }
         }
+
         put(&mut self.left, first, &pixels(&lefts));
         put(&mut self.right, first, &pixels(&rights));
         put(&mut self.top, first, &pixels(&tops));
@@ -266,20 +278,20 @@ impl FaceBatch {
         }
     }
 
-    /// The places in the cluster of the faces of a kind.
+    /// Iterates over the places of the faces of a kind in the cluster.
     #[inline(always)]
     pub(crate) fn faces(&self, kind: DrawKind) -> impl Iterator<Item = usize> {
         self.by_kind.faces(kind)
     }
 
-    /// 1/t as a function of the pixel, as [`DrawnFace`](crate::simd::raster_lanes::DrawnFace) has it.
+    /// Returns 1/t as a function of the pixel: see [`DrawnFace`](crate::simd::raster_lanes::DrawnFace).
     #[inline(always)]
     pub(crate) fn inverse_t(&self, i: usize) -> [f64; 3] {
         [self.at[3][i], self.across[3][i], self.down[3][i]]
     }
 
-    /// A face in one chunk, or the first of its two, and its number of rows. From where on 1/t is trusted is
-    /// left to those who draw with care.
+    /// Returns the only or the first chunk of a face, and its number of rows. `trusted` is 0: a caller that
+    /// draws with care sets it.
     #[inline(always)]
     pub(crate) fn chunk(&self, i: usize, slot: u32) -> (Chunk, usize) {
         let f = |k: usize| Linear {
@@ -302,7 +314,7 @@ impl FaceBatch {
         (chunk, self.bottom[i] as usize - row + 1)
     }
 
-    /// The second chunk of a face that has two, and how many columns of the face it holds.
+    /// Returns the second chunk of a face that has two, and the number of the face's columns in it.
     #[inline(always)]
     pub(crate) fn second_chunk(&self, i: usize, first: &Chunk) -> (Chunk, usize) {
         let (left, top) = (f64::from(self.left[i]) + LANES as f64, f64::from(self.top[i]));
@@ -335,12 +347,12 @@ impl FaceBatch {
     }
 }
 
-/// Whole numbers from 0 on, of a group at once: `as` takes one after another.
+/// Converts a group of whole numbers, at least 0, at once. The `as` operator would convert them one by one.
 #[inline(always)]
 fn pixels(whole: &[f64; GROUP]) -> [u32; GROUP] {
     let mut pixels = [0; GROUP];
     for i in 0..GROUP {
-        // From 2^52 on a number of 64 bits ends in the whole number itself.
+        // From 2⁵² on, the low bits of an `f64` are the whole number itself.
         pixels[i] = (whole[i] + (1u64 << 52) as f64).to_bits() as u32;
     }
     pixels
@@ -364,7 +376,7 @@ mod tests {
     const WIDTH: f64 = 90.0;
     const HEIGHT: f64 = 70.0;
 
-    /// A corner in the window or not far from it, with its 1/z; or one without a place in the view.
+    /// Returns a corner in or near the window with its 1/z, or a corner that the view cannot show.
     fn corner() -> impl Strategy<Value = [f64; 3]> {
         let at = |size: f64| {
             prop_oneof![-0.2 * size..1.2 * size, (0.0..1.0f64).prop_map(move |s| (s * size).round())]
@@ -375,7 +387,7 @@ mod tests {
         ]
     }
 
-    /// Corners that are near each other, as those of small faces are, or anywhere.
+    /// Returns corners that are close together, like the corners of a small face, or anywhere.
     fn face() -> impl Strategy<Value = [[f64; 3]; 3]> {
         (prop::array::uniform3(corner()), prop_oneof![Just(1.0), Just(0.3), Just(0.1)]).prop_map(
             |(c, spread)| {
@@ -393,7 +405,7 @@ mod tests {
             }
             let places: Vec<_> = (0..faces.len() as u8).map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 0]).collect();
             let mut batch = FaceBatch::new();
-            // What a fuller cluster left behind does no harm.
+            // Stale entries of a fuller cluster must do no harm.
             batch.set_up(&vec![[0, 1, 2, 0]; MAX_FACES], &corners, WIDTH, HEIGHT);
             batch.set_up(&places, &corners, WIDTH, HEIGHT);
 
@@ -407,24 +419,29 @@ mod tests {
                     prop_assert!(kind_of[i].replace(kind).is_none());
                 }
             }
+
             for (i, c) in faces.iter().enumerate() {
                 let kind = kind_of[i].unwrap();
                 if c.iter().any(|p| p[2] == 0.0) {
                     prop_assert_eq!(kind, DrawKind::InSpace);
                     continue;
                 }
+
                 let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
                     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
                 };
                 let [p, q, r] = c.map(|p| [p[0], p[1]]);
                 let whole = area(p, q, r);
                 let bounds = batch.bounds(i);
-                let (columns, rows) = (bounds.left..=bounds.right, bounds.top..=bounds.bottom);
+                let columns = bounds.left..=bounds.right;
+                let rows = bounds.top..=bounds.bottom;
                 let one = matches!(kind, DrawKind::Narrow | DrawKind::Small | DrawKind::Careful);
+
                 if one || kind == DrawKind::Wide {
                     let most = if kind == DrawKind::Narrow { 8 } else if one { LANES } else { 2 * LANES };
                     prop_assert!(columns.clone().count() <= most && rows.clone().count() <= MAX_ROWS);
                 }
+
                 for (x, y) in (0..WIDTH as usize).flat_map(|x| (0..HEIGHT as usize).map(move |y| (x, y))) {
                     let at = [x as f64, y as f64];
                     let weights = [area(at, q, r), area(p, at, r), area(p, q, at)].map(|w| w / whole);
@@ -435,13 +452,16 @@ mod tests {
                     if !(one || kind == DrawKind::Wide) {
                         continue;
                     }
+
                     let (mut chunk, rows) = batch.chunk(i, 5);
                     if x >= chunk.column + LANES {
                         let (second, columns) = batch.second_chunk(i, &chunk);
                         prop_assert!(kind == DrawKind::Wide && x < second.column + columns);
                         chunk = second;
                     }
-                    let (u, r) = ((x - chunk.column) as f32, (y - chunk.row) as f32);
+
+                    let u = (x - chunk.column) as f32;
+                    let r = (y - chunk.row) as f32;
                     prop_assert!(y < chunk.row + rows && chunk.slot == 5);
                     let value = |f: &Linear| f.at + f.across * u + f.down * r;
                     prop_assert!(chunk.edges.iter().all(|e| value(e) > -EDGE_ERROR));

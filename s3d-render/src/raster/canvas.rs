@@ -1,38 +1,40 @@
-//! What the rays of a window see so far: the heart of the visibility pass.
+//! The visibility buffer of a window: the faces that its rays see so far. It is the heart of the visibility
+//! pass.
 //!
 //! # The special case
 //!
-//! All rays of an image start at one point. Put it at zero: a face (a, b, c) is hit along the direction d
-//! exactly if d lies inside the three planes through the origin and an edge, N₁ = b × c, N₂ = c × a,
-//! N₃ = a × b (turned so that they look inwards), and 1/t = n · d / n · a, where n is the face's normal.
-//! So four dot products with d decide everything, and each is a simple function of the pixel: linear in a
-//! perspective view; in a row of a panorama, divided by the cosine of the latitude,
-//! x cos θ + y sin θ + z tan φ. Faces are drawn one after another, as a rasteriser does, the nearest first
-//! where that is known; what lies behind a tile of pixels that all see something nearer is not looked at.
+//! All rays of an image start at one point. Put it at zero. Let N₁ = b × c, N₂ = c × a and N₃ = a ×
+//! b be the normals of the planes through the origin and an edge of the face (a, b, c), turned inwards. The
+//! direction d hits the face exactly if it lies inside all three planes. With the face's normal n, 1/t = n ·
+//! d / n · a. So four dot products with d decide everything, and each is a simple function of the pixel. In
+//! a perspective view it is linear. In a row of a panorama, divided by the cosine of the latitude, it is x
+//! cos θ + y sin θ + z tan φ. Faces are drawn one after another, as a rasteriser does, the nearest first
+//! as far as that is known. A face behind a tile of pixels that all see something nearer is skipped.
 //!
 //! # Why it is exact
 //!
-//! The four functions are set up in `f64`, moved to a pixel at the face (the *anchor* of a chunk of 16 × up
-//! to [`MAX_ROWS`] pixels), rounded to `f32` there, and evaluated with one multiplication and one addition a
-//! row. Take an edge function e(i, j) = c + a·i + b·j with |a| + |b| = 1, so that e is about a distance in
-//! pixels, and |i| ≤ 15, |j| ≤ 31. Near its zero |c| ≤ 46, so the roundings of a, b, c, two products
-//! and two sums are at most 2⁻²⁴·(46 + 46 + 46 + 92) < 1.4e-5; `f64` before it adds less than 1e-8
-//! (`pinhole` and `panorama` say why). [`EDGE_ERROR`] is twice that. A pixel where the smallest of the three
-//! exceeds its error is *certainly* in the face; where it is below minus the error, certainly not.
+//! The four functions are set up in `f64` and moved to a pixel at the face: the *anchor* of a chunk of 16 ×
+//! up to [`MAX_ROWS`] pixels. There they are rounded to `f32`, and evaluated with one multiplication and one
+//! addition a row. Take an edge function e(i, j) = c + a·i + b·j with |a| + |b| = 1, so that e is about a
+//! distance in pixels, and |i| ≤ 15, |j| ≤ 31. Near its zero |c| ≤ 46, so the roundings of a, b, c, two
+//! products and two sums are at most 2⁻²⁴·(46 + 46 + 46 + 92) < 1.4e-5. The error of `f64` adds less
+//! than 1e-8 (`pinhole` and `panorama` prove it). [`EDGE_ERROR`] is twice that. If the smallest of the three
+//! functions exceeds the error, the pixel is *certainly* in the face; if it is below minus the error, the
+//! pixel is certainly outside.
 //!
-//! 1/t is off by at most 2⁻²²·(|c| + |a|·15 + |b|·31), which is held against what it is worth: where
-//! that is more than [`TRUSTED`] of the value, the pixel is not certain. Values that differ by more than
-//! [`CLOSE_ULPS`] steps of the last place (2.5e-5 of themselves at least: two errors, and some) are in order.
+//! The error of 1/t is at most 2⁻²²·(|c| + |a|·15 + |b|·31). If that is more than [`TRUSTED`] of the
+//! value, the pixel is not certain. Two values that differ by more than [`CLOSE_ULPS`] steps of the last
+//! place are in order: that is at least 2.5e-5 of themselves, more than two errors.
 //!
-//! Whatever is not certain — a pixel too near an edge, two faces almost equally far — goes to a list of
-//! *doubts*: this face may be what this pixel sees. In the end each pixel on the list is decided among its
-//! candidates by the exact [`Cone`](crate::ray::cone::Cone), as single rays are: the face that was certain of
-//! it, and all doubts that are not clearly behind. A face that is in neither place is certainly missed, or
-//! certainly behind a face that is certainly hit. So the face of every pixel is that of the exact ray, and no
-//! seam, sliver or duplicate is lost.
+//! An uncertain pixel is too close to an edge, or two of its faces are almost equally far. It goes to a list
+//! of *doubts*: this face may be what this pixel sees. In the end, the exact [`Cone`](crate::ray::cone::Cone)
+//! decides each pixel on the list among its candidates, as for single rays. The candidates are the face that
+//! was certain, and all doubts that are not clearly behind it. Any other face is certainly missed, or
+//! certainly behind a face that is certainly hit. So every pixel gets the face of the exact ray, and no seam,
+//! sliver or duplicate is lost.
 //!
-//! Depth is computed at the end from the `f64` functions of the face that is seen, and rounded once: within
-//! one step of the last place of `f32` of what a single ray gives.
+//! The depth is computed at the end from the `f64` functions of the visible face, and rounded once. It is
+//! within one step of the last place of `f32` of the depth of a single ray.
 //!
 //! [`EDGE_ERROR`]: crate::raster::chunk::EDGE_ERROR
 //! [`TRUSTED`]: crate::raster::chunk::TRUSTED
@@ -46,20 +48,21 @@ use crate::hits::NO_FACE;
 use crate::raster::chunk::{CLOSE_ULPS, Chunk, ChunkGrid, RowScratch, draw};
 use crate::simd::raster_lanes::{DrawnFace, LANES, RasterLanes, RowGroup};
 
-/// What is behind a tile must be so by this factor: ten times [`CLOSE_ULPS`].
+/// A face is behind a tile only if it is farther by this factor: ten times [`CLOSE_ULPS`].
 const BEHIND: f32 = 1.0 + 5e-4;
 
-/// Tiles of so many pixels, both ways, know the farthest that they see.
+/// The width and height of a tile in pixels. Each tile stores a bound on the farthest depth that it sees.
 pub(crate) const TILE: usize = LANES;
 
-/// What of a row of tiles lies between two rows: its first row, and how many there are.
+/// Returns the rows of a row of tiles that lie between `top` and `bottom`: the first row and their number.
 #[inline(always)]
 pub(crate) fn part_of_tile(tile_row: usize, top: usize, bottom: usize) -> (usize, usize) {
     let first = top.max(tile_row * TILE);
     (first, bottom.min(tile_row * TILE + TILE - 1) + 1 - first)
 }
 
-/// From where a tile is drawn to hold what of it lies between two columns, and whether half a register does.
+/// Returns the column at which a tile is drawn, and whether half a register covers its columns between `left`
+/// and `right`.
 #[inline(always)]
 pub(crate) fn half_of_tile(tile_column: usize, left: usize, right: usize) -> (usize, bool) {
     let (first, middle) = (tile_column * TILE, tile_column * TILE + TILE / 2);
@@ -75,23 +78,23 @@ pub(crate) fn half_of_tile(tile_column: usize, left: usize, right: usize) -> (us
 struct Doubt {
     pixel: u32,
     slot: u32,
-    /// A bound on 1/t from above.
+    /// An upper bound on 1/t.
     inverse_t: f32,
 }
 
-/// What a box may cover of a window.
+/// The part of a window that a box may cover.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cover {
-    /// First and last column and row of pixels.
+    /// The first and last column and row of pixels.
     pub(crate) columns: (u16, u16),
     pub(crate) rows: (u16, u16),
-    /// 1/t is nowhere greater; infinite if that is not known.
+    /// An upper bound on 1/t; infinite if none is known.
     pub(crate) inverse_t: f32,
 }
 
 impl Cover {
-    /// The centres of pixels, at whole numbers, between columns and between rows of a window of
-    /// `width` × `height`; `None` if there are none.
+    /// Returns the centres of pixels (at whole numbers) between two columns and two rows, in a window of
+    /// `width` × `height`. Returns `None` if there are none.
     #[inline(always)]
     pub(crate) fn new(
         (left, right): (f32, f32),
@@ -109,34 +112,34 @@ impl Cover {
     }
 }
 
-/// The visibility buffer of a window of an image; its memory serves one window after another.
+/// The visibility buffer of a window of an image. Its memory is reused from window to window.
 #[derive(Default)]
 pub(crate) struct Canvas {
     width: usize,
     height: usize,
-    /// Pixels from row to row: some more than the width, so that chunks may reach over the edge.
+    /// The number of pixels from row to row. It exceeds the width, so that chunks may reach over the edge.
     pitch: usize,
-    /// 1/t of the nearest face that is certainly hit; 0 for none. Infinite beyond the edges.
+    /// 1/t of the nearest face that is certainly hit; 0 if there is none. Infinite beyond the edges.
     inverse_t: Vec<f32>,
-    /// That face's slot; 0 for none.
+    /// The slot of that face; 0 if there is none.
     slots: Vec<u32>,
-    /// By tile: a bound from below on `inverse_t`.
+    /// A lower bound on `inverse_t` by tile.
     farthest: Vec<f32>,
-    /// By tile: whether that may have grown.
+    /// Whether the bound of a tile may have grown.
     stale: Vec<bool>,
     tile_columns: usize,
-    /// By slot; the first stands for no face.
+    /// The drawn faces by slot. Slot 0 stands for no face.
     drawn: Vec<DrawnFace>,
     rows: RowScratch,
     doubts: Vec<Doubt>,
-    /// The pixels that see a face whose function is too poor: none but doubtful ones do.
+    /// The pixels that see a face whose function is too poor. Only doubtful pixels can.
     poor: Vec<u32>,
 }
 
 const NOTHING: DrawnFace = DrawnFace::new([0.0; 3], NO_FACE, false);
 
 impl Canvas {
-    /// Makes an empty window of a size.
+    /// Prepares an empty window of `width` × `height`.
     pub(crate) fn begin(&mut self, width: usize, height: usize) {
         if (self.width, self.height) != (width, height) {
             (self.width, self.height) = (width, height);
@@ -151,6 +154,7 @@ impl Canvas {
             self.slots.resize(self.pitch * rows, 0);
             self.tile_columns = width.div_ceil(TILE);
         }
+
         self.farthest.clear();
         self.farthest.resize(self.tile_columns * height.div_ceil(TILE), 0.0);
         self.stale.clear();
@@ -161,14 +165,14 @@ impl Canvas {
         self.poor.clear();
     }
 
-    /// Enters a face and says under which number.
+    /// Registers a face and returns its slot.
     #[inline(always)]
     pub(crate) fn enter(&mut self, drawn: DrawnFace) -> u32 {
         self.drawn.push(drawn);
         self.drawn.len() as u32 - 1
     }
 
-    /// Whether all that `cover` may show is behind what is seen already.
+    /// Tells whether everything in `cover` is behind what is already visible.
     #[inline(always)]
     pub(crate) fn hides(&mut self, cover: &Cover) -> bool {
         let bound = cover.inverse_t * BEHIND;
@@ -180,7 +184,8 @@ impl Canvas {
                 if self.farthest[tile] >= bound || self.stale[tile] && self.look_again(tile) >= bound {
                     continue;
                 }
-                // Some pixel of the tile sees farther; one of the cover's?
+
+                // Some pixel of the tile sees farther; it counts only if it is in the cover.
                 let (x, y) = (column * TILE, row * TILE);
                 let lanes = left.saturating_sub(x)..=(right - x).min(TILE - 1);
                 for row in y.max(top)..=(y + TILE - 1).min(bottom) {
@@ -199,12 +204,13 @@ impl Canvas {
         true
     }
 
-    /// Whether all of a tile is nearer than `inverse_t`, as far as is known.
+    /// Tells whether all pixels of a tile are known to be nearer than `inverse_t`.
     #[inline(always)]
     pub(crate) fn tile_hides(&mut self, column: usize, row: usize, inverse_t: f32) -> bool {
         self.farthest[row * self.tile_columns + column] >= inverse_t * BEHIND
     }
 
+    /// Recomputes the bound of a tile.
     #[inline(always)]
     fn look_again(&mut self, tile: usize) -> f32 {
         self.stale[tile] = false;
@@ -222,7 +228,7 @@ impl Canvas {
         farthest
     }
 
-    /// Says that something was drawn in the cover.
+    /// Notes that the tiles of the cover were drawn on.
     #[inline(always)]
     pub(crate) fn touch(&mut self, cover: &Cover) {
         let tile = |pixel: u16| usize::from(pixel) / TILE;
@@ -232,12 +238,13 @@ impl Canvas {
         }
     }
 
+    /// Notes that a tile was drawn on.
     #[inline(always)]
     pub(crate) fn touch_tile(&mut self, column: usize, row: usize) {
         self.stale[row * self.tile_columns + column] = true;
     }
 
-    /// Draws a chunk; with `CARE` where 1/t is not trusted all over it; `PANORAMA` in panoramas.
+    /// Draws a chunk. `CARE` is for chunks in which 1/t is not trusted everywhere, `PANORAMA` for panoramas.
     #[inline(always)]
     pub(crate) fn draw<L: RasterLanes, const PANORAMA: bool, const CARE: bool>(
         &mut self,
@@ -252,7 +259,7 @@ impl Canvas {
         }
     }
 
-    /// Draws a chunk, `narrow` or not, with care unless 1/t is `trusted` all over it.
+    /// Draws a chunk on half a register if it is `narrow`, and with care unless 1/t is `trusted` everywhere.
     #[inline(always)]
     pub(crate) fn draw_part<L: RasterLanes, const PANORAMA: bool>(
         &mut self,
@@ -270,10 +277,10 @@ impl Canvas {
         }
     }
 
-    /// Notes the pixels of the chunk just drawn that may see its face.
+    /// Notes the pixels of the last chunk that may see its face.
     #[cold]
     #[inline(never)]
-    fn doubt(&mut self, grid: &ChunkGrid<'_>, chunk: &Chunk, turn: bool, care: bool) {
+    fn doubt(&mut self, grid: &ChunkGrid<'_>, chunk: &Chunk, panorama: bool, care: bool) {
         let f = &chunk.inverse_t;
         for (k, (&lanes, &row)) in self.rows.doubts.iter().zip(grid.rows).take(grid.count).enumerate() {
             let mut lanes = lanes;
@@ -283,17 +290,19 @@ impl Canvas {
                 if chunk.column + lane >= self.width {
                     continue;
                 }
+
                 let mut bound = f.across * grid.u[lane] + f.at;
-                if turn {
+                if panorama {
                     bound += f.bend * grid.v[lane];
                 }
                 bound += f.down * row;
-                if turn {
+                if panorama {
                     bound *= grid.scale[k];
                 }
                 if care {
                     bound += chunk.inverse_t_error;
                 }
+
                 let pixel = (chunk.row + k) * self.pitch + chunk.column + lane;
                 self.doubts
                     .push(Doubt { pixel: pixel as u32, slot: chunk.slot, inverse_t: bound });
@@ -301,9 +310,8 @@ impl Canvas {
         }
     }
 
-    /// Decides the doubtful pixels. `decide` is given a column, a row and what was drawn there and may be
-    /// seen, and says which of these it is (its place in the list), and whether its function is too poor to
-    /// give a depth there.
+    /// Decides the doubtful pixels. `decide` gets a column, a row and the candidate faces there. It returns
+    /// the place of the visible one in that list, and whether its function is too poor to give a depth.
     #[inline(always)]
     pub(crate) fn settle(
         &mut self,
@@ -312,10 +320,13 @@ impl Canvas {
         let mut doubts = std::mem::take(&mut self.doubts);
         doubts.sort_unstable_by_key(|d| (d.pixel, d.slot));
         let (mut slots, mut candidates) = (Vec::new(), Vec::new());
+
         for group in doubts.chunk_by(|a, b| a.pixel == b.pixel) {
             let pixel = group[0].pixel as usize;
             let best = self.inverse_t[pixel];
             let reach = best.to_bits() as i32 - CLOSE_ULPS;
+
+            // Doubts that are not clearly behind, and the face that was certain.
             slots.clear();
             slots.extend(
                 group
@@ -326,9 +337,11 @@ impl Canvas {
             if slots.is_empty() {
                 continue;
             }
+
             if best > 0.0 {
                 slots.push(self.slots[pixel]);
             }
+
             candidates.clear();
             candidates.extend(slots.iter().map(|&s| self.drawn[s as usize]));
             let decision = decide(pixel % self.pitch, pixel / self.pitch, &candidates);
@@ -337,15 +350,16 @@ impl Canvas {
                 self.poor.push(pixel as u32);
             }
         }
+
         doubts.clear();
         self.doubts = doubts;
     }
 
-    /// Writes faces and depths into `out`, whose first pixels are the window's and whose rows are `out_pitch`
-    /// apart, and empties the window.
+    /// Writes faces and depths into `out` and empties the window. `out` begins at the window's first pixel;
+    /// its rows are `out_pitch` apart.
     ///
-    /// `u` and `v` of the columns come in groups, `line` gives level and rise of a row: see [`DrawnFace`].
-    /// `single` casts the ray of a pixel (column, row) to a face whose function is too poor.
+    /// `u` and `v` of the columns come in groups, and `line` gives the level and the rise of a row: see
+    /// [`DrawnFace`]. `single` casts the ray of a pixel (column, row) to a face whose function is too poor.
     #[inline(always)]
     pub(crate) fn finish<L: RasterLanes, const PANORAMA: bool>(
         &mut self,
@@ -364,6 +378,7 @@ impl Canvas {
             let faces = &mut out.0[row * out_pitch..][..width];
             let depths = &mut out.1[row * out_pitch..][..width];
             let (level, rise) = line(row);
+
             let drawn = &self.drawn[..];
             let (faces, last_faces) = faces.as_chunks_mut::<LANES>();
             let (depths, last_depths) = depths.as_chunks_mut::<LANES>();
@@ -373,7 +388,8 @@ impl Canvas {
                 l.resolve::<PANORAMA>(slots, &RowGroup { u, v, level, rise }, drawn, faces, depths);
                 (*slots, *inverse_t) = ([0; LANES], [0.0; LANES]);
             }
-            // A last group that is not full.
+
+            // The last group, if it is not full.
             if let Some((slots, (u, v))) = groups.next() {
                 let (mut faces, mut depths) = ([NO_FACE; LANES], [0.0; LANES]);
                 l.resolve::<PANORAMA>(slots, &RowGroup { u, v, level, rise }, drawn, &mut faces, &mut depths);
@@ -383,6 +399,8 @@ impl Canvas {
                 inverse_t.1.fill(0.0);
             }
         }
+
+        // Exact depths where a function is too poor.
         for &pixel in &self.poor {
             let (column, row) = (pixel as usize % self.pitch, pixel as usize / self.pitch);
             let at = row * out_pitch + column;

@@ -1,5 +1,5 @@
-//! Which face each pixel sees: faces drawn from the rays' common origin, the nearest first, with the answer
-//! of exact single rays.
+//! Finds the face that each pixel sees. Faces are drawn from the common origin of the rays, the nearest
+//! first; the result is the same as the result of exact single rays.
 
 pub(crate) mod batch;
 pub(crate) mod canvas;
@@ -11,25 +11,25 @@ pub(crate) mod pinhole;
 pub(crate) mod visibility;
 pub(crate) mod window;
 
-/// The smaller of two, and of anything but numbers the second: one instruction, which `f64::min` is not.
+/// Returns the smaller of two; `b` if one is NaN. It is one instruction, which `f64::min` is not.
 #[inline(always)]
 fn min<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
 }
 
-/// The greater of two, likewise.
+/// Returns the greater of two; `b` if one is NaN.
 #[inline(always)]
 fn max<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
-/// The smallest of three.
+/// Returns the smallest of three.
 #[inline(always)]
 fn low<T: PartialOrd>([a, b, c]: [T; 3]) -> T {
     min(min(a, b), c)
 }
 
-/// The greatest of three.
+/// Returns the greatest of three.
 #[inline(always)]
 fn high<T: PartialOrd>([a, b, c]: [T; 3]) -> T {
     max(max(a, b), c)

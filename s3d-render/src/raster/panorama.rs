@@ -1,11 +1,11 @@
-//! Panoramas, for the visibility pass: [`PanoramaGrid`] says how.
+//! Panoramas in the visibility pass: [`PanoramaGrid`] explains the functions.
 
 use crate::raster::batch::DrawKind;
 use crate::raster::canvas::{Canvas, Cover, TILE, half_of_tile, part_of_tile};
 use crate::raster::chunk::{Linear, MAX_ROWS, TRUSTED};
 use crate::raster::panorama_batch::{PanoramaBatch, PanoramaCorners};
 use crate::raster::panorama_grid::{
-    ANGLE_ERROR, PanoramaBounds, PanoramaGrid, PanoramaPlanes, turn_of, turns_of,
+    ANGLE_ERROR, PanoramaBounds, PanoramaGrid, PanoramaPlanes, angle_of, angles_of,
 };
 use crate::raster::window::{Pixels, ProjectionRaster, Window};
 use crate::raster::{high, low, max, min};
@@ -18,11 +18,11 @@ use glam::{DVec3, Vec3};
 use s3d_geom::TriMesh;
 use std::f64::consts::TAU;
 
-/// Only faces over a greater azimuth, in radians, may hold a pole, or cross the azimuth opposite to the
-/// window's middle: their corners are half a turn apart at least.
+/// A face around a pole, or across the azimuth opposite to the window's middle, spans a greater azimuth than
+/// this, in radians: its corners are at least half a turn apart.
 const WIDEST: f32 = 3.0;
 
-/// A panorama's window.
+/// The window of a panorama.
 pub(crate) struct Panorama<'a> {
     mesh: &'a TriMesh,
     origin: DVec3,
@@ -33,11 +33,11 @@ pub(crate) struct Panorama<'a> {
 }
 
 impl<'a> Panorama<'a> {
-    /// The sixteen columns of a chunk are taken to lie within half a radian: panoramas of fewer than 190
-    /// columns are for single rays.
+    /// The widest step between columns, in radians. The sixteen columns of a chunk must lie within half a
+    /// radian, so panoramas of fewer than 190 columns are cast ray by ray.
     pub(crate) const WIDEST_STEP_RAD: f64 = 0.5 / (LANES - 1) as f64;
 
-    /// The window of `window`, whose columns are no farther apart than that.
+    /// Sets up a window whose columns are no farther apart than that.
     pub(crate) fn new(mesh: &'a TriMesh, window: &Window<'a>) -> Self {
         Self {
             mesh,
@@ -49,58 +49,68 @@ impl<'a> Panorama<'a> {
         }
     }
 
+    /// Computes the directions of the corners of a cluster.
     #[inline(always)]
     fn project(&mut self, corners: &[[[f32; PACKET]; 3]]) {
         let o = self.origin;
         let (sin, cos) = self.grid.middle_sin_cos;
         let projected = &mut *self.projected;
         for (k, [x, y, z]) in corners.iter().enumerate() {
-            // Arrays of their own, so that all corners of the packet go together.
+            // Each result has an array of its own, so that the compiler handles all corners of the packet at
+            // once.
             let (mut xs, mut ys, mut zs) = ([0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
-            let (mut turns, mut latitudes) = ([0.0; PACKET], [0.0; PACKET]);
+            let (mut azimuths, mut latitudes) = ([0.0; PACKET], [0.0; PACKET]);
             for i in 0..PACKET {
                 let (x, y, z) = (f64::from(x[i]) - o.x, f64::from(y[i]) - o.y, f64::from(z[i]) - o.z);
                 (xs[i], ys[i], zs[i]) = (x, y, z);
                 let (x, y, z) = (x as f32, y as f32, z as f32);
-                // Turned so that the window's middle is straight ahead, and to the right counts up.
-                turns[i] = turn_of(x * sin - y * cos, x * cos + y * sin);
-                latitudes[i] = turn_of(z, (x * x + y * y).sqrt());
+                // Turned so that the window's middle is straight ahead, and azimuths grow to the right.
+                azimuths[i] = angle_of(x * sin - y * cos, x * cos + y * sin);
+                latitudes[i] = angle_of(z, (x * x + y * y).sqrt());
             }
             let packet = k * PACKET..(k + 1) * PACKET;
             projected.x[packet.clone()].copy_from_slice(&xs);
             projected.y[packet.clone()].copy_from_slice(&ys);
             projected.z[packet.clone()].copy_from_slice(&zs);
-            projected.turn[packet.clone()].copy_from_slice(&turns);
+            projected.azimuth[packet.clone()].copy_from_slice(&azimuths);
             projected.latitude[packet].copy_from_slice(&latitudes);
         }
     }
 
-    /// Draws a face that goes around a good part of the sky, or across the place opposite to the window's
-    /// middle. `turns` are the azimuths of its corners.
+    /// Draws a face that spans a good part of the sky, or crosses the azimuth opposite to the window's
+    /// middle. `azimuths` belong to its corners.
     #[inline(never)]
-    fn draw_wide(&self, canvas: &mut Canvas, face: u32, turns: [f32; 3]) {
+    fn draw_wide(&self, canvas: &mut Canvas, face: u32, azimuths: [f32; 3]) {
         let corners = self.mesh.triangle(face).map(|p| p.as_dvec3() - self.origin);
         let latitude = corners.map(|p| libm::atan2(p.z, p.truncate().length()));
         let (south, north) =
             (latitude[0].min(latitude[1]).min(latitude[2]), latitude[0].max(latitude[1]).max(latitude[2]));
-        let (grid, wide) = (&self.grid, high(turns) - low(turns));
+
+        let grid = &self.grid;
+        let wide = high(azimuths) - low(azimuths);
         let (columns, bend) = if wide < WIDEST {
-            // It is between its corners: a face around a pole, or across the opposite place, is wider.
+            // The face is between its corners: a face around a pole, or across the opposite azimuth, is
+            // wider.
             (
-                grid.columns_between(low(turns), high(turns)),
+                grid.columns_between(low(azimuths), high(azimuths)),
                 libm::cos(0.5 * f64::from(wide + 4.0 * ANGLE_ERROR)),
             )
         } else {
             ((0.0, (grid.width - 1) as f32), 0.0)
         };
-        // Arcs bend towards the poles. Along one, the latitude's tangent is a cosine of the azimuth, and the
-        // nearer end is at most half of the width away from where that is greatest.
+
+        // Arcs bend towards the poles. Along an arc, the latitude's tangent is a cosine of the azimuth. Its
+        // greatest value is at most half of the width away from the nearer end.
         let towards_pole = |latitude: f64| libm::atan2(libm::sin(latitude), libm::cos(latitude) * bend);
         let north = if north > 0.0 { towards_pole(north) } else { north };
         let south = if south < 0.0 { towards_pole(south) } else { south };
+
         let rows = grid.rows_between(south as f32 - ANGLE_ERROR, north as f32 + ANGLE_ERROR);
-        let (top, bottom) = ((rows.0 - 1.0).max(0.0), (rows.1 + 1.0).min(grid.height as f32 - 1.0));
-        let (left, right) = (columns.0.max(0.0), columns.1.min(grid.width as f32 - 1.0));
+        let top = (rows.0 - 1.0).max(0.0);
+        let bottom = (rows.1 + 1.0).min(grid.height as f32 - 1.0);
+        let left = columns.0.max(0.0);
+        let right = columns.1.min(grid.width as f32 - 1.0);
+
         if top <= bottom && left <= right {
             let [left, right, top, bottom] = [left, right, top, bottom].map(|pixel| pixel as usize);
             self.draw_in_space(canvas, face, PanoramaBounds { left, right, top, bottom });
@@ -112,6 +122,7 @@ impl<'a> Panorama<'a> {
     fn draw_in_space(&self, canvas: &mut Canvas, face: u32, bounds: PanoramaBounds) {
         let Some(cone) = Cone::new(self.mesh, face, self.origin) else { return };
         let [a, b, c] = cone.corners;
+
         let mut edges = [DVec3::ZERO; 3];
         let mut edge_off = 0.0;
         for (k, (p, q)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
@@ -122,11 +133,13 @@ impl<'a> Panorama<'a> {
                 edge_off = f64::max(edge_off, 1e-15 + 8e-16 * p.length() * q.length() / length);
             }
         }
+
         let Plane { normal, offset } = cone.plane;
-        // Near the plane of the face nothing but single rays can tell.
+        // Near the plane of the face, only single rays can tell.
         let known = offset > 1e-7 * normal.length() * a.length();
         let inverse_t = if known { normal / offset } else { DVec3::ZERO };
         let slot = canvas.enter(DrawnFace::new(inverse_t.to_array(), face, !known));
+
         let planes = PanoramaPlanes { edges, inverse_t, edge_off };
         dispatch(PanoramaTiles {
             grid: &self.grid,
@@ -139,7 +152,7 @@ impl<'a> Panorama<'a> {
     }
 }
 
-/// A face on all the tiles that it may cover.
+/// A face on all tiles that it may cover.
 struct PanoramaTiles<'a> {
     grid: &'a PanoramaGrid,
     canvas: &'a mut Canvas,
@@ -172,6 +185,7 @@ impl PanoramaTiles<'_> {
                 for tile_column in bounds.left / TILE..=bounds.right / TILE {
                     let (column, narrow) = half_of_tile(tile_column, bounds.left, bounds.right);
                     let mut chunk = grid.chunk(planes, (column, row), &reach, slot);
+
                     if chunk
                         .edges
                         .iter()
@@ -179,17 +193,20 @@ impl PanoramaTiles<'_> {
                     {
                         continue;
                     }
+
                     if poor {
                         chunk.inverse_t = Linear { at: f32::MAX, ..Linear::default() };
                         (chunk.inverse_t_error, chunk.trusted) = (f32::INFINITY, f32::INFINITY);
                         canvas.draw::<L, true, true>(l, &lines, &chunk);
                         continue;
                     }
+
                     let high = reach.range(&chunk.inverse_t).1;
                     let (low, error) = reach.trust(&chunk.inverse_t);
                     if high + error <= 0.0 || canvas.tile_hides(tile_column, tile_row, high + error) {
                         continue;
                     }
+
                     canvas.touch_tile(tile_column, tile_row);
                     let trusted = error < TRUSTED * low;
                     (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
@@ -214,16 +231,18 @@ impl ProjectionRaster for Panorama<'_> {
     fn cover(&self, node: &Node) -> Option<Cover> {
         let lo = (Vec3::from(node.min).as_dvec3() - self.origin).as_vec3();
         let hi = (Vec3::from(node.max).as_dvec3() - self.origin).as_vec3();
-        // What rounding may have moved.
+        // A bound on the rounding error.
         let off = 1e-6 * lo.abs().max(hi.abs()) + 1e-30;
         let (lo, hi) = (lo - off, hi + off);
+
         let near = lo.max(-hi).max(Vec3::ZERO);
         let far = lo.abs().max(hi.abs());
         let flat = (near.x * near.x + near.y * near.y).sqrt();
         let flat_far = (far.x * far.x + far.y * far.y).sqrt();
         let distance = (flat * flat + near.z * near.z).sqrt() * (1.0 - 1e-6);
-        // All angles at once: both latitudes, the azimuth of the middle, and from there those of the corners,
-        // which are less than half a turn apart.
+
+        // All angles are computed at once: both latitudes, the azimuth of the middle, and the azimuths of the
+        // corners relative to it, which are less than half a turn apart.
         let (sin, cos) = self.grid.middle_sin_cos;
         let (x, y) = (0.5 * (lo.x + hi.x), 0.5 * (lo.y + hi.y));
         let from_middle = |cx: f32, cy: f32| (cx * y - cy * x, cx * x + cy * y);
@@ -233,21 +252,23 @@ impl ProjectionRaster for Panorama<'_> {
             (if lo.z < 0.0 { flat } else { flat_far }, if hi.z > 0.0 { flat } else { flat_far });
         let ys = [lo.z, hi.z, x * sin - y * cos, a.0, b.0, c.0, d.0, 0.0];
         let xs = [low_flat, high_flat, x * cos + y * sin, a.1, b.1, c.1, d.1, 1.0];
-        let [low, high, middle, corners @ .., _] = turns_of(&ys, &xs);
+        let [low, high, middle, corners @ .., _] = angles_of(&ys, &xs);
+
         let (top, bottom) = self.grid.rows_between(low - ANGLE_ERROR, high + ANGLE_ERROR);
         let rows = (top - 0.01, bottom + 0.01);
         let (mut left, mut right) = (0.0, self.grid.width as f32 - 1.0);
         if flat > 0.0 {
             let mut range = (0.0f32, 0.0f32);
-            for turn in corners {
-                range = (min(range.0, turn), max(range.1, turn));
+            for azimuth in corners {
+                range = (min(range.0, azimuth), max(range.1, azimuth));
             }
             let (middle_column, per_rad) = (self.grid.middle_column as f32, 1.0 / self.grid.step as f32);
             let pad = 0.01 + 2.0 * ANGLE_ERROR * per_rad;
             let around = TAU as f32 * per_rad;
             let mut first = middle_column + (middle + range.0) * per_rad - pad;
             let mut last = middle_column + (middle + range.1) * per_rad + pad;
-            // A turn more or less may bring it into the window, from one side or from both.
+
+            // A turn more or less may bring the range into the window, from one side or from both.
             let inside = |first: f32, last: f32| last >= 0.0 && first <= self.grid.width as f32 - 1.0;
             let shown = [-around, 0.0, around].map(|by| inside(first + by, last + by));
             match shown {
@@ -259,6 +280,7 @@ impl ProjectionRaster for Panorama<'_> {
             }
             (left, right) = (max(first, left), min(last, right));
         }
+
         Cover::new((left, right), rows, (self.grid.width, self.grid.height), 1.0 / distance)
     }
 
@@ -272,11 +294,13 @@ impl ProjectionRaster for Panorama<'_> {
             let inverse_t = batch.planes(j).inverse_t.to_array();
             canvas.enter(DrawnFace::new(inverse_t, cluster.ids[batch.place_in_cluster(j)], false))
         };
+
         for j in batch.faces(DrawKind::Large) {
             let slot = enter(canvas, j);
             let (planes, bounds) = (&batch.planes(j), &batch.bounds(j));
             PanoramaTiles { grid, canvas, planes, bounds, slot, poor: false }.draw(l);
         }
+
         let mut tangents = [0.0; MAX_ROWS];
         for j in batch.faces(DrawKind::Narrow) {
             let (chunk, rows) = batch.chunk(j, enter(canvas, j));
@@ -306,8 +330,8 @@ impl ProjectionRaster for Panorama<'_> {
         }
         for j in batch.faces(DrawKind::InSpace) {
             let (face, bounds) = (cluster.ids[batch.place_in_cluster(j)], batch.bounds(j));
-            match batch.wide_turns(j) {
-                Some(turns) => self.draw_wide(canvas, face, turns),
+            match batch.wide_azimuths(j) {
+                Some(azimuths) => self.draw_wide(canvas, face, azimuths),
                 None => self.draw_in_space(canvas, face, bounds),
             }
         }

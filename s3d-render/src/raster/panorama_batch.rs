@@ -1,67 +1,68 @@
-//! The faces of a cluster in a panorama, set up eight at a time, as [`crate::raster::batch`] does it for
+//! Sets up the faces of a cluster in a panorama, eight at a time, like [`crate::raster::batch`] for
 //! perspective views.
 
 use crate::raster::batch::{DrawKind, FacesByKind, GROUP, Values, group, put};
 use crate::raster::chunk::{Chunk, Linear, MAX_ROWS, TRUSTED};
 use crate::raster::panorama_grid::{
-    ANGLE_ERROR, Anchor, PanoramaBounds, PanoramaGrid, PanoramaPlanes, Reach,
+    ANGLE_ERROR, ChunkAnchor, PanoramaBounds, PanoramaGrid, PanoramaPlanes, Reach,
 };
 use crate::raster::{high, low, max, min};
 use crate::scene::clusters::{MAX_CORNERS, MAX_FACES};
 use crate::simd::raster_lanes::LANES;
 use glam::{DVec3, dvec3};
 
-/// Faces that bounds over a greater azimuth, in radians, are bounded by their latitude alone.
+/// Faces that span a greater azimuth than this, in radians, have no bounds in the image.
 const WIDE: f32 = 0.3;
 
-/// Where rounding may put an edge's plane off by more than so many times 1e-15, single rays decide.
+/// If the rounding error of an edge's plane exceeds this many times 1e-15, single rays decide.
 const FIRM: f64 = 1e6;
 
-/// The corners of a cluster.
+/// The corners of a cluster, as seen from the camera.
 pub(crate) struct PanoramaCorners {
-    /// Relative to the camera.
+    /// The position relative to the camera.
     pub(crate) x: [f64; MAX_CORNERS],
     pub(crate) y: [f64; MAX_CORNERS],
     pub(crate) z: [f64; MAX_CORNERS],
-    /// Azimuth from the window's middle, to the right, and latitude: to [`ANGLE_ERROR`].
-    pub(crate) turn: [f32; MAX_CORNERS],
+    /// The azimuth from the window's middle, positive to the right, and the latitude. The error is below
+    /// [`ANGLE_ERROR`].
+    pub(crate) azimuth: [f32; MAX_CORNERS],
     pub(crate) latitude: [f32; MAX_CORNERS],
 }
 
 impl PanoramaCorners {
     pub(crate) fn new() -> Self {
         let (none, no_angle) = ([0.0; MAX_CORNERS], [0.0; MAX_CORNERS]);
-        Self { x: none, y: none, z: none, turn: no_angle, latitude: no_angle }
+        Self { x: none, y: none, z: none, azimuth: no_angle, latitude: no_angle }
     }
 }
 
-/// What a face of a cluster may show in the window.
+/// Which part of the window a face of a cluster may show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shown {
     Nothing = 0,
-    /// What is in its bounds.
+    /// The pixels in its bounds.
     InBounds,
-    /// Nobody knows: it is too wide.
+    /// Unknown: the face is too wide.
     Wide,
 }
 
-/// What is known of each face of a cluster.
+/// The set-up of each face of a cluster.
 pub(crate) struct PanoramaBatch {
-    turn: [Values<f32>; 3],
+    azimuth: [Values<f32>; 3],
     latitude: [Values<f32>; 3],
-    /// First and last column and row of pixels, cut off at the window.
+    /// The first and last column and row of pixels, clipped to the window.
     left: Values<f32>,
     right: Values<f32>,
     top: Values<f32>,
     bottom: Values<f32>,
     shown: Values<u32>,
-    /// The places in the cluster of the faces that may show something. All from here on is by the place in
+    /// The places in the cluster of the faces that may be visible. All following arrays are by position in
     /// this list.
     places: Values<u8>,
     x: [Values<f64>; 3],
     y: [Values<f64>; 3],
     z: [Values<f64>; 3],
-    /// Of the chunk from the first column and row on.
+    /// The chunk at the first column and row.
     anchor_cos: Values<f64>,
     anchor_sin: Values<f64>,
     anchor_tan: Values<f64>,
@@ -89,7 +90,7 @@ impl PanoramaBatch {
     pub(crate) fn new() -> Self {
         let (angles, numbers) = ([0.0; MAX_FACES], [0.0; MAX_FACES]);
         Self {
-            turn: [angles; 3],
+            azimuth: [angles; 3],
             latitude: [angles; 3],
             left: angles,
             right: angles,
@@ -122,24 +123,27 @@ impl PanoramaBatch {
         }
     }
 
-    /// Sets up faces, given by the places of their corners, in a window.
+    /// Sets up the faces of a cluster, given by the places of their corners, in a window.
     #[inline(always)]
     pub(crate) fn set_up(&mut self, faces: &[[u8; 4]], corners: &PanoramaCorners, grid: &PanoramaGrid) {
         for (i, places) in faces.iter().enumerate() {
             for (k, &place) in places[..3].iter().enumerate() {
-                self.turn[k][i] = corners.turn[usize::from(place)];
+                self.azimuth[k][i] = corners.azimuth[usize::from(place)];
                 self.latitude[k][i] = corners.latitude[usize::from(place)];
             }
         }
-        // The last groups are filled up with what was there: nobody looks at it.
+
+        // The last groups are filled up with stale entries, which are never read.
         for first in (0..faces.len()).step_by(GROUP) {
             self.bound_group(first, grid);
         }
+
         let mut count = 0;
         for (i, &shown) in self.shown[..faces.len()].iter().enumerate() {
             self.places[count % MAX_FACES] = i as u8;
             count += usize::from(shown != Shown::Nothing as u32);
         }
+
         for j in 0..count {
             self.place(j, faces, corners, grid);
         }
@@ -149,32 +153,35 @@ impl PanoramaBatch {
         self.by_kind.sort(&self.kind[..count]);
     }
 
-    /// Bounds the faces of a group, and says which may show something.
+    /// Bounds the faces of a group, and notes which of them may be visible.
     #[inline(always)]
     fn bound_group(&mut self, first: usize, grid: &PanoramaGrid) {
-        let turns = [group(&self.turn[0], first), group(&self.turn[1], first), group(&self.turn[2], first)];
+        let azimuths =
+            [group(&self.azimuth[0], first), group(&self.azimuth[1], first), group(&self.azimuth[2], first)];
         let latitudes = [
             group(&self.latitude[0], first),
             group(&self.latitude[1], first),
             group(&self.latitude[2], first),
         ];
         let (last_column, last_row) = (grid.width as f32 - 1.0, grid.height as f32 - 1.0);
-        // Arrays of their own, so that all faces of the group go together.
+
+        // Each result has an array of its own, so that the compiler bounds all faces of the group at once.
         let (mut lefts, mut rights) = ([0.0; GROUP], [0.0; GROUP]);
         let (mut tops, mut bottoms) = ([0.0; GROUP], [0.0; GROUP]);
         let mut shown = [0; GROUP];
         for i in 0..GROUP {
-            let turn = [turns[0][i], turns[1][i], turns[2][i]];
+            let azimuth = [azimuths[0][i], azimuths[1][i], azimuths[2][i]];
             let latitude = [latitudes[0][i], latitudes[1][i], latitudes[2][i]];
-            let (first, last) = (low(turn), high(turn));
+            let (first, last) = (low(azimuth), high(azimuth));
             let wide = last - first;
-            // An arc bends towards the pole, by no more than the square of its width over 16.
+            // An arc bends towards the pole by at most the square of its width over 16; 15 leaves a margin.
             let bend = wide * wide * (1.0 / 15.0) + ANGLE_ERROR;
             let rows = grid.rows_between(low(latitude) - bend, high(latitude) + bend);
             let columns = grid.columns_between(first, last);
             let (left, right) = (max(columns.0, 0.0), min(columns.1, last_column));
             let top = max((rows.0 - 0.01).ceil(), 0.0);
             let bottom = min((rows.1 + 0.01).floor(), last_row);
+
             let seen = if left <= right {
                 Shown::InBounds as u32
             } else {
@@ -184,6 +191,7 @@ impl PanoramaBatch {
             shown[i] = if wide < WIDE { seen } else { Shown::Wide as u32 };
             (lefts[i], rights[i], tops[i], bottoms[i]) = (left, right, top, bottom);
         }
+
         put(&mut self.left, first, &lefts);
         put(&mut self.right, first, &rights);
         put(&mut self.top, first, &tops);
@@ -191,7 +199,7 @@ impl PanoramaBatch {
         put(&mut self.shown, first, &shown);
     }
 
-    /// Looks up what a face that may show something is set up from.
+    /// Looks up the values that the set-up of a visible face needs.
     #[inline(always)]
     fn place(&mut self, j: usize, faces: &[[u8; 4]], corners: &PanoramaCorners, grid: &PanoramaGrid) {
         let i = usize::from(self.places[j]) % MAX_FACES;
@@ -201,8 +209,9 @@ impl PanoramaBatch {
             self.y[k][j] = corners.y[place];
             self.z[k][j] = corners.z[place];
         }
+
         let bounds = self.bounds_in_cluster(i);
-        // Those of a wide face mean nothing; they may be anywhere.
+        // The bounds of a wide face mean nothing and may be anywhere.
         let (column, row) = (bounds.left.min(grid.width - 1), bounds.top.min(grid.height - 1));
         let anchor = grid.anchor(column, row);
         let reach = grid.reach(row, (bounds.bottom.max(row) - row).min(grid.height - row - 1) + 1);
@@ -232,6 +241,7 @@ impl PanoramaBatch {
         let (columns, rows) = (group(&self.columns, first), group(&self.rows, first));
         let wides = group(&self.wide, first);
         let columns_reach = grid.reach(0, 1);
+
         let mut planes = [[[0.0; GROUP]; 3]; 4];
         let mut offs = [0.0; GROUP];
         let (mut ats, mut acrosses) = ([[0.0; GROUP]; 4], [[0.0; GROUP]; 4]);
@@ -245,8 +255,9 @@ impl PanoramaBatch {
             let normal = cross(b - a, c - a);
             let offset = dot(normal, a);
             let size = size_of(a) * size_of(normal);
+
             let sign = if offset > 0.0 { 1.0 } else { -1.0 };
-            // Edge k is opposite to corner k, from corner k + 1 to k + 2.
+            // Edge k is opposite to corner k: it runs from corner k + 1 to corner k + 2.
             let across = [cross(b, c), cross(c, a), cross(a, b)];
             let shorter = [1.0 / size_of(across[0]), 1.0 / size_of(across[1]), 1.0 / size_of(across[2])];
             let off = high([
@@ -262,7 +273,7 @@ impl PanoramaBatch {
             let inverse_t = normal * (1.0 / offset);
             let edge_off = 1e-15 * off;
 
-            let anchor = Anchor { cos: coses[i], sin: sines[i], tan: tangents[i] };
+            let anchor = ChunkAnchor { cos: coses[i], sin: sines[i], tan: tangents[i] };
             let cos = [first_coses[i], last_coses[i]];
             let reach = Reach { tan: reaches[i], cos, ..columns_reach };
             let f = [
@@ -274,6 +285,7 @@ impl PanoramaBatch {
             let edge_error = anchor.edge_error(&[f[0], f[1], f[2]], &reach, edge_off);
             let (lowest, error) = reach.trust(&f[3]);
 
+            // The kind, without branches: each line overrides the ones before it.
             let trusted = error < TRUSTED * lowest;
             let half = columns[i] <= (LANES / 2) as f32;
             let kind = if half {
@@ -317,6 +329,7 @@ impl PanoramaBatch {
                 (bends[k][i], downs[k][i]) = (f[k].bend, f[k].down);
             }
         }
+
         for k in 0..4 {
             put(&mut self.planes[k][0], first, &planes[k][0]);
             put(&mut self.planes[k][1], first, &planes[k][1]);
@@ -332,19 +345,19 @@ impl PanoramaBatch {
         put(&mut self.kind, first, &kinds);
     }
 
-    /// The faces of a kind.
+    /// Iterates over the positions of the faces of a kind.
     #[inline(always)]
     pub(crate) fn faces(&self, kind: DrawKind) -> impl Iterator<Item = usize> {
         self.by_kind.faces(kind)
     }
 
-    /// The place of a face in its cluster.
+    /// Returns the place of a face in its cluster.
     #[inline(always)]
     pub(crate) fn place_in_cluster(&self, j: usize) -> usize {
         usize::from(self.places[j]) % MAX_FACES
     }
 
-    /// A face in one chunk, or the first of its two, and its number of rows.
+    /// Returns the only or the first chunk of a face, and its number of rows.
     #[inline(always)]
     pub(crate) fn chunk(&self, j: usize, slot: u32) -> (Chunk, usize) {
         let f = |k: usize| Linear {
@@ -385,10 +398,10 @@ impl PanoramaBatch {
         self.bounds_in_cluster(self.place_in_cluster(j))
     }
 
-    /// The azimuths of the corners of a face whose bounds mean nothing, since it is too wide.
-    pub(crate) fn wide_turns(&self, j: usize) -> Option<[f32; 3]> {
+    /// Returns the azimuths of the corners of a face that is too wide for bounds; `None` for other faces.
+    pub(crate) fn wide_azimuths(&self, j: usize) -> Option<[f32; 3]> {
         let i = self.place_in_cluster(j);
-        (self.wide[j] != 0).then(|| [self.turn[0][i], self.turn[1][i], self.turn[2][i]])
+        (self.wide[j] != 0).then(|| [self.azimuth[0][i], self.azimuth[1][i], self.azimuth[2][i]])
     }
 
     #[inline(always)]
@@ -412,7 +425,7 @@ fn dot(a: DVec3, b: DVec3) -> f64 {
     a.x * b.x + a.y * b.y + a.z * b.z
 }
 
-/// The sum of the absolute values of the coordinates.
+/// Returns the sum of the absolute values of the coordinates.
 #[inline(always)]
 fn size_of(v: DVec3) -> f64 {
     v.x.abs() + v.y.abs() + v.z.abs()

@@ -1,15 +1,15 @@
 //! The columns and rows of a panorama's window, and the functions of a face on them.
 //!
-//! The direction in column i and row j is (cos θ cos φ, sin θ cos φ, sin φ), with the azimuth θ falling
-//! by the same step from column to column. Divided by cos φ > 0, a plane's value is x cos θ + y sin θ +
-//! z tan φ. From an anchor in column a the columns go by the angle kδ, and with h = x cos θₐ + y sin θₐ and
-//! h′ = x sin θₐ − y cos θₐ
+//! The direction in column i and row j is (cos θ cos φ, sin θ cos φ, sin φ). The azimuth θ falls by the
+//! same step from column to column. Divided by cos φ > 0, the value of a plane is x cos θ + y sin θ + z
+//! tan φ. Column k from the anchor's column a is turned by the angle kδ. With h = x cos θₐ + y sin θₐ
+//! and h′ = x sin θₐ − y cos θₐ,
 //!
 //! > x cos θ + y sin θ = h + h·(cos kδ − 1) + h′·sin kδ.
 //!
-//! So the functions u = cos kδ − 1 and v = sin kδ of a chunk's columns are the same for all, and those of
-//! its rows are differences of tangents. Near a plane's zero all terms are as small as the chunk, so the
-//! error of `f32` is as in a perspective view: a few parts in 10⁵ of a pixel.
+//! So the functions u = cos kδ − 1 and v = sin kδ of a chunk's columns are the same for all chunks. The
+//! function of its rows is a difference of tangents. Near the zero of a plane all terms are as small as the
+//! chunk, so the error of `f32` is the same as in a perspective view: a few parts in 10⁵ of a pixel.
 
 #![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
 
@@ -22,49 +22,51 @@ use glam::DVec3;
 use s3d_geom::Rays;
 use std::f64::consts::TAU;
 
-/// By how much [`turn_of`] may be off, in radians, and then some.
+/// A bound on the error of [`angle_of`], in radians.
 pub(crate) const ANGLE_ERROR: f32 = 3e-5;
 
-/// Rounding in a chunk, as a part of the sizes of an edge function's terms.
+/// The rounding error in a chunk, as a part of the sizes of an edge function's terms.
 const EDGE_ROUNDING: f64 = 1e-6;
 
-/// Up to this tangent of the latitude rows are steady: they are more than 7° away from the poles.
+/// Rows whose latitude has at most this tangent are steady: they are more than 7° away from the poles.
 const STEEP_TAN: f64 = 8.0;
 
-/// Columns and rows of a window, by angle.
+/// The columns and rows of a window, by angle.
 pub(crate) struct PanoramaGrid {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Radians from column to column, and from row to row.
+    /// The angle from column to column and from row to row, in radians.
     pub(crate) step: f64,
-    /// Sine and cosine of the azimuth of the window's middle, and the column there.
+    /// The sine and the cosine of the azimuth at the middle of the window, and the column there.
     pub(crate) middle_sin_cos: (f32, f32),
     pub(crate) middle_column: f64,
-    /// Latitude of row 0.
+    /// The latitude of row 0.
     top: f64,
     /// cos θ and sin θ of the columns.
     pub(crate) cos: Vec<[f64; LANES]>,
     pub(crate) sin: Vec<[f64; LANES]>,
-    /// cos φ, sin φ and tan φ of the rows; then zeros, so that each row begins a whole group of tangents.
+    /// cos φ, sin φ and tan φ of the rows. Zeros follow the tangents, so that each row begins a whole
+    /// group of them.
     pub(crate) row_cos: Vec<f64>,
     pub(crate) row_sin: Vec<f64>,
     tan: Vec<f64>,
     /// cos φ of the rows.
     scale: Vec<f32>,
-    /// Of a chunk's columns.
+    /// The functions of a chunk's columns.
     u: [f32; LANES],
     v: [f32; LANES],
 }
 
-/// Where a chunk's anchor is: cos θ and sin θ of its column, tan φ of its row.
+/// The position of a chunk's anchor: cos θ and sin θ of its column, tan φ of its row.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Anchor {
+pub(crate) struct ChunkAnchor {
     pub(crate) cos: f64,
     pub(crate) sin: f64,
     pub(crate) tan: f64,
 }
 
-/// How far the functions of a chunk's columns and rows go from its anchor, and cos φ at both ends.
+/// The ranges of the functions of a chunk's columns and rows, relative to its anchor, and cos φ at both
+/// ends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach {
     pub(crate) u: f32,
@@ -73,12 +75,12 @@ pub(crate) struct Reach {
     pub(crate) cos: [f32; 2],
 }
 
-/// Three edges' planes, inwards, and 1/t = `inverse_t` · d.
+/// The planes of three edges, pointing inwards, and 1/t = `inverse_t` · d.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PanoramaPlanes {
     pub(crate) edges: [DVec3; 3],
     pub(crate) inverse_t: DVec3,
-    /// By how much the edges' values are off, for a direction of length 1.
+    /// A bound on the error of the edges' values, for a direction of length 1.
     pub(crate) edge_off: f64,
 }
 
@@ -92,7 +94,7 @@ pub(crate) struct PanoramaBounds {
 }
 
 impl PanoramaGrid {
-    /// The columns and rows of `window`.
+    /// Computes the columns and rows of `window`.
     pub(crate) fn new(window: &Window<'_>) -> Self {
         let Rays::Equirectangular { columns, rows } = window.rays else {
             unreachable!("a panorama has a panorama's rays")
@@ -100,6 +102,7 @@ impl PanoramaGrid {
         let pixel = |sample: usize| (window.stride / 2 + window.stride * sample as u32) as usize;
         let columns: Vec<_> = (0..window.width).map(|i| columns[pixel(window.column + i)]).collect();
         let rows: Vec<_> = (0..window.height).map(|j| rows[pixel(window.row + j)]).collect();
+
         let step = TAU / f64::from(window.camera.width) * f64::from(window.stride);
         let middle_column = 0.5 * (window.width - 1) as f64;
         let middle = libm::atan2(columns[0].y, columns[0].x) - step * middle_column;
@@ -122,14 +125,15 @@ impl PanoramaGrid {
         }
     }
 
-    /// Rows between two latitudes.
+    /// Returns the range of rows between two latitudes.
     #[inline(always)]
     pub(crate) fn rows_between(&self, low: f32, high: f32) -> (f32, f32) {
         let (top, per_rad) = (self.top as f32, 1.0 / self.step as f32);
         ((top - high) * per_rad, (top - low) * per_rad)
     }
 
-    /// Columns between two azimuths from the window's middle, to the right, and what [`turn_of`] may be off.
+    /// Returns the range of columns between two azimuths, counted to the right from the window's middle, plus
+    /// the error of [`angle_of`].
     #[inline(always)]
     pub(crate) fn columns_between(&self, first: f32, last: f32) -> (f32, f32) {
         let (middle, per_rad) = (self.middle_column as f32, 1.0 / self.step as f32);
@@ -137,14 +141,16 @@ impl PanoramaGrid {
         ((middle + first * per_rad - pad).ceil(), (middle + last * per_rad + pad).floor())
     }
 
+    /// Returns the anchor at a column and a row.
     #[inline(always)]
-    pub(crate) fn anchor(&self, column: usize, row: usize) -> Anchor {
+    pub(crate) fn anchor(&self, column: usize, row: usize) -> ChunkAnchor {
         let (cos, sin) = (self.cos.as_flattened()[column], self.sin.as_flattened()[column]);
-        Anchor { cos, sin, tan: self.tan[row] }
+        ChunkAnchor { cos, sin, tan: self.tan[row] }
     }
 
-    /// How many rows, from a row on and `most` at most, make a chunk on which 1/t can be trusted. Next to a
-    /// pole tan φ changes by up to three times from row to row: its rounding in one is too much for a later.
+    /// Returns how many rows from `row` on, at most `most`, make a chunk in which 1/t can be trusted. Next to
+    /// a pole tan φ changes by up to three times from row to row, so the rounding in one row is too large
+    /// for a later one.
     #[inline(always)]
     pub(crate) fn steady_rows(&self, row: usize, most: usize) -> usize {
         let tan = |row: usize| self.tan[row].abs();
@@ -159,7 +165,7 @@ impl PanoramaGrid {
         1 + (1..most).take_while(steady).count()
     }
 
-    /// The reach of a chunk of some rows, from a row on.
+    /// Returns the reach of a chunk of `rows` rows from `row` on.
     #[inline(always)]
     pub(crate) fn reach(&self, row: usize, rows: usize) -> Reach {
         let last = row + rows - 1;
@@ -171,7 +177,7 @@ impl PanoramaGrid {
         }
     }
 
-    /// Columns and rows of a chunk from a row on.
+    /// Returns the columns and rows of a chunk from `row` on.
     #[inline(always)]
     pub(crate) fn chunk_grid<'a>(
         &'a self,
@@ -191,7 +197,7 @@ impl PanoramaGrid {
         ChunkGrid { u: &self.u, v: &self.v, rows: tangents, count: rows, scale }
     }
 
-    /// Part of a face, from a column and a row on. Nothing is known yet of the error of 1/t.
+    /// Returns a part of a face, from a column and a row on. The error of 1/t is not set yet.
     #[inline(always)]
     pub(crate) fn chunk(
         &self,
@@ -209,8 +215,8 @@ impl PanoramaGrid {
     }
 }
 
-impl Anchor {
-    /// The function n · d / cos φ.
+impl ChunkAnchor {
+    /// Returns the function n · d / cos φ.
     #[inline(always)]
     pub(crate) fn linear(&self, n: &DVec3) -> Linear {
         let h = n.x * self.cos + n.y * self.sin;
@@ -218,12 +224,12 @@ impl Anchor {
         Linear { at: (h + n.z * self.tan) as f32, across: h as f32, bend: turned as f32, down: n.z as f32 }
     }
 
-    /// By how much edge functions may be off in a chunk whose planes are off by `edge_off`.
+    /// Returns a bound on the error of edge functions in a chunk, for planes with the error `edge_off`.
     #[inline(always)]
     pub(crate) fn edge_error(&self, edges: &[Linear; 3], reach: &Reach, edge_off: f64) -> f32 {
         let (reach_u, reach_v) = (f64::from(-reach.u), f64::from(reach.v));
         let reach_t = f64::from(-reach.tan);
-        // A direction is as long as 1 / cos φ where its planes are evaluated: 1 + |tan φ| at most.
+        // Planes are evaluated for directions of the length 1 / cos φ ≤ 1 + |tan φ|.
         let away = 1.0 + self.tan.abs() + reach_t.abs();
         let terms = |e: &Linear| {
             f64::from(e.across.abs()) * reach_u
@@ -236,24 +242,25 @@ impl Anchor {
 }
 
 impl Reach {
-    /// Bounds of a function on a chunk, before it is multiplied by cos φ, and the sizes of its terms.
+    /// Returns the bounds of a function on a chunk before it is multiplied by cos φ, and the sum of its
+    /// terms' sizes.
     #[inline(always)]
     pub(crate) fn range(&self, f: &Linear) -> (f32, f32, f32) {
         let down = f.down * self.tan;
         let (u, v) = (f.across * self.u, f.bend * self.v);
         let along = u + v;
-        // Between its ends the function along a row bulges by the square of the angle over 8.
+        // Between its ends, the function along a row bulges by the square of the angle over 8.
         let bulge = (f.across.abs() + f.bend.abs()) * (self.v * self.v - 2.0 * self.u) * 0.125;
         let low = f.at + min(along, 0.0) + min(down, 0.0) - bulge;
         let high = f.at + max(along, 0.0) + max(down, 0.0) + bulge;
         (low, high, f.at.abs() + u.abs() + v.abs() + down.abs())
     }
 
-    /// The least 1/t of a chunk, as far as is known, and by how much any may be off.
+    /// Returns a lower bound on 1/t in a chunk, and a bound on its error.
     #[inline(always)]
     pub(crate) fn trust(&self, inverse_t: &Linear) -> (f32, f32) {
         let (low, _, size) = self.range(inverse_t);
-        // cos φ is least at one of the ends; between them it may be greater than there.
+        // cos φ is least at one of the ends; between them it may be greater than at both.
         let (min_cos, max_cos) = (min(self.cos[0], self.cos[1]), max(self.cos[0], self.cos[1]));
         let max_cos = min(1.0, max_cos * 1.5);
         let low = if low > 0.0 { low * min_cos } else { low };
@@ -261,9 +268,9 @@ impl Reach {
     }
 }
 
-/// The angle of (x, y), from the x axis, to 1.2e-5.
+/// Returns the angle of (x, y) from the x axis, with an error below 1.2e-5.
 #[inline(always)]
-pub(crate) fn turn_of(y: f32, x: f32) -> f32 {
+pub(crate) fn angle_of(y: f32, x: f32) -> f32 {
     let (wide, high) = (x.abs(), y.abs());
     let (small, large) = if wide < high { (wide, high) } else { (high, wide) };
     let t = small / if large > 0.0 { large } else { 1.0 };
@@ -278,10 +285,11 @@ pub(crate) fn turn_of(y: f32, x: f32) -> f32 {
     if y < 0.0 { -angle } else { angle }
 }
 
-/// [`turn_of`] of eight. Not inlined: where LLVM sees how the arrays are made, it computes one after another.
+/// Calls [`angle_of`] eight times. It must not be inlined: if LLVM sees how the arrays are made, it
+/// computes one angle after another.
 #[inline(never)]
-pub(crate) fn turns_of(y: &[f32; 8], x: &[f32; 8]) -> [f32; 8] {
-    std::array::from_fn(|k| turn_of(y[k], x[k]))
+pub(crate) fn angles_of(y: &[f32; 8], x: &[f32; 8]) -> [f32; 8] {
+    std::array::from_fn(|k| angle_of(y[k], x[k]))
 }
 
 #[cfg(test)]
@@ -303,7 +311,7 @@ mod tests {
                 Some(rows)
             })
         };
-        // Tangents fall as 1, 1/3, 1/5, …, and a little faster; they rise again at the other pole.
+        // Tangents fall as 1, 1/3, 1/5, …, and a little faster. They rise again towards the other pole.
         assert_eq!(Vec::from_iter(chunks(0, 16)), [1, 3, 9, 3]);
         assert_eq!(Vec::from_iter(chunks(496, 512)), [11, 3, 1, 1]);
         assert_eq!(Vec::from_iter(chunks(248, 264)), [16]);

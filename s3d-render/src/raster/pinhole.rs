@@ -1,11 +1,11 @@
-//! Perspective views, for the visibility pass.
+//! Perspective views in the visibility pass.
 //!
 //! A corner p (relative to the camera) is in column x = (ρ·p)/(φ·p) and row y = (δ·p)/(φ·p) of the
-//! window, pixel centres at whole numbers, at the depth z = φ·p. For a corner that is no farther out than
-//! [`GUARD`] pixels x and y are good to 2⁻⁵³·8·GUARD < 2e-11 pixels, since |p|/z is then bounded by
-//! the angle of the guard band; so an edge function made from two corners at least 1e-3 apart is good to 1e-8
-//! over a chunk. Faces with a corner farther out or behind the camera, or with shorter edges, get their
-//! planes in space instead. The others are set up by [`FaceBatch`], a cluster at a time.
+//! window, with pixel centres at whole numbers, at the depth z = φ·p. If a corner is no farther out than
+//! [`GUARD`] pixels, |p|/z is bounded by the angle of the guard band, and x and y are good to
+//! 2⁻⁵³·8·GUARD < 2e-11 pixels. An edge function from two corners at least 1e-3 apart is then good to
+//! 1e-8 over a chunk. A face with a corner farther out or behind the camera, or with a shorter edge, is drawn
+//! from its planes in space instead. [`FaceBatch`] sets up the other faces, a cluster at a time.
 
 #![expect(clippy::unreachable, reason = "a camera has rays of its own kind")]
 
@@ -21,10 +21,10 @@ use crate::simd::{Kernel, Simd, dispatch};
 use glam::{DVec2, DVec3, Vec3, dvec2};
 use s3d_geom::{Projection, Rays, TriMesh};
 
-/// Pixels from the window's first that a corner may be away.
+/// The largest distance of a corner from the window's first pixel, in pixels.
 const GUARD: f64 = 16_384.0;
 
-/// 0, 1, 2 …: columns from the anchor, and rows.
+/// 0, 1, 2 …: the columns and rows from the anchor.
 const COUNT: [f32; MAX_ROWS] = {
     let mut count = [0.0; MAX_ROWS];
     let mut k = 0;
@@ -49,7 +49,7 @@ fn grid(rows: usize) -> ChunkGrid<'static> {
     ChunkGrid { u: &COLUMNS, v: &COLUMNS, rows: &COUNT, count: rows, scale: &[] }
 }
 
-/// Three edge functions and 1/t: at + across·i + down·j.
+/// Three edge functions and 1/t: at + across·i + down·j in column i and row j.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PinholePlanes {
     pub(crate) at: [f64; 4],
@@ -57,7 +57,7 @@ pub(crate) struct PinholePlanes {
     pub(crate) down: [f64; 4],
 }
 
-/// A perspective view's window.
+/// The window of a perspective view.
 pub(crate) struct Pinhole<'a> {
     mesh: &'a TriMesh,
     origin: DVec3,
@@ -65,9 +65,10 @@ pub(crate) struct Pinhole<'a> {
     across: DVec3,
     down: DVec3,
     ahead: DVec3,
-    /// Pixels from the first that a corner may be away, at most [`GUARD`].
+    /// The largest distance of a corner from the first pixel, in pixels; at most [`GUARD`].
     guard: f64,
-    /// The direction of the ray in column 0 and row 0, and from column to column and row to row.
+    /// The direction of the ray in column 0 and row 0, and its change from column to column and from row to
+    /// row.
     first: DVec3,
     step_x: DVec3,
     step_y: DVec3,
@@ -79,16 +80,16 @@ pub(crate) struct Pinhole<'a> {
     batch: Box<FaceBatch>,
 }
 
-/// As many as a byte can name, which spares checks of bounds.
+/// A byte can name this many places, which saves bounds checks.
 const PLACES: usize = 1 << u8::BITS;
 
 const _: () = assert!(MAX_CORNERS <= PLACES);
 
-/// The corners of a cluster.
+/// The projected corners of a cluster.
 pub(crate) struct PinholeCorners {
     pub(crate) x: [f64; PLACES],
     pub(crate) y: [f64; PLACES],
-    /// 1/z; 0 for a corner that is behind the camera or too far out.
+    /// 1/z; 0 for a corner behind the camera or too far out.
     pub(crate) inverse_z: [f64; PLACES],
 }
 
@@ -99,31 +100,38 @@ impl PinholeCorners {
     }
 }
 
-/// How far out corners may be, in pixels, of a window with these focal lengths and the principal point at
-/// `center`, so that x and y are as good as the module says: where pixels are far from square, or the window
-/// is far from the optical axis, less than [`GUARD`].
+/// Returns how far out corners may be, in pixels, so that x and y are as good as the module says. The window
+/// has these focal lengths and the principal point `center`. The result is below [`GUARD`] if pixels are far
+/// from square, or if the window is far from the optical axis.
 fn guard(focal: DVec2, center: DVec2) -> f64 {
-    // x is off by 2⁻⁵³·(fx + |cx|)·|p|/z, and |p|/z < 1 + (guard + |cx|)/fx + (guard + |cy|)/fy;
-    // y likewise.
+    // The error of x is 2⁻⁵³·(fx + |cx|)·|p|/z, and |p|/z < 1 + (guard + |cx|)/fx + (guard + |cy|)/fy.
+    // The same holds for y.
     let center = center.abs();
     let farthest = 8.0 * GUARD / (focal + center).max_element() - 1.0 - (center / focal).element_sum();
     (farthest / focal.recip().element_sum()).min(GUARD)
 }
 
 impl<'a> Pinhole<'a> {
-    /// The window of `window` of a view with the axes `right`, `down` and `forward`.
+    /// Sets up a window of a perspective view.
     pub(crate) fn new(mesh: &'a TriMesh, window: &Window<'a>) -> Self {
         let camera = window.camera;
         let pixels = Pixels::new(window);
         let Rays::Perspective { x_step, y_step, origin } = *pixels.rays else {
             unreachable!("a perspective camera has perspective rays")
         };
-        let (pose, stride) = (&camera.pose, f64::from(window.stride));
-        let (focal, center) = (camera.focal_px() / stride, camera.center_px());
-        // Sample i of the window is pixel centre offset + stride · i.
+
+        let pose = &camera.pose;
+        let stride = f64::from(window.stride);
+        let focal = camera.focal_px() / stride;
+        let center = camera.center_px();
+
+        // Sample i of the window is at the pixel centre offset + stride · i.
         let offset = |start: usize| f64::from(window.stride / 2) + stride * start as f64 + 0.5;
-        let (x, y) = (offset(window.column), offset(window.row));
-        let (cx, cy) = ((center.x - x) / stride, (center.y - y) / stride);
+        let x = offset(window.column);
+        let y = offset(window.row);
+        let cx = (center.x - x) / stride;
+        let cy = (center.y - y) / stride;
+
         let forward = pose.forward();
         Self {
             mesh,
@@ -153,7 +161,7 @@ impl<'a> Pinhole<'a> {
         let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
         let guard = self.guard;
         for (k, [x, y, z]) in corners.iter().enumerate() {
-            // Arrays of their own, so that all eight go together.
+            // Each result has an array of its own, so that the compiler projects all eight corners at once.
             let (mut xs, mut ys, mut qs) = ([0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
             for i in 0..PACKET {
                 let (x, y, z) = (f64::from(x[i]) - o.x, f64::from(y[i]) - o.y, f64::from(z[i]) - o.z);
@@ -174,16 +182,20 @@ impl<'a> Pinhole<'a> {
         }
     }
 
-    /// Draws a face by its planes in space: one that reaches behind the camera, or has next to no area.
+    /// Draws a face from its planes in space: it reaches behind the camera, or has almost no area.
     #[inline(never)]
     fn draw_in_space(&self, canvas: &mut Canvas, face: u32) {
         let Some(cone) = Cone::new(self.mesh, face, self.origin) else { return };
         let Some(bounds) = self.bounds_of(&cone) else { return };
         let [a, b, c] = cone.corners;
-        let (mut at, mut across, mut down) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+
+        let mut at = [0.0; 4];
+        let mut across = [0.0; 4];
+        let mut down = [0.0; 4];
         let farthest = self.first.length()
             + self.step_x.length() * self.width as f64
             + self.step_y.length() * self.height as f64;
+
         let mut edge_error = 0.0;
         for (k, (p, q)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
             let n = p.cross(q);
@@ -191,7 +203,7 @@ impl<'a> Pinhole<'a> {
             let (x, y) = (n.dot(self.step_x), n.dot(self.step_y));
             let slope = x.abs() + y.abs();
             if !(length > 0.0 && slope > 0.0) {
-                // No plane, or one that is the same everywhere: it never decides.
+                // The edge has no plane, or its function is the same everywhere: it never decides.
                 at[k] = 1.0;
                 continue;
             }
@@ -201,13 +213,15 @@ impl<'a> Pinhole<'a> {
             across[k] = x / slope;
             down[k] = y / slope;
         }
+
         let plane = cone.plane;
-        // Near the plane of the face nothing but single rays can tell.
+        // Near the plane of the face, only single rays can tell.
         let known = plane.offset > 1e-7 * plane.normal.length() * a.length();
         if known {
             let n = plane.normal / plane.offset;
             (at[3], across[3], down[3]) = (n.dot(self.first), n.dot(self.step_x), n.dot(self.step_y));
         }
+
         let planes = PinholePlanes { at, across, down };
         let inverse_t = [at[3], across[3], down[3]];
         let slot = canvas.enter(DrawnFace::new(inverse_t, face, !known));
@@ -216,15 +230,17 @@ impl<'a> Pinhole<'a> {
         dispatch(PinholeTiles { canvas, planes, bounds, edge_error, slot, poor: !known });
     }
 
-    /// The pixels that a face may cover; `None` if it is behind the camera or beside the window.
+    /// Returns the pixels that a face may cover; `None` if it is behind the camera or beside the window.
     fn bounds_of(&self, cone: &Cone) -> Option<PinholeBounds> {
         let infinite = f64::INFINITY;
-        let (mut x, mut y) = ((infinite, -infinite), (infinite, -infinite));
+        let mut x = (infinite, -infinite);
+        let mut y = (infinite, -infinite);
         let mut q = (infinite, 0.0f64);
         let widen = |range: &mut (f64, f64), v: f64| *range = (range.0.min(v), range.1.max(v));
+
         for (k, &p) in cone.corners.iter().enumerate() {
             let z = self.ahead.dot(p);
-            // A depth that rounding may have put on the wrong side counts as either.
+            // If rounding may have put a depth on the wrong side, it counts for both sides.
             let size = p.abs().element_sum();
             if z > 1e-12 * size {
                 widen(&mut x, self.across.dot(p) / z);
@@ -235,7 +251,8 @@ impl<'a> Pinhole<'a> {
                 q.0 = 0.0;
                 q.1 = infinite;
             }
-            // An edge that passes the camera's plane goes off to infinity, on the side where it passes.
+
+            // An edge that crosses the camera's plane goes off to infinity, on the side of the crossing.
             let next = cone.corners[(k + 1) % 3];
             let z_next = self.ahead.dot(next);
             let near = |z: f64, p: DVec3| z.abs() <= 1e-12 * p.abs().element_sum();
@@ -259,6 +276,7 @@ impl<'a> Pinhole<'a> {
                 }
             }
         }
+
         let left = (x.0 - 0.01).ceil().max(0.0);
         let right = (x.1 + 0.01).floor().min(self.width as f64 - 1.0);
         let top = (y.0 - 0.01).ceil().max(0.0);
@@ -273,7 +291,7 @@ impl<'a> Pinhole<'a> {
     }
 }
 
-/// The pixels that a face may cover, and the least and greatest 1/t that it may have there.
+/// The pixels that a face may cover, and the least and greatest 1/t of the face there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PinholeBounds {
     pub(crate) left: usize,
@@ -298,7 +316,7 @@ impl PinholePlanes {
     }
 }
 
-/// A face on all the tiles that it may cover.
+/// A face on all tiles that it may cover.
 struct PinholeTiles<'a> {
     canvas: &'a mut Canvas,
     planes: &'a PinholePlanes,
@@ -329,20 +347,24 @@ impl PinholeTiles<'_> {
                 let mut chunk = planes.chunk(column, top, slot, edge_error);
                 let last = ((if narrow { TILE / 2 } else { TILE }) - 1) as f32;
                 let last_row = (rows - 1) as f32;
-                // Where a function is greatest and least on the tile.
+
+                // Returns the least and the greatest value of a function on the tile.
                 let range = |f: &Linear| {
                     let (x, y) = (f.across * last, f.down * last_row);
                     (f.at + x.min(0.0) + y.min(0.0), f.at + x.max(0.0) + y.max(0.0))
                 };
+
                 if chunk.edges.iter().any(|e| range(e).1 < -2.0 * edge_error) {
                     continue;
                 }
+
                 if poor {
                     chunk.inverse_t = Linear { at: f32::MAX, ..Linear::default() };
                     (chunk.inverse_t_error, chunk.trusted) = (f32::INFINITY, f32::INFINITY);
                     canvas.draw::<L, false, true>(l, &grid(rows), &chunk);
                     continue;
                 }
+
                 let q = &chunk.inverse_t;
                 let error =
                     INVERSE_T_ROUNDING * (q.at.abs() + q.across.abs() * last + q.down.abs() * last_row);
@@ -351,6 +373,7 @@ impl PinholeTiles<'_> {
                 {
                     continue;
                 }
+
                 canvas.touch_tile(tile_column, tile_row);
                 let trusted = error < TRUSTED * low;
                 (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
@@ -374,6 +397,8 @@ impl ProjectionRaster for Pinhole<'_> {
         let (right, down, ahead) = (self.across.as_vec3(), self.down.as_vec3(), self.ahead.as_vec3());
         let lo = (Vec3::from(node.min).as_dvec3() - self.origin).as_vec3();
         let hi = (Vec3::from(node.max).as_dvec3() - self.origin).as_vec3();
+
+        // The corners of the box.
         let mut xs = [0.0f32; 8];
         let mut ys = [0.0f32; 8];
         let mut zs = [0.0f32; 8];
@@ -385,6 +410,7 @@ impl ProjectionRaster for Pinhole<'_> {
             ys[k] = down.x * x + down.y * y + down.z * z;
             zs[k] = ahead.x * x + ahead.y * y + ahead.z * z;
         }
+
         let far = lo.abs().max(hi.abs());
         let off = 1e-6 * ahead.abs().dot(far);
         let nearest = zs.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a }) - off;
@@ -394,6 +420,8 @@ impl ProjectionRaster for Pinhole<'_> {
         }
         let off = 1e-6 * (right.abs() + down.abs()).dot(far) + off * (self.width + self.height) as f32;
         let (width, height) = (self.width as f32, self.height as f32);
+
+        // A box around the camera's plane has no bounds in the image: only its sides can tell.
         if nearest <= 1e-4 * farthest {
             let outside = |v: &[f32; 8], size: f32| {
                 (0..8).all(|k| v[k] + zs[k] < -off) || (0..8).all(|k| v[k] - size * zs[k] > off)
@@ -403,6 +431,8 @@ impl ProjectionRaster for Pinhole<'_> {
             }
             return Cover::new((0.0, width), (0.0, height), (self.width, self.height), f32::INFINITY);
         }
+
+        // The bounds of the projected corners.
         let mut x = (f32::INFINITY, f32::NEG_INFINITY);
         let mut y = x;
         for k in 0..8 {
@@ -411,6 +441,7 @@ impl ProjectionRaster for Pinhole<'_> {
             x = (if px < x.0 { px } else { x.0 }, if px > x.1 { px } else { x.1 });
             y = (if py < y.0 { py } else { y.0 }, if py > y.1 { py } else { y.1 });
         }
+
         let pad = 0.01 + off / nearest;
         let (columns, rows) = ((x.0 - pad, x.1 + pad), (y.0 - pad, y.1 + pad));
         Cover::new(columns, rows, (self.width, self.height), 1.0 / nearest)
@@ -421,10 +452,12 @@ impl ProjectionRaster for Pinhole<'_> {
         self.project(cluster.corners);
         self.batch
             .set_up(cluster.faces, &self.projected, self.width as f64, self.height as f64);
+
         let batch = &*self.batch;
         let enter = |canvas: &mut Canvas, i: usize| {
             canvas.enter(DrawnFace::new(batch.inverse_t(i), cluster.ids[i], false))
         };
+
         for i in batch.faces(DrawKind::Large) {
             let slot = enter(canvas, i);
             let (planes, bounds) = (&batch.planes(i), &batch.bounds(i));

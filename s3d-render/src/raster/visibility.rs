@@ -1,4 +1,4 @@
-//! Which face each pixel of a camera sees, and how far away.
+//! Casts the pixels of a camera: the face that each one sees, and its depth.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::raster::panorama::Panorama;
@@ -11,10 +11,8 @@ use s3d_geom::{Camera, Projection, Raster};
 use s3d_simd::{Level, level};
 use std::f64::consts::TAU;
 
-/// Casts image after image of a scene, and keeps its memory between them: what a thread that renders should
-/// hold.
-///
-/// Nothing but time depends on what was cast before.
+/// Casts image after image of a scene and keeps its memory between them. Each thread that renders should hold
+/// one. Earlier images affect the time alone, not the result.
 ///
 /// ```
 /// use s3d_geom::{Camera, Pose, TriMesh, glam::{dvec3, vec3}};
@@ -35,19 +33,20 @@ pub struct Caster<'s, 'm> {
     scratch: Scratch,
 }
 
-/// The most pixels of a window that is cast at once: what a second-level cache and some of the third hold.
+/// The most pixels of a window that is cast at once: they fit in the second-level cache and a part of the
+/// third.
 const WINDOW: usize = 1 << 17;
 
-/// The most columns of a window, and rows: their numbers fit into 16 bits.
+/// The most columns and rows of a window: their numbers fit in 16 bits.
 const MAX_SIDE: usize = 1 << 14;
 
 impl<'s, 'm> Caster<'s, 'm> {
-    /// A caster for a scene.
+    /// Returns a caster for a scene.
     pub fn new(scene: &'s Scene<'m>) -> Self {
         Self { scene, scratch: Scratch::default() }
     }
 
-    /// The scene.
+    /// Returns the scene.
     pub fn scene(&self) -> &'s Scene<'m> {
         self.scene
     }
@@ -68,43 +67,52 @@ impl<'s, 'm> Caster<'s, 'm> {
         hits
     }
 
-    /// As [`Self::cast_strided`], into memory that is there: what `hits` held is lost. Images of one size
-    /// after another cost no new memory.
+    /// Casts like [`Self::cast_strided`], and overwrites `hits`. Repeated images of one size allocate no
+    /// memory.
     ///
     /// # Panics
     /// If `stride` is 0.
     pub fn cast_into(&mut self, camera: &Camera, stride: u32, hits: &mut Hits) {
-        let (columns, rows) = (samples(camera.width, stride), samples(camera.height, stride));
+        let columns = samples(camera.width, stride);
+        let rows = samples(camera.height, stride);
         hits.resize(columns, rows);
-        let (columns, rows) = (columns as usize, rows as usize);
+        let columns = columns as usize;
+        let rows = rows as usize;
         if columns == 0 || rows == 0 {
             return;
         }
+
         if !camera.pose.location.is_finite() {
             hits.face.pixels_mut().fill(NO_FACE);
             hits.depth.pixels_mut().fill(f32::INFINITY);
             return;
         }
+
+        // A coarse panorama is cast ray by ray.
         let step_rad = TAU / f64::from(camera.width) * f64::from(stride);
         if camera.is_panorama() && step_rad > Panorama::WIDEST_STEP_RAD {
             *hits = cast_ray_by_ray(self.scene, camera, stride);
             return;
         }
-        // A panorama's windows are about square, so that few clusters lie in several; and what is opposite to
-        // the middle of one is far from it. Views are no faster by squares than by strips.
+
+        // The windows of a panorama are about square, so that few clusters lie in several windows, and each
+        // window is far from the azimuth opposite to its middle. Views are no faster with squares than with
+        // strips.
         let across = if camera.is_panorama() {
             columns.div_ceil(WINDOW.isqrt()).max(4)
         } else {
             columns.div_ceil(MAX_SIDE)
         };
         let max_columns = columns.div_ceil(across);
-        // As many windows as it takes, of one height but for the last.
+        // All windows have the same height but the last.
         let windows = (rows * max_columns).div_ceil(WINDOW);
         let max_rows = rows.div_ceil(windows).min(MAX_SIDE);
+
         let rays = &camera.rays();
         for row in (0..rows).step_by(max_rows) {
             for column in (0..columns).step_by(max_columns) {
-                let (width, height) = (max_columns.min(columns - column), max_rows.min(rows - row));
+                let width = max_columns.min(columns - column);
+                let height = max_rows.min(rows - row);
                 let window = Window { camera, rays, stride, column, row, width, height };
                 let first = row * columns + column;
                 let out = (&mut hits.face.pixels_mut()[first..], &mut hits.depth.pixels_mut()[first..]);
@@ -114,8 +122,8 @@ impl<'s, 'm> Caster<'s, 'm> {
     }
 }
 
-/// Casts a window with the instructions of a level: `out` begins at the window's first pixel, its rows are
-/// `pitch` apart.
+/// Casts a window with the instructions of `level`. `out` begins at the first pixel of the window; its rows
+/// are `pitch` apart.
 fn cast_window(
     level: Level,
     scene: &Scene<'_>,
@@ -143,8 +151,8 @@ pub fn cast(scene: &Scene<'_>, camera: &Camera) -> Hits {
 }
 
 /// Casts the rays of every `stride`th pixel of every `stride`th row, from pixel (stride / 2, stride / 2) on:
-/// enough to score a view. Along an axis of n pixels there are (n − 1 − stride / 2) / stride + 1 of them
-/// (rounding down), none if stride / 2 ≥ n. A stride of 1 is [`cast`].
+/// enough to score a view. An axis of n pixels has (n − 1 − stride / 2) / stride + 1 of them (rounded
+/// down), or none if stride / 2 ≥ n. A stride of 1 gives [`cast`].
 ///
 /// # Panics
 /// If `stride` is 0.
@@ -152,16 +160,19 @@ pub fn cast_strided(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits {
     Caster::new(scene).cast_strided(camera, stride)
 }
 
-/// As [`cast_strided`], one exact ray at a time: the reference that tests and benches hold the fast one
-/// against.
+/// Casts like [`cast_strided`], one exact ray at a time. Tests and benches compare the fast way with this
+/// reference.
 ///
 /// # Panics
 /// If `stride` is 0.
 pub fn cast_ray_by_ray(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits {
-    let (columns, rows) = (strided(camera.width, stride), strided(camera.height, stride));
+    let columns = strided(camera.width, stride);
+    let rows = strided(camera.height, stride);
     let mut caster = RayCaster::new(scene, camera.pose.location);
     let rays = camera.rays();
-    let (mut faces, mut depths) = (Vec::new(), Vec::new());
+
+    let mut faces = Vec::new();
+    let mut depths = Vec::new();
     for &j in &rows {
         for &i in &columns {
             let hit = caster.cast(rays.at(i, j));
@@ -169,11 +180,13 @@ pub fn cast_ray_by_ray(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits 
             depths.push(hit.map_or(f32::INFINITY, |h| h.t as f32));
         }
     }
-    let (width, height) = (columns.len() as u32, rows.len() as u32);
+
+    let width = columns.len() as u32;
+    let height = rows.len() as u32;
     Hits { face: Raster::from_vec(width, height, faces), depth: Raster::from_vec(width, height, depths) }
 }
 
-/// How many samples there are along `size` pixels.
+/// Returns the number of samples along `size` pixels.
 fn samples(size: u32, stride: u32) -> u32 {
     assert!(stride > 0, "a stride of 0 pixels");
     if stride / 2 < size {
@@ -183,6 +196,7 @@ fn samples(size: u32, stride: u32) -> u32 {
     }
 }
 
+/// Returns the pixels of the samples along `size` pixels.
 fn strided(size: u32, stride: u32) -> Vec<u32> {
     assert!(stride > 0, "a stride of 0 pixels");
     (stride / 2..size).step_by(stride as usize).collect()
@@ -206,19 +220,23 @@ mod tests {
             Camera::pinhole(pose, dvec2(150.0, 90.0), dvec2(30.0, 150.0), 203, 131).unwrap(),
             Camera::equirectangular(pose, 400),
         ];
+
         for camera in &views {
-            let (width, height) = ((camera.width / 2) as usize, camera.height as usize - 5);
+            let width = (camera.width / 2) as usize;
+            let height = camera.height as usize - 5;
             let window =
                 Window { camera, rays: &camera.rays(), stride: 1, column: 60, row: 3, width, height };
             let images: Vec<_> = Level::all()
                 .into_iter()
                 .map(|level| {
-                    let (mut faces, mut depths) = (vec![7; width * height], vec![7.0; width * height]);
+                    let mut faces = vec![7; width * height];
+                    let mut depths = vec![7.0; width * height];
                     let out = (&mut faces[..], &mut depths[..]);
                     cast_window(level, &scene, &window, &mut Scratch::default(), out, width);
                     (faces, depths)
                 })
                 .collect();
+
             assert!(images.iter().all(|image| *image == images[0]));
             assert!(images[0].0.iter().any(|&face| face != NO_FACE));
         }

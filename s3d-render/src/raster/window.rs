@@ -1,4 +1,4 @@
-//! The visibility pass over a window of an image, whatever the projection.
+//! Runs the visibility pass over a window of an image, for any projection.
 
 use crate::raster::canvas::{Canvas, Cover};
 use crate::ray::caster::Nearest;
@@ -13,22 +13,22 @@ use s3d_geom::{Camera, Rays, TriMesh};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Samples of an image that are cast together: its column i is the image's column of pixels
-/// stride / 2 + stride · (`column` + i), likewise its rows.
+/// The samples of an image that are cast together. Column i of the window is column stride / 2 + stride ·
+/// (`column` + i) of the image; rows likewise.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window<'a> {
     pub(crate) camera: &'a Camera,
     /// The camera's rays.
     pub(crate) rays: &'a Rays,
     pub(crate) stride: u32,
-    /// The window's first column and row among the samples, and its size.
+    /// The first column and row of the window among the samples, and the size of the window.
     pub(crate) column: usize,
     pub(crate) row: usize,
     pub(crate) width: usize,
     pub(crate) height: usize,
 }
 
-/// Which pixels of the image the samples of a window are.
+/// Maps the samples of a window to pixels of the image.
 pub(crate) struct Pixels<'a> {
     pub(crate) rays: &'a Rays,
     stride: u32,
@@ -39,34 +39,35 @@ pub(crate) struct Pixels<'a> {
 impl<'a> Pixels<'a> {
     pub(crate) fn new(window: &Window<'a>) -> Self {
         let first = |sample: usize| window.stride / 2 + window.stride * sample as u32;
-        let (column, row) = (first(window.column), first(window.row));
+        let column = first(window.column);
+        let row = first(window.row);
         Self { rays: window.rays, stride: window.stride, column, row }
     }
 
-    /// The direction of a sample's ray, as single rays have it.
+    /// Returns the direction of a sample's ray, the same as for single rays.
     pub(crate) fn direction(&self, column: usize, row: usize) -> DVec3 {
         self.rays
             .at(self.column + self.stride * column as u32, self.row + self.stride * row as u32)
     }
 }
 
-/// Values by column in groups of a register; the last is filled up with zeros.
+/// Splits values by column into groups of a register. The last group is filled up with zeros.
 pub(crate) fn groups(values: &[f64]) -> Vec<[f64; LANES]> {
     let group = |chunk: &[f64]| std::array::from_fn(|k| chunk.get(k).copied().unwrap_or(0.0));
     values.chunks(LANES).map(group).collect()
 }
 
-/// How a projection puts faces on a window.
+/// Projects faces onto a window.
 pub(crate) trait ProjectionRaster {
-    /// Where all rays start.
+    /// The common origin of the rays.
     fn origin(&self) -> DVec3;
-    /// Width and height of the window.
+    /// The width and the height of the window.
     fn size(&self) -> (usize, usize);
-    /// The pixels that a box may cover; `None` if the window does not show it.
+    /// Returns the pixels that a box may cover; `None` if it is outside the window.
     fn cover(&self, node: &Node) -> Option<Cover>;
-    /// Draws the faces of a group.
+    /// Draws the faces of a cluster.
     fn draw<L: RasterLanes>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>);
-    /// [`Canvas::finish`] with this raster's functions.
+    /// Calls [`Canvas::finish`] with the functions of this projection.
     fn finish<L: RasterLanes>(
         &self,
         l: L,
@@ -75,13 +76,13 @@ pub(crate) trait ProjectionRaster {
         out_pitch: usize,
         single: impl Fn(u32, usize, usize) -> f64,
     );
-    /// 1/t of what was drawn, at a pixel.
+    /// Returns 1/t of a drawn face at a pixel.
     fn inverse_t(&self, drawn: &DrawnFace, column: usize, row: usize) -> f64;
-    /// The direction of the ray through the centre of a pixel.
+    /// Returns the direction of the ray through the centre of a pixel.
     fn direction(&self, column: usize, row: usize) -> DVec3;
 }
 
-/// What waits to be drawn, the nearest first.
+/// A node that waits to be drawn. The nearest comes first.
 struct QueuedNode {
     node: u32,
     cover: Cover,
@@ -89,7 +90,7 @@ struct QueuedNode {
 
 impl Ord for QueuedNode {
     fn cmp(&self, other: &Self) -> Ordering {
-        // For numbers from 0 on the bits have the order of the values.
+        // The bits of non-negative numbers are ordered like their values.
         let key = |w: &Self| w.cover.inverse_t.to_bits();
         key(self).cmp(&key(other)).then_with(|| other.node.cmp(&self.node))
     }
@@ -109,7 +110,7 @@ impl PartialEq for QueuedNode {
     }
 }
 
-/// The memory of the visibility pass, for one window after another.
+/// The memory of the visibility pass, reused from window to window.
 #[derive(Default)]
 pub(crate) struct Scratch {
     canvas: Canvas,
@@ -121,7 +122,7 @@ pub(crate) struct VisibilityKernel<'a, 'm, T> {
     pub(crate) scene: &'a Scene<'m>,
     pub(crate) raster: T,
     pub(crate) scratch: &'a mut Scratch,
-    /// Faces and depths from the window's first pixel on, `pitch` from row to row.
+    /// Faces and depths from the first pixel of the window on; rows are `pitch` apart.
     pub(crate) out: (&'a mut [u32], &'a mut [f32]),
     pub(crate) pitch: usize,
 }
@@ -133,19 +134,22 @@ impl<T: ProjectionRaster> Kernel for VisibilityKernel<'_, '_, T> {
     fn run<S: Simd>(self, simd: S) {
         let l = simd.raster();
         let Self { scene, mut raster, scratch, out, pitch } = self;
-        let (origin, size) = (raster.origin(), raster.size());
+        let origin = raster.origin();
+        let size = raster.size();
         let Scratch { canvas, queue } = scratch;
         canvas.begin(size.0, size.1);
         draw_all(l, scene.clusters(), &mut raster, canvas, queue);
+
         let mesh = scene.mesh();
         canvas.settle(|column, row, candidates| {
             let d = raster.direction(column, row);
             let (which, t) = nearest(mesh, origin, d, candidates)?;
-            // The function and the exact ray say the same, unless the function is poor there.
+            // The function and the exact ray agree unless the function is poor there.
             let off = raster.inverse_t(&candidates[which], column, row) * t - 1.0;
             let good = off.abs() < 1e-6;
             Some((which, !good))
         });
+
         let single = |face: u32, column: usize, row: usize| {
             distance(mesh, origin, raster.direction(column, row), face)
         };
@@ -153,6 +157,7 @@ impl<T: ProjectionRaster> Kernel for VisibilityKernel<'_, '_, T> {
     }
 }
 
+/// Draws the clusters that the window shows, the nearest first.
 #[inline(always)]
 fn draw_all<L: RasterLanes, T: ProjectionRaster>(
     l: L,
@@ -164,6 +169,7 @@ fn draw_all<L: RasterLanes, T: ProjectionRaster>(
     let nodes = clusters.nodes();
     queue.clear();
     queue.extend(raster.cover(&nodes[0]).map(|cover| QueuedNode { node: 0, cover }));
+
     while let Some(QueuedNode { node, cover }) = queue.pop() {
         if canvas.hides(&cover) {
             continue;
@@ -187,7 +193,8 @@ fn draw_all<L: RasterLanes, T: ProjectionRaster>(
     }
 }
 
-/// The nearest of `candidates` that the ray along `d` hits, by the rules of single rays, and its distance.
+/// Returns the nearest of `candidates` that the ray along `d` hits, by the rules of single rays: its place in
+/// the list and its distance.
 #[inline(never)]
 fn nearest(mesh: &TriMesh, origin: DVec3, d: DVec3, candidates: &[DrawnFace]) -> Option<(usize, f64)> {
     let mut nearest = Nearest::default();
@@ -198,7 +205,7 @@ fn nearest(mesh: &TriMesh, origin: DVec3, d: DVec3, candidates: &[DrawnFace]) ->
     Some((candidates.iter().position(|c| c.face == hit.face)?, hit.t))
 }
 
-/// How far the ray along `d`, which hits the face, goes until then.
+/// Returns the distance along `d` of a face that the ray hits.
 #[inline(never)]
 fn distance(mesh: &TriMesh, origin: DVec3, d: DVec3, face: u32) -> f64 {
     Cone::new(mesh, face, origin).map_or(f64::INFINITY, |cone| cone.distance(d))

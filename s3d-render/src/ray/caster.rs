@@ -1,4 +1,4 @@
-//! Single rays: the exact answer, one ray at a time.
+//! Casts single rays exactly, one at a time.
 
 use crate::ray::cone::Cone;
 use crate::scene::Scene;
@@ -6,38 +6,42 @@ use crate::scene::tree::Content;
 use glam::DVec3;
 use s3d_geom::TriMesh;
 
-/// Distances that agree to this relative difference are equal; the lowest face among them is the one that is
-/// hit. It covers the rounding of `f64` at edges that faces share. A wider one would hide faces of real
-/// scans, which hold overlapping ones that are less than a micrometre apart, behind others that are truly
-/// farther.
+/// Distances are equal if they agree to this relative difference; the ray hits the face with the lowest index
+/// among them. The tolerance covers the rounding of `f64` at edges that faces share. Real scans hold
+/// overlapping faces less than a micrometre apart: a wider tolerance would hide such a face behind one that
+/// is truly farther away.
 pub(crate) const TIE: f64 = 1e-12;
 
-/// A box this much farther than the nearest hit is not looked into: more than a face's distance may be off.
+/// A box that is farther than the nearest hit by this relative difference is skipped. It exceeds the error of
+/// a face's distance.
 const SLACK: f64 = 2e-6;
 
-/// The face that a ray hits first, and where.
+/// The face that a ray hits first, and the distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Index of the face.
+    /// The index of the face.
     pub face: u32,
-    /// The point is origin + t · direction; above 0.
+    /// The point that is hit is origin + t · direction; `t` is above 0.
     pub t: f64,
 }
 
-/// The first face that the ray from `origin` along `direction` hits, from either side.
+/// Returns the first face that the ray from `origin` along `direction` hits, from either side.
 ///
-/// - Watertight: what passes through an edge or a corner hits a face there; the rim belongs to a face.
-/// - A face whose plane contains the origin is not hit: it has no width from there. Nothing at t ≤ 0 is hit.
-/// - Of faces whose t agree to 1e-12 of the nearest, the lowest index is hit: coplanar duplicates do not
-///   depend on the order in which they are met.
+/// - The mesh is watertight: a ray through an edge or a corner hits a face there, since the rim belongs to
+///   the face.
+/// - A face whose plane contains the origin is not hit: it has no width as seen from there. No face at t ≤
+///   0 is hit.
+/// - Faces whose t agree with the nearest to 1e-12 of it are tied, and the lowest index wins: the order in
+///   which coplanar duplicates are met does not matter.
 ///
-/// `t` is good to 1e-7 of itself (or 1e-12 m); a face seen within 1e-8 rad of edge-on gives a place on it. A
-/// direction or origin that is not finite, or no direction, hits nothing.
+/// `t` is accurate to 1e-7 of itself (or 1e-12 m). If a face is seen within 1e-8 rad of edge-on, `t` gives a
+/// point between its corners. Returns `None` if the origin or the direction is not finite, or if the
+/// direction is zero.
 pub fn cast_ray(scene: &Scene<'_>, origin: DVec3, direction: DVec3) -> Option<Hit> {
     RayCaster::new(scene, origin).cast(direction)
 }
 
-/// As [`cast_ray`], by trying every face: the reference that tests hold the tree against.
+/// Casts like [`cast_ray`], but tries every face. Tests compare the tree with this reference.
 pub fn cast_ray_brute_force(mesh: &TriMesh, origin: DVec3, direction: DVec3) -> Option<Hit> {
     if !is_ray(origin, direction) {
         return None;
@@ -53,7 +57,7 @@ fn is_ray(origin: DVec3, direction: DVec3) -> bool {
     origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO
 }
 
-/// Finite even where a component is 0, so that no 0 · ∞ arises.
+/// Inverts a direction. The result is finite even where a component is 0, so that no 0 · ∞ arises.
 fn inverse(direction: DVec3) -> DVec3 {
     direction.map(|d| {
         if d.abs() < 1e-290 {
@@ -64,7 +68,7 @@ fn inverse(direction: DVec3) -> DVec3 {
     })
 }
 
-/// The hits that may still be the nearest.
+/// The hits that may still be the nearest one.
 #[derive(Default)]
 pub(crate) struct Nearest {
     t_min: Option<f64>,
@@ -81,7 +85,7 @@ impl Nearest {
         }
     }
 
-    /// What lies farther is not the nearest, even with a lower index.
+    /// Returns the largest `t` that may still win: beyond it, no index helps.
     fn reach(&self) -> f64 {
         self.t_min.map_or(f64::INFINITY, |t| t * (1.0 + TIE))
     }
@@ -95,8 +99,8 @@ impl Nearest {
     }
 }
 
-/// Tells what is in sight of one place: many questions cost less than as many rays, since the search ends at
-/// the first face that is in the way, and what hid one point is tried first for the next.
+/// Tells which points are in sight of one place. Many queries cost less than as many rays: the search ends at
+/// the first face in the way, and the face that hid one point is tried first for the next.
 ///
 /// ```
 /// use s3d_geom::{TriMesh, glam::{DVec3, vec3}};
@@ -108,24 +112,25 @@ impl Nearest {
 /// let mut sight = Sight::from(&scene, DVec3::Z);
 /// assert!(!sight.is_free(DVec3::new(0.0, 4.0, 1.0), 0.0));
 /// assert!(sight.is_free(DVec3::new(0.0, 1.9, 1.0), 0.0));
-/// // A point on the wall is seen from as far as 1 cm before it.
+/// // A point on the wall is free if faces within 1 cm in front of it do not count.
 /// assert!(sight.is_free(DVec3::new(0.0, 2.0, 1.0), 0.01));
 /// # Ok::<(), s3d_geom::MeshError>(())
 /// ```
 pub struct Sight<'s, 'm> {
     caster: RayCaster<'s, 'm>,
-    /// What was in the way last.
+    /// The face that was in the way last.
     hider: Option<u32>,
 }
 
 impl<'s, 'm> Sight<'s, 'm> {
-    /// Looks from `origin`.
+    /// Returns a sight from `origin`.
     pub fn from(scene: &'s Scene<'m>, origin: DVec3) -> Self {
         Self { caster: RayCaster::new(scene, origin), hider: None }
     }
 
-    /// Whether [`cast_ray`] towards `point` hits nothing, or nothing that is nearer to the origin than
-    /// `point` is by more than `slack_m` metres. Nothing hides what is no place, and what is at the origin.
+    /// Tells whether `point` is in sight: no face that [`cast_ray`] hits towards it is nearer to the origin
+    /// than `point` by more than `slack_m` metres. A point that is not finite, or that is the origin itself,
+    /// is always in sight.
     pub fn is_free(&mut self, point: DVec3, slack_m: f64) -> bool {
         let direction = point - self.caster.origin;
         let before = 1.0 - slack_m / direction.length();
@@ -141,7 +146,8 @@ impl<'s, 'm> Sight<'s, 'm> {
 pub(crate) struct RayCaster<'s, 'm> {
     scene: &'s Scene<'m>,
     origin: DVec3,
-    /// By how much boxes grow, in metres: far more than the rounding of `f64`, far less than anything else.
+    /// The growth of boxes in metres: far more than the rounding of `f64`, and far less than any detail of a
+    /// scan.
     padding: DVec3,
     stack: Vec<(f64, u32)>,
     nearest: Nearest,
@@ -158,16 +164,20 @@ impl<'s, 'm> RayCaster<'s, 'm> {
         if !is_ray(self.origin, direction) {
             return None;
         }
-        let (mesh, tree) = (self.scene.mesh(), self.scene.tree());
+
+        let mesh = self.scene.mesh();
+        let tree = self.scene.tree();
         let inverse = inverse(direction);
         self.nearest.t_min = None;
         self.nearest.candidates.clear();
         self.stack.clear();
         self.stack.extend(self.enter(0, inverse).map(|t| (t, 0)));
+
         while let Some((t_enter, node)) = self.stack.pop() {
             if self.nearest.t_min.is_some_and(|t| t_enter > t * (1.0 + SLACK)) {
                 continue;
             }
+
             let first = match tree.nodes[node as usize].content {
                 Content::Children(first) => first,
                 Content::Leaf { first, count } => {
@@ -177,6 +187,7 @@ impl<'s, 'm> RayCaster<'s, 'm> {
                     continue;
                 }
             };
+
             match (self.enter(first, inverse), self.enter(first + 1, inverse)) {
                 (Some(left), Some(right)) if left <= right => {
                     self.stack.push((right, first + 1));
@@ -188,19 +199,22 @@ impl<'s, 'm> RayCaster<'s, 'm> {
                 }
             }
         }
+
         self.nearest.hit()
     }
 
-    /// Some face that is hit before `end`, as a multiple of the direction.
+    /// Returns a face that is hit before `end`, a multiple of the direction.
     fn any_hit(&mut self, direction: DVec3, end: f64) -> Option<u32> {
-        // `end` may be no number.
+        // `end` may be NaN.
         if !is_ray(self.origin, direction) || end.is_nan() || end <= 0.0 {
             return None;
         }
+
         let tree = self.scene.tree();
         let inverse = inverse(direction);
         self.stack.clear();
         self.stack.extend(self.enter(0, inverse).map(|t| (t, 0)));
+
         while let Some((_, node)) = self.stack.pop() {
             let first = match tree.nodes[node as usize].content {
                 Content::Children(first) => first,
@@ -212,12 +226,13 @@ impl<'s, 'm> RayCaster<'s, 'm> {
                     continue;
                 }
             };
+
             let [left, right] = [first, first + 1].map(|node| {
                 self.enter(node, inverse)
                     .filter(|t| *t <= end * (1.0 + SLACK))
                     .map(|t| (t, node))
             });
-            // The nearer one is looked into first.
+            // The nearer box is searched first.
             let (near, far) = if right < left && right.is_some() {
                 (right, left)
             } else {
@@ -226,6 +241,7 @@ impl<'s, 'm> RayCaster<'s, 'm> {
             self.stack.extend(far);
             self.stack.extend(near);
         }
+
         None
     }
 
@@ -234,13 +250,15 @@ impl<'s, 'm> RayCaster<'s, 'm> {
             .is_some_and(|cone| cone.contains(direction) && cone.distance(direction) < end)
     }
 
-    /// Where the ray enters the box of a node, at 0 if it starts inside.
+    /// Returns where the ray enters the box of a node: 0 if it starts inside, `None` if it misses the box.
     fn enter(&self, node: u32, inverse: DVec3) -> Option<f64> {
         let node = &self.scene.tree().nodes[node as usize];
         let a = (node.min().as_dvec3() - self.origin - self.padding) * inverse;
         let b = (node.max().as_dvec3() - self.origin + self.padding) * inverse;
-        let (enter, leave) = (a.min(b).max_element().max(0.0), a.max(b).min_element());
-        // The slabs themselves are rounded to a few parts in 1e16.
+
+        let enter = a.min(b).max_element().max(0.0);
+        let leave = a.max(b).min_element();
+        // The slabs themselves are rounded to a few parts in 10¹⁶.
         (enter <= leave * (1.0 + 1e-14)).then_some(enter * (1.0 - 1e-14))
     }
 }
@@ -280,7 +298,7 @@ mod tests {
         mesh(&corners, &faces)
     }
 
-    /// A closed ball of rings and sectors whose corners are irrational.
+    /// A closed ball of rings and sectors with irrational corners.
     fn ball(center: Vec3, radius: f32, rings: u32, sectors: u32) -> TriMesh {
         let mut corners = vec![center - Vec3::Z * radius];
         for ring in 1..rings {
@@ -291,13 +309,16 @@ mod tests {
                     .push(center + radius * vec3(lat.sin() * lon.cos(), lat.sin() * lon.sin(), -lat.cos()));
             }
         }
+
         corners.push(center + Vec3::Z * radius);
         let last = corners.len() as u32 - 1;
+
         let at = |ring: u32, sector: u32| match ring {
             0 => 0,
             r if r == rings => last,
             r => 1 + (r - 1) * sectors + sector % sectors,
         };
+
         let mut faces = Vec::new();
         for ring in 0..rings {
             for sector in 0..sectors {
@@ -310,11 +331,12 @@ mod tests {
                 );
             }
         }
+
         mesh(&corners, &faces)
     }
 
-    /// Directions that hit corners and the middles of edges exactly (where they are representable), and near
-    /// them.
+    /// Returns directions that hit corners and middles of edges exactly (if they are representable), and
+    /// directions close to them.
     fn awkward(mesh: &TriMesh, origin: DVec3) -> Vec<DVec3> {
         let mut directions = Vec::new();
         for face in 0..mesh.faces().len() as u32 {
@@ -348,8 +370,8 @@ mod tests {
 
     #[test]
     fn nothing_leaks_through_a_wall_of_slivers() {
-        // A fan of 4,000 slivers from one corner over a wall, in front of another wall: the second is never
-        // seen.
+        // A fan of 4,000 slivers from one corner covers a wall in front of another wall, which is never seen.
+
         let mut corners = vec![vec3(-1.0, 2.0, -1.0)];
         let rim: Vec<Vec3> = (0..=4000).map(|k| vec3(1.0, 2.0, -1.0 + k as f32 * 5e-4)).collect();
         corners.extend(&rim);
@@ -357,14 +379,17 @@ mod tests {
         let n = corners.len() as u32;
         corners.extend([vec3(-9.0, 3.0, -9.0), vec3(9.0, 3.0, -9.0), vec3(0.0, 3.0, 20.0)]);
         faces.push([n, n + 1, n + 2]);
+
         let mesh = mesh(&corners, &faces);
         let origin = dvec3(0.1, 0.0, -0.2);
         let towards = |p: Vec3| p.as_dvec3() - origin;
+
         // Inside the fan, along its edges.
         let directions = rim[1..4000]
             .iter()
             .step_by(13)
             .flat_map(|&p| [0.1, 0.5, 0.9, 0.999].map(|s| towards(corners[0]) * (1.0 - s) + towards(p) * s));
+
         for hit in check(&mesh, origin, directions.collect::<Vec<_>>()) {
             assert!(hit.is_some_and(|h| h.face < 4000), "{hit:?}");
         }
@@ -378,7 +403,7 @@ mod tests {
         let corners = [&wall[..], &near, &wall].concat();
         let three = mesh(&corners, &[[3, 4, 5], [0, 1, 2], [8, 7, 6]]);
         for hit in check(&three, DVec3::ZERO, [DVec3::Y, dvec3(0.1, 1.0, -0.1)]) {
-            assert_eq!(hit.unwrap().face, 1, "of the nearest two the first, and not the one 4e-7 farther");
+            assert_eq!(hit.unwrap().face, 1, "the lowest of the nearest two, not the one 4e-7 farther");
         }
         let corners = [corners, nearer].concat();
         let four = mesh(&corners, &[[3, 4, 5], [0, 1, 2], [8, 7, 6], [9, 10, 11]]);
@@ -406,14 +431,16 @@ mod tests {
         assert_eq!(check(&floor, DVec3::NAN, [DVec3::Z]), [None]);
     }
 
-    /// Where the ray meets the plane of a face, by the textbook, and the barycentric coordinates there.
+    /// Returns the textbook's distance to the plane of a face, and the barycentric coordinates there.
     fn textbook(mesh: &TriMesh, face: u32, origin: DVec3, d: DVec3) -> (f64, [f64; 3]) {
         let [a, b, c] = mesh.triangle(face).map(|p| p.as_dvec3());
-        let (e1, e2) = (b - a, c - a);
+        let e1 = b - a;
+        let e2 = c - a;
         let p = d.cross(e2);
         let q = (origin - a).cross(e1);
         let det = e1.dot(p);
-        let (u, v) = ((origin - a).dot(p) / det, d.dot(q) / det);
+        let u = (origin - a).dot(p) / det;
+        let v = d.dot(q) / det;
         (e2.dot(q) / det, [1.0 - u - v, u, v])
     }
 
@@ -436,9 +463,11 @@ mod tests {
             let corners: Vec<Vec3> = corners.iter().map(|p| *p + far).collect();
             let faces = (0..corners.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]);
             let Ok(soup) = TriMesh::from_faces(corners, faces.collect()) else { return Ok(()) };
+
             let origin = far.as_dvec3() + dvec3(0.1, 0.2, 0.3);
             let scene = Scene::new(&soup);
             let mut sight = Sight::from(&scene, origin);
+
             for (hit, d) in check(&soup, origin, d.clone()).into_iter().zip(d) {
                 for (to, slack_m) in [(0.5, 0.0), (3.0, 0.0), (3.0, 0.4)] {
                     let hidden = hit.is_some_and(|hit| hit.t < to - slack_m / d.length());
@@ -446,6 +475,7 @@ mod tests {
                     let margin = hit.is_some_and(|hit| (hit.t - to + slack_m / d.length()).abs() < 1e-9);
                     prop_assert!(margin || sight.is_free(point, slack_m) != hidden, "{hit:?} {to} {slack_m}");
                 }
+
                 let all = (0..soup.faces().len() as u32).map(|f| textbook(&soup, f, origin, d));
                 let inside = |w: [f64; 3], by: f64| w.iter().all(|&w| w > by);
                 let hits = all.filter(|(t, w)| *t > 0.0 && inside(*w, 1e-9));
@@ -465,7 +495,7 @@ mod tests {
         fn rays_at_corners_and_edges_of_a_soup_are_the_same_by_any_way(
             corners in prop::collection::vec(corner(1.0), 12), picks in prop::collection::vec(0u32..12, 30),
         ) {
-            // Twelve corners shared by ten faces at random: many shared edges and corners, slivers, overlaps.
+            // Ten random faces share twelve corners: many shared edges and corners, slivers and overlaps.
             let faces: Vec<[u32; 3]> = picks.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
             let Ok(soup) = TriMesh::from_faces(corners.clone(), faces) else { return Ok(()) };
             let middle = corners[1].lerp(corners[2], 0.5);

@@ -1,16 +1,16 @@
-//! A face as its origin sees it: the cone of directions that hit it, with exact signs.
+//! A face as seen from the origin of a ray: the cone of directions that hit it, with exact signs.
 //!
-//! Put the origin of a ray at zero. Then the direction d hits the triangle (a, b, c), with det(a, b, c) > 0,
-//! exactly if it lies in the cone that a, b and c span: det(d, b, c) ≥ 0, det(d, c, a) ≥ 0 and det(d, a, b) ≥
-//! 0. The corners relative to the origin are rounded once, in `f64`, the same for every face that has them;
-//! the signs of the determinants are exact (Shewchuk's adaptive predicates). So the test decides on true
-//! cones, and these leave no gap between faces that share an edge or a corner.
+//! Put the origin of a ray at zero. Let det(a, b, c) > 0 for the corners of a triangle. The direction d hits
+//! the triangle exactly if it lies in the cone that a, b and c span: det(d, b, c) ≥ 0, det(d, c, a) ≥ 0
+//! and det(d, a, b) ≥ 0. The corners relative to the origin are rounded once, in `f64`, in the same way for
+//! every face that shares them. The signs of the determinants are exact (Shewchuk's adaptive predicates). So
+//! the test works on true cones, and these leave no gap between faces that share an edge or a corner.
 
 use glam::DVec3;
 use robust::{Coord3D, orient3d};
 use s3d_geom::TriMesh;
 
-/// A face in front of an origin, wound so that det(a, b, c) > 0 for its corners a, b, c relative to the
+/// A face in front of an origin. It is wound so that det(a, b, c) > 0 for its corners a, b, c relative to the
 /// origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cone {
@@ -18,8 +18,8 @@ pub(crate) struct Cone {
     pub(crate) plane: Plane,
 }
 
-/// The points x with normal · x = offset, relative to the origin; offset > 0 up to rounding. `normal` is
-/// twice as long as the face's area.
+/// The plane of the points x with normal · x = offset, relative to the origin; offset > 0 up to rounding.
+/// The length of `normal` is twice the area of the face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plane {
     pub(crate) normal: DVec3,
@@ -27,14 +27,15 @@ pub(crate) struct Plane {
 }
 
 impl Cone {
-    /// `None` if the origin lies exactly in the plane of the face, which then has no width from there: what a
-    /// ray meets at its rim are its neighbours.
+    /// Returns the cone of a face. Returns `None` if the origin lies exactly in the plane of the face: the
+    /// face has no width from there, and a ray at its rim hits its neighbours.
     pub(crate) fn new(mesh: &TriMesh, face: u32, origin: DVec3) -> Option<Self> {
         let world = mesh.triangle(face).map(|p| p.as_dvec3());
         let [a, b, c] = world.map(|p| p - origin);
-        // Differences of `f32` positions are all but exact in `f64`: the normal of a sliver is as good as
+        // Differences of `f32` positions are almost exact in `f64`, so the normal of a sliver is as good as
         // any.
         let normal = (world[1] - world[0]).cross(world[2] - world[0]);
+
         let turn = side(a, b, c);
         if turn > 0.0 {
             Some(Self { corners: [a, b, c], plane: Plane { normal, offset: normal.dot(a) } })
@@ -45,20 +46,21 @@ impl Cone {
         }
     }
 
-    /// Whether a ray along `d` hits the face; its rim belongs to it.
+    /// Tells whether a ray along `d` hits the face. The rim belongs to the face.
     pub(crate) fn contains(&self, d: DVec3) -> bool {
         let [a, b, c] = self.corners;
         side(d, b, c) >= 0.0 && side(d, c, a) >= 0.0 && side(d, a, b) >= 0.0
     }
 
-    /// The multiple of `d`, which the cone contains, that lies on the face: above 0.
+    /// Returns the multiple of `d` that lies on the face; it is above 0. The cone must contain `d`.
     pub(crate) fn distance(&self, d: DVec3) -> f64 {
         self.plane
             .distance(d)
             .unwrap_or_else(|| self.distance_between_corners(d))
     }
 
-    /// The face seen edge-on: the plane says little there, so weigh the corners' distances.
+    /// Returns the distance along `d` of a face that is seen edge-on. The plane is of little use there, so
+    /// the corners' distances are weighted.
     fn distance_between_corners(&self, d: DVec3) -> f64 {
         let [a, b, c] = self.corners;
         let weights = [side(d, b, c), side(d, c, a), side(d, a, b)].map(|w| w.max(0.0));
@@ -70,8 +72,8 @@ impl Cone {
 }
 
 impl Plane {
-    /// The multiple of `d` that lies in the plane, to 1e-8 of itself; `None` where the plane is seen too
-    /// edge-on.
+    /// Returns the multiple of `d` that lies in the plane, to 1e-8 of itself. Returns `None` if the plane is
+    /// seen too close to edge-on.
     #[inline(always)]
     pub(crate) fn distance(&self, d: DVec3) -> Option<f64> {
         let slope = self.normal.dot(d);
@@ -81,10 +83,10 @@ impl Plane {
     }
 }
 
-/// det(a, b, c) with the right sign, 0 included.
+/// Returns det(a, b, c) with the exact sign, 0 included.
 pub(crate) fn side(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let quick = a.dot(b.cross(c));
-    // Six products of three factors: the rounding error is below 24 · 2⁻⁵³ times the largest.
+    // There are six products of three factors: the rounding error is below 24 · 2⁻⁵³ times the largest.
     let bound = 3e-15 * a.abs().max_element() * b.abs().max_element() * c.abs().max_element();
     if quick.abs() > bound {
         quick
@@ -105,7 +107,7 @@ mod tests {
     use glam::{Vec3, dvec3, vec3};
     use proptest::prelude::*;
 
-    /// det(a, b, c) of small integers, exactly.
+    /// Returns det(a, b, c) of small integers, exactly.
     fn integer_side(a: [i64; 3], b: [i64; 3], c: [i64; 3]) -> i64 {
         a[0] * (b[1] * c[2] - b[2] * c[1])
             + a[1] * (b[2] * c[0] - b[0] * c[2])
@@ -119,8 +121,7 @@ mod tests {
     proptest! {
         #[test]
         fn signs_are_exact(a in point(), b in point(), c in point(), scale in -1e-3..1e-3f64) {
-            // Scaling each point by a factor that rounds keeps a zero only if it was exact: use powers of
-            // two.
+            // Scaling by a factor that rounds would keep a zero only by chance, so powers of two are used.
             let s = if scale > 0.0 { 1.0 / 1024.0 } else { 4096.0 };
             let p = |q: [i64; 3]| dvec3(q[0] as f64, q[1] as f64, q[2] as f64) * s;
             let expected = integer_side(a, b, c).signum() as f64;
@@ -133,9 +134,11 @@ mod tests {
             a in prop::array::uniform3(-1.0..1.0f64), b in prop::array::uniform3(-1.0..1.0f64),
             s in -1.0..1.0f64, t in -1.0..1.0f64,
         ) {
-            let (a, b) = (DVec3::from(a), DVec3::from(b));
-            let d = a * s + b * t; // In the plane of a and b, but for rounding.
-            let (one, other) = (side(d, a, b), side(d, b, a));
+            let a = DVec3::from(a);
+            let b = DVec3::from(b);
+            let d = a * s + b * t; // In the plane of a and b, up to rounding.
+            let one = side(d, a, b);
+            let other = side(d, b, a);
             prop_assert!((one > 0.0) == (other < 0.0) && (one < 0.0) == (other > 0.0), "{one} {other}");
         }
     }

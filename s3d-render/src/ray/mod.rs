@@ -1,4 +1,4 @@
-//! Single rays, exact: what a pixel sees is what its ray hits.
+//! Single rays, cast exactly: a pixel sees the face that its ray hits.
 
 pub(crate) mod caster;
 pub(crate) mod cone;

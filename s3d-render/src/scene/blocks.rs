@@ -1,24 +1,25 @@
-//! The faces of a mesh in blocks that lie together.
+//! Splits the faces of a mesh into blocks that lie together.
 
 use glam::Vec3;
 use s3d_geom::TriMesh;
 
-/// No block has more faces: what is in work on a block stays in the caches.
+/// The most faces of a block: the data of one block fits in the caches.
 const MAX_FACES: usize = 1 << 14;
 
-/// A face and the middle of its box.
+/// A face and the middle of its bounding box.
 #[derive(Clone, Copy)]
 struct Placed {
     middle: Vec3,
     face: u32,
 }
 
-/// All faces of a mesh, in blocks.
+/// Returns all faces of a mesh, in blocks.
 pub(crate) fn blocks(mesh: &TriMesh) -> Vec<Vec<u32>> {
     let count = mesh.faces().len();
     if count <= MAX_FACES {
         return vec![(0..count as u32).collect()];
     }
+
     let mut placed: Vec<Placed> = (0..count as u32)
         .map(|face| {
             let [a, b, c] = mesh.triangle(face);
@@ -28,31 +29,33 @@ pub(crate) fn blocks(mesh: &TriMesh) -> Vec<Vec<u32>> {
     split(&mut placed, MAX_FACES)
 }
 
-/// Halves the longest side of the box of all middles until few enough faces are left.
+/// Halves the longest side of the box around all middles, until few enough faces are left.
 fn split(placed: &mut [Placed], max_faces: usize) -> Vec<Vec<u32>> {
     if placed.len() <= max_faces {
         return vec![placed.iter().map(|p| p.face).collect()];
     }
+
     let (min, max) = placed
         .iter()
         .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p.middle), max.max(p.middle)));
     let axis = (max - min).max_position();
     let half = min.midpoint(max)[axis];
     let mut middle = partition(placed, |p| p.middle[axis] < half);
-    // Where nearly all are on one side, the number is halved instead: no scan needs many rounds.
+    // If nearly all faces are on one side, their number is halved instead, so that no scan needs many rounds.
     if middle.min(placed.len() - middle) <= placed.len() / 16 {
         middle = placed.len() / 2;
         placed.select_nth_unstable_by(middle, |a, b| {
             a.middle[axis].total_cmp(&b.middle[axis]).then(a.face.cmp(&b.face))
         });
     }
+
     let (left, right) = placed.split_at_mut(middle);
     let (mut blocks, mut rest) = rayon::join(|| split(left, max_faces), || split(right, max_faces));
     blocks.append(&mut rest);
     blocks
 }
 
-/// Brings what is `first` to the front; how many these are.
+/// Moves the elements for which `first` holds to the front, and returns their number.
 fn partition(placed: &mut [Placed], first: impl Fn(&Placed) -> bool) -> usize {
     let mut end = 0;
     for k in 0..placed.len() {

@@ -1,45 +1,45 @@
-//! The faces of a mesh in small groups that lie together, and a tree over the groups.
+//! The faces of a mesh in small clusters that lie together, and a tree over the clusters.
 //!
-//! The visibility pass prepares a group at a time: its corners are projected once however many of its faces
-//! meet in them, and its box says at once whether any of it can be seen.
+//! The visibility pass prepares one cluster at a time. A corner is projected once, however many faces of the
+//! cluster meet in it. The box of a cluster tells at once whether any of its faces can be seen.
 
 use crate::scene::tree::{Content, FaceTree, Node, Top};
 use s3d_geom::TriMesh;
 use s3d_simd::prefetch;
 
-/// No group has more faces; so a corner's place in its group fits a byte.
+/// The most faces of a cluster, so that the place of a corner in its cluster fits in a byte.
 pub(crate) const MAX_FACES: usize = 64;
 
-/// Corners are handled in packets of so many.
+/// The number of corners that are handled together.
 pub(crate) const PACKET: usize = 8;
 
-/// No group has more corners, padding included.
+/// The most corners of a cluster, padding included.
 pub(crate) const MAX_CORNERS: usize = 3 * MAX_FACES;
 
-/// Where a group's faces and corners are in the lists of all groups.
+/// The starts of a cluster's faces and corners in the lists of all clusters.
 #[derive(Clone, Copy, Debug)]
 struct ClusterStart {
     first_face: u32,
     first_packet: u32,
 }
 
-/// All groups of a mesh.
+/// All clusters of a mesh.
 #[derive(Debug)]
 pub(crate) struct Clusters {
-    /// The root is the first; the entry of a leaf is a group.
+    /// The root comes first. The entry of a leaf is a cluster.
     nodes: Vec<Node>,
-    /// One more than there are groups: each ends where the next begins.
+    /// One entry more than there are clusters: each cluster ends where the next one begins.
     starts: Vec<ClusterStart>,
     corners: Vec<[[f32; PACKET]; 3]>,
-    /// The corners of a face, as starts in its group; the fourth is nothing.
+    /// The places of each face's corners in its cluster; the fourth byte is unused.
     faces: Vec<[u8; 4]>,
     ids: Vec<u32>,
 }
 
-/// One group.
+/// One cluster.
 #[derive(Clone, Copy)]
 pub(crate) struct Cluster<'a> {
-    /// x, y and z of the corners, by packet; the last packet repeats its last corner.
+    /// x, y and z of the corners, by packet. The last packet is filled up with the last corner.
     pub(crate) corners: &'a [[[f32; PACKET]; 3]],
     pub(crate) faces: &'a [[u8; 4]],
     /// The index of each face in the mesh.
@@ -47,7 +47,7 @@ pub(crate) struct Cluster<'a> {
 }
 
 impl Clusters {
-    /// Cuts the tree where a branch has few enough faces.
+    /// Cuts the tree at each branch that has few enough faces.
     pub(crate) fn new(mesh: &TriMesh, tree: &FaceTree) -> Self {
         let counts = face_counts(&tree.nodes);
         let n = tree.faces.len();
@@ -58,8 +58,10 @@ impl Clusters {
             faces: Vec::with_capacity(n),
             ids: Vec::with_capacity(n),
         };
+
         let mut gather = Gather::new(mesh);
         let mut stack = vec![(0, 0)];
+
         while let Some((from, to)) = stack.pop() {
             clusters.nodes[to].content = match tree.nodes[from as usize].content {
                 Content::Children(first) if counts[from as usize] > MAX_FACES as u32 => {
@@ -73,16 +75,18 @@ impl Clusters {
                 _ => Content::Leaf { first: clusters.add(tree, from, &mut gather), count: 1 },
             };
         }
+
         clusters.end();
         clusters
     }
 
-    /// Those of several blocks as one.
+    /// Joins the clusters of several blocks.
     pub(crate) fn join(top: &Top, parts: Vec<Self>) -> Self {
         let nodes: Vec<_> = parts
             .iter()
             .map(|part| (&part.nodes[..], part.starts.len() - 1))
             .collect();
+
         let mut joined = Self {
             nodes: top.join(&nodes),
             starts: Vec::with_capacity(parts.iter().map(|part| part.starts.len()).sum()),
@@ -90,8 +94,10 @@ impl Clusters {
             faces: Vec::with_capacity(parts.iter().map(|part| part.faces.len()).sum()),
             ids: Vec::with_capacity(parts.iter().map(|part| part.ids.len()).sum()),
         };
+
         for part in &parts {
-            let (faces, packets) = (joined.faces.len() as u32, joined.corners.len() as u32);
+            let faces = joined.faces.len() as u32;
+            let packets = joined.corners.len() as u32;
             joined
                 .starts
                 .extend(part.starts[..part.starts.len() - 1].iter().map(|start| ClusterStart {
@@ -102,10 +108,12 @@ impl Clusters {
             joined.faces.extend_from_slice(&part.faces);
             joined.ids.extend_from_slice(&part.ids);
         }
+
         joined.end();
         joined
     }
 
+    /// Notes where the last cluster ends and the next one begins.
     fn end(&mut self) {
         self.starts.push(ClusterStart {
             first_face: self.faces.len() as u32,
@@ -113,7 +121,7 @@ impl Clusters {
         });
     }
 
-    /// Adds the faces below a node of the tree as a group.
+    /// Adds the faces below a node of the tree as a cluster, and returns its index.
     fn add(&mut self, tree: &FaceTree, branch: u32, gather: &mut Gather<'_>) -> u32 {
         self.end();
         gather.begin();
@@ -129,6 +137,7 @@ impl Clusters {
                 }
             }
         }
+
         gather.finish(&mut self.corners);
         self.starts.len() as u32 - 1
     }
@@ -137,7 +146,7 @@ impl Clusters {
         &self.nodes
     }
 
-    /// Prefetches what a node says where to find: the nodes below, or where the cluster is.
+    /// Prefetches whatever a node refers to: its children, or the start of its cluster.
     #[inline(always)]
     pub(crate) fn prefetch_below(&self, node: u32) {
         match self.nodes[node as usize].content {
@@ -149,7 +158,7 @@ impl Clusters {
         }
     }
 
-    /// Prefetches the cluster of a node that has one.
+    /// Prefetches the cluster of a node, if it has one.
     #[inline(always)]
     pub(crate) fn prefetch(&self, node: u32) {
         if let Content::Leaf { first: index, .. } = self.nodes[node as usize].content {
@@ -177,9 +186,9 @@ impl Clusters {
     }
 }
 
-/// The number of faces below each node.
+/// Counts the faces below each node.
 fn face_counts(nodes: &[Node]) -> Vec<u32> {
-    // Each node after the one above it.
+    // Every node comes after its parent.
     let mut order = vec![0u32];
     let mut next = 0;
     while let Some(&index) = order.get(next) {
@@ -188,6 +197,8 @@ fn face_counts(nodes: &[Node]) -> Vec<u32> {
         }
         next += 1;
     }
+
+    // Children are counted before their parents.
     let mut counts = vec![0; nodes.len()];
     for &index in order.iter().rev() {
         counts[index as usize] = match nodes[index as usize].content {
@@ -198,34 +209,34 @@ fn face_counts(nodes: &[Node]) -> Vec<u32> {
     counts
 }
 
-/// Collects the corners of one group after another.
+/// Collects the corners of one cluster after another.
 struct Gather<'m> {
     mesh: &'m TriMesh,
-    /// The corners of the group by a hash of their vertex; the next free slot where that is taken.
+    /// The corners of the cluster, in a hash table by vertex. If a slot is taken, the next free one is used.
     slots: [Slot; 1 << SLOT_BITS],
-    group: u32,
+    cluster: u32,
     positions: Vec<[f32; 3]>,
 }
 
-/// Enough for twice as many corners as a group has.
+/// The table has room for more than twice the corners of a cluster.
 const SLOT_BITS: u32 = 9;
 
 #[derive(Clone, Copy)]
 struct Slot {
-    /// Groups count from 1; of another group than the present one, a slot is free.
-    group: u32,
+    /// The cluster that filled the slot, counted from 1. The slot is free for all other clusters.
+    cluster: u32,
     vertex: u32,
     place: u8,
 }
 
 impl<'m> Gather<'m> {
     fn new(mesh: &'m TriMesh) -> Self {
-        let free = Slot { group: 0, vertex: 0, place: 0 };
-        Self { mesh, slots: [free; 1 << SLOT_BITS], group: 0, positions: Vec::new() }
+        let free = Slot { cluster: 0, vertex: 0, place: 0 };
+        Self { mesh, slots: [free; 1 << SLOT_BITS], cluster: 0, positions: Vec::new() }
     }
 
     fn begin(&mut self) {
-        self.group += 1;
+        self.cluster += 1;
         self.positions.clear();
     }
 
@@ -234,18 +245,19 @@ impl<'m> Gather<'m> {
         [a, b, c, 0]
     }
 
-    /// The place of a vertex among the group's corners.
+    /// Returns the place of a vertex among the corners of the cluster.
     fn place(&mut self, vertex: u32) -> u8 {
-        // Fibonacci hashing: 2^32 by the golden ratio.
+        // Fibonacci hashing: the factor is 2^32 divided by the golden ratio.
         let mut k = (vertex.wrapping_mul(0x9E37_79B9) >> (32 - SLOT_BITS)) as usize;
-        while self.slots[k].group == self.group {
+        while self.slots[k].cluster == self.cluster {
             if self.slots[k].vertex == vertex {
                 return self.slots[k].place;
             }
             k = (k + 1) % self.slots.len();
         }
+
         let place = self.positions.len() as u8;
-        self.slots[k] = Slot { group: self.group, vertex, place };
+        self.slots[k] = Slot { cluster: self.cluster, vertex, place };
         self.positions.push(self.mesh.positions()[vertex as usize].to_array());
         place
     }
@@ -264,16 +276,18 @@ mod tests {
     use crate::scene::Scene;
 
     #[test]
-    fn every_face_is_in_one_group_inside_its_box() {
-        // In several blocks.
+    fn every_face_is_in_one_cluster_inside_its_box() {
+        // The mesh is large enough for several blocks.
         let mesh = s3d_synth::scenes::scan_like(40_000, 3);
         let scene = Scene::new(&mesh);
         let clusters = scene.clusters();
+
         let mut met = vec![false; mesh.faces().len()];
-        let mut groups = 0;
+        let mut count = 0;
+
         for node in clusters.nodes() {
             let Content::Leaf { first: index, .. } = node.content else { continue };
-            groups += 1;
+            count += 1;
             let cluster = clusters.cluster(index);
             assert!(cluster.faces.len() <= MAX_FACES && cluster.faces.len() == cluster.ids.len());
             for (&id, corners) in cluster.ids.iter().zip(cluster.faces) {
@@ -287,6 +301,6 @@ mod tests {
             }
         }
         assert!(met.iter().all(|&m| m));
-        assert!(groups < 40_000 / 20, "groups of {} faces", 40_000 / groups);
+        assert!(count < 40_000 / 20, "clusters of {} faces", 40_000 / count);
     }
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use s3d_geom::TriMesh;
 use tree::{FaceTree, Top};
 
-/// A mesh with a bounding volume hierarchy over its faces: built once, shared by any number of threads that
+/// A mesh with a bounding volume hierarchy over its faces. It is built once, and any number of threads can
 /// render it.
 ///
 /// ```
@@ -34,8 +34,8 @@ pub struct Scene<'m> {
 }
 
 impl<'m> Scene<'m> {
-    /// Builds the tree over the faces of `mesh`: that of each block of faces by itself, by the threads that
-    /// rayon has, and one above them. What is seen does not depend on it.
+    /// Builds the trees over blocks of faces on the threads of the current rayon pool, and joins them. The
+    /// images do not depend on the tree.
     pub fn new(mesh: &'m TriMesh) -> Self {
         let blocks: Vec<(FaceTree, Clusters)> = blocks::blocks(mesh)
             .into_par_iter()
@@ -45,11 +45,13 @@ impl<'m> Scene<'m> {
                 (tree, clusters)
             })
             .collect();
+
         let top = Top::new(blocks.iter().map(|(tree, _)| tree.nodes[0]));
         let (trees, clusters): (Vec<_>, Vec<_>) = blocks.into_iter().unzip();
         let (tree, clusters) = rayon::join(|| FaceTree::join(&top, trees), || Clusters::join(&top, clusters));
-        let b = mesh.aabb();
-        let extent = f64::from(b.min.abs().max(b.max.abs()).max_element());
+
+        let bounds = mesh.aabb();
+        let extent = f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
         Self { mesh, tree, clusters, extent }
     }
 
@@ -66,7 +68,7 @@ impl<'m> Scene<'m> {
         &self.clusters
     }
 
-    /// A bound on the coordinates in play, seen from `origin`: rounding errors are small multiples of it.
+    /// Returns a bound on the coordinates relative to `origin`. Rounding errors are small multiples of it.
     pub(crate) fn magnitude(&self, origin: DVec3) -> f64 {
         self.extent + origin.abs().max_element()
     }

@@ -1,4 +1,4 @@
-//! Bounding volume hierarchies: of the faces of a block, and of several trees under one root.
+//! Bounding volume hierarchies over the faces of a block, and over several trees.
 
 use glam::Vec3;
 use obvhs::BvhBuildParams;
@@ -7,7 +7,7 @@ use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use s3d_geom::TriMesh;
 use std::time::Duration;
 
-/// A box, and what is in it.
+/// A box and its content.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     pub(crate) min: [f32; 3],
@@ -17,9 +17,9 @@ pub(crate) struct Node {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Content {
-    /// The first of two nodes that follow each other.
+    /// The index of the first child; the second child follows it.
     Children(u32),
-    /// `count` entries of a list, from `first` on.
+    /// The `count` entries of a list from index `first` on.
     Leaf { first: u32, count: u8 },
 }
 
@@ -36,7 +36,7 @@ impl Node {
         self.max.into()
     }
 
-    /// The same node where lists of nodes and of entries begin elsewhere.
+    /// Returns the same node for lists of nodes and entries that begin elsewhere.
     fn moved(mut self, nodes: u32, entries: u32) -> Self {
         match &mut self.content {
             Content::Children(first) => *first += nodes,
@@ -46,24 +46,25 @@ impl Node {
     }
 }
 
-/// A tree over faces. Its boxes are exact unions of `f32` corners; every test against them allows for its own
+/// A tree over faces. The boxes are exact unions of `f32` corners; every test against them allows for its own
 /// rounding.
 #[derive(Debug)]
 pub(crate) struct FaceTree {
-    /// The root is the first.
+    /// The root comes first.
     pub(crate) nodes: Vec<Node>,
-    /// Indices in the mesh: the entries of the leaves.
+    /// The entries of the leaves: indices of faces in the mesh.
     pub(crate) faces: Vec<u32>,
 }
 
 impl FaceTree {
-    /// Builds a tree over some faces, at least one.
+    /// Builds a tree over some faces; there must be at least one.
     pub(crate) fn new(mesh: &TriMesh, faces: &[u32]) -> Self {
         let boxes: Vec<Aabb> = faces
             .iter()
             .map(|&face| Aabb::from_points(&mesh.triangle(face).map(Into::into)))
             .collect();
-        // Small leaves: a face costs more than a box here.
+
+        // Leaves are small, since testing a face costs more than testing a box.
         let bvh = build(&boxes, 4);
         let node = |node: &obvhs::bvh2::node::Bvh2Node| {
             let first = node.first_index;
@@ -75,26 +76,27 @@ impl FaceTree {
             };
             Node::new(node.aabb(), content)
         };
+
         Self {
             nodes: bvh.nodes.iter().map(node).collect(),
             faces: bvh.primitive_indices.iter().map(|&k| faces[k as usize]).collect(),
         }
     }
 
-    /// Those of all blocks as one.
+    /// Joins the trees of all blocks.
     pub(crate) fn join(top: &Top, parts: Vec<Self>) -> Self {
         let nodes: Vec<_> = parts.iter().map(|part| (&part.nodes[..], part.faces.len())).collect();
         Self { nodes: top.join(&nodes), faces: parts.iter().flat_map(|part| &part.faces).copied().collect() }
     }
 }
 
-/// A tree over boxes, at least one, with at most so many in a leaf.
+/// Builds a tree over at least one box, with at most `max_prims_per_leaf` boxes in a leaf.
 fn build(boxes: &[Aabb], max_prims_per_leaf: u32) -> Bvh2 {
     let params = BvhBuildParams { max_prims_per_leaf, ..BvhBuildParams::fast_build() };
     build_bvh2(boxes, params, &mut Duration::default())
 }
 
-/// What lies above the trees of several blocks.
+/// The tree above the trees of several blocks.
 pub(crate) struct Top(Bvh2);
 
 impl Top {
@@ -105,20 +107,22 @@ impl Top {
         Self(build(&boxes, 1))
     }
 
-    /// One tree of those of all blocks, in their order: the nodes of each, and how many entries its leaves
-    /// have together. The lists of entries follow each other, too.
+    /// Joins the trees of all blocks, given in their order as the nodes of each tree and the number of its
+    /// entries. The lists of entries are expected to follow each other in the same order.
     pub(crate) fn join(&self, parts: &[(&[Node], usize)]) -> Vec<Node> {
         let top = &self.0;
-        let (mut nodes_before, mut entries_before) = (top.nodes.len(), 0);
+        let mut nodes_before = top.nodes.len();
+        let mut entries_before = 0;
         let starts: Vec<(u32, u32)> = parts
             .iter()
             .map(|(nodes, entries)| {
-                // A block's root takes the place of the leaf above it; the second of its nodes comes first.
+                // A block's root takes the place of the leaf above it, so only its other nodes are appended.
                 let start = (nodes_before as u32 - 1, entries_before as u32);
                 (nodes_before, entries_before) = (nodes_before + nodes.len() - 1, entries_before + entries);
                 start
             })
             .collect();
+
         let mut joined = Vec::with_capacity(nodes_before);
         joined.extend(top.nodes.iter().map(|node| {
             if !node.is_leaf() {
@@ -141,12 +145,13 @@ mod tests {
 
     #[test]
     fn every_face_is_in_one_leaf_inside_all_boxes_above_it() {
-        // In one block, and in several.
+        // One block, then several.
         for faces in [2000, 40_000] {
             let mesh = s3d_synth::scenes::scan_like(faces, 3);
             let scene = Scene::new(&mesh);
             let FaceTree { nodes, faces } = scene.tree();
             let mut met = vec![false; mesh.faces().len()];
+
             let mut stack = vec![(0, Vec3::NEG_INFINITY, Vec3::INFINITY)];
             let mut visited = 0;
             while let Some((node, min, max)) = stack.pop() {
@@ -167,6 +172,7 @@ mod tests {
                     }
                 }
             }
+
             assert!(met.iter().all(|&m| m) && visited == nodes.len());
         }
     }

@@ -1,24 +1,25 @@
-//! Attributes over a face, eight pixels at a time.
+//! Interpolates attributes over a face, eight pixels at a time.
 //!
 //! An attribute (a texture coordinate, a channel of the colour) is a ratio a(d) = (α·d) / (ω·d) of linear
-//! functions of the ray's direction d (see [`crate::shade::patch`]). Taken in `f64` a pixel, that is most of
-//! an image's time; taken in `f32`, the numerator loses the digits that count. So it is anchored at a pixel
-//! of the face with the direction e, where the attribute is a₀ = a(e), once in `f64`:
+//! functions of the ray's direction d (see [`crate::shade::patch`]). Evaluating it in `f64` for every pixel
+//! would take most of an image's time. In `f32`, the numerator would lose its significant digits. So it is
+//! anchored at a pixel of the face with the direction e. There the attribute a₀ = a(e) is evaluated once in
+//! `f64`:
 //!
 //! ```text
 //! a(d) = a₀ + n(d) / w(d),   n(d) = (α − a₀ω)·(d − e) / ω·e,   w(d) = 1 + ω·(d − e) / ω·e
 //! ```
 //!
-//! Both n and what is added to 1 are linear in d − e and small near the anchor, so nothing cancels. Along a
-//! row d − e is made of two functions of the column's offset k from the anchor alone: in a perspective view
-//! of k itself; in a panorama, with the turn δ from column to column, of sin kδ and 1 − cos kδ.
+//! Both n and w − 1 are linear in d − e and small near the anchor, so nothing cancels. Along a row, d −
+//! e depends on the column's offset k from the anchor through two functions alone. In a perspective view they
+//! are k and 0. In a panorama, with the angle δ from column to column, they are sin kδ and 1 − cos kδ.
 //!
 //! Error: an anchor serves pixels that are at most [`REACH`] columns and rows away and whose w is within
 //! 1/[`DEEP`] to [`DEEP`]. n and w each go through fewer than 8 roundings of 2⁻²⁴ relative to the pixels
-//! between; with f what one pixel more adds to the attribute, here or at the anchor, the quotient is off by
-//! less than 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and below f / 8000 where w hardly
-//! varies, as it mostly does in 64 pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a
-//! pixel in a texture of 4096.
+//! between. Let f be the change of the attribute by one pixel, here or at the anchor. The quotient is off by
+//! less than 16 · 2⁻²⁴ · 2 [`REACH`] · [`DEEP`] · f < f / 500, and by less than f / 8000 if w hardly
+//! varies, as is usual in 64 pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel
+//! in a texture of 4096.
 
 use crate::shade::patch::Patch;
 use crate::shade::texel_wrap::TexelWrap;
@@ -26,24 +27,24 @@ use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
 use glam::DVec3;
 use s3d_geom::{Camera, Rays};
 
-/// How far from its anchor a pixel may be, in columns and in rows.
+/// The largest distance of a pixel from its anchor, in columns and in rows.
 pub(crate) const REACH: i32 = 64;
-/// How many times nearer or farther than its anchor a pixel may be.
+/// The largest factor by which a pixel may be nearer or farther than its anchor.
 pub(crate) const DEEP: f32 = 16.0;
 
 /// Up to three attributes of a face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Attributes {
-    /// α of each.
+    /// α of each attribute.
     pub(crate) numerator: [DVec3; 3],
     /// ω.
     pub(crate) denominator: DVec3,
-    /// Between what bounds each is: what rounding throws outside is brought back.
+    /// The bounds of each attribute: values that rounding throws outside are clamped.
     pub(crate) bounds: [(f64, f64); 3],
 }
 
 impl Attributes {
-    /// From the values at the face's corners: `values[k]` are attribute k's.
+    /// Interpolates the values at the face's corners; `values[k]` belong to attribute k.
     #[inline(always)]
     pub(crate) fn new(patch: &Patch, values: [[f64; 3]; 3]) -> Self {
         let [p, q, r] = patch.weights_of_corners();
@@ -57,18 +58,20 @@ impl Attributes {
 }
 
 impl Attributes {
-    /// What [`AnchorBatch::anchors`] says. With a₀ = a(e) and 1/w = z(d) / z(e), z being how far the face
-    /// is along a ray, an attribute changes by (m − (a − a₀) ω / ω·e) · step / w where
-    /// m = (α − a₀ω) / ω·e; and z is greatest at a corner.
+    /// Returns the bound that [`AnchorBatch::anchors`] describes. Let a₀ = a(e), and 1/w = z(d) / z(e),
+    /// where z is the distance of the face along a ray. An attribute changes by (m − (a − a₀) ω /
+    /// ω·e) · step / w, where m = (α − a₀ω) / ω·e; and z is greatest at a corner.
     #[inline(always)]
     fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
         let scale = self.denominator.dot(e).recip();
         let here = self.denominator.dot(world[0] - origin) * scale;
+
         let mut far = 0.0;
         for corner in world {
             far = max(far, (corner - origin).length_squared());
         }
-        // A ray's direction is at least 1 long: corners are no farther along rays than they are away.
+        // The length of a ray's direction is at least 1, so z of a corner is no more than its distance.
+
         let mut sum = 0.0;
         for k in 0..2 {
             let (low, high) = self.bounds[k];
@@ -93,16 +96,16 @@ fn max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// The directions of an image's pixels, for anchors.
+/// The directions of an image's pixels, as anchors need them.
 pub(crate) struct RayGrid {
     rays: Rays,
-    /// In a panorama δ, else 1.
-    turn: f32,
-    /// In a panorama the rows' cosines and sines of latitude.
+    /// δ in a panorama, else 1.
+    column_step: f32,
+    /// The cosines and sines of the rows' latitudes; empty in a perspective view.
     rows: Vec<[f64; 2]>,
-    /// By column offset + [`REACH`]: sin kδ, or k.
+    /// sin kδ in a panorama, else k; by column offset k + [`REACH`].
     sines: [f32; 2 * REACH as usize + LANES],
-    /// 1 − cos kδ, or 0.
+    /// 1 − cos kδ in a panorama, else 0.
     versines: [f32; 2 * REACH as usize + LANES],
 }
 
@@ -110,7 +113,7 @@ impl RayGrid {
     pub(crate) fn new(camera: &Camera) -> Self {
         let rays = camera.rays();
         let offset = |at: usize| at as f64 - f64::from(REACH);
-        let (turn, rows) = match &rays {
+        let (column_step, rows) = match &rays {
             Rays::Perspective { .. } => (None, vec![]),
             Rays::Equirectangular { rows, .. } => (
                 Some(std::f64::consts::TAU / f64::from(camera.width)),
@@ -121,20 +124,24 @@ impl RayGrid {
         let versine = |a: f64| 2.0 * libm_sin(0.5 * a) * libm_sin(0.5 * a);
         Self {
             rays,
-            turn: turn.unwrap_or(1.0) as f32,
+            column_step: column_step.unwrap_or(1.0) as f32,
             rows,
-            sines: std::array::from_fn(|k| turn.map_or(offset(k), |t| libm_sin(offset(k) * t)) as f32),
-            versines: std::array::from_fn(|k| turn.map_or(0.0, |t| versine(offset(k) * t)) as f32),
+            sines: std::array::from_fn(|k| {
+                column_step.map_or(offset(k), |step| libm_sin(offset(k) * step)) as f32
+            }),
+            versines: std::array::from_fn(|k| {
+                column_step.map_or(0.0, |step| versine(offset(k) * step)) as f32
+            }),
         }
     }
 
-    /// Whether it is a panorama's.
+    /// Tells whether the image is a panorama.
     pub(crate) fn is_panorama(&self) -> bool {
         !self.rows.is_empty()
     }
 
-    /// How directions change at column `i`: from column to column and from row to row in a perspective view;
-    /// in a panorama the first is the column's unit vector.
+    /// Returns the change of the directions at column `i`: from column to column and from row to row in a
+    /// perspective view. In a panorama the first is the column's unit vector, the second is unused.
     fn steps(&self, i: usize) -> [DVec3; 2] {
         match &self.rays {
             Rays::Perspective { x_step, y_step, .. } => [*x_step, *y_step],
@@ -143,27 +150,27 @@ impl RayGrid {
     }
 }
 
-/// As glam's, which is the same on every platform.
+/// Returns the sine from glam, which is the same on every platform.
 fn libm_sin(a: f64) -> f64 {
     glam::DVec2::from_angle(a).y
 }
 
-/// Linear functions of d − e, n of the three attributes and w: in a perspective view `along` · columns +
-/// `down` · rows. In a panorama, with c(k) the unit vector of the column's azimuth, `along` what c(0) turns
-/// towards, `down` along c(0), and `up` upwards.
+/// The linear functions of d − e: n of the three attributes, then w − 1. In a perspective view they are
+/// `along` · columns + `down` · rows. In a panorama, let c(k) be the unit vector of the azimuth of column
+/// k: `along` belongs to the direction in which c(0) turns, `down` to c(0), and `up` to the vertical.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slopes {
     along: [f32; 4],
     down: [f32; 4],
     up: [f32; 4],
-    /// The attributes at the anchor, and their bounds; folded.
+    /// The attributes at the anchor and their bounds, after wrapping.
     base: [f32; 3],
     min: [f32; 3],
     max: [f32; 3],
 }
 
 impl Slopes {
-    /// Of attributes anchored at the direction `e`, where directions change by `steps`.
+    /// Anchors attributes at the direction `e`, where directions change by `steps`.
     #[inline(always)]
     fn new<const PANORAMA: bool>(
         attributes: &Attributes,
@@ -174,6 +181,7 @@ impl Slopes {
         let mut slopes = Self::default();
         let scale = attributes.denominator.dot(e).recip();
         slopes.set::<PANORAMA>(3, attributes.denominator * scale, steps);
+
         for (k, wrap) in wraps.into_iter().enumerate() {
             let (low, high) = attributes.bounds[k];
             let value = min(max(attributes.numerator[k].dot(e) * scale, low), high);
@@ -190,7 +198,7 @@ impl Slopes {
     #[inline(always)]
     fn set<const PANORAMA: bool>(&mut self, k: usize, m: DVec3, [x, y]: [DVec3; 2]) {
         if PANORAMA {
-            // Azimuth falls to the right.
+            // The azimuth falls to the right.
             self.along[k] = (m.x * x.y - m.y * x.x) as f32;
             self.down[k] = (m.x * x.x + m.y * x.y) as f32;
             self.up[k] = m.z as f32;
@@ -200,7 +208,7 @@ impl Slopes {
     }
 }
 
-/// Attributes anchored at a pixel; by default nowhere.
+/// Attributes anchored at a pixel. The default anchor serves no pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Anchor {
     pub(crate) column: i32,
@@ -215,8 +223,8 @@ impl Default for Anchor {
 }
 
 impl Anchor {
-    /// Anchors the attributes at a pixel, the values wrapped: an attribute with a period is brought between 0
-    /// and it, mirrored if its fold is. `false` if the face is seen edge-on there, or numbers are too large.
+    /// Anchors the attributes at a pixel. A periodic attribute is brought between 0 and its period, and
+    /// mirrored if needed. Returns `false` if the face is seen edge-on there, or if numbers are too large.
     pub(crate) fn set<const PANORAMA: bool>(
         &mut self,
         attributes: &Attributes,
@@ -244,14 +252,14 @@ impl Anchor {
         finite
     }
 
-    /// Whether the anchor serves the [`LANES`] pixels from a column on.
+    /// Tells whether the anchor serves the [`LANES`] pixels from a column on.
     #[inline(always)]
     pub(crate) fn reaches(&self, i: usize, j: usize) -> bool {
         (-REACH..=REACH - LANES as i32).contains(&(i as i32).wrapping_sub(self.column))
             && (j as i32 - self.row).abs() < REACH
     }
 
-    /// The row `j` of pixels.
+    /// Returns row `j` of pixels.
     #[inline(always)]
     pub(crate) fn line<'a, const PANORAMA: bool>(&'a self, grid: &'a RayGrid, j: usize) -> AnchoredRow<'a> {
         let (level, rise, cos, sin) = if PANORAMA {
@@ -271,15 +279,15 @@ impl Anchor {
     }
 }
 
-/// Faces to be anchored together: their numbers by lane.
+/// Faces to be anchored together. Their values are stored by lane.
 pub(crate) struct AnchorBatch {
-    /// By corner and axis.
+    /// Coordinates by corner and axis.
     corners: [[[f64; LANES]; 3]; 3],
-    /// By attribute and corner.
+    /// Values by attribute and corner.
     values: [[[f64; LANES]; 3]; 3],
-    /// By attribute: divisor, period and half.
+    /// Divisor, period and half by attribute.
     wraps: [[[f64; LANES]; 3]; 3],
-    /// The direction, and the steps there.
+    /// The direction of the anchor's ray, and the steps there.
     rays: [[[f64; LANES]; 3]; 3],
     at: [(usize, usize); LANES],
 }
@@ -290,8 +298,7 @@ impl AnchorBatch {
         Self { corners: zeros, values: zeros, wraps: zeros, rays: zeros, at: [(0, 0); LANES] }
     }
 
-    /// Says what lane `k` is: the corners and the values there, as of [`Attributes::new`], and where it is
-    /// anchored.
+    /// Sets lane `k`: the corners, the values there as in [`Attributes::new`], and the pixel of the anchor.
     #[inline(always)]
     pub(crate) fn put(
         &mut self,
@@ -318,9 +325,9 @@ impl AnchorBatch {
         self.at[k] = (i, j);
     }
 
-    /// What [`Anchor::set`] makes of each lane; and of each a bound on how fast the first two attributes
-    /// change: the sum of the squares of what a column and a row add to them is nowhere on the face numerator
-    /// it, and more than rounding below. Infinite in a panorama.
+    /// Returns the anchors that [`Anchor::set`] makes of each lane, and a bound on how fast the first two
+    /// attributes change. The bound is on the sum of the squares of their changes by a column and by a row,
+    /// anywhere on the face; rounding cannot exceed it. It is infinite in a panorama.
     #[inline(always)]
     pub(crate) fn anchors<const PANORAMA: bool>(&self, origin: DVec3) -> ([Anchor; LANES], [f32; LANES]) {
         let mut fastest = [f32::INFINITY; LANES];
@@ -328,7 +335,8 @@ impl AnchorBatch {
         let (mut down, mut up) = (along, along);
         let mut base = [[0.0f32; LANES]; 3];
         let (mut min, mut max) = (base, base);
-        // One face's arithmetic, written so that the compiler does it for several at once.
+
+        // The arithmetic of one face, written so that the compiler vectorises it over faces.
         for k in 0..LANES {
             let point = |v: &[[f64; LANES]; 3]| DVec3::new(v[0][k], v[1][k], v[2][k]);
             let row = |v: &[[f64; LANES]; 3]| [v[0][k], v[1][k], v[2][k]];
@@ -341,6 +349,7 @@ impl AnchorBatch {
             let [e, x, y] = [point(&self.rays[0]), point(&self.rays[1]), point(&self.rays[2])];
             let attributes = Attributes::new(&Patch::of(world, origin), values);
             let slopes = Slopes::new::<PANORAMA>(&attributes, [wrap(0), wrap(1), wrap(2)], e, [x, y]);
+
             for n in 0..4 {
                 (along[n][k], down[n][k], up[n][k]) = (slopes.along[n], slopes.down[n], slopes.up[n]);
             }
@@ -351,6 +360,7 @@ impl AnchorBatch {
                 fastest[k] = attributes.fastest(world, origin, e, [x, y]) as f32;
             }
         }
+
         let mut anchors = [Anchor::default(); LANES];
         for (k, anchor) in anchors.iter_mut().enumerate() {
             let four = |v: &[[f32; LANES]; 4]| [v[0][k], v[1][k], v[2][k], v[3][k]];
@@ -376,26 +386,26 @@ pub(crate) struct AnchoredRow<'a> {
     grid: &'a RayGrid,
     /// n and w − 1 in the anchor's column.
     start: [f32; 4],
-    /// In a panorama the row's.
+    /// cos φ and sin φ of the row in a panorama.
     cos: f32,
     sin: f32,
 }
 
-/// Attributes of eight pixels.
+/// The attributes of eight pixels.
 #[derive(Clone, Copy)]
 pub(crate) struct Interpolated<F, const N: usize> {
     pub(crate) values: [F; N],
-    /// What a column more adds to each.
+    /// The change of each attribute by one column.
     pub(crate) x: [F; N],
-    /// What a row more adds to each.
+    /// The change of each attribute by one row.
     pub(crate) y: [F; N],
-    /// Bit k: whether pixel k is so much nearer or farther than the anchor that its values are not exact
+    /// Bit k is set if pixel k is so much nearer or farther than the anchor that its values are not accurate
     /// enough.
     pub(crate) doubtful: u32,
 }
 
 impl AnchoredRow<'_> {
-    /// The first `N` attributes of the eight pixels from column `i` on.
+    /// Returns the first `N` attributes of the eight pixels from column `i` on.
     #[inline(always)]
     pub(crate) fn at<const PANORAMA: bool, const N: usize, L: ShadeLanes>(
         &self,
@@ -408,7 +418,8 @@ impl AnchoredRow<'_> {
         let s = eight(l, &grid.sines, k);
         let v = if PANORAMA { eight(l, &grid.versines, k) } else { s };
         let cosine = l.sub(l.splat(1.0), v);
-        // Loops and no closures: those would not be compiled for the lanes' instructions.
+
+        // Loops instead of closures, which would not be compiled for the instructions of the lanes.
         let zero = l.splat(0.0);
         let (mut values, mut by_column, mut by_row) = ([zero; 4], [zero; 4], [zero; 4]);
         for n in 0..4 {
@@ -419,7 +430,7 @@ impl AnchoredRow<'_> {
             if PANORAMA {
                 let change = l.sub(l.mul(l.splat(along[n] * cos), s), l.mul(l.splat(down[n] * cos), v));
                 values[n] = l.add(l.splat(start[n]), change);
-                let (level, rise) = (cos * grid.turn, sin * grid.turn);
+                let (level, rise) = (cos * grid.column_step, sin * grid.column_step);
                 let (a, b) = (l.mul(l.splat(along[n] * level), cosine), l.mul(l.splat(down[n] * level), s));
                 by_column[n] = l.sub(a, b);
                 let (a, b) = (l.mul(l.splat(down[n] * rise), cosine), l.mul(l.splat(along[n] * rise), s));
@@ -429,10 +440,12 @@ impl AnchoredRow<'_> {
                 (by_column[n], by_row[n]) = (l.splat(along[n]), l.splat(down[n]));
             }
         }
+
         let w = l.add(l.splat(1.0), values[3]);
         let near = l.greater(w, l.splat(1.0 / DEEP)) & l.greater(l.splat(DEEP), w);
         let scale = l.div(l.splat(1.0), w);
         let mut seen = Interpolated { values: [zero; N], x: [zero; N], y: [zero; N], doubtful: !near & 0xFF };
+
         for n in 0..N {
             let offset = l.mul(values[n], scale);
             let value = l.add(l.splat(anchor.slopes.base[n]), offset);
@@ -452,7 +465,8 @@ mod tests {
     use proptest::prelude::*;
     use s3d_geom::{Pose, TriMesh};
 
-    /// What eight pixels get, and what is exact in `f64`: values, change by column and by row.
+    /// Compares the values of eight pixels, and their changes by column and by row, with exact results in
+    /// `f64`.
     fn check<const PANORAMA: bool>(
         camera: &Camera,
         corners: [[f32; 3]; 3],
@@ -464,25 +478,31 @@ mod tests {
         let Ok(mesh) = mesh else { return };
         let patch = Patch::new(&mesh, 0, camera.pose.location);
         let mut attributes = Attributes::new(&patch, values);
-        // No bounds: the plane is tested beyond the triangle, too.
+        // The bounds are lifted, so that the plane is tested beyond the triangle, too.
         attributes.bounds = [(-1e9, 1e9); 3];
-        let (grid, mut anchor) = (RayGrid::new(camera), Anchor::default());
+
+        let grid = RayGrid::new(camera);
+        let mut anchor = Anchor::default();
         if !anchor.set::<PANORAMA>(&attributes, [TexelWrap::NONE; 3], &grid, at[0], at[1])
             || !anchor.reaches(to[0], to[1])
         {
             return;
         }
+
         let exact = |x: f64, y: f64, n: usize| {
             let d = camera.direction(x + 0.5, y + 0.5);
             attributes.numerator[n].dot(d) / attributes.denominator.dot(d)
         };
         let seen: Interpolated<_, 3> =
             anchor.line::<PANORAMA>(&grid, to[1]).at::<PANORAMA, 3, _>(Plain, to[0]);
+
         for k in 0..LANES {
-            let (x, y) = ((to[0] + k) as f64, to[1] as f64);
+            let x = (to[0] + k) as f64;
+            let y = to[1] as f64;
             if seen.doubtful >> k & 1 == 1 || to[0] + k >= camera.width as usize {
                 continue;
             }
+
             for n in 0..3 {
                 let change = |x: f64, y: f64| {
                     let h = 1e-3;
@@ -492,7 +512,7 @@ mod tests {
                 };
                 let ((xx, xy), (ax, ay)) = (change(x, y), change(at[0] as f64, at[1] as f64));
                 let footprint = [xx, xy, ax, ay].into_iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-                // All attributes go through the same w: the widest footprint bounds it.
+                // All attributes share the same w, so the widest footprint bounds it.
                 let value = exact(x, y, n);
                 let bound = footprint / 500.0
                     + f64::from(f32::EPSILON) * (value.abs() + exact(at[0] as f64, at[1] as f64, n).abs());
@@ -501,6 +521,7 @@ mod tests {
                     off <= bound,
                     "attribute {n} of ({x}, {y}) is {value}, off by {off:e}, bound {bound:e}"
                 );
+
                 for (got, want) in [(seen.x[n][k], xx), (seen.y[n][k], xy)] {
                     assert!((f64::from(got) - want).abs() <= 0.01 * footprint + 1e-9, "{got} for {want}");
                 }
@@ -515,7 +536,7 @@ mod tests {
             values in prop::array::uniform3(prop::array::uniform3(-900.0..900.0f64)),
             (p, q) in (0.0..1.0f64, 0.0..1.0f64), (r, t) in (0.0..1.0f64, 0.0..1.0f64),
         ) {
-            // Rays (x, y, 1) from a place; the anchor and a pixel anywhere on the face.
+            // The rays are (x, y, 1) from a place. The anchor and the pixel are anywhere on the face.
             let origin = DVec3::new(0.5, -0.25, 2.0);
             let world = corners.map(|(x, y, z)| DVec3::new(x * z, y * z, z) + origin);
             let attributes = Attributes::new(&Patch::of(world, origin), values);
@@ -525,7 +546,9 @@ mod tests {
             };
             let steps = [DVec3::new(0.01, 0.0, 0.0), DVec3::new(0.0, 0.01, 0.0)];
             let fastest = attributes.fastest(world, origin, ray(p, q), steps);
-            let (d, mut sum) = (ray(r, t), 0.0);
+
+            let d = ray(r, t);
+            let mut sum = 0.0;
             let scale = attributes.denominator.dot(d).recip();
             for numerator in &attributes.numerator[..2] {
                 for step in steps {
@@ -546,13 +569,16 @@ mod tests {
             let pose = Pose::level(DVec3::new(0.3, -0.2, 0.1), 0.4);
             let perspective = Camera::perspective(pose, 1.2, 64, 32);
             let camera = if panorama { Camera::equirectangular(pose, 64) } else { perspective };
-            let (grid, mut batch) = (RayGrid::new(&camera), AnchorBatch::new());
+
+            let grid = RayGrid::new(&camera);
+            let mut batch = AnchorBatch::new();
             let wraps = [TexelWrap::NONE, TexelWrap::repeat(period), TexelWrap::mirror(period)];
             for (k, corners) in corners.iter().enumerate() {
                 batch.put(k, corners.map(glam::Vec3::from), values, wraps, &grid, (7 * k, 3 * k));
             }
             let at = pose.location;
             let (together, _) = if panorama { batch.anchors::<true>(at) } else { batch.anchors::<false>(at) };
+
             for (k, corners) in corners.iter().enumerate() {
                 let world = corners.map(|p| glam::Vec3::from(p).as_dvec3());
                 let attributes = Attributes::new(&Patch::of(world, pose.location), values);
@@ -585,7 +611,7 @@ mod tests {
             prop_assert!((shift / period - (shift / period).round()).abs() < 1e-9);
             let (sign, shift) = TexelWrap::mirror(period).sign_and_shift(value);
             prop_assert!((-1e-6..=period).contains(&(sign * value + shift)), "{}", sign * value + shift);
-            // The same place of a texture that is mirrored at every period.
+            // The result is the same place of a texture that is mirrored at every period.
             prop_assert!((shift / (2.0 * period) - (shift / (2.0 * period)).round()).abs() < 1e-9);
         }
     }

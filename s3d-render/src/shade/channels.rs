@@ -1,7 +1,7 @@
-//! From hits to the images of the data set. Source: formats.md, "What is written".
+//! Makes the images of the data set from hits. Source: formats.md, "What is written".
 //!
-//! Every image has the size of the hits. Those that depend on the rays' directions take the camera that the
-//! hits were cast with, one ray a pixel.
+//! Every image has the size of the hits. A function whose image depends on the rays' directions takes the
+//! camera of the hits, which must have one ray a pixel.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::scene::Scene;
@@ -13,42 +13,43 @@ use crate::simd::{Kernel, Simd, dispatch};
 use glam::{DMat3, DVec3, Vec3};
 use s3d_geom::{Camera, NormalAxes, Raster, TriMesh};
 
-/// Depth that is missing, or too far to be written.
+/// The depth of a pixel that sees nothing, or sees too far to be written.
 pub const MISSING_DEPTH: u16 = 65_535;
-/// A normal that is missing.
+/// The normal of a pixel that sees nothing.
 pub const MISSING_NORMAL: [u8; 3] = [128; 3];
-/// An index that is missing: the ray hits nothing.
+/// The index of a pixel that sees nothing.
 pub const MISSING_INDEX: [u8; 3] = [13; 3];
 
-/// Which normals a face has.
+/// The normals of a face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Normals {
-    /// The face's own, the same all over it.
+    /// The normal of the face itself, the same all over it.
     #[default]
     Flat,
-    /// Interpolated between the normals at its corners; the face's own if the mesh has none there.
+    /// Interpolated between the normals at the corners; the face's own if the mesh has none there.
     Smooth,
 }
 
-/// Depth in 512ths of a metre, rounded half up: z-depth in a perspective view, distance in a panorama.
-/// [`MISSING_DEPTH`] where nothing is seen and beyond 65,534 units (128 m).
+/// Returns depth in 512ths of a metre, rounded half up: z-depth in a perspective view, distance in a
+/// panorama. [`MISSING_DEPTH`] where nothing is seen and beyond 65,534 units (128 m).
 pub fn depth_image(hits: &Hits) -> Raster<u16> {
     let mut out = Raster::filled(hits.depth.width(), hits.depth.height(), 0);
     depth_image_into(hits, &mut out);
     out
 }
 
-/// As [`depth_image`], into an image that is used again.
+/// Writes the image of [`depth_image`] into an existing image.
 pub fn depth_image_into(hits: &Hits, out: &mut Raster<u16>) {
     fit(out, &hits.depth, 0);
     dispatch(DepthKernel { depths: hits.depth.pixels(), out: out.pixels_mut() });
 }
 
-/// As [`depth_image_into`], in millimetres: [`MISSING_DEPTH`] where nothing is seen and beyond 65.534 m.
+/// Writes depth in millimetres, rounded half up, into an existing image: [`MISSING_DEPTH`] where nothing is
+/// seen and beyond 65.534 m.
 pub fn depth_image_mm_into(hits: &Hits, out: &mut Raster<u16>) {
     fit(out, &hits.depth, 0);
     for (depth, out) in hits.depth.pixels().iter().zip(out.pixels_mut()) {
-        // The product is exact; the cast rounds down and saturates, at infinity too.
+        // The product is exact. The cast rounds down and saturates, also at infinity.
         *out = (f64::from(*depth) * 1000.0 + 0.5) as u16;
     }
 }
@@ -68,7 +69,7 @@ impl Kernel for DepthKernel<'_> {
     }
 }
 
-/// DepthKernel in 512ths of a metre.
+/// Converts depths in metres to 512ths of a metre.
 #[inline(always)]
 pub(crate) fn depths(lanes: impl ShadeLanes, depths: &[f32], out: &mut [u16]) {
     let (eights, rest) = depths.as_chunks::<LANES>();
@@ -89,9 +90,9 @@ pub(crate) fn fit<T: Copy, U>(out: &mut Raster<T>, like: &Raster<U>, value: T) {
     }
 }
 
-/// Surface normals in the axes of [`Camera::normal_image_from_world`], the paper's, a channel = ⌊127.5 +
-/// 127.5 n + ½⌋; a normal never points away from the camera (its dot product with the ray is at most 0).
-/// [`MISSING_NORMAL`] where nothing is seen.
+/// Returns surface normals in the paper's axes: see [`Camera::normal_image_from_world`]. A channel is
+/// ⌊127.5 + 127.5 n + ½⌋. A normal never points away from the camera: its dot product with the ray is at
+/// most 0. [`MISSING_NORMAL`] where nothing is seen.
 ///
 /// # Panics
 /// If the hits are not of the camera's size.
@@ -101,11 +102,11 @@ pub fn normal_image(scene: &Scene<'_>, hits: &Hits, camera: &Camera, normals: No
     out
 }
 
-/// As [`normal_image`], with a choice of [axes](Camera::normal_axes_from_world) and into an image that is
-/// used again.
+/// Writes the image of [`normal_image`] with a choice of [axes](Camera::normal_axes_from_world) into an
+/// existing image.
 ///
 /// # Panics
-/// As [`normal_image`].
+/// As for [`normal_image`].
 pub fn normal_image_into(
     scene: &Scene<'_>,
     hits: &Hits,
@@ -137,15 +138,15 @@ fn flat_normals(
     by_face(Some(scene), hits, MISSING_NORMAL, out, |faces| flat_normals_of(scene.mesh(), faces, view));
 }
 
-/// The colours of faces' normals, on the side that `origin` sees: all rays start there, and see the same
-/// side.
+/// Returns the colours of faces' normals on the side that `origin` sees. All rays start there and see the
+/// same side.
 #[inline(always)]
 pub(crate) fn flat_normals_of(
     mesh: &TriMesh,
     faces: &[u32; LANES],
     (origin, image_from_world): (DVec3, DMat3),
 ) -> [[u8; 3]; LANES] {
-    // Corner by corner and axis by axis.
+    // By corner, axis and face.
     let mut corners = [[[0.0f64; LANES]; 3]; 3];
     for (k, &face) in faces.iter().enumerate() {
         for (corner, p) in corners.iter_mut().zip(mesh.triangle(face)) {
@@ -153,7 +154,7 @@ pub(crate) fn flat_normals_of(
         }
     }
     let mut channels = [[0.0f64; LANES]; 3];
-    // One face's arithmetic, written so that the compiler does it for several at once.
+    // The arithmetic of one face, written so that the compiler vectorises it over faces.
     for k in 0..LANES {
         let [a, b, c] = [0, 1, 2].map(|n| DVec3::new(corners[n][0][k], corners[n][1][k], corners[n][2][k]));
         let normal = (b - a).cross(c - a).normalize();
@@ -164,11 +165,11 @@ pub(crate) fn flat_normals_of(
     std::array::from_fn(|k| channels.map(|channel| channel[k] as u8))
 }
 
-/// Surface normals as vectors of length 1, before [`normal_image`] makes bytes of them; NaN where nothing is
-/// seen.
+/// Returns surface normals as unit vectors, before [`normal_image`] turns them into bytes; NaN where nothing
+/// is seen.
 ///
 /// # Panics
-/// As [`normal_image`].
+/// As for [`normal_image`].
 pub fn normal_vectors(
     scene: &Scene<'_>,
     hits: &Hits,
@@ -182,13 +183,14 @@ pub fn normal_vectors(
     if normals == Normals::Smooth {
         return smooth_normals(scene, hits, camera, [f32::NAN; 3], vector);
     }
+
     let mut vectors = FaceCache::new();
     hits.face.map(|face| {
         if face == NO_FACE {
             return [f32::NAN; 3];
         }
         *vectors.get(face, || {
-            // The same side and the same arithmetic as in the image of bytes.
+            // The side and the arithmetic are the same as in the image of bytes.
             let [a, b, c] = scene.mesh().triangle(face).map(|p| p.as_dvec3());
             let normal = (b - a).cross(c - a).normalize();
             vector(if normal.dot(a - camera.pose.location) > 0.0 {
@@ -200,7 +202,7 @@ pub fn normal_vectors(
     })
 }
 
-/// What `pixel` makes of the normal that each pixel sees.
+/// Returns the image of `pixel` for the normal that each pixel sees.
 fn smooth_normals<T: Copy>(
     scene: &Scene<'_>,
     hits: &Hits,
@@ -226,7 +228,7 @@ fn smooth_normals<T: Copy>(
     Raster::from_vec(hits.face.width(), hits.face.height(), out)
 }
 
-/// The normal where the ray along `d` arrives, on the side that it sees.
+/// Returns the normal where the ray along `d` arrives, on the side that the ray sees.
 fn smooth_normal(patch: &Patch, corners: Option<[Vec3; 3]>, d: DVec3) -> DVec3 {
     let (flat, away) = patch.normal_towards(d);
     let Some(corners) = corners else { return flat };
@@ -237,45 +239,46 @@ fn smooth_normal(patch: &Patch, corners: Option<[Vec3; 3]>, d: DVec3) -> DVec3 {
         .sum();
     // Corner normals follow the winding, which the flat normal shows.
     let sum = if away { -sum } else { sum };
-    // One that points away is bent until it is edge-on.
+    // A normal that points away is bent until it is edge-on.
     let beyond = sum.dot(d).max(0.0);
     (sum - d * (beyond / d.length_squared()))
         .try_normalize()
         .unwrap_or(flat)
 }
 
-/// ⌊127.5 + 127.5 n + ½⌋ a channel.
+/// Returns ⌊127.5 + 127.5 n + ½⌋ for each channel.
 fn quantized(n: DVec3) -> [u8; 3] {
     // The cast rounds down and saturates.
     shifted(n).to_array().map(|channel| channel as u8)
 }
 
-/// 127.5 + 127.5 n + ½ a channel, and a hair more: a wall along an axis has a 0 that rounding may put on
-/// either side of the tie, and 128 is meant.
+/// Returns 127.5 + 127.5 n + ½ for each channel, plus a tiny bias. A wall along an axis has a 0 that
+/// rounding may put on either side of the tie; it must become 128.
 #[inline(always)]
 fn shifted(n: DVec3) -> DVec3 {
     n * 127.5 + (128.0 + 1e-9)
 }
 
-/// An index a face, as the colour R·65536 + G·256 + B = index; [`MISSING_INDEX`] where nothing is seen. With
-/// each face's index into the label table it is the semantic image.
+/// Returns an index a face as the colour R·65536 + G·256 + B = index; [`MISSING_INDEX`] where nothing is
+/// seen. With the label table's index of each face, it is the semantic image.
 ///
 /// # Panics
-/// If there is not an index for each face that is seen, or one does not fit into 24 bits.
+/// If a visible face has no index, or an index does not fit into 24 bits.
 pub fn index_image(hits: &Hits, index_of_face: &[u32]) -> Raster<[u8; 3]> {
     let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
     index_image_into(hits, index_of_face, &mut out);
     out
 }
 
-/// As [`index_image`], into an image that is used again.
+/// Writes the image of [`index_image`] into an existing image.
 ///
 /// # Panics
-/// As [`index_image`].
+/// As for [`index_image`].
 pub fn index_image_into(hits: &Hits, index_of_face: &[u32], out: &mut Raster<[u8; 3]>) {
     by_face(None, hits, MISSING_INDEX, out, |faces| faces.map(|face| index_color(index_of_face, face)));
 }
 
+/// Returns the index of a face as a colour.
 #[inline(always)]
 pub(crate) fn index_color(index_of_face: &[u32], face: u32) -> [u8; 3] {
     let index = index_of_face[face as usize];
@@ -284,38 +287,38 @@ pub(crate) fn index_color(index_of_face: &[u32], face: u32) -> [u8; 3] {
     [r, g, b]
 }
 
-/// A colour a face, black where nothing is seen.
+/// Returns a colour a face; black where nothing is seen.
 ///
 /// # Panics
-/// If there is not a colour for each face that is seen.
+/// If a visible face has no colour.
 pub fn color_per_face_image(hits: &Hits, color_of_face: &[[u8; 3]]) -> Raster<[u8; 3]> {
     let mut out = Raster::filled(hits.face.width(), hits.face.height(), [0; 3]);
     color_per_face_image_into(hits, color_of_face, &mut out);
     out
 }
 
-/// As [`color_per_face_image`], into an image that is used again.
+/// Writes the image of [`color_per_face_image`] into an existing image.
 ///
 /// # Panics
-/// As [`color_per_face_image`].
+/// As for [`color_per_face_image`].
 pub fn color_per_face_image_into(hits: &Hits, color_of_face: &[[u8; 3]], out: &mut Raster<[u8; 3]>) {
     by_face(None, hits, [0; 3], out, |faces| faces.map(|face| color_of_face[face as usize]));
 }
 
-/// A byte a face, `missing` where nothing is seen: for images with a palette.
+/// Returns a byte a face, and `missing` where nothing is seen: for images with a palette.
 ///
 /// # Panics
-/// If there is not a byte for each face that is seen.
+/// If a visible face has no byte.
 pub fn byte_per_face_image(hits: &Hits, byte_of_face: &[u8], missing: u8) -> Raster<u8> {
     let mut out = Raster::filled(0, 0, 0);
     byte_per_face_image_into(hits, byte_of_face, missing, &mut out);
     out
 }
 
-/// As [`byte_per_face_image`], into an image that is used again.
+/// Writes the image of [`byte_per_face_image`] into an existing image.
 ///
 /// # Panics
-/// As [`byte_per_face_image`].
+/// As for [`byte_per_face_image`].
 pub fn byte_per_face_image_into(hits: &Hits, byte_of_face: &[u8], missing: u8, out: &mut Raster<u8>) {
     fit(out, &hits.face, 0);
     let byte = |face: u32| {
@@ -331,13 +334,13 @@ pub fn byte_per_face_image_into(hits: &Hits, byte_of_face: &[u8], missing: u8, o
         .for_each(|(out, face)| *out = byte(*face));
 }
 
-/// The share of pixels that see anything, 0 to 1; 0 for an image without pixels.
+/// Returns the share of pixels that see anything, 0 to 1; 0 for an image without pixels.
 pub fn coverage(hits: &Hits) -> f64 {
     let seen = hits.face.pixels().iter().filter(|&&face| face != NO_FACE).count();
     seen as f64 / hits.face.len().max(1) as f64
 }
 
-/// An image from a value a face: `values` is asked for eight faces at a time.
+/// Makes an image with one value a face. `values` is called for eight faces at a time.
 fn by_face(
     scene: Option<&Scene<'_>>,
     hits: &Hits,
@@ -356,7 +359,7 @@ fn by_face(
 }
 
 struct ByFaceKernel<'a, V> {
-    /// What values look at.
+    /// The mesh that `values` reads.
     mesh: Option<&'a TriMesh>,
     hits: &'a Hits,
     flat: FlatPainter<V, 1>,
@@ -371,7 +374,8 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> Kernel for ByFaceKernel<'_, 
         let lanes = simd.shade();
         let Self { mesh, hits, mut flat, out } = self;
         let width = hits.face.width() as usize;
-        let (mut spans, band) = (Spans::new(width), (band_rows(width) * width).max(1));
+        let mut spans = Spans::new(width);
+        let band = (band_rows(width) * width).max(1);
         for (faces, out) in hits.face.pixels().chunks(band).zip(out.pixels_mut().chunks_mut(band)) {
             if spans.find(lanes, mesh, faces) {
                 flat.forget();
@@ -381,12 +385,12 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; 1]; LANES]> Kernel for ByFaceKernel<'_, 
     }
 }
 
-/// Gives the pixels from `start` to `end` a colour, and perhaps some of those that follow.
+/// Gives the pixels from `start` to `end` a colour, and perhaps some of the pixels after them.
 #[inline(always)]
 pub(crate) fn paint(out: &mut [[u8; 3]], start: usize, end: usize, color: [u8; 3]) {
     let [r, g, b] = color.map(u64::from);
     let p = r | g << 8 | b << 16;
-    // Eight pixels are three words.
+    // Eight pixels fill three words.
     let words = [p | p << 24 | p << 48, p >> 16 | p << 8 | p << 32 | p << 56, p >> 8 | p << 16 | p << 40];
     let mut at = start;
     while at < end {
@@ -401,7 +405,8 @@ pub(crate) fn paint(out: &mut [[u8; 3]], start: usize, end: usize, color: [u8; 3
 }
 
 pub(crate) fn assert_size(hits: &Hits, camera: &Camera) {
-    let (w, h) = (hits.face.width(), hits.face.height());
+    let w = hits.face.width();
+    let h = hits.face.height();
     assert!(
         (w, h) == (camera.width, camera.height),
         "hits of {w}×{h} pixels for a camera of {}×{}",

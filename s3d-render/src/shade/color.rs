@@ -1,11 +1,11 @@
-//! The RGB image.
+//! Makes the RGB image.
 //!
-//! Faces that a band of rows is the first to show are prepared eight at a time. Then each row is coloured in
-//! two passes. The first walks its spans of equal faces: [`crate::shade::anchor`] gives the texture
-//! coordinates of eight pixels at a time and their change from pixel to pixel, hence each pixel's footprint.
-//! The second walks the row regardless of spans and fetches the textures, again eight pixels at a time
-//! ([`crate::shade::filter`]). What a pixel gets depends on no other pixel but through the anchor, whose
-//! rounding it takes over.
+//! Faces that first appear in a band of rows are prepared eight at a time. Each row is then coloured in two
+//! passes. The first pass walks the spans of equal faces: [`crate::shade::anchor`] gives the texture
+//! coordinates of eight pixels at a time and their change from pixel to pixel, which is each pixel's
+//! footprint. The second pass walks the row regardless of spans and fetches the textures, again eight pixels
+//! at a time ([`crate::shade::filter`]). A pixel depends on other pixels only through the rounding of their
+//! common anchor.
 
 use crate::hits::Hits;
 use crate::scene::Scene;
@@ -27,11 +27,11 @@ use s3d_geom::{Camera, FaceColor, NormalAxes, Raster};
 use s3d_simd::{Level, level};
 use std::ops::Range;
 
-/// The colours that the pixels see: textures filtered over each pixel's footprint, corners' colours
-/// interpolated, materials flat. Black is for what is missing alone: a dark pixel that is seen is at least
-/// (1, 1, 1).
+/// Returns the colours that the pixels see. Textures are filtered over each pixel's footprint, colours of
+/// corners are interpolated, and materials are flat. Black marks missing pixels alone: a visible dark pixel
+/// is at least (1, 1, 1).
 ///
-/// Near the seam of a texture atlas the footprint takes in what lies beside the seam, as with any mipmap.
+/// Near the seam of a texture atlas the footprint includes texels beyond the seam, as with any mip map.
 ///
 /// # Panics
 /// If the hits are not of the camera's size, or `mip_maps` are another mesh's.
@@ -39,10 +39,10 @@ pub fn rgb_image(scene: &Scene<'_>, mip_maps: &MipMaps, hits: &Hits, camera: &Ca
     rgb_image_with(scene, mip_maps, hits, camera, &TextureFilter::default())
 }
 
-/// As [`rgb_image`], with a filter of choice.
+/// Returns the image of [`rgb_image`] for a given filter.
 ///
 /// # Panics
-/// As [`rgb_image`].
+/// As for [`rgb_image`].
 pub fn rgb_image_with(
     scene: &Scene<'_>,
     mip_maps: &MipMaps,
@@ -55,10 +55,10 @@ pub fn rgb_image_with(
     out
 }
 
-/// As [`rgb_image_with`], into an image that is used again.
+/// Writes the image of [`rgb_image_with`] into an existing image.
 ///
 /// # Panics
-/// As [`rgb_image`].
+/// As for [`rgb_image`].
 pub fn rgb_image_into(
     scene: &Scene<'_>,
     mip_maps: &MipMaps,
@@ -71,7 +71,7 @@ pub fn rgb_image_into(
     rgb_of_faces_into(level(), scene, mip_maps, &hits.face, camera, filter, out);
 }
 
-/// As [`rgb_image_into`], of the faces of hits, with the instructions of a level.
+/// Writes the image of [`rgb_image_into`] from the faces of hits, with the instructions of `level`.
 pub(crate) fn rgb_of_faces_into(
     level: Level,
     scene: &Scene<'_>,
@@ -83,8 +83,14 @@ pub(crate) fn rgb_of_faces_into(
 ) {
     fit(out, faces, [0; 3]);
     let &filter = filter;
-    let (normal_axes, index_of_face, color_of_face) = (NormalAxes::default(), &[][..], &[][..]);
-    let shading = Shading { scene, mip_maps, filter, normal_axes, index_of_face, color_of_face };
+    let shading = Shading {
+        scene,
+        mip_maps,
+        filter,
+        normal_axes: NormalAxes::default(),
+        index_of_face: &[],
+        color_of_face: &[],
+    };
     let mut images = ViewImages::default();
     std::mem::swap(&mut images.rgb, out);
     let wanted = Modalities { rgb: true, ..Modalities::default() };
@@ -93,20 +99,21 @@ pub(crate) fn rgb_of_faces_into(
     std::mem::swap(&mut images.rgb, out);
 }
 
-/// Where a face has its colour from.
+/// Where the colour of a face comes from.
 #[derive(Clone, Copy)]
 enum ColorSource {
-    /// A tag.
+    /// A texture; the value is its tag: see [`RowBuffer`].
     Texture(u32),
     Corners,
     Flat([u8; 3]),
-    /// From [`PixelByPixel`] alone.
+    /// The face is coloured by [`PixelByPixel`] alone.
     PerPixel,
 }
 
-/// The attributes of a face's colour: what they are, their values at its corners, and how they repeat.
+/// The colour of a face as attributes: their source, their values at the corners, and how they repeat.
 type FaceColors = (ColorSource, [[f64; 3]; 3], [TexelWrap; 3]);
 
+/// Returns the colour of a face as attributes.
 #[inline(always)]
 fn colored(scene: &Scene<'_>, levels: &[MipLevels<'_>], face: u32) -> FaceColors {
     let wraps = [TexelWrap::NONE; 3];
@@ -133,31 +140,31 @@ fn colored(scene: &Scene<'_>, levels: &[MipLevels<'_>], face: u32) -> FaceColors
     }
 }
 
-/// A face, prepared.
+/// A prepared face.
 struct Prepared {
     source: ColorSource,
     anchor: Anchor,
 }
 
 impl Prepared {
-    /// What is missing is black.
+    /// Returns the entry of missing pixels, which are black.
     fn missing() -> Self {
         Self { source: ColorSource::Flat([0; 3]), anchor: Anchor::default() }
     }
 }
 
-/// A row between its two passes. Values are stored eight at a time, beyond the end of their span: the next
-/// span's go over them.
+/// A row between its two passes. Values are stored eight at a time, beyond the end of their span; the values
+/// of the next span overwrite them.
 struct RowBuffer {
     width: usize,
     footprints: Footprints,
-    /// By pixel: a texture, perhaps with [`NARROW`]; or [`DONE`].
+    /// The tag of each pixel: a texture, perhaps with the bit [`NARROW`], or [`DONE`].
     tags: Vec<u32>,
 }
 
-/// The colour stands already.
+/// The tag of a pixel whose colour is final.
 const DONE: u32 = u32::MAX;
-/// Footprints are nowhere wider than a pixel of the texture.
+/// The bit of a tag whose footprints are nowhere wider than a pixel of the texture.
 const NARROW: u32 = 1 << 31;
 
 impl RowBuffer {
@@ -171,14 +178,14 @@ impl RowBuffer {
 pub(crate) struct RgbPainter<'a, L> {
     lanes: L,
     scene: &'a Scene<'a>,
-    /// By texture.
+    /// The levels of each texture.
     levels: Vec<MipLevels<'a>>,
     origin: DVec3,
     max_taps: u32,
     batch: AnchorBatch,
-    /// By the face's number in the [`Spans`].
+    /// The prepared faces, by their numbers in the [`Spans`].
     prepared: Vec<Prepared>,
-    /// Of faces that need one anchor after another.
+    /// The attributes of faces that need several anchors.
     large: FaceCache<Attributes>,
     per_pixel: PixelByPixel<'a>,
     row: RowBuffer,
@@ -217,7 +224,7 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
         self.prepared.truncate(1);
     }
 
-    /// Colours the band from row `first_row` on, which sees `faces`.
+    /// Colours the band from row `first_row` on. Its pixels see `faces`.
     #[inline(always)]
     pub(crate) fn band<const PANORAMA: bool>(
         &mut self,
@@ -229,10 +236,12 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
         prefetch: &Prefetch<'_>,
     ) {
         let width = self.row.width;
+
         for k in 0..spans.new_groups() {
             let (group, count) = spans.new_group::<true>(self.lanes, Some(self.scene.mesh()), k);
             self.prepare::<PANORAMA>(grid, first_row, &group, count);
         }
+
         let mut pieces = spans.pieces().windows(2).peekable();
         for (j, row) in out.chunks_mut(width.max(1)).enumerate() {
             let from = j * width;
@@ -247,7 +256,7 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
         }
     }
 
-    /// Prepares the first `count` of some faces that the band from row `first_row` on is the first to show.
+    /// Prepares the first `count` of some faces that first appear in the band from row `first_row` on.
     #[inline(always)]
     fn prepare<const PANORAMA: bool>(
         &mut self,
@@ -264,10 +273,11 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
             self.batch
                 .put(k, self.scene.mesh().triangle(face), values, wraps, grid, at);
         }
+
         let (anchors, fastest) = self.batch.anchors::<PANORAMA>(self.origin);
         for k in 0..count {
             let source = match sources[k] {
-                // A footprint is wide where the sum is above 1.
+                // A footprint is wide if the sum is above 1.
                 ColorSource::Texture(texture) if fastest[k] < 0.999 => ColorSource::Texture(texture | NARROW),
                 source => source,
             };
@@ -275,7 +285,7 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
         }
     }
 
-    /// Anchors a face once more, at pixel (i, j).
+    /// Anchors a face again, at pixel (i, j). Returns `false` if that fails, or if the face needs no anchor.
     #[inline(never)]
     fn anchor_again<const PANORAMA: bool>(
         &mut self,
@@ -299,7 +309,7 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
         anchor.set::<PANORAMA>(attributes, wraps, grid, i, j)
     }
 
-    /// The first pass over the pixels `start` to `end` of row `j`, [`LANES`] at most, which all see `face`.
+    /// The first pass over the pixels `start` to `end` of row `j`, at most [`LANES`], which all see `face`.
     #[inline(always)]
     fn lay_out<const PANORAMA: bool>(
         &mut self,
@@ -317,6 +327,7 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
             self.row.tags[start..end].fill(DONE);
             return paint(out, start, end, color);
         }
+
         let mut anchor = anchor;
         if !anchor.reaches(start, j) {
             if !self.anchor_again::<PANORAMA>(grid, face, number, start, j) {
@@ -328,9 +339,11 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
             }
             anchor = &self.prepared[number as usize].anchor;
         }
+
         let line = anchor.line::<PANORAMA>(grid, j);
         let row = &mut self.row;
         let mut doubtful;
+
         if let ColorSource::Texture(tag) = source {
             let seen = line.at::<PANORAMA, 2, L>(lanes, start);
             doubtful = seen.doubtful;
@@ -351,6 +364,8 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
                 out[i] = if color == [0; 3] { [1; 3] } else { color };
             }
         }
+
+        // Pixels in doubt are coloured one by one.
         doubtful &= (1 << (end - start)) - 1;
         while doubtful != 0 {
             let at = start + doubtful.trailing_zeros() as usize;
@@ -360,7 +375,7 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
         }
     }
 
-    /// The second pass.
+    /// The second pass: fetches the textures of a row.
     #[inline(always)]
     fn fetch(&mut self, out: &mut [[u8; 3]], from: usize, prefetch: &Prefetch<'_>) {
         let width = out.len();
@@ -371,7 +386,8 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
                 prefetch.fetch(*lanes, from + i);
             }
             let Some(tags) = row.tags[i..].first_chunk::<LANES>() else { return };
-            // Mostly one texture, once; the others' pixels are left alone.
+
+            // There is mostly one texture. The tags of other pixels wait for the next round.
             let mut left = !lanes.equal(tags, DONE) & 0xFF;
             while left != 0 {
                 let texture = tags[left.trailing_zeros() as usize % LANES] & !NARROW;
@@ -380,6 +396,7 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
                 let these = narrow | maybe;
                 let pixels = (these, maybe);
                 let colors = levels[texture as usize].colors(*lanes, &row.footprints, i, pixels, *max_taps);
+
                 let to = out[i..].as_flattened_mut().first_chunk_mut();
                 if let (0xFF, Some(to)) = (these, to) {
                     lanes.store_pixels(&colors, to);
@@ -392,8 +409,8 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
     }
 }
 
-/// Those of eight colours that are among `these`. Not inlined: that would take registers from the loop that
-/// rarely calls it.
+/// Stores the colours whose bits are set in `these`. It is not inlined: that would take registers from the
+/// loop, which rarely calls it.
 #[cold]
 #[inline(never)]
 fn put_some(colors: &[u32; LANES], these: u32, to: &mut [[u8; 3]]) {
@@ -414,11 +431,12 @@ mod tests {
     #[test]
     fn every_level_of_instructions_gives_the_same_bytes() {
         let mesh = scan_like(6_000, 3);
-        let (scene, mip_maps) = (Scene::new(&mesh), MipMaps::new(&mesh));
+        let scene = Scene::new(&mesh);
+        let mip_maps = MipMaps::new(&mesh);
         let pose = Pose::level(glam::dvec3(3.0, 2.5, 1.5), 0.3);
         for camera in [
             Camera::perspective(pose.turned(0.3, -0.4), 1.2, 301, 203),
-            // Textures that are far too fine for the image.
+            // Textures that are much too fine for the image.
             Camera::perspective(pose, 1.6, 33, 21),
             Camera::pinhole(pose, glam::dvec2(150.0, 210.0), glam::dvec2(12.5, 190.0), 203, 301).unwrap(),
             Camera::equirectangular(pose, 256),

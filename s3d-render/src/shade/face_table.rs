@@ -1,23 +1,22 @@
-//! Numbers for the faces that an image shows, row after row, so that what is prepared for a face is found
-//! again.
+//! Numbers the faces that an image shows, row after row, so that the prepared data of a face is found again.
 //!
-//! A row's (or a block's) spans of pixels get their numbers first, and the faces that are new are listed:
-//! these can be prepared many at a time, which takes a fraction of what it takes one by one.
+//! The spans of a block of rows get their numbers first, and new faces are listed. Many new faces are then
+//! prepared at a time, which takes a fraction of the time that single faces take.
 
 use crate::hits::NO_FACE;
 use crate::simd::shade_lanes::ShadeLanes;
 use s3d_geom::TriMesh;
 
-/// Numbers faces 1, 2, 3… as they come, [`NO_FACE`] is 0, and forgets all but that now and then: its memory
-/// is bounded. The pixels of a face lie together, in one row after another.
+/// Numbers faces 1, 2, 3… as they come; [`NO_FACE`] has the number 0. To bound its memory, the table
+/// sometimes forgets all numbers but 0. The pixels of a face lie together, in one row after another.
 pub(crate) struct FaceTable {
-    /// By place, which a face's index gives: the face and its number.
+    /// The face at each place and its number. The place follows from the index of the face.
     places: Vec<(u32, u32)>,
     count: usize,
     max_count: usize,
 }
 
-/// A face that is new.
+/// A face without a number so far.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NewFace {
     pub(crate) face: u32,
@@ -26,17 +25,17 @@ pub(crate) struct NewFace {
 }
 
 impl FaceTable {
-    /// Far more than the faces across a panorama, a power of two.
+    /// Far more than the faces across a panorama, and a power of two.
     const PLACES: usize = 8192;
 
-    /// For blocks of no more than `longest` pixels.
+    /// Returns a table for blocks of at most `longest` pixels.
     pub(crate) fn new(longest: usize) -> Self {
         Self { places: vec![(NO_FACE, 0); Self::PLACES], count: 1, max_count: Self::PLACES + longest }
     }
 
-    /// Looks up the faces of a block's spans, which begin at `starts`: in `numbers` their numbers, in `new`
-    /// those that had none and get the next ones. Whether all earlier numbers are forgotten. What `mesh`, if
-    /// any, has of new faces themselves is fetched from memory.
+    /// Looks up the faces of a block's spans, which begin at `starts`. Writes their numbers to `numbers`, and
+    /// the faces that had none, in the order of their new numbers, to `new`. Returns whether all earlier
+    /// numbers are forgotten. The indices of new faces in `mesh`, if given, are prefetched.
     #[inline(always)]
     pub(crate) fn number(
         &mut self,
@@ -52,9 +51,10 @@ impl FaceTable {
             self.count = 1;
             self.places.fill((NO_FACE, 0));
         }
+
         numbers.clear();
         new.clear();
-        // Loops and no closures: those would not be compiled for the lanes' instructions.
+        // Loops instead of closures, which would not be compiled for the instructions of the lanes.
         for &at in starts {
             let face = faces[at as usize];
             let place = &mut self.places[face as usize % Self::PLACES];
@@ -78,8 +78,8 @@ impl FaceTable {
 }
 
 impl NewFace {
-    /// Fetches what of a mesh is read to prepare these faces, besides what [`FaceTable::number`] has fetched:
-    /// all at once, it comes many times as fast.
+    /// Prefetches the parts of a mesh that the preparation of these faces reads and that
+    /// [`FaceTable::number`] has not prefetched. Prefetching many at once is many times as fast.
     #[inline(always)]
     pub(crate) fn prefetch<const COLORS: bool>(new: &[Self], lanes: impl ShadeLanes, mesh: &TriMesh) {
         let p = mesh.parts();
@@ -98,7 +98,7 @@ impl NewFace {
     }
 }
 
-/// Fetches what leads to a face's corners.
+/// Prefetches the indices that lead to a face's corners.
 #[inline(always)]
 fn prefetch_face(lanes: impl ShadeLanes, mesh: &TriMesh, face: usize) {
     let p = mesh.parts();
@@ -124,8 +124,10 @@ mod tests {
             step in prop::sample::select(vec![1u32, 8192, 77]),
         ) {
             let mut table = FaceTable::new(60);
-            table.count = table.max_count - 150; // Forgets soon.
-            let (mut things, mut numbers, mut new) = (vec![NO_FACE; table.count], Vec::new(), Vec::new());
+            table.count = table.max_count - 150; // It forgets soon.
+            let mut things = vec![NO_FACE; table.count];
+            let mut numbers = Vec::new();
+            let mut new = Vec::new();
             for block in blocks {
                 let faces: Vec<u32> =
                     block.iter().map(|f| if f % 9 == 0 { NO_FACE } else { (f % 300) * step }).collect();

@@ -1,19 +1,20 @@
-//! Textures fetched for eight pixels at a time.
+//! Fetches textures for eight pixels at a time.
 //!
-//! Gives what [`crate::shade::mip_maps::MipMap::sample`] gives, in integers: places between a texture's
-//! pixels are kept in 32768ths of a pixel, and so are the weights of all pixels that make a colour; their
-//! products are added without rounding. Before it is rounded to 8 bits a colour is off by less than 0.03
-//! where one bilinear sample makes it. Where sixteen do, the weights of samples, rounded down, may darken it
-//! by 0.12. Samples of a footprint are steps of whole 32768ths apart, so that the last of eight is off by
-//! less than a 4000th of a pixel.
+//! Gives the colours of [`crate::shade::mip_maps::MipMap::sample`] in integers. Positions between texels are
+//! kept in 32768ths of a texel, and so are the weights of all texels of a colour; their products are added
+//! without rounding. Before rounding to 8 bits, a colour from one bilinear sample is off by less than 0.03. A
+//! colour from sixteen samples may be darker by 0.12, since the weights of samples are rounded down. The
+//! samples of a footprint are whole 32768ths apart, so the last of eight is off by less than a 4000th of a
+//! texel.
 
 use crate::shade::anchor::Interpolated;
 use crate::shade::texel_wrap::TexelWrap;
 use crate::simd::shade_lanes::{LANES, ShadeLanes, Texels, eight, put};
 use s3d_geom::{Raster, Texture, Wrap};
 
-/// Where the pixels of a row are in their textures, and the sides x and y of their footprints: what a column
-/// and what a row more add; in pixels of the full size. By column, and two more groups.
+/// The positions of a row's pixels in their textures, and the sides x and y of their footprints: the change
+/// from column to column and from row to row. Units are pixels of the full size. Indexed by column, with room
+/// for two more groups.
 #[derive(Debug, Default)]
 pub(crate) struct Footprints {
     at: [Vec<f32>; 2],
@@ -27,7 +28,8 @@ impl Footprints {
         Self { at: two(), x: two(), y: two() }
     }
 
-    /// The eight pixels from column `i` on; their sides only if they are not all `narrow`.
+    /// Stores the eight pixels from column `i` on. The sides are stored only if not all footprints are
+    /// `narrow`.
     #[inline(always)]
     pub(crate) fn store<L: ShadeLanes>(
         &mut self,
@@ -50,19 +52,19 @@ impl Footprints {
 
 /// How eight footprints are sampled.
 struct Taps<F> {
-    /// The level to sample: how often the full one is halved.
+    /// The level to sample: how often the full size is halved.
     level: F,
-    /// The weight of each sample there, and of each in the next level, in −32768ths.
+    /// The weight of each sample in that level, and in the next level, in −32768ths.
     weight: F,
     next_weight: F,
-    /// How many samples.
+    /// The number of samples.
     count: F,
-    /// From one sample to the next.
+    /// The step from one sample to the next.
     step_x: F,
     step_y: F,
 }
 
-/// A texture at one level: halved so many times.
+/// One level of a texture.
 #[derive(Clone, Copy)]
 struct MipLevel<'a> {
     image: &'a Raster<[u8; 3]>,
@@ -70,12 +72,13 @@ struct MipLevel<'a> {
     /// The last column and row, in 32768ths of a pixel.
     right: u32,
     bottom: u32,
-    /// Pixels of this level a pixel of the full size.
+    /// The size of this level relative to the full size.
     x: f32,
     y: f32,
 }
 
-/// What is read around eight places, one by one: see [`ShadeLanes::place`] and [`ShadeLanes::quads_from`].
+/// The texels around eight positions, read one by one: see [`ShadeLanes::place`] and
+/// [`ShadeLanes::quads_from`].
 #[derive(Default)]
 struct GatheredQuads {
     at: [i32; LANES],
@@ -85,11 +88,11 @@ struct GatheredQuads {
     lower: [u64; LANES],
 }
 
-/// GatheredQuads in an image that go on in steps: 0 is the middle of the first pixel.
+/// Eight positions in a level that advance in steps. Position 0 is the middle of the first pixel.
 struct TapWalk<L: ShadeLanes> {
     first: (L::F, L::F),
     step: (L::F, L::F),
-    /// Where it has come to, and the step, in 32768ths.
+    /// The current positions and the steps, in 32768ths.
     place: (L::I, L::I),
     fixed_step: (L::I, L::I),
 }
@@ -101,7 +104,7 @@ impl<L: ShadeLanes> TapWalk<L> {
         Self { first, step, place, fixed_step }
     }
 
-    /// In one of the levels; given are places and steps in pixels of the full one.
+    /// Starts in one of the levels. Positions and steps are given in pixels of the full size.
     #[inline(always)]
     fn new(l: L, level: &MipLevel<'_>, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
         let (x, y, half) = (l.splat(level.x), l.splat(level.y), l.splat(0.5));
@@ -109,6 +112,7 @@ impl<L: ShadeLanes> TapWalk<L> {
         Self::at(l, first, (l.mul(step.0, x), l.mul(step.1, y)))
     }
 
+    /// Takes a step.
     #[inline(always)]
     fn go_on(&mut self, l: L) {
         let (place, step) = (self.place, self.fixed_step);
@@ -125,7 +129,7 @@ pub(crate) struct MipLevels<'a> {
 impl<'a> MipLevels<'a> {
     pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
         let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)) as f32;
-        // Larger levels are not used.
+        // Larger levels are not used: see `is_usable`.
         let last = |size: u32| (size.clamp(1, 1 << 15) - 1) << 15;
         let level = |image: &'a Raster<[u8; 3]>| MipLevel {
             image,
@@ -138,7 +142,7 @@ impl<'a> MipLevels<'a> {
         Self { wrap: full.wrap, levels: std::iter::once(&full.image).chain(reductions).map(level).collect() }
     }
 
-    /// Whether places in it fit the numbers here.
+    /// Tells whether positions in the texture fit in the numbers used here.
     pub(crate) fn is_usable(&self) -> bool {
         let image = self.levels[0].image;
         !image.is_empty()
@@ -146,7 +150,7 @@ impl<'a> MipLevels<'a> {
             && 3 * image.len() < i32::MAX as usize
     }
 
-    /// How coordinates in pixels of the full size repeat.
+    /// Returns how coordinates in pixels of the full size repeat.
     pub(crate) fn wraps(&self) -> [TexelWrap; 3] {
         let image = self.levels[0].image;
         let texel_wrap = |wrap, size: u32| match wrap {
@@ -157,8 +161,8 @@ impl<'a> MipLevels<'a> {
         [texel_wrap(self.wrap[0], image.width()), texel_wrap(self.wrap[1], image.height()), TexelWrap::NONE]
     }
 
-    /// The colours of those of the eight pixels from `i` on that are among `these`, from at most `most`
-    /// samples each. Of these, those that are not among `maybe` have footprints that are not wide.
+    /// Returns the colours of the eight pixels from `i` on, from at most `most` samples each. Only pixels in
+    /// `these` count. Pixels in `these` but not in `maybe` have narrow footprints.
     #[inline(always)]
     pub(crate) fn colors<L: ShadeLanes>(
         &self,
@@ -171,7 +175,7 @@ impl<'a> MipLevels<'a> {
         l.pixels(self.sums(l, footprints, i, these_and_maybe, most))
     }
 
-    /// As [`MipLevels::colors`], not rounded.
+    /// Returns the same colours as [`MipLevels::colors`], as sums that are not rounded.
     #[inline(always)]
     pub(crate) fn sums<L: ShadeLanes>(
         &self,
@@ -193,7 +197,7 @@ impl<'a> MipLevels<'a> {
         }
     }
 
-    /// How those of eight footprints that are among `maybe` are sampled; `None` if none of them is wide.
+    /// Returns how the footprints in `maybe` are sampled; `None` if none of them is wide.
     #[inline(always)]
     fn taps<L: ShadeLanes>(
         &self,
@@ -211,7 +215,8 @@ impl<'a> MipLevels<'a> {
         if maybe == 0 {
             return None;
         }
-        // See `taps` and `axes` of mip_maps.rs for what follows.
+
+        // The same formulas as in `taps` and `axes` of mip_maps.rs.
         let (zero, half_of, one) = (l.splat(0.0), l.splat(0.5), l.splat(1.0));
         let b = l.add(l.mul(xx, xy), l.mul(yx, yy));
         let (mean, half) = (l.mul(half_of, sum), l.mul(half_of, l.sub(a, c)));
@@ -219,24 +224,29 @@ impl<'a> MipLevels<'a> {
         let long = l.sqrt(l.add(mean, root));
         let axis_x = l.select_by_sign(half, b, l.add(root, half));
         let axis_y = l.select_by_sign(half, l.sub(root, half), b);
-        // What makes the axis as long as that. A round footprint has no axis, and one sample.
+
+        // The factor that gives the axis its length. A round footprint has no axis, and one sample.
         let length_2 = l.add(l.mul(axis_x, axis_x), l.mul(axis_y, axis_y));
         let stretch = l.sqrt(l.div(l.add(mean, root), l.max(length_2, l.splat(1e-30))));
         let cross = l.sub(l.mul(xx, yy), l.mul(xy, yx));
         let minor = l.div(l.max(cross, l.sub(zero, cross)), long);
+
         let most = most.max(1) as f32;
         let width = l.max(l.max(minor, l.mul(long, l.splat(1.0 / most))), one);
         let count = l.min(l.max(l.add(l.div(long, width), half_of), one), l.splat(most));
         let count = l.truncate(count);
+
         let wide = maybe & (l.greater(width, one) | l.greater(count, one));
         if wide == 0 {
             return None;
         }
+
         let part = l.div(one, count);
         let step = l.mul(stretch, part);
         let (level, fraction) = self.level_of(l, width);
         let share = l.mul(l.splat(-32768.0), part);
         let next_weight = l.mul(share, fraction);
+
         Some(Taps {
             level: l.select(wide, level, zero),
             weight: l.select(wide, l.sub(share, next_weight), l.splat(-32768.0)),
@@ -247,8 +257,8 @@ impl<'a> MipLevels<'a> {
         })
     }
 
-    /// The colours, not rounded, over round footprints around those of the places that are among `these`:
-    /// one trilinear sample each.
+    /// Returns the colours over round footprints at the positions in `these`: one trilinear sample each, not
+    /// rounded.
     #[inline(always)]
     pub(crate) fn round_sums<L: ShadeLanes>(
         &self,
@@ -273,11 +283,12 @@ impl<'a> MipLevels<'a> {
         )
     }
 
-    /// The level in which samples of a width of at least 1 are taken, and how much of the next one.
+    /// Returns the level in which samples of a width of at least 1 are taken, and the share of the next
+    /// level.
     #[inline(always)]
     fn level_of<L: ShadeLanes>(&self, l: L, width: L::F) -> (L::F, L::F) {
         let (level, fraction) = l.log2(width);
-        // Beyond the last level there is the last.
+        // Beyond the last level, the last one is used.
         let last = l.splat((self.levels.len() - 1) as f32);
         (l.min(level, last), l.select_by_sign(l.sub(level, last), fraction, l.splat(0.0)))
     }
@@ -306,8 +317,8 @@ impl<'a> MipLevels<'a> {
             && l.greater(l.splat(-1.0), next_weight) & these != 0
             && let Some([this, next]) = self.levels.get(at as usize..).and_then(<[_]>::first_chunk)
         {
-            // The same two levels for all, as mostly: both in one loop, of which nobody can foretell when it
-            // ends.
+            // Usually all pixels need the same two levels. Both are sampled in one loop, since the length of
+            // a loop is unpredictable.
             let (mut a, mut b) = (TapWalk::new(l, this, first, step), TapWalk::new(l, next, first, step));
             let (weights, next_weights) = (l.weights(weight), l.weights(next_weight));
             let (mut active, mut tap) = (these, zero);
@@ -321,17 +332,19 @@ impl<'a> MipLevels<'a> {
             }
             return sum;
         }
-        // Level after level, each for the pixels that need it.
+
+        // Otherwise level after level, each for the pixels that need it.
         let mut left = these;
         let mut at = zero;
-        for of in &self.levels {
+        for level_here in &self.levels {
             let here = left & !l.greater(level, at);
-            // Weights of less than one part are none.
+            // A weight below one part counts as none.
             let weights = l.select_by_sign(l.sub(level, at), next_weight, weight);
             let mut active = here & l.greater(l.splat(-1.0), weights);
-            let (weights, mut walk, mut tap) = (l.weights(weights), TapWalk::new(l, of, first, step), zero);
+            let (weights, mut walk, mut tap) =
+                (l.weights(weights), TapWalk::new(l, level_here, first, step), zero);
             while active != 0 {
-                sum = self.add(l, sum, of, &walk, tap, l.masked(active, weights), active);
+                sum = self.add(l, sum, level_here, &walk, tap, l.masked(active, weights), active);
                 walk.go_on(l);
                 tap = l.add(tap, one);
                 active &= l.greater(count, tap);
@@ -345,8 +358,8 @@ impl<'a> MipLevels<'a> {
         sum
     }
 
-    /// `sum` and the weighted bilinear colours at those of the places that are among `these`, after `tap`
-    /// steps of the walk.
+    /// Adds the weighted bilinear colours at the positions in `these` to `sum`, after `tap` steps of the
+    /// walk.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "all of them in registers")]
     fn add<L: ShadeLanes>(
@@ -367,9 +380,12 @@ impl<'a> MipLevels<'a> {
         {
             return l.add_weighted(sum, quads, l.corners(parts, weights));
         }
+
+        // Near an edge of the image, or beyond it.
         let (mut xs, mut ys) = ([0.0; LANES], [0.0; LANES]);
         l.store(l.add(walk.first.0, l.mul(tap, walk.step.0)), &mut xs);
         l.store(l.add(walk.first.1, l.mul(tap, walk.step.1)), &mut ys);
+
         let mut places = GatheredQuads::default();
         l.store_fixed(at, &mut places.at);
         l.store_parts(parts, &mut places.x, &mut places.y);
@@ -378,8 +394,8 @@ impl<'a> MipLevels<'a> {
         l.add_weighted(sum, l.quads_from(&places.upper, &places.lower), corners)
     }
 
-    /// Reads what is at those of the places that are among `these`; of them, those among `inside` are not at
-    /// the image's edge.
+    /// Reads the texels at the positions in `these`. Positions that are also in `inside` are not at the
+    /// image's edge.
     #[cold]
     #[inline(never)]
     fn read_singly(
@@ -407,7 +423,8 @@ impl<'a> MipLevels<'a> {
         }
     }
 
-    /// The 2 × 2 pixels around a place of which some are not side by side, and the place's parts.
+    /// Returns the 2 × 2 texels around a position at the edge, where some are not side by side, and the
+    /// fractions of the position.
     fn at_the_edge(&self, level: &MipLevel<'a>, x: f32, y: f32) -> ((u64, u64), (i16, i16)) {
         let image = level.image;
         let split = |v: f32| {
@@ -416,7 +433,7 @@ impl<'a> MipLevels<'a> {
         };
         let ((column, x), (row, y)) = (split(x), split(y));
         let columns = [column, column + 1].map(|i| self.wrap[0].index(i, image.width()));
-        // v grows upwards and rows downwards: mirroring and repeating are the same seen from either side.
+        // v grows upwards and rows downwards, but mirroring and repeating look the same from both sides.
         let rows = [row, row + 1].map(|j| self.wrap[1].index(j, image.height()));
         let pair = |j: u32| {
             let ([a, b, c], [d, e, f]) = (image.at(columns[0], j), image.at(columns[1], j));
@@ -426,13 +443,13 @@ impl<'a> MipLevels<'a> {
     }
 }
 
-/// Eight bytes, if there are as many.
+/// Returns the eight bytes at `at`, if there are so many.
 #[inline(always)]
 fn word(bytes: &[u8], at: usize) -> Option<u64> {
     bytes.get(at..)?.first_chunk().map(|b| u64::from_le_bytes(*b))
 }
 
-/// Eight values from each of two lists. No closure: see [`crate::simd`].
+/// Loads eight values from each of two lists. It is no closure: see [`crate::simd`].
 #[inline(always)]
 fn pair<L: ShadeLanes>(l: L, of: &[Vec<f32>; 2], i: usize) -> [L::F; 2] {
     [eight(l, &of[0], i), eight(l, &of[1], i)]

@@ -1,14 +1,14 @@
-//! Images that have one value all over a face, painted span by span.
+//! Paints images that have one value all over a face, span by span.
 
 use crate::shade::spans::Spans;
 use crate::simd::shade_lanes::{COLOR_BLOCK, LANES, ShadeLanes};
 use s3d_geom::TriMesh;
 
-/// `N` such images of a view, painted band by band.
+/// Paints `N` such images of a view, band by band.
 pub(crate) struct FlatPainter<V, const N: usize> {
-    /// The colours of eight faces in each of the images.
+    /// Returns the colours of eight faces in each of the images.
     values: V,
-    /// By a face's number, its colours, R in the lowest byte; 0 is for what is missing.
+    /// The colours of each face by its number, with R in the lowest byte. Number 0 stands for missing pixels.
     colors: Vec<[u32; N]>,
 }
 
@@ -22,8 +22,8 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> FlatPainter<
         self.colors.truncate(1);
     }
 
-    /// Paints a band: `out` is its part of each image. What `values` look at in `mesh`, if given, is fetched
-    /// from memory.
+    /// Paints a band: `out` is its part of each image. The data that `values` reads from `mesh`, if given, is
+    /// prefetched.
     #[inline(always)]
     pub(crate) fn band(
         &mut self,
@@ -55,8 +55,8 @@ fn packed([r, g, b]: [u8; 3]) -> u32 {
     u32::from_le_bytes([r, g, b, 0])
 }
 
-/// Gives the pixels from `start` to `end` of each image a colour, and perhaps some of those that follow: no
-/// more pixels than a block has.
+/// Gives the pixels from `start` to `end` of each image a colour; there may be no more of them than in a
+/// block. Pixels after `end` may be overwritten.
 #[inline(always)]
 fn fill<const N: usize>(
     lanes: impl ShadeLanes,
@@ -69,7 +69,7 @@ fn fill<const N: usize>(
         let bytes = &mut image.as_flattened_mut()[3 * start..];
         match bytes.first_chunk_mut() {
             Some(to) => lanes.store_repeated(color, to),
-            // At the image's end.
+            // Near the end of the image.
             None => {
                 let mut block = [0; COLOR_BLOCK];
                 lanes.store_repeated(color, &mut block);

@@ -5,11 +5,11 @@ use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 use s3d_geom::{Raster, Texture, TriMesh, Wrap, sample_bilinear};
 
-/// How [`crate::rgb_image`] reads textures.
+/// How [`crate::rgb_image`] filters textures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TextureFilter {
-    /// The most samples along a pixel's footprint where a texture is seen at an angle; 1 blurs there, 8 is
-    /// sharp up to 83°. At least 1.
+    /// The most samples along a pixel's footprint if a texture is seen at an angle, at least 1. With 1 such
+    /// textures are blurred; with 8 they are sharp up to 83°.
     pub max_taps: u32,
 }
 
@@ -19,8 +19,8 @@ impl Default for TextureFilter {
     }
 }
 
-/// The textures of a mesh, each with its reductions to half, a quarter… down to one pixel: a third more
-/// memory. The full size stays in the mesh.
+/// The textures of a mesh, each reduced to a half, a quarter… down to one pixel. The reductions take a
+/// third of the textures' memory; the full size stays in the mesh.
 ///
 /// ```
 /// use s3d_geom::glam::{DVec3, vec2, vec3};
@@ -43,7 +43,7 @@ impl Default for TextureFilter {
 /// let mip_maps = MipMaps::new(&mesh);
 /// assert_eq!(mip_maps.bytes(), 3 * (4 * 4 + 2 * 2 + 1));
 ///
-/// // Seen in few pixels the chequers are their mean.
+/// // In a few pixels, the chequers are seen as their mean.
 /// let (scene, camera) = (Scene::new(&mesh), Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 1.2, 5, 5));
 /// let rgb = rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
 /// assert_eq!(rgb.at(2, 2), [100; 3]);
@@ -51,12 +51,12 @@ impl Default for TextureFilter {
 /// ```
 #[derive(Clone, Debug)]
 pub struct MipMaps {
-    /// By texture of the mesh; the first reduction is to half size.
+    /// The reductions of each texture of the mesh, half size first.
     reductions: Vec<Vec<Raster<[u8; 3]>>>,
 }
 
 impl MipMaps {
-    /// Reduces the textures of `mesh`, on all threads of the current pool.
+    /// Reduces the textures of `mesh`, on all threads of the current rayon pool.
     pub fn new(mesh: &TriMesh) -> Self {
         let reductions = mesh
             .textures()
@@ -66,34 +66,38 @@ impl MipMaps {
         Self { reductions }
     }
 
-    /// The number of bytes of the reductions of all textures.
+    /// Returns the size of all reductions in bytes.
     pub fn bytes(&self) -> usize {
         self.reductions.iter().flatten().map(|level| 3 * level.len()).sum()
     }
 
-    /// All levels of texture `texture` of the mesh, for the fast filter.
+    /// Returns all levels of a texture of the mesh, for the fast filter.
     pub(crate) fn levels<'a>(&'a self, texture: usize, full: &'a Texture) -> MipLevels<'a> {
         MipLevels::new(full, &self.reductions[texture])
     }
 
-    /// The levels of texture `texture`, each half of the one before.
+    /// Returns the levels of a texture, each half of the one before, for single pixels.
     pub(crate) fn mip_map<'a>(&'a self, texture: u32, full: &'a Texture) -> MipMap<'a> {
         MipMap { full, reductions: &self.reductions[texture as usize] }
     }
 }
 
-/// The image at half the size, each pixel the mean of the area it covers; `None` if it is one pixel. An odd
-/// size is cut into equal parts too, so that coordinates keep their meaning: these parts take shares of
-/// pixels.
+/// Returns the image at half the size: each pixel is the mean of the area it covers. Returns `None` if the
+/// image is one pixel. An odd size is also cut into equal parts, which take shares of pixels, so that
+/// coordinates keep their meaning.
 pub(crate) fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
-    let (w, h) = (image.width(), image.height());
+    let w = image.width();
+    let h = image.height();
     if w <= 1 && h <= 1 {
         return None;
     }
+
     if w.is_multiple_of(2) && h.is_multiple_of(2) {
         return Some(even_halved(image));
     }
-    let (columns, rows) = (shares(w), shares(h));
+
+    let columns = shares(w);
+    let rows = shares(h);
     let pixels = rows.par_iter().flat_map_iter(|row| {
         columns.iter().map(move |column| {
             let mut sum = [0.0f32; 3];
@@ -110,12 +114,14 @@ pub(crate) fn halved(image: &Raster<[u8; 3]>) -> Option<Raster<[u8; 3]>> {
             sum.map(|channel| (channel + 0.5) as u8)
         })
     });
+
     Some(Raster::from_vec(columns.len() as u32, rows.len() as u32, pixels.collect()))
 }
 
-/// [`halved`] of an even width and height: means of four.
+/// Halves an image of even width and height: each pixel is the mean of four.
 fn even_halved(image: &Raster<[u8; 3]>) -> Raster<[u8; 3]> {
-    let (w, h) = (image.width() as usize, image.height() as usize);
+    let w = image.width() as usize;
+    let h = image.height() as usize;
     let mut half = Raster::filled(w as u32 / 2, h as u32 / 2, [0u8; 3]);
     let rows = half
         .pixels_mut()
@@ -135,13 +141,14 @@ fn even_halved(image: &Raster<[u8; 3]>) -> Raster<[u8; 3]> {
     half
 }
 
-/// The pixels along an axis whose mean is one pixel of half as many: up to three, with weights that add up to
-/// 1.
+/// The pixels along an axis whose mean is one pixel of the reduction: up to three, with weights that add up
+/// to 1.
 struct Share {
     first: u32,
     weights: [f32; 3],
 }
 
+/// Returns the shares of the pixels of a reduced axis.
 fn shares(size: u32) -> Vec<Share> {
     let half = (size / 2).max(1);
     (0..half)
@@ -168,17 +175,20 @@ impl<'a> MipMap<'a> {
         Self { full, reductions }
     }
 
-    /// The colour at `uv`, 0 to 255 a channel, over the footprint of a pixel: the parallelogram whose sides
-    /// are `x` and `y`, in texture coordinates. Where the texture is magnified, the bilinear colour of the
-    /// full size; else the mean of samples along the footprint's long axis from the size at which its short
-    /// axis is one pixel.
+    /// Returns the colour at `uv`, 0 to 255 a channel, over the footprint of a pixel: the parallelogram whose
+    /// sides are `x` and `y`, in texture coordinates. A magnified texture is sampled once in the full size,
+    /// bilinearly. A minified one is sampled along the long axis of the footprint, in the level at which the
+    /// short axis is one pixel, and the mean is returned.
     #[inline(always)]
     pub(crate) fn sample(&self, uv: DVec2, x: DVec2, y: DVec2, filter: &TextureFilter) -> [f32; 3] {
         let size = DVec2::new(f64::from(self.full.image.width()), f64::from(self.full.image.height()));
-        let (x, y) = ((x * size).as_vec2(), (y * size).as_vec2());
+        let x = (x * size).as_vec2();
+        let y = (y * size).as_vec2();
+
         let mut sum = ColorSum::default();
         let (major, short, taps) = taps(x, y, filter.max_taps);
         let (level, fraction) = level_of(short);
+
         if taps == 1 {
             self.add_trilinear(&mut sum, level, fraction, uv, 1.0);
         } else {
@@ -194,6 +204,7 @@ impl<'a> MipMap<'a> {
                 );
             }
         }
+
         sum.color()
     }
 
@@ -206,7 +217,7 @@ impl<'a> MipMap<'a> {
         sum.add_bilinear(self.level(level + 1), self.full.wrap, uv, weight * fraction);
     }
 
-    /// The texture reduced `level` times; past the last is the last, of one pixel.
+    /// Returns the texture reduced `level` times; beyond the last level, the last one (one pixel).
     #[inline(always)]
     fn level(&self, level: usize) -> &Raster<[u8; 3]> {
         match self.reductions.len().min(level) {
@@ -216,8 +227,8 @@ impl<'a> MipMap<'a> {
     }
 }
 
-/// How to sample the footprint with the sides `x` and `y`, in pixels: along which long axis, how wide each
-/// sample is (at least 1), and how many there are.
+/// Decides how to sample the footprint with the sides `x` and `y`, in pixels. Returns the long axis, the
+/// width of each sample (at least 1), and the number of samples.
 #[inline(always)]
 fn taps(x: Vec2, y: Vec2, most: u32) -> (Vec2, f32, u32) {
     // The long axis is no longer than the root of this sum.
@@ -229,12 +240,12 @@ fn taps(x: Vec2, y: Vec2, most: u32) -> (Vec2, f32, u32) {
     let long = major.length();
     let most = most.max(1) as f32;
     let short = minor.max(long / most).max(1.0);
-    // Bilinear samples reach over their neighbours: half a sample less is no gap.
+    // Bilinear samples overlap their neighbours, so half a sample less leaves no gap.
     let count = (long / short + 0.5).clamp(1.0, most) as u32;
     (major, short, count)
 }
 
-/// ⌊log2 width⌋ and what is left of the logarithm, to 0.01, for a width of at least 1.
+/// Returns ⌊log2 width⌋ and the rest of the logarithm, to 0.01, for a width of at least 1.
 #[inline(always)]
 fn level_of(width: f32) -> (usize, f32) {
     let bits = width.to_bits();
@@ -243,14 +254,18 @@ fn level_of(width: f32) -> (usize, f32) {
     ((bits >> 23) as usize - 127, fraction.max(0.0))
 }
 
-/// The long axis of the ellipse whose conjugate diameters are `x` and `y`, and the length of its short one.
+/// Returns the long axis of the ellipse with the conjugate diameters `x` and `y`, and the length of its short
+/// axis.
 #[inline(always)]
 fn axes(x: Vec2, y: Vec2) -> (Vec2, f32) {
-    let (a, b, c) = (x.x * x.x + y.x * y.x, x.x * x.y + y.x * y.y, x.y * x.y + y.y * y.y);
-    let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
+    let a = x.x * x.x + y.x * y.x;
+    let b = x.x * x.y + y.x * y.y;
+    let c = x.y * x.y + y.y * y.y;
+    let mean = 0.5 * (a + c);
+    let half = 0.5 * (a - c);
     let root = (half * half + b * b).sqrt();
     let long = (mean + root).sqrt();
-    // Of the two ways to write the axis of the larger eigenvalue, the one that does not cancel.
+    // The axis of the larger eigenvalue can be written in two ways; this one does not cancel.
     let axis = if half >= 0.0 {
         Vec2::new(root + half, b)
     } else {
@@ -260,8 +275,8 @@ fn axes(x: Vec2, y: Vec2) -> (Vec2, f32) {
     (axis * long, x.perp_dot(y).abs() / long)
 }
 
-/// A weighted sum of colours. Two neighbours in a row are added at once, as they lie in memory: R G B R G B
-/// and two bytes that get no weight.
+/// A weighted sum of colours. Two neighbours in a row are added at once, in their memory layout: R G B R G B
+/// and two bytes without weight.
 #[derive(Clone, Copy, Default)]
 struct ColorSum([f32; 8]);
 
@@ -277,10 +292,12 @@ impl ColorSum {
         let bytes = image.pixels().as_flattened();
         let below = at + 3 * w as usize;
         let inside = x >= 0.0 && y >= 0.0 && xi + 1 < w && yi + 1 < h;
+
         let (true, Some(upper), Some(lower)) = (inside, bytes.get(at..at + 8), bytes.get(below..below + 8))
         else {
             return self.add_at_the_edge(image, wrap, uv, weight);
         };
+
         let (fx, fy) = ((x - f64::from(xi)) as f32, (y - f64::from(yi)) as f32);
         let (left, right) = ((1.0 - fx) * weight, fx * weight);
         let columns = [left, left, left, right, right, right, 0.0, 0.0];
@@ -305,7 +322,7 @@ impl ColorSum {
     }
 }
 
-/// The coordinate in 0 to 1 that shows the same.
+/// Returns the coordinate in 0 to 1 at which the texture shows the same.
 #[inline(always)]
 fn wrapped(u: f64, wrap: Wrap) -> f64 {
     match wrap {
@@ -334,7 +351,7 @@ mod tests {
         let half = halved(&image(4, 2, |x, y| (10 * x + y) as u8)).unwrap();
         assert_eq!((half.width(), half.height()), (2, 1));
         assert_eq!(half.pixels(), [[6; 3], [26; 3]], "5.5 and 25.5, rounded half up");
-        // 3 pixels to 1, 5 to 2: the middle one is shared.
+        // 3 pixels become 1, and 5 become 2: the middle one is shared.
         let half = halved(&image(5, 3, |x, _| [0, 0, 100, 200, 200][x as usize])).unwrap();
         assert_eq!(half.pixels(), [[20; 3], [180; 3]]);
         assert_eq!(halved(&image(1, 2, |_, y| 100 * y as u8)).unwrap().pixels(), [[50; 3]]);
@@ -350,7 +367,7 @@ mod tests {
             let full = image(w, h, noise);
             let levels: Vec<_> = std::iter::successors(halved(&full), halved).collect();
             let bytes: usize = levels.iter().map(Raster::len).sum();
-            // Along a strip of one pixel levels add up to as much again.
+            // Along a strip of one pixel, the levels add up to as much again.
             prop_assert!(3 * bytes <= full.len() + 2 * (w + h) as usize);
             let mean = full.pixels().iter().map(|p| f64::from(p[0])).sum::<f64>() / full.len() as f64;
             let last = levels.last().unwrap_or(&full);
@@ -379,9 +396,10 @@ mod tests {
         fn axes_are_those_of_the_ellipse(
             x in prop::array::uniform2(-9.0..9.0f32), y in prop::array::uniform2(-9.0..9.0f32),
         ) {
-            let (x, y) = (Vec2::from(x), Vec2::from(y));
+            let x = Vec2::from(x);
+            let y = Vec2::from(y);
             let (major, minor) = axes(x, y);
-            // The farthest point x cos a + y sin a of the ellipse, by trying.
+            // The farthest point x cos a + y sin a of the ellipse, by trial.
             let points = (0..2000).map(|k| Vec2::from_angle(k as f32 * 0.00314)).map(|a| x * a.x + y * a.y);
             let far = points.max_by(|p, q| p.length().total_cmp(&q.length())).unwrap();
             prop_assert!((far.length() - major.length()).abs() < 1e-2);
@@ -394,7 +412,8 @@ mod tests {
 
     #[test]
     fn footprints_choose_their_samples() {
-        let (x, y) = (vec2(0.5, 0.0), vec2(0.0, 0.6));
+        let x = vec2(0.5, 0.0);
+        let y = vec2(0.0, 0.6);
         assert_eq!(taps(x, y, 8).2, 1);
         assert_eq!(taps(x * 8.0, y, 8).2, 4);
         assert_eq!(taps(x * 4000.0, y, 8).2, 8);

@@ -1,4 +1,4 @@
-//! From hits to images: colours, depths, normals, indices and points.
+//! Makes images from hits: colours, depths, normals, indices and points.
 
 pub(crate) mod anchor;
 pub(crate) mod channels;

@@ -1,5 +1,5 @@
-//! The RGB image, a pixel at a time in `f64`: what the fast way is held against, and what it asks where its
-//! `f32` would not do.
+//! The RGB image, one pixel at a time in `f64`. It is the reference for the fast way, and replaces it for
+//! pixels whose `f32` values are not accurate enough.
 
 use crate::hits::{Hits, NO_FACE};
 use crate::scene::Scene;
@@ -9,12 +9,12 @@ use crate::shade::patch::{FaceCache, Patch, UvPatch};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, Projection, Raster, Rays};
 
-/// As [`crate::rgb_image_with`], one pixel at a time: the reference that tests and benches hold the fast one
-/// against. Channels differ by 1 at most, where rounding decides; but for the few pixels whose footprint is
-/// so near to the next number of samples that rounding decides how many there are.
+/// Makes the image of [`crate::rgb_image_with`] one pixel at a time. Tests and benches compare the fast way
+/// with this reference. Channels differ by at most 1, where rounding decides. Only in the few pixels whose
+/// footprint is close to the next number of samples may they differ by more.
 ///
 /// # Panics
-/// As [`crate::rgb_image`].
+/// As for [`crate::rgb_image`].
 pub fn rgb_image_pixel_by_pixel(
     scene: &Scene<'_>,
     mip_maps: &MipMaps,
@@ -34,9 +34,9 @@ pub fn rgb_image_pixel_by_pixel(
     Raster::from_vec(hits.face.width(), hits.face.height(), out)
 }
 
-/// The colour that the ray of `camera` along `direction` sees on `face`, which it hits: for places between
-/// pixels, or rays of no image. `direction` is as [`Camera::direction`] gives it. Channels are those of
-/// [`rgb_image_pixel_by_pixel`] at a pixel's centre.
+/// Returns the colour that the ray of `camera` along `direction` sees on `face`, which it must hit. It is for
+/// places between pixels, and for rays of no image. `direction` has the length of [`Camera::direction`]. At
+/// the centre of a pixel, the channels are the same as in [`rgb_image_pixel_by_pixel`].
 ///
 /// # Panics
 /// If there is no face `face`, or `mip_maps` are another mesh's.
@@ -62,7 +62,7 @@ pub fn rgb_of_ray(
     seen_color(paint.at(direction, 0, &steps, filter))
 }
 
-/// The colours of an image's pixels, one by one.
+/// Colours the pixels of an image one by one.
 pub(crate) struct PixelByPixel<'a> {
     scene: &'a Scene<'a>,
     mip_maps: &'a MipMaps,
@@ -70,7 +70,7 @@ pub(crate) struct PixelByPixel<'a> {
     origin: DVec3,
     rays: Rays,
     steps: RayDifferentials,
-    /// Made when the first pixel is asked for.
+    /// Created for the first pixel.
     paints: Option<FaceCache<FacePaint<'a>>>,
 }
 
@@ -81,16 +81,17 @@ impl<'a> PixelByPixel<'a> {
         camera: &Camera,
         filter: &'a TextureFilter,
     ) -> Self {
-        let (steps, rays) = (RayDifferentials::new(camera), camera.rays());
+        let steps = RayDifferentials::new(camera);
+        let rays = camera.rays();
         Self { scene, mip_maps, filter, origin: camera.pose.location, rays, steps, paints: None }
     }
 
-    /// What pixel (i, j), which sees `face`, shows of it.
+    /// Returns the colour of pixel (i, j), which sees `face`.
     pub(crate) fn color(&mut self, face: u32, i: usize, j: usize) -> [u8; 3] {
         self.along(face, self.rays.at(i as u32, j as u32), j)
     }
 
-    /// What the ray along `direction`, in row j, shows of `face`, which it hits.
+    /// Returns the colour of `face` along `direction`, a ray in row j that hits it.
     pub(crate) fn along(&mut self, face: u32, direction: DVec3, j: usize) -> [u8; 3] {
         let Self { scene, mip_maps, origin, .. } = *self;
         let paints = self.paints.get_or_insert_with(FaceCache::new);
@@ -99,7 +100,7 @@ impl<'a> PixelByPixel<'a> {
     }
 }
 
-/// Rounded to 8 bits, and never black.
+/// Rounds a colour to 8 bits. The result is never black.
 fn seen_color(color: [f32; 3]) -> [u8; 3] {
     match color.map(|channel| (channel + 0.5) as u8) {
         [0, 0, 0] => [1, 1, 1],
@@ -107,7 +108,7 @@ fn seen_color(color: [f32; 3]) -> [u8; 3] {
     }
 }
 
-/// How a face is coloured, prepared for the origin.
+/// The colour of a face, prepared for the origin.
 enum FacePaint<'a> {
     Texture(MipMap<'a>, UvPatch),
     Corners(Patch, [[u8; 3]; 3]),
@@ -126,7 +127,7 @@ impl<'a> FacePaint<'a> {
         }
     }
 
-    /// The colour that the ray along `d`, in row `j` of the image, sees: 0 to 255 a channel.
+    /// Returns the colour that the ray along `d`, in row `j` of the image, sees: 0 to 255 a channel.
     #[inline(always)]
     fn at(&self, d: DVec3, j: usize, steps: &RayDifferentials, filter: &TextureFilter) -> [f32; 3] {
         match self {
@@ -144,10 +145,11 @@ impl<'a> FacePaint<'a> {
     }
 }
 
-/// What a pixel to the right and a pixel down add to a direction.
+/// The change of a direction from a pixel to the next one on the right, and to the next one below.
 enum RayDifferentials {
     Same(DVec3, DVec3),
-    /// Radians a pixel: a panorama's pixels are squares on the sphere's map.
+    /// The angle from pixel to pixel, in radians: a panorama's pixels are squares in the map of longitude and
+    /// latitude.
     Turn {
         rad_per_pixel: f64,
         rows: Vec<(f64, f64)>,
@@ -166,14 +168,14 @@ impl RayDifferentials {
         }
     }
 
-    /// The derivatives of the direction `d`, in row `j`, by column and row.
+    /// Returns the derivatives of the direction `d`, in row `j`, by column and by row.
     #[inline(always)]
     fn at(&self, d: DVec3, j: usize) -> (DVec3, DVec3) {
         match self {
             Self::Same(x, y) => (*x, *y),
             Self::Turn { rad_per_pixel, rows } => {
-                // Azimuth falls to the right and latitude falls downwards. d = (cos lat · a, sin lat), |a| =
-                // 1; rows are never at a pole, so cos lat > 0.
+                // Azimuth falls to the right, and latitude falls downwards. d = (cos lat · a, sin lat) with
+                // |a| = 1. No row is at a pole, so cos lat > 0.
                 let (cos, sin) = rows[j];
                 let x = DVec3::new(d.y, -d.x, 0.0) * *rad_per_pixel;
                 let up = sin / cos;

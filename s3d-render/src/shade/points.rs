@@ -1,4 +1,4 @@
-//! From hits to the points that are seen. Source: formats.md, "What is written".
+//! Computes the points that the pixels see. Source: formats.md, "What is written".
 
 use crate::hits::Hits;
 use crate::shade::channels::{assert_size, fit};
@@ -8,8 +8,8 @@ use glam::DVec3;
 use half::f16;
 use s3d_geom::{Camera, Raster, Rays};
 
-/// The points that are seen, in world metres; (0, 0, 0) where nothing is. A point seen exactly at the world's
-/// origin cannot be told from a missing one: that is the format's, not ours.
+/// Returns the points that the pixels see, in world metres; (0, 0, 0) where nothing is seen. The format
+/// cannot tell a point exactly at the world's origin from a missing one.
 ///
 /// # Panics
 /// If the hits are not of the camera's size.
@@ -19,17 +19,18 @@ pub fn xyz_image(hits: &Hits, camera: &Camera) -> Raster<[f32; 3]> {
     out
 }
 
-/// As [`xyz_image`], into an image that is used again.
+/// Writes the image of [`xyz_image`] into an existing image.
 ///
 /// # Panics
-/// As [`xyz_image`].
+/// As for [`xyz_image`].
 pub fn xyz_image_into(hits: &Hits, camera: &Camera, out: &mut Raster<[f32; 3]>) {
     fit(out, &hits.depth, [0.0; 3]);
     points(hits, camera, out);
 }
 
-/// As [`xyz_image`], rounded to half floats as the data set has them: steps of 1.6 cm at 20 m from the
-/// world's origin, 6.3 cm at 100 m. A point within 3e-8 m of the origin looks like a missing one.
+/// Returns the points of [`xyz_image`], rounded to half floats for the data set. Their steps are 1.6 cm at 20
+/// m from the world's origin, and 6.3 cm at 100 m. A point within 3e-8 m of the origin looks like a missing
+/// one.
 ///
 /// # Panics
 /// If the hits are not of the camera's size.
@@ -39,19 +40,19 @@ pub fn xyz_image_half(hits: &Hits, camera: &Camera) -> Raster<[f16; 3]> {
     out
 }
 
-/// As [`xyz_image_half`], into an image that is used again.
+/// Writes the image of [`xyz_image_half`] into an existing image.
 ///
 /// # Panics
-/// As [`xyz_image_half`].
+/// As for [`xyz_image_half`].
 pub fn xyz_image_half_into(hits: &Hits, camera: &Camera, out: &mut Raster<[f16; 3]>) {
     fit(out, &hits.depth, [f16::ZERO; 3]);
     points(hits, camera, out);
 }
 
-/// A number type that coordinates are written in.
+/// A number type for coordinates.
 pub(crate) trait Coordinate: Copy {
     const ZERO: Self;
-    /// [`ShadeLanes::points`] in this type.
+    /// Calls [`ShadeLanes::points`] for this type.
     fn points<const PANORAMA: bool>(lanes: impl ShadeLanes, rays: &EightRays<'_>, to: &mut [Self; 3 * LANES]);
 }
 
@@ -105,11 +106,11 @@ impl<T: Coordinate, const PANORAMA: bool> Kernel for PointKernel<'_, T, PANORAMA
     }
 }
 
-/// The directions of an image's pixels. Each is made of a vector a column and one a row: their sum in a
-/// perspective view, their product axis by axis in a panorama (`PANORAMA`). That is what [`Rays::at`] gives,
+/// The directions of an image's pixels. A direction is made of a vector of its column and one of its row:
+/// their sum in a perspective view, their product by axis in a panorama (`PANORAMA`). It equals [`Rays::at`]
 /// to the last bit.
 pub(crate) struct RayTable {
-    /// In groups; the last filled up.
+    /// In groups of eight; the last one is padded.
     columns: Vec<[f64; 3 * LANES]>,
     rows: Vec<DVec3>,
     width: usize,
@@ -137,7 +138,7 @@ impl RayTable {
         Self { columns, rows, width, place: camera.pose.location }
     }
 
-    /// The points that some rows see, from `first_row` on.
+    /// Computes the points that the rows from `first_row` on see.
     #[inline(always)]
     pub(crate) fn points<const PANORAMA: bool, T: Coordinate>(
         &self,

@@ -1,10 +1,10 @@
-//! What is read and written soon, fetched from memory while there is something to calculate.
+//! Prefetches data that is read or written soon, while the processor calculates.
 
 use crate::simd::shade_lanes::ShadeLanes;
 use half::f16;
 
-/// By pixel of a band, what is next in turn after its colours: the images that are painted afterwards, and
-/// hits and images of the next band. By default nothing.
+/// The data that is needed after the colours of a pixel: the images that are painted afterwards, and the hits
+/// and images of the next band. All slices are by pixel of the band. By default they are empty.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Prefetch<'a> {
     pub(crate) faces: &'a [u32],
@@ -16,10 +16,10 @@ pub(crate) struct Prefetch<'a> {
 }
 
 impl Prefetch<'_> {
-    /// How many pixels are fetched at once.
+    /// The number of pixels that are prefetched at once.
     pub(crate) const PIXELS: usize = 64;
 
-    /// Fetches what belongs to the pixels from `at` on.
+    /// Prefetches the data of the pixels from `at` on.
     #[inline(always)]
     pub(crate) fn fetch(&self, lanes: impl ShadeLanes, at: usize) {
         prefetch(lanes, self.faces, at);
@@ -34,10 +34,10 @@ impl Prefetch<'_> {
 }
 
 #[inline(always)]
-fn prefetch<T>(lanes: impl ShadeLanes, of: &[T], at: usize) {
-    if let Some(some) = of.get(at..at + Prefetch::PIXELS) {
-        for thing in some.iter().step_by(64 / size_of::<T>()) {
-            lanes.prefetch(thing);
+fn prefetch<T>(lanes: impl ShadeLanes, values: &[T], at: usize) {
+    if let Some(values) = values.get(at..at + Prefetch::PIXELS) {
+        for value in values.iter().step_by(64 / size_of::<T>()) {
+            lanes.prefetch(value);
         }
     }
 }

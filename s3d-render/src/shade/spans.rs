@@ -1,48 +1,48 @@
-//! The spans of equal faces in a band of rows.
+//! Splits a band of rows into spans of equal faces.
 //!
-//! Images are made from hits a band at a time: its hits, and what is made of them, stay in the cache from one
-//! modality to the next, and its spans are found once for all that have something to do with faces.
+//! Images are made from hits one band at a time. The hits of a band, and everything made from them, stay in
+//! the cache from one modality to the next. The spans are found once for all modalities that depend on faces.
 
 use crate::shade::face_table::{FaceTable, NewFace};
 use crate::simd::shade_lanes::{LANES, ShadeLanes};
 use s3d_geom::TriMesh;
 
-/// Pixels of a band, about.
+/// The approximate number of pixels in a band.
 const BAND: usize = 1 << 13;
 
-/// New faces that are fetched from memory while as many are prepared.
+/// The number of new faces that are prefetched while as many are prepared.
 const PREFETCHED: usize = 4 * LANES;
 
-/// How many rows make a band of an image so wide.
+/// Returns the number of rows in a band of an image of this width.
 pub(crate) fn band_rows(width: usize) -> usize {
     (BAND / width.max(1)).max(1)
 }
 
-/// The spans of a band. None reaches from row to row.
+/// The spans of a band. No span reaches from one row to the next.
 pub(crate) struct Spans {
     table: FaceTable,
     width: usize,
-    /// Where spans start, ascending, from the band's first pixel on; and the band's end.
+    /// The starts of the spans, ascending, relative to the band's first pixel. The end of the band follows.
     starts: Vec<u32>,
-    /// By span: its face's number in the table.
+    /// The number of each span's face in the table.
     numbers: Vec<u32>,
-    /// The faces that got their number in this band.
+    /// The faces that got their numbers in this band.
     new: Vec<NewFace>,
     /// See [`Spans::pieces`].
     pieces: Vec<Piece>,
 }
 
-/// Part of a span, of [`LANES`] pixels or, at the span's end, fewer.
+/// A part of a span: [`LANES`] pixels or, at the end of the span, fewer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
-    /// Its first pixel.
+    /// The first pixel.
     pub(crate) start: u32,
-    /// Its face's number.
+    /// The number of the face.
     pub(crate) number: u32,
 }
 
 impl Spans {
-    /// Of no band yet.
+    /// Returns spans that belong to no band yet.
     pub(crate) fn new(width: usize) -> Self {
         Self {
             table: FaceTable::new(band_rows(width) * width),
@@ -54,8 +54,8 @@ impl Spans {
         }
     }
 
-    /// Finds the spans of the next band. Whether faces have forgotten their numbers, which then begin with 1
-    /// again.
+    /// Finds the spans of the next band. Returns whether the table has forgotten all earlier numbers: new
+    /// ones begin with 1 again.
     #[inline(always)]
     pub(crate) fn find(&mut self, lanes: impl ShadeLanes, mesh: Option<&TriMesh>, faces: &[u32]) -> bool {
         self.starts.clear();
@@ -70,20 +70,21 @@ impl Spans {
         forgotten
     }
 
-    /// All spans in pieces, one after another, and one more that begins where the last one ends. None reaches
-    /// from row to row.
+    /// Returns the pieces of all spans in order, followed by an entry that begins at the end of the band. No
+    /// piece reaches from one row to the next.
     #[inline(always)]
     pub(crate) fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
-    /// Cuts the spans. A loop for each piece of a span ends when nobody can foretell: here it is out of the
-    /// way of those that have much to do.
+    /// Cuts the spans into pieces. The length of a loop over the pieces of one span is unpredictable: doing
+    /// it here keeps the mispredictions out of the loops that do the work.
     #[inline(always)]
     fn cut(&mut self) {
         const PIECE: u32 = LANES as u32;
         let Self { starts, numbers, pieces, .. } = self;
         pieces.clear();
+
         for (span, &number) in starts.windows(2).zip(numbers.iter()) {
             let (start, end) = (span[0], span[1]);
             let at = pieces.len();
@@ -98,18 +99,19 @@ impl Spans {
                 pieces.truncate(at + 1 + usize::from(end - start > PIECE));
             }
         }
+
         let end = starts.last().copied().unwrap_or(0);
         pieces.push(Piece { start: end, number: 0 });
     }
 
-    /// How many groups of [`LANES`] faces have to be prepared.
+    /// Returns the number of groups of [`LANES`] faces to be prepared.
     pub(crate) fn new_groups(&self) -> usize {
         self.new.len().div_ceil(LANES)
     }
 
-    /// A group of new faces, filled up with its last face, and how many of it count. To be asked for one
-    /// after another: what `mesh`, if any, has of those to come is fetched meanwhile, colours included if
-    /// that is asked.
+    /// Returns group `k` of the new faces, filled up with its last face, and the number of faces that count.
+    /// Groups must be requested in order: the data of later faces in `mesh`, if given, is prefetched
+    /// meanwhile, with colours if `COLORS`.
     #[inline(always)]
     pub(crate) fn new_group<const COLORS: bool>(
         &self,
@@ -119,6 +121,7 @@ impl Spans {
     ) -> ([NewFace; LANES], usize) {
         let first = k * LANES;
         let new = &self.new[..];
+
         if let Some(mesh) = mesh
             && first.is_multiple_of(PREFETCHED)
         {
@@ -129,20 +132,24 @@ impl Spans {
             };
             NewFace::prefetch::<COLORS>(&new[from..(first + 2 * PREFETCHED).min(new.len())], lanes, mesh);
         }
+
         let count = (new.len() - first).min(LANES);
         (std::array::from_fn(|n| new[first + n.min(count - 1)]), count)
     }
 }
 
-/// Adds to `starts` where each span of equal values of a row starts, `from` being the row's first pixel.
+/// Adds the start of each span of equal values in a row to `starts`. `from` is the row's first pixel.
 #[inline(always)]
 fn add_starts(lanes: impl ShadeLanes, values: &[u32], from: usize, starts: &mut Vec<u32>) {
     if values.is_empty() {
         return;
     }
-    // A group of places is written whole, and its end over by the next: no branch that depends on the values.
+
+    // A group of places is written whole, and the next group overwrites its end: no branch depends on the
+    // values.
     let first = starts.len();
     starts.resize(first + values.len() + 4 * LANES, from as u32);
+
     let (mut at, mut count) = (1, first + 1);
     while let Some(window) = values.get(at - 1..).and_then(<[u32]>::first_chunk::<{ 4 * LANES + 1 }>)
         && let Some(to) = starts
@@ -160,6 +167,7 @@ fn add_starts(lanes: impl ShadeLanes, values: &[u32], from: usize, starts: &mut 
         count += some;
         at += 4 * LANES;
     }
+
     starts.truncate(count);
     starts.extend(
         (at..values.len())
@@ -184,13 +192,16 @@ mod tests {
             let mesh = scan_like(3_000, 1);
             let mut spans = Spans::new(width);
             let mut things = vec![crate::hits::NO_FACE];
+
             for band in bands {
                 let pixels = band.iter().flat_map(|&(face, n)| std::iter::repeat_n(face, n));
                 let mut faces: Vec<u32> = pixels.collect();
                 faces.resize(faces.len().next_multiple_of(width), 7);
+
                 if spans.find(Plain, Some(&mesh), &faces) {
                     things.truncate(1);
                 }
+
                 for k in 0..spans.new_groups() {
                     let (group, count) = spans.new_group::<true>(Plain, Some(&mesh), k);
                     for new in &group[..count] {
@@ -198,6 +209,7 @@ mod tests {
                         things.push(new.face);
                     }
                 }
+
                 let mut next = 0;
                 for (piece, after) in spans.pieces().iter().zip(&spans.pieces()[1..]) {
                     let (start, end) = (piece.start as usize, after.start as usize);

@@ -1,7 +1,7 @@
 //! Wrap modes of textures, for coordinates in texels.
 
-/// How a coordinate repeats: every `period`; beyond `half` of it, it is mirrored. Of no period where a
-/// texture is clamped, since coordinates are brought to its edge when it is read.
+/// How a coordinate repeats: every `period`, and mirrored beyond `half` of it. A clamped texture has no
+/// period, since its coordinates are brought to the edge when it is read.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TexelWrap {
     pub(crate) divisor: f64,
@@ -10,7 +10,7 @@ pub(crate) struct TexelWrap {
 }
 
 impl TexelWrap {
-    /// Not at all.
+    /// No repetition.
     pub(crate) const NONE: Self = Self { divisor: 1.0, period: 0.0, half: f64::INFINITY };
 
     pub(crate) fn repeat(period: f64) -> Self {
@@ -21,7 +21,8 @@ impl TexelWrap {
         Self { divisor: 2.0 * half, period: 2.0 * half, half }
     }
 
-    /// The sign and the shift that bring `value` between 0 and the period, or half of a mirrored one.
+    /// Returns the sign and the shift that bring `value` between 0 and the period, or between 0 and half of a
+    /// mirrored period.
     #[inline(always)]
     pub(crate) fn sign_and_shift(self, value: f64) -> (f64, f64) {
         let turn = (value / self.divisor).floor() * self.period;

@@ -1,7 +1,7 @@
-//! All images of a view from its hits, in one walk.
+//! Makes all images of a view from its hits, in one walk.
 //!
-//! Band by band, so that hits and what belongs to their faces are in the cache for one modality after
-//! another. The images are those of the functions that make one each.
+//! The walk goes band by band, so that the hits and the data of their faces stay in the cache from one
+//! modality to the next. Each image equals the one that its own function makes.
 
 use crate::hits::Hits;
 use crate::scene::Scene;
@@ -21,25 +21,25 @@ use half::f16;
 use s3d_geom::{Camera, NormalAxes, Raster};
 use std::ops::Range;
 
-/// What a view's images are made from, besides its hits.
+/// The inputs of a view's images, besides its hits.
 #[derive(Clone, Copy)]
 pub struct Shading<'a> {
     /// The scene that was cast.
     pub scene: &'a Scene<'a>,
-    /// Its textures.
+    /// The textures of the scene's mesh.
     pub mip_maps: &'a MipMaps,
-    /// How they are read.
+    /// How the textures are filtered.
     pub filter: TextureFilter,
     /// The axes of normals.
     pub normal_axes: NormalAxes,
-    /// As [`crate::index_image`] takes them; may be empty if that is not made.
+    /// The indices for [`crate::index_image`]; may be empty if no index image is wanted.
     pub index_of_face: &'a [u32],
-    /// As [`crate::color_per_face_image`] takes them; may be empty if that is not made.
+    /// The colours for [`crate::color_per_face_image`]; may be empty if that image is not wanted.
     pub color_of_face: &'a [[u8; 3]],
 }
 
-/// Which images of a view [`view_images_into`] makes; by default none. They share most of their work. What is
-/// not here has functions of its own alone: smooth normals, depth in millimetres, coordinates in 32 bits.
+/// The images of a view that [`view_images_into`] makes; by default none. They share most of their work.
+/// Smooth normals, depth in millimetres and coordinates in 32 bits have functions of their own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Modalities {
     /// [`ViewImages::rgb`].
@@ -60,29 +60,30 @@ impl Modalities {
 /// The images of a view; see [`view_images_into`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewImages {
-    /// [`crate::rgb_image_with`].
+    /// The image of [`crate::rgb_image_with`].
     pub rgb: Raster<[u8; 3]>,
-    /// [`crate::depth_image`].
+    /// The image of [`crate::depth_image`].
     pub depth: Raster<u16>,
-    /// Those that have one value all over a face.
+    /// The images that have one value all over a face.
     pub faces: FaceImages,
-    /// [`crate::xyz_image_half`].
+    /// The image of [`crate::xyz_image_half`].
     pub xyz: Raster<[f16; 3]>,
 }
 
 /// The images that have one value all over a face.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaceImages {
-    /// [`crate::normal_image`] with [`crate::Normals::Flat`], in the axes asked for.
+    /// The image of [`crate::normal_image`] with [`crate::Normals::Flat`], in the axes of
+    /// [`Shading::normal_axes`].
     pub normal: Raster<[u8; 3]>,
-    /// [`crate::index_image`].
+    /// The image of [`crate::index_image`].
     pub index: Raster<[u8; 3]>,
-    /// [`crate::color_per_face_image`].
+    /// The image of [`crate::color_per_face_image`].
     pub color: Raster<[u8; 3]>,
 }
 
 impl Default for ViewImages {
-    /// Without pixels.
+    /// Returns images without pixels.
     fn default() -> Self {
         Self {
             rgb: Raster::filled(0, 0, [0; 3]),
@@ -94,18 +95,18 @@ impl Default for ViewImages {
 }
 
 impl Default for FaceImages {
-    /// Without pixels.
+    /// Returns images without pixels.
     fn default() -> Self {
         let empty = || Raster::filled(0, 0, [0; 3]);
         Self { normal: empty(), index: empty(), color: empty() }
     }
 }
 
-/// Makes those of a view's images that are wanted, in less time than one after another. The others in `out`
-/// stay what they were; memory that has the right size already is used again.
+/// Makes the wanted images of a view, in less time than one after another. Other images in `out` stay as they
+/// are; memory of the right size is reused.
 ///
 /// # Panics
-/// If the hits are not of the camera's size, or `shading` is not for the faces that are seen: see
+/// If the hits are not of the camera's size, or `shading` does not cover the visible faces: see
 /// [`crate::rgb_image`], [`crate::index_image`] and [`crate::color_per_face_image`].
 pub fn view_images_into(
     shading: &Shading<'_>,
@@ -131,14 +132,15 @@ pub fn view_images_into(
     if wanted.xyz {
         fit(xyz, &hits.face, [f16::ZERO; 3]);
     }
+
     dispatch(ViewKernel { shading, faces: &hits.face, depths: &hits.depth, camera, wanted, out });
 }
 
-/// Makes the images that are wanted; they have the size of `faces` already.
+/// Makes the wanted images, which must have the size of `faces` already.
 pub(crate) struct ViewKernel<'a> {
     pub(crate) shading: &'a Shading<'a>,
     pub(crate) faces: &'a Raster<u32>,
-    /// Looked at for depth and xyz alone; else it may be empty.
+    /// Only read for depth and xyz; may be empty otherwise.
     pub(crate) depths: &'a Raster<f32>,
     pub(crate) camera: &'a Camera,
     pub(crate) wanted: Modalities,
@@ -179,7 +181,8 @@ impl ViewKernel<'_> {
         let directions = RayTable::new(camera);
 
         let width = all_faces.width() as usize;
-        let (mut spans, rows) = (Spans::new(width), band_rows(width));
+        let mut spans = Spans::new(width);
+        let rows = band_rows(width);
         let band = (rows * width).max(1);
         for (k, faces) in all_faces.pixels().chunks(band).enumerate() {
             let pixels = k * band..k * band + faces.len();
@@ -192,13 +195,16 @@ impl ViewKernel<'_> {
                 let out = &mut xyz.pixels_mut()[pixels.clone()];
                 directions.points::<PANORAMA, f16>(lanes, k * rows, distances, out);
             }
+
             if !wanted.rgb && !wanted.faces {
                 continue;
             }
+
             if spans.find(lanes, Some(scene.mesh()), faces) {
                 painter.forget();
                 flat.forget();
             }
+
             if wanted.rgb {
                 let next = pixels.end..all_faces.len().min(pixels.end + band);
                 let (done, rest) = rgb.pixels_mut().split_at_mut(next.start);
@@ -214,10 +220,11 @@ impl ViewKernel<'_> {
                 };
                 painter.band::<PANORAMA>(grid, &spans, k * rows, faces, &mut done[pixels.start..], &prefetch);
             }
+
             if wanted.faces {
                 let out =
                     [&mut *normal, &mut *index, &mut *color].map(|i| &mut i.pixels_mut()[pixels.clone()]);
-                // For colours the faces have been fetched already.
+                // The faces have been prefetched already if colours were painted.
                 let mesh = (!wanted.rgb).then_some(scene.mesh());
                 flat.band(lanes, mesh, &spans, out);
             }

@@ -1,19 +1,20 @@
-//! Wide registers: one choice of instructions for all kernels.
+//! Wide registers: one choice of vector instructions for all kernels.
 //!
-//! A kernel is written once, over [`Simd`], and compiled for every level of instructions; [`dispatch`] runs
-//! it with the level that s3d-simd has chosen. A level gives it registers for sixteen pixels of the
-//! visibility pass ([`RasterLanes`]) or for eight pixels to be shaded ([`ShadeLanes`]). All give the same
-//! bits: every operation is on integers or rounds once, as IEEE 754 says it must; products and sums are never
-//! fused.
+//! A kernel is written once, over [`Simd`], and compiled for every level of instructions. [`dispatch`] runs
+//! it at the level that s3d-simd has chosen. A [`Level`] carries the proof that the processor has its
+//! instructions; the public [`SimdLevel`](s3d_simd::SimdLevel) is its name. A level has registers for sixteen
+//! pixels of the visibility pass ([`RasterLanes`]) and for eight pixels to be shaded ([`ShadeLanes`]). All
+//! levels give the same bits: every operation is on integers or rounds once, as IEEE 754 demands, and
+//! products and sums are never fused.
 //!
-//! Where time counts, no closure with instructions goes to `map` of an array or to `from_fn`, or is called
-//! from several places: it may be compiled for any processor, and called. Loops and functions with
-//! `#[inline(always)]` are not.
+//! In hot code, no closure that contains vector instructions is passed to `map` of an array or to `from_fn`,
+//! or called from several places: the compiler may compile it for any processor and call it. It does not do
+//! so with loops, nor with functions that are `#[inline(always)]`.
 //!
-//! Own code, since a library costs time in the kernel that counts: by `fearless_simd` 1.2 (no dependencies,
-//! safe, stable Rust), which has no stores of some lanes alone, the chunks of a window take 0 to 10 % longer
-//! with AVX-512 on Zen 4, and with AVX2 18 to 20 % longer on Zen 3, but 6 % less on Zen 4; and it asks for
-//! Ice Lake where AVX-512 is to be used. Measured by `docs/performance/simd_library`.
+//! This is our own code, since a library costs time in the hottest kernel. `fearless_simd` 1.2 (no
+//! dependencies, safe, stable Rust) has no masked stores. With it, the chunks of a window take 0 to 10 %
+//! longer with AVX-512 on Zen 4. With AVX2 they take 18 to 20 % longer on Zen 3, but 6 % less on Zen 4. It
+//! also requires Ice Lake for AVX-512. Measured by `docs/performance/simd_library`.
 
 pub(crate) mod raster_lanes;
 #[cfg(target_arch = "x86_64")]
@@ -35,9 +36,9 @@ pub(crate) trait Simd: Copy {
     type Raster: RasterLanes;
     type Shade: ShadeLanes;
 
-    /// Registers of the visibility pass.
+    /// Returns the registers of the visibility pass.
     fn raster(self) -> Self::Raster;
-    /// Registers of what makes images from hits.
+    /// Returns the registers that make images from hits.
     fn shade(self) -> Self::Shade;
 }
 
@@ -85,19 +86,20 @@ impl Simd for Avx512 {
     }
 }
 
-/// Work that is compiled for every level. `run` and what it calls in its loops are `#[inline(always)]`.
+/// Work that is compiled for every level. `run` and the functions that it calls in loops are
+/// `#[inline(always)]`.
 pub(crate) trait Kernel {
     type Output;
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// Runs a kernel with the instructions in use.
+/// Runs a kernel at the level in use.
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     dispatch_on(level(), kernel)
 }
 
-/// Runs a kernel with the instructions of a level.
+/// Runs a kernel at a given level.
 pub(crate) fn dispatch_on<K: Kernel>(level: Level, kernel: K) -> K::Output {
     s3d_simd::dispatch!(level, simd => kernel.run(simd))
 }

@@ -1,8 +1,7 @@
-//! Sixteen pixels at a time: the few operations that the visibility pass needs, on the widest registers there
-//! are.
+//! Sixteen pixels at a time: the few operations of the visibility pass, on the widest registers.
 //!
-//! [`Portable`] has them in plain Rust, which defines what they give; `raster_x86.rs` has them by wide
-//! registers.
+//! [`Portable`] implements them in plain Rust, which defines the results. `raster_x86.rs` implements them
+//! with wide registers.
 #![expect(
     clippy::expect_used,
     reason = "slices are cut to the length of the array: there is nothing left of the check"
@@ -10,44 +9,45 @@
 
 use std::ops::BitOr;
 
-/// Pixels in a register (or in as many registers as it takes).
+/// The number of pixels in a register, or in as many registers as that takes.
 pub(crate) const LANES: usize = 16;
 
-/// A set of instructions, as the proof that the processor has it, and registers of [`RasterLanes::N`] pixels.
+/// Operations on registers of [`RasterLanes::N`] pixels. A value is the proof that the processor has the
+/// instructions.
 pub(crate) trait RasterLanes: Copy {
-    /// Pixels at a time; at most [`LANES`].
+    /// The number of pixels in a register, at most [`LANES`].
     const N: usize;
-    /// `N` times `f32`.
+    /// `N` values of `f32`.
     type F: Copy;
-    /// `N` times yes or no.
+    /// `N` booleans.
     type M: Copy;
-    /// Registers of 8 pixels, for what is narrow.
+    /// Registers of 8 pixels, for narrow faces.
     type Half: RasterLanes;
 
     fn half(self) -> Self::Half;
     fn splat(self, x: f32) -> Self::F;
-    /// The first `N` of a slice. Panics if it is shorter; so do the others.
+    /// Loads the first `N` values of a slice. Panics if it is shorter, like all loads and stores.
     fn load(self, from: &[f32]) -> Self::F;
-    /// Overwrites the first `N`.
+    /// Overwrites the first `N` values.
     fn store(self, to: &mut [f32], x: Self::F);
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
     fn min(self, a: Self::F, b: Self::F) -> Self::F;
-    /// a > b; no for what is not a number.
+    /// Compares a > b; false if one is NaN.
     fn greater(self, a: Self::F, b: Self::F) -> Self::M;
-    /// The bits of `a`, as an integer, are above those of `b` plus `ulps`: for numbers from 0 on, `a` is
-    /// greater by more than so many times the last place.
+    /// Compares the bits of `a`, as an integer, with the bits of `b` plus `ulps`. For numbers from 0 on, the
+    /// result is true if `a` is greater by more than so many steps of the last place.
     fn greater_by_ulps(self, a: Self::F, b: Self::F, ulps: i32) -> Self::M;
     fn and(self, a: Self::M, b: Self::M) -> Self::M;
-    /// One bit a lane, the first lane's the lowest.
+    /// Returns one bit a lane; the first lane is the lowest bit.
     fn bits(self, m: Self::M) -> u16;
     /// Overwrites the lanes in `m`.
     fn store_masked_f32(self, to: &mut [f32], m: Self::M, x: Self::F);
     /// Overwrites the lanes in `m`.
     fn store_masked_u32(self, to: &mut [u32], m: Self::M, x: u32);
 
-    /// Depths and faces of [`LANES`] pixels that see the faces drawn in their slots. Panics if there is no
-    /// such slot.
+    /// Writes the faces and depths of [`LANES`] pixels that see the faces in their slots. Panics if there is
+    /// no such slot.
     #[inline(always)]
     fn resolve<const PANORAMA: bool>(
         self,
@@ -73,19 +73,20 @@ pub(crate) trait RasterLanes: Copy {
     }
 }
 
-/// A face that was drawn: half a line of the cache, and no padding, since its halves are read as numbers.
+/// A face that was drawn. It fills half a cache line without padding, since its halves are loaded as numbers.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(crate) struct DrawnFace {
-    /// 1/t as a function [a, b, c] of the pixel: with u and v of its column, level and rise of its row
-    /// ([`RowGroup`]), a + c·rise + b·u in a perspective view, and c·rise + level·(a·u + b·v) in a panorama.
+    /// The coefficients [a, b, c] of 1/t as a function of the pixel, with u and v of its column and the level
+    /// and the rise of its row ([`RowGroup`]): a + c·rise + b·u in a perspective view, and c·rise +
+    /// level·(a·u + b·v) in a panorama.
     pub(crate) inverse_t: [f64; 3],
     pub(crate) face: u32,
     poor: u32,
 }
 
 impl DrawnFace {
-    /// `poor` says whether `inverse_t` is too poor for a depth: single rays give it then.
+    /// `poor` says that `inverse_t` is too poor to give a depth: single rays give it instead.
     #[inline(always)]
     pub(crate) const fn new(inverse_t: [f64; 3], face: u32, poor: bool) -> Self {
         Self { inverse_t, face, poor: poor as u32 }
@@ -96,17 +97,17 @@ impl DrawnFace {
     }
 }
 
-/// [`LANES`] pixels of a row, as the functions of [`DrawnFace`] take them.
+/// [`LANES`] pixels of a row, in the form that the functions of a [`DrawnFace`] need.
 #[derive(Clone, Copy)]
 pub(crate) struct RowGroup<'a> {
     pub(crate) u: &'a [f64; LANES],
     pub(crate) v: &'a [f64; LANES],
-    /// See [`DrawnFace`].
+    /// cos φ and sin φ of the row in a panorama; 0 and the row in a perspective view.
     pub(crate) level: f64,
     pub(crate) rise: f64,
 }
 
-/// The function of a [`DrawnFace`] in a row: at + across·u + bend·v.
+/// Returns the function of a [`DrawnFace`] in a row: at + across·u + bend·v.
 #[inline(always)]
 pub(crate) fn along<const PANORAMA: bool>([a, b, c]: [f64; 3], line: &RowGroup<'_>) -> [f64; 3] {
     if PANORAMA {
@@ -116,16 +117,16 @@ pub(crate) fn along<const PANORAMA: bool>([a, b, c]: [f64; 3], line: &RowGroup<'
     }
 }
 
-/// Plain arrays of eight, for any processor: the compiler uses the registers that every processor of the
+/// Plain arrays of eight, for any processor. The compiler uses the registers that every processor of the
 /// target has.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
 
-/// Values in a [`Portable`].
+/// The number of values in a [`Portable`] register.
 const WIDTH: usize = 8;
 
-/// An array of eight values: `value` for each `k` from 0 to 7. It is written out: a loop in each operation
-/// was most of what a kernel took to compile.
+/// Builds an array of eight values: `value` for each `k` from 0 to 7. It is written out, since loops in each
+/// operation took most of the time to compile a kernel.
 macro_rules! eight {
     ($k:ident => $value:expr) => {
         eight!($k => $value; 0, 1, 2, 3, 4, 5, 6, 7)
@@ -138,7 +139,7 @@ macro_rules! eight {
     };
 }
 
-/// Operations on arrays, which touch no memory: value `k` of the result.
+/// Operations on arrays that touch no memory: the closure gives value `k` of the result.
 macro_rules! portable {
     ($(fn $name:ident($($arg:ident: $type:ty),*) -> $out:ty = |$k:ident| $body:expr;)*) => {$(
         #[inline(always)]
@@ -284,4 +285,5 @@ impl<L: RasterLanes> RasterLanes for Pair<L> {
     }
 }
 
+/// The message of the panic if a slice is too short.
 pub(crate) const SHORT: &str = "a slice as long as a register";

@@ -1,7 +1,7 @@
-//! [`RasterLanes`] by AVX2 and by AVX-512.
+//! Implements [`RasterLanes`] with AVX2 and with AVX-512.
 //!
-//! Every block that is unsafe here uses instructions of a level whose proof `self` holds; loads and stores go
-//! through references that are as long as the registers.
+//! Every unsafe block uses instructions whose proof `self` holds. Loads and stores go through references to
+//! arrays as long as the registers.
 #![expect(
     clippy::expect_used,
     reason = "slices are cut to the length of the array: there is nothing left of the check"
@@ -16,7 +16,7 @@ use std::arch::{asm, x86_64::*};
 #[derive(Clone, Copy)]
 pub(crate) struct Wide512(pub(crate) Avx512);
 
-/// Operations on registers, which touch no memory.
+/// Operations on registers that touch no memory.
 macro_rules! registers {
     ($(fn $name:ident($($arg:ident: $type:ty),*) -> $out:ty = $body:expr;)*) => {$(
         #[inline(always)]
@@ -97,12 +97,13 @@ impl RasterLanes for Wide512 {
         faces: &mut [u32; LANES],
         depths: &mut [f32; LANES],
     ) {
-        // SAFETY: `self` is the proof of AVX-512 and so of AVX2. Arrays have sixteen values, of which eight
-        // are loaded from or stored to `u`, `v` and `depths` from place 0 and from place 8 on.
+        // SAFETY: `self` is the proof of AVX-512 and so of AVX2. The arrays have sixteen values. Eight values
+        // are loaded from `u` and `v` and stored to `depths`, from place 0 and from place 8 on.
         unsafe {
             let all = _mm512_loadu_epi32(slots.as_ptr().cast());
-            // Mostly there is one face, in a panorama one or two. (Perspective views with small faces are
-            // faster if their pairs count as a mixture.)
+
+            // There is mostly one face; in a panorama one or two. (Perspective views with small faces are
+            // faster if two faces count as a mixture.)
             let these = _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(slots[0] as i32));
             let other = if PANORAMA {
                 slots[these.trailing_ones() as usize % LANES]
@@ -112,12 +113,14 @@ impl RasterLanes for Wide512 {
             if these | _mm512_cmpeq_epi32_mask(all, _mm512_set1_epi32(other as i32)) != u16::MAX {
                 return resolve_by_fours::<PANORAMA>(slots, line, drawn, faces, depths);
             }
+
             let (one, other) = (&drawn[slots[0] as usize], &drawn[other as usize]);
             let seen = _mm512_set1_epi32(other.face as i32);
             let seen = _mm512_mask_set1_epi32(seen, these, one.face as i32);
             _mm512_storeu_epi32(faces.as_mut_ptr().cast(), seen);
             let (one, other) =
                 (along::<PANORAMA>(one.inverse_t, line), along::<PANORAMA>(other.inverse_t, line));
+
             for (k, these) in [(0, these as u8), (8, (these >> 8) as u8)] {
                 let either =
                     |n: usize| _mm512_mask_blend_pd(these, _mm512_set1_pd(other[n]), _mm512_set1_pd(one[n]));
@@ -134,7 +137,7 @@ impl RasterLanes for Wide512 {
     }
 }
 
-/// A half of each of two faces: two numbers (`AT` = 0), or one with a face (`AT` = 2).
+/// Loads a half of each of two faces: two numbers (`AT` = 0), or a number and the face (`AT` = 2).
 #[inline]
 #[target_feature(enable = "avx2")]
 fn halves<const AT: usize>(p: &DrawnFace, r: &DrawnFace) -> __m256d {
@@ -146,7 +149,7 @@ fn halves<const AT: usize>(p: &DrawnFace, r: &DrawnFace) -> __m256d {
     }
 }
 
-/// Depths of the four pixels from `k` on, which is at most twelve.
+/// Returns the depths of the four pixels from `k` on; `k` is at most twelve.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn four_depths<const PANORAMA: bool>([a, b, c]: [__m256d; 3], line: &RowGroup<'_>, k: usize) -> __m128 {
@@ -168,7 +171,7 @@ fn four_depths<const PANORAMA: bool>([a, b, c]: [__m256d; 3], line: &RowGroup<'_
     _mm256_cvtpd_ps(_mm256_andnot_pd(_mm256_set1_pd(-0.0), _mm256_div_pd(_mm256_set1_pd(1.0), value)))
 }
 
-/// [`RasterLanes::resolve`], four pixels at a time.
+/// Implements [`RasterLanes::resolve`], four pixels at a time.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn resolve_by_fours<const PANORAMA: bool>(
@@ -203,13 +206,13 @@ fn resolve_by_fours<const PANORAMA: bool>(
 #[derive(Clone, Copy)]
 pub(crate) struct Wide256(pub(crate) Avx2);
 
-/// Values in a register of 256 bits.
+/// The number of values in a register of 256 bits.
 const WIDTH: usize = 8;
 
-/// The same register, of which the compiler knows no more.
+/// Returns the same register, but hides its origin from the compiler.
 ///
-/// It makes one masked store of a load, a blend and a store to the same place, if it sees them. Zen 3 takes so
-/// long for one that views took 1.6 times as long.
+/// If the compiler sees a load, a blend and a store to the same place, it makes one masked store of them.
+/// That is so slow on Zen 3 that views took 1.6 times as long.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn opaque(mut x: __m256) -> __m256 {

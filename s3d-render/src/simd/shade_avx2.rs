@@ -1,7 +1,7 @@
-//! [`ShadeLanes`] by AVX2, and by AVX-512 where registers of 64 bytes do better.
+//! Implements [`ShadeLanes`] with AVX2, and with AVX-512 where registers of 64 bytes are faster.
 //!
-//! Every block that is unsafe here uses instructions of which `self` holds the proof, or loads from and
-//! stores to references that are as large as what is loaded or stored.
+//! Every unsafe block uses instructions whose proof `self` holds, or loads from and stores to references that
+//! are large enough.
 #![allow(unsafe_code)]
 
 use crate::simd::shade_lanes::{COLOR_BLOCK, EightRays, LANES, ShadeLanes, Texels};
@@ -9,11 +9,11 @@ use crate::simd::shade_width::Width;
 use half::f16;
 use std::arch::x86_64::*;
 
-/// The proof of AVX2, and how wide the registers are in which it blends texels.
+/// The proof of AVX2, and the width of the registers that blend texels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Eight<W>(pub(crate) W);
 
-/// Operations on registers, which touch no memory.
+/// Operations on registers that touch no memory.
 macro_rules! registers {
     ($(fn $name:ident($($arg:ident: $type:ty),*) -> $out:ty = $body:expr;)*) => {$(
         #[inline(always)]
@@ -27,7 +27,7 @@ macro_rules! registers {
 impl<W: Width> ShadeLanes for Eight<W> {
     type F = __m256;
     type I = __m256i;
-    /// To the right, then downwards.
+    /// The parts to the right, then the parts downwards.
     type Parts = __m256i;
     type Weights = __m128i;
     type Corners = W::Corners;
@@ -64,14 +64,14 @@ impl<W: Width> ShadeLanes for Eight<W> {
             _mm256_cvttps_epi32(_mm256_mul_ps(values, _mm256_set1_ps(32768.0)));
         fn add_fixed(a: __m256i, b: __m256i) -> __m256i = _mm256_add_epi32(a, b);
         fn within(values: __m256i, end: u32) -> u32 = {
-            // What is negative is large without a sign.
+            // A negative number is large as an unsigned one.
             let most = _mm256_max_epu32(values, _mm256_set1_epi32(end as i32));
             let beyond = _mm256_cmpeq_epi32(most, values);
             !(_mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32) & 0xFF
         };
         fn place(x: __m256i, y: __m256i, stride: i32, these: u32) -> (__m256i, __m256i) = {
             let rest = _mm256_set1_epi32(0x7FFF);
-            // x of pixels 0 to 3, y of 0 to 3, then of 4 to 7.
+            // x of pixels 0 to 3, y of pixels 0 to 3, then the same of pixels 4 to 7.
             let parts = _mm256_packus_epi32(_mm256_and_si256(x, rest), _mm256_and_si256(y, rest));
             let columns = _mm256_srai_epi32::<15>(x);
             let columns = _mm256_add_epi32(columns, _mm256_add_epi32(columns, columns));
@@ -129,8 +129,8 @@ impl<W: Width> ShadeLanes for Eight<W> {
         if self.within(at, image.end()) != 0xFF {
             return None;
         }
-        // SAFETY: all places are below `end`, from where on `Texels` does not promise eight bytes and eight
-        // more a row later.
+        // SAFETY: all places are below `end`. `Texels` promises eight bytes at every place below it, and
+        // eight more a row later.
         Some(unsafe { self.0.quads(image.bytes().as_ptr(), at, image.stride() as usize) })
     }
     #[inline(always)]
@@ -176,7 +176,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]) {
-        // SAFETY: `self` holds the proof of AVX2; 32 bytes are loaded of 32, and 16 + 8 stored of 24.
+        // SAFETY: `self` holds the proof of AVX2; all 32 bytes are loaded, and all 24 are stored, as 16 + 8.
         unsafe {
             let packed = _mm256_loadu_si256(packed.as_ptr().cast());
             let three = _mm_setr_epi8(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1);
@@ -188,7 +188,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn store_repeated(self, packed: u32, to: &mut [u8; COLOR_BLOCK]) {
-        // SAFETY: `self` holds the proof of AVX2; 32 bytes are stored of 32.
+        // SAFETY: `self` holds the proof of AVX2; all 32 bytes are stored.
         unsafe {
             let three = _mm256_setr_epi8(
                 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, //
@@ -220,7 +220,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
         // SAFETY: as in `load`, for arrays of eight values.
         unsafe {
             let twice = _mm256_mul_ps(_mm256_loadu_ps(depths.as_ptr()), _mm256_set1_ps(1024.0));
-            // `max` gives its second value where the first is not a number.
+            // `max` returns its second value if the first is NaN.
             let twice = _mm256_max_ps(twice, _mm256_setzero_ps());
             let twice = _mm256_cvttps_epi32(_mm256_min_ps(twice, _mm256_set1_ps(131_070.0)));
             let rounded = _mm256_srli_epi32::<1>(_mm256_add_epi32(twice, _mm256_set1_epi32(1)));
@@ -230,7 +230,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]) {
-        // SAFETY: `self` holds the proof of AVX2; three times eight numbers are stored of 24.
+        // SAFETY: `self` holds the proof of AVX2; all 24 numbers are stored, as three times eight.
         unsafe {
             let points = self.0.points::<PANORAMA>(rays);
             for (k, eight) in points.iter().enumerate() {
@@ -240,7 +240,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
     #[inline(always)]
     fn half_points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]) {
-        // SAFETY: `self` holds the proof of F16C; three times eight numbers are stored of 24.
+        // SAFETY: `self` holds the proof of F16C; all 24 numbers are stored, as three times eight.
         unsafe {
             let points = self.0.points::<PANORAMA>(rays);
             for (k, eight) in points.iter().enumerate() {
@@ -251,7 +251,7 @@ impl<W: Width> ShadeLanes for Eight<W> {
     }
 }
 
-/// All bits of the lanes of `these`.
+/// Returns a mask: all bits of the lanes in `these` are set.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn lanes_of(these: u32) -> __m256i {
@@ -276,11 +276,11 @@ mod tests {
     }
 
     fn bits(a: [f32; LANES]) -> [u32; LANES] {
-        // One bit pattern for all that is not a number.
+        // All NaNs count as the same bit pattern.
         a.map(|v| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() })
     }
 
-    /// Sums of colours with weights, and without.
+    /// Compares weighted sums of colours, with partial and with full weights.
     fn same_colors<L: ShadeLanes>(
         lanes: L,
         upper: &[u64; LANES],
@@ -297,7 +297,8 @@ mod tests {
         let some = (lanes.weights(lanes.load(weights)), Plain.weights(*weights));
         let some = (lanes.masked(these, some.0), Plain.masked(these, some.1));
         let some = (lanes.corners(parts.0, some.0), Plain.corners(parts.1, some.1));
-        let (mut sum, mut plain) = (lanes.zero_sum(), Plain.zero_sum());
+        let mut sum = lanes.zero_sum();
+        let mut plain = Plain.zero_sum();
         for (corners, plain_corners) in [some, some, all] {
             sum = lanes.add_weighted(sum, quads, corners);
             plain = Plain.add_weighted(plain, plain_quads, plain_corners);
@@ -314,7 +315,7 @@ mod tests {
         Ok(())
     }
 
-    /// What is read of an image.
+    /// Compares the texels that are read from an image.
     fn same_quads<L: ShadeLanes>(
         lanes: L,
         image: &Texels<'_>,
@@ -332,13 +333,15 @@ mod tests {
         Ok(())
     }
 
-    /// Points that are seen, and those in half floats.
+    /// Compares the points, in `f32` and in half floats.
     fn same_points(lanes: impl ShadeLanes, rays: &EightRays<'_>) -> Result<(), TestCaseError> {
-        let (mut got, mut want) = ([0.0; 24], [0.0; 24]);
+        let mut got = [0.0; 24];
+        let mut want = [0.0; 24];
         lanes.points::<false>(rays, &mut got);
         Plain.points::<false>(rays, &mut want);
         prop_assert_eq!(got.map(f32::to_bits), want.map(f32::to_bits));
-        let (mut got, mut want) = ([f16::ZERO; 24], [f16::ZERO; 24]);
+        let mut got = [f16::ZERO; 24];
+        let mut want = [f16::ZERO; 24];
         lanes.half_points::<true>(rays, &mut got);
         Plain.half_points::<true>(rays, &mut want);
         prop_assert_eq!(got.map(f16::to_bits), want.map(f16::to_bits));
@@ -349,7 +352,9 @@ mod tests {
         #[test]
         fn numbers_are_those_of_plain_rust(a in eight(), b in eight(), c in eight()) {
             let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
-            let (x, y, z) = (avx2.load(&a), avx2.load(&b), avx2.load(&c));
+            let x = avx2.load(&a);
+            let y = avx2.load(&b);
+            let z = avx2.load(&c);
             let mut got = [0.0; LANES];
             macro_rules! same {
                 ($op:ident, $($avx2:expr, $plain:expr);*) => {
@@ -368,6 +373,7 @@ mod tests {
             for these in [0, 0b1001_0110, 255] {
                 same!(select, these, these; x, a; y, b);
             }
+
             let above_one = a.map(|v| if v.abs() >= 1.0 { v.abs() } else { 1.0 });
             let (whole, rest) = avx2.log2(avx2.load(&above_one));
             let (plain_whole, plain_rest) = Plain.log2(above_one);
@@ -375,8 +381,10 @@ mod tests {
             prop_assert_eq!(bits(got), bits(plain_whole));
             avx2.store(rest, &mut got);
             prop_assert_eq!(bits(got), bits(plain_rest));
+
             prop_assert_eq!(avx2.greater(avx2.load(&a), avx2.load(&b)), Plain.greater(a, b));
-            let (mut got, mut want) = ([0; LANES], [0; LANES]);
+            let mut got = [0; LANES];
+            let mut want = [0; LANES];
             avx2.depths(&a, &mut got);
             Plain.depths(&a, &mut want);
             prop_assert_eq!(got, want);
@@ -393,12 +401,15 @@ mod tests {
             if let Some(full) = Avx512::detect().map(Eight) {
                 same_colors(full, &upper, &lower, (&x, &y), &weights, these)?;
             }
+
             let packed = upper.map(|v| v as u32);
-            let (mut got, mut want) = ([0; 3 * LANES], [0; 3 * LANES]);
+            let mut got = [0; 3 * LANES];
+            let mut want = [0; 3 * LANES];
             avx2.store_pixels(&packed, &mut got);
             Plain.store_pixels(&packed, &mut want);
             prop_assert_eq!(got, want);
-            let (mut got, mut want) = ([0; COLOR_BLOCK], [0; COLOR_BLOCK]);
+            let mut got = [0; COLOR_BLOCK];
+            let mut want = [0; COLOR_BLOCK];
             avx2.store_repeated(packed[0], &mut got);
             Plain.store_repeated(packed[0], &mut want);
             prop_assert_eq!(got, want);
@@ -411,7 +422,8 @@ mod tests {
         ) {
             let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
             let image = Texels::new(&bytes, 36);
-            let (a, b) = (avx2.fixed(avx2.load(&x)), avx2.fixed(avx2.load(&y)));
+            let a = avx2.fixed(avx2.load(&x));
+            let b = avx2.fixed(avx2.load(&y));
             let (at, parts) = avx2.place(a, b, 36, these);
             let plain = Plain.place(Plain.fixed(x), Plain.fixed(y), 36, these);
             let mut got = ([0; LANES], ([0; LANES], [0; LANES]));
@@ -427,13 +439,18 @@ mod tests {
         #[test]
         fn whole_numbers_are_those_of_plain_rust(a in eight(), b in eight(), end in 0u32..=1 << 31) {
             let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
-            let (x, y) = (avx2.fixed(avx2.load(&a)), avx2.fixed(avx2.load(&b)));
-            let (plain_x, plain_y) = (Plain.fixed(a), Plain.fixed(b));
-            let (mut got, sum) = ([0; LANES], Plain.add_fixed(plain_x, plain_y));
+            let x = avx2.fixed(avx2.load(&a));
+            let y = avx2.fixed(avx2.load(&b));
+
+            let plain_x = Plain.fixed(a);
+            let plain_y = Plain.fixed(b);
+            let mut got = [0; LANES];
+            let sum = Plain.add_fixed(plain_x, plain_y);
             avx2.store_fixed(x, &mut got);
             prop_assert_eq!(got, plain_x);
             avx2.store_fixed(avx2.add_fixed(x, y), &mut got);
             prop_assert_eq!(got, sum);
+
             for end in [end, sum[0] as u32 & i32::MAX as u32, 0] {
                 prop_assert_eq!(avx2.within(avx2.add_fixed(x, y), end), Plain.within(sum, end));
             }
@@ -443,7 +460,8 @@ mod tests {
         fn changes_are_those_of_plain_rust(values in prop::collection::vec(0u32..3, 17)) {
             let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
             let window = std::array::from_fn(|k| values[k]);
-            let (mut got, mut want) = ([0; 16], [0; 16]);
+            let mut got = [0; 16];
+            let mut want = [0; 16];
             let same = Plain.changes(&window, 70_000, &mut want);
             let some = avx2.changes(&window, 70_000, &mut got);
             prop_assert_eq!(&got[..some], &want[..same]);

@@ -1,29 +1,30 @@
-//! Eight pixels at a time, for what makes images from hits.
+//! Eight pixels at a time, for making images from hits.
 //!
-//! [`ShadeLanes`] names the few operations on eight values that images need. [`Plain`] has them in plain
-//! Rust, which defines what they give; `shade_avx2.rs` and `shade_width.rs` have them by wide registers.
+//! [`ShadeLanes`] names the few operations on eight values that images need. [`Plain`] implements them in
+//! plain Rust, which defines the results. `shade_avx2.rs` and `shade_width.rs` implement them with wide
+//! registers.
 
 use half::f16;
 
-/// How many pixels go together.
+/// The number of pixels that are handled together.
 pub(crate) const LANES: usize = 8;
 
-/// Bytes of a colour again and again, ten times and more.
+/// The bytes of a block that repeats one colour, a little more than ten times.
 pub(crate) const COLOR_BLOCK: usize = 32;
 
 /// Operations on eight values.
 pub(crate) trait ShadeLanes: Copy {
     /// Eight `f32`.
     type F: Copy;
-    /// Eight whole numbers; of coordinates in an image, in 32768ths of a pixel.
+    /// Eight integers: coordinates in an image are in 32768ths of a pixel.
     type I: Copy;
-    /// Eight numbers from 0 to 1 to the right and eight downwards, in 32768ths.
+    /// The fractions of eight places to the right, and of eight downwards: 0 to 1 in 32768ths.
     type Parts: Copy;
-    /// The 2 × 2 pixels of a texture around each of eight places.
+    /// The 2 × 2 texels around each of eight places.
     type Quads: Copy;
-    /// Weights of eight pixels in −32768ths: negative, so that 1 fits into 16 bits.
+    /// The weights of eight pixels in −32768ths. They are negative, so that 1 fits in 16 bits.
     type Weights: Copy;
-    /// The same of the 2 × 2 pixels of a texture around each of eight places.
+    /// The weights of the 2 × 2 texels around each of eight places, in −32768ths.
     type Corners: Copy;
     /// Sums of weighted colours of eight pixels, in −32768ths of a step of 8 bits.
     type ColorSum: Copy;
@@ -36,80 +37,85 @@ pub(crate) trait ShadeLanes: Copy {
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
     fn div(self, a: Self::F, b: Self::F) -> Self::F;
     fn sqrt(self, a: Self::F) -> Self::F;
-    /// The smaller; `b` if one is not a number.
+    /// Returns the smaller value; `b` if one is NaN.
     fn min(self, a: Self::F, b: Self::F) -> Self::F;
-    /// The larger; `b` if one is not a number.
+    /// Returns the larger value; `b` if one is NaN.
     fn max(self, a: Self::F, b: Self::F) -> Self::F;
-    /// `negative` where the sign bit of `of` is set, else `positive`.
+    /// Returns `negative` where the sign bit of `of` is set, else `positive`.
     fn select_by_sign(self, of: Self::F, negative: Self::F, positive: Self::F) -> Self::F;
-    /// `yes` in the lanes of `these`, else `no`.
+    /// Returns `yes` in the lanes of `these`, else `no`.
     fn select(self, these: u32, yes: Self::F, no: Self::F) -> Self::F;
-    /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
+    /// Rounds towards 0. The result is unspecified where it does not fit into an `i32`.
     fn truncate(self, values: Self::F) -> Self::F;
-    /// Bit k: whether a > b in lane k.
+    /// Returns bit k if a > b in lane k.
     fn greater(self, a: Self::F, b: Self::F) -> u32;
-    /// Rounded towards 0, where that fits into an `i32`; anything elsewhere.
+    /// Stores values rounded towards 0. The result is unspecified where it does not fit into an `i32`.
     fn store_int(self, values: Self::F, to: &mut [i32; LANES]);
 
-    /// ⌊log2⌋ of values of at least 1, and what is left of the logarithm to 0.01.
+    /// Returns ⌊log2⌋ of values of at least 1, and the rest of the logarithm to 0.01.
     fn log2(self, values: Self::F) -> (Self::F, Self::F);
-    /// In 32768ths, rounded towards 0; the least number where that does not fit.
+    /// Converts to 32768ths, rounded towards 0. The result is the least integer where it does not fit.
     fn fixed(self, values: Self::F) -> Self::I;
-    /// Sums, wrapped around.
+    /// Adds, wrapping around.
     fn add_fixed(self, a: Self::I, b: Self::I) -> Self::I;
     fn store_fixed(self, values: Self::I, to: &mut [i32; LANES]);
-    /// Bit k: whether 0 ≤ v < `end` in lane k; `end` is at most 2^31.
+    /// Returns bit k if 0 ≤ v < `end` in lane k; `end` is at most 2^31.
     fn within(self, values: Self::I, end: u32) -> u32;
-    /// Of the places (x, y) of an image whose rows are `stride` bytes: where the upper left pixel begins, and
-    /// how far beyond it the places are. The beginning of the image in lanes that are not among `these`;
-    /// anything for places that are not in an image of less than 2^15 columns, rows and 2^31 bytes.
+    /// Locates the places (x, y) in an image whose rows are `stride` bytes. Returns where the upper left
+    /// texel begins, and the fractions of the places beyond it. Lanes that are not in `these` give the
+    /// beginning of the image. The result is unspecified for places outside an image of less than 2^15
+    /// columns and rows and 2^31 bytes.
     fn place(self, x: Self::I, y: Self::I, stride: i32, these: u32) -> (Self::I, Self::Parts);
-    /// What [`ShadeLanes::place`] gives, from the 32768ths.
+    /// Loads the fractions that [`ShadeLanes::place`] returns, from 32768ths.
     fn parts(self, x: &[i16; LANES], y: &[i16; LANES]) -> Self::Parts;
-    /// The 32768ths.
+    /// Stores fractions as 32768ths.
     fn store_parts(self, parts: Self::Parts, x: &mut [i16; LANES], y: &mut [i16; LANES]);
-    /// The 2 × 2 pixels whose upper left ones begin at `at`; `None` if one is too near the image's end.
+    /// Loads the 2 × 2 texels whose upper left ones begin at `at`. Returns `None` if one is too near the
+    /// image's end.
     fn quads(self, image: &Texels<'_>, at: Self::I) -> Option<Self::Quads>;
-    /// R G B of two neighbours in the lowest six bytes of each: upper ones, lower ones.
+    /// Combines texels: each value has R G B of two neighbours in its lowest six bytes, in the upper and the
+    /// lower row.
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
-    /// Weights from −1 (0) to −32768 (1), rounded towards 0.
+    /// Converts weights from −1 (0) to −32768 (1), rounded towards 0.
     fn weights(self, weights: Self::F) -> Self::Weights;
-    /// `weights`, and none in lanes that are not among `these`.
+    /// Returns `weights`, but 0 in lanes that are not in `these`.
     fn masked(self, these: u32, weights: Self::Weights) -> Self::Weights;
-    /// Weights of 1.
+    /// Returns weights of 1.
     fn full_weights(self) -> Self::Weights;
-    /// Weights shared out to the 2 × 2 pixels around places, downwards and then to the right, by [`part`]:
-    /// each is off by at most 1, and together they are what was shared out.
+    /// Distributes weights over the 2 × 2 texels around places, first by row, then by column, with [`part`].
+    /// Each weight is off by at most 1; together they are the weight that was distributed.
     fn corners(self, parts: Self::Parts, weights: Self::Weights) -> Self::Corners;
-    /// No colour.
+    /// Returns sums without colour.
     fn zero_sum(self) -> Self::ColorSum;
-    /// `sum` and weighted colours. Nothing is rounded.
+    /// Adds weighted colours to `sum`. Nothing is rounded.
     fn add_weighted(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum;
-    /// Of 0 to 255 a channel, not rounded.
+    /// Returns the sums as 0 to 255 a channel, not rounded.
     fn channels(self, sum: Self::ColorSum) -> [Self::F; 3];
-    /// Rounded to bytes, R G B in the lowest three of each value; never black.
+    /// Rounds the sums to bytes: R G B in the lowest three of each value. The result is never black.
     fn pixels(self, sum: Self::ColorSum) -> [u32; LANES];
-    /// The lowest three bytes of each value, one after another.
+    /// Stores the lowest three bytes of each value, one after another.
     fn store_pixels(self, packed: &[u32; LANES], to: &mut [u8; 3 * LANES]);
-    /// The lowest three bytes of a value, again and again.
+    /// Stores the lowest three bytes of a value again and again.
     fn store_repeated(self, packed: u32, to: &mut [u8; COLOR_BLOCK]);
 
-    /// Says that `thing` will be read soon.
+    /// Prefetches `thing`, which will be read soon.
     fn prefetch<T>(self, thing: &T);
-    /// Bit k: whether `values[k]` is `value`.
+    /// Returns bit k if `values[k]` is `value`.
     fn equal(self, values: &[u32; LANES], value: u32) -> u32;
-    /// Where a value differs from the one before it, ascending, as `from` and the number of values in
-    /// between: how many places that are. They are at the beginning of `to`; the rest there is anything.
+    /// Finds where a value differs from the one before it. Writes these places to the beginning of `to`,
+    /// ascending, as `from` plus the offset in `values`, and returns their number. The rest of `to` is
+    /// unspecified.
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
-    /// Depths in 512ths, rounded half up, at most 65,535.
+    /// Converts depths to 512ths, rounded half up, at most 65,535.
     fn depths(self, depths: &[f32; LANES], to: &mut [u16; LANES]);
-    /// Points place + direction × depth, rounded to `f32`; `PANORAMA` says how a direction is made.
+    /// Computes the points place + direction × depth, rounded to `f32`. `PANORAMA` decides how a direction
+    /// is made: see [`EightRays`].
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f32; 3 * LANES]);
-    /// As [`ShadeLanes::points`], rounded once more to half floats.
+    /// Computes the points of [`ShadeLanes::points`], rounded once more to half floats.
     fn half_points<const PANORAMA: bool>(self, rays: &EightRays<'_>, to: &mut [f16; 3 * LANES]);
 }
 
-/// An image's bytes, and up to where 2 × 2 pixels can be read at once.
+/// The bytes of an image, and the end of the places at which 2 × 2 texels can be read at once.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Texels<'a> {
     bytes: &'a [u8],
@@ -118,7 +124,7 @@ pub(crate) struct Texels<'a> {
 }
 
 impl<'a> Texels<'a> {
-    /// Of rows of `stride` bytes.
+    /// Wraps an image with rows of `stride` bytes.
     pub(crate) fn new(bytes: &'a [u8], stride: i32) -> Self {
         let len = i32::try_from(bytes.len()).unwrap_or(0);
         let end = if stride < 0 {
@@ -134,41 +140,42 @@ impl<'a> Texels<'a> {
         self.bytes
     }
 
-    /// Bytes a row.
+    /// Returns the bytes a row.
     #[inline(always)]
     pub(crate) fn stride(&self) -> i32 {
         self.stride
     }
 
-    /// From every place before this one on there are eight bytes, and eight more a `stride` later. Less than
-    /// 2^31.
+    /// Returns the end of the readable places: at every place before it there are eight bytes, and eight more
+    /// a `stride` later. It is less than 2^31.
     #[inline(always)]
     pub(crate) fn end(&self) -> u32 {
         self.end
     }
 }
 
-/// Eight rays side by side, and how far they reach. What belongs to an axis repeats: x y z x y z…
+/// Eight rays side by side, and their depths. Values by axis repeat: x y z x y z…
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EightRays<'a> {
-    /// Of each ray, what its column gives to its direction.
+    /// The part of each ray's direction that depends on its column.
     pub(crate) column: &'a [f64; 3 * LANES],
-    /// What their row gives: to be added to that, or multiplied by it axis by axis if the columns turn.
+    /// The part that depends on the row. It is added to the columns' part in a perspective view, and
+    /// multiplied by it axis by axis in a panorama.
     pub(crate) row: &'a [f64; 12],
-    /// Missing where it is not finite.
+    /// The depths; not finite where nothing is seen.
     pub(crate) depths: &'a [f32; LANES],
-    /// Where they start.
+    /// The common origin of the rays.
     pub(crate) place: &'a [f64; 12],
 }
 
-/// a · b / 32768, rounded half up.
+/// Returns a · b / 32768, rounded half up.
 #[inline(always)]
 pub(crate) fn part(a: i16, b: i16) -> i16 {
     ((i32::from(a) * i32::from(b) + 0x4000) >> 15) as i16
 }
 
-/// Ordinary Rust. Whether longer operations are inlined is left to the compiler: with all of them inlined, the
-/// crate takes 1.08 times as long to compile.
+/// Plain Rust. The compiler decides whether longer operations are inlined: if all of them are, the crate
+/// takes 1.08 times as long to compile.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain;
 
@@ -185,7 +192,7 @@ impl ShadeLanes for Plain {
     type Parts = ([i16; LANES], [i16; LANES]);
     type Quads = [[u64; LANES]; 2];
     type Weights = [i16; LANES];
-    /// By pixel: of the upper row left and right, and of the lower one.
+    /// By pixel: the left and right weights of the upper row, then of the lower row.
     type Corners = [[[i16; 2]; 2]; LANES];
     type ColorSum = [[i32; 3]; LANES];
 
@@ -285,7 +292,7 @@ impl ShadeLanes for Plain {
     }
     #[inline]
     fn within(self, values: [i32; LANES], end: u32) -> u32 {
-        // What is negative is large without a sign.
+        // A negative number is large as an unsigned one.
         (0..LANES).map(|k| u32::from((values[k] as u32) < end) << k).sum()
     }
     #[inline]
@@ -403,7 +410,7 @@ impl ShadeLanes for Plain {
     }
     #[inline]
     fn depths(self, depths: &Eight, to: &mut [u16; LANES]) {
-        // ⌊x + ½⌋ = ⌊(⌊2x⌋ + 1) / 2⌋, and 2x is exact. The cast takes what is not a number to 0.
+        // ⌊x + ½⌋ = ⌊(⌊2x⌋ + 1) / 2⌋, and 2x is exact. The cast turns NaN into 0.
         *to = depths.map(|depth| (((depth * 1024.0).clamp(0.0, 131_070.0) as i32 + 1) >> 1) as u16);
     }
     #[inline]
@@ -431,7 +438,7 @@ impl ShadeLanes for Plain {
     }
 }
 
-/// The eight values from the `at`th on; 0 if there are not as many.
+/// Loads the eight values from the `at`th on; 0 if there are not as many.
 #[inline(always)]
 pub(crate) fn eight<L: ShadeLanes>(lanes: L, of: &[f32], at: usize) -> L::F {
     match of[at..].first_chunk() {
@@ -440,7 +447,7 @@ pub(crate) fn eight<L: ShadeLanes>(lanes: L, of: &[f32], at: usize) -> L::F {
     }
 }
 
-/// Colours of 0 to 255 a channel as R G B in the lowest three bytes of each value, rounded half up.
+/// Packs colours of 0 to 255 a channel: R G B in the lowest three bytes of each value, rounded half up.
 #[inline(always)]
 pub(crate) fn packed<L: ShadeLanes>(lanes: L, color: [L::F; 3]) -> [u32; LANES] {
     let mut packed = [0; LANES];

@@ -1,65 +1,71 @@
-//! What [`Eight`](crate::simd::shade_avx2::Eight) does in registers of 32 and of 64 bytes.
+//! The parts of [`Eight`](crate::simd::shade_avx2::Eight) that need registers of 32 or 64 bytes.
 //!
-//! A place's 2 × 2 pixels are in 128 bits, the two neighbours of the upper row in the first half and those of
-//! the lower row in the second: one instruction multiplies neighbours by their weights and adds the two, for
-//! all channels.
+//! The 2 × 2 texels of a place fill 128 bits: the two neighbours of the upper row in the first half, and the
+//! neighbours of the lower row in the second. One instruction multiplies neighbours by their weights and adds
+//! the two products, for all channels.
 //!
-//! Every block that is unsafe here uses instructions of which `self` is the proof, loads from or stores to
-//! references that are as large, or loads from places of an image that were compared with its end.
+//! Every unsafe block uses instructions whose proof is `self`, or loads from and stores to references that
+//! are large enough, or loads from places that were compared with the end of an image.
 #![allow(unsafe_code)]
 
 use crate::simd::shade_lanes::{EightRays, LANES};
 use s3d_simd::{Avx2, Avx512};
 use std::arch::x86_64::*;
 
-/// The widest registers that hold texels, as the proof that the processor has them.
+/// The widest registers for texels, as the proof that the processor has them.
 pub(crate) trait Width: Copy {
-    /// The weights of the 2 × 2 pixels of eight places.
+    /// The weights of the 2 × 2 texels of eight places.
     type Corners: Copy;
-    /// The 2 × 2 pixels.
+    /// The 2 × 2 texels of eight places.
     type Quads: Copy;
     /// Weighted sums.
     type ColorSum: Copy;
 
-    /// Of the weights of neighbours in a row: those of pixels 0 to 3 in the upper and then in the lower row,
-    /// and those of pixels 4 to 7.
+    /// Combines the weights of neighbours. `low` has the weights of pixels 0 to 3, for the upper and then for
+    /// the lower row; `high` has the weights of pixels 4 to 7.
     fn corners(self, low: __m256i, high: __m256i) -> Self::Corners;
+    /// Loads the 2 × 2 texels of eight places.
+    ///
     /// # Safety
-    /// At every place, and `stride` bytes after it, are eight bytes.
+    /// Eight bytes must be readable at every place, and eight more `stride` bytes after it.
     unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads;
+    /// Combines texels that were read one by one: see [`crate::simd::shade_lanes::ShadeLanes::quads_from`].
     fn quads_from(self, upper: &[u64; LANES], lower: &[u64; LANES]) -> Self::Quads;
+    /// Returns sums of 0.
     fn none(self) -> Self::ColorSum;
+    /// Adds weighted texels to the sums.
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum;
     /// See [`crate::simd::shade_lanes::ShadeLanes::channels`].
     fn channels(self, sum: Self::ColorSum) -> [__m256; 3];
-    /// R, G, B and 0, rounded to bytes.
+    /// Returns R, G, B and 0, rounded to bytes.
     fn bytes(self, sum: Self::ColorSum) -> __m256i;
     /// See [`crate::simd::shade_lanes::ShadeLanes::changes`].
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize;
-    /// What [`crate::simd::shade_lanes::ShadeLanes::points`] stores.
+    /// Returns the points of [`crate::simd::shade_lanes::ShadeLanes::points`].
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>) -> [__m256; 3];
 }
 
-/// The upper neighbours' R G B R G B as 16-bit numbers R R, G G, B B; and the lower ones'.
+/// The upper neighbours' R G B R G B as the 16-bit numbers R R, G G, B B; then the same for the lower
+/// neighbours.
 const NEIGHBORS: [[i8; 16]; 2] = [
     [0, -1, 3, -1, 1, -1, 4, -1, 2, -1, 5, -1, -1, -1, -1, -1],
     [8, -1, 11, -1, 9, -1, 12, -1, 10, -1, 13, -1, -1, -1, -1, -1],
 ];
 
-/// The 2 × 2 pixels of each place.
+/// Loads the 2 × 2 texels of each place.
 ///
 /// # Safety
-/// The processor has AVX2. At every place, and `stride` bytes after it, are eight bytes.
+/// The processor has AVX2. Eight bytes are readable at every place, and eight more `stride` bytes after it.
 #[inline(always)]
 unsafe fn pairs(bytes: *const u8, at: __m256i, stride: usize) -> [__m128i; LANES] {
-    // SAFETY: the caller's word; eight values are stored in an array of eight.
+    // SAFETY: the caller vouches for the places; eight values are stored in an array of eight.
     unsafe {
         let (mut each, below) = ([0u32; LANES], bytes.add(stride));
         _mm256_storeu_si256(each.as_mut_ptr().cast(), at);
         let mut pairs = [_mm_setzero_si128(); LANES];
         for k in 0..LANES {
-            // Volatile, since compilers would rather take `at` apart than load from where it was stored:
-            // twice the work.
+            // The load is volatile, since compilers would otherwise take `at` apart instead of loading it
+            // from where it was stored: twice the work.
             let at = std::ptr::read_volatile(&each[k]) as usize;
             let (upper, lower) = (bytes.add(at).cast::<f64>(), below.add(at).cast::<f64>());
             pairs[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_load_sd(upper), lower));
@@ -68,9 +74,9 @@ unsafe fn pairs(bytes: *const u8, at: __m256i, stride: usize) -> [__m128i; LANES
     }
 }
 
-/// 32 bytes: pixels k and k + 4 a register.
+/// 32 bytes: pixels k and k + 4 share a register.
 impl Width for Avx2 {
-    /// Of the upper neighbours, as pixels in a register, and of the lower ones.
+    /// The upper neighbours' weights, as pixels in a register, then the lower neighbours' weights.
     type Corners = [__m256i; 2];
     type Quads = [__m256i; 4];
     type ColorSum = [__m256i; 4];
@@ -84,7 +90,7 @@ impl Width for Avx2 {
     }
     #[inline(always)]
     unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads {
-        // SAFETY: `self` is the proof of AVX2. What is around the places is the caller's word.
+        // SAFETY: `self` is the proof of AVX2. The caller vouches for the places.
         unsafe {
             let pairs = pairs(bytes, at, stride);
             let mut quads = [_mm256_setzero_si256(); 4];
@@ -113,7 +119,7 @@ impl Width for Avx2 {
     }
     #[inline(always)]
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
-        // SAFETY: `self` is the proof of AVX2. Sixteen bytes are loaded of sixteen.
+        // SAFETY: `self` is the proof of AVX2. All sixteen bytes are loaded.
         unsafe {
             let mut sum = sum;
             for (neighbors, corners) in NEIGHBORS.iter().zip(corners) {
@@ -136,7 +142,7 @@ impl Width for Avx2 {
     fn channels(self, [a, b, c, d]: Self::ColorSum) -> [__m256; 3] {
         // SAFETY: `self` is the proof of AVX2.
         unsafe {
-            // R R G G, and B B.
+            // Red and green, then blue.
             let (ab, cd) = (_mm256_unpacklo_epi32(a, b), _mm256_unpacklo_epi32(c, d));
             let blue = _mm256_unpacklo_epi64(_mm256_unpackhi_epi32(a, b), _mm256_unpackhi_epi32(c, d));
             let mut channels = [_mm256_setzero_ps(); 3];
@@ -172,9 +178,9 @@ impl Width for Avx2 {
     }
 }
 
-/// 64 bytes: pixels 0 to 3 a register, and 4 to 7.
+/// 64 bytes: pixels 0 to 3 are in one register, 4 to 7 in another.
 impl Width for Avx512 {
-    /// By register, of the upper neighbours and of the lower ones.
+    /// By register: the upper neighbours' weights, then the lower neighbours' weights.
     type Corners = [[__m512i; 2]; 2];
     type Quads = [__m512i; 2];
     type ColorSum = [__m512i; 2];
@@ -194,7 +200,7 @@ impl Width for Avx512 {
     }
     #[inline(always)]
     unsafe fn quads(self, bytes: *const u8, at: __m256i, stride: usize) -> Self::Quads {
-        // SAFETY: `self` is the proof of AVX-512. What is around the places is the caller's word.
+        // SAFETY: `self` is the proof of AVX-512. The caller vouches for the places.
         unsafe {
             let [a, b, c, d, e, f, g, h] = pairs(bytes, at, stride);
             let (ab, cd) = (_mm256_set_m128i(b, a), _mm256_set_m128i(d, c));
@@ -225,7 +231,7 @@ impl Width for Avx512 {
     }
     #[inline(always)]
     fn add(self, sum: Self::ColorSum, quads: Self::Quads, corners: Self::Corners) -> Self::ColorSum {
-        // SAFETY: `self` is the proof of AVX-512. Sixteen bytes are loaded of sixteen.
+        // SAFETY: `self` is the proof of AVX-512. All sixteen bytes are loaded.
         unsafe {
             let mut sum = sum;
             for k in 0..2 {
@@ -269,8 +275,8 @@ impl Width for Avx512 {
     }
     #[inline(always)]
     fn changes(self, values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
-        // SAFETY: `self` is the proof of AVX-512. Sixteen of seventeen values are loaded, and sixteen stored
-        // of sixteen.
+        // SAFETY: `self` is the proof of AVX-512. Sixteen of seventeen values are loaded, and sixteen of
+        // sixteen stored.
         unsafe {
             let before = _mm512_loadu_si512(values.as_ptr().cast());
             let after = _mm512_loadu_si512(values.as_ptr().add(1).cast());
@@ -283,14 +289,15 @@ impl Width for Avx512 {
     }
     #[inline(always)]
     fn points<const PANORAMA: bool>(self, rays: &EightRays<'_>) -> [__m256; 3] {
-        // Of the numbers 8k to 8k + 7: whose depth it is, and where x y z x y z… begins.
+        // For the numbers 8k to 8k + 7: the pixel of each depth, and the first axis of x y z x y z…
         const DEPTHS: [[i64; 8]; 3] =
             [[0, 0, 0, 1, 1, 1, 2, 2], [2, 3, 3, 3, 4, 4, 4, 5], [5, 5, 6, 6, 6, 7, 7, 7]];
         const AXES: [usize; 3] = [0, 2, 1];
-        /// Infinities and what is not a number.
+        /// The class of infinities and NaNs.
         const MISSING: i32 = 0b1001_1001;
         let EightRays { column, row, depths, place } = *rays;
         // SAFETY: `self` is the proof of AVX-512. Loads are from slices and arrays of eight.
+
         unsafe {
             let all = _mm512_cvtps_pd(_mm256_loadu_ps(depths.as_ptr()));
             let load = |from: &[f64], k: usize| _mm512_loadu_pd(from[k..k + 8].as_ptr());
@@ -312,7 +319,7 @@ impl Width for Avx512 {
     }
 }
 
-/// By a byte: the numbers of the bits that are set, ascending, and zeros.
+/// For each byte: the numbers of its set bits, ascending, then zeros.
 static BITS: [[u8; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut byte = 0;
@@ -330,7 +337,7 @@ static BITS: [[u8; 8]; 256] = {
     table
 };
 
-/// See [`Width::changes`].
+/// Implements [`Width::changes`] for AVX2.
 #[inline]
 #[target_feature(enable = "avx2,popcnt")]
 fn changes_by_eights(values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 * LANES]) -> usize {
@@ -352,7 +359,7 @@ fn changes_by_eights(values: &[u32; 2 * LANES + 1], from: u32, to: &mut [u32; 2 
     count
 }
 
-/// See [`Width::points`].
+/// Implements [`Width::points`] for AVX2.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn points_by_fours<const PANORAMA: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
@@ -365,6 +372,7 @@ fn points_by_fours<const PANORAMA: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
         _mm256_andnot_ps(_mm256_set1_ps(-0.0), all),
         _mm256_set1_ps(f32::INFINITY),
     );
+
     let mut out = [_mm_setzero_ps(); 6];
     for half in 0..2 {
         let (four, seen) = if half == 0 {
@@ -372,6 +380,7 @@ fn points_by_fours<const PANORAMA: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
         } else {
             (_mm256_extractf128_ps::<1>(all), _mm256_extractf128_ps::<1>(seen))
         };
+
         let depths = _mm256_cvtps_pd(four);
         let times = [
             _mm256_permute4x64_pd::<0b01_00_00_00>(depths),
@@ -383,6 +392,7 @@ fn points_by_fours<const PANORAMA: bool>(rays: &EightRays<'_>) -> [__m256; 3] {
             _mm_permute_ps::<0b10_10_01_01>(seen),
             _mm_permute_ps::<0b11_11_11_10>(seen),
         ];
+
         for k in 0..3 {
             let (column, row) = (load(column, 3 * half + k), load(row, k));
             let direction = if PANORAMA {

@@ -1,14 +1,15 @@
-//! Files for decoders that are not ours: they allocate what a damaged file claims, and stop at a header that
-//! miscounts what nobody needs.
+//! Wrappers of a LAS file, for a decoder that is not ours: it allocates whatever a damaged file claims, and
+//! stops at header counts that nobody needs.
 //!
-//! laz allocates every layer of a chunk before it reads one: up to 4 GiB each for a file of a few hundred
-//! bytes (`tests/findings.rs` feeds those again that were found).
+//! The crate laz allocates every layer of a chunk before it reads one: up to 4 GiB each, for a file of a few
+//! hundred bytes. `tests/findings.rs` feeds it such files again.
 
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// A file whose decoder allocates as much as a number of four bytes says, before it reads that many.
+/// A file with a bound on lengths: its decoder allocates as many bytes as a four-byte number says, and only
+/// then reads them.
 #[derive(Debug)]
 pub(crate) struct BoundedClaims<R> {
     file: R,
@@ -16,7 +17,7 @@ pub(crate) struct BoundedClaims<R> {
 }
 
 impl<R> BoundedClaims<R> {
-    /// Beside the file the largest number of four bytes that it hands on. At first that is any.
+    /// Returns the file, and the largest four-byte number that it passes on. At first this is any number.
     pub(crate) fn new(file: R) -> (Self, Arc<AtomicU32>) {
         let most = Arc::new(AtomicU32::new(u32::MAX));
         (Self { file, most: most.clone() }, most)
@@ -46,17 +47,17 @@ impl<R: Seek> Seek for BoundedClaims<R> {
     }
 }
 
-/// A file with other numbers at a few places.
+/// A file that reads other numbers at a few places.
 #[derive(Debug)]
 pub(crate) struct Mended<R> {
     file: R,
     at: u64,
-    /// Where, and what stands there instead.
+    /// Where each number stands, and its bytes.
     mends: Vec<(u64, [u8; 4])>,
 }
 
 impl<R> Mended<R> {
-    /// The file from its first byte, with these numbers at these places.
+    /// Wraps `file`, which must be at its first byte, with these numbers at these places.
     pub(crate) fn new(file: R, mends: &[(u64, u32)]) -> Self {
         Self { file, at: 0, mends: mends.iter().map(|(at, n)| (*at, n.to_le_bytes())).collect() }
     }
@@ -98,7 +99,8 @@ mod tests {
         for at_once in 1..20 {
             let mut file = Mended::new(Cursor::new(&bytes), &[(3, 0x0607_0809), (12, 5)]);
             for start in [0, 5] {
-                let (mut all, mut piece) = (Vec::new(), vec![0; at_once]);
+                let mut all = Vec::new();
+                let mut piece = vec![0; at_once];
                 file.seek(SeekFrom::Start(start)).unwrap();
                 loop {
                     let n = file.read(&mut piece).unwrap();

@@ -1,4 +1,4 @@
-//! `pointcloud.mat` as a source of annotations.
+//! Annotations from `pointcloud.mat`.
 
 use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
@@ -16,17 +16,17 @@ use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the name of an object says.
+/// The meaning of an object's name.
 enum Named {
     Instance(Class, u32),
-    /// A word that is no class, but taken for one.
+    /// The word is no class of its own, but counts as this one.
     Other(Class),
-    /// A word of what is left out.
+    /// The points are left out.
     Unlabelled,
 }
 
 impl Annotations {
-    /// The objects of a `pointcloud.mat`. Those without points are left out, with a warning.
+    /// Takes the objects of a `pointcloud.mat`. Objects without points are left out, with a warning.
     pub(crate) fn from_mat(source: Source, options: &AnnotationOptions) -> Result<Self> {
         let path = source.name();
         let columns = [&options.class_column, &options.instance_column, &options.room_column];
@@ -36,8 +36,10 @@ impl Annotations {
                 "names rooms, classes and instances itself: columns and a room are for clouds",
             ));
         }
+
         let taxonomy = options.taxonomy.clone();
         let mut all = Self { taxonomy, rooms: Vec::new(), warnings: Vec::new() };
+
         for room in MatArea::read(&source)?.rooms {
             if let Some(room) = all.mat_room(path, room, options)? {
                 match all.rooms.binary_search_by_key(&room.room, |r| r.room) {
@@ -46,12 +48,14 @@ impl Annotations {
                 }
             }
         }
+
         if all.rooms.is_empty() {
             return Err(Error::format(path, "holds no room with an object that has points"));
         }
         Ok(all)
     }
 
+    /// The room and its objects. Returns `None` if it is left out.
     fn mat_room(
         &mut self,
         path: &Path,
@@ -65,6 +69,7 @@ impl Annotations {
                 return Ok(None);
             }
         };
+
         let mut objects: BTreeMap<(Class, u32), MatObject> = BTreeMap::new();
         let mut others: Vec<(Class, MatObject)> = Vec::new();
         for object in found.objects {
@@ -86,6 +91,8 @@ impl Annotations {
                 Err(message) => self.fault(path, options, format!("{}: {message}", object.part()))?,
             }
         }
+
+        // Objects of other words get the numbers after the last of their class.
         for (class, object) in others {
             let last = objects.range((class, 0)..=(class, u32::MAX)).next_back();
             let number = last.map_or(0, |((_, n), _)| *n) + 1;
@@ -94,7 +101,9 @@ impl Annotations {
                 .push(format!("{}: {part} is taken for {class}_{number}", path.display()));
             objects.insert((class, number), object);
         }
-        let (offset_m, on_fault) = (options.offset_m, options.on_fault);
+
+        let offset_m = options.offset_m;
+        let on_fault = options.on_fault;
         let instances: Vec<AnnotatedInstance> = objects
             .into_iter()
             .map(|((class, number), object)| {
@@ -119,7 +128,7 @@ impl Annotations {
     }
 }
 
-/// Class and number of "chair_3".
+/// The class and number that a name such as "chair_3" stands for.
 fn named(name: &str, options: &AnnotationOptions) -> std::result::Result<Named, String> {
     let digits = name
         .rsplit_once('_')
@@ -131,6 +140,7 @@ fn named(name: &str, options: &AnnotationOptions) -> std::result::Result<Named, 
         let name = quote(name.as_bytes());
         return Err(format!("{name} names no instance: a name is CLASS_N, with N from 1, as in chair_3"));
     };
+
     Ok(match class_of_word(&options.taxonomy, &options.classes, options.unknown_as_clutter, word) {
         Ok(Some(ClassOfWord::Own(class))) => Named::Instance(class, number),
         Ok(Some(ClassOfWord::Other(class))) => Named::Other(class),

@@ -1,4 +1,4 @@
-//! `pointcloud.mat`: the points of a published area.
+//! `pointcloud.mat`, which holds the points of a published area.
 
 mod annotations;
 mod hdf5;

@@ -1,5 +1,5 @@
-//! Reading `pointcloud.mat`, as MATLAB saved the published ones and as [`MatWriter`](crate::cloud::MatWriter)
-//! writes it.
+//! Reads `pointcloud.mat`, as MATLAB saved the published files and as [`MatWriter`](crate::cloud::MatWriter)
+//! writes them.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -16,18 +16,18 @@ use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Cells in cells, and references to references.
+/// The deepest nesting of cells in cells, and of references to references.
 const MAX_DEPTH: usize = 8;
-/// Characters of a name.
+/// The most characters of a name.
 const LONGEST_NAME: u64 = 4096;
 
-/// What a `pointcloud.mat` holds: names, and where the points are.
+/// The names in a `pointcloud.mat`, and where its points are.
 ///
-/// The file is a MAT-file of version 7.3 with a variable `Area` (or of any other name, if there is one alone
-/// with a field `Disjoint_Space`), in which [`MatWriter`](crate::cloud::MatWriter) tells what is. Of an area
-/// only `Disjoint_Space` is needed, of a room `name` and `object`, of an object `name` and `points`; other
-/// fields may be there. Struct arrays may be cells of structs; names may be in cells; numbers may be of any
-/// class. `points` and `RGB_color` may be of 3 × N instead of N × 3.
+/// The file is a MAT-file of version 7.3 with a variable `Area`, as [`MatWriter`](crate::cloud::MatWriter)
+/// describes it. The variable may have another name if no other one has a field `Disjoint_Space`. An area
+/// needs only `Disjoint_Space`, a room `name` and `object`, and an object `name` and `points`; there may be
+/// other fields. Struct arrays may be cells of structs, names may be in cells, and numbers may be of any
+/// class. `points` and `RGB_color` may be 3 × N instead of N × 3.
 #[derive(Clone, Debug)]
 pub struct MatArea {
     /// The area's name: "Area_1". `None` if the file has none.
@@ -41,7 +41,7 @@ pub struct MatArea {
 pub struct MatRoom {
     /// Its name: "office_1".
     pub name: String,
-    /// By how many degrees it is turned about Z to bring its walls parallel to the axes.
+    /// The angle in degrees by which it is turned about Z to bring its walls parallel to the axes.
     pub alignment_deg: Option<f64>,
     /// Its objects, in the order of the file.
     pub objects: Vec<MatObject>,
@@ -54,12 +54,14 @@ pub struct MatObject {
     pub name: String,
     /// Its label: "chair_17_office_1_1". `None` if the file has none.
     pub global_name: Option<String>,
-    /// How many points it has.
+    /// The number of its points.
     pub len: u64,
     file: Arc<MatFile>,
+    /// Address of the array of positions.
     points: u64,
+    /// Address of the array of colours.
     colors: Option<u64>,
-    /// "office_1, chair_3"
+    /// Its name in messages: "office_1, chair_3".
     part: String,
 }
 
@@ -69,7 +71,7 @@ struct MatFile {
     hdf5: Hdf5File,
 }
 
-/// The fields of a struct, by name: addresses of objects.
+/// The fields of a struct: names, and addresses of objects.
 type Fields = BTreeMap<String, u64>;
 
 impl MatArea {
@@ -77,16 +79,16 @@ impl MatArea {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Unsupported`] for forms of HDF5 that MATLAB does not write; [`Error::Format`]
-    /// if it is no MAT-file of version 7.3, is cut off or damaged, or has not these structs: the sentence
-    /// names the field.
+    /// if the file is no MAT-file of version 7.3, is cut off or damaged, or lacks one of the structs or their
+    /// fields, which the message names.
     pub fn open(path: &Path) -> Result<Self> {
         Self::read(&Source::file(path))
     }
 
-    /// As [`MatArea::open`], from a reader of the file's bytes; errors call the file `name`.
+    /// Reads like [`MatArea::open`], from a reader of the file's bytes. Errors call the file `name`.
     ///
     /// # Errors
-    /// As [`MatArea::open`].
+    /// The errors of [`MatArea::open`].
     pub fn new(reader: impl Read + Seek + Send + 'static, name: &Path) -> Result<Self> {
         Self::read(&Source::reader(name, reader))
     }
@@ -95,6 +97,7 @@ impl MatArea {
         let file = Arc::new(MatFile { path: source.name().to_owned(), hdf5: Hdf5File::open(source)? });
         let area = file.area()?;
         let name = area.get("name").map(|name| file.text(*name, "Area.name")).transpose()?;
+
         let mut rooms = Vec::new();
         let place = "Area.Disjoint_Space";
         for (i, fields) in (1..).zip(file.structs(field(&file, &area, "Disjoint_Space", "Area")?, place)?) {
@@ -105,12 +108,13 @@ impl MatArea {
 }
 
 impl MatObject {
-    /// Appends the points to `out`: as many as [`MatObject::len`], in world metres, with a colour each (black
-    /// if the file has none).
+    /// Appends the object's [`MatObject::len`] points to `out`, in world metres, with a colour each (black if
+    /// the file has none).
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if the arrays are damaged, or for a coordinate that is not finite or
-    /// a colour beyond 0 to 255: the sentence says which point. `out` may then hold the points before it.
+    /// [`Error::Io`]; [`Error::Format`] if the arrays are damaged, and for a coordinate that is not finite or
+    /// a colour beyond 0 to 255, with the number of the point. After an error, `out` may hold the points
+    /// before it.
     ///
     /// # Panics
     /// If `out` has points without colours or with faces.
@@ -119,8 +123,8 @@ impl MatObject {
         Ok(())
     }
 
-    /// As [`MatObject::read`], less `offset_m`, which is subtracted before positions become `f32`, and with a
-    /// choice of what to do at a point that is none.
+    /// Reads like [`MatObject::read`]. Subtracts `offset_m` before positions become `f32`, and skips invalid
+    /// points or stops at them.
     pub(crate) fn read_with(
         &self,
         offset_m: DVec3,
@@ -132,20 +136,23 @@ impl MatObject {
         if self.len == 0 {
             return Ok(skipped);
         }
+
         let place = |what| format!("{}, {what}", self.part);
         let positions = self.file.triples(self.points, &place("points"))?;
         let colors = self
             .colors
             .map(|at| self.file.triples(at, &place("RGB_color")))
             .transpose()?;
+
         let n = positions.len();
         let counts = [Some(n), colors.as_ref().map(Triples::len)];
         if let Some(other) = counts.into_iter().flatten().find(|count| *count as u64 != self.len) {
-            let (part, n) = (&self.part, self.len);
             return Err(self.fault(format!(
-                "{part}: has {n} points and {other} colours, or it changed while it was read"
+                "{}: has {} points and {other} colours, or it changed while it was read",
+                self.part, self.len
             )));
         }
+
         out.positions.reserve(n);
         out.colors.reserve(n);
         for i in 0..n {
@@ -153,15 +160,17 @@ impl MatObject {
             let point = DVec3::from_array(positions.row(i)) - offset_m;
             let color = colors.as_ref().map_or([0.0; 3], |c| c.row(i));
             let position = point.as_vec3();
-            let wrong = if !position.is_finite() {
-                format!("lies at {point}, which is no place")
-            } else if !color.iter().all(|c| (0.0..=255.0).contains(c)) {
-                format!("has the colour {color:?}, which is none from 0 to 255")
-            } else {
+            if position.is_finite() && color.iter().all(|c| (0.0..=255.0).contains(c)) {
                 out.positions.push(position);
                 #[expect(clippy::cast_possible_truncation, reason = "checked above: 0 to 255")]
                 out.colors.push(color.map(|c| c.round() as u8));
                 continue;
+            }
+
+            let wrong = if position.is_finite() {
+                format!("has the colour {color:?}, which is not from 0 to 255")
+            } else {
+                format!("lies at {point}, which is not finite")
             };
             let error = self.fault(format!("{}: point {} {wrong}", self.part, i.saturating_add(1)));
             if on_fault == OnFault::Stop {
@@ -173,12 +182,12 @@ impl MatObject {
         Ok(skipped)
     }
 
-    /// The file.
+    /// The path of the file.
     pub(crate) fn path(&self) -> &Path {
         &self.file.path
     }
 
-    /// Which object of it this is: "office_1, chair_3".
+    /// The object's name in messages: "office_1, chair_3".
     pub(crate) fn part(&self) -> &str {
         &self.part
     }
@@ -189,7 +198,7 @@ impl MatObject {
 }
 
 impl MatFile {
-    /// The struct of the area.
+    /// Finds the struct of the area.
     fn area(&self) -> Result<Fields> {
         let variables = self.hdf5.members(&self.hdf5.root()?)?.unwrap_or_default();
         let mut found = None;
@@ -205,6 +214,7 @@ impl MatFile {
                 }
             }
         }
+
         let Some(address) = found else {
             let names: Vec<&str> = variables.iter().map(|(name, _)| name.as_str()).take(8).collect();
             return Err(self.hdf5.fault(format!(
@@ -212,15 +222,14 @@ impl MatFile {
                  of an area?"
             )));
         };
+
         let mut areas = self.structs(address, "Area")?;
-        match (areas.pop(), areas.is_empty()) {
-            (Some(area), true) => Ok(area),
-            (last, _) => {
-                let n = areas.iter().chain(&last).count();
-                Err(self
-                    .hdf5
-                    .fault(format!("holds {n} areas: save each in a file of its own")))
-            }
+        let count = areas.len();
+        match areas.pop().filter(|_| count == 1) {
+            Some(area) => Ok(area),
+            None => Err(self
+                .hdf5
+                .fault(format!("holds {count} areas: save each in a file of its own"))),
         }
     }
 
@@ -230,6 +239,7 @@ impl MatFile {
             Some(angle) => self.number(*angle)?,
             None => None,
         };
+
         let within = format!("{place}.object");
         let mut objects = Vec::new();
         for (i, object) in (1..).zip(self.structs(field(self, fields, "object", place)?, &within)?) {
@@ -244,6 +254,7 @@ impl MatFile {
             Some(global) => Some(self.text(*global, &format!("{place}.global_name"))?),
             None => None,
         };
+
         let points = field(self, fields, "points", place)?;
         let object = self.hdf5.object(points)?;
         let len = match self.array(&object, &format!("{place}.points"))? {
@@ -253,15 +264,16 @@ impl MatFile {
             })?,
             None => 0,
         };
+
         let colors = fields.get("RGB_color").copied();
         let part = format!("{room}, {name}");
         Ok(MatObject { name, global_name, len, file: self.clone(), points, colors, part })
     }
 
-    /// The structs of a struct array, of one struct or of cells of structs.
+    /// The structs of a struct array, of a single struct or of cells of structs.
     fn structs(&self, address: u64, place: &str) -> Result<Vec<Fields>> {
         let mut found = Vec::new();
-        // Every struct and every cell of a sound file has a header of its own.
+        // In a sound file, every struct and every cell has a header of its own.
         let mut left = self.hdf5.len() / 16;
         self.push_structs(address, place, MAX_DEPTH, &mut left, &mut found)?;
         Ok(found)
@@ -276,15 +288,17 @@ impl MatFile {
         found: &mut Vec<Fields>,
     ) -> Result<()> {
         if depth == 0 || *left == 0 {
-            return Err(self
-                .hdf5
-                .fault(format!("{place}: refers to itself, or more often than there is place for")));
+            return Err(self.hdf5.fault(format!(
+                "{place}: refers to itself, or has more structs than the file has room for"
+            )));
         }
         *left = left.saturating_sub(1);
+
         let object = self.hdf5.object(address)?;
         if object.header.is_set("MATLAB_empty") {
             return Ok(());
         }
+
         let Some(members) = self.hdf5.members(&object)? else {
             let Some(references) = self.references(&object)? else {
                 return Err(self.hdf5.fault(format!("{place}: is no struct")));
@@ -294,7 +308,8 @@ impl MatFile {
                 .into_iter()
                 .try_for_each(|at| self.push_structs(at, place, below, left, found));
         };
-        // The fields of an array of structs are references to its elements', all as many.
+
+        // In an array of structs, each field is a list of references with an entry for each struct.
         let mut columns = Vec::new();
         for (name, address) in &members {
             let member = self.hdf5.object(*address)?;
@@ -307,30 +322,35 @@ impl MatFile {
                 }
             }
         }
+
         let n = columns.first().map_or(0, |(_, references)| references.len());
         if let Some((name, other)) = columns.iter().find(|(_, references)| references.len() != n) {
             let message = format!("{place}: has {n} elements, but {} in its field {name}", other.len());
             return Err(self.hdf5.fault(message));
         }
-        let field = |i: usize, (name, refs): &(&String, Vec<u64>)| Some(((*name).clone(), *refs.get(i)?));
-        found
-            .extend((0..n).map(|i| columns.iter().filter_map(|column| field(i, column)).collect::<Fields>()));
+
+        for i in 0..n {
+            let fields = columns
+                .iter()
+                .filter_map(|(name, references)| Some(((*name).clone(), *references.get(i)?)));
+            found.push(fields.collect());
+        }
         Ok(())
     }
 
-    /// The references of an array of them, `None` if it is something else.
+    /// The references of an array. Returns `None` if the object is something else.
     fn references(&self, object: &Object) -> Result<Option<Vec<u64>>> {
         match object.header.dataset() {
             Some(array) if array.kind == Kind::Reference => {
                 let data = self.hdf5.data(&array)?;
-                let address = |bytes: &[u8]| bytes.iter().rev().fold(0, |n, b| n << 8 | u64::from(*b));
-                Ok(Some(data.chunks_exact(8).map(address).collect()))
+                let addresses = data.chunks_exact(8).map(|address| bits(address, false));
+                Ok(Some(addresses.collect()))
             }
             _ => Ok(None),
         }
     }
 
-    /// An object as an array, `None` if it is an empty one.
+    /// Takes an object as an array. Returns `None` if the array is empty.
     fn array(&self, object: &Object, place: &str) -> Result<Option<Dataset>> {
         let Some(array) = object.header.dataset() else {
             return Err(self.hdf5.fault(format!("{place}: is no array")));
@@ -339,7 +359,7 @@ impl MatFile {
         Ok((!is_empty).then_some(array))
     }
 
-    /// The text of an array of characters, perhaps in a cell.
+    /// Reads the text of an array of characters, which may be in a cell.
     fn text(&self, address: u64, place: &str) -> Result<String> {
         let mut address = address;
         for _ in 0..MAX_DEPTH {
@@ -348,41 +368,24 @@ impl MatFile {
                 address = one;
                 continue;
             }
+
             let Some(array) = self.array(&object, place)? else { return Ok(String::new()) };
             let length = array.dims.iter().try_fold(1u64, |n, d| n.checked_mul(*d));
-            let is_short = |n: u64| n <= LONGEST_NAME;
-            if !length.is_some_and(is_short) || !is_short(array.kind.size() as u64) {
+            let is_short =
+                length.is_some_and(|n| n <= LONGEST_NAME) && array.kind.size() as u64 <= LONGEST_NAME;
+            if !is_short {
                 return Err(self
                     .hdf5
                     .fault(format!("{place}: is {}, too long for a name", size(&array.dims))));
             }
             let data = self.hdf5.data(&array)?;
-            let text = match array.kind {
-                Kind::Integer { size: 1, .. } | Kind::Text { .. } => String::from_utf8(data).ok(),
-                Kind::Integer { size: 2, big_endian, .. } => {
-                    let unit = if big_endian {
-                        u16::from_be_bytes
-                    } else {
-                        u16::from_le_bytes
-                    };
-                    let units: Vec<u16> = data.as_chunks().0.iter().map(|b| unit(*b)).collect();
-                    String::from_utf16(&units).ok()
-                }
-                Kind::Integer { size, big_endian, .. } if size > 0 => {
-                    let codes = data.chunks_exact(size).map(|b| bits(b, big_endian));
-                    codes
-                        .map(|code| u32::try_from(code).ok().and_then(char::from_u32))
-                        .collect()
-                }
-                _ => None,
-            };
-            let Some(text) = text else { break };
+            let Some(text) = characters(array.kind, data) else { break };
             return Ok(text.trim_matches(|c: char| c == '\0' || c.is_whitespace()).to_owned());
         }
         Err(self.hdf5.fault(format!("{place}: is no text")))
     }
 
-    /// The number of an array of one, `None` if it is something else.
+    /// Reads the number of an array with one element. Returns `None` if the object is something else.
     fn number(&self, address: u64) -> Result<Option<f64>> {
         let object = self.hdf5.object(address)?;
         let Some(array) = object.header.dataset().filter(|a| a.dims.iter().all(|d| *d == 1)) else {
@@ -394,16 +397,14 @@ impl MatFile {
         Ok(Some(number(array.kind, &self.hdf5.data(&array)?)))
     }
 
-    /// The rows of three numbers of an array.
+    /// Reads an array of rows of three numbers.
     fn triples(&self, address: u64, place: &str) -> Result<Triples> {
         let object = self.hdf5.object(address)?;
         let Some(array) = self.array(&object, place)? else {
             return Ok(Triples { data: Vec::new(), kind: Kind::Other { size: 1 }, n: 0, is_by_column: true });
         };
         if !matches!(array.kind, Kind::Integer { .. } | Kind::Float { .. }) {
-            return Err(self
-                .hdf5
-                .fault(format!("{place}: holds something else than real numbers")));
+            return Err(self.hdf5.fault(format!("{place}: does not hold real numbers")));
         }
         let axes = axes_of_triples(&array.dims).and_then(|(n, by)| Some((usize::try_from(n).ok()?, by)));
         let Some((n, is_by_column)) = axes else {
@@ -411,6 +412,7 @@ impl MatFile {
                 .hdf5
                 .fault(format!("{place}: is {}, and not N x 3", size(&array.dims))));
         };
+
         let data = self.hdf5.data(&array)?;
         Ok(Triples { data, kind: array.kind, n, is_by_column })
     }
@@ -421,7 +423,7 @@ struct Triples {
     data: Vec<u8>,
     kind: Kind,
     n: usize,
-    /// All first numbers, then all second ones…, as MATLAB stores N × 3.
+    /// Whether all first numbers come before all second numbers and so on, as MATLAB stores N × 3.
     is_by_column: bool,
 }
 
@@ -430,7 +432,7 @@ impl Triples {
         self.n
     }
 
-    /// Three numbers; what is not there is not a number.
+    /// The numbers of a row. Missing numbers are NaN.
     fn row(&self, row: usize) -> [f64; 3] {
         let size = self.kind.size();
         let number = |column: usize| {
@@ -446,7 +448,8 @@ impl Triples {
     }
 }
 
-/// How many triples an array of these extents (in HDF5's order) has, and whether they are stored by column.
+/// The number of triples in an array with these extents (in HDF5's order), and whether they are stored by
+/// column.
 fn axes_of_triples(dims: &[u64]) -> Option<(u64, bool)> {
     match *dims {
         [3, n] => Some((n, true)),
@@ -455,7 +458,7 @@ fn axes_of_triples(dims: &[u64]) -> Option<(u64, bool)> {
     }
 }
 
-/// The extents of an array as MATLAB tells them.
+/// The extents of an array as MATLAB shows them.
 fn size(dims: &[u64]) -> String {
     let dims: Vec<String> = dims.iter().rev().map(u64::to_string).collect();
     if dims.is_empty() {
@@ -465,7 +468,7 @@ fn size(dims: &[u64]) -> String {
     }
 }
 
-/// A field that a struct must have.
+/// The address of a field that a struct must have.
 fn field(file: &MatFile, fields: &Fields, name: &str, place: &str) -> Result<u64> {
     fields.get(name).copied().ok_or_else(|| {
         let there: Vec<&str> = fields.keys().map(String::as_str).take(12).collect();
@@ -473,7 +476,30 @@ fn field(file: &MatFile, fields: &Fields, name: &str, place: &str) -> Result<u64
     })
 }
 
-/// An element as a number. Not a number for what is none.
+/// Decodes the text of an array of characters. Returns `None` if it is no text.
+fn characters(kind: Kind, data: Vec<u8>) -> Option<String> {
+    match kind {
+        Kind::Integer { size: 1, .. } | Kind::Text { .. } => String::from_utf8(data).ok(),
+        Kind::Integer { size: 2, big_endian, .. } => {
+            let unit = if big_endian {
+                u16::from_be_bytes
+            } else {
+                u16::from_le_bytes
+            };
+            let units: Vec<u16> = data.as_chunks().0.iter().map(|b| unit(*b)).collect();
+            String::from_utf16(&units).ok()
+        }
+        Kind::Integer { size, big_endian, .. } if size > 0 => {
+            let codes = data.chunks_exact(size).map(|b| bits(b, big_endian));
+            codes
+                .map(|code| u32::try_from(code).ok().and_then(char::from_u32))
+                .collect()
+        }
+        _ => None,
+    }
+}
+
+/// An element as a number, or NaN if it is none.
 fn number(kind: Kind, bytes: &[u8]) -> f64 {
     match kind {
         Kind::Integer { signed: false, big_endian, .. } => bits(bytes, big_endian) as f64,
@@ -493,16 +519,20 @@ fn number(kind: Kind, bytes: &[u8]) -> f64 {
     }
 }
 
-/// The number that up to eight bytes make.
+/// The number in up to eight bytes.
 fn bits(bytes: &[u8], big_endian: bool) -> u64 {
     bits_behind(0, bytes, big_endian)
 }
 
+/// Continues the number `start` with the bytes of another.
 fn bits_behind(start: u64, bytes: &[u8], big_endian: bool) -> u64 {
-    let push = |n: u64, b: &u8| n << 8 | u64::from(*b);
     if big_endian {
-        bytes.iter().fold(start, push)
+        bytes.iter().fold(start, push_byte)
     } else {
-        bytes.iter().rev().fold(start, push)
+        bytes.iter().rev().fold(start, push_byte)
     }
+}
+
+fn push_byte(number: u64, byte: &u8) -> u64 {
+    number << 8 | u64::from(*byte)
 }

@@ -1,7 +1,7 @@
-//! Writing `pointcloud.mat`: an area's points by room and object. Source: formats.md, "What is written", and
+//! Writes `pointcloud.mat`: an area's points by room and object. Source: formats.md, "What is written", and
 //! the README of the published data set.
 
-#![expect(clippy::indexing_slicing, reason = "a writer: places in the file are those that it gave")]
+#![expect(clippy::indexing_slicing, reason = "a writer: it reads only places in the file that it assigned")]
 
 use crate::cloud::mat::hdf5::write::{Attribute, Hdf5Writer, Kind};
 use crate::error::{Error, Result};
@@ -18,8 +18,8 @@ const ROOM_FIELDS: [&str; 4] = ["name", "AlignmentAngle", "color", "object"];
 const OBJECT_FIELDS: [&str; 8] =
     ["name", "points", "RGB_color", "global_name", "Bbox", "Voxels", "Voxel_Occupancy", "Points_per_Voxel"];
 
-/// What stands before all in a MAT-file: text, which ends at byte 116, version and byte order. MATLAB writes
-/// the time too; here it is the same in every file.
+/// The block before the HDF5 data of a MAT-file: text up to byte 116, version and byte order. MATLAB also
+/// writes the time; here it is the same in every file.
 fn user_block() -> [u8; 512] {
     let mut block = [0; 512];
     block[..116].fill(b' ');
@@ -29,10 +29,11 @@ fn user_block() -> [u8; 512] {
     block
 }
 
-/// Writes `pointcloud.mat` of an area, a MAT-file of version 7.3 (HDF5) as MATLAB, h5py and others read it.
+/// Writes the `pointcloud.mat` of an area: a MAT-file of version 7.3 (HDF5) that MATLAB, h5py and others
+/// read.
 ///
-/// It holds one variable, `Area`, of nested structs. The sizes are MATLAB's; in HDF5, and so in h5py, the
-/// axes are reversed: `points` is 3 × N there.
+/// It holds one variable, `Area`, of nested structs. The sizes below are MATLAB's. HDF5, and so h5py, has the
+/// axes in reverse: `points` is 3 × N there.
 ///
 /// | field | class, size | |
 /// |---|---|---|
@@ -42,7 +43,7 @@ fn user_block() -> [u8; 512] {
 /// | `….AlignmentAngle` | double, 1 × 1 | whole degrees, as in the S3DIS tree's file of angles |
 /// | `….color` | double, 1 × 3 | R G B from 0 to 1, another for each room |
 /// | `….object` | struct, 1 × objects | |
-/// | `….object.name` | char | "chair_3": its number runs per class and room, as the S3DIS tree's files are named |
+/// | `….object.name` | char | "chair_3": numbered per class and room, as in the names of the S3DIS tree's files |
 /// | `….object.points` | single, N × 3 | x y z, metres |
 /// | `….object.RGB_color` | uint8, N × 3 | 0 to 255 |
 /// | `….object.global_name` | char | its label: "chair_17_office_1_1" |
@@ -51,12 +52,12 @@ fn user_block() -> [u8; 512] {
 /// | `….object.Voxel_Occupancy` | uint8, 216 × 1 | 1 where a voxel holds a point |
 /// | `….object.Points_per_Voxel` | cell, 216 × 1 | for each voxel the rows of `points` in it: uint32, n × 1, from 1 |
 ///
-/// Box and voxels are those of the points beside them. A room without objects and an object without points
-/// are left out. As in MATLAB's own files a struct of one element has its fields themselves, one of more has
-/// references to them.
+/// Box and voxels are computed from `points`. A room without objects and an object without points are left
+/// out. As in MATLAB's own files, a struct array of one element holds the fields themselves, and a longer one
+/// holds references to them.
 ///
-/// The points of one object are in memory, and 60 bytes an array that was written. The file is there whole or
-/// not at all, and the same input gives the same bytes.
+/// Memory holds the points of one object, and 60 bytes for each written array. The file appears whole or not
+/// at all, and the same input gives the same bytes.
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -77,9 +78,9 @@ fn user_block() -> [u8; 512] {
 pub struct MatWriter<W = AtomicFile> {
     hdf5: Hdf5Writer<W>,
     name: String,
-    /// What is known by reference only: it gets a name in the group `#refs#`.
+    /// Objects that are known only by reference. They get names in the group `#refs#`.
     referenced: Vec<u64>,
-    /// The contents of all voxels without a point, once there is one.
+    /// The contents of every empty voxel, once it is written.
     empty: Option<u64>,
     room_fields: Attribute,
     object_fields: Attribute,
@@ -87,14 +88,14 @@ pub struct MatWriter<W = AtomicFile> {
     rooms: Vec<[u64; 4]>,
     /// The room that is being written, with the fields of its objects.
     room: Option<(String, u32, Vec<[u64; 8]>)>,
-    /// The object that is being written: its two names.
+    /// The two names of the object that is being written.
     object: Option<(String, String)>,
     positions: Vec<Vec3>,
     colors: Vec<[u8; 3]>,
 }
 
 impl MatWriter {
-    /// Starts the file of the area called `name`: "Area_1".
+    /// Creates the file of an area called `name`: "Area_1".
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -105,14 +106,14 @@ impl MatWriter {
     /// Ends the area, gives the file its name, and returns its size in bytes.
     ///
     /// # Errors
-    /// As [`MatWriter::into_inner`]. Then there is no file.
+    /// The errors of [`MatWriter::into_inner`]. After an error there is no file.
     pub fn finish(self) -> Result<u64> {
         self.into_inner()?.commit()
     }
 }
 
 impl<W: Write + Seek> MatWriter<W> {
-    /// Starts the area called `name` ("Area_1") in `file`, which is empty; errors call it `file_name`.
+    /// Starts an area called `name` ("Area_1") in `file`, which must be empty. Errors call it `file_name`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -135,20 +136,20 @@ impl<W: Write + Seek> MatWriter<W> {
         })
     }
 
-    /// Starts a room: "office_1", with its alignment angle in whole degrees.
+    /// Starts a room with its name ("office_1") and its alignment angle in whole degrees.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] for the object before, as [`MatWriter::append`].
+    /// [`Error::Io`]; [`Error::Format`] for the object before it, as in [`MatWriter::append`].
     pub fn room(&mut self, name: &str, alignment_deg: u32) -> Result<()> {
         self.finish_room()?;
         self.room = Some((name.to_owned(), alignment_deg, Vec::new()));
         Ok(())
     }
 
-    /// Starts an object of the room: "chair_3", with its label.
+    /// Starts an object of the room with its name ("chair_3") and its label.
     ///
     /// # Errors
-    /// As [`MatWriter::room`].
+    /// The errors of [`MatWriter::room`].
     ///
     /// # Panics
     /// If no room was started.
@@ -162,11 +163,11 @@ impl<W: Write + Seek> MatWriter<W> {
     /// Appends points to the object.
     ///
     /// # Errors
-    /// [`Error::Format`] for a coordinate that is not finite, and for more than 4,294,967,295 points of an
+    /// [`Error::Format`] for a coordinate that is not finite, and for more than 4,294,967,295 points in one
     /// object.
     ///
     /// # Panics
-    /// If no object was started, or there are not as many colours as positions.
+    /// If no object was started, or if there are not as many colours as positions.
     #[expect(clippy::panic, reason = "a caller's mistake: see Panics")]
     pub fn append(&mut self, positions: &[Vec3], colors: &[[u8; 3]]) -> Result<()> {
         let Some((name, _)) = &self.object else { panic!("points of no object") };
@@ -186,19 +187,22 @@ impl<W: Write + Seek> MatWriter<W> {
         Ok(())
     }
 
-    /// What the area was written to, complete.
+    /// Ends the area, and returns the complete file.
     ///
     /// # Errors
-    /// As [`MatWriter::room`].
+    /// The errors of [`MatWriter::room`].
     pub fn into_inner(mut self) -> Result<W> {
         self.finish_room()?;
+
         let fields = self.hdf5.words("MATLAB_fields", &AREA_FIELDS)?;
         let name = self.name.clone();
         let name = self.text(&name)?;
-        let (rooms, room_fields) = (std::mem::take(&mut self.rooms), self.room_fields.clone());
+        let rooms = std::mem::take(&mut self.rooms);
+        let room_fields = self.room_fields.clone();
         let rooms = self.structs(ROOM_FIELDS, &rooms, room_fields)?;
         let members = AREA_FIELDS.map(str::to_owned).into_iter().zip([name, rooms]);
         let area = self.hdf5.group(members, &[class("struct"), fields])?;
+
         let mut root = vec![("Area".to_owned(), area)];
         if !self.referenced.is_empty() {
             let referenced = self
@@ -233,36 +237,23 @@ impl<W: Write + Seek> MatWriter<W> {
     #[expect(clippy::expect_used, reason = "an object is only started in a room")]
     fn finish_object(&mut self) -> Result<()> {
         let Some((name, global_name)) = self.object.take() else { return Ok(()) };
-        let (positions, colors) = (std::mem::take(&mut self.positions), std::mem::take(&mut self.colors));
+        let positions = std::mem::take(&mut self.positions);
+        let colors = std::mem::take(&mut self.colors);
         let Some(voxels) = Voxels::from_points(&positions) else { return Ok(()) };
+
         let name = self.text(&name)?;
         let global_name = self.text(&global_name)?;
 
-        let single = [class("single")];
-        let column = |axis: usize| positions.iter().map(move |p| p[axis].to_le_bytes());
         let n = positions.len() as u64;
-        let points = (0..3).flat_map(column);
-        let points = self.hdf5.dataset(Kind::F32, &[3, n], &single, points)?;
-        let column = |channel: usize| colors.iter().map(move |c| [c[channel]]);
-        let rgb = (0..3).flat_map(column);
+        let points = (0..3).flat_map(|axis| positions.iter().map(move |p| p[axis].to_le_bytes()));
+        let points = self.hdf5.dataset(Kind::F32, &[3, n], &[class("single")], points)?;
+        let rgb = (0..3).flat_map(|channel: usize| colors.iter().map(move |c| [c[channel]]));
         let rgb = self.hdf5.dataset(Kind::Unsigned(1), &[3, n], &[class("uint8")], rgb)?;
+        let [bbox, boxes, occupied, members] = self.voxels(&voxels)?;
 
-        let bbox = voxels.grid.bbox.to_array().into_iter().map(f32::to_le_bytes);
-        let bbox = self.hdf5.dataset(Kind::F32, &[6, 1], &single, bbox)?;
-        let boxes: Vec<[f32; 6]> = (0..VoxelGrid::CELLS)
-            .map(|cell| voxels.grid.voxel_aabb(cell).to_array())
-            .collect();
-        let column = |i: usize| boxes.iter().map(move |b| b[i].to_le_bytes());
-        let cells = VoxelGrid::CELLS as u64;
-        let boxes = (0..6).flat_map(column);
-        let boxes = self.hdf5.dataset(Kind::F32, &[6, cells], &single, boxes)?;
-        let occupied = voxels.occupancy().map(|o| [u8::from(o)]).into_iter();
-        let occupied = self
-            .hdf5
-            .dataset(Kind::Unsigned(1), &[1, cells], &[class("uint8")], occupied)?;
-        let members = self.members(&voxels)?;
-        // The large ones keep their memory for the next object.
-        (self.positions, self.colors) = (positions, colors);
+        // The two lists keep their memory for the next object.
+        self.positions = positions;
+        self.colors = colors;
         self.positions.clear();
         self.colors.clear();
 
@@ -272,34 +263,61 @@ impl<W: Write + Seek> MatWriter<W> {
         Ok(())
     }
 
-    /// Writes the cell of each voxel's points.
+    /// Writes an object's box, the boxes of its voxels, their occupancy and their points.
+    fn voxels(&mut self, voxels: &Voxels) -> Result<[u64; 4]> {
+        let single = [class("single")];
+        let bbox = voxels.grid.bbox.to_array().into_iter().map(f32::to_le_bytes);
+        let bbox = self.hdf5.dataset(Kind::F32, &[6, 1], &single, bbox)?;
+
+        let boxes: Vec<[f32; 6]> = (0..VoxelGrid::CELLS)
+            .map(|cell| voxels.grid.voxel_aabb(cell).to_array())
+            .collect();
+        let cells = VoxelGrid::CELLS as u64;
+        let boxes = (0..6).flat_map(|i: usize| boxes.iter().map(move |b| b[i].to_le_bytes()));
+        let boxes = self.hdf5.dataset(Kind::F32, &[6, cells], &single, boxes)?;
+
+        let occupied = voxels.occupancy().map(|o| [u8::from(o)]).into_iter();
+        let occupied = self
+            .hdf5
+            .dataset(Kind::Unsigned(1), &[1, cells], &[class("uint8")], occupied)?;
+        let members = self.members(voxels)?;
+        Ok([bbox, boxes, occupied, members])
+    }
+
+    /// Writes the cell array of each voxel's points.
     fn members(&mut self, voxels: &Voxels) -> Result<u64> {
         let mut cells = [[0; 8]; VoxelGrid::CELLS];
         for (cell, slot) in cells.iter_mut().enumerate() {
             let members = voxels.members_of(cell);
-            let address = match (members.is_empty(), self.empty) {
-                (true, Some(empty)) => empty,
-                (true, None) => {
-                    // An array without elements: its size instead.
-                    let attributes = [class("uint32"), Attribute::flag("MATLAB_empty")];
-                    let size = [0u64; 2].map(u64::to_le_bytes).into_iter();
-                    let empty = self.hdf5.dataset(Kind::Unsigned(8), &[2], &attributes, size)?;
-                    self.referenced.push(empty);
-                    *self.empty.insert(empty)
-                }
-                (false, _) => {
-                    let rows = members.iter().map(|m| (m + 1).to_le_bytes());
-                    let dims = [1, members.len() as u64];
-                    let rows = self.hdf5.dataset(Kind::Unsigned(4), &dims, &[class("uint32")], rows)?;
-                    self.referenced.push(rows);
-                    rows
-                }
+            let address = if members.is_empty() {
+                self.empty_voxel()?
+            } else {
+                let rows = members.iter().map(|m| (m + 1).to_le_bytes());
+                let dims = [1, members.len() as u64];
+                let rows = self.hdf5.dataset(Kind::Unsigned(4), &dims, &[class("uint32")], rows)?;
+                self.referenced.push(rows);
+                rows
             };
             *slot = address.to_le_bytes();
         }
+
         let dims = [1, VoxelGrid::CELLS as u64];
         self.hdf5
             .dataset(Kind::Reference, &dims, &[class("cell")], cells.into_iter())
+    }
+
+    /// The contents of an empty voxel, which are written once.
+    fn empty_voxel(&mut self) -> Result<u64> {
+        if let Some(empty) = self.empty {
+            return Ok(empty);
+        }
+        // MATLAB stores an array without elements as its size.
+        let attributes = [class("uint32"), Attribute::flag("MATLAB_empty")];
+        let size = [0u64; 2].map(u64::to_le_bytes).into_iter();
+        let empty = self.hdf5.dataset(Kind::Unsigned(8), &[2], &attributes, size)?;
+        self.referenced.push(empty);
+        self.empty = Some(empty);
+        Ok(empty)
     }
 
     /// Writes an array of structs, 1 × `values`.
@@ -310,6 +328,7 @@ impl<W: Write + Seek> MatWriter<W> {
         fields: Attribute,
     ) -> Result<u64> {
         let mut members = names.map(|name| (name.to_owned(), 0));
+
         match values {
             [] => {
                 let size = [0u64; 2].map(u64::to_le_bytes).into_iter();
@@ -345,7 +364,7 @@ fn class(name: &str) -> Attribute {
     Attribute::text("MATLAB_class", name)
 }
 
-/// A name for the `i`th of many, as MATLAB names them: a, b … z, aa, ba…
+/// The name that MATLAB gives to object `i` of many: a, b … z, aa, ba…
 fn letters(mut i: usize) -> String {
     let mut name = String::new();
     loop {

@@ -1,4 +1,4 @@
-//! numpy's arrays of numbers, whatever they mean: an NPY file, or a member of an NPZ archive.
+//! numpy's arrays of numbers of any meaning: an NPY file, or a member of an NPZ archive.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-/// The most arrays of an archive.
+/// The most arrays in an archive.
 const MOST_ARRAYS: usize = 1 << 16;
 
-/// An array of integers, floats or Booleans, read piece by piece, so that one of any size needs little
-/// memory. Numbers come in the order of the file: the last index fastest, or the first if
+/// An array of integers, floats or Booleans, read piece by piece, so that arrays of any size need little
+/// memory. Numbers come in the order of the file: the last index varies fastest, or the first if
 /// [`NpyArray::is_column_major`].
 ///
 /// ```
@@ -51,14 +51,14 @@ impl NpyArray {
     /// Opens an NPY file.
     ///
     /// # Errors
-    /// As [`NpyArray::new`].
+    /// The errors of [`NpyArray::new`].
     pub fn open(path: &Path) -> Result<Self> {
         Self::new(BufReader::new(open_file(path)?), path)
     }
 }
 
 impl<R: Read> NpyArray<R> {
-    /// Reads the header of the NPY file in `source`; errors call it `name`.
+    /// Reads the header of the NPY file in `source`. Errors call the file `name`.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] if it is no NPY file; [`Error::Unsupported`] if the array does not
@@ -71,6 +71,7 @@ impl<R: Read> NpyArray<R> {
         };
         let Elements::Plain(stored) = header.elements else { return Err(no_numbers()) };
         let kind = stored.kind.filter(|kind| !kind.is_text()).ok_or_else(no_numbers)?;
+
         let shape = header.shape;
         Ok(Self {
             name: name.to_owned(),
@@ -85,17 +86,17 @@ impl<R: Read> NpyArray<R> {
         })
     }
 
-    /// The file, or the archive and its member.
+    /// The path of the file, or of the archive followed by the member's name.
     pub fn name(&self) -> &Path {
         &self.name
     }
 
-    /// Its sides; none of a single number.
+    /// The sides of the array; empty for a single number.
     pub fn shape(&self) -> &[u64] {
         &self.shape
     }
 
-    /// Whether the first index runs fastest, as numpy stores a transposed array (`fortran_order`).
+    /// Whether the first index varies fastest, as numpy stores a transposed array (`fortran_order`).
     pub fn is_column_major(&self) -> bool {
         self.is_column_major
     }
@@ -105,14 +106,13 @@ impl<R: Read> NpyArray<R> {
         self.kind.is_float()
     }
 
-    /// Appends the next numbers to `out`, a MiB of the file or less, and gives how many: 0 at the end.
+    /// Appends the next numbers to `out`, up to a MiB of the file, and returns their number: 0 at the end.
     /// Booleans are 0 and 1.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] if the file ends before the array, or a number is beyond an `i64`;
-    /// [`Error::Unsupported`] if it holds floats.
+    /// [`Error::Unsupported`] if the array holds floats.
     pub fn read_integers(&mut self, out: &mut Vec<i64>) -> Result<usize> {
-        let wide = |name: &Path| Error::format(name, format!("holds a number beyond {}", i64::MAX));
         let n = self.next_block()?;
         macro_rules! put {
             ($t:ty) => {
@@ -122,6 +122,7 @@ impl<R: Read> NpyArray<R> {
                 )
             };
         }
+
         match self.kind {
             Kind::I8 => put!(i8),
             Kind::U8 => put!(u8),
@@ -133,7 +134,7 @@ impl<R: Read> NpyArray<R> {
             Kind::U64 => {
                 let read = numbers(&self.block, self.big_endian, u64::from_le_bytes, u64::from_be_bytes);
                 for number in read {
-                    out.push(i64::try_from(number).map_err(|_| wide(&self.name))?);
+                    out.push(i64::try_from(number).map_err(|_| self.too_large())?);
                 }
             }
             Kind::F16 | Kind::F32 | Kind::F64 | Kind::Bytes(_) | Kind::Utf32(_) => {
@@ -144,7 +145,7 @@ impl<R: Read> NpyArray<R> {
         Ok(n)
     }
 
-    /// Appends the next numbers to `out`, a MiB of the file or less, and gives how many: 0 at the end.
+    /// Appends the next numbers to `out`, up to a MiB of the file, and returns their number: 0 at the end.
     /// Integers become the nearest floats.
     ///
     /// # Errors
@@ -175,7 +176,11 @@ impl<R: Read> NpyArray<R> {
         Ok(n)
     }
 
-    /// Reads the bytes of the next numbers, and gives how many they are.
+    fn too_large(&self) -> Error {
+        Error::format(&self.name, format!("holds a number beyond {}", i64::MAX))
+    }
+
+    /// Reads the bytes of the next numbers, and returns the number of these.
     fn next_block(&mut self) -> Result<usize> {
         let size = self.kind.size();
         let n = rows_of_block(self.count, self.done, size).unwrap_or(0);
@@ -186,7 +191,7 @@ impl<R: Read> NpyArray<R> {
     }
 }
 
-/// The numbers of a block.
+/// Decodes the numbers of a block.
 fn numbers<T, const N: usize>(
     block: &[u8],
     big_endian: bool,
@@ -232,7 +237,7 @@ impl NpzArchive {
     /// Opens one of its arrays.
     ///
     /// # Errors
-    /// [`Error::Format`] if it has none of this name; as [`NpyArray::new`].
+    /// [`Error::Format`] if the archive has no array of this name, and the errors of [`NpyArray::new`].
     pub fn array(&mut self, name: &str) -> Result<NpyArray<impl Read>> {
         let member = format!("{name}.npy");
         let path = self.path.join(&member);
@@ -241,7 +246,7 @@ impl NpzArchive {
     }
 }
 
-fn zipped(path: &Path, error: ZipError) -> Error {
+pub(super) fn zipped(path: &Path, error: ZipError) -> Error {
     match error {
         ZipError::Io(e) => Error::io(path, "read", e),
         e => Error::format(path, format!("is no NPZ that can be read: {e}")),
@@ -295,6 +300,7 @@ mod tests {
             let expected: Vec<f64> = whole.iter().map(|number| *number as f64).collect();
             assert_eq!(floats(&bytes).unwrap(), expected, "{kind}");
         }
+
         for (kind, data) in [
             ("<f2", vec![0, 0x3c, 0, 0xc0]),
             (">f4", [1f32, -2.0].map(f32::to_be_bytes).concat()),
@@ -309,6 +315,7 @@ mod tests {
                     .contains("astype(numpy.int64)")
             );
         }
+
         let beyond = npy("<u8", "(1,)", "False", &u64::MAX.to_le_bytes());
         assert!(integers(&beyond).unwrap_err().to_string().contains("beyond"));
     }
@@ -351,11 +358,13 @@ mod tests {
             zip.write_all(&npy("|u1", "(2,)", "False", &data)).unwrap();
         }
         zip.finish().unwrap();
+
         let mut archive = NpzArchive::open(&path).unwrap();
         assert_eq!(archive.names(), ["classes", "scores"]);
         let mut out = Vec::new();
         assert_eq!(archive.array("scores").unwrap().read_integers(&mut out).unwrap(), 2);
         assert_eq!(out, [1, 2]);
+
         let message = archive.array("masks").err().unwrap().to_string();
         assert!(message.contains("room.npz"), "{message}");
         std::fs::write(&path, "no archive").unwrap();

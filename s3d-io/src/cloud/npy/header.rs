@@ -1,5 +1,5 @@
-//! The header of an NPY file: what numpy says of an array, written as a Python dictionary. Source: numpy's
-//! "NPY format", versions 1.0 to 3.0.
+//! The header of an NPY file: numpy's description of an array as a Python dictionary. Source: numpy's "NPY
+//! format", versions 1.0 to 3.0.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -9,29 +9,30 @@ use crate::error::{Error, Result};
 use std::io::Read;
 use std::path::Path;
 
-/// The longest header that is read: numpy's own are aligned to 64 bytes and rarely longer than a few hundred.
+/// The longest header that is read. numpy's own are aligned to 64 bytes and rarely exceed a few hundred.
 const LONGEST_HEADER: usize = 1 << 17;
 /// The most columns of a table.
 const MOST_COLUMNS: usize = 4096;
 
-/// An array's header.
+/// The header of an array that is a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct NpyHeader {
-    /// Rows: the first number of its shape, 1 for none.
+    /// The number of rows: the first number of the shape, or 1 if it is empty.
     pub(crate) rows: u64,
-    /// Bytes of a row.
+    /// The bytes of a row.
     pub(crate) stride: usize,
-    /// What a row holds. An array that is not structured has fields `[0]`, `[1]`…, or one without a name.
+    /// The fields of a row. In an array that is not structured they are `[0]`, `[1]`…, or one without a name.
     pub(crate) fields: Vec<Field>,
     /// Whether the fields have names of their own.
     pub(crate) is_structured: bool,
 }
 
 impl NpyHeader {
-    /// Reads the header and leaves `source` at the first row.
+    /// Reads the header, and leaves `source` at the first row.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] and [`Error::Unsupported`] for what is no table of numbers and texts.
+    /// [`Error::Io`]; [`Error::Format`] and [`Error::Unsupported`] if the array is no table of numbers and
+    /// texts.
     pub(crate) fn read(path: &Path, source: &mut impl Read) -> Result<Self> {
         Self::parse(&read_text(path, source)?).map_err(|why| why.of(path))
     }
@@ -47,53 +48,62 @@ impl NpyHeader {
                 return Err(Refused::Unsupported(why));
             }
         };
+
         if header.is_column_major && columns.is_some_and(|k| k > 1) && rows > 1 {
             let why = "is stored column by column: save numpy.ascontiguousarray(array)".to_owned();
             return Err(Refused::Unsupported(why));
         }
-        let (mut fields, mut at) = (Vec::new(), 0);
         let is_structured = matches!(header.elements, Elements::Structure(_));
-        match header.elements {
-            Elements::Structure(_) if columns.is_some_and(|k| k != 1) => {
-                return Err(Refused::Unsupported("is a structured array of two dimensions".to_owned()));
-            }
-            Elements::Structure(structure) => {
-                for (name, sides, stored) in structure {
-                    let count = sides.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
-                    let names: Vec<String> = match count {
-                        _ if sides.is_empty() => vec![name],
-                        Some(n) if n <= MOST_COLUMNS as u64 => {
-                            (0..n).map(|i| format!("{name}[{i}]")).collect()
-                        }
-                        _ => return Err(bad("a huge field")),
-                    };
-                    push_fields(&mut fields, &mut at, names, stored)?;
-                }
-            }
-            Elements::Plain(stored) => {
-                let names = match columns {
-                    None => vec![String::new()],
-                    Some(k) if k <= MOST_COLUMNS as u64 => (0..k).map(|i| format!("[{i}]")).collect(),
-                    Some(k) => return Err(bad(&format!("{k} columns"))),
-                };
-                push_fields(&mut fields, &mut at, names, stored)?;
-            }
-        }
-        Ok(Self { rows, stride: at, fields, is_structured })
+        let (fields, stride) = fields_of(header.elements, columns)?;
+        Ok(Self { rows, stride, fields, is_structured })
     }
 }
 
-/// The text of a header; `source` is left at the first number.
+/// The fields of a row and its bytes. `columns` is the second number of the shape.
+fn fields_of(elements: Elements, columns: Option<u64>) -> std::result::Result<(Vec<Field>, usize), Refused> {
+    let mut fields = Vec::new();
+    let mut stride = 0;
+    match elements {
+        Elements::Structure(_) if columns.is_some_and(|k| k != 1) => {
+            return Err(Refused::Unsupported("is a structured array of two dimensions".to_owned()));
+        }
+        Elements::Structure(structure) => {
+            for (name, sides, stored) in structure {
+                // An array in a field becomes columns `name[i]`.
+                let count = sides.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
+                let names: Vec<String> = match count {
+                    _ if sides.is_empty() => vec![name],
+                    Some(n) if n <= MOST_COLUMNS as u64 => (0..n).map(|i| format!("{name}[{i}]")).collect(),
+                    _ => return Err(bad("a huge field")),
+                };
+                push_fields(&mut fields, &mut stride, names, stored)?;
+            }
+        }
+
+        Elements::Plain(stored) => {
+            let names = match columns {
+                None => vec![String::new()],
+                Some(k) if k <= MOST_COLUMNS as u64 => (0..k).map(|i| format!("[{i}]")).collect(),
+                Some(k) => return Err(bad(&format!("{k} columns"))),
+            };
+            push_fields(&mut fields, &mut stride, names, stored)?;
+        }
+    }
+    Ok((fields, stride))
+}
+
+/// Reads the text of a header, and leaves `source` at the first number.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] for what is no NPY file.
+/// [`Error::Io`]; [`Error::Format`] if it is no NPY file.
 pub(super) fn read_text(path: &Path, source: &mut impl Read) -> Result<String> {
-    let mut start = [0; 8];
     let short = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::UnexpectedEof => Error::format(path, "is no NPY array: it ends in its header"),
         std::io::ErrorKind::InvalidData => Error::format(path, format!("cannot be unpacked: {e}")),
         _ => Error::io(path, "read", e),
     };
+
+    let mut start = [0; 8];
     source.read_exact(&mut start).map_err(short)?;
     if &start[..6] != b"\x93NUMPY" {
         return Err(Error::format(path, "is no NPY array: it does not begin with \\x93NUMPY"));
@@ -111,41 +121,42 @@ pub(super) fn read_text(path: &Path, source: &mut impl Read) -> Result<String> {
     if length > LONGEST_HEADER {
         return Err(Error::format(path, format!("claims a header of {length} bytes")));
     }
+
     let mut text = vec![0; length];
     source.read_exact(&mut text).map_err(short)?;
     Ok(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// What a header says.
+/// The contents of a header.
 #[derive(Debug)]
 pub(super) struct Header {
     pub(super) shape: Vec<u64>,
-    /// How many elements that are.
+    /// The number of elements.
     pub(super) count: u64,
-    /// Whether the first index runs fastest (`fortran_order`).
+    /// Whether the first index varies fastest (`fortran_order`).
     pub(super) is_column_major: bool,
     pub(super) elements: Elements,
 }
 
-/// What an array holds.
+/// The elements of an array.
 #[derive(Debug)]
 pub(super) enum Elements {
     Plain(Stored),
-    /// Fields: name, sides if it is an array, and type.
+    /// Fields: the name, the sides if it is an array, and the type.
     Structure(Vec<(String, Vec<u64>, Stored)>),
 }
 
-/// How numbers or texts of a type are stored.
+/// The way numbers or texts of a type are stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stored {
-    /// `None` for what holds no label: padding, dates, complex numbers, floats of more than 64 bits.
+    /// `None` for types that hold no label: padding, dates, complex numbers, floats of more than 64 bits.
     pub(super) kind: Option<Kind>,
-    /// Bytes of each.
+    /// The bytes of an element.
     size: usize,
     pub(super) big_endian: bool,
 }
 
-/// What the text of a header says.
+/// Parses the text of a header.
 pub(super) fn parse(text: &str) -> std::result::Result<Header, Refused> {
     let Literal::Dictionary(entries) = literal::parse(text).map_err(Refused::Bad)? else {
         return Err(bad("it is no dictionary"));
@@ -156,9 +167,12 @@ pub(super) fn parse(text: &str) -> std::result::Result<Header, Refused> {
             .map(|(_, value)| value)
             .ok_or_else(|| bad(&format!("missing key '{key}'")))
     };
+
     let shape = sides(value("shape")?)?;
-    let count = shape.iter().try_fold(1u64, |count, side| count.checked_mul(*side));
-    let count = count.ok_or_else(|| bad("its shape is too large"))?;
+    let count = shape
+        .iter()
+        .try_fold(1u64, |count, side| count.checked_mul(*side))
+        .ok_or_else(|| bad("its shape is too large"))?;
     let Literal::Bool(is_column_major) = *value("fortran_order")? else {
         return Err(bad("its fortran_order is neither True nor False"));
     };
@@ -174,18 +188,29 @@ pub(super) fn parse(text: &str) -> std::result::Result<Header, Refused> {
 
 /// The numbers of a tuple.
 fn sides(tuple: &Literal) -> std::result::Result<Vec<u64>, Refused> {
-    let number = |side: &Literal| if let Literal::Number(n) = side { Some(*n) } else { None };
-    let numbers = if let Literal::List(sides) = tuple {
-        sides.iter().map(number).collect()
-    } else {
-        None
-    };
-    numbers.ok_or_else(|| bad("a shape is no tuple of whole numbers"))
+    let Literal::List(sides) = tuple else { return Err(no_shape()) };
+    sides
+        .iter()
+        .map(|side| {
+            if let Literal::Number(n) = side {
+                Ok(*n)
+            } else {
+                Err(no_shape())
+            }
+        })
+        .collect()
 }
 
-/// A field: its name, or title and name; its type; its sides if it is an array.
+fn no_field() -> Refused {
+    bad("a field is no tuple of name, type and shape")
+}
+
+fn no_shape() -> Refused {
+    bad("a shape is no tuple of whole numbers")
+}
+
+/// Parses a field: its name, or its title and name; its type; its sides if it is an array.
 fn field(field: &Literal) -> std::result::Result<(String, Vec<u64>, Stored), Refused> {
-    let no_field = || bad("a field is no tuple of name, type and shape");
     let Literal::List(field) = field else { return Err(no_field()) };
     let (name, kind, shape) = match &field[..] {
         [name, kind] => (name, kind, Vec::new()),
@@ -206,16 +231,17 @@ fn field(field: &Literal) -> std::result::Result<(String, Vec<u64>, Stored), Ref
     }
 }
 
-/// How the type of a string is stored: order of bytes, kind, and size in bytes or characters.
+/// Parses a type string: byte order, kind, and size in bytes or characters.
 fn stored(text: &str) -> std::result::Result<Stored, Refused> {
     let unknown = || bad(&format!("the type string {text:?}"));
     let mut chars = text.chars();
-    let (order, code) = (chars.next(), chars.next());
+    let order = chars.next();
+    let code = chars.next();
     if code == Some('O') {
         let why = "holds pickled Python objects: save an array of numbers or texts";
         return Err(Refused::Unsupported(why.to_owned()));
     }
-    // The unit of a date stands behind it.
+    // A date's unit follows its size.
     let size = chars.as_str().split('[').next().and_then(|size| size.parse().ok());
     let size: usize = size.filter(|size| *size <= 1 << 16).ok_or_else(unknown)?;
     let big_endian = match order {
@@ -223,6 +249,7 @@ fn stored(text: &str) -> std::result::Result<Stored, Refused> {
         Some('<' | '|') => false,
         _ => return Err(unknown()),
     };
+
     let kind = match (code, size) {
         (Some('i'), 1) => Kind::I8,
         (Some('u' | 'b'), 1) => Kind::U8,
@@ -245,7 +272,7 @@ fn stored(text: &str) -> std::result::Result<Stored, Refused> {
     Ok(Stored { kind: Some(kind), size: kind.size(), big_endian })
 }
 
-/// Adds fields of one type; those of a type that holds no label are passed over.
+/// Adds fields of one type. Fields of a type that holds no label only take up their bytes.
 fn push_fields(
     fields: &mut Vec<Field>,
     at: &mut usize,
@@ -264,7 +291,7 @@ fn push_fields(
     Ok(())
 }
 
-/// Why a header is not read.
+/// The reason why a header is not read.
 #[derive(Debug)]
 pub(super) enum Refused {
     Bad(String),
@@ -274,7 +301,7 @@ pub(super) enum Refused {
 impl Refused {
     pub(super) fn of(self, path: &Path) -> Error {
         match self {
-            Self::Bad(why) => Error::format(path, format!("has a header that is none of numpy: {why}")),
+            Self::Bad(why) => Error::format(path, format!("has a header that numpy would not write: {why}")),
             Self::Unsupported(why) => Error::unsupported(path, why),
         }
     }
@@ -321,9 +348,11 @@ mod tests {
             ]
         );
         assert_eq!((h.rows, h.stride, h.is_structured), (7, 25, true));
+
         let h = header("{'descr': '>f8', 'fortran_order': False, 'shape': (5L, 7L)}").unwrap();
         assert_eq!((h.rows, h.stride, h.fields.len(), h.is_structured), (5, 56, 7, false));
         assert_eq!((h.fields[6].at, h.fields[6].kind, h.fields[6].big_endian), (48, Kind::F64, true));
+
         let h = header("{'descr': '|b1', 'fortran_order': True, 'shape': (5,)}").unwrap();
         assert_eq!((h.rows, h.stride, h.fields[0].name.as_str()), (5, 1, ""));
     }
@@ -395,6 +424,7 @@ mod tests {
             rows in 0u64..9,
         ) {
             let numbers = |sides: &[u64]| sides.iter().map(|n| format!("{n}, ")).collect::<String>();
+
             let mut descr = String::new();
             for (name, kind, sides) in &fields {
                 let name = name.replace('\\', "\\\\").replace('\'', "\\'");
@@ -405,6 +435,7 @@ mod tests {
             let mut bytes = b"\x93NUMPY\x03\x00".to_vec();
             bytes.extend(u32::try_from(text.len()).unwrap().to_le_bytes());
             bytes.extend(text.bytes());
+
             let theirs = npyz::NpyHeader::from_reader(&bytes[..]).unwrap();
             prop_assert_eq!(theirs.shape(), &[rows]);
             let npyz::DType::Record(theirs) = theirs.dtype() else { panic!("{text}") };

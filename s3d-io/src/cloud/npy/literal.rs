@@ -1,13 +1,13 @@
-//! Python's literals, as far as headers of NPY files have them: texts, whole numbers, truth values, tuples,
-//! lists and dictionaries. Source: Python Language Reference, "Lexical analysis".
+//! Parses Python's literals, as far as headers of NPY files have them: texts, whole numbers, truth values,
+//! tuples, lists and dictionaries. Source: Python Language Reference, "Lexical analysis".
 //!
-//! Own code: npyz, which reads headers too, and what it needs are 16 packages, a C compiler, and 4 % of the
-//! time of a first build; its parser overflows the stack on brackets in brackets. Tests hold the types that
-//! are read against it.
+//! Own code: npyz, which reads headers too, brings 16 packages, a C compiler, and 4 % of the time of a first
+//! build, and its parser overflows the stack on deeply nested brackets. Tests compare the types that are read
+//! with npyz's.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-/// How deep brackets may be in brackets: numpy's are four deep, and two more for each structure in a field.
+/// The deepest nesting of brackets. numpy's are four deep, and two more for each structure in a field.
 const DEEPEST: u32 = 8;
 
 /// A value.
@@ -22,7 +22,7 @@ pub(super) enum Literal {
     Dictionary(Vec<(String, Literal)>),
 }
 
-/// The only value of a text.
+/// Parses a text that holds one value.
 ///
 /// # Errors
 /// What is wrong, and at which byte.
@@ -40,13 +40,13 @@ struct Parser<'a> {
 }
 
 impl Parser<'_> {
-    /// The next character that is no space.
+    /// The next character that is no space, which stays.
     fn next(&mut self) -> Option<char> {
         self.rest = self.rest.trim_ascii_start();
         self.rest.chars().next()
     }
 
-    /// Passes over a text if it comes next.
+    /// Skips a text if it comes next, and returns whether it did.
     fn has(&mut self, expected: &str) -> bool {
         self.next();
         let rest = self.rest.strip_prefix(expected);
@@ -73,7 +73,7 @@ impl Parser<'_> {
         }
     }
 
-    /// What stands between brackets, with commas between, or after each.
+    /// Parses items between brackets, with a comma between them or after each.
     fn list<T>(
         &mut self,
         open: &str,
@@ -99,7 +99,7 @@ impl Parser<'_> {
         }
     }
 
-    /// A whole number; Python 2 wrote an `L` after it.
+    /// Parses a whole number. Python 2 wrote an `L` after it.
     fn number(&mut self) -> Result<u64, &'static str> {
         let end = self.rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(self.rest.len());
         let (digits, rest) = self.rest.split_at(end);
@@ -108,7 +108,7 @@ impl Parser<'_> {
         Ok(number)
     }
 
-    /// What stands between quotes.
+    /// Parses a text between quotes.
     fn text(&mut self, quote: char) -> Result<String, &'static str> {
         let mut text = String::new();
         let mut chars = self.rest.chars();
@@ -136,7 +136,7 @@ impl Parser<'_> {
     }
 }
 
-/// The character that hexadecimal digits name.
+/// The character with a hexadecimal code point.
 fn code_point(chars: &mut std::str::Chars<'_>, digits: usize) -> Result<char, &'static str> {
     let code = (0..digits).try_fold(0u32, |code, _| {
         let digit = chars.next().and_then(|c| c.to_digit(16))?;

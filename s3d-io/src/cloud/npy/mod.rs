@@ -1,4 +1,4 @@
-//! numpy's arrays, NPY and NPZ.
+//! numpy's arrays: NPY and NPZ.
 
 mod array;
 mod header;

@@ -1,8 +1,9 @@
-//! Annotated points in numpy's arrays: NPY, and NPZ with an array a column or a few.
+//! Annotated points in numpy's arrays: NPY files, and NPZ archives of one array or of several columns.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::npy::array::zipped;
 use crate::cloud::npy::header::NpyHeader;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::records::{Field, Table, fill, rows_of_block};
@@ -11,18 +12,18 @@ use crate::error::{Error, Result};
 use crate::fs::source::{Bytes, Source};
 use s3d_label::Class;
 use std::cell::Cell;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::Path;
 use zip::ZipArchive;
 
-/// The columns of a plain array, unless they are named.
+/// The columns of a plain array whose columns are not named.
 const PLAIN: [&str; 8] = ["x", "y", "z", "r", "g", "b", "class", "instance"];
 
 /// An `.npy` or `.npz` file.
 pub(crate) struct NpyCloud<'a> {
     source: Source,
     options: &'a AnnotationOptions,
-    /// Whether numbers of classes are the 13's: a plain array, of which nothing is said.
+    /// Whether class numbers are S3DIS's: in a plain array whose columns and classes are not named.
     s3dis_numbers: Cell<bool>,
 }
 
@@ -49,7 +50,7 @@ impl<'a> NpyCloud<'a> {
         table.read(self.source.name(), source, header.rows, colors, reading)
     }
 
-    /// The table of an array of its own.
+    /// The table of a single array.
     fn table(
         &self,
         mut fields: Vec<Field>,
@@ -77,6 +78,7 @@ impl<'a> NpyCloud<'a> {
         Table::new(self.source.name(), fields, stride, self.options)
     }
 
+    /// Names the columns of a plain array.
     fn name_plain(&self, fields: &mut [Field]) -> Result<()> {
         let usual = PLAIN.map(str::to_owned);
         let named = &self.options.columns;
@@ -104,28 +106,14 @@ impl<'a> NpyCloud<'a> {
     }
 
     fn read_npz(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-        let zipped = |e: zip::result::ZipError| match e {
-            zip::result::ZipError::Io(e) => Error::io(self.source.name(), "read", e),
-            e => Error::format(self.source.name(), format!("is no NPZ that can be read: {e}")),
-        };
-        let names: Vec<String> = {
-            let archive = ZipArchive::new(self.file()?).map_err(zipped)?;
-            archive
-                .file_names()
-                .flatten()
-                .filter(|n| n.ends_with(".npy"))
-                .map(std::borrow::Cow::into_owned)
-                .collect()
-        };
-        // An archive lends one member at a time: each array has one of its own. Few have more than a dozen.
-        if names.is_empty() || names.len() > 64 {
-            let message = format!("holds {} arrays: points are in 1 to 64 of them", names.len());
-            return Err(Error::format(self.source.name(), message));
-        }
+        let zipped = |e| zipped(self.source.name(), e);
+        let names = self.array_names()?;
+        // An archive lends one member at a time, so each array gets its own reader of the archive.
         let mut archives = Vec::new();
         for _ in &names {
             archives.push(ZipArchive::new(self.file()?).map_err(zipped)?);
         }
+
         let mut arrays = Vec::new();
         for (archive, name) in archives.iter_mut().zip(&names) {
             let mut member = archive.by_name(name).map_err(zipped)?;
@@ -133,21 +121,49 @@ impl<'a> NpyCloud<'a> {
             let stem = name.trim_end_matches(".npy").to_owned();
             match NpyHeader::read(&path, &mut member) {
                 Ok(header) => arrays.push((stem, header, member)),
-                // Another array than those of points may be of any kind.
+                // Beside the arrays of points there may be arrays of any kind.
                 Err(Error::Unsupported { .. }) if names.len() > 1 => {}
                 Err(e) => return Err(e),
             }
         }
+
         if let [(_, header, member)] = &mut arrays[..] {
             let fields = std::mem::take(&mut header.fields);
             let table = self.table(fields, header.stride, header.is_structured, reading)?;
             return table.read(self.source.name(), member, header.rows, colors, reading);
         }
-        // All arrays that are as long as most are columns of one table; what is shorter says something of the
-        // whole.
+        self.read_columns(arrays, colors, reading)
+    }
+
+    /// The names of an archive's arrays. Few archives have more than a dozen.
+    fn array_names(&self) -> Result<Vec<String>> {
+        let archive = ZipArchive::new(self.file()?).map_err(|e| zipped(self.source.name(), e))?;
+        let names: Vec<String> = archive
+            .file_names()
+            .flatten()
+            .filter(|n| n.ends_with(".npy"))
+            .map(std::borrow::Cow::into_owned)
+            .collect();
+        if names.is_empty() || names.len() > 64 {
+            let message = format!("holds {} arrays: points are in 1 to 64 of them", names.len());
+            return Err(Error::format(self.source.name(), message));
+        }
+        Ok(names)
+    }
+
+    /// Reads several arrays, each with its name and its header, as columns of one table. Shorter arrays than
+    /// the longest describe the cloud as a whole, and are left out.
+    fn read_columns<R: Read>(
+        &self,
+        mut arrays: Vec<(String, NpyHeader, R)>,
+        colors: ColorRange,
+        reading: &mut Reading<'_>,
+    ) -> Result<bool> {
+        let path = self.source.name();
         let rows = arrays.iter().map(|(_, h, _)| h.rows).max().unwrap_or(0);
         arrays.retain(|(_, h, _)| h.rows == rows && h.stride > 0);
-        let (mut fields, mut stride) = (Vec::new(), 0);
+        let mut fields = Vec::new();
+        let mut stride = 0;
         for (stem, header, _) in &arrays {
             for field in &header.fields {
                 let name = if header.is_structured {
@@ -159,17 +175,19 @@ impl<'a> NpyCloud<'a> {
             }
             stride = header.stride.saturating_add(stride);
         }
-        let table = Table::new(self.source.name(), fields, stride, self.options)?;
-        // Rows may be as long as 64 KiB: what is in memory is a few MiB all the same.
+        let table = Table::new(path, fields, stride, self.options)?;
+
+        // Rows have up to 64 KiB, so a block has a few MiB at most.
         let mut done = 0;
-        let (mut block, mut column) = (Vec::new(), Vec::new());
+        let mut block = Vec::new();
+        let mut column = Vec::new();
         let mut texts = Default::default();
         while let Some(n) = rows_of_block(rows, done, stride) {
             block.resize(n.saturating_mul(stride), 0);
             let mut at = 0usize;
             for (_, header, member) in &mut arrays {
                 column.resize(n.saturating_mul(header.stride), 0);
-                fill(self.source.name(), member, &mut column, done, rows, header.stride)?;
+                fill(path, member, &mut column, done, rows, header.stride)?;
                 for (record, piece) in block.chunks_exact_mut(stride).zip(column.chunks_exact(header.stride))
                 {
                     let place = record.get_mut(at..).and_then(|r| r.get_mut(..piece.len()));
@@ -177,8 +195,9 @@ impl<'a> NpyCloud<'a> {
                 }
                 at = at.saturating_add(header.stride);
             }
+
             for (record, number) in block.chunks_exact(stride).zip(done.saturating_add(1)..) {
-                if !table.push(number, record, colors, &mut texts, self.source.name(), reading)? {
+                if !table.push(number, record, colors, &mut texts, path, reading)? {
                     return Ok(false);
                 }
             }

@@ -1,4 +1,4 @@
-//! Writing `.npy` files, numpy's arrays, piece by piece.
+//! Writes `.npy` files, numpy's arrays, piece by piece.
 //!
 //! Own code, a dozen lines: npyz writes other bytes than numpy (`npyz_writes_other_bytes`).
 
@@ -7,7 +7,7 @@ use crate::fs::atomic::AtomicFile;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes one array of any size piece by piece, row-major (C order), whole or not at all.
+/// Writes an array of any size piece by piece, row-major (C order). The file appears whole or not at all.
 ///
 /// ```
 /// # let dir = tempfile::tempdir().unwrap();
@@ -28,13 +28,13 @@ pub struct NpyWriter<W = AtomicFile> {
 }
 
 impl NpyWriter {
-    /// Starts the file `path`; see [`NpyWriter::new`].
+    /// Creates the file `path`; see [`NpyWriter::new`].
     ///
     /// # Errors
     /// [`Error::Io`].
     ///
     /// # Panics
-    /// As [`NpyWriter::new`].
+    /// As [`NpyWriter::new`] does.
     pub fn create(path: &Path, kind: &str, shape: &[u64]) -> Result<Self> {
         Self::new(AtomicFile::create(path)?, path, kind, shape)
     }
@@ -42,21 +42,21 @@ impl NpyWriter {
     /// Gives the file its name, and returns its size in bytes.
     ///
     /// # Errors
-    /// As [`NpyWriter::into_inner`]. Then there is no file.
+    /// The errors of [`NpyWriter::into_inner`]. After an error there is no file.
     pub fn finish(self) -> Result<u64> {
         self.into_inner()?.commit()
     }
 }
 
 impl<W: Write> NpyWriter<W> {
-    /// Starts, in `file`, an array of elements of a numpy type (`"<f4"`, `"<f8"`, `"<i8"`, `"<u4"`…: the
-    /// digit is the element's bytes) and this shape. Errors call the file `name`.
+    /// Starts an array in `file`, with elements of the numpy type `kind` (`"<f4"`, `"<f8"`, `"<i8"`,
+    /// `"<u4"`…: the digit is the element's bytes) and the sides `shape`. Errors call the file `name`.
     ///
     /// # Errors
     /// [`Error::Io`].
     ///
     /// # Panics
-    /// If `kind` is no type with a size of one digit, or the array has more bytes than 64 bits can count.
+    /// If `kind` does not end with a size of one digit, or the array has more bytes than 64 bits can count.
     #[expect(clippy::expect_used, reason = "a caller's mistake: see Panics")]
     pub fn new(mut file: W, name: &Path, kind: &str, shape: &[u64]) -> Result<Self> {
         let size = kind
@@ -71,7 +71,7 @@ impl<W: Write> NpyWriter<W> {
         Ok(Self { file, name: name.to_owned(), promised, written: 0 })
     }
 
-    /// Appends elements: their bytes, lowest first.
+    /// Appends elements as bytes, the lowest byte first.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -82,10 +82,10 @@ impl<W: Write> NpyWriter<W> {
             .map_err(|e| Error::io(&self.name, "write", e))
     }
 
-    /// What the array was written to, complete.
+    /// Returns the complete file.
     ///
     /// # Errors
-    /// [`Error::Format`] if not as many bytes came as the shape promises.
+    /// [`Error::Format`] if there are not as many bytes as the shape promises.
     pub fn into_inner(self) -> Result<W> {
         if self.written != self.promised {
             let message = format!("{} bytes of an array were promised, {} came", self.promised, self.written);
@@ -95,9 +95,9 @@ impl<W: Write> NpyWriter<W> {
     }
 }
 
-/// What stands before the numbers of an `.npy` file (version 1.0 of numpy's format): magic, length, and a
-/// Python literal padded with spaces so that the numbers begin at a multiple of 64 bytes. npyz writes a space
-/// more in it (`npyz_writes_other_bytes`), and with its types of elements at run time this would be longer.
+/// The header of an `.npy` file (version 1.0 of numpy's format): magic, length, and a Python literal padded
+/// with spaces so that the numbers begin at a multiple of 64 bytes. npyz writes one more space in it
+/// (`npyz_writes_other_bytes`), and its types of elements at run time would make this code longer.
 pub(crate) fn npy_header(kind: &str, shape: &[u64]) -> Vec<u8> {
     const FIXED: usize = 10;
     let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
@@ -124,11 +124,13 @@ mod tests {
                 .put(&piece.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>())
                 .unwrap();
         }
+
         array.finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let read = npyz::NpyFile::new(&bytes[..]).unwrap();
         assert_eq!(read.shape(), [1000, 7]);
         assert_eq!(read.into_vec::<f64>().unwrap(), values);
+
         NpyWriter::create(&path, "<i8", &[0]).unwrap().finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();
         assert!(

@@ -7,13 +7,13 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Bytes of one point: three floats, three bytes, two integers.
+/// The bytes of a point: three floats, three bytes, two integers.
 const POINT_BYTES: usize = 3 * 4 + 3 + 2 * 4;
 /// The properties of a point, in order.
 const PROPERTIES: [&str; 8] =
     ["float x", "float y", "float z", "uchar red", "uchar green", "uchar blue", "uint label", "uint face"];
 
-/// A point of such a cloud.
+/// A point of a labelled cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LabelledPoint {
     /// World metres, Z-up.
@@ -22,7 +22,7 @@ pub struct LabelledPoint {
     pub color: [u8; 3],
     /// An index into `semantic_labels.json`, 0 for the null label.
     pub label: u32,
-    /// The face of the mesh that it was drawn from; 4294967295 if that is not known.
+    /// The face of the mesh that the point was drawn from; 4294967295 if unknown.
     pub face: u32,
 }
 
@@ -39,32 +39,35 @@ impl LabelledPoints {
     /// Reads the header of `path`.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if the file is another PLY file, none, or shorter or longer than its
-    /// header says.
+    /// [`Error::Io`]; [`Error::Format`] if the file is no PLY file of labelled points, or is shorter or
+    /// longer than its header says.
     pub fn open(path: &Path) -> Result<Self> {
         Self::new(open_file(path)?, path)
     }
 }
 
 impl<R: Read + Seek> LabelledPoints<R> {
-    /// As [`LabelledPoints::open`], from a reader of the file's bytes; errors call it `name`.
+    /// Reads like [`LabelledPoints::open`], from a reader of the file's bytes. Errors call the file `name`.
     ///
     /// # Errors
-    /// As [`LabelledPoints::open`].
+    /// The errors of [`LabelledPoints::open`].
     pub fn new(mut reader: R, name: &Path) -> Result<Self> {
         let path = name;
         let io = |e| Error::io(path, "read", e);
+        let other = || Error::format(path, "is no PLY file of labelled points, as an export has it");
         let bytes = reader
             .seek(SeekFrom::End(0))
             .and_then(|n| reader.rewind().map(|()| n))
             .map_err(io)?;
+
         let mut file = BufReader::with_capacity(1 << 18, reader);
-        let (mut count, mut properties, mut header) = (None, Vec::new(), 0u64);
+        let mut count = None;
+        let mut properties = Vec::new();
+        let mut header = 0u64;
         let mut line = Vec::new();
-        let other = || Error::format(path, "is no PLY file of labelled points, as an export has it");
         loop {
             line.clear();
-            // A header is short; what goes on for longer is none.
+            // Headers are short. A long line or a long header belongs to another kind of file.
             let read = file.by_ref().take(4096).read_until(b'\n', &mut line).map_err(io)? as u64;
             header += read;
             let text = String::from_utf8_lossy(&line).trim().to_owned();
@@ -81,6 +84,7 @@ impl<R: Read + Seek> LabelledPoints<R> {
                 break;
             }
         }
+
         let count = count.filter(|_| properties == PROPERTIES).ok_or_else(other)?;
         let expected = count
             .checked_mul(POINT_BYTES as u64)
@@ -91,12 +95,12 @@ impl<R: Read + Seek> LabelledPoints<R> {
         Ok(Self { path: path.to_owned(), file, count, left: count })
     }
 
-    /// How many points the file has.
+    /// The number of points in the file.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Puts the next points, `most` at most, into `out`; what it held is lost. Returns whether there were
+    /// Replaces the contents of `out` by the next points, up to `most` of them. Returns whether there were
     /// any.
     ///
     /// # Errors
@@ -145,9 +149,11 @@ mod tests {
             .append(&cloud, &(0..n).map(|i| 100 * i).collect::<Vec<_>>())
             .unwrap();
         writer.finish().unwrap();
+
         let mut points = LabelledPoints::open(&path).unwrap();
         assert_eq!(points.count(), 10);
-        let (mut piece, mut all) = (Vec::new(), Vec::new());
+        let mut piece = Vec::new();
+        let mut all = Vec::new();
         while points.read(4, &mut piece).unwrap() {
             all.extend_from_slice(&piece);
         }

@@ -27,7 +27,7 @@ impl<'a> PlyCloud<'a> {
     }
 }
 
-/// Opens a PLY file at its vertices. The element, and whether the file is a mesh.
+/// Opens a PLY file at its vertices. Returns the element too, and whether the file is a mesh.
 pub(crate) fn open_vertices(source: &Source) -> Result<(PlyReader<'static>, PlyElement, bool)> {
     let (file, size) = source.open()?;
     let mut reader = PlyReader::new(file, size, source.name())?;
@@ -43,7 +43,7 @@ pub(crate) fn open_vertices(source: &Source) -> Result<(PlyReader<'static>, PlyE
     }
 }
 
-/// The colour of a row, if it is one.
+/// The colour of a row, black if there are no channels.
 #[expect(
     clippy::indexing_slicing,
     reason = "the channels were found in the element, and are wanted of the batch"
@@ -74,42 +74,45 @@ impl Cloud for PlyCloud<'_> {
         let path = self.source.name();
         let (mut reader, element, has_faces) = open_vertices(&self.source)?;
         self.has_faces.set(has_faces);
-        // A list is no column; an empty name is none's.
+        // A list is no column. It gets the empty name, which no column has.
         let names: Vec<String> = element
             .properties
             .iter()
             .map(|p| if p.is_list() { String::new() } else { p.name.clone() })
             .collect();
-        let c = Columns::choose(path, &names, self.options)?;
-        let others = [Some(c.class), c.instance, c.room].into_iter().flatten();
+        let columns = Columns::choose(path, &names, self.options)?;
+        let others = [Some(columns.class), columns.instance, columns.room];
         reader.want(
-            c.position
+            columns
+                .position
                 .into_iter()
-                .chain(c.color.into_iter().flatten())
-                .chain(others),
+                .chain(columns.color.into_iter().flatten())
+                .chain(others.into_iter().flatten()),
         );
+
         let mut batch = PlyBatch::default();
         while reader.read_batch(&mut batch)? {
-            let [x, y, z] = c.position.map(|p| batch.scalars(p));
+            let [x, y, z] = columns.position.map(|p| batch.scalars(p));
             for row in 0..batch.len() {
-                let rgb = match color_of(&element, &batch, c.color, row, colors) {
+                let rgb = match color_of(&element, &batch, columns.color, row, colors) {
                     Color::Rgb(rgb) => rgb,
                     Color::Wider => return Ok(false),
                     Color::Beyond(channel) => {
-                        let p = c.color.map_or(0, |channels| channels[channel]);
+                        let p = columns.color.map_or(0, |channels| channels[channel]);
                         let v = batch.scalars(p)[row];
                         let why = format!("{v} is no colour ({})", element.properties[p].name);
                         reading.fault(reader.fail(&batch, row, why))?;
                         continue;
                     }
                 };
+
                 let value = |p: Option<usize>| p.map_or(Value::None, |p| Value::Float(batch.scalars(p)[row]));
                 let point = Row {
                     position: dvec3(x[row], y[row], z[row]),
                     color: rgb,
-                    class: value(Some(c.class)),
-                    instance: value(c.instance),
-                    room: value(c.room),
+                    class: value(Some(columns.class)),
+                    instance: value(columns.instance),
+                    room: value(columns.room),
                 };
                 match batch.lines.get(row) {
                     Some(line) => reading.push_line(*line, &point)?,

@@ -1,4 +1,4 @@
-//! Some of the points of a large cloud.
+//! Reads some of the points of a large cloud, and writes small ones.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -10,11 +10,12 @@ use s3d_geom::glam::Vec3;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// A header that goes on for longer is none.
+/// The longest header.
 const MAX_HEADER: u64 = 65_536;
 
-/// What is needed of a header: where things are in a point.
+/// The layout of the points, from the file's header.
 struct Header {
+    /// The bytes of the header itself.
     bytes: u64,
     count: u64,
     stride: usize,
@@ -24,10 +25,10 @@ struct Header {
 }
 
 /// Reads up to `most` points of a binary little-endian PLY cloud such as `area_N/3d/pointcloud.ply`: all of
-/// them, or evenly spaced ones in the file's order. As the file is ordered by face, they cover the surface
-/// evenly. Their colours are black if the file has none; what else the file tells of them is left out.
+/// them, or evenly spaced ones in the file's order. Such a file is ordered by face, so they cover the surface
+/// evenly. Points are black if the file has no colours. Other properties are left out.
 ///
-/// Never more is in memory than the points that are returned.
+/// Memory holds no more points than are returned.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is another kind of PLY file, if it is shorter than its header says,
@@ -38,6 +39,7 @@ pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
     let size = file.metadata().map_err(io)?.len();
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let header = read_header(path, &mut reader)?;
+
     let needed = header
         .count
         .checked_mul(header.stride as u64)
@@ -58,35 +60,34 @@ pub fn read_point_sample(path: &Path, most: usize) -> Result<PointCloud> {
     let mut point = vec![0; header.stride];
     let mut at = 0u64;
     for k in 0..chosen {
-        // The middle of the k-th of as many equal parts.
+        // The middle of part k of `chosen` equal parts.
         let i = middle_of_part(k, chosen, header.count);
         let skipped = i.saturating_sub(at).saturating_mul(header.stride as u64);
         reader.seek_relative(skipped.cast_signed()).map_err(io)?;
         reader.read_exact(&mut point).map_err(io)?;
         at = i.saturating_add(1);
-        let float = |o: usize| {
-            point
-                .get(o..)
-                .and_then(<[u8]>::first_chunk)
-                .map(|b| f32::from_le_bytes(*b))
-        };
-        let position = header.position.map(|o| float(o).unwrap_or(f32::NAN));
+        let position = header.position.map(|o| float_at(&point, o).unwrap_or(f32::NAN));
         if !position.iter().all(|c| c.is_finite()) {
             return Err(Error::format(path, format!("point {i} (counted from 0) is at {position:?}")));
         }
         cloud.positions.push(Vec3::from_array(position));
-        let byte = |o: usize| point.get(o).copied().unwrap_or(0);
-        cloud
-            .colors
-            .push(header.color.map_or([0; 3], |offsets| offsets.map(byte)));
+        let color = header
+            .color
+            .map(|offsets| offsets.map(|o| point.get(o).copied().unwrap_or(0)));
+        cloud.colors.push(color.unwrap_or_default());
     }
     Ok(cloud)
 }
 
-/// The number of the element in the middle of the `k`th of `parts` parts of `count`, which are as many or
-/// more.
+fn float_at(point: &[u8], offset: usize) -> Option<f32> {
+    let bytes = point.get(offset..)?.first_chunk()?;
+    Some(f32::from_le_bytes(*bytes))
+}
+
+/// The index of the element in the middle of part `k`, where `count` elements are cut into `parts` parts.
+/// There are at least as many elements as parts.
 fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
-    // u128, as counts may be anything.
+    // Products of any two counts fit into u128.
     let [k, parts, count] = [k, parts, count].map(u128::from);
     let middle = k
         .saturating_mul(2)
@@ -96,14 +97,15 @@ fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
     middle.and_then(|i| u64::try_from(i).ok()).unwrap_or(0)
 }
 
-/// Writes a cloud as a binary little-endian PLY file of positions (float) and colours (uchar, black if it has
-/// none), as viewers and Gaussian splatting read it, whole or not at all, and returns its size in bytes.
+/// Writes a cloud as a binary little-endian PLY file of positions (float) and colours (uchar; black if it has
+/// none), which viewers and Gaussian splatting read. The file appears whole or not at all. Returns its size
+/// in bytes.
 ///
 /// # Errors
 /// [`Error::Io`].
 ///
 /// # Panics
-/// If it has colours, but not one a point.
+/// If the cloud has colours, but not one a point.
 pub fn write_colored_points(path: &Path, cloud: &PointCloud) -> Result<u64> {
     let n = cloud.len();
     assert!(
@@ -125,6 +127,7 @@ pub fn write_colored_points(path: &Path, cloud: &PointCloud) -> Result<u64> {
          end_header\n"
     );
     file.put(header.as_bytes())?;
+
     for (i, position) in cloud.positions.iter().enumerate() {
         let mut point = [0; 15];
         for (bytes, v) in point.as_chunks_mut().0.iter_mut().zip(position.to_array()) {
@@ -136,11 +139,17 @@ pub fn write_colored_points(path: &Path, cloud: &PointCloud) -> Result<u64> {
     file.commit()
 }
 
+/// Reads the header, and leaves `reader` at the first point.
 fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
     let mut bytes = 0u64;
-    let (mut number, mut binary, mut in_vertex) = (0u64, false, false);
-    let (mut count, mut stride) = (None, 0usize);
+    let mut number = 0u64;
+    let mut is_binary = false;
+    let mut in_vertex = false;
+    let mut count = None;
+    let mut stride = 0usize;
+    // Name, type and offset of each property.
     let mut columns: Vec<(String, String, usize)> = Vec::new();
+
     loop {
         let mut line = Vec::new();
         let read = reader
@@ -153,6 +162,7 @@ fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         let wrong =
             |message: String| Error::Format { path: path.to_owned(), place: Place::Line(number), message };
+
         if number == 1 && words != ["ply"] {
             return Err(wrong("not a PLY file: it does not begin with \"ply\"".into()));
         }
@@ -160,7 +170,7 @@ fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
             return Err(wrong("the header of the PLY file has no end".into()));
         }
         match words[..] {
-            ["format", "binary_little_endian", _] => binary = true,
+            ["format", "binary_little_endian", _] => is_binary = true,
             ["format", other, ..] => {
                 return Err(wrong(format!("the PLY file is {other}; only binary_little_endian is sampled")));
             }
@@ -179,13 +189,8 @@ fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
                 return Err(wrong("a point has a list as property".into()));
             }
             ["property", kind, name] if in_vertex => {
-                let size = match kind {
-                    "char" | "uchar" | "int8" | "uint8" => 1,
-                    "short" | "ushort" | "int16" | "uint16" => 2,
-                    "int" | "uint" | "float" | "int32" | "uint32" | "float32" => 4,
-                    "double" | "float64" => 8,
-                    other => return Err(wrong(format!("\"{other}\" is no type of a property"))),
-                };
+                let size =
+                    bytes_of(kind).ok_or_else(|| wrong(format!("\"{kind}\" is no type of a property")))?;
                 columns.push((name.to_owned(), kind.to_owned(), stride));
                 stride = stride.saturating_add(size);
             }
@@ -193,23 +198,39 @@ fn read_header(path: &Path, reader: &mut impl BufRead) -> Result<Header> {
             _ => {}
         }
     }
-    let find = |names: [&str; 3], kinds: [&str; 2]| -> Option<[usize; 3]> {
-        let at = |name: &str| {
-            columns
-                .iter()
-                .find(|c| c.0 == name && kinds.contains(&c.1.as_str()))
-                .map(|c| c.2)
-        };
-        Some([at(names[0])?, at(names[1])?, at(names[2])?])
-    };
-    let position = find(["x", "y", "z"], ["float", "float32"]);
-    match (binary, count, position) {
-        (true, Some(count), Some(position)) => {
-            let color = find(["red", "green", "blue"], ["uchar", "uint8"]);
-            Ok(Header { bytes, count, stride, position, color })
-        }
-        _ => Err(Error::format(path, "not a PLY file of points with x, y and z as floats")),
+
+    let position = find_columns(&columns, ["x", "y", "z"], ["float", "float32"]);
+    let color = find_columns(&columns, ["red", "green", "blue"], ["uchar", "uint8"]);
+    match count.zip(position).filter(|_| is_binary) {
+        Some((count, position)) => Ok(Header { bytes, count, stride, position, color }),
+        None => Err(Error::format(path, "not a PLY file of points with x, y and z as floats")),
     }
+}
+
+/// The bytes of a property's type.
+fn bytes_of(kind: &str) -> Option<usize> {
+    match kind {
+        "char" | "uchar" | "int8" | "uint8" => Some(1),
+        "short" | "ushort" | "int16" | "uint16" => Some(2),
+        "int" | "uint" | "float" | "int32" | "uint32" | "float32" => Some(4),
+        "double" | "float64" => Some(8),
+        _ => None,
+    }
+}
+
+/// The offsets of three columns with these names, each of one of these types.
+fn find_columns(
+    columns: &[(String, String, usize)],
+    names: [&str; 3],
+    kinds: [&str; 2],
+) -> Option<[usize; 3]> {
+    let at = |name: &str| {
+        columns
+            .iter()
+            .find(|c| c.0 == name && kinds.contains(&c.1.as_str()))
+            .map(|c| c.2)
+    };
+    Some([at(names[0])?, at(names[1])?, at(names[2])?])
 }
 
 #[cfg(test)]
@@ -235,13 +256,14 @@ mod tests {
         let mut writer = PlyPointWriter::create(&path, 20_000).unwrap();
         writer.append(&all, &vec![7; 20_000]).unwrap();
         writer.finish().unwrap();
+
         for most in [0, 1, 3, 999, 20_000, 50_000] {
             let sample = read_point_sample(&path, most).unwrap();
             assert_eq!((sample.len(), sample.colors.len()), (most.min(20_000), most.min(20_000)));
             for (k, p) in sample.positions.iter().enumerate() {
                 let i = p.x as usize;
                 assert_eq!((*p, sample.colors[k]), (all.positions[i], all.colors[i]));
-                // In the k-th of as many equal parts.
+                // In part k of as many equal parts.
                 assert_eq!(i * sample.len() / 20_000, k);
             }
         }
@@ -302,6 +324,7 @@ mod tests {
             let e = read_point_sample(&path, 10).unwrap_err().to_string();
             assert!(e.contains(words), "{text:?}: {e}");
         }
+
         let mut bytes = head(little, &format!("element vertex 1\n{xyz}")).into_bytes();
         [1f32, f32::NAN, 2.0].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
         write_bytes(&path, &bytes).unwrap();

@@ -1,7 +1,7 @@
-//! Labelled point clouds as binary PLY files.
+//! Writes labelled point clouds as binary PLY files.
 //!
-//! Own code: ply-rs holds all points before it writes the first; here the millions of an area go through in
-//! pieces (`points_come_back_from_several_pieces`).
+//! Own code: ply-rs holds all points before it writes the first. This writer takes the millions of points of
+//! an area in pieces (`points_come_back_from_several_pieces`).
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
@@ -12,13 +12,14 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Bytes of one point: three floats, three bytes, two integers.
+/// The bytes of a point: three floats, three bytes, two integers.
 const POINT_BYTES: usize = 3 * 4 + 3 + 2 * 4;
 
-/// Points that are turned into bytes before they are handed on.
+/// The number of points that are turned into bytes at a time.
 const BATCH: usize = 4096;
 
-/// Writes a point cloud of any size piece by piece as a binary little-endian PLY file, whole or not at all.
+/// Writes a point cloud of any size piece by piece as a binary little-endian PLY file. The file appears whole
+/// or not at all.
 ///
 /// Columns: `x y z` (float, world metres, Z-up), `red green blue` (uchar; black if the cloud has no colours),
 /// `label` (uint, index into `semantic_labels.json`), `face` (uint, the face of the mesh that the point was
@@ -33,7 +34,7 @@ pub struct PlyPointWriter<W = AtomicFile> {
 }
 
 impl PlyPointWriter {
-    /// Starts the file `path`, which will hold `count` points.
+    /// Creates the file `path`, which will hold `count` points.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -41,8 +42,8 @@ impl PlyPointWriter {
         Self::create_moved(path, count, DVec3::ZERO)
     }
 
-    /// As [`PlyPointWriter::create`], for points from which `offset_m` was subtracted: a comment of the
-    /// header says so, if it is not 0.
+    /// Creates a file like [`PlyPointWriter::create`], for points from which `offset_m` was subtracted. A
+    /// comment in the header says so, unless the offset is 0.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -53,14 +54,14 @@ impl PlyPointWriter {
     /// Gives the file its name, and returns its size in bytes.
     ///
     /// # Errors
-    /// As [`PlyPointWriter::into_inner`]. Then there is no file.
+    /// The errors of [`PlyPointWriter::into_inner`]. After an error there is no file.
     pub fn finish(self) -> Result<u64> {
         self.into_inner()?.commit()
     }
 }
 
 impl<W: Write> PlyPointWriter<W> {
-    /// Starts a file of `count` points in `file`; errors call it `name`.
+    /// Starts a file of `count` points in `file`. Errors call it `name`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -75,6 +76,7 @@ impl<W: Write> PlyPointWriter<W> {
                 format!("comment offset_m {x:?} {y:?} {z:?}: add it for the scan's own coordinates\n")
             }
         };
+
         let header = format!(
             "ply\n\
              format binary_little_endian 1.0\n\
@@ -93,19 +95,20 @@ impl<W: Write> PlyPointWriter<W> {
              property uint face\n\
              end_header\n"
         );
+
         file.write_all(header.as_bytes())
             .map_err(|e| Error::io(name, "write", e))?;
         let name = name.to_owned();
         Ok(Self { file, name, promised: count, written: 0, buffer: Vec::with_capacity(BATCH * POINT_BYTES) })
     }
 
-    /// Appends the points of `cloud`, the label of each in `labels`.
+    /// Appends the points of `cloud`, with the label of each in `labels`.
     ///
     /// # Errors
     /// [`Error::Io`].
     ///
     /// # Panics
-    /// If `labels`, or a column of the cloud that is not empty, has not one entry a point.
+    /// If `labels`, or a column of the cloud that is not empty, does not have one entry a point.
     pub fn append(&mut self, cloud: &PointCloud, labels: &[u32]) -> Result<()> {
         let n = cloud.len();
         assert_eq!(labels.len(), n, "{n} points need as many labels");
@@ -119,6 +122,7 @@ impl<W: Write> PlyPointWriter<W> {
             "{} faces for {n} points",
             cloud.faces.len()
         );
+
         for first in (0..n).step_by(BATCH) {
             self.buffer.clear();
             put_points(&mut self.buffer, cloud, labels, first..n.min(first + BATCH));
@@ -130,10 +134,10 @@ impl<W: Write> PlyPointWriter<W> {
         Ok(())
     }
 
-    /// What the points were written to, complete.
+    /// Returns the complete file.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if not as many points came as were promised.
+    /// [`Error::Io`]; [`Error::Format`] if fewer or more points came than were promised.
     pub fn into_inner(self) -> Result<W> {
         if self.written != self.promised {
             let message = format!("{} points were promised, {} came", self.promised, self.written);
@@ -143,7 +147,7 @@ impl<W: Write> PlyPointWriter<W> {
     }
 }
 
-/// Appends the bytes of some points of a cloud. Not generic, so that it is compiled here, once.
+/// Appends the bytes of some points of a cloud. It is not generic, so that it is compiled here, once.
 fn put_points(buffer: &mut Vec<u8>, cloud: &PointCloud, labels: &[u32], which: Range<usize>) {
     let points = cloud.positions.iter().zip(labels).enumerate();
     for (i, (position, label)) in points.skip(which.start).take(which.len()) {
@@ -162,10 +166,10 @@ fn put_points(buffer: &mut Vec<u8>, cloud: &PointCloud, labels: &[u32], which: R
 /// The number of points that the header of the PLY file `path` states.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it has no such header.
+/// [`Error::Io`]; [`Error::Format`] if the file has no such header.
 pub fn read_ply_point_count(path: &Path) -> Result<u64> {
     let file = open_file(path)?;
-    // A header is short; what goes on for longer is none.
+    // Headers are short. A longer start belongs to another kind of file.
     for line in BufReader::new(file.take(65_536)).split(b'\n') {
         let line = line.map_err(|e| Error::io(path, "read", e))?;
         let text = String::from_utf8_lossy(&line);
@@ -185,7 +189,7 @@ mod tests {
     use super::*;
     use s3d_geom::glam::vec3;
 
-    /// A reader of exactly this kind of file, written from the specification of PLY.
+    /// Reads exactly this kind of file, as the specification of PLY describes it.
     fn read(path: &Path) -> (String, Vec<[u8; POINT_BYTES]>) {
         let bytes = std::fs::read(path).unwrap();
         let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
@@ -206,6 +210,7 @@ mod tests {
         };
         let bare = PointCloud { positions: vec![vec3(7.0, 8.0, 9.0)], ..PointCloud::default() };
         let labels: Vec<u32> = (0..n as u32).map(|i| i % 300).collect();
+
         let mut writer = PlyPointWriter::create(&path, n as u64 + 1).unwrap();
         writer.append(&cloud, &labels).unwrap();
         writer.append(&PointCloud::default(), &[]).unwrap();

@@ -1,7 +1,8 @@
-//! The points of the S3DIS tree: `x y z r g b` a line.
+//! Reads the points of the S3DIS tree: `x y z r g b` a line.
 //!
-//! Own code: the csv crate splits at one separator, where these files have runs of any blanks
-//! (`forms_of_a_line`), and holds a line of any length (`an_endless_line_is_refused_without_holding_it`).
+//! Own code: the csv crate splits at one separator, but these files have runs of any blanks
+//! (`forms_of_a_line`). The csv crate also holds a line of any length
+//! (`an_endless_line_is_refused_without_holding_it`).
 
 use crate::cloud::annotations::{PointBlocks, Skipped};
 use crate::cloud::s3dis::tree::OnFault;
@@ -18,19 +19,20 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// Bytes that are read at a time.
+/// The bytes that are read at a time.
 const BLOCK: usize = 1 << 20;
 /// The longest line that may hold a point.
 const LONGEST_LINE: usize = 1 << 16;
-/// The shortest: `0 0 0 0 0 0` and its end.
+/// The shortest line of a point: `0 0 0 0 0 0` and its end.
 const SHORTEST_LINE: usize = 12;
-/// Bytes that one thread reads at a time.
+/// The bytes that one thread parses at a time.
 const PIECE: usize = 1 << 16;
 
-/// Reads points of a file piece by piece, so that one of any size needs little memory.
+/// Reads the points of a file piece by piece, so that files of any size need little memory.
 ///
-/// A line is `x y z r g b` between any ASCII white space: metres in the Z-up world, as the nearest `f32`, and
-/// a colour of whole numbers, 0 to 255, which may be written `41.000000`. Empty lines do not count.
+/// A line is `x y z r g b`, separated by any ASCII white space: metres in the Z-up world, as the nearest
+/// `f32`, and a colour of whole numbers from 0 to 255, which may be written `41.000000`. Empty lines do not
+/// count.
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -52,7 +54,7 @@ pub struct PointReader<R = File> {
     file: Utf8Reader<R>,
     on_fault: OnFault,
     offset_m: DVec3,
-    /// What was read and is not used up: `block[start..end]`.
+    /// Bytes that were read; `block[start..end]` is not parsed yet.
     block: Vec<u8>,
     start: usize,
     end: usize,
@@ -63,7 +65,7 @@ pub struct PointReader<R = File> {
 }
 
 impl PointReader {
-    /// Opens a file of points; a line that is none will stop the reading.
+    /// Opens a file of points. An invalid line will be an error.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -71,7 +73,7 @@ impl PointReader {
         Self::open_with(path, OnFault::Stop)
     }
 
-    /// Opens a file of points, with a choice of what to do at lines that are none.
+    /// Opens a file of points, with a choice of what to do about invalid lines.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for a folder or a device.
@@ -81,7 +83,7 @@ impl PointReader {
 }
 
 impl<R: Read> PointReader<R> {
-    /// Reads the points of `reader`, with a choice of what to do at lines that are none; errors call it
+    /// Reads the points of `reader`, with a choice of what to do about invalid lines. Errors call the file
     /// `name`.
     pub fn new(reader: R, name: &Path, on_fault: OnFault) -> Self {
         Self {
@@ -99,40 +101,41 @@ impl<R: Read> PointReader<R> {
         }
     }
 
-    /// The same points, less `offset_m`, which is subtracted in `f64`, before coordinates are rounded.
+    /// Subtracts `offset_m` from the points in `f64`, before their coordinates are rounded.
     #[must_use]
     pub fn with_offset(mut self, offset_m: DVec3) -> Self {
         self.offset_m = offset_m;
         self
     }
 
-    /// How many lines were left out so far; 0 unless opened with [`OnFault::Skip`].
+    /// The number of lines left out so far; 0 unless opened with [`OnFault::Skip`].
     pub fn skipped(&self) -> u64 {
         self.skipped
     }
 
-    /// What was wrong with the first line that was left out, with its number.
+    /// The fault of the first line that was left out, with the line's number.
     pub fn first_skipped(&self) -> Option<&Error> {
         self.first_skipped.as_ref()
     }
 
-    /// What was left out, once the file is read.
+    /// The lines left out, once the file is read.
     pub(crate) fn into_skipped(self) -> Skipped {
         Skipped { count: self.skipped, first: self.first_skipped }
     }
 
-    /// Appends the next points, at most `max_points`, to `out`, and gives their number: 0 at the end of the
-    /// file.
+    /// Appends the next points to `out`, up to `max_points` of them, and returns their number: 0 at the end
+    /// of the file.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] with the number and the text of a line that is no point, or has a
-    /// coordinate that is not finite or a colour beyond 0 to 255. `out` holds the points before it.
+    /// coordinate that is not finite or a colour beyond 0 to 255. `out` holds the points before that line.
     ///
     /// # Panics
     /// If `max_points` is 0, or `out` has points without colours or with faces.
     pub fn read_chunk(&mut self, max_points: usize, out: &mut PointCloud) -> Result<usize> {
         assert!(max_points > 0, "a chunk of no points");
         assert!(out.colors.len() == out.len() && out.faces.is_empty(), "a cloud of other columns");
+
         let mut n = self.read_pieces(max_points, out);
         while n < max_points {
             let unread = self.block.get(self.start..self.end).unwrap_or_default();
@@ -147,6 +150,7 @@ impl<R: Read> PointReader<R> {
                 None if unread.is_empty() => break,
                 None => (unread, unread.len()),
             };
+
             self.line += 1;
             match parse_point(line, self.offset_m) {
                 Ok(Some((position, color))) => {
@@ -170,8 +174,8 @@ impl<R: Read> PointReader<R> {
         Ok(n)
     }
 
-    /// Appends the points of all whole lines at hand, on all threads, and gives their number. Nothing if
-    /// something is wrong with one, or if they may be more than `max_points`.
+    /// Appends the points of all whole lines in the block, on all threads, and returns their number. Does
+    /// nothing if a line is invalid, or if there may be more than `max_points` points.
     fn read_pieces(&mut self, max_points: usize, out: &mut PointCloud) -> usize {
         let unread = self.block.get(self.start..self.end).unwrap_or_default();
         let Some((lines, _)) = memrchr(b'\n', unread).and_then(|last| unread.split_at_checked(last + 1))
@@ -181,11 +185,13 @@ impl<R: Read> PointReader<R> {
         if lines.len() / SHORTEST_LINE >= max_points {
             return 0;
         }
+
         let pieces: Vec<&[u8]> = pieces(lines).collect();
         let offset_m = self.offset_m;
         let read = pieces.par_iter().map(|piece| points_of(piece, offset_m));
         let read: Option<Vec<(PointCloud, u64)>> = read.collect();
         let Some(read) = read else { return 0 };
+
         self.start += lines.len();
         let before = out.len();
         for (points, lines) in read {
@@ -196,7 +202,7 @@ impl<R: Read> PointReader<R> {
         out.len() - before
     }
 
-    /// Moves what is not used up to the front and fills the rest of the block.
+    /// Moves the bytes that are not parsed yet to the front, and fills the rest of the block.
     fn refill(&mut self) -> Result<()> {
         self.block.copy_within(self.start..self.end, 0);
         self.end -= self.start;
@@ -223,10 +229,10 @@ impl PointBlocks for PointReader {
     }
 }
 
-/// Appends all points of a file to `out`; see [`PointReader`] for its form.
+/// Appends all points of a file to `out`; see [`PointReader`] for its format.
 ///
 /// # Errors
-/// As [`PointReader::open`] and [`PointReader::read_chunk`].
+/// The errors of [`PointReader::open`] and [`PointReader::read_chunk`].
 ///
 /// # Panics
 /// If `out` has points without colours or with faces.
@@ -236,7 +242,7 @@ pub fn read_points(path: &Path, out: &mut PointCloud) -> Result<()> {
     Ok(())
 }
 
-/// Whole lines, cut into parts of whole lines.
+/// Cuts whole lines into pieces of whole lines.
 fn pieces(mut lines: &[u8]) -> impl Iterator<Item = &[u8]> {
     std::iter::from_fn(move || {
         let end = lines
@@ -249,7 +255,7 @@ fn pieces(mut lines: &[u8]) -> impl Iterator<Item = &[u8]> {
     })
 }
 
-/// The points of whole lines and the number of these, if nothing is wrong with any.
+/// Parses whole lines. Returns their points and the number of lines, or `None` if a line is invalid.
 fn points_of(mut lines: &[u8], offset_m: DVec3) -> Option<(PointCloud, u64)> {
     let mut points = PointCloud::default();
     let mut n = 0;
@@ -264,7 +270,7 @@ fn points_of(mut lines: &[u8], offset_m: DVec3) -> Option<(PointCloud, u64)> {
     Some((points, n))
 }
 
-/// The point of a line, less an offset, or `None` if the line is empty.
+/// Parses a line, and subtracts an offset from its point. Returns `None` for an empty line.
 fn parse_point(line: &[u8], offset_m: DVec3) -> std::result::Result<Option<(Vec3, [u8; 3])>, String> {
     let mut words = words(line);
     let mut fields: [&[u8]; 6] = [b""; 6];
@@ -281,33 +287,40 @@ fn parse_point(line: &[u8], offset_m: DVec3) -> std::result::Result<Option<(Vec3
         let than = if n > 6 { "more than " } else { "" };
         return Err(format!("not a point `x y z r g b`: {than}{} fields", n.min(6)));
     }
-    let coordinate = |word: &[u8], offset_m: f64| -> std::result::Result<f32, String> {
-        let value = if offset_m == 0.0 {
-            number(word)
-        } else {
-            less(word, offset_m)
-        };
-        match value {
-            Some(v) if v.is_finite() => Ok(v),
-            Some(_) => Err(format!("the coordinate {} is not finite", quote(word))),
-            None => Err(format!("the coordinate {} is no number", quote(word))),
-        }
-    };
-    let color = |word: &[u8]| {
-        parse_byte(word).ok_or_else(|| format!("the colour {} is none from 0 to 255", quote(word)))
-    };
+
     let [x, y, z, r, g, b] = fields;
-    let position = vec3(coordinate(x, offset_m.x)?, coordinate(y, offset_m.y)?, coordinate(z, offset_m.z)?);
-    Ok(Some((position, [color(r)?, color(g)?, color(b)?])))
+    let position = vec3(
+        parse_coordinate(x, offset_m.x)?,
+        parse_coordinate(y, offset_m.y)?,
+        parse_coordinate(z, offset_m.z)?,
+    );
+    Ok(Some((position, [parse_color(r)?, parse_color(g)?, parse_color(b)?])))
 }
 
-/// The number that a word spells, less an offset.
+fn parse_coordinate(word: &[u8], offset_m: f64) -> std::result::Result<f32, String> {
+    let value = if offset_m == 0.0 {
+        number(word)
+    } else {
+        less(word, offset_m)
+    };
+    match value {
+        Some(v) if v.is_finite() => Ok(v),
+        Some(_) => Err(format!("the coordinate {} is not finite", quote(word))),
+        None => Err(format!("the coordinate {} is no number", quote(word))),
+    }
+}
+
+fn parse_color(word: &[u8]) -> std::result::Result<u8, String> {
+    parse_byte(word).ok_or_else(|| format!("the colour {} is not from 0 to 255", quote(word)))
+}
+
+/// Parses a number, and subtracts an offset from it.
 fn less(word: &[u8], offset_m: f64) -> Option<f32> {
     let value: f64 = std::str::from_utf8(word).ok()?.parse().ok()?;
     Some((value - offset_m) as f32)
 }
 
-/// A whole number from 0 to 255, or the nearest to a float that lies between.
+/// Parses a whole number from 0 to 255, or rounds a float within that range.
 fn parse_byte(word: &[u8]) -> Option<u8> {
     if word.len() <= 3 && word.iter().all(u8::is_ascii_digit) {
         return u8::try_from(word.iter().fold(0u16, |n, d| n * 10 + u16::from(d - b'0'))).ok();
@@ -370,7 +383,7 @@ mod tests {
             (b"1 2 3\x10 4 5 6", "the coordinate `3\u{fffd}` is no number"),
             (b"1 nan 3 4 5 6", "`nan` is not finite"),
             (b"1 2 1e39 4 5 6", "`1e39` is not finite"),
-            (b"1 2 3 256 5 6", "the colour `256` is none"),
+            (b"1 2 3 256 5 6", "the colour `256` is not from 0 to 255"),
             (b"1 2 3 -1 5 6", "the colour `-1`"),
             (b"1 2 3 4 255.5 6", "the colour `255.5`"),
             (b"1 2 3 4 NaN 6", "the colour `NaN`"),
@@ -400,15 +413,16 @@ mod tests {
     fn chunks_are_as_large_as_asked_for() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.txt");
-        // Three blocks, so that lines lie across their borders.
+        // Two blocks and more, so that lines lie across their borders.
         let n = 3 * BLOCK / 30;
         let text: String = (0..n)
             .map(|i| format!("{i}.125 -{i}.5 1.000 1 2 {}\n\n", i % 256))
             .collect();
         assert!(text.len() > 2 * BLOCK);
         fs::write(&path, &text).unwrap();
-        let (mut reader, mut all, mut piece) =
-            (PointReader::open(&path).unwrap(), PointCloud::default(), PointCloud::default());
+        let mut reader = PointReader::open(&path).unwrap();
+        let mut all = PointCloud::default();
+        let mut piece = PointCloud::default();
         loop {
             piece.clear();
             let read = reader.read_chunk(1000, &mut piece).unwrap();
@@ -420,6 +434,7 @@ mod tests {
                 break;
             }
         }
+
         let mut whole = PointCloud::default();
         read_points(&path, &mut whole).unwrap();
         assert_eq!(all, whole);
@@ -431,7 +446,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.txt");
         let n = 5 * BLOCK / 20;
-        // In the first piece, in one between, in a later block.
+        // In the first piece, in a middle one, and in a later block.
         for bad in [3, 2 * PIECE / 20, n - 7] {
             let line = |i| {
                 if i == bad {
@@ -443,15 +458,18 @@ mod tests {
             fs::write(&path, (0..n).map(line).collect::<String>()).unwrap();
             // Each line but the bad one is followed by an empty one.
             let words = format!("line {}: not a point", 2 * bad + 1);
+
             let mut cloud = PointCloud::default();
             let message = read_points(&path, &mut cloud).unwrap_err().to_string();
             assert!(message.contains(&words), "{message}");
             assert_eq!(cloud.len(), bad);
+
             let mut reader = PointReader::open_with(&path, OnFault::Skip).unwrap();
             cloud.clear();
             while reader.read_chunk(usize::MAX, &mut cloud).unwrap() > 0 {}
             assert_eq!((cloud.len(), reader.skipped()), (n - 1, 1));
             assert!(reader.first_skipped().unwrap().to_string().contains(&words));
+
             let x = (0..n).filter(|i| *i != bad).map(|i| i as f32 + 0.5);
             assert!(cloud.positions.iter().map(|p| p.x).eq(x));
         }

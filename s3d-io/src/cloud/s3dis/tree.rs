@@ -1,5 +1,5 @@
-//! The S3DIS tree: an area's folder of rooms, their folders of annotated instances. Names only; the points
-//! are read by [`PointReader`](crate::cloud::PointReader). Source: formats.md, "What is written".
+//! Finds the files of an S3DIS tree: an area's folder of rooms, and their folders of annotated instances.
+//! [`PointReader`](crate::cloud::PointReader) reads the points. Source: formats.md, "What is written".
 
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
@@ -8,30 +8,31 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What to do at a name or a line that is not as it should be. The published files hold a few.
+/// What to do about a faulty name or line. The published files have a few.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum OnFault {
     /// Stop with an error that names it.
     #[default]
     Stop,
-    /// Leave it out, and keep an account of it.
+    /// Leave it out, and keep count of it.
     Skip,
 }
 
-/// How [`AnnotationTree::open_with`] takes what it finds.
+/// How [`AnnotationTree::open_with`] interprets names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TreeOptions {
-    /// Which classes and types of rooms there are.
+    /// The classes and the types of rooms.
     pub taxonomy: Taxonomy,
-    /// At a folder that names no room, a room without annotations, or a file that names no instance.
+    /// What to do about a folder that names no room, a room without annotations, or a file that names no
+    /// instance.
     pub on_fault: OnFault,
-    /// Whether an unknown class (`stairs_1.txt` in the published area) is taken for clutter
-    /// ([`Taxonomy::clutter`]), as its loaders do: its instances get the numbers after those of the room's
-    /// clutter.
+    /// Whether an unknown class (`stairs_1.txt` in the published area) counts as clutter
+    /// ([`Taxonomy::clutter`]), as in the data set's own loaders. Such instances are numbered after the
+    /// room's clutter.
     pub unknown_as_clutter: bool,
-    /// Which class a word of a file's name means, even if it is a class; `None`: such files are left
-    /// out without a warning. Instances of another class than the word's get the numbers after those of the
-    /// room's own, as with clutter.
+    /// The class that a word in a file's name stands for, even if the word is a class itself. `None`: such
+    /// files are left out without a warning. If the class is not the word's own, the instances are numbered
+    /// after the room's own ones of that class, as with clutter.
     pub classes: BTreeMap<String, Option<Class>>,
 }
 
@@ -40,14 +41,14 @@ pub struct TreeOptions {
 pub struct AnnotationTree {
     /// The rooms, by type and number; see [`Room`]. At least one.
     pub rooms: Vec<RoomFiles>,
-    /// What was left out or taken for something else: a sentence each, for the user.
+    /// What was left out or reinterpreted: a sentence each, for the user.
     pub warnings: Vec<String>,
 }
 
 /// A room's folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RoomFiles {
-    /// Which room it is.
+    /// The room.
     pub room: Room,
     /// Its folder, which holds `Annotations`.
     pub path: PathBuf,
@@ -58,9 +59,9 @@ pub struct RoomFiles {
 /// The file of an instance's points.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InstanceFile {
-    /// What it is.
+    /// Its class.
     pub class: Class,
-    /// Its number among the room's instances of its class, from 1.
+    /// Its number among the room's instances of the same class, from 1.
     pub number: u32,
     /// The file: `x y z r g b` a line.
     pub path: PathBuf,
@@ -69,20 +70,21 @@ pub struct InstanceFile {
 impl AnnotationTree {
     /// Finds the instances below `dir`, an area's folder: `dir/ROOM/Annotations/CLASS_N.txt`.
     ///
-    /// Hidden files do not count; other files that are not `.txt` and files where folders should be become
+    /// Hidden files do not count. Other files that are not `.txt`, and files in the place of folders, become
     /// [`AnnotationTree::warnings`].
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] for the path of a folder that names no room, a room without
-    /// annotations, a file that names no instance or one that is there twice, an area without rooms.
+    /// [`Error::Io`]; [`Error::Format`] for a folder that names no room, a room without annotations, a file
+    /// that names no instance or the same one as another file, and an area without rooms.
     pub fn open(dir: &Path) -> Result<Self> {
         Self::open_with(dir, &TreeOptions::default())
     }
 
-    /// As [`AnnotationTree::open`], with a choice of what to do about odd names.
+    /// Opens a tree like [`AnnotationTree::open`], with a choice of what to do about odd names.
     ///
     /// # Errors
-    /// As [`AnnotationTree::open`]; with [`OnFault::Skip`] only [`Error::Io`] and an area without rooms.
+    /// The errors of [`AnnotationTree::open`]; with [`OnFault::Skip`] only [`Error::Io`] and an area without
+    /// rooms.
     pub fn open_with(dir: &Path, options: &TreeOptions) -> Result<Self> {
         let mut tree = Self { rooms: Vec::new(), warnings: Vec::new() };
         for path in entries(dir)? {
@@ -96,6 +98,7 @@ impl AnnotationTree {
                     .push(format!("{}: not a room's folder, left out", path.display()));
             }
         }
+
         if tree.rooms.is_empty() {
             let form =
                 "an area's folder holds ROOM/Annotations/CLASS_N.txt, as in office_3/Annotations/chair_1.txt";
@@ -122,6 +125,7 @@ impl AnnotationTree {
         if !annotations.is_dir() {
             return Err(Error::format(path, "is a room without a folder Annotations"));
         }
+
         let mut instances: BTreeMap<(Class, u32), PathBuf> = BTreeMap::new();
         let mut others: Vec<(Class, PathBuf)> = Vec::new();
         for path in entries(&annotations)? {
@@ -143,6 +147,7 @@ impl AnnotationTree {
                     continue;
                 }
             };
+
             match instances.get(&found) {
                 Some(first) => {
                     let message = format!("is a second {}_{} beside {}", found.0, found.1, name_of(first));
@@ -151,6 +156,8 @@ impl AnnotationTree {
                 None => drop(instances.insert(found, path)),
             }
         }
+
+        // Instances of other words get the numbers after the last of their class.
         for (class, path) in others {
             let last = instances.range((class, 0)..=(class, u32::MAX)).next_back();
             let number = last.map_or(0, |((_, n), _)| *n) + 1;
@@ -159,6 +166,7 @@ impl AnnotationTree {
                 .push(format!("{}: {name} is taken for {class}_{number}", path.display()));
             instances.insert((class, number), path);
         }
+
         if instances.is_empty() {
             return Err(Error::format(&annotations, "holds no CLASS_N.txt"));
         }
@@ -170,12 +178,12 @@ impl AnnotationTree {
     }
 }
 
-/// What a file's name says.
+/// The meaning of a file's name.
 enum Named {
     Instance(Class, u32),
-    /// A word that is no class, but is taken for one.
+    /// The word is no class of its own, but counts as this one.
     Other(Class),
-    /// A word whose points do not count.
+    /// The points do not count.
     Unlabelled,
 }
 
@@ -198,6 +206,7 @@ fn instance_of(path: &Path, options: &TreeOptions) -> Result<Named> {
         }
         return Err(Error::format(path, message));
     };
+
     match class_of_word(&options.taxonomy, &options.classes, options.unknown_as_clutter, word) {
         Ok(Some(ClassOfWord::Own(class))) => Ok(Named::Instance(class, number)),
         Ok(Some(ClassOfWord::Other(class))) => Ok(Named::Other(class)),
@@ -206,15 +215,15 @@ fn instance_of(path: &Path, options: &TreeOptions) -> Result<Named> {
     }
 }
 
-/// What the word in an instance's name says of its class.
+/// The class of an instance, from the word in its name.
 pub(crate) enum ClassOfWord {
-    /// It is the class's name: the instance keeps its number.
+    /// The word is the class's name: the instance keeps its number.
     Own(Class),
-    /// It is another word for the class: the number may be that of an instance with the class's name.
+    /// The word is another one for the class: an instance with the class's name may have the same number.
     Other(Class),
 }
 
-/// The class of an instance that is named after `word`; `None`: it is unlabelled.
+/// The class of an instance that is named after `word`. Returns `None` if it is unlabelled.
 pub(crate) fn class_of_word(
     taxonomy: &Taxonomy,
     classes: &BTreeMap<String, Option<Class>>,
@@ -232,7 +241,7 @@ pub(crate) fn class_of_word(
     }
 }
 
-/// What lies in a folder, by name, without hidden files.
+/// The entries of a folder, sorted by name, without hidden ones.
 fn entries(dir: &Path) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for entry in fs::read_dir(dir).map_err(|e| Error::io(dir, "read the folder", e))? {

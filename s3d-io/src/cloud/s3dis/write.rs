@@ -1,6 +1,6 @@
-//! Writing the S3DIS tree: text files of annotated points. Source: formats.md, "What is written".
+//! Writes the S3DIS tree: text files of annotated points. Source: formats.md, "What is written".
 
-#![expect(clippy::indexing_slicing, reason = "a writer: its table is its own")]
+#![expect(clippy::indexing_slicing, reason = "a writer: it indexes only its own table of digits")]
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::{AtomicFile, create_dir, write_whole};
@@ -8,22 +8,22 @@ use s3d_geom::glam::Vec3;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Text that is collected before it is handed on.
+/// The bytes of text that are collected before they are written.
 const BATCH_BYTES: usize = 1 << 16;
 
 /// Writes the tree of one area, room by room: `office_1/office_1.txt`, `office_1/Annotations/chair_1.txt`…,
 /// `Area_1_alignmentAngle.txt`.
 ///
 /// A line is `x y z r g b`: metres with three decimals, colours 0 to 255. A room's file holds its points in
-/// the order in which they came, which is that of its annotation files one after another. Nothing is kept in
-/// memory. Each file is there whole or not at all.
+/// the order in which they came, which is the order of its annotation files. Nothing is kept in memory. Each
+/// file appears whole or not at all.
 #[derive(Debug)]
 pub struct S3disAreaWriter {
     dir: PathBuf,
 }
 
 impl S3disAreaWriter {
-    /// Makes the folder of the area, such as `s3dis/Area_1`.
+    /// Creates the folder of the area, such as `s3dis/Area_1`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -32,7 +32,7 @@ impl S3disAreaWriter {
         Ok(Self { dir: dir.to_owned() })
     }
 
-    /// Starts a room: "office_1".
+    /// Starts a room, such as "office_1".
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -43,8 +43,8 @@ impl S3disAreaWriter {
         Ok(S3disRoomWriter { dir, file, points: 0, unfinished: false })
     }
 
-    /// Writes the angle of each room, in the order given: whole degrees, 0 to 359. The file is named after
-    /// the area's folder.
+    /// Writes the alignment angle of each room, in the order given: whole degrees, 0 to 359. The file is
+    /// named after the area's folder. Returns its size in bytes.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -66,12 +66,12 @@ pub struct S3disRoomWriter {
     dir: PathBuf,
     file: AtomicFile,
     points: u64,
-    /// An instance was begun and not finished: its points stand in the room's file only.
+    /// Whether an instance was started and not finished: its points are in the room's file only.
     unfinished: bool,
 }
 
 impl S3disRoomWriter {
-    /// Starts an instance: its class and its number in the room, from 1.
+    /// Starts an instance with its class and its number in the room, from 1.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -81,7 +81,7 @@ impl S3disRoomWriter {
         Ok(S3disInstanceWriter { room: self, file, points: 0 })
     }
 
-    /// Appends points that belong to no instance: they stand in the room's file only.
+    /// Appends points that belong to no instance. They are in the room's file only.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for a coordinate that is not finite.
@@ -92,7 +92,7 @@ impl S3disRoomWriter {
         self.append(positions, colors, None)
     }
 
-    /// Gives the room's file its name, and returns how many points it holds.
+    /// Gives the room's file its name, and returns the number of its points.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -122,7 +122,7 @@ impl S3disRoomWriter {
     }
 }
 
-/// Writes the same into a room's file and that of one of its instances, if the points are of one.
+/// Writes the same text into a room's file and into the file of an instance, if there is one.
 struct RoomAndInstance<'a> {
     room: &'a mut AtomicFile,
     instance: Option<&'a mut AtomicFile>,
@@ -142,7 +142,7 @@ impl Write for RoomAndInstance<'_> {
     }
 }
 
-/// Writes the file of one instance, and its points into the room's too; see [`S3disRoomWriter::instance`].
+/// Writes the file of one instance, and its points into the room's file; see [`S3disRoomWriter::instance`].
 #[derive(Debug)]
 pub struct S3disInstanceWriter<'a> {
     room: &'a mut S3disRoomWriter,
@@ -164,7 +164,7 @@ impl S3disInstanceWriter<'_> {
         Ok(())
     }
 
-    /// Gives the instance's file its name, and returns how many points it holds.
+    /// Gives the instance's file its name, and returns the number of its points.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -175,11 +175,11 @@ impl S3disInstanceWriter<'_> {
     }
 }
 
-/// Writes points as the files of the tree hold them, a line `x y z r g b` each: metres with three decimals,
-/// colours 0 to 255.
+/// Writes points as in the files of the tree, a line `x y z r g b` each: metres with three decimals, colours
+/// 0 to 255.
 ///
 /// # Errors
-/// Those of `w`; [`InvalidInput`](io::ErrorKind::InvalidInput) for a coordinate that is not finite.
+/// The errors of `w`; [`InvalidInput`](io::ErrorKind::InvalidInput) for a coordinate that is not finite.
 ///
 /// # Panics
 /// If there are not as many colours as positions.
@@ -209,7 +209,7 @@ pub fn write_s3dis_points(w: &mut dyn Write, positions: &[Vec3], colors: &[[u8; 
     w.write_all(&text)
 }
 
-/// Appends the line of a point, `x y z r g b`, as `{:.3}` and `{}` would write it, many times as fast.
+/// Appends the line of a point, `x y z r g b`: the text of `{:.3}` and `{}`, written many times as fast.
 fn push_point(text: &mut Vec<u8>, position: Vec3, color: [u8; 3]) {
     for coordinate in position.to_array() {
         push_fixed3(text, coordinate);
@@ -224,11 +224,11 @@ fn push_point(text: &mut Vec<u8>, position: Vec3, color: [u8; 3]) {
     text.push(b'\n');
 }
 
-/// Metres rounded to millimetres (halves away from zero), with three decimals and never "-0.000".
+/// Appends metres rounded to millimetres (halves away from zero), with three decimals and never "-0.000".
 fn push_fixed3(text: &mut Vec<u8>, metres: f32) {
     let thousandths = (f64::from(metres) * 1000.0).round();
     if thousandths.abs() >= 1e15 {
-        // Farther than any scan: digits that a double does not hold one by one.
+        // Farther than any scan. A double does not hold every digit of such a number.
         text.extend_from_slice(format!("{metres:.3}").as_bytes());
         return;
     }
@@ -239,8 +239,11 @@ fn push_fixed3(text: &mut Vec<u8>, metres: f32) {
     let magnitude = millimetres.unsigned_abs();
     push_integer(text, magnitude / 1000);
     let rest = (magnitude % 1000) as u16;
-    let digit = |value: u16| b'0' + (value % 10) as u8;
-    text.extend_from_slice(&[b'.', digit(rest / 100), digit(rest / 10), digit(rest)]);
+    text.extend_from_slice(&[b'.', last_digit(rest / 100), last_digit(rest / 10), last_digit(rest)]);
+}
+
+fn last_digit(value: u16) -> u8 {
+    b'0' + (value % 10) as u8
 }
 
 fn push_integer(text: &mut Vec<u8>, mut value: u64) {
@@ -289,13 +292,13 @@ mod tests {
         fn fast_digits_are_those_of_the_formatter(
             metres in prop_oneof![-1e3..1e3f32, -1e6..1e6f32, -1e-2..1e-2f32],
         ) {
-            // `{:.3}` rounds the exact value, and a half that comes up exactly to even; ours goes away from
-            // zero.
+            // `{:.3}` rounds the exact value, and an exact half to even. Ours rounds halves away from zero.
             let plain = format!("{metres:.3}");
             let half = f64::from(metres) * 1000.0;
             if (half - half.trunc()).abs() != 0.5 {
                 prop_assert_eq!(fixed3(metres), if plain == "-0.000" { "0.000" } else { &plain });
             }
+
             let mut text = Vec::new();
             push_integer(&mut text, u64::from(metres.to_bits()));
             prop_assert_eq!(String::from_utf8(text).unwrap(), metres.to_bits().to_string());
@@ -308,14 +311,17 @@ mod tests {
         let area = S3disAreaWriter::create(&dir.path().join("Area_1")).unwrap();
         let mut room = area.room("office_1").unwrap();
         let many: Vec<Vec3> = (0..10_000).map(|i| vec3(i as f32 * 0.001, -0.5, 2.25)).collect();
+
         let mut chair = room.instance("chair", 1).unwrap();
         chair.append(&many[..6000], &vec![[1, 20, 255]; 6000]).unwrap();
         chair.append(&many[6000..], &vec![[0, 0, 0]; 4000]).unwrap();
         assert_eq!(chair.finish().unwrap(), 10_000);
+
         let mut wall = room.instance("wall", 3).unwrap();
         wall.append(&[vec3(-24.048, 3.997, 0.0)], &[[7, 8, 9]]).unwrap();
         wall.finish().unwrap();
         room.append_unannotated(&[vec3(1.0, 2.0, 3.0)], &[[4, 5, 6]]).unwrap();
+
         let room_file = dir.path().join("Area_1/office_1/office_1.txt");
         assert!(!room_file.exists());
         assert_eq!(room.finish().unwrap(), 10_002);

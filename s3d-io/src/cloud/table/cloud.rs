@@ -1,11 +1,11 @@
-//! What every format's reader of a table of points is.
+//! The interface of every format's reader of a table of points.
 
 use crate::cloud::table::rows::{Reading, Tag};
 use crate::error::Result;
 use s3d_label::{Class, Room, Taxonomy};
 use std::path::Path;
 
-/// What a format's colours are taken for. Where a format leaves it open, the narrow range is tried first.
+/// How a format's colours are scaled. If the format leaves it open, the narrow range is tried first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum ColorRange {
     /// 16-bit numbers up to 255, or floats from 0 to 1.
@@ -19,23 +19,23 @@ pub(crate) enum ColorRange {
 pub(crate) trait Cloud {
     fn path(&self) -> &Path;
 
-    /// The room that the file itself names, by its own name for instance.
+    /// The room that the file itself states, for instance by its own name.
     fn room(&self, taxonomy: &Taxonomy) -> Option<Room> {
         room_of_name(self.path(), taxonomy)
     }
 
-    /// The class of S3DIS that a tag means in this kind of file, where the user says nothing.
+    /// The S3DIS class that this kind of file gives a tag, if the user gives it none.
     fn class_of(&self, _tag: &Tag) -> Option<Class> {
         None
     }
 
-    /// Whether its points are the vertices of a mesh; known once it is read.
+    /// Whether its points are the vertices of a mesh. This is known once the file is read.
     fn are_vertices(&self) -> bool {
         false
     }
 
-    /// Reads all rows. `false`: colours go beyond the narrow range, and the rows must be read again with the
-    /// wide one.
+    /// Reads all rows. Returns `false` if a colour is beyond the narrow range; the rows must then be read
+    /// again with the wide one.
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool>;
 }
 

@@ -1,18 +1,18 @@
-//! Which columns of a table of points hold what: by name, since every program has its own.
+//! Finds the columns of a table of points by name. Every program has names of its own.
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Names of coordinates, of one column each and of arrays of three.
+/// Names of the three coordinate columns, and of arrays of three coordinates.
 const POSITIONS: [[&str; 3]; 1] = [["x", "y", "z"]];
 const POSITION_ARRAYS: [&str; 9] =
     ["xyz", "points", "point", "coord", "coords", "positions", "position", "pos", "vertices"];
-/// Names of colours.
+/// Names of the three colour columns, and of arrays of three colours.
 const COLORS: [[&str; 3]; 3] =
     [["red", "green", "blue"], ["r", "g", "b"], ["diffuse_red", "diffuse_green", "diffuse_blue"]];
 const COLOR_ARRAYS: [&str; 6] = ["rgb", "colors", "color", "colours", "colour", "rgbs"];
-/// Names of classes, the surest first. `scalar_…` is CloudCompare's.
+/// Names of class columns, the surest first. `scalar_…` is CloudCompare's.
 pub(crate) const CLASSES: [&str; 19] = [
     "class",
     "semantic_class",
@@ -34,7 +34,7 @@ pub(crate) const CLASSES: [&str; 19] = [
     "scalar_classification",
     "object_class",
 ];
-/// Names of instance numbers.
+/// Names of columns of instance numbers.
 pub(crate) const INSTANCES: [&str; 15] = [
     "instance",
     "instance_id",
@@ -53,7 +53,7 @@ pub(crate) const INSTANCES: [&str; 15] = [
     "track_id",
 ];
 
-/// Where in a row things are: indices of columns.
+/// The columns of a table, as indices: where each thing is in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Columns {
     pub(crate) position: [usize; 3],
@@ -64,63 +64,75 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Finds the columns: those that the options name, to the letter, and else those that are called as
-    /// usual, in capitals or not. An element of an array is a column `name[i]`.
+    /// Chooses the columns. A name from the options is case-sensitive; the usual names are found in capitals
+    /// or not. An element of an array is a column `name[i]`.
     ///
     /// # Errors
-    /// [`Error::Format`] with the columns that there are if one is missing, or named and not there.
+    /// [`Error::Format`], with the names of all columns, if a needed or named column is missing.
     pub(crate) fn choose(path: &Path, names: &[String], options: &AnnotationOptions) -> Result<Self> {
-        let usual = |wanted: &[&str]| wanted.iter().find_map(|w| find(names, w));
-        let there = || {
-            let list: Vec<&str> = names.iter().map(String::as_str).collect();
-            format!("its columns are {}", list.join(" "))
-        };
-        let named = |key: &str, name: &str| {
-            names.iter().position(|n| n == name).ok_or_else(|| {
-                Error::format(path, format!("has no column {name:?} ({key} in [annotations]); {}", there()))
-            })
-        };
-        let three = |sets: &[[&str; 3]], arrays: &[&str]| {
-            let of_set =
-                |set: &[&str; 3]| Some([find(names, set[0])?, find(names, set[1])?, find(names, set[2])?]);
-            let of_array = |array: &&str| {
-                let at = |i: usize| find(names, &format!("{array}[{i}]"));
-                Some([at(0)?, at(1)?, at(2)?])
-            };
-            sets.iter()
-                .find_map(of_set)
-                .or_else(|| arrays.iter().find_map(of_array))
-        };
-        let position = three(&POSITIONS, &POSITION_ARRAYS).ok_or_else(|| {
-            Error::format(path, format!("has no columns of coordinates, such as x y z; {}", there()))
+        let position = find_three(names, &POSITIONS, &POSITION_ARRAYS).ok_or_else(|| {
+            Error::format(path, format!("has no columns of coordinates, such as x y z; {}", listed(names)))
         })?;
         let class = match &options.class_column {
-            Some(name) => named("class", name)?,
-            None => usual(&CLASSES).ok_or_else(|| {
+            Some(name) => find_named(path, names, "class", name)?,
+            None => find_usual(names, &CLASSES).ok_or_else(|| {
                 Error::format(
                     path,
                     format!(
                         "has no column of classes; {}. If one of them is it, name it, as in class = \
                          \"label\" in [annotations]; a cloud without labels cannot label a mesh",
-                        there()
+                        listed(names)
                     ),
                 )
             })?,
         };
         let instance = match &options.instance_column {
-            Some(name) => Some(named("instance", name)?),
-            None => usual(&INSTANCES).filter(|i| *i != class),
+            Some(name) => Some(find_named(path, names, "instance", name)?),
+            None => find_usual(names, &INSTANCES).filter(|i| *i != class),
         };
         let room = options
             .room_column
             .as_ref()
-            .map(|name| named("rooms", name))
+            .map(|name| find_named(path, names, "rooms", name))
             .transpose()?;
-        Ok(Self { position, color: three(&COLORS, &COLOR_ARRAYS), class, instance, room })
+
+        let color = find_three(names, &COLORS, &COLOR_ARRAYS);
+        Ok(Self { position, color, class, instance, room })
     }
 }
 
-/// The column of this name, in capitals or not.
+/// All columns, for messages.
+fn listed(names: &[String]) -> String {
+    format!("its columns are {}", names.join(" "))
+}
+
+/// The column that the user named for `key`.
+fn find_named(path: &Path, names: &[String], key: &str, name: &str) -> Result<usize> {
+    names.iter().position(|n| n == name).ok_or_else(|| {
+        let message = format!("has no column {name:?} ({key} in [annotations]); {}", listed(names));
+        Error::format(path, message)
+    })
+}
+
+/// The column with the first of these names that there is.
+fn find_usual(names: &[String], usual: &[&str]) -> Option<usize> {
+    usual.iter().find_map(|name| find(names, name))
+}
+
+/// The three columns with the names of a set, or else the three elements of an array.
+fn find_three(names: &[String], sets: &[[&str; 3]], arrays: &[&str]) -> Option<[usize; 3]> {
+    let set = sets
+        .iter()
+        .find_map(|[a, b, c]| Some([find(names, a)?, find(names, b)?, find(names, c)?]));
+    set.or_else(|| {
+        arrays.iter().find_map(|array| {
+            let element = |i: usize| find(names, &format!("{array}[{i}]"));
+            Some([element(0)?, element(1)?, element(2)?])
+        })
+    })
+}
+
+/// The column with this name, in capitals or not. An exact match comes first.
 fn find(names: &[String], name: &str) -> Option<usize> {
     let exact = names.iter().position(|n| n == name);
     exact.or_else(|| names.iter().position(|n| n.eq_ignore_ascii_case(name)))

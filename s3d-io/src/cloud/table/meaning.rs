@@ -1,9 +1,9 @@
-//! What the classes and rooms of a flat cloud mean, and which instances it holds.
+//! What the classes and rooms of a table of points mean, and which instances it holds.
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::s3dis::tree::OnFault;
 use crate::cloud::table::cloud::Cloud;
-use crate::cloud::table::rows::{NO_INSTANCE, NO_TAG, Tag, Tags};
+use crate::cloud::table::rows::{CloudTags, NO_INSTANCE, NO_TAG, Tag};
 use crate::error::{Error, Result};
 use s3d_label::{Class, Room};
 use std::collections::BTreeMap;
@@ -12,69 +12,70 @@ use std::path::Path;
 /// The most tags that a message lists.
 const LISTED: usize = 20;
 
-/// Points that say the same of themselves.
+/// Points with the same room, class and instance number.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Group {
-    /// Index of a tag, or [`NO_TAG`].
+    /// Index of the room's tag, or [`NO_TAG`].
     pub(crate) room: u32,
-    /// Index of a tag.
+    /// Index of the class's tag.
     pub(crate) class: u32,
-    /// Number in the file, or [`NO_INSTANCE`].
+    /// The instance number in the file, or [`NO_INSTANCE`].
     pub(crate) instance: i64,
-    /// The first file that tells of it.
+    /// The first file that has points of it.
     pub(crate) file: usize,
     pub(crate) points: u64,
 }
 
 /// An instance of the area.
 #[derive(Clone, Debug)]
-pub(crate) struct FlatInstance {
+pub(crate) struct TableInstance {
     pub(crate) room: Room,
     pub(crate) class: Class,
-    /// Among the room's instances of its class, from 1.
+    /// Its number among the room's instances of the same class, from 1.
     pub(crate) number: u32,
     pub(crate) points: u64,
-    /// The first file that tells of it.
+    /// The first file that has points of it.
     pub(crate) file: usize,
-    /// What the file calls it.
+    /// Its name in the file.
     pub(crate) part: String,
 }
 
-/// Which instance each group belongs to.
+/// The instances of a cloud, and the instance of each group.
 #[derive(Debug)]
 pub(crate) struct Meaning {
-    /// By room, class and number: the order of their points.
-    pub(crate) instances: Vec<FlatInstance>,
-    /// An index into them for each group; `None`: its points are left out.
+    /// By room, class and number, which is the order of their points.
+    pub(crate) instances: Vec<TableInstance>,
+    /// For each group, an index into the instances. `None`: its points are left out.
     pub(crate) instance_of: Vec<Option<usize>>,
 }
 
-/// What makes an instance: equal keys are one, and their order is that of the numbers. The tag is `None` for
-/// points without an instance number, which are one instance a class and room, whatever their class is
-/// called.
+/// The key of an instance: points with equal keys are one instance, and instances are numbered in the order
+/// of their keys. The tag is `None` for points without an instance number; these are one instance a class and
+/// room, whatever the file calls the class.
 type Key = (Room, Class, i64, Option<Tag>);
 
 impl Meaning {
-    /// Finds what tags mean. What has no meaning stops with a list of it, or is left out with a warning.
+    /// Finds the meaning of the tags. Tags without a meaning are an error that lists them, or are left out
+    /// with a warning.
     ///
     /// # Panics
-    /// If a group is of none of the classes or of none of the clouds.
+    /// If a group has a class or a cloud that is not given.
     #[expect(clippy::indexing_slicing, clippy::expect_used, reason = "whoever makes groups numbers both")]
     pub(crate) fn new(
         clouds: &[&dyn Cloud],
         options: &AnnotationOptions,
         groups: &[Group],
-        classes: &Tags,
-        rooms: &Tags,
+        tags: &CloudTags,
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
         let mut unknown_classes = Unknown::default();
         let mut unknown_rooms = Unknown::default();
         let mut keys: Vec<Option<Key>> = Vec::new();
         let mut any_known = false;
+
         for group in groups {
-            let room = room_of(options, rooms.get(group.room));
-            let tag = classes.get(group.class).expect("groups have classes");
+            let room = room_of(options, tags.rooms.get(group.room));
+            let tag = tags.classes.get(group.class).expect("groups have classes");
             let class = match class_of(clouds[group.file], options, tag) {
                 Some(known) => {
                     any_known |= known.is_some();
@@ -89,18 +90,21 @@ impl Meaning {
                     }
                 }
             };
+
             // Unlabelled points need no room.
             if room.is_none() && class.is_some() {
                 let key = if group.room == NO_TAG {
                     None
                 } else {
-                    rooms.get(group.room).map(Tag::key)
+                    tags.rooms.get(group.room).map(Tag::key)
                 };
                 unknown_rooms.add(key.unwrap_or_default(), group);
             }
+
             let tag = (group.instance != NO_INSTANCE).then(|| tag.clone());
             keys.push(room.zip(class).map(|(room, class)| (room, class, group.instance, tag)));
         }
+
         unknown_classes.tell_classes(clouds, options, any_known, warnings)?;
         let any_left = keys.iter().any(Option::is_some);
         unknown_rooms.tell_rooms(clouds, options, any_left, warnings)?;
@@ -117,28 +121,36 @@ impl Meaning {
             }
         }
         if found.is_empty() {
-            let path = clouds.first().map_or(Path::new(""), |cloud| cloud.path());
+            let path = first_path(clouds);
             return Err(Error::format(path, "has no annotated point: every class in it is unlabelled"));
         }
-        let mut instances: Vec<FlatInstance> = Vec::new();
+
+        let mut instances: Vec<TableInstance> = Vec::new();
         let mut index: BTreeMap<&Key, usize> = BTreeMap::new();
         for (key, (points, file)) in found {
             let (room, class, in_file, tag) = key;
             let before = instances.last().filter(|i| i.room == *room && i.class == *class);
-            let number = before.map_or(0, |i| i.number) + 1;
+            let number = before.map_or(0, |instance| instance.number) + 1;
             index.insert(key, instances.len());
             let part = match tag {
                 None => format!("the {class} of {room}"),
                 Some(tag) => format!("instance {in_file} of class {} in {room}", tag.key()),
             };
-            instances.push(FlatInstance { room: *room, class: *class, number, points, file, part });
+            instances.push(TableInstance { room: *room, class: *class, number, points, file, part });
         }
+
         let instance_of = keys.iter().map(|key| index.get(key.as_ref()?).copied()).collect();
         Ok(Self { instances, instance_of })
     }
 }
 
-/// The class that a tag means: `Some(None)` for unlabelled, `None` if that is not known.
+/// The path of the first cloud, for messages.
+pub(crate) fn first_path<'c>(clouds: &[&'c dyn Cloud]) -> &'c Path {
+    clouds.first().map_or(Path::new(""), |cloud| cloud.path())
+}
+
+/// The class that a tag means. Returns `Some(None)` for unlabelled points, and `None` if the meaning is
+/// unknown.
 fn class_of(cloud: &dyn Cloud, options: &AnnotationOptions, tag: &Tag) -> Option<Option<Class>> {
     if let Some(class) = options.classes.get(&tag.key()) {
         return Some(*class);
@@ -147,7 +159,7 @@ fn class_of(cloud: &dyn Cloud, options: &AnnotationOptions, tag: &Tag) -> Option
         Tag::Name(name) => options.taxonomy.meaning(name),
         Tag::Number(number) => options.taxonomy.meaning_of_number(*number),
     };
-    // What formats know of themselves is told in classes of S3DIS.
+    // The classes that formats themselves define are given as classes of S3DIS.
     meant.or_else(|| {
         if options.taxonomy.is_s3dis() {
             cloud.class_of(tag).map(Some)
@@ -168,7 +180,7 @@ fn room_of(options: &AnnotationOptions, tag: Option<&Tag>) -> Option<Room> {
     }
 }
 
-/// Tags without a meaning, their points and the first file of each.
+/// Tags without a meaning: for each the number of its points, and its first file.
 #[derive(Default)]
 struct Unknown(BTreeMap<String, (u64, usize)>);
 
@@ -179,13 +191,14 @@ impl Unknown {
         *file = (*file).min(group.file);
     }
 
-    /// The first file, the list for a message, and the number of points.
+    /// The first file, the list for a message, and the number of points. Returns `None` if there are no tags.
     fn list<'c>(&self, clouds: &[&'c dyn Cloud]) -> Option<(&'c Path, String, u64)> {
         let file = self.0.values().map(|(_, file)| *file).min()?;
         let path = clouds.get(file)?.path();
         let mut rows: Vec<_> = self.0.iter().collect();
-        // Numbers in their order, before names.
+        // Numbers in their order, then names.
         rows.sort_by_key(|(key, _)| (key.parse::<i64>().unwrap_or(i64::MAX), (*key).clone()));
+
         let mut items: Vec<String> = rows
             .iter()
             .take(LISTED)
@@ -197,6 +210,7 @@ impl Unknown {
         Some((path, items.join(", "), rows.iter().map(|(_, (n, _))| n).sum()))
     }
 
+    /// Warns of points with unknown classes, or refuses them. `any_known`: some class has a meaning.
     fn tell_classes(
         &self,
         clouds: &[&dyn Cloud],
@@ -205,43 +219,48 @@ impl Unknown {
         warnings: &mut Vec<String>,
     ) -> Result<()> {
         let Some((path, list, points)) = self.list(clouds) else { return Ok(()) };
-        if let (true, Some(clutter)) = (options.unknown_as_clutter, options.taxonomy.clutter()) {
+        if options.unknown_as_clutter
+            && let Some(clutter) = options.taxonomy.clutter()
+        {
             warnings.push(format!("{}: classes taken for {clutter}: {list}", path.display()));
-        } else if options.on_fault == OnFault::Skip && any_known {
-            let message = format!("{points} points left out, whose class is none: {list}");
-            warnings.push(format!("{}: {message}", path.display()));
-        } else {
-            let first = self.0.keys().next().map_or("", String::as_str);
-            // Without them nothing would be left, so that there is nothing to be lenient about.
-            let column = if any_known {
-                ""
-            } else {
-                ". No point has another: if the classes are in another column, name it, as in class = \
-                 \"label\""
-            };
-            let taxonomy = &options.taxonomy;
-            let of = if taxonomy.is_s3dis() {
-                "the 13".to_owned()
-            } else {
-                format!("the {} of {}", taxonomy.classes().len(), taxonomy.name())
-            };
-            let example = taxonomy
-                .classes()
-                .get(Class::CHAIR.index())
-                .or(taxonomy.classes().first());
-            let example = example.map_or("chair", |class| class.name());
-            return Err(Error::format(
-                path,
-                format!(
-                    "classes that are none of {of}: {list}. Say what they are in [annotations.classes], as \
-                     in {first:?} = {example:?}, or \"\" for points without a label; or take all of them for \
-                     clutter with unknown_as_clutter = true{column}"
-                ),
-            ));
+            return Ok(());
         }
-        Ok(())
+        if options.on_fault == OnFault::Skip && any_known {
+            let message = format!("{points} points of unknown classes left out: {list}");
+            warnings.push(format!("{}: {message}", path.display()));
+            return Ok(());
+        }
+        Err(Error::format(path, self.class_message(options, any_known, &list)))
     }
 
+    fn class_message(&self, options: &AnnotationOptions, any_known: bool, list: &str) -> String {
+        let taxonomy = &options.taxonomy;
+        let all = if taxonomy.is_s3dis() {
+            "the 13".to_owned()
+        } else {
+            format!("the {} of {}", taxonomy.classes().len(), taxonomy.name())
+        };
+        let first = self.0.keys().next().map_or("", String::as_str);
+        let example = taxonomy
+            .classes()
+            .get(Class::CHAIR.index())
+            .or(taxonomy.classes().first())
+            .map_or("chair", |class| class.name());
+
+        // If no class is known, leaving out the unknown ones would leave nothing.
+        let column = if any_known {
+            ""
+        } else {
+            ". No point has another: if the classes are in another column, name it, as in class = \"label\""
+        };
+        format!(
+            "classes that are not among {all}: {list}. Say what they are in [annotations.classes], as in \
+             {first:?} = {example:?}, or \"\" for points without a label; or take all of them for clutter \
+             with unknown_as_clutter = true{column}"
+        )
+    }
+
+    /// Warns of points without a known room, or refuses them. `any_left`: some points have a known room.
     fn tell_rooms(
         &self,
         clouds: &[&dyn Cloud],
@@ -256,13 +275,14 @@ impl Unknown {
                  it, or say which column holds it (`rooms`)"
             ),
             (None, Some(_)) => {
-                format!("rooms that are none: {list}. A room is named as in office_1, or numbered from 1")
+                format!("unknown rooms: {list}. A room is named as in office_1, or numbered from 1")
             }
             (None, None) => format!(
-                "rooms that are none: {list}. A room is named as in office_1; if they are numbers, say what \
-                 type of room they are, as in room = \"office_1\""
+                "unknown rooms: {list}. A room is named as in office_1; if they are numbers, say what type \
+                 of room they are, as in room = \"office_1\""
             ),
         };
+
         if options.on_fault == OnFault::Skip && any_left && !self.0.contains_key("") {
             warnings.push(format!("{}: {points} points left out; {message}", path.display()));
             return Ok(());

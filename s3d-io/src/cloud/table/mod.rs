@@ -1,8 +1,10 @@
-//! Tables of points: every instance of an area in one file, or in a few.
+//! Tables of points, called clouds: every instance of an area in one file, or in a few.
 
 pub(crate) mod cloud;
 pub(crate) mod columns;
+mod gathered;
 pub(crate) mod meaning;
+mod points;
 pub(crate) mod read;
 pub(crate) mod records;
 pub(crate) mod rows;

@@ -1,85 +1,76 @@
-//! Flat clouds: every instance of an area in one table of points, or in a few. Rows are grouped by room,
+//! Reads tables of points: every instance of an area in one table, or in a few. Rows are grouped by room,
 //! class and instance, whatever the format.
 //!
-//! The files are read once and their points counted by what they say of themselves. Then it is known what the
-//! tags mean and how many instances there are. As long as the points fit, they were kept on the way and are
-//! put in order; else the files are read a second time, and every point goes to its place in a temporary
-//! file.
+//! A first pass over the files counts the points by room, class and instance. Then the meaning of the tags
+//! and the number of instances are known. As long as the points fit into memory, the first pass keeps them,
+//! and they are sorted there. Otherwise the files are read a second time, and every point goes to its place
+//! in a temporary file.
 
-use crate::cloud::annotations::{
-    AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
-};
+use crate::cloud::annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
-use crate::cloud::table::meaning::{Group, Meaning};
-use crate::cloud::table::rows::{NO_TAG, Reading, Rows, Sink, Tags};
-use crate::cloud::table::store::{FlatStore, SpoolWriter};
+use crate::cloud::table::gathered::{Gathered, default_room};
+use crate::cloud::table::meaning::{Meaning, first_path};
+use crate::cloud::table::points::TablePoints;
+use crate::cloud::table::rows::{CloudTags, NO_TAG, Reading, Rows, Sink};
+use crate::cloud::table::store::{PointStore, SpoolWriter};
 use crate::error::{Error, Result};
-use s3d_geom::PointCloud;
 use s3d_geom::glam::Vec3;
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
-/// The most instances that a cloud may tell of: beyond, the column is another one.
-const MAX_GROUPS: usize = 1_000_000;
-/// Farther from the origin than this, metres as `f32` step by a millimetre.
-const FAR_M: f64 = 10_000.0;
-
-/// The points that are found and what they say, before it is known what that means.
-#[derive(Default)]
-struct Gathered {
-    groups: Vec<Group>,
-    index: HashMap<(u32, u32, i64), u32>,
-    points: u64,
-    /// The points as they came, with the index of their group; empty if there are too many.
-    positions: Vec<Vec3>,
-    colors: Vec<[u8; 3]>,
-    group_of: Vec<u32>,
-}
-
-/// Reads flat clouds as one.
+/// Reads several tables as one cloud.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] for what a reader finds wrong, and for classes and rooms without a
+/// [`Error::Io`]; [`Error::Format`] for the faults that a reader finds, and for classes and rooms without a
 /// meaning.
-pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> Result<Annotations> {
+pub(crate) fn read_tables(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> Result<Annotations> {
     let mut colors = vec![ColorRange::Narrow; clouds.len()];
-    // Each turn settles the colours of one file at least.
-    let (gathered, classes, rooms, mut warnings) = loop {
-        let (mut classes, mut rooms) = (Tags::new(), Tags::new());
+    // Each turn settles the colours of at least one file.
+    let (gathered, tags, mut warnings) = loop {
         let mut gathered = Gathered::default();
+        let mut tags = CloudTags::new();
         let mut warnings = Vec::new();
-        let wide =
-            gather(clouds, &colors, options, &mut gathered, (&mut classes, &mut rooms), &mut warnings)?;
+        let wide = gathered.read(clouds, &colors, options, &mut tags, &mut warnings)?;
         match wide.and_then(|file| colors.get_mut(file)) {
             Some(range) => *range = ColorRange::Wide,
-            None => break (gathered, classes, rooms, warnings),
+            None => break (gathered, tags, warnings),
         }
     };
     if gathered.points == 0 {
-        // What is wrong with the first record says why there is none.
-        let path = clouds.first().map_or(Path::new(""), |cloud| cloud.path());
-        let of = format!("{}: ", path.display());
-        let why = warnings
-            .first()
-            .map_or_else(String::new, |why| format!(": {}", why.replace(&of, "")));
-        return Err(Error::format(path, format!("holds no point that can be used{why}")));
+        return Err(no_point(first_path(clouds), &warnings));
     }
-    let meaning = Meaning::new(clouds, options, &gathered.groups, &classes, &rooms, &mut warnings)?;
+
+    let meaning = Meaning::new(clouds, options, &gathered.groups, &tags, &mut warnings)?;
     let counts: Vec<u64> = meaning.instances.iter().map(|i| i.points).collect();
-    let store = if gathered.group_of.len() as u64 == gathered.points {
+    let store = if gathered.has_all_points() {
         in_memory(&gathered, &meaning, &counts)
     } else {
-        spooled(clouds, &colors, options, &gathered, &meaning, &counts, (classes, rooms))?
+        spooled(clouds, &colors, options, &gathered, &meaning, &counts, tags)?
     };
-    let store = Arc::new(store);
-    let mut found: Vec<AnnotatedRoom> = Vec::new();
+
+    let rooms = rooms_of(clouds, meaning, &Arc::new(store));
+    Ok(Annotations { taxonomy: options.taxonomy.clone(), rooms, warnings })
+}
+
+/// The error for a cloud without a point. It repeats the first warning, which says what is wrong with the
+/// first record.
+fn no_point(path: &Path, warnings: &[String]) -> Error {
+    let prefix = format!("{}: ", path.display());
+    let why = warnings
+        .first()
+        .map_or_else(String::new, |why| format!(": {}", why.replace(&prefix, "")));
+    Error::format(path, format!("holds no point that can be used{why}"))
+}
+
+/// The instances by room. Their points lie in `store` in the same order.
+fn rooms_of(clouds: &[&dyn Cloud], meaning: Meaning, store: &Arc<PointStore>) -> Vec<AnnotatedRoom> {
+    let mut rooms: Vec<AnnotatedRoom> = Vec::new();
     let mut start = 0;
     for instance in meaning.instances {
         #[expect(clippy::indexing_slicing, reason = "the meaning names these files by their places")]
         let cloud = clouds[instance.file];
-        let points = FlatPoints {
-            store: Arc::clone(&store),
+        let points = TablePoints {
+            store: Arc::clone(store),
             start,
             count: instance.points,
             path: cloud.path().to_owned(),
@@ -87,105 +78,22 @@ pub(crate) fn read_flat(clouds: &[&dyn Cloud], options: &AnnotationOptions) -> R
             part: instance.part,
         };
         start += instance.points;
+
         let points = AnnotatedInstance::new(instance.class, instance.number, Arc::new(points));
-        match found.last_mut().filter(|r| r.room == instance.room) {
+        match rooms.last_mut().filter(|r| r.room == instance.room) {
             Some(room) => room.instances.push(points),
-            None => found.push(AnnotatedRoom { room: instance.room, instances: vec![points] }),
+            None => rooms.push(AnnotatedRoom { room: instance.room, instances: vec![points] }),
         }
     }
-    Ok(Annotations { taxonomy: options.taxonomy.clone(), rooms: found, warnings })
+    rooms
 }
 
-/// Reads every file once. `Some`: that file's colours are wide.
-fn gather(
-    clouds: &[&dyn Cloud],
-    colors: &[ColorRange],
-    options: &AnnotationOptions,
-    gathered: &mut Gathered,
-    (classes, rooms): (&mut Tags, &mut Tags),
-    warnings: &mut Vec<String>,
-) -> Result<Option<usize>> {
-    for ((file, cloud), colors) in clouds.iter().enumerate().zip(colors) {
-        let path = cloud.path();
-        let mut sink = |rows: &Rows| gathered.add(file, path, rows, options.points_in_memory);
-        let room = default_room(*cloud, options, rooms);
-        let mut reading = Reading::new(path, options, room, (classes, rooms), &mut sink);
-        if !cloud.read(*colors, &mut reading)? {
-            return Ok(Some(file));
-        }
-        reading.end()?;
-        let (skipped, farthest_m) = (std::mem::take(&mut reading.skipped), reading.farthest_m);
-        warnings.append(&mut reading.notes);
-        if let Some(first) = skipped.first {
-            warnings.push(format!("{}: {} records left out; {first}", path.display(), skipped.count));
-        }
-        if farthest_m > FAR_M {
-            warnings.push(format!(
-                "{}: coordinates up to {farthest_m:.0} m from the origin are rounded by up to {:.1} mm; give \
-                 an offset (`offset_m`) that brings them near to it, the mesh's",
-                path.display(),
-                1e3 * farthest_m * f64::from(f32::EPSILON)
-            ));
-        }
-    }
-    Ok(None)
-}
-
-fn default_room(cloud: &dyn Cloud, options: &AnnotationOptions, rooms: &mut Tags) -> u32 {
-    let room = options.room.or_else(|| cloud.room(&options.taxonomy));
-    room.and_then(|r| rooms.name(&r.to_string())).unwrap_or(NO_TAG)
-}
-
-impl Gathered {
-    fn add(&mut self, file: usize, path: &Path, rows: &Rows, in_memory: u64) -> Result<()> {
-        let kept = self.group_of.len() as u64 == self.points;
-        self.points += rows.len() as u64;
-        let keep = kept && self.points <= in_memory;
-        if keep {
-            self.positions.extend_from_slice(&rows.positions);
-            self.colors.extend_from_slice(&rows.colors);
-        } else if kept {
-            (self.positions, self.colors, self.group_of) = Default::default();
-        }
-        let mut last = ((NO_TAG, NO_TAG, 0), 0);
-        for ((room, class), instance) in rows.rooms.iter().zip(&rows.classes).zip(&rows.instances) {
-            let key = (*room, *class, *instance);
-            if key != last.0 {
-                let next = self.groups.len() as u32;
-                let index = *self.index.entry(key).or_insert(next);
-                if index == next {
-                    self.groups.push(Group {
-                        room: *room,
-                        class: *class,
-                        instance: *instance,
-                        file,
-                        points: 0,
-                    });
-                    if self.groups.len() > MAX_GROUPS {
-                        let message =
-                            format!("tells of more than {MAX_GROUPS} instances: is it the right column?");
-                        return Err(Error::format(path, message));
-                    }
-                }
-                last = (key, index);
-            }
-            #[expect(clippy::indexing_slicing, reason = "each index in the map is that of a group")]
-            let group = &mut self.groups[last.1 as usize];
-            group.points += 1;
-            if keep {
-                self.group_of.push(last.1);
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Puts the points in order: within an instance, that of the files.
+/// Sorts the points by instance. Within an instance they keep the order of the files.
 #[expect(
     clippy::indexing_slicing,
     reason = "points were gathered in columns of one length, and counted by instance"
 )]
-fn in_memory(gathered: &Gathered, meaning: &Meaning, counts: &[u64]) -> FlatStore {
+fn in_memory(gathered: &Gathered, meaning: &Meaning, counts: &[u64]) -> PointStore {
     let mut next: Vec<usize> = counts
         .iter()
         .scan(0, |end, n| {
@@ -195,7 +103,9 @@ fn in_memory(gathered: &Gathered, meaning: &Meaning, counts: &[u64]) -> FlatStor
         })
         .collect();
     let total = counts.iter().sum::<u64>() as usize;
-    let (mut positions, mut colors) = (vec![Vec3::ZERO; total], vec![[0; 3]; total]);
+    let mut positions = vec![Vec3::ZERO; total];
+    let mut colors = vec![[0; 3]; total];
+
     for (i, group) in gathered.group_of.iter().enumerate() {
         if let Some(instance) = meaning.instance_of[*group as usize] {
             let at = &mut next[instance];
@@ -204,10 +114,10 @@ fn in_memory(gathered: &Gathered, meaning: &Meaning, counts: &[u64]) -> FlatStor
             *at += 1;
         }
     }
-    FlatStore::Memory { positions, colors }
+    PointStore::Memory { positions, colors }
 }
 
-/// Reads every file a second time, and every point to its place in a temporary file.
+/// Reads every file a second time, and puts every point in its place in a temporary file.
 fn spooled(
     clouds: &[&dyn Cloud],
     colors: &[ColorRange],
@@ -215,121 +125,81 @@ fn spooled(
     gathered: &Gathered,
     meaning: &Meaning,
     counts: &[u64],
-    (mut classes, mut rooms): (Tags, Tags),
-) -> Result<FlatStore> {
+    mut tags: CloudTags,
+) -> Result<PointStore> {
     let mut writer = SpoolWriter::create(options.spool_dir.as_deref(), counts)?;
     for (cloud, colors) in clouds.iter().zip(colors) {
         let path = cloud.path();
-        let mut sink = |rows: &Rows| {
-            let tags = rows.rooms.iter().zip(&rows.classes).zip(&rows.instances);
-            let points = rows.positions.iter().zip(&rows.colors);
-            let (mut last, mut known) = ((NO_TAG, NO_TAG, 0), None);
-            for (((room, class), instance), (position, color)) in tags.zip(points) {
-                let key = (*room, *class, *instance);
-                if key != last || known.is_none() {
-                    let group = gathered.index.get(&key);
-                    known = group.and_then(|g| meaning.instance_of.get(*g as usize)).copied();
-                    last = key;
-                }
-                let fits = match known {
-                    Some(Some(instance)) => writer.push(instance, *position, *color)?,
-                    Some(None) => true,
-                    None => false,
-                };
-                if !fits {
-                    return Err(changed(path));
-                }
-            }
-            Ok(())
-        };
-        let room = default_room(*cloud, options, &mut rooms);
+        let mut sink = |rows: &Rows| spool(rows, gathered, meaning, &mut writer, path);
+        let room = default_room(*cloud, options, &mut tags);
         let sink: &mut Sink<'_> = &mut sink;
-        let mut reading = Reading::new(path, options, room, (&mut classes, &mut rooms), sink);
+        let mut reading = Reading::new(path, options, room, &mut tags, sink);
         if !cloud.read(*colors, &mut reading)? {
             return Err(changed(path));
         }
         reading.flush()?;
     }
-    let first = clouds.first().map_or(Path::new(""), |cloud| cloud.path());
-    writer.finish()?.ok_or_else(|| changed(first))
+    writer.finish()?.ok_or_else(|| changed(first_path(clouds)))
+}
+
+/// Puts rows in their places in the file. Rows that the first pass did not see are an error.
+fn spool(
+    rows: &Rows,
+    gathered: &Gathered,
+    meaning: &Meaning,
+    writer: &mut SpoolWriter,
+    path: &Path,
+) -> Result<()> {
+    let tags = rows.rooms.iter().zip(&rows.classes).zip(&rows.instances);
+    let points = rows.positions.iter().zip(&rows.colors);
+    // Rows of one group often follow one another.
+    let mut last = (NO_TAG, NO_TAG, 0);
+    let mut known = None;
+    for (((room, class), instance), (position, color)) in tags.zip(points) {
+        let key = (*room, *class, *instance);
+        if key != last || known.is_none() {
+            let group = gathered.index.get(&key);
+            known = group.and_then(|g| meaning.instance_of.get(*g as usize)).copied();
+            last = key;
+        }
+
+        let fits = match known {
+            Some(Some(instance)) => writer.push(instance, *position, *color)?,
+            Some(None) => true,
+            None => false,
+        };
+        if !fits {
+            return Err(changed(path));
+        }
+    }
+    Ok(())
 }
 
 fn changed(path: &Path) -> Error {
     Error::format(path, "changed while it was read")
 }
 
-/// An instance of a flat cloud.
-#[derive(Debug)]
-struct FlatPoints {
-    store: Arc<FlatStore>,
-    start: u64,
-    count: u64,
-    path: PathBuf,
-    part: String,
-    are_vertices: bool,
-}
-
-impl InstancePoints for FlatPoints {
-    fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
-        self.store.read(self.start, self.count, out)?;
-        Ok(Skipped::default())
-    }
-
-    fn path(&self) -> &Path {
-        &self.path
-    }
-
-    fn part(&self) -> String {
-        self.part.clone()
-    }
-
-    fn are_vertices(&self) -> bool {
-        self.are_vertices
-    }
-
-    fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
-        Ok(Box::new(FlatBlocks { points: self, done: 0 }))
-    }
-}
-
-/// The points of an instance of a flat cloud, block by block.
-struct FlatBlocks<'a> {
-    points: &'a FlatPoints,
-    done: u64,
-}
-
-impl PointBlocks for FlatBlocks<'_> {
-    fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool> {
-        let FlatPoints { store, start, count, .. } = self.points;
-        let n = (points as u64).min(count - self.done);
-        store.read(start + self.done, n, out)?;
-        self.done += n;
-        Ok(self.done < *count)
-    }
-
-    fn skipped(&mut self) -> Skipped {
-        Skipped::default()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cloud::s3dis::tree::OnFault;
+    use crate::cloud::table::gathered::MAX_GROUPS;
     use crate::cloud::table::rows::{Row, Value};
     use proptest::prelude::*;
+    use s3d_geom::PointCloud;
     use s3d_geom::glam::DVec3;
     use s3d_label::{Class, Room};
     use std::collections::BTreeMap;
+    use std::path::PathBuf;
 
     /// A row: class, instance, room (0: none). Its place in the list is its x coordinate and its colour.
     type TestRow = (i64, i64, i64);
 
-    /// Rows in place of a file.
+    /// A cloud of rows in memory.
     struct TestCloud {
         path: PathBuf,
         rows: Vec<TestRow>,
-        /// The first row whose colour is beyond the narrow range.
+        /// The first row with a colour beyond the narrow range.
         wide_from: usize,
     }
 
@@ -375,7 +245,7 @@ mod tests {
 
     fn read(clouds: &[TestCloud], options: &AnnotationOptions) -> Result<Annotations> {
         let clouds: Vec<&dyn Cloud> = clouds.iter().map(|c| c as &dyn Cloud).collect();
-        read_flat(&clouds, options)
+        read_tables(&clouds, options)
     }
 
     /// Every instance's name, and the x coordinates and colours of its points.
@@ -419,15 +289,16 @@ mod tests {
         let found = read(&[cloud], &options()).unwrap();
         let expected = [
             ("office_2 chair_1", vec![7.0]),
-            // Without a number: one instance, before the numbered.
+            // Points without a number are one instance, before the numbered ones.
             ("office_7 wall_1", vec![4.0, 5.0]),
             ("office_7 wall_2", vec![3.0]),
             ("office_7 wall_3", vec![0.0, 8.0]),
-            // Two of the file's classes are kept apart, though both are chairs.
+            // Two classes of the file are kept apart, though both mean chairs.
             ("office_7 chair_1", vec![1.0]),
             ("office_7 chair_2", vec![2.0]),
         ];
         assert_eq!(names(&found), expected.map(|(name, x)| (name.to_owned(), x)));
+
         let sources: Vec<String> = found.rooms[1].instances.iter().map(AnnotatedInstance::source).collect();
         assert_eq!(sources[0], "a.las, the wall of office_7");
         assert_eq!(sources[4], "a.las, instance 9 of class 3 in office_7");
@@ -444,7 +315,8 @@ mod tests {
         assert_eq!(names(&found).into_iter().map(|n| n.0).collect::<Vec<_>>(), expected);
         let message = read(&[c], &unnamed).unwrap_err().to_string();
         assert!(message.contains("rest.ply: 1 points are in no room"), "{message}");
-        // What is said goes before a file's name; and the same number in two files is the same instance.
+
+        // The user's room comes before a file's name; and the same number in two files is one instance.
         let twice = [TestCloud::new("office_2.ply", &[(1, 1, 0)]), TestCloud::new("b.ply", &[(1, 1, 0)])];
         assert_eq!(
             names(&read(&twice, &options()).unwrap()),
@@ -486,10 +358,11 @@ mod tests {
                 Ok(true)
             }
         }
-        let strict = read_flat(&[&Bad], &options()).unwrap_err().to_string();
+
+        let strict = read_tables(&[&Bad], &options()).unwrap_err().to_string();
         assert_eq!(strict, "bad.npy: record 2: the coordinates 0 NaN 0 are not finite");
         let lenient = AnnotationOptions { on_fault: OnFault::Skip, ..options() };
-        let found = read_flat(&[&Bad], &lenient).unwrap();
+        let found = read_tables(&[&Bad], &lenient).unwrap();
         assert_eq!(names(&found), [("office_7 wall_1".to_owned(), vec![0.0])]);
         assert!(
             found.warnings[0].starts_with("bad.npy: 5 records left out; bad.npy: record 2: "),
@@ -504,29 +377,38 @@ mod tests {
         let message = |rows: &[TestRow], options: &AnnotationOptions| {
             read(&[TestCloud::new("a.las", rows)], options).unwrap_err().to_string()
         };
-        // A column of intensities, say: no number in it is a class.
+
+        // A column of something else, such as intensities: no number in it is a class.
         let said = message(&[(77, 1, 0), (78, 1, 0), (78, 1, 0)], &lenient);
         assert!(said.contains("\"77\" (1 points), \"78\" (2 points)"), "{said}");
         assert!(said.contains("class = \"label\""), "{said}");
         let some = read(&[TestCloud::new("a.las", &[(77, 1, 0), (1, 1, 0)])], &lenient).unwrap();
-        assert!(some.warnings[0].contains("1 points left out, whose class is none"), "{:?}", some.warnings);
-        // Numbers of rooms, and nothing says of which type.
+        assert!(some.warnings[0].contains("1 points of unknown classes left out"), "{:?}", some.warnings);
+
+        // Room numbers without a type of room.
         let said = message(&[(1, 1, 4)], &AnnotationOptions { room: None, ..lenient.clone() });
-        assert!(said.contains("rooms that are none: \"4\""), "{said}");
-        // Not one record is a point.
+        assert!(said.contains("unknown rooms: \"4\""), "{said}");
+
+        // No record is a valid point.
         struct Halves;
         impl Cloud for Halves {
             fn path(&self) -> &Path {
                 Path::new("a.las")
             }
             fn read(&self, _: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-                let (position, color) = (DVec3::ZERO, [0; 3]);
-                let (class, instance, room) = (Value::Float(0.5), Value::None, Value::None);
-                reading.push(1, &Row { position, color, class, instance, room })?;
+                let row = Row {
+                    position: DVec3::ZERO,
+                    color: [0; 3],
+                    class: Value::Float(0.5),
+                    instance: Value::None,
+                    room: Value::None,
+                };
+                reading.push(1, &row)?;
                 Ok(true)
             }
         }
-        let said = read_flat(&[&Halves], &lenient).unwrap_err().to_string();
+
+        let said = read_tables(&[&Halves], &lenient).unwrap_err().to_string();
         let expected = "a.las: holds no point that can be used: 1 records left out; record 1: class: 0.5 is \
                         no whole number";
         assert_eq!(said, expected);
@@ -557,7 +439,7 @@ mod tests {
         assert!(message.contains("a.las: tells of more than 1000000 instances"), "{message}");
     }
 
-    /// The plain version: every point to the list of its key.
+    /// Plain reference: appends every point to the list of its key.
     fn reference(clouds: &[Vec<TestRow>]) -> Vec<(String, Vec<f32>)> {
         let mut lists: BTreeMap<(Room, Class, i64, i64), Vec<f32>> = BTreeMap::new();
         for rows in clouds {
@@ -569,13 +451,14 @@ mod tests {
                 else {
                     continue;
                 };
-                let of = if *instance < 0 { -1 } else { *class };
+                let file_class = if *instance < 0 { -1 } else { *class };
                 lists
-                    .entry((room, meant, (*instance).max(-1), of))
+                    .entry((room, meant, (*instance).max(-1), file_class))
                     .or_default()
                     .push(i as f32);
             }
         }
+
         let mut numbers: BTreeMap<(Room, Class), u32> = BTreeMap::new();
         let name = |((room, class, ..), x): ((Room, Class, i64, i64), Vec<f32>)| {
             let number = numbers.entry((room, class)).or_default();

@@ -1,4 +1,4 @@
-//! Records of fixed size, as binary PLY, NPY and LAS hold points: fields at fixed places.
+//! Records of fixed size, in which binary PLY, NPY and LAS hold points: fields at fixed places.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -61,7 +61,7 @@ impl Kind {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Field {
     pub(crate) name: String,
-    /// Where in the record it starts, in bytes.
+    /// Where it starts in the record, in bytes.
     pub(crate) at: usize,
     pub(crate) kind: Kind,
     pub(crate) big_endian: bool,
@@ -74,12 +74,12 @@ enum Number {
 }
 
 impl Field {
-    /// The record from the field on, if it reaches so far.
+    /// The record from this field on. Returns `None` if the record ends before.
     fn start<'r>(&self, record: &'r [u8]) -> Option<&'r [u8]> {
         record.get(self.at..)
     }
 
-    /// `None` if it is a text, or reaches beyond the record.
+    /// The field's number. Returns `None` if it is a text, or reaches beyond the record.
     fn number(&self, record: &[u8]) -> Option<Number> {
         macro_rules! number {
             ($t:ty, $form:path, $to:ty) => {{
@@ -92,6 +92,7 @@ impl Field {
                 $form(<$to>::from(v))
             }};
         }
+
         Some(match self.kind {
             Kind::I8 => number!(i8, Number::Whole, i64),
             Kind::U8 => number!(u8, Number::Whole, i64),
@@ -107,7 +108,7 @@ impl Field {
                 } else {
                     u64::from_le_bytes(bytes)
                 };
-                // Beyond, it is no number of anything: as a float it will be refused.
+                // A larger number has no meaning here; as a float it will be refused.
                 i64::try_from(v).map_or(Number::Float(v as f64), Number::Whole)
             }
             Kind::F16 => number!(half::f16, Number::Float, f64),
@@ -117,7 +118,7 @@ impl Field {
         })
     }
 
-    /// Its number; not a number if it is a text, or reaches beyond the record.
+    /// The field's number. Returns NaN if it is a text, or reaches beyond the record.
     pub(crate) fn float(&self, record: &[u8]) -> f64 {
         match self.number(record) {
             Some(Number::Whole(n)) => n as f64,
@@ -126,10 +127,11 @@ impl Field {
         }
     }
 
-    /// Its value; a text is put into `text`.
+    /// The field's value. A text is put into `text`.
     pub(crate) fn value<'a>(&self, record: &[u8], text: &'a mut String) -> Value<'a> {
         text.clear();
         let written = self.start(record).and_then(|r| r.get(..self.kind.size()));
+
         match self.kind {
             Kind::Bytes(_) => {
                 let bytes = written.and_then(|w| w.split(|b| *b == 0).next());
@@ -159,19 +161,19 @@ impl Field {
     }
 }
 
-/// What became of a colour.
+/// The result of reading a colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Color {
     Rgb([u8; 3]),
-    /// It does not fit the narrow range.
+    /// It is beyond the narrow range.
     Wider,
-    /// It fits none: this channel.
+    /// This channel is beyond every range.
     Beyond(usize),
 }
 
 /// Turns three numbers into 8 bits each.
 pub(crate) fn color(channels: [f64; 3], is_float: bool, range: ColorRange) -> Color {
-    // What the narrow range ends at, and what a number of 8 bits is multiplied by.
+    // The largest number of the range, and the scale from numbers to 8 bits.
     let (most, scale) = match (is_float, range) {
         (false, ColorRange::Narrow) => (255.0, 1.0),
         (false, ColorRange::Wide) => (65_535.0, 1.0 / 257.0),
@@ -182,11 +184,11 @@ pub(crate) fn color(channels: [f64; 3], is_float: bool, range: ColorRange) -> Co
         let may_be_wider = range == ColorRange::Narrow && channels.get(i).is_some_and(|v| *v > most);
         return if may_be_wider { Color::Wider } else { Color::Beyond(i) };
     }
-    #[expect(clippy::cast_possible_truncation, reason = "0 to 255, as what is beyond was sent back")]
+    #[expect(clippy::cast_possible_truncation, reason = "0 to 255: larger numbers were returned above")]
     Color::Rgb(channels.map(|v| (v * scale).round() as u8))
 }
 
-/// A table of records: fields, and which of them are what.
+/// The layout of a table: its fields, and the columns chosen among them.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     pub(crate) fields: Vec<Field>,
@@ -207,13 +209,16 @@ impl Table {
     ) -> Result<Self> {
         let names: Vec<String> = fields.iter().map(|f| f.name.clone()).collect();
         let columns = Columns::choose(path, &names, options)?;
+
         let numbers = columns.position.into_iter().chain(columns.color.into_iter().flatten());
         if let Some(text) = numbers.filter_map(|i| fields.get(i)).find(|f| f.kind.is_text()) {
-            return Err(Error::format(path, format!("the column {} holds texts, no numbers", text.name)));
+            return Err(Error::format(path, format!("the column {} holds texts, not numbers", text.name)));
         }
+
         if stride == 0 || stride > LONGEST_RECORD {
-            return Err(Error::format(path, format!("records of {stride} bytes are none of points")));
+            return Err(Error::format(path, format!("records of {stride} bytes cannot hold points")));
         }
+
         let is_inside = |f: &Field| f.at.checked_add(f.kind.size()).is_some_and(|end| end <= stride);
         if let Some(field) = fields.iter().find(|f| !is_inside(f)) {
             let message = format!("the column {} reaches beyond the {stride} bytes of a record", field.name);
@@ -222,7 +227,8 @@ impl Table {
         Ok(Self { fields, columns, stride })
     }
 
-    /// Hands on record `number` (from 1). `false`: its colour is beyond the narrow range.
+    /// Hands on the record with this `number` (from 1). Returns `false` if its colour is beyond the narrow
+    /// range.
     #[expect(clippy::indexing_slicing, reason = "the columns were chosen among these fields")]
     pub(crate) fn push(
         &self,
@@ -233,41 +239,43 @@ impl Table {
         path: &Path,
         reading: &mut Reading<'_>,
     ) -> Result<bool> {
-        let c = &self.columns;
-        let [x, y, z] = c.position.map(|i| self.fields[i].float(record));
+        let columns = &self.columns;
+        let [x, y, z] = columns.position.map(|i| self.fields[i].float(record));
+
         let mut rgb = [0; 3];
-        if let Some(channels) = c.color {
+        if let Some(channels) = columns.color {
             let first = &self.fields[channels[0]];
             match color(channels.map(|i| self.fields[i].float(record)), first.kind.is_float(), colors) {
                 Color::Rgb(found) => rgb = found,
                 Color::Wider => return Ok(false),
                 Color::Beyond(i) => {
                     let field = &self.fields[channels[i]];
-                    let (v, name) = (field.float(record), &field.name);
-                    let why = format!("record {number}: {v} is no colour ({name})");
+                    let value = field.float(record);
+                    let why = format!("record {number}: {value} is no colour ({})", field.name);
                     reading.fault(Error::format(path, why))?;
                     return Ok(true);
                 }
             }
         }
+
         let [class, instance, room] = texts;
         let row = Row {
             position: dvec3(x, y, z),
             color: rgb,
-            class: self.fields[c.class].value(record, class),
-            instance: c
+            class: self.fields[columns.class].value(record, class),
+            instance: columns
                 .instance
                 .map_or(Value::None, |i| self.fields[i].value(record, instance)),
-            room: c.room.map_or(Value::None, |i| self.fields[i].value(record, room)),
+            room: columns.room.map_or(Value::None, |i| self.fields[i].value(record, room)),
         };
         reading.push(number, &row)?;
         Ok(true)
     }
 
-    /// Hands on `count` records. `false`: a colour is beyond the narrow range.
+    /// Hands on `count` records. Returns `false` if a colour is beyond the narrow range.
     ///
     /// # Errors
-    /// [`Error::Format`] if there are fewer; what [`Table::push`] says.
+    /// [`Error::Format`] if there are fewer records, and the errors of [`Table::push`].
     pub(crate) fn read(
         &self,
         path: &Path,
@@ -277,7 +285,8 @@ impl Table {
         reading: &mut Reading<'_>,
     ) -> Result<bool> {
         let mut texts = Default::default();
-        let (mut done, mut block) = (0, Vec::new());
+        let mut done = 0;
+        let mut block = Vec::new();
         while let Some(n) = rows_of_block(count, done, self.stride) {
             block.resize(n.saturating_mul(self.stride), 0);
             fill(path, &mut source, &mut block, done, count, self.stride)?;
@@ -292,8 +301,8 @@ impl Table {
     }
 }
 
-/// How many records of `stride` bytes are read at once after `done` of `count`: as many as fit a block, but
-/// one at least; `None` at the end.
+/// The number of records of `stride` bytes to read at once after `done` of `count`: as many as fit into a
+/// block, and at least one. Returns `None` at the end.
 pub(crate) fn rows_of_block(count: u64, done: u64, stride: usize) -> Option<usize> {
     let most = BLOCK.checked_div(stride)?.max(1);
     match count.checked_sub(done)? {
@@ -302,7 +311,7 @@ pub(crate) fn rows_of_block(count: u64, done: u64, stride: usize) -> Option<usiz
     }
 }
 
-/// Fills a block of records after the `done`th.
+/// Fills a block with the records after the first `done`.
 pub(crate) fn fill(
     path: &Path,
     source: &mut impl Read,
@@ -313,6 +322,7 @@ pub(crate) fn fill(
 ) -> Result<()> {
     let size = block.len();
     let mut rest = block;
+
     while !rest.is_empty() {
         match source.read(rest) {
             Ok(0) => {
@@ -321,7 +331,7 @@ pub(crate) fn fill(
                 let message = format!("ends in record {record} of {count}: the file is cut short");
                 return Err(Error::format(path, message));
             }
-            // A source that claims more than it was given room for has filled it.
+            // A reader may claim more bytes than there was room for; the block is full then.
             Ok(n) => rest = rest.get_mut(n..).unwrap_or_default(),
             Err(e) if e.kind() == ErrorKind::Interrupted => {}
             Err(e) if e.kind() == ErrorKind::InvalidData || e.kind() == ErrorKind::InvalidInput => {
@@ -357,10 +367,12 @@ mod tests {
         ] {
             assert_eq!(field(kind, big_endian).value(&record, &mut text), value, "{kind:?}");
         }
+
         let one = [0, 0, 0x3c];
         assert_eq!(field(Kind::F16, false).float(&one), 1.0);
         assert_eq!(field(Kind::F32, true).float(&[0, 0x3f, 0x80, 0, 0]), 1.0);
         assert_eq!(field(Kind::F64, true).float(&[0, 0x3f, 0xf0, 0, 0, 0, 0, 0, 0]), 1.0);
+
         assert_eq!(field(Kind::Bytes(4), false).value(b"-wall", &mut text), Value::Name("wall"));
         assert_eq!(field(Kind::Bytes(4), false).value(b"-wa\0x", &mut text), Value::Name("wa"));
         let utf32 = [0, 0, 0, 0, b'w', 0, 0, 0, 0xfc, 0, 0, 0, 0];

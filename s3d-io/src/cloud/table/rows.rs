@@ -1,5 +1,5 @@
-//! The rows of a flat cloud, as every format's reader hands them on: one point each, with what it says of
-//! itself.
+//! The rows of a table of points, as every format's reader hands them on: a point each, with its class,
+//! instance and room.
 
 use crate::bounds::Bounds;
 use crate::cloud::annotations::{AnnotationOptions, Skipped};
@@ -10,16 +10,16 @@ use s3d_geom::glam::{DVec3, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Rows that are handed on at a time.
+/// The number of rows that are handed on at a time.
 const BATCH: usize = 65_536;
-/// The most different classes or rooms that a cloud may name: beyond, the column is another one.
+/// The most different classes or rooms that a cloud may name. More of them mean that the column is wrong.
 const MAX_TAGS: usize = 10_000;
-/// Numbers that are looked up without hashing.
+/// Numbers below this are looked up without hashing.
 const SMALL: usize = 4096;
 
-/// In place of an index into [`Tags`]: the file does not say.
+/// Stands for an index into [`Tags`] if the file does not say.
 pub(crate) const NO_TAG: u32 = u32::MAX;
-/// In place of an instance number: the file does not say. So are all negative numbers.
+/// Stands for an instance number if the file does not say. All negative numbers mean the same.
 pub(crate) const NO_INSTANCE: i64 = -1;
 
 /// What a file calls a class or a room: a number or a name.
@@ -30,7 +30,7 @@ pub(crate) enum Tag {
 }
 
 impl Tag {
-    /// The key of it in a table that a user writes.
+    /// Its key in a table that users write.
     pub(crate) fn key(&self) -> String {
         match self {
             Self::Number(n) => n.to_string(),
@@ -39,12 +39,26 @@ impl Tag {
     }
 }
 
-/// The tags that occurred, each with an index, in order of their first occurrence.
+/// The tags that occurred, each with an index, in the order of their first occurrence.
 #[derive(Debug)]
 pub(crate) struct Tags {
     list: Vec<Tag>,
     index: HashMap<Tag, u32>,
+    /// The indices of small numbers, or [`NO_TAG`].
     small: Vec<u32>,
+}
+
+/// The classes and the rooms that the files of a cloud name.
+#[derive(Debug)]
+pub(crate) struct CloudTags {
+    pub(crate) classes: Tags,
+    pub(crate) rooms: Tags,
+}
+
+impl CloudTags {
+    pub(crate) fn new() -> Self {
+        Self { classes: Tags::new(), rooms: Tags::new() }
+    }
 }
 
 impl Tags {
@@ -52,7 +66,7 @@ impl Tags {
         Self { list: Vec::new(), index: HashMap::new(), small: vec![NO_TAG; SMALL] }
     }
 
-    /// The index of a number; `None` if there are too many different ones.
+    /// The index of a number. Returns `None` if there are too many different tags.
     pub(crate) fn number(&mut self, number: i64) -> Option<u32> {
         let small = usize::try_from(number).ok();
         let known = small.and_then(|n| self.small.get(n));
@@ -66,7 +80,7 @@ impl Tags {
         Some(index)
     }
 
-    /// The index of a name; `None` if there are too many different ones.
+    /// The index of a name. Returns `None` if there are too many different tags.
     pub(crate) fn name(&mut self, name: &str) -> Option<u32> {
         self.intern(Tag::Name(name.to_owned()))
     }
@@ -89,17 +103,17 @@ impl Tags {
     }
 }
 
-/// Some rows. Every column has an entry a row.
+/// Some rows, by column. Every column has an entry a row.
 #[derive(Debug, Default)]
 pub(crate) struct Rows {
     /// World metres, less the offset.
     pub(crate) positions: Vec<Vec3>,
     pub(crate) colors: Vec<[u8; 3]>,
-    /// Indices into the tags of classes.
+    /// Indices into the classes of [`CloudTags`].
     pub(crate) classes: Vec<u32>,
     /// [`NO_INSTANCE`] if unknown.
     pub(crate) instances: Vec<i64>,
-    /// Indices into the tags of rooms, or [`NO_TAG`].
+    /// Indices into the rooms of [`CloudTags`], or [`NO_TAG`].
     pub(crate) rooms: Vec<u32>,
 }
 
@@ -117,7 +131,7 @@ impl Rows {
     }
 }
 
-/// What a row says of its class, its instance or its room, as it stands in the file.
+/// The class, instance or room of a row, as it stands in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value<'a> {
     /// Nothing: there is no such column.
@@ -151,25 +165,24 @@ pub(crate) struct Row<'a> {
     pub(crate) room: Value<'a>,
 }
 
-/// What is done with some rows.
+/// The function that takes a batch of rows.
 pub(crate) type Sink<'a> = dyn FnMut(&Rows) -> Result<()> + 'a;
 
-/// The reading of one file: takes rows, checks them and hands them on in batches.
+/// Reads one file: takes rows, checks them and hands them on in batches.
 pub(crate) struct Reading<'a> {
     path: PathBuf,
     on_fault: OnFault,
     offset_m: DVec3,
     watch: Option<FrameWatch>,
-    /// The room of rows that name none.
+    /// The index of the room for rows that name none.
     room: u32,
-    pub(crate) classes: &'a mut Tags,
-    pub(crate) rooms: &'a mut Tags,
+    tags: &'a mut CloudTags,
     rows: Rows,
     sink: &'a mut Sink<'a>,
     pub(crate) skipped: Skipped,
     /// The largest coordinate, in metres.
     pub(crate) farthest_m: f64,
-    /// What the user should know of the file, as a sentence each.
+    /// What the user should know about the file, a sentence each.
     pub(crate) notes: Vec<String>,
 }
 
@@ -178,7 +191,7 @@ impl<'a> Reading<'a> {
         path: &Path,
         options: &AnnotationOptions,
         room: u32,
-        (classes, rooms): (&'a mut Tags, &'a mut Tags),
+        tags: &'a mut CloudTags,
         sink: &'a mut Sink<'a>,
     ) -> Self {
         Self {
@@ -187,8 +200,7 @@ impl<'a> Reading<'a> {
             offset_m: options.offset_m,
             watch: options.mesh_bounds.map(|mesh| FrameWatch::new(mesh, options.offset_m)),
             room,
-            classes,
-            rooms,
+            tags,
             rows: Rows::default(),
             sink,
             skipped: Skipped::default(),
@@ -200,13 +212,13 @@ impl<'a> Reading<'a> {
     /// Takes the record `number` (from 1).
     ///
     /// # Errors
-    /// Those of the sink; [`Error::Format`] with the record's number if it is no point, unless faults are
-    /// skipped.
+    /// The errors of the sink; [`Error::Format`] with the record's number if it is no valid point, unless
+    /// faults are skipped.
     pub(crate) fn push(&mut self, number: u64, row: &Row<'_>) -> Result<()> {
         self.push_at(row, |path, why| Error::format(path, format!("record {number}: {why}")))
     }
 
-    /// As [`Reading::push`], for a line of text (from 1).
+    /// Takes a line of text (from 1) like [`Reading::push`].
     pub(crate) fn push_line(&mut self, line: u64, row: &Row<'_>) -> Result<()> {
         self.push_at(row, |path, why| Error::line(path, line, why))
     }
@@ -218,7 +230,7 @@ impl<'a> Reading<'a> {
         if self.rows.len() >= BATCH { self.flush() } else { Ok(()) }
     }
 
-    /// Counts something that is no row, or stops at it.
+    /// Counts a faulty row, or stops at it.
     pub(crate) fn fault(&mut self, error: Error) -> Result<()> {
         if self.on_fault == OnFault::Stop {
             return Err(error);
@@ -238,9 +250,13 @@ impl<'a> Reading<'a> {
         if farthest > f64::from(f32::MAX) {
             return Err(format!("a coordinate of {farthest:e} m is too large"));
         }
+
         let class = match row.class {
-            Value::Name(name) => self.classes.name(name),
-            value => self.classes.number(value.whole().map_err(|e| format!("class: {e}"))?),
+            Value::Name(name) => self.tags.classes.name(name),
+            value => {
+                let number = value.whole().map_err(|e| format!("class: {e}"))?;
+                self.tags.classes.number(number)
+            }
         };
         let class = class.ok_or_else(|| too_many("classes"))?;
         let instance = match row.instance {
@@ -249,12 +265,13 @@ impl<'a> Reading<'a> {
         };
         let room = match row.room {
             Value::None => self.room,
-            Value::Name(name) => self.rooms.name(name).ok_or_else(|| too_many("rooms"))?,
+            Value::Name(name) => self.tags.rooms.name(name).ok_or_else(|| too_many("rooms"))?,
             value => {
                 let number = value.whole().map_err(|e| format!("room: {e}"))?;
-                self.rooms.number(number).ok_or_else(|| too_many("rooms"))?
+                self.tags.rooms.number(number).ok_or_else(|| too_many("rooms"))?
             }
         };
+
         self.farthest_m = self.farthest_m.max(farthest);
         if let Some(watch) = &mut self.watch {
             watch.see(row.position);
@@ -267,7 +284,7 @@ impl<'a> Reading<'a> {
         Ok(())
     }
 
-    /// Takes the box that the file's header gives its points.
+    /// Takes the box of all points that the file's header states.
     #[cfg_attr(not(any(feature = "las", feature = "e57")), allow(dead_code))]
     pub(crate) fn claims(&mut self, bounds: Bounds) {
         if let Some(watch) = &mut self.watch {
@@ -275,7 +292,7 @@ impl<'a> Reading<'a> {
         }
     }
 
-    /// Ends the file: hands on what is left, and refuses points that all lie far from the mesh.
+    /// Ends the file: hands on the last rows, and refuses points that all lie far from the mesh.
     pub(crate) fn end(&mut self) -> Result<()> {
         self.flush()?;
         self.watch.as_ref().map_or(Ok(()), |watch| watch.at_end(&self.path))

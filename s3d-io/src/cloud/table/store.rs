@@ -1,4 +1,4 @@
-//! Points in the order of their instances: in memory, or in a temporary file when there are many.
+//! Points sorted by instance: in memory, or in a temporary file when there are many.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -14,12 +14,12 @@ use std::sync::{Mutex, PoisonError};
 const POINT_BYTES: usize = 15;
 /// Points that are read back at a time.
 const POINTS_AT_ONCE: usize = 65_536;
-/// Memory for what waits to be written to the file.
+/// Memory for points that wait to be written to the file.
 const BUFFER_BYTES: usize = 64 << 20;
 
-/// Points that lie one instance after another.
+/// Points, one instance after another.
 #[derive(Debug)]
-pub(crate) enum FlatStore {
+pub(crate) enum PointStore {
     Memory { positions: Vec<Vec3>, colors: Vec<[u8; 3]> },
     Spool(Spool),
 }
@@ -28,20 +28,20 @@ pub(crate) enum FlatStore {
 #[derive(Debug)]
 pub(crate) struct Spool {
     file: Mutex<File>,
-    /// The folder that it is in, for messages.
+    /// The folder of the file, for messages.
     dir: PathBuf,
 }
 
-impl FlatStore {
-    /// Appends `count` points from the `start`th on to `out`.
+impl PointStore {
+    /// Appends `count` points to `out`, from point `start` on.
     ///
     /// # Panics
-    /// If there are not so many in memory.
+    /// If there are not so many points in memory.
     #[expect(
         clippy::indexing_slicing,
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
-        reason = "places and counts are those by which the store was filled; what is in memory is counted by \
+        reason = "places and counts are those by which the store was filled; what is in memory has a size in \
                   usize"
     )]
     pub(crate) fn read(&self, start: u64, count: u64, out: &mut PointCloud) -> Result<()> {
@@ -59,7 +59,7 @@ impl FlatStore {
     }
 }
 
-/// Where a point begins in the file: beyond what a file can have, the system refuses to seek.
+/// The first byte of a point in the file. The system refuses to seek beyond what a file can have.
 fn byte_of(point: u64) -> u64 {
     point.saturating_mul(POINT_BYTES as u64)
 }
@@ -71,7 +71,8 @@ impl Spool {
     fn read(&self, start: u64, count: u64, out: &mut PointCloud) -> std::io::Result<()> {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.seek(SeekFrom::Start(byte_of(start)))?;
-        let (mut bytes, mut left) = (Vec::new(), count);
+        let mut bytes = Vec::new();
+        let mut left = count;
         while left > 0 {
             let n = usize::try_from(left).map_or(POINTS_AT_ONCE, |left| left.min(POINTS_AT_ONCE));
             bytes.resize(n.saturating_mul(POINT_BYTES), 0);
@@ -90,27 +91,28 @@ impl Spool {
     }
 }
 
-/// Puts points that come in any order into the file, each instance's beside one another.
+/// Sorts points that come in any order into the file, by instance.
 pub(crate) struct SpoolWriter {
     file: File,
     dir: PathBuf,
     places: Vec<Place>,
-    /// Bytes of an instance that may wait.
+    /// The most bytes of an instance that may wait.
     most: usize,
 }
 
-/// The place of an instance.
+/// The place of an instance in the file.
 struct Place {
-    /// What waits to be written.
+    /// Bytes that wait to be written.
     waiting: Vec<u8>,
-    /// Where that belongs, in points.
+    /// Where the next bytes belong, in points.
     next: u64,
     /// How many points are still to come.
     left: u64,
 }
 
 impl SpoolWriter {
-    /// A file for instances of these numbers of points, in `dir` or where the system keeps such files.
+    /// Creates a file for instances with these numbers of points, in `dir` or in the system's folder for
+    /// temporary files.
     pub(crate) fn create(dir: Option<&Path>, counts: &[u64]) -> Result<Self> {
         let dir = dir.map_or_else(std::env::temp_dir, Path::to_owned);
         let file = tempfile::tempfile_in(&dir).map_err(|e| Error::io(&dir, WRITE, e))?;
@@ -123,7 +125,7 @@ impl SpoolWriter {
         Ok(Self { file, dir, places: places.collect(), most: share.clamp(1, 16_384 * POINT_BYTES) })
     }
 
-    /// Adds a point of an instance; `false` if that has as many as were promised.
+    /// Adds a point of an instance. Returns `false` if the instance is complete already.
     pub(crate) fn push(&mut self, instance: usize, position: Vec3, color: [u8; 3]) -> Result<bool> {
         let Some(place) = self.places.get_mut(instance) else { return Ok(false) };
         let Some(left) = place.left.checked_sub(1) else { return Ok(false) };
@@ -140,15 +142,15 @@ impl SpoolWriter {
         Ok(true)
     }
 
-    /// The points, to be read; `None` if fewer came than were promised.
-    pub(crate) fn finish(mut self) -> Result<Option<FlatStore>> {
+    /// Returns the points, to be read. Returns `None` if fewer points came than were promised.
+    pub(crate) fn finish(mut self) -> Result<Option<PointStore>> {
         for place in &mut self.places {
             place
                 .write(&mut self.file)
                 .map_err(|e| Error::io(&self.dir, WRITE, e))?;
         }
         let complete = self.places.iter().all(|place| place.left == 0);
-        Ok(complete.then(|| FlatStore::Spool(Spool { file: Mutex::new(self.file), dir: self.dir })))
+        Ok(complete.then(|| PointStore::Spool(Spool { file: Mutex::new(self.file), dir: self.dir })))
     }
 }
 
@@ -169,7 +171,7 @@ mod tests {
 
     #[test]
     fn buffers_that_overflow_are_written_where_they_belong() {
-        // More than the 16,384 points that wait, of two instances by turns.
+        // More points than the 16,384 that wait, of two instances in turn.
         let counts = [40_000, 0, 20_000];
         let mut writer = SpoolWriter::create(None, &counts).unwrap();
         for i in 0..60_000u32 {
@@ -178,23 +180,26 @@ mod tests {
         }
         assert!(!writer.push(1, Vec3::ZERO, [0; 3]).unwrap());
         assert!(!writer.push(2, Vec3::ZERO, [0; 3]).unwrap());
+
         let store = writer.finish().unwrap().unwrap();
         let mut cloud = PointCloud::default();
         store.read(40_000, 20_000, &mut cloud).unwrap();
+        let expected = |k: usize| 3 * k + 2;
         assert!(
             cloud
                 .positions
                 .iter()
                 .enumerate()
-                .all(|(k, p)| *p == Vec3::splat((3 * k + 2) as f32))
+                .all(|(k, p)| *p == Vec3::splat(expected(k) as f32))
         );
         assert!(
             cloud
                 .colors
                 .iter()
                 .enumerate()
-                .all(|(k, c)| *c == [(3 * k + 2) as u8; 3])
+                .all(|(k, c)| *c == [expected(k) as u8; 3])
         );
+
         cloud.clear();
         store.read(0, 40_000, &mut cloud).unwrap();
         assert_eq!(cloud.positions[39_999], Vec3::splat(59_998.0));

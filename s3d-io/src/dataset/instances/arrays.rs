@@ -6,45 +6,47 @@ use crate::fs::open::open_file;
 use std::io::{Read, Seek};
 use std::path::Path;
 
-/// The arrays of `instances.npz`; see [`InstanceWriter`](crate::dataset::InstanceWriter) for their shapes.
+/// The arrays of `instances.npz`. [`InstanceWriter`](crate::dataset::InstanceWriter) gives their shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstanceArrays {
     /// The label of each instance.
     pub labels: Vec<String>,
-    /// Its index in `semantic_labels.json`.
+    /// The index of the instance's label in `semantic_labels.json`.
     pub label_index: Vec<u32>,
-    /// Its box: smallest x y z, largest x y z, world metres.
+    /// The box of the instance: smallest x y z, largest x y z, world metres.
     pub bbox: Vec<[f32; 6]>,
-    /// 216 an instance: 1 where the voxel holds a point.
+    /// 216 numbers for each instance: 1 if the voxel holds a point, else 0.
     pub voxel_occupancy: Vec<u8>,
-    /// 216 an instance.
+    /// 216 numbers for each instance.
     pub points_per_voxel: Vec<u32>,
-    /// One more than instances: the points of instance i are `point_index[point_start[i]..point_start[i +
-    /// 1]]`.
+    /// One number more than instances. The points of instance i are
+    /// `point_index[point_start[i]..point_start[i + 1]]`.
     pub point_start: Vec<u64>,
 }
 
-/// Reads the arrays that [`InstanceWriter`](crate::dataset::InstanceWriter) wrote, but for the members of
-/// voxels, which [`read_instance_members`] reads: a few kilobytes an instance.
+/// Reads the arrays that [`InstanceWriter`](crate::dataset::InstanceWriter) wrote, a few kilobytes for each
+/// instance. The members of voxels are left out; [`read_instance_members`] reads them.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is no such archive, damaged, or an array has another type or shape.
+/// [`Error::Io`]; [`Error::Format`] if it is not such an archive, is damaged, or an array has another type or
+/// shape.
 pub fn read_instance_arrays(path: &Path) -> Result<InstanceArrays> {
     read_instance_arrays_from(open_file(path)?, path)
 }
 
-/// As [`read_instance_arrays`], from a reader of the archive; errors call it `name`.
+/// Reads like [`read_instance_arrays`], from a reader of the archive. Errors call the file `name`.
 ///
 /// # Errors
-/// As [`read_instance_arrays`].
+/// Like [`read_instance_arrays`].
 pub fn read_instance_arrays_from(reader: impl Read + Seek, name: &Path) -> Result<InstanceArrays> {
     let path = name;
     let mut archive = NpzReader::new(reader, path)?;
     let index = archive.whole("label_index", |_| "<u4".into(), |bytes| vec![bytes as u64 / 4])?;
-    let n = index.len() / 4;
-    let count = n as u64;
-    let width = |bytes: usize| (bytes / 4).checked_div(n).unwrap_or(1).max(1);
+    let instances = index.len() / 4;
+    let count = instances as u64;
+    let width = |bytes: usize| (bytes / 4).checked_div(instances).unwrap_or(1).max(1);
     let names = archive.whole("labels", |bytes| format!("<U{}", width(bytes)), |_| vec![count])?;
+
     let mut array = |name: &str, kind: &str, shape: &[u64], size: u64| -> Result<Vec<u8>> {
         let bytes = archive.whole(name, |_| kind.into(), |_| shape.to_vec())?;
         if bytes.len() as u64 == size * shape.iter().product::<u64>() {
@@ -61,16 +63,9 @@ pub fn read_instance_arrays_from(reader: impl Read + Seek, name: &Path) -> Resul
     let point_start = array("point_start", "<u8", &[count + 1], 8)?;
 
     let units = numbers(&names, u32::from_le_bytes);
-    let text = |units: &[u32]| -> String {
-        units
-            .iter()
-            .take_while(|u| **u != 0)
-            .map(|u| char::from_u32(*u).unwrap_or('\u{fffd}'))
-            .collect()
-    };
-    let labels: Vec<String> = units.chunks_exact(width(names.len())).map(text).collect();
-    if labels.len() != n {
-        return Err(Error::format(path, format!("{} labels for {n} instances", labels.len())));
+    let labels: Vec<String> = units.chunks_exact(width(names.len())).map(text_of_units).collect();
+    if labels.len() != instances {
+        return Err(Error::format(path, format!("{} labels for {instances} instances", labels.len())));
     }
     Ok(InstanceArrays {
         labels,
@@ -82,12 +77,21 @@ pub fn read_instance_arrays_from(reader: impl Read + Seek, name: &Path) -> Resul
     })
 }
 
-/// Hands the points of each instance, voxel after voxel, to `each`, one instance at a time. `point_start` is
-/// that of the archive's arrays.
+/// Returns the text of a fixed width, UTF-32, that ends at a zero.
+fn text_of_units(units: &[u32]) -> String {
+    units
+        .iter()
+        .take_while(|u| **u != 0)
+        .map(|u| char::from_u32(*u).unwrap_or('\u{fffd}'))
+        .collect()
+}
+
+/// Hands the points of each instance to `each`, voxel after voxel, one instance at a time. `point_start` is
+/// the array of that name in the archive.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is no such archive, damaged, or has not as many points as
-/// `point_start` tells.
+/// [`Error::Io`]; [`Error::Format`] if it is not such an archive, is damaged, or does not have as many points
+/// as `point_start` says.
 pub fn read_instance_members(
     path: &Path,
     point_start: &[u64],
@@ -96,10 +100,10 @@ pub fn read_instance_members(
     read_instance_members_from(open_file(path)?, path, point_start, each)
 }
 
-/// As [`read_instance_members`], from a reader of the archive; errors call it `name`.
+/// Reads like [`read_instance_members`], from a reader of the archive. Errors call the file `name`.
 ///
 /// # Errors
-/// As [`read_instance_members`].
+/// Like [`read_instance_members`].
 pub fn read_instance_members_from(
     reader: impl Read + Seek,
     name: &Path,
@@ -113,14 +117,17 @@ pub fn read_instance_members_from(
     if !point_start.is_sorted() || point_start.first() != Some(&0) {
         return Err(Error::format(path, "point_start does not divide point_index among the instances"));
     }
+
     let (header, mut values) = archive.array(name)?;
     check_header(path, name, &header, "<u4", &[total])?;
-    let (mut bytes, mut members) = (Vec::new(), Vec::new());
+
+    let mut bytes = Vec::new();
+    let mut members = Vec::new();
     for (i, [start, end]) in point_start.array_windows().enumerate() {
-        // It ascends.
+        // `point_start` ascends.
         let size = (end - start).saturating_mul(4);
         bytes.clear();
-        // Memory grows as bytes arrive, whatever is claimed.
+        // Memory grows as bytes arrive, whatever the file claims.
         values
             .by_ref()
             .take(size)
@@ -129,11 +136,13 @@ pub fn read_instance_members_from(
         if bytes.len() as u64 != size {
             return Err(Error::format(path, format!("the array {name:?} ends too early")));
         }
+
         members.clear();
         members.extend(bytes.as_chunks().0.iter().map(|b| u32::from_le_bytes(*b)));
         each(i, &members);
     }
-    // Where it ends the checksum is compared.
+
+    // The checksum is compared at the array's end.
     match values.read(&mut [0; 1]) {
         Ok(0) => Ok(()),
         Ok(_) => Err(Error::format(path, format!("the array {name:?} goes on behind its {total} points"))),
@@ -151,7 +160,8 @@ mod tests {
     #[test]
     fn the_arrays_come_back_and_damage_is_told() {
         let dir = tempfile::tempdir().unwrap();
-        let (json, npz) = (dir.path().join("i.json"), dir.path().join("i.npz"));
+        let json = dir.path().join("i.json");
+        let npz = dir.path().join("i.npz");
         InstanceWriter::create(&json, &npz).unwrap().finish().unwrap();
         let empty = read_instance_arrays(&npz).unwrap();
         assert_eq!((empty.labels.len(), &empty.point_start[..]), (0, &[0][..]));
@@ -165,9 +175,12 @@ mod tests {
             writer.push(&record, &mut &points[..]).unwrap();
         }
         writer.finish().unwrap();
-        let (arrays, entries) = (read_instance_arrays(&npz).unwrap(), read_instances(&json).unwrap());
+
+        let arrays = read_instance_arrays(&npz).unwrap();
+        let entries = read_instances(&json).unwrap();
         assert_eq!(arrays.labels, ["chair_3_office_5_1", "wall_1_WC_2_1"]);
         assert_eq!((&arrays.label_index[..], &arrays.point_start[..]), (&[7, 7][..], &[0, 3, 6][..]));
+
         let mut members = Vec::new();
         read_instance_members(&npz, &arrays.point_start, |i, of| members.push((i, of.to_vec()))).unwrap();
         assert_eq!(members, [(0, vec![1, 0, 2]), (1, vec![1, 0, 2])]);
@@ -175,6 +188,7 @@ mod tests {
             let e = read_instance_members(&npz, starts, |_, _| ()).unwrap_err().to_string();
             assert!(e.contains(words), "{e}");
         }
+
         assert_eq!(arrays.bbox[1], entries[1].bbox);
         assert!(
             arrays

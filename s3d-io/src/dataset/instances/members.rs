@@ -1,44 +1,45 @@
-//! The indices of an instance's points by voxel, written without holding them.
+//! Writes the indices of an instance's points by voxel, without holding all of them.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
-/// Indices of a voxel that wait to be written, at most.
+/// The largest number of a voxel's indices that wait to be written.
 const MOST_WAITING: usize = 1 << 14;
 
-/// Puts the indices of points, which come in the order of the points, into a file by voxel.
+/// Writes the indices of points into a file by voxel. The points come in their own order.
 pub(crate) struct VoxelMembers<'a> {
     file: &'a mut File,
     voxels: Vec<Voxel>,
     /// The index of the next point.
     next: u32,
-    /// Where the last voxel's indices end in the file, in bytes.
+    /// The place in the file at which the last voxel's indices end, bytes.
     end: u64,
 }
 
-/// What waits to be written of a voxel.
+/// The indices of a voxel that wait to be written.
 struct Voxel {
     waiting: Vec<u8>,
-    /// Where in the file it goes on, in bytes, and where its indices end.
+    /// The place in the file at which the next indices are written, bytes.
     at: u64,
+    /// The place in the file at which the voxel's indices end, bytes.
     end: u64,
 }
 
 impl<'a> VoxelMembers<'a> {
-    /// Voxels of these numbers of points, one after another from where `file` stands.
+    /// Starts voxels with these numbers of points, one after another from the position of `file`.
     pub(crate) fn new(file: &'a mut File, counts: &[u32]) -> io::Result<Self> {
         let mut end = file.stream_position()?;
-        let mut voxel = |count: &u32| {
+        let mut voxels = Vec::with_capacity(counts.len());
+        for count in counts {
             let at = end;
             end += 4 * u64::from(*count);
-            Voxel { waiting: Vec::new(), at, end }
-        };
-        let voxels = counts.iter().map(&mut voxel).collect();
+            voxels.push(Voxel { waiting: Vec::new(), at, end });
+        }
         Ok(Self { file, voxels, next: 0, end })
     }
 
-    /// Takes the voxels of the next points. Points that were not counted are an error: their file has
-    /// changed.
+    /// Adds the next points, given the voxel of each. Points that were not counted are an error: their file
+    /// has changed.
     pub(crate) fn add(&mut self, cells: &[u8]) -> io::Result<()> {
         for cell in cells {
             let voxel = self.voxels.get_mut(usize::from(*cell)).ok_or_else(changed)?;
@@ -51,7 +52,7 @@ impl<'a> VoxelMembers<'a> {
         Ok(())
     }
 
-    /// Writes what waits, and leaves the file at the end of it all.
+    /// Writes the waiting indices, and leaves the file at the end of all indices.
     pub(crate) fn finish(mut self) -> io::Result<()> {
         for voxel in &mut self.voxels {
             voxel.write(self.file)?;
@@ -87,7 +88,7 @@ mod tests {
     use super::*;
     use std::io::Read;
 
-    /// The numbers in the file from byte 4 on.
+    /// Returns the numbers that are written from byte 4 on.
     fn written(cells: &[u8], counts: &[u32]) -> io::Result<Vec<u32>> {
         let mut file = tempfile::tempfile()?;
         file.write_all(b"head")?;
@@ -105,7 +106,7 @@ mod tests {
 
     #[test]
     fn each_voxel_has_its_points_in_order() {
-        // Enough that one waits too long, and a voxel of none.
+        // Voxel 3 has so many points that it is written early; voxel 2 has none.
         let cells: Vec<u8> = (0..5 * MOST_WAITING).map(|i| [0, 3, 3, 1, 3][i % 5]).collect();
         let mut counts = [0; 4];
         cells.iter().for_each(|c| counts[usize::from(*c)] += 1);

@@ -1,8 +1,9 @@
 //! Boxes and voxels of an area's instances: `instances.json` to read, `instances.npz` for numpy.
 //!
-//! They hold what the published `pointcloud.mat` does beside the points: per instance its tightest box, split
-//! in 6 × 6 × 6 equal voxels, each with its occupancy and its points. Voxel (ix, iy, iz), counted from the
-//! box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "What is written".
+//! They hold what the published `pointcloud.mat` holds beside the points. Each instance has its tightest box,
+//! split into 6 × 6 × 6 equal voxels, and each voxel its occupancy and its points. Voxel (ix, iy, iz),
+//! counted from the box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "What
+//! is written".
 
 use crate::cloud::passes::PointPasses;
 use crate::dataset::instances::members::VoxelMembers;
@@ -16,73 +17,73 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Voxels of an instance.
+/// The number of voxels of an instance.
 const CELLS: usize = VoxelGrid::CELLS;
 
-/// One instance but its points, as [`InstanceWriter::push`] takes it.
+/// An instance without its points, as [`InstanceWriter::push`] takes it.
 #[derive(Clone, Copy, Debug)]
 pub struct InstanceRecord<'a> {
-    /// Its label: "chair_3_office_5_1".
+    /// The label: "chair_3_office_5_1".
     pub label: &'a str,
     /// The index of the label in `semantic_labels.json`.
     pub label_index: u32,
-    /// Its class: "chair".
+    /// The class: "chair".
     pub class: &'a str,
-    /// Type and number of its room: "office_5".
+    /// Type and number of the room: "office_5".
     pub room: &'a str,
-    /// The tightest box of its points, world metres.
+    /// The tightest box of the instance's points, world metres.
     pub bbox: Aabb,
 }
 
-/// One instance, as `instances.json` holds it.
+/// An instance of `instances.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InstanceEntry {
-    /// Its label: "chair_3_office_5_1".
+    /// The label: "chair_3_office_5_1".
     pub label: String,
     /// The index of the label in `semantic_labels.json`.
     pub label_index: u32,
-    /// Its class: "chair".
+    /// The class: "chair".
     pub class: String,
-    /// Type and number of its room: "office_5".
+    /// Type and number of the room: "office_5".
     pub room: String,
-    /// How many points it has.
+    /// The number of points.
     pub points: u64,
-    /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, world metres.
+    /// The tightest box of the points: `[xmin, ymin, zmin, xmax, ymax, zmax]`, world metres.
     pub bbox: [f32; 6],
-    /// 216 times 1 (the voxel holds a point) or 0.
+    /// 216 numbers: 1 if the voxel holds a point, else 0.
     pub voxel_occupancy: Vec<u8>,
-    /// 216 counts.
+    /// 216 numbers of points.
     pub points_per_voxel: Vec<u32>,
 }
 
 /// Writes `instances.json` and `instances.npz` of an area, instance by instance, each whole or not at all.
 ///
-/// The archive holds these arrays, for n instances with N points together:
+/// The archive holds these arrays, for n instances with N points in total:
 ///
 /// | name | type, shape | |
 /// |---|---|---|
 /// | `labels` | text, n | "chair_3_office_5_1" |
 /// | `label_index` | u32, n | index into `semantic_labels.json` |
 /// | `bbox` | f32, n × 6 | smallest x y z, largest x y z, metres |
-/// | `voxel_occupancy` | u8, n × 6 × 6 × 6 | 1 where the voxel \[ix, iy, iz\] holds a point |
-/// | `points_per_voxel` | u32, n × 6 × 6 × 6 | how many |
+/// | `voxel_occupancy` | u8, n × 6 × 6 × 6 | 1 if the voxel \[ix, iy, iz\] holds a point |
+/// | `points_per_voxel` | u32, n × 6 × 6 × 6 | the number of points |
 /// | `point_start` | u64, n + 1 | the points of instance i are `point_index[point_start[i]:point_start[i+1]]` |
 /// | `point_index` | u32, N | points of an instance (from 0, in the order of its file in the S3DIS tree), voxel after voxel |
 ///
-/// Memory: about 1.3 kilobytes an instance, whatever its points. Point indices wait in a nameless temporary
-/// file.
+/// Memory: about 1.3 kilobytes for each instance, however many points it has. Point indices wait in a
+/// nameless temporary file.
 #[derive(Debug)]
 pub struct InstanceWriter<J = AtomicFile, N = AtomicFile> {
     json: J,
     npz: N,
-    /// Of `npz`, for messages.
+    /// The path of `npz`, for messages.
     name: PathBuf,
     entries: Vec<InstanceEntry>,
     point_index: BufWriter<File>,
 }
 
 impl InstanceWriter {
-    /// Starts the two files. Their folders must be there.
+    /// Starts the two files. Their folders must exist.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -95,7 +96,7 @@ impl InstanceWriter {
         Ok(Self::new(AtomicFile::create(json)?, AtomicFile::create(npz)?, npz, spool))
     }
 
-    /// Gives both files their names, and returns their size in bytes.
+    /// Gives both files their final names, and returns the sum of their sizes in bytes.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -106,22 +107,21 @@ impl InstanceWriter {
 }
 
 impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
-    /// Starts the two files in writers of the caller's. `name` stands for `npz` in messages; indices of
-    /// points wait in `spool`, an empty file that is open for reading and writing.
+    /// Starts the two files in writers of the caller. `name` stands for `npz` in messages. Indices of points
+    /// wait in `spool`, an empty file that is open for reading and writing.
     pub fn new(json: J, npz: N, name: &Path, spool: File) -> Self {
         let point_index = BufWriter::with_capacity(1 << 18, spool);
         Self { json, npz, name: name.to_owned(), entries: Vec::new(), point_index }
     }
 
-    /// Appends an instance, whose points are in the order of its file in the S3DIS tree. Those that are not
-    /// in memory are gone through twice, once to count them by voxel and once to write their indices, which
-    /// takes 14 MB.
+    /// Appends an instance. Its points are in the order of its file in the S3DIS tree. Points that are not in
+    /// memory are read twice, once to count them by voxel and once to write their indices, which takes 14 MB.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] for more points than `u32` can number; those of the points' own file.
+    /// [`Error::Io`]; [`Error::Format`] for more points than `u32` can number; errors of reading the points.
     ///
     /// # Panics
-    /// If it has no point; if the box of points in memory is another than theirs.
+    /// If the instance has no point, or the box of points in memory is not `instance.bbox`.
     pub fn push(&mut self, instance: &InstanceRecord<'_>, points: &mut dyn PointPasses) -> Result<()> {
         let label = instance.label;
         assert!(!points.is_empty(), "{label} has no point");
@@ -133,15 +133,17 @@ impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
             );
             return Err(Error::format(&self.name, message));
         }
+
         let grid = VoxelGrid { bbox: instance.bbox };
         let points_per_voxel = match points.in_memory().and_then(Voxels::from_points) {
             Some(voxels) => {
-                assert_eq!(voxels.grid, grid, "the box of {label} is not that of its points");
+                assert_eq!(voxels.grid, grid, "the box of {label} is not the box of its points");
                 self.put(&voxels.members)?;
                 voxels.starts.array_windows().map(|[start, end]| end - start).collect()
             }
             None => self.put_in_passes(grid, points)?,
         };
+
         self.entries.push(InstanceEntry {
             label: label.to_owned(),
             label_index: instance.label_index,
@@ -164,10 +166,11 @@ impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
             .map_err(failed)
     }
 
-    /// Appends the indices of points that are not in memory, and returns how many are in each voxel.
+    /// Appends the indices of points that are not in memory. Returns the number of points in each voxel.
     fn put_in_passes(&mut self, grid: VoxelGrid, points: &mut dyn PointPasses) -> Result<Vec<u32>> {
         let failed = |e| Error::io(&self.name, "write", e);
         let mut counts = vec![0u32; CELLS];
+
         let mut cells = Vec::new();
         points.pass(&mut |block| {
             grid.cells_of(block, &mut cells);
@@ -178,6 +181,7 @@ impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
             }
             Ok(())
         })?;
+
         self.point_index.flush().map_err(failed)?;
         let mut members = VoxelMembers::new(self.point_index.get_mut(), &counts).map_err(failed)?;
         points.pass(&mut |block| {
@@ -188,7 +192,7 @@ impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
         Ok(counts)
     }
 
-    /// Writes both files to their ends, and hands them back: `instances.json`, `instances.npz`.
+    /// Completes both files and hands their writers back: `instances.json`, `instances.npz`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -203,7 +207,7 @@ impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
     }
 }
 
-/// One instance a line.
+/// Writes one instance a line.
 fn write_entries(w: &mut impl Write, entries: &[InstanceEntry]) -> io::Result<()> {
     w.write_all(b"{\"instances\":[")?;
     for (i, entry) in entries.iter().enumerate() {
@@ -216,16 +220,16 @@ fn write_entries(w: &mut impl Write, entries: &[InstanceEntry]) -> io::Result<()
 /// Reads `instances.json`.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if it is something else, or an instance has not 216 voxels.
+/// [`Error::Io`]; [`Error::Format`] if it is something else, or an instance does not have 216 voxels.
 pub fn read_instances(path: &Path) -> Result<Vec<InstanceEntry>> {
     #[derive(Deserialize)]
     struct Instances {
         instances: Vec<InstanceEntry>,
     }
     let Instances { instances } = read_json(path)?;
-    for i in &instances {
-        if i.voxel_occupancy.len() != CELLS || i.points_per_voxel.len() != CELLS {
-            return Err(Error::format(path, format!("{} has not {CELLS} voxels", i.label)));
+    for instance in &instances {
+        if instance.voxel_occupancy.len() != CELLS || instance.points_per_voxel.len() != CELLS {
+            return Err(Error::format(path, format!("{} has not {CELLS} voxels", instance.label)));
         }
     }
     Ok(instances)
@@ -235,24 +239,16 @@ fn write_arrays<N: Write + Seek>(file: N, entries: &[InstanceEntry], spool: File
     let mut archive = NpzWriter::new(file);
     let n = entries.len() as u64;
 
-    // Text of a fixed width, UTF-32, padded with zeros: numpy's own form, which needs no pickle.
+    // Text of a fixed width, UTF-32, padded with zeros. It is numpy's own form, and needs no pickle.
     let width = entries
         .iter()
         .map(|e| e.label.chars().count())
         .max()
         .unwrap_or(0)
         .max(1);
-    let label = |e: &InstanceEntry| {
-        let mut units: Vec<u32> = e.label.chars().map(u32::from).collect();
-        units.resize(width, 0);
-        units
-    };
-    archive.array(
-        "labels",
-        &format!("<U{width}"),
-        &[n],
-        bytes(entries.iter().flat_map(label), u32::to_le_bytes),
-    )?;
+    let labels = entries.iter().flat_map(|e| padded_units(&e.label, width));
+    archive.array("labels", &format!("<U{width}"), &[n], bytes(labels, u32::to_le_bytes))?;
+
     let indices = entries.iter().map(|e| e.label_index);
     archive.array("label_index", "<u4", &[n], bytes(indices, u32::to_le_bytes))?;
     let boxes = entries.iter().flat_map(|e| e.bbox);
@@ -261,6 +257,7 @@ fn write_arrays<N: Write + Seek>(file: N, entries: &[InstanceEntry], spool: File
     archive.array("voxel_occupancy", "|u1", &[n, 6, 6, 6], occupancy.collect::<Vec<_>>().as_slice())?;
     let counts = entries.iter().flat_map(|e| e.points_per_voxel.iter().copied());
     archive.array("points_per_voxel", "<u4", &[n, 6, 6, 6], bytes(counts, u32::to_le_bytes))?;
+
     let starts = point_starts(entries);
     let total = starts.last().copied().unwrap_or(0);
     archive.array("point_start", "<u8", &[n + 1], bytes(starts.into_iter(), u64::to_le_bytes))?;
@@ -274,7 +271,15 @@ fn write_arrays<N: Write + Seek>(file: N, entries: &[InstanceEntry], spool: File
     archive.finish()
 }
 
-/// Where the points of each instance start among those of all, and where they end.
+/// Returns a text as `width` units of UTF-32, padded with zeros.
+fn padded_units(text: &str, width: usize) -> Vec<u32> {
+    let mut units: Vec<u32> = text.chars().map(u32::from).collect();
+    units.resize(width, 0);
+    units
+}
+
+/// Returns the place of each instance's first point among all points, and at the end the number of all
+/// points.
 fn point_starts(entries: &[InstanceEntry]) -> Vec<u64> {
     let ends = entries.iter().scan(0, |sum, e| {
         *sum += e.points;
@@ -292,7 +297,7 @@ mod tests {
     const CHAIR: Aabb = Aabb { min: vec3(0.1, -2.0, 0.0), max: vec3(1.5, -1.25, 0.9) };
     const WALL: Aabb = Aabb { min: Vec3::splat(5.0), max: Vec3::splat(5.0) };
 
-    /// Points of the chair in the voxels 215, 0, 215, 0 and (0, 1, 1).
+    /// Returns points of the chair in the voxels 215, 0, 215, 0 and (0, 1, 1).
     fn chair_points() -> [Vec3; 5] {
         let size = CHAIR.size();
         [
@@ -331,13 +336,15 @@ mod tests {
     }
 
     fn write(dir: &Path) -> Vec<InstanceEntry> {
-        let (json, npz) = (dir.join("instances.json"), dir.join("instances.npz"));
+        let json = dir.join("instances.json");
+        let npz = dir.join("instances.npz");
         let mut writer = InstanceWriter::create(&json, &npz).unwrap();
         writer
             .push(&record("chair_3_office_5_1"), &mut &chair_points()[..])
             .unwrap();
         writer.push(&record("wall_1_WC_2_1"), &mut &[WALL.min][..]).unwrap();
         let bytes = writer.finish().unwrap();
+
         let size = |path: &Path| std::fs::metadata(path).unwrap().len();
         assert_eq!(bytes, size(&json) + size(&npz));
         assert_eq!(std::fs::read_dir(dir).unwrap().count(), 2);
@@ -379,7 +386,7 @@ mod tests {
         assert!(npz.into_inner() == std::fs::read(dir.path().join("instances.npz")).unwrap());
     }
 
-    /// The archive through the reader of npyz, which knows numpy's types.
+    /// Reads the archive with npyz, which knows numpy's types.
     #[test]
     fn the_arrays_come_back() {
         let dir = tempfile::tempdir().unwrap();
@@ -398,12 +405,14 @@ mod tests {
             let npy = npyz::NpyFile::new(bytes).unwrap();
             (npy.shape().to_vec(), npy.into_vec().unwrap())
         }
+
         assert_eq!(
             read::<String>(&array("labels")),
             (vec![2], entries.iter().map(|e| e.label.clone()).collect())
         );
         assert_eq!(read::<u32>(&array("label_index")), (vec![2], vec![9, 40]));
         assert_eq!(read::<f32>(&array("bbox")), (vec![2, 6], entries.iter().flat_map(|e| e.bbox).collect()));
+
         let occupancy = entries.iter().flat_map(|e| e.voxel_occupancy.clone()).collect();
         assert_eq!(read::<u8>(&array("voxel_occupancy")), (vec![2, 6, 6, 6], occupancy));
         let counts = entries.iter().flat_map(|e| e.points_per_voxel.clone()).collect();
@@ -415,9 +424,11 @@ mod tests {
     #[test]
     fn an_area_without_instances_and_the_same_bytes_twice() {
         let dir = tempfile::tempdir().unwrap();
-        let (json, npz) = (dir.path().join("i.json"), dir.path().join("i.npz"));
+        let json = dir.path().join("i.json");
+        let npz = dir.path().join("i.npz");
         InstanceWriter::create(&json, &npz).unwrap().finish().unwrap();
         assert_eq!(read_instances(&json).unwrap(), []);
+
         let others = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
         for other in &others {
             write(other.path());
@@ -436,13 +447,15 @@ mod tests {
         let bbox = Aabb::from_points(points.iter().copied());
         let written = |on_disk: bool| {
             let dir = tempfile::tempdir().unwrap();
-            let (json, npz) = (dir.path().join("i.json"), dir.path().join("i.npz"));
+            let json = dir.path().join("i.json");
+            let npz = dir.path().join("i.npz");
             let mut writer = InstanceWriter::create(&json, &npz).unwrap();
             for label in ["chair_3_office_5_1", "wall_1_WC_2_1"] {
                 let record = InstanceRecord { bbox, ..record(label) };
-                match on_disk {
-                    true => writer.push(&record, &mut OnDisk(&points)).unwrap(),
-                    false => writer.push(&record, &mut &points[..]).unwrap(),
+                if on_disk {
+                    writer.push(&record, &mut OnDisk(&points)).unwrap();
+                } else {
+                    writer.push(&record, &mut &points[..]).unwrap();
                 }
             }
             writer
@@ -454,7 +467,7 @@ mod tests {
         assert!(written(true) == written(false));
     }
 
-    /// As many points as are asked for, none of which is ever read.
+    /// Claims to have as many points as asked for. None of them is ever read.
     struct Claimed(u64);
 
     impl PointPasses for Claimed {

@@ -1,4 +1,4 @@
-//! PNG files of one kind, and no other: their samples may be numbers, which must not be converted.
+//! Reads PNG files of one kind and no other: their samples may be numbers, which must not be converted.
 
 use super::lines::PngReader;
 use crate::error::{Error, Result};
@@ -9,16 +9,16 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
-/// Images with more pixels than this are not read: 16 times a panorama of the data set's double size.
+/// The most pixels of an image that is read: 16 times a panorama of the data set's double size.
 pub(super) const MAX_PIXELS: u64 = 1 << 30;
 
-/// What deflate can make of a byte at most.
+/// The most bytes that deflate can make of one.
 pub(super) const MAX_DEFLATE: u64 = 1032;
 
-/// Larger files are not held in memory.
+/// The largest file in bytes that is read into memory.
 const MAX_WHOLE: u64 = 1 << 28;
 
-/// Reads an 8-bit RGB PNG file, and nothing else: its channels may be numbers, which must not be converted.
+/// Reads an 8-bit RGB PNG file and no other kind: its channels may be numbers, which must not be converted.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no PNG file, damaged, or of another kind.
@@ -32,15 +32,16 @@ pub fn read_rgb8(path: &Path) -> Result<Raster<[u8; 3]>> {
     }
 }
 
-/// As [`read_rgb8`], from the file's bytes; errors call it `name`.
+/// Decodes like [`read_rgb8`], from the file's bytes. Errors name the file by `name`.
 ///
 /// # Errors
-/// As [`read_rgb8`].
+/// Like [`read_rgb8`].
 pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
     Ok(PngReader::default().rgb8(bytes, name)?.into_raster())
 }
 
-/// Reads an 8-bit PNG file with a palette, and nothing else: the places in the palette, and its colours.
+/// Reads an 8-bit PNG file with a palette, and no other kind. Returns the palette index of each pixel, and
+/// the colours of the palette.
 ///
 /// ```
 /// use s3d_geom::Raster;
@@ -54,22 +55,23 @@ pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
 /// ```
 ///
 /// # Errors
-/// As [`read_rgb8`].
+/// Like [`read_rgb8`].
 pub fn read_palette8(path: &Path) -> Result<(Raster<u8>, Vec<[u8; 3]>)> {
     decode_palette8(&read_file(path)?, path)
 }
 
-/// As [`read_palette8`], from the file's bytes; errors call it `name`.
+/// Decodes like [`read_palette8`], from the file's bytes. Errors name the file by `name`.
 ///
 /// # Errors
-/// As [`read_palette8`].
+/// Like [`read_palette8`].
 pub fn decode_palette8(bytes: &[u8], name: &Path) -> Result<(Raster<u8>, Vec<[u8; 3]>)> {
-    let (file, size) = (Cursor::new(bytes), bytes.len() as u64);
-    let (width, height, places, palette) = decode(file, size, name, ColorType::Indexed, BitDepth::Eight)?;
-    Ok((Raster::from_vec(width, height, places), palette.as_chunks().0.to_vec()))
+    let size = bytes.len() as u64;
+    let (width, height, indices, palette) =
+        decode(Cursor::new(bytes), size, name, ColorType::Indexed, BitDepth::Eight)?;
+    Ok((Raster::from_vec(width, height, indices), palette.as_chunks().0.to_vec()))
 }
 
-/// Reads a 16-bit gray PNG file, and nothing else: its values are numbers, which must not be converted.
+/// Reads a 16-bit gray PNG file and no other kind: its values are numbers, which must not be converted.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if it is no PNG file, damaged, or of another kind.
@@ -90,7 +92,7 @@ pub fn read_gray16(path: &Path) -> Result<Raster<u16>> {
     }
 }
 
-/// As [`read_gray16`], from the file's bytes; errors call it `name`.
+/// Decodes like [`read_gray16`], from the file's bytes. Errors name the file by `name`.
 ///
 /// ```
 /// use s3d_geom::Raster;
@@ -103,27 +105,27 @@ pub fn read_gray16(path: &Path) -> Result<Raster<u16>> {
 /// ```
 ///
 /// # Errors
-/// As [`read_gray16`].
+/// Like [`read_gray16`].
 pub fn decode_gray16(bytes: &[u8], name: &Path) -> Result<Raster<u16>> {
     Ok(PngReader::default().gray16(bytes, name)?.into_raster())
 }
 
-/// A file, and how many bytes it has.
+/// Opens a file. Returns its size in bytes too.
 fn open(path: &Path) -> Result<(BufReader<File>, u64)> {
     let file = open_file(path)?;
     let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
     Ok((BufReader::new(file), size))
 }
 
-/// A file that was opened.
+/// An open file.
 enum Opened {
-    /// All of it.
+    /// The bytes of a small file.
     Whole(Vec<u8>),
-    /// One that is read piece by piece, and how many bytes it has.
+    /// A large file, which is read piece by piece, and its size in bytes.
     Large(BufReader<File>, u64),
 }
 
-/// Opens a file, and reads it if it is not large.
+/// Opens a file, and reads it unless it is large.
 fn open_whole(path: &Path) -> Result<Opened> {
     let (mut file, size) = open(path)?;
     if size > MAX_WHOLE {
@@ -134,8 +136,8 @@ fn open_whole(path: &Path) -> Result<Opened> {
     Ok(Opened::Whole(bytes))
 }
 
-/// Reads the numbers of an 8-bit gray PNG file, or the places of one with a palette, of up to 8 bits, and
-/// nothing else: classes, as trainers write them.
+/// Reads an 8-bit gray PNG file, or the palette indices of one with a palette of up to 8 bits, and no other
+/// kind. Trainers write classes so.
 ///
 /// ```
 /// use s3d_geom::Raster;
@@ -152,7 +154,7 @@ fn open_whole(path: &Path) -> Result<Opened> {
 /// ```
 ///
 /// # Errors
-/// As [`read_rgb8`].
+/// Like [`read_rgb8`].
 pub fn read_numbers8(path: &Path) -> Result<Raster<u8>> {
     let (file, size) = open(path)?;
     let is_one = |color, depth| match color {
@@ -164,8 +166,10 @@ pub fn read_numbers8(path: &Path) -> Result<Raster<u8>> {
     if depth == BitDepth::Eight {
         return Ok(Raster::from_vec(width, height, bytes));
     }
-    // Several to a byte, the first in the highest bits; a row begins with a byte.
-    let (bits, line) = (depth as usize, (width as usize * depth as usize).div_ceil(8));
+
+    // A byte holds several numbers, the first in its highest bits. Each row begins with a new byte.
+    let bits = depth as usize;
+    let line = (width as usize * bits).div_ceil(8);
     let numbers = bytes.chunks_exact(line.max(1)).flat_map(|row| {
         let of_byte = move |byte: &u8| {
             let byte = u16::from(*byte);
@@ -176,7 +180,7 @@ pub fn read_numbers8(path: &Path) -> Result<Raster<u8>> {
     Ok(Raster::from_vec(width, height, numbers.collect()))
 }
 
-/// Width, height, samples and palette of a file of `size` bytes.
+/// Returns width, height, samples and palette of a file of `size` bytes.
 pub(super) fn decode(
     file: impl BufRead + Seek,
     size: u64,
@@ -190,7 +194,7 @@ pub(super) fn decode(
     Ok((width, height, bytes, palette))
 }
 
-/// What a file holds.
+/// The content of a PNG file.
 struct Decoded {
     width: u32,
     height: u32,
@@ -199,7 +203,8 @@ struct Decoded {
     palette: Vec<u8>,
 }
 
-/// What a file of `size` bytes holds, if its colours and bits are what is `wanted`.
+/// Reads a file of `size` bytes, if `is_one` accepts its colour type and bit depth. `wanted` describes them
+/// in the error.
 fn decode_one_of(
     file: impl BufRead + Seek,
     size: u64,
@@ -214,26 +219,32 @@ fn decode_one_of(
         png::DecodingError::IoError(_) => Error::format(path, "the PNG file ends too early"),
         e => Error::format(path, format!("no readable PNG file: {e}")),
     };
+
     let mut reader = png::Decoder::new(file).read_info().map_err(failed)?;
     let info = reader.info();
-    let (width, height) = (info.width, info.height);
+    let width = info.width;
+    let height = info.height;
     let palette = info.palette.as_deref().unwrap_or_default().to_vec();
     let depth = info.bit_depth;
+
     if !is_one(info.color_type, depth) {
         let found = describe(info.color_type, depth);
         return Err(Error::format(path, format!("the image is {found}, not {wanted}")));
     }
+
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         return Err(Error::unsupported(
             path,
             format!("{width} × {height} pixels are more than {MAX_PIXELS}"),
         ));
     }
+
     let line = (u64::from(width) * info.bits_per_pixel() as u64).div_ceil(8);
     let needed = line * u64::from(height);
     if needed > size.saturating_mul(MAX_DEFLATE) {
         return Err(Error::format(path, format!("claims {width} × {height} pixels in {size} bytes")));
     }
+
     let mut bytes = vec![0; needed as usize];
     reader.next_frame(&mut bytes).map_err(failed)?;
     Ok(Decoded { width, height, depth, bytes, palette })

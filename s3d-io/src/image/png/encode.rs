@@ -1,4 +1,4 @@
-//! PNG files made with the deflate of this workspace: what an image shows decides how it is searched.
+//! Writes PNG files with the deflate of this workspace. What an image shows decides how it is compressed.
 
 use crate::error::Result;
 use crate::fs::atomic::write_bytes;
@@ -9,35 +9,35 @@ use s3d_deflate::{Deflater, Search};
 use s3d_geom::Raster;
 use std::path::Path;
 
-/// What an 8-bit image shows, which decides how it compresses best. The pixels come back the same whatever is
-/// said.
+/// What an 8-bit image shows, which decides how it compresses best. The pixels are the same for all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// Texture and noise.
     Photo,
     /// Surface normals: constant on planes, smooth elsewhere.
     Normals,
-    /// Constant in pieces: label indices, a colour per instance.
+    /// Constant on patches: label indices, or a colour for each instance.
     Labels,
 }
 
-/// An image as the bytes of an 8-bit RGB PNG file.
+/// Encodes an image as an 8-bit RGB PNG file.
 ///
 /// # Panics
-/// If it has no pixel.
+/// If the image has no pixel.
 pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compression) -> Vec<u8> {
-    // A line of samples after the filter's number.
+    // A line has one byte for its filter, then the samples.
     let line = 1 + 3 * image.width() as usize;
-    let (photo, small) = (Search::photo(line), Search::thorough(line, 3));
+    let photo = Search::photo(line);
+    let small = Search::thorough(line, 3);
     let plans: &[(Filter, Search)] = match (content, compression) {
         (Content::Photo, Compression::Fast) => &[(Filter::Paeth, Search { nice: 16, patience: 3, ..photo })],
         (Content::Photo, Compression::Balanced) => &[(Filter::Paeth, photo)],
-        // In noise, matches of few bytes do not pay.
+        // In noise, matches of a few bytes do not pay.
         (Content::Photo, Compression::Small) => &[(Filter::Paeth, small), (Filter::Paeth, photo)],
         (Content::Normals, Compression::Fast | Compression::Balanced) => {
             &[(Filter::None, Search::smooth(line))]
         }
-        // Large patches repeat best as they are, small ones as differences.
+        // Large patches repeat best without a filter, small ones as differences.
         (Content::Normals, Compression::Small) => {
             &[(Filter::Paeth, small), (Filter::None, small), (Filter::None, Search::smooth(line))]
         }
@@ -45,25 +45,25 @@ pub fn encode_rgb8(image: &Raster<[u8; 3]>, content: Content, compression: Compr
         (Content::Labels, Compression::Balanced) => &[(Filter::Up, Search::labels(line))],
         (Content::Labels, Compression::Small) => &[(Filter::Up, small), (Filter::Paeth, small)],
     };
+
     let format = Format { color: ColorType::Rgb, depth: BitDepth::Eight, pixel: 3, palette: &[] };
     encode(image.width(), image.height(), format, image.pixels().as_flattened(), plans)
 }
 
-/// An image as the bytes of an 8-bit gray PNG file, set for images that are constant in pieces, such as
-/// masks.
+/// Encodes an image as an 8-bit gray PNG file, tuned for images that are constant on patches, such as masks.
 ///
 /// # Panics
-/// If it has no pixel.
+/// If the image has no pixel.
 pub fn encode_gray8(image: &Raster<u8>) -> Vec<u8> {
     let search = Search::patches(1 + image.width() as usize);
     let format = Format { color: ColorType::Grayscale, depth: BitDepth::Eight, pixel: 1, palette: &[] };
     encode(image.width(), image.height(), format, image.pixels(), &[(Filter::Up, search)])
 }
 
-/// An image of places in a palette as the bytes of an 8-bit PNG file with it.
+/// Encodes an image of palette indices as an 8-bit PNG file with its palette.
 ///
 /// # Panics
-/// If it has no pixel, or the palette no colour or more than 256.
+/// If the image has no pixel, or the palette has no colour or more than 256.
 pub fn encode_palette8(image: &Raster<u8>, palette: &[[u8; 3]], compression: Compression) -> Vec<u8> {
     assert!((1..=256).contains(&palette.len()), "a palette of {} colours", palette.len());
     let line = 1 + image.width() as usize;
@@ -78,10 +78,10 @@ pub fn encode_palette8(image: &Raster<u8>, palette: &[[u8; 3]], compression: Com
     encode(image.width(), image.height(), format, image.pixels(), plans)
 }
 
-/// An image as the bytes of a 16-bit gray PNG file, set for smooth images such as depth.
+/// Encodes an image as a 16-bit gray PNG file, tuned for smooth images such as depth.
 ///
 /// # Panics
-/// If it has no pixel.
+/// If the image has no pixel.
 pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
     let mut bytes = vec![0; 2 * image.len()];
     bytes
@@ -90,6 +90,7 @@ pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
         .iter_mut()
         .zip(image.pixels())
         .for_each(|(pair, v)| *pair = v.to_be_bytes());
+
     let line = 1 + 2 * image.width() as usize;
     let balanced = Search::depth(line);
     let small = Search { hash_bytes: 6, ..Search::thorough(line, 2) };
@@ -104,18 +105,18 @@ pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
 struct Format<'a> {
     color: ColorType,
     depth: BitDepth,
-    /// Bytes a pixel.
+    /// The number of bytes in a pixel.
     pixel: usize,
-    /// Colours of a palette, three bytes each; empty if there is none.
+    /// The colours of the palette, three bytes each. Empty without a palette.
     palette: &'a [u8],
 }
 
-/// Lines of which it is tried out how they compress best, and from how many they are.
+/// The lines of a band on which the plans are compared, and the distance from one band to the next.
 const SAMPLE: (usize, usize) = (32, 128);
-/// Up to so many lines, it is tried out on all.
+/// The largest number of lines of which all are compared.
 const FEW_LINES: usize = 512;
 
-/// The file, made by the plan that does best on a sample of the lines.
+/// Encodes the file by the plan that makes the smallest sample.
 #[expect(
     clippy::indexing_slicing,
     clippy::expect_used,
@@ -124,6 +125,7 @@ const FEW_LINES: usize = 512;
 fn encode(width: u32, height: u32, format: Format<'_>, bytes: &[u8], plans: &[(Filter, Search)]) -> Vec<u8> {
     assert!(!bytes.is_empty(), "a PNG image needs pixels: {width} × {height}");
     let line = width as usize * format.pixel;
+
     let compress = |bytes: &[u8], (by, search): (Filter, Search)| {
         let mut out = Vec::with_capacity(bytes.len() / 4 + 1024);
         let filtered = filter(bytes, line, format.pixel, by).expect("whole lines");
@@ -132,6 +134,7 @@ fn encode(width: u32, height: u32, format: Format<'_>, bytes: &[u8], plans: &[(F
             .zlib(&filtered, None, &mut out);
         out
     };
+
     let plan = if let [plan] = plans {
         *plan
     } else {
@@ -159,7 +162,7 @@ fn encode(width: u32, height: u32, format: Format<'_>, bytes: &[u8], plans: &[(F
         encoder.set_palette(format.palette);
     }
     let written = encoder.write_header().and_then(|mut writer| {
-        // A chunk's length has 31 bits.
+        // The length of a chunk has 31 bits.
         compressed
             .chunks(1 << 30)
             .try_for_each(|piece| writer.write_chunk(png::chunk::IDAT, piece))?;
@@ -169,14 +172,14 @@ fn encode(width: u32, height: u32, format: Format<'_>, bytes: &[u8], plans: &[(F
     file
 }
 
-/// Writes an image as an 8-bit RGB PNG file, whole or not at all, and returns its size in bytes; see
+/// Writes an image as an 8-bit RGB PNG file, whole or not at all, and returns its size in bytes. See
 /// [`encode_rgb8`].
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
 ///
 /// # Panics
-/// If it has no pixel.
+/// If the image has no pixel.
 pub fn write_rgb8(
     path: &Path,
     image: &Raster<[u8; 3]>,
@@ -186,14 +189,14 @@ pub fn write_rgb8(
     write_bytes(path, &encode_rgb8(image, content, compression))
 }
 
-/// Writes an image as a 16-bit gray PNG file, whole or not at all, and returns its size in bytes; see
+/// Writes an image as a 16-bit gray PNG file, whole or not at all, and returns its size in bytes. See
 /// [`encode_gray16`].
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
 ///
 /// # Panics
-/// If it has no pixel.
+/// If the image has no pixel.
 pub fn write_gray16(path: &Path, image: &Raster<u16>, compression: Compression) -> Result<u64> {
     write_bytes(path, &encode_gray16(image, compression))
 }

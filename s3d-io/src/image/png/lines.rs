@@ -1,8 +1,8 @@
-//! PNG files in memory, line by line: what this workspace writes, in about half of the `png` crate's time.
-//! Whatever is unusual or damaged is left to that crate, which decides whether it can be read.
+//! Reads PNG files in memory line by line, in about half of the png crate's time for the files of this
+//! workspace. Unusual and damaged files are left to that crate, which decides whether it can read them.
 //!
-//! The time goes to what a stream of unknown length has to do: one call inflates a whole image here
-//! ([`Inflater`]), and lines lose their filters together (`s3d_deflate::png::unfilter`).
+//! The png crate reads a stream of unknown length, which costs it the time. Here one call inflates a whole
+//! image ([`Inflater`]), and the filters of several lines are undone together (`s3d_deflate::png::unfilter`).
 
 use super::decode::{MAX_DEFLATE, MAX_PIXELS, decode};
 use crate::error::Result;
@@ -13,13 +13,13 @@ use s3d_geom::Raster;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Lines that lose their filters at a time: they stay in a first-level cache until they are used.
+/// How many lines are unfiltered at a time. They stay in a first-level cache until they are used.
 const BAND: usize = 8;
 
-/// What every PNG file begins with.
+/// The first bytes of every PNG file.
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Reads PNG images one after the other, in memory that it keeps.
+/// Reads PNG images one after the other, and reuses its memory.
 ///
 /// ```
 /// use s3d_geom::Raster;
@@ -41,17 +41,17 @@ pub struct PngReader {
     inflater: Inflater,
 }
 
-/// The lines of a whole image, pixels of `N` bytes.
+/// The lines of an image. A pixel has `N` bytes.
 pub struct PngLines<'a, const N: usize> {
     width: u32,
     height: u32,
-    /// Filtered, after the filter's number, or as they are.
+    /// Filtered lines, each after the number of its filter, or plain samples.
     lines: &'a mut [u8],
     is_filtered: bool,
 }
 
 impl PngReader {
-    /// The lines of an 8-bit RGB image, from its file's bytes, and of nothing else; errors call it `name`.
+    /// Returns the lines of an 8-bit RGB image from the bytes of its file. Errors name the file by `name`.
     ///
     /// # Errors
     /// [`Error::Format`](crate::Error::Format) if it is no PNG file, damaged, or of another kind.
@@ -59,10 +59,10 @@ impl PngReader {
         self.lines(bytes, name, ColorType::Rgb, BitDepth::Eight)
     }
 
-    /// As [`Self::rgb8`], of a 16-bit gray image: the samples are big-endian.
+    /// Reads like [`Self::rgb8`], a 16-bit gray image. The samples are big-endian.
     ///
     /// # Errors
-    /// As [`Self::rgb8`].
+    /// Like [`Self::rgb8`].
     pub fn gray16(&mut self, bytes: &[u8], name: &Path) -> Result<PngLines<'_, 2>> {
         self.lines(bytes, name, ColorType::Grayscale, BitDepth::Sixteen)
     }
@@ -84,22 +84,24 @@ impl PngReader {
         Ok(PngLines { width, height, lines: &mut self.lines, is_filtered: false })
     }
 
-    /// Width and height of an image of this kind, and how many of `self.lines` are its filtered lines; `None`
-    /// if anything about the file is other than usual.
+    /// Inflates an image of this kind into `self.lines`. Returns its width and height, and how many bytes its
+    /// filtered lines have. Returns `None` if anything about the file is unusual.
     fn inflate<const N: usize>(&mut self, bytes: &[u8], kind: [u8; 2]) -> Option<(u32, u32, usize)> {
         let mut chunks = Chunks(bytes.strip_prefix(SIGNATURE)?);
         let (name, header) = chunks.next()?;
         let (size, rest) = header.split_first_chunk::<8>()?;
         let [a, b, c, d, size @ ..] = *size;
-        let (width, height) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes(size));
-        // Compression and filters have one method each, and no interlacing.
+        let width = u32::from_be_bytes([a, b, c, d]);
+        let height = u32::from_be_bytes(size);
+        // Compression and filters have one known method each, and there is no interlacing.
         let is_usual = name == *b"IHDR" && rest.strip_prefix(&kind)? == [0; 3];
         let pixels = u64::from(width) * u64::from(height);
         let needed = pixels * N as u64 + u64::from(height);
         if !is_usual || pixels == 0 || pixels > MAX_PIXELS || needed > MAX_DEFLATE * bytes.len() as u64 {
             return None;
         }
-        // Mostly there is one chunk, which needs no copy.
+
+        // Most files have one chunk of pixels, which needs no copy.
         self.stream.clear();
         let (mut name, mut stream) = chunks.next()?;
         let first = stream;
@@ -117,35 +119,39 @@ impl PngReader {
         if name != *b"IEND" || !stream.is_empty() {
             return None;
         }
+
         let stream = if count == 1 { first } else { &self.stream };
         let len = usize::try_from(needed).ok()?;
         if self.lines.len() < len {
-            // What was there is of no use: nothing to copy.
+            // A new vector, since the old content need not be copied.
             self.lines = Vec::new();
             self.lines = vec![0; len];
         }
         let lines = self.lines.get_mut(..len)?;
-        // As the png crate does: chunks have checksums of their own.
+
+        // Chunks have checksums of their own, so the png crate does not check this one either.
         self.inflater.zlib_without_checksum(stream, lines).ok()?;
+
         let line = N * width as usize;
-        let is_known = |line: &[u8]| line.first().is_some_and(|filter| *filter <= 4);
-        let is_whole = lines.chunks(line + 1).all(is_known);
-        is_whole.then_some((width, height, len))
+        let filters_are_known = lines
+            .chunks(line + 1)
+            .all(|line| line.first().is_some_and(|filter| *filter <= 4));
+        filters_are_known.then_some((width, height, len))
     }
 }
 
 impl<const N: usize> PngLines<'_, N> {
-    /// Width of the image.
+    /// Returns the width of the image in pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Height of the image.
+    /// Returns the height of the image in pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Hands over line by line, the top line first.
+    /// Calls `each` with every line, from the top.
     pub fn for_each(self, mut each: impl FnMut(&[[u8; N]])) {
         let line = N * self.width as usize;
         if !self.is_filtered {
@@ -154,9 +160,10 @@ impl<const N: usize> PngLines<'_, N> {
                 .for_each(|line| each(line.as_chunks().0));
             return;
         }
+
         let mut above: Option<&[u8]> = None;
         for band in self.lines.chunks_mut(BAND * (line + 1)) {
-            // Lines and their filters were looked at before.
+            // The lines and their filters were checked before.
             let is_done = unfilter(band, above, line, N);
             debug_assert!(is_done.is_ok(), "{is_done:?}");
             let band = &*band;
@@ -168,16 +175,17 @@ impl<const N: usize> PngLines<'_, N> {
 }
 
 impl PngLines<'_, 3> {
-    /// The whole image.
+    /// Returns the whole image.
     pub fn into_raster(self) -> Raster<[u8; 3]> {
-        let (width, height) = (self.width, self.height);
+        let width = self.width;
+        let height = self.height;
         let mut pixels = Vec::with_capacity(width as usize * height as usize);
         self.for_each(|line| pixels.extend_from_slice(line));
         Raster::from_vec(width, height, pixels)
     }
 
-    /// Whether it is surely this image, without taking filters off, which takes a few times as long. It may be
-    /// `false` of files that others wrote.
+    /// Returns whether the image is certainly `image`. The filters are not undone for this, which would take
+    /// a few times as long. May return `false` for equal images that another program wrote.
     pub fn are_of(&self, image: &Raster<[u8; 3]>) -> bool {
         let fits = (self.width, self.height) == (image.width(), image.height());
         let top = vec![[0; 3]; image.width() as usize];
@@ -193,19 +201,20 @@ impl PngLines<'_, 3> {
 }
 
 impl PngLines<'_, 2> {
-    /// The whole image.
+    /// Returns the whole image.
     pub fn into_raster(self) -> Raster<u16> {
-        let (width, height) = (self.width, self.height);
+        let width = self.width;
+        let height = self.height;
         let mut samples = Vec::with_capacity(width as usize * height as usize);
         self.for_each(|line| samples.extend(line.iter().map(|sample| u16::from_be_bytes(*sample))));
         Raster::from_vec(width, height, samples)
     }
 
-    /// As [`PngLines::<3>::are_of`].
+    /// Compares like [`PngLines::<3>::are_of`].
     pub fn are_of(&self, image: &Raster<u16>) -> bool {
         let fits = (self.width, self.height) == (image.width(), image.height());
-        let (mut line, mut above) =
-            (vec![0; 2 * image.width() as usize], vec![0; 2 * image.width() as usize]);
+        let mut line = vec![0; 2 * image.width() as usize];
+        let mut above = line.clone();
         let mut lines = self.lines.chunks_exact(line.len() + 1).zip(image.rows());
         self.is_filtered
             && fits
@@ -220,7 +229,7 @@ impl PngLines<'_, 2> {
     }
 }
 
-/// The chunks of a file: names and contents of those that are whole.
+/// The chunks of a file, their names and contents, up to the first that is damaged or cut off.
 struct Chunks<'a>(&'a [u8]);
 
 impl<'a> Iterator for Chunks<'a> {

@@ -34,7 +34,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn pixels_come_back((w, h, data) in (1u32..40, 1u32..40).prop_flat_map(|(w, h)| {
-        // Noise, or few colours, in which there are repetitions.
+        // Noise, or few colours, which repeat.
         let color = prop_oneof![any::<[u8; 3]>(), proptest::array::uniform3(0u8..2)];
         (Just(w), Just(h), proptest::collection::vec(color, (w * h) as usize))
     })) {
@@ -77,7 +77,7 @@ fn lines_longer_than_a_repetition_reaches_come_back() {
 
 #[test]
 fn sixteen_bits_are_big_endian_in_the_file() {
-    // The `image` crate is the other reader.
+    // The image crate is the other reader.
     for compression in Compression::ALL {
         let image = Raster::from_vec(3, 1, vec![1, 0x1234, u16::MAX]);
         let other = image::load_from_memory(&encode_gray16(&image, compression)).unwrap();
@@ -123,11 +123,12 @@ struct View {
 fn view() -> View {
     let (width, height) = (320, 240);
     let mut byte = noise();
-    // Across, depth, whether it is the floor.
+    // The horizontal position, the depth, and whether the pixel shows the floor.
     type Seen = (f32, f32, bool);
     let pixels: Vec<Seen> = (0..width * height)
         .map(|i| {
-            let (x, y) = ((i % width) as f32 / width as f32 - 0.5, (i / width) as f32 / height as f32 - 0.5);
+            let x = (i % width) as f32 / width as f32 - 0.5;
+            let y = (i / width) as f32 / height as f32 - 0.5;
             let floor = y > 0.1 + 0.1 * x;
             (x, if floor { 0.3 / y.max(0.01) } else { 2.0 + 0.7 * x }, floor)
         })
@@ -135,13 +136,14 @@ fn view() -> View {
     let raster = |of: &mut dyn FnMut(&Seen) -> [u8; 3]| {
         Raster::from_vec(width, height, pixels.iter().map(of).collect())
     };
+
     View {
         rgb: raster(&mut |&(x, depth, _)| {
             let light = 120.0 - 60.0 * x * x + 30.0 * depth;
             [1.0, 0.9, 0.8].map(|k| ((k * light) as u8).saturating_add(byte() % 8))
         }),
         depth: Raster::from_vec(width, height, pixels.iter().map(|p| (512.0 * p.1) as u16).collect()),
-        // Triangles of noisy vertices: each its own normal.
+        // Triangles of noisy vertices, each with its own normal.
         normals: raster(&mut |&(x, depth, floor)| {
             let (u, v) = (9.0 * (x + 1.0), 11.0 * depth + 3.0 * x);
             let upper = u32::from(u.fract() > v.fract());
@@ -156,7 +158,7 @@ fn view() -> View {
     }
 }
 
-/// What the `png` crate makes of it, by the heuristic of libpng and with zlib's level 6.
+/// Returns the file size that the png crate reaches, by the heuristic of libpng and with zlib's level 6.
 fn peer(width: u32, height: u32, color: ColorType, depth: BitDepth, bytes: &[u8]) -> usize {
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, width, height);
@@ -171,12 +173,14 @@ fn peer(width: u32, height: u32, color: ColorType, depth: BitDepth, bytes: &[u8]
 #[test]
 fn more_time_makes_smaller_files_about_as_small_as_libpngs() {
     let view = view();
-    let (w, h) = (view.rgb.width(), view.rgb.height());
+    let w = view.rgb.width();
+    let h = view.rgb.height();
     let images = [
         (&view.rgb, Content::Photo, 115),
         (&view.normals, Content::Normals, 112),
         (&view.labels, Content::Labels, 110),
     ];
+
     let sizes = |encode: &dyn Fn(Compression) -> Vec<u8>| Compression::ALL.map(|c| encode(c).len());
     for (image, content, percent) in images {
         let [fast, balanced, small] = sizes(&|c| encode_rgb8(image, content, c));
@@ -186,6 +190,7 @@ fn more_time_makes_smaller_files_about_as_small_as_libpngs() {
         assert!(100 * balanced <= percent * peer, "{content:?}: {balanced}, the peer {peer}");
         assert!(100 * small <= 102 * peer, "{content:?}: {small}, the peer {peer}");
     }
+
     let [fast, balanced, small] = sizes(&|c| encode_gray16(&view.depth, c));
     let bytes: Vec<u8> = view.depth.pixels().iter().flat_map(|v| v.to_be_bytes()).collect();
     let peer = peer(w, h, ColorType::Grayscale, BitDepth::Sixteen, &bytes);
@@ -208,6 +213,7 @@ fn numbers_of_few_bits_are_unpacked() {
         encoder.write_header().unwrap().write_image_data(&packed).unwrap();
         assert_eq!(in_file(&file, read_numbers8).unwrap().into_vec(), [&numbers[..], &[0; 9]].concat());
     }
+
     let gray = encode_gray16(&Raster::filled(2, 2, 5), Compression::Balanced);
     let e = in_file(&gray, read_numbers8).unwrap_err().to_string();
     assert!(e.ends_with("the image is 16-bit gray, not 8-bit gray or with a palette"), "{e}");
@@ -233,7 +239,7 @@ fn broken_files_are_format_errors() {
     let mut damaged = whole.clone();
     damaged[50] ^= 0x55;
     assert!(matches!(in_file(&damaged, read_rgb8), Err(Error::Format { .. })));
-    // A header that promises more than anybody has.
+    // A header that claims more pixels than any memory holds.
     let mut huge = whole;
     huge[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
     assert!(in_file(&huge, read_rgb8).is_err());
@@ -241,7 +247,7 @@ fn broken_files_are_format_errors() {
     assert!(matches!(missing, Error::Io { action: "read", .. }));
 }
 
-/// An image in the `png` crate's words: what our reader of whole files is held to.
+/// Decodes an image with the png crate, as a reference for our reader.
 fn plain(bytes: &[u8]) -> Result<Raster<[u8; 3]>, String> {
     let size = bytes.len() as u64;
     let decoded = decode(Cursor::new(bytes), size, Path::new("a.png"), ColorType::Rgb, BitDepth::Eight);
@@ -254,6 +260,7 @@ fn cut_and_damaged_files_are_read_as_the_png_crate_does() {
     let mut byte = noise();
     let image = Raster::from_vec(13, 11, (0..143).map(|i| [i as u8, byte() % 4, 7]).collect());
     let ours = |bytes: &[u8]| decode_rgb8(bytes, Path::new("a.png")).map_err(|e| e.to_string());
+
     for content in CONTENTS {
         let whole = encode_rgb8(&image, content, Compression::Balanced);
         assert_eq!(ours(&whole).as_ref(), Ok(&image));
@@ -270,7 +277,7 @@ fn cut_and_damaged_files_are_read_as_the_png_crate_does() {
     }
 }
 
-/// A file of these chunks, with right checksums.
+/// Makes a file of these chunks, with right checksums.
 fn file_of(chunks: &[([u8; 4], &[u8])]) -> Vec<u8> {
     let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
     for (name, content) in chunks {
@@ -288,7 +295,9 @@ fn files_of_other_programs_are_read() {
     let mut byte = noise();
     let image = Raster::from_vec(w, h, (0..w * h).map(|i| [(i / 3) as u8, byte() % 9, 250]).collect());
     let header = [&w.to_be_bytes()[..], &h.to_be_bytes(), &[8, 2, 0, 0, 0]].concat();
-    // All filters, by the png crate; its stream in pieces, with chunks between, and with something behind.
+
+    // The png crate uses all filters. Its stream is split, with chunks between the pieces and bytes after
+    // them.
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, w, h);
     encoder.set_color(ColorType::Rgb);
@@ -299,12 +308,14 @@ fn files_of_other_programs_are_read() {
         .write_image_data(image.pixels().as_flattened())
         .unwrap();
     assert_eq!(decode_rgb8(&file, Path::new("a.png")).unwrap(), image);
+
     let at = file.windows(4).position(|name| name == b"IDAT").unwrap();
     let len = u32::from_be_bytes(file[at - 4..at].try_into().unwrap()) as usize;
     let stream = &file[at + 4..at + 4 + len];
     let (first, second) = stream.split_at(len / 3);
     let [ihdr, idat, iend] = [*b"IHDR", *b"IDAT", *b"IEND"];
     let behind = [stream, &[1, 2, 3]].concat();
+
     for chunks in [
         vec![(ihdr, &header[..]), (idat, first), (idat, second), (iend, &[])],
         vec![(ihdr, &header), (*b"tEXt", b"k\0v"), (idat, stream), (iend, &[])],
@@ -333,6 +344,7 @@ fn a_reader_forgets_what_it_read_before() {
             lines += 1;
         });
         assert_eq!(lines, 50);
+
         let mut found = Vec::new();
         let add = |line: &[[u8; 2]]| found.extend(line.iter().map(|v| u16::from_be_bytes(*v)));
         reader.gray16(&small, name).unwrap().for_each(add);

@@ -1,9 +1,9 @@
-//! The numbers of glTF accessors.
+//! Reads the numbers of glTF accessors.
 //!
-//! The gltf crate's utilities read them, but panic on indices that are not there, counts of 0, types that are
-//! unknown and sums that overflow (`claims_beyond_the_data_are_refused`), give memory to any count without
-//! data (`sparse_changes_apply_with_and_without_data`) and pass over sparse indices that do not grow
-//! (`sparse_indices_grow`): here every range is checked before they read it.
+//! The utilities of the gltf crate decode them. But they panic on indices that are out of range, counts of 0,
+//! unknown types and sums that overflow (`claims_beyond_the_data_are_refused`), reserve memory for any count
+//! without data (`sparse_changes_apply_with_and_without_data`) and accept sparse indices that do not grow
+//! (`sparse_indices_grow`). So every range is checked here before they read it.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -11,17 +11,17 @@ use crate::error::Result;
 use crate::mesh::gltf::document::GltfDocument;
 use gltf::accessor::{DataType, Item, Iter};
 use gltf::json::Index;
-use gltf::json::accessor::Accessor;
+use gltf::json::accessor::{Accessor, sparse::Sparse};
 use gltf::json::buffer::View;
 use gltf::json::validation::Checked;
 
-/// The most elements of an accessor that has no data: one made of zeros and sparse changes can claim any
-/// number. Those that are lawful are of morph targets, which are not read.
+/// The most elements of an accessor without data. An accessor of zeros and sparse changes can claim any
+/// number. Lawful ones belong to morph targets, which are not read.
 const MAX_WITHOUT_DATA: u64 = 1 << 20;
 
 impl GltfDocument {
-    /// The elements of an accessor of `N` numbers each; integers are scaled to 0…1 or −1…1 where the accessor
-    /// says so. `who` is for messages: "mesh 0, primitive 1, POSITION".
+    /// Reads the elements of an accessor, `N` numbers each. Integers are scaled to 0…1 or −1…1 if the
+    /// accessor says so. `who` is for messages: "mesh 0, primitive 1, POSITION".
     pub(crate) fn read_vectors<const N: usize>(
         &self,
         index: Index<Accessor>,
@@ -42,6 +42,7 @@ impl GltfDocument {
         if accessor.count() == 0 {
             return Ok(Vec::new());
         }
+
         let zeros = || vec![[0.0; N]; accessor.count()];
         macro_rules! vectors {
             ($type:ty, $largest:expr) => {{
@@ -59,6 +60,7 @@ impl GltfDocument {
                     .map_or_else(zeros, |all| all.map(|e| e.map(number)).collect())
             }};
         }
+
         Ok(match accessor.data_type() {
             DataType::I8 => vectors!(i8, Some(127.0)),
             DataType::U8 => vectors!(u8, Some(255.0)),
@@ -69,7 +71,7 @@ impl GltfDocument {
         })
     }
 
-    /// Colours: elements of three numbers, or of four, the last of which is left out.
+    /// Reads colours. Elements have three numbers, or four of which the last is left out.
     pub(crate) fn read_colors(&self, index: Index<Accessor>, who: &str) -> Result<Vec<[f32; 3]>> {
         match self.checked(index, who)?.1 {
             3 => self.read_vectors(index, who),
@@ -82,7 +84,7 @@ impl GltfDocument {
         }
     }
 
-    /// Indices of vertices.
+    /// Reads vertex indices.
     pub(crate) fn read_indices(&self, index: Index<Accessor>, who: &str) -> Result<Vec<u32>> {
         let (accessor, width) = self.checked(index, who)?;
         if accessor.count() == 0 {
@@ -101,20 +103,23 @@ impl GltfDocument {
         }
     }
 
-    /// The elements of a checked accessor that is not empty; `None` if it has no data, and they are zeros.
+    /// Returns the elements of a checked accessor that is not empty. Returns `None` if it has no data, so
+    /// that all its numbers are zeros.
     fn iter<'a, T: Item>(&'a self, accessor: &gltf::Accessor<'a>) -> Option<Iter<'a, T>> {
         Iter::new(accessor.clone(), |buffer| self.buffer(buffer.index()))
     }
 
-    /// An accessor that can be read, and how many numbers its elements have.
+    /// Checks that an accessor can be read. Returns it, and how many numbers an element has.
     fn checked(&self, index: Index<Accessor>, who: &str) -> Result<(gltf::Accessor<'_>, usize)> {
         let json = self.get(index, who, "accessor")?;
         let name = format!("{who}: accessor {index}");
         let (Checked::Valid(component), Checked::Valid(kind)) = (json.component_type, json.type_) else {
             return Err(self.fail(format!("{name} has an unknown type")));
         };
-        let (count, width) = (json.count.0, kind.multiplicity());
+        let count = json.count.0;
+        let width = kind.multiplicity();
         let size = width.saturating_mul(component.0.size());
+
         match json.buffer_view {
             Some(view) => {
                 self.range(view, json.byte_offset.map_or(0, |o| o.0), count, size, &name)?;
@@ -124,41 +129,51 @@ impl GltfDocument {
             }
             None => {}
         }
-        // Of no elements nothing is read; no sparse part is empty (see `GltfDocument::open`).
+
+        // A sparse part without changes was removed by `GltfDocument::read`.
         if let Some(sparse) = &json.sparse {
-            let Checked::Valid(place) = sparse.indices.component_type else {
-                return Err(self.fail(format!("{name}: its sparse indices have an unknown type")));
-            };
-            let (changes, at, size_of_place) = (sparse.count.0, &sparse.indices, place.0.size());
-            let (bytes, stride) =
-                self.range(at.buffer_view, at.byte_offset.0, changes, size_of_place, &name)?;
-            let mut least = 0;
-            for place in bytes
-                .chunks(stride)
-                .take(usize::try_from(changes).unwrap_or(usize::MAX))
-            {
-                let place = place
-                    .iter()
-                    .take(size_of_place)
-                    .rev()
-                    .fold(0u64, |n, b| n << 8 | u64::from(*b));
-                if place >= count {
-                    return Err(self.fail(format!("{name}: sparse index {place} of {count} elements")));
-                }
-                if place < least {
-                    return Err(self.fail(format!("{name}: its sparse indices do not grow at {place}")));
-                }
-                least = place.saturating_add(1);
-            }
-            let at = &sparse.values;
-            self.range(at.buffer_view, at.byte_offset.0, changes, size, &name)?;
+            self.check_sparse(sparse, count, size, &name)?;
         }
         let missing = || self.fail(format!("{name} is not there"));
         Ok((self.json.accessors().nth(index.value()).ok_or_else(missing)?, width))
     }
+    /// Checks the changes of a sparse accessor of `count` elements of `size` bytes.
+    fn check_sparse(&self, sparse: &Sparse, count: u64, size: usize, name: &str) -> Result<()> {
+        let Checked::Valid(component) = sparse.indices.component_type else {
+            return Err(self.fail(format!("{name}: its sparse indices have an unknown type")));
+        };
+        let changes = sparse.count.0;
+        let index_size = component.0.size();
+        let indices = &sparse.indices;
+        let (bytes, stride) =
+            self.range(indices.buffer_view, indices.byte_offset.0, changes, index_size, name)?;
 
-    /// The bytes of a buffer view from `offset` on, which hold `count` elements of `size` bytes, and how far
-    /// these are apart.
+        let mut least = 0;
+        for index in bytes
+            .chunks(stride)
+            .take(usize::try_from(changes).unwrap_or(usize::MAX))
+        {
+            let index = index
+                .iter()
+                .take(index_size)
+                .rev()
+                .fold(0u64, |n, b| n << 8 | u64::from(*b));
+            if index >= count {
+                return Err(self.fail(format!("{name}: sparse index {index} of {count} elements")));
+            }
+            if index < least {
+                return Err(self.fail(format!("{name}: its sparse indices do not grow at {index}")));
+            }
+            least = index.saturating_add(1);
+        }
+
+        let values = &sparse.values;
+        self.range(values.buffer_view, values.byte_offset.0, changes, size, name)?;
+        Ok(())
+    }
+
+    /// Returns the bytes of a buffer view from `offset` on, which hold `count` elements of `size` bytes, and
+    /// the distance from one element to the next.
     fn range(
         &self,
         view: Index<View>,
@@ -173,6 +188,7 @@ impl GltfDocument {
             .byte_stride
             .map_or(0, |stride| stride.0);
         let stride = if stride == 0 { size } else { stride };
+
         let Some(before_last) = count.checked_sub(1) else { return Ok((&[], stride)) };
         let inside = || {
             let end = before_last
@@ -182,6 +198,7 @@ impl GltfDocument {
             let bytes = bytes.get(usize::try_from(offset).ok()?..)?;
             (end <= offset.checked_add(bytes.len() as u64)? && stride >= size).then_some(bytes)
         };
+
         let bytes = inside().ok_or_else(|| {
             let length = bytes.len();
             self.fail(format!(
@@ -199,8 +216,8 @@ mod tests {
     use base64::Engine;
     use base64::engine::general_purpose::STANDARD;
 
-    /// A document of one buffer of the bytes 0, 1, 2 … 63 and one view over it, `view` added to the view's
-    /// JSON.
+    /// Makes a document with one buffer of the bytes 0, 1, 2 … 63 and one view over it. `view` is added to
+    /// the JSON of the view.
     fn document(view: &str, accessor: &str) -> (tempfile::TempDir, GltfDocument) {
         let data = STANDARD.encode((0..64).collect::<Vec<u8>>());
         let json = format!(
@@ -276,12 +293,13 @@ mod tests {
 
     #[test]
     fn sparse_indices_grow() {
-        // The bytes 0, 1, 2…: indices of 16 bits are 256, 770….
+        // The bytes are 0, 1, 2…, so the 16-bit indices are 256, 770….
         let sparse = r#"{"componentType": 5121, "type": "VEC2", "count": 771, "sparse": {"count": 2,
         "indices": {"bufferView": 0,
             "componentType": 5123}, "values": {"bufferView": 0}}}"#;
         let changed = vectors("", sparse).unwrap();
         assert_eq!((changed[256], changed[770], changed.len()), ([0.0, 1.0], [2.0, 3.0], 771));
+
         let backwards = STANDARD.encode([1u8, 0]);
         let json = format!(
             r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 2,

@@ -1,4 +1,4 @@
-//! The primitives of a glTF scene, put together to one mesh.
+//! Joins the primitives of a glTF scene into one mesh.
 
 use crate::error::{Error, Result};
 use crate::fs::quote::{count, quote};
@@ -14,8 +14,8 @@ use s3d_geom::glam::{DMat3, DVec3, Vec2, Vec3};
 use s3d_geom::{MeshParts, NO_INDEX};
 use std::collections::HashMap;
 
-/// The most vertices and corners of faces that are placed, 30 GB of them. A file can place a mesh any number
-/// of times.
+/// The most vertices and face corners that are placed: 30 GB of them. A file can place a mesh any number of
+/// times.
 const MAX_ELEMENTS: u64 = if cfg!(fuzzing) { 1 << 20 } else { 1 << 30 };
 
 /// Collects the columns of a mesh.
@@ -23,17 +23,17 @@ pub(crate) struct Builder<'a> {
     document: &'a GltfDocument,
     looks: &'a GltfLooks,
     up: UpAxis,
-    /// What is subtracted from positions, in the world's axes.
+    /// The offset that is subtracted from positions, in the file's unit, in the world's axes.
     offset: DVec3,
-    /// Whether the mesh has colours of vertices.
+    /// Whether the mesh has vertex colours.
     colored: bool,
     parts: MeshParts,
-    /// Where the texture coordinates of an accessor, mapped for a material, start.
+    /// The first index of the texture coordinates of an accessor, after they are mapped for a material.
     uv_starts: HashMap<(usize, usize), u32>,
     notes: Notes,
 }
 
-/// What was left out, by number.
+/// Counts of anything left out or ignored.
 #[derive(Default)]
 struct Notes {
     no_triangles: usize,
@@ -44,7 +44,7 @@ struct Notes {
     morphed: usize,
 }
 
-/// What primitives of one instance can share: the places at which columns start, by accessor.
+/// The columns that primitives of one instance can share: the first index of each, by accessor.
 #[derive(Default)]
 struct Shared {
     /// By position accessor, colour accessor and, in a mesh with colours, material.
@@ -53,6 +53,7 @@ struct Shared {
 }
 
 impl<'a> Builder<'a> {
+    /// Checks that all instances together are not too large.
     pub(crate) fn new(
         document: &'a GltfDocument,
         looks: &'a GltfLooks,
@@ -62,6 +63,7 @@ impl<'a> Builder<'a> {
     ) -> Result<Self> {
         let mut colored = false;
         let mut elements = 0u64;
+
         for instance in instances {
             let mesh = document.get(instance.mesh, "a node", "mesh")?;
             for p in &mesh.primitives {
@@ -78,21 +80,31 @@ impl<'a> Builder<'a> {
                     instances.len()
                 )));
             }
+
             colored |= mesh
                 .primitives
                 .iter()
                 .any(|p| color_accessor(p).is_some() && !is_textured(p, looks));
         }
-        let (parts, uv_starts, notes) = Default::default();
-        Ok(Self { document, looks, up, offset, colored, parts, uv_starts, notes })
+
+        Ok(Self {
+            document,
+            looks,
+            up,
+            offset,
+            colored,
+            parts: MeshParts::default(),
+            uv_starts: HashMap::new(),
+            notes: Notes::default(),
+        })
     }
 
-    /// The vertices so far, in the world's axes.
+    /// Returns the vertices so far, in the world's axes.
     pub(crate) fn positions(&self) -> &[Vec3] {
         &self.parts.positions
     }
 
-    /// The corners of all faces so far.
+    /// Returns the positions of all face corners so far.
     pub(crate) fn corners(&self) -> impl Iterator<Item = DVec3> {
         let position = |&v: &u32| self.parts.positions.get(v as usize).map(|p| p.as_dvec3());
         self.parts.faces.iter().flatten().filter_map(position)
@@ -115,6 +127,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
+    /// Adds the triangles of a primitive.
     fn add_primitive(
         &mut self,
         instance: &Instance,
@@ -131,11 +144,13 @@ impl<'a> Builder<'a> {
             self.notes.no_triangles += 1;
             return Ok(());
         };
+
         self.refuse_missing_data(p, positions, who, "vertices")?;
         if let Some(indices) = p.indices {
             self.refuse_missing_data(p, indices, who, "faces")?;
         }
         let vertices: Vec<[f32; 3]> = self.document.read_vectors(positions, &format!("{who}, POSITION"))?;
+
         let corners = match p.indices {
             Some(indices) => self.document.read_indices(indices, &format!("{who}, indices"))?,
             None => (0..vertices.len() as u32).collect(),
@@ -145,6 +160,7 @@ impl<'a> Builder<'a> {
                 .document
                 .fail(format!("{who}: index {index}, but there are {} vertices", vertices.len())));
         }
+
         let mut triangles = triangles_of(&corners, mode);
         if mode == Mode::Triangles {
             self.notes.left_over_corners += corners.len() % 3;
@@ -152,8 +168,6 @@ impl<'a> Builder<'a> {
         if instance.world_from_node.determinant() < 0.0 {
             triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
-        let material = p.material.map(|m| m.value());
-
         let start = self.vertex_start(instance, p, positions, &vertices, who, shared)?;
         let moved = self.parts.positions.get(start as usize..).unwrap_or_default();
         let is_finite = |v: u32| moved.get(v as usize).is_some_and(|p| p.is_finite());
@@ -163,20 +177,22 @@ impl<'a> Builder<'a> {
                 .document
                 .fail(format!("{who}: vertex {bad} is not finite: {position}")));
         }
+
         let uv_start = self.uv_start(p, vertices.len(), who)?;
         let normal_start = self.normal_start(instance, p, vertices.len(), who, shared)?;
-        let from = |start: Option<u32>, t: [u32; 3]| start.map_or([NO_INDEX; 3], |s| t.map(|v| s + v));
+        let material = p.material.map_or(NO_INDEX, |m| m.value() as u32);
+
         for t in triangles {
             self.parts.faces.push(t.map(|v| start + v));
-            self.parts.face_uvs.push(from(uv_start, t));
-            self.parts.face_normals.push(from(normal_start, t));
-            self.parts.face_materials.push(material.map_or(NO_INDEX, |m| m as u32));
+            self.parts.face_uvs.push(shifted(t, uv_start));
+            self.parts.face_normals.push(shifted(t, normal_start));
+            self.parts.face_materials.push(material);
         }
         Ok(())
     }
 
-    /// An accessor may lawfully have no data, and is zero then; of positions and indices it means that an
-    /// extension has them.
+    /// Refuses positions and indices without data. Such an accessor is lawful and its numbers are zeros, but
+    /// here it means that an extension holds them.
     fn refuse_missing_data(
         &self,
         p: &Primitive,
@@ -198,7 +214,8 @@ impl<'a> Builder<'a> {
         }))
     }
 
-    /// Where the vertices of the primitive start among the mesh's; adds them if no primitive before had them.
+    /// Returns the index of the primitive's first vertex in the mesh. Adds the vertices if no earlier
+    /// primitive has them.
     fn vertex_start(
         &mut self,
         instance: &Instance,
@@ -215,17 +232,20 @@ impl<'a> Builder<'a> {
         if let Some(&start) = shared.vertices.get(&key) {
             return Ok(start);
         }
+
         let start = self.next_start(self.parts.positions.len(), vertices.len())?;
         let matrix = instance.world_from_node;
         self.parts.positions.extend(vertices.iter().map(|&v| {
             let moved = matrix.transform_point3(Vec3::from_array(v).as_dvec3());
             (self.up.exact_world_from_file(moved) - self.offset).as_vec3()
         }));
+
         let base = match material {
             Some(m) => self.looks.linear_colors.get(m).copied(),
             None => Some(default_linear()),
         };
         let base = base.ok_or_else(|| no_material(self.document, who))?;
+
         let multiplied = match colors {
             Some(accessor) => {
                 self.same_count(accessor, vertices.len(), who, "COLOR_0")?;
@@ -233,7 +253,7 @@ impl<'a> Builder<'a> {
                 if over_texture && colors.iter().flatten().any(|&c| c < 0.999) {
                     self.notes.colors_over_textures += 1;
                 }
-                // Without a material the vertices' colours stand alone.
+                // Without a material, vertex colours stand alone.
                 let base = if material.is_some() { base } else { [1.0; 3] };
                 colors
                     .into_iter()
@@ -242,6 +262,7 @@ impl<'a> Builder<'a> {
             }
             None => vec![base; vertices.len()],
         };
+
         if self.colored {
             self.parts
                 .colors
@@ -251,8 +272,8 @@ impl<'a> Builder<'a> {
         Ok(start)
     }
 
-    /// Where the texture coordinates of the primitive start, if its material has a texture and the primitive
-    /// has coordinates for it.
+    /// Returns the index of the primitive's first texture coordinate, if its material has a texture and the
+    /// primitive has coordinates for it.
     fn uv_start(&mut self, p: &Primitive, vertices: usize, who: &str) -> Result<Option<u32>> {
         let Some(material) = p.material.map(|m| m.value()).filter(|_| is_textured(p, self.looks)) else {
             return Ok(None);
@@ -267,11 +288,13 @@ impl<'a> Builder<'a> {
             self.notes.no_uvs += 1;
             return Ok(None);
         };
+
         let what = format!("TEXCOORD_{}", mapping.set);
         self.same_count(accessor, vertices, who, &what)?;
         if let Some(&start) = self.uv_starts.get(&(accessor.value(), material)) {
             return Ok(Some(start));
         }
+
         let uvs: Vec<[f32; 2]> = self.document.read_vectors(accessor, &format!("{who}, {what}"))?;
         let start = self.next_start(self.parts.uvs.len(), uvs.len())?;
         self.parts
@@ -281,7 +304,7 @@ impl<'a> Builder<'a> {
         Ok(Some(start))
     }
 
-    /// Where the normals of the primitive start, if it has any.
+    /// Returns the index of the primitive's first normal, if it has normals.
     fn normal_start(
         &mut self,
         instance: &Instance,
@@ -295,22 +318,25 @@ impl<'a> Builder<'a> {
         if let Some(&start) = shared.normals.get(&accessor.value()) {
             return Ok(Some(start));
         }
+
         let normals: Vec<[f32; 3]> = self.document.read_vectors(accessor, &format!("{who}, NORMAL"))?;
         let start = self.next_start(self.parts.normals.len(), normals.len())?;
-        // Normals turn with the inverse transpose; the cofactors are that up to a factor and exist for flat
-        // scales too.
+        // Normals turn with the inverse transpose. The matrix of cofactors is a multiple of it, and exists
+        // for flat scales too.
         let m = DMat3::from_mat4(instance.world_from_node);
-        let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+        let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
         let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * m.determinant().signum();
+
         self.parts.normals.extend(normals.into_iter().map(|n| {
             let turned = cofactors * Vec3::from_array(n).as_dvec3();
-            // Without a length it becomes NaN, which the mesh's check takes out.
+            // A normal without length becomes NaN, which the check of the mesh removes.
             self.up.world_from_file((turned / turned.length()).as_vec3())
         }));
         shared.normals.insert(accessor.value(), start);
         Ok(Some(start))
     }
 
+    /// Checks that an accessor has one element for each vertex.
     fn same_count(&self, accessor: Index<Accessor>, vertices: usize, who: &str, what: &str) -> Result<()> {
         let n = self.document.get(accessor, who, "accessor")?.count.0;
         if n == vertices as u64 {
@@ -321,6 +347,7 @@ impl<'a> Builder<'a> {
             .fail(format!("{who}: {n} elements of {what} for {vertices} vertices")))
     }
 
+    /// Returns the index of the next element, if `more` of them fit.
     fn next_start(&self, length: usize, more: usize) -> Result<u32> {
         match u32::try_from(length + more) {
             Ok(end) if end < NO_INDEX => Ok(length as u32),
@@ -330,7 +357,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The columns, without materials and textures.
+    /// Returns the columns, without materials and textures. Adds what was left out to `warnings`.
     pub(crate) fn finish(self, warnings: &mut Vec<String>) -> MeshParts {
         let Self { mut parts, notes, .. } = self;
         let has_materials = parts.face_materials.iter().any(|&m| m != NO_INDEX);
@@ -342,6 +369,7 @@ impl<'a> Builder<'a> {
                 column.clear();
             }
         }
+
         for (n, what, then) in [
             (notes.no_triangles, "primitive", "without triangles left out (points, lines or no positions)"),
             (notes.left_over_corners, "corner", "too many for whole triangles left out"),
@@ -362,8 +390,14 @@ impl<'a> Builder<'a> {
                 warnings.push(format!("{} {then}", count(n, what)));
             }
         }
+
         parts
     }
+}
+
+/// Adds `start` to the corners of a triangle. Returns [`NO_INDEX`] for each if there is no start.
+fn shifted(triangle: [u32; 3], start: Option<u32>) -> [u32; 3] {
+    start.map_or([NO_INDEX; 3], |start| triangle.map(|v| start + v))
 }
 
 fn color_accessor(p: &Primitive) -> Option<Index<Accessor>> {
@@ -376,19 +410,21 @@ fn is_textured(p: &Primitive, looks: &GltfLooks) -> bool {
         .is_some_and(|m| m.texture.is_some())
 }
 
-/// Every material that a primitive names was looked up before: this is for the next who calls the builder.
+/// Every material that a primitive names was looked up before. This error is for another caller of the
+/// builder.
 fn no_material(document: &GltfDocument, who: &str) -> Error {
     document.fail(format!("{who} has a material that is not there"))
 }
 
-/// The triangles that `corners` spell. glTF 2.0, section 3.7.2.1.
+/// Returns the triangles of `corners`. Source: glTF 2.0, section 3.7.2.1.
 fn triangles_of(corners: &[u32], mode: Mode) -> Vec<[u32; 3]> {
     match mode {
         Mode::Triangles => corners.as_chunks::<3>().0.to_vec(),
-        Mode::TriangleStrip => {
-            let turn = |(i, &[a, b, c]): (usize, &[u32; 3])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] };
-            corners.array_windows().enumerate().map(turn).collect()
-        }
+        Mode::TriangleStrip => corners
+            .array_windows()
+            .enumerate()
+            .map(|(i, &[a, b, c])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] })
+            .collect(),
         Mode::TriangleFan => {
             let Some((&hub, rim)) = corners.split_first() else { return Vec::new() };
             rim.array_windows().map(|&[a, b]| [a, b, hub]).collect()

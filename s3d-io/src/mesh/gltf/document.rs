@@ -1,7 +1,7 @@
-//! The parts of a glTF file: its JSON, its buffers and the bytes that its images are made of.
+//! Reads the parts of a glTF file: its JSON, its buffers and the bytes of its images.
 //!
-//! gltf's own import finds buffers and data URIs too, but brings a second base64 and decodes every image,
-//! wanted or not; what is left of it is [`GltfDocument::resource`].
+//! gltf's own import finds buffers and data URIs too. But it brings a second base64 decoder and decodes every
+//! image, wanted or not. [`GltfDocument::resource`] does what is needed of it.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -29,11 +29,11 @@ pub(crate) struct GltfDocument {
     /// The JSON. Its indices are not checked.
     pub(crate) json: gltf::Document,
     buffers: Vec<Vec<u8>>,
-    /// The places of nodes as they are written, of scenes far from their origin.
-    places: Vec<ExactNode>,
+    /// The nodes in `f64`, if any is far from its parent's origin. Otherwise empty.
+    exact_nodes: Vec<ExactNode>,
 }
 
-/// What must be known before the JSON is read in full.
+/// The part of the JSON that is read before all of it.
 #[derive(Deserialize)]
 struct Head {
     #[serde(default)]
@@ -42,7 +42,7 @@ struct Head {
     required: Vec<String>,
 }
 
-/// Where a node is, in `f64`.
+/// The position of a node, in `f64`.
 #[derive(Debug, Default, Deserialize)]
 struct ExactNode {
     #[serde(default)]
@@ -51,22 +51,22 @@ struct ExactNode {
     matrix: Option<[f64; 16]>,
 }
 
-/// The nodes of a file in which one is so far from its parent's origin that `f32` loses digits of its place.
+/// Reads the nodes in `f64`, if any is so far from its parent's origin that `f32` loses digits of its
+/// position. Otherwise returns none.
 fn exact_nodes(root: &json::Root, text: &[u8]) -> Vec<ExactNode> {
     #[derive(Deserialize)]
     struct Nodes {
         nodes: Vec<ExactNode>,
     }
-    let is_far = |node: &json::Node| {
-        let place = node.translation.or(node.matrix.map(|m| [m[12], m[13], m[14]]));
-        place.is_some_and(|place| place.iter().any(|v| v.abs() > 1000.0))
-    };
-    let read = || serde_json::from_slice(text).map_or_else(|_| Vec::new(), |all: Nodes| all.nodes);
-    if root.nodes.iter().any(is_far) {
-        read()
-    } else {
-        Vec::new()
+    if !root.nodes.iter().any(is_far) {
+        return Vec::new();
     }
+    serde_json::from_slice(text).map_or_else(|_| Vec::new(), |all: Nodes| all.nodes)
+}
+
+fn is_far(node: &json::Node) -> bool {
+    let position = node.translation.or(node.matrix.map(|m| [m[12], m[13], m[14]]));
+    position.is_some_and(|position| position.iter().any(|v| v.abs() > 1000.0))
 }
 
 impl GltfDocument {
@@ -75,7 +75,8 @@ impl GltfDocument {
         Self::read(read_file(path)?, path)
     }
 
-    /// Reads a `.gltf` or `.glb` file, told apart by its content, and its buffers, which lie beside `path`.
+    /// Reads a `.gltf` or `.glb` file, and its buffers, which lie beside `path`. The content tells which of
+    /// the two it is.
     pub(crate) fn read(bytes: Vec<u8>, path: &Path) -> Result<Self> {
         let mut bytes = into_utf8(bytes);
         let (text, blob) = if bytes.starts_with(b"glTF") {
@@ -83,24 +84,21 @@ impl GltfDocument {
         } else {
             (&bytes[..], None)
         };
+
         let is_text = blob.is_none() && !bytes.starts_with(b"glTF");
-        let json_error = |e: serde_json::Error| match is_text {
-            true if e.line() > 0 => Error::line(path, e.line() as u64, format!("is no valid glTF 2.0: {e}")),
-            true => Error::format(path, format!("is no valid glTF 2.0: {e}")),
-            false => Error::format(path, format!("its JSON is no valid glTF 2.0: {e}")),
-        };
-        let head: Head = serde_json::from_slice(text).map_err(json_error)?;
+        let head: Head = serde_json::from_slice(text).map_err(|e| invalid_json(path, is_text, &e))?;
         check_version(path, &head.asset)?;
         check_required(path, &head.required)?;
-        let mut root = root_of(text).map_err(json_error)?;
+        let mut root = root_of(text).map_err(|e| invalid_json(path, is_text, &e))?;
         for accessor in &mut root.accessors {
-            // No changes are the same as no sparse part, which the gltf crate can read.
+            // A sparse part without changes is the same as none, which the gltf crate can read.
             accessor.sparse.take_if(|sparse| sparse.count.0 == 0);
         }
-        let places = exact_nodes(&root, text);
+
+        let exact_nodes = exact_nodes(&root, text);
         let json = gltf::Document::from_json_without_validation(root);
-        let mut document = Self { path: path.to_owned(), json, buffers: Vec::new(), places };
-        // The chunk stays where it was read to: it is most of the file.
+        let mut document = Self { path: path.to_owned(), json, buffers: Vec::new(), exact_nodes };
+        // The binary chunk stays in the memory of the file, since it is most of the file.
         let blob = blob.map(|blob| {
             bytes.truncate(blob.end);
             bytes.drain(..blob.start);
@@ -110,35 +108,35 @@ impl GltfDocument {
         Ok(document)
     }
 
-    /// The file.
+    /// Returns the path of the file.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The JSON. Its indices are not checked; [`GltfDocument::get`] does.
+    /// Returns the JSON. Its indices are not checked; [`GltfDocument::get`] checks them.
     pub(crate) fn root(&self) -> &json::Root {
         self.json.as_json()
     }
 
-    /// Where a node is in its parent's frame, as it is written, if that is more exact than what
-    /// [`GltfDocument::root`] has.
+    /// Returns the position of a node in its parent's frame, in `f64`. Returns `None` if
+    /// [`GltfDocument::root`] is as exact.
     pub(crate) fn exact_place(&self, node: usize) -> Option<DVec3> {
-        let node = self.places.get(node)?;
+        let node = self.exact_nodes.get(node)?;
         let of_matrix = node.matrix.map(|m| [m[12], m[13], m[14]]);
         of_matrix.or(node.translation).map(DVec3::from_array)
     }
 
-    /// The bytes of a buffer.
+    /// Returns the bytes of a buffer.
     pub(crate) fn buffer(&self, index: usize) -> Option<&[u8]> {
         self.buffers.get(index).map(Vec::as_slice)
     }
 
-    /// An error about this file.
+    /// Makes an error about this file.
     pub(crate) fn fail(&self, message: impl Into<String>) -> Error {
         Error::format(&self.path, message)
     }
 
-    /// The object that `index` points to; `who` and `what` are for the message: "mesh 3", "accessor".
+    /// Returns the object at `index`. `who` and `what` are for the message: "mesh 3", "accessor".
     pub(crate) fn get<T>(&self, index: json::Index<T>, who: &str, what: &str) -> Result<&T>
     where
         json::Root: json::root::Get<T>,
@@ -148,7 +146,7 @@ impl GltfDocument {
             .ok_or_else(|| self.fail(format!("{who} points to {what} {index}, which is not there")))
     }
 
-    /// The bytes of a buffer view.
+    /// Returns the bytes of a buffer view.
     pub(crate) fn view(&self, index: json::Index<json::buffer::View>, who: &str) -> Result<&[u8]> {
         let view = self.get(index, who, "buffer view")?;
         self.get(view.buffer, &format!("buffer view {index}"), "buffer")?;
@@ -167,10 +165,11 @@ impl GltfDocument {
             })
     }
 
-    /// The encoded bytes of an image, and a name for it.
+    /// Returns a name for an image, and its encoded bytes.
     ///
     /// # Errors
-    /// A sentence that follows the image's name: images that are missing do not stop the reading of a mesh.
+    /// The error of the bytes is a sentence that follows the image's name. A missing image does not stop the
+    /// mesh.
     pub(crate) fn image(&self, image: usize) -> (String, std::result::Result<Vec<u8>, String>) {
         let Some(json) = self.root().images.get(image) else {
             return (format!("image {image}"), Err("is not there".into()));
@@ -181,6 +180,7 @@ impl GltfDocument {
             (None, Some(name)) => name.clone(),
             (None, None) => format!("image_{image}"),
         };
+
         let bytes = match (json.buffer_view, &json.uri) {
             (Some(view), _) => self
                 .view(view, &format!("image {image}"))
@@ -192,10 +192,12 @@ impl GltfDocument {
         (name, bytes)
     }
 
+    /// Reads all buffers. `blob` is the binary chunk of a `.glb`.
     fn load_buffers(&self, mut blob: Option<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
         let mut buffers = Vec::new();
         for (i, json) in self.root().buffers.iter().enumerate() {
             let may_be_blob = i == 0 && json.uri.is_none() && !is_fallback(json);
+
             let bytes = match (&json.uri, blob.take_if(|_| may_be_blob)) {
                 (Some(uri), _) => self.resource(uri).map_err(|why| {
                     let name = if uri.starts_with("data:") { "the data URI" } else { uri };
@@ -203,7 +205,7 @@ impl GltfDocument {
                 })?,
                 (None, Some(blob)) => blob,
                 (None, _) => {
-                    // What an extension compresses may have a buffer that is not there.
+                    // Extensions that compress data may leave out the buffer.
                     let meshopt = self
                         .root()
                         .extensions_used
@@ -215,8 +217,10 @@ impl GltfDocument {
                     return Err(self.fail(format!("buffer {i} has neither a URI nor a chunk of a .glb{why}")));
                 }
             };
+
             if (bytes.len() as u64) < json.byte_length.0 {
-                let (is, should) = (bytes.len(), json.byte_length.0);
+                let is = bytes.len();
+                let should = json.byte_length.0;
                 return Err(
                     self.fail(format!("buffer {i} should have {should} bytes and has {is}; it is cut off"))
                 );
@@ -226,10 +230,10 @@ impl GltfDocument {
         Ok(buffers)
     }
 
-    /// The file that a URI names.
+    /// Returns the path of the file that a URI names.
     fn beside(&self, uri: &str) -> PathBuf {
         let folder = self.path.parent().unwrap_or(Path::new(""));
-        // Some exporters do not encode what they write.
+        // Some exporters do not escape URIs.
         let written = folder.join(uri);
         if fs::exists(&written).unwrap_or(false) {
             written
@@ -238,7 +242,7 @@ impl GltfDocument {
         }
     }
 
-    /// The files beside this one that its buffers and images are in, those that are there.
+    /// Returns the files of its buffers and images, if they exist.
     pub(crate) fn companions(&self) -> Vec<PathBuf> {
         let buffers = self.root().buffers.iter().filter_map(|b| b.uri.as_deref());
         let images = self.root().images.iter().filter_map(|i| i.uri.as_deref());
@@ -251,7 +255,7 @@ impl GltfDocument {
             .collect()
     }
 
-    /// What a URI stands for: data in itself, or a file beside this one.
+    /// Returns the bytes that a URI names: the data in it, or the file beside this one.
     fn resource(&self, uri: &str) -> std::result::Result<Vec<u8>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
             let (kind, data) = data.split_once(',').ok_or("has no data")?;
@@ -263,9 +267,11 @@ impl GltfDocument {
                 .decode(data)
                 .map_err(|e| format!("is no base64: {e}"));
         }
+
         if uri.contains("://") {
             return Err("is on the network; only files beside the mesh are read".into());
         }
+
         let path = self.beside(uri);
         read_file(&path).map_err(|e| match e {
             Error::Io { source, .. } => {
@@ -276,7 +282,7 @@ impl GltfDocument {
     }
 }
 
-/// Whether a buffer only stands for what an extension has compressed.
+/// Returns whether a buffer only stands for data that an extension compresses.
 fn is_fallback(buffer: &json::Buffer) -> bool {
     let extensions = buffer.extensions.iter().flat_map(|e| &e.others);
     extensions
@@ -284,15 +290,17 @@ fn is_fallback(buffer: &json::Buffer) -> bool {
         .any(|(_, extension)| extension.get("fallback") == Some(&true.into()))
 }
 
-/// The JSON, or what is needed of it if the crate's types do not fit all of it.
+/// Reads the JSON. If the types of the gltf crate do not fit all of it, only the parts that are needed are
+/// read.
 fn root_of(text: &[u8]) -> std::result::Result<json::Root, serde_json::Error> {
     json::Root::from_slice(text).or_else(|first| {
         let document = serde_json::from_slice(text)?;
-        // Written as text again, since gltf-json has compiled how its types are read from text: to read them
-        // from a `Value`, all of it would be compiled once more here.
+        // The parts are read from text again. gltf-json has compiled how its types are read from text; to
+        // read them from a `Value`, all of that would be compiled once more.
         json::Root::from_slice(needed(document).to_string().as_bytes()).map_err(|second| {
-            let (known, fault) = (without_place(&first), without_place(&second));
-            // The first error has the place of the fault in the file, the second one in our text.
+            let known = without_place(&first);
+            let fault = without_place(&second);
+            // The first error has the place of the fault in the file, the second one in the rewritten text.
             if known == fault {
                 first
             } else {
@@ -302,19 +310,31 @@ fn root_of(text: &[u8]) -> std::result::Result<json::Root, serde_json::Error> {
     })
 }
 
-/// What an error says, but not where.
+/// Returns the message of an error without its place.
 fn without_place(error: &serde_json::Error) -> String {
-    let (message, place) =
-        (error.to_string(), format!(" at line {} column {}", error.line(), error.column()));
+    let message = error.to_string();
+    let place = format!(" at line {} column {}", error.line(), error.column());
     message.strip_suffix(&place).unwrap_or(&message).to_owned()
 }
 
-/// The JSON of a `.glb` file, and where its binary chunk is.
+/// Makes the error for JSON that cannot be read, with its line if the file is text.
+fn invalid_json(path: &Path, is_text: bool, e: &serde_json::Error) -> Error {
+    if !is_text {
+        return Error::format(path, format!("its JSON is no valid glTF 2.0: {e}"));
+    }
+    let message = format!("is no valid glTF 2.0: {e}");
+    match e.line() {
+        0 => Error::format(path, message),
+        line => Error::line(path, line as u64, message),
+    }
+}
+
+/// Splits a `.glb` file into its JSON and the range of its binary chunk.
 fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Range<usize>>)> {
     let cut = || {
         Error::format(path, format!("is cut off: a .glb of {} bytes does not hold its chunks", bytes.len()))
     };
-    // "glTF", the version and the length of the file; then chunks of a length, a kind and data.
+    // The file has "glTF", the version and its length, then chunks of a length, a kind and data.
     let (_, rest) = bytes.split_first_chunk::<4>().ok_or_else(cut)?;
     let (version, rest) = rest.split_first_chunk().ok_or_else(cut)?;
     match u32::from_le_bytes(*version) {
@@ -324,24 +344,27 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Range
             return Err(Error::unsupported(path, format!("is binary glTF of version {other}; 2 is read")));
         }
     }
-    let mut chunks = [const { None }; 2];
     let (_, mut rest) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
-    // Chunks beyond the second belong to extensions; what is behind the last chunk may be anything.
+
+    let mut chunks = [const { None }; 2];
+    // Chunks after the second belong to extensions. Anything may follow the last chunk.
     for (chunk, kind) in chunks.iter_mut().zip([*b"JSON", *b"BIN\0"]) {
         let Some((length, after)) = rest.split_first_chunk() else { break };
         let Some((found, after)) = after.split_first_chunk() else { break };
         if *found != kind {
             break;
         }
+
         let length = usize::try_from(u32::from_le_bytes(*length)).ok();
         let (data, after) = length.and_then(|n| after.split_at_checked(n)).ok_or_else(cut)?;
         let start = bytes.len().saturating_sub(data.len().saturating_add(after.len()));
         *chunk = Some(start..start.saturating_add(data.len()));
         rest = after;
     }
+
     let [json, blob] = chunks;
     let json = json.and_then(|json| bytes.get(json));
-    // Some writers fill the chunk with zeros.
+    // Some writers pad the chunk with zeros.
     let json = json.map(|json| {
         let zeros = json.iter().rev().take_while(|b| **b == 0).count();
         json.get(..json.len().saturating_sub(zeros)).unwrap_or(json)
@@ -350,13 +373,7 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Range
 }
 
 fn check_version(path: &Path, asset: &serde_json::Value) -> Result<()> {
-    // A text by the format; a number is understood too.
-    let version = |key: &str| match asset.get(key)? {
-        serde_json::Value::String(text) => Some(text.trim().to_owned()),
-        serde_json::Value::Number(number) => Some(number.to_string()),
-        _ => None,
-    };
-    match version("version").as_deref() {
+    match version_of(asset, "version").as_deref() {
         None | Some("") => {
             return Err(Error::format(
                 path,
@@ -371,7 +388,7 @@ fn check_version(path: &Path, asset: &serde_json::Value) -> Result<()> {
             return Err(Error::unsupported(path, format!("is glTF of the version {v}; 2.0 is read")));
         }
     }
-    match version("minVersion").as_deref() {
+    match version_of(asset, "minVersion").as_deref() {
         Some(v) if v != "2.0" && v != "2" => {
             let v = quote(v.as_bytes());
             Err(Error::unsupported(path, format!("needs a reader of glTF {v}; 2.0 is read")))
@@ -380,22 +397,27 @@ fn check_version(path: &Path, asset: &serde_json::Value) -> Result<()> {
     }
 }
 
+/// Returns a version of the asset. The format wants a string; a number is understood too.
+fn version_of(asset: &serde_json::Value, key: &str) -> Option<String> {
+    match asset.get(key)? {
+        serde_json::Value::String(text) => Some(text.trim().to_owned()),
+        serde_json::Value::Number(number) => Some(number.to_string()),
+        _ => None,
+    }
+}
+
 fn old_version(path: &Path, version: &str) -> Error {
     let way_out = "convert it, for example by importing it into Blender and exporting glTF 2.0";
     Error::unsupported(path, format!("is glTF {version}, which differs from 2.0 and is not read; {way_out}"))
 }
 
-/// `text` with `%20` and the like replaced. What is not an escape stays.
+/// Replaces escapes such as `%20`. Anything else stays.
 fn percent_decode(text: &str) -> Cow<'_, str> {
     if !text.contains('%') {
         return Cow::Borrowed(text);
     }
-    let escape = |rest: &[u8]| {
-        let [high, low] = *rest.first_chunk()?;
-        let digits = [high, low].iter().all(u8::is_ascii_hexdigit).then_some([high, low])?;
-        u8::from_str_radix(std::str::from_utf8(&digits).ok()?, 16).ok()
-    };
-    let (mut out, mut rest) = (Vec::new(), text.as_bytes());
+    let mut out = Vec::new();
+    let mut rest = text.as_bytes();
     while let Some((&byte, after)) = rest.split_first() {
         let escaped = Some(after).filter(|_| byte == b'%').and_then(escape);
         out.push(escaped.unwrap_or(byte));
@@ -406,6 +428,13 @@ fn percent_decode(text: &str) -> Cow<'_, str> {
         };
     }
     String::from_utf8(out).map_or(Cow::Borrowed(text), Cow::Owned)
+}
+
+/// Reads the byte of two hexadecimal digits.
+fn escape(rest: &[u8]) -> Option<u8> {
+    let [high, low] = *rest.first_chunk()?;
+    let digits = [high, low].iter().all(u8::is_ascii_hexdigit).then_some([high, low])?;
+    u8::from_str_radix(std::str::from_utf8(&digits).ok()?, 16).ok()
 }
 
 #[cfg(test)]

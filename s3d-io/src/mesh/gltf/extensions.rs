@@ -1,14 +1,15 @@
-//! Extensions of glTF: which are read, which change nothing that is, and which a file is refused for.
+//! Decides about extensions of glTF: which are read, which change nothing that is read, and for which a file
+//! is refused.
 //!
-//! A file may be read without an extension that it does not require. That is no use where the extension has
-//! the geometry: such an object is refused by the extension's name, whatever the file requires of readers.
+//! A file may be read without an extension that it does not require. That does not help if the extension
+//! holds the geometry. Such an object is refused by the name of the extension, whatever the file requires.
 
 use crate::error::{Error, Result};
 use crate::mesh::gltf::document::GltfDocument;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// Extensions that are read or change nothing that is, beside the families of [`is_harmless`].
+/// The extensions that are read, or change nothing that is read. [`HARMLESS_FAMILIES`] has more.
 const HARMLESS: [&str; 24] = [
     // Read.
     "EXT_mesh_gpu_instancing",
@@ -16,7 +17,7 @@ const HARMLESS: [&str; 24] = [
     "KHR_node_visibility",
     "KHR_texture_transform",
     "MSFT_lod",
-    // What is not drawn, or not now: animation, physics, light, sound, the mouse.
+    // Anything that is not drawn, or not now: animation, physics, light, sound, the mouse.
     "AGI_articulations",
     "AGI_stk_metadata",
     "EXT_lights_ies",
@@ -27,7 +28,7 @@ const HARMLESS: [&str; 24] = [
     "KHR_lights_punctual",
     "KHR_node_hoverability",
     "KHR_node_selectability",
-    // What describes the geometry that is there.
+    // Anything that describes the geometry without changing it.
     "CESIUM_primitive_outline",
     "EXT_instance_features",
     "EXT_mesh_features",
@@ -39,15 +40,16 @@ const HARMLESS: [&str; 24] = [
     "GODOT_single_root",
 ];
 
-/// Families that change reflections and transparency, describe the file, or are of physics and avatars.
+/// The prefixes of extensions that change reflections and transparency, describe the file, or are about
+/// sound, physics and avatars.
 const HARMLESS_FAMILIES: [&str; 6] =
     ["KHR_materials_", "KHR_xmp", "KHR_audio_", "KHR_physics_", "OMI_physics_", "VRM"];
 
-/// Extensions that hold the geometry beside a form without them, which is read where it is there.
+/// The extensions that hold compressed geometry beside a plain form. The plain form is read if it is there.
 const COMPRESSIONS: [&str; 3] =
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// Extensions that add, replace or move geometry, so that an object with one is not what it seems without.
+/// The extensions that add, replace or move geometry, so an object that has one is not what it seems.
 const GEOMETRY: [&str; 6] = [
     "CESIUM_RTC",
     "EXT_mesh_primitive_restart",
@@ -57,7 +59,7 @@ const GEOMETRY: [&str; 6] = [
     "NEEDLE_progressive",
 ];
 
-/// What to do about extensions that are not read.
+/// What the user can do about an extension that is not read.
 const WAYS_OUT: [(&str, &str); 9] = [
     (
         "KHR_draco_mesh_compression",
@@ -82,19 +84,19 @@ const WAYS_OUT: [(&str, &str); 9] = [
     ("NEEDLE_progressive", "export the full mesh: the file holds a coarse one"),
 ];
 
-/// Whether what is read stays as it is without the extension.
+/// Returns whether the extension changes nothing that is read.
 fn is_harmless(extension: &str) -> bool {
     HARMLESS.contains(&extension) || HARMLESS_FAMILIES.iter().any(|family| extension.starts_with(family))
 }
 
-/// Stops at an extension without which, as the file says, it cannot be read.
+/// Refuses a file that requires an extension which is not read.
 pub(crate) fn check_required(path: &Path, required: &[String]) -> Result<()> {
     let Some(extension) = required.iter().find(|e| !is_harmless(e)) else { return Ok(()) };
     let way_out = way_out(extension);
     Err(Error::unsupported(path, format!("requires the extension {extension}, which is not read; {way_out}")))
 }
 
-/// What to do about an extension that is not read.
+/// Returns what the user can do about an extension that is not read.
 pub(crate) fn way_out(extension: &str) -> &'static str {
     WAYS_OUT
         .iter()
@@ -103,8 +105,8 @@ pub(crate) fn way_out(extension: &str) -> &'static str {
 }
 
 impl GltfDocument {
-    /// Stops at an object whose geometry is another with its extensions. `who` is for the message: "node 3".
-    /// Extensions that nothing is known of are added to `unknown`.
+    /// Refuses an object whose geometry is changed by its extensions. `who` is for the message: "node 3".
+    /// Adds unfamiliar extensions to `unknown`.
     pub(crate) fn check_extensions(
         &self,
         extensions: Option<&Map<String, Value>>,

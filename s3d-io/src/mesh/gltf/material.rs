@@ -1,4 +1,4 @@
-//! Materials and textures of glTF files: the base colour, which is all that a data set keeps of them.
+//! Reads the base colours and textures of glTF materials, which is all that a data set keeps of them.
 
 use crate::fs::quote::quote;
 use crate::image::texture::{LoadedTexture, TextureFault, TextureFile, Together, decode_texture};
@@ -9,25 +9,25 @@ use gltf::json::{self, Index, texture};
 use rayon::prelude::*;
 use s3d_geom::glam::{Vec2, vec2};
 use s3d_geom::{DEFAULT_COLOR, Material, Raster, Texture, Wrap};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// The looks of a file's materials.
+/// The materials and textures of a file.
 #[derive(Debug, Default)]
 pub(crate) struct GltfLooks {
-    /// One a material of the file.
+    /// One for each material of the file.
     pub(crate) materials: Vec<Material>,
-    /// One a material of the file: its colour before it is encoded.
+    /// The linear colour of each material of the file.
     pub(crate) linear_colors: Vec<[f32; 3]>,
-    /// One a material of the file: how its texture's coordinates are found.
+    /// How the texture coordinates of each material of the file are mapped.
     pub(crate) mappings: Vec<UvMapping>,
     pub(crate) textures: Vec<Texture>,
     pub(crate) files: Vec<Option<TextureFile>>,
 }
 
-/// From a set of texture coordinates of the file to those of a [`Texture`].
+/// Maps a set of texture coordinates of the file to coordinates of a [`Texture`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct UvMapping {
-    /// The set: the n of TEXCOORD_n.
+    /// The number of the set: the n of TEXCOORD_n.
     pub(crate) set: u32,
     offset: Vec2,
     rotation_rad: f32,
@@ -37,8 +37,8 @@ pub(crate) struct UvMapping {
 impl UvMapping {
     const PLAIN: Self = Self { set: 0, offset: Vec2::ZERO, rotation_rad: 0.0, scale: Vec2::ONE };
 
-    /// The coordinate in a [`Texture`], whose v points up, of one of the file, whose v points down. Source:
-    /// the extension KHR_texture_transform: scaled, turned, moved.
+    /// Maps a coordinate of the file, whose v points down, to a coordinate of a [`Texture`], whose v points
+    /// up. Source: the extension KHR_texture_transform, which scales, turns and moves.
     pub(crate) fn apply(&self, uv: Vec2) -> Vec2 {
         let (sin, cos) = libm::sincosf(self.rotation_rad);
         let s = uv * self.scale;
@@ -47,7 +47,7 @@ impl UvMapping {
     }
 }
 
-/// What makes a texture of ours: an image, how it repeats, and what its colours are multiplied with.
+/// Everything that makes a texture of ours: an image, how it repeats, and a factor for its colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct TextureKey {
     image: usize,
@@ -58,10 +58,10 @@ struct TextureKey {
 const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 
 impl GltfLooks {
-    /// The looks of all materials; images are decoded for those that are `used`, each once.
+    /// Reads all materials, and decodes the images of the materials that are `used`, each image once.
     ///
     /// # Errors
-    /// For images that are too large.
+    /// [`crate::Error::Format`] for images that are too large.
     pub(crate) fn load(
         document: &GltfDocument,
         used: &[bool],
@@ -69,6 +69,7 @@ impl GltfLooks {
     ) -> crate::error::Result<Self> {
         let mut looks = Self::default();
         let mut keys = Vec::new();
+
         for ((i, material), used) in document.root().materials.iter().enumerate().zip(used) {
             let (factor, info) = base_color(material);
             let name = material.name.clone().unwrap_or_else(|| format!("material_{i}"));
@@ -79,74 +80,98 @@ impl GltfLooks {
             });
             looks.linear_colors.push(factor);
             looks.mappings.push(info.map_or(UvMapping::PLAIN, mapping));
-            keys.push(info.filter(|_| *used).and_then(|info| {
-                match texture_key(document, info.index, factor) {
-                    Ok(key) => Some(key),
-                    Err(why) => {
-                        warnings.push(format!(
-                            "material {} is drawn in its colour: {why}",
-                            quote(name.as_bytes())
-                        ));
-                        None
-                    }
+            let info = info.filter(|_| *used);
+            keys.push(info.and_then(|info| match texture_key(document, info.index, factor) {
+                Ok(key) => Some(key),
+                Err(why) => {
+                    let name = quote(name.as_bytes());
+                    warnings.push(format!("material {name} is drawn in its colour: {why}"));
+                    None
                 }
             }));
         }
-        type Loaded = (String, Result<LoadedTexture, TextureFault>);
-        let mut images: BTreeMap<usize, Loaded> = BTreeMap::new();
-        for key in keys.iter().flatten() {
-            let nothing = || (String::new(), Err(TextureFault::Unreadable(String::new())));
-            images.entry(key.image).or_insert_with(nothing);
-        }
-        images.par_iter_mut().for_each(|(&image, slot)| {
-            let (name, bytes) = document.image(image);
-            *slot = (name, bytes.map_err(TextureFault::Unreadable).and_then(decode_texture));
-        });
-        for (name, image) in images.values() {
-            if let Err(why @ TextureFault::TooLarge(_)) = image {
-                return Err(document.fail(format!("texture {} {why}", quote(name.as_bytes()))));
-            }
-            if let Err(why) = image {
-                warnings.push(format!(
-                    "texture {} {why}; its materials are drawn in their colour",
-                    quote(name.as_bytes())
-                ));
-            }
-        }
+
+        let images = decoded_images(document, &keys, warnings)?;
+        looks.add_textures(document, &keys, &images)?;
+        Ok(looks)
+    }
+
+    /// Makes a texture of each key, and assigns it to its materials.
+    fn add_textures(
+        &mut self,
+        document: &GltfDocument,
+        keys: &[Option<TextureKey>],
+        images: &BTreeMap<usize, DecodedImage>,
+    ) -> crate::error::Result<()> {
         let mut known: BTreeMap<TextureKey, u32> = BTreeMap::new();
         let mut together = Together::default();
-        for (material, key) in looks.materials.iter_mut().zip(&keys) {
+
+        for (material, key) in self.materials.iter_mut().zip(keys) {
             let Some(key) = key else { continue };
             let Some((name, Ok(loaded))) = images.get(&key.image) else { continue };
             if !known.contains_key(key) {
-                let (width, height) = (loaded.image.width(), loaded.image.height());
-                together.add(width, height).map_err(|message| {
-                    document.fail(format!("texture {} {message}", quote(name.as_bytes())))
-                })?;
+                together
+                    .add(loaded.image.width(), loaded.image.height())
+                    .map_err(|message| {
+                        document.fail(format!("texture {} {message}", quote(name.as_bytes())))
+                    })?;
             }
+
             let index = *known.entry(*key).or_insert_with(|| {
                 let factor = key.factor_bits.map(f32::from_bits);
                 let wrap = key
                     .wrap
                     .map(|w| WRAPS.get(usize::from(w)).copied().unwrap_or(Wrap::Repeat));
-                let plain = factor == [1.0; 3];
-                let image = if plain {
+                let is_plain = factor == [1.0; 3];
+                let image = if is_plain {
                     loaded.image.clone()
                 } else {
                     multiplied(&loaded.image, factor)
                 };
-                looks.textures.push(Texture { name: name.clone(), image, wrap });
-                looks.files.push(plain.then(|| loaded.file.clone()));
-                (looks.textures.len() - 1) as u32
+                self.textures.push(Texture { name: name.clone(), image, wrap });
+                self.files.push(is_plain.then(|| loaded.file.clone()));
+                (self.textures.len() - 1) as u32
             });
             material.texture = Some(index);
         }
-        Ok(looks)
+        Ok(())
     }
 }
 
-/// Base colour, linear, and texture of a material: of its specular-glossiness variant if it has one, which
-/// readers that know the extension prefer.
+/// The name of an image, and the image.
+type DecodedImage = (String, Result<LoadedTexture, TextureFault>);
+
+/// Decodes the images of the keys in parallel. An image that cannot be decoded is a warning.
+///
+/// # Errors
+/// [`crate::Error::Format`] for images that are too large.
+fn decoded_images(
+    document: &GltfDocument,
+    keys: &[Option<TextureKey>],
+    warnings: &mut Vec<String>,
+) -> crate::error::Result<BTreeMap<usize, DecodedImage>> {
+    let wanted: BTreeSet<usize> = keys.iter().flatten().map(|key| key.image).collect();
+    let images: BTreeMap<usize, DecodedImage> = wanted
+        .into_par_iter()
+        .map(|image| {
+            let (name, bytes) = document.image(image);
+            (image, (name, bytes.map_err(TextureFault::Unreadable).and_then(decode_texture)))
+        })
+        .collect();
+
+    for (name, image) in images.values() {
+        let Err(why) = image else { continue };
+        let name = quote(name.as_bytes());
+        if let TextureFault::TooLarge(_) = why {
+            return Err(document.fail(format!("texture {name} {why}")));
+        }
+        warnings.push(format!("texture {name} {why}; its materials are drawn in their colour"));
+    }
+    Ok(images)
+}
+
+/// Returns the linear base colour of a material and its texture. They come from its specular-glossiness
+/// variant if it has one, as in other readers that know the extension.
 fn base_color(material: &json::Material) -> ([f32; 3], Option<&texture::Info>) {
     let metallic = &material.pbr_metallic_roughness;
     let variant = material
@@ -170,6 +195,7 @@ fn mapping(info: &texture::Info) -> UvMapping {
     })
 }
 
+/// Finds the image of a texture, and how it repeats.
 fn texture_key(
     document: &GltfDocument,
     index: Index<json::Texture>,
@@ -186,6 +212,7 @@ fn texture_key(
         });
         return Err(format!("texture {index} has no PNG or JPEG image{only}"));
     }
+
     let sampler = match texture.sampler {
         Some(s) => Some(
             document
@@ -195,11 +222,12 @@ fn texture_key(
         ),
         None => None,
     };
+
     let wrap = sampler.map_or([0; 2], |s| [s.wrap_s, s.wrap_t].map(wrap_number));
     Ok(TextureKey { image: texture.source.value(), wrap, factor_bits: factor.map(f32::to_bits) })
 }
 
-/// A place in [`WRAPS`]; unknown modes repeat, as the format's default.
+/// Returns an index into [`WRAPS`]. Unknown modes repeat, as the format does by default.
 fn wrap_number(mode: Checked<texture::WrappingMode>) -> u8 {
     match mode {
         Checked::Valid(texture::WrappingMode::MirroredRepeat) => 1,
@@ -208,18 +236,18 @@ fn wrap_number(mode: Checked<texture::WrappingMode>) -> u8 {
     }
 }
 
-/// `image` with its colours multiplied by `factor` where that is done: before they are encoded.
+/// Multiplies the light of an image by `factor`: the colours are decoded for it and encoded again.
 fn multiplied(image: &Raster<[u8; 3]>, factor: [f32; 3]) -> Raster<[u8; 3]> {
     let tables = factor
         .map(|f| std::array::from_fn::<u8, 256, _>(|b| srgb_from_linear(linear_from_srgb(b as u8) * f)));
     image.map(|rgb| {
-        let ([r, g, b], [of_r, of_g, of_b]) = (rgb.map(usize::from), &tables);
+        let [r, g, b] = rgb.map(usize::from);
         #[expect(clippy::indexing_slicing, reason = "a table has an entry for each byte")]
-        [of_r[r], of_g[g], of_b[b]]
+        [tables[0][r], tables[1][g], tables[2][b]]
     })
 }
 
-/// A byte of sRGB from light, 0 to 1; what is no number is black. Source: IEC 61966-2-1.
+/// Encodes light from 0 to 1 as an sRGB byte. NaN is black. Source: IEC 61966-2-1.
 pub(crate) fn srgb_from_linear(light: f32) -> u8 {
     let light = f64::from(light.clamp(0.0, 1.0));
     let encoded = if light <= 0.003_130_8 {
@@ -230,6 +258,7 @@ pub(crate) fn srgb_from_linear(light: f32) -> u8 {
     (encoded * 255.0).round() as u8
 }
 
+/// Decodes an sRGB byte to light from 0 to 1.
 fn linear_from_srgb(byte: u8) -> f32 {
     let encoded = f64::from(byte) / 255.0;
     (if encoded <= 0.040_45 {
@@ -239,7 +268,7 @@ fn linear_from_srgb(byte: u8) -> f32 {
     }) as f32
 }
 
-/// The colour of a material that the file does not describe: [`DEFAULT_COLOR`], linear.
+/// The linear colour of a material that the file does not describe: [`DEFAULT_COLOR`].
 pub(crate) fn default_linear() -> [f32; 3] {
     DEFAULT_COLOR.map(linear_from_srgb)
 }
@@ -269,7 +298,7 @@ mod tests {
         assert_eq!(UvMapping::PLAIN.apply(vec2(0.25, 0.0)), vec2(0.25, 1.0));
         let m = UvMapping { offset: vec2(0.5, 0.25), scale: vec2(2.0, 4.0), ..UvMapping::PLAIN };
         assert_eq!(m.apply(vec2(0.1, 0.1)), vec2(0.7, 1.0 - 0.65));
-        // A quarter turn: the extension's matrix takes (1, 0) to (0, −1) and (0, 1) to (1, 0), v down.
+        // A quarter turn. The matrix of the extension, with v down, takes u to −v and v to u.
         let m = UvMapping { rotation_rad: std::f32::consts::FRAC_PI_2, ..UvMapping::PLAIN };
         assert!(m.apply(vec2(1.0, 0.0)).abs_diff_eq(vec2(0.0, 2.0), 1e-6));
         assert!(m.apply(vec2(0.0, 1.0)).abs_diff_eq(vec2(1.0, 1.0), 1e-6));

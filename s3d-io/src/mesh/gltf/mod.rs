@@ -1,4 +1,4 @@
-//! glTF 2.0, `.gltf` and `.glb`.
+//! Reads glTF 2.0, `.gltf` and `.glb`.
 
 mod accessor;
 mod builder;

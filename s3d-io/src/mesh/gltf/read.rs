@@ -1,8 +1,9 @@
-//! glTF 2.0, `.gltf` and `.glb`.
+//! Reads meshes in glTF 2.0 files, `.gltf` and `.glb`.
 //!
-//! The `gltf` crate gives the JSON its types. Its import and its check are not used: the one decodes every
-//! image, wanted or not, and panics on ranges that are wrong, the other panics on a wrong index and refuses
-//! what does no harm, such as a missing bounding box. Here each index is checked before it is followed.
+//! The gltf crate gives the JSON its types. Its import and its validation are not used. The import decodes
+//! every image, wanted or not, and panics on wrong ranges. The validation panics on a wrong index, and
+//! refuses harmless faults such as a missing bounding box. So every index is checked here before it is
+//! followed.
 
 use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
@@ -15,62 +16,78 @@ use s3d_geom::MeshParts;
 use s3d_geom::glam::DVec3;
 use std::path::Path;
 
-/// Reads the default scene of a glTF file; without one the first that has nodes, and without any all nodes
-/// that are no one's child.
+/// Reads the default scene of a glTF file, or else the first scene that has nodes, or else all nodes that
+/// have no parent.
 ///
 /// # Errors
-/// As [`crate::mesh::read_mesh`].
+/// Like [`crate::mesh::read_mesh_with`].
 pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let frame = FileFrame::new(options.origin, options.units.unwrap_or_default());
     let document = GltfDocument::read(bytes, path)?;
     let mut warnings = Vec::new();
     let instances = instances(&document, Precision::OfFile, &mut warnings)?;
+    let used = used_materials(&document, &instances)?;
+    let looks = GltfLooks::load(&document, &used, &mut warnings)?;
+
+    let build = |instances: &[Instance], offset_m: DVec3| {
+        let mut builder = Builder::new(&document, &looks, up, instances, frame.in_units(offset_m))?;
+        instances.iter().try_for_each(|instance| builder.add(instance))?;
+        Ok::<_, Error>(builder)
+    };
+
+    let mut offset_m = DVec3::ZERO;
+    let mut builder = build(&instances, offset_m)?;
+    if frame.needs_exact(largest(builder.positions())) {
+        offset_m = frame.offset_m(builder.corners());
+        if offset_m != DVec3::ZERO {
+            // Only one mesh is in memory at a time. All warnings were given before.
+            drop(builder);
+            let exact = self::instances(&document, Precision::Exact, &mut Vec::new())?;
+            builder = build(&exact, offset_m)?;
+        }
+    }
+
+    let parts = builder.finish(&mut warnings);
+    if parts.faces.is_empty() {
+        return Err(document.fail(no_triangles(&instances, &warnings)));
+    }
+
+    let parts = MeshParts { materials: looks.materials, textures: looks.textures, ..parts };
+    let mesh = checked_mesh(parts, frame, &mut warnings)
+        .map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
+
+    Ok(MeshFile {
+        texture_files: looks.files,
+        warnings,
+        companions: document.companions(),
+        offset_m,
+        ..MeshFile::new(path, mesh)
+    })
+}
+
+/// Returns for each material of the file whether an instance uses it.
+fn used_materials(document: &GltfDocument, instances: &[Instance]) -> Result<Vec<bool>> {
     let mut used = vec![false; document.root().materials.len()];
-    for instance in &instances {
-        for (p, primitive) in document
-            .get(instance.mesh, "a node", "mesh")?
-            .primitives
-            .iter()
-            .enumerate()
-        {
+    for instance in instances {
+        let mesh = document.get(instance.mesh, "a node", "mesh")?;
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
             if let Some(material) = primitive.material {
                 document.get(material, &format!("mesh {}, primitive {p}", instance.mesh), "material")?;
                 used.get_mut(material.value()).into_iter().for_each(|used| *used = true);
             }
         }
     }
-    let looks = GltfLooks::load(&document, &used, &mut warnings)?;
-    let build = |instances: &[Instance], offset_m: DVec3| {
-        let mut builder = Builder::new(&document, &looks, up, instances, frame.in_units(offset_m))?;
-        instances.iter().try_for_each(|instance| builder.add(instance))?;
-        Ok::<_, Error>(builder)
+    Ok(used)
+}
+
+fn no_triangles(instances: &[Instance], warnings: &[String]) -> String {
+    let what = if instances.is_empty() { "mesh" } else { "triangle" };
+    let why = if warnings.is_empty() {
+        String::new()
+    } else {
+        format!(": {}", warnings.join("; "))
     };
-    let mut builder = build(&instances, DVec3::ZERO)?;
-    let mut offset_m = DVec3::ZERO;
-    if frame.needs_exact(largest(builder.positions())) {
-        offset_m = frame.offset_m(builder.corners());
-        if offset_m != DVec3::ZERO {
-            // Not two meshes at once. What is to be told was told.
-            drop(builder);
-            let exact = self::instances(&document, Precision::Exact, &mut Vec::new())?;
-            builder = build(&exact, offset_m)?;
-        }
-    }
-    let parts = builder.finish(&mut warnings);
-    if parts.faces.is_empty() {
-        let what = if instances.is_empty() { "mesh" } else { "triangle" };
-        let why = if warnings.is_empty() {
-            String::new()
-        } else {
-            format!(": {}", warnings.join("; "))
-        };
-        return Err(document.fail(format!("has no {what} in its scene{why}")));
-    }
-    let parts = MeshParts { materials: looks.materials, textures: looks.textures, ..parts };
-    let mesh = checked_mesh(parts, frame, &mut warnings)
-        .map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
-    let companions = document.companions();
-    Ok(MeshFile { texture_files: looks.files, warnings, companions, offset_m, ..MeshFile::new(path, mesh) })
+    format!("has no {what} in its scene{why}")
 }
 
 #[cfg(test)]
@@ -98,7 +115,8 @@ mod tests {
 
     impl Fixture {
         fn accessor(&mut self, bytes: Vec<u8>, kind: &str, component: u32, count: usize) -> usize {
-            let (offset, length) = (self.data.len(), bytes.len());
+            let offset = self.data.len();
+            let length = bytes.len();
             self.data.extend(bytes);
             let view = self.views.len();
             self.views
@@ -141,7 +159,7 @@ mod tests {
             )
         }
 
-        /// Reads the file, Z up, so that coordinates stay.
+        /// Reads the file, Z-up, so that coordinates stay.
         fn read(&self, rest: &str) -> Result<MeshFile> {
             let dir = tempfile::tempdir().unwrap();
             fs::write(dir.path().join("two words.png"), two_pixels([255, 188, 0], [0, 0, 255])).unwrap();
@@ -158,7 +176,8 @@ mod tests {
     #[test]
     fn nodes_place_meshes_and_mirrors_keep_fronts_in_front() {
         let mut f = Fixture::default();
-        let (p, n) = (f.triangle(), f.floats(&[[0.0, 0.0, 2.0]; 3]));
+        let p = f.triangle();
+        let n = f.floats(&[[0.0, 0.0, 2.0]; 3]);
         let file = f
             .read(&format!(
                 r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "NORMAL": {n}}}}}]}}],
@@ -169,6 +188,7 @@ mod tests {
                 "scenes": [{{"nodes": [0]}}], "scene": 0"#
             ))
             .unwrap();
+
         let mesh = &file.mesh;
         assert_eq!(mesh.faces().len(), 3);
         assert_eq!(mesh.triangle(0), [vec3(5.0, 0.0, 0.0), vec3(6.0, 0.0, 0.0), vec3(5.0, 1.0, 0.0)]);
@@ -202,13 +222,16 @@ mod tests {
     fn strips_fans_and_shared_vertices() {
         let mut f = Fixture::default();
         let p = f.floats(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]);
-        let (strip, fan, points) = (f.indices(&[0, 1, 2, 3]), f.indices(&[0, 1, 3, 2]), f.indices(&[0]));
+        let strip = f.indices(&[0, 1, 2, 3]);
+        let fan = f.indices(&[0, 1, 3, 2]);
+        let points = f.indices(&[0]);
         let list = f.accessor(vec![0, 1, 3, 2], "SCALAR", 5121, 4);
         let primitive = |indices: usize, mode: u32| {
             format!(r#"{{"attributes": {{"POSITION": {p}}}, "indices": {indices}, "mode": {mode}}}"#)
         };
         let primitives =
             [primitive(strip, 5), primitive(fan, 6), primitive(list, 4), primitive(points, 0)].join(",");
+
         let file = f
             .read(&format!(r#""meshes": [{{"primitives": [{primitives}]}}], "nodes": [{{"mesh": 0}}]"#))
             .unwrap();
@@ -230,7 +253,8 @@ mod tests {
     #[test]
     fn textures_factors_and_fallbacks() {
         let mut f = Fixture::default();
-        let (p, uv) = (f.triangle(), f.floats(&[[0.0, 0.0], [1.0, 0.0], [0.0, 0.75]]));
+        let p = f.triangle();
+        let uv = f.floats(&[[0.0, 0.0], [1.0, 0.0], [0.0, 0.75]]);
         let textured = |i: u32, more: &str| {
             format!(
                 r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": {i}{more}}},
@@ -255,6 +279,7 @@ mod tests {
         let primitive = |m: usize| {
             format!(r#"{{"attributes": {{"POSITION": {p}, "TEXCOORD_0": {uv}}}, "material": {m}}}"#)
         };
+
         let primitives: Vec<String> = (0..materials.len()).map(primitive).collect();
         let file = f
             .read(&format!(
@@ -264,6 +289,7 @@ mod tests {
                 primitives.join(",")
             ))
             .unwrap();
+
         let mesh = &file.mesh;
         let FaceColor::Texture(0, texture, uvs) = mesh.color_of(0) else { panic!("{:?}", mesh.color_of(0)) };
         assert_eq!((texture.name.as_str(), texture.wrap), ("two words.png", [Wrap::Clamp, Wrap::Mirror]));
@@ -279,6 +305,7 @@ mod tests {
         assert_eq!(uvs[1], vec2(2.5, 1.0));
         assert!(matches!(mesh.color_of(6), FaceColor::Flat([0, 255, 0])));
         assert_eq!(mesh.materials()[6].name, "old");
+
         let told = file.warnings.join("\n");
         for words in [
             "`gone.jpg` cannot be read",
@@ -320,9 +347,10 @@ mod tests {
     fn every_wrong_index_and_number_is_named() {
         let mut f = Fixture::default();
         let p = f.triangle();
-        let (bad, uv) =
-            (f.floats(&[[0.0; 3], [f32::INFINITY, 0.0, 0.0], [0.0, 1.0, 0.0]]), f.floats(&[[0.0; 2]; 2]));
-        let (i, beyond) = (f.indices(&[0, 1, 2]), f.indices(&[0, 1, 3]));
+        let bad = f.floats(&[[0.0; 3], [f32::INFINITY, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let uv = f.floats(&[[0.0; 2]; 2]);
+        let i = f.indices(&[0, 1, 2]);
+        let beyond = f.indices(&[0, 1, 3]);
         let mesh = |primitive: &str| {
             format!(
                 r#"{IMAGES},
@@ -358,7 +386,7 @@ mod tests {
             let message = f.error(&mesh(&primitive));
             assert!(message.contains(words), "{words}: {message}");
         }
-        // A vertex that no triangle uses may be anything.
+        // A vertex that no triangle uses may have any coordinates.
         let two = f.indices(&[0, 2, 2, 2, 0, 0]);
         assert!(
             f.error(&mesh(&format!(r#""attributes": {{"POSITION": {bad}}}, "indices": {two}"#)))
@@ -403,11 +431,13 @@ mod tests {
         assert!(message.contains("extension KHR_draco_mesh_compression"), "{message}");
     }
 
-    /// Any number of a file may be any other: it loads or is refused.
+    /// Any number in a file may be replaced by another: the file is read or refused.
     #[test]
     fn wrong_numbers_anywhere_do_no_harm() {
         let mut f = Fixture::default();
-        let (p, uv, i) = (f.triangle(), f.floats(&[[0.0; 2]; 3]), f.indices(&[0, 1, 2]));
+        let p = f.triangle();
+        let uv = f.floats(&[[0.0; 2]; 3]);
+        let i = f.indices(&[0, 1, 2]);
         let rest = format!(
             r#"{IMAGES}, "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0,
             "texCoord": 0}}}}}}],
@@ -416,16 +446,18 @@ mod tests {
             "indices": {i}, "material": 0, "mode": 4}}]}}], "nodes": [{{"mesh": 0, "skin": 0}}],
             "scenes": [{{"nodes": [0]}}], "scene": 0"#
         );
+
         assert!(f.read(&rest).is_ok());
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.gltf");
         let json = f.json(&rest);
         let is_part = |c: char| c.is_ascii_digit();
+
         let mut at = 0;
         while let Some(start) = json[at..].find(is_part).map(|n| at + n) {
             let end = json[start..].find(|c| !is_part(c)).map_or(json.len(), |n| start + n);
             at = end;
-            // Not in names and data.
+            // Digits in names and data stay.
             if !json[..start].ends_with([' ', '[', ',']) {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! Where the meshes of a glTF scene stand: its nodes, and the instances of EXT_mesh_gpu_instancing.
+//! Places the meshes of a glTF scene: by its nodes, and by the instances of EXT_mesh_gpu_instancing.
 
 use crate::error::Result;
 use crate::fs::quote::count;
@@ -10,29 +10,29 @@ use s3d_geom::glam::{DMat4, DQuat, DVec3, DVec4};
 use serde_json::Value;
 use std::collections::HashSet;
 
-/// The most meshes that are placed, 2.4 GB of places. A few bytes can place one.
+/// The most meshes that are placed: 2.4 GB of transforms. A file can place one with a few bytes.
 const MAX_INSTANCES: u64 = if cfg!(fuzzing) { 1 << 16 } else { 1 << 24 };
 
-/// A mesh at its place in the scene.
+/// A mesh, placed in the scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Instance {
     pub(crate) mesh: Index<Mesh>,
-    /// Node → the file's world, in the file's axes.
+    /// The transform from the node to the world of the file, in the file's axes.
     pub(crate) world_from_node: DMat4,
-    /// Whether joints would move it.
+    /// Whether it has joints, which would move it.
     pub(crate) skinned: bool,
 }
 
-/// How places of nodes are taken.
+/// How exactly the positions of nodes are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Precision {
-    /// As `f32`, which the gltf crate reads.
+    /// In `f32`, as the gltf crate reads them.
     OfFile,
-    /// As `f64`, for scenes far from their origin.
+    /// In `f64`, for scenes far from their origin.
     Exact,
 }
 
-/// All meshes of the scene with their places, in the order of its nodes, parents first.
+/// Returns all meshes of the scene with their transforms, in the order of the nodes, parents first.
 pub(crate) fn instances(
     document: &GltfDocument,
     precision: Precision,
@@ -42,9 +42,11 @@ pub(crate) fn instances(
     let mut unknown = Vec::new();
     document.check_extensions(root.extensions.as_ref().map(|e| &e.others), "the file", &mut unknown)?;
     let coarse = coarser_levels(&root.nodes);
-    let (mut placed, mut total) = (Vec::new(), 0u64);
-    let (mut hidden, mut coarser) = (0, 0);
-    // A tree holds each node once; one that comes twice would make a circle, or instances without end.
+    let mut placed = Vec::new();
+    let mut total = 0u64;
+    let mut hidden = 0;
+    let mut coarser = 0;
+    // A tree has each node once. A node that comes twice would make a circle, or instances without end.
     let mut visited = vec![false; root.nodes.len()];
     let mut checked = vec![false; root.meshes.len()];
     let mut stack: Vec<(Index<Node>, DMat4)> = roots(document)?
@@ -52,6 +54,7 @@ pub(crate) fn instances(
         .rev()
         .map(|n| (n, DMat4::IDENTITY))
         .collect();
+
     while let Some((index, world_from_parent)) = stack.pop() {
         let node = document.get(index, "the scene", "node")?;
         if visited
@@ -60,6 +63,7 @@ pub(crate) fn instances(
         {
             return Err(document.fail(format!("node {index} is in the scene twice; nodes must form a tree")));
         }
+
         if coarse.contains(&index.value()) {
             coarser += 1;
             continue;
@@ -68,6 +72,7 @@ pub(crate) fn instances(
             hidden += 1;
             continue;
         }
+
         let others = node.extensions.as_ref().map(|e| &e.others);
         document.check_extensions(others, &format!("node {index}"), &mut unknown)?;
         let place = document
@@ -75,14 +80,17 @@ pub(crate) fn instances(
             .filter(|_| precision == Precision::Exact);
         let world_from_node = world_from_parent
             * parent_from_node(node, place).ok_or_else(|| {
-                document.fail(format!("node {index} has a transform that is not finite or turns by no angle"))
+                document.fail(format!(
+                    "node {index} has a transform that is not finite, or a rotation of length 0"
+                ))
             })?;
+
         if let Some(mesh) = node.mesh {
             check_mesh(document, mesh, &mut checked, &mut unknown)?;
             let many = extension(node, "EXT_mesh_gpu_instancing");
             let many = many.map(|many| Instancing::new(document, many, index)).transpose()?;
             total = total.saturating_add(many.as_ref().map_or(1, |many| many.length));
-            // Before there is memory for them.
+            // The count is checked before memory is reserved.
             if total > MAX_INSTANCES {
                 return Err(document.fail(format!(
                     "node {index} makes {total} meshes in the scene, and {MAX_INSTANCES} are read at most: \
@@ -91,6 +99,7 @@ pub(crate) fn instances(
             }
             placed.push((Instance { mesh, world_from_node, skinned: node.skin.is_some() }, many));
         }
+
         stack.extend(
             node.children
                 .iter()
@@ -99,16 +108,9 @@ pub(crate) fn instances(
                 .map(|&child| (child, world_from_node)),
         );
     }
-    let mut instances = Vec::new();
-    for (first, many) in placed {
-        let Some(many) = many else {
-            instances.push(first);
-            continue;
-        };
-        let world_from_node = first.world_from_node;
-        let places = many.node_from_instance(document)?.into_iter();
-        instances.extend(places.map(|from| Instance { world_from_node: world_from_node * from, ..first }));
-    }
+
+    let instances = all_instances(document, placed)?;
+
     if hidden > 0 {
         warnings.push(format!(
             "{} and what is below left out: hidden by KHR_node_visibility",
@@ -124,8 +126,8 @@ pub(crate) fn instances(
     Ok(instances)
 }
 
-/// The nodes that the scene begins with: of the default scene, without one of the first that has nodes, and
-/// without any all nodes that are no one's child.
+/// Returns the nodes at which the scene begins: the nodes of the default scene, or else of the first scene
+/// that has nodes, or else all nodes that have no parent.
 fn roots(document: &GltfDocument) -> Result<Vec<Index<Node>>> {
     let root = document.root();
     if let Some(scene) = root.scene {
@@ -170,11 +172,30 @@ fn check_mesh(
     Ok(())
 }
 
+/// Places each mesh, and each instance of a mesh that has many.
+fn all_instances(
+    document: &GltfDocument,
+    placed: Vec<(Instance, Option<Instancing>)>,
+) -> Result<Vec<Instance>> {
+    let mut instances = Vec::new();
+    for (first, many) in placed {
+        let Some(many) = many else {
+            instances.push(first);
+            continue;
+        };
+        let world_from_node = first.world_from_node;
+        let transforms = many.node_from_instance(document)?.into_iter();
+        instances
+            .extend(transforms.map(|from| Instance { world_from_node: world_from_node * from, ..first }));
+    }
+    Ok(instances)
+}
+
 fn extension<'a>(node: &'a Node, name: &str) -> Option<&'a Value> {
     node.extensions.as_ref()?.others.get(name)
 }
 
-/// A number of the JSON that is an index, however it is written.
+/// Reads an index, even if the JSON writes it as a decimal fraction.
 fn index_of(value: &Value) -> Option<u32> {
     let number = value
         .as_u64()
@@ -182,7 +203,7 @@ fn index_of(value: &Value) -> Option<u32> {
     u32::try_from(number).ok()
 }
 
-/// The nodes that stand for others from afar. Source: the extension MSFT_lod.
+/// Returns the nodes that replace others at a distance. Source: the extension MSFT_lod.
 fn coarser_levels(nodes: &[Node]) -> HashSet<usize> {
     let ids = nodes.iter().enumerate().flat_map(|(n, node)| {
         let ids = extension(node, "MSFT_lod").and_then(|lod| lod.get("ids")?.as_array());
@@ -195,12 +216,12 @@ fn coarser_levels(nodes: &[Node]) -> HashSet<usize> {
     ids.collect()
 }
 
-/// The instances of a node's mesh. Source: the extension EXT_mesh_gpu_instancing: an attribute each for
-/// translation, rotation and scale, all of one length.
+/// The instances of a node's mesh. Source: the extension EXT_mesh_gpu_instancing, which has an attribute each
+/// for translation, rotation and scale, all of one length.
 struct Instancing {
-    /// For messages.
+    /// The name in messages.
     who: String,
-    /// Attributes by name.
+    /// The accessor of each attribute, by name.
     accessors: Vec<(String, Index<Accessor>)>,
     length: u64,
 }
@@ -210,6 +231,7 @@ impl Instancing {
         let who = format!("node {node}, EXT_mesh_gpu_instancing");
         let attributes = extension.get("attributes").and_then(Value::as_object);
         let mut many = Self { who, accessors: Vec::new(), length: 0 };
+
         for (name, value) in attributes.into_iter().flatten() {
             let who = &many.who;
             let index: Option<Index<Accessor>> = index_of(value).map(Index::new);
@@ -217,7 +239,7 @@ impl Instancing {
                 index.ok_or_else(|| document.fail(format!("{who}: {name} is {value}, no accessor")))?;
             let accessor = document.get(index, who, "accessor")?;
             let n = accessor.count.0;
-            // An element has a byte at least, so that no claim alone makes instances.
+            // An element has at least one byte, so a mere claim makes no instances.
             let bytes = match accessor.buffer_view {
                 Some(view) => document.view(view, who)?.len() as u64,
                 None => 0,
@@ -232,12 +254,14 @@ impl Instancing {
             many.length = n;
             many.accessors.push((name.clone(), index));
         }
+
         if many.accessors.is_empty() {
             return Err(document.fail(format!("{} has no attributes", many.who)));
         }
         Ok(many)
     }
 
+    /// Reads an attribute, or repeats its default.
     fn read<const N: usize>(
         &self,
         document: &GltfDocument,
@@ -258,18 +282,17 @@ impl Instancing {
         }
     }
 
-    /// Instance → node, of each.
+    /// Returns the transform from each instance to the node.
     fn node_from_instance(&self, document: &GltfDocument) -> Result<Vec<DMat4>> {
         let translations = self.read(document, "TRANSLATION", [0.0; 3])?;
         let rotations = self.read(document, "ROTATION", [0.0, 0.0, 0.0, 1.0])?;
         let scales = self.read(document, "SCALE", [1.0; 3])?;
-        let vector = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
         let places = translations.into_iter().zip(rotations).zip(scales).enumerate();
         let places = places.map(|(n, ((translation, rotation), scale))| {
-            placed_by(vector(scale), rotation, vector(translation)).ok_or_else(|| {
+            transform(exact(scale), rotation, exact(translation)).ok_or_else(|| {
                 let who = &self.who;
                 document.fail(format!(
-                    "{who}: instance {n} has a transform that is not finite or turns by no angle"
+                    "{who}: instance {n} has a transform that is not finite, or a rotation of length 0"
                 ))
             })
         });
@@ -277,10 +300,8 @@ impl Instancing {
     }
 }
 
-/// `place` is its last column, where that is known better.
+/// Returns the transform of a node. `place` is a more exact translation, if it is known.
 fn parent_from_node(node: &Node, place: Option<DVec3>) -> Option<DMat4> {
-    let vector =
-        |v: Option<[f32; 3]>, default: DVec3| v.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
     match node.matrix {
         Some(matrix) => {
             let mut matrix = DMat4::from_cols_array(&matrix.map(f64::from));
@@ -289,17 +310,22 @@ fn parent_from_node(node: &Node, place: Option<DVec3>) -> Option<DMat4> {
             }
             Some(matrix).filter(|matrix| matrix.is_finite())
         }
-        None => placed_by(
-            vector(node.scale, DVec3::ONE),
+        None => transform(
+            node.scale.map_or(DVec3::ONE, exact),
             node.rotation.unwrap_or_default().0,
-            place.unwrap_or_else(|| vector(node.translation, DVec3::ZERO)),
+            place.unwrap_or_else(|| node.translation.map_or(DVec3::ZERO, exact)),
         ),
     }
 }
 
-/// Scaled, turned, moved. Files round their unit quaternions to f32, or to fewer bits.
-fn placed_by(scale: DVec3, rotation: [f32; 4], translation: DVec3) -> Option<DMat4> {
+/// Scales, then turns, then moves. Returns `None` if the transform is not finite or the rotation has no
+/// length. Unit quaternions are normalised, since files round them to `f32` or to fewer bits.
+fn transform(scale: DVec3, rotation: [f32; 4], translation: DVec3) -> Option<DMat4> {
     let rotation = DQuat::from_vec4(DVec4::from_array(rotation.map(f64::from)).try_normalize()?);
     let matrix = DMat4::from_scale_rotation_translation(scale, rotation, translation);
     matrix.is_finite().then_some(matrix)
+}
+
+fn exact(v: [f32; 3]) -> DVec3 {
+    DVec3::from_array(v.map(f64::from))
 }

@@ -1,20 +1,20 @@
-//! The JSON of a glTF file without what is not read.
+//! Reduces the JSON of a glTF file to the parts that are read.
 //!
-//! The gltf crate's types are stricter than the format in places, and one odd value anywhere stops them: an
-//! animation channel without a node, `extras` that is no object, 1.0 for 1. A file that they refuse is read
-//! again with the parts alone that geometry, materials and textures need.
+//! The types of the gltf crate are stricter than the format in places, and one odd value anywhere stops them:
+//! an animation channel without a node, `extras` that is no object, 1.0 for 1. A file that they refuse is
+//! read again with only the parts that geometry, materials and textures need.
 
 use serde_json::{Map, Number, Value, json};
 
-/// What is kept of a value.
+/// The part of a value that is kept.
 enum Keep {
     /// All of it.
     All,
-    /// It, if it is a text.
+    /// The value, if it is a string.
     Text,
-    /// Members of an object, each with what is kept of it.
+    /// The named members of an object, each reduced in its turn.
     Members(&'static [(&'static str, Keep)]),
-    /// As [`Keep::Members`], of each element of a list.
+    /// Like [`Keep::Members`], for each element of a list.
     Each(&'static [(&'static str, Keep)]),
 }
 
@@ -107,8 +107,8 @@ const ROOT: &[(&str, Keep)] = &[
     ("textures", Each(&[("extensions", All), ("sampler", All), ("source", All)])),
 ];
 
-/// What geometry, materials and textures need of a document, whole numbers written as such. It is one of glTF
-/// 2.0, whatever its asset says.
+/// Returns the parts of a document that geometry, materials and textures need, with whole numbers written as
+/// such. The result calls itself glTF 2.0, whatever the asset says.
 pub(crate) fn needed(document: Value) -> Value {
     let mut root = match Members(ROOT).of(document) {
         Some(Value::Object(root)) => root,
@@ -129,6 +129,7 @@ pub(crate) fn needed(document: Value) -> Value {
 }
 
 impl Keep {
+    /// Reduces a value. Returns `None` if nothing is left.
     fn of(&self, value: Value) -> Option<Value> {
         match (self, value) {
             (_, Value::Null) => None,
@@ -140,7 +141,7 @@ impl Keep {
                     .filter_map(|(name, keep)| Some(((*name).to_owned(), keep.of(object.remove(*name)?)?)));
                 Some(Value::Object(kept.collect()))
             }
-            // What is needed and of another kind is a fault, which the types tell.
+            // A value of a wrong kind is a fault, which the types report.
             (Members(_), value) => Some(value),
             (Each(members), Value::Array(list)) => {
                 let kept = list.into_iter().map(|e| Members(members).of(e).unwrap_or_default());
@@ -151,11 +152,11 @@ impl Keep {
     }
 }
 
-/// `value` with whole numbers in place of such as 1.0.
+/// Writes numbers such as 1.0 as whole numbers.
 fn whole(value: Value) -> Value {
     match value {
         Value::Number(number) => {
-            // All whole numbers up to 2^53 are exact. The sign of -0.0 is kept.
+            // Whole numbers up to 2^53 are exact. −0.0 keeps its sign.
             let float = number
                 .as_f64()
                 .filter(|v| number.is_f64() && v.fract() == 0.0 && v.abs() < 9e15);

@@ -1,5 +1,5 @@
-//! Where in an OBJ file a fault is: a strict scan of its statements, for when it is known only that there is
-//! one. tobj tells no line, and accepts indices that are not there.
+//! Finds the line of a fault in an OBJ file, after the file is known to have one. A strict scan of the
+//! statements is needed, since tobj reports no line and accepts indices that are out of range.
 
 use crate::error::Error;
 use crate::fs::quote::quote;
@@ -8,13 +8,14 @@ use crate::mesh::obj::statement::{Why, corner, normal, out_of_range, uv, vertex}
 use s3d_geom::glam::Vec3;
 use std::path::Path;
 
-/// The error for the first fault of a file that tobj refuses, `said` what it says.
+/// Returns the error for the first fault of a file that tobj refuses with the words `said`.
 pub(crate) fn fault(path: &Path, bytes: &[u8], said: &str) -> Error {
-    // Faces may come before their vertices.
+    // A face may come before its vertices.
     let mut counts = [0; 3];
     for line in logical_lines(bytes) {
         count(&line, &mut counts);
     }
+
     let mut so_far = [0; 3];
     for line in logical_lines(bytes) {
         count(&line, &mut so_far);
@@ -34,7 +35,7 @@ fn count(line: &Line<'_>, counts: &mut [u64; 3]) {
     }
 }
 
-/// Checks a statement before which, and after the last of which, columns have so many values.
+/// Checks a statement. The columns have `so_far` values before it and `counts` values in the whole file.
 fn check(line: &Line<'_>, so_far: [u64; 3], counts: [u64; 3]) -> Result<(), Why> {
     let (keyword, mut rest) = line.keyword();
     match keyword {
@@ -56,7 +57,7 @@ fn check(line: &Line<'_>, so_far: [u64; 3], counts: [u64; 3]) -> Result<(), Why>
     }
 }
 
-/// The error for the vertex `vertex`, from 0, whose position is not finite.
+/// Returns the error for a vertex, counted from 0, whose position is not finite.
 pub(crate) fn vertex_error(path: &Path, bytes: &[u8], vertex: u32, position: Vec3) -> Error {
     match logical_lines(bytes)
         .filter(|line| line.keyword().0 == b"v")
@@ -70,7 +71,7 @@ pub(crate) fn vertex_error(path: &Path, bytes: &[u8], vertex: u32, position: Vec
     }
 }
 
-/// The line of the face `face`, from 0, of those with three corners or more.
+/// Returns the line of a face, counted from 0 among the faces of three or more corners.
 pub(crate) fn face_line(bytes: &[u8], face: usize) -> Option<u64> {
     let mut faces = logical_lines(bytes).filter(|line| {
         let (keyword, mut rest) = line.keyword();

@@ -1,4 +1,4 @@
-//! The lines of OBJ and MTL files.
+//! Splits OBJ and MTL files into lines and words.
 
 use crate::error::Result;
 use crate::fs::encoding::into_utf8;
@@ -11,16 +11,16 @@ use std::path::Path;
 /// A statement of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Line<'a> {
-    /// The number, from 1, of the line on which it starts.
+    /// The number of its first line, from 1.
     pub(crate) number: u64,
-    /// The bytes of its lines, their ends included.
+    /// The range of its bytes in the file, line ends included.
     pub(crate) place: Range<usize>,
-    /// What it says, without surrounding space; borrowed if it is on one line.
+    /// Its text without surrounding space. Borrowed if it is on one line.
     pub(crate) text: Cow<'a, [u8]>,
 }
 
 impl Line<'_> {
-    /// The word with which it starts, and what follows.
+    /// Splits off the first word.
     #[inline]
     pub(crate) fn keyword(&self) -> (&[u8], &[u8]) {
         let end = self
@@ -32,12 +32,13 @@ impl Line<'_> {
     }
 }
 
-/// The statements of a file whose lines end in LF or CR LF: a line that ends in a backslash is joined with
-/// the next, a mark of UTF-8 at the start skipped. Empty lines and comments stay.
+/// Returns the statements of a file whose lines end in LF or CR LF. A line that ends in a backslash is joined
+/// with the next, and a UTF-8 byte order mark is skipped. Empty lines and comments stay.
 pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     let mut start = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    // Each line as it stands: its range, and its text.
     let physical = std::iter::from_fn(move || {
-        // Behind the last line end is a line too, if only an empty one.
+        // After the last line end comes one more line, which may be empty.
         let rest = bytes.get(start..)?;
         let length = memchr(b'\n', rest).unwrap_or(rest.len());
         let line = rest.get(..length).unwrap_or_default();
@@ -45,12 +46,14 @@ pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
         start += length + 1;
         Some((place, line.trim_ascii()))
     });
+
     let mut lines = (1..).zip(physical);
     std::iter::from_fn(move || {
         let (number, (mut place, line)) = lines.next()?;
         let Some(continued) = line.strip_suffix(b"\\").filter(|line| !line.starts_with(b"#")) else {
             return Some(Line { number, place, text: Cow::Borrowed(line) });
         };
+
         let mut joined = continued.to_vec();
         for (_, (next_place, next)) in lines.by_ref() {
             place.end = next_place.end;
@@ -64,15 +67,15 @@ pub(crate) fn logical_lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
-/// The content of a text file, in UTF-8 if its mark says what it is; if its lines end in CR alone, they end
-/// in LF now.
+/// Reads a text file as UTF-8, converted if its byte order mark says so. Lines that end in CR alone end in LF
+/// afterwards.
 pub(crate) fn read_text(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = into_utf8(read_file(path)?);
     end_lines_in_lf(&mut bytes);
     Ok(bytes)
 }
 
-/// Lines that end in CR alone end in LF then.
+/// Changes the ends of lines from CR to LF, in a file without any LF.
 pub(crate) fn end_lines_in_lf(bytes: &mut [u8]) {
     if memchr(b'\n', bytes).is_none() {
         bytes
@@ -82,13 +85,13 @@ pub(crate) fn end_lines_in_lf(bytes: &mut [u8]) {
     }
 }
 
-/// What is behind the word that starts a line.
+/// Returns what follows the word that starts a line.
 #[inline]
 pub(crate) fn after<'a>(line: &'a [u8], word: &[u8]) -> &'a [u8] {
     line.get(word.len()..).unwrap_or_default()
 }
 
-/// Takes the next word off the front of a line; the sign that starts a comment ends the line.
+/// Takes the next word off the front of a line. `#` starts a comment, which ends the line.
 #[inline]
 pub(crate) fn next_word<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
@@ -102,12 +105,12 @@ pub(crate) fn next_word<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     (!word.is_empty()).then_some(word)
 }
 
-/// `line` up to the sign that starts a comment.
+/// Returns the line up to a comment.
 pub(crate) fn without_comment(line: &[u8]) -> &[u8] {
     line.split(|&b| b == b'#').next().unwrap_or_default()
 }
 
-/// A name in UTF-8 or, if it is not that, in Latin-1, so that different bytes stay different names.
+/// Decodes a name as UTF-8, or else as Latin-1, so that different bytes stay different names.
 pub(crate) fn text(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(utf8) => utf8.to_owned(),
@@ -115,7 +118,7 @@ pub(crate) fn text(bytes: &[u8]) -> String {
     }
 }
 
-/// The finite number that a word spells.
+/// Parses a finite number.
 pub(crate) fn parse_f32(word: &[u8]) -> Option<f32> {
     std::str::from_utf8(word)
         .ok()?

@@ -1,83 +1,53 @@
-//! How the faces of an OBJ file look: its libraries and the images that they name.
+//! Reads how the faces of an OBJ file look: its material libraries and the images that they name.
 
 use crate::error::Result;
 use crate::fs::quote::{count, quote};
 use crate::image::find::{find_image, resolve};
 use crate::image::texture::{TextureFile, read_textures};
 use crate::mesh::obj::lines::read_text;
-use crate::mesh::obj::mtl::{MtlMaterial, parse_mtl};
+use crate::mesh::obj::mtl::{MtlMap, MtlMaterial, parse_mtl};
 use crate::mesh::obj::normal::ObjNames;
 use s3d_geom::{DEFAULT_COLOR, Material, Raster, Texture, Wrap};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Materials and textures of the faces.
+/// The materials and textures of the faces.
 #[derive(Default)]
 pub(crate) struct ObjLooks {
     /// In the order of [`ObjNames::materials`].
     pub(crate) materials: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
-    /// One a texture.
+    /// One for each texture.
     pub(crate) files: Vec<Option<TextureFile>>,
     /// The libraries and images that were read.
     pub(crate) companions: Vec<PathBuf>,
 }
 
-/// A material of a library, and the library's folder and name for messages.
+/// A material, and the library that describes it.
 struct Found {
     material: MtlMaterial,
     library: PathBuf,
 }
 
 impl ObjLooks {
-    /// Reads the libraries that the file at `path` has `names` of, and the images of the materials that it
-    /// uses.
+    /// Reads the libraries in `names` of the file at `path`, and the images of the materials that it uses.
     ///
     /// # Errors
-    /// For images that are too large.
+    /// [`crate::Error::Unsupported`] for images that are too large.
     pub(crate) fn load(path: &Path, names: &ObjNames, warnings: &mut Vec<String>) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut looks = Self::default();
         let library = load_libraries(folder, &names.libraries, &mut looks.companions, warnings);
-        let mut wanted: Vec<PathBuf> = Vec::new();
-        let mut place_of: HashMap<PathBuf, usize> = HashMap::new();
+
+        let mut images = WantedImages::default();
         let mut unknown: Vec<&str> = Vec::new();
-        // For each material the image, into `wanted`, and how it repeats.
-        let mut maps: Vec<Option<(usize, [Wrap; 2])>> = Vec::new();
         for name in &names.materials {
             let found = library.get(name.as_str());
-            let color = found.map_or(DEFAULT_COLOR, |f| f.material.color);
+            let color = found.map_or(DEFAULT_COLOR, |found| found.material.color);
             looks
                 .materials
                 .push(Material { name: name.clone(), color, texture: None });
-            let mut map = None;
-            if let Some((f, m)) = found.and_then(|f| Some((f, f.material.map.as_ref()?))) {
-                match find_image(&m.file, f.library.parent().unwrap_or(folder), folder) {
-                    Some((image, exact)) => {
-                        if !exact {
-                            let (image, written) = (image.display(), quote(m.file.as_bytes()));
-                            let line = m.line;
-                            warnings.push(format!(
-                                "{}, line {line}: {written} is not there; {image} is used",
-                                f.library.display()
-                            ));
-                        }
-                        let at = *place_of.entry(image.clone()).or_insert(wanted.len());
-                        if at == wanted.len() {
-                            wanted.push(image);
-                        }
-                        map = Some((at, m.wrap));
-                    }
-                    None => warnings.push(format!(
-                        "{}, line {}: texture {} is not there; material {} has its colour instead",
-                        f.library.display(),
-                        m.line,
-                        quote(m.file.as_bytes()),
-                        quote(name.as_bytes())
-                    )),
-                }
-            }
-            maps.push(map);
+            images.add(found, folder, warnings);
             if found.is_none() {
                 unknown.push(name);
             }
@@ -87,24 +57,26 @@ impl ObjLooks {
             warnings
                 .push(format!("{n} in no library and drawn gray, the first is {}", quote(first.as_bytes())));
         }
-        looks.load_images(&wanted, &maps, warnings)?;
-        looks.companions.append(&mut wanted);
+
+        looks.load_images(&images, warnings)?;
+        looks.companions.append(&mut images.paths);
         Ok(looks)
     }
 
-    /// Decodes the images and lays them on their materials: a texture for each way in which an image repeats.
-    fn load_images(
-        &mut self,
-        wanted: &[PathBuf],
-        maps: &[Option<(usize, [Wrap; 2])>],
-        warnings: &mut Vec<String>,
-    ) -> Result<()> {
-        for ((at, loaded), image) in read_textures(wanted)?.into_iter().enumerate().zip(wanted) {
-            let users = maps.iter().enumerate().filter_map(|(m, map)| Some((m, (*map)?)));
-            let users: Vec<(usize, [Wrap; 2])> = users
-                .filter(|(_, (i, _))| *i == at)
-                .map(|(m, (_, wrap))| (m, wrap))
+    /// Decodes the images and assigns them to their materials. An image that repeats in two ways becomes two
+    /// textures.
+    fn load_images(&mut self, images: &WantedImages, warnings: &mut Vec<String>) -> Result<()> {
+        let loaded = read_textures(&images.paths)?;
+        for (index, (loaded, image)) in loaded.into_iter().zip(&images.paths).enumerate() {
+            let users: Vec<(usize, [Wrap; 2])> = images
+                .of_material
+                .iter()
+                .enumerate()
+                .filter_map(|(material, map)| (*map).map(|(image, wrap)| (material, image, wrap)))
+                .filter(|(_, image, _)| *image == index)
+                .map(|(material, _, wrap)| (material, wrap))
                 .collect();
+
             let mut texture = match loaded {
                 Ok(texture) => texture,
                 Err(why) => {
@@ -116,6 +88,8 @@ impl ObjLooks {
                     continue;
                 }
             };
+
+            // The different ways in which the image repeats.
             let mut wraps: Vec<[Wrap; 2]> = Vec::new();
             for &(material, wrap) in &users {
                 let place = wraps.iter().position(|w| *w == wrap).unwrap_or_else(|| {
@@ -126,9 +100,10 @@ impl ObjLooks {
                     material.texture = Some((self.textures.len() + place) as u32);
                 }
             }
+
             let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
             while let Some((&wrap, more)) = wraps.split_first() {
-                // The last takes the image: most have no second.
+                // The last texture takes the image without a copy: most images have one texture.
                 let (pixels, file) = if more.is_empty() {
                     let pixels = std::mem::replace(&mut texture.image, Raster::from_vec(0, 0, Vec::new()));
                     (pixels, std::mem::take(&mut texture.file.bytes))
@@ -145,7 +120,59 @@ impl ObjLooks {
     }
 }
 
-/// All materials of all libraries by name; of two with one name the later counts.
+/// The images that materials name, each once.
+#[derive(Default)]
+struct WantedImages {
+    paths: Vec<PathBuf>,
+    /// The index of each path.
+    index_of: HashMap<PathBuf, usize>,
+    /// For each material the index of its image, and how it repeats.
+    of_material: Vec<Option<(usize, [Wrap; 2])>>,
+}
+
+impl WantedImages {
+    /// Adds the next material, whose image is searched beside its library and in `folder`. `None` is a
+    /// material that no library describes.
+    fn add(&mut self, found: Option<&Found>, folder: &Path, warnings: &mut Vec<String>) {
+        let image = found.and_then(|found| {
+            let map = found.material.map.as_ref()?;
+            let path = image_path(found, map, folder, warnings)?;
+            let next = self.paths.len();
+            let index = *self.index_of.entry(path.clone()).or_insert(next);
+            if index == next {
+                self.paths.push(path);
+            }
+            Some((index, map.wrap))
+        });
+        self.of_material.push(image);
+    }
+}
+
+/// Returns the path of the image that `map` names. Adds a warning if it lies elsewhere or is missing.
+fn image_path(found: &Found, map: &MtlMap, folder: &Path, warnings: &mut Vec<String>) -> Option<PathBuf> {
+    let library = found.library.display();
+    let line = map.line;
+    let written = quote(map.file.as_bytes());
+    match find_image(&map.file, found.library.parent().unwrap_or(folder), folder) {
+        Some((image, exact)) => {
+            if !exact {
+                let image = image.display();
+                warnings.push(format!("{library}, line {line}: {written} is not there; {image} is used"));
+            }
+            Some(image)
+        }
+        None => {
+            let material = quote(found.material.name.as_bytes());
+            warnings.push(format!(
+                "{library}, line {line}: texture {written} is not there; material {material} has its colour \
+                 instead"
+            ));
+            None
+        }
+    }
+}
+
+/// Reads all libraries and returns their materials by name. The later of two materials with one name counts.
 fn load_libraries(
     folder: &Path,
     libraries: &[(u64, String)],
@@ -153,6 +180,7 @@ fn load_libraries(
     warnings: &mut Vec<String>,
 ) -> HashMap<String, Found> {
     let mut found = HashMap::new();
+
     for (line, names) in libraries {
         // A name may hold spaces, and a line may hold several names.
         let whole = resolve(folder, names);
@@ -161,6 +189,7 @@ fn load_libraries(
         } else {
             names.split_whitespace().map(|name| resolve(folder, name)).collect()
         };
+
         for library in files {
             match read_text(&library) {
                 Ok(bytes) => {
@@ -188,7 +217,7 @@ mod tests {
     use s3d_geom::FaceColor;
     use std::fs;
 
-    /// Reads `obj` in a folder that holds `files` too.
+    /// Reads `obj` in a folder that also holds `files`.
     fn read_with(obj: &str, files: &[(&str, &[u8])]) -> MeshFile {
         let dir = tempfile::tempdir().unwrap();
         for (name, bytes) in files {
@@ -235,6 +264,7 @@ mod tests {
             .map(|path| path.file_name().unwrap().to_str().unwrap())
             .collect();
         assert_eq!(read, ["lib.mtl", "other.mtl", "two words.png", "bad.png"]);
+
         let kept = TextureFile { extension: "png", bytes: png.clone() };
         assert_eq!(file.texture_files, [Some(kept.clone()), Some(kept)]);
         assert!(matches!(mesh.color_of(0), FaceColor::Texture(0, ..)));

@@ -1,4 +1,4 @@
-//! Wavefront OBJ with its material libraries.
+//! Reads and writes Wavefront OBJ with its material libraries.
 
 mod diagnose;
 mod lines;

@@ -1,21 +1,20 @@
-//! Material libraries of OBJ files: the three statements that say how a face looks, `newmtl`, `Kd` and
-//! `map_Kd`.
+//! Reads the three statements of a material library that say how a face looks: `newmtl`, `Kd` and `map_Kd`.
 //!
-//! tobj reads these files too, but panics on a `Kd` of fewer than three numbers, gives up a whole library for
-//! one malformed line of no interest, tells no lines, and takes the options of `map_Kd` for a part of the
-//! file's name (`tobj_gives_a_library_up`). Every line would have to be written anew for it, and read again
-//! behind it.
+//! tobj reads these files too. But it panics on a `Kd` of fewer than three numbers, gives up a whole library
+//! because of one malformed line of no interest, reports no lines, and takes the options of `map_Kd` for a
+//! part of the file name (`tobj_gives_a_library_up`). Every line would have to be rewritten before tobj and
+//! read again after it.
 
 use crate::fs::quote::quote;
 use crate::fs::text::words;
 use crate::mesh::obj::lines::{Line, after, logical_lines, parse_f32, text, without_comment};
 use s3d_geom::{DEFAULT_COLOR, Wrap};
 
-/// Starts a comment that tells our own reader how the next texture goes on beyond its edges, where MTL files
-/// cannot say it, or do not for the sake of other readers.
+/// The start of a comment that tells our own reader how the next texture continues beyond its edges. It is
+/// written where MTL files cannot say so, and where the MTL option is left out for other readers.
 pub(crate) const WRAP_COMMENT: &str = "# s3d wrap";
 
-/// The word for a wrap in such a comment.
+/// Returns the word for a wrap in such a comment.
 pub(crate) const fn wrap_name(wrap: Wrap) -> &'static str {
     match wrap {
         Wrap::Repeat => "repeat",
@@ -24,7 +23,7 @@ pub(crate) const fn wrap_name(wrap: Wrap) -> &'static str {
     }
 }
 
-/// A material as its library describes it.
+/// A material, as its library describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MtlMaterial {
     pub(crate) name: String,
@@ -33,21 +32,22 @@ pub(crate) struct MtlMaterial {
     pub(crate) map: Option<MtlMap>,
 }
 
-/// What `map_Kd` says.
+/// The texture that `map_Kd` names.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MtlMap {
-    /// The image's name as written.
+    /// The name of the image, as written.
     pub(crate) file: String,
     pub(crate) wrap: [Wrap; 2],
     pub(crate) line: u64,
 }
 
-/// The materials of a library in its order, and warnings, each starting with its line.
+/// Returns the materials of a library in its order, and warnings, each with its line.
 pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
     let mut materials: Vec<MtlMaterial> = Vec::new();
     let mut warnings = Vec::new();
-    // What a comment of ours says of the texture to come.
+    // What our comment says of the next texture.
     let mut wrap = None;
+
     for Line { number, text: line, .. } in logical_lines(bytes) {
         let line = &*line;
         let Some(keyword) = words(line).next() else { continue };
@@ -60,6 +60,8 @@ pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
             wrap = parse_wrap(words);
             continue;
         }
+
+        // Statements before the first `newmtl` belong to no material.
         let Some(material) = materials.last_mut() else { continue };
         if keyword == b"Kd" {
             match parse_color(rest) {
@@ -83,22 +85,24 @@ pub(crate) fn parse_mtl(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
     (materials, warnings)
 }
 
-/// Two words, for u and v.
+/// Reads two words, for u and v.
 fn parse_wrap(rest: &[u8]) -> Option<[Wrap; 2]> {
-    let wrap = |word: &[u8]| {
-        [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp]
-            .into_iter()
-            .find(|w| wrap_name(*w).as_bytes() == word)
-    };
     let mut words = words(rest);
-    Some([wrap(words.next()?)?, wrap(words.next()?)?])
+    let u = wrap_of_name(words.next()?)?;
+    let v = wrap_of_name(words.next()?)?;
+    Some([u, v])
 }
 
-/// Up to three numbers from 0 to 1; one stands for all three. `None` if it is something else, such as `Kd
-/// spectral …`.
+fn wrap_of_name(word: &[u8]) -> Option<Wrap> {
+    [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp]
+        .into_iter()
+        .find(|wrap| wrap_name(*wrap).as_bytes() == word)
+}
+
+/// Reads up to three numbers from 0 to 1; one number stands for all three. Returns `None` for anything else,
+/// such as `Kd spectral …`.
 fn parse_color(rest: &[u8]) -> Option<[u8; 3]> {
     let values: Option<Vec<f32>> = words(without_comment(rest)).take(3).map(parse_f32).collect();
-    let to_byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
     match values?.as_slice() {
         [r, g, b] => Some([r, g, b].map(|&v| to_byte(v))),
         [gray] => Some([to_byte(*gray); 3]),
@@ -106,8 +110,12 @@ fn parse_color(rest: &[u8]) -> Option<[u8; 3]> {
     }
 }
 
-/// Takes the options from the front of a `map_Kd` line; the rest is the file's name, spaces included. Beside
-/// it the first option that moves or scales the image, which is not applied.
+fn to_byte(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+/// Takes the options off the front of a `map_Kd` line. The rest is the name of the file, spaces included.
+/// Also returns the first option that moves or scales the image, which is not applied.
 fn parse_map(mut rest: &[u8], line: u64) -> (Option<MtlMap>, Option<&[u8]>) {
     let mut wrap = Wrap::Repeat;
     let mut ignored = None;
@@ -120,6 +128,7 @@ fn parse_map(mut rest: &[u8], line: u64) -> (Option<MtlMap>, Option<&[u8]>) {
             | b"-type" | b"-colorspace" => (1, 1),
             _ => break,
         };
+
         let mut behind = after(rest, option).trim_ascii_start();
         let mut values = Vec::new();
         while values.len() < most {
@@ -130,6 +139,7 @@ fn parse_map(mut rest: &[u8], line: u64) -> (Option<MtlMap>, Option<&[u8]>) {
             values.push(word);
             behind = after(behind, word).trim_ascii_start();
         }
+
         let neutral = if option == b"-s" { 1.0 } else { 0.0 };
         match option {
             b"-clamp" if values.first() == Some(&&b"on"[..]) => wrap = Wrap::Clamp,
@@ -140,6 +150,8 @@ fn parse_map(mut rest: &[u8], line: u64) -> (Option<MtlMap>, Option<&[u8]>) {
         }
         rest = behind;
     }
+
+    // Some programs put the name into quotes.
     let name = rest
         .strip_prefix(b"\"")
         .and_then(|r| r.strip_suffix(b"\""))

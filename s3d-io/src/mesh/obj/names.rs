@@ -1,8 +1,8 @@
-//! Names of textures and materials that every reader and system takes.
+//! Cleans names of textures and materials, so that every reader and system takes them.
 
 use crate::fs::names::portable_file_name;
 
-/// A [`portable_file_name`] without "rgb", which loaders replace in paths.
+/// Returns a [`portable_file_name`] without "rgb", which loaders replace in paths.
 pub(crate) fn clean_file_name(name: &str) -> String {
     let mut name = name.to_owned();
     while let Some(at) = name.to_ascii_lowercase().find("rgb") {
@@ -13,7 +13,7 @@ pub(crate) fn clean_file_name(name: &str) -> String {
         .unwrap_or_else(|| "texture".into())
 }
 
-/// A material name without white space, which ends it in many readers.
+/// Returns a material name without white space, at which many readers end a name.
 pub(crate) fn clean_material_name(name: &str) -> String {
     let clean: String = name
         .chars()

@@ -1,18 +1,17 @@
-//! OBJ text as tobj 4 reads it right.
+//! Rewrites OBJ text so that tobj 4 reads it right.
 //!
-//! What is plain goes to tobj as it stands in the file; these are left out or written anew, each with its
-//! test:
-//! * `o`, `g` and `usemtl` start new models, which have their own vertices: here a mesh keeps the file's
-//!   (`vertices_and_faces_keep_the_files_order`, `polygons_are_cut_with_their_attributes`);
-//! * `l` with three points becomes a triangle, `f` with fewer than three corners stays
+//! Plain statements go to tobj unchanged. These are left out or rewritten, each with its test:
+//! * `o`, `g` and `usemtl` start new models in tobj, each with its own vertices; our mesh keeps the vertices
+//!   of the file (`vertices_and_faces_keep_the_files_order`, `polygons_are_cut_with_their_attributes`);
+//! * `l` with three points becomes a triangle, and `f` with fewer than three corners stays
 //!   (`what_is_left_out_is_told`);
-//! * a corner without a texture coordinate or normal gets the one before (`dialects_become_plain`), and so
-//!   does one whose index is 0 or too far from the end, or overflows (`every_fault_has_its_line`);
-//! * lines that go on on the next, comments behind numbers, a `vt` of one number, a colour with alpha, lines
-//!   that end in CR alone and a mark of UTF-8 are refused (`dialects_become_plain`,
-//!   `obj_files_of_every_dialect`);
-//! * bytes that are no UTF-8, in comments and names too, are refused (`names_need_not_be_utf_8`);
-//! * colours of some vertices go to the first (`vertex_colours_of_both_scales_and_of_some_vertices`).
+//! * a corner without a texture coordinate or normal takes the previous corner's (`dialects_become_plain`),
+//!   and so does a corner whose index is 0, out of range or too large (`every_fault_has_its_line`);
+//! * continued lines, comments after numbers, a `vt` of one number, a colour with alpha, lines that end in CR
+//!   alone and a UTF-8 byte order mark are refused (`dialects_become_plain`, `obj_files_of_every_dialect`);
+//! * bytes that are not UTF-8 are refused, even in comments and names (`names_need_not_be_utf_8`);
+//! * if only some vertices have colours, they go to the first vertices
+//!   (`vertex_colours_of_both_scales_and_of_some_vertices`).
 
 use crate::mesh::obj::lines::{logical_lines, next_word, text};
 use crate::mesh::obj::statement;
@@ -22,10 +21,10 @@ use std::collections::HashMap;
 use std::io::{BufRead, Read};
 use std::ops::Range;
 
-/// What faces are beyond their corners.
+/// What faces have beside their corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FaceKind {
-    /// Into [`ObjNames::materials`], or [`NO_INDEX`].
+    /// An index into [`ObjNames::materials`], or [`NO_INDEX`].
     pub(crate) material: u32,
     /// Whether every corner has a texture coordinate.
     pub(crate) has_uv: bool,
@@ -36,33 +35,33 @@ pub(crate) struct FaceKind {
 /// The names in an OBJ file.
 #[derive(Debug, Default)]
 pub(crate) struct ObjNames {
-    /// Those that `usemtl` gives, in the order of their first use.
+    /// The names of `usemtl`, in the order of their first use.
     pub(crate) materials: Vec<String>,
     /// The lines and names of `mtllib`.
     pub(crate) libraries: Vec<(u64, String)>,
 }
 
-/// An OBJ file for tobj, and what tobj does not tell of it.
+/// An OBJ file for tobj, with everything that tobj does not report.
 #[derive(Debug, Default)]
 pub(crate) struct NormalObj<'a> {
     bytes: &'a [u8],
-    /// What tobj is to read, in order: of the file, or of `rewritten`.
+    /// What tobj reads, in order: ranges of the file or of `rewritten`.
     pieces: Vec<Piece>,
     rewritten: Vec<u8>,
     /// How many values the columns `v`, `vt` and `vn` have.
     pub(crate) counts: [u64; 3],
-    /// Whether corners have indices into them.
+    /// Whether any corner has an index into them.
     used: [bool; 3],
-    /// How many vertices have a colour. If only some have, it is not finite for the others.
+    /// How many vertices have a colour. If only some have one, the others get a colour that is not finite.
     pub(crate) colored: u64,
-    /// Faces with three corners or more.
+    /// The number of faces with three or more corners.
     pub(crate) faces: usize,
-    /// What faces are, from the one of this number on.
+    /// The kind of all faces from this number on, up to the next entry.
     pub(crate) kinds: Vec<(usize, FaceKind)>,
     pub(crate) names: ObjNames,
-    /// Lines of `f` elements with fewer than three corners.
+    /// The lines of `f` elements with fewer than three corners.
     pub(crate) short_faces: Vec<u64>,
-    /// Number of `p` and `l` elements.
+    /// The number of `p` and `l` elements.
     pub(crate) points_and_lines: usize,
 }
 
@@ -72,17 +71,18 @@ enum Piece {
     Rewritten(Range<usize>),
 }
 
-/// A line that tobj is to read: as it stands, or anew.
+/// A line for tobj: rewritten, or `None` if it stays as it is.
 type Line = Option<String>;
 
 impl<'a> NormalObj<'a> {
-    /// `None` if a statement has a fault. Others are found by tobj.
+    /// Returns `None` if a statement has a fault. tobj finds other faults.
     pub(crate) fn new(bytes: &'a [u8]) -> Option<Self> {
         let obj = Self::scan(bytes, false)?;
-        // tobj passes over indices into a column that is empty.
+        // tobj does not check indices into an empty column.
         if obj.used.iter().zip(obj.counts).any(|(used, count)| *used && count == 0) {
             return None;
         }
+
         let every_or_none = obj.colored == 0 || obj.colored == obj.counts[0];
         if every_or_none {
             Some(obj)
@@ -91,11 +91,13 @@ impl<'a> NormalObj<'a> {
         }
     }
 
-    /// Vertices without a colour get one that is not finite if `fill_colors`.
+    /// Scans all statements. Vertices without a colour get one that is not finite if `fill_colors` is set.
     fn scan(bytes: &'a [u8], fill_colors: bool) -> Option<Self> {
         let mut obj = Self { bytes, ..Self::default() };
+
         let mut materials: HashMap<String, u32> = HashMap::new();
         let mut material = NO_INDEX;
+
         for line in logical_lines(bytes) {
             let (keyword, rest) = line.keyword();
             let read = match keyword {
@@ -126,10 +128,10 @@ impl<'a> NormalObj<'a> {
                     obj.points_and_lines += 1;
                     continue;
                 }
-                // Objects, groups, smoothing and curves say nothing about faces; comments and unknown words
-                // neither.
+                // Objects, groups, smoothing, curves, comments and unknown words say nothing about faces.
                 _ => continue,
             };
+
             match (read, line.text) {
                 (None, Cow::Borrowed(_)) => obj.keep(line.place),
                 (None, Cow::Owned(joined)) => obj.rewrite(&joined),
@@ -139,6 +141,7 @@ impl<'a> NormalObj<'a> {
         Some(obj)
     }
 
+    /// Hands a range of the file to tobj.
     fn keep(&mut self, place: Range<usize>) {
         match self.pieces.last_mut() {
             Some(Piece::File(last)) if last.end == place.start => last.end = place.end,
@@ -146,6 +149,7 @@ impl<'a> NormalObj<'a> {
         }
     }
 
+    /// Hands a rewritten line to tobj.
     fn rewrite(&mut self, line: &[u8]) {
         let start = self.rewritten.len();
         self.rewritten.extend_from_slice(line);
@@ -164,6 +168,7 @@ impl<'a> NormalObj<'a> {
             self.colored += u64::from(plain == Some(6));
             return Some(None);
         }
+
         let (p, color) = statement::vertex(rest).ok()?;
         self.colored += u64::from(color.is_some());
         let color = match color.or_else(|| fill_colors.then_some([f32::NAN; 3])) {
@@ -191,7 +196,7 @@ impl<'a> NormalObj<'a> {
         Some(Some(format!("vn {x} {y} {z}")))
     }
 
-    /// `Some(None)` for a face of fewer than three corners.
+    /// Returns `Some(None)` for a face of fewer than three corners.
     fn face(&mut self, rest: &[u8], material: u32) -> Option<Option<Line>> {
         let (corners, line) = match Corners::plain(rest) {
             Some(corners) => (corners, None),
@@ -200,6 +205,7 @@ impl<'a> NormalObj<'a> {
         if corners.n < 3 {
             return Some(None);
         }
+
         for (used, has) in self.used.iter_mut().zip(corners.any_has) {
             *used |= has;
         }
@@ -212,13 +218,13 @@ impl<'a> NormalObj<'a> {
         Some(Some(line))
     }
 
-    /// A face of corners that are written in any way, and plainly.
+    /// Reads corners in any notation, and rewrites them plainly.
     fn any_face(&self, mut rest: &[u8]) -> Option<(Corners, Line)> {
         let mut line = String::from("f");
         while let Some(word) = next_word(&mut rest) {
             let [v, vt, vn] = statement::corner(word, self.counts).ok()?;
-            let part = |index: u64| if index == 0 { String::new() } else { index.to_string() };
-            line += &format!(" {v}/{}/{}", part(vt), part(vn));
+            let [vt, vn] = [vt, vn].map(|index| if index == 0 { String::new() } else { index.to_string() });
+            line += &format!(" {v}/{}/{}", vt, vn);
         }
         let corners = line
             .strip_prefix('f')
@@ -226,26 +232,27 @@ impl<'a> NormalObj<'a> {
         Some((corners, Some(line)))
     }
 
-    /// What tobj is to read. In front of it are faces that hold all vertices in their order, as tobj numbers
-    /// them by their first use, with the first of the other columns: [`Self::vertex_faces`] many.
+    /// Returns the text for tobj. tobj numbers vertices by their first use, so the text begins with
+    /// [`Self::vertex_faces`] faces that use all vertices in order.
     pub(crate) fn reader(&self) -> impl BufRead {
-        // Corners without an index get the one before.
+        // A corner without further indices takes the previous corner's: here the first of each column.
         let mut vertex_faces = String::from("f 1/1/1");
         for vertex in 2..=self.counts[0] {
             vertex_faces += if vertex % 4 == 1 { "\nf " } else { " " };
             vertex_faces += &vertex.to_string();
         }
         vertex_faces.push('\n');
+
         std::io::Cursor::new(vertex_faces).chain(Pieces { obj: self, next: 0, rest: &[] })
     }
 
-    /// How many faces come before the file's in what tobj reads.
+    /// Returns how many such faces come before the faces of the file.
     pub(crate) fn vertex_faces(&self) -> usize {
         self.counts[0].div_ceil(4).max(1) as usize
     }
 }
 
-/// The pieces of an OBJ file as one text.
+/// The pieces of an OBJ file, read as one text.
 struct Pieces<'a> {
     obj: &'a NormalObj<'a>,
     next: usize,
@@ -283,19 +290,24 @@ impl Read for Pieces<'_> {
 /// The corners of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Corners {
+    /// How many corners there are.
     n: usize,
-    /// Whether each, and whether any has a vertex, a texture coordinate, a normal.
+    /// Whether every corner has a vertex, a texture coordinate, a normal.
     all_have: [bool; 3],
+    /// Whether any corner has one.
     any_has: [bool; 3],
 }
 
 impl Corners {
-    /// Those of an `f` line without its keyword, if each has a vertex, and tobj reads them right: digits and
-    /// slashes, no index 0 or larger than tobj can multiply.
+    /// Reads an `f` line without its keyword, if tobj reads it right: digits and slashes, a vertex at each
+    /// corner, no index that is 0 or too large for tobj's arithmetic.
     fn plain(rest: &[u8]) -> Option<Self> {
         let mut corners = Self { n: 0, all_have: [true; 3], any_has: [false; 3] };
-        // Of the corner so far: which indices it has, which one comes, and how many digits that has.
-        let (mut has, mut part, mut digits) = ([false; 3], 0, 0);
+        // For the current corner: which indices it has, which one is being read, and its digits so far.
+        let mut has = [false; 3];
+        let mut part = 0;
+        let mut digits = 0;
+
         for &byte in rest.iter().chain(b" ") {
             match byte {
                 b'0' if digits == 0 => return None,
@@ -303,7 +315,10 @@ impl Corners {
                     digits += 1;
                     *has.get_mut(part)? = true;
                 }
-                b'/' => (part, digits) = (part + 1, 0),
+                b'/' => {
+                    part += 1;
+                    digits = 0;
+                }
                 b' ' | b'\t' if digits > 0 || part > 0 => {
                     if !has[0] || part > 2 {
                         return None;
@@ -313,19 +328,23 @@ impl Corners {
                         *all &= has;
                         *any |= has;
                     }
-                    (has, part, digits) = ([false; 3], 0, 0);
+                    has = [false; 3];
+                    part = 0;
+                    digits = 0;
                 }
                 b' ' | b'\t' => {}
                 _ => return None,
             }
         }
+
         Some(corners)
     }
 }
 
-/// How many words the rest of a line has, if they are made of what decimal numbers are.
+/// Counts the words of the rest of a line. Returns `None` if any byte does not belong to a decimal number.
 fn plain_numbers(rest: &[u8]) -> Option<usize> {
-    let (mut words, mut in_word) = (0, false);
+    let mut words = 0;
+    let mut in_word = false;
     for &byte in rest {
         match byte {
             b'0'..=b'9' | b'.' | b'-' | b'+' | b'e' | b'E' => {
@@ -343,7 +362,7 @@ fn plain_numbers(rest: &[u8]) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// What tobj is to read of a file, without the faces in front, and what it is not told.
+    /// Returns what tobj reads of a file, without the faces in front, and the rest of what was found.
     fn normal(text: &str) -> Option<(String, NormalObj<'_>)> {
         let obj = NormalObj::new(text.as_bytes())?;
         let mut all = String::new();
@@ -375,6 +394,7 @@ mod tests {
         let expected = "v 0 0 0\nv 1 0 0\nv\t0 1 0\nvt 0.5 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n\
                         f 1//1 2//1 3//1\nf 1/1/ 2// 3//\n";
         assert_eq!(rest, expected);
+
         let kind = |material, has_uv, has_normal| FaceKind { material, has_uv, has_normal };
         assert_eq!(
             obj.kinds,

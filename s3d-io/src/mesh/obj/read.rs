@@ -1,7 +1,8 @@
-//! Wavefront OBJ with its material libraries.
+//! Reads Wavefront OBJ with its material libraries.
 //!
-//! tobj reads it. [`NormalObj`] hands it what it reads right, [`crate::mesh::obj::diagnose`] finds the line
-//! of a fault, [`ObjLooks`] the libraries and images; here the parts become a mesh.
+//! tobj is the parser. [`NormalObj`] rewrites the text so that tobj reads it right,
+//! [`crate::mesh::obj::diagnose`] finds the line of a fault, and [`ObjLooks`] reads the libraries and images.
+//! This module makes a mesh of the parts.
 
 use crate::error::{Error, Result};
 use crate::fs::encoding::into_utf8;
@@ -20,14 +21,15 @@ use std::path::Path;
 
 /// Reads an OBJ file, the libraries that it names and their `map_Kd` images.
 ///
-/// Vertices keep the file's order and number; faces its order.
+/// Vertices and faces keep the file's order, and vertices their number.
 ///
 /// # Errors
-/// As [`crate::mesh::read_mesh`].
+/// Like [`crate::mesh::read_mesh_with`].
 pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let mut bytes = into_utf8(bytes);
     end_lines_in_lf(&mut bytes);
     refuse_other_files(path, &bytes)?;
+
     let obj = NormalObj::new(&bytes).ok_or_else(|| fault(path, &bytes, "it is damaged"))?;
     if obj.faces == 0 {
         return Err(Error::format(path, no_faces(&obj)));
@@ -38,36 +40,33 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
             "has more vertices than 32 bits count; cut the scan into parts",
         ));
     }
-    // Decoding images takes as long as all else, and needs nothing of it but names.
-    let (mut warnings, mut remarks) = (Vec::new(), Vec::new());
+
+    // Decoding images takes as long as everything else, and needs only their names.
+    let mut warnings = Vec::new();
+    let mut remarks = Vec::new();
     let (geometry, looks) = rayon::join(
         || Columns::read(&obj).map_err(|e| fault(path, &bytes, &e.to_string())),
         || ObjLooks::load(path, &obj.names, &mut remarks),
     );
-    let (mut columns, looks) = (geometry?, looks?);
+    let mut columns = geometry?;
+    let looks = looks?;
+
     let unit_said = unit_in_comments(&bytes);
     warnings.extend(unit_said.filter(|_| options.units.is_none()).and_then(told));
     let frame = FileFrame::new(options.origin, options.units.or(unit_said).unwrap_or_default());
     let offset_m = columns.bring_near(&bytes, up, frame);
+
     let faces = Triangles::new(&obj, &columns)
         .map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
     let polygons_triangulated = faces.polygons;
-    let refused = faces
-        .refused
-        .map(|(face, why, n)| (face_line(&bytes, face).unwrap_or(0), why, n));
-    if faces.triangles.is_empty() {
-        let reason = refused.map_or_else(String::new, |(line, why, _)| format!(", as on line {line}: {why}"));
-        return Err(Error::format(path, format!("has no face that can be used{reason}")));
-    }
-    if let Some((line, why, n)) = refused {
-        warnings.push(format!("{} left out: the first, on line {line}, {why}", count(n, "polygon")));
-    }
+    tell_refused(path, &bytes, &faces, &mut warnings)?;
     if let Some(first) = obj.short_faces.first() {
         let n = count(obj.short_faces.len(), "face");
         warnings.push(format!("{n} with fewer than three corners left out, the first on line {first}"));
     }
     let colors = vertex_colors(&columns.colors, &mut warnings);
     warnings.append(&mut remarks);
+
     let parts = MeshParts {
         positions: columns.positions.into_iter().map(|p| up.world_from_file(p)).collect(),
         faces: faces.triangles,
@@ -89,12 +88,12 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         MeshError::NonFinite { vertex, position } => vertex_error(path, &bytes, vertex, position),
         source => Error::Mesh { path: path.to_owned(), source },
     })?;
-    let (texture_files, companions) = (looks.files, looks.companions);
+
     Ok(MeshFile {
         unit_said,
-        texture_files,
+        texture_files: looks.files,
         warnings,
-        companions,
+        companions: looks.companions,
         offset_m,
         polygons_triangulated,
         ..MeshFile::new(path, mesh)
@@ -104,6 +103,25 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
 fn refuse_other_files(path: &Path, bytes: &[u8]) -> Result<()> {
     if bytes.iter().take(4096).any(|b| *b == 0) {
         return Err(Error::format(path, "is binary; a Wavefront OBJ file is text"));
+    }
+    Ok(())
+}
+
+/// Warns of polygons that cannot be cut.
+///
+/// # Errors
+/// [`Error::Format`] if no face is left.
+fn tell_refused(path: &Path, bytes: &[u8], faces: &Triangles, warnings: &mut Vec<String>) -> Result<()> {
+    let refused = faces
+        .refused
+        .as_ref()
+        .map(|(face, why, n)| (face_line(bytes, *face).unwrap_or(0), why, *n));
+    if faces.triangles.is_empty() {
+        let reason = refused.map_or_else(String::new, |(line, why, _)| format!(", as on line {line}: {why}"));
+        return Err(Error::format(path, format!("has no face that can be used{reason}")));
+    }
+    if let Some((line, why, n)) = refused {
+        warnings.push(format!("{} left out: the first, on line {line}, {why}", count(n, "polygon")));
     }
     Ok(())
 }
@@ -119,19 +137,19 @@ fn no_faces(obj: &NormalObj<'_>) -> String {
     message + "; a mesh is needed"
 }
 
-/// What tobj reads of a file, in the file's axes.
+/// The columns that tobj reads from a file, in the file's axes.
 struct Columns {
     positions: Vec<Vec3>,
-    /// As written, and not finite for vertices without; empty if none has one.
+    /// As written; not finite for a vertex without a colour. Empty if no vertex has one.
     colors: Vec<[f32; 3]>,
-    /// The first of the file and those that corners use, in the order of their first use.
+    /// The first texture coordinate of the file, then all that corners use, in the order of their first use.
     uvs: Vec<Vec2>,
-    /// Likewise, of any length.
+    /// Likewise; of any length.
     normals: Vec<Vec3>,
-    /// The indices of all faces' corners into positions, texture coordinates and normals, the last two empty
-    /// if the file has none.
+    /// For each corner of each face its index into positions, texture coordinates and normals. Each of the
+    /// last two is empty if the file has none.
     corners: [Vec<u32>; 3],
-    /// How many corners the faces have; empty if all have three.
+    /// The number of corners of each face. Empty if every face has three.
     arities: Vec<u32>,
 }
 
@@ -140,12 +158,9 @@ impl Columns {
         let no_library = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
         let (models, _) = tobj::load_obj_buf(&mut obj.reader(), &tobj::LoadOptions::default(), no_library)?;
         let mesh = models.into_iter().next().ok_or(tobj::LoadError::GenericFailure)?.mesh;
-        // The faces in front hold each vertex once.
-        let (vertices, faces) = (obj.counts[0] as usize, obj.vertex_faces());
-        let behind = |mut column: Vec<u32>, n: usize| {
-            column.drain(..column.len().min(n));
-            column
-        };
+
+        // The faces in front use each vertex once.
+        let vertices = obj.counts[0] as usize;
         let corners = [mesh.indices, mesh.texcoord_indices, mesh.normal_indices];
         let columns = Self {
             positions: triples(&mesh.positions).map(Vec3::from_array).collect(),
@@ -158,11 +173,12 @@ impl Columns {
                 .map(|uv| Vec2::from_array(*uv))
                 .collect(),
             normals: triples(&mesh.normals).map(Vec3::from_array).collect(),
-            corners: corners.map(|column| behind(column, vertices)),
-            arities: behind(mesh.face_arities, faces),
+            corners: corners.map(|column| without_first(column, vertices)),
+            arities: without_first(mesh.face_arities, obj.vertex_faces()),
         };
+
+        // tobj passes over colours that are no numbers, and reads some that are too large for a number.
         let expected = if obj.colored > 0 { vertices } else { 0 };
-        // tobj passes over colours that are no numbers, and reads some that are too large for one.
         if columns.colors.len() != expected {
             return Err(tobj::LoadError::ColorParseError);
         }
@@ -177,11 +193,10 @@ impl Columns {
             Ok(columns)
         }
     }
-}
 
-impl Columns {
-    /// Brings the vertices near the origin, if they are to be; their positions are read again for it, in
-    /// `f64`, which tobj does not give. Returns what was subtracted, in the world's axes.
+    /// Moves the vertices near the origin, if `frame` asks for it. Their positions are read again for this,
+    /// in `f64`, which tobj does not give. Returns the offset that was subtracted, in metres in the world's
+    /// axes.
     fn bring_near(&mut self, bytes: &[u8], up: UpAxis, frame: FileFrame) -> DVec3 {
         if !frame.needs_exact(largest(&self.positions)) {
             return DVec3::ZERO;
@@ -191,10 +206,11 @@ impl Columns {
         if offset_m == DVec3::ZERO {
             return offset_m;
         }
+
         let statements = logical_lines(bytes).filter(|line| line.keyword().0 == b"v");
         for (position, line) in self.positions.iter_mut().zip(statements) {
             let exact = exact_vertex(line.keyword().1).unwrap_or(position.as_dvec3());
-            // In the world's axes, in which a difference of 0 has no sign.
+            // The subtraction happens in the world's axes, where a difference of 0 has no sign.
             let near = up.exact_world_from_file(exact) - frame.in_units(offset_m);
             *position = up.exact_file_from_world(near).as_vec3();
         }
@@ -202,7 +218,12 @@ impl Columns {
     }
 }
 
-/// The unit that a comment in the head of the file tells, as in `# File units = inches`.
+fn without_first(mut column: Vec<u32>, n: usize) -> Vec<u32> {
+    column.drain(..column.len().min(n));
+    column
+}
+
+/// Returns the unit that a comment in the head of the file names, such as `# File units = inches`.
 fn unit_in_comments(bytes: &[u8]) -> Option<LengthUnit> {
     let head = bytes
         .split(|b| *b == b'\n')
@@ -215,10 +236,12 @@ fn unit_in_comments(bytes: &[u8]) -> Option<LengthUnit> {
     .next()
 }
 
-/// What is said of a unit that is none of ours.
+/// Says that a comment names another unit than metres.
 fn told(unit: LengthUnit) -> Option<String> {
     (unit != LengthUnit::Metre).then(|| {
-        format!("a comment says that its unit is {unit}: positions are taken to metres (units says another)")
+        format!(
+            "a comment says that its unit is {unit}: positions are converted to metres (set units for another unit)"
+        )
     })
 }
 
@@ -226,21 +249,21 @@ fn triples(flat: &[f32]) -> impl Iterator<Item = [f32; 3]> {
     flat.as_chunks().0.iter().copied()
 }
 
-/// The faces of a file, polygons cut into triangles.
+/// The faces of a file, with polygons cut into triangles.
 #[derive(Default)]
 struct Triangles {
     triangles: Vec<[u32; 3]>,
     uvs: Vec<[u32; 3]>,
     normals: Vec<[u32; 3]>,
     materials: Vec<u32>,
-    /// Polygons that were cut.
+    /// How many polygons were cut.
     polygons: usize,
-    /// Polygons that cannot be cut: number, from 0, and reason of the first, and how many.
+    /// The polygons that cannot be cut: number of the first, from 0, its reason, and how many there are.
     refused: Option<(usize, String, usize)>,
 }
 
 impl Triangles {
-    /// A vertex of a polygon that is not finite is the error.
+    /// Cuts all polygons. The error is a polygon's vertex that is not finite, with its position.
     #[expect(
         clippy::indexing_slicing,
         reason = "tobj checked indices and counted corners; cuts index their polygon; a face is of the first \
@@ -249,7 +272,9 @@ impl Triangles {
     fn new(obj: &NormalObj<'_>, columns: &Columns) -> std::result::Result<Self, (u32, Vec3)> {
         let mut out = Self::default();
         let [vertices, uvs, normals] = &columns.corners;
-        let (mut start, mut kind) = (0, 0);
+        let mut start = 0;
+        let mut kind = 0;
+
         for face in 0..obj.faces {
             if obj.kinds.get(kind + 1).is_some_and(|(first, _)| *first == face) {
                 kind += 1;
@@ -259,6 +284,7 @@ impl Triangles {
             let corners = start..start + n;
             start += n;
             let polygon = &vertices[corners.clone()];
+
             let cut = if n == 3 {
                 Cow::Borrowed(&[[0, 1, 2]][..])
             } else {
@@ -277,6 +303,7 @@ impl Triangles {
                     }
                 }
             };
+
             let uvs = of_face.has_uv.then(|| &uvs[corners.clone()]);
             let normals = of_face.has_normal.then(|| &normals[corners]);
             for triangle in cut.iter() {
@@ -287,6 +314,7 @@ impl Triangles {
                 out.materials.push(of_face.material);
             }
         }
+
         for column in [&mut out.uvs, &mut out.normals] {
             if column.iter().all(|c| *c == [NO_INDEX; 3]) {
                 column.clear();
@@ -299,11 +327,12 @@ impl Triangles {
     }
 }
 
-/// One colour a vertex if any has one. Files write them from 0 to 1, some from 0 to 255: the largest tells,
-/// with room for what is a little too bright.
+/// Returns the colours of all vertices if any has one. Files write colours from 0 to 1, and some from 0 to
+/// 255. The largest number tells the scale, with room for colours that are a little too bright.
 fn vertex_colors(written: &[[f32; 3]], warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
-    // The largest is a number unless there is none.
+    // The largest is a number, unless no colour is.
     let largest = written.iter().flatten().fold(0.0f32, |a, &b| a.max(b));
+
     let scale = if largest > 2.0 { 1.0 } else { 255.0 };
     let mut without = 0;
     let colors = written.iter().map(|color| {
@@ -332,7 +361,7 @@ mod tests {
     use s3d_geom::glam::vec3;
     use std::fs;
 
-    /// Reads `obj`, Z up.
+    /// Reads `obj`, Z-up.
     fn read_obj(obj: &str) -> Result<MeshFile> {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.obj");
@@ -346,7 +375,7 @@ mod tests {
     fn vertices_and_faces_keep_the_files_order() {
         let obj = format!("v 9 9 9\n{SQUARE}v 1 0 0\no x\nf 5 4 3\ng y\nf 4 2 3\nf 2 6 5\n");
         let file = read_obj(&obj).unwrap();
-        // The first vertex is in no face, the last has the place of the third: both stay.
+        // The first vertex is in no face, and the last has the position of the third. Both stay.
         assert_eq!(file.mesh.positions().len(), 6);
         assert_eq!(file.mesh.positions()[0], vec3(9.0, 9.0, 9.0));
         assert_eq!(file.mesh.faces(), [[4, 3, 2], [3, 1, 2], [1, 5, 4]]);
@@ -375,13 +404,14 @@ mod tests {
 
     #[test]
     fn polygons_are_cut_with_their_attributes() {
-        // An L, concave at its fourth corner, then a square that repeats its outline, then a triangle.
+        // An L, concave at its fourth corner. Then a polygon that crosses itself, then a triangle.
         let obj = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nvt 0 0\nvt 2 0\nvt 2 1\nvt 1 1\n\
                    vt 1 2\nvt 0 2\n\
             usemtl l\nf 1/1 2/2 3/3 4/4 5/5 6/6\nusemtl bad\nf 1 4 2 3 1 4\nusemtl t\nf 1/1 2/2 3/3\n";
         let file = read_obj(obj).unwrap();
         assert_eq!((file.polygons_triangulated, file.mesh.faces().len()), (1, 5));
         assert_eq!(file.mesh.total_area(), 3.0 + 1.0);
+
         for face in 0..5 {
             let corners = file.mesh.triangle(face).map(|p| p.truncate());
             assert_eq!(
@@ -443,7 +473,7 @@ mod tests {
             let message = read_obj(obj).unwrap_err().to_string();
             assert!(message.contains(words), "{message}");
         }
-        // A vertex that no face uses may be anything but malformed.
+        // A vertex that no face uses may have any number that is well-formed.
         assert!(read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan nan nan\nf 1 2 3\n").is_ok());
         assert!(
             read_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan 0\nf 1/1 2/1 3/1\n")
@@ -484,7 +514,7 @@ mod tests {
         obj.extend(std::iter::repeat_n('x', 5_000_000));
         obj.push('\n');
         for i in 0..n {
-            // A saw of n corners along a line, closed by its first and last corner.
+            // A saw of n corners along a line, closed by its first and last corners.
             obj += &format!("v {i} {} 0\n", if i % (n - 1) == 0 { 0 } else { 1 + i % 2 });
         }
         obj.push('f');
@@ -502,7 +532,7 @@ mod tests {
             "2//1", "1/", "//", "1.5", "nan", "inf", "1e99",
             "-9223372036854775808", "9223372036854775807", "4294967296", "x", "\u{e4}", "0.5", "\r",
         ]), 0..60)) {
-            // Whatever tobj refuses has a line.
+            // Any fault that tobj refuses has a line.
             if let Err(e) = read_obj(&words.join(" ")) {
                 prop_assert!(!e.to_string().contains("cannot be read"), "{e}");
             }

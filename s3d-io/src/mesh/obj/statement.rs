@@ -1,5 +1,5 @@
-//! One statement of an OBJ file, read strictly: what [`crate::mesh::obj::normal`] rewrites and
-//! [`crate::mesh::obj::diagnose`] looks for.
+//! Reads one statement of an OBJ file, strictly. [`crate::mesh::obj::normal`] rewrites what this reads,
+//! [`crate::mesh::obj::diagnose`] looks for what this refuses.
 
 use crate::fs::quote::quote;
 use crate::fs::text::number;
@@ -9,13 +9,13 @@ use s3d_geom::glam::{DVec3, Vec3};
 /// What is wrong with a statement.
 pub(crate) type Why = String;
 
-/// The columns that a corner of a face points into.
+/// The columns that the corners of a face index.
 const COLUMNS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
-/// A position, divided by its weight, and its colour as written, of a `v` line without its keyword.
+/// Reads a `v` line without its keyword: the position, divided by its weight, and the colour as written.
 pub(crate) fn vertex(mut rest: &[u8]) -> Result<(Vec3, Option<[f32; 3]>), Why> {
     let words: Vec<&[u8]> = std::iter::from_fn(|| next_word(&mut rest)).take(8).collect();
-    // A seventh is the colour's alpha.
+    // A seventh number is the alpha of the colour.
     let (position, weight, color) = match words[..] {
         [x, y, z] => ([x, y, z], None, None),
         [x, y, z, w] => ([x, y, z], Some(w), None),
@@ -27,6 +27,7 @@ pub(crate) fn vertex(mut rest: &[u8]) -> Result<(Vec3, Option<[f32; 3]>), Why> {
             ));
         }
     };
+
     let mut position = Vec3::from_array(numbers(position)?);
     if let Some(weight) = weight {
         let [weight] = numbers([weight])?;
@@ -35,8 +36,7 @@ pub(crate) fn vertex(mut rest: &[u8]) -> Result<(Vec3, Option<[f32; 3]>), Why> {
         }
         position /= weight;
     }
-    let finite =
-        |word| parse_f32(word).ok_or_else(|| format!("the colour {} is no finite number", quote(word)));
+
     let color = match color {
         Some([r, g, b]) => Some([finite(r)?, finite(g)?, finite(b)?]),
         None => None,
@@ -44,25 +44,32 @@ pub(crate) fn vertex(mut rest: &[u8]) -> Result<(Vec3, Option<[f32; 3]>), Why> {
     Ok((position, color))
 }
 
-/// The position of [`vertex`] in `f64`; `None` if the statement has a fault.
+fn finite(word: &[u8]) -> Result<f32, Why> {
+    parse_f32(word).ok_or_else(|| format!("the colour {} is no finite number", quote(word)))
+}
+
+/// Reads the position like [`vertex`], in `f64`. Returns `None` if the statement has a fault.
 pub(crate) fn exact_vertex(mut rest: &[u8]) -> Option<DVec3> {
     let words: Vec<&[u8]> = std::iter::from_fn(|| next_word(&mut rest)).take(8).collect();
-    let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f64>().ok();
     let (&[x, y, z], more) = words.split_first_chunk()?;
-    let position = DVec3::new(number(x)?, number(y)?, number(z)?);
+    let position = DVec3::new(parse_f64(x)?, parse_f64(y)?, parse_f64(z)?);
     match more {
-        [weight] => Some(position / number(weight)?),
+        [weight] => Some(position / parse_f64(weight)?),
         _ => Some(position),
     }
 }
 
-/// A `vt` line without its keyword. A texture of one dimension has no second coordinate.
+fn parse_f64(word: &[u8]) -> Option<f64> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// Reads a `vt` line without its keyword. The second coordinate is 0 if the texture has one dimension.
 pub(crate) fn uv(mut rest: &[u8]) -> Result<[f32; 2], Why> {
     let u = next_word(&mut rest).ok_or("a texture coordinate without a number")?;
     numbers([u, next_word(&mut rest).unwrap_or(b"0")])
 }
 
-/// A `vn` line without its keyword.
+/// Reads a `vn` line without its keyword.
 pub(crate) fn normal(mut rest: &[u8]) -> Result<[f32; 3], Why> {
     let mut words = [&b""[..]; 3];
     for word in &mut words {
@@ -79,7 +86,8 @@ fn numbers<const N: usize>(words: [&[u8]; N]) -> Result<[f32; N], Why> {
     Ok(numbers)
 }
 
-/// The indices of a corner of a face into columns that have so many values so far: from 1, and 0 for none.
+/// Reads the indices of a face's corner: from 1, or 0 if there is none. `counts` is how many values each
+/// column has so far.
 pub(crate) fn corner(corner: &[u8], counts: [u64; 3]) -> Result<[u64; 3], Why> {
     let mut indices = [0; 3];
     let mut parts = corner.split(|&b| b == b'/');
@@ -88,9 +96,10 @@ pub(crate) fn corner(corner: &[u8], counts: [u64; 3]) -> Result<[u64; 3], Why> {
         if part.is_empty() {
             continue;
         }
+
         let written = std::str::from_utf8(part).ok().and_then(|part| part.parse::<i64>().ok());
         let written = written.ok_or_else(|| format!("the index {} is no whole number", quote(part)))?;
-        // More values than 63 bits count are in no file.
+        // No file has more values than 63 bits count.
         let absolute = if written < 0 {
             count as i64 + written + 1
         } else {
@@ -101,6 +110,7 @@ pub(crate) fn corner(corner: &[u8], counts: [u64; 3]) -> Result<[u64; 3], Why> {
         }
         *index = absolute as u64;
     }
+
     if parts.next().is_some() {
         return Err(format!("the corner {} has more than three indices", quote(corner)));
     }
@@ -110,11 +120,11 @@ pub(crate) fn corner(corner: &[u8], counts: [u64; 3]) -> Result<[u64; 3], Why> {
     Ok(indices)
 }
 
-/// An index of a column of `count` values that is not there.
+/// Says that a column of `count` values has no value `index`.
 pub(crate) fn out_of_range(column: usize, index: i64, count: u64) -> Why {
     let what = COLUMNS.get(column).copied().unwrap_or_default();
     match index {
         0 => format!("{what} 0: indices count from 1"),
-        _ => format!("{what} {index} is not there, {count} are"),
+        _ => format!("{what} {index} is not there; there are {count}"),
     }
 }

@@ -1,4 +1,4 @@
-//! The rows of a PLY file, a batch at a time: memory does not grow with the file.
+//! Reads the rows of a PLY file in batches, so memory does not grow with the file.
 //!
 //! ```text
 //! let mut reader = PlyReader::new(file, size, path)?;
@@ -14,105 +14,102 @@
 //! }
 //! ```
 //!
-//! Numbers come as `f64`, which holds every type of PLY exactly; [`crate::mesh::ply::batch::integer`] makes
-//! whole ones of them.
+//! Numbers come as `f64`, which holds every type of PLY exactly; [`crate::mesh::ply::batch::integer`] turns
+//! them into whole numbers.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::error::{Error, Result};
 use crate::fs::encoding::Utf8Reader;
-use crate::fs::quote::quote;
 use crate::mesh::ply::batch::PlyBatch;
-use crate::mesh::ply::header::{MAX_HEADER, PlyElement, PlyEncoding, PlyHeader, PlyProperty, PlyType};
-use crate::mesh::ply::source::{BUFFER, Fault, Outcome, Source, column_of, decode, number, parse_f64};
+use crate::mesh::ply::header::{MAX_HEADER, PlyElement, PlyEncoding, PlyHeader, PlyProperty};
+use crate::mesh::ply::source::{Fault, Source};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// The most rows of a batch.
+/// The largest number of rows in a batch.
 const BATCH_ROWS: u64 = 4096;
-/// A batch ends early when its lists hold this many numbers.
-const BATCH_VALUES: usize = 1 << 18;
-/// The most numbers of one list. Strips of the largest published scans have a tenth of it.
-const MAX_LIST: usize = 1 << 26;
 
 /// Reads the elements of a PLY file one after the other.
 pub(crate) struct PlyReader<'r> {
     path: PathBuf,
-    header: PlyHeader,
-    source: Source<'r>,
-    /// Of the whole file; 0 if that is not known.
+    pub(super) header: PlyHeader,
+    pub(super) source: Source<'r>,
+    /// The size of the file in bytes; 0 if it is not known.
     bytes: u64,
-    /// The element whose rows come now, and how many are read of it; before the first one `None`.
-    at: Option<(usize, u64)>,
-    wanted: Vec<bool>,
+    /// The current element, and how many of its rows are read. `None` before the first element.
+    current: Option<(usize, u64)>,
+    pub(super) wanted: Vec<bool>,
     /// The line of the next byte, in ASCII files.
-    line: u64,
-    /// The line on which the row before ended.
-    row_end: u64,
+    pub(super) line: u64,
+    /// The line on which the previous row ended.
+    pub(super) row_end: u64,
 }
 
 impl<'r> PlyReader<'r> {
-    /// Reads the header of a file of so many bytes (0: not known), which errors call `path`.
+    /// Reads the header of a file of `bytes` bytes (0: not known). Errors name the file by `path`.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] with the line.
     pub(crate) fn new(file: impl Read + 'r, bytes: u64, path: &Path) -> Result<Self> {
-        let io = |e| Error::io(path, "read", e);
         let mut source = Source::new(Utf8Reader::new(file));
-        // A header is nearly always in the first bytes: more are read only where they are missing.
+
+        // A header nearly always lies in the first bytes; more are read only if it does not.
         let mut size = 4096usize;
         let header = loop {
-            let complete = source.need(size).map_err(io)?;
+            let complete = source.need(size).map_err(|e| Error::io(path, "read", e))?;
             match PlyHeader::parse(path, source.bytes()) {
                 Err(_) if complete && size < MAX_HEADER => size = size.saturating_mul(4),
                 other => break other?,
             }
         };
+
         source.pass(header.bytes);
         let line = header.lines.saturating_add(1);
+
         Ok(Self {
             path: path.to_owned(),
             header,
             source,
             bytes,
-            at: None,
+            current: None,
             wanted: Vec::new(),
             line,
             row_end: 0,
         })
     }
 
-    /// What the file says about itself.
+    /// Returns the header.
     pub(crate) fn header(&self) -> &PlyHeader {
         &self.header
     }
 
-    /// How many rows of `element` the file can hold by its size: what may be reserved for them.
+    /// Returns how many rows of `element` the file can hold by its size. This much memory may be reserved for
+    /// them.
     pub(crate) fn plausible_rows(&self, element: &PlyElement) -> usize {
         let row = element.min_row_bytes(self.header.encoding).max(1) as u64;
         usize::try_from(self.bytes.checked_div(row).unwrap_or(0).min(element.count)).unwrap_or(0)
     }
 
-    /// Goes to the next element, whose rows follow, over what is left of the last one. Nothing is wanted of
-    /// it yet.
+    /// Goes to the next element, past the remaining rows of the current one. No property of it is wanted yet.
     ///
     /// # Errors
-    /// As [`PlyReader::read_batch`], for the rows that are passed over.
+    /// Like [`PlyReader::read_batch`], for the rows that are skipped.
     pub(crate) fn next_element(&mut self) -> Result<Option<PlyElement>> {
-        if self.at.is_some() {
+        if self.current.is_some() {
             self.want([]);
             let mut rest = PlyBatch::default();
             while self.read_batch(&mut rest)? {}
         }
-        let next = self.at.map_or(0, |(element, _)| element.saturating_add(1));
+
+        let next = self.current.map_or(0, |(element, _)| element.saturating_add(1));
         let Some(element) = self.header.elements.get(next).cloned() else { return Ok(None) };
-        self.at = Some((next, 0));
+        self.current = Some((next, 0));
         self.wanted = vec![false; element.properties.len()];
         Ok(Some(element))
     }
 
-    /// Says which properties of the element the next batches hold, by their places; the others are passed
-    /// over.
+    /// Chooses the properties that the next batches hold, by their indices. Other properties are skipped.
     ///
     /// # Panics
     /// If there is no element, or no such property.
@@ -127,17 +124,21 @@ impl<'r> PlyReader<'r> {
         }
     }
 
-    /// Reads the next rows of the element into `batch`, whose memory is used again; `false` if there are no
-    /// more, or before the first [`PlyReader::next_element`].
+    /// Reads the next rows of the current element into `batch`, whose memory is reused. Returns `false` after
+    /// the last row, and before the first [`PlyReader::next_element`].
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] with the line or the row: the file ends too soon, a word is no number
-    /// or does not fit its property's type, a line holds more than a row, a list has a negative length.
+    /// [`Error::Io`]; [`Error::Format`] with the line or the row if the file ends too soon, a word is not a
+    /// number or does not fit its property's type, a line holds more than a row, or a list has a negative
+    /// length.
     pub(crate) fn read_batch(&mut self, batch: &mut PlyBatch) -> Result<bool> {
-        let Some((element, done)) = self.at else { return Ok(false) };
+        let Some((element, done)) = self.current else { return Ok(false) };
         let Some(current) = self.header.elements.get_mut(element) else { return Ok(false) };
-        let (properties, count) = (std::mem::take(&mut current.properties), current.count);
+        let count = current.count;
+        // The properties are taken out of the header while its reader changes.
+        let properties = std::mem::take(&mut current.properties);
         batch.clear(done, properties.len());
+
         let read = if properties.is_empty() {
             Ok(())
         } else {
@@ -153,13 +154,15 @@ impl<'r> PlyReader<'r> {
         if let Some(current) = self.header.elements.get_mut(element) {
             current.properties = properties;
         }
+
         let done = done.saturating_add(batch.rows as u64);
-        self.at = Some((element, done));
+        self.current = Some((element, done));
         read.map_err(|fault| self.fault(fault, done))?;
         Ok(batch.rows > 0)
     }
 
-    /// Whether anything but space is left behind the last element, to be called after it.
+    /// Returns whether the file goes on after the last element, other than with white space. To be called
+    /// after that element.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -177,9 +180,10 @@ impl<'r> PlyReader<'r> {
         }
     }
 
-    /// An error about row `row` of a batch that was just read.
+    /// Makes an error about row `row` of the batch that was just read.
     pub(crate) fn fail(&self, batch: &PlyBatch, row: usize, message: impl std::fmt::Display) -> Error {
-        let (name, number) = (self.row_name(), batch.first_row().saturating_add(row as u64));
+        let name = self.row_name();
+        let number = batch.first_row().saturating_add(row as u64);
         let message = format!("{name} {number}: {message}");
         match batch.lines.get(row) {
             Some(&line) => Error::line(&self.path, line, message),
@@ -187,15 +191,16 @@ impl<'r> PlyReader<'r> {
         }
     }
 
-    /// The element whose rows come now.
+    /// Returns the current element.
     fn element(&self) -> Option<&PlyElement> {
-        self.header.elements.get(self.at?.0)
+        self.header.elements.get(self.current?.0)
     }
 
     fn row_name(&self) -> &str {
         self.element().map_or("row", |element| &element.name)
     }
 
+    /// Makes an error about the row `row` of the current element.
     fn fault(&self, fault: Fault, row: u64) -> Error {
         let name = self.row_name();
         let count = self.element().map_or(0, |element| element.count);
@@ -214,161 +219,13 @@ impl<'r> PlyReader<'r> {
             }
         }
     }
-
-    /// Rows of a fixed size: column by column.
-    fn fixed_rows(&mut self, properties: &[PlyProperty], rows: u64, batch: &mut PlyBatch) -> Outcome {
-        let size: usize = properties.iter().map(|p| p.kind.size()).sum();
-        if rows == 0 {
-            return Ok(());
-        }
-        if !self.source.need(size)? {
-            return Err(Fault::End);
-        }
-        let bytes = self.source.bytes();
-        let there = bytes.len().checked_div(size).unwrap_or(0);
-        let rows = usize::try_from(rows).map_or(there, |rows| rows.min(there));
-        let bytes = bytes.get(..rows.saturating_mul(size)).unwrap_or_default();
-        let big = self.header.encoding == PlyEncoding::BigEndian;
-        let mut offset = 0usize;
-        for ((property, wanted), column) in properties.iter().zip(&self.wanted).zip(&mut batch.columns) {
-            if *wanted {
-                column_of(bytes, size, offset, property.kind, big, &mut column.values);
-            }
-            offset = offset.saturating_add(property.kind.size());
-        }
-        batch.rows = rows;
-        let read = bytes.len();
-        self.source.pass(read);
-        Ok(())
-    }
-
-    /// Rows with lists, whose size is known when they are read.
-    fn binary_rows(&mut self, properties: &[PlyProperty], rows: u64, batch: &mut PlyBatch) -> Outcome {
-        let big = self.header.encoding == PlyEncoding::BigEndian;
-        let mut values = 0usize;
-        for _ in 0..rows {
-            for ((property, wanted), column) in properties.iter().zip(&self.wanted).zip(&mut batch.columns) {
-                let column = wanted.then_some(column);
-                let n = match property.list {
-                    None => 1,
-                    Some(kind) => {
-                        let length = number(self.source.take(kind.size())?, kind, big);
-                        list_length(length, column.is_some(), property).map_err(Fault::Row)?
-                    }
-                };
-                let size = property.kind.size();
-                let Some(column) = column else {
-                    self.source.skip((n as u64).saturating_mul(size as u64))?;
-                    continue;
-                };
-                let mut rest = n.saturating_mul(size);
-                while rest > 0 {
-                    let bytes = self.source.take(rest.min(BUFFER / 2))?;
-                    decode(bytes, property.kind, big, &mut column.values);
-                    rest = rest.saturating_sub(bytes.len());
-                }
-                if property.is_list() {
-                    column.ends.push(column.values.len());
-                    values = values.saturating_add(n);
-                }
-            }
-            batch.rows = batch.rows.saturating_add(1);
-            if values > BATCH_VALUES {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Rows of words. A row starts on a line of its own; it may go on on the next.
-    #[expect(
-        clippy::indexing_slicing,
-        reason = "what is wanted, and the batch's columns, have an entry a property"
-    )]
-    fn ascii_rows(&mut self, properties: &[PlyProperty], rows: u64, batch: &mut PlyBatch) -> Outcome {
-        let mut values = 0usize;
-        for _ in 0..rows {
-            for (p, property) in properties.iter().enumerate() {
-                let wanted = self.wanted[p];
-                let n = match property.list {
-                    None => 1,
-                    Some(kind) => {
-                        let length = self.ascii_number(kind, property)?;
-                        self.check_row_start(p == 0, batch)?;
-                        list_length(length, wanted, property).map_err(|m| Fault::Line(self.line, m))?
-                    }
-                };
-                for k in 0..n {
-                    let value = self.ascii_number(property.kind, property)?;
-                    self.check_row_start(p == 0 && k == 0 && !property.is_list(), batch)?;
-                    if wanted {
-                        batch.columns[p].values.push(value);
-                    }
-                }
-                if wanted && property.is_list() {
-                    let column = &mut batch.columns[p];
-                    column.ends.push(column.values.len());
-                    values = values.saturating_add(n);
-                }
-            }
-            self.row_end = self.line;
-            batch.rows = batch.rows.saturating_add(1);
-            if values > BATCH_VALUES {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    fn check_row_start(&self, first: bool, batch: &mut PlyBatch) -> Outcome {
-        if !first {
-            return Ok(());
-        }
-        if self.line == self.row_end {
-            let message = "this line has more numbers than the row before needs; are properties missing in \
-                           the header, or numbers on the line before?";
-            return Err(Fault::Line(self.line, message.into()));
-        }
-        batch.lines.push(self.line);
-        Ok(())
-    }
-
-    /// The number that the next word spells.
-    fn ascii_number(&mut self, kind: PlyType, property: &PlyProperty) -> std::result::Result<f64, Fault> {
-        let word = self.source.word(self.header.line_end, &mut self.line)?;
-        let Some(value) = parse_f64(word) else {
-            return Err(Fault::Line(
-                self.line,
-                format!("{} is no number, but {} is", quote(word), property.name),
-            ));
-        };
-        if kind.is_integer() {
-            let (least, most) = kind.range();
-            if value.fract() != 0.0 || !(least..=most).contains(&value) {
-                let (word, name, kind) = (quote(word), &property.name, kind.name());
-                return Err(Fault::Line(self.line, format!("{word} does not fit {name}, which is a {kind}")));
-            }
-        }
-        Ok(value)
-    }
-}
-
-fn list_length(length: f64, wanted: bool, property: &PlyProperty) -> std::result::Result<usize, String> {
-    if length < 0.0 {
-        return Err(format!("the list {} has a length of {length}", property.name));
-    }
-    if wanted && length > MAX_LIST as f64 {
-        return Err(format!("the list {} has {length} entries; up to {MAX_LIST} are read", property.name));
-    }
-    #[expect(clippy::cast_possible_truncation, reason = "a whole number of at most 32 bits")]
-    Ok(length as usize)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A file with all types, once as words and once as bytes.
+    /// The rows of a file with all types, which is written once as words and once as bytes.
     const ROWS: [[f64; 8]; 3] = [
         [-128.0, 255.0, -32_768.0, 65_535.0, -2_147_483_648.0, 4_294_967_295.0, 0.5, 1e-300],
         [0.0; 8],
@@ -386,12 +243,12 @@ mod tests {
     }
 
     fn bytes(big: bool) -> Vec<u8> {
-        let mut out = header(if big {
+        let format = if big {
             "binary_big_endian"
         } else {
             "binary_little_endian"
-        })
-        .into_bytes();
+        };
+        let mut out = header(format).into_bytes();
         let mut put = |le: &[u8]| {
             let mut le = le.to_vec();
             if big {
@@ -427,7 +284,7 @@ mod tests {
             out += &r.map(|v| v.to_string()).join(" ");
             out += "\n";
         }
-        // A row that goes on on the next line, an empty line.
+        // One row continues on the next line, and one line is empty.
         out + "2 -3\r\n  4\t7 0\n\n0 8 1 0.1"
     }
 
@@ -435,10 +292,11 @@ mod tests {
         PlyReader::new(bytes, bytes.len() as u64, Path::new("a.ply"))
     }
 
-    /// Every row of every element as text, `wanted` properties of each.
+    /// Returns every row of every element as text, with the `wanted` properties.
     fn all(bytes: &[u8], wanted: impl Fn(usize) -> bool) -> Result<Vec<String>> {
         let mut reader = open(bytes)?;
-        let (mut out, mut batch) = (Vec::new(), PlyBatch::default());
+        let mut out = Vec::new();
+        let mut batch = PlyBatch::default();
         while let Some(element) = reader.next_element()? {
             let wanted: Vec<usize> = (0..element.properties.len()).filter(|&p| wanted(p)).collect();
             reader.want(wanted.iter().copied());
@@ -446,9 +304,12 @@ mod tests {
                 for row in 0..batch.len() {
                     let values: Vec<String> = wanted
                         .iter()
-                        .map(|&p| match element.properties[p].is_list() {
-                            true => format!("{:?}", batch.list(p, row)),
-                            false => batch.scalars(p)[row].to_string(),
+                        .map(|&p| {
+                            if element.properties[p].is_list() {
+                                format!("{:?}", batch.list(p, row))
+                            } else {
+                                batch.scalars(p)[row].to_string()
+                            }
                         })
                         .collect();
                     out.push(format!(
@@ -492,6 +353,7 @@ mod tests {
                 }
             }
         }
+
         let claims = header("binary_little_endian").replace("element a 3", "element a 18446744073709551615");
         let message = all(claims.as_bytes(), |_| true).unwrap_err().to_string();
         assert!(
@@ -528,6 +390,7 @@ mod tests {
             all(file("-NaN(ind) 255.0 0\ninf 2e1 0\n").as_bytes(), |_| true).unwrap()[0]
                 .starts_with("v 0: NaN")
         );
+
         let text = file("1 2 0\n1 2 0\n 3");
         let mut reader = open(text.as_bytes()).unwrap();
         while reader.next_element().unwrap().is_some() {}
@@ -571,12 +434,14 @@ mod tests {
             }
             ascii += "\n";
         }
+
         for file in [file, ascii.into_bytes()] {
             let mut reader = open(&file).unwrap();
             let element = reader.next_element().unwrap().unwrap();
             assert!(reader.plausible_rows(&element) >= n);
             reader.want([0]);
-            let (mut batch, mut row) = (PlyBatch::default(), 0);
+            let mut batch = PlyBatch::default();
+            let mut row = 0;
             while reader.read_batch(&mut batch).unwrap() {
                 for r in 0..batch.len() {
                     let length = if row == 100 { 60_000 } else { row % 5 };

@@ -9,30 +9,30 @@ use s3d_geom::glam::{Vec2, Vec3, vec2};
 use s3d_geom::{NO_INDEX, triangulate_face};
 use std::path::Path;
 
-/// Columns of the element `face`, a row a polygon.
+/// The columns of the element `face`. A row is a polygon.
 #[derive(Debug, Default)]
 pub(crate) struct PlyFaces {
-    /// The corners of all polygons, one after the other, as indices of vertices.
+    /// The corners of all polygons, one after the other, as vertex indices.
     corners: Vec<u32>,
-    /// How many corners each polygon has.
+    /// The number of corners of each polygon.
     sizes: Vec<u32>,
-    /// Texture coordinates, one a corner, NaN for a polygon without; empty if no polygon has any.
+    /// A texture coordinate for each corner; NaN for a polygon without any. Empty if no polygon has any.
     uvs: Vec<Vec2>,
-    /// Which texture lies on a polygon, [`NO_INDEX`] for none; empty if the file does not say.
+    /// The texture of each polygon, or [`NO_INDEX`]. Empty if the file does not tell.
     textures: Vec<u32>,
-    /// Polygons whose list of texture coordinates has not two numbers a corner, and is not empty.
+    /// How many polygons have a list of texture coordinates that is neither empty nor two numbers a corner.
     pub(crate) odd_uvs: usize,
 }
 
 const CORNERS: [&str; 4] = ["vertex_indices", "vertex_index", "vertex_indexes", "vertices"];
 
 impl PlyFaces {
-    /// Reads the element that comes now; its labels too, if they belong to faces. `vertices` is the number of
+    /// Reads the current element, and its labels if they belong to faces. `vertices` is the number of
     /// vertices.
     ///
     /// # Errors
-    /// As [`PlyReader::read_batch`]; [`Error::Format`] for a list of corners that is not there or names a
-    /// vertex that is not.
+    /// Like [`PlyReader::read_batch`]; [`Error::Format`] if the list of corners is missing or names a vertex
+    /// that is not there.
     pub(crate) fn read(
         path: &Path,
         reader: &mut PlyReader<'_>,
@@ -56,39 +56,36 @@ impl PlyFaces {
                 let polygon = batch.list(corners, row);
                 for &corner in polygon {
                     if !(corner >= 0.0 && corner < vertices as f64) {
-                        let message = format!("vertex {corner} is not there, {vertices} are");
+                        let message = format!("vertex {corner} is not there; there are {vertices}");
                         return Err(reader.fail(&batch, row, message));
                     }
                     out.corners.push(corner as u32);
                 }
                 out.sizes.push(polygon.len() as u32);
+
                 if let Some(uv) = uv {
                     let uvs = batch.list(uv, row);
                     let fits = uvs.len() == 2 * polygon.len();
                     out.odd_uvs += usize::from(!fits && !uvs.is_empty());
-                    match fits {
-                        true => out
-                            .uvs
-                            .extend(uvs.as_chunks().0.iter().map(|&[u, v]| vec2(u as f32, v as f32))),
-                        false => out.uvs.extend(polygon.iter().map(|_| Vec2::NAN)),
+                    if fits {
+                        out.uvs
+                            .extend(uvs.as_chunks().0.iter().map(|&[u, v]| vec2(u as f32, v as f32)));
+                    } else {
+                        out.uvs.extend(polygon.iter().map(|_| Vec2::NAN));
                     }
                 }
             }
+
             if out.corners.len() >= NO_INDEX as usize {
                 return Err(Error::format(
                     path,
                     "has more corners than 32 bits count; cut the scan into parts",
                 ));
             }
+
             if let Some(texture) = texture {
-                let number = |&n: &f64| {
-                    if n >= 0.0 && n < f64::from(NO_INDEX) {
-                        n as u32
-                    } else {
-                        NO_INDEX
-                    }
-                };
-                out.textures.extend(batch.scalars(texture).iter().map(number));
+                out.textures
+                    .extend(batch.scalars(texture).iter().map(|&n| texture_index(n)));
             }
             if let Some(labels) = labels.as_deref_mut() {
                 labels.add(reader, &batch)?;
@@ -100,16 +97,16 @@ impl PlyFaces {
         Ok(out)
     }
 
-    /// The corners of all polygons.
+    /// Returns the corners of all polygons, as vertex indices.
     pub(crate) fn corners(&self) -> &[u32] {
         &self.corners
     }
 
-    /// Adds the triangles of the element `tristrips`: lists of vertices, of which each three neighbours are a
-    /// triangle; −1 starts a new strip.
+    /// Adds the triangles of the element `tristrips`. Each list holds vertices, of which each three
+    /// neighbours are a triangle; −1 starts a new strip.
     ///
     /// # Errors
-    /// As [`PlyFaces::read`].
+    /// Like [`PlyFaces::read`].
     pub(crate) fn read_strips(
         &mut self,
         path: &Path,
@@ -120,6 +117,7 @@ impl PlyFaces {
         let list = corner_list(path, element)?;
         reader.want([list]);
         let mut batch = PlyBatch::default();
+
         while reader.read_batch(&mut batch)? {
             for row in 0..batch.len() {
                 let mut strip: Vec<u32> = Vec::new();
@@ -129,11 +127,13 @@ impl PlyFaces {
                         continue;
                     }
                     if corner >= vertices as f64 {
-                        let message = format!("vertex {corner} is not there, {vertices} are");
+                        let message = format!("vertex {corner} is not there; there are {vertices}");
                         return Err(reader.fail(&batch, row, message));
                     }
+
                     strip.push(corner as u32);
-                    // Every other triangle is turned over. Those that repeat a vertex only lead to the next.
+                    // Every other triangle is turned over. A triangle that repeats a vertex only leads to the
+                    // next.
                     if let &[.., a, b, c] = strip.as_slice()
                         && a != b
                         && b != c
@@ -161,16 +161,18 @@ impl PlyFaces {
         out.faces.reserve(self.sizes.len());
         let mut start = 0usize;
         let mut points = Vec::new();
+
         for (polygon, &size) in self.sizes.iter().enumerate() {
             let Some(corners) = self.corners.get(start..).and_then(|c| c.get(..size as usize)) else { break };
             let mut add = |triangle: [u32; 3]| {
                 let of = |c: u32| corners.get(c as usize).copied().unwrap_or(NO_INDEX);
-                // What 32 bits do not count has no coordinates on the texture.
+                // A corner beyond 32 bits has no coordinates on the texture.
                 let number = |c: u32| u32::try_from(start.saturating_add(c as usize)).unwrap_or(NO_INDEX);
                 out.faces.push(triangle.map(of));
                 out.corners.push(triangle.map(number));
                 out.polygons.push(u32::try_from(polygon).unwrap_or(NO_INDEX));
             };
+
             match size {
                 0..3 => {
                     out.short_first.get_or_insert(polygon);
@@ -193,13 +195,14 @@ impl PlyFaces {
                     }
                 }
             }
+
             start = start.saturating_add(size as usize);
         }
         out
     }
 
-    /// The coordinates of corners, and the indices into them of the triangles' corners; `None` if there are
-    /// none.
+    /// Takes the texture coordinates of corners, and for each triangle the indices of its three. Returns
+    /// `None` if there are none.
     pub(crate) fn take_uvs(&mut self, triangles: &PlyTriangles) -> Option<(Vec<Vec2>, Vec<[u32; 3]>)> {
         if self.uvs.is_empty() {
             return None;
@@ -213,35 +216,35 @@ impl PlyFaces {
         Some((uvs, indices))
     }
 
-    /// The texture of each triangle, the first where the file does not say.
+    /// Returns the texture of each triangle: the first texture if the file does not tell.
     pub(crate) fn textures(&self, triangles: &PlyTriangles) -> Vec<u32> {
-        let number = |&polygon: &u32| match self.textures.get(polygon as usize) {
-            Some(&texture) => texture,
-            None => 0,
-        };
-        triangles.polygons.iter().map(number).collect()
+        triangles
+            .polygons
+            .iter()
+            .map(|&polygon| self.textures.get(polygon as usize).copied().unwrap_or(0))
+            .collect()
     }
 }
 
-/// The triangles that polygons were cut into.
+/// The triangles of all polygons.
 #[derive(Debug, Default)]
 pub(crate) struct PlyTriangles {
     /// Their vertices.
     pub(crate) faces: Vec<[u32; 3]>,
     /// Their corners, counted over all polygons.
     corners: Vec<[u32; 3]>,
-    /// The polygon that each is a part of.
+    /// The polygon that each belongs to.
     pub(crate) polygons: Vec<u32>,
     /// How many polygons were cut.
     pub(crate) cut: usize,
-    /// Polygons of fewer than three corners, and the first of them.
+    /// How many polygons have fewer than three corners, and the first of them.
     pub(crate) short: usize,
     pub(crate) short_first: Option<usize>,
-    /// Polygons that cannot be cut: number and reason of the first, and how many.
+    /// The polygons that cannot be cut: number of the first, its reason, and how many there are.
     pub(crate) refused: Option<(usize, String, usize)>,
 }
 
-/// The place of the list of corners: by its name, or the only list of integers.
+/// Finds the list of corners: by its name, or else the only list of integers.
 fn corner_list(path: &Path, element: &PlyElement) -> Result<usize> {
     let mut lists = element
         .properties
@@ -251,7 +254,16 @@ fn corner_list(path: &Path, element: &PlyElement) -> Result<usize> {
     let only = lists.next().filter(|_| lists.next().is_none()).map(|(place, _)| place);
     element.find_list(&CORNERS).or(only).ok_or_else(|| {
         let names: Vec<&str> = element.properties.iter().map(|p| p.name.as_str()).collect();
-        let (name, names) = (&element.name, names.join(", "));
+        let name = &element.name;
+        let names = names.join(", ");
         Error::format(path, format!("the element \"{name}\" has no list vertex_indices, only: {names}"))
     })
+}
+
+fn texture_index(number: f64) -> u32 {
+    if number >= 0.0 && number < f64::from(NO_INDEX) {
+        number as u32
+    } else {
+        NO_INDEX
+    }
 }

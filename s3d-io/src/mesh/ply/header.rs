@@ -1,8 +1,8 @@
-//! The header of a PLY file: its encoding, and which elements of which properties follow.
+//! The header of a PLY file: its encoding, its elements and their properties.
 //!
-//! PLY has no standard beyond Greg Turk's description of 1994. What is read here is what files hold: both
-//! families of type names (`uchar` and `uint8`), lines that end in LF, CR LF or CR, comments anywhere, any
-//! elements in any order.
+//! PLY has no standard beyond Greg Turk's description of 1994. This reader accepts what files hold: both
+//! families of type names (`uchar` and `uint8`), lines that end in LF, CR LF or CR, comments anywhere, and
+//! any elements in any order.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -10,8 +10,8 @@ use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use std::path::Path;
 
-/// The most bytes of a header. Files with hundreds of properties and a story in their comments stay far
-/// below.
+/// The largest size of a header in bytes. Headers with hundreds of properties and long comments stay far
+/// below it.
 pub(crate) const MAX_HEADER: usize = 1 << 20;
 
 /// How the numbers of a file are written.
@@ -50,7 +50,7 @@ impl PlyType {
         })
     }
 
-    /// The size of a number in bytes.
+    /// Returns the size of a number in bytes.
     pub(crate) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -64,7 +64,7 @@ impl PlyType {
         !matches!(self, Self::F32 | Self::F64)
     }
 
-    /// The smallest and the largest number of an integer type; everything for the others.
+    /// Returns the smallest and the largest number of an integer type. Other types have infinite bounds.
     pub(crate) fn range(self) -> (f64, f64) {
         match self {
             Self::I8 => (f64::from(i8::MIN), f64::from(i8::MAX)),
@@ -77,7 +77,7 @@ impl PlyType {
         }
     }
 
-    /// Its older name, for messages.
+    /// Returns its older name, for messages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::I8 => "char",
@@ -92,12 +92,12 @@ impl PlyType {
     }
 }
 
-/// A property of an element: a number a row, or a list of numbers.
+/// A property of an element: one number in each row, or a list of numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PlyProperty {
     pub(crate) name: String,
     pub(crate) kind: PlyType,
-    /// The type of a list's length; `None` if the property is a single number.
+    /// The type of the list's length; `None` for a single number.
     pub(crate) list: Option<PlyType>,
 }
 
@@ -106,75 +106,73 @@ impl PlyProperty {
         self.list.is_some()
     }
 
-    /// The fewest bytes that a row takes for it.
+    /// Returns the fewest bytes of the property in a row.
     fn min_bytes(&self, encoding: PlyEncoding) -> usize {
         match encoding {
-            // A digit and a space.
+            // One digit and a space.
             PlyEncoding::Ascii => 2,
             _ => self.list.unwrap_or(self.kind).size(),
         }
     }
 }
 
-/// An element of the header: so many rows of such properties.
+/// An element of the header: a number of rows, all of the same properties.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PlyElement {
     pub(crate) name: String,
-    /// The rows that the header claims; what the file holds is known when they are read.
+    /// The number of rows that the header claims. The file may hold fewer.
     pub(crate) count: u64,
     pub(crate) properties: Vec<PlyProperty>,
 }
 
 impl PlyElement {
-    /// The place among the properties of the first of `names` that is one, upper and lower case being the
-    /// same. A name earlier in `names` goes before one later.
+    /// Finds the first of `names` that is a property, in upper or lower case, and returns its index.
     pub(crate) fn find(&self, names: &[&str]) -> Option<usize> {
-        names
-            .iter()
-            .find_map(|name| self.properties.iter().position(|p| p.name.eq_ignore_ascii_case(name)))
+        self.find_where(names, |_| true)
     }
 
-    /// As [`PlyElement::find`], among the properties that are single numbers.
+    /// Finds like [`PlyElement::find`], among the properties that are single numbers.
     pub(crate) fn find_scalar(&self, names: &[&str]) -> Option<usize> {
-        names.iter().find_map(|name| {
-            self.properties
-                .iter()
-                .position(|p| !p.is_list() && p.name.eq_ignore_ascii_case(name))
-        })
+        self.find_where(names, |property| !property.is_list())
     }
 
-    /// As [`PlyElement::find`], among the properties that are lists.
+    /// Finds like [`PlyElement::find`], among the properties that are lists.
     pub(crate) fn find_list(&self, names: &[&str]) -> Option<usize> {
+        self.find_where(names, PlyProperty::is_list)
+    }
+
+    fn find_where(&self, names: &[&str], fits: impl Fn(&PlyProperty) -> bool) -> Option<usize> {
         names.iter().find_map(|name| {
             self.properties
                 .iter()
-                .position(|p| p.is_list() && p.name.eq_ignore_ascii_case(name))
+                .position(|property| fits(property) && property.name.eq_ignore_ascii_case(name))
         })
     }
 
-    /// The fewest bytes of a row.
+    /// Returns the fewest bytes of a row.
     pub(crate) fn min_row_bytes(&self, encoding: PlyEncoding) -> usize {
         self.properties.iter().map(|p| p.min_bytes(encoding)).sum()
     }
 }
 
-/// What a PLY file says about itself.
+/// The content of a PLY header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PlyHeader {
     pub(crate) encoding: PlyEncoding,
-    /// What stands behind `comment` and `obj_info`, in the order of the file.
+    /// The text of each `comment` and `obj_info` line, in the order of the file.
     pub(crate) comments: Vec<String>,
     pub(crate) elements: Vec<PlyElement>,
-    /// Its length in bytes: the rows start here.
+    /// The length of the header in bytes. The rows follow it.
     pub(crate) bytes: usize,
-    /// Its lines; the first row of an ASCII file is on the next.
+    /// The number of its lines. The first row of an ASCII file is on the next line.
     pub(crate) lines: u64,
-    /// The byte that ends a line: LF, or CR in files that know no LF.
+    /// The byte that ends a line: LF, or CR in a file without LF.
     pub(crate) line_end: u8,
 }
 
 impl PlyHeader {
-    /// Reads the header at the front of `bytes`: of the whole file, or its first [`MAX_HEADER`] bytes.
+    /// Reads the header at the front of `bytes`, which are the whole file or at least its first
+    /// [`MAX_HEADER`] bytes.
     ///
     /// # Errors
     /// [`Error::Format`] with the line.
@@ -189,6 +187,7 @@ impl PlyHeader {
             Some([b'\r', rest @ ..]) if rest.first() != Some(&b'\n') => b'\r',
             _ => b'\n',
         };
+
         let mut header = Self {
             encoding: PlyEncoding::Ascii,
             comments: Vec::new(),
@@ -197,11 +196,13 @@ impl PlyHeader {
             lines: 0,
             line_end,
         };
+
         let mut encoding = None;
-        // The last piece has no end.
+        // The last piece is cut off: it has no line end.
         let pieces = head
             .split_inclusive(|&b| b == line_end)
             .filter(|piece| piece.ends_with(&[line_end]));
+
         for piece in pieces {
             let line = piece.trim_ascii();
             header.bytes = header.bytes.saturating_add(piece.len());
@@ -214,6 +215,7 @@ impl PlyHeader {
             let mut words = text.split_ascii_whitespace();
             let keyword = words.next().unwrap_or_default();
             let rest: Vec<&str> = words.collect();
+
             match (keyword, rest.as_slice()) {
                 ("", _) => {}
                 ("ply", []) if header.lines == 1 => {}
@@ -232,8 +234,11 @@ impl PlyHeader {
                 }
                 ("element", [name, count]) => {
                     let count = count.parse().map_err(|_| fail("not a number of rows".into()))?;
-                    let (name, properties) = ((*name).to_owned(), Vec::new());
-                    header.elements.push(PlyElement { name, count, properties });
+                    header.elements.push(PlyElement {
+                        name: (*name).to_owned(),
+                        count,
+                        properties: Vec::new(),
+                    });
                 }
                 ("property", words) => {
                     let property = property(words).map_err(fail)?;
@@ -252,6 +257,7 @@ impl PlyHeader {
                 _ => return Err(fail("no line of a PLY header".into())),
             }
         }
+
         Err(Error::format(
             path,
             if head.len() < MAX_HEADER {
@@ -262,7 +268,7 @@ impl PlyHeader {
         ))
     }
 
-    /// The element `name` and its place.
+    /// Finds an element by its name. Returns its index too.
     pub(crate) fn element(&self, name: &str) -> Option<(usize, &PlyElement)> {
         self.elements
             .iter()
@@ -271,21 +277,24 @@ impl PlyHeader {
     }
 }
 
-/// A property from the words behind `property`.
+/// Reads a property from the words after `property`.
 fn property(words: &[&str]) -> std::result::Result<PlyProperty, String> {
-    let kind = |name: &str| PlyType::parse(name).ok_or_else(|| format!("`{name}` is no type of PLY"));
     match words {
         ["list", length, value, name] => {
-            let length = kind(length)?;
+            let length = type_of(length)?;
             if !length.is_integer() {
                 return Err("the length of a list is an integer".into());
             }
-            Ok(PlyProperty { name: (*name).to_owned(), kind: kind(value)?, list: Some(length) })
+            Ok(PlyProperty { name: (*name).to_owned(), kind: type_of(value)?, list: Some(length) })
         }
         ["list", ..] => Err("a list property has two types and a name".into()),
-        [value, name] => Ok(PlyProperty { name: (*name).to_owned(), kind: kind(value)?, list: None }),
+        [value, name] => Ok(PlyProperty { name: (*name).to_owned(), kind: type_of(value)?, list: None }),
         _ => Err("a property has a type and a name".into()),
     }
+}
+
+fn type_of(name: &str) -> std::result::Result<PlyType, String> {
+    PlyType::parse(name).ok_or_else(|| format!("`{name}` is no type of PLY"))
 }
 
 #[cfg(test)]
@@ -329,7 +338,7 @@ mod tests {
             let header = parse(&text.replace('\n', end)).unwrap();
             assert_eq!((header.line_end, header.lines, header.elements.len()), (mark, 5, 1), "{end:?}");
         }
-        // Rows of a binary file may start with the byte of a line's end.
+        // The rows of a binary file may start with the byte of a line end.
         let header = parse("ply\nformat binary_little_endian 1.0\nend_header\n\n\n").unwrap();
         assert_eq!(header.bytes, 47);
     }

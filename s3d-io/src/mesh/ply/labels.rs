@@ -1,4 +1,4 @@
-//! Which properties of a PLY mesh are labels, and their numbers.
+//! Finds the label properties of a PLY mesh, and collects their numbers.
 
 use crate::error::{Error, Result};
 use crate::mesh::file::MeshOptions;
@@ -8,19 +8,20 @@ use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::header::{PlyElement, PlyHeader};
 use std::path::Path;
 
-/// A column of labels while it is read.
+/// A label column while it is read.
 #[derive(Debug)]
 struct Column {
-    /// Its place among the properties.
+    /// The index of its property.
     property: usize,
-    /// Whether the caller named it: then every number must be whole, else a column that has others is none.
+    /// Whether the caller named it. Then every number must be whole. A column that is found by a known name
+    /// is dropped if it has other numbers.
     demanded: bool,
     /// Whether it holds a number that is not whole.
     broken: bool,
     column: LabelColumn,
 }
 
-/// The columns of labels of a file.
+/// The label columns of a file.
 #[derive(Debug)]
 pub(crate) struct PlyLabels {
     pub(crate) element: LabelElement,
@@ -29,11 +30,11 @@ pub(crate) struct PlyLabels {
 }
 
 impl PlyLabels {
-    /// Finds the columns that `options` names, or known names where it names none: of faces or else of
-    /// vertices.
+    /// Finds the columns that `options` names, or else columns with known names: first of the faces, then of
+    /// the vertices.
     ///
     /// # Errors
-    /// [`Error::Format`] if what `options` names is not there.
+    /// [`Error::Format`] if a named column is not there.
     pub(crate) fn find(path: &Path, header: &PlyHeader, options: &MeshOptions) -> Result<Option<Self>> {
         for (name, kind) in [("face", LabelElement::Face), ("vertex", LabelElement::Vertex)] {
             let Some((_, element)) = header.element(name) else { continue };
@@ -44,6 +45,7 @@ impl PlyLabels {
                 return Ok(Some(Self { element: kind, class, instance }));
             }
         }
+
         let asked: Vec<&str> = [&options.class_column, &options.instance_column]
             .into_iter()
             .flatten()
@@ -52,35 +54,29 @@ impl PlyLabels {
         if asked.is_empty() {
             return Ok(None);
         }
-        let properties = |name: &str| {
-            let names = header.element(name).map(|(_, e)| {
-                let single = e.properties.iter().filter(|p| !p.is_list());
-                single.map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ")
-            });
-            format!("{name}: {}", names.filter(|n| !n.is_empty()).unwrap_or_else(|| "none".into()))
-        };
+
         let message = format!(
             "has no column of labels {:?} among the properties of its faces or of its vertices ({}; {})",
             asked.join("\", \""),
-            properties("face"),
-            properties("vertex")
+            single_properties(header, "face"),
+            single_properties(header, "vertex")
         );
         Err(Error::format(path, message.replace("\\\"", "\"")))
     }
 
-    /// The places of the properties.
+    /// Returns the indices of the label properties.
     pub(crate) fn properties(&self) -> impl Iterator<Item = usize> {
         [&self.class, &self.instance].into_iter().flatten().map(|c| c.property)
     }
 
-    /// Takes the numbers of a batch.
+    /// Adds the numbers of a batch.
     ///
     /// # Errors
-    /// [`Error::Format`] for a number that is not whole in a column that was asked for.
+    /// [`Error::Format`] for a number that is not whole in a column that the caller named.
     pub(crate) fn add(&mut self, reader: &PlyReader<'_>, batch: &PlyBatch) -> Result<()> {
         for column in [&mut self.class, &mut self.instance].into_iter().flatten() {
             for (row, &value) in batch.scalars(column.property).iter().enumerate() {
-                // CloudCompare writes NaN where there is none.
+                // CloudCompare writes NaN for a missing label.
                 let number = integer(value).or_else(|| value.is_nan().then_some(NO_LABEL));
                 if number.is_none() && column.demanded {
                     let message =
@@ -94,20 +90,11 @@ impl PlyLabels {
         Ok(())
     }
 
-    /// The columns, as they stand in the file, without those that are no labels after all.
+    /// Returns the label columns, row by row as in the file. A column with numbers that are not whole is left
+    /// out with a warning.
     pub(crate) fn finish(self, warnings: &mut Vec<String>) -> Option<MeshLabels> {
-        let mut whole = |column: Option<Column>| {
-            let column = column?;
-            if column.broken {
-                let name = &column.column.name;
-                warnings.push(format!(
-                    "the property {name} is not taken as labels: not all its numbers are whole"
-                ));
-                return None;
-            }
-            Some(column.column)
-        };
-        let (class, instance) = (whole(self.class), whole(self.instance));
+        let class = self.class.and_then(|column| column.finish(warnings));
+        let instance = self.instance.and_then(|column| column.finish(warnings));
         (class.is_some() || instance.is_some()).then_some(MeshLabels::Numbers {
             element: self.element,
             class,
@@ -116,20 +103,43 @@ impl PlyLabels {
     }
 }
 
-/// The column `asked` or, without that, one of `known` if there is one; `None` if `asked` is not there.
+impl Column {
+    /// Returns the column, or warns that it does not hold labels.
+    fn finish(self, warnings: &mut Vec<String>) -> Option<LabelColumn> {
+        if self.broken {
+            let name = &self.column.name;
+            warnings
+                .push(format!("the property {name} is not taken as labels: not all its numbers are whole"));
+            return None;
+        }
+        Some(self.column)
+    }
+}
+
+/// Names the properties of an element that are single numbers, for a message.
+fn single_properties(header: &PlyHeader, name: &str) -> String {
+    let names = header.element(name).map(|(_, e)| {
+        let single = e.properties.iter().filter(|p| !p.is_list());
+        single.map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ")
+    });
+    format!("{name}: {}", names.filter(|n| !n.is_empty()).unwrap_or_else(|| "none".into()))
+}
+
+/// Finds the column `asked`, or else the first of `known`. Returns `None` if `asked` is not there, and
+/// `Some(None)` if none of `known` is.
 fn column(element: &PlyElement, asked: Option<&str>, known: &[&str]) -> Option<Option<Column>> {
     let property = match asked {
-        // As it is written goes before another case.
+        // The same case wins over another case.
         Some(name) => {
             let exact = element.properties.iter().position(|p| !p.is_list() && p.name == name);
             Some(exact.or_else(|| element.find_scalar(&[name]))?)
         }
         None => element.find_scalar(known),
     };
-    let column = |property: usize| {
+
+    Some(property.and_then(|property| {
         let name = element.properties.get(property)?.name.clone();
         let column = LabelColumn { name, values: Vec::new() };
         Some(Column { property, demanded: asked.is_some(), broken: false, column })
-    };
-    Some(property.and_then(column))
+    }))
 }

@@ -9,6 +9,8 @@ pub(crate) mod elements;
 mod faces;
 pub(crate) mod header;
 mod labels;
+mod looks;
 pub(crate) mod read;
+mod rows;
 mod source;
 mod vertices;

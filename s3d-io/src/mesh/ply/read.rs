@@ -1,13 +1,10 @@
-//! Meshes in PLY files.
+//! Reads meshes in PLY files.
 //!
-//! [`PlyReader`] reads the numbers; [`PlyVertices`] and [`PlyFaces`] know what they are called, and here they
-//! become a mesh. Texture images are named by comments, as MeshLab writes them: `comment TextureFile
-//! wall.png`.
+//! [`PlyReader`] reads the numbers, [`PlyVertices`] and [`PlyFaces`] know their names, [`PlyLooks`] reads the
+//! textures, and this module makes a mesh of them.
 
 use crate::error::{Error, Result};
-use crate::fs::quote::{count, quote};
-use crate::image::find::find_image;
-use crate::image::texture::{TextureFile, read_textures};
+use crate::fs::quote::count;
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
 use crate::mesh::labels::LabelElement;
 use crate::mesh::origin::FileFrame;
@@ -15,16 +12,17 @@ use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::faces::{PlyFaces, PlyTriangles};
 use crate::mesh::ply::header::PlyHeader;
 use crate::mesh::ply::labels::PlyLabels;
+use crate::mesh::ply::looks::{PlyLooks, lay_textures};
 use crate::mesh::ply::vertices::PlyVertices;
-use s3d_geom::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX, Texture, Wrap};
+use s3d_geom::{MeshParts, NO_INDEX};
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Reads a PLY file of so many bytes (0: not known), which errors call `path`: vertices keep its order and
-/// number, faces its order.
+/// Reads a PLY file of `bytes` bytes (0: not known). Errors name the file by `path`. Vertices and faces keep
+/// the file's order, and vertices their number.
 ///
 /// # Errors
-/// As [`crate::mesh::read_mesh_with`].
+/// Like [`crate::mesh::read_mesh_with`].
 pub(crate) fn read(
     file: impl Read,
     bytes: u64,
@@ -34,34 +32,34 @@ pub(crate) fn read(
 ) -> Result<MeshFile> {
     let mut reader = PlyReader::new(file, bytes, path)?;
     let header = reader.header().clone();
-    let vertex_count = header.element("vertex").map_or(0, |(_, e)| e.count);
-    let rows_of = |name: &str| header.element(name).map_or(0, |(_, e)| e.count);
-    if rows_of("face") == 0 && rows_of("tristrips") == 0 {
+    let vertex_count = rows_of(&header, "vertex");
+    if rows_of(&header, "face") == 0 && rows_of(&header, "tristrips") == 0 {
         return Err(Error::format(path, no_faces(&header, vertex_count)));
     }
     if vertex_count >= u64::from(NO_INDEX) {
         return Err(Error::format(path, "has more vertices than 32 bits count; cut the scan into parts"));
     }
+
     let frame = FileFrame::new(options.origin, options.units.unwrap_or_default());
     let mut labels = PlyLabels::find(path, &header, options)?;
     let mut vertices = PlyVertices::default();
     let mut faces = PlyFaces::default();
+
+    // The first of two elements with one name counts, as it does for the header.
     let mut done = [false; 3];
     while let Some(element) = reader.next_element()? {
-        let belongs = |l: &&mut PlyLabels, to: LabelElement| l.element == to;
         let known = ["vertex", "face", "tristrips"]
             .iter()
             .position(|name| element.name.eq_ignore_ascii_case(name));
-        // Of two elements with one name the first counts, as for the header.
         let is_first = |k: &usize| done.get_mut(*k).is_some_and(|done| !std::mem::replace(done, true));
         match known.filter(is_first) {
             Some(0) => {
-                let labels = labels.as_mut().filter(|l| belongs(l, LabelElement::Vertex));
+                let labels = labels.as_mut().filter(|l| l.element == LabelElement::Vertex);
                 vertices = PlyVertices::read(path, &mut reader, &element, (up, frame), labels)?;
             }
             Some(1) => {
-                let labels = labels.as_mut().filter(|l| belongs(l, LabelElement::Face));
-                // Strips that came before are polygons without labels: those of faces go first.
+                let labels = labels.as_mut().filter(|l| l.element == LabelElement::Face);
+                // Strips are polygons without labels. They follow the faces, even if the file has them first.
                 let strips = std::mem::take(&mut faces);
                 faces = PlyFaces::read(path, &mut reader, &element, vertex_count, labels)?;
                 faces.append_strips(strips);
@@ -70,13 +68,16 @@ pub(crate) fn read(
             None => {}
         }
     }
+
     let mut warnings = Vec::new();
     if reader.has_more()? {
         warnings.push("the file goes on after its last element; the rest is not read".into());
     }
+
     let offset_m = vertices.bring_near(frame, faces.corners());
     let triangles = faces.triangles(&vertices.positions);
     tell_triangles(path, &triangles, &mut warnings)?;
+
     if faces.odd_uvs > 0 {
         let n = count(faces.odd_uvs, "face");
         warnings.push(format!("texture coordinates of {n} left out: not two numbers a corner"));
@@ -85,20 +86,23 @@ pub(crate) fn read(
         .element("face")
         .is_some_and(|(_, e)| e.find(&["red", "diffuse_red"]).is_some());
     if has_face_colors && vertices.colors.is_empty() {
-        warnings.push("colours of faces are not read; colours of vertices or a texture are".into());
+        warnings.push("face colours are not read, but vertex colours and textures are".into());
     }
-    let looks = Looks::load(path, &header, &mut warnings)?;
+
+    let looks = PlyLooks::load(path, &header, &mut warnings)?;
     let mut parts = MeshParts::default();
     lay_textures(&mut parts, &mut vertices, &mut faces, &triangles, &looks, &mut warnings);
     let PlyTriangles { faces: triangles, polygons, cut, .. } = triangles;
     if !vertices.normals.is_empty() {
         parts.face_normals = triangles.clone();
     }
+
+    // Face labels belong to polygons until all checks are done.
     let labels = labels.and_then(|l| l.finish(&mut warnings));
     if labels.as_ref().is_some_and(|l| l.element() == LabelElement::Face) {
-        // The labels are those of polygons until all checks are done.
         parts.face_tags = polygons;
     }
+
     let parts = MeshParts {
         positions: vertices.positions,
         faces: triangles,
@@ -109,6 +113,7 @@ pub(crate) fn read(
     };
     let mesh = checked_mesh(parts, frame, &mut warnings)
         .map_err(|source| Error::Mesh { path: path.to_owned(), source })?;
+
     Ok(MeshFile {
         polygons_triangulated: cut,
         offset_m,
@@ -118,6 +123,10 @@ pub(crate) fn read(
         labels,
         ..MeshFile::new(path, mesh)
     })
+}
+
+fn rows_of(header: &PlyHeader, element: &str) -> u64 {
+    header.element(element).map_or(0, |(_, e)| e.count)
 }
 
 fn no_faces(header: &PlyHeader, vertices: u64) -> String {
@@ -139,8 +148,10 @@ fn no_faces(header: &PlyHeader, vertices: u64) -> String {
     )
 }
 
+/// Warns of polygons that are left out.
+///
 /// # Errors
-/// If no triangle is left.
+/// [`Error::Format`] if no triangle is left.
 fn tell_triangles(path: &Path, triangles: &PlyTriangles, warnings: &mut Vec<String>) -> Result<()> {
     if triangles.faces.is_empty() {
         let reason = match &triangles.refused {
@@ -160,121 +171,6 @@ fn tell_triangles(path: &Path, triangles: &PlyTriangles, warnings: &mut Vec<Stri
     Ok(())
 }
 
-/// The images that the header's comments name.
-#[derive(Default)]
-struct Looks {
-    /// For each comment its texture, if that could be read.
-    by_comment: Vec<(String, Option<u32>)>,
-    textures: Vec<Texture>,
-    files: Vec<Option<TextureFile>>,
-    /// The images that were read.
-    companions: Vec<PathBuf>,
-}
-
-impl Looks {
-    /// # Errors
-    /// For textures that are too large.
-    fn load(path: &Path, header: &PlyHeader, warnings: &mut Vec<String>) -> Result<Self> {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let names = header.comments.iter().filter_map(|comment| {
-            let (keyword, name) = comment.split_once(char::is_whitespace)?;
-            keyword
-                .eq_ignore_ascii_case("TextureFile")
-                .then(|| name.trim().to_owned())
-        });
-        let mut looks = Self::default();
-        let mut wanted: Vec<PathBuf> = Vec::new();
-        let mut places = Vec::new();
-        for name in names {
-            match find_image(&name, folder, folder) {
-                Some((image, exact)) => {
-                    if !exact {
-                        let written = quote(name.as_bytes());
-                        warnings.push(format!("texture {written} is not there; {} is used", image.display()));
-                    }
-                    places.push(wanted.len());
-                    wanted.push(image);
-                }
-                None => {
-                    let written = quote(name.as_bytes());
-                    warnings.push(format!("texture {written} is not there; its faces are drawn without it"));
-                    places.push(usize::MAX);
-                }
-            }
-            looks.by_comment.push((name, None));
-        }
-        for ((at, loaded), image) in read_textures(&wanted)?.into_iter().enumerate().zip(&wanted) {
-            match loaded {
-                Ok(loaded) => {
-                    let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                    for (slot, _) in looks
-                        .by_comment
-                        .iter_mut()
-                        .zip(&places)
-                        .filter(|(_, place)| **place == at)
-                    {
-                        slot.1 = Some(looks.textures.len() as u32);
-                    }
-                    looks
-                        .textures
-                        .push(Texture { name, image: loaded.image, wrap: [Wrap::Repeat; 2] });
-                    looks.files.push(Some(loaded.file));
-                }
-                Err(why) => warnings
-                    .push(format!("texture {} {why}; its faces are drawn without it", image.display())),
-            }
-        }
-        looks.companions = wanted;
-        Ok(looks)
-    }
-}
-
-/// Gives faces their texture coordinates, of corners before those of vertices, and a material a texture.
-fn lay_textures(
-    parts: &mut MeshParts,
-    vertices: &mut PlyVertices,
-    faces: &mut PlyFaces,
-    triangles: &PlyTriangles,
-    looks: &Looks,
-    warnings: &mut Vec<String>,
-) {
-    let uvs = faces.take_uvs(triangles);
-    if looks.by_comment.is_empty() {
-        if uvs.is_some() || !vertices.uvs.is_empty() {
-            warnings.push(
-                "texture coordinates are not used: no \"comment TextureFile NAME\" in the header names an \
-                 image"
-                    .into(),
-            );
-        }
-        return;
-    }
-    parts.materials = looks
-        .by_comment
-        .iter()
-        .map(|(name, texture)| Material { name: name.clone(), color: DEFAULT_COLOR, texture: *texture })
-        .collect();
-    parts.face_materials = faces.textures(triangles);
-    let known = looks.by_comment.len() as u32;
-    let mut unknown = 0;
-    for material in parts.face_materials.iter_mut().filter(|m| **m >= known) {
-        unknown += usize::from(*material != NO_INDEX);
-        *material = NO_INDEX;
-    }
-    if unknown > 0 {
-        let (faces, textures) = (count(unknown, "face"), count(known as usize, "texture"));
-        warnings.push(format!("{faces} without a texture: texnumber is beyond the {textures} of the header"));
-    }
-    match uvs {
-        Some((uvs, face_uvs)) => (parts.uvs, parts.face_uvs) = (uvs, face_uvs),
-        None if !vertices.uvs.is_empty() => {
-            parts.uvs = std::mem::take(&mut vertices.uvs);
-            parts.face_uvs = triangles.faces.clone();
-        }
-        None => warnings.push("the header names a texture, but nothing has texture coordinates".into()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -284,7 +180,7 @@ mod tests {
     use s3d_geom::FaceColor;
     use s3d_geom::glam::{Vec3, vec2, vec3};
 
-    /// Reads a file of these elements and rows, Z up, with two images beside it.
+    /// Reads a file of these elements and rows, Z-up, with images beside it.
     fn read_with(elements: &str, rows: &str, options: &MeshOptions) -> Result<MeshFile> {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("two words.png"), two_pixels([1, 2, 3], [4, 5, 6])).unwrap();
@@ -309,7 +205,8 @@ mod tests {
 
     #[test]
     fn elements_in_any_order_and_polygons_of_any_size() {
-        // An L, concave at its fourth corner, before its vertices and behind an element of no interest.
+        // An L, concave at its fourth corner. It stands before its vertices and after an element of no
+        // interest.
         let elements = format!(
             "element camera 1\nproperty float f\nproperty list int int l\nelement face 4\n\
              property float other\n\
@@ -317,6 +214,7 @@ mod tests {
         );
         let rows = "0.5 2 1 1\n7 6 0 1 2 3 4 5\n7 3 0 1 2\n7 2 0 1\n7 6 0 3 1 2 0 3\n\
             9 0 0 0\n9 2 0 0\n9 2 1 0\n9 1 1 0\n9 1 2 0\n9 0 2 0\n";
+
         let file = read_ply(&elements, rows).unwrap();
         assert_eq!((file.mesh.faces().len(), file.polygons_triangulated), (5, 1));
         assert_eq!(file.mesh.total_area(), 3.0 + 1.0);
@@ -362,7 +260,7 @@ mod tests {
 
         let elements = square("", "property uchar red\nproperty uchar green\nproperty uchar blue\n", 1);
         let file = read_ply(&elements, &format!("{SQUARE}4 0 1 2 3 9 9 9\n")).unwrap();
-        assert_eq!(file.warnings, ["colours of faces are not read; colours of vertices or a texture are"]);
+        assert_eq!(file.warnings, ["face colours are not read, but vertex colours and textures are"]);
     }
 
     #[test]
@@ -382,8 +280,9 @@ mod tests {
             assert!(file.companions.len() == 1 && file.companions[0].ends_with("two words.png"));
             assert!(file.warnings.is_empty());
         }
-        // As MeshLab writes them: two images, one list a face; the coordinates of a polygon go with its
-        // corners.
+
+        // As MeshLab writes it: two images, and one list for each face. The coordinates of a polygon go with
+        // its corners.
         let list = "property list uchar float texcoord\nproperty int texnumber\n";
         let comments = "comment TextureFile two words.png\ncomment TextureFile b.png\n";
         let rows = format!(
@@ -393,6 +292,7 @@ mod tests {
         );
         // Four different planes, so that no face repeats another.
         let file = read_ply(&format!("{comments}{}", square("", list, 6)), &rows).unwrap();
+
         let texture_of = |face| match file.mesh.color_of(face) {
             FaceColor::Texture(_, texture, uvs) => Some((texture.name.as_str(), uvs)),
             _ => None,
@@ -440,8 +340,8 @@ mod tests {
 
     #[test]
     fn labels_of_faces_stay_with_their_faces() {
-        // A quad, a face without area, one with two corners, one that repeats the first half of the quad, a
-        // triangle.
+        // A quad, a face without area, a face with two corners, a face that repeats the first half of the
+        // quad, and a triangle.
         let elements = format!(
             "element vertex 5\n{XYZ}element face 5\nproperty int material_id\nproperty short category_id\n\
              {FACE}property uint object_id\n"
@@ -480,10 +380,12 @@ mod tests {
         };
         let file = read_with(&elements, rows, &ask(Some("nyu"), None)).unwrap();
         assert_eq!(numbers(&file).1, [column("nyu", &[7, 7, 8, 9]), instance]);
-        // The faces have that column, and no column of classes.
+
+        // The faces have that column, but no column of classes.
         let file = read_with(&elements, rows, &ask(None, Some("part"))).unwrap();
         assert_eq!(numbers(&file), (LabelElement::Face, [None, column("part", &[20, 21])]));
-        // No element has both.
+
+        // No element has both columns.
         let message = read_with(&elements, rows, &ask(Some("label"), Some("part")))
             .unwrap_err()
             .to_string();
@@ -505,6 +407,7 @@ mod tests {
             file.warnings,
             ["the property label is not taken as labels: not all its numbers are whole"]
         );
+
         let options = MeshOptions { class_column: Some("LABEL".into()), ..MeshOptions::default() };
         let message = read_with(&elements, rows, &options).unwrap_err().to_string();
         assert!(
@@ -519,6 +422,7 @@ mod tests {
             format!("element vertex 4\n{XYZ}element tristrips 1\nproperty list int int vertex_indices\n");
         let file = read_ply(&elements, &format!("{SQUARE}9 0 1 3 2 -1 0 0 1 2\n")).unwrap();
         assert_eq!(file.mesh.faces(), [[0, 1, 3], [3, 1, 2], [1, 0, 2]]);
+
         // Strips before faces with labels, whose order stays.
         let elements = format!(
             "element tristrips 1\nproperty list int int vertex_indices\nelement vertex 4\n\
@@ -533,7 +437,7 @@ mod tests {
     fn faults_are_named_with_their_place() {
         let face = |row: &str| read_ply(&square("", "", 1), &format!("{SQUARE}{row}\n"));
         for (outcome, words) in [
-            (face("3 0 1 4"), "line 14: face 0: vertex 4 is not there, 4 are"),
+            (face("3 0 1 4"), "line 14: face 0: vertex 4 is not there; there are 4"),
             (face("3 0 1 -1"), "line 14: face 0: vertex -1 is not there"),
             (face("2 0 1"), "has no face that can be used"),
             (face("4 0 2 1 3"), "has no face that can be used, as face 0 (counted from 0): "),
@@ -557,7 +461,7 @@ mod tests {
                 ),
                 "its vertices have no x, y and z",
             ),
-            (read_ply(&format!("element face 1\n{FACE}"), "3 0 1 2\n"), "vertex 0 is not there, 0 are"),
+            (read_ply(&format!("element face 1\n{FACE}"), "3 0 1 2\n"), "vertex 0 is not there; there are 0"),
             (
                 read_ply(
                     &format!("element vertex 4\n{XYZ}element face 1\nproperty int a\n"),
@@ -583,7 +487,7 @@ mod tests {
 
     #[test]
     fn claims_are_not_believed() {
-        // 4 billion faces, and none there: refused as soon as the file ends.
+        // 4 billion faces are claimed and none is there. The reader notices as soon as the file ends.
         let elements = format!("element vertex 4\n{XYZ}element face 18446744073709551615\n{FACE}");
         let message = read_ply(&elements, SQUARE).unwrap_err().to_string();
         assert!(message.contains("claims 18446744073709551615 rows of the element \"face\""), "{message}");

@@ -1,18 +1,18 @@
-//! The bytes of a PLY file, read ahead, and the numbers that they spell.
+//! Reads the bytes of a PLY file ahead, and decodes the numbers in them.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::mesh::ply::header::PlyType;
 use std::io::Read;
 
-/// The longest word of an ASCII file.
+/// The longest word of an ASCII file, in bytes.
 const MAX_WORD: usize = 4096;
-/// Bytes that are read at once.
+/// How many bytes are read at once.
 pub(crate) const BUFFER: usize = 1 << 18;
 
 pub(crate) type Outcome = std::result::Result<(), Fault>;
 
-/// What is wrong with a row; where it is, the reader knows.
+/// The fault of a row. The reader knows where the row is.
 #[derive(Debug)]
 pub(crate) enum Fault {
     Io(std::io::Error),
@@ -28,11 +28,11 @@ impl From<std::io::Error> for Fault {
     }
 }
 
-/// A file and the bytes that were read ahead.
+/// A file, with the bytes that were read ahead.
 pub(crate) struct Source<'r> {
     file: Box<dyn Read + 'r>,
     buffer: Vec<u8>,
-    /// Where what is not yet taken starts and ends in the buffer.
+    /// The range of the buffer that is not yet taken.
     pub(crate) start: usize,
     pub(crate) end: usize,
 }
@@ -46,17 +46,20 @@ impl<'r> Source<'r> {
         self.buffer.get(self.start..self.end).unwrap_or_default()
     }
 
-    /// Reads until there are `n` bytes; `false` if the file ends before.
+    /// Reads until there are `n` bytes. Returns `false` if the file ends before.
     pub(crate) fn need(&mut self, n: usize) -> std::io::Result<bool> {
         let there = self.bytes().len();
         if there >= n {
             return Ok(true);
         }
+
         self.buffer.copy_within(self.start..self.end, 0);
-        (self.start, self.end) = (0, there);
+        self.start = 0;
+        self.end = there;
         if self.buffer.len() < n {
             self.buffer.resize(n, 0);
         }
+
         while self.end < n {
             match self.file.read(self.buffer.get_mut(self.end..).unwrap_or_default()) {
                 Ok(0) => return Ok(false),
@@ -68,7 +71,7 @@ impl<'r> Source<'r> {
         Ok(true)
     }
 
-    /// The next `n` bytes.
+    /// Takes the next `n` bytes.
     #[inline]
     pub(crate) fn take(&mut self, n: usize) -> std::result::Result<&[u8], Fault> {
         if self.bytes().len() < n && !self.need(n)? {
@@ -83,11 +86,12 @@ impl<'r> Source<'r> {
         Ok(taken)
     }
 
-    /// Goes on behind the next `n` bytes, which are there.
+    /// Skips the next `n` bytes, which are in the buffer.
     pub(crate) fn pass(&mut self, n: usize) {
         self.start = self.start.saturating_add(n).min(self.end);
     }
 
+    /// Skips the next `n` bytes, in the buffer or not.
     pub(crate) fn skip(&mut self, mut n: u64) -> Outcome {
         while n > 0 {
             let step = usize::try_from(n).map_or(BUFFER, |n| n.min(BUFFER));
@@ -97,16 +101,19 @@ impl<'r> Source<'r> {
         Ok(())
     }
 
-    /// The next word, and its line.
+    /// Takes the next word. Counts the line ends before it into `line`.
     pub(crate) fn word(&mut self, line_end: u8, line: &mut u64) -> std::result::Result<&[u8], Fault> {
         loop {
             let bytes = self.bytes();
             let space = bytes.iter().take_while(|b| b.is_ascii_whitespace());
-            let (mut spaces, mut ends) = (0usize, 0u64);
+            let mut spaces = 0usize;
+            let mut ends = 0u64;
+
             for byte in space {
                 spaces = spaces.saturating_add(1);
                 ends = ends.saturating_add((*byte == line_end).into());
             }
+
             let found = spaces < bytes.len();
             *line = line.saturating_add(ends);
             self.pass(spaces);
@@ -117,6 +124,8 @@ impl<'r> Source<'r> {
                 return Err(Fault::End);
             }
         }
+
+        // A word may continue beyond the bytes that were read ahead.
         let mut length = 0usize;
         loop {
             let bytes = self.bytes();
@@ -137,7 +146,7 @@ impl<'r> Source<'r> {
     }
 }
 
-/// Appends the numbers that lie `offset` bytes into each `stride` of `bytes`.
+/// Appends a number of each row of `stride` bytes, `offset` bytes into the row.
 pub(crate) fn column_of(
     bytes: &[u8],
     stride: usize,
@@ -148,7 +157,7 @@ pub(crate) fn column_of(
 ) {
     macro_rules! rows {
         ($type:ty) => {{
-            // What a row does not reach to is not a number.
+            // A row that ends before the number counts as NaN.
             let rows = bytes.chunks_exact(stride).map(|row| row.get(offset..)?.first_chunk());
             if big {
                 out.extend(rows.map(|b| b.map_or(f64::NAN, |b| f64::from(<$type>::from_be_bytes(*b)))));
@@ -200,11 +209,11 @@ pub(crate) fn number(b: &[u8], kind: PlyType, big: bool) -> f64 {
     }
 }
 
-/// Powers of ten that `f64` holds exactly.
+/// The powers of ten that `f64` holds exactly.
 const POWERS: [f64; 19] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18];
 
-/// The number that a word spells, rounded once as `str::parse` does. C's other spellings of NaN are known.
+/// Parses a number, rounded once as by `str::parse`. Spellings of NaN from C are known too.
 pub(crate) fn parse_f64(word: &[u8]) -> Option<f64> {
     let negative = word.first() == Some(&b'-');
     let written = word.strip_prefix(b"-").unwrap_or(word);
@@ -217,14 +226,15 @@ pub(crate) fn parse_f64(word: &[u8]) -> Option<f64> {
         .or_else(|| written.to_ascii_lowercase().starts_with(b"nan(").then_some(f64::NAN))
 }
 
-/// A plain decimal fraction whose digits `f64` holds exactly, as nearly all are: the quotient of two exact
-/// numbers is rounded once.
+/// Parses a plain decimal fraction whose digits `f64` holds exactly, as nearly all are. The quotient of two
+/// exact numbers is rounded once.
 #[inline]
 fn plain_f64(written: &[u8]) -> Option<f64> {
     if written.len() > 19 {
         return None;
     }
-    let (mut digits, mut point) = (0u64, written.len());
+    let mut digits = 0u64;
+    let mut point = written.len();
     for (at, &byte) in written.iter().enumerate() {
         match byte {
             // 19 digits fit into 64 bits.
@@ -233,10 +243,11 @@ fn plain_f64(written: &[u8]) -> Option<f64> {
             _ => return None,
         }
     }
-    // A point alone, or nothing, is no number.
+    // A point alone is no number, nor is an empty word.
     if written.len() == usize::from(point < written.len()) || digits >= 1 << 53 {
         return None;
     }
+
     let decimals = written.len().saturating_sub(point).saturating_sub(1);
     POWERS.get(decimals).map(|power| digits as f64 / power)
 }

@@ -10,26 +10,26 @@ use crate::mesh::ply::labels::PlyLabels;
 use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};
 use std::path::Path;
 
-/// Columns of the element `vertex`, in the world's axes; those that the file lacks are empty.
+/// The columns of the element `vertex`, in the world's axes. A column that the file lacks is empty.
 #[derive(Debug, Default)]
 pub(crate) struct PlyVertices {
     pub(crate) positions: Vec<Vec3>,
-    /// The same in `f64`, of a mesh that is to be brought nearer to the origin; else empty.
+    /// The positions in `f64`, if the mesh is to be moved nearer to the origin. Otherwise empty.
     exact: Vec<DVec3>,
-    /// Of length 1; NaN where the file's has no length.
+    /// Of length 1; NaN for a normal without length.
     pub(crate) normals: Vec<Vec3>,
     pub(crate) colors: Vec<[u8; 3]>,
     pub(crate) uvs: Vec<Vec2>,
 }
 
-/// Names of two or three columns that go together, in the order in which they are looked for.
+/// The names of two or three columns that belong together, in the order of search.
 const POSITIONS: [[&str; 3]; 1] = [["x", "y", "z"]];
 const NORMALS: [[&str; 3]; 2] = [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
 const COLORS: [[&str; 3]; 3] =
     [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]];
 const UVS: [[&str; 2]; 4] = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
 
-/// The places of the first of `names` of which all are there.
+/// Returns the indices of the first names that are all there.
 fn places<const N: usize>(element: &PlyElement, names: &[[&str; N]]) -> Option<[usize; N]> {
     names.iter().find_map(|names| {
         let mut places = [0; N];
@@ -41,10 +41,10 @@ fn places<const N: usize>(element: &PlyElement, names: &[[&str; N]]) -> Option<[
 }
 
 impl PlyVertices {
-    /// Reads the element that comes now; its labels too, if they belong to vertices.
+    /// Reads the current element, and its labels if they belong to vertices.
     ///
     /// # Errors
-    /// As [`PlyReader::read_batch`]; [`Error::Format`] without coordinates.
+    /// Like [`PlyReader::read_batch`]; [`Error::Format`] without coordinates.
     pub(crate) fn read(
         path: &Path,
         reader: &mut PlyReader<'_>,
@@ -55,27 +55,30 @@ impl PlyVertices {
         let Some(xyz) = places(element, &POSITIONS) else {
             return Err(Error::format(path, "its vertices have no x, y and z"));
         };
-        let (normal, color, uv) =
-            (places(element, &NORMALS), places(element, &COLORS), places(element, &UVS));
+        let normal = places(element, &NORMALS);
+        let color = places(element, &COLORS);
+        let uv = places(element, &UVS);
         let wanted = xyz
             .into_iter()
             .chain(normal.into_iter().flatten())
-            .chain(color.into_iter().flatten());
-        let wanted = wanted.chain(uv.into_iter().flatten());
+            .chain(color.into_iter().flatten())
+            .chain(uv.into_iter().flatten());
         reader.want(wanted.chain(labels.iter().flat_map(|l| l.properties())));
 
         let mut out = Self::default();
         out.positions.reserve_exact(reader.plausible_rows(element));
         let mut colors = color.map(|places| Colors::new(element, places));
         let mut batch = PlyBatch::default();
+
         while reader.read_batch(&mut batch)? {
-            // The first rows tell how far all are: of those that are used no one knows yet.
+            // The first batch tells how far the mesh is, as the vertices of faces are not known yet.
             let is_far =
                 || frame.needs_exact(vectors(&batch, xyz).fold(0.0, |m, v| m.max(v.abs().max_element())));
             if !out.exact.is_empty() || out.positions.is_empty() && is_far() {
                 out.exact
                     .extend(vectors(&batch, xyz).map(|v| up.exact_world_from_file(v)));
             }
+
             out.positions
                 .extend(vectors(&batch, xyz).map(|v| up.world_from_file(v.as_vec3())));
             if let Some(places) = normal {
@@ -85,6 +88,7 @@ impl PlyVertices {
                         .map(|n| up.world_from_file(n / n.length())),
                 );
             }
+
             if let Some([u, v]) = uv {
                 let pairs = batch.scalars(u).iter().zip(batch.scalars(v));
                 out.uvs.extend(pairs.map(|(&u, &v)| vec2(u as f32, v as f32)));
@@ -96,12 +100,13 @@ impl PlyVertices {
                 labels.add(reader, &batch)?;
             }
         }
+
         out.colors = colors.map_or_else(Vec::new, Colors::finish);
         Ok(out)
     }
 
-    /// Brings the vertices near the origin, if they are to be; `corners` are those of faces. Returns what was
-    /// subtracted, in the world's axes.
+    /// Moves the vertices near the origin, if they were read for it. `corners` are the vertices of the faces.
+    /// Returns the offset that was subtracted, in metres in the world's axes.
     pub(crate) fn bring_near(&mut self, frame: FileFrame, corners: &[u32]) -> DVec3 {
         let exact = std::mem::take(&mut self.exact);
         if exact.is_empty() {
@@ -119,11 +124,11 @@ impl PlyVertices {
 }
 
 fn vectors(batch: &PlyBatch, [x, y, z]: [usize; 3]) -> impl Iterator<Item = DVec3> {
-    let (x, y, z) = (batch.scalars(x), batch.scalars(y), batch.scalars(z));
+    let [x, y, z] = [x, y, z].map(|property| batch.scalars(property));
     x.iter().zip(y).zip(z).map(|((&x, &y), &z)| DVec3::new(x, y, z))
 }
 
-/// Colours while they are read: bytes as bytes, other types as they are until the largest is known.
+/// Colours while they are read. Bytes stay bytes; other numbers wait until the largest is known.
 struct Colors {
     places: [usize; 3],
     kind: PlyType,
@@ -134,7 +139,7 @@ struct Colors {
 impl Colors {
     fn new(element: &PlyElement, places: [usize; 3]) -> Self {
         let [r, g, b] = places.map(|p| element.properties.get(p).map(|p| p.kind));
-        // Three types that differ are read as numbers.
+        // Columns of different types are read as numbers.
         let kind = r.filter(|_| r == g && g == b).unwrap_or(PlyType::F32);
         Self { places, kind, bytes: Vec::new(), numbers: Vec::new() }
     }
@@ -148,17 +153,20 @@ impl Colors {
         }
     }
 
-    /// Numbers of floating point run from 0 to 1, in some files from 0 to 255: the largest tells, with room
-    /// for what is a little too bright. Those of 16 bits run to 65,535 if one is larger than 255.
+    /// Returns the colours as bytes. Numbers of floating point run from 0 to 1, and in some files from 0 to
+    /// 255. The largest number tells the scale, with room for colours that are a little too bright. Whole
+    /// numbers run to 65,535 if any is larger than 255.
     fn finish(self) -> Vec<[u8; 3]> {
         if self.kind == PlyType::U8 {
             return self.bytes;
         }
         let largest = self.numbers.iter().flatten().fold(0.0f32, |a, &b| a.max(b));
-        let scale = match self.kind.is_integer() {
-            true if largest > 255.0 => 255.0 / 65_535.0,
-            false if largest <= 2.0 => 255.0,
-            _ => 1.0,
+        let scale = if self.kind.is_integer() {
+            if largest > 255.0 { 255.0 / 65_535.0 } else { 1.0 }
+        } else if largest <= 2.0 {
+            255.0
+        } else {
+            1.0
         };
         let byte = |v: f32| (v * scale).round().clamp(0.0, 255.0) as u8;
         self.numbers.into_iter().map(|c| c.map(byte)).collect()

@@ -1,4 +1,4 @@
-//! WebDataset: training samples in tar archives.
+//! Writes WebDataset: training samples in tar archives.
 
 mod shards;
 mod tar;

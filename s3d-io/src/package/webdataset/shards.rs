@@ -1,8 +1,8 @@
-//! WebDataset: training samples in tar archives, the shards.
+//! Plans the shards of a WebDataset: tar archives of training samples.
 //!
-//! A sample is the files of one image, one after another in its shard, all named by the same key. WebDataset
-//! takes as key what stands before the first dot of the file's name, folders included, and as field what
-//! stands after it: the image `area_1/camera_…_office_3_frame_7` has the fields `rgb.png`, `depth.png`, …,
+//! A sample is the files of one image, one after another in its shard, all with the same key. For WebDataset
+//! the key is the part of the name before its first dot, folders included, and the field is the part after
+//! it. The image `area_1/camera_…_office_3_frame_7` has the fields `rgb.png`, `depth.png`, …,
 //! `pose.json`.
 
 use crate::dataset::domain::Domain;
@@ -14,14 +14,14 @@ use serde::Serialize;
 use std::ops::Range;
 use std::path::Path;
 
-/// The key of an image's sample: `area_{N}/camera_{uuid}_{room}_frame_{frame}`. It has no dot, and no other
-/// image of the data set has the same.
+/// Returns the key of an image's sample: `area_{N}/camera_{uuid}_{room}_frame_{frame}`. It has no dot and is
+/// unique in the data set.
 pub fn sample_key(image: &DatasetImage) -> String {
     format!("area_{}/{}", image.area, image.stem())
 }
 
-/// The name of a sample's file in the archive: the key and, after its first dot, the field: `rgb.png`,
-/// `normals.png`, `global_xyz.exr`, `pose.json`.
+/// Returns the name of a sample's file in the archive, `KEY.FIELD`. Fields are `rgb.png`, `normals.png`,
+/// `global_xyz.exr`, `pose.json` and the like.
 pub fn sample_member(key: &str, domain: Domain) -> String {
     format!("{key}.{}.{}", domain.suffix(), domain.extension())
 }
@@ -29,9 +29,9 @@ pub fn sample_member(key: &str, domain: Domain) -> String {
 /// How large shards may become.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShardLimits {
-    /// Bytes of a shard; a sample that is larger alone gets a shard alone.
+    /// The largest size of a shard in bytes. A sample that is larger gets its own shard.
     pub max_bytes: u64,
-    /// Samples of a shard.
+    /// The largest number of samples in a shard.
     pub max_samples: usize,
 }
 
@@ -42,20 +42,22 @@ impl Default for ShardLimits {
     }
 }
 
-/// Which samples go to which shard, in order: as many to each as the limits allow. `sizes` are what the
-/// samples take in an archive, the sum of [`TarWriter::entry_bytes`].
+/// Assigns samples to shards, in order, as many to each shard as the limits allow. `sizes` are the bytes of
+/// each sample in an archive, the sum of its [`TarWriter::entry_bytes`].
 ///
 /// # Panics
-/// If a shard may hold no sample.
+/// If `limits` allow no sample in a shard.
 pub fn plan_shards(sizes: &[u64], limits: ShardLimits) -> Vec<Range<usize>> {
     assert!(limits.max_samples > 0, "a shard needs room for a sample");
     let mut shards = Vec::new();
-    let (mut start, mut bytes) = (0, TarWriter::EMPTY_BYTES);
+    let mut start = 0;
+    let mut bytes = TarWriter::EMPTY_BYTES;
     for (i, size) in sizes.iter().enumerate() {
         let full = i - start >= limits.max_samples || bytes.saturating_add(*size) > limits.max_bytes;
         if full && i > start {
             shards.push(start..i);
-            (start, bytes) = (i, TarWriter::EMPTY_BYTES);
+            start = i;
+            bytes = TarWriter::EMPTY_BYTES;
         }
         bytes = bytes.saturating_add(*size);
     }
@@ -65,19 +67,19 @@ pub fn plan_shards(sizes: &[u64], limits: ShardLimits) -> Vec<Range<usize>> {
     shards
 }
 
-/// A shard in the list of them. The fields bear the file's names.
+/// A shard in the shard list. The fields are named as in the file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ShardEntry {
     /// Its file, relative to the list.
     pub url: String,
-    /// Its samples.
+    /// How many samples it has.
     pub nsamples: usize,
-    /// Its bytes.
+    /// Its size in bytes.
     pub filesize: u64,
 }
 
-/// Writes a list of shards in the form of the `wids` index (`wids-shard-index-v1`), which says how many
-/// samples there are before a shard is opened, and returns the file's size in bytes.
+/// Writes a shard list as a `wids` index (`wids-shard-index-v1`), which gives the number of samples before a
+/// shard is opened. Returns the size of the file in bytes.
 ///
 /// # Errors
 /// [`crate::Error::Io`].

@@ -1,8 +1,8 @@
-//! Tape archives (POSIX ustar), as far as training data needs them: plain files, one after another.
+//! Writes tar archives (POSIX ustar) of plain files, which is all that training data needs.
 //!
-//! The tar crate would save a dozen lines of these: the sizes of entries, by which shards are planned, and
-//! extended headers would stay ours, as it writes long names GNU's way, and the bytes of shards would change
-//! (`the_tar_crate_writes_other_bytes`). It reads them in the tests.
+//! The tar crate would save a dozen lines. The sizes of entries, by which shards are planned, and extended
+//! headers would stay ours, since it writes long names in GNU's way. The bytes of shards would change too
+//! (`the_tar_crate_writes_other_bytes`). The tests use it as a reader.
 
 #![expect(clippy::indexing_slicing, reason = "a writer: the fields of a header of 512 bytes")]
 
@@ -10,21 +10,21 @@ use crate::error::Result;
 use crate::fs::atomic::AtomicFile;
 use std::path::Path;
 
-/// Headers and contents are filled up to a multiple of this.
+/// Headers and contents are padded to a multiple of this.
 const BLOCK: u64 = 512;
 
-/// Two empty blocks end an archive.
+/// An archive ends with two empty blocks.
 const END: u64 = 2 * BLOCK;
 
-/// Sizes from here on do not fit the header's eleven octal digits.
+/// The first size that does not fit the header's eleven octal digits.
 const MAX_OCTAL: u64 = 1 << 33;
 
-/// Writes a tar archive of plain files, whole or not at all. It depends on nothing but what is appended:
-/// owner 0, mode 644, time 0.
+/// Writes a tar archive of plain files, whole or not at all. The bytes depend only on the files: owner 0,
+/// mode 644, time 0.
 ///
-/// Names of up to 100 bytes, or 256 with a `/` at a good place, stand in the header; longer ones, and sizes
-/// from 8 GiB on, in an extended header before it (POSIX pax), which tar programs and Python's `tarfile`
-/// read.
+/// The header holds names of up to 100 bytes, or up to 256 if they can be split at a `/`. For longer names,
+/// and for sizes of 8 GiB or more, an extended header (POSIX pax) comes before it, which tar programs and
+/// Python's `tarfile` read.
 #[derive(Debug)]
 pub struct TarWriter {
     file: AtomicFile,
@@ -61,7 +61,7 @@ impl TarWriter {
         self.fill(bytes)
     }
 
-    /// Writes bytes and fills their last block.
+    /// Writes bytes and pads their last block.
     fn fill(&mut self, bytes: &[u8]) -> Result<()> {
         self.file.put(bytes)?;
         let rest = bytes.len() as u64 % BLOCK;
@@ -72,7 +72,7 @@ impl TarWriter {
         }
     }
 
-    /// Ends the archive, gives it its name, and returns its size in bytes.
+    /// Ends the archive and gives it its name. Returns its size in bytes.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -81,10 +81,10 @@ impl TarWriter {
         self.file.commit()
     }
 
-    /// The bytes that an archive takes besides its files.
+    /// The bytes of an archive without files.
     pub const EMPTY_BYTES: u64 = END;
 
-    /// The bytes that a file of this name and size takes in an archive.
+    /// Returns how many bytes a file of this name and size takes in an archive.
     pub fn entry_bytes(name: &str, size: u64) -> u64 {
         let records = pax_records(name, size).len() as u64;
         let extended = if records == 0 {
@@ -96,12 +96,13 @@ impl TarWriter {
     }
 }
 
-/// The extended header of a file, if it needs one: "LENGTH key=value\n" for each of what does not fit.
+/// Returns the extended header of a file, "LENGTH key=value
+/// " for each value that does not fit the header. Empty if all fit.
 fn pax_records(name: &str, size: u64) -> String {
     let mut records = String::new();
     let mut push = |key: &str, value: &str| {
         let rest = key.len() + value.len() + 3;
-        // The length counts its own digits.
+        // The length counts its own digits too.
         let mut length = rest + 1;
         while length != rest + length.to_string().len() {
             length = rest + length.to_string().len();
@@ -117,8 +118,8 @@ fn pax_records(name: &str, size: u64) -> String {
     records
 }
 
-/// A name as the header's two fields take it: up to 155 bytes of folders, and up to 100 after a `/`. `None`
-/// if it does not fit.
+/// Splits a name for the two fields of the header: up to 155 bytes of folders, and up to 100 bytes after a
+/// `/`. Returns `None` if it does not fit.
 fn split_name(name: &str) -> Option<(&str, &str)> {
     if name.len() <= 100 {
         return Some(("", name));
@@ -129,11 +130,13 @@ fn split_name(name: &str) -> Option<(&str, &str)> {
     slashes.find(|(folders, rest)| folders.len() <= 155 && (1..=100).contains(&rest.len()))
 }
 
-/// The header of a file, or of an extended header (`kind` b'x').
+/// Makes the header of a file, or of an extended header (`kind` b'x').
 fn header(name: &str, size: u64, kind: u8) -> [u8; BLOCK as usize] {
     let mut block = [0; BLOCK as usize];
     let mut put = |at: usize, bytes: &[u8]| block[at..at + bytes.len()].copy_from_slice(bytes);
-    // What does not fit stands in the extended header; its beginning is here for programs that read none.
+
+    // A name that does not fit is in the extended header. Its beginning stands here, for programs that do not
+    // read those.
     let beginning = name
         .split_at_checked(name.floor_char_boundary(100))
         .map_or("", |(beginning, _)| beginning);
@@ -150,6 +153,7 @@ fn header(name: &str, size: u64, kind: u8) -> [u8; BLOCK as usize] {
     put(329, b"0000000\0");
     put(337, b"0000000\0");
     put(345, folders.as_bytes());
+
     let sum: u32 = block.iter().map(|b| u32::from(*b)).sum();
     block[148..156].copy_from_slice(format!("{sum:06o}\0 ").as_bytes());
     block
@@ -160,7 +164,7 @@ mod tests {
     use super::*;
     use std::io::Read;
 
-    /// Names and contents, as the tar crate reads them.
+    /// Returns names and contents, as the tar crate reads them.
     fn read(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
         let mut archive = tar::Archive::new(bytes);
         let files = archive.entries().unwrap().map(|entry| {
@@ -194,7 +198,9 @@ mod tests {
             header.set_cksum();
             std::io::Result::Ok(*header.as_bytes())
         };
-        let (ours, other) = (header("a", 5, b'0'), theirs("a").unwrap());
+
+        let ours = header("a", 5, b'0');
+        let other = theirs("a").unwrap();
         let differ: Vec<usize> = (0..512).filter(|&at| ours[at] != other[at]).collect();
         assert!(differ.iter().all(|at| (148..156).contains(at)) && !differ.is_empty(), "{differ:?}");
         let deep = format!("a/{}/{}", "b".repeat(60), "c".repeat(90));

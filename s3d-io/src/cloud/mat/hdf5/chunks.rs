@@ -1,28 +1,28 @@
-//! Arrays in chunks: a B-tree of pieces, each perhaps shuffled and deflated.
+//! Reads arrays in chunks: a B-tree of pieces, which may be shuffled and deflated.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use super::UNDEFINED;
 use super::file::{Cursor, Dataset, Filter, Hdf5File};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
-/// What deflate can make of a byte at most.
+/// The most bytes that deflate makes of one.
 const MAX_DEFLATE: u64 = 1032;
-/// Levels of a B-tree.
+/// The most levels of a B-tree.
 const MAX_LEVELS: u8 = 40;
 
 /// A piece of an array.
 struct Chunk {
-    /// Where it begins, in elements along each axis.
+    /// Its first element's index along each axis.
     offset: Vec<u64>,
-    /// Where it is stored, and its bytes there.
+    /// Where it is stored, and the number of bytes there.
     address: u64,
     stored: u32,
-    /// A bit for each filter that was left out.
+    /// A bit for each filter that was not applied.
     skipped: u32,
 }
 
-/// All `bytes` of an array whose chunks of extents `chunk` are under the B-tree at `tree`.
+/// Reads all `bytes` of an array. Its chunks have the extents `chunk` and are under the B-tree at `tree`.
 pub(super) fn read(
     file: &Hdf5File,
     dataset: &Dataset,
@@ -30,7 +30,7 @@ pub(super) fn read(
     chunk: &[u64],
     bytes: u64,
 ) -> Result<Vec<u8>> {
-    let damaged = || file.fault(format!("an array of {:?} in chunks of {chunk:?} is damaged", dataset.dims));
+    let damaged = || damaged(file, dataset, chunk);
     let element = dataset.kind.size();
     let chunk_bytes = chunk
         .iter()
@@ -44,36 +44,10 @@ pub(super) fn read(
             return Err(file.unsupported(&format!("an array compressed with filter {id}")));
         }
     }
+
     let chunks = list(file, tree, chunk.len())?;
-    // Before anything is allocated: the chunks must be able to fill the array.
-    let needed = dataset
-        .dims
-        .iter()
-        .zip(chunk)
-        .try_fold(1u64, |n, (d, c)| n.checked_mul(d.div_ceil(*c)));
-    if needed.is_none_or(|n| n > chunks.len() as u64) {
-        return Err(file.fault(format!(
-            "an array of {:?} has only {} of its chunks",
-            dataset.dims,
-            chunks.len()
-        )));
-    }
-    // Chunks share no bytes. Thus the array is not larger than the whole file could be deflated from.
-    let stored: u64 = chunks.iter().map(|c| u64::from(c.stored)).sum();
-    if stored > file.len() {
-        return Err(damaged());
-    }
-    let most = if dataset.filters.contains(&Filter::Deflate) {
-        MAX_DEFLATE
-    } else {
-        1
-    };
-    if chunks
-        .iter()
-        .any(|c| chunk_bytes > most.saturating_mul(u64::from(c.stored)).saturating_add(64))
-    {
-        return Err(damaged());
-    }
+    check_chunks(file, dataset, chunk, chunk_bytes, &chunks)?;
+
     let size = usize::try_from(bytes)
         .ok()
         .filter(|_| bytes <= chunk_bytes.saturating_mul(chunks.len() as u64));
@@ -88,11 +62,56 @@ pub(super) fn read(
     Ok(data)
 }
 
-/// The chunks under a B-tree.
+/// The error for an array that cannot be right.
+fn damaged(file: &Hdf5File, dataset: &Dataset, chunk: &[u64]) -> Error {
+    file.fault(format!("an array of {:?} in chunks of {chunk:?} is damaged", dataset.dims))
+}
+
+/// Checks, before anything is allocated, that the chunks can fill the array.
+fn check_chunks(
+    file: &Hdf5File,
+    dataset: &Dataset,
+    chunk: &[u64],
+    chunk_bytes: u64,
+    chunks: &[Chunk],
+) -> Result<()> {
+    let needed = dataset
+        .dims
+        .iter()
+        .zip(chunk)
+        .try_fold(1u64, |n, (d, c)| n.checked_mul(d.div_ceil(*c)));
+    if needed.is_none_or(|n| n > chunks.len() as u64) {
+        return Err(file.fault(format!(
+            "an array of {:?} has only {} of its chunks",
+            dataset.dims,
+            chunks.len()
+        )));
+    }
+
+    // Chunks share no bytes, so the array is no larger than what the whole file could inflate to.
+    let stored: u64 = chunks.iter().map(|c| u64::from(c.stored)).sum();
+    if stored > file.len() {
+        return Err(damaged(file, dataset, chunk));
+    }
+    let most = if dataset.filters.contains(&Filter::Deflate) {
+        MAX_DEFLATE
+    } else {
+        1
+    };
+    if chunks
+        .iter()
+        .any(|c| chunk_bytes > most.saturating_mul(u64::from(c.stored)).saturating_add(64))
+    {
+        return Err(damaged(file, dataset, chunk));
+    }
+    Ok(())
+}
+
+/// Lists the chunks under a B-tree.
 fn list(file: &Hdf5File, tree: u64, axes: usize) -> Result<Vec<Chunk>> {
     let damaged = || file.fault("the list of an array's chunks is damaged");
-    // A key: bytes and filters, an offset along each axis and in the element. A node has one more than
-    // children.
+    // A key has the chunk's bytes, its filters, and an offset along each axis and within the element. A node
+    // has one key more than children.
     let key_bytes = axes.checked_add(2).and_then(|n| n.checked_mul(8)).ok_or_else(damaged)?;
     let entry_bytes = key_bytes.checked_add(8).ok_or_else(damaged)?;
     let mut chunks = Vec::new();
@@ -102,9 +121,11 @@ fn list(file: &Hdf5File, tree: u64, axes: usize) -> Result<Vec<Chunk>> {
         vec![(tree, MAX_LEVELS)]
     };
     let mut left = file.len() / 8;
+
     while let Some((address, below)) = nodes.pop() {
         let head: [u8; 24] = file.array(address)?;
-        let (level, count) = (head[5], u16::from_le_bytes([head[6], head[7]]));
+        let level = head[5];
+        let count = u16::from_le_bytes([head[6], head[7]]);
         left = left
             .checked_sub(1)
             .and_then(|n| n.checked_sub(count.into()))
@@ -112,18 +133,11 @@ fn list(file: &Hdf5File, tree: u64, axes: usize) -> Result<Vec<Chunk>> {
         if !head.starts_with(b"TREE\x01") || level >= below {
             return Err(damaged());
         }
+
         let body_bytes = (entry_bytes as u64).checked_mul(count.into()).ok_or_else(damaged)?;
         let body = file.bytes(address.checked_add(24).ok_or_else(damaged)?, body_bytes)?;
         for entry in body.chunks_exact(entry_bytes) {
-            let mut entry = Cursor::new(entry);
-            let mut parse = || {
-                let (stored, skipped) =
-                    (u32::from_le_bytes(entry.array()?), u32::from_le_bytes(entry.array()?));
-                let offset = (0..axes).map(|_| entry.number(8)).collect::<Option<Vec<u64>>>()?;
-                entry.number(8)?;
-                Some(Chunk { offset, stored, skipped, address: entry.number(8)? })
-            };
-            let chunk = parse().ok_or_else(damaged)?;
+            let chunk = parse_chunk(entry, axes).ok_or_else(damaged)?;
             if level == 0 {
                 chunks.push(chunk);
             } else {
@@ -134,7 +148,17 @@ fn list(file: &Hdf5File, tree: u64, axes: usize) -> Result<Vec<Chunk>> {
     Ok(chunks)
 }
 
-/// A chunk's bytes as they were before the filters, which are undone from the last to the first.
+/// Parses a key of a B-tree and the address behind it.
+fn parse_chunk(entry: &[u8], axes: usize) -> Option<Chunk> {
+    let mut entry = Cursor::new(entry);
+    let stored = u32::from_le_bytes(entry.array()?);
+    let skipped = u32::from_le_bytes(entry.array()?);
+    let offset = (0..axes).map(|_| entry.number(8)).collect::<Option<Vec<u64>>>()?;
+    entry.number(8)?;
+    Some(Chunk { offset, stored, skipped, address: entry.number(8)? })
+}
+
+/// Restores a chunk's bytes: undoes the filters from the last to the first.
 fn unfilter(
     mut data: Vec<u8>,
     skipped: u32,
@@ -147,14 +171,15 @@ fn unfilter(
             continue;
         }
         match filter {
-            // Its checksum is left to zlib's, or to nobody.
+            // The checksum is not verified. Deflated data have one of their own.
             Filter::Fletcher32 => data.truncate(data.len().checked_sub(4)?),
-            // A little more than the chunk: there may be a checksum.
+            // Four bytes more than the chunk, for a checksum.
             Filter::Deflate => {
                 data = fdeflate::decompress_to_vec_bounded(&data, size.checked_add(4)?).ok()?;
             }
             Filter::Shuffle => {
-                // All first bytes of the elements, then all second ones…; what is no whole element is behind.
+                // All first bytes of the elements come first, then all second ones, and so on. Bytes of no
+                // whole element are at the end.
                 let n = data.len().checked_div(element)?;
                 let mut whole = data.clone();
                 for (byte, plane) in data.chunks_exact(n.max(1)).take(element).enumerate() {
@@ -169,8 +194,8 @@ fn unfilter(
     (data.len() == size).then_some(data)
 }
 
-/// Copies a chunk to its place; what lies beyond the array is filling. `None` if the chunk or the array is
-/// smaller than its extents say.
+/// Copies a chunk to its place in the array. Elements beyond the array are filling and are dropped. Returns
+/// `None` if the chunk or the array is smaller than its extents say.
 fn place(
     data: &mut [u8],
     dims: &[u64],
@@ -182,30 +207,27 @@ fn place(
     if offset.iter().zip(dims).any(|(o, d)| o >= d) {
         return Some(());
     }
-    // How many of the chunk's elements are in the array, along each axis.
-    let within = |((e, d), o): ((&u64, &u64), &u64)| Some(*e.min(&d.checked_sub(*o)?));
+    // The number of the chunk's elements inside the array, along each axis.
     let inside = extents
         .iter()
         .zip(dims)
         .zip(offset)
-        .map(within)
+        .map(|((extent, d), o)| Some(*extent.min(&d.checked_sub(*o)?)))
         .collect::<Option<Vec<u64>>>()?;
-    // Elements of the last axis lie in a row.
+    // Elements along the last axis are contiguous.
     let run = usize::try_from(inside.last().copied().unwrap_or(1))
         .ok()?
         .checked_mul(element)?;
-    let (mut at, first) = (vec![0u64; dims.len()], vec![0; dims.len()]);
+    let mut at = vec![0u64; dims.len()];
+    let first = vec![0; dims.len()];
+
     loop {
-        let index = |start: &[u64], dims: &[u64]| {
-            let mut axes = at.iter().zip(start).zip(dims);
-            let index =
-                axes.try_fold(0u64, |n, ((a, s), d)| n.checked_mul(*d)?.checked_add(*a)?.checked_add(*s))?;
-            usize::try_from(index).ok()?.checked_mul(element)
-        };
-        let (to, from) = (index(offset, dims)?, index(&first, extents)?);
+        let to = byte_index(&at, offset, dims, element)?;
+        let from = byte_index(&at, &first, extents, element)?;
         let row = chunk.get(from..)?.get(..run)?;
         data.get_mut(to..)?.get_mut(..run)?.copy_from_slice(row);
-        // The next row: all axes but the last count up, and begin again at their ends.
+
+        // The next row: counts up all axes but the last, each of which starts again at its end.
         let mut axes = at.iter_mut().zip(&inside);
         axes.next_back();
         let counted = axes.rev().any(|(at, inside)| {
@@ -217,4 +239,11 @@ fn place(
             return Some(());
         }
     }
+}
+
+/// The byte of the element at `start + at` in an array of these extents.
+fn byte_index(at: &[u64], start: &[u64], dims: &[u64], element: usize) -> Option<usize> {
+    let mut axes = at.iter().zip(start).zip(dims);
+    let index = axes.try_fold(0u64, |n, ((a, s), d)| n.checked_mul(*d)?.checked_add(*a)?.checked_add(*s))?;
+    usize::try_from(index).ok()?.checked_mul(element)
 }

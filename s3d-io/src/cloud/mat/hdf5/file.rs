@@ -9,7 +9,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-/// What an element of an array is.
+/// The type of an array's elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// An integer of `size` bytes, 1 to 8.
@@ -18,9 +18,9 @@ pub(crate) enum Kind {
     Float { size: usize, big_endian: bool },
     /// The address of an object.
     Reference,
-    /// Text of so many bytes.
+    /// Text of `size` bytes.
     Text { size: usize },
-    /// Anything else, of so many bytes.
+    /// Anything else, of `size` bytes.
     Other { size: usize },
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct Dataset {
     pub(crate) filters: Vec<Filter>,
 }
 
-/// Where the data of an array are.
+/// The place of an array's data.
 #[derive(Clone, Debug)]
 pub(crate) enum Layout {
     /// In the header.
@@ -54,28 +54,28 @@ pub(crate) enum Layout {
     Contiguous { address: u64, size: u64 },
     /// In pieces of these extents, under a B-tree.
     Chunked { tree: u64, dims: Vec<u64> },
-    /// In a way that is not read, for this reason.
+    /// In a form that is not read. The text names it.
     Unsupported(&'static str),
 }
 
-/// What was done to the bytes of a chunk.
+/// A filter that was applied to the bytes of a chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Filter {
     Deflate,
     Shuffle,
     Fletcher32,
-    /// One that is not read, with its number.
+    /// A filter that is not supported, with its number.
     Other(u16),
 }
 
-/// An open file. Whatever its bytes are, reading it allocates no more than a small multiple of them.
+/// An open file. Reading it allocates at most a small multiple of its size, whatever its bytes are.
 #[derive(Debug)]
 pub(crate) struct Hdf5File {
     path: PathBuf,
     file: Mutex<Bytes>,
-    /// Bytes of the file.
+    /// The bytes of the file.
     file_len: u64,
-    /// Bytes before those that addresses count, fewer than the file has.
+    /// The bytes before address 0; fewer than the file has.
     user_block: u64,
     /// Address of the root group.
     pub(super) root: u64,
@@ -92,6 +92,7 @@ impl Hdf5File {
             user_block: 0,
             root: UNDEFINED,
         };
+
         let mut at = 0u64;
         while this.array(at).map_or(true, |b| b != SIGNATURE) {
             at = at.saturating_mul(2).max(512);
@@ -99,12 +100,13 @@ impl Hdf5File {
                 return Err(this.fault(this.not_hdf5()));
             }
         }
+
         this.user_block = at;
         this.root = this.superblock()?;
         Ok(this)
     }
 
-    /// Why it is none of our files.
+    /// Why the file is not read, as a message.
     fn not_hdf5(&self) -> &'static str {
         match self.bytes(0, 20) {
             Ok(head) if head.starts_with(b"MATLAB 5.0") => {
@@ -117,11 +119,10 @@ impl Hdf5File {
         }
     }
 
-    /// The address of the root group.
+    /// Reads the superblock, and returns the address of the root group.
     fn superblock(&self) -> Result<u64> {
         let [version] = self.array(8)?;
-        // Version 1 has four bytes more than version 0 before the addresses: of the end, and with the root's
-        // entry.
+        // Version 1 has four more bytes than version 0 before its addresses.
         let (sizes, root, end) = match version {
             0 => (13, 64, 40),
             1 => (13, 68, 44),
@@ -133,13 +134,13 @@ impl Hdf5File {
         }
         let end = self.number(end)?;
         if end > self.file_len {
-            let (is, should) = (self.file_len, end);
-            return Err(self.fault(format!("is cut off: it has {is} of {should} bytes; fetch it again")));
+            let is = self.file_len;
+            return Err(self.fault(format!("is cut off: it has {is} of {end} bytes; fetch it again")));
         }
         self.number(root)
     }
 
-    /// `len` bytes at an address.
+    /// Reads `len` bytes at an address.
     pub(crate) fn bytes(&self, address: u64, len: u64) -> Result<Vec<u8>> {
         let (start, size) = self.piece(address, len)?;
         let mut bytes = vec![0; size];
@@ -147,7 +148,7 @@ impl Hdf5File {
         Ok(bytes)
     }
 
-    /// The `N` bytes at an address.
+    /// Reads the `N` bytes at an address.
     pub(crate) fn array<const N: usize>(&self, address: u64) -> Result<[u8; N]> {
         let (start, _) = self.piece(address, N as u64)?;
         let mut bytes = [0; N];
@@ -155,7 +156,8 @@ impl Hdf5File {
         Ok(bytes)
     }
 
-    /// Where in the file `len` bytes at an address begin, and how many they are, if it has them.
+    /// The place in the file of `len` bytes at an address, and their number. An error if the file ends
+    /// before.
     fn piece(&self, address: u64, len: u64) -> Result<(u64, usize)> {
         let start = self.user_block.checked_add(address);
         let inside = start.filter(|s| s.checked_add(len).is_some_and(|end| end <= self.file_len));
@@ -174,7 +176,7 @@ impl Hdf5File {
             .map_err(|e| Error::io(&self.path, "read", e))
     }
 
-    /// Up to `len` bytes at an address, fewer at the end of the file.
+    /// Reads up to `len` bytes at an address; fewer at the end of the file.
     pub(crate) fn some_bytes(&self, address: u64, len: u64) -> Result<Vec<u8>> {
         self.bytes(address, len.min(self.len().saturating_sub(address)))
     }
@@ -183,7 +185,7 @@ impl Hdf5File {
         self.array(address).map(u64::from_le_bytes)
     }
 
-    /// Bytes of the file behind the user block.
+    /// The number of bytes behind the user block.
     pub(crate) fn len(&self) -> u64 {
         self.file_len.saturating_sub(self.user_block)
     }
@@ -193,7 +195,7 @@ impl Hdf5File {
         Error::format(&self.path, message)
     }
 
-    /// An error about a form that is not read, with the way out.
+    /// An error about a form that is not read, with a way to avoid it.
     pub(crate) fn unsupported(&self, what: &str) -> Error {
         let way = "save it with MATLAB's save(…, '-v7.3') or with h5py's default libver";
         Error::unsupported(&self.path, format!("{what}, which is not read: {way}"))
@@ -211,7 +213,7 @@ impl<'a> Cursor<'a> {
         Self { bytes }
     }
 
-    /// The next `n` bytes, `None` if there are not so many.
+    /// The next `n` bytes. Returns `None` if there are not so many.
     pub(crate) fn take(&mut self, n: usize) -> Option<&'a [u8]> {
         let (head, rest) = self.bytes.split_at_checked(n)?;
         self.bytes = rest;
@@ -223,7 +225,7 @@ impl<'a> Cursor<'a> {
         Some(self.take(n)?.iter().rev().fold(0, |n, b| n << 8 | u64::from(*b)))
     }
 
-    /// The next number of `n` bytes, at most 8, as a number of bytes in memory.
+    /// The next number of `n` bytes, at most 8, as a size in memory.
     pub(crate) fn size(&mut self, n: usize) -> Option<usize> {
         usize::try_from(self.number(n)?).ok()
     }

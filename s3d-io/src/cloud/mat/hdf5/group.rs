@@ -1,4 +1,4 @@
-//! The members of groups.
+//! Reads the members of groups.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -7,11 +7,11 @@ use super::header::Header;
 use super::message::until_zero;
 use crate::error::Result;
 
-/// Levels of a B-tree: with two children a node that is more than any file has.
+/// The most levels of a B-tree. With two children a node, no file reaches more.
 const MAX_LEVELS: u8 = 40;
 
-/// The members of a group, in the order of their names where it is in the old form; `None` if the object is
-/// no group.
+/// The members of a group. In the old form of groups they come in the order of their names. Returns `None` if
+/// the object is no group.
 pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(String, u64)>>> {
     if header.is_dense {
         return Err(file.unsupported("a group with its members in a heap (HDF5 1.8's newer form)"));
@@ -19,22 +19,14 @@ pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(St
     let Some((tree, heap)) = header.symbol_table else {
         return Ok(header.is_new_group.then(|| header.links.clone()));
     };
+
     let damaged = || file.fault("the list of a group's members is damaged");
-    let head = file.bytes(heap, 32)?;
-    let mut cursor = Cursor::new(&head);
-    let is_heap = cursor.take(8).is_some_and(|m| m.starts_with(b"HEAP"));
-    let (Some(size), Some(_free), Some(data)) = (cursor.number(8), cursor.number(8), cursor.number(8)) else {
-        return Err(damaged());
-    };
-    if !is_heap {
-        return Err(damaged());
-    }
-    let names = file.bytes(data, size)?;
+    let names = heap_of_names(file, heap)?.ok_or_else(damaged)?;
 
     let mut found = Vec::new();
-    // Nodes to be read, each at a level below that of its parent, so that there is an end.
+    // Nodes to be read, each with the level of its parent. Levels must fall, so there is an end.
     let mut nodes = vec![(tree, MAX_LEVELS)];
-    // A node has 24 bytes at least, and each is read once in a sound file.
+    // A node has at least 24 bytes, and in a sound file each is read once.
     let mut left = file.len() / 8;
     while let Some((address, below)) = nodes.pop() {
         left = left.checked_sub(1).ok_or_else(damaged)?;
@@ -57,14 +49,15 @@ pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(St
             }
             continue;
         }
+
         let level = head[5];
         if !head.starts_with(b"TREE\0") || level >= below {
             return Err(damaged());
         }
-        // A name, a child, a name, a child… and a name.
+        // A name, a child, a name, a child… and a last name.
         let body = file.bytes(behind(32)?, count.saturating_mul(16))?;
         let children: Vec<[u8; 8]> = body.as_chunks().0.iter().step_by(2).copied().collect();
-        // The last first, as they are taken from the end.
+        // The last child is pushed first, because nodes are taken from the end.
         nodes.extend(
             children
                 .into_iter()
@@ -73,4 +66,18 @@ pub(super) fn members(file: &Hdf5File, header: &Header) -> Result<Option<Vec<(St
         );
     }
     Ok(Some(found))
+}
+
+/// The names of a group's members, from its heap. Returns `None` if the heap is damaged.
+fn heap_of_names(file: &Hdf5File, heap: u64) -> Result<Option<Vec<u8>>> {
+    let head = file.bytes(heap, 32)?;
+    let mut cursor = Cursor::new(&head);
+    let is_heap = cursor.take(8).is_some_and(|m| m.starts_with(b"HEAP"));
+    let (Some(size), Some(_free), Some(data)) = (cursor.number(8), cursor.number(8), cursor.number(8)) else {
+        return Ok(None);
+    };
+    if !is_heap {
+        return Ok(None);
+    }
+    file.bytes(data, size).map(Some)
 }

@@ -6,21 +6,21 @@ use super::file::{Cursor, Dataset, Filter, Hdf5File, Kind, Layout};
 use super::message::{self, AttributeValue};
 use crate::error::Result;
 
-/// Blocks that a header may be continued in.
+/// The most blocks that a header may be continued in.
 const MAX_BLOCKS: usize = 256;
-/// Bytes that the messages of a header may have: attributes and compact data end at 64 KiB each.
+/// The most bytes of a header's messages. Attributes and compact data have up to 64 KiB each.
 const MAX_BYTES: u64 = 1 << 24;
 
-/// What the header of an object says.
+/// The contents of an object's header.
 #[derive(Debug, Default)]
 pub(crate) struct Header {
-    /// B-tree and heap of a group in the old form.
+    /// Addresses of the B-tree and the heap of a group in the old form.
     pub(crate) symbol_table: Option<(u64, u64)>,
     /// Members of a group in the new form: names and addresses.
     pub(crate) links: Vec<(String, u64)>,
     /// Whether it is a group in the new form.
     pub(crate) is_new_group: bool,
-    /// Whether its members are where they are not read.
+    /// Whether its members are in a heap, which is not read.
     pub(crate) is_dense: bool,
     /// The attributes whose values are text or integers.
     pub(crate) attributes: Vec<(String, AttributeValue)>,
@@ -34,68 +34,44 @@ impl Header {
     /// Reads the header at `address`.
     pub(crate) fn read(file: &Hdf5File, address: u64) -> Result<Self> {
         let damaged = || file.fault(format!("the object at {address} is damaged"));
+        let head = file.some_bytes(address, 64)?;
+        let start = Start::parse(&head, address).ok_or_else(damaged)?;
+
         let mut this = Self::default();
         // Blocks of messages that are still to be read.
-        let mut blocks: Vec<(u64, u64)> = Vec::new();
-        let head = file.some_bytes(address, 64)?;
-        let mut cursor = Cursor::new(&head);
-        let new = head.starts_with(b"OHDR");
-        let mut has_order = false;
-        if new {
-            let flags = *head.get(5).ok_or_else(damaged)?;
-            has_order = flags & 4 != 0;
-            let times = if flags & 0x20 != 0 { 16 } else { 0 };
-            let phases = if flags & 0x10 != 0 { 4 } else { 0 };
-            let width = 1usize << (flags & 3);
-            for bytes in [6, times, phases] {
-                cursor.take(bytes).ok_or_else(damaged)?;
-            }
-            let size = cursor.number(width).ok_or_else(damaged)?;
-            let before = head.len().checked_sub(cursor.rest().len()).ok_or_else(damaged)?;
-            blocks.push((address.checked_add(before as u64).ok_or_else(damaged)?, size));
-        } else {
-            if cursor.byte() != Some(1) {
-                return Err(damaged());
-            }
-            let size = cursor.take(7).and_then(|_| cursor.number(4)).ok_or_else(damaged)?;
-            blocks.push((address.checked_add(16).ok_or_else(damaged)?, size));
-        }
-        let (mut blocks_left, mut bytes_left) = (MAX_BLOCKS, MAX_BYTES);
+        let mut blocks = vec![start.block];
+        let mut blocks_left = MAX_BLOCKS;
+        let mut bytes_left = MAX_BYTES;
         while let Some((at, size)) = blocks.pop() {
             let is_first = blocks_left == MAX_BLOCKS;
             blocks_left = blocks_left.checked_sub(1).ok_or_else(damaged)?;
             bytes_left = bytes_left.checked_sub(size).ok_or_else(damaged)?;
             let mut bytes = &file.bytes(at, size)?[..];
-            if new && !is_first {
-                // A signature before the messages and a checksum behind them.
+            if start.is_new && !is_first {
+                // The block has a signature before its messages and a checksum behind them.
                 bytes = bytes
                     .strip_prefix(b"OCHK")
                     .and_then(|b| b.get(..b.len().checked_sub(4)?))
                     .ok_or_else(damaged)?;
             }
             let mut cursor = Cursor::new(bytes);
-            let prefix = if !new {
-                8
-            } else if has_order {
-                6
-            } else {
-                4
-            };
-            while cursor.rest().len() >= prefix {
-                let (kind, size, flags) = if new {
-                    let (kind, size, flags) = (cursor.number(1), cursor.size(2), cursor.byte());
-                    cursor.take(if has_order { 2 } else { 0 });
-                    (kind, size, flags)
-                } else {
-                    let (kind, size, flags) = (cursor.number(2), cursor.size(2), cursor.byte());
-                    cursor.take(3);
-                    (kind, size, flags)
+            while cursor.rest().len() >= start.message_head_bytes() {
+                let kind = cursor.number(if start.is_new { 1 } else { 2 });
+                let size = cursor.size(2);
+                let flags = cursor.byte();
+                let reserved = match (start.is_new, start.has_order) {
+                    (false, _) => 3,
+                    (true, true) => 2,
+                    (true, false) => 0,
                 };
+                cursor.take(reserved);
                 let (Some(kind), Some(size), Some(flags)) = (kind, size, flags) else {
                     return Err(damaged());
                 };
+
                 let body = cursor.take(size).ok_or_else(damaged)?;
                 if kind == 0x10 {
+                    // The header continues in another block.
                     let mut body = Cursor::new(body);
                     let (Some(at), Some(size)) = (body.number(8), body.number(8)) else {
                         return Err(damaged());
@@ -109,17 +85,18 @@ impl Header {
         Ok(this)
     }
 
-    /// Takes a message; `None` if it is damaged.
+    /// Takes a message. Returns `None` if it is damaged.
     fn take(&mut self, kind: u64, body: &[u8], is_shared: bool) -> Option<()> {
         if is_shared {
-            // The message is elsewhere. Of an attribute that is no loss; a datatype that has a name of its
-            // own…
+            // The message itself is elsewhere. A shared attribute is not needed, but an array without its
+            // type cannot be read.
             if kind == 0x03 {
                 self.layout = Some(Layout::Unsupported("an array's type is stored as an object of its own"));
                 self.kind = Some(Kind::Other { size: 1 });
             }
             return Some(());
         }
+
         match kind {
             0x01 => self.dims = Some(message::dataspace(&mut Cursor::new(body))?),
             0x02 => {
@@ -140,7 +117,7 @@ impl Header {
         Some(())
     }
 
-    /// The array that it describes, `None` if it is none.
+    /// The array that the header describes. Returns `None` if it describes none.
     pub(crate) fn dataset(&self) -> Option<Dataset> {
         Some(Dataset {
             kind: self.kind?,
@@ -158,10 +135,56 @@ impl Header {
         })
     }
 
-    /// Whether it has an attribute that is a number other than 0.
+    /// Whether the object has an attribute with this name that is a number other than 0.
     pub(crate) fn is_set(&self, name: &str) -> bool {
         self.attributes
             .iter()
             .any(|(n, value)| n == name && matches!(value, AttributeValue::Number(v) if *v != 0))
+    }
+}
+
+/// The start of a header.
+struct Start {
+    /// Whether it is a header of version 2.
+    is_new: bool,
+    /// Whether messages have a creation order (version 2).
+    has_order: bool,
+    /// Address and bytes of the first block of messages.
+    block: (u64, u64),
+}
+
+impl Start {
+    /// Parses the first bytes of the header at `address`. Returns `None` if they are damaged.
+    fn parse(head: &[u8], address: u64) -> Option<Self> {
+        let mut cursor = Cursor::new(head);
+        if !head.starts_with(b"OHDR") {
+            if cursor.byte() != Some(1) {
+                return None;
+            }
+            let size = cursor.take(7).and_then(|_| cursor.number(4))?;
+            let block = (address.checked_add(16)?, size);
+            return Some(Self { is_new: false, has_order: false, block });
+        }
+
+        let flags = *head.get(5)?;
+        let times = if flags & 0x20 != 0 { 16 } else { 0 };
+        let phases = if flags & 0x10 != 0 { 4 } else { 0 };
+        let width = 1usize << (flags & 3);
+        for bytes in [6, times, phases] {
+            cursor.take(bytes)?;
+        }
+        let size = cursor.number(width)?;
+        let before = head.len().checked_sub(cursor.rest().len())?;
+        let block = (address.checked_add(before as u64)?, size);
+        Some(Self { is_new: true, has_order: flags & 4 != 0, block })
+    }
+
+    /// The bytes of a message before its body.
+    fn message_head_bytes(&self) -> usize {
+        match (self.is_new, self.has_order) {
+            (false, _) => 8,
+            (true, true) => 6,
+            (true, false) => 4,
+        }
     }
 }

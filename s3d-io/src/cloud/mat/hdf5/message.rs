@@ -1,11 +1,11 @@
-//! The messages of object headers, each from its bytes; `None` where they are damaged.
+//! Parses the messages of object headers. A damaged message gives `None`.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use super::UNDEFINED;
 use super::file::{Cursor, Filter, Kind, Layout};
 
-/// Axes of an array: the library's own limit.
+/// The most axes of an array: the HDF5 library's own limit.
 const MAX_AXES: usize = 32;
 
 /// The value of an attribute.
@@ -17,7 +17,9 @@ pub(crate) enum AttributeValue {
 
 /// The extents of an array.
 pub(super) fn dataspace(m: &mut Cursor<'_>) -> Option<Vec<u64>> {
-    let (version, axes, _flags) = (m.byte()?, usize::from(m.byte()?), m.byte()?);
+    let version = m.byte()?;
+    let axes = usize::from(m.byte()?);
+    let _flags = m.byte()?;
     let reserved = match version {
         1 => 5,
         2 => 1,
@@ -37,8 +39,9 @@ pub(super) fn datatype(m: &mut Cursor<'_>) -> Option<Kind> {
     let size = m.size(4)?;
     let big_endian = bits & 1 != 0;
     let other = Kind::Other { size };
-    // All bits of the element count: else it is of no type that MATLAB writes.
+    // Every bit of the element must count; MATLAB writes no other types.
     let is_whole = |m: &mut Cursor<'_>| Some(m.size(2)? == 0 && Some(m.size(2)?) == size.checked_mul(8));
+
     Some(match class {
         0 if is_whole(m)? && (1..=8).contains(&size) => {
             Kind::Integer { size, signed: bits & 8 != 0, big_endian }
@@ -54,7 +57,7 @@ pub(super) fn datatype(m: &mut Cursor<'_>) -> Option<Kind> {
     })
 }
 
-/// Where an array's data are.
+/// The place of an array's data.
 pub(super) fn layout(body: &[u8]) -> Option<Layout> {
     let mut m = Cursor::new(body);
     let version = m.byte()?;
@@ -78,18 +81,21 @@ pub(super) fn layout(body: &[u8]) -> Option<Layout> {
     })
 }
 
-/// What was done to chunks, in the order in which it was done.
+/// The filters of an array's chunks, in the order in which they were applied.
 pub(super) fn filters(body: &[u8]) -> Option<Vec<Filter>> {
     let mut m = Cursor::new(body);
-    let (version, count) = (m.byte()?, m.byte()?);
+    let version = m.byte()?;
+    let count = m.byte()?;
     if version == 1 {
         m.take(6)?;
     }
+
     let mut filters = Vec::new();
     for _ in 0..count {
         let id = u16::from_le_bytes(m.array()?);
         let name = if version == 1 || id >= 256 { m.size(2)? } else { 0 };
-        let (_flags, values) = (m.number(2)?, m.size(2)?.checked_mul(4)?);
+        let _flags = m.number(2)?;
+        let values = m.size(2)?.checked_mul(4)?;
         for bytes in [name, values] {
             m.take(if version == 1 {
                 bytes.checked_next_multiple_of(8)?
@@ -97,6 +103,7 @@ pub(super) fn filters(body: &[u8]) -> Option<Vec<Filter>> {
                 bytes
             })?;
         }
+
         filters.push(match id {
             1 => Filter::Deflate,
             2 => Filter::Shuffle,
@@ -107,10 +114,11 @@ pub(super) fn filters(body: &[u8]) -> Option<Vec<Filter>> {
     Some(filters)
 }
 
-/// A member of a group in the new form, as far as it is in this file.
+/// A member of a group in the new form. Returns `Some(None)` if it is not in this file.
 pub(super) fn link(body: &[u8]) -> Option<Option<(String, u64)>> {
     let mut m = Cursor::new(body);
-    let (_version, flags) = (m.byte()?, m.byte()?);
+    let _version = m.byte()?;
+    let flags = m.byte()?;
     let is_hard = if flags & 8 != 0 { m.byte()? == 0 } else { true };
     m.take(if flags & 4 != 0 { 8 } else { 0 })?;
     m.take(if flags & 0x10 != 0 { 1 } else { 0 })?;
@@ -126,21 +134,26 @@ pub(super) fn link(body: &[u8]) -> Option<Option<(String, u64)>> {
 /// Whether a group in the new form has its members in a heap.
 pub(super) fn link_info_is_dense(body: &[u8]) -> Option<bool> {
     let mut m = Cursor::new(body);
-    let (_version, flags) = (m.byte()?, m.byte()?);
+    let _version = m.byte()?;
+    let flags = m.byte()?;
     m.take(if flags & 1 != 0 { 8 } else { 0 })?;
     Some(m.number(8)? != UNDEFINED)
 }
 
-/// An attribute, if its value is one text or one integer. Others are left out, and so are damaged ones: none
-/// is needed.
+/// An attribute, if its value is one text or one integer. Other attributes are left out, and so are damaged
+/// ones: none of them is needed.
 pub(super) fn attribute(body: &[u8]) -> Option<(String, AttributeValue)> {
     let mut m = Cursor::new(body);
-    let (version, flags) = (m.byte()?, m.byte()?);
+    let version = m.byte()?;
+    let flags = m.byte()?;
     let sizes = [m.size(2)?, m.size(2)?, m.size(2)?];
     if !(1..=3).contains(&version) || version > 1 && flags & 3 != 0 {
         return None;
     }
+
     m.take(usize::from(version == 3))?;
+
+    // The parts are padded to eight bytes in version 1.
     let mut part = |size: usize| {
         let padded = if version == 1 {
             size.checked_next_multiple_of(8)?
@@ -149,12 +162,15 @@ pub(super) fn attribute(body: &[u8]) -> Option<(String, AttributeValue)> {
         };
         m.take(padded)?.get(..size)
     };
-    let (name, kind, space) = (part(sizes[0])?, part(sizes[1])?, part(sizes[2])?);
+    let name = part(sizes[0])?;
+    let kind = part(sizes[1])?;
+    let space = part(sizes[2])?;
     let name = String::from_utf8_lossy(until_zero(name)).into_owned();
     let kind = datatype(&mut Cursor::new(kind))?;
     if dataspace(&mut Cursor::new(space))?.iter().any(|d| *d != 1) {
         return None;
     }
+
     let value = match kind {
         Kind::Text { size } => {
             AttributeValue::Text(String::from_utf8_lossy(until_zero(m.take(size)?)).into_owned())

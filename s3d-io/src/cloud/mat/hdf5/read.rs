@@ -1,4 +1,4 @@
-//! Reading HDF5: objects by address, their members and data.
+//! Reads HDF5: objects by address, their members and data.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -19,17 +19,17 @@ impl Hdf5File {
         self.object(self.root)
     }
 
-    /// The object at an address.
+    /// Reads the object at an address.
     pub(crate) fn object(&self, address: u64) -> Result<Object> {
         Ok(Object { header: Header::read(self, address)? })
     }
 
-    /// The members of a group, by name; `None` if it is no group.
+    /// The members of a group, by name. Returns `None` if the object is no group.
     pub(crate) fn members(&self, object: &Object) -> Result<Option<Vec<(String, u64)>>> {
         group::members(self, &object.header)
     }
 
-    /// All of an array's data, as they are in the file: in C order, each element as its [`Kind`] says.
+    /// Reads all data of an array, as they are in the file: in C order, each element as its [`Kind`] says.
     pub(crate) fn data(&self, dataset: &Dataset) -> Result<Vec<u8>> {
         let element = dataset.kind.size() as u64;
         let bytes = dataset.dims.iter().try_fold(element, |n, d| n.checked_mul(*d));
@@ -38,6 +38,7 @@ impl Hdf5File {
         if bytes == 0 {
             return Ok(Vec::new());
         }
+
         match &dataset.layout {
             Layout::Compact(data) if data.len() as u64 == bytes => Ok(data.clone()),
             Layout::Contiguous { address, size } if *size >= bytes && *address != UNDEFINED => {
@@ -46,7 +47,7 @@ impl Hdf5File {
             Layout::Chunked { tree, dims } => chunks::read(self, dataset, *tree, dims, bytes),
             Layout::Unsupported(why) => Err(self.unsupported(why)),
             Layout::Compact(_) | Layout::Contiguous { .. } => {
-                Err(self.fault(format!("an array of {:?} has fewer data than that", dataset.dims)))
+                Err(self.fault(format!("an array of {:?} has too few data", dataset.dims)))
             }
         }
     }

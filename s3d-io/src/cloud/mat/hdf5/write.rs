@@ -1,28 +1,28 @@
-//! Writing HDF5 from front to back: each object once, its data before its header, groups when their members
-//! are there.
+//! Writes HDF5 from front to back: each object once, its data before its header, and groups after their
+//! members.
 
-#![expect(clippy::indexing_slicing, reason = "a writer: places in the file are those that it gave")]
+#![expect(clippy::indexing_slicing, reason = "a writer: it reads only places in the file that it assigned")]
 
 use super::{SIGNATURE, UNDEFINED};
 use crate::error::{Error, Result};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Bytes of the superblock (version 0) with the root group's entry.
+/// The bytes of the superblock (version 0) with the root group's entry.
 const SUPERBLOCK: usize = 96;
-/// Half of the names in a symbol table's node, and of the children of a B-tree's: the library's own defaults,
-/// which the superblock tells.
+/// Half of the most names in a symbol table's node, and half of the most children of a B-tree's node. These
+/// are the HDF5 library's defaults, which the superblock states.
 const LEAF_K: u16 = 4;
 const INTERNAL_K: u16 = 16;
-/// Bytes that are collected before the file is called.
+/// The bytes that are collected before they are written to the file.
 const BLOCK: usize = 1 << 16;
 /// The smallest global heap that the library reads.
 const SMALLEST_HEAP: usize = 4096;
 
-/// What an element is. All are little-endian.
+/// The type of an element. All types are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Unsigned integers of so many bytes.
+    /// Unsigned integers of this many bytes.
     Unsigned(u32),
     /// A signed integer of four bytes.
     I32,
@@ -30,44 +30,49 @@ pub(crate) enum Kind {
     F64,
     /// The address of an object.
     Reference,
-    /// Text of so many bytes.
+    /// Text of this many bytes.
     Text(u32),
-    /// Words of any length: how many bytes, and where in the global heap.
+    /// Words of any length: their bytes, and their place in the global heap.
     Words,
 }
 
 impl Kind {
     /// The datatype message (version 1).
     fn message(self) -> Vec<u8> {
-        let head = |class: u8, bits: [u8; 3], size: u32| {
-            let mut m = vec![0x10 | class, bits[0], bits[1], bits[2]];
-            m.extend(size.to_le_bytes());
-            m
-        };
-        let integer = |size: u32, signed: u8| {
-            let mut m = head(0, [signed, 0, 0], size);
-            m.extend(0u16.to_le_bytes());
-            m.extend((8 * size as u16).to_le_bytes());
-            m
-        };
-        let float = |size: u32, exponent: [u8; 2], mantissa: u8, bias: u32| {
-            let mut m = head(1, [0x20, 8 * size as u8 - 1, 0], size);
-            m.extend(0u16.to_le_bytes());
-            m.extend((8 * size as u16).to_le_bytes());
-            m.extend([exponent[0], exponent[1], 0, mantissa]);
-            m.extend(bias.to_le_bytes());
-            m
-        };
         match self {
-            Self::Unsigned(size) => integer(size, 0),
-            Self::I32 => integer(4, 8),
-            Self::F32 => float(4, [23, 8], 23, 127),
-            Self::F64 => float(8, [52, 11], 52, 1023),
-            Self::Reference => head(7, [0; 3], 8),
-            Self::Text(size) => head(3, [0; 3], size),
-            Self::Words => [head(9, [0; 3], 16), Self::Text(1).message()].concat(),
+            Self::Unsigned(size) => integer_type(size, 0),
+            Self::I32 => integer_type(4, 8),
+            Self::F32 => float_type(4, [23, 8], 23, 127),
+            Self::F64 => float_type(8, [52, 11], 52, 1023),
+            Self::Reference => type_head(7, [0; 3], 8),
+            Self::Text(size) => type_head(3, [0; 3], size),
+            Self::Words => [type_head(9, [0; 3], 16), Self::Text(1).message()].concat(),
         }
     }
+}
+
+/// The start of a datatype message.
+fn type_head(class: u8, bits: [u8; 3], size: u32) -> Vec<u8> {
+    let mut m = vec![0x10 | class, bits[0], bits[1], bits[2]];
+    m.extend(size.to_le_bytes());
+    m
+}
+
+fn integer_type(size: u32, signed: u8) -> Vec<u8> {
+    let mut m = type_head(0, [signed, 0, 0], size);
+    m.extend(0u16.to_le_bytes());
+    m.extend((8 * size as u16).to_le_bytes());
+    m
+}
+
+/// A float type; `exponent` has the place and the number of the exponent's bits.
+fn float_type(size: u32, exponent: [u8; 2], mantissa: u8, bias: u32) -> Vec<u8> {
+    let mut m = type_head(1, [0x20, 8 * size as u8 - 1, 0], size);
+    m.extend(0u16.to_le_bytes());
+    m.extend((8 * size as u16).to_le_bytes());
+    m.extend([exponent[0], exponent[1], 0, mantissa]);
+    m.extend(bias.to_le_bytes());
+    m
 }
 
 /// An attribute of an object.
@@ -75,29 +80,30 @@ impl Kind {
 pub(crate) struct Attribute {
     name: &'static str,
     kind: Kind,
-    /// The number of elements, `None` for a scalar.
+    /// The number of elements. `None`: a scalar.
     count: Option<u64>,
     value: Vec<u8>,
 }
 
 impl Attribute {
-    /// A word.
+    /// An attribute that is a word.
     pub(crate) fn text(name: &'static str, word: &str) -> Self {
         Self { name, kind: Kind::Text(word.len() as u32), count: None, value: word.into() }
     }
 
-    /// A number.
+    /// An attribute that is a number.
     pub(crate) fn number(name: &'static str, number: i32) -> Self {
         Self { name, kind: Kind::I32, count: None, value: number.to_le_bytes().into() }
     }
 
-    /// A mark.
+    /// An attribute that is a flag, which is set.
     pub(crate) fn flag(name: &'static str) -> Self {
         Self { name, kind: Kind::Unsigned(1), count: None, value: vec![1] }
     }
 
     fn message(&self) -> Vec<u8> {
-        let (kind, space) = (self.kind.message(), dataspace(self.count.as_slice()));
+        let kind = self.kind.message();
+        let space = dataspace(self.count.as_slice());
         let mut m = vec![1, 0];
         for length in [self.name.len() + 1, kind.len(), space.len()] {
             m.extend((length as u16).to_le_bytes());
@@ -111,18 +117,19 @@ impl Attribute {
     }
 }
 
-/// Writes a file. An address is that of an object's header, as the object is known to groups and references.
+/// Writes a file. Groups and references know an object by the address of its header, which the methods
+/// return.
 #[derive(Debug)]
 pub(crate) struct Hdf5Writer<W> {
     file: W,
     name: PathBuf,
-    /// Bytes of the file behind the user block so far.
+    /// The bytes written so far behind the user block.
     at: u64,
     user_block: u64,
 }
 
 impl<W: Write + Seek> Hdf5Writer<W> {
-    /// Starts the file. `user_block` stands before all: 512 bytes, or twice as many, or twice again…
+    /// Starts the file with `user_block`: 512 bytes, or twice as many, or twice again…
     pub(crate) fn new(mut file: W, name: &Path, user_block: &[u8]) -> Result<Self> {
         let written = file
             .write_all(user_block)
@@ -132,15 +139,15 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         Ok(Self { file, name, at: SUPERBLOCK as u64, user_block: user_block.len() as u64 })
     }
 
-    /// The file.
+    /// The path of the file, for messages.
     pub(crate) fn name(&self) -> &Path {
         &self.name
     }
 
-    /// Writes an array of `dims`, the slowest first, whose elements are `elements`, each `N` bytes.
+    /// Writes an array with the extents `dims`, the slowest first. Each element has `N` bytes.
     ///
     /// # Panics
-    /// If there are not as many elements as `dims` say, or they are of another size than the kind.
+    /// If there are not as many elements as `dims` say, or if the type `kind` has another size.
     pub(crate) fn dataset<const N: usize>(
         &mut self,
         kind: Kind,
@@ -150,6 +157,7 @@ impl<W: Write + Seek> Hdf5Writer<W> {
     ) -> Result<u64> {
         let kind = kind.message();
         assert_eq!(u32::from_le_bytes([kind[4], kind[5], kind[6], kind[7]]) as usize, N, "bytes an element");
+
         let data = self.at;
         let mut block = Vec::with_capacity(BLOCK + N);
         for element in elements {
@@ -170,7 +178,7 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         let mut messages = vec![
             (0x01, dataspace(dims)),
             (0x03, kind),
-            // Allocated late, filled if asked for, with the library's default.
+            // The fill value: allocated late, and written only if set; the library's default.
             (0x05, vec![2, 2, 2, 1, 0, 0, 0, 0]),
             (0x08, layout),
         ];
@@ -178,12 +186,13 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         self.header(&messages)
     }
 
-    /// Writes a list of words for an attribute, which any number of objects may bear.
+    /// Writes a list of words for an attribute, which any number of objects may have.
     pub(crate) fn words(&mut self, name: &'static str, words: &[&str]) -> Result<Attribute> {
         let mut heap = b"GCOL\x01\0\0\0".to_vec();
         let objects: usize = words.iter().map(|w| 16 + w.len().next_multiple_of(8)).sum();
         let size = (16 + objects + 16).max(SMALLEST_HEAP);
         heap.extend((size as u64).to_le_bytes());
+
         let mut value = Vec::new();
         for (index, word) in (1u16..).zip(words) {
             heap.extend(index.to_le_bytes());
@@ -195,7 +204,8 @@ impl<W: Write + Seek> Hdf5Writer<W> {
             value.extend(self.at.to_le_bytes());
             value.extend(u32::from(index).to_le_bytes());
         }
-        // Object 0: what is free.
+
+        // Object 0 is the free space.
         heap.extend([0; 8]);
         heap.extend(((size - heap.len() + 8) as u64).to_le_bytes());
         heap.resize(size, 0);
@@ -206,7 +216,7 @@ impl<W: Write + Seek> Hdf5Writer<W> {
     /// Writes a group of objects, each with its name.
     ///
     /// # Panics
-    /// If a name is there twice or empty.
+    /// If two names are equal, or one is empty.
     pub(crate) fn group(
         &mut self,
         members: impl IntoIterator<Item = (String, u64)>,
@@ -218,10 +228,10 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         self.header(&messages)
     }
 
-    /// Writes the root group; what was written to is complete.
+    /// Writes the root group and the superblock, and returns the complete file.
     ///
     /// # Panics
-    /// As [`Hdf5Writer::group`].
+    /// If two names are equal, or one is empty.
     pub(crate) fn finish(mut self, members: impl IntoIterator<Item = (String, u64)>) -> Result<W> {
         let root = self.group(members, &[])?;
         let mut block = SIGNATURE.to_vec();
@@ -233,6 +243,7 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         }
         block.extend(entry(0, root));
         debug_assert_eq!(block.len(), SUPERBLOCK);
+
         let placed = self
             .file
             .seek(SeekFrom::Start(self.user_block))
@@ -277,10 +288,11 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         Ok(address)
     }
 
-    /// Writes the names and nodes of a group; the addresses of its B-tree and of its heap.
+    /// Writes the names and nodes of a group. Returns the addresses of its B-tree and of its heap.
     fn symbol_table(&mut self, mut members: Vec<(String, u64)>) -> Result<(u64, u64)> {
         members.sort_unstable();
         assert!(members.windows(2).all(|w| w[0].0 != w[1].0), "two objects of one name");
+
         // The empty name comes first: it is the key below all others.
         let mut names = vec![0u8; 8];
         let mut nodes: Vec<(u64, u64)> = Vec::new();
@@ -299,10 +311,11 @@ impl<W: Write + Seek> Hdf5Writer<W> {
             nodes.push((last, self.at));
             self.put(&bytes)?;
         }
+
         let tree = self.tree(nodes)?;
         let heap = self.at;
         self.put(b"HEAP\0\0\0\0")?;
-        // Its size, no free place in it, and where it is: behind this.
+        // The size of the names, no free space, and their address, which is behind this.
         for number in [names.len() as u64, 1, heap + 32] {
             self.put(&number.to_le_bytes())?;
         }
@@ -310,19 +323,22 @@ impl<W: Write + Seek> Hdf5Writer<W> {
         Ok((tree, heap))
     }
 
-    /// Writes a B-tree over nodes, each known by the place of its last name in the heap; the address of its
-    /// root.
+    /// Writes a B-tree over nodes, each with the place of its last name in the heap and its address. Returns
+    /// the address of the tree's root.
     fn tree(&mut self, mut nodes: Vec<(u64, u64)>) -> Result<u64> {
-        let (fan, mut level) = (2 * usize::from(INTERNAL_K), 0u8);
+        let fan = 2 * usize::from(INTERNAL_K);
         let size = 24 + 8 * (2 * fan + 1);
+        let mut level = 0u8;
         loop {
-            let (count, first) = (nodes.len().div_ceil(fan).max(1), self.at);
+            let count = nodes.len().div_ceil(fan).max(1);
+            let first = self.at;
             let mut parents = Vec::with_capacity(count);
             let mut key = 0u64;
             for i in 0..count {
                 let children = &nodes[i * fan..nodes.len().min((i + 1) * fan)];
                 let sibling =
                     |there: bool, at: usize| if there { first + (at * size) as u64 } else { UNDEFINED };
+
                 let mut bytes = b"TREE\0".to_vec();
                 bytes.push(level);
                 bytes.extend((children.len() as u16).to_le_bytes());
@@ -338,6 +354,7 @@ impl<W: Write + Seek> Hdf5Writer<W> {
                 parents.push((key, self.at));
                 self.put(&bytes)?;
             }
+
             if let [(_, root)] = parents[..] {
                 return Ok(root);
             }
@@ -354,7 +371,7 @@ fn dataspace(dims: &[u64]) -> Vec<u8> {
     m
 }
 
-/// A symbol table's entry: place of the name, address of the object, nothing cached.
+/// An entry of a symbol table: the place of the name, the address of the object, and nothing cached.
 fn entry(name: u64, address: u64) -> [u8; 40] {
     let mut entry = [0; 40];
     entry[..8].copy_from_slice(&name.to_le_bytes());
