@@ -42,10 +42,10 @@ mod scene;
 pub mod scenes;
 mod sight;
 
-pub use building::Building;
+pub use building::{Building, BuildingError};
 #[cfg(feature = "files")]
 pub use error::ScanError;
-pub use error::{BuildingError, RangeError};
+pub use error::RangeError;
 #[cfg(feature = "files")]
 pub use files::{is_area_scan, is_demo_scan};
 pub use generate::{BuildingOptions, FloorPlan, Models, RoomOptions, Style};

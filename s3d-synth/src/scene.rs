@@ -1,12 +1,10 @@
 //! What a building looks like to a scanner: an annotated mesh.
 
-use crate::BuildingError;
-use crate::building::{Building, ScanLocation};
-use crate::construct::builder::Builder;
+use crate::building::ScanLocation;
 use s3d_geom::TriMesh;
 use s3d_label::{Class, Room};
 
-/// A textured mesh with its annotation and its scan locations: what [`Building::build`] makes.
+/// A textured mesh with its annotation and its scan locations: what [`Building::build`](crate::Building::build) makes.
 ///
 /// ```
 /// use s3d_label::Class;
@@ -45,36 +43,4 @@ pub struct Instance {
     pub number: u32,
     /// Where it is.
     pub room: Room,
-}
-
-impl Building {
-    /// Builds the scene: the same at every call, on every platform.
-    ///
-    /// A room's faces come in this order: what fills its openings, its lamps, its items, floor, ceiling,
-    /// walls. The images of floors, walls and ceilings hold the light of windows and lamps, and shade where
-    /// something stands.
-    ///
-    /// # Errors
-    /// [`BuildingError`] if something is impossible: a room without a size, an opening outside its wall,
-    /// rooms or openings that overlap, a thing that is too small to be built or leaves its room, a location
-    /// outside of all rooms, …
-    pub fn build(&self) -> Result<AnnotatedScene, BuildingError> {
-        self.check()?;
-        let mut builder = Builder::new(self.texture_scale);
-        for room in &self.rooms {
-            room.construct(&mut builder)?;
-        }
-        let (mesh, instance_of_face, instances) = builder.finish(self.origin)?;
-        let locations = self.locations.iter().map(|location| ScanLocation {
-            position: location.position + self.origin.as_dvec3(),
-            ..location.clone()
-        });
-        Ok(AnnotatedScene {
-            mesh,
-            instance_of_face,
-            instances,
-            locations: locations.collect(),
-            title: self.title.clone(),
-        })
-    }
 }

@@ -136,6 +136,37 @@ fn bookcases_keep_away_from_window_sills() {
     });
 }
 
+/// Once drawn by the property below: a desk lamp, turned beside a wall, reached through it.
+#[test]
+fn lamps_beside_walls_stay_in_their_room() {
+    let office = RoomOptions {
+        size_m: [1.8, 2.2],
+        heights_m: [2.4; 2],
+        windows: 0,
+        furnishing: 0.0,
+        locations: 1,
+        ..RoomOptions::new(RoomType::OFFICE)
+    };
+    let openspace = RoomOptions {
+        size_m: [8.24653, 4.523878],
+        heights_m: [3.3843372; 2],
+        windows: 0,
+        furnishing: 0.39903605,
+        locations: 2,
+        ..RoomOptions::new(RoomType::OPENSPACE)
+    };
+    check(&BuildingOptions {
+        rooms: vec![office, openspace],
+        storeys: 2,
+        hallway_width_m: 1.2,
+        hallway_height_m: 2.4,
+        wall_m: 0.1,
+        texture_scale: 0.05,
+        seed: 16844732267559214184,
+        ..BuildingOptions::default()
+    });
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 16, ..ProptestConfig::default() })]
 

@@ -1,8 +1,7 @@
 //! What is impossible in a building, found before it is built. What things leave their room is found while
 //! they are built.
 
-use super::{Beam, Building, Filling, Item, Opening, RoomPlan, Stairwell, TableBase, Thing};
-use crate::construct::shell::KNEE_M;
+use super::{Beam, Building, Filling, Item, KNEE_M, Opening, RoomPlan, Stairwell, TableBase, Thing};
 use crate::{BuildingError, RangeError};
 use s3d_geom::glam::Vec2;
 use std::collections::BTreeSet;
@@ -23,13 +22,14 @@ impl Building {
         for (value, axis) in self.origin.to_array().into_iter().zip(["x", "y", "z"]) {
             RangeError::check(value, [-1e6, 1e6], || far(axis))?;
         }
-        RangeError::check(self.texture_scale, [0.01, 2.0], || "the scale of textures".to_owned())?;
+        check_texture_scale(self.texture_scale)?;
         if self.rooms.is_empty() {
             return Err(BuildingError::NoRoom);
         }
         let mut names = BTreeSet::new();
         for (index, room) in self.rooms.iter().enumerate() {
-            room.check()?;
+            room.check_shell()?;
+            room.check_items()?;
             if !names.insert(room.room) {
                 return Err(BuildingError::SameRoom { room: room.room });
             }
@@ -56,8 +56,26 @@ impl Building {
     }
 }
 
+/// How many panes a window has at most, beside or above one another, along a length of so many metres.
+pub(crate) fn most_panes(length_m: f32) -> u32 {
+    ((length_m / 0.2) as u32).max(1)
+}
+
+/// Refuses images of floors, walls and ceilings that are too coarse or too fine.
+pub(crate) fn check_texture_scale(scale: f32) -> Result<(), RangeError> {
+    RangeError::check(scale, [0.01, 2.0], || "the scale of textures".to_owned())
+}
+
 impl RoomPlan {
-    fn check(&self) -> Result<(), BuildingError> {
+    fn check_items(&self) -> Result<(), BuildingError> {
+        let range = |value: f32, range: [f64; 2], what: &str| {
+            RangeError::check(value, range, || format!("{}: {what}", self.room))
+        };
+        self.items.iter().try_for_each(|item| Ok(item.check(&range)?))
+    }
+
+    /// Checks all but the items: size and height, openings, holes and lamps.
+    pub(crate) fn check_shell(&self) -> Result<(), BuildingError> {
         let range = |value: f32, range: [f64; 2], what: &str| {
             RangeError::check(value, range, || format!("{}: {what}", self.room))
         };
@@ -97,7 +115,7 @@ impl RoomPlan {
                 return Err(outside("lamp", index));
             }
         }
-        self.items.iter().try_for_each(|item| Ok(item.check(&range)?))
+        Ok(())
     }
 
     fn check_opening(&self, opening: &Opening) -> Result<(), BuildingError> {
@@ -140,7 +158,7 @@ impl RoomPlan {
             Filling::Glazing { panes, depth_m } => {
                 let [columns, rows] = panes.map(|n| n as f32);
                 RangeError::check(depth_m, [0.06, 5.0], || what("the depth of a window"))?;
-                let most = |m: f32| [1.0, f64::from((m / 0.2).floor()).max(1.0)];
+                let most = |m: f32| [1.0, f64::from(most_panes(m))];
                 RangeError::check(columns, most(to - from), || what("the panes beside one another"))?;
                 RangeError::check(rows, most(high - low), || what("the panes above one another"))?;
             }
@@ -167,8 +185,8 @@ impl Opening {
 
 type Range<'a> = &'a dyn Fn(f32, [f64; 2], &str) -> Result<(), RangeError>;
 
-/// The longest that a thing may be.
-const LARGE_M: f64 = 50.0;
+/// The longest that a thing may be, metres.
+pub(crate) const LARGE_M: f64 = 50.0;
 
 impl Item {
     fn check(&self, range: Range<'_>) -> Result<(), RangeError> {

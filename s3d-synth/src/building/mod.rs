@@ -5,16 +5,21 @@
 //! [`AnnotatedScene`](crate::AnnotatedScene) of it. Its coordinates are the building's own: metres, x to the
 //! east, y to the north, z up. The walls of rooms are parallel to the axes.
 
-mod check;
+pub(crate) mod check;
 mod demo;
+mod error;
 mod item;
 mod two_storeys;
 
+pub use error::BuildingError;
 pub use item::{Beam, Item, SeatBase, ShelfFront, TableBase, Thing};
 
 use crate::look::{CeilingFinish, FloorFinish, Look, Paint};
 use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};
 use s3d_label::{Class, Room};
+
+/// Below this height walls are upright and openings end. Above it a slanted ceiling squeezes the walls. Metres.
+pub(crate) const KNEE_M: f32 = 2.1;
 
 /// A building: what [`Building::build`] makes a scene of. Its `Default` is [`Building::demo`].
 ///

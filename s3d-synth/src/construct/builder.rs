@@ -21,6 +21,14 @@ pub(crate) enum Side {
     Bottom,
 }
 
+/// Steps a metre of the lattice that all corners lie on.
+const LATTICE_PER_M: f32 = 16384.0;
+
+/// Whether two coordinates come to lie on one step of the lattice.
+pub(super) fn coincide(a: f32, b: f32) -> bool {
+    (a * LATTICE_PER_M).round() == (b * LATTICE_PER_M).round()
+}
+
 /// Where something stands: its origin, and the direction of its x axis in the plan.
 #[derive(Clone, Copy)]
 struct Frame {
@@ -61,6 +69,8 @@ pub(crate) struct Builder {
     /// Of materials and textures.
     names: BTreeSet<String>,
     texture_scale: f32,
+    /// Whether only corners are wanted.
+    only_measures: bool,
 }
 
 impl Builder {
@@ -77,7 +87,14 @@ impl Builder {
             images: BTreeMap::new(),
             names: BTreeSet::new(),
             texture_scale,
+            only_measures: false,
         }
+    }
+
+    /// A builder that notes where corners lie and makes no surfaces: [`Builder::positions_since`] tells how far
+    /// a thing reaches, to the last bit, in a small part of the time.
+    pub(crate) fn measuring() -> Self {
+        Self { only_measures: true, ..Self::new(1.0) }
     }
 
     /// From here on everything belongs to `room`, whose floor is at `floor_m`, lit by `light`.
@@ -151,7 +168,14 @@ impl Builder {
 
     /// As [`Builder::panel`], its texture starting at `shift` of its width.
     pub(crate) fn shifted_panel(&mut self, corners: [Vec3; 4], look: Look, shift: f32) {
-        let [a, b, c, d] = corners.map(|p| self.frame.apply(p));
+        let corners = corners.map(|p| self.frame.apply(p));
+        if self.only_measures {
+            let seated = corners.map(|p| self.seated(p));
+            self.parts.positions.extend(seated);
+            return;
+        }
+
+        let [a, b, c, d] = corners;
         let (width, height) = (a.distance(b).max(d.distance(c)), a.distance(d).max(b.distance(c)));
         let cells = [width, height].map(|m| ((m / look.cell_m() - 0.01).ceil() as u32).max(1));
         let mut parts = grid(Vec3::ZERO, Vec3::X, Vec3::Y, cells);
@@ -176,6 +200,13 @@ impl Builder {
     fn fan(&mut self, apex: Vec3, ring: &[Vec3], look: Look) {
         let apex = self.frame.apply(apex);
         let low = ring.iter().fold(apex, |low, &p| low.min(self.frame.apply(p)));
+        if self.only_measures {
+            let seated = ring.iter().map(|&p| self.seated(self.frame.apply(p)));
+            let seated: Vec<Vec3> = seated.chain([self.seated(apex)]).collect();
+            self.parts.positions.extend(seated);
+            return;
+        }
+
         for i in 0..ring.len() {
             let [a, b] = [i, (i + 1) % ring.len()].map(|k| self.frame.apply(ring[k]));
             let corner = |p: Vec3| (p - low).truncate() * look.uv_scale(Vec2::ONE);
@@ -298,12 +329,9 @@ impl Builder {
     }
 
     fn push(&mut self, mut parts: MeshParts, material: u32) {
-        parts.positions.iter_mut().for_each(|p| p.z += self.floor_m);
-        // Onto a lattice of 61 µm: what touches by design then touches in the last bit, also after `finish`.
-        parts
-            .positions
-            .iter_mut()
-            .for_each(|p| *p = (*p * 16384.0).round() / 16384.0);
+        for p in &mut parts.positions {
+            *p = self.seated(*p);
+        }
         self.parts.append(parts);
         let n = self.parts.faces.len();
         self.parts.face_materials.resize(self.instance_of_face.len(), material);
@@ -311,6 +339,13 @@ impl Builder {
         // Something was begun before anything is added.
         self.instance_of_face
             .resize(n, self.instances.len().saturating_sub(1) as u32);
+    }
+
+    /// A point of the room in building coordinates, on a lattice of 61 µm: things that touch by design then
+    /// touch in the last bit, also after [`Builder::finish`].
+    fn seated(&self, p: Vec3) -> Vec3 {
+        let raised = Vec3 { z: p.z + self.floor_m, ..p };
+        (raised * LATTICE_PER_M).round() / LATTICE_PER_M
     }
 
     /// The corners of what was added since there were `first` of them, in building coordinates.

@@ -1,20 +1,18 @@
 //! The shell of a room: floor, walls with openings, ceiling; and what fills the openings.
 
-use super::builder::Builder;
+use super::builder::{Builder, coincide};
 use super::light::{Lamp, Light};
 use super::openings::{doorway, glazing, handle, leaf, model_leaf, window};
 use super::things::{beam, construct_thing};
 use crate::BuildingError;
-use crate::building::{Beam, Filling, Item, Opening, RoomPlan, Stairwell, Wall};
+use crate::building::{Beam, Filling, Item, KNEE_M, Opening, RoomPlan, Stairwell, Wall};
 use crate::look::{LAMP, Look, Pattern, WHITE, to_bytes};
 use s3d_geom::{
-    MeshParts, NO_INDEX, Raster, Wrap,
+    Aabb, MeshParts, NO_INDEX, Raster, Wrap,
     glam::{Vec2, Vec3, vec2, vec3},
 };
 use s3d_label::Class;
 
-/// Below it walls are upright and openings end; above it a slanted ceiling squeezes them.
-pub(crate) const KNEE_M: f32 = 2.1;
 /// How far things may reach into a wall: what touches it does so to within rounding.
 const SLACK_M: f32 = 1e-3;
 /// Edge of the cells, metres.
@@ -32,32 +30,50 @@ impl RoomPlan {
     pub(crate) fn construct(&self, b: &mut Builder) -> Result<(), BuildingError> {
         b.enter(self.room, self.floor_m, self.light());
         self.fill(b);
-        let low = self.low.extend(self.floor_m) - SLACK_M;
-        let high = self.high.extend(self.floor_m + self.top()) + SLACK_M;
+        let inside = self.inside();
+
         for (index, item) in self.items.iter().enumerate() {
             let first = b.position_count();
-            match item {
-                Item::Standing { thing, position, yaw_deg } => {
-                    b.place(*position, *yaw_deg, |b| construct_thing(b, thing));
-                }
-                Item::OnWall { thing, wall, along } => {
-                    self.at_wall(b, *wall, *along, |b| construct_thing(b, thing));
-                }
-                Item::Beam(Beam { from, to, half_width_m, depth_m, look }) => {
-                    let [from, to] = [from, to].map(|end| end.extend(self.ceiling_at(end.y)));
-                    beam(b, from, to, *half_width_m, *depth_m, *look);
-                }
-            }
-            if !b
-                .positions_since(first)
-                .iter()
-                .all(|p| p.cmpge(low).all() && p.cmple(high).all())
-            {
+            self.construct_item(b, item);
+            if !b.positions_since(first).iter().all(|&p| inside.contains(p)) {
                 return Err(BuildingError::Outside { room: self.room, what: "item", index });
             }
         }
+
         self.enclose(b, &self.room.to_string());
         Ok(())
+    }
+
+    /// The box that nothing in the room may leave, in building coordinates.
+    pub(crate) fn inside(&self) -> Aabb {
+        Aabb {
+            min: self.low.extend(self.floor_m) - SLACK_M,
+            max: self.high.extend(self.floor_m + self.top()) + SLACK_M,
+        }
+    }
+
+    /// The box that an item of this room reaches, in building coordinates: exactly what [`RoomPlan::construct`]
+    /// would make of it.
+    pub(crate) fn bounds_of(&self, item: &Item) -> Aabb {
+        let mut b = Builder::measuring();
+        b.enter(self.room, self.floor_m, Light::default());
+        self.construct_item(&mut b, item);
+        Aabb::from_points(b.positions_since(0).iter().copied())
+    }
+
+    fn construct_item(&self, b: &mut Builder, item: &Item) {
+        match item {
+            Item::Standing { thing, position, yaw_deg } => {
+                b.place(*position, *yaw_deg, |b| construct_thing(b, thing));
+            }
+            Item::OnWall { thing, wall, along } => {
+                self.at_wall(b, *wall, *along, |b| construct_thing(b, thing));
+            }
+            Item::Beam(Beam { from, to, half_width_m, depth_m, look }) => {
+                let [from, to] = [from, to].map(|end| end.extend(self.ceiling_at(end.y)));
+                beam(b, from, to, *half_width_m, *depth_m, *look);
+            }
+        }
     }
 
     /// The light of its windows, doorways and lamps.
@@ -160,7 +176,8 @@ impl RoomPlan {
             cuts[0].push(corner.x);
             cuts[1].push(corner.y);
         }
-        let [xs, ys, zs] = cuts.map(subdivided);
+        let [xs, ys, zs] = cuts;
+        let (xs, ys, zs) = (subdivided(xs, 0.0), subdivided(ys, 0.0), subdivided(zs, self.floor_m));
 
         let inside = |p: Vec2| (p - self.low) / (self.high - self.low);
         b.begin(Class::FLOOR);
@@ -355,10 +372,12 @@ fn lattice(
     parts
 }
 
-/// Sorted `cuts` with more between them, so that no step is longer than a cell.
-fn subdivided(mut cuts: Vec<f32>) -> Vec<f32> {
+/// Sorted `cuts` with more between them, so that no step is longer than a cell. Cuts that the builder would move
+/// to one place are one: doors that face one another across a hallway begin at the same place but for rounding.
+/// `raised_m` is added to the cuts later.
+fn subdivided(mut cuts: Vec<f32>, raised_m: f32) -> Vec<f32> {
     cuts.sort_by(f32::total_cmp);
-    cuts.dedup();
+    cuts.dedup_by(|a, b| coincide(*a + raised_m, *b + raised_m));
     let mut all = vec![cuts[0]];
     for pair in cuts.windows(2) {
         let n = ((pair[1] - pair[0]) / CELL_M).ceil().max(1.0);
@@ -374,8 +393,8 @@ mod tests {
 
     #[test]
     fn cuts_are_kept_and_steps_are_short() {
-        let all = subdivided(vec![4.5, 0.0, 1.3, 0.0, 1.5]);
+        let all = subdivided(vec![4.5, 0.0, 1.3, 0.0, 1.5, 1.300001], 0.0);
         assert!([0.0, 1.3, 1.5, 4.5].iter().all(|c| all.contains(c)));
-        assert!(all.windows(2).all(|p| p[1] > p[0] && p[1] - p[0] <= CELL_M + 1e-6));
+        assert!(all.windows(2).all(|p| p[1] > p[0] + 0.1 && p[1] - p[0] <= CELL_M + 1e-6));
     }
 }

@@ -2,7 +2,6 @@
 
 use super::wings::arrange_wings;
 use super::{BuildingOptions, FloorPlan, RoomOptions, between, pick, rng};
-use crate::BuildingError;
 use crate::building::{Filling, Opening, RoomPlan, Wall};
 use crate::look::{CeilingFinish, FloorFinish, Paint};
 use rand::RngExt;
@@ -28,7 +27,7 @@ const BESIDE_DOOR_M: f32 = 0.45;
 const WINDOW_TOP_M: f32 = 2.1;
 
 /// The rooms in their order, and after those of each storey its hallway.
-pub(super) fn arrange(options: &BuildingOptions) -> Result<Vec<Site>, BuildingError> {
+pub(super) fn arrange(options: &BuildingOptions) -> Vec<Site> {
     let mut rng = rng(options.seed, u64::MAX - 1);
     let mut numbers = BTreeMap::new();
     let mut sites = Vec::new();
@@ -51,7 +50,7 @@ pub(super) fn arrange(options: &BuildingOptions) -> Result<Vec<Site>, BuildingEr
         }
         floor_m += top + SLAB_M;
     }
-    Ok(sites)
+    sites
 }
 
 fn arrange_storey(

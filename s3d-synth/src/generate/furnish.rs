@@ -1,6 +1,7 @@
 //! What rooms of each type have in them.
 
 use super::arrange::{Site, lamp_cells};
+use super::inside::keep_inside;
 use super::outfit::outfit;
 use super::space::{Frame, Space};
 use super::{BuildingOptions, Style, between, pick};
@@ -132,7 +133,10 @@ pub(super) fn furnish(
         by_wall.or_else(|| space.find_stand(rng, STAND_M))
     };
     let first = if options.models.is_some() { 1 } else { locations };
-    let stands: Vec<Vec2> = (0..first).map_while(|_| find(&mut space, rng)).collect();
+    let mut stands: Vec<Vec2> = (0..first).map_while(|_| find(&mut space, rng)).collect();
+    if stands.is_empty() {
+        stands.extend(space.find_stand(rng, BETWEEN_M));
+    }
     space.keep_ways_free(&room);
     let mut places = stand_at(&stands, room.floor_m, rng);
     if let Some(models) = options.models.as_ref().filter(|_| furnishing > 0.0) {
@@ -149,6 +153,7 @@ pub(super) fn furnish(
             }
         }
     }
+    keep_inside(&mut room);
     let more = (first..locations).map_while(|_| space.find_stand(rng, BETWEEN_M));
     let more: Vec<Vec2> = more.collect();
     places.extend(stand_at(&more, room.floor_m, rng));

@@ -8,6 +8,7 @@
 mod areas;
 mod arrange;
 mod furnish;
+mod inside;
 mod models;
 mod options;
 mod outfit;
@@ -63,7 +64,11 @@ impl Building {
             locations: Vec::new(),
             texture_scale: options.texture_scale,
         };
-        for (index, site) in (0..).zip(arrange::arrange(options)?) {
+        let sites = arrange::arrange(options);
+        // A hallway may be too long, a storey too high above the ground.
+        sites.iter().try_for_each(|site| site.plan.check_shell())?;
+
+        for (index, site) in (0..).zip(sites) {
             let mut rng = rng(options.seed, index);
             let (room, locations) = furnish(site, options, &mut rng);
             building.rooms.push(room);

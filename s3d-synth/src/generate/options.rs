@@ -3,6 +3,7 @@
 use super::furnish::can_furnish;
 use super::outfit::can_outfit;
 use super::{Models, Style, between, pick, rng};
+use crate::building::check::check_texture_scale;
 use crate::{BuildingError, RangeError};
 use s3d_label::RoomType;
 
@@ -163,6 +164,7 @@ impl BuildingOptions {
             RangeError::check(hallways, [f64::from(least), 200.0], || words("the number of hallways"))?;
             RangeError::check(courtyard_m, [0.5, 100.0], || words("what is between wings"))?;
         }
+        check_texture_scale(self.texture_scale)?;
         self.models.as_ref().map_or(Ok(()), |models| models.check(self))?;
         self.style.check()
     }

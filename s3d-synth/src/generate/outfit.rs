@@ -5,6 +5,7 @@ use super::furnish::{Group, add_radiators, at_a_seat, place, windows, wobble};
 use super::models::{Models, sized};
 use super::space::{Frame, Space};
 use super::{Style, between, pick};
+use crate::building::check::LARGE_M;
 use crate::building::{Beam, Item, RoomPlan, TableBase, Thing, Wall};
 use crate::look::{CONCRETE, Look, Pattern};
 use rand::RngExt;
@@ -197,7 +198,7 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, models: &Models, rng: &
             && beams.iter().all(|other| (other - x).abs() > 2.0 * half_width_m + 0.3)
     };
     let mut beams: Vec<f32> = Vec::new();
-    if lowest >= 2.5 {
+    if lowest >= 2.5 && f64::from(high.y - low.y) <= LARGE_M {
         for _ in 0..drawn(models.beams * share, rng) {
             let found = (0..30)
                 .map(|_| between(rng, low.x, high.x))

@@ -3,6 +3,7 @@
 
 use super::arrange::{Site, shell};
 use super::{BuildingOptions, FloorPlan, Models, RoomOptions, between, pick};
+use crate::building::check::most_panes;
 use crate::building::{Filling, Opening, Wall};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -51,6 +52,8 @@ pub(super) fn arrange_wings(
     };
     let planner = Planner { options, models, rooms };
     let wall_m = options.wall_m;
+    // The wall that divides the cross hallway stands in it.
+    let courtyard_m = courtyard_m.max(wall_m);
     let has_cross = wings > 1;
     let start = if has_cross {
         options.hallway_width_m + wall_m
@@ -137,8 +140,11 @@ impl Planner<'_> {
     }
 
     fn window(&self, wall: Wall, middle: f32, width: f32, rng: &mut ChaCha8Rng) -> Opening {
-        let filling = Filling::Glazing { panes: pick(rng, &self.models.panes), depth_m: 0.12 };
         let span = [middle - 0.5 * width, middle + 0.5 * width].map(snapped);
+        let size = [span[1] - span[0], self.models.window_m[1] - self.models.window_m[0]];
+        let [across, up] = pick(rng, &self.models.panes);
+        let panes = [across.min(most_panes(size[0])), up.min(most_panes(size[1]))];
+        let filling = Filling::Glazing { panes, depth_m: 0.12 };
         Opening { wall, span, heights: self.models.window_m, filling }
     }
 
@@ -273,21 +279,25 @@ impl Planner<'_> {
     /// every room a place for its door.
     fn cuts(&self, wing: &Wing, [start, end]: [f32; 2], pieces: usize) -> Vec<f32> {
         let rooms = || wing.rows.iter().flatten().map(|(_, span)| *span);
-        let has_place = |cut: f32| {
+        let have_place = |cuts: &[f32]| {
             rooms().all(|span| {
-                let [from, to] = self.free_for_door(span, &[cut]);
+                let [from, to] = self.free_for_door(span, cuts);
                 to - from >= self.models.door_m[0]
             })
         };
         let places: Vec<f32> = rooms()
             .map(|[_, to]| to + 0.5 * self.options.wall_m)
-            .filter(|&cut| has_place(cut))
+            .filter(|&cut| have_place(&[cut]))
             .collect();
         let mut cuts: Vec<f32> = Vec::new();
         for k in 1..pieces {
             let wanted = start + (end - start) * k as f32 / pieces as f32;
             let least = cuts.last().map_or(start, |cut| *cut) + SHORTEST_M + self.options.wall_m;
-            let fits = |cut: &&f32| **cut >= least && **cut <= end - SHORTEST_M - self.options.wall_m;
+            let fits = |cut: &&f32| {
+                **cut >= least
+                    && **cut <= end - SHORTEST_M - self.options.wall_m
+                    && have_place(&[cuts.as_slice(), &[**cut]].concat())
+            };
             let nearest = places
                 .iter()
                 .filter(fits)
