@@ -1,8 +1,8 @@
-//! The errors that need no word about buildings.
+//! Errors that are not about buildings alone.
 
 use thiserror::Error;
 
-/// A number is out of its range, or none at all.
+/// A number is out of its range, or is no number.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("{what} is {value}, and must be from {min} to {max}", value = short(*value))]
 pub struct RangeError {
@@ -27,14 +27,14 @@ fn short(value: f64) -> String {
 }
 
 impl RangeError {
-    /// Nothing if `value` is from `min` to `max`, or else the error, with `what` in its words.
+    /// Returns an error about `what` unless `value` is from `min` to `max`.
     pub(crate) fn check(
         value: impl Into<f64>,
         [min, max]: [f64; 2],
         what: impl FnOnce() -> String,
     ) -> Result<(), Self> {
         let value = value.into();
-        // What is written as 1.8 may come as an `f32` a little below that.
+        // A bound of 1.8 may come as an `f32` a little below it.
         let single = |bound: f64| f64::from(bound as f32);
         if (min.min(single(min))..=max.max(single(max))).contains(&value) {
             Ok(())
@@ -52,7 +52,7 @@ pub enum ScanError {
     /// A file or folder cannot be written.
     #[error(transparent)]
     File(#[from] s3d_io::Error),
-    /// A number of the options is out of its range, or none at all.
+    /// A number of the options is out of its range, or is no number.
     #[error(transparent)]
     Range(#[from] RangeError),
     /// The caller did not want to go on.

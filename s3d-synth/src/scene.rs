@@ -1,10 +1,11 @@
-//! What a building looks like to a scanner: an annotated mesh.
+//! A building as a scanner sees it: an annotated mesh.
 
 use crate::building::ScanLocation;
 use s3d_geom::TriMesh;
 use s3d_label::{Class, Room};
 
-/// A textured mesh with its annotation and its scan locations: what [`Building::build`](crate::Building::build) makes.
+/// A textured mesh with its annotation and its scan locations, made by
+/// [`Building::build`](crate::Building::build).
 ///
 /// ```
 /// use s3d_label::Class;
@@ -21,14 +22,14 @@ use s3d_label::{Class, Room};
 /// ```
 #[derive(Clone, Debug)]
 pub struct AnnotatedScene {
-    /// Its surface with textures: world metres, Z-up. Room by room; fronts are on the side from which they
+    /// The surface with textures: world metres, Z-up, room by room. Fronts are on the side from which they
     /// are seen.
     pub mesh: TriMesh,
     /// Index into `instances` by face of the mesh.
     pub instance_of_face: Vec<u32>,
-    /// The annotated objects, room by room. Each has faces, which follow one another.
+    /// The annotated objects, room by room. Each has at least one face, and its faces follow one another.
     pub instances: Vec<Instance>,
-    /// Where the scanner stood, in world coordinates.
+    /// The places where the scanner stood, in world coordinates.
     pub locations: Vec<ScanLocation>,
     /// The building's title.
     pub title: String,

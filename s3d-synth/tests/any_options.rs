@@ -67,7 +67,12 @@ fn models(lowest: f32, is_level: bool, hallway_width_m: f32) -> BoxedStrategy<Mo
     );
     let kinds = (
         some(&[TableBase::Legs, TableBase::Trestles, TableBase::Panels, TableBase::Pedestal]),
-        some(&[(SeatBase::Legs, true), (SeatBase::Star, true), (SeatBase::Sled, false), (SeatBase::Block, true)]),
+        some(&[
+            (SeatBase::Legs, true),
+            (SeatBase::Star, true),
+            (SeatBase::Sled, false),
+            (SeatBase::Block, true),
+        ]),
         some(&[true, false]),
         some(&[ShelfFront::Open, ShelfFront::Doors, ShelfFront::HalfDoors]),
         some(&[LeafModel::Flush, LeafModel::Panelled, LeafModel::Glazed]),
@@ -81,33 +86,35 @@ fn models(lowest: f32, is_level: bool, hallway_width_m: f32) -> BoxedStrategy<Mo
         [0.0f64..=1.0, 0.0f64..=1.0, 0.0f64..=1.0],
     );
     (furniture, kinds, openings)
-        .prop_map(move |((table_m, seat_m, couch_m, shelf_m, [board_width, board_share]), kinds, openings)| {
-            let (tables, seats, couches, shelves, leaves, panes) = kinds;
-            let (door_m, window_m, [beams, columns], [plain_boards, shut, end_windows]) = openings;
-            let highest_board = lowest - couch_m[2][1] - 0.2;
-            let board_height = board_share.map(|share| 0.4 + share * (highest_board - 0.4).max(0.0));
-            Models {
-                tables,
-                table_m,
-                seats,
-                seat_m,
-                couches,
-                couch_m,
-                shelves,
-                shelf_m,
-                board_m: [board_width, board_height],
-                leaves,
-                door_m,
-                panes,
-                window_m,
-                beams,
-                columns,
-                plain_boards,
-                shut,
-                end_windows,
-                ..BuildingOptions::area(1, 1).unwrap().models.unwrap()
-            }
-        })
+        .prop_map(
+            move |((table_m, seat_m, couch_m, shelf_m, [board_width, board_share]), kinds, openings)| {
+                let (tables, seats, couches, shelves, leaves, panes) = kinds;
+                let (door_m, window_m, [beams, columns], [plain_boards, shut, end_windows]) = openings;
+                let highest_board = lowest - couch_m[2][1] - 0.2;
+                let board_height = board_share.map(|share| 0.4 + share * (highest_board - 0.4).max(0.0));
+                Models {
+                    tables,
+                    table_m,
+                    seats,
+                    seat_m,
+                    couches,
+                    couch_m,
+                    shelves,
+                    shelf_m,
+                    board_m: [board_width, board_height],
+                    leaves,
+                    door_m,
+                    panes,
+                    window_m,
+                    beams,
+                    columns,
+                    plain_boards,
+                    shut,
+                    end_windows,
+                    ..BuildingOptions::area(1, 1).unwrap().models.unwrap()
+                }
+            },
+        )
         .boxed()
 }
 
@@ -163,17 +170,16 @@ fn without_models(mut options: BuildingOptions) -> BuildingOptions {
 }
 
 fn options() -> impl Strategy<Value = BuildingOptions> {
-    prop_oneof![
-        plain_options().prop_map(without_models),
-        plain_options().prop_flat_map(with_models)
-    ]
+    prop_oneof![plain_options().prop_map(without_models), plain_options().prop_flat_map(with_models)]
 }
 
 /// Why the generator refuses options that are all in range: the whole is too large, or the ceiling too low for
 /// sofas and boards above one another.
 fn is_refusal(error: &BuildingError) -> bool {
     let BuildingError::Range(error) = error else { return false };
-    ["the length along", "the height of the floor", "the size of boards"].iter().any(|w| error.what.contains(w))
+    ["the length along", "the height of the floor", "the size of boards"]
+        .iter()
+        .any(|w| error.what.contains(w))
 }
 
 proptest! {

@@ -300,7 +300,8 @@ fn scan_options() -> ScanOptions {
 fn points_are_where_a_location_sees_them() {
     let whole = scene(3);
     let seen = whole.seen(&SightOptions::default()).unwrap();
-    let (all, left) = (whole.mesh.faces().len(), seen.mesh.faces().len());
+    let all = whole.mesh.faces().len();
+    let left = seen.mesh.faces().len();
     assert!(left * 10 > all * 4 && left * 10 < all * 9, "{left} of {all} faces");
     // The back of a bookcase is gone, its front is not.
     let backs = |scene: &AnnotatedScene| {

@@ -4,6 +4,8 @@ mod common;
 
 use common::{Seen, directions};
 use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
 use s3d_label::{Class, RoomType};
 use s3d_synth::building::Filling;
 use s3d_synth::look::{Look, RED};
@@ -134,6 +136,19 @@ fn bookcases_keep_away_from_window_sills() {
         seed: 6484140468959298736,
         ..BuildingOptions::default()
     });
+}
+
+/// `.cargo/config.toml` has the seed of random tests. An unpacked package of the crate has no such file.
+#[test]
+fn random_tests_draw_the_same_cases_in_every_run() {
+    let workspace = concat!(env!("CARGO_MANIFEST_DIR"), "/../.cargo/config.toml");
+    if !std::path::Path::new(workspace).exists() {
+        return;
+    }
+
+    // As a property does it: a generator of its own for each run.
+    let draw = || options().new_tree(&mut TestRunner::default()).unwrap().current();
+    assert_eq!(draw(), draw(), "is PROPTEST_RNG_SEED of {workspace} in the environment?");
 }
 
 /// Once drawn by the property below: a desk lamp, turned beside a wall, reached through it.

@@ -11,7 +11,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum BuildingError {
-    /// A number is out of its range, or none at all.
+    /// A number is out of its range, or is no number.
     #[error(transparent)]
     Range(#[from] RangeError),
     /// There is no room.
@@ -39,7 +39,7 @@ pub enum BuildingError {
         room: Room,
         /// The wall.
         wall: Wall,
-        /// From where to where along the wall.
+        /// The stretch of the wall that it takes.
         span: [f32; 2],
     },
     /// Two openings of a wall overlap.
@@ -50,20 +50,20 @@ pub enum BuildingError {
         room: Room,
         /// The wall.
         wall: Wall,
-        /// Where the second lies along the wall.
+        /// The stretch of the wall that the second one takes.
         span: [f32; 2],
     },
-    /// What was built leaves its room.
+    /// A part of the room leaves it.
     #[error("{room}: {what} {index} leaves the room")]
     Outside {
         /// The room.
         room: Room,
         /// "item", "lamp", "ceiling hole" or "stairwell".
         what: &'static str,
-        /// Its place in the list, from 0.
+        /// Its index in the list.
         index: usize,
     },
-    /// Two locations have the same uuid, or one has none of 32 lower-case hexadecimal digits.
+    /// Two locations have the same uuid, or the uuid of one is not made of 32 lower-case hexadecimal digits.
     #[error("{uuid:?} is no uuid of 32 lower-case hexadecimal digits, or another location has it too")]
     Uuid {
         /// The uuid.
@@ -77,13 +77,13 @@ pub enum BuildingError {
         /// Where it is, in building coordinates.
         position: DVec3,
     },
-    /// Nothing is known of how to furnish rooms of this type.
+    /// The generator cannot furnish rooms of this type.
     #[error("rooms of the type {} cannot be generated", room_type.name())]
     RoomType {
         /// The type.
         room_type: RoomType,
     },
-    /// A list of what to choose from is empty.
+    /// A list of choices is empty.
     #[error("the style has no {what}")]
     EmptyStyle {
         /// The list.

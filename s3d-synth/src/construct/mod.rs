@@ -1,4 +1,4 @@
-//! From what stands where to annotated surfaces with the light in their looks.
+//! Makes annotated surfaces of a building, with the light in their looks.
 
 mod builder;
 mod furniture;
@@ -13,11 +13,10 @@ use crate::scene::AnnotatedScene;
 use builder::Builder;
 
 impl Building {
-    /// Builds the scene: the same at every call, on every platform.
+    /// Builds the scene. The result is the same at every call, on every platform.
     ///
-    /// A room's faces come in this order: what fills its openings, its lamps, its items, floor, ceiling,
-    /// walls. The images of floors, walls and ceilings hold the light of windows and lamps, and shade where
-    /// something stands.
+    /// The faces of a room come in this order: fillings of openings, lamps, items, floor, ceiling, walls. The
+    /// images of floors, walls and ceilings hold the light of windows and lamps, and shade around things.
     ///
     /// # Errors
     /// [`BuildingError`] if something is impossible: a room without a size, an opening outside its wall,

@@ -1,18 +1,18 @@
 //! Nothing reaches through a wall.
 //!
-//! A group of things takes a rectangle of the room, which has room for its things as they usually stand. A thing
-//! that is turned, or larger than usual, may reach a few centimetres beyond it: beside other groups into the
-//! gap, beside a wall through the wall. Such a thing is moved off the wall here.
+//! A group of things takes a rectangle of the room that holds its things as they usually stand. A thing that
+//! is turned, or larger than usual, may reach a few centimetres beyond the rectangle, and beside a wall
+//! through the wall. Such a thing is moved off the wall here.
 
 use crate::building::{Item, RoomPlan};
 use s3d_geom::Aabb;
 use s3d_geom::glam::Vec3;
 
-/// How far off the wall a thing comes to stand that has been moved.
+/// The distance from the wall of a thing that was moved, metres.
 const OFF_M: f32 = 0.002;
 
-/// Moves the items that leave the room back into it, each by as little as possible. Items that stay in the room
-/// are not touched. Leaves out an item that no move brings into the room.
+/// Moves the items that leave the room back into it, each by as little as possible. Items that stay in the
+/// room are not touched. An item that no move brings into the room is left out.
 pub(super) fn keep_inside(room: &mut RoomPlan) {
     let items = std::mem::take(&mut room.items);
     room.items = items.into_iter().filter_map(|item| kept(room, item)).collect();

@@ -111,6 +111,7 @@ pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
     for (letter, x) in [(S, 40.0), (THREE, 100.0), (D, 158.0)] {
         c.line(letter, [x, 34.0], 76.0, 7.0, RED);
     }
+
     c.line(&[[36.0, 126.0], [208.0, 120.0]], [0.0, 0.0], 1.0, 4.0, RED);
     c.line(
         &[[230.0, 84.0], [300.0, 78.0], [282.0, 66.0], [300.0, 78.0], [284.0, 94.0]],
@@ -119,8 +120,10 @@ pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
         4.0,
         INK,
     );
+
     // The room in perspective, and rays into it.
-    let (near, far) = ([[330., 30.], [480., 24.], [484., 130.], [332., 134.], [330., 30.]], [366., 56.]);
+    let near = [[330., 30.], [480., 24.], [484., 130.], [332., 134.], [330., 30.]];
+    let far = [366., 56.];
     c.line(&near, [0.0; 2], 1.0, 3.0, BLUE);
     c.line(&[far, [444., 54.], [446., 106.], [366., 108.], far], [0.0; 2], 1.0, 3.0, BLUE);
     for (a, b) in [(near[0], far), (near[1], [444., 54.]), (near[2], [446., 106.]), (near[3], [366., 108.])] {
@@ -130,6 +133,7 @@ pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
     for end in [[436., 62.], [440., 96.], [378., 100.]] {
         c.line(&[[404.0, 84.0], end], [0.0; 2], 1.0, 2.0, RED);
     }
+
     // Handwriting: a dot and a wavering line an item.
     for (row, length) in [150.0, 118.0, 164.0, 92.0].into_iter().enumerate() {
         let y = 162.0 + 26.0 * row as f32;
@@ -139,6 +143,7 @@ pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
             .collect();
         c.line(&wave, [0.0; 2], 1.0, 2.5, INK);
     }
+
     // A rising curve over its axes.
     c.line(&[[300., 160.], [300., 256.], [478., 256.]], [0.0; 2], 1.0, 3.0, INK);
     c.line(
@@ -198,6 +203,7 @@ pub(crate) fn cork() -> Raster<[u8; 3]> {
         let grain = 46.0 * (hash(x as u32 / 2, y as u32 / 2, 19) - 0.5);
         tint([188.0, 146.0, 98.0], grain + 24.0 * (fractal(x / 30.0, y / 30.0, 64, 20) - 0.5))
     });
+
     let sheets = [
         ([24., 22.], [74., 104.], [250.0, 249.0, 244.0]),
         ([122., 34.], [82., 60.], [250.0, 249.0, 244.0]),
@@ -208,9 +214,11 @@ pub(crate) fn cork() -> Raster<[u8; 3]> {
         ([36., 156.], [62., 62.], [168.0, 222.0, 172.0]),
         ([236., 134.], [66., 94.], [252.0, 250.0, 246.0]),
     ];
+
     for (k, ([x, y], [w, h], color)) in sheets.into_iter().enumerate() {
         c.rect([x + 3.0, y + 3.0], [x + w + 3.0, y + h + 3.0], [140.0, 104.0, 68.0]);
         c.rect([x, y], [x + w, y + h], color);
+
         // Ragged lines of text, flush left, under a short heading.
         c.rect([x + 8.0, y + 12.0], [x + 0.6 * w, y + 17.0], INK);
         for row in 0..((h - 34.0) / 8.0) as u32 {
@@ -220,6 +228,7 @@ pub(crate) fn cork() -> Raster<[u8; 3]> {
         }
         c.disc([x + 0.5 * w, y + 5.0], 4.0, if k % 2 == 0 { RED } else { BLUE });
     }
+
     c.finish()
 }
 
@@ -352,10 +361,12 @@ mod tests {
                 .into_iter()
                 .chain([chalkboard([44.0, 88.0, 68.0])])
         {
-            let (w, h) = (picture.width(), picture.height());
+            let w = picture.width();
+            let h = picture.height();
             let differs = |other: &dyn Fn(u32, u32) -> (u32, u32)| {
                 let changed = |&(x, y): &(u32, u32)| {
-                    let (a, b) = (other(x, y), picture.at(x, y));
+                    let a = other(x, y);
+                    let b = picture.at(x, y);
                     picture.at(a.0, a.1).iter().zip(b).any(|(p, q)| p.abs_diff(q) > 24)
                 };
                 let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));

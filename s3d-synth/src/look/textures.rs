@@ -3,6 +3,7 @@
 use super::noise::{fractal, hash, mix, smooth, tint, value};
 use super::pictures;
 use s3d_geom::Raster;
+use std::sync::OnceLock;
 
 /// An image that several surfaces may wear: a pattern that repeats, or a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -91,7 +92,14 @@ impl Pattern {
         }
     }
 
-    pub(crate) fn image(self) -> Raster<[u8; 3]> {
+    /// The image, drawn once in a process: drawing takes most of the time of a small building.
+    pub(crate) fn image(self) -> &'static Raster<[u8; 3]> {
+        static IMAGES: [OnceLock<Raster<[u8; 3]>>; Pattern::BlackBoard as usize + 1] =
+            [const { OnceLock::new() }; Pattern::BlackBoard as usize + 1];
+        IMAGES[self as usize].get_or_init(|| self.draw())
+    }
+
+    fn draw(self) -> Raster<[u8; 3]> {
         match self {
             Pattern::Oak => wood(&Wood::OAK),
             Pattern::Walnut => wood(&Wood::WALNUT),
@@ -211,7 +219,8 @@ fn books() -> Raster<[u8; 3]> {
         [236.0, 234.0, 228.0],
     ];
     let mut spines = Vec::new();
-    let (mut left, mut k) = (0, 0);
+    let mut left = 0;
+    let mut k = 0;
     while left < 512 {
         let width = 11 + (hash(k, 1, 77) * 16.0) as u32;
         let right = if 512 - left < width + 11 { 512 } else { left + width };
@@ -291,7 +300,8 @@ mod tests {
     fn tiles_meet_at_their_edges() {
         for pattern in [Pattern::Oak, Pattern::Concrete, Pattern::BlueFabric] {
             let image = pattern.image();
-            let (w, h) = (image.width(), image.height());
+            let w = image.width();
+            let h = image.height();
             let step = |a: [u8; 3], b: [u8; 3]| i32::from(a[0].abs_diff(b[0]));
             let inner: i32 = (0..h).map(|y| step(image.at(w / 2 - 1, y), image.at(w / 2, y))).sum();
             let seam: i32 = (0..h).map(|y| step(image.at(w - 1, y), image.at(0, y))).sum();

@@ -78,7 +78,8 @@ impl Seen {
     pub fn check_things_stay_in_their_rooms(&self) {
         let rooms = self.rooms();
         for f in self.faces() {
-            let (instance, room) = (self.instance_of(f), rooms[&self.instance_of(f).room]);
+            let instance = self.instance_of(f);
+            let room = rooms[&self.instance_of(f).room];
             let deep = if matches!(instance.class, Class::WINDOW | Class::DOOR) {
                 0.161
             } else {
@@ -93,7 +94,8 @@ impl Seen {
 
     /// Every face has a texture, with coordinates in range, or a colour. Returns how many have which.
     pub fn check_colors(&self) -> [usize; 2] {
-        let (mut textured, mut plain) = (0, 0);
+        let mut textured = 0;
+        let mut plain = 0;
         for f in self.faces() {
             match self.scene.mesh.color_of(f) {
                 FaceColor::Texture(_, texture, uvs) => {
@@ -177,7 +179,9 @@ impl Seen {
 
 /// Distance along the unit vector `d` at which the ray from `o` meets a triangle.
 fn meets(o: DVec3, d: DVec3, &[a, b, c]: &[DVec3; 3]) -> Option<f64> {
-    let (e, f, s) = (b - a, c - a, o - a);
+    let e = b - a;
+    let f = c - a;
+    let s = o - a;
     let p = d.cross(f);
     let det = e.dot(p);
     let u = s.dot(p) / det;
@@ -185,7 +189,8 @@ fn meets(o: DVec3, d: DVec3, &[a, b, c]: &[DVec3; 3]) -> Option<f64> {
         return None;
     }
     let q = s.cross(e);
-    let (v, t) = (d.dot(q) / det, f.dot(q) / det);
+    let v = d.dot(q) / det;
+    let t = f.dot(q) / det;
     (v >= -1e-9 && u + v <= 1.0 + 1e-9 && t > 0.0).then_some(t)
 }
 
