@@ -1,5 +1,5 @@
-//! Options from the whole of what the generator takes, furniture of several models and wings among them: it
-//! refuses them for a reason that no seed changes, or what it generates can be built.
+//! Options from the whole of their ranges, furniture of several models and wings among them. The generator
+//! refuses them for a reason that no seed changes, or it makes a building that can be built.
 
 use proptest::prelude::*;
 use s3d_label::RoomType;
@@ -173,8 +173,8 @@ fn options() -> impl Strategy<Value = BuildingOptions> {
     prop_oneof![plain_options().prop_map(without_models), plain_options().prop_flat_map(with_models)]
 }
 
-/// Why the generator refuses options that are all in range: the whole is too large, or the ceiling too low for
-/// sofas and boards above one another.
+/// Whether it is a reason to refuse options that are all in range: the whole is too large, or the ceiling too
+/// low for a board above a sofa.
 fn is_refusal(error: &BuildingError) -> bool {
     let BuildingError::Range(error) = error else { return false };
     ["the length along", "the height of the floor", "the size of boards"]

@@ -18,7 +18,8 @@ use crate::look::{CeilingFinish, FloorFinish, Look, Paint};
 use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};
 use s3d_label::{Class, Room};
 
-/// Below this height walls are upright and openings end. Above it a slanted ceiling squeezes the walls. Metres.
+/// The height below which walls are upright, and at which openings end, metres. Above it a slanted ceiling
+/// squeezes the walls.
 pub(crate) const KNEE_M: f32 = 2.1;
 
 /// A building. [`Building::build`] makes a scene of it. The `Default` is [`Building::demo`].

@@ -89,8 +89,8 @@ impl Builder {
         }
     }
 
-    /// A builder that notes where corners lie and makes no surfaces: [`Builder::positions_since`] tells how far
-    /// a thing reaches, to the last bit, in a small part of the time.
+    /// A builder that only notes where corners lie. [`Builder::positions_since`] then tells how far a thing
+    /// reaches, to the last bit, in a small part of the time.
     pub(crate) fn measuring() -> Self {
         Self { only_measures: true, ..Self::new(1.0) }
     }

@@ -1,4 +1,4 @@
-//! What covers walls, floors and ceilings: a colour for each place, in metres.
+//! The finishes of walls, floors and ceilings: a colour for each place in metres.
 
 use super::noise::{fractal, hash, mix, tint, value};
 use super::textures::Wood;

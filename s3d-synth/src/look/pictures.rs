@@ -1,5 +1,5 @@
-//! What hangs on the walls and glows on the screens. Each picture reads only one way round, so that a
-//! mirrored or upside down texture shows at once.
+//! Pictures on walls and screens. Each can be read only one way round, so that a mirrored or upside-down
+//! texture shows at once.
 
 use super::noise::{fractal, hash, mix, smooth, tint};
 use super::textures::{image, to_bytes};
@@ -22,7 +22,7 @@ impl Canvas {
         Self { width, pixels: (0..width * height).map(at).collect() }
     }
 
-    /// Lays `color` over what is there, as much as `cover` says for each pixel.
+    /// Blends `color` over each pixel, by the share that `cover` gives.
     fn cover(&mut self, color: Color, cover: impl Fn(Vec2) -> f32) {
         for (i, pixel) in self.pixels.iter_mut().enumerate() {
             let at = vec2((i as u32 % self.width) as f32, (i as u32 / self.width) as f32);
@@ -101,7 +101,7 @@ const BLUE: Color = [36.0, 88.0, 190.0];
 const GREEN: Color = [38.0, 138.0, 72.0];
 
 fn board_white(x: f32, y: f32) -> Color {
-    // Traces of what was wiped away.
+    // Traces of wiped-away writing.
     tint([246.0, 248.0, 250.0], -10.0 * fractal(x / 90.0 + y / 150.0, y / 40.0, 64, 41))
 }
 
@@ -250,6 +250,7 @@ pub(crate) fn landscape() -> Raster<[u8; 3]> {
     image(384, 256, |x, y| {
         let sky = mix([120.0, 164.0, 212.0], [248.0, 214.0, 176.0], smooth(y / 130.0));
         let clouds = smooth((fractal(x / 90.0, y / 36.0, 64, 31) - 0.5) * 4.0);
+
         let mut color = mix(sky, [252.0, 244.0, 234.0], 0.7 * clouds * (1.0 - y / 160.0).max(0.0));
         for (k, (base, rise, tone)) in [
             (118.0, 78.0, [132.0, 146.0, 172.0]),
@@ -268,16 +269,18 @@ pub(crate) fn landscape() -> Raster<[u8; 3]> {
             };
             color = mix(color, tint(tone, rock + snow), smooth((y - ridge) / 2.0 + 0.5));
         }
+
         if y > 172.0 {
             let ripple = fractal(x / 60.0, y / 4.0, 64, 39);
             let water = mix([70.0, 104.0, 134.0], [206.0, 190.0, 170.0], smooth((ripple - 0.35) * 2.0));
             color = mix(water, [34.0, 52.0, 62.0], smooth((y - 190.0) / 90.0));
         }
+
         tint(color, 10.0 * (hash(x as u32, y as u32, 40) - 0.5))
     })
 }
 
-/// What is seen through a window: sky, clouds, and roofs that rise to the right.
+/// The view through a window: sky, clouds, and roofs that rise to the right.
 pub(crate) fn sky() -> Raster<[u8; 3]> {
     image(320, 256, |x, y| {
         let blue = mix([112.0, 168.0, 232.0], [206.0, 228.0, 248.0], smooth(y / 200.0));
