@@ -1,4 +1,5 @@
-//! Writes the scan of a building that `s3d export` reads: that of the demo, or a random one of so many rooms.
+//! Writes the scan of a building that `s3d export` reads: the demo's building, or a random one of so many
+//! rooms.
 //!
 //! `cargo run --release -p s3d-synth --example building -- FOLDER [ROOMS [SEED]]`
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
@@ -17,7 +18,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let scene = building.build()?;
     let file = scene.write_scan(Path::new(folder), &ScanOptions::default(), || true)?;
-    let (faces, things) = (scene.mesh.faces().len(), scene.instances.len());
+    let faces = scene.mesh.faces().len();
+    let things = scene.instances.len();
     println!("{}: {faces} faces, {things} things, {} locations", file.display(), scene.locations.len());
     Ok(())
 }

@@ -15,6 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .next()
         .filter(|f| !f.starts_with('-'))
         .ok_or("usage: large_scene FOLDER [--points N] …")?;
+
     let mut scan = LargeScan::default();
     while let Some(key) = args.next() {
         let value = args.next().ok_or_else(|| format!("{key} wants a value"))?;
@@ -36,7 +37,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             other => return Err(format!("{other} is no option").into()),
         }
     }
+
     let written = scan.write(Path::new(&folder))?;
+
     println!(
         "{folder}: {} faces, {} materials, {} labels in {} rooms, {} points, {} scan locations, {:.0} m²",
         written.faces,

@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 
 const SCENE_FILE: &str = "scene.toml";
 
-/// How the scene file of the demo begins: what tells it from a user's own.
+/// The first words of the demo's scene file, which tell it from a user's own.
 const DEMO: &str = "# The built-in scene of s3d";
 
-/// The same of the scenes of [`BuildingOptions::area`](crate::BuildingOptions::area).
+/// The first words of the scene files of [`BuildingOptions::area`](crate::BuildingOptions::area).
 const AREA: &str = "# A generated area of s3d";
 
 /// Whether `folder` holds a scan of the demo's building, and may be written again.
@@ -36,7 +36,7 @@ impl AnnotatedScene {
     /// locations (`cameras.csv`), and `scene.toml`, which ties them together. Returns the path of
     /// `scene.toml`, which is written last.
     ///
-    /// `go_on` is asked before each room of points. Where it says no, what was written so far stays.
+    /// `go_on` is asked before each room of points. If it returns false, the files written so far stay.
     ///
     /// ```
     /// use s3d_synth::{Building, ScanError, ScanOptions};
@@ -55,7 +55,7 @@ impl AnnotatedScene {
     /// ```
     ///
     /// # Errors
-    /// [`ScanError`].
+    /// [`ScanError`] if a file cannot be written, a number is out of its range, or `go_on` returns false.
     pub fn write_scan(
         &self,
         folder: &Path,
@@ -67,7 +67,7 @@ impl AnnotatedScene {
         write_rgb_obj(folder, &self.mesh, &[])?;
         self.write_annotations(&folder.join(&area), options, &mut go_on)?;
         write_bytes(&folder.join("cameras.csv"), camera_table(self).as_bytes())?;
-        // The title is one line, whatever is in it.
+        // The title becomes one line, whatever it holds.
         let title = self.title.replace(char::is_control, " ");
         let toml = format!(
             "# {title}.\narea = {number}\n\n\
@@ -90,12 +90,15 @@ impl AnnotatedScene {
         let tree = S3disAreaWriter::create(folder)?;
         let mut angles = Vec::new();
         let mut scan = self.scan(options)?.peekable();
+
         while let Some((first, _)) = scan.peek() {
             if !go_on() {
                 return Err(ScanError::Cancelled);
             }
+
             let room = self.instances[*first].room;
             let mut files = tree.room(&room.to_string())?;
+
             while let Some((index, cloud)) = scan.next_if(|(index, _)| self.instances[*index].room == room) {
                 if cloud.is_empty() {
                     continue;
@@ -105,10 +108,12 @@ impl AnnotatedScene {
                 file.append(&cloud.positions, &cloud.colors)?;
                 file.finish()?;
             }
+
             files.finish()?;
             // Walls are parallel to the axes.
             angles.push((room.to_string(), 0));
         }
+
         tree.alignment(&angles)?;
         Ok(())
     }
@@ -118,7 +123,8 @@ impl AnnotatedScene {
 fn camera_table(scene: &AnnotatedScene) -> String {
     let mut text = String::new();
     for l in &scene.locations {
-        let (p, q) = (l.position, DQuat::from_rotation_z(l.yaw_rad));
+        let p = l.position;
+        let q = DQuat::from_rotation_z(l.yaw_rad);
         let _ = writeln!(
             text,
             "{},{:.6},{:.6},{:.6},{:.9},{:.9},{:.9},{:.9}",

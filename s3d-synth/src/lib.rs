@@ -1,12 +1,12 @@
 //! Procedural furnished buildings.
 //!
 //! A [`Building`] is plain data: rooms with openings and finishes, things that stand in them, scan locations.
-//! [`Building::demo`] is that of `s3d demo`, [`Building::generate`] makes one by rule from
-//! [`BuildingOptions`], and what is in [`building`] and [`look`] is what they are put together from.
-//! [`Building::build`] makes an [`AnnotatedScene`]: a mesh with light and shade in its textures, whose every
-//! face belongs to an instance of one of the 13 classes. [`AnnotatedScene::scan`] draws the points of a scan,
-//! and `AnnotatedScene::write_scan` (feature `files`, on by default) writes what `s3d export` reads. Meshes
-//! for benches and tests are in [`scenes`].
+//! [`Building::demo`] is the building of `s3d demo`. [`Building::generate`] makes one by rule from
+//! [`BuildingOptions`]. The modules [`building`] and [`look`] hold the parts of buildings.
+//! [`Building::build`] makes an [`AnnotatedScene`]: a mesh with light and shade in its textures. Every face
+//! belongs to an instance of one of the 13 classes. [`AnnotatedScene::scan`] draws the points of a scan, and
+//! `AnnotatedScene::write_scan` (feature `files`, on by default) writes what `s3d export` reads. Meshes for
+//! benches and tests are in [`scenes`].
 //!
 //! ```
 //! use s3d_label::Class;
@@ -23,8 +23,8 @@
 //! # Ok::<(), s3d_synth::BuildingError>(())
 //! ```
 
-// What a building says is checked: nothing panics but the generators of scenes, whose "Panics" tell when.
-// Loops index by what was made here.
+// A building is checked before it is built: nothing panics but the generators of `scenes`, whose docs say
+// when. Loops index lists that the same function made.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
@@ -42,10 +42,10 @@ mod scene;
 pub mod scenes;
 mod sight;
 
-pub use building::Building;
+pub use building::{Building, BuildingError};
+pub use error::RangeError;
 #[cfg(feature = "files")]
 pub use error::ScanError;
-pub use error::{BuildingError, RangeError};
 #[cfg(feature = "files")]
 pub use files::{is_area_scan, is_demo_scan};
 pub use generate::{BuildingOptions, FloorPlan, Models, RoomOptions, Style};

@@ -9,20 +9,20 @@ use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use std::fmt;
 use std::sync::Arc;
 
-/// How a scene is scanned. Its `Default` is that of the demo: 3,000 points a square metre, about what S3DIS
-/// has.
+/// How a scene is scanned. The `Default` is the scan of the demo: 3,000 points a square metre, about as many
+/// as S3DIS has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanOptions {
     /// Points a square metre of every instance: at most 1e6.
     pub points_per_m2: f64,
-    /// How far points lie off the surface, at most, in metres: up to 0.1.
+    /// The greatest distance of points from the surface, metres: up to 0.1.
     pub noise_m: f32,
-    /// From which all randomness comes.
+    /// The seed of all randomness.
     pub seed: u64,
     /// The number of the area in files.
     pub area: u32,
-    /// Measure only what the scan locations see, and as densely as they see it; the noise then lies along the
-    /// rays and grows with their length. Everything alike where it is not there.
+    /// Measures only what the scan locations see, and as densely as they see it. The noise then lies along
+    /// the rays and grows with their length. `None` measures everything alike.
     pub sight: Option<SightOptions>,
 }
 
@@ -32,14 +32,14 @@ impl Default for ScanOptions {
     }
 }
 
-/// The points of a scene's instances: yields the index of an instance and its points, in the order of the
-/// rooms' names and in a room in that of the instances. See [`AnnotatedScene::scan`].
+/// The points of a scene's instances. Yields the index of an instance and its points: rooms in the order of
+/// their names, and the instances of a room in their own order. See [`AnnotatedScene::scan`].
 #[derive(Clone)]
 pub struct Scan<'a> {
     scene: &'a AnnotatedScene,
     options: ScanOptions,
     faces_of: Vec<Vec<u32>>,
-    /// Instances that are still to come, the next one last.
+    /// The instances that are still to come. The last one is next.
     rest: Vec<usize>,
     noise: ChaCha8Rng,
     sight: Option<Arc<Sight>>,
@@ -55,9 +55,9 @@ impl fmt::Debug for Scan<'_> {
 }
 
 impl AnnotatedScene {
-    /// Scans every instance: uniformly drawn points with colours, each with the face that it lies on, off its
-    /// surface by a uniform noise. An instance gets one point at least; where only what is seen is measured,
-    /// one that nobody sees gets none. World metres.
+    /// Scans every instance. Points are drawn uniformly, with their colours and faces, and moved off the
+    /// surface by a uniform noise. World metres. An instance gets at least one point. With
+    /// [`ScanOptions::sight`], an instance that no location sees gets none.
     ///
     /// ```
     /// use s3d_synth::{Building, ScanOptions};
@@ -77,16 +77,20 @@ impl AnnotatedScene {
         RangeError::check(options.points_per_m2, [0.0, 1e6], || "points a square metre".to_owned())?;
         RangeError::check(options.noise_m, [0.0, 0.1], || "the noise of points".to_owned())?;
         options.sight.as_ref().map_or(Ok(()), SightOptions::check)?;
+
         let sight = options.sight.as_ref().map(|sight| Arc::new(Sight::new(self, sight)));
+
         let mut faces_of = vec![Vec::new(); self.instances.len()];
         for (face, &instance) in (0..).zip(&self.instance_of_face) {
             if let Some(faces) = faces_of.get_mut(instance as usize) {
                 faces.push(face);
             }
         }
+
         let names: Vec<String> = self.instances.iter().map(|i| i.room.to_string()).collect();
         let mut rest: Vec<usize> = (0..self.instances.len()).collect();
         rest.sort_by(|&a, &b| names[a].cmp(&names[b]).then(a.cmp(&b)).reverse());
+
         let noise = ChaCha8Rng::seed_from_u64(options.seed);
         Ok(Scan { scene: self, options: options.clone(), faces_of, rest, noise, sight })
     }
@@ -100,11 +104,13 @@ impl Iterator for Scan<'_> {
         let mesh = &self.scene.mesh;
         let faces = std::mem::take(&mut self.faces_of[instance]);
         let seed = self.options.seed.wrapping_add(instance as u64);
+
         let sampler = |density| SurfaceSampler::over_faces(mesh, faces.clone(), density, seed);
         let mut points = sampler(Density::PerM2(self.options.points_per_m2));
         if points.is_empty() {
             points = sampler(Density::Total(1));
         }
+
         let mut cloud = PointCloud::default();
         points.sample(0..points.len(), &mut cloud);
         let noise_m = self.options.noise_m;
@@ -123,17 +129,18 @@ impl Iterator for Scan<'_> {
     }
 }
 
-/// Points that one task measures.
+/// The number of points that one task measures.
 const CHUNK: usize = 2048;
 
 impl Scan<'_> {
-    /// Those points that come back, off their places along the rays. An instance of which anything is seen
-    /// keeps one.
+    /// Returns the points that come back, moved along their rays by the noise. An instance keeps at least one
+    /// point if any of it is seen.
     fn measured(&self, sight: &Sight, drawn: &PointCloud, faces: &[u32], seed: u64) -> PointCloud {
         let mesh = &self.scene.mesh;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(1);
         let chances: Vec<[f32; 2]> = drawn.faces.iter().map(|_| [rng.random(), rng.random()]).collect();
+
         let mut at = vec![None; drawn.len()];
         at.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, at)| {
             let mut memory = sight.memory();
@@ -143,12 +150,13 @@ impl Scan<'_> {
                     .measures((p, face), mesh.normal(face), chance, &mut memory)
                     .map(|location| {
                         let ray = p - location;
-                        // Half as much close by, as much at 5 m.
+                        // Half of the noise close by, all of it at 5 m.
                         let noise_m = self.options.noise_m * (0.5 + 0.1 * ray.length());
                         p + ray.normalize() * (2.0 * noise - 1.0) * noise_m
                     });
             }
         });
+
         let mut cloud = PointCloud::default();
         for (i, p) in (0..).zip(at) {
             if let Some(p) = p {
@@ -157,6 +165,7 @@ impl Scan<'_> {
                 cloud.faces.push(drawn.faces[i]);
             }
         }
+
         let mut memory = sight.memory();
         let mut seen = faces
             .iter()

@@ -1,12 +1,11 @@
-//! What a building looks like to a scanner: an annotated mesh.
+//! A building as a scanner sees it: an annotated mesh.
 
-use crate::BuildingError;
-use crate::building::{Building, ScanLocation};
-use crate::construct::builder::Builder;
+use crate::building::ScanLocation;
 use s3d_geom::TriMesh;
 use s3d_label::{Class, Room};
 
-/// A textured mesh with its annotation and its scan locations: what [`Building::build`] makes.
+/// A textured mesh with its annotation and its scan locations, made by
+/// [`Building::build`](crate::Building::build).
 ///
 /// ```
 /// use s3d_label::Class;
@@ -23,14 +22,14 @@ use s3d_label::{Class, Room};
 /// ```
 #[derive(Clone, Debug)]
 pub struct AnnotatedScene {
-    /// Its surface with textures: world metres, Z-up. Room by room; fronts are on the side from which they
+    /// The surface with textures: world metres, Z-up, room by room. Fronts are on the side from which they
     /// are seen.
     pub mesh: TriMesh,
     /// Index into `instances` by face of the mesh.
     pub instance_of_face: Vec<u32>,
-    /// The annotated objects, room by room. Each has faces, which follow one another.
+    /// The annotated objects, room by room. Each has at least one face, and its faces follow one another.
     pub instances: Vec<Instance>,
-    /// Where the scanner stood, in world coordinates.
+    /// The places where the scanner stood, in world coordinates.
     pub locations: Vec<ScanLocation>,
     /// The building's title.
     pub title: String,
@@ -45,36 +44,4 @@ pub struct Instance {
     pub number: u32,
     /// Where it is.
     pub room: Room,
-}
-
-impl Building {
-    /// Builds the scene: the same at every call, on every platform.
-    ///
-    /// A room's faces come in this order: what fills its openings, its lamps, its items, floor, ceiling,
-    /// walls. The images of floors, walls and ceilings hold the light of windows and lamps, and shade where
-    /// something stands.
-    ///
-    /// # Errors
-    /// [`BuildingError`] if something is impossible: a room without a size, an opening outside its wall,
-    /// rooms or openings that overlap, a thing that is too small to be built or leaves its room, a location
-    /// outside of all rooms, …
-    pub fn build(&self) -> Result<AnnotatedScene, BuildingError> {
-        self.check()?;
-        let mut builder = Builder::new(self.texture_scale);
-        for room in &self.rooms {
-            room.construct(&mut builder)?;
-        }
-        let (mesh, instance_of_face, instances) = builder.finish(self.origin)?;
-        let locations = self.locations.iter().map(|location| ScanLocation {
-            position: location.position + self.origin.as_dvec3(),
-            ..location.clone()
-        });
-        Ok(AnnotatedScene {
-            mesh,
-            instance_of_face,
-            instances,
-            locations: locations.collect(),
-            title: self.title.clone(),
-        })
-    }
 }

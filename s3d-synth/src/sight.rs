@@ -13,11 +13,11 @@ use std::time::Duration;
 /// How a scanner sees.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SightOptions {
-    /// Farther than this nothing is measured, metres: 0.5 to 200.
+    /// The range of the scanner, metres: 0.5 to 200.
     pub range_m: f32,
-    /// A surface that the rays of one location meet at a right angle has all its points up to this distance,
-    /// and fewer with its square beyond, metres: 0.1 to 200. Rays that meet it aslant give fewer with the
-    /// cosine.
+    /// Up to this distance a surface has all its points if the rays of one location meet it at a right angle,
+    /// metres: 0.1 to 200. Beyond, the points get fewer with the square of the distance. Rays that meet a
+    /// surface aslant give fewer points with the cosine of the angle.
     pub full_m: f32,
     /// Rays that meet a surface at a smaller angle than this give no points, degrees: 0 to 89.
     pub grazing_deg: f32,
@@ -46,22 +46,22 @@ impl SightOptions {
 
 /// Edge of the patches that have no points.
 const PATCH_M: f32 = 0.12;
-/// A ray ends so far before the point that it asks for, metres: the point's own surface is not in its way.
+/// A ray ends this far before its point, metres, so that the point's own surface does not block it.
 const SLACK_M: f32 = 0.004;
 
-/// A scene that is looked at from its locations.
+/// A scene, seen from its locations.
 pub(crate) struct Sight {
     options: SightOptions,
     bvh: Bvh2,
-    /// In the order of the tree.
+    /// The triangles in the order of the tree.
     triangles: Vec<Triangle>,
     locations: Vec<Vec3>,
-    /// Of the rays' angle to the surface.
+    /// The least sine of the angle between a ray and a surface.
     least_sine: f32,
     is_glass: Vec<bool>,
 }
 
-/// What hid the last point from each location: tried first for the next.
+/// The triangle that hid the last point from each location. It is tried first for the next point.
 pub(crate) struct Memory(Vec<u32>);
 
 impl Sight {
@@ -75,13 +75,16 @@ impl Sight {
                 Triangle { v0, v1, v2 }
             })
             .collect();
+
         let bvh = build_bvh2_from_tris(&all, BvhBuildParams::medium_build(), &mut Duration::default());
         let triangles = bvh.primitive_indices.iter().map(|&i| all[i as usize]).collect();
+
         let glass = Pattern::Sky.name();
         let is_glass = |face| {
             let material = mesh.material_of(face).and_then(|m| mesh.materials().get(m as usize));
             material.is_some_and(|m| m.name.starts_with(glass))
         };
+
         Self {
             options: options.clone(),
             bvh,
@@ -96,8 +99,8 @@ impl Sight {
         Memory(vec![NO_INDEX; self.locations.len()])
     }
 
-    /// How densely a location would measure a surface at `p` with the normal `n` if nothing stood between: 0
-    /// to 1.
+    /// The share of points, 0 to 1, that a location measures on a surface at `p` with the normal `n` if
+    /// nothing is between.
     fn weight(&self, location: Vec3, p: Vec3, n: Vec3) -> f32 {
         let d = location - p;
         let distance = d.length();
@@ -132,8 +135,8 @@ impl Sight {
         })
     }
 
-    /// Whether a point `p` of a face comes back, by a number `chance` from 0 to 1; and from which location it
-    /// is seen best.
+    /// Returns the location that sees the point `p` of a face best, or `None` if the point does not come
+    /// back. The number `chance`, from 0 to 1, decides.
     pub(crate) fn measures(
         &self,
         (p, face): (Vec3, u32),
@@ -146,20 +149,25 @@ impl Sight {
         } else {
             1.0
         };
+
         let patch = (p / PATCH_M).floor().as_ivec3();
         let in_hole = hash(patch.x as u32, (patch.y as u32).wrapping_add(patch.z as u32 * 7919), 101);
         if chance >= share || in_hole < self.options.holes {
             return None;
         }
+
         let mut near: Vec<(f32, usize)> = (0..self.locations.len())
             .map(|k| (self.weight(self.locations[k], p, n), k))
             .filter(|(weight, _)| *weight > 0.0)
             .collect();
         near.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+
         let mut left: f32 = near.iter().map(|(weight, _)| weight).sum();
-        let (mut sum, mut best) = (0.0, None);
+        let mut sum = 0.0;
+        let mut best = None;
+
         for (weight, k) in near {
-            // All that may still come is not enough.
+            // All remaining weights are not enough.
             if (sum + left) * share <= chance {
                 return None;
             }
@@ -172,20 +180,23 @@ impl Sight {
                 }
             }
         }
+
         None
     }
 
-    /// A place of a face that some location sees, if there is one.
+    /// Returns a place of a face that some location sees.
     pub(crate) fn seen_place(&self, mesh: &TriMesh, face: u32, memory: &mut Memory) -> Option<Vec3> {
         let ([a, b, c], n) = (mesh.triangle(face), mesh.normal(face));
         let toward =
             |near: f32, k: usize| std::array::from_fn(|i| if i == k { 1.0 - 2.0 * near } else { near });
+
         let places = [[1.0 / 3.0; 3]].into_iter();
         let places = places.chain(
             [0.1, 0.48, 0.02]
                 .into_iter()
                 .flat_map(|near| [0, 1, 2].map(|k| toward(near, k))),
         );
+
         places.map(|[u, v, w]: [f32; 3]| a * u + b * v + c * w).find(|&p| {
             (0..self.locations.len())
                 .any(|k| self.weight(self.locations[k], p, n) > 0.0 && self.is_free(k, p, memory))
@@ -194,9 +205,8 @@ impl Sight {
 }
 
 impl AnnotatedScene {
-    /// The scene as a scanner could have captured it: without the faces that no location sees anything of
-    /// (ten places of each are looked at), and without the instances that then have none. Instances are
-    /// numbered anew.
+    /// The scene as a scanner could have captured it. Faces that no location sees are left out (ten places of
+    /// each are tried), and so are instances that have no face left. Instances are numbered anew.
     ///
     /// ```
     /// use s3d_synth::{Building, SightOptions};
@@ -215,7 +225,7 @@ impl AnnotatedScene {
         options.check()?;
         let sight = Sight::new(self, options);
         let faces: Vec<u32> = (0..self.mesh.faces().len() as u32).collect();
-        // Neighbours are often hidden by the same.
+        // The same triangle often hides neighbours.
         let kept: Vec<Vec<u32>> = faces
             .par_chunks(256)
             .map(|chunk| {
@@ -242,8 +252,10 @@ impl AnnotatedScene {
             }
             new_of[old]
         });
+
         let instance_of_face = instance_of_face.collect();
         let old = self.mesh.parts();
+
         let mut parts = MeshParts {
             materials: old.materials.clone(),
             textures: old.textures.clone(),
@@ -253,6 +265,7 @@ impl AnnotatedScene {
                 .collect(),
             ..MeshParts::default()
         };
+
         let corners = |list: &[[u32; 3]]| {
             kept.iter()
                 .filter_map(|&f| list.get(f as usize).copied())
@@ -260,6 +273,7 @@ impl AnnotatedScene {
         };
         (parts.faces, parts.positions) = compacted(corners(&old.faces), &old.positions);
         (parts.face_uvs, parts.uvs) = compacted(corners(&old.face_uvs), &old.uvs);
+
         Ok(Self {
             mesh: TriMesh::new(parts)?,
             instance_of_face,
@@ -270,8 +284,8 @@ impl AnnotatedScene {
     }
 }
 
-/// The values that corners name, in the order in which they are first named, and the corners by their new
-/// places. Corners without a value stay without.
+/// Returns the corners with new indices, and the values that they index in the order of their first use.
+/// Corners without a value stay without one.
 fn compacted<T: Copy>(mut corners: Vec<[u32; 3]>, values: &[T]) -> (Vec<[u32; 3]>, Vec<T>) {
     let mut new_of = vec![NO_INDEX; values.len()];
     let mut kept = Vec::new();

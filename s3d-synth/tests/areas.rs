@@ -28,7 +28,7 @@ fn scene(number: u32) -> AnnotatedScene {
     area(number).build().unwrap()
 }
 
-/// What is in each room, as its plan says.
+/// The instances of each room, as its plan names them.
 fn planned(building: &Building) -> Vec<(Room, Class)> {
     let mut all = Vec::new();
     for plan in &building.rooms {
@@ -60,7 +60,7 @@ const ROOMS: [(RoomType, [usize; 6]); 11] = [
     (RoomType::WC, [1, 2, 2, 4, 2, 0]),
 ];
 
-/// Instances of areas 1 to 6, counted likewise.
+/// Instances of areas 1 to 6, counted from the same names.
 const INSTANCES: [(Class, [usize; 6]); 12] = [
     (Class::CEILING, [55, 81, 37, 73, 76, 63]),
     (Class::FLOOR, [44, 50, 23, 50, 68, 49]),
@@ -95,8 +95,8 @@ fn rooms_are_those_of_the_published_areas() {
     }
 }
 
-/// Instances a room over all areas: walls and ceilings are not divided as in real rooms, and of things as
-/// many are there as find room.
+/// Instances per room over all areas. Walls and ceilings are not divided as in real rooms, and rooms have
+/// only as many things as find a place.
 #[test]
 fn instances_a_room_are_about_as_frequent_as_published() {
     for seed in [1, 2] {
@@ -110,6 +110,7 @@ fn instances_a_room_are_about_as_frequent_as_published() {
                 other = Building::generate(&options(number, seed)).unwrap();
                 &other
             };
+
             rooms += building.rooms.len();
             let mut here = BTreeSet::new();
             for (_, class) in planned(building) {
@@ -118,6 +119,7 @@ fn instances_a_room_are_about_as_frequent_as_published() {
             }
             assert_eq!(here, BTreeSet::from(Class::S3DIS), "area {number}, seed {seed}");
         }
+
         for (class, published) in INSTANCES {
             let published = published.iter().sum::<usize>() as f64 / 272.0;
             let ratio = made[&class] as f64 / rooms as f64 / published;
@@ -147,7 +149,8 @@ fn buildings_differ_in_the_shape_of_things_and_areas_of_one_do_not() {
     let mean = |sizes: &[[f32; 3]], axis: usize| {
         sizes.iter().map(|size| size[axis]).sum::<f32>() / sizes.len() as f32
     };
-    // Tables that one works at, chairs, bookcases: an axis each, and by how much buildings differ.
+
+    // Work tables, chairs, bookcases: an axis of each, and the difference between buildings.
     let table = |thing: &Thing| match *thing {
         Thing::ModelTable { size_m, .. } if size_m[0] >= 1.4 => Some(size_m),
         _ => None,
@@ -160,6 +163,7 @@ fn buildings_differ_in_the_shape_of_things_and_areas_of_one_do_not() {
         Thing::Shelves { size_m, .. } => Some(size_m),
         _ => None,
     };
+
     type Size<'a> = &'a dyn Fn(&Thing) -> Option<[f32; 3]>;
     for (size, axis, apart, what) in [
         (&table as Size<'_>, 1, 0.05, "tables"),
@@ -168,13 +172,16 @@ fn buildings_differ_in_the_shape_of_things_and_areas_of_one_do_not() {
     ] {
         let buildings = [&[1, 3, 6][..], &[2, 4], &[5]].map(|numbers| sizes(numbers, size));
         assert!(buildings.iter().all(|sizes| sizes.len() > 20), "{what}");
+
         let means = buildings.map(|sizes| mean(&sizes, axis));
         for (a, b) in [(0, 1), (0, 2), (1, 2)] {
             assert!((means[a] - means[b]).abs() > apart, "{what}: {means:?}");
         }
+
         let within = [1, 6].map(|number| mean(&sizes(&[number], size), axis));
         assert!((within[0] - within[1]).abs() < apart, "{what}: {within:?}");
     }
+
     let leaves = |number| -> BTreeSet<String> {
         let openings = area(number).rooms.iter().flat_map(|plan| &plan.openings);
         let model = |model: LeafModel| format!("{model:?}");
@@ -185,6 +192,7 @@ fn buildings_differ_in_the_shape_of_things_and_areas_of_one_do_not() {
             })
             .collect()
     };
+
     assert_eq!(leaves(1), leaves(6));
     assert!(leaves(1).is_disjoint(&leaves(2)) && leaves(2).is_disjoint(&leaves(5)));
 }
@@ -214,6 +222,7 @@ fn a_generated_area_is_whole() {
     seen.check_colors();
     seen.check_no_overlaps();
     seen.check_things_stay_in_their_rooms();
+
     let rooms: BTreeSet<Room> = seen
         .scene
         .locations
@@ -228,6 +237,7 @@ fn a_generated_area_is_whole() {
         })
         .collect();
     assert_eq!(rooms.len(), area(3).rooms.len());
+
     for location in seen.scene.locations.iter().step_by(9) {
         assert!(seen.clearance(location.position) > 0.2, "{location:?}");
         for d in directions(60) {
@@ -237,7 +247,7 @@ fn a_generated_area_is_whole() {
     }
 }
 
-/// Nor do doors, beams and columns: their boxes along the axes do not meet.
+/// Doors, beams and columns do not either: the boxes along the axes do not meet.
 #[test]
 fn no_two_pieces_of_furniture_interpenetrate() {
     let solid = [
@@ -250,6 +260,7 @@ fn no_two_pieces_of_furniture_interpenetrate() {
         Class::DOOR,
         Class::BOARD,
     ];
+
     for number in 1..=6 {
         let scene = scene(number);
         let mut boxes = vec![Aabb::EMPTY; scene.instances.len()];
@@ -257,12 +268,14 @@ fn no_two_pieces_of_furniture_interpenetrate() {
             let own = &mut boxes[instance as usize];
             *own = scene.mesh.triangle(face).into_iter().fold(*own, Aabb::with);
         }
+
         let mut by_room: BTreeMap<Room, Vec<usize>> = BTreeMap::new();
         for (index, instance) in scene.instances.iter().enumerate() {
             if solid.contains(&instance.class) {
                 by_room.entry(instance.room).or_default().push(index);
             }
         }
+
         for members in by_room.values() {
             for (i, &a) in members.iter().enumerate() {
                 for &b in &members[i + 1..] {
@@ -300,8 +313,10 @@ fn scan_options() -> ScanOptions {
 fn points_are_where_a_location_sees_them() {
     let whole = scene(3);
     let seen = whole.seen(&SightOptions::default()).unwrap();
-    let (all, left) = (whole.mesh.faces().len(), seen.mesh.faces().len());
+    let all = whole.mesh.faces().len();
+    let left = seen.mesh.faces().len();
     assert!(left * 10 > all * 4 && left * 10 < all * 9, "{left} of {all} faces");
+
     // The back of a bookcase is gone, its front is not.
     let backs = |scene: &AnnotatedScene| {
         let faces = 0..scene.mesh.faces().len() as u32;
@@ -316,7 +331,7 @@ fn points_are_where_a_location_sees_them() {
     for (_, cloud) in look.scene.scan(&scan_options()).unwrap() {
         for (p, face) in cloud.positions.iter().zip(&cloud.faces).step_by(4001) {
             checked += 1;
-            // Some location has it in sight, from its front.
+            // Some location sees the front of its face.
             let sees = |location: &s3d_synth::building::ScanLocation| {
                 let d = p.as_dvec3() - location.position;
                 look.scene.mesh.normal(*face).as_dvec3().dot(d) < 0.0
@@ -339,9 +354,11 @@ fn points_are_fewer_where_they_are_seen_worse_and_the_same_on_any_number_of_thre
         let options = ScanOptions { sight: Some(sight), ..scan_options() };
         pool.install(|| seen.scan(&options).unwrap().collect::<Vec<_>>())
     };
+
     let usual = scan(2, SightOptions::default());
     assert!(usual == scan(1, SightOptions::default()), "threads change nothing");
     assert!(usual.iter().all(|(_, cloud)| !cloud.is_empty()), "what is left is seen");
+
     let count = |clouds: &[(usize, s3d_geom::PointCloud)], class: Option<Class>| -> usize {
         let of = |(i, _): &&(usize, _)| class.is_none_or(|class| seen.instances[*i].class == class);
         clouds.iter().filter(of).map(|(_, cloud)| cloud.len()).sum()
@@ -349,6 +366,7 @@ fn points_are_fewer_where_they_are_seen_worse_and_the_same_on_any_number_of_thre
     let even = ScanOptions { sight: None, ..scan_options() };
     let even: Vec<_> = seen.scan(&even).unwrap().collect();
     assert!(count(&usual, None) * 10 < count(&even, None) * 9);
+
     // Panes of windows have fewer points than walls have.
     let share = |class| count(&usual, Some(class)) as f64 / count(&even, Some(class)) as f64;
     assert!(
@@ -357,9 +375,11 @@ fn points_are_fewer_where_they_are_seen_worse_and_the_same_on_any_number_of_thre
         share(Class::WINDOW),
         share(Class::WALL)
     );
+
     let holes = scan(2, SightOptions { holes: 0.5, ..SightOptions::default() });
     let ratio = count(&holes, None) as f64 / count(&usual, None) as f64;
     assert!((0.4..0.62).contains(&ratio), "{ratio}");
+
     let near = scan(2, SightOptions { range_m: 1.0, ..SightOptions::default() });
     assert!(count(&near, None) * 4 < count(&usual, None));
 }

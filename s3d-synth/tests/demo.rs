@@ -38,12 +38,13 @@ fn its_size_is_a_small_scans() {
     assert!(pixels < 8_000_000, "{pixels} pixels of texture");
 }
 
-/// The bytes of `s3d demo` follow from these.
+/// These numbers determine the bytes of `s3d demo`.
 #[test]
 fn it_is_what_it_always_was() {
     let parts = SEEN.scene.mesh.parts();
     let mut digest = 0xcbf2_9ce4_8422_2325_u64;
     let mut add = |x: u64| digest = (digest ^ x).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
+
     parts
         .positions
         .iter()
@@ -54,10 +55,12 @@ fn it_is_what_it_always_was() {
         .iter()
         .flat_map(|p| p.to_array())
         .for_each(|x| add(u64::from(x.to_bits())));
+
     for indices in [&parts.faces, &parts.face_uvs] {
         indices.iter().flatten().for_each(|&i| add(u64::from(i)));
     }
     parts.face_materials.iter().for_each(|&m| add(u64::from(m)));
+
     for texture in &parts.textures {
         texture.name.bytes().for_each(|b| add(u64::from(b)));
         texture.image.pixels().iter().flatten().for_each(|&c| add(u64::from(c)));
@@ -69,6 +72,7 @@ fn it_is_what_it_always_was() {
             .chain(material.color)
             .for_each(|b| add(u64::from(b)));
     }
+
     SEEN.scene.instance_of_face.iter().for_each(|&i| add(u64::from(i)));
     assert_eq!(digest, 0x0525_cc88_e880_5f73, "{digest:#x}");
 }

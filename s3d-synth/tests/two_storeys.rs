@@ -36,7 +36,8 @@ fn stairs_lead_from_one_floor_to_the_other() {
         let (face, down) = seen.first_hit(DVec3::new(0.6, y, above), -DVec3::Z).unwrap();
         (above - down, seen.instance_of(face).class)
     };
-    let (mut z, mut risers) = (0.0, 0);
+    let mut z = 0.0;
+    let mut risers = 0;
     for k in 0..=60 {
         let (next, class) = height(1.0 + 0.07 * f64::from(k), z + 1.0);
         assert!(next - z > -1e-4 && next - z < 0.179, "from {z} to {next}");

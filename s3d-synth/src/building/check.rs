@@ -1,15 +1,14 @@
-//! What is impossible in a building, found before it is built. What things leave their room is found while
-//! they are built.
+//! Checks a building before it is built. Whether a thing leaves its room is found only while it is built.
 
-use super::{Beam, Building, Filling, Item, Opening, RoomPlan, Stairwell, TableBase, Thing};
-use crate::construct::shell::KNEE_M;
+use super::{Beam, Building, Filling, Item, KNEE_M, Opening, RoomPlan, Stairwell, TableBase, Thing};
 use crate::{BuildingError, RangeError};
 use s3d_geom::glam::Vec2;
 use std::collections::BTreeSet;
 
-/// How far numbers that should be equal may be apart: rooms that share a wall's plane do not overlap.
+/// The tolerance for numbers that should be equal, metres: rooms that share the plane of a wall do not
+/// overlap.
 const SLACK_M: f32 = 1e-3;
-/// The longest side of a room, and the farthest that anything may be from the origin.
+/// The longest side of a room, and the greatest distance of anything from the origin.
 const LONGEST_M: f64 = 150.0;
 const FARTHEST_M: f64 = 10_000.0;
 /// The lowest ceiling: doors are 2.1 m high.
@@ -17,19 +16,22 @@ pub(crate) const LOWEST_CEILING_M: f64 = 2.2;
 const HIGHEST_CEILING_M: f64 = 30.0;
 
 impl Building {
-    /// What [`Building::build`] finds before it builds.
+    /// Checks everything that can be checked without building.
     pub(crate) fn check(&self) -> Result<(), BuildingError> {
         let far = |axis: &str| format!("the origin's {axis}");
         for (value, axis) in self.origin.to_array().into_iter().zip(["x", "y", "z"]) {
             RangeError::check(value, [-1e6, 1e6], || far(axis))?;
         }
-        RangeError::check(self.texture_scale, [0.01, 2.0], || "the scale of textures".to_owned())?;
+
+        check_texture_scale(self.texture_scale)?;
         if self.rooms.is_empty() {
             return Err(BuildingError::NoRoom);
         }
+
         let mut names = BTreeSet::new();
         for (index, room) in self.rooms.iter().enumerate() {
-            room.check()?;
+            room.check_shell()?;
+            room.check_items()?;
             if !names.insert(room.room) {
                 return Err(BuildingError::SameRoom { room: room.room });
             }
@@ -37,6 +39,7 @@ impl Building {
                 return Err(BuildingError::RoomsOverlap { first: other.room, second: room.room });
             }
         }
+
         let mut uuids = BTreeSet::new();
         for location in &self.locations {
             let uuid = &location.uuid;
@@ -56,11 +59,30 @@ impl Building {
     }
 }
 
+/// The greatest number of panes side by side, or above one another, in a window of this length.
+pub(crate) fn most_panes(length_m: f32) -> u32 {
+    ((length_m / 0.2) as u32).max(1)
+}
+
+/// Checks that images of floors, walls and ceilings are neither too coarse nor too fine.
+pub(crate) fn check_texture_scale(scale: f32) -> Result<(), RangeError> {
+    RangeError::check(scale, [0.01, 2.0], || "the scale of textures".to_owned())
+}
+
 impl RoomPlan {
-    fn check(&self) -> Result<(), BuildingError> {
+    fn check_items(&self) -> Result<(), BuildingError> {
         let range = |value: f32, range: [f64; 2], what: &str| {
             RangeError::check(value, range, || format!("{}: {what}", self.room))
         };
+        self.items.iter().try_for_each(|item| Ok(item.check(&range)?))
+    }
+
+    /// Checks all but the items: size and height, openings, holes and lamps.
+    pub(crate) fn check_shell(&self) -> Result<(), BuildingError> {
+        let range = |value: f32, range: [f64; 2], what: &str| {
+            RangeError::check(value, range, || format!("{}: {what}", self.room))
+        };
+
         let far = [-FARTHEST_M, FARTHEST_M];
         range(self.low.x, far, "the smallest x")?;
         range(self.low.y, far, "the smallest y")?;
@@ -70,13 +92,16 @@ impl RoomPlan {
         for height in self.heights_m {
             range(height, [LOWEST_CEILING_M, HIGHEST_CEILING_M], "the height of the ceiling")?;
         }
+
         for (index, opening) in self.openings.iter().enumerate() {
             self.check_opening(opening)?;
             if self.openings.iter().take(index).any(|other| other.overlaps(opening)) {
-                let (wall, span) = (opening.wall, opening.span);
+                let wall = opening.wall;
+                let span = opening.span;
                 return Err(BuildingError::OpeningsOverlap { room: self.room, wall, span });
             }
         }
+
         let inside = |p: Vec2| p.cmpge(self.low).all() && p.cmple(self.high).all();
         let outside = |what, index| BuildingError::Outside { room: self.room, what, index };
         if let Some([low, high]) = self.ceiling_hole
@@ -90,14 +115,16 @@ impl RoomPlan {
                 return Err(outside("stairwell", 0));
             }
         }
+
         for (index, &[x, y, length, width]) in self.lamps.iter().enumerate() {
             range(length.min(width), [0.05, LONGEST_M], "the length of a lamp")?;
-            let (middle, half) = (Vec2::new(x, y), 0.5 * Vec2::new(length, width));
+            let middle = Vec2::new(x, y);
+            let half = 0.5 * Vec2::new(length, width);
             if !(inside(middle - half) && inside(middle + half)) {
                 return Err(outside("lamp", index));
             }
         }
-        self.items.iter().try_for_each(|item| Ok(item.check(&range)?))
+        Ok(())
     }
 
     fn check_opening(&self, opening: &Opening) -> Result<(), BuildingError> {
@@ -107,12 +134,14 @@ impl RoomPlan {
         } else {
             (self.low.y, self.high.y)
         };
-        // Under a slanted ceiling walls are upright up to the knee only.
+
+        // Under a slanted ceiling, walls are upright only up to the knee.
         let top = if self.heights_m[0] == self.heights_m[1] {
             self.top()
         } else {
             KNEE_M
         };
+
         let is_door = !filling.is_window();
         // Bars and linings need room.
         let fits = from >= start
@@ -122,11 +151,14 @@ impl RoomPlan {
             && high <= top
             && high - low >= if is_door { 1.5 } else { 0.65 }
             && (!is_door || low == 0.0);
+
         if !fits {
             return Err(BuildingError::OpeningOutside { room: self.room, wall, span: [from, to] });
         }
+
         let what = |what: &str| format!("{}: {what}", self.room);
         let thickness = |m: f32| RangeError::check(m, [0.01, 5.0], || what("the thickness of a doorway"));
+
         match filling {
             Filling::Door { thickness_m, open_deg, .. } => {
                 thickness(thickness_m)?;
@@ -140,7 +172,7 @@ impl RoomPlan {
             Filling::Glazing { panes, depth_m } => {
                 let [columns, rows] = panes.map(|n| n as f32);
                 RangeError::check(depth_m, [0.06, 5.0], || what("the depth of a window"))?;
-                let most = |m: f32| [1.0, f64::from((m / 0.2).floor()).max(1.0)];
+                let most = |m: f32| [1.0, f64::from(most_panes(m))];
                 RangeError::check(columns, most(to - from), || what("the panes beside one another"))?;
                 RangeError::check(rows, most(high - low), || what("the panes above one another"))?;
             }
@@ -167,8 +199,8 @@ impl Opening {
 
 type Range<'a> = &'a dyn Fn(f32, [f64; 2], &str) -> Result<(), RangeError>;
 
-/// The longest that a thing may be.
-const LARGE_M: f64 = 50.0;
+/// The longest that a thing may be, metres.
+pub(crate) const LARGE_M: f64 = 50.0;
 
 impl Item {
     fn check(&self, range: Range<'_>) -> Result<(), RangeError> {
@@ -196,18 +228,20 @@ impl Item {
 }
 
 impl Thing {
-    /// Whether its parts have a size, whatever its measures are.
+    /// Checks that every part of the thing has a size.
     fn check(&self, range: Range<'_>) -> Result<(), RangeError> {
         let hanging = |width: f32, [low, high]: [f32; 2], what: &str| {
             range(width, [0.1, LARGE_M], &format!("the width of {what}"))?;
             range(low, [0.0, LARGE_M], &format!("the lower edge of {what}"))?;
             range(high - low, [0.1, LARGE_M], &format!("the height of {what}"))
         };
+
         let measures = |size: [f32; 3], least: [(&str, f64); 3], what: &str| {
             size.into_iter().zip(least).try_for_each(|(m, (word, least))| {
                 range(m, [least, LARGE_M], &format!("the {word} of {what}"))
             })
         };
+
         match *self {
             Self::Table { width_m, depth_m, height_m, .. } => {
                 range(width_m.min(depth_m), [0.2, LARGE_M], "the width or depth of a table")?;

@@ -14,8 +14,8 @@ pub(super) const WALL_M: f32 = 0.15;
 const DOOR_M: f32 = 2.1;
 
 impl Building {
-    /// The building of `s3d demo`: three rooms and a hallway of about 120 m². It holds what a scan holds:
-    /// textures with light and shade in them, windows as opaque surfaces, doors that stand open, a slanted
+    /// The building of `s3d demo`: three rooms and a hallway of about 120 m². It has the peculiarities of a
+    /// scan: textures with light and shade in them, windows as opaque surfaces, open doors, a slanted
     /// ceiling, all 13 classes, and a place that was not captured (a tile of the conference room's ceiling).
     pub fn demo() -> Self {
         let location = |(uuid, position, yaw_deg): (&str, [f64; 3], f64)| ScanLocation {

@@ -5,7 +5,7 @@ use crate::look::{Look, Pattern};
 use s3d_geom::glam::{Vec2, Vec3};
 use s3d_label::Class;
 
-/// Something in a room, and where. Each is an annotated instance of its own.
+/// Something in a room, and its place. Each item is an annotated instance of its own.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// It stands on the floor or on something else.
@@ -14,8 +14,7 @@ pub enum Item {
         thing: Thing,
         /// The middle of its foot: x and y of the building, z from the room's floor.
         position: Vec3,
-        /// By how much it is turned, degrees, counter-clockwise seen from above. Without a turn its back is
-        /// to the north.
+        /// Its turn in degrees, counter-clockwise seen from above. At 0 its back is to the north.
         yaw_deg: f32,
     },
     /// It hangs on a wall or stands with its back to it.
@@ -24,14 +23,14 @@ pub enum Item {
         thing: Thing,
         /// The wall.
         wall: Wall,
-        /// Where its middle is along the wall: x or y of the building.
+        /// The middle of the thing along the wall: x or y of the building.
         along: f32,
     },
     /// A beam under the ceiling.
     Beam(Beam),
 }
 
-/// A beam that touches the ceiling. Its ends are open, as they touch walls.
+/// A beam under the ceiling. It has no faces at its ends, which touch walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
     /// One end in the plan, in building coordinates.
@@ -46,8 +45,8 @@ pub struct Beam {
     pub look: Look,
 }
 
-/// Things, with the measures that may differ: metres. Where nothing else is said they stand with the middle
-/// of their foot at the origin of their frame and look along −y: their back goes to a wall.
+/// Things, with the measures that may differ, in metres. Unless a variant says otherwise, the middle of the
+/// foot is at the origin of the thing's frame, and the thing looks along −y, with its back to a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Thing {
@@ -57,7 +56,7 @@ pub enum Thing {
         width_m: f32,
         /// Along y, at least 0.2.
         depth_m: f32,
-        /// Of the top's upper side, at least 0.1.
+        /// The height of the top's upper side, at least 0.1.
         height_m: f32,
         /// The top.
         top: Look,
@@ -73,7 +72,7 @@ pub enum Thing {
     RoundTable {
         /// At least 0.3.
         radius_m: f32,
-        /// Of the top's upper side, at least 0.1.
+        /// The height of the top's upper side, at least 0.1.
         height_m: f32,
         /// The top.
         top: Look,
@@ -108,11 +107,11 @@ pub enum Thing {
     Board {
         /// Along the wall, at least 0.1.
         width_m: f32,
-        /// From which height to which, at least 0.1 apart.
+        /// The heights of its lower and upper edge, at least 0.1 apart.
         heights_m: [f32; 2],
-        /// What is on it.
+        /// The picture on it.
         picture: Pattern,
-        /// What it is framed with.
+        /// The look of its frame.
         frame: Look,
         /// The width of the tray with pens below it, if any: at least 0.6.
         tray_m: Option<f32>,
@@ -121,18 +120,18 @@ pub enum Thing {
     Picture {
         /// Along the wall, at least 0.1.
         width_m: f32,
-        /// From which height to which, at least 0.1 apart.
+        /// The heights of its lower and upper edge, at least 0.1 apart.
         heights_m: [f32; 2],
         /// What it shows.
         picture: Pattern,
-        /// What it is framed with.
+        /// The look of its frame.
         frame: Look,
     },
     /// A large screen on a wall. The origin is on the wall, at its foot.
     WallScreen {
         /// Along the wall, at least 0.1.
         width_m: f32,
-        /// From which height to which, at least 0.1 apart.
+        /// The heights of its lower and upper edge, at least 0.1 apart.
         heights_m: [f32; 2],
     },
     /// A screen on a foot, for a table.
@@ -151,7 +150,7 @@ pub enum Thing {
     FloorLamp,
     /// A plant in a pot.
     Plant {
-        /// Of the plant above its pot, roughly: 0.3 to 5.
+        /// The height of the plant above its pot, roughly: 0.3 to 5.
         height_m: f32,
         /// The pot.
         pot: Look,
@@ -220,7 +219,7 @@ pub enum Thing {
     },
     /// A bookcase of some model.
     Shelves {
-        /// What is before its rows.
+        /// What covers the front of its rows.
         front: ShelfFront,
         /// Width, depth and height: at least 0.4, 0.2 and 0.5.
         size_m: [f32; 3],
@@ -233,9 +232,9 @@ pub enum Thing {
     PlainBoard {
         /// Along the wall, at least 0.1.
         width_m: f32,
-        /// From which height to which, at least 0.1 apart.
+        /// The heights of its lower and upper edge, at least 0.1 apart.
         heights_m: [f32; 2],
-        /// What is on it.
+        /// The picture on it.
         picture: Pattern,
     },
     /// A toilet, 70 cm deep. The origin is on the wall.
@@ -244,9 +243,9 @@ pub enum Thing {
     Basin,
     /// A thin screen that stands out of a wall, such as between toilets. The origin is on the wall.
     Partition {
-        /// Out of the wall, at least 0.2.
+        /// How far it stands out of the wall, at least 0.2.
         depth_m: f32,
-        /// From the floor, at least 0.5: its upper edge.
+        /// The height of its upper edge, at least 0.5.
         height_m: f32,
     },
     /// A column at a wall. The origin is on the wall.
@@ -286,7 +285,7 @@ pub enum SeatBase {
     Block,
 }
 
-/// What is before the rows of a bookcase.
+/// What covers the front of a bookcase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShelfFront {
     /// Nothing: books are seen in all rows.
@@ -308,7 +307,7 @@ impl Item {
         Self::OnWall { thing, wall, along }
     }
 
-    /// The class that it is annotated as.
+    /// The class of its annotation.
     pub fn class(&self) -> Class {
         match self {
             Self::Standing { thing, .. } | Self::OnWall { thing, .. } => thing.class(),
@@ -318,7 +317,7 @@ impl Item {
 }
 
 impl Thing {
-    /// The class that it is annotated as.
+    /// The class of its annotation.
     pub fn class(&self) -> Class {
         match self {
             Self::Table { .. } | Self::Desk { .. } | Self::RoundTable { .. } | Self::ModelTable { .. } => {

@@ -1,22 +1,28 @@
 //! Buildings as plain data: rooms with their openings and finishes, what stands in them, and where a scanner
 //! stood.
 //!
-//! A [`Building`] says what is where and nothing of triangles; [`Building::build`] makes an
-//! [`AnnotatedScene`](crate::AnnotatedScene) of it. Its coordinates are the building's own: metres, x to the
+//! A [`Building`] says what is where, and nothing about triangles. [`Building::build`] makes an
+//! [`AnnotatedScene`](crate::AnnotatedScene) of it. Coordinates are the building's own: metres, x to the
 //! east, y to the north, z up. The walls of rooms are parallel to the axes.
 
-mod check;
+pub(crate) mod check;
 mod demo;
+mod error;
 mod item;
 mod two_storeys;
 
+pub use error::BuildingError;
 pub use item::{Beam, Item, SeatBase, ShelfFront, TableBase, Thing};
 
 use crate::look::{CeilingFinish, FloorFinish, Look, Paint};
 use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};
 use s3d_label::{Class, Room};
 
-/// A building: what [`Building::build`] makes a scene of. Its `Default` is [`Building::demo`].
+/// The height below which walls are upright, and at which openings end, metres. Above it a slanted ceiling
+/// squeezes the walls.
+pub(crate) const KNEE_M: f32 = 2.1;
+
+/// A building. [`Building::build`] makes a scene of it. The `Default` is [`Building::demo`].
 ///
 /// ```
 /// use s3d_geom::glam::vec2;
@@ -37,9 +43,9 @@ pub struct Building {
     pub title: String,
     /// Where the origin of its coordinates lies in the world, metres.
     pub origin: Vec3,
-    /// Its rooms; no two of them meet. The faces of the scene follow in their order.
+    /// The rooms. No two of them overlap. The faces of the scene come in the order of the rooms.
     pub rooms: Vec<RoomPlan>,
-    /// Where the scanner stood, each place in a room.
+    /// The places where the scanner stood, each in a room.
     pub locations: Vec<ScanLocation>,
     /// How fine the images of floors, walls and ceilings are: at 1 a floor has 100 texels a metre.
     pub texture_scale: f32,
@@ -48,40 +54,40 @@ pub struct Building {
 /// A room: a box with openings in its walls, finishes, and what is in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomPlan {
-    /// Its type and number; no other room of the building has both.
+    /// The type and number, unique in the building.
     pub room: Room,
     /// Its smallest corner in the plan.
     pub low: Vec2,
     /// Its largest corner in the plan.
     pub high: Vec2,
-    /// Height of the floor in the building. Every other height is counted from there.
+    /// The height of the floor in the building. All other heights are counted from it.
     pub floor_m: f32,
-    /// Height of the ceiling at the smallest and at the largest y. Where they differ the ceiling is slanted;
-    /// openings then end at 2.1 m at the highest.
+    /// The height of the ceiling at the smallest and at the largest y. If they differ, the ceiling is
+    /// slanted, and openings end at 2.1 m at most.
     pub heights_m: [f32; 2],
     /// What is cut out of the walls.
     pub openings: Vec<Opening>,
-    /// A rectangle of the ceiling that is not there, as if it had not been captured: its smallest and largest
+    /// A rectangle that is missing from the ceiling, as if it had not been captured: its smallest and largest
     /// corner.
     pub ceiling_hole: Option<[Vec2; 2]>,
-    /// A rectangle of the floor that is not there, for stairs that come up through it.
+    /// A rectangle that is missing from the floor, for stairs that come up through it.
     pub stairwell: Option<Stairwell>,
     /// Lamps under the ceiling: x and y of the middle, and the lengths along x and y.
     pub lamps: Vec<[f32; 4]>,
     /// What covers the walls.
     pub paint: Paint,
-    /// One wall may be painted otherwise.
+    /// A wall with a paint of its own.
     pub accent: Option<(Wall, Paint)>,
     /// What covers the floor.
     pub floor: FloorFinish,
     /// What covers the ceiling.
     pub ceiling: CeilingFinish,
-    /// Furniture, structure and all else. Instances of a class are numbered in this order, after those of
+    /// Furniture, structure and everything else. Instances of a class are numbered in this order, after
     /// openings and lamps.
     pub items: Vec<Item>,
 }
 
-/// A rectangle of a floor that is not there.
+/// A rectangle that is missing from a floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stairwell {
     /// Its smallest corner in the plan.
@@ -92,7 +98,7 @@ pub struct Stairwell {
     pub depth_m: f32,
 }
 
-/// A wall of a room, by where it stands; in the order in which they pass when one turns right.
+/// A wall of a room. The order is the one in which walls pass by when one turns right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wall {
     /// At the smallest y.
@@ -108,11 +114,11 @@ pub enum Wall {
 /// A rectangle cut out of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Opening {
-    /// In which wall.
+    /// The wall.
     pub wall: Wall,
-    /// From where to where along it: x or y of the building.
+    /// The stretch of the wall that it takes: x or y of the building.
     pub span: [f32; 2],
-    /// From which height to which.
+    /// The heights of its lower and upper edge.
     pub heights: [f32; 2],
     /// What it holds.
     pub filling: Filling,
@@ -127,7 +133,7 @@ pub enum Filling {
     Door {
         /// How deep the doorway is: the thickness of the wall, metres.
         thickness_m: f32,
-        /// Whether the door hangs on the left for who looks at the wall, or else on the right.
+        /// Whether the door hangs on the left, seen by someone who looks at the wall, or on the right.
         hinge_left: bool,
         /// How far it stands open, degrees.
         open_deg: f32,
@@ -141,8 +147,8 @@ pub enum Filling {
         /// How far the pane is behind the wall, at least 0.06 m.
         depth_m: f32,
     },
-    /// A doorway with a door of some model, open into the room or shut. What is beyond `depth_m` belongs to
-    /// the room on the other side: [`Filling::Frame`], or another leaf where both are shut.
+    /// A doorway with a door of some model, open into the room or shut. The doorway beyond `depth_m` belongs
+    /// to the room on the other side, as [`Filling::Frame`], or as another leaf if the door is shut.
     Leaf {
         /// How the leaf is made.
         model: LeafModel,
@@ -150,12 +156,13 @@ pub enum Filling {
         look: Look,
         /// How deep this side of the doorway is, metres, at least 0.05: half of the wall.
         depth_m: f32,
-        /// Whether the door hangs on the left for who looks at the wall, or else on the right.
+        /// Whether the door hangs on the left, seen by someone who looks at the wall, or on the right.
         hinge_left: bool,
         /// How far it stands open, degrees: 0 is shut, 2 cm before the end of this side.
         open_deg: f32,
     },
-    /// The far side of a doorway whose leaf is in the other room: lining and frame, a door of this room too.
+    /// The far side of a doorway whose leaf is in the other room: lining and frame, which are a door of this
+    /// room too.
     Frame {
         /// How deep this side of the doorway is, metres.
         depth_m: f32,
@@ -187,12 +194,12 @@ pub struct ScanLocation {
 }
 
 impl Filling {
-    /// Whether it is a window, or else belongs to a doorway.
+    /// Whether it is a window. All other fillings belong to doorways.
     pub fn is_window(self) -> bool {
         matches!(self, Self::Window | Self::Glazing { .. })
     }
 
-    /// The class that it is annotated as, if there is something.
+    /// The class of its annotation. `None` for [`Filling::Nothing`].
     pub fn class(self) -> Option<Class> {
         match self {
             Self::Window | Self::Glazing { .. } => Some(Class::WINDOW),
@@ -209,10 +216,10 @@ impl Default for Building {
 }
 
 impl Wall {
-    /// All four, each after the one to its left for who stands in the room.
+    /// All four walls. Seen from inside the room, each follows the wall to its left.
     pub const ALL: [Self; 4] = [Self::South, Self::West, Self::North, Self::East];
 
-    /// The direction in the plan that is to the right for who looks at the wall.
+    /// The direction in the plan that is to the right of someone who looks at the wall.
     pub fn right(self) -> Vec2 {
         match self {
             Self::South => Vec2::NEG_X,
@@ -227,8 +234,7 @@ impl Wall {
         -self.right().perp().extend(0.0)
     }
 
-    /// By how much a frame is turned so that it looks at the wall: degrees, counter-clockwise seen from
-    /// above.
+    /// The turn of a frame that looks at the wall: degrees, counter-clockwise seen from above.
     pub fn yaw_deg(self) -> f32 {
         match self {
             Self::South => 180.0,
@@ -238,7 +244,7 @@ impl Wall {
         }
     }
 
-    /// Whether it runs along x, or else along y.
+    /// Whether it runs along x. The other two run along y.
     pub fn along_x(self) -> bool {
         matches!(self, Self::South | Self::North)
     }

@@ -7,12 +7,12 @@ use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};
 use s3d_label::{Room, RoomType};
 
 const CEILING_M: f32 = 2.7;
-/// What is between a ceiling and the floor above it.
+/// The distance between a ceiling and the floor above it.
 const SLAB_M: f32 = 0.15;
-/// Treads; the floor above is one riser higher.
+/// The number of treads. The floor above is one riser higher.
 const STEPS: u32 = 15;
 const TREAD_M: f32 = 0.26;
-/// Where stairs begin, and the opening above them, through which a person's head goes.
+/// The place where the stairs begin, and the opening above them, which leaves room for a person's head.
 const STAIRS_Y: f32 = 1.2;
 const WELL: [Vec2; 2] = [vec2(0.0, 2.2), vec2(1.15, STAIRS_Y + STEPS as f32 * TREAD_M)];
 
@@ -43,7 +43,7 @@ impl Building {
     }
 }
 
-/// One in each room, but the storage.
+/// One location in each room but the storage.
 const LOCATIONS: [(&str, [f64; 3]); 5] = [
     ("1f0c7a52e9d84b36a7c15e08d24b9f61", [2.4, 3.2, 1.5]),
     ("62b8d3f1047e4c9ab5e92f6d71c0a834", [5.4, 4.6, 1.5]),

@@ -1,16 +1,16 @@
-//! Puts surfaces together: places them, cuts them into cells, notes whose they are and bakes a light into
+//! Puts surfaces together: places them, cuts them into cells, notes their instances, and bakes light into
 //! their looks.
 
 use super::light::Light;
 use crate::BuildingError;
-use crate::look::{Look, Pattern, scaled};
+use crate::look::{Look, scaled};
 use crate::scene::Instance;
 use glam::{Vec2, Vec3};
 use s3d_geom::{Aabb, Material, MeshParts, Raster, Texture, TriMesh, Wrap, glam, primitives::grid};
 use s3d_label::{Class, Room, RoomType};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A side of a body in its own frame: x to the right, y away from who looks at its front, z up.
+/// A side of a body in the body's frame: x to the right, y away from someone who looks at its front, z up.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
     Front,
@@ -19,6 +19,14 @@ pub(crate) enum Side {
     Left,
     Top,
     Bottom,
+}
+
+/// Steps a metre of the lattice that all corners lie on.
+const LATTICE_PER_M: f32 = 16384.0;
+
+/// Whether two coordinates come to lie on one step of the lattice.
+pub(super) fn coincide(a: f32, b: f32) -> bool {
+    (a * LATTICE_PER_M).round() == (b * LATTICE_PER_M).round()
 }
 
 /// Where something stands: its origin, and the direction of its x axis in the plan.
@@ -35,7 +43,7 @@ impl Frame {
 
     fn then(self, origin: Vec3, yaw_deg: f32) -> Self {
         let turn = match yaw_deg.rem_euclid(360.0) {
-            // Exact, so that what touches a wall touches it.
+            // Exact, so that a thing at a wall touches it.
             0.0 => Vec2::X,
             90.0 => Vec2::Y,
             180.0 => Vec2::NEG_X,
@@ -52,15 +60,16 @@ pub(crate) struct Builder {
     instance_of_face: Vec<u32>,
     instances: Vec<Instance>,
     room: Room,
-    /// Height of the room's floor. Frames, light and what is added are counted from there.
+    /// The height of the room's floor. Frames, light and new surfaces are relative to it.
     floor_m: f32,
     light: Light,
     frame: Frame,
     materials: BTreeMap<(Look, u32), u32>,
-    images: BTreeMap<Pattern, Raster<[u8; 3]>>,
-    /// Of materials and textures.
+    /// The names of materials and textures so far.
     names: BTreeSet<String>,
     texture_scale: f32,
+    /// Whether only corners are wanted.
+    only_measures: bool,
 }
 
 impl Builder {
@@ -74,10 +83,16 @@ impl Builder {
             light: Light::default(),
             frame: Frame { origin: Vec3::ZERO, x_axis: Vec2::X },
             materials: BTreeMap::new(),
-            images: BTreeMap::new(),
             names: BTreeSet::new(),
             texture_scale,
+            only_measures: false,
         }
+    }
+
+    /// A builder that only notes where corners lie. [`Builder::positions_since`] then tells how far a thing
+    /// reaches, to the last bit, in a small part of the time.
+    pub(crate) fn measuring() -> Self {
+        Self { only_measures: true, ..Self::new(1.0) }
     }
 
     /// From here on everything belongs to `room`, whose floor is at `floor_m`, lit by `light`.
@@ -85,7 +100,7 @@ impl Builder {
         (self.room, self.floor_m, self.light) = (room, floor_m, light);
     }
 
-    /// The light of the room, with all that was built in it since as obstacles.
+    /// The light of the room. Everything built in the room so far is an obstacle to it.
     pub(crate) fn light(&self) -> &Light {
         &self.light
     }
@@ -115,7 +130,7 @@ impl Builder {
         self.frame = outer;
     }
 
-    /// The box between two corners, without the sides `omit`: those that lie on something else.
+    /// Adds the box between two corners without the sides `omit`, which lie on something else.
     pub(crate) fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], look: Look, omit: &[Side]) {
         let ([x0, y0, z0], [x1, y1, z1]) = (low, high);
         let plan = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
@@ -123,8 +138,8 @@ impl Builder {
         self.hexahedron(std::array::from_fn(corner), look, omit);
     }
 
-    /// A body of six sides: the corners of its bottom counter-clockwise seen from above, from the front left
-    /// one, then those of its top.
+    /// Adds a body of six sides. The corners of its bottom come first, counter-clockwise seen from above,
+    /// starting at the front left. The corners of its top follow in the same order.
     pub(crate) fn hexahedron(&mut self, corners: [Vec3; 8], look: Look, omit: &[Side]) {
         let sides = [
             (Side::Front, [0, 1, 5, 4]),
@@ -143,21 +158,31 @@ impl Builder {
             .block(Aabb::from_points(corners.map(|p| self.frame.apply(p))));
     }
 
-    /// A four-sided surface, its corners counter-clockwise seen from the front, from the texture's bottom
-    /// left.
+    /// Adds a four-sided surface. Its corners run counter-clockwise seen from the front, and start at the
+    /// texture's bottom left.
     pub(crate) fn panel(&mut self, corners: [Vec3; 4], look: Look) {
         self.shifted_panel(corners, look, 0.0);
     }
 
-    /// As [`Builder::panel`], its texture starting at `shift` of its width.
+    /// Adds a surface like [`Builder::panel`]. Its texture starts at `shift` of the texture's width.
     pub(crate) fn shifted_panel(&mut self, corners: [Vec3; 4], look: Look, shift: f32) {
-        let [a, b, c, d] = corners.map(|p| self.frame.apply(p));
-        let (width, height) = (a.distance(b).max(d.distance(c)), a.distance(d).max(b.distance(c)));
+        let corners = corners.map(|p| self.frame.apply(p));
+        if self.only_measures {
+            let seated = corners.map(|p| self.seated(p));
+            self.parts.positions.extend(seated);
+            return;
+        }
+
+        let [a, b, c, d] = corners;
+        let width = a.distance(b).max(d.distance(c));
+        let height = a.distance(d).max(b.distance(c));
         let cells = [width, height].map(|m| ((m / look.cell_m() - 0.01).ceil() as u32).max(1));
+
         let mut parts = grid(Vec3::ZERO, Vec3::X, Vec3::Y, cells);
         for p in &mut parts.positions {
             *p = a.lerp(b, p.x).lerp(d.lerp(c, p.x), p.y);
         }
+
         // Grain runs along the longer side.
         let size = if look.has_grain() && height > width {
             parts.uvs.iter_mut().for_each(|uv| *uv = Vec2::new(uv.y, uv.x));
@@ -167,15 +192,23 @@ impl Builder {
         };
         let scale = look.uv_scale(size);
         parts.uvs.iter_mut().for_each(|uv| *uv = *uv * scale + Vec2::X * shift);
+
         let normal = (b - a).cross(d - a).normalize();
         let lit = self.light.open(0.25 * (a + b + c + d), normal);
         self.add(parts, look, lit);
     }
 
-    /// Triangles from `apex` to each edge of `ring`, which runs counter-clockwise seen from the front.
+    /// Adds triangles from `apex` to each edge of `ring`, which runs counter-clockwise seen from the front.
     fn fan(&mut self, apex: Vec3, ring: &[Vec3], look: Look) {
         let apex = self.frame.apply(apex);
         let low = ring.iter().fold(apex, |low, &p| low.min(self.frame.apply(p)));
+        if self.only_measures {
+            let seated = ring.iter().map(|&p| self.seated(self.frame.apply(p)));
+            let seated: Vec<Vec3> = seated.chain([self.seated(apex)]).collect();
+            self.parts.positions.extend(seated);
+            return;
+        }
+
         for i in 0..ring.len() {
             let [a, b] = [i, (i + 1) % ring.len()].map(|k| self.frame.apply(ring[k]));
             let corner = |p: Vec3| (p - low).truncate() * look.uv_scale(Vec2::ONE);
@@ -193,7 +226,7 @@ impl Builder {
         }
     }
 
-    /// An upright cone stump of `sides` sides from radius `radii[0]` at `foot` to `radii[1]` at `foot` +
+    /// Adds an upright cone stump of `sides` sides from radius `radii[0]` at `foot` to `radii[1]` at `foot` +
     /// `height`, with lids unless `omit` has its top or bottom.
     pub(crate) fn stump(
         &mut self,
@@ -205,7 +238,8 @@ impl Builder {
         omit: &[Side],
     ) {
         let foot = Vec3::from_array(foot);
-        let (low, high) = (ring(foot, radii[0], sides), ring(foot + Vec3::Z * height, radii[1], sides));
+        let low = ring(foot, radii[0], sides);
+        let high = ring(foot + Vec3::Z * height, radii[1], sides);
         for i in 0..sides as usize {
             let j = (i + 1) % sides as usize;
             self.panel([low[i], low[j], high[j], high[i]], look);
@@ -217,17 +251,18 @@ impl Builder {
             self.fan(foot, &low.iter().rev().copied().collect::<Vec<_>>(), look);
         }
         let r = radii[0].max(radii[1]) * 0.8;
-        let (a, b) = (foot - Vec3::new(r, r, 0.0), foot + Vec3::new(r, r, height));
+        let a = foot - Vec3::new(r, r, 0.0);
+        let b = foot + Vec3::new(r, r, height);
         self.light.block(Aabb::from_points([a, b].map(|p| self.frame.apply(p))));
     }
 
-    /// A round surface that looks up: the lid of a stump that is of something else.
+    /// Adds a round surface that looks up, as the lid of a stump of another material.
     pub(crate) fn disc(&mut self, center: [f32; 3], radius: f32, sides: u32, look: Look) {
         let center = Vec3::from_array(center);
         self.fan(center, &ring(center, radius, sides), look);
     }
 
-    /// A leaf: a flat spindle from `base` to `tip`, `width` metres wide.
+    /// Adds a leaf: a flat spindle from `base` to `tip`, `width` metres wide.
     pub(crate) fn leaf(&mut self, base: Vec3, tip: Vec3, width: f32, look: Look) {
         let along = tip - base;
         let across = along.cross(Vec3::Z).normalize() * 0.5 * width;
@@ -238,7 +273,7 @@ impl Builder {
         self.fan(base, &ring.into_iter().rev().collect::<Vec<_>>(), look);
     }
 
-    /// Adds what comes in building coordinates with coordinates of its own into a texture of its own.
+    /// Adds parts that are in building coordinates and have coordinates in a texture of their own.
     pub(crate) fn baked(&mut self, parts: MeshParts, texture: u32) {
         let first = self.parts.materials.iter().position(|m| m.texture == Some(texture));
         let material = first.unwrap_or_else(|| {
@@ -270,7 +305,7 @@ impl Builder {
                 let name = self.unique(format!("{}_{level:02}", look.name()));
                 let factor = look.factor(level);
                 let texture = look.pattern().map(|pattern| {
-                    let image = scaled(self.images.entry(pattern).or_insert_with(|| pattern.image()), factor);
+                    let image = scaled(pattern.image(), factor);
                     self.push_texture(name.clone(), image, look.wrap())
                 });
                 let color = scaled(&Raster::filled(1, 1, look.color()), factor).at(0, 0);
@@ -283,8 +318,8 @@ impl Builder {
         self.push(parts, material);
     }
 
-    /// `name`, or if something else has it a name that begins so. Names are written into files: words without
-    /// spaces.
+    /// Returns `name`, or a longer name that begins with it if it is taken. Names are written into files, so
+    /// they are words without spaces.
     fn unique(&mut self, name: String) -> String {
         let name = name.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
         let mut unique = name.clone();
@@ -298,27 +333,31 @@ impl Builder {
     }
 
     fn push(&mut self, mut parts: MeshParts, material: u32) {
-        parts.positions.iter_mut().for_each(|p| p.z += self.floor_m);
-        // Onto a lattice of 61 µm: what touches by design then touches in the last bit, also after `finish`.
-        parts
-            .positions
-            .iter_mut()
-            .for_each(|p| *p = (*p * 16384.0).round() / 16384.0);
+        for p in &mut parts.positions {
+            *p = self.seated(*p);
+        }
         self.parts.append(parts);
         let n = self.parts.faces.len();
         self.parts.face_materials.resize(self.instance_of_face.len(), material);
         self.parts.face_materials.resize(n, material);
-        // Something was begun before anything is added.
+        // `begin` is called before anything is added.
         self.instance_of_face
             .resize(n, self.instances.len().saturating_sub(1) as u32);
     }
 
-    /// The corners of what was added since there were `first` of them, in building coordinates.
+    /// A point of the room in building coordinates, on a lattice of 61 µm: things that touch by design then
+    /// touch in the last bit, also after [`Builder::finish`].
+    fn seated(&self, p: Vec3) -> Vec3 {
+        let raised = Vec3 { z: p.z + self.floor_m, ..p };
+        (raised * LATTICE_PER_M).round() / LATTICE_PER_M
+    }
+
+    /// The corners after the first `first` ones, in building coordinates.
     pub(crate) fn positions_since(&self, first: usize) -> &[Vec3] {
         self.parts.positions.get(first..).unwrap_or_default()
     }
 
-    /// How many corners were added so far.
+    /// The number of corners so far.
     pub(crate) fn position_count(&self) -> usize {
         self.parts.positions.len()
     }

@@ -1,5 +1,5 @@
-//! Tables, seats and shelves. Each stands with the middle of its foot at the origin of the frame and looks
-//! along −y: its back goes to a wall.
+//! Tables, seats and shelves. The middle of a thing's foot is at the origin of the frame. The thing looks
+//! along −y, with its back to a wall.
 
 use super::builder::{Builder, Side};
 use crate::look::*;
@@ -11,10 +11,12 @@ use Side::{Back, Bottom, Front, Left, Right, Top};
 /// A table: a top on four legs.
 pub(super) fn table(b: &mut Builder, width: f32, depth: f32, height: f32, top: Look) {
     b.begin(Class::TABLE);
-    let (x, y) = (0.5 * width, 0.5 * depth);
+    let x = 0.5 * width;
+    let y = 0.5 * depth;
     b.cuboid([-x, -y, height - 0.035], [x, y, height], top, &[]);
     for (sx, sy) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-        let (cx, cy) = (sx * (x - 0.06), sy * (y - 0.06));
+        let cx = sx * (x - 0.06);
+        let cy = sy * (y - 0.06);
         b.cuboid(
             [cx - 0.025, cy - 0.025, 0.0],
             [cx + 0.025, cy + 0.025, height - 0.035],
@@ -27,9 +29,13 @@ pub(super) fn table(b: &mut Builder, width: f32, depth: f32, height: f32, top: L
 /// A desk: a table with a panel at its back and a chest of drawers under its right end.
 pub(super) fn desk(b: &mut Builder, width: f32, depth: f32) {
     table(b, width, depth, 0.74, OAK);
-    let (x, y) = (0.5 * width, 0.5 * depth);
+    let x = 0.5 * width;
+    let y = 0.5 * depth;
     b.cuboid([-x + 0.1, y - 0.05, 0.3], [x - 0.1, y - 0.03, 0.7], WHITE, &[]);
-    let (left, right, front, back) = (x - 0.55, x - 0.12, -y + 0.1, y - 0.14);
+    let left = x - 0.55;
+    let right = x - 0.12;
+    let front = -y + 0.1;
+    let back = y - 0.14;
     b.cuboid([left, front, 0.05], [right, back, 0.62], WHITE, &[]);
     for drawer in 0..3 {
         let z = 0.16 + 0.18 * drawer as f32;
@@ -54,12 +60,15 @@ pub(super) fn office_chair(b: &mut Builder, fabric: Look) {
             b.cuboid([0.26, -0.02, 0.0], [0.31, 0.02, 0.05], BLACK, &[Top, Bottom]);
         });
     }
+
     b.stump([0.0, 0.0, 0.06], [0.04, 0.03], 0.37, 12, BLACK, &[Top]);
     b.cuboid([-0.24, -0.24, 0.43], [0.24, 0.23, 0.51], fabric, &[]);
     tilted_back(b, 0.22, 0.22, [0.6, 1.08], 0.07, fabric);
     b.cuboid([-0.03, 0.215, 0.45], [0.03, 0.25, 0.62], BLACK, &[]);
+
     for side in [-1.0, 1.0] {
-        let (x0, x1) = (side * 0.29 - 0.025, side * 0.29 + 0.025);
+        let x0 = side * 0.29 - 0.025;
+        let x1 = side * 0.29 + 0.025;
         b.cuboid([x0, -0.12, 0.66], [x1, 0.16, 0.69], BLACK, &[]);
         b.cuboid([x0 + 0.01, 0.0, 0.47], [x1 - 0.01, 0.04, 0.66], BLACK, &[Top, Bottom]);
         let (from, to) = if side < 0.0 {
@@ -75,7 +84,8 @@ pub(super) fn office_chair(b: &mut Builder, fabric: Look) {
 fn tilted_back(b: &mut Builder, half_width: f32, y: f32, span: [f32; 2], lean: f32, look: Look) {
     let [z0, z1] = span;
     let ring = |y: f32, z: f32| {
-        let (x, t) = (half_width, 0.06);
+        let x = half_width;
+        let t = 0.06;
         [vec3(-x, y, z), vec3(x, y, z), vec3(x, y + t, z), vec3(-x, y + t, z)]
     };
     let ([a, c, d, e], [f, g, h, i]) = (ring(y, z0), ring(y + lean, z1));
@@ -111,10 +121,13 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
     for (x, y) in [(-half, -0.36), (half, -0.36), (half, 0.36), (-half, 0.36)] {
         b.cuboid([x - 0.03, y - 0.03, 0.0], [x + 0.03, y + 0.03, 0.1], WALNUT, &[Top, Bottom]);
     }
+
     b.cuboid([-half, -0.42, 0.1], [half, 0.24, 0.3], fabric, &[Left, Right, Back]);
     b.cuboid([-half, 0.24, 0.1], [half, 0.44, 0.82], fabric, &[Front, Left, Right]);
+
     // The part of the back's front above the base, and its ends above the arms.
     b.panel([[-half, 0.3], [half, 0.3], [half, 0.82], [-half, 0.82]].map(|[x, z]| vec3(x, 0.24, z)), fabric);
+
     for side in [-1.0, 1.0] {
         let (x0, x1) = if side < 0.0 {
             (-half - 0.16, -half)
@@ -129,6 +142,7 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
         }
         b.panel(end, fabric);
     }
+
     for seat in 0..seats {
         let x = -half + 0.66 * seat as f32;
         b.cuboid([x + 0.015, -0.43, 0.305], [x + 0.645, 0.22, 0.44], fabric, &[Bottom]);
@@ -143,10 +157,12 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
         });
         b.hexahedron(back, fabric, &[Bottom]);
     }
+
     // A cushion thrown into the corner.
     b.place(vec3(half - 0.28, -0.1, 0.445), 24.0, |b| {
         let corner = |x: f32, y: f32, z: f32| vec3(x, y + 0.4 * z, z);
-        let (x, y) = (0.21, 0.05);
+        let x = 0.21;
+        let y = 0.05;
         b.hexahedron(
             [
                 corner(-x, -y, 0.0),
@@ -164,25 +180,31 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
     });
 }
 
-/// A bookcase with `shelves` rows of books; which books depends on `seed`.
+/// A bookcase with `shelves` rows of books, which `seed` chooses.
 pub(super) fn bookcase(b: &mut Builder, width: f32, shelves: u32, wood: Look, seed: u32) {
     const ROW: f32 = 0.36;
     const BOARD: f32 = 0.025;
     const DEPTH: f32 = 0.3;
+
     b.begin(Class::BOOKCASE);
-    let (x, y) = (0.5 * width, 0.5 * DEPTH);
+    let x = 0.5 * width;
+    let y = 0.5 * DEPTH;
+
     let height = 0.08 + ROW * shelves as f32 + BOARD;
     b.cuboid([-x, -y, 0.0], [-x + BOARD, y, height], wood, &[Bottom]);
     b.cuboid([x - BOARD, -y, 0.0], [x, y, height], wood, &[Bottom]);
-    let (left, right) = (-x + BOARD, x - BOARD);
+    let left = -x + BOARD;
+    let right = x - BOARD;
     b.cuboid([left, y - 0.015, 0.08], [right, y, height], wood, &[Bottom, Left, Right]);
     b.cuboid([left, -y + 0.02, 0.0], [right, -y + 0.04, 0.08], wood, &[Bottom, Top, Left, Right]);
+
     for shelf in 0..=shelves {
         let z = 0.08 + ROW * shelf as f32;
         b.cuboid([left, -y, z], [right, y - 0.015, z + BOARD], wood, &[Left, Right, Back]);
         if shelf == shelves {
             break;
         }
+
         // Blocks of books of one height, with a gap somewhere.
         let mut from = left + 0.01;
         let mut block = 0;
@@ -202,7 +224,7 @@ pub(super) fn bookcase(b: &mut Builder, width: f32, shelves: u32, wood: Look, se
     }
 }
 
-/// A block of books: spines in front, `start` shifts which ones.
+/// A block of books with their spines in front. `start` chooses the spines.
 pub(super) fn books(b: &mut Builder, x: [f32; 2], y: [f32; 2], z: [f32; 2], start: f32) {
     let paper = Look::Plain("pages", [226, 216, 194]);
     b.cuboid([x[0], y[0], z[0]], [x[1], y[1], z[1]], paper, &[Bottom, Front, Back]);

@@ -8,18 +8,18 @@ use s3d_geom::{Aabb, glam::Vec3};
 pub(crate) struct Lamp {
     /// Its middle, building metres.
     pub(crate) center: Vec3,
-    /// Where it shines to; a unit vector.
+    /// The direction in which it shines; a unit vector.
     pub(crate) normal: Vec3,
     /// Its area in m² times its brightness.
     pub(crate) power: f32,
 }
 
-/// The lamps of a room and what keeps their light off.
+/// The lamps of a room, and the bodies that block their light.
 #[derive(Clone, Default)]
 pub(crate) struct Light {
     /// Windows and lamps.
     pub(crate) lamps: Vec<Lamp>,
-    /// The height of the room, which its ceiling's brightness depends on.
+    /// The height of the room. The brightness of its ceiling depends on it.
     pub(crate) height_m: f32,
     blockers: Vec<Aabb>,
 }
@@ -34,8 +34,8 @@ impl Light {
         self.blockers.push(body);
     }
 
-    /// The brightness, about 1 where it is bright, of a surface at `p` with the unit normal `n`, with nothing
-    /// in between.
+    /// The brightness of a surface at `p` with the unit normal `n` if nothing is in between: about 1 in
+    /// bright places.
     pub(crate) fn open(&self, p: Vec3, n: Vec3) -> f32 {
         // The floor throws light back to the ceiling, but not to the undersides of tables.
         let height = (p.z / self.height_m.max(0.1)).min(1.0);
@@ -63,14 +63,15 @@ impl Light {
         }
     }
 
-    /// As [`Light::open`], darkened by what stands close.
+    /// The brightness of [`Light::open`], darkened by the bodies close by.
     pub(crate) fn at(&self, p: Vec3, n: Vec3) -> f32 {
         let axis = n.abs().max_position();
         let shade: f32 = self
             .blockers
             .iter()
             .map(|b| {
-                // How far it stands out of the surface: a picture shades less of its wall than a cupboard.
+                // How far the body stands out of the surface: a picture shades less of its wall than a
+                // cupboard.
                 let out = (b.center() - p).dot(n) + 0.5 * b.size().dot(n.abs());
                 if out <= 0.0 {
                     return 1.0;

@@ -1,4 +1,4 @@
-//! Furniture of several models, whose measures differ between buildings. Frames as in `furniture`.
+//! Furniture of several models, whose measures differ between buildings. Frames are as in `furniture`.
 
 use super::builder::{Builder, Side};
 use super::furniture::books;
@@ -11,11 +11,12 @@ use Side::{Back, Bottom, Front, Left, Right, Top};
 
 /// The four corners (−x, −y) to (x, y), `inset` from them.
 fn corners(x: f32, y: f32, inset: f32) -> [[f32; 2]; 4] {
-    let (x, y) = (x - inset, y - inset);
+    let x = x - inset;
+    let y = y - inset;
     [[-x, -y], [x, -y], [x, y], [-x, y]]
 }
 
-/// An upright of a square section of `half` to each side, without its ends.
+/// A square post without its ends, `half` to each side.
 fn post(b: &mut Builder, [x, y]: [f32; 2], half: f32, [z0, z1]: [f32; 2], look: Look) {
     b.cuboid([x - half, y - half, z0], [x + half, y + half, z1], look, &[Top, Bottom]);
 }
@@ -23,9 +24,14 @@ fn post(b: &mut Builder, [x, y]: [f32; 2], half: f32, [z0, z1]: [f32; 2], look: 
 /// A table of a model.
 pub(super) fn table(b: &mut Builder, base: TableBase, [width, depth, height]: [f32; 3], top: Look) {
     const TOP_M: f32 = 0.035;
+
     b.begin(Class::TABLE);
-    let (x, y, under) = (0.5 * width, 0.5 * depth, height - TOP_M);
+    let x = 0.5 * width;
+    let y = 0.5 * depth;
+
+    let under = height - TOP_M;
     b.cuboid([-x, -y, under], [x, y, height], top, &[]);
+
     match base {
         TableBase::Legs => {
             for at in corners(x, y, 0.06) {
@@ -89,8 +95,10 @@ pub(super) fn seat(
     fabric: Look,
 ) {
     b.begin(Class::CHAIR);
-    let (x, y) = (0.5 * width, 0.5 * (width.max(0.4)));
+    let x = 0.5 * width;
+    let y = 0.5 * (width.max(0.4));
     let pad = seat - 0.07;
+
     match base {
         SeatBase::Legs => {
             for at in corners(x, y, 0.03) {
@@ -118,23 +126,28 @@ pub(super) fn seat(
             b.cuboid([-x + 0.02, -y + 0.03, 0.0], [x - 0.02, y - 0.01, pad], fabric, &[Top, Bottom]);
         }
     }
+
     b.cuboid([-x, -y, pad], [x, y, seat], fabric, &[]);
-    // The back leans by a twelfth of its height, off the seat by a gap but for block seats.
+
+    // The back leans by a twelfth of its height. Only on block seats there is no gap below it.
     let from = if base == SeatBase::Block {
         seat + 0.002
     } else {
         seat + 0.1
     };
-    let (thick, lean) = (if base == SeatBase::Block { 0.12 } else { 0.05 }, (back - from) / 12.0);
+    let thick = if base == SeatBase::Block { 0.12 } else { 0.05 };
+    let lean = (back - from) / 12.0;
     let ring =
         |y: f32, z: f32| [vec3(-x, y, z), vec3(x, y, z), vec3(x, y + thick, z), vec3(-x, y + thick, z)];
     let ([a, c, d, e], [f, g, h, i]) = (ring(y - thick, from), ring(y - thick + lean, back));
     b.hexahedron([a, c, d, e, f, g, h, i], fabric, &[]);
+
     if base != SeatBase::Block {
         for side in [-1.0, 1.0] {
             post(b, [side * 0.6 * x, y - 0.02], 0.014, [seat, from], STEEL);
         }
     }
+
     if has_arms {
         let top = seat + 0.22;
         for side in [-1.0, 1.0] {
@@ -162,13 +175,16 @@ pub(super) fn couch(
     fabric: Look,
 ) {
     b.begin(Class::SOFA);
-    let (x, y) = (0.5 * seat * seats as f32, 0.5 * depth);
+    let x = 0.5 * seat * seats as f32;
+    let y = 0.5 * depth;
     let back = 0.2 * depth;
     for at in corners(x, y, 0.06) {
         post(b, at, 0.025, [0.0, 0.12], BLACK);
     }
+
     b.cuboid([-x, -y, 0.12], [x, y - back, 0.28], fabric, &[Back]);
     b.cuboid([-x, y - back, 0.12], [x, y, height], fabric, &[]);
+
     for k in 0..seats {
         let from = -x + seat * k as f32;
         b.cuboid(
@@ -178,6 +194,7 @@ pub(super) fn couch(
             &[Bottom],
         );
     }
+
     if has_arms {
         for side in [-1.0, 1.0] {
             let (x0, x1) = if side < 0.0 {
@@ -200,18 +217,25 @@ pub(super) fn shelves(
 ) {
     const BOARD: f32 = 0.022;
     const PLINTH: f32 = 0.06;
+
     b.begin(Class::BOOKCASE);
-    let (x, y) = (0.5 * width, 0.5 * depth);
+    let x = 0.5 * width;
+    let y = 0.5 * depth;
+
     for side in [-1.0, 1.0] {
         let (x0, x1) = if side < 0.0 { (-x, -x + BOARD) } else { (x - BOARD, x) };
         b.cuboid([x0, -y, 0.0], [x1, y, height], wood, &[Bottom]);
     }
-    let (left, right) = (-x + BOARD, x - BOARD);
+
+    let left = -x + BOARD;
+    let right = x - BOARD;
     b.cuboid([left, y - 0.012, PLINTH], [right, y, height - BOARD], wood, &[Bottom, Top, Left, Right]);
     b.cuboid([left, -y + 0.03, 0.0], [right, -y + 0.05, PLINTH], wood, &[Bottom, Top, Left, Right]);
+
     let inner = height - PLINTH - BOARD;
     let rows = ((inner / 0.36).round() as u32).max(1);
     let pitch = inner / rows as f32;
+
     for row in 0..=rows {
         let z = PLINTH + pitch * row as f32;
         b.cuboid(
@@ -221,13 +245,16 @@ pub(super) fn shelves(
             &[Left, Right],
         );
     }
+
     let hidden = match front {
         ShelfFront::Open => 0,
         ShelfFront::HalfDoors => rows.div_ceil(2),
         ShelfFront::Doors => rows,
     };
+
     if hidden > 0 {
-        let (z0, z1) = (PLINTH + 0.004, PLINTH + pitch * hidden as f32 - 0.002);
+        let z0 = PLINTH + 0.004;
+        let z1 = PLINTH + pitch * hidden as f32 - 0.002;
         let doors = ((width / 0.55).ceil() as u32).max(1);
         let leaf = (right - left) / doors as f32;
         for k in 0..doors {
@@ -238,6 +265,7 @@ pub(super) fn shelves(
             b.cuboid([at, -y - 0.014, middle - 0.06], [at + 0.02, -y + 0.002, middle + 0.06], STEEL, &[Back]);
         }
     }
+
     for row in hidden..rows {
         let z = PLINTH + pitch * row as f32 + BOARD;
         let mut from = left + 0.01;

@@ -1,4 +1,4 @@
-//! What fills the openings of walls: windows and doors.
+//! Windows and doors in the openings of walls.
 
 use super::builder::{Builder, Side};
 use crate::building::LeafModel;
@@ -19,18 +19,22 @@ fn reveal(b: &mut Builder, width: f32, [z0, z1]: [f32; 2], depth: f32, look: Loo
     b.panel([g, h, f, e], look);
 }
 
-/// A window `heights` above the floor: its pane behind the wall, its board before it. The frame is the
-/// wall's, from the opening's left edge.
+/// Adds a window at `heights` above the floor, with its pane behind the wall and its board in front. The
+/// frame is on the wall, and begins at the opening's left edge.
 pub(crate) fn window(b: &mut Builder, width: f32, heights: [f32; 2]) {
     const DEPTH: f32 = 0.16;
     const BAR: f32 = 0.05;
+
     let [z0, z1] = heights;
     b.begin(Class::WINDOW);
     reveal(b, width, heights, DEPTH, WHITE, WHITE);
     let pane = [[0.0, z0], [width, z0], [width, z1], [0.0, z1]].map(|[x, z]| vec3(x, DEPTH, z));
     b.panel(pane, Look::Fitted(Pattern::Sky));
+
     let middle = 0.5 * (width - BAR);
-    let (front, back) = (DEPTH - 0.05, DEPTH);
+    let front = DEPTH - 0.05;
+    let back = DEPTH;
+
     use Side::{Back, Bottom, Left, Right, Top};
     b.cuboid([0.0, front, z0], [width, back, z0 + BAR], WHITE, &[Back, Left, Right, Bottom]);
     b.cuboid([0.0, front, z1 - BAR], [width, back, z1], WHITE, &[Back, Left, Right, Top]);
@@ -41,11 +45,13 @@ pub(crate) fn window(b: &mut Builder, width: f32, heights: [f32; 2]) {
     upright(b, width - BAR, Right);
     upright(b, middle, Back);
     b.cuboid([middle + 0.015, front - 0.03, z0 + 0.5], [middle + 0.035, front, z0 + 0.62], STEEL, &[Back]);
+
     // The board below it stands out a little.
     b.cuboid([-0.04, -0.06, z0 - 0.03], [width + 0.04, 0.0, z0], WHITE, &[Back]);
 }
 
-/// The lining and the frame of a doorway `depth` metres deep; what follows belongs to the same door.
+/// Adds the lining and the frame of a doorway `depth` metres deep. Surfaces added next belong to the same
+/// door.
 pub(crate) fn doorway(b: &mut Builder, width: f32, height: f32, depth: f32) {
     const TRIM: f32 = 0.06;
     use Side::{Back, Bottom};
@@ -58,7 +64,8 @@ pub(crate) fn doorway(b: &mut Builder, width: f32, height: f32, depth: f32) {
 
 /// A door leaf along x from the hinge at the origin, 4 cm thick towards −y.
 pub(crate) fn leaf(b: &mut Builder, width: f32, height: f32) {
-    let (w, h) = (width - 0.02, height - 0.02);
+    let w = width - 0.02;
+    let h = height - 0.02;
     let wood = Look::Fitted(Pattern::Door);
     let edge = Look::Plain("door_edge", [186, 140, 96]);
     b.cuboid([0.0, -0.04, 0.01], [w, 0.0, h], edge, &[Side::Front, Side::Back]);
@@ -80,31 +87,39 @@ pub(crate) fn glazing(b: &mut Builder, width: f32, [z0, z1]: [f32; 2], panes: [u
     use Side::{Back, Bottom, Left, Right, Top};
     b.begin(Class::WINDOW);
     reveal(b, width, [z0, z1], depth, WHITE, WHITE);
-    let (front, columns, rows) = (depth - 0.05, panes[0], panes[1]);
+
+    let front = depth - 0.05;
+    let columns = panes[0];
+    let rows = panes[1];
     let pane = [(width - BAR) / columns as f32 - BAR, (z1 - z0 - BAR) / rows as f32 - BAR];
     let x_of = |k: u32| k as f32 * (pane[0] + BAR);
     let z_of = |k: u32| z0 + k as f32 * (pane[1] + BAR);
+
     for k in 0..=columns {
         let omit = [Back, Top, Bottom, if k == 0 { Left } else { Right }];
         let omit = if k == 0 || k == columns { &omit[..] } else { &omit[..3] };
         b.cuboid([x_of(k), front, z0], [x_of(k) + BAR, depth, z1], WHITE, omit);
     }
+
     for i in 0..columns {
-        let (x0, x1) = (x_of(i) + BAR, x_of(i + 1));
+        let x0 = x_of(i) + BAR;
+        let x1 = x_of(i + 1);
         for k in 0..=rows {
             let omit = [Back, Left, Right, if k == 0 { Bottom } else { Top }];
             let omit = if k == 0 || k == rows { &omit[..] } else { &omit[..3] };
             b.cuboid([x0, front, z_of(k)], [x1, depth, z_of(k) + BAR], WHITE, omit);
         }
+
         for k in 0..rows {
-            let (low, high) = (z_of(k) + BAR, z_of(k + 1));
+            let low = z_of(k) + BAR;
+            let high = z_of(k + 1);
             let corners = [[x0, low], [x1, low], [x1, high], [x0, high]];
             b.panel(corners.map(|[x, z]| vec3(x, depth - 0.02, z)), Look::Fitted(Pattern::Sky));
         }
     }
 }
 
-/// A door leaf of a model, as [`leaf`], 4 cm thick. A shut one is seen from the front alone.
+/// Adds a door leaf of a model, placed like [`leaf`] and 4 cm thick. A shut one is seen only from the front.
 pub(crate) fn model_leaf(
     b: &mut Builder,
     model: LeafModel,
@@ -117,9 +132,11 @@ pub(crate) fn model_leaf(
     } else {
         (width - 0.02, height - 0.02)
     };
+
     let low = if shut { 0.0 } else { 0.01 };
     let all = [Side::Left, Side::Right, Side::Top, Side::Bottom, Side::Back];
     b.cuboid([0.0, -0.04, low], [w, 0.0, h], wood, if shut { &all } else { &[] });
+
     let sides = if shut { 1 } else { 2 };
     for side in 0..sides {
         let (origin, yaw) = if side == 0 {
@@ -127,11 +144,13 @@ pub(crate) fn model_leaf(
         } else {
             (vec3(w, 0.0, 0.0), 180.0)
         };
+
         let hang = if side == 0 { w - 0.08 } else { 0.15 };
         b.place(origin, yaw, |b| {
             let mut raised = |z: [f32; 2], out: f32, look: Look| {
                 b.cuboid([0.17, -out, z[0]], [w - 0.17, 0.0, z[1]], look, &[Side::Back]);
             };
+
             match model {
                 LeafModel::Flush => {}
                 LeafModel::Panelled => {

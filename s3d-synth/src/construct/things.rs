@@ -1,5 +1,5 @@
-//! What stands and hangs about: boards, pictures, screens, plants, boxes. Frames as in `furniture`; what
-//! hangs has its origin on the wall, at its foot.
+//! Boards, pictures, screens, plants, boxes. Frames are as in `furniture`. A thing that hangs has its origin
+//! on the wall, at its foot.
 
 use super::builder::{Builder, Side};
 use super::furniture::*;
@@ -11,7 +11,7 @@ use s3d_label::Class;
 
 use Side::{Back, Bottom, Front, Left, Right, Top};
 
-/// Builds a thing in the frame that holds.
+/// Builds a thing in the current frame.
 pub(super) fn construct_thing(b: &mut Builder, thing: &Thing) {
     match *thing {
         Thing::Table { width_m, depth_m, height_m, top } => table(b, width_m, depth_m, height_m, top),
@@ -61,17 +61,20 @@ pub(super) fn construct_thing(b: &mut Builder, thing: &Thing) {
     }
 }
 
-/// Something flat on a wall, 2 cm off it, in a frame: from the floor up `z`, with `picture` on it.
+/// Something flat with `picture` on it, in a frame, 2 cm off a wall, between the heights `z`.
 fn hanging(b: &mut Builder, class: Class, width: f32, z: [f32; 2], picture: Pattern, frame: Look) {
     const EDGE: f32 = 0.03;
     b.begin(class);
     let (x, [z0, z1]) = (0.5 * width, z);
-    let (front, back) = (-0.045, -0.02);
+    let front = -0.045;
+    let back = -0.02;
     b.cuboid([-x, front, z0], [x, back, z0 + EDGE], frame, &[Top]);
     b.cuboid([-x, front, z1 - EDGE], [x, back, z1], frame, &[Bottom]);
     b.cuboid([-x, front, z0 + EDGE], [-x + EDGE, back, z1 - EDGE], frame, &[Top, Bottom, Right]);
     b.cuboid([x - EDGE, front, z0 + EDGE], [x, back, z1 - EDGE], frame, &[Top, Bottom, Left]);
-    let (x, z0, z1) = (x - EDGE, z0 + EDGE, z1 - EDGE);
+    let x = x - EDGE;
+    let z0 = z0 + EDGE;
+    let z1 = z1 - EDGE;
     let at = |y: f32| [[-x, z0], [x, z0], [x, z1], [-x, z1]].map(|[x, z]| vec3(x, y, z));
     b.panel(at(front), Look::Fitted(picture));
     let mut behind = at(back);
@@ -132,7 +135,11 @@ fn laptop(b: &mut Builder) {
     let keys = [[-0.17, -0.12], [0.17, -0.12], [0.17, 0.12], [-0.17, 0.12]];
     b.panel(keys.map(|[x, y]| vec3(x, y, 0.018)), Look::Fitted(Pattern::Keyboard));
     let at = |x: f32, y: f32, z: f32| vec3(x, y + 0.28 * z, z);
-    let (x, y0, y1, z0, z1) = (0.17, 0.118, 0.128, 0.022, 0.23);
+    let x = 0.17;
+    let y0 = 0.118;
+    let y1 = 0.128;
+    let z0 = 0.022;
+    let z1 = 0.23;
     let corners = [
         at(-x, y0, z0),
         at(x, y0, z0),
@@ -255,7 +262,7 @@ fn rug(b: &mut Builder) {
     b.panel(corners.map(|[x, y]| vec3(x, y, 0.012)), Look::Fitted(Pattern::Rug));
 }
 
-/// Stairs: a block a step, each as high as its tread, of which only what is not behind another is built.
+/// Stairs: a block for each step, as high as its tread. Faces that the next block hides are left out.
 fn stairs(b: &mut Builder, width: f32, steps: u32, tread: f32, riser: f32) {
     b.begin(Class::CLUTTER);
     let x = 0.5 * width;
@@ -272,15 +279,16 @@ fn stairs(b: &mut Builder, width: f32, steps: u32, tread: f32, riser: f32) {
     }
 }
 
-/// A beam under a ceiling from `from` to `to`, which are on the ceiling: `half` its width to either side,
-/// `depth` down.
+/// A beam under a ceiling, between two points on the ceiling: `half` of its width to either side, `depth`
+/// down.
 pub(super) fn beam(b: &mut Builder, from: Vec3, to: Vec3, half: f32, depth: f32, look: Look) {
     b.begin(Class::BEAM);
     // The ends touch walls, and the top the ceiling.
     let side = (to - from).cross(Vec3::Z).normalize() * half;
     let down = Vec3::Z * depth;
     let ring = |z: Vec3| [from - side - z, from + side - z, to + side - z, to - side - z];
-    let (low, high) = (ring(down), ring(Vec3::ZERO));
+    let low = ring(down);
+    let high = ring(Vec3::ZERO);
     b.hexahedron(
         [low[0], low[1], low[2], low[3], high[0], high[1], high[2], high[3]],
         look,

@@ -2,12 +2,13 @@
 //!
 //! Areas 1, 3 and 6 are of one building, 2 and 4 of another, 5 of a third, as in 2D-3D-S. How many rooms of
 //! each type an area has, and how many beams, columns and windows, is counted from the names in the published
-//! table of labels; area 5 has 60 of its 68 rooms. What is in a room follows `outfit`. All else is made up.
+//! table of labels; area 5 has 60 of its 68 rooms. The things in a room follow `outfit`. Everything else is
+//! made up.
 //!
 //! Each building has materials of its own, of the kinds that offices have: doors of veneer or painted, light
 //! table tops, dark chairs, sofas in warm colours, bookcases of painted steel or dark wood, boards white,
 //! green, black or of cork, all before walls that are almost white. So colours tell classes apart, though
-//! hardly one is the same in two buildings.
+//! hardly any colour is the same in two buildings.
 
 use super::models::Models;
 use super::{BuildingOptions, FloorPlan, RoomOptions, Style, between, rng};
@@ -18,8 +19,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use s3d_label::RoomType;
 
-/// The types of rooms, and between which sizes they lie in the first building: along the hallway, and away
-/// from it.
+/// The types of rooms, and the ranges of their sizes in the first building: along the hallway, and away from
+/// it.
 const TYPES: [(RoomType, [[f32; 2]; 2]); 10] = [
     (RoomType::CONFERENCE_ROOM, [[6.8, 9.0], [5.2, 6.6]]),
     (RoomType::AUDITORIUM, [[13.5, 15.0], [12.0, 13.0]]),
@@ -33,14 +34,14 @@ const TYPES: [(RoomType, [[f32; 2]; 2]); 10] = [
     (RoomType::WC, [[4.0, 5.0], [4.2, 5.4]]),
 ];
 
-/// What is counted of an area.
+/// The counts of an area.
 struct Area {
-    /// Which building it is of.
+    /// The index of its building.
     building: usize,
     /// Rooms by type, in the order of `TYPES`.
     rooms: [u32; 10],
     hallways: u32,
-    /// Not counted: made up.
+    /// The number of wings, which is made up.
     wings: u32,
     beams: u32,
     columns: u32,
@@ -66,7 +67,8 @@ const fn area(
     Area { building, rooms, hallways, wings, beams, columns, windows }
 }
 
-/// A building: what sizes are multiplied by, its hallways' width and height, walls, ceilings, courtyards.
+/// The proportions of a building: the factor of all room sizes, the width and height of hallways, walls,
+/// ceilings, courtyards.
 struct Proportions {
     rooms: f32,
     hallway_m: [f32; 2],
@@ -76,13 +78,13 @@ struct Proportions {
 }
 
 impl BuildingOptions {
-    /// How many areas there are.
+    /// The number of areas.
     pub const AREAS: u32 = 6;
 
-    /// One of six areas in three buildings (1, 3 and 6; 2 and 4; 5): of 23 to 60 rooms, hallways among them,
-    /// whose types are as frequent as in the published areas of the same numbers, and what is in them as in
-    /// rooms of their type there. Proportions, materials and models of furniture are a building's own. Same
-    /// number and seed, same options.
+    /// The options of one of six areas in three buildings (1, 3 and 6; 2 and 4; 5), with 23 to 60 rooms,
+    /// hallways among them. Types of rooms are as frequent as in the published area of the same number, and
+    /// things as frequent as in published rooms of the type. Each building has proportions, materials and
+    /// models of furniture of its own. The same number and seed give the same options.
     ///
     /// ```
     /// use s3d_synth::{Building, BuildingOptions};
@@ -97,25 +99,30 @@ impl BuildingOptions {
     /// [`RangeError`] if there is no area of this number.
     pub fn area(number: u32, seed: u64) -> Result<Self, RangeError> {
         RangeError::check(number, [1.0, f64::from(Self::AREAS)], || "the number of an area".to_owned())?;
+
         let area = &AREAS[number as usize - 1];
         let mut rng = rng(seed, u64::MAX - 1 - u64::from(number));
         let proportions = proportions(area.building);
         let with_windows = area.rooms[0] + area.rooms[2] + area.rooms[3] + area.rooms[4];
         let windows = area.windows as f32 / with_windows as f32;
+
         let mut rooms = Vec::new();
         for (&(room_type, size), &count) in TYPES.iter().zip(&area.rooms) {
             for _ in 0..count {
                 rooms.push(room(room_type, size, &proportions, windows, &mut rng));
             }
         }
+
         for i in (1..rooms.len()).rev() {
             rooms.swap(i, rng.random_range(0..=i));
         }
+
         let surface: f32 = rooms.iter().map(|room| room.size_m[0] * room.size_m[1]).sum();
         let hallways = 0.2 * surface;
         let a_room = |count: u32| count as f32 / ((surface + hallways) / 20.0);
         let models =
             Models { beams: a_room(area.beams), columns: a_room(area.columns), ..models(area.building) };
+
         let [hallway_width_m, hallway_height_m] = proportions.hallway_m;
         Ok(Self {
             title: format!("A generated area of s3d: area {number}, seed {seed}"),
@@ -217,6 +224,7 @@ fn models(building: usize) -> Models {
         columns: 0.0,
         end_windows: 0.3,
     };
+
     match building {
         0 => common(
             vec![TableBase::Legs, TableBase::Legs, TableBase::Pedestal],

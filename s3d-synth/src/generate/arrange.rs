@@ -2,7 +2,6 @@
 
 use super::wings::arrange_wings;
 use super::{BuildingOptions, FloorPlan, RoomOptions, between, pick, rng};
-use crate::BuildingError;
 use crate::building::{Filling, Opening, RoomPlan, Wall};
 use crate::look::{CeilingFinish, FloorFinish, Paint};
 use rand::RngExt;
@@ -11,29 +10,31 @@ use s3d_geom::glam::{Vec2, vec2};
 use s3d_label::{Room, RoomType};
 use std::collections::BTreeMap;
 
-/// A room without anything in it, and what is wanted of it.
+/// An empty room, and the wishes for its content.
 pub(super) struct Site {
     pub(super) plan: RoomPlan,
-    /// Its place in the list of rooms; of a hallway the largest number.
+    /// Its place in the list of rooms. `usize::MAX` for a hallway.
     pub(super) index: usize,
     pub(super) furnishing: f32,
     pub(super) locations: u32,
 }
 
-/// Between the ceiling of a storey and the floor of the next.
+/// The distance from the highest ceiling of a storey to the next floor.
 const SLAB_M: f32 = 0.3;
 const DOOR_M: [f32; 2] = [0.9, 2.1];
-/// How far a doorway keeps from the next wall: its leaf finds room there.
+/// The distance of a doorway from the next wall, which leaves room for its leaf.
 const BESIDE_DOOR_M: f32 = 0.45;
 const WINDOW_TOP_M: f32 = 2.1;
 
-/// The rooms in their order, and after those of each storey its hallway.
-pub(super) fn arrange(options: &BuildingOptions) -> Result<Vec<Site>, BuildingError> {
+/// Arranges the rooms in their order. The hallway of a storey follows its rooms.
+pub(super) fn arrange(options: &BuildingOptions) -> Vec<Site> {
     let mut rng = rng(options.seed, u64::MAX - 1);
     let mut numbers = BTreeMap::new();
     let mut sites = Vec::new();
     let mut floor_m = 0.0;
-    let (rooms, storeys) = (&options.rooms, options.storeys as usize);
+    let rooms = &options.rooms;
+    let storeys = options.storeys as usize;
+
     for storey in 0..storeys {
         let here = &rooms[rooms.len() * storey / storeys..rooms.len() * (storey + 1) / storeys];
         let first = sites.len();
@@ -41,6 +42,7 @@ pub(super) fn arrange(options: &BuildingOptions) -> Result<Vec<Site>, BuildingEr
             FloorPlan::OneHallway => arrange_storey(options, here, &mut rng, &mut sites),
             FloorPlan::Wings { .. } => arrange_wings(options, here, &mut rng, &mut sites),
         }
+
         let mut top = 0f32;
         for site in &mut sites[first..] {
             let number = numbers.entry(site.plan.room.room_type).or_insert(0);
@@ -49,9 +51,10 @@ pub(super) fn arrange(options: &BuildingOptions) -> Result<Vec<Site>, BuildingEr
             site.plan.floor_m = floor_m;
             top = top.max(site.plan.top());
         }
+
         floor_m += top + SLAB_M;
     }
-    Ok(sites)
+    sites
 }
 
 fn arrange_storey(
@@ -73,6 +76,7 @@ fn arrange_storey(
             (side, from)
         })
         .collect();
+
     let deepest = |side: usize| {
         let depths = rooms
             .iter()
@@ -95,13 +99,17 @@ fn arrange_storey(
             let y = north + wall_m;
             (vec2(from, y), vec2(to, y + room.size_m[1]), Wall::South, Wall::North)
         };
+
         let at = between(rng, from + BESIDE_DOOR_M, to - BESIDE_DOOR_M - DOOR_M[0]);
         let opening =
             |wall, filling| Opening { wall, span: [at, at + DOOR_M[0]], heights: [0.0, DOOR_M[1]], filling };
-        let (hinge_left, open_deg) = (rng.random(), between(rng, 94.0, 107.0));
+
+        let hinge_left = rng.random();
+        let open_deg = between(rng, 94.0, 107.0);
         let door = Filling::Door { thickness_m: wall_m, hinge_left, open_deg };
         let mut openings = vec![opening(inner, door)];
         openings.extend(windows(room, outer, [from, to], rng));
+
         // The hallway's wall is opposite to the room's.
         hallway_openings.push(opening(outer, Filling::Nothing));
         let plan = shell(options, room.room_type, [low, high], room.heights_m, openings, rng);
@@ -109,6 +117,7 @@ fn arrange_storey(
     }
 
     let middle = 0.5 * (south + north);
+
     let half = (0.5 * options.hallway_width_m - 0.2).min(0.9);
     let end = |wall, half, heights, filling| Opening {
         wall,
@@ -116,8 +125,10 @@ fn arrange_storey(
         heights,
         filling,
     };
+
     hallway_openings.push(end(Wall::West, half, [0.8, WINDOW_TOP_M], Filling::Window));
     hallway_openings.push(end(Wall::East, 0.5 * DOOR_M[0], [0.0, DOOR_M[1]], Filling::ShutDoor));
+
     let corners = [vec2(0.0, south), vec2(length, north)];
     let heights = [options.hallway_height_m; 2];
     let plan = shell(options, RoomType::HALLWAY, corners, heights, hallway_openings, rng);
@@ -151,8 +162,10 @@ pub(super) fn shell(
     let paint = Paint { color: pick(rng, &style.walls), band: None, skirting };
     let accent = Paint { color: pick(rng, &style.accents), ..paint };
     let accent = rng.random_bool(0.6).then(|| (pick(rng, &Wall::ALL), accent));
+
     let floor: FloorFinish = pick(rng, &style.floors);
     let ceiling: CeilingFinish = pick(rng, &style.ceilings);
+
     RoomPlan {
         room: Room { room_type, number: 0 },
         low,
@@ -174,7 +187,7 @@ pub(super) fn shell(
     }
 }
 
-/// How many lamps there are along a length: one in the middle of each of so many cells.
+/// The number of lamps along a length: one in the middle of each cell.
 pub(super) fn lamp_cells(length_m: f32) -> u32 {
     (length_m / 3.2).ceil().max(1.0) as u32
 }

@@ -1,6 +1,7 @@
-//! What rooms of each type have in them.
+//! The things in rooms of each type.
 
 use super::arrange::{Site, lamp_cells};
+use super::inside::keep_inside;
 use super::outfit::outfit;
 use super::space::{Frame, Space};
 use super::{BuildingOptions, Style, between, pick};
@@ -14,7 +15,7 @@ use std::f32::consts::TAU;
 
 /// Half of the free square around a scanner.
 const STAND_M: f32 = 0.45;
-/// The same between furniture that is there already.
+/// Half of the free square around a scanner that stands between furniture.
 const BETWEEN_M: f32 = 0.3;
 const BEAM_DEPTH_M: f32 = 0.2;
 const BEAM_HALF_M: f32 = 0.17;
@@ -45,10 +46,11 @@ pub(super) fn can_furnish(room_type: RoomType) -> bool {
     room_type != RoomType::HALLWAY && !groups(room_type, 20.0).is_empty()
 }
 
-/// What a room of so many square metres has, the largest first, and how much of it.
+/// The groups of a room of this area, the largest first, and the mean number of each.
 fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
     use Group::*;
-    let (low, high) = (Bookcase { most_shelves: 2 }, Bookcase { most_shelves: 5 });
+    let low = Bookcase { most_shelves: 2 };
+    let high = Bookcase { most_shelves: 5 };
     match room_type {
         RoomType::OFFICE => vec![
             (Workplace, (area_m2 / 9.0).min(4.0)),
@@ -113,7 +115,7 @@ fn groups(room_type: RoomType, area_m2: f32) -> Vec<(Group, f32)> {
     }
 }
 
-/// The room with what is in it, and where a scanner stands.
+/// Furnishes a room. Returns it with its scan locations.
 pub(super) fn furnish(
     site: Site,
     options: &BuildingOptions,
@@ -122,8 +124,9 @@ pub(super) fn furnish(
     let Site { plan: mut room, furnishing, locations, .. } = site;
     let style = &options.style;
     let mut space = Space::new(&room);
-    // First, so that every room has one. Where furniture is as dense as in published rooms, the others find a
-    // place between it.
+
+    // The first location is found before the furniture, so that every room has one. If furniture is as dense
+    // as in published rooms, the other locations are found between it.
     let find = |space: &mut Space, rng: &mut ChaCha8Rng| {
         let by_wall = options
             .models
@@ -131,17 +134,23 @@ pub(super) fn furnish(
             .and_then(|_| space.find_stand_at_wall(rng, STAND_M));
         by_wall.or_else(|| space.find_stand(rng, STAND_M))
     };
+
     let first = if options.models.is_some() { 1 } else { locations };
-    let stands: Vec<Vec2> = (0..first).map_while(|_| find(&mut space, rng)).collect();
+    let mut stands: Vec<Vec2> = (0..first).map_while(|_| find(&mut space, rng)).collect();
+    if stands.is_empty() {
+        stands.extend(space.find_stand(rng, BETWEEN_M));
+    }
+
     space.keep_ways_free(&room);
     let mut places = stand_at(&stands, room.floor_m, rng);
+
     if let Some(models) = options.models.as_ref().filter(|_| furnishing > 0.0) {
         outfit(&mut room, &mut space, (models, style), furnishing, rng);
     } else if furnishing > 0.0 {
         add_structure(&mut room, &mut space, rng);
         let size = room.high - room.low;
         for (group, count) in groups(room.room.room_type, size.x * size.y) {
-            // 1.6 are two with a chance of 60 %, else one.
+            // 1.6 means two with a chance of 60 %, and one otherwise.
             let count = (count * furnishing + rng.random::<f32>()).floor() as u32;
             for _ in 0..count {
                 let items = place(group, &mut space, [size.x, size.y], style, rng);
@@ -149,13 +158,16 @@ pub(super) fn furnish(
             }
         }
     }
+
+    keep_inside(&mut room);
     let more = (first..locations).map_while(|_| space.find_stand(rng, BETWEEN_M));
     let more: Vec<Vec2> = more.collect();
     places.extend(stand_at(&more, room.floor_m, rng));
+
     (room, places)
 }
 
-/// Scanners at places in the plan.
+/// Makes scan locations at places in the plan.
 fn stand_at(plan: &[Vec2], floor_m: f32, rng: &mut ChaCha8Rng) -> Vec<ScanLocation> {
     let location = |p: &Vec2| ScanLocation {
         uuid: format!("{:016x}{:016x}", rng.random::<u64>(), rng.random::<u64>()),
@@ -165,18 +177,22 @@ fn stand_at(plan: &[Vec2], floor_m: f32, rng: &mut ChaCha8Rng) -> Vec<ScanLocati
     plan.iter().map(location).collect()
 }
 
-/// Beams between the lamps, columns under them at outer walls, radiators under windows.
+/// Adds beams between the lamps, columns under them at outer walls, and radiators under windows.
 fn add_structure(room: &mut RoomPlan, space: &mut Space, rng: &mut ChaCha8Rng) {
-    let (low, high) = (room.low, room.high);
+    let low = room.low;
+    let high = room.high;
     let lowest = room.heights_m[0].min(room.heights_m[1]);
     let cells = lamp_cells(high.x - low.x);
     let windows = windows(room);
+
     if lowest >= 2.6 && rng.random_bool(0.6) {
         for k in 1..cells {
             let x = low.x + (high.x - low.x) * k as f32 / cells as f32;
-            let (from, to) = (vec2(x, low.y), vec2(x, high.y));
+            let from = vec2(x, low.y);
+            let to = vec2(x, high.y);
             let beam = Beam { from, to, half_width_m: BEAM_HALF_M, depth_m: BEAM_DEPTH_M, look: CONCRETE };
             room.items.push(Item::Beam(beam));
+
             // Under a slanted ceiling a column would not meet its beam.
             let Some(&(wall, _)) = windows.first().filter(|(wall, _)| wall.along_x()) else { continue };
             let depth_m = 0.3;
@@ -188,19 +204,21 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, rng: &mut ChaCha8Rng) {
             }
         }
     }
+
     add_radiators(room, space, &windows);
 }
 
-/// The windows of a room: the wall, and from where to where along it.
+/// The windows of a room: the wall, and the stretch of it.
 pub(super) fn windows(room: &RoomPlan) -> Vec<(Wall, [f32; 2])> {
     let windows = room.openings.iter().filter(|opening| opening.filling.is_window());
     windows.map(|opening| (opening.wall, opening.span)).collect()
 }
 
-/// Radiators under windows.
+/// Adds radiators under windows.
 pub(super) fn add_radiators(room: &mut RoomPlan, space: &mut Space, windows: &[(Wall, [f32; 2])]) {
     for &(wall, [from, to]) in windows {
-        let (middle, width_m) = (0.5 * (from + to), (to - from - 0.1).clamp(0.4, 1.3));
+        let middle = 0.5 * (from + to);
+        let width_m = (to - from - 0.1).clamp(0.4, 1.3);
         let span = [middle - 0.5 * width_m, middle + 0.5 * width_m];
         if space.take_at_wall(wall, span, 0.14, false) {
             room.items
@@ -209,7 +227,7 @@ pub(super) fn add_radiators(room: &mut RoomPlan, space: &mut Space, windows: &[(
     }
 }
 
-/// A group where there is space for it, or nothing.
+/// Places a group where there is space for it. Returns no items if there is none.
 pub(super) fn place(
     group: Group,
     space: &mut Space,
@@ -221,15 +239,18 @@ pub(super) fn place(
     let fabric = pick(rng, &style.fabrics);
     let glaze = pick(rng, &style.glazes);
     let frame_look = pick(rng, &style.frames);
+
     let mut hang = |rng: &mut ChaCha8Rng, width: f32, depth: f32, thing: Thing| {
         let place = space.find_on_wall(rng, width, depth);
         place
             .map(|(wall, along)| vec![Item::on_wall(wall, along, thing)])
             .unwrap_or_default()
     };
+
     match group {
         Group::Board => {
-            let (width_m, picture) = (between(rng, 1.2, 2.4), pick(rng, &style.boards));
+            let width_m = between(rng, 1.2, 2.4);
+            let picture = pick(rng, &style.boards);
             let tray_m = (picture == Pattern::Whiteboard).then_some(0.9);
             let heights_m = [0.95, 2.05];
             hang(rng, width_m, 0.0, Thing::Board { width_m, heights_m, picture, frame: frame_look, tray_m })
@@ -281,7 +302,8 @@ pub(super) fn place(
                 .unwrap_or_default()
         }
         Group::Bookcase { most_shelves } => {
-            let (width_m, shelves) = (between(rng, 0.8, 1.2), rng.random_range(2..=most_shelves));
+            let width_m = between(rng, 0.8, 1.2);
+            let shelves = rng.random_range(2..=most_shelves);
             // Two shelves reach a window's sill already.
             let found = space.find_at_wall(rng, [width_m, 0.32], true);
             let bookcase = Thing::Bookcase { width_m, shelves, wood, seed: rng.random() };
@@ -322,7 +344,7 @@ pub(super) fn place(
     }
 }
 
-/// A round thing near a wall, turned anyhow.
+/// Places a round thing near a wall, with a random turn.
 fn alone(space: &mut Space, rng: &mut ChaCha8Rng, width: f32, thing: Thing) -> Vec<Item> {
     let found = space.find_at_wall(rng, [width, width], false);
     let yaw = between(rng, 0.0, 360.0);
@@ -354,7 +376,9 @@ fn workplace(f: &Frame, width_m: f32, [fabric, glaze]: [Look; 2], rng: &mut ChaC
 }
 
 fn meeting_table(f: &Frame, seats: u32, [wood, fabric, glaze]: [Look; 3], rng: &mut ChaCha8Rng) -> Vec<Item> {
-    let (width_m, depth_m, height_m) = (0.9 * seats as f32 + 0.3, 1.2, 0.74);
+    let width_m = 0.9 * seats as f32 + 0.3;
+    let depth_m = 1.2;
+    let height_m = 0.74;
     let mut items = vec![f.put([0.0; 3], 0.0, Thing::Table { width_m, depth_m, height_m, top: wood })];
     for seat in 0..seats {
         let x = 0.9 * (seat as f32 - 0.5 * (seats - 1) as f32);
@@ -374,7 +398,7 @@ fn meeting_table(f: &Frame, seats: u32, [wood, fabric, glaze]: [Look; 3], rng: &
     items
 }
 
-/// What lies on a table before a seat, by a number: nothing from 3 on.
+/// Draws the thing on a table in front of a seat. `number` chooses it: nothing from 3 on.
 pub(super) fn at_a_seat(
     f: &Frame,
     at: [f32; 3],
@@ -391,7 +415,7 @@ pub(super) fn at_a_seat(
     }
 }
 
-/// How far a thing is turned from where it should look, in degrees.
+/// Draws a small turn, in degrees.
 pub(super) fn wobble(rng: &mut ChaCha8Rng) -> f32 {
     between(rng, -8.0, 8.0)
 }
@@ -420,7 +444,8 @@ fn coffee_table(space: &mut Space, wood: Look, glaze: Look, rng: &mut ChaCha8Rng
 fn bar_table(f: &Frame, [wood, fabric, glaze]: [Look; 3], rng: &mut ChaCha8Rng) -> Vec<Item> {
     let table = Thing::RoundTable { radius_m: 0.42, height_m: 1.02, top: wood };
     let mut items = vec![f.put([0.0; 3], 0.0, table)];
-    let (stools, first) = (rng.random_range(2..=4), between(rng, 0.0, TAU));
+    let stools = rng.random_range(2..=4);
+    let first = between(rng, 0.0, TAU);
     for k in 0..stools {
         let at = 0.7 * Vec2::from_angle(first + TAU * k as f32 / stools as f32);
         items.push(f.put([at.x, at.y, 0.0], between(rng, 0.0, 360.0), Thing::Stool(fabric)));

@@ -1,13 +1,15 @@
-//! Buildings by rule: from a list of rooms and a seed to what stands where.
+//! Makes buildings by rule, from a list of rooms and a seed.
 //!
 //! A storey is a hallway with rooms on both sides, each with a door to it and windows in its outer wall
-//! (`arrange`), or several such wings, joined by a cross hallway (`wings`). `furnish` fills a room with what
-//! its type has, `outfit` does so with furniture of several `models`, and `space` knows where there is room
-//! for it. `areas` has the options of six areas in three buildings. Furnishing knows nothing of floor plans.
+//! (`arrange`), or several such wings, joined by a cross hallway (`wings`). `furnish` fills a room with the
+//! things of its type. `outfit` does the same with furniture of several `models`. `space` keeps account of
+//! free places, and `inside` moves things off the walls. `areas` has the options of six areas in three
+//! buildings. Furnishing knows nothing about floor plans.
 
 mod areas;
 mod arrange;
 mod furnish;
+mod inside;
 mod models;
 mod options;
 mod outfit;
@@ -27,10 +29,10 @@ use rand_chacha::ChaCha8Rng;
 use s3d_geom::glam::Vec3;
 
 impl Building {
-    /// Makes a building of the rooms wanted: the same for the same options. Every room and hallway has a scan
-    /// location.
+    /// Makes a building of the rooms wanted. The same options give the same building, and it can be built.
+    /// Every room has a scan location, and so has every hallway in which open doors leave a place for one.
     ///
-    /// What is drawn in a room follows from the seed and the room's place in the list alone.
+    /// The random choices in a room depend only on the seed and on the room's place in the list.
     ///
     /// ```
     /// use s3d_label::RoomType;
@@ -53,7 +55,8 @@ impl Building {
     ///
     /// # Errors
     /// [`BuildingError`]: no room, a room of a type that cannot be furnished, a number out of its range, more
-    /// windows than the outer wall takes, a style without a choice.
+    /// windows than the outer wall takes, a hallway of more than 150 m, a storey more than 10 km above the
+    /// ground, a style without a choice. No seed changes the answer.
     pub fn generate(options: &BuildingOptions) -> Result<Self, BuildingError> {
         options.check()?;
         let mut building = Self {
@@ -63,7 +66,11 @@ impl Building {
             locations: Vec::new(),
             texture_scale: options.texture_scale,
         };
-        for (index, site) in (0..).zip(arrange::arrange(options)?) {
+        let sites = arrange::arrange(options);
+        // A hallway may be too long, a storey too high above the ground.
+        sites.iter().try_for_each(|site| site.plan.check_shell())?;
+
+        for (index, site) in (0..).zip(sites) {
             let mut rng = rng(options.seed, index);
             let (room, locations) = furnish(site, options, &mut rng);
             building.rooms.push(room);
@@ -80,12 +87,12 @@ fn rng(seed: u64, unit: u64) -> ChaCha8Rng {
     rng
 }
 
-/// From `from` to `to`, which may be the same.
+/// Draws a number from `from` to `to`, which may be equal.
 fn between(rng: &mut ChaCha8Rng, from: f32, to: f32) -> f32 {
     from + (to - from) * rng.random::<f32>()
 }
 
-/// One of them; there is one.
+/// Draws one of the choices. There is at least one.
 fn pick<T: Copy>(rng: &mut ChaCha8Rng, choices: &[T]) -> T {
     choices[rng.random_range(0..choices.len())]
 }

@@ -1,4 +1,4 @@
-//! Which models of furniture, doors and windows a building has, and how large they are.
+//! The models of furniture, doors and windows of a building, and their sizes.
 
 use super::{BuildingOptions, between, pick};
 use crate::building::{LeafModel, SeatBase, ShelfFront, TableBase, Thing};
@@ -7,8 +7,8 @@ use crate::{BuildingError, RangeError};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// What is chosen from for the shape of things. Sizes are metres, each drawn evenly between two; no list may
-/// be empty.
+/// The shapes of things to choose from. Sizes are in metres, drawn evenly from their ranges. No list may be
+/// empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Models {
     /// What tables rest on.
@@ -23,13 +23,13 @@ pub struct Models {
     pub couches: Vec<bool>,
     /// Width of a seat of a sofa, depth of the whole, height of the back.
     pub couch_m: [[f32; 2]; 3],
-    /// What is before the rows of bookcases.
+    /// What covers the front of bookcases.
     pub shelves: Vec<ShelfFront>,
     /// Width, depth and height of bookcases.
     pub shelf_m: [[f32; 2]; 3],
     /// The share of boards without a frame.
     pub plain_boards: f64,
-    /// Width of boards, and height of the board itself.
+    /// Width of boards, and their height from lower to upper edge.
     pub board_m: [[f32; 2]; 2],
     /// What tables are made of.
     pub table_looks: Vec<Look>,
@@ -51,11 +51,11 @@ pub struct Models {
     pub panes: Vec<[u32; 2]>,
     /// The lower and the upper edge of windows.
     pub window_m: [f32; 2],
-    /// Beams a room of 20 m², on average.
+    /// The mean number of beams in a room of 20 m².
     pub beams: f32,
-    /// Columns a room of 20 m², on average.
+    /// The mean number of columns in a room of 20 m².
     pub columns: f32,
-    /// The share of cross hallways' and wings' ends that have a window.
+    /// The share of the ends of hallways that have a window. The others have a door.
     pub end_windows: f64,
 }
 
@@ -77,25 +77,30 @@ impl Models {
         if let Some((what, _)) = lists.into_iter().find(|(_, is_empty)| *is_empty) {
             return Err(BuildingError::EmptyStyle { what });
         }
+
         let check = |value: f32, range: [f64; 2], what: &str| {
             RangeError::check(value, range, || format!("the models: {what}"))
         };
+
         let sizes = [
             (&self.table_m, [[1.4, 3.0], [0.6, 1.5], [0.6, 1.1]], "the size of tables"),
             (&self.seat_m, [[0.35, 0.65], [0.38, 0.55], [0.65, 1.3]], "the size of chairs"),
             (&self.couch_m, [[0.5, 0.9], [0.65, 1.2], [0.6, 1.2]], "the size of sofas"),
             (&self.shelf_m, [[0.5, 2.5], [0.22, 0.7], [0.6, 2.3]], "the size of bookcases"),
         ];
+
         for (ranges, allowed, what) in sizes {
             for (range, allowed) in ranges.iter().zip(allowed) {
                 range.iter().try_for_each(|&m| check(m, allowed, what))?;
             }
         }
+
         let lowest = options
             .rooms
             .iter()
             .flat_map(|room| room.heights_m)
             .fold(options.hallway_height_m, f32::min);
+
         // Boards hang above the highest sofa.
         let board = f64::from(lowest - self.couch_m[2][1] - 0.2);
         for (range, allowed) in self.board_m.iter().zip([[0.4, 5.0], [0.4, board]]) {
@@ -103,22 +108,27 @@ impl Models {
                 .iter()
                 .try_for_each(|&m| check(m, allowed, "the size of boards"))?;
         }
+
         let most = options.hallway_width_m - 0.2;
         check(self.door_m[0], [0.7, f64::from(most.min(1.1))], "the width of doorways")?;
         check(self.door_m[1], [1.9, 2.1], "the height of doorways")?;
         check(self.window_m[0], [0.3, 1.2], "the lower edge of windows")?;
-        // Where a ceiling is slanted, openings end below the slant.
+
+        // Under a slanted ceiling, openings end below the slant.
         let top = if options.rooms.iter().all(|r| r.heights_m[0] == r.heights_m[1]) {
             lowest - 0.1
         } else {
             2.1
         };
         check(self.window_m[1], [1.9, f64::from(top)], "the upper edge of windows")?;
+
         for panes in self.panes.iter().flatten() {
             check(*panes as f32, [1.0, 3.0], "the panes of a window")?;
         }
+
         check(self.beams, [0.0, 20.0], "the number of beams")?;
         check(self.columns, [0.0, 20.0], "the number of columns")?;
+
         for (share, what) in [
             (self.plain_boards, "the share of boards without a frame"),
             (self.shut, "the share of doors that are shut"),
@@ -134,7 +144,7 @@ impl Models {
         Thing::ModelTable { base: pick(rng, &self.tables), size_m, top }
     }
 
-    /// A chair; as wide as it is with its arms.
+    /// Draws a chair. Returns its width too, arms included.
     pub(super) fn seat(&self, fabric: Look, rng: &mut ChaCha8Rng) -> (Thing, f32) {
         let (base, has_arms) = pick(rng, &self.seats);
         let [width, seat, back] = sized(&self.seat_m, rng);
@@ -157,7 +167,7 @@ impl Models {
     }
 }
 
-/// One size of each range.
+/// Draws one size from each range.
 pub(super) fn sized<const N: usize>(ranges: &[[f32; 2]; N], rng: &mut ChaCha8Rng) -> [f32; N] {
     ranges.map(|[from, to]| between(rng, from, to))
 }

@@ -1,54 +1,56 @@
-//! What one may wish of a building.
+//! The options of a generated building.
 
 use super::furnish::can_furnish;
 use super::outfit::can_outfit;
 use super::{Models, Style, between, pick, rng};
+use crate::building::check::check_texture_scale;
 use crate::{BuildingError, RangeError};
 use s3d_label::RoomType;
 
-/// What [`Building::generate`](crate::Building::generate) makes a building of. Its `Default` has six rooms.
+/// The options of [`Building::generate`](crate::Building::generate). The `Default` has six rooms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildingOptions {
-    /// What it is called: a line of text.
+    /// The title: a line of text.
     pub title: String,
-    /// The rooms, without hallways: 1 to 1,000. They are numbered by type in their order.
+    /// The rooms without hallways, 1 to 1,000. Rooms of a type are numbered in this order.
     pub rooms: Vec<RoomOptions>,
-    /// The rooms are dealt to so many storeys in their order, one above the other, without stairs: from 1 to
-    /// as many as there are rooms.
+    /// The number of storeys, from 1 to the number of rooms. Rooms are dealt to them in order. There are no
+    /// stairs.
     pub storeys: u32,
-    /// How wide hallways are: 1.2 to 10 m.
+    /// The width of hallways, 1.2 to 10 m.
     pub hallway_width_m: f32,
-    /// How high they are: 2.4 to 10 m.
+    /// The height of hallways, 2.4 to 10 m.
     pub hallway_height_m: f32,
-    /// How thick walls are: 0.1 to 1 m.
+    /// The thickness of walls, 0.1 to 1 m.
     pub wall_m: f32,
-    /// How rooms lie.
+    /// The floor plan.
     pub plan: FloorPlan,
-    /// What rooms and furniture are made of.
+    /// The finishes of rooms and the materials of furniture.
     pub style: Style,
-    /// Furniture, doors and windows of several models, in numbers like those of the published areas. Where it
-    /// is not there, they are those of the demo.
+    /// Furniture, doors and windows of several models, as many as the published areas have. `None` takes the
+    /// models of the demo.
     pub models: Option<Models>,
-    /// How fine the images of floors, walls and ceilings are: at 1 a floor has 100 texels a metre.
+    /// The resolution of the images of floors, walls and ceilings, 0.01 to 2. At 1 a floor has 100 texels a
+    /// metre.
     pub texture_scale: f32,
-    /// From which all random choices come.
+    /// The seed of all random choices.
     pub seed: u64,
 }
 
-/// How the rooms of a storey lie.
+/// The floor plan of a storey.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FloorPlan {
-    /// On both sides of one hallway.
+    /// Rooms on both sides of one hallway.
     OneHallway,
-    /// On both sides of the hallways of several wings, which a hallway at their west ends joins. It needs
-    /// [`BuildingOptions::models`].
+    /// Rooms on both sides of the hallways of several wings. A cross hallway joins the wings at their west
+    /// ends. This plan needs [`BuildingOptions::models`].
     Wings {
-        /// How many: 1 to 20; one has no cross hallway.
+        /// The number of wings, 1 to 20. A single wing has no cross hallway.
         wings: u32,
-        /// How many hallways there are in all, one at least in each wing, and as many in the cross hallway:
-        /// doors divide them. Fewer are made where doors of rooms leave no place.
+        /// The number of hallways, divided by doors: at least one in each wing, and one for each wing in the
+        /// cross hallway. Fewer are made if the doors of rooms leave no place for a wall.
         hallways: u32,
-        /// What is between two wings, metres: 0.5 to 100.
+        /// The gap between two wings, 0.5 to 100 m. A wall that is thicker takes its place.
         courtyard_m: f32,
     },
 }
@@ -56,22 +58,22 @@ pub enum FloorPlan {
 /// A room that a building should have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomOptions {
-    /// Its type: any but hallways, which join the rooms; auditoriums and WCs need
+    /// Its type: any but a hallway, which the floor plan adds. Auditoriums and WCs need
     /// [`BuildingOptions::models`].
     pub room_type: RoomType,
-    /// How long it is along the hallway (at least 1.8) and away from it (at least 2.2): up to 40 m.
+    /// The lengths along the hallway (1.8 to 40 m) and away from it (2.2 to 40 m).
     pub size_m: [f32; 2],
-    /// Height of its ceiling at the smallest and at the largest y: 2.4 to 10 m.
+    /// The height of the ceiling at the smallest and at the largest y, 2.4 to 10 m.
     pub heights_m: [f32; 2],
-    /// How many windows its outer wall has: one for each 1.1 m and 0.8 m more, at most.
+    /// The number of windows in its outer wall. Each needs 1.1 m, and all together need 0.8 m more.
     pub windows: u32,
-    /// How much stands in it: from 0, nothing, to 1, as much as its type has.
+    /// The amount of furniture, from 0, nothing, to 1, as much as its type has.
     pub furnishing: f32,
-    /// How many scan locations it has: 1 to 100, or as many as find room.
+    /// The number of scan locations, 1 to 100. Fewer are made if there is no place for more.
     pub locations: u32,
 }
 
-/// The types that can be generated, common ones more than once; and between which sizes they lie.
+/// The types that are drawn, common ones more than once, with the ranges of their sizes.
 const DRAWN: [(RoomType, [[f32; 2]; 2]); 11] = [
     (RoomType::OFFICE, [[3.0, 5.6], [3.6, 5.2]]),
     (RoomType::OFFICE, [[3.0, 5.6], [3.6, 5.2]]),
@@ -109,8 +111,8 @@ impl Default for BuildingOptions {
 }
 
 impl BuildingOptions {
-    /// One storey with `rooms` rooms of random types and sizes, about half of them offices. Same `seed`, same
-    /// options.
+    /// One storey with `rooms` rooms of random types and sizes, about half of them offices. The same `seed`
+    /// gives the same options.
     pub fn drawn(rooms: u32, seed: u64) -> Self {
         let mut rng = rng(seed, u64::MAX);
         let room = |_| {
@@ -142,18 +144,22 @@ impl BuildingOptions {
         if self.rooms.is_empty() {
             return Err(BuildingError::NoRoom);
         }
+
         let words = |what: &str| what.to_owned();
         let count = self.rooms.len() as f64;
         RangeError::check(count, [1.0, 1000.0], || words("the number of rooms"))?;
         RangeError::check(self.storeys, [1.0, count], || words("the number of storeys"))?;
+
         RangeError::check(self.hallway_width_m, [1.2, 10.0], || words("the width of hallways"))?;
         RangeError::check(self.hallway_height_m, HEIGHTS, || words("the height of hallways"))?;
         RangeError::check(self.wall_m, [0.1, 1.0], || words("the thickness of walls"))?;
+
         let with_models = self.models.is_some();
         self.rooms
             .iter()
             .enumerate()
             .try_for_each(|(index, room)| room.check(index, with_models))?;
+
         if let FloorPlan::Wings { wings, hallways, courtyard_m } = self.plan {
             if !with_models {
                 return Err(BuildingError::EmptyStyle { what: "models, which wings need" });
@@ -163,12 +169,14 @@ impl BuildingOptions {
             RangeError::check(hallways, [f64::from(least), 200.0], || words("the number of hallways"))?;
             RangeError::check(courtyard_m, [0.5, 100.0], || words("what is between wings"))?;
         }
+
+        check_texture_scale(self.texture_scale)?;
         self.models.as_ref().map_or(Ok(()), |models| models.check(self))?;
         self.style.check()
     }
 }
 
-/// Heights of ceilings: furniture, lamps and beams find room below.
+/// The range of ceilings. Furniture, lamps and beams find room below the lowest.
 const HEIGHTS: [f64; 2] = [2.4, 10.0];
 
 impl RoomOptions {
@@ -179,7 +187,7 @@ impl RoomOptions {
         }
         let room = |what: &str| format!("room {index}, {}: {what}", self.room_type.name());
         let [length, depth] = self.size_m;
-        // So that the door has its place, and beyond its leaf a scanner has.
+        // The door needs its place, and so does a scanner beyond the open leaf.
         RangeError::check(length, [1.8, 40.0], || room("the length along the hallway"))?;
         RangeError::check(depth, [2.2, 40.0], || room("the length away from the hallway"))?;
         for height in self.heights_m {

@@ -1,10 +1,11 @@
-//! What rooms of each type have in them where furniture comes in several models: as much, on average, as
-//! rooms of the type have in the published areas, counted from the names in their table of labels.
+//! The things in rooms of each type if furniture comes in several models. On average a room has as many as
+//! rooms of its type have in the published areas, counted from the names in their table of labels.
 
 use super::furnish::{Group, add_radiators, at_a_seat, place, windows, wobble};
 use super::models::{Models, sized};
 use super::space::{Frame, Space};
 use super::{Style, between, pick};
+use crate::building::check::LARGE_M;
 use crate::building::{Beam, Item, RoomPlan, TableBase, Thing, Wall};
 use crate::look::{CONCRETE, Look, Pattern};
 use rand::RngExt;
@@ -12,10 +13,10 @@ use rand_chacha::ChaCha8Rng;
 use s3d_geom::glam::{Vec2, vec2};
 use s3d_label::RoomType;
 
-/// What is placed as a whole.
+/// A piece that is placed as a whole.
 #[derive(Clone, Copy)]
 enum Piece {
-    /// A table with a chair and what is on it.
+    /// A table with a chair, and things on it.
     Desk,
     /// Tables in a row with chairs around them.
     Meeting,
@@ -40,12 +41,12 @@ use Piece::{
     Basins, Board, Cafe, Chair, CoffeeTable, Couch, Desk, Meeting, Rows, Shelves, SideTable, Stalls, Usual,
 };
 
-/// Whether rooms of this type can be furnished so.
+/// Whether rooms of this type can be furnished with models.
 pub(super) fn can_outfit(room_type: RoomType) -> bool {
     room_type != RoomType::HALLWAY && !pieces(room_type).is_empty()
 }
 
-/// What a room has on average, the largest first.
+/// The pieces of a room, the largest first, and the mean number of each.
 fn pieces(room_type: RoomType) -> &'static [(Piece, f32)] {
     match room_type {
         RoomType::OFFICE => &[
@@ -153,7 +154,7 @@ fn pieces(room_type: RoomType) -> &'static [(Piece, f32)] {
     }
 }
 
-/// A whole number around `mean`.
+/// Draws a whole number around `mean`.
 fn drawn(mean: f32, rng: &mut ChaCha8Rng) -> u32 {
     (mean * between(rng, 0.5, 1.5) + rng.random::<f32>()).floor() as u32
 }
@@ -169,6 +170,7 @@ pub(super) fn outfit(
     add_structure(room, space, models, rng);
     let windows = windows(room);
     add_radiators(room, space, &windows);
+
     let size = room.high - room.low;
     for &(piece, mean) in pieces(room.room.room_type) {
         for _ in 0..drawn(mean * furnishing, rng) {
@@ -181,12 +183,15 @@ pub(super) fn outfit(
     }
 }
 
-/// Beams from south to north between the lamps, and columns at the walls.
+/// Adds beams from south to north between the lamps, and columns at the walls.
 fn add_structure(room: &mut RoomPlan, space: &mut Space, models: &Models, rng: &mut ChaCha8Rng) {
-    let (low, high) = (room.low, room.high);
+    let low = room.low;
+    let high = room.high;
     let lowest = room.heights_m[0].min(room.heights_m[1]);
     let share = (high - low).element_product() / 20.0;
-    let (half_width_m, depth_m) = (between(rng, 0.1, 0.2), between(rng, 0.16, (lowest - 2.3).min(0.35)));
+    let half_width_m = between(rng, 0.1, 0.2);
+    let depth_m = between(rng, 0.16, (lowest - 2.3).min(0.35));
+
     let lamps = room.lamps.clone();
     let is_free = |x: f32, beams: &[f32]| {
         x - half_width_m > low.x + 0.1
@@ -196,8 +201,9 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, models: &Models, rng: &
                 .all(|l| (l[0] - x).abs() > 0.5 * l[2] + half_width_m + 0.05)
             && beams.iter().all(|other| (other - x).abs() > 2.0 * half_width_m + 0.3)
     };
+
     let mut beams: Vec<f32> = Vec::new();
-    if lowest >= 2.5 {
+    if lowest >= 2.5 && f64::from(high.y - low.y) <= LARGE_M {
         for _ in 0..drawn(models.beams * share, rng) {
             let found = (0..30)
                 .map(|_| between(rng, low.x, high.x))
@@ -205,26 +211,34 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, models: &Models, rng: &
             beams.extend(found);
         }
     }
+
     for &x in &beams {
-        let (from, to) = (vec2(x, low.y), vec2(x, high.y));
+        let from = vec2(x, low.y);
+        let to = vec2(x, high.y);
         room.items
             .push(Item::Beam(Beam { from, to, half_width_m, depth_m, look: CONCRETE }));
     }
-    // Under a slanted ceiling a column would not meet it.
+
+    // A column would not meet a slanted ceiling.
     if room.heights_m[0] != room.heights_m[1] {
         return;
     }
+
     for _ in 0..drawn(models.columns * share, rng) {
-        let (width_m, out_m) = (between(rng, 0.3, 0.55), between(rng, 0.15, 0.35));
+        let width_m = between(rng, 0.3, 0.55);
+        let out_m = between(rng, 0.15, 0.35);
         let Some((wall, along)) = space.find_on_wall(rng, width_m, out_m) else { continue };
+
         let [from, to] = match wall {
             Wall::South | Wall::North => [along - 0.5 * width_m, along + 0.5 * width_m],
             Wall::West => [low.x, low.x + out_m],
             Wall::East => [high.x - out_m, high.x],
         };
+
         let under_beam = beams.iter().any(|x| x - half_width_m < to && x + half_width_m > from);
         let under_lamp = lamps.iter().any(|l| l[0] - 0.5 * l[2] < to && l[0] + 0.5 * l[2] > from);
         let height_m = if under_beam { lowest - depth_m } else { lowest };
+
         if under_lamp && !wall.along_x() {
             continue;
         }
@@ -233,7 +247,7 @@ fn add_structure(room: &mut RoomPlan, space: &mut Space, models: &Models, rng: &
     }
 }
 
-/// The half of a square in which a chair turns.
+/// Half of the square in which a chair of usual size turns.
 const CHAIR_M: f32 = 0.42;
 
 struct Outfitter<'a> {
@@ -243,20 +257,25 @@ struct Outfitter<'a> {
 }
 
 impl Outfitter<'_> {
-    /// A piece where there is space for it, or nothing.
+    /// Places a piece where there is space for it. Returns no items if there is none.
     fn place(&self, piece: Piece, space: &mut Space, rng: &mut ChaCha8Rng) -> Vec<Item> {
-        let (models, style) = (self.models, self.style);
+        let models = self.models;
+        let style = self.style;
         let woods = if matches!(piece, Shelves) {
             &models.shelf_looks
         } else {
             &models.table_looks
         };
+
         let fabrics = if matches!(piece, Couch) {
             &models.couch_looks
         } else {
             &models.seat_looks
         };
-        let (wood, fabric) = (pick(rng, woods), pick(rng, fabrics));
+
+        let wood = pick(rng, woods);
+        let fabric = pick(rng, fabrics);
+
         match piece {
             Desk => {
                 let size = sized(&models.table_m, rng);
@@ -291,7 +310,8 @@ impl Outfitter<'_> {
                 found.map(&mut on).unwrap_or_default()
             }
             Couch => {
-                let (seats, has_arms) = (rng.random_range(2..=3), pick(rng, &models.couches));
+                let seats = rng.random_range(2..=3);
+                let has_arms = pick(rng, &models.couches);
                 let size_m = sized(&models.couch_m, rng);
                 let width = size_m[0] * seats as f32 + if has_arms { 0.28 } else { 0.0 };
                 let found = space.find_at_wall(rng, [width, size_m[1] + 0.03], false);
@@ -372,12 +392,14 @@ impl Outfitter<'_> {
         let screen = pick(rng, &[Pattern::Editor, Pattern::Chart]);
         let (chair, _) = self.models.seat(fabric, rng);
         let glaze = pick(rng, &self.style.glazes);
+
         let mut items = vec![
             f.put([0.0, -0.5 * depth, 0.0], 0.0, self.table([width, depth, top], wood, rng)),
             f.put([x, 0.15 - 0.5 * depth, top], between(rng, -8.0, 8.0), Thing::Monitor(screen)),
             f.put([x, 0.17 - depth, top], between(rng, -5.0, 5.0), Thing::Keyboard),
             f.put([x, -depth - 0.03 - CHAIR_M, 0.0], between(rng, 140.0, 220.0), chair),
         ];
+
         let on_left = between(rng, 90.0, 270.0);
         for (thing, at, chance) in [
             (Thing::Mug(glaze), [0.15 - 0.5 * width, 0.25 - depth, top], 0.7),
@@ -401,23 +423,28 @@ impl Outfitter<'_> {
         items
     }
 
-    /// As many tables in a row as fit, chairs of one model around them.
+    /// Places as many tables in a row as fit, with chairs of one model around them.
     fn meeting(&self, space: &mut Space, [wood, fabric]: [Look; 2], rng: &mut ChaCha8Rng) -> Vec<Item> {
         let [width, depth, height] = sized(&self.models.table_m, rng);
         let depth = depth.max(0.8) * 1.2;
         let table = self.table([width, depth, height], wood, rng);
+
         let length = |tables: u32| tables as f32 * (width + 0.02) - 0.02;
+
         let found = [4, 3, 2, 1].into_iter().find_map(|tables| {
             let size = [length(tables) + 4.0 * CHAIR_M + 0.1, depth + 4.0 * CHAIR_M + 0.1];
             space.find(rng, size).map(|frame| (frame, tables))
         });
         let Some((f, tables)) = found else { return Vec::new() };
-        let (half, mut items) = (0.5 * length(tables), Vec::new());
+
+        let half = 0.5 * length(tables);
+        let mut items = Vec::new();
         for k in 0..tables {
             let x = (width + 0.02) * (k as f32 + 0.5) - 0.01 - half;
             items.push(f.put([x, 0.0, 0.0], 0.0, table));
         }
         let (chair, _) = self.models.seat(fabric, rng);
+
         let seats = (2.0 * half / (2.0 * CHAIR_M)).floor() as u32;
         let glaze = pick(rng, &self.style.glazes);
         for seat in 0..seats {
@@ -429,6 +456,7 @@ impl Outfitter<'_> {
                 items.extend(at_a_seat(&f, at, yaw, rng.random_range(0..6), glaze, rng));
             }
         }
+
         for (side, yaw) in [(-1.0, 90.0), (1.0, -90.0)] {
             if rng.random_bool(0.5) {
                 let turn = yaw + wobble(rng);
@@ -459,11 +487,12 @@ impl Outfitter<'_> {
         items
     }
 
-    /// Rows of chairs that look to the north, with an aisle in the middle.
+    /// Places rows of chairs that look to the north, with an aisle in the middle.
     fn rows(&self, space: &mut Space, fabric: Look, rng: &mut ChaCha8Rng) -> Vec<Item> {
         let [low, high] = self.room;
         let (chair, width) = self.models.seat(fabric, rng);
-        let (pitch, aisle) = (width + 0.06, 0.5 * (low.x + high.x));
+        let pitch = width + 0.06;
+        let aisle = 0.5 * (low.x + high.x);
         let mut items = Vec::new();
         let mut y = low.y + 1.0;
         while y < high.y - 2.5 {

@@ -6,7 +6,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use s3d_geom::glam::{Vec2, Vec3, vec2};
 
-/// Between two things, and between a thing and a wall.
+/// The gap between two things, and between a thing and a wall, metres.
 const GAP_M: f32 = 0.04;
 /// How often a place is drawn before a thing is left out.
 const TRIES: u32 = 60;
@@ -14,16 +14,17 @@ const TRIES: u32 = 60;
 /// A rectangle of the plan.
 type Rect = [Vec2; 2];
 
-/// What is taken of a room.
+/// The places of a room that are taken.
 pub(super) struct Space {
     low: Vec2,
     high: Vec2,
     taken: Vec<Rect>,
-    /// From where to where each wall is taken at the height of the eyes.
+    /// The stretches of each wall that are taken at eye level.
     walls: [Vec<[f32; 2]>; 4],
 }
 
-/// Where a group of things stands: its back at the origin, or for one in the middle of the room its middle.
+/// The place of a group of things. The origin is at the group's back, or at its middle if it stands away from
+/// walls.
 pub(super) struct Frame {
     origin: Vec2,
     yaw_deg: f32,
@@ -52,9 +53,10 @@ fn has_open_leaf(filling: Filling) -> bool {
 }
 
 impl Space {
-    /// A room without furniture: what windows and the leaves of doors need is taken.
+    /// The space of a room without furniture. Windows and the leaves of doors have taken their places.
     pub(super) fn new(room: &RoomPlan) -> Self {
-        let (low, high) = (room.low, room.high);
+        let low = room.low;
+        let high = room.high;
         let mut space = Self { low, high, taken: Vec::new(), walls: Default::default() };
         for opening in &room.openings {
             let [from, to] = opening.span;
@@ -69,8 +71,8 @@ impl Space {
         space
     }
 
-    /// Takes what is before doorways without a leaf in this room: a scanner may stand there, furniture may
-    /// not.
+    /// Takes the places in front of doorways without a leaf in this room. A scanner may stand there,
+    /// furniture may not.
     pub(super) fn keep_ways_free(&mut self, room: &RoomPlan) {
         for opening in &room.openings {
             if !opening.filling.is_window() && !has_open_leaf(opening.filling) {
@@ -83,7 +85,8 @@ impl Space {
 
     /// The rectangle along a wall between two distances from it.
     fn at_wall(&self, wall: Wall, [from, to]: [f32; 2], [near, far]: [f32; 2]) -> Rect {
-        let (low, high) = (self.low, self.high);
+        let low = self.low;
+        let high = self.high;
         match wall {
             Wall::South => [vec2(from, low.y + near), vec2(to, low.y + far)],
             Wall::North => [vec2(from, high.y - far), vec2(to, high.y - near)],
@@ -127,8 +130,8 @@ impl Space {
         true
     }
 
-    /// A place for a group with its back to any wall: `size` along the wall and away from it. `tall` ones,
-    /// which reach the sill of a window, do not stand before windows or what hangs.
+    /// Finds a place for a group with its back to any wall: `size` along the wall and away from it. A `tall`
+    /// group, which reaches the sill of a window, does not stand in front of windows or hanging things.
     pub(super) fn find_at_wall(&mut self, rng: &mut ChaCha8Rng, size: [f32; 2], tall: bool) -> Option<Frame> {
         (0..TRIES).find_map(|_| {
             let (wall, along) = self.draw_on_wall(rng, size[0])?;
@@ -149,8 +152,8 @@ impl Space {
         })
     }
 
-    /// A place to hang something `width` wide, up to 20 cm deep where `depth` says so: the wall, and where
-    /// along it.
+    /// Finds a place to hang something `width` wide. The floor below is taken too if `depth` is not 0.
+    /// Returns the wall and the place along it.
     pub(super) fn find_on_wall(
         &mut self,
         rng: &mut ChaCha8Rng,
@@ -171,7 +174,7 @@ impl Space {
         })
     }
 
-    /// A wall that is long enough, and a place along it.
+    /// Draws a wall and a place along it. Returns `None` if the wall is too short.
     fn draw_on_wall(&self, rng: &mut ChaCha8Rng, width: f32) -> Option<(Wall, f32)> {
         let wall = Wall::ALL[rng.random_range(0..4)];
         let [start, end] = self.ends(wall);
@@ -180,7 +183,7 @@ impl Space {
         (from <= to).then_some((wall, along))
     }
 
-    /// A place for a group anywhere: `size` in its own frame, turned by a right angle or not.
+    /// Finds a place for a group anywhere: `size` in the group's frame, which may be turned by a right angle.
     pub(super) fn find(&mut self, rng: &mut ChaCha8Rng, size: [f32; 2]) -> Option<Frame> {
         (0..TRIES).find_map(|_| {
             let turned = rng.random_bool(0.5);
@@ -201,14 +204,15 @@ impl Space {
         })
     }
 
-    /// A place at a wall that stays free for a scanner, `half` to each side.
+    /// Finds a place at a wall that stays free for a scanner, `half` to each side.
     pub(super) fn find_stand_at_wall(&mut self, rng: &mut ChaCha8Rng, half: f32) -> Option<Vec2> {
         let frame = self.find_at_wall(rng, [2.0 * half; 2], false)?;
-        // Back goes to the wall: away from it is the frame's −y.
+        // The back is at the wall, so −y of the frame leads away from it.
         Some(frame.origin + Vec2::from_angle(frame.yaw_deg.to_radians()).perp() * -half)
     }
 
-    /// A place that stays free for a scanner, `half` to each side: drawn, or else the first of a fine grid.
+    /// Finds a place that stays free for a scanner, `half` to each side: a drawn one, or else the first free
+    /// one of a fine grid.
     pub(super) fn find_stand(&mut self, rng: &mut ChaCha8Rng, half: f32) -> Option<Vec2> {
         let stand = self.find(rng, [2.0 * half; 2]).map(|frame| frame.origin);
         stand.or_else(|| {

@@ -1,15 +1,14 @@
-//! What the rooms of a building are made of.
+//! The finishes and materials of a building.
 
 use crate::BuildingError;
 use crate::look::*;
 
-/// What is chosen from for each room and thing. Its `Default` is what the demo is made of; no list may be
-/// empty.
+/// The finishes and materials to choose from. The `Default` is the style of the demo. No list may be empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
     /// Colours of walls: red, green and blue, 0 to 255.
     pub walls: Vec<[f32; 3]>,
-    /// Colours of the one wall that is painted otherwise.
+    /// Colours of the one wall with a paint of its own.
     pub accents: Vec<[f32; 3]>,
     /// Colours of skirtings.
     pub skirtings: Vec<[f32; 3]>,
@@ -17,17 +16,17 @@ pub struct Style {
     pub floors: Vec<FloorFinish>,
     /// Ceilings.
     pub ceilings: Vec<CeilingFinish>,
-    /// What seats are covered with.
+    /// Fabrics of seats.
     pub fabrics: Vec<Look>,
-    /// What tables and bookcases are made of.
+    /// Materials of tables and bookcases.
     pub woods: Vec<Look>,
-    /// What pots, mugs and bins are made of.
+    /// Materials of pots, mugs and bins.
     pub glazes: Vec<Look>,
-    /// What frames are made of.
+    /// Materials of frames.
     pub frames: Vec<Look>,
-    /// What hangs on walls as pictures.
+    /// Pictures on walls.
     pub pictures: Vec<Pattern>,
-    /// What is on boards.
+    /// Pictures on boards.
     pub boards: Vec<Pattern>,
 }
 

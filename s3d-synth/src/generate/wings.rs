@@ -3,31 +3,32 @@
 
 use super::arrange::{Site, shell};
 use super::{BuildingOptions, FloorPlan, Models, RoomOptions, between, pick};
+use crate::building::check::most_panes;
 use crate::building::{Filling, Opening, Wall};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use s3d_geom::glam::vec2;
 use s3d_label::RoomType;
 
-/// How far a doorway keeps from the next wall: its leaf finds room there.
+/// The distance of a doorway from the next wall, which leaves room for its leaf.
 const BESIDE_DOOR_M: f32 = 0.45;
 /// The shortest piece of a hallway.
 const SHORTEST_M: f32 = 2.5;
 
-/// A wing: which rooms lie to its south and north, and from where to where along x.
+/// A wing: the rooms to its south and to its north, with their stretches along x.
 #[derive(Default)]
 struct Wing {
     rows: [Vec<(usize, [f32; 2])>; 2],
     ends: [f32; 2],
 }
 
-/// The walls of a doorway: what is in it on either side.
+/// A doorway, with its filling on either side.
 struct Doorway {
     span: [f32; 2],
     sides: [Filling; 2],
 }
 
-/// To the millimetre: what should be at one place then is, to the last bit.
+/// Rounds to the millimetre. Things that should be at one place then are, to the last bit.
 fn snapped(m: f32) -> f32 {
     (m * 1000.0).round() / 1000.0
 }
@@ -44,35 +45,44 @@ pub(super) fn arrange_wings(
     rng: &mut ChaCha8Rng,
     sites: &mut Vec<Site>,
 ) {
-    // Both were checked.
+    // The options were checked for both.
     let (FloorPlan::Wings { wings, hallways, courtyard_m }, Some(models)) = (options.plan, &options.models)
     else {
         return;
     };
+
     let planner = Planner { options, models, rooms };
     let wall_m = options.wall_m;
+    // A wall that divides the cross hallway stands in it.
+    let courtyard_m = courtyard_m.max(wall_m);
+
     let has_cross = wings > 1;
     let start = if has_cross {
         options.hallway_width_m + wall_m
     } else {
         0.0
     };
+
     let wings = planner.deal(wings, start);
-    // The hallways that are not the cross hallway's, as many as possible in each wing.
+    // The hallways left for the wings, dealt evenly.
     let left = hallways as usize - if has_cross { wings.len() } else { 0 };
     let pieces = |wing: usize| left / wings.len() + usize::from(wing < left % wings.len());
+
     let first = sites.len();
     let mut hallway_sites = Vec::new();
     let mut cross = Vec::new();
     let mut y = 0.0;
+
     for (index, wing) in wings.iter().enumerate() {
         let deepest = |row: usize| {
             let depths = wing.rows[row].iter().map(|(room, _)| rooms[*room].size_m[1] + wall_m);
             depths.fold(0f32, f32::max)
         };
+
         let south = y + deepest(0);
         let north = south + options.hallway_width_m;
         let top = north + deepest(1);
+
         let entry = planner.wing(
             wing,
             [start, south, north],
@@ -84,6 +94,7 @@ pub(super) fn arrange_wings(
         cross.push(([y, top], entry));
         y = top + courtyard_m;
     }
+
     // The rooms in the order in which they were asked for: they are numbered so.
     sites[first..].sort_by_key(|site| site.index);
     if has_cross {
@@ -110,13 +121,15 @@ impl Planner<'_> {
         all
     }
 
-    /// A doorway between two places at least, and its door: the leaf on the first side.
+    /// Draws a doorway within a stretch of wall, and its door. The leaf is on the first side.
     fn doorway(&self, [from, to]: [f32; 2], rng: &mut ChaCha8Rng) -> Doorway {
         let models = self.models;
         let at = between(rng, from, (to - models.door_m[0]).max(from));
         let shut = rng.random_bool(models.shut);
-        let (model, look) = (pick(rng, &models.leaves), pick(rng, &models.leaf_looks));
-        let (depth_m, hinge_left) = (0.5 * self.options.wall_m, rng.random());
+        let model = pick(rng, &models.leaves);
+        let look = pick(rng, &models.leaf_looks);
+        let depth_m = 0.5 * self.options.wall_m;
+        let hinge_left = rng.random();
         let angle = between(rng, 60.0, 107.0);
         let leaf = |open_deg| Filling::Leaf { model, look, depth_m, hinge_left, open_deg };
         let sides = if shut {
@@ -137,8 +150,11 @@ impl Planner<'_> {
     }
 
     fn window(&self, wall: Wall, middle: f32, width: f32, rng: &mut ChaCha8Rng) -> Opening {
-        let filling = Filling::Glazing { panes: pick(rng, &self.models.panes), depth_m: 0.12 };
         let span = [middle - 0.5 * width, middle + 0.5 * width].map(snapped);
+        let size = [span[1] - span[0], self.models.window_m[1] - self.models.window_m[0]];
+        let [across, up] = pick(rng, &self.models.panes);
+        let panes = [across.min(most_panes(size[0])), up.min(most_panes(size[1]))];
+        let filling = Filling::Glazing { panes, depth_m: 0.12 };
         Opening { wall, span, heights: self.models.window_m, filling }
     }
 
@@ -155,6 +171,7 @@ impl Planner<'_> {
         let wall_m = self.options.wall_m;
         let end = (wing.ends[0].max(wing.ends[1]) - wall_m).max(start + SHORTEST_M);
         let cuts = self.cuts(wing, [start, end], pieces);
+
         let mut doors: Vec<Opening> = Vec::new();
         for (row, (inner, outer)) in [(Wall::North, Wall::South), (Wall::South, Wall::North)]
             .into_iter()
@@ -167,6 +184,7 @@ impl Planner<'_> {
                 } else {
                     (north + wall_m, north + wall_m + room.size_m[1])
                 };
+
                 let door = self.doorway(self.free_for_door(span, &cuts), rng);
                 let mut openings = vec![self.opening(inner, &door, 0)];
                 let slot = (span[1] - span[0] - 0.8) / room.windows.max(1) as f32;
@@ -174,6 +192,7 @@ impl Planner<'_> {
                     let middle = span[0] + 0.4 + slot * (k as f32 + 0.5);
                     openings.push(self.window(outer, middle, (slot - 0.5).min(2.0), rng));
                 }
+
                 // The hallway's wall is opposite to the room's.
                 doors.push(self.opening(outer, &door, 1));
                 let corners = [[span[0], y0], [span[1], y1]].map(|[x, y]| vec2(snapped(x), snapped(y)));
@@ -182,16 +201,19 @@ impl Planner<'_> {
                 sites.push(Site { plan, index, furnishing: room.furnishing, locations: room.locations });
             }
         }
+
         let middle = 0.5 * (south + north);
         let half = 0.5 * self.models.door_m[0];
         let across = [middle - half, middle + half];
         let entry = has_cross.then(|| self.doorway(across, rng));
         let mut west = entry.as_ref().map(|door| self.opening(Wall::West, door, 1));
+
         let mut from = start;
         let ends: Vec<f32> = cuts.iter().copied().chain([end + 0.5 * wall_m]).collect();
         for (k, cut) in ends.iter().enumerate() {
             let to = cut - 0.5 * wall_m;
             let inside = |o: &&Opening| o.span[0] >= from && o.span[1] <= to;
+
             let mut openings: Vec<Opening> = doors.iter().filter(inside).copied().collect();
             openings.extend(west.take());
             if k + 1 < ends.len() {
@@ -201,6 +223,7 @@ impl Planner<'_> {
             } else {
                 openings.push(self.end(Wall::East, middle, rng));
             }
+
             hallways.push(self.hallway([[from, south], [to, north]], openings, rng));
             from = cut + 0.5 * wall_m;
         }
@@ -231,7 +254,8 @@ impl Planner<'_> {
         Site { plan, index: usize::MAX, furnishing: 1.0, locations: (length / 6.0).ceil() as u32 }
     }
 
-    /// The hallway that joins the wings: a piece for each, which a wall in the middle of the courtyard ends.
+    /// Adds the hallway that joins the wings. Each wing has a piece, which ends at a wall in the middle of
+    /// the courtyard.
     fn cross(
         &self,
         wings: &[([f32; 2], Option<Doorway>)],
@@ -239,24 +263,30 @@ impl Planner<'_> {
         hallways: &mut Vec<Site>,
         rng: &mut ChaCha8Rng,
     ) {
-        let (width, wall_m) = (self.options.hallway_width_m, self.options.wall_m);
+        let width = self.options.hallway_width_m;
+        let wall_m = self.options.wall_m;
         let half = 0.5 * self.models.door_m[0];
         let across = [0.5 * width - half, 0.5 * width + half];
+
         let mut from = wings.first().map_or(0.0, |(span, _)| span[0]);
         let mut before = None;
+
         for (k, ([_, top], entry)) in wings.iter().enumerate() {
             let mut openings: Vec<Opening> =
                 entry.iter().map(|door| self.opening(Wall::East, door, 0)).collect();
+
             let is_last = k + 1 == wings.len();
             let to = if is_last {
                 *top
             } else {
                 top + 0.5 * (courtyard_m - wall_m)
             };
+
             openings.push(match before.take() {
                 Some(door) => self.opening(Wall::South, &door, 1),
                 None => self.end(Wall::South, 0.5 * width, rng),
             });
+
             if is_last {
                 openings.push(self.end(Wall::North, 0.5 * width, rng));
             } else {
@@ -264,30 +294,39 @@ impl Planner<'_> {
                 openings.push(self.opening(Wall::North, &door, 0));
                 before = Some(door);
             }
+
             hallways.push(self.hallway([[0.0, from], [width, to]], openings, rng));
             from = to + wall_m;
         }
     }
 
-    /// Where walls divide the hallway of a wing: their middles. Each is beside the edge of a room, and leaves
-    /// every room a place for its door.
+    /// Returns the middles of the walls that divide the hallway of a wing. Each is at the edge of a room.
+    /// Together they leave every room a place for its door.
     fn cuts(&self, wing: &Wing, [start, end]: [f32; 2], pieces: usize) -> Vec<f32> {
         let rooms = || wing.rows.iter().flatten().map(|(_, span)| *span);
-        let has_place = |cut: f32| {
+        let have_place = |cuts: &[f32]| {
             rooms().all(|span| {
-                let [from, to] = self.free_for_door(span, &[cut]);
+                let [from, to] = self.free_for_door(span, cuts);
                 to - from >= self.models.door_m[0]
             })
         };
+
         let places: Vec<f32> = rooms()
             .map(|[_, to]| to + 0.5 * self.options.wall_m)
-            .filter(|&cut| has_place(cut))
+            .filter(|&cut| have_place(&[cut]))
             .collect();
+
         let mut cuts: Vec<f32> = Vec::new();
         for k in 1..pieces {
             let wanted = start + (end - start) * k as f32 / pieces as f32;
             let least = cuts.last().map_or(start, |cut| *cut) + SHORTEST_M + self.options.wall_m;
-            let fits = |cut: &&f32| **cut >= least && **cut <= end - SHORTEST_M - self.options.wall_m;
+
+            let fits = |cut: &&f32| {
+                **cut >= least
+                    && **cut <= end - SHORTEST_M - self.options.wall_m
+                    && have_place(&[cuts.as_slice(), &[**cut]].concat())
+            };
+
             let nearest = places
                 .iter()
                 .filter(fits)

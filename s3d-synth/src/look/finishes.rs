@@ -1,4 +1,4 @@
-//! What covers walls, floors and ceilings: a colour for each place, in metres.
+//! The finishes of walls, floors and ceilings: a colour for each place in metres.
 
 use super::noise::{fractal, hash, mix, tint, value};
 use super::textures::Wood;
@@ -53,8 +53,10 @@ impl FloorFinish {
     pub(crate) fn at(self, x: f32, y: f32) -> Color {
         match self {
             FloorFinish::CarpetTiles(color) => {
-                let (i, j) = ((x * 2.0).floor(), (y * 2.0).floor());
-                let (fx, fy) = (x * 2.0 - i, y * 2.0 - j);
+                let i = (x * 2.0).floor();
+                let j = (y * 2.0).floor();
+                let fx = x * 2.0 - i;
+                let fy = y * 2.0 - j;
                 let along = (i as i64 + j as i64) % 2 == 0;
                 let ribs = value(
                     if along { x * 90.0 } else { x * 9.0 },
@@ -69,7 +71,8 @@ impl FloorFinish {
             FloorFinish::PlanksAlongX(wood) => planks(&wood, x, y),
             FloorFinish::PlanksAlongY(wood) => planks(&wood, y, x),
             FloorFinish::Terrazzo => {
-                let (i, j) = ((x / 0.45).floor(), (y / 0.45).floor());
+                let i = (x / 0.45).floor();
+                let j = (y / 0.45).floor();
                 let edge = (x / 0.45 - i).min(y / 0.45 - j);
                 let chip = value(x * 45.0, y * 45.0, 4096, 85);
                 let base = if hash(i as u32, j as u32, 86) > 0.88 {
@@ -102,7 +105,8 @@ fn planks(wood: &Wood, along: f32, across: f32) -> Color {
     let row = (across / 0.14).floor();
     let shift = 1.6 * hash(row as u32, 0, 88);
     let piece = ((along + shift) / 1.6).floor();
-    let (fa, fc) = ((along + shift) / 1.6 - piece, across / 0.14 - row);
+    let fa = (along + shift) / 1.6 - piece;
+    let fc = across / 0.14 - row;
     let seam = if fc < 0.05 || fa < 0.006 { -34.0 } else { 0.0 };
     let own = hash(row as u32, piece as u32, 89);
     tint(wood.at(along + 7.0 * own, across + 0.37 * row, 91), seam + 34.0 * (own - 0.5))
@@ -125,9 +129,11 @@ impl CeilingFinish {
     pub(crate) fn at(self, x: f32, y: f32) -> Color {
         match self {
             CeilingFinish::Tiles => {
-                let (i, j) = ((x / 0.6).floor(), (y / 0.6).floor());
+                let i = (x / 0.6).floor();
+                let j = (y / 0.6).floor();
                 let edge = {
-                    let (fx, fy) = (x / 0.6 - i, y / 0.6 - j);
+                    let fx = x / 0.6 - i;
+                    let fy = y / 0.6 - j;
                     fx.min(1.0 - fx).min(fy).min(1.0 - fy) * 0.6
                 };
                 let pore = if hash_at(x, y, 64.0) > 0.9 { -34.0 } else { 0.0 };

@@ -1,4 +1,4 @@
-//! What surfaces are made of.
+//! The materials of surfaces.
 
 use super::textures::Pattern;
 use s3d_geom::{
@@ -29,7 +29,7 @@ pub const WHITE: Look = Look::Plain("white_lacquer", [246, 245, 240]);
 pub const LEAF: Look = Look::Plain("leaf", [74, 122, 58]);
 /// The soil in pots.
 pub const SOIL: Look = Look::Plain("soil", [74, 54, 42]);
-/// What is in mugs.
+/// The coffee in mugs.
 pub const COFFEE: Look = Look::Plain("coffee", [70, 44, 30]);
 /// Fired clay.
 pub const CLAY: Look = Look::Plain("clay", [190, 104, 70]);
@@ -71,7 +71,7 @@ impl Look {
         }
     }
 
-    /// Its colour where it has no pattern.
+    /// Its colour, white if it has a pattern.
     pub(crate) fn color(self) -> [u8; 3] {
         match self {
             Look::Plain(_, color) | Look::Glow(_, color) => color,
@@ -120,7 +120,8 @@ impl Look {
         }
     }
 
-    /// The step of brightness nearest to `lit`; textures come in few steps, as each is an image of its own.
+    /// The step of brightness nearest to `lit`. Textures have few steps, because each step is an image of its
+    /// own.
     pub(crate) fn level(self, lit: f32) -> u32 {
         match self {
             Look::Glow(..) => self.steps(),

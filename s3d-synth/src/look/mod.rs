@@ -1,7 +1,7 @@
-//! How surfaces look: what covers walls, floors and ceilings, what furniture is made of, and the images on
+//! The looks of surfaces: finishes of walls, floors and ceilings, materials of furniture, and the images on
 //! it.
 //!
-//! All images are computed, so that a scene needs no files, and are the same on every platform.
+//! All images are computed, so that a scene needs no files. They are the same on every platform.
 
 mod finishes;
 mod materials;

@@ -11,10 +11,15 @@ pub(crate) fn hash(x: u32, y: u32, seed: u32) -> f32 {
 
 /// Smooth noise in [0, 1): lattice values blended; repeats every `period` cells in x and y.
 pub(crate) fn value(x: f32, y: f32, period: u32, seed: u32) -> f32 {
-    let (xf, yf) = (x.floor(), y.floor());
+    let xf = x.floor();
+    let yf = y.floor();
     let wrap = |v: f32| (v as i64).rem_euclid(i64::from(period)) as u32;
-    let (x0, x1, y0, y1) = (wrap(xf), wrap(xf + 1.0), wrap(yf), wrap(yf + 1.0));
-    let (fx, fy) = (smooth(x - xf), smooth(y - yf));
+    let x0 = wrap(xf);
+    let x1 = wrap(xf + 1.0);
+    let y0 = wrap(yf);
+    let y1 = wrap(yf + 1.0);
+    let fx = smooth(x - xf);
+    let fy = smooth(y - yf);
     let row = |y| hash(x0, y, seed) * (1.0 - fx) + hash(x1, y, seed) * fx;
     row(y0) * (1.0 - fy) + row(y1) * fy
 }
@@ -51,7 +56,8 @@ mod tests {
     #[test]
     fn noise_repeats_and_stays_in_range() {
         for i in 0..500 {
-            let (x, y) = (i as f32 * 0.37, i as f32 * 0.91);
+            let x = i as f32 * 0.37;
+            let y = i as f32 * 0.91;
             for f in [value, fractal] {
                 let v = f(x, y, 4, 3);
                 assert!((0.0..1.0).contains(&v));

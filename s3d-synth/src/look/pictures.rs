@@ -1,5 +1,5 @@
-//! What hangs on the walls and glows on the screens. Each picture reads only one way round, so that a
-//! mirrored or upside down texture shows at once.
+//! Pictures on walls and screens. Each can be read only one way round, so that a mirrored or upside-down
+//! texture shows at once.
 
 use super::noise::{fractal, hash, mix, smooth, tint};
 use super::textures::{image, to_bytes};
@@ -22,7 +22,7 @@ impl Canvas {
         Self { width, pixels: (0..width * height).map(at).collect() }
     }
 
-    /// Lays `color` over what is there, as much as `cover` says for each pixel.
+    /// Blends `color` over each pixel, by the share that `cover` gives.
     fn cover(&mut self, color: Color, cover: impl Fn(Vec2) -> f32) {
         for (i, pixel) in self.pixels.iter_mut().enumerate() {
             let at = vec2((i as u32 % self.width) as f32, (i as u32 / self.width) as f32);
@@ -101,7 +101,7 @@ const BLUE: Color = [36.0, 88.0, 190.0];
 const GREEN: Color = [38.0, 138.0, 72.0];
 
 fn board_white(x: f32, y: f32) -> Color {
-    // Traces of what was wiped away.
+    // Traces of wiped-away writing.
     tint([246.0, 248.0, 250.0], -10.0 * fractal(x / 90.0 + y / 150.0, y / 40.0, 64, 41))
 }
 
@@ -111,6 +111,7 @@ pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
     for (letter, x) in [(S, 40.0), (THREE, 100.0), (D, 158.0)] {
         c.line(letter, [x, 34.0], 76.0, 7.0, RED);
     }
+
     c.line(&[[36.0, 126.0], [208.0, 120.0]], [0.0, 0.0], 1.0, 4.0, RED);
     c.line(
         &[[230.0, 84.0], [300.0, 78.0], [282.0, 66.0], [300.0, 78.0], [284.0, 94.0]],
@@ -119,8 +120,10 @@ pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
         4.0,
         INK,
     );
+
     // The room in perspective, and rays into it.
-    let (near, far) = ([[330., 30.], [480., 24.], [484., 130.], [332., 134.], [330., 30.]], [366., 56.]);
+    let near = [[330., 30.], [480., 24.], [484., 130.], [332., 134.], [330., 30.]];
+    let far = [366., 56.];
     c.line(&near, [0.0; 2], 1.0, 3.0, BLUE);
     c.line(&[far, [444., 54.], [446., 106.], [366., 108.], far], [0.0; 2], 1.0, 3.0, BLUE);
     for (a, b) in [(near[0], far), (near[1], [444., 54.]), (near[2], [446., 106.]), (near[3], [366., 108.])] {
@@ -130,6 +133,7 @@ pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
     for end in [[436., 62.], [440., 96.], [378., 100.]] {
         c.line(&[[404.0, 84.0], end], [0.0; 2], 1.0, 2.0, RED);
     }
+
     // Handwriting: a dot and a wavering line an item.
     for (row, length) in [150.0, 118.0, 164.0, 92.0].into_iter().enumerate() {
         let y = 162.0 + 26.0 * row as f32;
@@ -139,6 +143,7 @@ pub(crate) fn whiteboard() -> Raster<[u8; 3]> {
             .collect();
         c.line(&wave, [0.0; 2], 1.0, 2.5, INK);
     }
+
     // A rising curve over its axes.
     c.line(&[[300., 160.], [300., 256.], [478., 256.]], [0.0; 2], 1.0, 3.0, INK);
     c.line(
@@ -198,6 +203,7 @@ pub(crate) fn cork() -> Raster<[u8; 3]> {
         let grain = 46.0 * (hash(x as u32 / 2, y as u32 / 2, 19) - 0.5);
         tint([188.0, 146.0, 98.0], grain + 24.0 * (fractal(x / 30.0, y / 30.0, 64, 20) - 0.5))
     });
+
     let sheets = [
         ([24., 22.], [74., 104.], [250.0, 249.0, 244.0]),
         ([122., 34.], [82., 60.], [250.0, 249.0, 244.0]),
@@ -208,9 +214,11 @@ pub(crate) fn cork() -> Raster<[u8; 3]> {
         ([36., 156.], [62., 62.], [168.0, 222.0, 172.0]),
         ([236., 134.], [66., 94.], [252.0, 250.0, 246.0]),
     ];
+
     for (k, ([x, y], [w, h], color)) in sheets.into_iter().enumerate() {
         c.rect([x + 3.0, y + 3.0], [x + w + 3.0, y + h + 3.0], [140.0, 104.0, 68.0]);
         c.rect([x, y], [x + w, y + h], color);
+
         // Ragged lines of text, flush left, under a short heading.
         c.rect([x + 8.0, y + 12.0], [x + 0.6 * w, y + 17.0], INK);
         for row in 0..((h - 34.0) / 8.0) as u32 {
@@ -220,6 +228,7 @@ pub(crate) fn cork() -> Raster<[u8; 3]> {
         }
         c.disc([x + 0.5 * w, y + 5.0], 4.0, if k % 2 == 0 { RED } else { BLUE });
     }
+
     c.finish()
 }
 
@@ -241,6 +250,7 @@ pub(crate) fn landscape() -> Raster<[u8; 3]> {
     image(384, 256, |x, y| {
         let sky = mix([120.0, 164.0, 212.0], [248.0, 214.0, 176.0], smooth(y / 130.0));
         let clouds = smooth((fractal(x / 90.0, y / 36.0, 64, 31) - 0.5) * 4.0);
+
         let mut color = mix(sky, [252.0, 244.0, 234.0], 0.7 * clouds * (1.0 - y / 160.0).max(0.0));
         for (k, (base, rise, tone)) in [
             (118.0, 78.0, [132.0, 146.0, 172.0]),
@@ -259,16 +269,18 @@ pub(crate) fn landscape() -> Raster<[u8; 3]> {
             };
             color = mix(color, tint(tone, rock + snow), smooth((y - ridge) / 2.0 + 0.5));
         }
+
         if y > 172.0 {
             let ripple = fractal(x / 60.0, y / 4.0, 64, 39);
             let water = mix([70.0, 104.0, 134.0], [206.0, 190.0, 170.0], smooth((ripple - 0.35) * 2.0));
             color = mix(water, [34.0, 52.0, 62.0], smooth((y - 190.0) / 90.0));
         }
+
         tint(color, 10.0 * (hash(x as u32, y as u32, 40) - 0.5))
     })
 }
 
-/// What is seen through a window: sky, clouds, and roofs that rise to the right.
+/// The view through a window: sky, clouds, and roofs that rise to the right.
 pub(crate) fn sky() -> Raster<[u8; 3]> {
     image(320, 256, |x, y| {
         let blue = mix([112.0, 168.0, 232.0], [206.0, 228.0, 248.0], smooth(y / 200.0));
@@ -352,10 +364,12 @@ mod tests {
                 .into_iter()
                 .chain([chalkboard([44.0, 88.0, 68.0])])
         {
-            let (w, h) = (picture.width(), picture.height());
+            let w = picture.width();
+            let h = picture.height();
             let differs = |other: &dyn Fn(u32, u32) -> (u32, u32)| {
                 let changed = |&(x, y): &(u32, u32)| {
-                    let (a, b) = (other(x, y), picture.at(x, y));
+                    let a = other(x, y);
+                    let b = picture.at(x, y);
                     picture.at(a.0, a.1).iter().zip(b).any(|(p, q)| p.abs_diff(q) > 24)
                 };
                 let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));

@@ -1,8 +1,9 @@
-//! The images on furniture, computed: patterns that repeat, and pictures (see `pictures`).
+//! The images on furniture: patterns that repeat, and pictures (see `pictures`).
 
 use super::noise::{fractal, hash, mix, smooth, tint, value};
 use super::pictures;
 use s3d_geom::Raster;
+use std::sync::OnceLock;
 
 /// An image that several surfaces may wear: a pattern that repeats, or a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,7 +29,7 @@ pub enum Pattern {
     Door,
     /// A rug with a border.
     Rug,
-    /// What one sees through a window.
+    /// The view through a window.
     Sky,
     /// A whiteboard that was written on.
     Whiteboard,
@@ -91,7 +92,14 @@ impl Pattern {
         }
     }
 
-    pub(crate) fn image(self) -> Raster<[u8; 3]> {
+    /// The image, drawn once in a process: drawing takes most of the time of a small building.
+    pub(crate) fn image(self) -> &'static Raster<[u8; 3]> {
+        static IMAGES: [OnceLock<Raster<[u8; 3]>>; Pattern::BlackBoard as usize + 1] =
+            [const { OnceLock::new() }; Pattern::BlackBoard as usize + 1];
+        IMAGES[self as usize].get_or_init(|| self.draw())
+    }
+
+    fn draw(self) -> Raster<[u8; 3]> {
         match self {
             Pattern::Oak => wood(&Wood::OAK),
             Pattern::Walnut => wood(&Wood::WALNUT),
@@ -140,12 +148,12 @@ pub(crate) fn scaled(image: &Raster<[u8; 3]>, factor: f32) -> Raster<[u8; 3]> {
     image.map(|pixel| to_bytes(pixel.map(|c| f32::from(c) * factor)))
 }
 
-/// The colours of a wood: between its rings, and of them.
+/// The colours of a wood.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wood {
     /// Between its rings: red, green and blue, 0 to 255.
     pub light: [f32; 3],
-    /// Of its rings.
+    /// On its rings: red, green and blue, 0 to 255.
     pub dark: [f32; 3],
 }
 
@@ -210,28 +218,34 @@ fn books() -> Raster<[u8; 3]> {
         [120.0, 140.0, 164.0],
         [236.0, 234.0, 228.0],
     ];
+
     let mut spines = Vec::new();
-    let (mut left, mut k) = (0, 0);
+    let mut left = 0;
+    let mut k = 0;
     while left < 512 {
         let width = 11 + (hash(k, 1, 77) * 16.0) as u32;
         let right = if 512 - left < width + 11 { 512 } else { left + width };
         spines.push((left, right, k));
         (left, k) = (right, k + 1);
     }
+
     image(512, 160, |x, y| {
         let book = spines.iter().find(|(_, right, _)| (x as u32) < *right);
         let &(left, right, k) = book.unwrap_or(&spines[0]);
         let across = (x - left as f32 + 0.5) / (right - left) as f32;
         let cover = COVERS[(hash(k, 2, 77) * 8.0) as usize];
+
         // Round backs are brighter in their middle, and a gap of shadow parts the books.
         let off = (2.0 * across - 1.0) * (2.0 * across - 1.0);
         let round = 1.0 - 0.5 * off * off;
+
         let band_top = 18.0 + 24.0 * hash(k, 3, 77);
         let in_band = y > band_top && y < band_top + 9.0;
         let in_title = y > band_top + 16.0
             && y < band_top + 16.0 + 60.0 * hash(k, 4, 77)
             && (across - 0.5).abs() < 0.16
             && hash(0, y as u32 / 4, k) > 0.25;
+
         let ink = if cover[0] > 190.0 {
             [70.0, 60.0, 60.0]
         } else {
@@ -291,7 +305,8 @@ mod tests {
     fn tiles_meet_at_their_edges() {
         for pattern in [Pattern::Oak, Pattern::Concrete, Pattern::BlueFabric] {
             let image = pattern.image();
-            let (w, h) = (image.width(), image.height());
+            let w = image.width();
+            let h = image.height();
             let step = |a: [u8; 3], b: [u8; 3]| i32::from(a[0].abs_diff(b[0]));
             let inner: i32 = (0..h).map(|y| step(image.at(w / 2 - 1, y), image.at(w / 2, y))).sum();
             let seam: i32 = (0..h).map(|y| step(image.at(w - 1, y), image.at(0, y))).sum();

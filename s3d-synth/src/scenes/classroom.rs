@@ -4,12 +4,12 @@ use super::checked;
 use s3d_geom::glam::{DVec3, Vec3, vec2, vec3};
 use s3d_geom::{Material, MeshParts, Raster, Texture, TriMesh};
 
-/// Where one stands in a [`classroom`].
+/// A place to stand in a [`classroom`].
 pub const CLASSROOM_LOCATION: DVec3 = DVec3::new(4.03, 3.07, 1.5);
 
 /// A furnished room of 8 × 6 × 3 m whose surfaces are noisy grids like a scan's, textured with a grain of 2
-/// cm. About `faces` faces, and more where cells are larger than parts of the furniture: 1.35 times as many
-/// of 20,000. Its texture repeats every 2 m and has 1024² texels. The same every time.
+/// cm. It has about `faces` faces, and more if cells are larger than parts of the furniture: 1.35 times as
+/// many for 20,000. Its texture repeats every 2 m and has 1024² texels. The room is the same every time.
 ///
 /// # Panics
 /// If `faces` is 0 or beyond 100 million.
@@ -17,8 +17,10 @@ pub fn classroom(faces: usize) -> TriMesh {
     // The surfaces below add up to 210 m²; two faces a cell.
     assert!((1..=100_000_000).contains(&faces), "a room of {faces} faces");
     let cell = (2.0 * 210.0 / faces as f32).sqrt();
+
     let mut b = Builder { cell, ..Builder::default() };
     b.inside_out(vec3(0.0, 0.0, 0.0), vec3(8.0, 6.0, 3.0));
+
     for k in 0..8 {
         let at = vec3(1.0 + (k % 4) as f32 * 1.7, if k < 4 { 1.2 } else { 4.4 }, 0.7);
         b.cuboid(at, at + vec3(1.4, 0.7, 0.04));
@@ -31,6 +33,7 @@ pub fn classroom(faces: usize) -> TriMesh {
         b.cuboid(seat, seat + vec3(0.45, 0.45, 0.06));
         b.cuboid(seat + vec3(0.0, 0.0, 0.06), seat + vec3(0.45, 0.05, 0.55));
     }
+
     for k in 0..5 {
         for shelf in 0..6 {
             let at = vec3(0.8 + k as f32 * 1.3, 5.6, 0.02 + shelf as f32 * 0.36);
@@ -54,9 +57,11 @@ impl Builder {
         );
         let normal = u.cross(v).normalize();
         let first = self.parts.positions.len() as u32;
+
         for j in 0..=nv {
             for i in 0..=nu {
-                let (s, t) = (i as f32 / nu as f32, j as f32 / nv as f32);
+                let s = i as f32 / nu as f32;
+                let t = j as f32 / nv as f32;
                 let p = origin + u * s + v * t;
                 let inner = i > 0 && j > 0 && i < nu && j < nv;
                 let noise = if inner {
@@ -68,17 +73,22 @@ impl Builder {
                 self.parts.uvs.push(vec2(s * u.length(), t * v.length()) * 0.5);
             }
         }
+
         for j in 0..nv {
             for i in 0..nu {
                 let a = first + j * (nu + 1) + i;
-                let (b, c, d) = (a + 1, a + nu + 2, a + nu + 1);
+                let b = a + 1;
+                let c = a + nu + 2;
+                let d = a + nu + 1;
                 self.parts.faces.extend([[a, b, c], [a, c, d]]);
             }
         }
     }
 
     fn cuboid(&mut self, min: Vec3, max: Vec3) {
-        let (x, y, z) = (Vec3::X * (max.x - min.x), Vec3::Y * (max.y - min.y), Vec3::Z * (max.z - min.z));
+        let x = Vec3::X * (max.x - min.x);
+        let y = Vec3::Y * (max.y - min.y);
+        let z = Vec3::Z * (max.z - min.z);
         for (origin, u, v) in
             [(min, y, x), (min, x, z), (min, z, y), (min + z, x, y), (min + y, z, x), (min + x, y, z)]
         {
@@ -87,7 +97,9 @@ impl Builder {
     }
 
     fn inside_out(&mut self, min: Vec3, max: Vec3) {
-        let (x, y, z) = (Vec3::X * (max.x - min.x), Vec3::Y * (max.y - min.y), Vec3::Z * (max.z - min.z));
+        let x = Vec3::X * (max.x - min.x);
+        let y = Vec3::Y * (max.y - min.y);
+        let z = Vec3::Z * (max.z - min.z);
         for (origin, u, v) in
             [(min, x, y), (min, z, x), (min, y, z), (min + z, y, x), (min + y, x, z), (min + x, z, y)]
         {
@@ -101,7 +113,8 @@ impl Builder {
         parts.face_materials = vec![0; parts.faces.len()];
         let image = (0..1024u32 * 1024)
             .map(|k| {
-                let (x, y) = (k % 1024, k / 1024);
+                let x = k % 1024;
+                let y = k / 1024;
                 let grain = (noise(vec3(x as f32, y as f32, 0.5)) * 20.0) as i32;
                 let tile = if (x / 64 + y / 64) % 2 == 0 { 150 } else { 90 };
                 [(tile + grain) as u8, (tile + grain / 2) as u8, (200 - tile + grain) as u8]

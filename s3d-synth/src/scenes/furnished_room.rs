@@ -10,21 +10,24 @@ use s3d_geom::primitives::{cuboid, cylinder};
 use s3d_geom::{Material, MeshParts, TriMesh};
 
 /// A closed, textured room with furniture in its corners, from the origin to between (4.5, 4, 2.6) and (6,
-/// 5.5, 3) metres; its middle is free from floor to ceiling. Same `seed`, same room.
+/// 5.5, 3) metres; its middle is free from floor to ceiling. The same `seed` gives the same room.
 pub fn furnished_room(seed: u64) -> TriMesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let size = vec3(rng.random_range(4.5..6.0), rng.random_range(4.0..5.5), rng.random_range(2.6..3.0));
     let mut parts = shell(Vec3::ZERO, size, (size / 0.25).as_uvec3().to_array(), |_, _| true);
+
     for (material, name) in ["floor", "wall", "ceiling"].into_iter().enumerate() {
         parts.materials[material].texture = Some(parts.textures.len() as u32);
         parts.textures.push(speckled(&mut rng, name));
     }
+
     for corner in [vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(0.0, 1.0), vec2(1.0, 1.0)] {
         // The item's box, 5 to 20 cm off the walls.
         let extent = vec2(rng.random_range(0.8..1.3), rng.random_range(0.5..0.9));
         let gap = vec2(rng.random_range(0.05..0.2), rng.random_range(0.05..0.2));
         let low = gap + corner * (size.truncate() - extent - 2.0 * gap);
         let high = low + extent;
+
         let kind = rng.random_range(0..3);
         let mut item = match kind {
             0 => {
@@ -40,6 +43,7 @@ pub fn furnished_room(seed: u64) -> TriMesh {
             1 => cuboid(low.extend(0.005), high.extend(rng.random_range(0.8..1.9))),
             _ => cylinder(((low + high) * 0.5).extend(0.005), 0.5 * extent.y, rng.random_range(0.4..1.0), 24),
         };
+
         let name = ["table", "bookcase", "clutter"][kind];
         let color = std::array::from_fn(|_| rng.random_range(40..220));
         item.materials = vec![Material { name: name.into(), color, texture: (kind == 1).then_some(0) }];
@@ -47,6 +51,7 @@ pub fn furnished_room(seed: u64) -> TriMesh {
         item.face_materials = vec![0; item.faces.len()];
         parts.append(item);
     }
+
     checked(parts)
 }
 
@@ -66,7 +71,8 @@ mod tests {
             let is_textured = |f: &u32| matches!(m.color_of(*f), FaceColor::Texture(..));
             let textured = (0..m.faces().len() as u32).filter(is_textured).count();
             prop_assert!(textured * 2 > m.faces().len());
-            let (middle, height) = (m.aabb().center(), m.aabb().max.z);
+            let middle = m.aabb().center();
+            let height = m.aabb().max.z;
             for p in m.positions() {
                 // Whatever is near the middle's vertical belongs to floor or ceiling.
                 let near = p.truncate().distance(middle.truncate()) < 0.4;

@@ -18,15 +18,15 @@ const CEILING: usize = 1;
 const WALL: usize = 2;
 /// Labels of a room of the usual size.
 const LABELS_A_ROOM: usize = 50;
-/// How often a scanner comes by: in each sweep of a room every surface gets a share of its points.
+/// The number of sweeps of a room. Every surface gets a share of its points in each.
 const SWEEPS: u64 = 256;
 /// How far points lie off their surface, metres.
 const NOISE_M: f32 = 0.005;
 
-/// A scan of any size as files: to see what an export of it takes. A building of rooms with simple furniture,
-/// its annotated points, textures and scan locations; of several rooms the first is a hall with half of all
-/// surfaces, whose floor holds about a tenth of the points. Everything is streamed, so that a cloud larger
-/// than the memory can be made, and the same numbers give the same bytes.
+/// The files of a scan of any size, to see what an export of it takes: a building of rooms with simple
+/// furniture, annotated points, textures and scan locations. If there are several rooms, the first is a hall
+/// with half of all surfaces, and its floor holds about a tenth of the points. Everything is streamed, so
+/// that a cloud larger than the memory can be made. The same numbers give the same bytes.
 ///
 /// ```
 /// use s3d_synth::scenes::LargeScan;
@@ -41,23 +41,23 @@ const NOISE_M: f32 = 0.005;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LargeScan {
-    /// About so many faces has the mesh: 1 to 10⁹.
+    /// About the number of faces of the mesh: 1 to 10⁹.
     pub faces: u64,
-    /// So many materials, each with a texture: 1 to a million.
+    /// The number of materials, each with a texture: 1 to a million.
     pub materials: u64,
-    /// So many annotated things: 6 to a million. A room of the usual size has 50.
+    /// The number of annotated things: 6 to a million. A room of the usual size has 50.
     pub labels: usize,
-    /// So many points: up to 10¹².
+    /// The number of points: up to 10¹².
     pub points: u64,
-    /// So many scan locations.
+    /// The number of scan locations.
     pub cameras: usize,
     /// Width and height of a texture in pixels: 8 to 16,384.
     pub texture_px: u32,
-    /// In which form the points are written.
+    /// The file format of the points.
     pub format: PointFormat,
 }
 
-/// In which form the points of a [`LargeScan`] are written.
+/// The file format of the points of a [`LargeScan`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointFormat {
     /// One PLY file.
@@ -68,7 +68,7 @@ pub enum PointFormat {
     S3dis,
 }
 
-/// What a [`LargeScan`] came to.
+/// The outcome of [`LargeScan::write`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LargeScanSummary {
     /// The scene file.
@@ -102,7 +102,8 @@ impl LargeScan {
     /// which ties them together, into `folder`, which is made if it is not there.
     ///
     /// # Errors
-    /// [`ScanError::Range`] for a number that is out of its range, [`ScanError::File`].
+    /// [`ScanError::Range`] for a number that is out of its range, [`ScanError::File`] if a file cannot be
+    /// written.
     pub fn write(&self, folder: &Path) -> Result<LargeScanSummary, ScanError> {
         let range = |value: f64, min: f64, max: f64, what: &str| {
             RangeError::check(value, [min, max], || format!("the number of {what}"))
@@ -112,6 +113,7 @@ impl LargeScan {
         range(self.labels as f64, 6.0, 1e6, "labels")?;
         range(self.points as f64, 0.0, 1e12, "points")?;
         range(f64::from(self.texture_px), 8.0, 16_384.0, "pixels along a texture")?;
+
         create_dir(folder)?;
         let rooms = Rooms::new(self);
         let faces = rooms.write_mesh(self, folder)?;
@@ -119,9 +121,11 @@ impl LargeScan {
             PointFormat::S3dis => rooms.write_tree(self, folder)?,
             PointFormat::Ply | PointFormat::Npy => rooms.write_cloud(self, folder)?,
         }
+
         rooms.write_cameras(self, folder)?;
         let scene = folder.join("scene.toml");
         write_bytes(&scene, scene_file(self.format).as_bytes())?;
+
         Ok(LargeScanSummary {
             scene,
             faces,
@@ -156,7 +160,7 @@ struct Surface {
 /// An annotated thing.
 struct Thing {
     class: usize,
-    /// Among its room's of its class, from 1.
+    /// Counts the things of its class in its room, from 1.
     number: u32,
     /// Its surfaces.
     surfaces: std::ops::Range<usize>,
@@ -172,7 +176,7 @@ struct Rooms {
     rooms: Vec<RoomBox>,
     things: Vec<Thing>,
     surfaces: Vec<Surface>,
-    /// Of all surfaces before each, and of all: m².
+    /// The area of all surfaces before each one, and of all surfaces at the end, m².
     areas: Vec<f64>,
     area: f64,
 }
@@ -187,6 +191,7 @@ impl Rooms {
             areas: Vec::new(),
             area: 0.0,
         };
+
         let columns = (rooms as f64).sqrt().ceil() as usize;
         for room in 0..rooms {
             let is_hall = room == 0 && rooms > 1;
@@ -201,6 +206,7 @@ impl Rooms {
             let labels = options.labels * (room + 1) / rooms - options.labels * room / rooms;
             all.add_room(origin, size, labels);
         }
+
         for s in &all.surfaces {
             all.areas.push(all.area);
             all.area += f64::from(s.u.cross(s.v).length());
@@ -211,25 +217,33 @@ impl Rooms {
 
     fn add_room(&mut self, o: Vec3, size: Vec3, labels: usize) {
         let first = self.things.len();
-        let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
+        let x = Vec3::X * size.x;
+        let y = Vec3::Y * size.y;
+        let z = Vec3::Z * size.z;
+
         self.add(FLOOR, 1, &[(o, x, y)]);
         self.add(CEILING, 1, &[(o + z, y, x)]);
         for (number, (origin, u, v)) in (1..).zip([(o, z, x), (o + y, x, z), (o, y, z), (o + x, z, y)]) {
             self.add(WALL, number, &[(origin, u, v)]);
         }
+
         // Things stand on a grid, each in the middle of its cell.
         let things = labels.saturating_sub(6);
         let side = (things as f32).sqrt().ceil().max(1.0);
         for thing in 0..things {
-            let (i, j) = ((thing as f32 % side).floor(), (thing as f32 / side).floor());
+            let i = (thing as f32 % side).floor();
+            let j = (thing as f32 / side).floor();
             let cell = vec3(size.x / side, size.y / side, 0.0);
             let at = o + vec3((i + 0.25) * cell.x, (j + 0.25) * cell.y, 0.0);
-            let (u, v) = (Vec3::X * (cell.x / 2.0), Vec3::Y * (cell.y / 2.0));
+            let u = Vec3::X * (cell.x / 2.0);
+            let v = Vec3::Y * (cell.y / 2.0);
             let h = Vec3::Z * (0.4 + 0.8 * unit(hash(thing as u64)));
+
             let class = WALL + 1 + thing % 3;
             let sides = [(at + h, u, v), (at, u, h), (at + u, v, h), (at + u + v, -u, h), (at + v, -v, h)];
             self.add(class, thing as u32 / 3 + 1, &sides);
         }
+
         self.rooms
             .push(RoomBox { origin: o, size, things: first..self.things.len() });
     }
@@ -254,6 +268,7 @@ impl Rooms {
         let cut: Vec<[u64; 2]> = self.surfaces.iter().map(|s| self.squares(s, options.faces)).collect();
         let total: u64 = cut.iter().map(|[n, m]| n * m).sum();
         write_file(&folder.join("building.obj"), 1 << 20, |obj| self.write_obj(options, &cut, total, obj))?;
+
         let mut mtl = String::new();
         for m in 0..options.materials {
             let _ = writeln!(mtl, "newmtl m{m}\nKd 1 1 1\nmap_Kd m{m}.png");
@@ -263,6 +278,7 @@ impl Rooms {
                     hash((m << 32) | u64::from(at % px / 8) << 16 | u64::from(at / px / 8)).to_le_bytes();
                 [r, g, b]
             };
+
             let image = Raster::from_vec(px, px, (0..px * px).map(color).collect());
             write_bytes(
                 &folder.join(format!("m{m}.png")),
@@ -281,12 +297,18 @@ impl Rooms {
         obj: &mut impl Write,
     ) -> io::Result<()> {
         writeln!(obj, "mtllib building.mtl")?;
-        let (mut first, mut square, mut material) = (1, 0, u64::MAX);
+
+        let mut first = 1;
+        let mut square = 0;
+        let mut material = u64::MAX;
+
         for (surface, [n, m]) in self.surfaces.iter().zip(cut) {
             let normal = surface.u.cross(surface.v).normalize();
+
             for i in 0..=*n {
                 for j in 0..=*m {
-                    let (s, t) = (i as f32 / *n as f32, j as f32 / *m as f32);
+                    let s = i as f32 / *n as f32;
+                    let t = j as f32 / *m as f32;
                     // Inner corners lie off the plane, as in a scan.
                     let is_inner = i > 0 && i < *n && j > 0 && j < *m;
                     let off = if is_inner {
@@ -298,6 +320,7 @@ impl Rooms {
                     writeln!(obj, "v {:.4} {:.4} {:.4}\nvt {s:.5} {t:.5}", p.x, p.y, p.z)?;
                 }
             }
+
             for i in 0..*n {
                 for j in 0..*m {
                     let this = square * options.materials / total;
@@ -307,16 +330,19 @@ impl Rooms {
                     }
                     square += 1;
                     let a = first + i * (m + 1) + j;
-                    let (b, c, d) = (a + m + 1, a + m + 2, a + 1);
+                    let b = a + m + 1;
+                    let c = a + m + 2;
+                    let d = a + 1;
                     writeln!(obj, "f {a}/{a} {b}/{b} {c}/{c}\nf {a}/{a} {c}/{c} {d}/{d}")?;
                 }
             }
+
             first += (n + 1) * (m + 1);
         }
         Ok(())
     }
 
-    /// How many points come before a share of a surface.
+    /// The number of points before a share of a surface.
     fn points_before(&self, surface: usize, share: f64, points: u64) -> u64 {
         let area = self.areas[surface] + share * (self.areas[surface + 1] - self.areas[surface]);
         (points as f64 * (area / self.area)) as u64
@@ -325,7 +351,8 @@ impl Rooms {
     fn point(&self, surface: &Surface, number: u64) -> (Vec3, [u8; 3]) {
         let bits = hash(number);
         // Steps of the plastic number fill a square evenly.
-        let (s, t) = (fraction(number, 0xc13f_a9a9_02a6_328f), fraction(number, 0x91e1_0da5_c79e_7b1c));
+        let s = fraction(number, 0xc13f_a9a9_02a6_328f);
+        let t = fraction(number, 0x91e1_0da5_c79e_7b1c);
         let normal = surface.u.cross(surface.v).normalize();
         let position =
             surface.origin + surface.u * s + surface.v * t + normal * (NOISE_M * (2.0 * unit(bits) - 1.0));
@@ -339,6 +366,7 @@ impl Rooms {
             PointFormat::Npy => ("cloud.npy", npy_header(options.points)),
             _ => ("cloud.ply", ply_header(options.points)),
         };
+
         write_file(&folder.join(name), 1 << 20, |file| {
             file.write_all(&header)?;
             for (room, RoomBox { things, .. }) in self.rooms.iter().enumerate() {
@@ -395,7 +423,8 @@ impl Rooms {
         for i in 0..options.cameras {
             let room = &self.rooms[i % self.rooms.len()];
             let k = (i / self.rooms.len()) as u64 + 1;
-            let (s, t) = (fraction(k, 0xc13f_a9a9_02a6_328f), fraction(k, 0x91e1_0da5_c79e_7b1c));
+            let s = fraction(k, 0xc13f_a9a9_02a6_328f);
+            let t = fraction(k, 0x91e1_0da5_c79e_7b1c);
             let p = room.origin + vec3(0.1 + 0.8 * s, 0.1 + 0.8 * t, 0.0) * room.size + Vec3::Z * 1.6;
             let uuid = format!("{:016x}{:016x}", hash(i as u64), hash(!(i as u64)));
             let _ = writeln!(text, "{uuid},{:.4},{:.4},{:.4},0,0,0,1", p.x, p.y, p.z);

@@ -1,8 +1,8 @@
-//! Scenes of benches and tests: meshes of any size without an annotation, made in a moment, the same for the
-//! same numbers.
+//! Scenes for benches and tests: meshes of any size without an annotation. The same numbers give the same
+//! mesh.
 //!
 //! [`furnished_room`] is small and closed, [`classroom`] has a fine texture, [`scan_like`] is as untidy as a
-//! scan. Their first corner is the origin; metres, Z-up. `LargeScan` writes the files of a scan of any size.
+//! scan. All begin at the origin, in metres, Z-up. `LargeScan` writes the files of a scan of any size.
 //!
 //! ```
 //! use s3d_synth::scenes::{furnished_room, scan_like};

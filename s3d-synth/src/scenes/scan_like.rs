@@ -19,7 +19,7 @@ pub fn scan_like(faces: usize, seed: u64) -> TriMesh {
 /// A mesh of exactly `faces` or `faces` − 1 triangles that looks like a scan: rooms behind each other along
 /// +Y, joined by doorways, with furniture in them; jittered vertices, 4 % of faces split, half of them into
 /// slivers, and small holes. From (0, 0, 0) on, 6 m wide; a point 1.5 m above (3, 2.5) stands free in the
-/// first room. Same `seed`, same mesh.
+/// first room. The same `seed` gives the same mesh.
 ///
 /// # Panics
 /// If there is no room, or fewer than 600 faces a room or 2,000 in all.
@@ -28,7 +28,8 @@ pub fn scan_like_rooms(rooms: u32, faces: usize, seed: u64) -> TriMesh {
         rooms > 0 && faces >= 2000.max(600 * rooms as usize),
         "a scan of {faces} faces and {rooms} rooms"
     );
-    // As many faces as that on about 190 m² a room, then coarser until there is room for the splits.
+
+    // Cells for this many faces on about 190 m² a room, then larger ones until there is room for the splits.
     let mut cell = (2.0 * 190.0 * rooms as f32 / faces as f32).sqrt();
     let mut parts = loop {
         let parts = tidy_scan(rooms, cell, &mut ChaCha8Rng::seed_from_u64(seed));
@@ -43,19 +44,22 @@ pub fn scan_like_rooms(rooms: u32, faces: usize, seed: u64) -> TriMesh {
     for p in &mut parts.positions {
         *p += vec3(jitter(&mut rng, amplitude), jitter(&mut rng, amplitude), jitter(&mut rng, amplitude));
     }
-    // Neighbours in the list are neighbours on the surface, so a run of faces is a strip that the scanner
-    // missed.
+
+    // Neighbours in the list are neighbours on the surface, so a run of faces is a strip that a scanner would
+    // have missed.
     let mut missed = vec![false; parts.faces.len()];
     for _ in 0..faces / 2000 {
         let start = rng.random_range(0..parts.faces.len() - 8);
         missed[start..start + 8].fill(true);
     }
+
     for column in [&mut parts.faces, &mut parts.face_uvs] {
         let mut at = missed.iter();
         column.retain(|_| at.next() != Some(&true));
     }
     let mut at = missed.iter();
     parts.face_materials.retain(|_| at.next() != Some(&true));
+
     while parts.faces.len() + 2 <= faces {
         let face = rng.random_range(0..parts.faces.len());
         // Weights of the new vertex; one of nearly nothing makes a sliver along the edge opposite to that
@@ -66,6 +70,7 @@ pub fn scan_like_rooms(rooms: u32, faces: usize, seed: u64) -> TriMesh {
         }
         split(&mut parts, face, weights);
     }
+
     checked(parts)
 }
 
@@ -77,12 +82,14 @@ fn tidy_scan(rooms: u32, cell: f32, rng: &mut ChaCha8Rng) -> MeshParts {
     for room in 0..rooms {
         let low = vec3(0.0, y, 0.0);
         let size = vec3(6.0, rng.random_range(4.8..5.6), rng.random_range(2.6..3.0));
+
         // Doorways in the walls at small and large y.
         let open = [None, None, None, None, Some(room > 0), Some(room + 1 < rooms)];
         let walls = shell(low, low + size, cells(size), |side, center| {
             side < 2 || open[side] != Some(true) || (center.x - 3.0).abs() > 0.5 || center.z > 2.1
         });
         parts.append(walls);
+
         for _ in 0..8 {
             // Along the walls at small and large x, so that the way from door to door is free.
             let extent =
@@ -93,9 +100,11 @@ fn tidy_scan(rooms: u32, cell: f32, rng: &mut ChaCha8Rng) -> MeshParts {
             } else {
                 size.x - 0.05 - extent.x
             };
+
             let foot = low + vec3(across, along, 0.01);
             let mut item = shell(foot, foot + extent, cells(extent), |_, _| true);
             item.flip();
+
             if rng.random_bool(0.4) {
                 // Rounded off: the box blown to the ellipsoid that touches its sides.
                 let middle = foot + 0.5 * extent;
@@ -105,11 +114,14 @@ fn tidy_scan(rooms: u32, cell: f32, rng: &mut ChaCha8Rng) -> MeshParts {
             }
             parts.append(item);
         }
+
         y += size.y + 0.1;
     }
+
     // One set of materials for all.
     parts.face_materials.iter_mut().for_each(|m| *m %= 3);
     parts.materials.truncate(3);
+
     for material in &mut parts.materials {
         material.texture = Some(parts.textures.len() as u32);
         parts.textures.push(speckled(rng, &material.name));

@@ -1,4 +1,4 @@
-//! What the scenes are made of: boxes of cells, and textures of blocks.
+//! The parts of the scenes: boxes of cells, and textures of blocks.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -6,16 +6,17 @@ use s3d_geom::glam::{Vec3, vec2};
 use s3d_geom::{Material, MeshParts, NO_INDEX, Raster, Texture, Wrap};
 
 /// The surface of the box between two corners, its front inside, in `cells` quads along x, y and z. Vertices
-/// are shared, also along the edges. Only the cells that `keep` wants by side (floor, ceiling, smallest x,
-/// largest x, smallest y, largest y) and middle. Texture coordinates in metres, v upwards on walls; materials
-/// floor, wall, ceiling.
+/// are shared, also along the edges. `keep` chooses cells by their side (floor, ceiling, smallest x, largest
+/// x, smallest y, largest y) and middle. Texture coordinates in metres, v upwards on walls; materials floor,
+/// wall, ceiling.
 pub(super) fn shell(min: Vec3, max: Vec3, cells: [u32; 3], keep: impl Fn(usize, Vec3) -> bool) -> MeshParts {
     assert!(
         min.cmplt(max).all() && cells.iter().all(|&n| n > 0),
         "a box from {min} to {max}, {cells:?} cells"
     );
+
     let coordinate = |axis: usize, i: u32| {
-        // The ends exactly, so that a box touches what it should touch.
+        // The ends are exact, so that boxes side by side touch.
         let n = cells[axis];
         if i == n {
             max[axis]
@@ -23,6 +24,7 @@ pub(super) fn shell(min: Vec3, max: Vec3, cells: [u32; 3], keep: impl Fn(usize, 
             min[axis] + (max[axis] - min[axis]) * (i as f32 / n as f32)
         }
     };
+
     let strides = [1, cells[0] as usize + 1, (cells[0] as usize + 1) * (cells[1] as usize + 1)];
     let mut vertex_of = vec![NO_INDEX; strides[2] * (cells[2] as usize + 1)];
     let mut parts = MeshParts {
@@ -31,17 +33,23 @@ pub(super) fn shell(min: Vec3, max: Vec3, cells: [u32; 3], keep: impl Fn(usize, 
             .to_vec(),
         ..MeshParts::default()
     };
+
     for side in 0..6 {
-        let (axis, upper) = ([2, 0, 1][side / 2], side % 2 == 1);
-        let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
+        let axis = [2, 0, 1][side / 2];
+        let upper = side % 2 == 1;
+        let b = (axis + 1) % 3;
+        let c = (axis + 2) % 3;
         let at = if upper { cells[axis] } else { 0 };
         let base = parts.uvs.len() as u32;
+
         for k in 0..=cells[c] {
             for j in 0..=cells[b] {
-                let (pb, pc) = (coordinate(b, j) - min[b], coordinate(c, k) - min[c]);
+                let pb = coordinate(b, j) - min[b];
+                let pc = coordinate(c, k) - min[c];
                 parts.uvs.push(if axis == 1 { vec2(pc, pb) } else { vec2(pb, pc) });
             }
         }
+
         for k in 0..cells[c] {
             for j in 0..cells[b] {
                 let point = |j: u32, k: u32| {
@@ -50,6 +58,7 @@ pub(super) fn shell(min: Vec3, max: Vec3, cells: [u32; 3], keep: impl Fn(usize, 
                     lattice
                 };
                 let place = |l: [u32; 3]| Vec3::from_array(std::array::from_fn(|a| coordinate(a, l[a])));
+
                 if !keep(side, (place(point(j, k)) + place(point(j + 1, k + 1))) * 0.5) {
                     continue;
                 }
@@ -64,7 +73,9 @@ pub(super) fn shell(min: Vec3, max: Vec3, cells: [u32; 3], keep: impl Fn(usize, 
                     }
                     *slot
                 });
+
                 let mut t = corners.map(|(j, k)| base + k * (cells[b] + 1) + j);
+
                 if upper {
                     v.swap(1, 3);
                     t.swap(1, 3);

@@ -78,7 +78,8 @@ impl Seen {
     pub fn check_things_stay_in_their_rooms(&self) {
         let rooms = self.rooms();
         for f in self.faces() {
-            let (instance, room) = (self.instance_of(f), rooms[&self.instance_of(f).room]);
+            let instance = self.instance_of(f);
+            let room = rooms[&self.instance_of(f).room];
             let deep = if matches!(instance.class, Class::WINDOW | Class::DOOR) {
                 0.161
             } else {
@@ -93,7 +94,8 @@ impl Seen {
 
     /// Every face has a texture, with coordinates in range, or a colour. Returns how many have which.
     pub fn check_colors(&self) -> [usize; 2] {
-        let (mut textured, mut plain) = (0, 0);
+        let mut textured = 0;
+        let mut plain = 0;
         for f in self.faces() {
             match self.scene.mesh.color_of(f) {
                 FaceColor::Texture(_, texture, uvs) => {
@@ -135,7 +137,9 @@ impl Seen {
                 .or_default()
                 .push((f, flat));
         }
-        // Apart by a line along an edge of one of them, but for what corners move onto the builder's lattice.
+
+        // Two triangles are apart if a line along an edge of one of them divides them, but for the step of
+        // the builder's lattice.
         let apart = |a: &[DVec2; 3], b: &[DVec2; 3]| {
             (0..3).any(|i| {
                 let edge = (a[(i + 1) % 3] - a[i]).normalize();
@@ -144,23 +148,27 @@ impl Seen {
                 b.iter().all(|&p| side(p) * inner < 2e-4)
             })
         };
+
         let mut overlaps = BTreeMap::new();
         for list in planes.values_mut() {
             let left = |t: &[DVec2; 3]| t.iter().map(|p| p.x).fold(f64::MAX, f64::min);
             list.sort_by(|a, b| left(&a.1).total_cmp(&left(&b.1)));
+
             for (i, (f, a)) in list.iter().enumerate() {
                 let right = a.iter().map(|p| p.x).fold(f64::MIN, f64::max);
                 for (g, b) in list[i + 1..].iter().take_while(|(_, b)| left(b) < right) {
-                    // Far from the origin a plane's place in the key is rough.
+                    // Far from the origin, the place of a plane in the key is rough.
                     let n = self.scene.mesh.normal(*f).as_dvec3();
                     let first = self.triangles[*f as usize][0];
                     let level = self.triangles[*g as usize]
                         .iter()
                         .all(|p| n.dot(p - first).abs() < 2e-3);
-                    // Parts of one thing may touch: what is between them nobody sees.
+
+                    // Parts of one thing may touch: nobody sees the faces between them.
                     let opposite = n.dot(self.scene.mesh.normal(*g).as_dvec3()) < 0.0;
                     let of = &self.scene.instance_of_face;
                     let touches = opposite && of[*f as usize] == of[*g as usize];
+
                     if level && !touches && !apart(a, b) && !apart(b, a) {
                         let pair =
                             [self.instance_of(*f), self.instance_of(*g)].map(|i| (i.class, i.number, i.room));
@@ -171,13 +179,16 @@ impl Seen {
                 }
             }
         }
+
         assert!(overlaps.is_empty(), "{overlaps:#?}");
     }
 }
 
 /// Distance along the unit vector `d` at which the ray from `o` meets a triangle.
 fn meets(o: DVec3, d: DVec3, &[a, b, c]: &[DVec3; 3]) -> Option<f64> {
-    let (e, f, s) = (b - a, c - a, o - a);
+    let e = b - a;
+    let f = c - a;
+    let s = o - a;
     let p = d.cross(f);
     let det = e.dot(p);
     let u = s.dot(p) / det;
@@ -185,7 +196,8 @@ fn meets(o: DVec3, d: DVec3, &[a, b, c]: &[DVec3; 3]) -> Option<f64> {
         return None;
     }
     let q = s.cross(e);
-    let (v, t) = (d.dot(q) / det, f.dot(q) / det);
+    let v = d.dot(q) / det;
+    let t = f.dot(q) / det;
     (v >= -1e-9 && u + v <= 1.0 + 1e-9 && t > 0.0).then_some(t)
 }
 
