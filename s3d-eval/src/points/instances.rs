@@ -100,7 +100,7 @@ impl<'a> Prediction<'a> {
         }
     }
 
-    /// Reads the scores of its instances, of which there are `instances`.
+    /// Reads a score for each of `instances` instances.
     fn scores(&mut self, instances: usize) -> Result<Vec<f64>> {
         let name = named(self.path, &self.names, &SCORES)?;
         let mut array = self.archive.array(&name)?;
