@@ -19,8 +19,8 @@
 //! metres. [`cross_validate`] trains and tests over the folds of the paper, scores with [`s3d_eval::boxes`],
 //! and returns a [`table::Table`] in the form of the paper.
 //!
-//! The same data, options and seed give the same bytes for any number of threads. Each module says what is
-//! the paper's and what is chosen here; `docs/detector.md` has the whole of it, with figures.
+//! The same data, options and seed give the same bytes for any number of threads. Each module says what
+//! the paper has and what is chosen here; `docs/detector.md` has all of it, with figures.
 //!
 //! # Example
 //!
@@ -65,7 +65,7 @@
 //! # Ok::<(), s3d_detect::Error>(())
 //! ```
 
-// What a file holds must not make it panic.
+// No content of a file may make this crate panic.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 pub mod boxes;

@@ -31,7 +31,7 @@ const VERSION: u32 = 2;
 pub struct TrainOptions {
     /// The source of everything random.
     pub seed: u64,
-    /// What the spaces are.
+    /// The kind of spaces to search.
     pub spaces: SpaceSource,
     /// The machines to train.
     pub variants: Vec<Variant>,
@@ -52,7 +52,7 @@ pub struct Model {
     version: u32,
     /// The seed that it was trained with.
     pub seed: u64,
-    /// What the spaces are.
+    /// The kind of spaces to search.
     pub spaces: SpaceSource,
     /// The areas that it was trained on.
     pub areas: Vec<u32>,

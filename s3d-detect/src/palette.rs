@@ -107,7 +107,7 @@ const NEAR_M: f32 = 0.005;
 /// Added to the shares that [`Palette::own`] divides by: a difference of small shares counts little.
 const LITTLE: f32 = 0.02;
 
-/// The colours of a box and of what is around it.
+/// The colours of a box and of its surroundings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Palette {
     /// The colours in each third of the box, from below.

@@ -31,7 +31,7 @@
 //! assert_eq!(counts.scores(AbsentClass::LeftOut).mean_iou, 0.5);
 //! ```
 
-// What a file holds must not make it panic.
+// No content of a file may make this crate panic.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 pub mod boxes;

@@ -94,7 +94,7 @@ impl Detector {
             for area in read(root, &areas, self.0.spaces, ctx)? {
                 found.extend(detect_area(&self.0, &area, ctx)?);
             }
-            Ok(found)
+            Ok::<_, Error>(found)
         };
         let found = watched(py, threads, &sink, |ctx| Ok(find(ctx)))?.map_err(|e| exception_of(&e))?;
         crate::calls::json(&found)

@@ -169,6 +169,7 @@ impl<'a> Content<'a> {
             let photographs = faults.keep(root, data.photographs(area))?.unwrap_or_default();
             let of_area = photographs.into_iter().map(|p| ((area, p.camera_uuid.clone()), p));
             content.photographs.extend(of_area);
+
             for view in faults.keep(root, data.views(area))?.unwrap_or_default() {
                 rooms.entry((area, view.camera_uuid.clone())).or_default();
                 content.candidates.push((area, view));
@@ -266,6 +267,7 @@ impl<'a> Content<'a> {
     ) -> Result<()> {
         let panoramas = self.panoramas.iter().filter(|(_, image)| image.area == area);
         let mut jobs: Vec<Job<'_>> = panoramas.map(|(i, image)| Job::Panorama(*i, image)).collect();
+
         let first = self.views.partition_point(|view| view.area < area);
         let of_area = self.views.get(first..).unwrap_or_default();
         let of_area = of_area
@@ -288,6 +290,7 @@ impl<'a> Content<'a> {
                 let mut faults = Faults::default();
                 let mut made = Vec::new();
                 let mut bytes = 0;
+
                 match job {
                     Job::Panorama(i, image) => {
                         let (one, picture, _) = self.make(image, of_panorama, tools, &mut faults)?;
@@ -460,6 +463,7 @@ impl<'a> Content<'a> {
                 entry.azimuth_rad = Some(located.original.1);
             }
         }
+
         for ((i, _), made) in self.panoramas.iter().zip(&made.panoramas) {
             let Some(entry) = entries.get_mut(*i) else { continue };
             if let Some(located) = &made.located {

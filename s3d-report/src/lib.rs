@@ -16,7 +16,7 @@
 //! # Ok::<(), s3d_report::Error>(())
 //! ```
 
-// What a file holds must not make it panic.
+// No content of a file may make this crate panic.
 #![cfg_attr(
     not(test),
     deny(clippy::unwrap_used, clippy::panic, clippy::string_slice, clippy::indexing_slicing)

@@ -103,6 +103,7 @@ pub(crate) fn write(
             Shown { mesh, positions: mesh.positions(), faces: mesh.faces(), colors, face_of: &all }
         }
     };
+
     let by_material = shown.by_material();
     let parts: Vec<(usize, &[usize])> = by_material.chunks(FACES_PER_FILE).enumerate().collect();
     let mut bytes = map_in_order(
@@ -111,6 +112,7 @@ pub(crate) fn write(
         || (),
         |(), (k, faces)| scripts.write(&format!("mesh_{area}_{k}"), &shown.part(faces)),
     )?;
+
     let (textures, written) = write_textures(ctx, area, mesh, scripts)?;
     bytes.push(written);
 
@@ -119,6 +121,7 @@ pub(crate) fn write(
     if let Some(votes) = &votes {
         bytes.push(scripts.write(&format!("faces_{area}"), &face_votes(votes))?);
     }
+
     let labels = votes.as_ref().map_or(&[][..], |votes| &votes.label);
     let surfaces = table
         .map(|table| surface_by_class(mesh, labels, table))
@@ -305,6 +308,7 @@ impl Shown<'_> {
         let positions: Vec<[f64; 3]> = vertices.iter().map(|v| position(v).to_array()).collect();
         let place = Steps::of(&positions);
         let of_uv = Steps::of(&uvs);
+
         let color = |v: &u32| self.colors.get(*v as usize).copied().unwrap_or(DEFAULT_COLOR);
         Part {
             vertices: vertices.len(),

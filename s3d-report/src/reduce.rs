@@ -269,6 +269,7 @@ impl Mean {
             std::mem::swap(&mut self.columns, &mut self.halved);
         }
         dispatch!(level, _simd => divide(&self.columns, 2 * halvings, &mut self.means));
+
         let begin = self.pixels.len();
         let step = 3 << halvings;
         let first = |bytes: &[u8]| bytes.first_chunk().copied().unwrap_or_default();
@@ -335,6 +336,7 @@ impl Mean {
             }
             self.missing_at.fill(0);
         }
+
         self.columns.fill(0);
         self.lines = 0;
         self.some_missing = false;

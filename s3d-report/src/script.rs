@@ -69,6 +69,7 @@ impl Scripts {
                 let element =
                     format!("<script type=\"application/json\" data-key=\"{key}\">{text}</script>\n");
                 let bytes = element.len() as u64;
+
                 let mut elements = elements.lock().unwrap_or_else(PoisonError::into_inner);
                 elements.bytes += bytes;
                 if elements.bytes > MOST_BYTES {

@@ -74,6 +74,7 @@ impl Predictions {
         };
 
         let (files, others) = files(task.predictions)?;
+
         let mut list = None;
         for path in &files {
             task.ctx.check()?;
@@ -253,6 +254,7 @@ impl Reader<'_> {
             let message = format!("box_type_3d is {kind:?}: only boxes of type \"Depth\" have z upwards");
             return Err(file(message).into());
         }
+
         let counts = [sample.labels_3d.len(), sample.scores_3d.len(), sample.bboxes_3d.len()];
         if counts != [counts[0]; 3] {
             let message = format!("has {counts:?} labels_3d, scores_3d, bboxes_3d: as many of each");

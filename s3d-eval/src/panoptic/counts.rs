@@ -252,6 +252,7 @@ fn sized(
             .get_mut(&id)
             .map_or_else(|| unlisted.entry(id).or_default(), |(_, area)| area) += count;
     }
+
     if let Some((id, pixels)) = unlisted.pop_first() {
         return Err(SegmentFault::Unlisted { id, pixels });
     }

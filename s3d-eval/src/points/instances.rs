@@ -100,7 +100,7 @@ impl<'a> Prediction<'a> {
         }
     }
 
-    /// Reads the scores of its instances, of which there are `instances`.
+    /// Reads a score for each of `instances` instances.
     fn scores(&mut self, instances: usize) -> Result<Vec<f64>> {
         let name = named(self.path, &self.names, &SCORES)?;
         let mut array = self.archive.array(&name)?;
@@ -239,6 +239,7 @@ fn masks_by_point(
         ctx.check()?;
         let rows: Vec<&[f64]> = numbers.chunks_exact(instances.max(1)).collect();
         let used = rows.len() * instances;
+
         runs.split(&rows, |at, part| {
             let mut counts = vec![0u64; instances];
             for row in part {
@@ -270,6 +271,7 @@ fn masks_one_by_one(
     let mut runs = Runs::new(truth);
     let mut left = rows;
     let mut numbers = Vec::new();
+
     while array.read_floats(&mut numbers)? > 0 {
         ctx.check()?;
         let mut rest = &numbers[..];

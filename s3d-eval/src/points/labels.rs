@@ -60,6 +60,7 @@ impl<R: Read> Labels<R> {
     /// Returns the classes of the next points; none at the end.
     pub(super) fn next(&mut self) -> Result<&[i64]> {
         self.labels.clear();
+
         if self.columns == 1 {
             self.array.read_integers(&mut self.labels)?;
             let valid = self.least..CLASSES as i64;
@@ -84,6 +85,7 @@ impl<R: Read> Labels<R> {
             }
             self.scores.drain(..self.scores.len() - rest);
         }
+
         self.done += self.labels.len() as u64;
         Ok(&self.labels)
     }

@@ -77,6 +77,7 @@ impl InstanceMatches {
                     None => ignored += common,
                 }
             }
+
             let ignored = ignored as f64 / instance.points as f64;
             class
                 .predicted

@@ -88,6 +88,7 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
         })?;
         Ok(counts)
     })?;
+
     let (absent, of_absent) = match task.variant {
         "nanmean" => (
             AbsentClass::LeftOut,
@@ -100,6 +101,7 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
              mIoU and mAcc, as in Pointcept d74c646 (engines/test.py, tools/test_s3dis_6fold.py).",
         ),
     };
+
     let tables = tables(task, &["IoU", "accuracy"], &counted.rooms, |rooms| {
         let scores = SemanticCounts::sum(CLASSES, rooms.iter().copied()).scores(absent);
         let classes = scores
@@ -110,6 +112,7 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
         let mean = [scores.mean_iou, scores.mean_accuracy];
         rows(classes, [("mean", mean), ("overall", [f64::NAN, scores.overall_accuracy])])
     });
+
     let definition = [
         "Points are counted by class and summed over rooms: those of the truth, those predicted, those both.",
         "IoU = both / (truth + predicted - both); accuracy = both / truth; overall accuracy = right points \
@@ -127,12 +130,14 @@ pub(crate) fn inst_ap(task: &Task<'_>) -> Result<Evaluation> {
         let (truth, predicted) = scored(path, room, points, task.ctx)?;
         Ok(InstanceMatches::new(&truth, &predicted, CLASSES))
     })?;
+
     let tables = tables(task, &["AP", "AP50", "AP25"], &counted.rooms, |rooms| {
         let mut ap = instance_ap(rooms);
-        // No room was drawn of a fold.
+        // There are no classes if no room of a fold was drawn.
         ap.by_class.resize(CLASSES, [f64::NAN; 3]);
         rows(ap.by_class, [("mean", ap.mean)])
     });
+
     let definition = [
         "Instances of fewer than 100 points do not count, on both sides.",
         "In their order, true instances take the first prediction of their class that is free and whose \
@@ -157,16 +162,18 @@ pub(crate) fn inst_cov(task: &Task<'_>) -> Result<Evaluation> {
         let (truth, predicted) = segments(path, room, points, task.ctx)?;
         Ok(RoomCoverage::new(&truth, &predicted, CLASSES))
     })?;
+
     let columns = ["precision", "recall", "coverage", "weighted coverage"];
     let tables = tables(task, &columns, &counted.rooms, |rooms| {
         let mut classes: Vec<_> = coverage(rooms).into_iter().map(CoverageScores::to_array).collect();
-        // No room was drawn of a fold.
+        // There are no classes if no room of a fold was drawn.
         classes.resize(CLASSES, [f64::NAN; 4]);
         let mean =
             std::array::from_fn(|i| classes.iter().map(|class| class[i]).sum::<f64>() / CLASSES as f64);
         let defined = std::array::from_fn(|i| nan_mean(classes.iter().map(|class| class[i])));
         rows(classes, [("mean", mean), ("mean where defined", defined)])
     });
+
     let definition = [
         "The class of a predicted instance is that of most of its points, the lowest number of equals; \
          points of instance -1 are in none.",
