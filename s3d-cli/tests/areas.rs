@@ -1,7 +1,6 @@
 //! `s3d demo --areas`: a data set of generated areas that is whole, is gone on with, and is not written over.
 
-mod common;
-
+use crate::common;
 use common::{s3d_fails, s3d_ok, text};
 use s3d_io::dataset::{Layout, read_splits};
 use std::fs;

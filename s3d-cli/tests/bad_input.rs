@@ -1,8 +1,7 @@
 //! Input that is broken, hostile or absurd: every export of it ends soon, with exit code 1 and a message that
 //! names the file; nothing that a file says makes the program write outside of OUT.
 
-mod common;
-
+use crate::common;
 use common::scan::{SMALL, Scan, png_that_claims, run, wait};
 use common::{UUID_A, UUID_B, text};
 use std::fs;

@@ -1,8 +1,7 @@
 //! Names in the input that are paths, or names of devices, or the same but for case: nothing that a file says
 //! makes the program write outside of OUT.
 
-mod common;
-
+use crate::common;
 use common::scan::{Scan, listing, png_that_claims};
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,7 +1,6 @@
 //! Scan locations from other forms than the table, and placed ones.
 
-mod common;
-
+use crate::common;
 use common::{files, s3d, s3d_fails, s3d_ok, text, write_scan};
 use s3d_io::dataset::{PoseFile, read_pose};
 use std::collections::BTreeMap;

@@ -1,7 +1,6 @@
 //! The same input and seed give the same bytes, for any number of threads.
 
-mod common;
-
+use crate::common;
 use common::{copyroom, files, s3d_ok, text, write_scan};
 use std::path::Path;
 use std::process::Command;

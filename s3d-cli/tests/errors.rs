@@ -1,8 +1,7 @@
 //! Wrong calls and bad input: one clear message that names the file and the place, the right exit code,
 //! nothing lost.
 
-mod common;
-
+use crate::common;
 use common::scan::Scan;
 use common::{UUID_A, files, s3d, s3d_fails, s3d_ok, text, write_scan};
 use std::fs;

@@ -1,7 +1,6 @@
 //! `s3d eval`: answers as text and JSON, and what is wrong with a call or a prediction.
 
-mod common;
-
+use crate::common;
 use common::{s3d, s3d_fails, s3d_ok, text, write_scan};
 use serde_json::Value;
 use std::fs;

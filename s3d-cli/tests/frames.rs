@@ -1,7 +1,6 @@
 //! Points, scan locations and meshes that are in different frames, or in one that is far from the origin.
 
-mod common;
-
+use crate::common;
 use common::scan::{SMALL, Scan};
 use common::{files, s3d_fails, s3d_ok, text};
 use std::fmt::Write as _;

@@ -2,8 +2,7 @@
 //! with the same arguments and ends with the same bytes as one that nobody disturbed.
 #![cfg(unix)]
 
-mod common;
-
+use crate::common;
 use common::{UUID_B, files, s3d, s3d_fails, s3d_ok, text, write_scan};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};

@@ -2,8 +2,7 @@
 //! `docs/reliability/curves.py` measure the same on clouds of hundreds of millions.
 #![allow(clippy::print_stderr, reason = "says why it measures nothing")]
 
-mod common;
-
+use crate::common;
 use common::{files, text, write_scan};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};

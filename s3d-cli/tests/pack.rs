@@ -1,8 +1,7 @@
 //! `s3d pack`, run as a process on a small data set: packages are whole, the same for any number of threads,
 //! and never touch the data set; what is wrong is told with the file's name.
 
-mod common;
-
+use crate::common;
 use common::{files, list_files, s3d_fails, s3d_ok, text, write_scan};
 use std::collections::BTreeMap;
 use std::fs;

@@ -2,8 +2,7 @@
 //! — a sky box, a panorama, 18 captures through a lens that distorts — must give the images that the mesh
 //! itself gives.
 
-mod common;
-
+use crate::common;
 use common::{UUID_A, UUID_B, files, s3d_fails, s3d_ok, text, write_scan};
 use glam::{DVec2, DVec3, dvec2};
 use s3d_geom::{Camera, Lens, Pose, Raster, TriMesh};

@@ -1,7 +1,6 @@
 //! `colors = "points"`: a mesh without texture takes the colours of the annotated points.
 
-mod common;
-
+use crate::common;
 use common::scan::{SMALL, Scan};
 use common::{files, s3d, s3d_ok, text, write_scan};
 use s3d_geom::{FaceColor, PointCloud, TriMesh};

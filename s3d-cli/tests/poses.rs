@@ -1,7 +1,6 @@
 //! `s3d render --poses`: the cameras of any list, registered with what an export makes of the same cameras.
 
-mod common;
-
+use crate::common;
 use common::scan::Scan;
 use common::{files, s3d_fails, s3d_ok, text};
 use s3d_dataset::{Cancel, Context, Error, Event, PosesOptions, render_poses};

@@ -1,8 +1,7 @@
 //! Exports are read back and held against their own mesh, poses and tables: the built-in scene, and the real
 //! scan.
 
-mod common;
-
+use crate::common;
 use common::{copyroom, s3d, s3d_ok, text};
 use glam::{DMat3, DVec3};
 use s3d_geom::{Camera, Pose, rotation_from_euler};

@@ -1,7 +1,6 @@
 //! Shards of an export, merged, are byte for byte what a single run writes.
 
-mod common;
-
+use crate::common;
 use common::{UUID_A, UUID_B, files, s3d, s3d_fails, s3d_ok, text, write_scan};
 use s3d_geom::Raster;
 use s3d_io::image::{Compression, Content, write_rgb8};

@@ -1,8 +1,7 @@
 //! Scans in other forms than one OBJ and an S3DIS tree: published areas, labels that came with the mesh,
 //! several files.
 
-mod common;
-
+use crate::common;
 use common::{files, s3d_fails, s3d_ok, text, write_scan};
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,7 +1,6 @@
 //! Scenes whose classes are not S3DIS's: what is made of them, and what is said of taxonomies that are none.
 
-mod common;
-
+use crate::common;
 use common::{files, s3d, s3d_fails, s3d_ok, text, write_scan};
 use serde_json::Value;
 use std::collections::BTreeMap;

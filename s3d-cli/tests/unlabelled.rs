@@ -1,7 +1,6 @@
 //! Scenes without labels: a scene file without annotations, and a mesh alone.
 
-mod common;
-
+use crate::common;
 use common::scan::{SMALL, Scan, run};
 use common::{files, s3d, s3d_fails, s3d_ok, text, write_scan};
 use std::collections::BTreeMap;

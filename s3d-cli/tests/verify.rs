@@ -1,7 +1,6 @@
 //! `s3d verify` finds what was planted, by name, and nothing where nothing is.
 
-mod common;
-
+use crate::common;
 use common::{UUID_A, list_files, s3d, s3d_ok, text, write_scan};
 use glam::DMat3;
 use s3d_geom::{Camera, Pose, Raster};

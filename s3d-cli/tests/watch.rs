@@ -2,8 +2,7 @@
 //! summary counts.
 #![cfg(unix)]
 
-mod common;
-
+use crate::common;
 use common::{UUID_A, files, s3d, s3d_ok, text, write_scan};
 use s3d_io::dataset::{Domain, Frame, Layout};
 use s3d_io::image::read_gray16;

@@ -1,13 +1,12 @@
 //! `s3d compare`: what differs is told, by name and by number; what is equal is not; what cannot be read is
 //! named.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod exports;
 mod images;
 mod relabelled;
 mod wrong;
 
+use crate::common;
 use common::{s3d, text};
 use serde_json::Value;
 use std::path::Path;

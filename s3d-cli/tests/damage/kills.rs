@@ -1,7 +1,7 @@
 //! Every command that writes, killed at any moment: no file is there by halves, what is half made does not
 //! pass for whole, and the same call ends with the same files as one that nobody disturbed.
 //!
-//! `S3D_KILLS=100 cargo test -p s3d-cli --test damage killed` kills each of them so often.
+//! `S3D_KILLS=100 cargo test -p s3d-cli damage::kills` kills each of them so often.
 
 use super::structured::{Random, number_of};
 use super::{SMALL, common, folder};

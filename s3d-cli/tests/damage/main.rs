@@ -2,11 +2,10 @@
 //! it is, and ends.
 #![cfg(unix)]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod kills;
 mod structured;
 
+use crate::common;
 use common::{files, list_files, s3d_ok, text, write_scan};
 use s3d_io::fs::{create_dir, write_bytes};
 use serde_json::Value;

@@ -1,6 +1,6 @@
 //! Whole small exports, damaged at random: `verify` finds it, or nothing changed that it could know of.
 //!
-//! `S3D_DAMAGES=2000 cargo test -p s3d-cli --test damage structured` tries more; `S3D_SEED` others.
+//! `S3D_DAMAGES=2000 cargo test -p s3d-cli damage::structured` tries more; `S3D_SEED` others.
 
 use super::{copy, export, files};
 use s3d_dataset::{Context, VerifyOptions, verify};

@@ -1,10 +1,9 @@
 //! Photographs with poses, there and back: pictures that our own renderer took in the built-in scene, ray by
 //! ray through lenses that bend, become views that lie on those of the mesh.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod studio;
 
+use crate::common;
 use common::{files, s3d_fails, s3d_ok, text};
 use s3d_geom::{Lens, PhotoLens, Pose, Raster};
 use s3d_io::dataset::{Domain, Layout, dataset_images};

@@ -1,0 +1,32 @@
+//! All tests of the command line, in one program: each of two dozen would be compiled and linked with all crates.
+//! `cargo test -p s3d-cli kill::` runs the tests of one file.
+
+mod common;
+
+mod areas;
+mod bad_input;
+mod bad_names;
+mod cameras;
+#[path = "compare/main.rs"]
+mod compare;
+#[path = "damage/main.rs"]
+mod damage;
+mod determinism;
+mod errors;
+mod eval;
+mod frames;
+mod kill;
+mod large;
+mod pack;
+#[path = "photographs/main.rs"]
+mod photographs;
+mod pictures;
+mod point_colors;
+mod poses;
+mod read_back;
+mod shards;
+mod sources;
+mod taxonomy;
+mod unlabelled;
+mod verify;
+mod watch;
