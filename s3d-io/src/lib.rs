@@ -161,7 +161,7 @@
 //! # }
 //! ```
 //!
-//! # Errors and warnings
+//! # Warnings and errors
 //!
 //! An [`Error`] has a kind: the system refused, the content is wrong, the mesh cannot be used, or something
 //! is not supported. All kinds name the file, and a text file's errors name the line. The message says what
