@@ -1,5 +1,6 @@
 //! Why a command did not do what it was called for, and the exit code that says so.
 
+use crate::flags::Flags;
 use crate::hint::resume_hint;
 use crate::stop;
 use s3d_dataset::Error;
@@ -42,14 +43,14 @@ impl Failure {
 }
 
 impl fmt::Display for Failure {
-    /// What may be tried again ends with the command that does.
+    /// Options are named as flags. What may be tried again ends with the command that does.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Call(Error::Cancelled) => {
                 write!(f, "stopped by {}; {}", stop::signal_name(), resume_hint())
             }
             Self::Call(e) if e.is_temporary() => write!(f, "{e}; {}", resume_hint()),
-            Self::Call(e) => e.fmt(f),
+            Self::Call(e) => f.write_str(&e.message(&Flags)),
             Self::Usage(text) | Self::Input(text) | Self::Answer(text) => f.write_str(text),
         }
     }
@@ -58,6 +59,14 @@ impl fmt::Display for Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use s3d_dataset::{InputError, UsageError};
+
+    #[test]
+    fn options_are_named_as_flags() {
+        let exists = UsageError::Exists { path: "a.ply".into(), note: None };
+        let text = Failure::from(exists).to_string();
+        assert_eq!(text, "a.ply is there already: replace it with --overwrite");
+    }
 
     #[test]
     fn another_try_is_told_with_its_command() {
@@ -71,9 +80,13 @@ mod tests {
     #[test]
     fn exit_codes_tell_whose_fault_it_is() {
         let code = |error: Error| Failure::from(error).exit_code();
-        assert_eq!((code(Error::Usage("a".into())), code(Error::Input("b".into()))), (2, 1));
-        assert_eq!((code(Error::Temporary("c".into())), code(Error::Cancelled)), (75, 75));
-        assert_eq!((Failure::Usage("a".into()).exit_code(), Failure::Input("b".into()).exit_code()), (2, 1));
+        let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        assert_eq!(code(UsageError::NoShards.into()), 2);
+        assert_eq!(code(InputError::Labels { why: "b".into() }.into()), 1);
+        assert_eq!(code(s3d_io::Error::io("out".as_ref(), "write", full).into()), 75);
+        assert_eq!(code(Error::Cancelled), 75);
+        assert_eq!(Failure::Usage("a".into()).exit_code(), 2);
+        assert_eq!(Failure::Input("b".into()).exit_code(), 1);
         assert_eq!(Failure::Answer("2 faults".into()).exit_code(), 1);
     }
 }

@@ -8,6 +8,7 @@ mod cli;
 mod commands;
 mod console;
 mod failure;
+mod flags;
 mod hint;
 mod panics;
 mod stop;

@@ -44,6 +44,7 @@
 
 mod account;
 mod compare;
+mod condition;
 mod context;
 mod error;
 mod event;
@@ -73,8 +74,12 @@ pub use compare::comparison::{
     ViewName,
 };
 pub use compare::{CompareOptions, compare};
+pub use condition::Condition;
 pub use context::{Cancel, Context, Observer, Progress};
-pub use error::{Error, Result};
+pub use error::{
+    Difference, Error, FieldNames, Held, InputError, OptionNames, Overwriting, Result, TemporaryError,
+    UsageError, Work,
+};
 pub use event::{Event, Level, Task, UnitKind};
 pub use export::Export;
 pub use export::input::memory::{MemoryScene, SceneSource, SharedScene};
@@ -84,11 +89,13 @@ pub use export::shard::merge::merge;
 pub use info::{
     DataSetInfo, InfoOptions, LocationInfo, MeshInfo, RoomInfo, SceneInfo, data_set_info, info, is_data_set,
 };
-pub use options::condition::Condition;
 pub use options::profile::Profile;
+#[cfg(feature = "clap")]
+pub use options::words;
 pub use options::{ExportOptions, PadLabels, canonical_uuid};
 pub use pack::{
-    ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions, pack,
+    ClassList, CocoOptions, ColmapOptions, DepthFiles, NerfstudioOptions, PackOptions, Package,
+    PackageArguments, PackageKind, PackedImages, ParquetOptions, ShardPrefix, WebdatasetOptions, pack,
 };
 pub use parallel::map_in_order;
 pub use place::{PlaceOptions, place_cameras};

@@ -99,13 +99,13 @@ mod tests {
             || (),
             |(), i| {
                 if *i == 7 {
-                    Err(Error::Input(format!("item {i}")))
+                    Err(Error::unfit(format!("item {i}"), "wrong"))
                 } else {
                     Ok(())
                 }
             },
         );
-        assert_eq!(e.unwrap_err().to_string(), "item 7");
+        assert_eq!(e.unwrap_err().to_string(), "item 7: wrong");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A mesh's file to a dense coloured point cloud.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Result, UsageError};
 use crate::store::new_file::NewFile;
 use crate::useful::{PLY_POINT_BYTES, check_points, check_space};
 use glam::DVec3;
@@ -40,17 +40,15 @@ impl Default for SampleOptions {
 /// points.
 ///
 /// # Errors
-/// [`Error::Usage`] if the file's name is not that of a PLY file, if it is there and not to be replaced, or
-/// the points are too many; [`Error::File`]; [`Error::Cancelled`].
+/// [`Error::Usage`](crate::Error::Usage) if the file's name is not that of a PLY file, if it is there and not to be replaced, or
+/// the points are too many; [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
     if !output
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("ply"))
     {
-        return Err(Error::Usage(format!(
-            "{}: a cloud is written as PLY: give it a name that ends with .ply",
-            output.display()
-        )));
+        let why = "a cloud is written as PLY: give it a name that ends with .ply";
+        return Err(UsageError::WrongEnding { path: output.to_owned(), why }.into());
     }
     NewFile::check_free(output, options.overwrite)?;
     let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };

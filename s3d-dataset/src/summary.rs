@@ -201,7 +201,10 @@ impl Summary {
             ));
         }
         if views.not_asked > 0 {
-            lines.push(format!("{} kept views are of locations that --only leaves out", views.not_asked));
+            lines.push(format!(
+                "{} kept views are of locations whose images were not asked for",
+                views.not_asked
+            ));
         }
         if self.warnings > 0 {
             lines.push(format!("{} warnings above", self.warnings));

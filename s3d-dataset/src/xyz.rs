@@ -1,7 +1,7 @@
 //! `s3d xyz`: the world coordinates of a data set's images, from depth and pose.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Result, UsageError};
 use crate::parallel::for_each_in_order;
 use crate::record::data_set::{DataSet, Listed};
 use crate::record::listing;
@@ -39,17 +39,18 @@ impl Default for XyzOptions {
 /// depth along the ray. Returns the number of images.
 ///
 /// # Errors
-/// [`Error::Usage`] if coordinates are there and not to be replaced; [`Error::File`] if there is no data set,
-/// or no image with both depth and pose, or one of these is damaged; [`Error::Cancelled`];
-/// [`Error::Temporary`]. The data set stays as it was then; so it does when the process is killed, or the
+/// [`Error::Usage`](crate::Error::Usage) if coordinates are there and not to be replaced; [`Error::File`](crate::Error::File) if there is no data set,
+/// or no image with both depth and pose, or one of these is damaged; [`Error::Cancelled`](crate::Error::Cancelled);
+/// [`Error::Temporary`](crate::Error::Temporary). The data set stays as it was then; so it does when the process is killed, or the
 /// same call completes what it had begun.
 pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Result<usize> {
     if options.xyz == XyzType::None {
-        return Err(Error::Usage("world coordinates are made as half or float".to_owned()));
+        let range = "half or float".to_owned();
+        return Err(UsageError::OutOfRange { option: "xyz", range }.into());
     }
     let layout = &Layout::new(root.into());
     Manifest::require(layout)?;
-    let call = format!("s3d xyz --type {} --compression {}", options.xyz, options.compression);
+    let call = format!("xyz as {}, {}", options.xyz, options.compression);
     // Nobody may replace the data set meanwhile.
     Lock::during(ctx, layout, |completed| {
         let data = DataSet::open_in(layout)?;
@@ -97,10 +98,11 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
         return Err(FileError::format(layout.root(), "no image with both depth and pose: export them").into());
     }
     if let Some(there) = works.iter().find(|w| w.xyz.exists() && !args.overwrite) {
-        return Err(Error::Usage(format!(
-            "{} is there already, and what export writes is more exact: replace it with --overwrite",
-            there.xyz.display()
-        )));
+        return Err(UsageError::Exists {
+            path: there.xyz.clone(),
+            note: Some("what export writes is more exact"),
+        }
+        .into());
     }
     let needed: BTreeSet<&Path> = works.iter().flat_map(|w| [&*w.pose, &*w.depth]).collect();
     data.files.require(ctx, |path| needed.contains(path))?;

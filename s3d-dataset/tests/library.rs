@@ -4,8 +4,8 @@ mod common;
 
 use common::{memory_scene, options};
 use s3d_dataset::{
-    Cancel, Context, Error, Event, Export, ExportOptions, InfoOptions, Level, PackOptions, PackageKind,
-    Profile, ProfileOptions, Stage, UnitKind, VerifyOptions, XyzOptions,
+    Cancel, Context, Error, Event, Export, ExportOptions, InfoOptions, Level, PackOptions, Package, Profile,
+    ProfileOptions, Stage, UnitKind, VerifyOptions, WebdatasetOptions, XyzOptions,
 };
 use s3d_geom::glam::dvec3;
 use s3d_geom::{Pose, TriMesh};
@@ -138,7 +138,7 @@ fn values_in_memory_become_a_data_set_that_verifies_and_packs() {
     let mut moved = memory_scene();
     moved.locations[0].pose = Pose::level(dvec3(2.0, 1.0, 1.4), 0.3);
     let refused = export(moved).run(&out, &context).unwrap_err();
-    assert!(matches!(&refused, Error::Usage(m) if m.contains("memory:locations")), "{refused}");
+    assert!(matches!(&refused, Error::Usage(e) if e.to_string().contains("memory:locations")), "{refused}");
     let mut twice = memory_scene();
     let mut parts = twice.mesh.into_parts();
     parts.faces.push(parts.faces[0]);
@@ -152,8 +152,9 @@ fn values_in_memory_become_a_data_set_that_verifies_and_packs() {
     let statistics = s3d_dataset::statistics(&out).unwrap();
     assert_eq!(statistics.areas[0].labels.as_ref().unwrap().tally.instances_per_class["wall"], 4);
 
+    let package = Package::Webdataset(WebdatasetOptions::default());
     let packed = PackOptions { output: Some(dir.path().join("packed")), ..PackOptions::default() };
-    let place = s3d_dataset::pack(&out, PackageKind::Webdataset, &packed, &context).unwrap();
+    let place = s3d_dataset::pack(&out, &package, &packed, &context).unwrap();
     assert!(fs::read_dir(place).unwrap().count() >= 2);
     s3d_dataset::profile(&out, &[Profile::PointNet], &ProfileOptions::default(), &context).unwrap();
     assert!(out.join("profiles/pointnet").is_dir());

@@ -21,7 +21,7 @@ fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Co
         Export::new([scene()]).options(options).run(&out, context)
     };
     let error = export(&[], &Context::default()).unwrap_err();
-    assert!(matches!(&error, Error::Input(m) if m.contains(words)), "{error}");
+    assert!(matches!(&error, Error::Input(e) if e.to_string().contains(words)), "{error}");
     assert!(error.to_string().contains(&format!("--allow {condition}")), "{error}");
     let manifest = || std::fs::read_to_string(out.join("manifest.json")).unwrap_or_default();
     assert!(!manifest().contains("complete"), "nothing passes for a data set");

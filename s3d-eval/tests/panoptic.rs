@@ -3,7 +3,7 @@
 mod scene;
 
 use s3d_dataset::{
-    ClassList, DataSet, Export, ExportOptions, PackOptions, PackageKind, PackedImages, SpecificOptions, pack,
+    ClassList, CocoOptions, DataSet, Export, ExportOptions, PackOptions, Package, PackedImages, pack,
 };
 use s3d_eval::{Context, EvalOptions, Evaluation, Folds, Protocol, Result, evaluate};
 use s3d_geom::Raster;
@@ -17,12 +17,13 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// Packs the images of the data set itself into a folder.
-fn packed(change: impl Fn(&mut PackOptions)) -> (TempDir, PathBuf) {
+fn packed(change: impl Fn(&mut CocoOptions)) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("coco");
-    let mut options = PackOptions { output: Some(out.clone()), ..PackOptions::default() };
-    change(&mut options);
-    pack(data_set(), PackageKind::Coco, &options, &Context::default()).unwrap();
+    let mut coco = CocoOptions::default();
+    change(&mut coco);
+    let options = PackOptions { output: Some(out.clone()), ..PackOptions::default() };
+    pack(data_set(), &Package::Coco(coco), &options, &Context::default()).unwrap();
     (folder, out)
 }
 
@@ -65,7 +66,7 @@ fn a_data_set_against_itself_is_perfect() {
 
     // The file by its name; then only panoramas, in folds, with intervals; then one area.
     assert_perfect(&panoptic(&package.join("panoptic.json"), |_| ()).unwrap());
-    let (_folder, package) = packed(|o| o.images = Some(PackedImages::Panoramas));
+    let (_folder, package) = packed(|o| o.images = PackedImages::Panoramas);
     let evaluation = panoptic(&package, |o| (o.folds, o.bootstrap) = (Folds::EachArea, Some(20))).unwrap();
     assert_perfect(&evaluation);
     assert_eq!((evaluation.counted["views"], evaluation.counted["panoramas"]), (0, panoramas));
@@ -78,7 +79,7 @@ fn a_data_set_against_itself_is_perfect() {
 #[test]
 fn the_stuff_classes_can_be_chosen() {
     let stuff: ClassList = "floor,door".parse().unwrap();
-    let (_folder, package) = packed(|o| o.specific.stuff = Some(stuff.clone()));
+    let (_folder, package) = packed(|o| o.stuff = Some(stuff.clone()));
     let told = panoptic(&package, |_| ()).unwrap_err().to_string();
     assert!(
         told.contains(
@@ -131,9 +132,9 @@ fn outside_of_photographs_is_void() {
     let photographs = DataSet::open(&out).unwrap().photographs(1).unwrap();
     assert!(photographs.len() == 1 && photographs[0].masked > 0.02, "{photographs:?}");
 
-    let mut options = PackOptions { output: Some(package.clone()), ..PackOptions::default() };
-    options.images = Some(PackedImages::Views);
-    pack(&out, PackageKind::Coco, &options, &Context::default()).unwrap();
+    let options = PackOptions { output: Some(package.clone()), ..PackOptions::default() };
+    let views = CocoOptions { images: PackedImages::Views, ..CocoOptions::default() };
+    pack(&out, &Package::Coco(views), &options, &Context::default()).unwrap();
     let options = EvalOptions::default();
     let evaluation = evaluate(Protocol::Panoptic, &out, &package, &options, &Context::default()).unwrap();
     let scores = evaluation.tables[0].rows.iter().flat_map(|row| &row.scores);
@@ -144,7 +145,7 @@ fn outside_of_photographs_is_void() {
 #[test]
 fn trainers_write_other_names() {
     // A flat folder with other names, no categories, and an image that is not listed.
-    let (_folder, package) = packed(|o| o.images = Some(PackedImages::Panoramas));
+    let (_folder, package) = packed(|o| o.images = PackedImages::Panoramas);
     let path = package.join("panoptic.json");
     let mut value: Value = read_json(&path).unwrap();
     value.as_object_mut().unwrap().remove("categories");
@@ -163,7 +164,7 @@ fn trainers_write_other_names() {
 
 #[test]
 fn a_segment_that_is_lost_is_missed() {
-    let (_folder, package) = packed(|o| o.images = Some(PackedImages::Panoramas));
+    let (_folder, package) = packed(|o| o.images = PackedImages::Panoramas);
     let path = package.join("panoptic.json");
     let mut value: Value = read_json(&path).unwrap();
 
@@ -197,7 +198,7 @@ fn a_segment_that_is_lost_is_missed() {
 
 #[test]
 fn wrong_predictions_are_refused() {
-    let (_folder, package) = packed(|o| o.images = Some(PackedImages::Panoramas));
+    let (_folder, package) = packed(|o| o.images = PackedImages::Panoramas);
     let first = |value: &mut Value, key: &str, new: Value| value["annotations"][0][key] = new;
     let e = message(&package, |v| first(v, "image_id", json!(2)));
     assert!(e.contains("panoptic.json: image 2: ") && e.contains("annotated twice"), "{e}");
@@ -265,8 +266,7 @@ fn wrong_predictions_are_refused() {
     assert!(e.contains("panoptic: missing"), "{e}");
 
     // Another list of stuff gives other segments.
-    let walls = SpecificOptions { stuff: Some(ClassList(vec!["wall".into()])), ..SpecificOptions::default() };
-    let (_folder, package) = packed(|o| o.specific = walls.clone());
+    let (_folder, package) = packed(|o| o.stuff = Some(ClassList(vec!["wall".into()])));
     let e = panoptic(&package, |_| ()).unwrap_err().to_string();
     assert!(e.contains("ceiling is a thing, and by the taxonomy of the data set stuff"), "{e}");
 }

@@ -5,8 +5,8 @@ use crate::mesh::parsed;
 use crate::work::watched;
 use pyo3::prelude::*;
 use s3d_dataset::{
-    ClassList, CompareOptions, InfoOptions, PackOptions, Profile, ProfileOptions, SceneSource,
-    SpecificOptions, VerifyOptions, XyzOptions,
+    ClassList, CompareOptions, InfoOptions, PackOptions, PackageArguments, Profile, ProfileOptions,
+    SceneSource, VerifyOptions, XyzOptions,
 };
 use s3d_eval::{EvalOptions, Folds, Protocol};
 use s3d_report::ReportOptions;
@@ -148,7 +148,7 @@ pub(crate) fn compare(
 pub(crate) fn statistics(py: Python<'_>, root: PathBuf) -> PyResult<Answer> {
     let made = py
         .detach(|| s3d_dataset::statistics(&root))
-        .map_err(|e| crate::error::exception(&e))?;
+        .map_err(|e| exception(&e))?;
     Ok((json(&made)?, made.to_markdown()))
 }
 
@@ -238,26 +238,23 @@ pub(crate) fn pack(
             .map(|modality| crate::dataset::domain(&modality))
             .collect::<PyResult<Vec<_>>>()
     });
-    let options = PackOptions {
-        output: how.output,
-        overwrite: how.overwrite,
-        areas: how.areas,
+    let arguments = PackageArguments {
         images: word(how.images)?,
-        specific: SpecificOptions {
-            modalities: modalities.transpose()?,
-            max_size: how.max_size,
-            max_count: how.max_count,
-            prefix: word(how.prefix)?,
-            shuffle: how.shuffle,
-            points: how.points,
-            binary: how.binary,
-            copy_images: how.copy_images,
-            depth: word(how.depth)?,
-            stuff: word(stuff)?,
-            compression: word(how.compression)?,
-        },
+        modalities: modalities.transpose()?,
+        max_size: how.max_size,
+        max_count: how.max_count,
+        prefix: word(how.prefix)?,
+        shuffle: how.shuffle,
+        points: how.points,
+        binary: how.binary,
+        copy_images: how.copy_images,
+        depth: word(how.depth)?,
+        stuff: word(stuff)?,
+        compression: word(how.compression)?,
     };
-    watched(py, threads, &sink, |ctx| s3d_dataset::pack(&root, kind, &options, ctx))
+    let package = arguments.package(kind).map_err(|error| exception(&error))?;
+    let options = PackOptions { output: how.output, overwrite: how.overwrite, areas: how.areas };
+    watched(py, threads, &sink, |ctx| s3d_dataset::pack(&root, &package, &options, ctx))
 }
 
 #[pyfunction]

@@ -3,13 +3,25 @@
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use s3d_dataset::Error;
+use s3d_dataset::{Error, OptionNames};
 use s3d_io::{Error as FileError, Place};
 use std::io::ErrorKind;
 
-/// A call that cannot be: `UsageError`.
-pub(crate) fn usage(message: impl Into<String>) -> PyErr {
-    exception(&Error::Usage(message.into()))
+/// The options of calls as arguments of the Python package.
+struct Arguments;
+
+impl OptionNames for Arguments {
+    fn option(&self, name: &str, value: Option<&str>) -> String {
+        /// Arguments that are True or False.
+        const SWITCHES: [&str; 5] = ["overwrite", "lenient", "keep_all", "full", "single"];
+        match value {
+            Some(value) if name == "allow" => format!("allow=[{value:?}]"),
+            Some(value) if value.parse::<f64>().is_ok() => format!("{name}={value}"),
+            Some(value) => format!("{name}={value:?}"),
+            None if SWITCHES.contains(&name) => format!("{name}=True"),
+            None => name.to_owned(),
+        }
+    }
 }
 
 /// The input does not fit together: `InputError`.
@@ -17,16 +29,22 @@ pub(crate) fn input(message: impl Into<String>) -> PyErr {
     raise("InputError", &message.into(), None)
 }
 
-/// The exception that an error is.
+/// A call that cannot be: `UsageError`.
+pub(crate) fn usage(message: impl Into<String>) -> PyErr {
+    raise("UsageError", &message.into(), None)
+}
+
+/// The exception that an error is. Options are named as arguments.
 pub(crate) fn exception(error: &Error) -> PyErr {
-    match error {
-        Error::Usage(text) => raise("UsageError", text, None),
-        Error::Input(text) => raise("InputError", text, None),
-        Error::Temporary(text) => raise("TemporaryError", text, None),
-        Error::Cancelled => raise("CancelledError", &error.to_string(), None),
-        Error::File(file) => of_file(file),
-        other => raise("Error", &other.to_string(), None),
-    }
+    let class = match error {
+        Error::Usage(_) => "UsageError",
+        Error::Input(_) => "InputError",
+        Error::Temporary(_) => "TemporaryError",
+        Error::Cancelled => "CancelledError",
+        Error::File(file) => return of_file(file),
+        _ => "Error",
+    };
+    raise(class, &error.message(&Arguments), None)
 }
 
 fn of_file(error: &FileError) -> PyErr {
@@ -57,7 +75,6 @@ fn raise(class: &str, message: &str, about: Option<About>) -> PyErr {
     let made = Python::attach(|py| {
         let errors = py.import("s3d_py._errors")?;
         let class = errors.getattr(class)?;
-        let message = errors.call_method1("in_python", (message,))?;
         let fields = PyDict::new(py);
         if let Some((path, detail)) = about {
             fields.set_item("path", path)?;

@@ -116,3 +116,9 @@ fn annotations(
 pub(crate) fn uuid_of_name(name: &str) -> String {
     s3d_io::camera::uuid_from_name(name)
 }
+
+/// The names of the options of an export, but `allow`.
+#[pyfunction]
+pub(crate) fn export_option_names() -> Vec<&'static str> {
+    ExportOptions::names().to_vec()
+}

@@ -34,7 +34,7 @@ mod native {
     #[pymodule_export]
     use super::detect::Detector;
     #[pymodule_export]
-    use super::export::{export, uuid_of_name};
+    use super::export::{export, export_option_names, uuid_of_name};
     #[pymodule_export]
     use super::mesh::Mesh;
     #[pymodule_export]

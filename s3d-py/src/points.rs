@@ -6,7 +6,7 @@ use crate::mesh::Mesh;
 use crate::work::watched;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use s3d_dataset::Error;
+use s3d_dataset::InputError;
 use s3d_geom::{Density, NearestFaces, PointCloud, SurfaceSampler};
 use s3d_label::{FaceVotes, LabelId, Labeler, MAX_LABELS, VoteError, VoteOptions, fill_labels};
 
@@ -91,7 +91,7 @@ pub(crate) fn vote<'py>(
             ctx.check()?;
             labeler
                 .add_labelled_points(points, labels)
-                .map_err(|e: VoteError| Error::Input(e.to_string()))?;
+                .map_err(|e: VoteError| InputError::Labels { why: e.to_string() })?;
             progress.add(points.len() as u64);
         }
         Ok(labeler.finish().iter().collect())

@@ -44,11 +44,15 @@ def test_messages_name_arguments_not_options(demo: Path, tmp_path: Path) -> None
     with pytest.raises(s3d.UsageError) as raised:
         s3d.open(demo).report(tmp_path / "page")
     assert "--" not in str(raised.value)
-    in_python = importlib.import_module("s3d_py._errors").in_python
-    assert in_python("stops here without --allow far-points") == 'stops here without allow=["far-points"]'
-    assert in_python("--pano-width 4096 there, 64 now") == "pano_width 4096 there, 64 now"
-    whole = "go on with: s3d export scan.toml -o out --views 3"
-    assert in_python(whole) == whole
+    with pytest.raises(s3d.UsageError, match=r"size 64 there, 32 now|size 540 there, 32 now"):
+        s3d.export(demo / "scan" / "scene.toml", demo, size=32)
+    with pytest.raises(s3d.UsageError, match="stuff belongs to to=.coco. only"):
+        s3d.open(demo).pack("colmap", stuff=["wall"])
+
+
+def test_options_of_an_export_are_those_of_the_crate() -> None:
+    names = importlib.import_module("s3d_py._native").export_option_names()
+    assert list(s3d.ExportOptions.__annotations__) == names
 
 
 def test_errors_are_a_hierarchy() -> None:

@@ -3,10 +3,10 @@
 
 use super::on_threads;
 use crate::args::Threads;
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::values::{even_width, parsed, positive};
 use clap::{Args, value_parser};
-use s3d_dataset::{Cancel, Context, Error, Export, ExportOptions, Result};
+use s3d_dataset::{Cancel, Context, Error, Export, ExportOptions, InputError, Result};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;
@@ -123,7 +123,7 @@ impl Scene {
     }
 
     fn write(&self, folder: &Path, options: &ExportOptions, cancel: &Cancel) -> Result<PathBuf> {
-        let wrong = |e: BuildingError| Error::Input(e.to_string());
+        let wrong = |e: BuildingError| InputError::Unfit { path: folder.to_owned(), why: e.to_string() };
         let (scene, scan) = match self.area {
             None => (Building::demo().build().map_err(wrong)?, ScanOptions::default()),
             Some(area) => {
@@ -148,7 +148,7 @@ impl Scene {
             .map_err(|e| match e {
                 ScanError::File(e) => e.into(),
                 ScanError::Cancelled => Error::Cancelled,
-                other => Error::Input(other.to_string()),
+                other => InputError::Unfit { path: folder.to_owned(), why: other.to_string() }.into(),
             })
     }
 }
@@ -169,31 +169,47 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         .allow(SCAN)
         .allow(SCAN_PART);
     on_threads(args.threads, |context| {
-        export.check_output(&output, context)?;
-        for scene in &scenes {
-            if scene.folder.exists() && !scene.is_ours() {
-                return Err(Error::Usage(format!(
-                    "{} is there and is not {}: choose another folder",
-                    scene.folder.display(),
-                    scene.name()
-                )));
-            }
+        Ok(make(&scenes, &export, &output, &options, args.overwrite, context))
+    })??;
+
+    let layout = Layout::new(output);
+    let pano = layout.area_dir(1).join("pano");
+    let tables = layout.statistics_md();
+    if args.no_images {
+        info!("look at {}", tables.display());
+    } else {
+        info!("look at {} and {}", pano.display(), tables.display());
+    }
+    Ok(())
+}
+
+/// Writes the scenes and exports them.
+fn make(
+    scenes: &[Scene],
+    export: &Export,
+    output: &Path,
+    options: &ExportOptions,
+    overwrite: bool,
+    context: &Context,
+) -> Outcome<()> {
+    export.check_output(output, context)?;
+    for scene in scenes {
+        if scene.folder.exists() && !scene.is_ours() {
+            return Err(Failure::Usage(format!(
+                "{} is there and is not {}: choose another folder",
+                scene.folder.display(),
+                scene.name()
+            )));
         }
-        let part = output.join(SCAN_PART);
-        for scene in &scenes {
-            put(scene, &part, &options, args.overwrite, context)?;
-            info!("{} is in {}", scene.name(), scene.folder.display());
-        }
-        export.run(&output, context)?;
-        let layout = Layout::new(output);
-        let (pano, tables) = (layout.area_dir(1).join("pano"), layout.statistics_md());
-        if args.no_images {
-            info!("look at {}", tables.display());
-        } else {
-            info!("look at {} and {}", pano.display(), tables.display());
-        }
-        Ok(())
-    })
+    }
+
+    let part = output.join(SCAN_PART);
+    for scene in scenes {
+        put(scene, &part, options, overwrite, context)?;
+        info!("{} is in {}", scene.name(), scene.folder.display());
+    }
+    export.run(output, context)?;
+    Ok(())
 }
 
 /// Writes the scene and gives it its place. One that is there already, of a demo that was stopped, may stay
@@ -204,18 +220,18 @@ fn put(
     options: &ExportOptions,
     overwrite: bool,
     context: &Context,
-) -> Result<()> {
+) -> Outcome<()> {
     let (folder, cancel) = (&scene.folder, &context.cancel);
     context.check()?;
     remove(part)?;
     scene.write(part, options, cancel)?;
     if folder.exists() {
         if same(part, folder).map_err(|e| FileError::io(folder, "read", e))? {
-            return remove(part);
+            return Ok(remove(part)?);
         }
         remove(part)?;
         if !overwrite {
-            return Err(Error::Usage(format!(
+            return Err(Failure::Usage(format!(
                 "{} is there and differs from {}: choose another folder, or replace it with --overwrite",
                 folder.display(),
                 scene.name()

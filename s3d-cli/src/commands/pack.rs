@@ -6,7 +6,7 @@ use crate::failure::Outcome;
 use crate::values::parsed;
 use clap::{Args, value_parser};
 use s3d_dataset::{
-    ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions,
+    ClassList, DepthFiles, PackOptions, PackageArguments, PackageKind, PackedImages, ShardPrefix,
 };
 use s3d_io::dataset::Domain;
 use s3d_io::image::Compression;
@@ -85,11 +85,12 @@ pub(crate) struct SpecificArgs {
     pub(crate) compression: Option<Compression>,
 }
 
-impl From<SpecificArgs> for SpecificOptions {
-    fn from(args: SpecificArgs) -> Self {
-        let SpecificArgs { modalities, max_size, max_count, prefix, shuffle, points, .. } = args;
-        let SpecificArgs { binary, copy_images, depth, stuff, compression, .. } = args;
-        Self {
+impl SpecificArgs {
+    fn arguments(self, images: Option<PackedImages>) -> PackageArguments {
+        let Self { modalities, max_size, max_count, prefix, shuffle, points, .. } = self;
+        let Self { binary, copy_images, depth, stuff, compression, .. } = self;
+        PackageArguments {
+            images,
             modalities,
             max_size,
             max_count,
@@ -106,14 +107,11 @@ impl From<SpecificArgs> for SpecificOptions {
 }
 
 pub(crate) fn run(args: PackArgs) -> Outcome<()> {
-    let options = PackOptions {
-        output: args.output,
-        overwrite: args.overwrite,
-        areas: args.areas,
-        images: args.images,
-        specific: args.options.into(),
-    };
-    on_threads(args.threads, |context| s3d_dataset::pack(&args.dataset, args.to, &options, context).map(drop))
+    let package = args.options.arguments(args.images).package(args.to)?;
+    let options = PackOptions { output: args.output, overwrite: args.overwrite, areas: args.areas };
+    on_threads(args.threads, |context| {
+        s3d_dataset::pack(&args.dataset, &package, &options, context).map(drop)
+    })
 }
 
 #[cfg(test)]
@@ -132,7 +130,7 @@ mod tests {
     #[test]
     fn words_become_options() {
         let args = parse(&["--to", "coco", "--stuff", "wall,floor,wall"]).unwrap();
-        let options = SpecificOptions::from(args.options);
+        let options = args.options.arguments(None);
         assert_eq!(options.stuff, "floor,wall".parse().ok());
         let args = parse(&["--to", "colmap", "--points", "0", "--copy-images"]).unwrap();
         assert_eq!((args.options.points, args.options.copy_images), (Some(0), true));

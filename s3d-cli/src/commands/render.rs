@@ -2,11 +2,11 @@
 
 use super::on_threads;
 use crate::args::{MeshArgs, Threads};
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::values::{field_of_view, finite, intrinsics, parsed, point};
 use clap::{Args, value_parser};
 use glam::{DVec3, dvec2};
-use s3d_dataset::{Condition, Error, PosesOptions, RenderOptions};
+use s3d_dataset::{Condition, PosesOptions, RenderOptions};
 use s3d_geom::{Camera, Pose};
 use s3d_io::camera::{Distortion, GivenIntrinsics, Optics};
 use s3d_io::image::Compression;
@@ -100,7 +100,7 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
         let width = args.size.unwrap_or(4096);
         if width % 2 == 1 {
             let message = format!("--size {width}: a panorama is half as high as wide, so even");
-            return Err(Error::Usage(message).into());
+            return Err(Failure::Usage(message));
         }
         Camera::equirectangular(pose, width)
     } else {

@@ -4,7 +4,7 @@ use super::{on_threads, print};
 use crate::args::Threads;
 use crate::failure::{Failure, Outcome};
 use clap::Args;
-use s3d_dataset::{Error, VerifyOptions};
+use s3d_dataset::{Error, TemporaryError, VerifyOptions};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -26,7 +26,7 @@ pub(crate) fn run(args: VerifyArgs) -> Outcome<()> {
     print(&report.to_string())?;
     let root = args.output.display();
     match (report.unread.clone(), report.fault_count()) {
-        (Some(why), _) => Err(Error::Temporary(why).into()),
+        (Some(what), _) => Err(Error::from(TemporaryError::Changed { what }).into()),
         (None, 0) => Ok(()),
         (None, 1) => Err(Failure::Answer(format!("{root}: 1 fault"))),
         (None, n) => Err(Failure::Answer(format!("{root}: {n} faults"))),

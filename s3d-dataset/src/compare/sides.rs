@@ -1,7 +1,7 @@
 //! The two data sets as they are read, and what is wrong in them.
 
 use super::comparison::{ComparedSet, Side, UnreadFile};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, UsageError};
 use crate::record::data_set::DataSet;
 use s3d_io::dataset::{FileRecord, Layout};
 use std::collections::BTreeMap;
@@ -24,10 +24,7 @@ impl Sides {
         for folder in [a, b] {
             // What is no regular file is told of by its reader.
             if std::fs::symlink_metadata(Layout::new(folder).manifest()).is_err() {
-                return Err(Error::Usage(format!(
-                    "{}: no data set is there (no manifest.json): give the folder of one",
-                    folder.display()
-                )));
+                return Err(UsageError::NoDataSet { folder: folder.to_owned() }.into());
             }
         }
         Ok(Self { a: DataSet::open(a)?, b: DataSet::open(b)?, unread: Mutex::default() })

@@ -2,7 +2,7 @@
 //! the files on the disk, the request and what the journals tell.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use crate::export::photographs::doubts;
 use crate::export::views::select_requested;
 use crate::profile::{self};
@@ -43,7 +43,7 @@ pub(crate) struct Totals {
 /// something does.
 ///
 /// # Errors
-/// [`Error::Input`] if a unit is missing.
+/// [`Error::Input`](crate::Error::Input) if a unit is missing.
 pub(crate) fn finish(
     ctx: &Context,
     layout: &Layout,
@@ -54,7 +54,8 @@ pub(crate) fn finish(
 ) -> Result<Totals> {
     let ctx = &ctx.noting();
     if let Some(unit) = missing_units(request, finished).first() {
-        return Err(Error::Input(format!("{}: {unit:?} is missing", layout.root().display())));
+        let what = format!("{}: {unit} missing", layout.root().display());
+        return Err(InputError::Incomplete { what, remedy: "make the same call again".into() }.into());
     }
     let areas = request.numbers();
     let (candidates, views) = select_requested(request, finished)?;
@@ -79,7 +80,7 @@ pub(crate) fn finish(
         if let Some(share) = pixels.share_unlabelled().filter(|share| *share > MUCH_UNLABELLED) {
             ctx.warn(format_args!(
                 "area {area}: {:.0} % of the pixels show faces without a label: no annotated point is next \
-                 to them (--fill METRES gives them the label of the surface beside them)",
+                 to them (the option `fill` gives them the label of the surface beside them)",
                 100.0 * share
             ));
         }

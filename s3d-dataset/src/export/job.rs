@@ -2,7 +2,7 @@
 
 use crate::account::Account;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result, UsageError};
 use crate::export::area::{self, Common, PreparedMesh};
 use crate::export::finish::finish;
 use crate::export::input::cameras::Cameras;
@@ -323,14 +323,11 @@ fn area_pictures(ctx: &Context, area: &AreaInput, options: &ExportOptions) -> Re
 
 /// Refuses more labels than loaders of the data set can tell apart.
 fn check_label_count(labels: usize) -> Result<()> {
-    if labels <= s3d_io::dataset::MAX_LABELS_OF_LOADERS {
+    let most = s3d_io::dataset::MAX_LABELS_OF_LOADERS;
+    if labels <= most {
         return Ok(());
     }
-    Err(Error::Input(format!(
-        "{labels} labels are more than {}: loaders of the data set take a label's index from G and B of a \
-         pixel alone, and a pixel with an R for one without a label; export the areas in several data sets",
-        s3d_io::dataset::MAX_LABELS_OF_LOADERS
-    )))
+    Err(InputError::TooManyLabels { labels, most }.into())
 }
 
 /// Refuses a `--only` that names no location, as far as they are known before the areas are labelled.
@@ -354,7 +351,11 @@ fn check_only(inputs: &Inputs, only: &[String]) -> Result<()> {
 fn only_known<'a>(uuids: impl Iterator<Item = &'a str>, only: &[String]) -> Result<()> {
     let known: BTreeSet<&str> = uuids.collect();
     match only.iter().find(|uuid| !known.contains(uuid.as_str())) {
-        Some(uuid) => Err(Error::Usage(format!("--only {uuid}: no scan location has this uuid"))),
+        Some(uuid) => {
+            let value = uuid.clone();
+            let why = "no scan location has this uuid".to_owned();
+            Err(UsageError::InvalidValue { option: "only", value, why }.into())
+        }
         None => Ok(()),
     }
 }
@@ -362,13 +363,15 @@ fn only_known<'a>(uuids: impl Iterator<Item = &'a str>, only: &[String]) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
 
     #[test]
     fn more_labels_than_sixteen_bits_are_refused() {
         assert!(check_label_count(65_535).is_ok());
         let e = check_label_count(65_536).unwrap_err();
         assert!(
-            matches!(e, Error::Input(_)) && e.to_string().starts_with("65536 labels are more than 65535")
+            matches!(e, Error::Input(InputError::TooManyLabels { .. }))
+                && e.to_string().starts_with("65536 labels are more than 65535")
         );
     }
 }

@@ -1,6 +1,6 @@
 //! Which candidate views of an area are still to be scored, and their scores.
 
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use crate::export::area::{Common, PreparedMesh};
 use crate::export::views::{Kinds, Scoring, score_area};
 use crate::record::journal::{Done, ScoresDone, Unit};
@@ -58,5 +58,6 @@ pub(crate) fn check_faces(plan: &LabelledArea, prepared: &PreparedMesh<'_>) -> R
     if labels == faces {
         return Ok(());
     }
-    Err(Error::Input(format!("area {}: {labels} faces are labelled, and the mesh has {faces}", plan.area)))
+    let why = format!("{labels} faces are labelled, and the mesh has {faces}");
+    Err(InputError::UnfitArea { area: plan.area, why }.into())
 }

@@ -1,7 +1,7 @@
 //! Which views are taken: candidates at every location, their entropies, the selection, and their numbers.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use crate::parallel::for_each_in_order;
 use crate::record::journal::Finished;
 use crate::record::request::Request;
@@ -164,7 +164,7 @@ pub(crate) fn score_area(
 /// made, and what became of them.
 ///
 /// # Errors
-/// [`Error::Input`] if something of that is missing.
+/// [`Error::Input`](crate::Error::Input) if something of that is missing.
 pub(crate) fn select_requested(
     request: &Request,
     finished: &Finished,
@@ -172,18 +172,22 @@ pub(crate) fn select_requested(
     let options = &request.options;
     let mut candidates = Vec::new();
     for area in request.numbers() {
-        let missing = |what: &str| Error::Input(format!("area {area}: {what} missing"));
+        let missing = |what: &str| InputError::UnfitArea { area, why: format!("{what} missing") };
         let labels = finished.labels(area).ok_or_else(|| missing("its labels are"))?;
         for (index, uuid) in labels.locations.iter().enumerate() {
             let entropies = finished.scores(area, uuid);
             let entropies = entropies.ok_or_else(|| missing(&format!("the scores of {uuid} are")))?;
             // No more is drawn than was scored, whatever a request claims.
             if entropies.len() != options.views as usize {
-                return Err(Error::Input(format!(
-                    "area {area}: location {uuid} has {} scores instead of {}, one a candidate view",
-                    entropies.len(),
-                    options.views
-                )));
+                return Err(InputError::UnfitArea {
+                    area,
+                    why: format!(
+                        "location {uuid} has {} scores instead of {}, one a candidate view",
+                        entropies.len(),
+                        options.views
+                    ),
+                }
+                .into());
             }
             candidates.extend(draw(area, index, uuid, options.views, request.seed, Some(entropies)));
         }

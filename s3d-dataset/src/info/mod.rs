@@ -256,8 +256,8 @@ fn unlabelled_doubt(scene: &Scene<'_>, locations: &[ScanLocation], annotated: &A
     let share = unlabelled_share(scene, locations, &annotated.label_of_face)?;
     (share > MUCH_UNLABELLED).then(|| {
         format!(
-            "{:.0} % of what scan locations see has no label: no annotated point is next to it (export \
-             --fill METRES gives it the label of the surface beside it)",
+            "{:.0} % of what scan locations see has no label: no annotated point is next to it (the \
+             option `fill` of an export gives it the label of the surface beside it)",
             100.0 * share
         )
     })

@@ -1,10 +1,10 @@
 //! `s3d pack --to coco`: panoptic annotations.
 
 use super::destination::Destination;
-use super::options::SpecificOptions;
+use super::options::CocoOptions;
 use super::source::Source;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use crate::parallel::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
@@ -28,19 +28,17 @@ pub(super) fn pack(
     ctx: &Context,
     source: &Source,
     destination: &Destination,
-    options: &SpecificOptions,
+    options: &CocoOptions,
 ) -> Result<Vec<String>> {
     let Some(table) = source.labels()? else {
-        let root = source.layout.root().display();
-        return Err(Error::Input(format!(
-            "{root}: COCO needs labels, and the data set was exported without"
-        )));
+        let dataset = source.layout.root().to_owned();
+        return Err(InputError::WithoutLabels { dataset, needs: "COCO needs" }.into());
     };
     source.require(Domain::Rgb, "COCO")?;
     source.require(Domain::Semantic, "COCO")?;
     let taxonomy = table.taxonomy();
     let stuff = stuff(options, taxonomy)?;
-    let compression = options.compression.unwrap_or_default();
+    let compression = options.compression;
     let folder = destination.path().join(FOLDER);
     for image in &source.images {
         let below = image.relative_path(Domain::Rgb);
@@ -92,7 +90,7 @@ pub(super) fn pack(
 }
 
 /// The classes of which all instances in an image are one segment.
-pub(super) fn stuff(options: &SpecificOptions, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
+pub(super) fn stuff(options: &CocoOptions, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
     match &options.stuff {
         Some(list) => list.classes(taxonomy),
         None => Ok(taxonomy

@@ -2,7 +2,7 @@
 
 use super::area_points;
 use super::destination::Destination;
-use super::options::SpecificOptions;
+use super::options::ColmapOptions;
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
@@ -15,7 +15,7 @@ pub(super) fn pack(
     ctx: &Context,
     source: &Source,
     destination: &Destination,
-    options: &SpecificOptions,
+    options: &ColmapOptions,
 ) -> Result<Vec<String>> {
     source.require(Domain::Rgb, "COLMAP")?;
     source.require(Domain::Pose, "COLMAP")?;

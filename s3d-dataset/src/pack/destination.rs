@@ -121,7 +121,7 @@ mod tests {
         write("first", false).unwrap();
         assert_eq!(names(&place), ["file", ABOUT]);
         let e = write("second", false).unwrap_err().to_string();
-        assert!(e.contains("--overwrite"), "{e}");
+        assert!(e.contains("`overwrite`"), "{e}");
         assert_eq!(fs::read_to_string(place.join("file")).unwrap(), "first");
         write("third", true).unwrap();
         assert_eq!(fs::read_to_string(place.join("file")).unwrap(), "third");

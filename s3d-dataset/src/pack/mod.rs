@@ -10,13 +10,16 @@ mod source;
 mod webdataset;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+#[cfg(doc)]
+use crate::error::Error;
+use crate::error::Result;
 use crate::store::new_file::NewFile;
 use crate::store::new_folder::{beside, check_apart};
 use crate::store::parent_of;
 use destination::{About, Destination};
 pub use options::{
-    ClassList, DepthFiles, PackOptions, PackageKind, PackedImages, ShardPrefix, SpecificOptions,
+    ClassList, CocoOptions, ColmapOptions, DepthFiles, NerfstudioOptions, PackOptions, Package,
+    PackageArguments, PackageKind, PackedImages, ParquetOptions, ShardPrefix, WebdatasetOptions,
 };
 use s3d_geom::PointCloud;
 use s3d_io::fs::create_dir;
@@ -30,38 +33,35 @@ const POINTS: u32 = 100_000;
 /// Makes a package of the data set in the folder `dataset`, in which nothing is altered. Returns where it is.
 ///
 /// # Errors
-/// [`Error::Usage`] if options exclude each other or something is in the way; [`Error::Input`] if the data
-/// set lacks what the package needs; [`Error::File`]; [`Error::Cancelled`]; [`Error::Temporary`]. No half of
-/// a package is left behind.
-pub fn pack(dataset: &Path, kind: PackageKind, options: &PackOptions, ctx: &Context) -> Result<PathBuf> {
+/// [`Error::Usage`] if something is in the way; [`Error::Input`] if the data set lacks what the package needs;
+/// [`Error::File`]; [`Error::Cancelled`]; [`Error::Temporary`]. No half of a package is left behind.
+pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Context) -> Result<PathBuf> {
     let started = Instant::now();
-    options.specific.check(kind)?;
-    let which = which_images(ctx, kind, options.images)?;
-    let source = Source::open(ctx, dataset, &options.areas, which)?;
+    let kind = package.kind();
+    let source = Source::open(ctx, dataset, &options.areas, package.images())?;
     let place = match &options.output {
         Some(place) => place.clone(),
         None => default_place(dataset, kind)?,
     };
-    if kind == PackageKind::Parquet {
-        check_apart(&place, dataset)?;
-        NewFile::check_free(&place, options.overwrite)?;
-        create_dir(&parent_of(&place))?;
-        let table = NewFile::begin(ctx, &place, options.overwrite)?;
-        parquet::pack(ctx, &source, table.path())?;
-        table.finish()?;
-        source.frame_notes().iter().for_each(|note| ctx.info(note));
-    } else {
+
+    let into_folder = |write: &dyn Fn(&Destination) -> Result<Vec<String>>| {
         let destination = Destination::begin(ctx, &place, dataset, options.overwrite)?;
-        let mut notes = match kind {
-            PackageKind::Webdataset => webdataset::pack(ctx, &source, &destination, &options.specific)?,
-            PackageKind::Colmap => colmap::pack(ctx, &source, &destination, &options.specific)?,
-            PackageKind::Nerfstudio => nerfstudio::pack(ctx, &source, &destination, &options.specific)?,
-            _ => coco::pack(ctx, &source, &destination, &options.specific)?,
-        };
+        let mut notes = write(&destination)?;
         notes.extend(source.frame_notes());
         notes.iter().for_each(|note| ctx.info(note));
         let about = About::new(kind.to_string(), &source.areas, source.images.len(), notes);
-        destination.finish(&about)?;
+        destination.finish(&about)
+    };
+    match package {
+        Package::Webdataset(webdataset) => {
+            into_folder(&|folder| webdataset::pack(ctx, &source, folder, webdataset))?;
+        }
+        Package::Colmap(colmap) => into_folder(&|folder| colmap::pack(ctx, &source, folder, colmap))?,
+        Package::Nerfstudio(nerfstudio) => {
+            into_folder(&|folder| nerfstudio::pack(ctx, &source, folder, nerfstudio))?;
+        }
+        Package::Coco(coco) => into_folder(&|folder| coco::pack(ctx, &source, folder, coco))?,
+        Package::Parquet(_) => pack_table(ctx, &source, dataset, &place, options.overwrite)?,
     }
     ctx.info(format_args!(
         "{}: {} images for {} in {:.1} s",
@@ -73,21 +73,16 @@ pub fn pack(dataset: &Path, kind: PackageKind, options: &PackOptions, ctx: &Cont
     Ok(place)
 }
 
-/// The images that a package holds.
-fn which_images(ctx: &Context, kind: PackageKind, images: Option<PackedImages>) -> Result<PackedImages> {
-    match (kind, images) {
-        (PackageKind::Colmap, Some(PackedImages::Panoramas)) => Err(Error::Usage(
-            "--images panoramas: COLMAP's cameras are pinholes, and panoramas are none: take --to nerfstudio"
-                .into(),
-        )),
-        (PackageKind::Colmap, which) => {
-            if which == Some(PackedImages::All) {
-                ctx.warn(format_args!("panoramas are left out: COLMAP's cameras are pinholes"));
-            }
-            Ok(PackedImages::Views)
-        }
-        (_, which) => Ok(which.unwrap_or(PackedImages::All)),
-    }
+/// Writes the Parquet table of all images, which is a file and no folder.
+fn pack_table(ctx: &Context, source: &Source, dataset: &Path, place: &Path, overwrite: bool) -> Result<()> {
+    check_apart(place, dataset)?;
+    NewFile::check_free(place, overwrite)?;
+    create_dir(&parent_of(place))?;
+    let table = NewFile::begin(ctx, place, overwrite)?;
+    parquet::pack(ctx, source, table.path())?;
+    table.finish()?;
+    source.frame_notes().iter().for_each(|note| ctx.info(note));
+    Ok(())
 }
 
 /// Where a package goes if nothing is said: beside the data set, named after it.

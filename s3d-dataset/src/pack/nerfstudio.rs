@@ -3,7 +3,7 @@
 
 use super::area_points;
 use super::destination::{Destination, relative_path};
-use super::options::{DepthFiles, SpecificOptions};
+use super::options::{DepthFiles, NerfstudioOptions};
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
@@ -28,14 +28,14 @@ pub(super) fn pack(
     ctx: &Context,
     source: &Source,
     destination: &Destination,
-    options: &SpecificOptions,
+    options: &NerfstudioOptions,
 ) -> Result<Vec<String>> {
     source.require(Domain::Rgb, "nerfstudio")?;
     source.require(Domain::Pose, "nerfstudio")?;
     let depth = match options.depth {
         Some(DepthFiles::None) => DepthFiles::None,
         Some(asked) => {
-            source.require(Domain::Depth, "--depth")?;
+            source.require(Domain::Depth, "depth for nerfstudio")?;
             asked
         }
         None if source.has(Domain::Depth) => DepthFiles::Millimetres,
@@ -111,7 +111,7 @@ struct Job<'a> {
     depth: DepthFiles,
     /// Whether views have masks.
     masks: bool,
-    options: &'a SpecificOptions,
+    options: &'a NerfstudioOptions,
 }
 
 impl<'a> Job<'a> {
@@ -120,7 +120,7 @@ impl<'a> Job<'a> {
         destination: &Destination,
         below: &str,
         depth: DepthFiles,
-        options: &'a SpecificOptions,
+        options: &'a NerfstudioOptions,
     ) -> Result<Self> {
         let absolute = |path: &Path| resolved(path).map_err(|e| FileError::io(path, "look for", e));
         let folder = destination.path().join(below);
@@ -163,7 +163,7 @@ impl<'a> Job<'a> {
                 let depth = self.source.depth(image)?;
                 let file = encode_gray16(
                     &millimetres(&depth, self.source.depth_units_per_m),
-                    self.options.compression.unwrap_or_default(),
+                    self.options.compression,
                 );
                 let name = format!("depths/{}_depth.png", image.stem());
                 write_bytes(&self.folder.join(&name), &file)?;

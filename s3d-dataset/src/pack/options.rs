@@ -1,6 +1,6 @@
-//! PackedImages package is made of which images, and what belongs to each.
+//! Which package is made of which images, and the options of each package.
 
-use crate::error::{Error, Result};
+use crate::error::{Result, UsageError};
 use s3d_io::dataset::Domain;
 use s3d_io::image::Compression;
 use s3d_label::{Class, Taxonomy};
@@ -8,96 +8,228 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// What is made of which images. `Default` packs all images of all areas, beside the data set.
+/// Options of all packages. `Default` packs all areas, beside the data set.
 #[derive(Clone, Debug, Default)]
 pub struct PackOptions {
-    /// The package's folder, of Parquet its file; `None` for a place beside the data set, named after it.
+    /// The package's folder, or the file of a Parquet table. `None` for a place beside the data set, named after
+    /// it.
     pub output: Option<PathBuf>,
     /// Replace an earlier package there.
     pub overwrite: bool,
-    /// Of these areas only; of all if empty.
+    /// Pack these areas only; all if empty.
     pub areas: Vec<u32>,
-    /// Of which images; `None` for all that the package can hold.
-    pub images: Option<PackedImages>,
-    /// What belongs to some packages only.
-    pub specific: SpecificOptions,
 }
 
-/// What belongs to some packages only; `None` (or false) where it was not said.
+/// A package, with the options that it has.
+#[derive(Clone, Debug)]
+pub enum Package {
+    /// Tar shards, a sample an image.
+    Webdataset(WebdatasetOptions),
+    /// Cameras, images and points as COLMAP writes a sparse model: perspective views only, since COLMAP's cameras
+    /// are pinholes.
+    Colmap(ColmapOptions),
+    /// `transforms.json` of nerfstudio.
+    Nerfstudio(NerfstudioOptions),
+    /// COCO panoptic.
+    Coco(CocoOptions),
+    /// A table of all images.
+    Parquet(ParquetOptions),
+}
+
+/// Options of [`Package::Webdataset`].
 #[derive(Clone, Debug, Default)]
-pub struct SpecificOptions {
-    /// webdataset: which files of an image go into its sample [default: all that there are]
+pub struct WebdatasetOptions {
+    /// Which images are packed.
+    pub images: PackedImages,
+    /// Which files of an image go into its sample; `None` for all that there are.
     pub modalities: Option<Vec<Domain>>,
-    /// webdataset: megabytes (1,000,000 bytes) of a shard, at most [default: 1000]
+    /// Megabytes (1,000,000 bytes) of a shard, at most. `None` for 1000.
     pub max_size: Option<u32>,
-    /// webdataset: samples of a shard, at most [default: 10000]
+    /// Samples of a shard, at most. `None` for an eighth of a series, so that eight workers have work, or 10,000
+    /// where `max_size` is given.
     pub max_count: Option<u32>,
-    /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar
-    /// and area_N_panoramas-000000.tar for each
+    /// One series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar and
+    /// area_N_panoramas-000000.tar for each.
     pub prefix: Option<ShardPrefix>,
-    /// webdataset: samples in a random order that this number decides, instead of by scan location
+    /// The seed of a random order of samples; `None` for their order by scan location.
     pub shuffle: Option<u64>,
-    /// colmap, nerfstudio: points of each area's cloud, evenly spaced [default: 100000; 0 for none]
+}
+
+/// Options of [`Package::Colmap`].
+#[derive(Clone, Debug, Default)]
+pub struct ColmapOptions {
+    /// Points of each area's cloud, evenly spaced; 0 for none, `None` for 100,000.
     pub points: Option<u32>,
-    /// colmap: cameras.bin, images.bin and points3D.bin instead of text
+    /// Write cameras.bin, images.bin and points3D.bin instead of text.
     pub binary: bool,
-    /// colmap, nerfstudio: copy the RGB images into DEST, which can be moved then, instead of pointing to
-    /// those in OUT
+    /// Copy the RGB images into the package, which can be moved then, instead of pointing to those of the data
+    /// set.
     pub copy_images: bool,
-    /// nerfstudio: depth written anew in millimetres with 0 for missing, as it is read by default; OUT's own
-    /// files, for which ns-train's --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels
-    /// seem to be 128 m away; or none [default: millimetres]
+}
+
+/// Options of [`Package::Nerfstudio`].
+#[derive(Clone, Debug, Default)]
+pub struct NerfstudioOptions {
+    /// Which images are packed.
+    pub images: PackedImages,
+    /// Points of each area's cloud, evenly spaced; 0 for none, `None` for 100,000.
+    pub points: Option<u32>,
+    /// Copy the RGB images into the package, which can be moved then, instead of pointing to those of the data
+    /// set.
+    pub copy_images: bool,
+    /// Which depth files nerfstudio gets; `None` for millimetres where there is depth.
     pub depth: Option<DepthFiles>,
-    /// coco: classes of which all instances in an image are one segment, or none [default: those that the
-    /// taxonomy calls stuff: ceiling,floor,wall]
+    /// How much time the images' files may take.
+    pub compression: Compression,
+}
+
+/// Options of [`Package::Coco`].
+#[derive(Clone, Debug, Default)]
+pub struct CocoOptions {
+    /// Which images are packed.
+    pub images: PackedImages,
+    /// Classes of which all instances in an image are one segment. `None` for those that the taxonomy calls
+    /// stuff: ceiling, floor and wall of S3DIS.
     pub stuff: Option<ClassList>,
-    /// coco, nerfstudio: how much time the images' files may take: fast, balanced or small [default:
-    /// balanced]
+    /// How much time the images' files may take.
+    pub compression: Compression,
+}
+
+/// Options of [`Package::Parquet`].
+#[derive(Clone, Debug, Default)]
+pub struct ParquetOptions {
+    /// Which images are packed.
+    pub images: PackedImages,
+}
+
+/// The options of all packages side by side, as words or arguments give them. [`package`](Self::package) makes a
+/// [`Package`] of them. An option that was not given is `None` or false.
+#[derive(Clone, Debug, Default)]
+pub struct PackageArguments {
+    /// Of all but COLMAP.
+    pub images: Option<PackedImages>,
+    /// Of WebDataset.
+    pub modalities: Option<Vec<Domain>>,
+    /// Of WebDataset.
+    pub max_size: Option<u32>,
+    /// Of WebDataset.
+    pub max_count: Option<u32>,
+    /// Of WebDataset.
+    pub prefix: Option<ShardPrefix>,
+    /// Of WebDataset.
+    pub shuffle: Option<u64>,
+    /// Of COLMAP and nerfstudio.
+    pub points: Option<u32>,
+    /// Of COLMAP.
+    pub binary: bool,
+    /// Of COLMAP and nerfstudio.
+    pub copy_images: bool,
+    /// Of nerfstudio.
+    pub depth: Option<DepthFiles>,
+    /// Of COCO.
+    pub stuff: Option<ClassList>,
+    /// Of COCO and nerfstudio.
     pub compression: Option<Compression>,
 }
 
-impl SpecificOptions {
-    /// Refuses options that another package has.
-    pub(crate) fn check(&self, kind: PackageKind) -> Result<()> {
-        use PackageKind::{Coco, Colmap, Nerfstudio, Webdataset};
-        let options: [(&str, bool, &[PackageKind]); 11] = [
-            ("--modalities", self.modalities.is_some(), &[Webdataset]),
-            ("--max-size", self.max_size.is_some(), &[Webdataset]),
-            ("--max-count", self.max_count.is_some(), &[Webdataset]),
-            ("--prefix", self.prefix.is_some(), &[Webdataset]),
-            ("--shuffle", self.shuffle.is_some(), &[Webdataset]),
-            ("--points", self.points.is_some(), &[Colmap, Nerfstudio]),
-            ("--binary", self.binary, &[Colmap]),
-            ("--copy-images", self.copy_images, &[Colmap, Nerfstudio]),
-            ("--depth", self.depth.is_some(), &[Nerfstudio]),
-            ("--stuff", self.stuff.is_some(), &[Coco]),
-            ("--compression", self.compression.is_some(), &[Coco, Nerfstudio]),
-        ];
-        for (name, given, kinds) in options {
-            if given && !kinds.contains(&kind) {
-                let kinds: Vec<String> = kinds.iter().map(PackageKind::to_string).collect();
-                return Err(Error::Usage(format!(
-                    "{name} is an option of --to {} only",
-                    kinds.join(" and ")
-                )));
+impl PackageArguments {
+    /// Makes a package of a kind.
+    ///
+    /// # Errors
+    /// [`UsageError::ForeignOption`] if an option is given that only another package has;
+    /// [`UsageError::InvalidValue`] if COLMAP is to have panoramas.
+    pub fn package(self, kind: PackageKind) -> Result<Package> {
+        self.check(kind)?;
+        let Self { modalities, max_size, max_count, prefix, shuffle, points, .. } = self;
+        let Self { binary, copy_images, depth, stuff, .. } = self;
+        let images = self.images.unwrap_or_default();
+        let compression = self.compression.unwrap_or_default();
+        Ok(match kind {
+            PackageKind::Webdataset => Package::Webdataset(WebdatasetOptions {
+                images,
+                modalities,
+                max_size,
+                max_count,
+                prefix,
+                shuffle,
+            }),
+            PackageKind::Colmap => Package::Colmap(ColmapOptions { points, binary, copy_images }),
+            PackageKind::Nerfstudio => {
+                Package::Nerfstudio(NerfstudioOptions { images, points, copy_images, depth, compression })
             }
+            PackageKind::Coco => Package::Coco(CocoOptions { images, stuff, compression }),
+            PackageKind::Parquet => Package::Parquet(ParquetOptions { images }),
+        })
+    }
+
+    /// Refuses options that only another package has.
+    fn check(&self, kind: PackageKind) -> Result<()> {
+        use PackageKind::{Coco, Colmap, Nerfstudio, Webdataset};
+        let options: [(&'static str, bool, &[PackageKind]); 11] = [
+            ("modalities", self.modalities.is_some(), &[Webdataset]),
+            ("max_size", self.max_size.is_some(), &[Webdataset]),
+            ("max_count", self.max_count.is_some(), &[Webdataset]),
+            ("prefix", self.prefix.is_some(), &[Webdataset]),
+            ("shuffle", self.shuffle.is_some(), &[Webdataset]),
+            ("points", self.points.is_some(), &[Colmap, Nerfstudio]),
+            ("binary", self.binary, &[Colmap]),
+            ("copy_images", self.copy_images, &[Colmap, Nerfstudio]),
+            ("depth", self.depth.is_some(), &[Nerfstudio]),
+            ("stuff", self.stuff.is_some(), &[Coco]),
+            ("compression", self.compression.is_some(), &[Coco, Nerfstudio]),
+        ];
+        for (option, given, kinds) in options {
+            if given && !kinds.contains(&kind) {
+                let packages = kinds.iter().map(|kind| kind.name()).collect();
+                return Err(UsageError::ForeignOption { option, packages }.into());
+            }
+        }
+        if kind == Colmap && self.images == Some(PackedImages::Panoramas) {
+            let value = PackedImages::Panoramas.to_string();
+            let why =
+                "COLMAP's cameras are pinholes, and panoramas are none: pack them for nerfstudio".to_owned();
+            return Err(UsageError::InvalidValue { option: "images", value, why }.into());
         }
         Ok(())
     }
 }
 
-/// A package.
+impl Package {
+    /// Its kind.
+    pub fn kind(&self) -> PackageKind {
+        match self {
+            Self::Webdataset(_) => PackageKind::Webdataset,
+            Self::Colmap(_) => PackageKind::Colmap,
+            Self::Nerfstudio(_) => PackageKind::Nerfstudio,
+            Self::Coco(_) => PackageKind::Coco,
+            Self::Parquet(_) => PackageKind::Parquet,
+        }
+    }
+
+    /// Which images it holds.
+    pub(crate) fn images(&self) -> PackedImages {
+        match self {
+            Self::Webdataset(options) => options.images,
+            Self::Colmap(_) => PackedImages::Views,
+            Self::Nerfstudio(options) => options.images,
+            Self::Coco(options) => options.images,
+            Self::Parquet(options) => options.images,
+        }
+    }
+}
+
+/// A kind of package.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PackageKind {
-    /// Tar shards, a sample an image.
+    /// [`Package::Webdataset`].
     Webdataset,
-    /// Cameras, images and points as COLMAP writes a sparse model.
+    /// [`Package::Colmap`].
     Colmap,
-    /// `transforms.json` of nerfstudio.
+    /// [`Package::Nerfstudio`].
     Nerfstudio,
-    /// COCO panoptic.
+    /// [`Package::Coco`].
     Coco,
-    /// A table of all images.
+    /// [`Package::Parquet`].
     Parquet,
 }
 
@@ -109,11 +241,16 @@ impl PackageKind {
         ("coco", Self::Coco),
         ("parquet", Self::Parquet),
     ];
+
+    /// Its name, which `FromStr` reads.
+    pub fn name(self) -> &'static str {
+        name_of(&Self::ALL, self)
+    }
 }
 
 impl fmt::Display for PackageKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(name_of(&Self::ALL, *self))
+        f.write_str(self.name())
     }
 }
 
@@ -125,14 +262,15 @@ impl FromStr for PackageKind {
     }
 }
 
-/// PackedImages images are packed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Which images are packed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PackedImages {
     /// Perspective views.
     Views,
     /// Panoramas.
     Panoramas,
     /// Both.
+    #[default]
     All,
 }
 
@@ -155,12 +293,12 @@ impl FromStr for PackedImages {
     }
 }
 
-/// PackedImages depth files nerfstudio gets.
+/// Which depth files nerfstudio gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthFiles {
     /// Written anew: 16 bits, millimetres, 0 for missing.
     Millimetres,
-    /// The data set's own.
+    /// The files of the data set. nerfstudio must be told their unit, and missing pixels seem to be 128 m away.
     Original,
     /// None.
     None,
@@ -197,10 +335,17 @@ impl ClassList {
     /// The classes, in their order and once each.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a name that is none of a class.
+    /// [`UsageError::InvalidValue`] for a name that no class has.
     pub fn classes(&self, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
-        let class = |name: &String| taxonomy.class(name).map_err(|e| Error::Usage(format!("--stuff: {e}")));
-        let mut classes = self.0.iter().map(class).collect::<Result<Vec<_>>>()?;
+        let mut classes = Vec::with_capacity(self.0.len());
+        for name in &self.0 {
+            let class = taxonomy.class(name).map_err(|e| UsageError::InvalidValue {
+                option: "stuff",
+                value: name.clone(),
+                why: e.to_string(),
+            })?;
+            classes.push(class);
+        }
         classes.sort_unstable();
         classes.dedup();
         Ok(classes)
@@ -255,13 +400,18 @@ mod tests {
     fn options_belong_to_their_package() {
         let stuff: ClassList = "wall,floor,wall".parse().unwrap();
         assert_eq!(stuff.classes(&Taxonomy::s3dis()).unwrap(), [Class::FLOOR, Class::WALL]);
-        let coco = SpecificOptions { stuff: Some(stuff), ..SpecificOptions::default() };
-        coco.check(PackageKind::Coco).unwrap();
-        let e = coco.check(PackageKind::Parquet).unwrap_err().to_string();
-        assert_eq!(e, "--stuff is an option of --to coco only");
-        let points = SpecificOptions { points: Some(0), copy_images: true, ..SpecificOptions::default() };
-        points.check(PackageKind::Nerfstudio).unwrap();
-        assert!(points.check(PackageKind::Webdataset).is_err());
+        let coco = PackageArguments { stuff: Some(stuff), ..PackageArguments::default() };
+        assert!(matches!(coco.clone().package(PackageKind::Coco), Ok(Package::Coco(_))));
+        let e = coco.package(PackageKind::Parquet).unwrap_err().to_string();
+        assert_eq!(e, "`stuff` belongs to `to = coco` only");
+
+        let points = PackageArguments { points: Some(0), copy_images: true, ..PackageArguments::default() };
+        points.clone().package(PackageKind::Nerfstudio).unwrap();
+        assert!(points.package(PackageKind::Webdataset).is_err());
+
+        let panoramas = PackageArguments { images: Some(PackedImages::Panoramas), ..Default::default() };
+        assert!(panoramas.clone().package(PackageKind::Colmap).is_err());
+        assert_eq!(panoramas.package(PackageKind::Coco).unwrap().images(), PackedImages::Panoramas);
         assert_eq!("none".parse(), Ok(ClassList(Vec::new())));
     }
 
@@ -276,7 +426,7 @@ mod tests {
         let e = grass.classes(&Taxonomy::s3dis()).unwrap_err();
         assert!(
             e.to_string()
-                .contains("--stuff: \"grass\" is no class; the classes are ceiling"),
+                .contains("`stuff = grass`: \"grass\" is no class; the classes are ceiling"),
             "{e}"
         );
         let beds: ClassList = "bed,wall".parse().unwrap();

@@ -2,7 +2,7 @@
 
 use super::options::PackedImages;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result, UsageError};
 use crate::record::data_set::{DataSet, Listed};
 use s3d_geom::{PointCloud, Raster};
 use s3d_io::Error as FileError;
@@ -48,11 +48,16 @@ impl Source {
         let there = &manifest.area_numbers;
         if let Some(area) = areas.iter().find(|a| !there.contains(a)) {
             let there: Vec<String> = there.iter().map(u32::to_string).collect();
-            return Err(Error::Usage(format!(
-                "--areas {area}: the data set in {} has no such area; there are {}",
-                root.display(),
-                there.join(", ")
-            )));
+            return Err(UsageError::InvalidValue {
+                option: "areas",
+                value: area.to_string(),
+                why: format!(
+                    "the data set in {} has no such area; there are {}",
+                    root.display(),
+                    there.join(", ")
+                ),
+            }
+            .into());
         }
         let chosen = |a: &u32| areas.is_empty() || areas.contains(a);
         let mut areas: Vec<u32> = there.iter().copied().filter(chosen).collect();
@@ -71,7 +76,7 @@ impl Source {
             } else {
                 which.to_string()
             };
-            return Err(Error::Input(format!("{}: the data set has no {what} to pack", root.display())));
+            return Err(InputError::NothingToPack { dataset: root.to_owned(), what }.into());
         }
         let of_image = |image: &DatasetImage| -> Vec<PathBuf> {
             image

@@ -1,7 +1,7 @@
 //! `s3d pack --to webdataset`: tar shards, one sample an image.
 
 use super::destination::Destination;
-use super::options::{ShardPrefix, SpecificOptions};
+use super::options::{ShardPrefix, WebdatasetOptions};
 use super::source::Source;
 use crate::context::Context;
 use crate::error::Result;
@@ -30,7 +30,7 @@ pub(super) fn pack(
     ctx: &Context,
     source: &Source,
     destination: &Destination,
-    options: &SpecificOptions,
+    options: &WebdatasetOptions,
 ) -> Result<Vec<String>> {
     let domains = match &options.modalities {
         Some(asked) => {
@@ -119,7 +119,7 @@ pub(super) fn pack(
 
 /// The series of shards: of each area its views and its panoramas, or one of all images under the user's
 /// name.
-fn series<'a>(source: &'a Source, options: &SpecificOptions) -> Vec<(String, Vec<&'a DatasetImage>)> {
+fn series<'a>(source: &'a Source, options: &WebdatasetOptions) -> Vec<(String, Vec<&'a DatasetImage>)> {
     if let Some(prefix) = options.prefix.as_ref().map(ShardPrefix::as_str) {
         return vec![(prefix.to_owned(), source.images.iter().collect())];
     }

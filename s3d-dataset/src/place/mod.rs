@@ -4,7 +4,7 @@
 pub(crate) mod free_space;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use crate::options::ExportOptions;
 use crate::options::placing::SHARE;
 use crate::survey::annotated::SurveyedRoom;
@@ -61,8 +61,8 @@ pub struct PlaceOptions {
 /// above surfaces that face up, inside, where a tripod could stand. All look along +Y; the most useful comes
 /// first. The same for the same mesh, options and seed, for any number of threads.
 ///
-/// # Errors [`Error::Usage`] for numbers out of range, or both given; [`Error::Input`] if there is no such
-/// place, or hardly any surface is seen, with what was found and what may be wrong; [`Error::Cancelled`].
+/// # Errors [`Error::Usage`](crate::Error::Usage) for numbers out of range, or both given; [`Error::Input`](crate::Error::Input) if there is no such
+/// place, or hardly any surface is seen, with what was found and what may be wrong; [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn place_cameras(scene: &Scene<'_>, options: &PlaceOptions, ctx: &Context) -> Result<Vec<ScanLocation>> {
     let PlaceOptions { see, apart_m: place_cameras, seed } = *options;
     ExportOptions { see, place_cameras, ..ExportOptions::default() }.canonical()?;
@@ -133,11 +133,8 @@ pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Resu
         }
     }
     if placed.is_empty() {
-        return Err(Error::Input(format!(
-            "area {}: no place for a scan location in any room: {}",
-            ground.area,
-            warnings.join("; ")
-        )));
+        let why = format!("no place for a scan location in any room: {}", warnings.join("; "));
+        return Err(InputError::UnfitArea { area: ground.area, why }.into());
     }
     Ok((placed, warnings))
 }

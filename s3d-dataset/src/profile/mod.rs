@@ -10,7 +10,7 @@ mod pointcept;
 pub(crate) mod room;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result, UsageError};
 pub(crate) use crate::options::profile::Profile;
 use crate::parallel::for_each_in_order;
 use crate::record::data_set::{DataSet, Listed};
@@ -39,8 +39,8 @@ pub struct ProfileOptions {
 /// Writes what these loaders want into the data set in the folder `root`, to `profiles/NAME`.
 ///
 /// # Errors
-/// [`Error::Usage`] if one is there and not to be replaced; [`Error::File`]; [`Error::Cancelled`];
-/// [`Error::Temporary`]. The data set stays as it was then; so it does when the process is killed, or the
+/// [`Error::Usage`](crate::Error::Usage) if one is there and not to be replaced; [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled);
+/// [`Error::Temporary`](crate::Error::Temporary). The data set stays as it was then; so it does when the process is killed, or the
 /// same call completes what it had begun.
 pub fn profile(
     root: impl Into<PathBuf>,
@@ -53,7 +53,7 @@ pub fn profile(
     wanted.sort();
     wanted.dedup();
     let names: Vec<&str> = wanted.iter().map(|profile| profile.name()).collect();
-    let call = format!("s3d profile --to {}", names.join(","));
+    let call = format!("profile {}", names.join(","));
     Manifest::require(layout)?;
     // Nobody may replace the data set meanwhile.
     Lock::during(ctx, layout, |completed| {
@@ -75,13 +75,11 @@ fn add(ctx: &Context, data: &DataSet, wanted: &[Profile], overwrite: bool, call:
         .map(|profile| layout.profile_dir(profile.name()))
         .collect();
     if let Some(dir) = dirs.iter().find(|dir| dir.exists() && !overwrite) {
-        return Err(Error::Usage(format!("{} is there already: replace it with --overwrite", dir.display())));
+        return Err(UsageError::Exists { path: dir.clone(), note: None }.into());
     }
     if !data.manifest.is_labelled() {
-        let root = layout.root().display();
-        return Err(Error::Input(format!(
-            "{root}: profiles need labels, and the data set was exported without"
-        )));
+        let dataset = layout.root().to_owned();
+        return Err(InputError::WithoutLabels { dataset, needs: "profiles need" }.into());
     }
     let areas = &data.manifest.area_numbers;
     let trees: Vec<PathBuf> = areas.iter().map(|area| layout.s3dis_area_dir(*area)).collect();

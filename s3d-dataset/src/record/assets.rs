@@ -55,10 +55,14 @@ pub(crate) fn texts(layout: &Layout) -> [(PathBuf, &'static str); 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::options::ExportOptions;
+
+    /// Options that stand beside `options` in a manifest.
+    const STORED_ELSEWHERE: [&str; 3] = ["seed", "place_cameras", "see"];
     use crate::profile::Profile;
 
     #[test]
-    fn the_schema_of_manifests_knows_all_modalities_and_profiles() {
+    fn the_schema_of_manifests_knows_all_options_modalities_and_profiles() {
         let schema: serde_json::Value = serde_json::from_str(MANIFEST_SCHEMA).unwrap();
         let words = |option: &str| {
             schema["properties"]["options"]["properties"][option]["items"]["enum"]
@@ -66,6 +70,15 @@ mod tests {
                 .unwrap()
                 .clone()
         };
+        let options = &schema["properties"]["options"]["properties"];
+        let stored: Vec<&str> = ExportOptions::names()
+            .iter()
+            .filter(|name| !STORED_ELSEWHERE.contains(name))
+            .copied()
+            .collect();
+        let mut known: Vec<&str> = options.as_object().unwrap().keys().map(String::as_str).collect();
+        known.sort_unstable_by_key(|name| stored.iter().position(|other| other == name));
+        assert_eq!(known, stored);
         assert_eq!(words("modalities"), Domain::ALL.map(Domain::folder));
         assert_eq!(words("profiles"), Profile::ALL.map(Profile::name));
     }

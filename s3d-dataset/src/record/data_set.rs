@@ -1,7 +1,7 @@
 //! A complete data set that is read: everything that is read of it is held against its list of files.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, InputError, Result};
 use crate::parallel::for_each_in_order;
 use crate::record::manifest::{Head, Manifest};
 use s3d_io::Error as FileError;
@@ -246,13 +246,7 @@ impl Listed {
     pub(crate) fn require(&self, ctx: &Context, needed: impl Fn(&Path) -> bool) -> Result<()> {
         let faults = self.faults(ctx, needed)?;
         let Some(first) = faults.values().next() else { return Ok(()) };
-        let them = match faults.len() {
-            1 => "a file that is needed is".to_owned(),
-            n => format!("{n} files that are needed are"),
-        };
-        Err(Error::Input(format!(
-            "{}: {them} missing or damaged, as {first}; `s3d verify` tells all that is wrong",
-            self.root.display()
-        )))
+        Err(InputError::Damaged { dataset: self.root.clone(), files: faults.len(), first: first.to_string() }
+            .into())
     }
 }

@@ -1,6 +1,6 @@
 //! `manifest.json`: what made a data set, from what, with which options, and what was lost on the way.
 
-use crate::error::Result;
+use crate::error::{Difference, Result};
 use crate::options::profile::Profile;
 use crate::options::{ExportOptions, by_name};
 use crate::record::if_there;
@@ -254,10 +254,11 @@ impl Manifest {
     }
 
     /// In what this data set differs from one that would be made `now`, a sentence each.
-    pub(crate) fn differences(&self, now: &Request) -> Vec<String> {
+    pub(crate) fn differences(&self, now: &Request) -> Vec<Difference> {
         let mut differences = self.request().differences(now);
         if self.xyz_from_depth.is_some() {
-            differences.push("its world coordinates were made again by `s3d xyz`".to_owned());
+            differences
+                .push(Difference::Other("its world coordinates were made again by `s3d xyz`".to_owned()));
         }
         differences
     }

@@ -1,7 +1,7 @@
 //! What decides the bytes of a data set: the version of s3d, the options, the input. Two exports of equal
 //! requests write the same files, so that one can go on where the other was killed.
 
-use crate::error::Result;
+use crate::error::{Difference, Result};
 use crate::options::ExportOptions;
 use crate::record::if_there;
 use s3d_io::dataset::{Layout, WorldOffsets};
@@ -60,43 +60,45 @@ impl InputRecord {
     }
 }
 
-/// What differs between options, a sentence each.
-fn option_differences(there: &ExportOptions, now: &ExportOptions) -> Vec<String> {
-    let fields = |options: &ExportOptions| match serde_json::to_value(options) {
-        Ok(Value::Object(fields)) => fields,
-        _ => serde_json::Map::new(),
-    };
-    let (there, now) = (fields(there), fields(now));
-    // What has its default may not be stored.
+/// What differs between options.
+fn option_differences(there: &ExportOptions, now: &ExportOptions) -> Vec<Difference> {
+    let there = stored_fields(there);
+    let now = stored_fields(now);
+    // An option that has its default may not be stored.
     let names: BTreeSet<&String> = there.keys().chain(now.keys()).collect();
     let value = |of: &serde_json::Map<String, Value>, name: &str| of.get(name).cloned().unwrap_or_default();
-    let both = names
+    names
         .into_iter()
-        .map(|name| (name, value(&there, name), value(&now, name)));
-    both.filter(|(_, a, b)| a != b)
-        .map(|(name, a, b)| difference(&flag(name), &a, &b))
+        .map(|name| (name, value(&there, name), value(&now, name)))
+        .filter(|(_, there, now)| there != now)
+        .map(|(name, there, now)| difference(name, &there, &now))
         .collect()
 }
 
-/// The option on the command line that a key stands for.
-fn flag(name: &str) -> String {
-    match name {
-        "normals" => "--smooth-normals".to_owned(),
-        "profiles" => "--profile".to_owned(),
-        _ => format!("--{}", name.replace('_', "-")),
+/// The options as they are stored.
+fn stored_fields(options: &ExportOptions) -> serde_json::Map<String, Value> {
+    match serde_json::to_value(options) {
+        Ok(Value::Object(fields)) => fields,
+        _ => serde_json::Map::new(),
     }
 }
 
-fn difference(flag: &str, there: &Value, now: &Value) -> String {
-    let smooth = |value: &Value| value == "smooth";
+/// How an option differs: a switch is set or not, anything else has a value.
+fn difference(name: &str, there: &Value, now: &Value) -> Difference {
+    let is_smooth = |value: &Value| value == "smooth";
+    let switch = |value: Option<String>, now: bool| Difference::Switch { name: name.to_owned(), value, now };
     match (there, now) {
-        (Value::Bool(true), _) => format!("{flag} there, not now"),
-        (Value::Bool(false), _) => format!("{flag} now, not there"),
-        (a, b) if flag == "--smooth-normals" && smooth(a) != smooth(b) => {
-            difference(flag, &Value::Bool(smooth(a)), &Value::Null)
+        (Value::Bool(there), _) => switch(None, !there),
+        (a, b) if name == "normals" && is_smooth(a) != is_smooth(b) => {
+            switch(Some("smooth".to_owned()), is_smooth(b))
         }
-        _ => format!("{flag} {} there, {} now", words(there), words(now)),
+        _ => Difference::Option { name: name.to_owned(), there: words(there), now: words(now) },
     }
+}
+
+/// A difference that is no option's.
+fn other(text: String) -> Difference {
+    Difference::Other(text)
 }
 
 fn words(value: &Value) -> String {
@@ -151,15 +153,18 @@ impl Request {
         Self { options, ..self.clone() }
     }
 
-    /// What is asked for `now` that was not asked for here, and the other way round, a sentence each; none if
-    /// the two make the same bytes.
-    pub(crate) fn differences(&self, now: &Self) -> Vec<String> {
+    /// How the request `now` differs from this one. There is no difference if the two make the same bytes.
+    pub(crate) fn differences(&self, now: &Self) -> Vec<Difference> {
         let mut differences = Vec::new();
         if self.version != now.version {
-            differences.push(format!("version {} of s3d there, {} now", self.version, now.version));
+            differences.push(other(format!("version {} of s3d there, {} now", self.version, now.version)));
         }
         if self.seed != now.seed {
-            differences.push(format!("--seed {} there, {} now", self.seed, now.seed));
+            differences.push(Difference::Option {
+                name: "seed".to_owned(),
+                there: self.seed.to_string(),
+                now: now.seed.to_string(),
+            });
         }
         differences.extend(option_differences(&self.options, &now.options));
         let by_number = |areas: &[RequestedArea]| -> BTreeMap<u32, RequestedArea> {
@@ -169,17 +174,17 @@ impl Request {
         for (number, before) in &there {
             match now.get(number) {
                 Some(after) => differences.extend(before.differences(after)),
-                None => differences.push(format!("area {number} there, not now")),
+                None => differences.push(other(format!("area {number} there, not now"))),
             }
         }
         let more = now.keys().filter(|number| !there.contains_key(number));
-        differences.extend(more.map(|number| format!("area {number} now, not there")));
+        differences.extend(more.map(|number| other(format!("area {number} now, not there"))));
         differences
     }
 }
 
 impl RequestedArea {
-    fn differences(&self, now: &Self) -> Vec<String> {
+    fn differences(&self, now: &Self) -> Vec<Difference> {
         let mut differences = Vec::new();
         if (self.place_cameras, self.see) != (now.place_cameras, now.see) {
             let words = |area: &Self| match (area.place_cameras, area.see) {
@@ -187,21 +192,21 @@ impl RequestedArea {
                 (None, Some(share)) => format!("to see {share} of the surface"),
                 (None, None) => "none".to_owned(),
             };
-            differences.push(format!(
+            differences.push(other(format!(
                 "placed scan locations of area {}: {} there, {} now",
                 self.area,
                 words(self),
                 words(now)
-            ));
+            )));
         }
         if self.offset_m != now.offset_m {
             let words = |offset: Option<[f64; 3]>| offset.map_or("none".to_owned(), |o| format!("{o:?}"));
-            differences.push(format!(
+            differences.push(other(format!(
                 "offset_m of area {}: {} there, {} now",
                 self.area,
                 words(self.offset_m),
                 words(now.offset_m)
-            ));
+            )));
         }
         let by_path = |inputs: &[InputRecord]| -> BTreeMap<String, Vec<(u64, Checksum)>> {
             let mut map: BTreeMap<String, Vec<(u64, Checksum)>> = BTreeMap::new();
@@ -216,16 +221,16 @@ impl RequestedArea {
         for (path, before) in &there {
             match after.get(path) {
                 Some(now) if now == before => {}
-                Some(_) => differences.push(format!("{path}: other bytes")),
-                None => differences.push(format!("{path}: input there, not now")),
+                Some(_) => differences.push(other(format!("{path}: other bytes"))),
+                None => differences.push(other(format!("{path}: input there, not now"))),
             }
         }
         let more = after.keys().filter(|path| !there.contains_key(*path));
-        differences.extend(more.map(|path| format!("{path}: input now, not there")));
+        differences.extend(more.map(|path| other(format!("{path}: input now, not there"))));
         // The same files in another order are another input: meshes are joined in the order of the scene
         // file.
         if differences.is_empty() && self.inputs != now.inputs {
-            differences.push(format!("area {}: its input in another order", self.area));
+            differences.push(other(format!("area {}: its input in another order", self.area)));
         }
         differences
     }
@@ -260,6 +265,10 @@ pub(crate) mod tests {
     use s3d_io::dataset::{Domain, XyzType};
     use s3d_render::Normals;
     use s3d_sample::Pool;
+
+    fn texts(differences: &[Difference]) -> Vec<String> {
+        differences.iter().map(Difference::to_string).collect()
+    }
 
     pub(crate) fn request() -> Request {
         Request {
@@ -299,21 +308,21 @@ pub(crate) mod tests {
             let mut now = request();
             change(&mut now);
             assert_ne!(now, request());
-            request().differences(&now)
+            texts(&request().differences(&now))
         };
-        assert_eq!(changed(&|r| r.seed = 7), ["--seed 0 there, 7 now"]);
+        assert_eq!(changed(&|r| r.seed = 7), ["`seed` 0 there, 7 now"]);
         assert_eq!(changed(&|r| r.version = "2.0.0".into()), ["version 1.2.3 of s3d there, 2.0.0 now"]);
-        assert_eq!(changed(&|r| r.options.pano_width = 64), ["--pano-width 4096 there, 64 now"]);
-        assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["--fill none there, 0.5 now"]);
-        assert_eq!(changed(&|r| r.options.keep_all = true), ["--keep-all now, not there"]);
-        assert_eq!(changed(&|r| r.options.normals = Normals::Smooth), ["--smooth-normals now, not there"]);
+        assert_eq!(changed(&|r| r.options.pano_width = 64), ["`pano_width` 4096 there, 64 now"]);
+        assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
+        assert_eq!(changed(&|r| r.options.keep_all = true), ["`keep_all` now, not there"]);
+        assert_eq!(changed(&|r| r.options.normals = Normals::Smooth), ["`normals = smooth` now, not there"]);
         assert_eq!(
             changed(&|r| r.options.only = vec!["a".into(), "b".into()]),
-            ["--only none there, a,b now"]
+            ["`only` none there, a,b now"]
         );
         assert_eq!(
             changed(&|r| r.options.profiles = vec![Profile::PointNet]),
-            ["--profile none there, pointnet now"]
+            ["`profiles` none there, pointnet now"]
         );
         assert_eq!(changed(&|r| r.areas[1].inputs[1].xxh3_128 = Checksum(8)), ["rgb.obj: other bytes"]);
         assert_eq!(changed(&|r| drop(r.areas[0].inputs.remove(2))), ["Area_1/: input there, not now"]);
@@ -339,7 +348,7 @@ pub(crate) mod tests {
         let changed = |change: &dyn Fn(&mut Request)| {
             let mut now = request();
             change(&mut now);
-            request().of_plan().differences(&now.of_plan())
+            texts(&request().of_plan().differences(&now.of_plan()))
         };
         let other_images = |r: &mut Request| {
             r.options.pano_width = 64;
@@ -348,10 +357,10 @@ pub(crate) mod tests {
             r.options.xyz = XyzType::None;
         };
         assert!(changed(&other_images).is_empty());
-        assert_eq!(changed(&|r| r.options.size = 64), ["--size 1080 there, 64 now"]);
-        assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["--fill none there, 0.5 now"]);
-        assert_eq!(changed(&|r| r.options.lenient = true), ["--lenient now, not there"]);
-        assert_eq!(changed(&|r| r.seed = 7), ["--seed 0 there, 7 now"]);
+        assert_eq!(changed(&|r| r.options.size = 64), ["`size` 1080 there, 64 now"]);
+        assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
+        assert_eq!(changed(&|r| r.options.lenient = true), ["`lenient` now, not there"]);
+        assert_eq!(changed(&|r| r.seed = 7), ["`seed` 0 there, 7 now"]);
         let known = request();
         assert_eq!(known.input(3, "Area_1").map(|i| i.path.as_str()), Some("Area_1/"));
         assert!(known.input(1, "rgb.obj").is_some() && known.input(2, "rgb.obj").is_none());

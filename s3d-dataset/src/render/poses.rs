@@ -2,10 +2,10 @@
 
 use super::frame_names::frame_names;
 use super::view::{IMAGES, RenderOptions, channels, face_image, faces_fit};
+use crate::condition::Condition;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, Overwriting, Result, UsageError};
 use crate::export::modality::{Image, ImageBuffers};
-use crate::options::condition::Condition;
 use crate::parallel::for_each_in_order;
 use crate::store::parent_of;
 use crate::store::staging::Staging;
@@ -142,7 +142,7 @@ pub fn render_poses(
 
     let places = frames.iter().map(|frame| frame.camera.pose.location.as_vec3());
     let (places, count) = (Aabb::from_points(places), frames.len() as u64);
-    let findings = poses_findings(blind, count, &places, &file.mesh.aabb(), "--up and --poses-up");
+    let findings = poses_findings(blind, count, &places, &file.mesh.aabb(), "up and poses_up");
     judge_of(("the views", "write them"), ctx, &findings, &options.allow)?;
     let is_panorama = frames.first().is_some_and(|frame| frame.camera.is_panorama());
     let listed = |frame: &Frame<'_>| NerfstudioFrame::new(format!("rgb/{}.png", frame.stem), &frame.camera);
@@ -172,19 +172,26 @@ fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics)
                 line => FileError::line(poses, line, message),
             }
         };
-        let camera = posed.camera(given).map_err(|e| match e {
-            IntrinsicsError::NoSize => {
-                Error::Usage(format!("{}: give --width and --height", at(e.to_string())))
+        let camera = posed.camera(given).map_err(|e| -> Error {
+            match e {
+                IntrinsicsError::NoSize => UsageError::Missing {
+                    what: at(e.to_string()).to_string(),
+                    groups: vec![vec![("width", None), ("height", None)]],
+                }
+                .into(),
+                IntrinsicsError::NoOptics => UsageError::Missing {
+                    what: at(e.to_string()).to_string(),
+                    groups: vec![vec![("fov", Some("DEGREES"))], vec![("k", Some("FX,FY,CX,CY"))]],
+                }
+                .into(),
+                _ => at(e.to_string()).into(),
             }
-            IntrinsicsError::NoOptics => {
-                Error::Usage(format!("{}: give --fov DEGREES, or --k FX,FY,CX,CY", at(e.to_string())))
-            }
-            _ => at(e.to_string()).into(),
         })?;
         let (w, h) = (camera.width, camera.height);
         if w > MAX_SIDE || h > MAX_SIDE {
-            let message = format!("images of {w} × {h} pixels: give a --width of at most {MAX_SIDE}");
-            return Err(Error::Usage(at(message).to_string()));
+            let what = at(format!("images of {w} × {h} pixels")).to_string();
+            let range = format!("at most {MAX_SIDE} ({what})");
+            return Err(UsageError::OutOfRange { option: "width", range }.into());
         }
         frames.push(Frame { name: &posed.name, stem, camera });
     }
@@ -265,15 +272,15 @@ fn check_free(output: &Path, overwrite: bool) -> Result<()> {
     };
     let Some(first) = entries.next() else { return Ok(()) };
     let first = first.map_err(|e| FileError::io(output, "read", e))?.file_name();
-    let what = format!("{} already holds {}", output.display(), first.display());
+    let folder = output.to_owned();
+    let entry = first.display().to_string();
     match (is_ours(output), overwrite) {
         (true, true) => Ok(()),
-        (true, false) => Err(Error::Usage(format!(
-            "{what}: choose another folder, or replace the views in it with --overwrite"
-        ))),
-        (false, _) => Err(Error::Usage(format!(
-            "{what}, and was not written by s3d render --poses: choose another folder"
-        ))),
+        (true, false) => {
+            let overwriting = Overwriting::Replaces("the views");
+            Err(UsageError::Holds { folder, entry, overwriting }.into())
+        }
+        (false, _) => Err(UsageError::Foreign { folder, entry, generator: "s3d render" }.into()),
     }
 }
 

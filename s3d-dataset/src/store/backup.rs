@@ -104,11 +104,10 @@ pub(super) fn restore(layout: &Layout) -> Result<()> {
 fn take_back(from: &Layout, layout: &Layout, head: Option<Head>) -> Result<()> {
     let Some(head) = head else {
         return match fs::remove_dir(from.root()) {
-            Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::Input(format!(
-                "{} holds an earlier data set, or a part of it, without its manifest: move it to another \
-                 folder",
-                from.root().display()
-            ))),
+            Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::unfit(
+                from.root(),
+                "holds an earlier data set, or a part of it, without its manifest: move it to another folder",
+            )),
             _ => Ok(()),
         };
     };

@@ -137,7 +137,7 @@ mod tests {
     use super::*;
     use s3d_io::fs::write_bytes;
 
-    const CALL: &str = "s3d profile --to pointnet";
+    const CALL: &str = "profile pointnet";
 
     fn put(layout: &Layout, name: &str, text: &str) {
         let path = layout.root().join(name);

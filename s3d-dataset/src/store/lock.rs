@@ -1,7 +1,7 @@
 //! One process at a time exports into a folder.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Result, TemporaryError, Work};
 use crate::store::change;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
@@ -29,7 +29,7 @@ impl Lock {
     /// Takes the lock of OUT, for which it makes the folder and `.s3d`.
     ///
     /// # Errors
-    /// [`Error::Temporary`] if another process holds it.
+    /// [`Error::Temporary`](crate::Error::Temporary) if another process holds it.
     pub(crate) fn take(ctx: &Context, layout: &Layout, sharing: Sharing) -> Result<Self> {
         let path = layout.lock();
         loop {
@@ -54,10 +54,8 @@ impl Lock {
                 // A lock of a file that is not there any more is worth nothing.
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
-                    return Err(Error::Temporary(format!(
-                        "{}: another process exports into it",
-                        layout.root().display()
-                    )));
+                    let path = layout.root().to_owned();
+                    return Err(TemporaryError::InUse { path, by: Work::Exporting }.into());
                 }
                 Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {
                     ctx.warn(format_args!(
@@ -117,6 +115,7 @@ fn is_still(_: &File, layout: &Layout) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
 
     #[test]
     fn one_holds_it_until_it_is_dropped() {
@@ -125,7 +124,10 @@ mod tests {
         let lock = Lock::take(&Context::default(), &layout, Sharing::Alone).unwrap();
         for sharing in [Sharing::Alone, Sharing::Shards] {
             let refused = Lock::take(&Context::default(), &layout, sharing).unwrap_err();
-            assert!(matches!(&refused, Error::Temporary(m) if m.contains("another process")), "{refused}");
+            assert!(
+                matches!(&refused, Error::Temporary(TemporaryError::InUse { by: Work::Exporting, .. })),
+                "{refused}"
+            );
         }
         drop(lock);
         let shared = [(); 2].map(|()| Lock::take(&Context::default(), &layout, Sharing::Shards).unwrap());

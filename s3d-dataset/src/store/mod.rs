@@ -9,16 +9,14 @@ pub(crate) mod output;
 pub(crate) mod staging;
 pub(crate) mod state;
 
-use crate::error::{Error, Result};
+use crate::error::{Result, UsageError};
 use s3d_io::Error as FileError;
 use std::path::{Path, PathBuf};
 
 /// Refuses to replace a file unless that was asked for.
 pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<()> {
     match path.try_exists() {
-        Ok(true) if !overwrite => {
-            Err(Error::Usage(format!("{} is there already: replace it with --overwrite", path.display())))
-        }
+        Ok(true) if !overwrite => Err(UsageError::Exists { path: path.to_owned(), note: None }.into()),
         Ok(_) => Ok(()),
         Err(e) => Err(FileError::io(path, "look for", e).into()),
     }

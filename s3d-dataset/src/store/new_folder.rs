@@ -1,7 +1,7 @@
 //! A folder of a kind that is made of a data set: beside its place, and moved there when it is complete.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Overwriting, Result, UsageError};
 use crate::store::parent_of;
 use crate::store::staging::Staging;
 use s3d_io::Error as FileError;
@@ -19,7 +19,7 @@ pub struct FolderKind {
     pub about: &'static str,
     /// What its member `generator` says: `s3d pack`.
     pub generator: &'static str,
-    /// What such a folder is called in messages: `package`.
+    /// What such a folder is called in messages: `the package`.
     pub noun: &'static str,
     /// What cannot be done with a file that has the folder's name, in messages.
     pub action: &'static str,
@@ -43,16 +43,15 @@ impl FolderKind {
         };
         let Some(first) = entries.next() else { return Ok(()) };
         let first = first.map_err(|e| FileError::io(place, "read", e))?.file_name();
-        let what = format!("{} already holds {}", place.display(), first.display());
-        let Self { generator, noun, .. } = self;
+        let folder = place.to_owned();
+        let entry = first.display().to_string();
         match (self.is_of(place), overwrite) {
             (true, true) => Ok(()),
-            (true, false) => Err(Error::Usage(format!(
-                "{what}: choose another folder, or replace the {noun} in it with --overwrite"
-            ))),
-            (false, _) => Err(Error::Usage(format!(
-                "{what}, and was not written by {generator}: choose another folder"
-            ))),
+            (true, false) => {
+                let overwriting = Overwriting::Replaces(self.noun);
+                Err(UsageError::Holds { folder, entry, overwriting }.into())
+            }
+            (false, _) => Err(UsageError::Foreign { folder, entry, generator: self.generator }.into()),
         }
     }
 }
@@ -69,9 +68,9 @@ impl NewFolder {
     /// Begins what will be the folder `place`, made of the data set in `root`.
     ///
     /// # Errors
-    /// [`Error::Usage`] if it lies in the data set or holds it, or if there is something in it that is not of
-    /// this kind, or is not to be replaced; [`Error::Temporary`] if another process makes it;
-    /// [`Error::File`] if no file can be made there.
+    /// [`Error::Usage`](crate::Error::Usage) if it lies in the data set or holds it, or if there is something in it that is not of
+    /// this kind, or is not to be replaced; [`Error::Temporary`](crate::Error::Temporary) if another process makes it;
+    /// [`Error::File`](crate::Error::File) if no file can be made there.
     pub fn begin(
         ctx: &Context,
         place: &Path,
@@ -104,7 +103,7 @@ impl NewFolder {
     /// Moves the folder to its place, instead of an earlier one. [`FolderKind::about`] must be in it by now.
     ///
     /// # Errors
-    /// [`Error::File`]; what was there before is there again.
+    /// [`Error::File`](crate::Error::File); what was there before is there again.
     pub fn finish(self) -> Result<()> {
         self.staging.place_folder(&self.place, self.kind.is_of(&self.place))
     }
@@ -114,7 +113,7 @@ impl NewFolder {
 /// `…/OUT_report`.
 ///
 /// # Errors
-/// [`Error::File`] if the folder has no name of its own, as `.` has none, and is not there to be asked.
+/// [`Error::File`](crate::Error::File) if the folder has no name of its own, as `.` has none, and is not there to be asked.
 pub fn beside(dataset: &Path, ending: &str) -> Result<PathBuf> {
     // The name of "." is that of the folder it is.
     let named = match dataset.file_name() {
@@ -129,15 +128,11 @@ pub fn beside(dataset: &Path, ending: &str) -> Result<PathBuf> {
 /// Refuses a place in the data set in `root`, or one that holds it.
 ///
 /// # Errors
-/// [`Error::Usage`].
+/// [`Error::Usage`](crate::Error::Usage).
 pub fn check_apart(place: &Path, root: &Path) -> Result<()> {
     let (Ok(place_at), Ok(root_at)) = (resolved(place), resolved(root)) else { return Ok(()) };
     if place_at.starts_with(&root_at) || root_at.starts_with(&place_at) {
-        return Err(Error::Usage(format!(
-            "{} and the data set {} would lie in one another: choose another folder with -o",
-            place.display(),
-            root.display()
-        )));
+        return Err(UsageError::Nested { place: place.to_owned(), dataset: root.to_owned() }.into());
     }
     Ok(())
 }

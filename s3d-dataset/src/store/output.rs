@@ -16,7 +16,7 @@
 
 use crate::account::Account;
 use crate::context::Context;
-use crate::error::{Error, Result, passes};
+use crate::error::{Error, InputError, Result, TemporaryError, UsageError, Work, passes};
 use crate::record::journal::{Done, Finished, Journal};
 use crate::record::listing::remove_parts;
 use crate::record::manifest::Manifest;
@@ -142,10 +142,8 @@ pub(crate) fn begin_shard(
                 }
                 lock.abandon();
                 if started.elapsed() > BEGIN_WITHIN {
-                    return Err(Error::Temporary(format!(
-                        "{}: shards of another call are at work in it",
-                        layout.root().display()
-                    )));
+                    let path = layout.root().to_owned();
+                    return Err(TemporaryError::InUse { path, by: Work::OtherShards }.into());
                 }
             }
             Err(e @ Error::Temporary(_)) if started.elapsed() > BEGIN_WITHIN => return Err(e),
@@ -259,7 +257,7 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
         Ok(records) => records,
         Err(e) if passes(&e) => return Err(e.into()),
         Err(_) if exactly => return Ok(false),
-        Err(e) => return Err(Error::Input(format!("{e}; make the data set again with --overwrite"))),
+        Err(e) => return Err(InputError::Remake { what: e.to_string() }.into()),
     };
     let faults = if exactly {
         let files: Vec<_> = records.iter().collect();
@@ -284,12 +282,12 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
         ));
         return Ok(false);
     }
-    Err(Error::Input(format!(
-        "{}: the data set was complete, but {} of its files are missing or cut, the first: {first}; make it \
-         again with --overwrite",
+    let what = format!(
+        "{}: the data set was complete, but {} of its files are missing or cut, the first: {first}",
         layout.root().display(),
         faults.len()
-    )))
+    );
+    Err(InputError::Remake { what }.into())
 }
 
 /// Refuses what is in the way of the data set that is asked for, unless it is of one of these areas, which is
@@ -302,10 +300,7 @@ fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Resul
     };
     for path in layout.entries(&request.numbers()) {
         if path.exists() && !ours.contains(&path) {
-            return Err(Error::Usage(format!(
-                "{} is in the way, and was not written by s3d: move it, or choose another folder",
-                path.display()
-            )));
+            return Err(UsageError::InTheWay { path }.into());
         }
     }
     Ok(())

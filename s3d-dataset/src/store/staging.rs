@@ -6,7 +6,7 @@
 //! may be replaced by the same call. It says so until a call has come to its end, however many are killed.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, TemporaryError, Work};
 use crate::store::backup::{remove, rename};
 use crate::store::lock::{Lock, Sharing};
 use s3d_io::Error as FileError;
@@ -62,9 +62,7 @@ impl Staging {
         }
         let folder = folder_of(parent, name);
         let lock = Lock::take(ctx, &Layout::new(&folder), Sharing::Alone).map_err(|e| match e {
-            Error::Temporary(_) => {
-                Error::Temporary(format!("{}: another process is writing it", place.display()))
-            }
+            Error::Temporary(_) => TemporaryError::InUse { path: place.clone(), by: Work::Writing }.into(),
             Error::File(FileError::Io { source, .. }) => FileError::io(&place, "write", source).into(),
             other => other,
         })?;

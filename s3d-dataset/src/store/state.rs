@@ -1,7 +1,7 @@
 //! What an output folder holds, read once, and whether an export may go into it.
 
 use crate::context::Context;
-use crate::error::{Error, Result, passes};
+use crate::error::{Difference, Held, Overwriting, Result, UsageError, passes};
 use crate::record::manifest::{Head, Manifest};
 use crate::record::request::{Request, begun_by_other_version, read_request};
 use crate::store::backup::BACKUP;
@@ -10,9 +10,6 @@ use s3d_io::dataset::Layout;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// How many differences are named in a message.
-const MAX_NAMED: usize = 8;
 
 /// What an output folder held at the moment that it was read.
 #[derive(Debug)]
@@ -36,14 +33,14 @@ pub(super) enum Holding {
     Nothing,
     /// A complete data set.
     Complete {
-        /// How its request differs, a sentence each.
-        differences: Vec<String>,
+        /// How its request differs.
+        differences: Vec<Difference>,
     },
     /// An unfinished export.
     Unfinished {
         areas: Vec<u32>,
-        /// How its request differs, a sentence each.
-        differences: Vec<String>,
+        /// How its request differs.
+        differences: Vec<Difference>,
         failed: bool,
     },
     /// The rest of an unfinished export of these areas that nobody can go on with.
@@ -108,7 +105,7 @@ impl OutputState {
         if let Some(manifest) = &self.manifest {
             let differences = match manifest {
                 Ok(manifest) => manifest.differences(request),
-                Err(message) => vec![message.clone()],
+                Err(message) => vec![Difference::Other(message.clone())],
             };
             return Holding::Complete { differences };
         }
@@ -126,7 +123,10 @@ impl OutputState {
         match &self.other_version {
             Some(there) => Holding::Unfinished {
                 areas,
-                differences: vec![format!("version {there} of s3d there, {} now", request.version)],
+                differences: vec![Difference::Other(format!(
+                    "version {there} of s3d there, {} now",
+                    request.version
+                ))],
                 failed: self.failed,
             },
             None => Holding::Leftover { areas },
@@ -152,7 +152,7 @@ impl OutputState {
         }
         // Its journals would be taken for those of an export.
         if crate::store::is_plan(root) {
-            return Err(Error::Usage(format!("{} holds a plan: choose another folder", root.display())));
+            return Err(UsageError::HoldsPlan { folder: root.to_owned() }.into());
         }
         let entries = match fs::read_dir(root) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
@@ -171,11 +171,12 @@ impl OutputState {
             if is_leftover(&path) || is_working_name(name) || allowed.iter().any(|a| name == *a) {
                 continue;
             }
-            return Err(Error::Usage(format!(
-                "{} already holds {}: choose another folder, or write into this one with --overwrite",
-                root.display(),
-                name.display()
-            )));
+            return Err(UsageError::Holds {
+                folder: root.to_owned(),
+                entry: name.display().to_string(),
+                overwriting: Overwriting::Beside,
+            }
+            .into());
         }
         Ok(())
     }
@@ -200,11 +201,8 @@ impl OutputState {
             let Ok(input) = fs::canonicalize(path) else { continue };
             let lies_in_output = entries.iter().any(|entry| input.starts_with(entry));
             if lies_in_output || input.is_dir() && root.starts_with(&input) {
-                return Err(Error::Usage(format!(
-                    "{}: the data set would be written over its own input {}: choose another folder",
-                    layout.root().display(),
-                    path.display()
-                )));
+                let folder = layout.root().to_owned();
+                return Err(UsageError::OverInput { folder, input: path.clone() }.into());
             }
         }
         Ok(())
@@ -214,26 +212,17 @@ impl OutputState {
 impl Holding {
     /// Refuses to replace the data set or export of another call, unless that was asked for.
     pub(super) fn refuse(&self, layout: &Layout, overwrite: bool) -> Result<()> {
-        let (what, differences) = match self {
-            Self::Complete { differences } => ("a data set", differences),
-            Self::Unfinished { differences, failed: false, .. } => ("an unfinished export", differences),
+        let (held, differences) = match self {
+            Self::Complete { differences } => (&Held::DataSet, differences),
+            Self::Unfinished { differences, failed: false, .. } => (&Held::UnfinishedExport, differences),
             Self::Unfinished { .. } | Self::Leftover { .. } | Self::Nothing => return Ok(()),
         };
         if overwrite || differences.is_empty() {
             return Ok(());
         }
 
-        let named: Vec<&str> = differences.iter().take(MAX_NAMED).map(String::as_str).collect();
-        let more = match differences.len() - named.len() {
-            0 => String::new(),
-            more => format!("; and {more} more"),
-        };
-        Err(Error::Usage(format!(
-            "{} already holds {what} of another call ({}{more}): choose another folder, or replace it with \
-             --overwrite",
-            layout.root().display(),
-            named.join("; ")
-        )))
+        let folder = layout.root().to_owned();
+        Err(UsageError::OtherCall { folder, held: *held, differences: differences.clone() }.into())
     }
 
     /// Whether this is a complete data set of the same request.

@@ -1,7 +1,7 @@
 //! How large a data set becomes, before its first byte is written.
 
 use super::{Condition, Finding};
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use crate::options::ExportOptions;
 use s3d_geom::TriMesh;
 use s3d_io::dataset::{Domain, XyzType};
@@ -143,9 +143,7 @@ pub(crate) fn check_points(points: f64) -> Result<()> {
     if points <= MOST_POINTS {
         return Ok(());
     }
-    Err(Error::Input(format!(
-        "{points:.1e} points are more than {MOST_POINTS:.0e}: ask for fewer, or is the mesh not in metres?"
-    )))
+    Err(InputError::TooManyPoints { points, most: MOST_POINTS }.into())
 }
 
 /// What looks wrong about the number of points sampled of a mesh.
@@ -156,10 +154,10 @@ pub(crate) fn size_findings(mesh: &TriMesh, points_per_m2: f64) -> Result<Vec<Fi
     let (area_m2, points) = (mesh.total_area(), mesh.total_area() * points_per_m2);
     let text = format!(
         "{points_per_m2} points a m² on {area_m2:.1} m² are {points:.1e} points: is the mesh in metres? or \
-         lower --points-per-m2"
+         ask for fewer points"
     );
     if points > MOST_POINTS {
-        return Err(Error::Input(text));
+        return Err(InputError::TooManyPoints { points, most: MOST_POINTS }.into());
     }
     Ok((points > MANY_POINTS)
         .then(|| Finding::new(Condition::Size, true, text))
@@ -170,7 +168,7 @@ pub(crate) fn size_findings(mesh: &TriMesh, points_per_m2: f64) -> Result<Vec<Fi
 /// Refuses exactly so many bytes where the disk of `folder` has not the space.
 pub(crate) fn check_space(bytes: f64, folder: &Path) -> Result<()> {
     match lack_of_space(bytes, folder) {
-        Some((_, text)) => Err(Error::Input(text)),
+        Some((_, why)) => Err(InputError::NoSpace { why }.into()),
         None => Ok(()),
     }
 }

@@ -11,9 +11,9 @@ pub(crate) use estimate::{PLY_POINT_BYTES, check_points, check_space, size_findi
 pub(crate) use headroom::Headroom;
 pub use headroom::Storey;
 
+use crate::condition::Condition;
 use crate::context::Context;
-use crate::error::{Error, Result};
-use crate::options::condition::Condition;
+use crate::error::{InputError, Result};
 use crate::record::manifest::half_step;
 use crate::survey::annotated::{Annotated, SurveyedRoom};
 use crate::survey::outlook::{LOW_COVERAGE, Outlook};
@@ -44,7 +44,7 @@ impl Finding {
     pub(crate) fn sentence(&self) -> String {
         let Self { condition, stops, text } = self;
         if *stops {
-            format!("{text}; an export stops here without --allow {condition}")
+            format!("{text}; an export stops here unless {condition} is allowed")
         } else {
             text.clone()
         }
@@ -54,14 +54,14 @@ impl Finding {
 /// Warns of what was found, unless some of it stops the export and is not allowed.
 ///
 /// # Errors
-/// [`Error::Input`] with all that stops it.
+/// [`Error::Input`](crate::Error::Input) with all that stops it.
 pub(crate) fn judge(ctx: &Context, findings: &[Finding], allowed: &[Condition]) -> Result<()> {
     judge_of(("the data set", "export it"), ctx, findings, allowed)
 }
 
 /// As [`judge`], of something else than a data set: what it is, and what is done with it.
 pub(crate) fn judge_of(
-    (what, done): (&str, &str),
+    (what, action): (&'static str, &'static str),
     ctx: &Context,
     findings: &[Finding],
     allowed: &[Condition],
@@ -75,13 +75,13 @@ pub(crate) fn judge_of(
     let mut conditions: Vec<Condition> = stopping.iter().map(|f| f.condition).collect();
     conditions.sort_unstable();
     conditions.dedup();
-    let texts: Vec<&str> = stopping.iter().map(|f| f.text.as_str()).collect();
-    let options: Vec<String> = conditions.iter().map(|c| format!("--allow {c}")).collect();
-    Err(Error::Input(format!(
-        "{what} would be of no use: {} (to {done} all the same: {})",
-        texts.join("; "),
-        options.join(" ")
-    )))
+    Err(InputError::Useless {
+        what,
+        action,
+        reasons: stopping.iter().map(|f| f.text.clone()).collect(),
+        conditions,
+    }
+    .into())
 }
 
 /// Whether something would stop an export that allows nothing.
@@ -99,7 +99,7 @@ fn percent(share: f64) -> String {
 pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
     /// The largest number that a half float can hold.
     const LARGEST_HALF_M: f32 = 65_504.0;
-    const UNITS: &str = "--units of a mesh, or units = \"cm\" under [mesh], says another unit";
+    const UNITS: &str = "the option units of a mesh, or units = \"cm\" under [mesh], says another unit";
     let mut findings = Vec::new();
     let bbox = mesh.aabb();
     let (length, farthest) = (bbox.size().max_element(), bbox.min.abs().max(bbox.max.abs()).max_element());
@@ -128,7 +128,7 @@ pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
     }
     if makes_rgb && !has_colors(mesh) {
         let text = "the mesh has no texture and no colours, so that its RGB images would be flat: leave rgb \
-                    out of --modalities, name the scanner's pictures, or write colors = \"points\" under \
+                    out of the modalities, name the scanner's pictures, or write colors = \"points\" under \
                     [mesh] if annotated points have colours";
         findings.push(Finding::new(Condition::Colour, true, text.to_owned()));
     }

@@ -23,7 +23,7 @@ mod tables;
 mod views;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Result, UsageError};
 use crate::export::modality::{Channels, NO_CLASS};
 use crate::parallel::for_each_in_order;
 use crate::record::manifest::Manifest;
@@ -71,14 +71,11 @@ struct Common<'a> {
 /// Checks the data set of this layout.
 ///
 /// # Errors
-/// [`Error::Usage`] if no data set is there; [`Error::Cancelled`]. Faults are no error.
+/// [`Error::Usage`](crate::Error::Usage) if no data set is there; [`Error::Cancelled`](crate::Error::Cancelled). Faults are no error.
 pub fn verify(root: impl Into<PathBuf>, options: &VerifyOptions, ctx: &Context) -> Result<VerifyReport> {
     let layout = &Layout::new(root.into());
     if !layout.manifest().is_file() {
-        return Err(Error::Usage(format!(
-            "{}: no data set is there (no manifest.json): give the folder of one",
-            layout.root().display()
-        )));
+        return Err(UsageError::NoDataSet { folder: layout.root().to_owned() }.into());
     }
     check_all(ctx, layout, options.full).map(Report::finish)
 }

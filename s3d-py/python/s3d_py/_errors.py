@@ -2,26 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
-_IN_PYTHON = {"smooth-normals": 'normals="smooth"', "profile": "profiles"} | {
-    name: name.replace("-", "_") + "=True" for name in ("overwrite", "lenient", "keep-all", "full", "single")
-}
-
-
-def in_python(message: str) -> str:
-    """A message of the crates, which names options of the command line, with the names of arguments instead.
-    What quotes a whole command stays as it is.
-    """
-    if re.search(r"\bs3d [a-z]+ .*--", message):
-        return message
-    message = re.sub(r"--allow ([\w-]+)", r'allow=["\1"]', message)
-    return re.sub(
-        r"(?<![\w-])--([a-z][a-z0-9-]*)",
-        lambda option: _IN_PYTHON.get(option[1], option[1].replace("-", "_")),
-        message,
-    )
-
 
 class Error(Exception):
     """What all errors of this package are."""

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Union
 
-from ._errors import in_python
 
 log = logging.getLogger("s3d_py")
 
@@ -46,7 +45,7 @@ class Sink:
 
     def message(self, level: str, text: str) -> None:
         number = {"warning": logging.WARNING, "info": logging.INFO}.get(level, logging.DEBUG)
-        log.log(number, "%s", in_python(text))
+        log.log(number, "%s", text)
 
     def started(self, id: int, what: str, unit: str, total: int) -> None: ...
 

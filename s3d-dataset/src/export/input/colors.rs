@@ -24,8 +24,7 @@ pub(super) struct PointColors {
 impl PointColors {
     /// Of all points of `annotations`, which the scene file `scene` asks for.
     pub(super) fn of(scene: &Path, mesh: &TriMesh, annotations: &Annotations) -> Result<Self> {
-        let fault =
-            |message: &str| Error::Input(format!("{}: mesh.colors = \"points\": {message}", scene.display()));
+        let fault = |message: &str| Error::unfit(scene, format!("mesh.colors = \"points\": {message}"));
         if !mesh.textures().is_empty() {
             return Err(fault("the mesh has textures, which would cover these colours: leave the key out"));
         }

@@ -129,7 +129,7 @@ impl SharedScene {
     /// Refuses what files could not hold.
     pub(crate) fn check(&self) -> Result<()> {
         let name = self.name();
-        let refuse = |what: String| Err(Error::Input(format!("{}: {what}", name.display())));
+        let refuse = |what: String| Err(Error::unfit(&name, what));
         if self.area == 0 {
             return refuse("areas count from 1".to_owned());
         }

@@ -95,10 +95,12 @@ impl MeshFrame {
     pub(crate) fn refuse_far_points(&self, name: &Path, annotations: &Annotations) -> Result<()> {
         let Some(gap) = annotations.frame_gap(DVec3::ZERO, self.bounds) else { return Ok(()) };
         let [x, y, z] = gap.offset_m.to_array();
-        Err(Error::Input(format!(
-            "{}: the annotated points lie {gap}, in metres, Z-up; subtract {x:?}, {y:?}, {z:?} from them",
-            name.display()
-        )))
+        Err(Error::unfit(
+            name,
+            format!(
+                "the annotated points lie {gap}, in metres, Z-up; subtract {x:?}, {y:?}, {z:?} from them"
+            ),
+        ))
     }
 
     /// Refuses scan locations that all lie far from the mesh.
@@ -107,11 +109,13 @@ impl MeshFrame {
         let (min, max) = at().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
         let Some(gap) = FrameGap::between([min, max], DVec3::ZERO, self.bounds) else { return Ok(()) };
         let [x, y, z] = (-gap.offset_m + DVec3::ZERO).to_array();
-        Err(Error::Input(format!(
-            "{}: the scan locations lie {gap}, in metres, Z-up. Locations and mesh need one frame: if they \
+        Err(Error::unfit(
+            list,
+            format!(
+                "the scan locations lie {gap}, in metres, Z-up. Locations and mesh need one frame: if they \
              are of one scan, write transform = [[1, 0, 0, {x:?}], [0, 1, 0, {y:?}], [0, 0, 1, {z:?}], [0, \
-             0, 0, 1]] under [cameras] in the scene file",
-            list.display()
-        )))
+             0, 0, 1]] under [cameras] in the scene file"
+            ),
+        ))
     }
 }

@@ -12,7 +12,7 @@ mod unit;
 mod up_axis;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, InputError, Result};
 use crate::export::input::cameras::Cameras;
 use crate::export::input::colors::PointColors;
 use crate::export::input::memory::{SceneSource, SharedScene};
@@ -158,12 +158,9 @@ impl Inputs {
             };
             let path = &area.path;
             if let Some(other) = area_of.insert(area.number, path.clone()) {
-                return Err(Error::Input(format!(
-                    "{} and {} are both area {}: give each scene an area of its own",
-                    other.display(),
-                    path.display(),
-                    area.number
-                )));
+                return Err(
+                    InputError::SameArea { first: other, second: path.clone(), area: area.number }.into()
+                );
             }
             let list = &area.cameras_path;
             for location in area.cameras.listed() {
@@ -182,22 +179,18 @@ impl Inputs {
         areas.sort_by_key(|a| a.number);
         let without = areas.iter().find(|area| !area.is_labelled);
         if let (Some(without), Some(with)) = (without, areas.iter().find(|area| area.is_labelled)) {
-            return Err(Error::Input(format!(
-                "{} has labels and {} has none: export them into data sets of their own",
-                with.path.display(),
-                without.path.display()
-            )));
+            return Err(
+                InputError::MixedLabels { with: with.path.clone(), without: without.path.clone() }.into()
+            );
         }
         let taxonomy = areas.first().map(|area| (&area.taxonomy, &area.path));
         let other = |area: &&AreaInput| taxonomy.is_some_and(|(first, _)| area.taxonomy != *first);
         if let (Some((taxonomy, path)), Some(other)) = (taxonomy, areas.iter().find(other)) {
-            return Err(Error::Input(format!(
-                "{} has the classes of {} and {} those of {}: export them into data sets of their own",
-                path.display(),
-                taxonomy.name(),
-                other.path.display(),
-                other.taxonomy.name()
-            )));
+            return Err(InputError::MixedTaxonomies {
+                first: (path.clone(), taxonomy.name().to_owned()),
+                second: (other.path.clone(), other.taxonomy.name().to_owned()),
+            }
+            .into());
         }
         Ok(areas)
     }
@@ -277,8 +270,7 @@ impl AreaInput {
             }
             let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
             if opened.annotations {
-                rooms = number(scene.area, annotations)
-                    .map_err(|e| Error::Input(format!("{}: {e}", of.display())))?;
+                rooms = number(scene.area, annotations).map_err(|e| Error::unfit(of, e.to_string()))?;
             }
         }
         let mesh_file = opened.keep_mesh.then_some(file);
@@ -382,8 +374,7 @@ impl AreaInput {
             frame.refuse_far_points(&name, annotations)?;
             let mut annotations = annotations.clone();
             warnings = std::mem::take(&mut annotations.warnings);
-            rooms = number(scene.area, annotations)
-                .map_err(|e| Error::Input(format!("{}: {e}", name.display())))?;
+            rooms = number(scene.area, annotations).map_err(|e| Error::unfit(&name, e.to_string()))?;
         }
         let cameras = match asked {
             Some(placing) => Cameras::Placed(placing),

@@ -1,6 +1,6 @@
 //! The names of labels: instances numbered by area, and the table of all labels.
 
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use crate::export::input::{AreaInput, InstanceInput, RoomInput};
 use s3d_io::cloud::Annotations;
 use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
@@ -31,7 +31,9 @@ pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
         }
     }
     let taxonomy = areas.first().map(|area| area.taxonomy.clone()).unwrap_or_default();
-    taxonomy.table(labels).map_err(|e| Error::Input(e.to_string()))
+    taxonomy
+        .table(labels)
+        .map_err(|e| InputError::Labels { why: e.to_string() }.into())
 }
 
 /// Gives every instance, whose numbers run per room, its number in the area.

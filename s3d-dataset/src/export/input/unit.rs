@@ -54,7 +54,7 @@ impl UnitGuess {
         let height = self.height.filter(|_| self.unit() == LengthUnit::Metre)?;
         let feet = HEIGHTS_M.contains(&(height * LengthUnit::Foot.metres())) && !HEIGHTS_M.contains(&height);
         feet.then(|| {
-            format!("ceilings are {height:.1} m above floors: if the file is in feet, say --units ft")
+            format!("ceilings are {height:.1} m above floors: if the file is in feet, say units = ft")
         })
     }
 }

@@ -40,7 +40,7 @@ impl UpGuess {
     pub(super) fn sentence(self) -> String {
         let [y, z] = self.level.map(|share| 100.0 * share);
         format!(
-            "+{} is taken for up: {y:.0} % of the surface is level with +Y, {z:.0} % with +Z (--up y or --up \
+            "+{} is taken for up: {y:.0} % of the surface is level with +Y, {z:.0} % with +Z (up = y or up = \
              z says it)",
             self.up().name().to_uppercase()
         )
@@ -51,7 +51,7 @@ impl UpGuess {
         let [y, z] = self.level;
         (y.max(z) < CLEAR * y.min(z)).then(|| {
             format!(
-                "which axis points up is hardly to be seen: look at the first image, or say it (--up {})",
+                "which axis points up is hardly to be seen: look at the first image, or say it (up = {})",
                 { if self.up() == UpAxis::Y { "z" } else { "y" } }
             )
         })
@@ -78,6 +78,6 @@ mod tests {
         assert_eq!((z.up(), y.up()), (UpAxis::Z, UpAxis::Y));
         assert!(z.doubt().is_none() && z.sentence().starts_with("+Z is taken for up: "), "{}", z.sentence());
         let even = UpGuess { level: [0.3, 0.31] };
-        assert!(even.doubt().unwrap().contains("--up y"));
+        assert!(even.doubt().unwrap().contains("up = y"));
     }
 }

@@ -1,7 +1,7 @@
 //! From annotated points to labelled faces: votes, instances, floor outlines, wall directions.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, InputError, Result};
 use crate::export::input::AreaInput;
 use crate::summary::Unlabelled;
 use crate::survey::annotated::{Annotated, SkippedLines, SurveyedRoom};
@@ -99,7 +99,7 @@ pub(crate) fn annotate(
         rooms.push(room, builder);
     }
     if rooms.surveyed.is_empty() {
-        return Err(Error::Input(format!("{}: no room in it", area.path.display())));
+        return Err(Error::unfit(&area.path, "no room in it"));
     }
     let (labels, directions_deg, report) = rooms.draw_beside(|| {
         let labels = labeler.finish();
@@ -111,7 +111,7 @@ pub(crate) fn annotate(
     for room in &mut rooms {
         room.wall_direction_deg = directions_deg.get(&room.room).copied().unwrap_or(0);
     }
-    let report = report.map_err(|e| Error::Input(e.to_string()))?;
+    let report = report.map_err(|e| InputError::Labels { why: e.to_string() })?;
     let mut annotated = Annotated {
         label_of_face: labels.label_of_face().to_vec(),
         filled: Vec::new(),
@@ -128,7 +128,9 @@ pub(crate) fn annotate(
 /// An area without annotations: no face has a label, and no room is known.
 pub(crate) fn unannotated(nearest_faces: &NearestFaces<'_>, table: &LabelTable) -> Result<Annotated> {
     let labels = Labeler::new(nearest_faces).finish();
-    let report = labels.report(table).map_err(|e| Error::Input(e.to_string()))?;
+    let report = labels
+        .report(table)
+        .map_err(|e| InputError::Labels { why: e.to_string() })?;
     Ok(Annotated {
         label_of_face: labels.into_label_of_face(),
         filled: Vec::new(),

@@ -1,5 +1,6 @@
 //! The labels of an area: made from its annotations, taken from an earlier run, or taken from a plan.
 
+use crate::condition::Condition;
 use crate::context::Context;
 use crate::error::Result;
 use crate::event::UnitKind;
@@ -11,7 +12,6 @@ use crate::export::photographs::judge_sight;
 use crate::export::shard::plan::Plan;
 use crate::export::survey::{Locating, Survey, SurveyOptions, Surveyor, survey};
 use crate::options::ExportOptions;
-use crate::options::condition::Condition;
 use crate::record::journal::{Done, LabelsDone, Unit, tally_of};
 use crate::record::listing;
 use crate::record::manifest::{AreaEntry, XyzLoss};

@@ -2,6 +2,7 @@
 
 pub(crate) mod agreement;
 
+use crate::condition::Condition;
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::images::{ImageJob, Memory, count};
@@ -9,7 +10,6 @@ use crate::export::input::photographs::{Photograph, Photographs};
 use crate::export::input::pictures::PictureColors;
 use crate::export::location::room_name;
 use crate::export::modality::{Channels, Image};
-use crate::options::condition::Condition;
 use crate::record::journal::PhotographDone;
 use crate::summary::{ImageTally, UnitTally};
 use crate::useful::{judge_of, poses_findings};

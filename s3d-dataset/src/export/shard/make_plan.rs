@@ -2,7 +2,7 @@
 
 use crate::account::Account;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Result, UsageError};
 use crate::export::input::memory::SceneSource;
 use crate::export::job::Job;
 use crate::export::shard::assignment::Shard;
@@ -22,7 +22,7 @@ use std::path::Path;
 /// Makes a plan of scenes in a folder, or a shard's part of it; what is there already is not made again.
 ///
 /// # Errors
-/// [`Error::Usage`] if the folder holds something else, or a plan of another call.
+/// [`Error::Usage`](crate::Error::Usage) if the folder holds something else, or a plan of another call.
 pub fn plan<S: Clone + Into<SceneSource>>(
     scenes: &[S],
     folder: &Path,
@@ -107,11 +107,8 @@ fn refuse_foreign(folder: &Path) -> Result<()> {
         let name = entry.map_err(|e| FileError::io(folder, "read", e))?.file_name();
         // Another shard may be about to begin.
         if !is_working_name(&name) && !plan_file(folder).exists() {
-            let root = folder.display();
-            return Err(Error::Usage(format!(
-                "{root} holds {}, and no plan: choose another folder",
-                name.display()
-            )));
+            let entry = name.display().to_string();
+            return Err(UsageError::HoldsNoPlan { folder: folder.to_owned(), entry }.into());
         }
     }
     Ok(())

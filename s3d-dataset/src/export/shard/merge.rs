@@ -3,7 +3,7 @@
 
 use crate::account::Account;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, InputError, Result, UsageError};
 use crate::export::finish::{Totals, finish};
 use crate::export::run::{Run, Target};
 use crate::export::shard::assignment::Assignment;
@@ -67,7 +67,7 @@ pub fn merge(
     let loading = run.account.stage(Stage::Load, None);
     let (_locks, parts) = read_parts(ctx, &folders, layout)?;
     let Some(first) = parts.first() else {
-        return Err(Error::Usage("there is no shard to merge".to_owned()));
+        return Err(UsageError::NoShards.into());
     };
     let request = &first.request;
     refuse_mixed(&parts)?;
@@ -179,9 +179,9 @@ fn label_list(parts: &[Part]) -> Result<LabelList> {
         .iter()
         .find_map(|part| LabelList::read(&LabelList::path(&part.layout)).ok());
     found.ok_or_else(|| {
-        Error::Input(
-            "none of the folders has the label table: run any of the shards again, and merge then".to_owned(),
-        )
+        let what = "none of the folders has the label table".to_owned();
+        let remedy = "run any of the shards again, and merge then".to_owned();
+        InputError::Incomplete { what, remedy }.into()
     })
 }
 
@@ -236,7 +236,7 @@ impl Part {
             let message = if Manifest::read(&layout).is_ok() {
                 "is a complete data set, and no shard of one"
             } else {
-                "holds no shard of an export: give the folders that `s3d export --shard` wrote"
+                "holds no shard of an export: give the folders that shards of an export wrote"
             };
             return Err(FileError::format(folder, message).into());
         };
@@ -252,19 +252,12 @@ fn refuse_mixed(parts: &[Part]) -> Result<()> {
     for other in others {
         let differences = first.request.differences(&other.request);
         if !differences.is_empty() {
-            return Err(Error::Usage(format!(
-                "{} and {} are shards of different calls: {} (\"there\" is {}, \"now\" is {})",
-                first.layout.root().display(),
-                other.layout.root().display(),
-                differences
-                    .iter()
-                    .take(MAX_NAMED)
-                    .cloned()
-                    .collect::<Vec<_>>()
-                    .join("; "),
-                first.layout.root().display(),
-                other.layout.root().display()
-            )));
+            return Err(UsageError::MixedShards {
+                first: first.layout.root().to_owned(),
+                other: other.layout.root().to_owned(),
+                differences,
+            }
+            .into());
         }
     }
     Ok(())
@@ -280,11 +273,7 @@ fn refuse_other_version(part: &Part) -> Result<()> {
 }
 
 fn other_version(folder: &Path, there: &str) -> Error {
-    Error::Usage(format!(
-        "{} is a shard by version {there} of s3d, and this is {}: merge with that version",
-        folder.display(),
-        env!("CARGO_PKG_VERSION")
-    ))
+    UsageError::OtherVersion { folder: folder.to_owned(), there: there.to_owned() }.into()
 }
 
 /// What is to be done about units that are not there.
@@ -306,7 +295,7 @@ fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
         .into_iter()
         .filter(|(_, numbers)| !numbers.is_empty())
         .map(|(of, numbers)| {
-            let calls: Vec<String> = numbers.iter().map(|i| format!("--shard {i}/{of}")).collect();
+            let calls: Vec<String> = numbers.iter().map(|i| format!("shard {i}/{of}")).collect();
             calls.join(", ")
         });
     let calls: Vec<String> = calls.collect();
@@ -315,7 +304,11 @@ fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
     } else {
         calls.join(", or ")
     };
-    Error::Input(format!("{}{more} {what}: run again {calls}, and merge then", named.join(", ")))
+    InputError::Incomplete {
+        what: format!("{}{more} {what}", named.join(", ")),
+        remedy: format!("run again {calls}, and merge then"),
+    }
+    .into()
 }
 
 /// Brings the files of all units that OUT has not yet into it, and checks each there.

@@ -6,7 +6,7 @@
 //! labels the areas that it scores in, if nobody has, and scores its share of their locations.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, Held, InputError, Result, UsageError};
 use crate::export::transfer::bring;
 use crate::record::checked::read_checked;
 use crate::record::journal::{Done, Finished, Unit};
@@ -102,11 +102,12 @@ impl Plan {
         }
         let named: Vec<String> = missing.iter().take(MAX_NAMED).map(Unit::to_string).collect();
         let more = if missing.len() > MAX_NAMED { " and more" } else { "" };
-        Err(Error::Input(format!(
-            "{} is not complete: {}{more} missing; call `s3d plan` again, each shard of it if it has some",
-            self.layout.root().display(),
-            named.join(", ")
-        )))
+        let root = self.layout.root().display();
+        Err(InputError::Incomplete {
+            what: format!("{root} is not complete: {}{more} missing", named.join(", ")),
+            remedy: "call `s3d plan` again, each shard of it if it has some".to_owned(),
+        }
+        .into())
     }
 
     /// A labelled area.
@@ -123,10 +124,9 @@ impl Plan {
             .map_or(Vec::new(), |labels| labels.files.clone());
         for record in &files {
             if let Some(fault) = bring(record, self.layout.root(), to.root())? {
-                return Err(Error::Input(format!(
-                    "{}/{fault}: call `s3d plan` again, and it is made anew",
-                    self.layout.root().display()
-                )));
+                let what = format!("{}/{fault}", self.layout.root().display());
+                let remedy = "call `s3d plan` again, and it is made anew".to_owned();
+                return Err(InputError::Incomplete { what, remedy }.into());
             }
         }
         Ok(files)
@@ -137,7 +137,11 @@ impl Plan {
         let done = self.finished.get(&Unit::Scores(area, uuid.to_owned()));
         done.cloned().ok_or_else(|| {
             let root = self.layout.root().display();
-            Error::Input(format!("{root}: the scores of location {uuid} of area {area} are missing"))
+            InputError::Incomplete {
+                what: format!("{root}: the scores of location {uuid} of area {area} are missing"),
+                remedy: "call `s3d plan` again".to_owned(),
+            }
+            .into()
         })
     }
 }
@@ -147,6 +151,5 @@ pub(crate) fn refuse_other(folder: &Path, there: &Request, now: &Request) -> Res
     if differences.is_empty() {
         return Ok(());
     }
-    let root = folder.display();
-    Err(Error::Usage(format!("{root} is a plan of another call ({})", differences.join("; "))))
+    Err(UsageError::OtherCall { folder: folder.to_owned(), held: Held::Plan, differences }.into())
 }

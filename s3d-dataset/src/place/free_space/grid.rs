@@ -1,6 +1,6 @@
 //! A grid of vertical lines, and where they meet surfaces.
 
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 use s3d_geom::TriMesh;
@@ -60,11 +60,15 @@ impl Grid {
         let step = (m2 / MANY_FEET).sqrt().clamp(STEP_M, MOST_STEP_M);
         let size = mesh.aabb().size().as_dvec3();
         if m2 / (step * step) > MOST_FEET || size.x.max(size.y) > MOST_EXTENT_M {
-            return Err(Error::Input(format!(
-                "the mesh is {:.0} × {:.0} m large, and {m2:.0} m² of it face up: that is too much to place \
+            return Err(InputError::Unfit {
+                path: "the mesh".into(),
+                why: format!(
+                    "is {:.0} × {:.0} m large, and {m2:.0} m² of it face up: that is too much to place \
                  scan locations on; is `units` right? If it is, list scan locations or split the scan",
-                size.x, size.y
-            )));
+                    size.x, size.y
+                ),
+            }
+            .into());
         }
         let aabb = mesh.aabb();
         let min = aabb.min.as_dvec3();

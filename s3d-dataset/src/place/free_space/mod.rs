@@ -10,7 +10,7 @@ mod standing;
 mod visibility;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{InputError, Result};
 use crate::place::HEIGHT_M;
 use crate::survey::surface_seen::SurfaceSeen;
 use cover::Cover;
@@ -82,8 +82,8 @@ pub(crate) struct FreeSpace {
 /// The same for the same mesh, options and seed, for any number of threads.
 ///
 /// # Errors
-/// [`Error::Input`] if there is no such place, or if hardly any surface is seen: what was found, and what may
-/// be wrong. [`Error::Cancelled`].
+/// [`Error::Input`](crate::Error::Input) if there is no such place, or if hardly any surface is seen: what was found, and what may
+/// be wrong. [`Error::Cancelled`](crate::Error::Cancelled).
 pub(crate) fn place_in_free_space(
     ctx: &Context,
     area: u32,
@@ -97,7 +97,7 @@ pub(crate) fn place_in_free_space(
     let search = Search { ctx, scene, nearest, cell_m, most };
     let found = search.run(Facing::Fronts)?;
     if found.places.is_empty() {
-        return Err(Error::Input(format!("area {area}: {}", search.explain(&found)?)));
+        return Err(InputError::UnfitArea { area, why: search.explain(&found)? }.into());
     }
     let surface = Surface::sample(mesh, options.seed);
     let eyes: Vec<DVec3> = found.places.iter().map(Place::eye).collect();
@@ -131,13 +131,17 @@ pub(crate) fn place_in_free_space(
     let mut warnings = Vec::new();
     let share = seen.seen_m2[0] / seen.surface_m2;
     if share < LEAST_SEEN {
-        return Err(Error::Input(format!(
-            "area {area}: {} scan locations in free space see only {:.1} of {:.1} m² of surface; {HINTS} If \
+        return Err(InputError::UnfitArea {
+            area,
+            why: format!(
+                "{} scan locations in free space see only {:.1} of {:.1} m² of surface; {HINTS} If \
              the scan is as it should be, list scan locations",
-            chosen.len(),
-            seen.seen_m2[0],
-            seen.surface_m2
-        )));
+                chosen.len(),
+                seen.seen_m2[0],
+                seen.surface_m2
+            ),
+        }
+        .into());
     }
     if share < FEW_SEEN {
         warnings.push(format!(

@@ -1,4 +1,5 @@
 use super::*;
+use crate::error::Error;
 use crate::survey::outlook::Outlook;
 use glam::{Vec3, dvec3};
 use s3d_geom::MeshParts;

@@ -1,5 +1,15 @@
 //! Why a call of this crate did not do what it was asked for.
 
+mod input;
+mod names;
+mod temporary;
+mod usage;
+
+pub use input::InputError;
+pub use names::{FieldNames, OptionNames};
+pub use temporary::{TemporaryError, Work};
+pub use usage::{Difference, Held, Overwriting, UsageError};
+
 use std::error::Error as StdError;
 use std::io::{self, ErrorKind};
 use thiserror::Error as ThisError;
@@ -11,21 +21,20 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, ThisError)]
 #[non_exhaustive]
 pub enum Error {
-    /// What is asked for cannot be: options that exclude each other, a folder that holds something else.
-    /// Options are named as on the command line of `s3d`.
-    #[error("{0}")]
-    Usage(String),
+    /// The call cannot be made: options that exclude each other, a folder that holds something else.
+    #[error(transparent)]
+    Usage(#[from] UsageError),
     /// A file is wrong or the disk refuses.
     #[error(transparent)]
     File(s3d_io::Error),
     /// The input does not fit together.
-    #[error("{0}")]
-    Input(String),
-    /// Nothing is wrong with the call or the input, and what was done so far is kept: the same call may go on
-    /// later.
-    #[error("{0}")]
-    Temporary(String),
-    /// The call was [cancelled](crate::Cancel). What was done so far is kept: the same call goes on.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// Nothing is wrong with the call or the input, and everything that was done so far is kept: the same call
+    /// may go on later.
+    #[error(transparent)]
+    Temporary(#[from] TemporaryError),
+    /// The call was [cancelled](crate::Cancel). Everything that was done so far is kept: the same call goes on.
     #[error("cancelled; the same call goes on where it stopped")]
     Cancelled,
 }
@@ -35,13 +44,27 @@ impl Error {
     pub fn is_temporary(&self) -> bool {
         matches!(self, Self::Temporary(_) | Self::Cancelled)
     }
+
+    /// Returns the message with options named by `names`.
+    pub fn message(&self, names: &dyn OptionNames) -> String {
+        match self {
+            Self::Usage(error) => error.message(names),
+            Self::Input(error) => error.message(names),
+            Self::File(_) | Self::Temporary(_) | Self::Cancelled => self.to_string(),
+        }
+    }
+
+    /// The input in `path` does not fit, because of `why`.
+    pub(crate) fn unfit(path: impl Into<std::path::PathBuf>, why: impl Into<String>) -> Self {
+        InputError::Unfit { path: path.into(), why: why.into() }.into()
+    }
 }
 
 impl From<s3d_io::Error> for Error {
     /// A file that is wrong, or a system that may do better the next time: [`Error::Temporary`].
     fn from(error: s3d_io::Error) -> Self {
         if passes(&error) {
-            Self::Temporary(error.to_string())
+            TemporaryError::System(error).into()
         } else {
             Self::File(error)
         }
