@@ -1,7 +1,7 @@
 //! Loops over bytes in wide registers.
 //!
 //! Wide registers make the files of a view in a third of the time of the portable form
-//! (`docs/performance/encoding.md`). Every form gives the same bytes; tests compare each with the portable
+//! (the book's page on encoding). Every form gives the same bytes; tests compare each with the portable
 //! form.
 
 use s3d_simd::{Level, Scalar, level};

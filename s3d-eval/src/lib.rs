@@ -5,7 +5,7 @@
 //!
 //! [`evaluate`] compares predictions with a data set by a [`Protocol`], which is a named and versioned
 //! definition. It returns an [`Evaluation`]: tables of scores, with the definition that they follow.
-//! `docs/evaluation.md` explains each protocol, its source, how others differ, and the files of predictions.
+//! [`protocols`] explains each protocol, its source, how others differ, and the files of predictions.
 //!
 //! ```no_run
 //! use s3d_eval::{Context, EvalOptions, Protocol, evaluate};

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error as ThisError;
 
-/// A definition of how to compare predictions with a data set. `docs/evaluation.md` describes each.
+/// A definition of how to compare predictions with a data set. [`crate::protocols`] describes each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Protocol {

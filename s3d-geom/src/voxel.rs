@@ -1,7 +1,7 @@
 //! The box of an instance, split into 6 × 6 × 6 voxels.
 //!
-//! Source: formats.md, "What is written" (`Bbox`, `Voxels`, `Voxel_Occupancy` and `Points_per_Voxel` of the
-//! data set).
+//! Source: `s3d_io::formats`, "What is written" (`Bbox`, `Voxels`, `Voxel_Occupancy` and `Points_per_Voxel`
+//! of the data set).
 
 use crate::Aabb;
 use glam::Vec3;

@@ -4,7 +4,7 @@
 //! The images show a furnished room that is made here from a fixed seed: uneven walls as a scan has them,
 //! seen at an angle, a texture with noise, and a few dozen instances. `Throughput` counts bytes before
 //! compression; the size after it is printed once. `view` is all six images of a view, one after the other.
-//! `docs/performance/encode_peers.py` has figures of other encoders for images of a data set.
+//! `bench/encode_peers.py` has figures of other encoders for images of a data set.
 //!
 //! Goal: a view in 50 ms with balanced compression; no PNG image more than 1.1 times as large as by libpng's
 //! level 6 (RGB 1.15), and no OpenEXR image larger than by OpenEXR.

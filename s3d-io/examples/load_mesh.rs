@@ -1,5 +1,5 @@
 //! Measures how long a mesh with its textures takes to load, and how much memory. Prints one line of JSON for
-//! docs/performance/load_peers.py, which compares it with other readers.
+//! bench/load_peers.py, which compares it with other readers.
 //!
 //! `cargo run --release -p s3d-io --example load_mesh -- scan/rgb.obj`; `RAYON_NUM_THREADS` sets the threads.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]

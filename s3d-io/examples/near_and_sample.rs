@@ -3,7 +3,7 @@
 //! the same.
 //!
 //! `cargo run --release -p s3d-io --example near_and_sample -- MESH [y|z] [POINTS] [FOLDER]`; MESH is a file,
-//! or `scan_like:300000` for a generated one. docs/performance/near_sample_peers.py compares with others.
+//! or `scan_like:300000` for a generated one. bench/near_sample_peers.py compares with others.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for the terminal")]
 
 use s3d_geom::glam::Vec3;

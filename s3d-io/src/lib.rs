@@ -18,7 +18,7 @@
 //! | [`scene`] | `scene.toml`; published areas as scenes |
 //! | [`fs`] | files that are whole, synced and checked by checksums; JSON |
 //!
-//! formats.md defines what the files hold, and the docs here name its sections. A function that takes a path
+//! [`formats`] defines what the files hold, and the docs here name its sections. A function that takes a path
 //! has a counterpart that takes a reader, a writer or bytes; the examples below use both.
 //!
 //! # Reading a mesh

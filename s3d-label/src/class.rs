@@ -7,7 +7,7 @@ use thiserror::Error;
 /// A class of objects: its place in a [`Taxonomy`](crate::Taxonomy), and its name. The constants are the 13
 /// classes of S3DIS. [`Taxonomy::class`](crate::Taxonomy::class) finds the classes of other taxonomies.
 ///
-/// `Ord` is the order of the taxonomy. The order of S3DIS is in formats.md, "What is written".
+/// `Ord` is the order of the taxonomy. The order of S3DIS is in `s3d_io::formats`, "What is written".
 ///
 /// ```
 /// use s3d_label::Class;

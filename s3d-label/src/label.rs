@@ -11,7 +11,7 @@ use thiserror::Error;
 pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 
 /// One instance of a class in an area, written `class_instanceNum_roomType_roomNum_areaNum`, as in
-/// `board_3_hallway_4_6`. Source: formats.md, "What is written".
+/// `board_3_hallway_4_6`. Source: `s3d_io::formats`, "What is written".
 ///
 /// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, with the underscore, so
 /// `beam_10_…` comes before `beam_1_…`. Then by room, which only matters for two labels of the same instance.

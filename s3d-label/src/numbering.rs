@@ -44,7 +44,7 @@ pub enum NumberingError {
 /// a few rooms are at other places.
 ///
 /// The result is sorted by room, class and number in the room, whatever the order of the input. Source:
-/// formats.md, "What is written" and "S3DIS tree".
+/// `s3d_io::formats`, "What is written".
 ///
 /// # Errors
 /// [`NumberingError::Duplicate`] if an instance is there twice.

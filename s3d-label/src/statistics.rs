@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The number of instances of each class, by area.
 ///
 /// This is the paper's table of object classes. The paper counts every cell one higher than the published
-/// labels do (docs/paper.md, "Objects by class").
+/// labels do (the book's page on the paper, "Objects by class").
 ///
 /// ```
 /// use s3d_label::{Class, ClassCounts, LabelTable};
@@ -52,7 +52,7 @@ impl ClassCounts {
 /// The number of rooms of each type, by area. Only rooms with at least one instance count.
 ///
 /// This is the paper's table of rooms. The paper's total of area 5 (55) is not the sum of its row (68;
-/// docs/paper.md, "Rooms by type").
+/// the book's page on the paper, "Rooms by type").
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoomCounts {

@@ -8,7 +8,7 @@ use thiserror::Error;
 /// The largest number of entries of a label table, with the null label.
 ///
 /// A semantic image writes an index as a colour, and the colour (13, 13, 13) means that the ray hit nothing
-/// (formats.md, "What is written"). So every index is below 13·65536 + 13·256 + 13.
+/// (`s3d_io::formats`, "What is written"). So every index is below 13·65536 + 13·256 + 13.
 pub const MAX_LABELS: usize = 13 * 65_536 + 13 * 256 + 13;
 
 /// An index into a label table. Semantic images store it, and points vote for it.
@@ -38,7 +38,7 @@ impl fmt::Display for LabelId {
 }
 
 /// The labels of a data set in the published order. Index 0 is the null label; the others are sorted by `Ord`
-/// of [`Label`]. Source: formats.md, "What is written".
+/// of [`Label`]. Source: `s3d_io::formats`, "What is written".
 ///
 /// ```
 /// use s3d_label::{Class, LabelId, LabelTable, NULL_NAME};

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! For every input line it casts nine views of 1080² and a panorama of 2048 × 1024, and prints a line with
-//! the milliseconds of each. With that, `docs/performance/states.py` lets two programs take turns. The scenes
+//! the milliseconds of each. With that, `bench/states.py` lets two programs take turns. The scenes
 //! are the same as in the bench `shade`.
 
 #[path = "../benches/common/mod.rs"]

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! For every input line it makes the images of nine views of 1080², and prints a line with the milliseconds
-//! of each. With that, `docs/performance/states.py` lets two programs take turns of a fraction of a second,
+//! of each. With that, `bench/states.py` lets two programs take turns of a fraction of a second,
 //! so that a busy machine disturbs both alike. The scenes are the same as in the bench `shade`.
 
 #[path = "../benches/common/mod.rs"]

@@ -11,7 +11,7 @@
 //! second of user time and of wall time: the median of the rounds. The location is rounded to `f32` first, so
 //! that ray casters of `f32` start at the same point.
 //!
-//! With `--dump` it also writes the data that `docs/performance/embree_cast.cpp` needs to cast the same rays
+//! With `--dump` it also writes the data that `bench/embree_cast.cpp` needs to cast the same rays
 //! and compare. All files are little-endian:
 //!
 //! - `dump.txt`: vertices, faces, views, their width and height, the panorama's width and height, the origin.

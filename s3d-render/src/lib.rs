@@ -52,7 +52,7 @@
 //!
 //! # Images
 //!
-//! The data set defines the images (formats.md, "What is written"). A function makes each of them:
+//! The data set defines the images (`s3d_io::formats`, "What is written"). A function makes each of them:
 //! [`rgb_image`], [`depth_image`], [`normal_image`], [`xyz_image`], [`index_image`] and
 //! [`color_per_face_image`]. [`view_images_into`] makes the same bytes in one walk over the hits, in less
 //! time. A semantic image is an index image: this crate stores faces and knows no labels. [`sample_edges`]

@@ -572,7 +572,7 @@ fn rgb_of_scans_is_what_single_pixels_give() {
     }
 }
 
-/// Compares the other images with formats.md, one pixel at a time.
+/// Compares the other images with `s3d_io::formats`, one pixel at a time.
 #[test]
 fn images_are_what_single_pixels_give() {
     let mesh = s3d_synth::scenes::scan_like(20_000, 5);

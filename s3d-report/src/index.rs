@@ -1,4 +1,4 @@
-//! The index of a report: everything but the images. `docs/report.md` describes it, and `web/src/data.ts`
+//! The index of a report: everything but the images. [`crate::files`] describes it, and `web/src/data.ts`
 //! reads it.
 
 use crate::faults::Fault;

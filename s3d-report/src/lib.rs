@@ -4,7 +4,7 @@
 //! `data/` has reduced images, the mesh, and their tables. The data set is not altered. [`report_against`]
 //! shows another data set beside it, with the differences.
 //!
-//! `docs/report.md` describes the files of the folder. The source of the page is in `web/`, in TypeScript.
+//! [`files`] describes the files of the folder. The source of the page is in `web/`, in TypeScript.
 //! Its bundle is in `web/dist/`, so that this crate builds without Node.
 //!
 //! ```no_run

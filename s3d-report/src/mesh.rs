@@ -1,4 +1,4 @@
-//! Writes the mesh of an area for the 3D view, simplified if it is large: `docs/report.md`, "Meshes".
+//! Writes the mesh of an area for the 3D view, simplified if it is large: [`crate::files`], "Meshes".
 
 use crate::faults::Faults;
 use crate::index::{MaterialEntry, MeshEntry, Surface, VoteSpread, rounded};

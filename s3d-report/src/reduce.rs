@@ -29,7 +29,7 @@ pub(crate) fn shown_size(size: [u32; 2], width: u32) -> [u32; 2] {
     )
 }
 
-/// Returns the pixel of an axis of `from` pixels that holds the centre of pixel `i` of `to`. `docs/report.md`
+/// Returns the pixel of an axis of `from` pixels that holds the centre of pixel `i` of `to`. [`crate::files`]
 /// states this rule, since the page computes rays by it.
 pub(crate) fn source_pixel(i: u32, from: u32, to: u32) -> u32 {
     ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))) as u32

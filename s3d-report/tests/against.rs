@@ -1,4 +1,4 @@
-//! A report of a data set against another, read back by docs/report.md.
+//! A report of a data set against another, read back by `s3d_report::files`.
 
 mod common;
 

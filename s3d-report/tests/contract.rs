@@ -1,4 +1,5 @@
-//! A report that is read back by its contract (docs/report.md), and held against the data set's own files.
+//! A report that is read back by its contract (`s3d_report::files`), and held against the data set's own
+//! files.
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! The meshes of a report and the faces of its pictures, read back by docs/report.md and held against the
-//! data set's own files.
+//! The meshes of a report and the faces of its pictures, read back by `s3d_report::files` and held against
+//! the data set's own files.
 
 mod common;
 

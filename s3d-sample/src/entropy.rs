@@ -4,7 +4,7 @@
 ///
 /// The entropy is 0 if one class has all pixels, and the logarithm of the number of classes if all have the
 /// same number of pixels. Pixels without a class are not in the histogram. The entropy of an empty histogram
-/// is 0. Source: formats.md, "Views".
+/// is 0. Source: `s3d_io::formats`, "Views".
 ///
 /// ```
 /// // As many pixels of wall as of floor.

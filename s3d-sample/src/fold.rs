@@ -11,8 +11,8 @@ pub struct Fold {
     pub test: Vec<u32>,
 }
 
-/// The published folds of areas 1 to 6: number, training areas, test areas. Source: formats.md, "What is
-/// written".
+/// The published folds of areas 1 to 6: number, training areas, test areas. Source: `s3d_io::formats`, "What
+/// is written".
 const PUBLISHED: [(u32, &[u32], &[u32]); 3] =
     [(1, &[1, 2, 3, 4, 6], &[5]), (2, &[1, 3, 5, 6], &[2, 4]), (3, &[2, 4, 5], &[1, 3, 6])];
 

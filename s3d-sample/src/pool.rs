@@ -7,7 +7,7 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// The views that compete with each other. Source: formats.md, "Views".
+/// The views that compete with each other. Source: `s3d_io::formats`, "Views".
 ///
 /// ```
 /// use s3d_sample::Pool;

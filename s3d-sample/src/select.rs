@@ -3,7 +3,7 @@
 use crate::stream::{stream, uniform_above_zero};
 use thiserror::Error;
 
-/// The shares of a pool that stay and go. Source: formats.md, "Views".
+/// The shares of a pool that stay and go. Source: `s3d_io::formats`, "Views".
 ///
 /// ```
 /// use s3d_sample::Selection;
@@ -25,7 +25,7 @@ pub struct Selection {
 
 impl Default for Selection {
     /// The shares of the paper: 15 % go, 60 % stay, and half of the remaining 25 % stay too, which makes
-    /// 72.5 %. In the published data 69.3 % of the views stayed (docs/paper.md, "Which views").
+    /// 72.5 %. In the published data 69.3 % of the views stayed (the book's page on the paper, "Which views").
     fn default() -> Self {
         Self { discard: 0.15, keep: 0.60, half_of_rest: 0.5 }
     }

@@ -5,10 +5,11 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
 use thiserror::Error;
 
-/// The number of candidate views of a scan location: 3 × 24. Source: formats.md, "Views".
+/// The number of candidate views of a scan location: 3 × 24. Source: `s3d_io::formats`, "Views".
 pub const CANDIDATES_PER_LOCATION: u32 = 72;
 
-/// The distribution of views. The yaw is always uniform, the roll always 0. Source: formats.md, "Views".
+/// The distribution of views. The yaw is always uniform, the roll always 0. Source: `s3d_io::formats`,
+/// "Views".
 ///
 /// ```
 /// use s3d_sample::ViewDistribution;
@@ -90,7 +91,7 @@ impl ViewDistribution {
 }
 
 /// A view from a scan location, relative to the original camera of the location: `E(final) = E(original) ·
-/// Ry(yaw) · Rx(pitch)`, without roll. Source: formats.md, "Views".
+/// Ry(yaw) · Rx(pitch)`, without roll. Source: `s3d_io::formats`, "Views".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Turn about the vertical, in [−π, π).
@@ -109,7 +110,7 @@ pub struct View {
 /// - the yaw, uniform in [−180°, 180°);
 /// - the pitch, normal by the method of Box and Muller. It is drawn again (2 in 10⁹) if the camera would tip
 ///   over, at 90° or more up or down;
-/// - the angle of view, `fov_max − |normal|`. It is drawn again below `fov_min`.
+/// - the angle of view, `fov_max_deg − |normal|`. It is drawn again below `fov_min_deg`.
 ///
 /// # Panics
 /// If [`ViewDistribution::check`] fails.

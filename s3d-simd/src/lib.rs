@@ -33,7 +33,7 @@
 //! # Why not a library
 //!
 //! Libraries that offer this (`fearless_simd`, `pulp`) bring register types of their own, which cost time in
-//! our hottest kernels: see `docs/performance.md`.
+//! our hottest kernels: see the book's page on speed.
 
 use std::fmt;
 use std::sync::OnceLock;

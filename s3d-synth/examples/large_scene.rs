@@ -1,8 +1,8 @@
 //! Writes a scan of any size, to see what an export of it takes: see `s3d_synth::scenes::LargeScan`.
 //!
 //! `cargo run --release -p s3d-synth --example large_scene -- FOLDER [--faces N] [--materials N] [--labels N]
-//! [--points N] [--cameras N] [--texture PX] [--form ply|npy|s3dis]`; `docs/reliability/curves.py` makes and
-//! exports a row of them.
+//! [--points N] [--cameras N] [--texture PX] [--form ply|npy|s3dis]`; `s3d-cli/tests/reliability/curves.py`
+//! makes and exports a row of them.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 use s3d_synth::scenes::{LargeScan, PointFormat};

@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 
 const COLUMNS: [&str; 3] = ["PQ", "SQ", "RQ"];
 
-/// The pixel of a semantic image that shows no surface. Source: formats.md, "What is written".
+/// The pixel of a semantic image that shows no surface. Source: [`s3d_io::formats`], "What is written".
 const MISSING: [u8; 3] = [13; 3];
 
 const DEFINITION: [&str; 5] = [

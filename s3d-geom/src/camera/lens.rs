@@ -11,9 +11,9 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 /// x' = x·q + 2p₁xy + p₂(r² + 2x²),   y' = y·q + p₁(r² + 2y²) + 2p₂xy
 /// ```
 ///
-/// and projected to the pixel (fx·x' + cx, fy·y' + cy). The top left corner of the picture is (0, 0), and the
-/// centre of pixel (i, j) is at (i + ½, j + ½), as everywhere. Source: OpenCV's `projectPoints`; formats.md,
-/// "The scanner's pictures".
+/// and projected to the pixel (fx·x' + cx, fy·y' + cy). The top left corner of the picture is (0, 0), and
+/// the centre of pixel (i, j) is at (i + ½, j + ½), as everywhere. Source: OpenCV's `projectPoints`;
+/// `s3d_io::formats`, "The scanner's pictures".
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

@@ -1,7 +1,7 @@
 //! Cameras: from pixels to rays and back.
 //!
 //! Pixel coordinates: x to the right, y down, the centre of pixel (i, j) at (i + ½, j + ½). Source:
-//! formats.md, "What is written".
+//! `s3d_io::formats`, "What is written".
 
 mod error;
 mod fisheye;
@@ -41,7 +41,7 @@ pub enum Projection {
     Equirectangular,
 }
 
-/// The axes in which normals are written. Source: formats.md, "What is written".
+/// The axes in which normals are written. Source: `s3d_io::formats`, "What is written".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum NormalAxes {
@@ -211,8 +211,8 @@ impl Camera {
     }
 
     /// Returns the rotation from the world to the axes in which normal images of this camera are written
-    /// (formats.md, "What is written"). The channels R G B are right, down and towards the camera for a
-    /// pinhole, and X, −Z, Y of the world for a panorama.
+    /// (`s3d_io::formats`, "What is written"). The channels R G B are right, down and towards the camera for
+    /// a pinhole, and X, −Z, Y of the world for a panorama.
     pub fn normal_image_from_world(&self) -> DMat3 {
         self.normal_axes_from_world(NormalAxes::Paper)
     }

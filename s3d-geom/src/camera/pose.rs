@@ -1,7 +1,8 @@
 //! The place and rotation of a camera, in the convention of the published data set.
 //!
-//! Camera axes are Blender's: x right, y up, looking along −z. Angles are Blender's XYZ Euler angles,
-//! E(x, y, z) = Rz·Ry·Rx, in radians. Source: formats.md, "What is written" (checked on genuine pose files).
+//! Camera axes are Blender's: x right, y up, looking along −z. Angles are Blender's XYZ Euler angles, E(x,
+//! y, z) = Rz·Ry·Rx, in radians. Source: `s3d_io::formats`, "What is written" (checked on genuine pose
+//! files).
 
 use crate::CameraError;
 use glam::{DMat3, DQuat, DVec3, dvec3};

@@ -1,7 +1,7 @@
 //! The face of a mesh that is nearest to a point.
 //!
-//! Source: formats.md, "What is written": an annotated point votes for its nearest face. If several faces are
-//! equally near, it votes for the smallest face index.
+//! Source: `s3d_io::formats`, "What is written": an annotated point votes for its nearest face. If several
+//! faces are equally near, it votes for the smallest face index.
 //!
 //! All arithmetic that decides is in `f64`, on corners sorted by their coordinates. Faces that share an edge
 //! or a corner therefore get the same distance there to the bit, whatever their winding and vertex indices.

@@ -11,7 +11,7 @@ const STEEPEST: f32 = 0.3;
 /// Each face is given by its unit normal and area. A room turned about Z by the direction has its walls
 /// parallel to the axes. Walls that meet at a right angle count as one direction. The direction is the mean
 /// by area around the peak of a histogram, which keeps clutter out. Faces whose normal is not finite or whose
-/// area is not positive are left out. Source: formats.md, "What is written" (the alignment angle).
+/// area is not positive are left out. Source: `s3d_io::formats`, "What is written" (the alignment angle).
 ///
 /// ```
 /// use s3d_geom::{dominant_wall_direction_deg, glam::Vec3};

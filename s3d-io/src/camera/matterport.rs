@@ -1,7 +1,8 @@
 //! The scanner's own pictures: raw Matterport captures, sky boxes and equirectangular photographs.
 //!
-//! Source: formats.md, "The scanner's pictures". Files are looked up in a folder and in the folders in it,
-//! because Matterport3D keeps colours, poses and intrinsics in separate ones (`matterport_color_images/`…).
+//! Source: [`crate::formats`], "The scanner's pictures". Files are looked up in a folder and in the folders
+//! in it, because Matterport3D keeps colours, poses and intrinsics in separate ones
+//! (`matterport_color_images/`…).
 
 use crate::camera::picture::{check_picture, read_picture};
 use crate::camera::table::ScanLocation;

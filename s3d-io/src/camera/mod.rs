@@ -20,8 +20,8 @@
 //! Polycam's keyframes, trajectories of TUM and tables.
 //!
 //! A [`PictureFolder`] finds the pictures of each location: raw captures ([`CaptureFile`], with lens and
-//! pose), sky boxes or panoramas. [`read_picture`] reads a PNG or JPEG file. Source: formats.md, "Scan
-//! locations" and "The scanner's pictures".
+//! pose), sky boxes or panoramas. [`read_picture`] reads a PNG or JPEG file. Source: [`crate::formats`],
+//! "Scan locations" and "The scanner's pictures".
 //!
 //! ```
 //! use s3d_geom::glam::DAffine3;

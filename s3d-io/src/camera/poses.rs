@@ -1,4 +1,4 @@
-//! Scan locations from the pose files of images. Source: formats.md, "What is written".
+//! Scan locations from the pose files of images. Source: [`crate::formats`], "What is written".
 
 use crate::camera::table::{FARTHEST_M, ScanLocation};
 use crate::dataset::layout::{ImageName, is_valid_uuid};

@@ -31,8 +31,8 @@ const FORM: &str = "uuid or name, x,y,z, and qx,qy,qz,qw or look_x,look_y,look_z
 pub struct ScanLocation {
     /// The name: 32 lower-case hexadecimal digits.
     pub uuid: String,
-    /// The position in world metres, and the rotation of the camera: E(original) of formats.md, "What is
-    /// written".
+    /// The position in world metres, and the rotation of the camera: E(original) of [`crate::formats`], "What
+    /// is written".
     pub pose: Pose,
     /// The line in the table, from 1; 0 if the location comes from a file without lines.
     pub line: u64,
@@ -45,7 +45,7 @@ pub struct ScanLocation {
 /// (`look_x,look_y,look_z`) or a heading in degrees (`yaw`, and perhaps `pitch`) may stand for the
 /// quaternion. A uuid may be in upper case and hyphenated. If no location has a uuid, [`uuid_from_name`]
 /// makes them from the names ("scan_0"). Lines that start with `#` and empty lines do not count. Source:
-/// formats.md, "Scan locations".
+/// [`crate::formats`], "Scan locations".
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line, for a wrong number of fields, a name that is no uuid among

@@ -1,6 +1,6 @@
 //! Annotated points of any source: rooms, their instances, and the points of each instance.
 
-use crate::cloud::s3dis::tree::OnFault;
+use crate::cloud::on_fault::OnFault;
 use crate::error::{Error, Result};
 use s3d_geom::glam::DVec3;
 use s3d_geom::{Aabb, PointCloud};

@@ -20,7 +20,7 @@
 //!
 //! Writers take points piece by piece. They write to a path (the whole file or none) or to any `Write`:
 //! [`PlyPointWriter`], read back by [`LabelledPoints`]; [`S3disAreaWriter`]; [`MatWriter`]; and [`NpyWriter`]
-//! for arrays, read back by [`NpyArray`] and [`NpzArchive`]. Source: formats.md, "Annotations".
+//! for arrays, read back by [`NpyArray`] and [`NpzArchive`]. Source: [`crate::formats`], "Annotations".
 //!
 //! ```
 //! use s3d_geom::PointCloud;
@@ -53,6 +53,7 @@ mod of_faces;
 mod of_memory;
 #[cfg(feature = "mesh")]
 mod of_mesh;
+pub(crate) mod on_fault;
 mod open;
 pub(crate) mod passes;
 #[cfg(feature = "ply")]

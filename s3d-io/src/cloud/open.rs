@@ -5,8 +5,9 @@ use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
 use crate::cloud::frame_gap::{FrameGap, refusal};
+use crate::cloud::on_fault::OnFault;
 use crate::cloud::s3dis::points::PointReader;
-use crate::cloud::s3dis::tree::{AnnotationTree, InstanceFile, OnFault, TreeOptions};
+use crate::cloud::s3dis::tree::{AnnotationTree, InstanceFile, TreeOptions};
 use crate::cloud::table::cloud::Cloud;
 use crate::cloud::table::read::read_tables;
 use crate::error::{Error, Result};

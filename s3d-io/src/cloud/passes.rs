@@ -267,7 +267,7 @@ const WRITE: &str = "write points to a temporary file in";
 mod tests {
     use super::*;
     use crate::cloud::annotations::{AnnotationOptions, Annotations};
-    use crate::cloud::s3dis::tree::OnFault;
+    use crate::cloud::on_fault::OnFault;
     use std::fmt::Write as _;
     use std::fs;
 

@@ -1,4 +1,4 @@
-//! `conventions.json`: the meaning of a data set's numbers, for programs. Source: formats.md.
+//! `conventions.json`: the meaning of a data set's numbers, for programs. Source: [`crate::formats`].
 
 use crate::dataset::domain::Domain;
 use crate::error::{Error, Result};

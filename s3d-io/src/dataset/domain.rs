@@ -1,4 +1,4 @@
-//! What the images of the data set show. Source: formats.md, "What is written".
+//! What the images of the data set show. Source: [`crate::formats`], "What is written".
 
 use std::fmt;
 use std::str::FromStr;
@@ -36,8 +36,8 @@ pub struct UnknownDomain {
 }
 
 impl Domain {
-    /// All domains in the order of formats.md, which is the order of options, of manifests and of the columns
-    /// of tables.
+    /// All domains in the order of [`crate::formats`], which is the order of options, of manifests and of the
+    /// columns of tables.
     pub const ALL: [Self; 8] = [
         Self::Rgb,
         Self::Depth,

@@ -19,7 +19,7 @@ pub fn pad_labels(names: &mut Vec<String>, entries: usize) {
 }
 
 /// Writes the names of labels, the null label first, and returns the file's size in bytes. Source:
-/// formats.md, "What is written".
+/// [`crate::formats`], "What is written".
 ///
 /// # Errors
 /// [`crate::Error::Io`].

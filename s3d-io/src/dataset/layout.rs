@@ -1,4 +1,4 @@
-//! All paths and names of the data set. Source: formats.md, "What is written".
+//! All paths and names of the data set. Source: [`crate::formats`], "What is written".
 //!
 //! The usual loaders find the other files of an image by replacing `rgb` in the **whole path** by another
 //! domain's name. They find its room and scan location by splitting its name at `_`. So below the root `rgb`

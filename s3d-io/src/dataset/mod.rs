@@ -14,7 +14,7 @@
 //! - [`FileRecord`]: `files.csv`, the sizes and checksums of all files.
 //! - [`Conventions`]: `conventions.json`, the meaning of the numbers.
 //!
-//! Source: formats.md, "What is written".
+//! Source: [`crate::formats`], "What is written".
 //!
 //! ```
 //! use s3d_io::dataset::{Domain, Frame, ImageName, Layout};

@@ -1,4 +1,4 @@
-//! Pose files: the cameras of images. Source: formats.md, "What is written".
+//! Pose files: the cameras of images. Source: [`crate::formats`], "What is written".
 
 use crate::dataset::layout::Frame;
 use crate::error::Result;
@@ -37,8 +37,8 @@ pub struct PoseFile {
     pub camera_uuid: String,
     /// The scan location again.
     pub point_uuid: String,
-    /// The number of the view; the word "equirectangular" for a panorama. (formats.md leaves the panorama
-    /// open; the word is the one in the file's name.)
+    /// The number of the view; the word "equirectangular" for a panorama. ([`crate::formats`] leaves the
+    /// panorama open; the word is the one in the file's name.)
     pub frame_num: Frame,
     /// Type, number and area of the room: "office_5_3".
     pub room: String,

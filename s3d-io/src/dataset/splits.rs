@@ -1,4 +1,5 @@
-//! `splits.json`: the areas to train on and the areas to test on. Source: formats.md, "What is written".
+//! `splits.json`: the areas to train on and the areas to test on. Source: [`crate::formats`], "What is
+//! written".
 
 use crate::error::Result;
 use crate::fs::atomic::write_whole;

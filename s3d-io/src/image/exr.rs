@@ -32,8 +32,8 @@ const MAX_PIXELS: usize = 1 << 30;
 const MAX_PIXELS_PER_BYTE: usize = 1032 / 6;
 
 /// Encodes world coordinates as an OpenEXR file of half floats. The channels R G B are X Y Z in metres, (0,
-/// 0, 0) where nothing was seen. Scan lines run from the top; the compression is ZIP. Source: formats.md,
-/// "What is written".
+/// 0, 0) where nothing was seen. Scan lines run from the top; the compression is ZIP. Source:
+/// [`crate::formats`], "What is written".
 ///
 /// # Panics
 /// If the image has no pixel.

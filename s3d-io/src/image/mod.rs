@@ -12,7 +12,7 @@
 //! | [`encode_xyz_half`], [`encode_xyz_float`] | 3 × 16 or 32 bits, floats | `global_xyz` |
 //!
 //! [`Compression`] chooses between time and size, and [`Content`] says what the image shows. The bytes depend
-//! on nothing else, and are the same on every machine. Source: formats.md, "What is written".
+//! on nothing else, and are the same on every machine. Source: [`crate::formats`], "What is written".
 //!
 //! ```
 //! use s3d_geom::Raster;

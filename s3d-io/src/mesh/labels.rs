@@ -52,7 +52,7 @@ impl MeshLabels {
     /// Takes the labels of faces from the names of their materials (`usemtl chair_3_office_5_1`). Returns
     /// them with warnings about names that are no label. Returns `None` if fewer than half of the faces have
     /// such a name, or if no name is a label. The null label `<UNK>_0_<UNK>_0_0` counts as a name. Source:
-    /// formats.md, "What is written".
+    /// [`crate::formats`], "What is written".
     ///
     /// ```
     /// use s3d_geom::{Material, MeshParts, TriMesh, glam::Vec3};

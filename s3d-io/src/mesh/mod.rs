@@ -18,7 +18,7 @@
 //! names a way out.
 //!
 //! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set into a folder; [`RgbObj`] and
-//! [`SemanticObj`] write them into any writer. Source: formats.md, "Meshes".
+//! [`SemanticObj`] write them into any writer. Source: [`crate::formats`], "Meshes".
 //!
 //! ```
 //! use s3d_io::mesh::{UpAxis, read_mesh};

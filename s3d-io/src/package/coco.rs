@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
 
-/// The colour of pixels in a semantic image that show no surface. Source: formats.md, "What is written".
+/// The colour of pixels in a semantic image that show no surface. Source: [`crate::formats`], "What is
+/// written".
 const MISSING: [u8; 3] = [13; 3];
 
 /// The first number of segments that cover all of a class in an image. It is larger than any label index.

@@ -5,8 +5,8 @@
 //! [`camera`](crate::camera). [`PublishedArea`] finds the same parts in the folder of a published area, or of
 //! an export. A [`PictureSource`] says which of the scanner's pictures give images their colours, and a
 //! [`FrameSource`] which photographs become views. [`read_taxonomy`] reads the classes of a scene that does
-//! not use the classes of S3DIS. An unknown key is an error with its line. Source: formats.md, "The scene
-//! file".
+//! not use the classes of S3DIS. An unknown key is an error with its line. Source: [`crate::formats`], "The
+//! scene file".
 //!
 //! ```
 //! use s3d_io::scene::parse_scene;

@@ -41,7 +41,7 @@ impl Default for PublishedOptions {
 /// | `assets/taxonomy.json` | beside the area's folder, if the classes are not S3DIS's |
 /// | `assets/semantic_labels.json` | beside the area's folder or in it, if it exists |
 ///
-/// Source: formats.md, "What is written", "World and meshes".
+/// Source: [`crate::formats`], "What is written".
 #[derive(Clone, Debug, PartialEq)]
 pub struct PublishedArea {
     /// The folder.

@@ -17,7 +17,7 @@ pub struct PictureSource {
     pub options: PictureOptions,
 }
 
-/// The kind of the scanner's pictures. Source: formats.md, "The scanner's pictures".
+/// The kind of the scanner's pictures. Source: [`crate::formats`], "The scanner's pictures".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PictureKind {

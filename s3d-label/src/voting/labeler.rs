@@ -56,7 +56,7 @@ pub enum VoteError {
 ///
 /// Only the vote of a point is kept, so a scan of any size needs little memory: see [`Votes`], and 20 bytes
 /// for each point of a block, at most 20 MB. Nearest faces are looked up on all threads of the current rayon
-/// pool. Votes are counted on the calling thread. Source: formats.md, "What is written": voting.
+/// pool. Votes are counted on the calling thread. Source: `s3d_io::formats`, "What is written": voting.
 ///
 /// ```
 /// use s3d_geom::{NearestFaces, TriMesh, glam::{Vec3, vec3}};

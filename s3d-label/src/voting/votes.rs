@@ -77,8 +77,8 @@ impl FaceVotes {
 /// [`Votes::add`] takes the points one at a time, in any order, and keeps only counts. Several counts over
 /// the same faces can be [merged](Votes::merge). The result does not depend on the order of points and
 /// merges. Memory: 16 bytes per face, and 16 bytes for each pair of a face and a label that occurs. A
-/// [`Labeler`](crate::Labeler) finds the faces of points and counts them here. Source: formats.md, "What is
-/// written": voting.
+/// [`Labeler`](crate::Labeler) finds the faces of points and counts them here. Source: `s3d_io::formats`,
+/// "What is written": voting.
 ///
 /// ```
 /// use s3d_label::{LabelId, Votes};

@@ -71,11 +71,11 @@ pub(crate) fn place_on(face: usize, d: DVec3) -> DVec2 {
 
 /// The picture all around a place, in six faces of 90° each.
 ///
-/// The faces have the order and the names of the scanner's sky boxes (formats.md, "The scanner's pictures"):
-/// 0 up, 1 right, 2 back, 3 left, 4 front, 5 down, relative to the location's original camera E(original).
-/// That camera sees faces 1 to 4 when it turns on the spot. It sees faces 0 and 5 when it looks straight up
-/// or down from the front: the lower edge of *up* and the upper edge of *down* meet *front*. Every face is
-/// seen from inside, its first row at its top.
+/// The faces have the order and the names of the scanner's sky boxes (`s3d_io::formats`, "The scanner's
+/// pictures"): 0 up, 1 right, 2 back, 3 left, 4 front, 5 down, relative to the location's original camera
+/// E(original). That camera sees faces 1 to 4 when it turns on the spot. It sees faces 0 and 5 when it looks
+/// straight up or down from the front: the lower edge of *up* and the upper edge of *down* meet *front*.
+/// Every face is seen from inside, its first row at its top.
 ///
 /// ```
 /// use s3d_geom::{Pose, Raster, glam::DVec3};

@@ -13,7 +13,7 @@ pub enum SkyBoxTurn {
     /// The turn that agrees best along the edges, for each of the two pictures by itself. *Front* wins a tie.
     ///
     /// Viewers of Matterport's sky boxes (Matterport3DSimulator, PanoBasic) turn them to meet *right*. Taken
-    /// literally, formats.md turns them to meet *front*. The pictures themselves decide.
+    /// literally, `s3d_io::formats` turns them to meet *front*. The pictures themselves decide.
     #[default]
     Detect,
     /// They meet picture 4.

@@ -28,8 +28,8 @@ impl CubeMap {
     /// Makes a cube map from an equirectangular photograph. Its columns are longitudes that grow to the
     /// right, its rows are latitudes from +90° at the top to −90°, and it is upright in the world (+Z
     /// up). Its centre column looks along the forward axis of `pose` projected to the horizon, turned by
-    /// `yaw_rad` to the left; formats.md's panoramas have 0. The faces have `size` pixels, or as many as keep
-    /// the detail of the photograph.
+    /// `yaw_rad` to the left; The panoramas of `s3d_io::formats` have 0. The faces have `size` pixels, or as
+    /// many as keep the detail of the photograph.
     ///
     /// # Panics
     /// If the photograph has no pixels.

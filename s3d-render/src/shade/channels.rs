@@ -1,4 +1,4 @@
-//! Makes the images of the data set from hits. Source: formats.md, "What is written".
+//! Makes the images of the data set from hits. Source: `s3d_io::formats`, "What is written".
 //!
 //! Every image has the size of the hits. A function whose image depends on the rays' directions takes the
 //! camera of the hits, which must have one ray a pixel.

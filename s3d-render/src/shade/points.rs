@@ -1,4 +1,4 @@
-//! Computes the points that the pixels see. Source: formats.md, "What is written".
+//! Computes the points that the pixels see. Source: `s3d_io::formats`, "What is written".
 
 use crate::hits::Hits;
 use crate::shade::channels::{assert_size, fit};

@@ -14,7 +14,7 @@
 //! This is our own code, since a library costs time in the hottest kernel. `fearless_simd` 1.2 (no
 //! dependencies, safe, stable Rust) has no masked stores. With it, the chunks of a window take 0 to 10 %
 //! longer with AVX-512 on Zen 4. With AVX2 they take 18 to 20 % longer on Zen 3, but 6 % less on Zen 4. It
-//! also requires Ice Lake for AVX-512. Measured by `docs/performance/simd_library`.
+//! also requires Ice Lake for AVX-512. Measured by `bench/simd_library`.
 
 pub(crate) mod raster_lanes;
 #[cfg(target_arch = "x86_64")]

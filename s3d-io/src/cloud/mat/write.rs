@@ -1,5 +1,5 @@
-//! Writes `pointcloud.mat`: an area's points by room and object. Source: formats.md, "What is written", and
-//! the README of the published data set.
+//! Writes `pointcloud.mat`: an area's points by room and object. Source: [`crate::formats`], "What is
+//! written", and the README of the published data set.
 
 #![expect(clippy::indexing_slicing, reason = "a writer: it reads only places in the file that it assigned")]
 

@@ -4,6 +4,7 @@ pub(crate) mod points;
 pub(crate) mod tree;
 mod write;
 
+pub use crate::cloud::on_fault::OnFault;
 pub use points::{PointReader, read_points};
-pub use tree::{AnnotationTree, InstanceFile, OnFault, RoomFiles, TreeOptions};
+pub use tree::{AnnotationTree, InstanceFile, RoomFiles, TreeOptions};
 pub use write::{S3disAreaWriter, S3disInstanceWriter, S3disRoomWriter, write_s3dis_points};

@@ -5,7 +5,7 @@
 //! (`an_endless_line_is_refused_without_holding_it`).
 
 use crate::cloud::annotations::{PointBlocks, Skipped};
-use crate::cloud::s3dis::tree::OnFault;
+use crate::cloud::on_fault::OnFault;
 use crate::error::{Error, Result};
 use crate::fs::encoding::Utf8Reader;
 use crate::fs::open::open_file;

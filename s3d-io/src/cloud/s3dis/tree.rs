@@ -1,22 +1,14 @@
 //! Finds the files of an S3DIS tree: an area's folder of rooms, and their folders of annotated instances.
-//! [`PointReader`](crate::cloud::PointReader) reads the points. Source: formats.md, "What is written".
+//! [`PointReader`](crate::cloud::PointReader) reads the points. Source: [`crate::formats`], "What is
+//! written".
 
+use crate::cloud::on_fault::OnFault;
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use s3d_label::{Class, Room, Taxonomy, UnknownClass};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// What to do about a faulty name or line. The published files have a few.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum OnFault {
-    /// Stop with an error that names it.
-    #[default]
-    Stop,
-    /// Leave it out, and keep count of it.
-    Skip,
-}
 
 /// How [`AnnotationTree::open_with`] interprets names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! Writes the S3DIS tree: text files of annotated points. Source: formats.md, "What is written".
+//! Writes the S3DIS tree: text files of annotated points. Source: [`crate::formats`], "What is written".
 
 #![expect(clippy::indexing_slicing, reason = "a writer: it indexes only its own table of digits")]
 

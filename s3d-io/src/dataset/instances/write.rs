@@ -2,8 +2,8 @@
 //!
 //! They hold what the published `pointcloud.mat` holds beside the points. Each instance has its tightest box,
 //! split into 6 × 6 × 6 equal voxels, and each voxel its occupancy and its points. Voxel (ix, iy, iz),
-//! counted from the box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source: formats.md, "What
-//! is written".
+//! counted from the box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source:
+//! [`crate::formats`], "What is written".
 
 use crate::cloud::passes::PointPasses;
 use crate::dataset::instances::members::VoxelMembers;

@@ -3,7 +3,7 @@
 //! Both files are **Y-up**, as published: (x, y, z) in them is (x, z, −y) of the Z-up world. Both have one
 //! line for each face, in the order of the mesh, since consumers pair the two files face by face; `usemtl`
 //! stands where the material changes. Numbers are written so that they are read back bit by bit. Source:
-//! formats.md, "What is written".
+//! [`crate::formats`], "What is written".
 
 mod rgb;
 mod semantic;
