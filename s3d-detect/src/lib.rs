@@ -24,10 +24,10 @@
 //!
 //! # Example
 //!
-//! A model learns from one room with a table, and finds the table of another.
+//! A model learns from one room with a sofa, and finds the sofa of another.
 //!
 //! ```
-//! use glam::vec3;
+//! use glam::{Vec3, vec3};
 //! use s3d_detect::surfel::surfels_of;
 //! use s3d_detect::{
 //!     Area, CLASSES, Context, Element, Model, ParsedArea, SpaceSource, TrainOptions, boxes, detect_area,
@@ -35,33 +35,41 @@
 //! use s3d_geom::{Aabb, PointCloud};
 //! use s3d_label::Class;
 //!
-//! // A room of 4 × 3 m: points every 2.5 cm on its floor and on a table top of 1.6 × 0.8 m.
-//! let class = CLASSES.iter().position(|c| *c == Class::TABLE).unwrap();
-//! let room = |number: u32, x: f32, y: f32| {
-//!     let table = Aabb { min: vec3(x, y, 0.70), max: vec3(x + 1.6, y + 0.8, 0.72) };
-//!     let floor = Aabb { min: vec3(0.0, 0.0, 0.0), max: vec3(4.0, 3.0, 0.0) };
-//!     let mut cloud = PointCloud::default();
-//!     for sheet in [floor, table] {
-//!         let [columns, rows, _] = (sheet.size() / 0.025).as_uvec3().to_array();
-//!         for (i, j) in (0..=columns).flat_map(|i| (0..=rows).map(move |j| (i, j))) {
-//!             cloud.positions.push(sheet.min + 0.025 * vec3(i as f32, j as f32, 0.0));
-//!             cloud.colors.push([180, 170, 160]);
+//! // Points every 2.5 cm on the surface of a box.
+//! fn scan(cloud: &mut PointCloud, bbox: Aabb, color: [u8; 3]) {
+//!     let last = (bbox.size() / 0.025).round().as_uvec3();
+//!     for (x, y) in (0..=last.x).flat_map(|x| (0..=last.y).map(move |y| (x, y))) {
+//!         let is_side = x == 0 || x == last.x || y == 0 || y == last.y;
+//!         for z in (0..=last.z).filter(|&z| is_side || z == last.z) {
+//!             cloud.positions.push(bbox.min + 0.025 * vec3(x as f32, y as f32, z as f32));
+//!             cloud.colors.push(color);
 //!         }
 //!     }
-//!     let elements = vec![Element { class, room: 0, bbox: table }];
+//! }
+//!
+//! // A room of 4 × 3 m with a floor and a sofa of 1.6 × 0.8 × 0.7 m; `Area::read` reads one of a data set.
+//! let class = CLASSES.iter().position(|c| *c == Class::SOFA).unwrap();
+//! let room = |number: u32, corner: Vec3| {
+//!     let bbox = Aabb { min: corner, max: corner + vec3(1.6, 0.8, 0.7) };
+//!     let mut cloud = PointCloud::default();
+//!     scan(&mut cloud, Aabb { min: Vec3::ZERO, max: vec3(4.0, 3.0, 0.0) }, [180, 170, 160]);
+//!     scan(&mut cloud, bbox, [150, 40, 40]);
+//!     let elements = vec![Element { class, room: 0, bbox }];
 //!     let rooms = vec!["office_1".to_owned()];
 //!     ParsedArea::new(Area { number, surfels: surfels_of(&cloud, 0), rooms, elements }, SpaceSource::Rooms)
 //! };
 //!
-//! let (seen, unseen, context) = (room(1, 1.0, 1.2), room(2, 2.0, 0.5), Context::default());
+//! let context = Context::default();
+//! let seen = room(1, vec3(1.0, 1.2, 0.0));
+//! let unseen = room(2, vec3(2.0, 0.5, 0.0));
 //! let spaces: Vec<_> = seen.spaces.iter().collect();
 //! let model = Model::train(&spaces, &TrainOptions::default(), &context)?;
 //! let found = detect_area(&model, &unseen, &context)?;
 //!
 //! let best = &found[0];
-//! assert_eq!((best.class.as_str(), best.room.as_str()), ("table", "office_1"));
+//! assert_eq!((best.class.as_str(), best.room.as_str()), ("sofa", "office_1"));
 //! let bbox = Aabb { min: best.min.into(), max: best.max.into() };
-//! assert!(boxes::iou(&bbox, &unseen.elements[0].bbox) > 0.5);
+//! assert!(boxes::iou(&bbox, &unseen.elements[0].bbox) > 0.5, "{bbox:?}");
 //! # Ok::<(), s3d_detect::Error>(())
 //! ```
 
