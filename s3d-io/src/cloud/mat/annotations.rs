@@ -4,7 +4,8 @@ use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
 use crate::cloud::mat::read::{MatArea, MatObject, MatRoom};
-use crate::cloud::s3dis::tree::{ClassOfWord, OnFault, class_of_word};
+use crate::cloud::on_fault::OnFault;
+use crate::cloud::s3dis::tree::{ClassOfWord, class_of_word};
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use crate::fs::source::Source;

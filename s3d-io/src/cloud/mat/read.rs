@@ -6,7 +6,7 @@
 use crate::cloud::annotations::Skipped;
 use crate::cloud::mat::hdf5::file::{Dataset, Hdf5File, Kind};
 use crate::cloud::mat::hdf5::read::Object;
-use crate::cloud::s3dis::tree::OnFault;
+use crate::cloud::on_fault::OnFault;
 use crate::error::{Error, Result};
 use crate::fs::source::Source;
 use s3d_geom::PointCloud;

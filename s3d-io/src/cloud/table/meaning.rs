@@ -1,7 +1,7 @@
 //! What the classes and rooms of a table of points mean, and which instances it holds.
 
 use crate::cloud::annotations::AnnotationOptions;
-use crate::cloud::s3dis::tree::OnFault;
+use crate::cloud::on_fault::OnFault;
 use crate::cloud::table::cloud::Cloud;
 use crate::cloud::table::rows::{CloudTags, NO_INSTANCE, NO_TAG, Tag};
 use crate::error::{Error, Result};

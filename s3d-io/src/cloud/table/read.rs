@@ -182,7 +182,7 @@ fn changed(path: &Path) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::s3dis::tree::OnFault;
+    use crate::cloud::on_fault::OnFault;
     use crate::cloud::table::gathered::MAX_GROUPS;
     use crate::cloud::table::rows::{Row, Value};
     use proptest::prelude::*;

@@ -4,7 +4,7 @@
 use crate::bounds::Bounds;
 use crate::cloud::annotations::{AnnotationOptions, Skipped};
 use crate::cloud::frame_gap::FrameWatch;
-use crate::cloud::s3dis::tree::OnFault;
+use crate::cloud::on_fault::OnFault;
 use crate::error::{Error, Result};
 use s3d_geom::glam::{DVec3, Vec3};
 use std::collections::HashMap;
