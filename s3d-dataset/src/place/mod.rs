@@ -1,5 +1,5 @@
-//! Scan locations for a scan that comes without: on the floor of every room, spread evenly, away from walls
-//! and things; or, for a scan without labels, by the space that is free ([`free_space`]).
+//! Places scan locations for a scan without any. With labels they stand on the floor of every room, spread
+//! evenly, away from walls and things. Without labels they stand in the free space ([`free_space`]).
 
 pub(crate) mod free_space;
 
@@ -17,29 +17,30 @@ use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk;
 use std::collections::BTreeMap;
 
-/// A tripod's height above the floor, metres. The paper leaves it to the scanner; a tripod of Matterport's
-/// stands so.
+/// A tripod's height above the floor, metres. The paper leaves it to the scanner; Matterport's tripods have
+/// this height.
 const HEIGHT_M: f64 = 1.5;
 
-/// How far a location keeps from every surface, metres: the first that some place of its room allows.
+/// The distance of a location from every surface, metres. The first that a place in its room allows is used.
 const CLEARANCES_M: [f32; 4] = [0.5, 0.35, 0.2, 0.1];
 
-/// Above the floor the tripod needs this much, metres: less is the floor's own unevenness.
+/// The height above the floor that the tripod's foot may start at, metres. Anything lower is unevenness of
+/// the floor.
 const FOOT_M: f64 = 0.05;
 
-/// Where one place sees too little, so do those this near, metres.
+/// A place that sees too little rules out the places this near to it, metres.
 const BLIND_M: f64 = 0.25;
 
-/// A floor that rises more steeply than this is none: the cosine of 45°.
+/// The cosine of 45°. A steeper floor is not used.
 const LEVEL: f32 = 0.707;
 
-/// Most places that are looked at in an area.
+/// The largest number of places that are examined in an area.
 const MOST_PLACES: f64 = 4e6;
 
 /// How scan locations are placed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
-    /// No two of a room are nearer to each other, metres.
+    /// The smallest distance between two locations of a room, metres.
     pub(crate) distance_m: f64,
     pub(crate) seed: u64,
 }
@@ -47,22 +48,25 @@ pub(crate) struct Placement {
 /// How [`place_cameras`] chooses places.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaceOptions {
-    /// Of the surface that can be seen from anywhere, the share that the locations see together, above 0 to
-    /// 1. `None`: 0.95, if `apart_m` is not given either.
+    /// The share of the visible surface that the locations see together, above 0 to 1. `None`: 0.95, unless
+    /// `apart_m` is given. The visible surface is all that can be seen from any free place.
     pub see: Option<f64>,
-    /// Instead: no two locations that see each other are nearer than this, metres, and every free place is
-    /// nearer than that to one.
+    /// Used instead of `see`: the smallest distance between two locations that see each other, metres. Every
+    /// free place is nearer than this to a location.
     pub apart_m: Option<f64>,
-    /// Everything random comes from it.
+    /// The seed of everything random.
     pub seed: u64,
 }
 
-/// Places scan locations on a mesh without labels, as an export of the mesh alone does, in its area 1: 1.5 m
-/// above surfaces that face up, inside, where a tripod could stand. All look along +Y; the most useful comes
-/// first. The same for the same mesh, options and seed, for any number of threads.
+/// Places scan locations on a mesh without labels, as an export of the mesh alone does in its area 1.
+/// Locations are 1.5 m above surfaces that face up, inside, where a tripod could stand. All look along +Y,
+/// and the most useful comes first. The same mesh, options and seed give the same locations, for any number
+/// of threads.
 ///
-/// # Errors [`Error::Usage`](crate::Error::Usage) for numbers out of range, or both given; [`Error::Input`](crate::Error::Input) if there is no such
-/// place, or hardly any surface is seen, with what was found and what may be wrong; [`Error::Cancelled`](crate::Error::Cancelled).
+/// # Errors
+/// [`Error::Usage`](crate::Error::Usage) if numbers are out of range, or both are given.
+/// [`Error::Input`](crate::Error::Input) if there is no such place, or hardly any surface is seen; the error
+/// says what was found and what may be wrong. [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn place_cameras(scene: &Scene<'_>, options: &PlaceOptions, ctx: &Context) -> Result<Vec<ScanLocation>> {
     let PlaceOptions { see, apart_m: place_cameras, seed } = *options;
     ExportOptions { see, place_cameras, ..ExportOptions::default() }.canonical()?;
@@ -75,7 +79,7 @@ pub fn place_cameras(scene: &Scene<'_>, options: &PlaceOptions, ctx: &Context) -
     Ok(placed.locations)
 }
 
-/// What [`place_locations`] reads.
+/// The input of [`place_locations`].
 #[derive(Clone, Copy)]
 pub(crate) struct Ground<'a> {
     pub(crate) area: u32,
@@ -89,33 +93,38 @@ pub(crate) struct Ground<'a> {
 /// The scan locations of an area, each with its room.
 pub(crate) type Located = Vec<(ScanLocation, Room)>;
 
-/// Placed locations, and a sentence on each room that has none.
+/// Placed locations, and a sentence on each room without any.
 pub(crate) type Placed = (Located, Vec<String>);
 
-/// Puts scan locations into the rooms of an area, 1.5 m above their floors, on a Poisson-disk pattern: no two
-/// of a room are nearer than the distance asked for, and every place that is free is nearer than that to one.
-/// The way up from the floor is free, and so are 0.5 m around, or less in rooms that are narrower; and half
-/// of all directions or more end at the front of a surface, if that is so anywhere in the room. All look
-/// along +Y. Returns the locations with their rooms, in the order of rooms, and a sentence on each room that
-/// has none.
+/// Places scan locations in the rooms of an area, 1.5 m above the floor, on a Poisson-disk pattern. Two
+/// locations of a room are never nearer than the requested distance, and every free place is nearer than that
+/// to a location.
 ///
-/// A room's floor is the faces labelled so; a room without any has the floor outline of its points instead,
-/// at the height of the lowest.
+/// A place is free if the way up from the floor is free, and 0.5 m around it, or less in narrower rooms. At
+/// least half of all directions must end at the front of a surface, if that holds anywhere in the room. All
+/// locations look along +Y. Returns the locations with their rooms, in the order of rooms, and a sentence on
+/// each room without any.
+///
+/// A room's floor is its faces with a floor label. A room without such faces uses the floor outline of its
+/// points, at the height of the lowest point.
 pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Result<Placed> {
-    let (mut placed, mut warnings) = (Vec::new(), Vec::new());
+    let mut placed = Vec::new();
+    let mut warnings = Vec::new();
     let mut floors = floor_faces(ground);
     let floor_m2: f64 = ground.rooms.iter().map(|r| r.footprint.area_m2).sum();
-    // A hundred or so places for each location that may be put, and as many as make 10 cm steps in small
-    // rooms.
+
+    // About a hundred places for each possible location, and at least one every 10 cm for small rooms.
     let per_m2 = (100.0 / (placement.distance_m * placement.distance_m))
         .clamp(100.0, 10_000.0)
         .min(MOST_PLACES / floor_m2.max(1.0));
+
     for room in ground.rooms {
         let name = format!("{}_{}", room.room, ground.area);
         let feet = match floors.remove(&room.room) {
             Some(faces) => on_faces(ground.scene.mesh(), faces, per_m2, placement.seed),
             None => on_outline(room, per_m2),
         };
+
         let free = free_places(ground.scene, ground.nearest, &feet);
         if free.is_empty() {
             warnings.push(format!(
@@ -125,13 +134,15 @@ pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Resu
             ));
             continue;
         }
+
         for (number, [x, y, z]) in choose(ground.scene, free, placement, &name).into_iter().enumerate() {
             let pose = Pose::level(dvec3(x, y, z), 0.0);
-            // Its place makes it another than that of any other building.
+            // The position makes the uuid differ from those of other buildings.
             let uuid = uuid_from_name(&format!("s3d place {name} {number} {} {x} {y} {z}", placement.seed));
             placed.push((ScanLocation { uuid, pose, line: 0 }, room.room));
         }
     }
+
     if placed.is_empty() {
         let why = format!("no place for a scan location in any room: {}", warnings.join("; "));
         return Err(InputError::UnfitArea { area: ground.area, why }.into());
@@ -139,7 +150,7 @@ pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Resu
     Ok((placed, warnings))
 }
 
-/// The level faces labelled as floor, by room.
+/// Returns the level faces with a floor label, by room.
 fn floor_faces(ground: &Ground<'_>) -> BTreeMap<Room, Vec<u32>> {
     let mut floors: BTreeMap<Room, Vec<u32>> = BTreeMap::new();
     for (face, label) in (0u32..).zip(ground.label_of_face) {
@@ -153,7 +164,7 @@ fn floor_faces(ground: &Ground<'_>) -> BTreeMap<Room, Vec<u32>> {
     floors
 }
 
-/// Places on faces, spread at random.
+/// Returns random places on faces, spread evenly.
 fn on_faces(mesh: &TriMesh, faces: Vec<u32>, per_m2: f64, seed: u64) -> Vec<DVec3> {
     let sampler = SurfaceSampler::over_faces(mesh, faces, Density::PerM2(per_m2), seed);
     let mut cloud = PointCloud::default();
@@ -161,11 +172,13 @@ fn on_faces(mesh: &TriMesh, faces: Vec<u32>, per_m2: f64, seed: u64) -> Vec<DVec
     cloud.positions.iter().map(|p| p.as_dvec3()).collect()
 }
 
-/// Places on a grid in the room's outline.
+/// Returns the places of a grid in the room's outline.
 fn on_outline(room: &SurveyedRoom, per_m2: f64) -> Vec<DVec3> {
     let step = 1.0 / per_m2.sqrt();
-    let (min, size) = (room.bbox.min.as_dvec3(), room.bbox.size().as_dvec3());
+    let min = room.bbox.min.as_dvec3();
+    let size = room.bbox.size().as_dvec3();
     let along = |length: f64| (length / step).ceil().min(1e4) as u32;
+
     (0..along(size.x))
         .flat_map(|i| (0..along(size.y)).map(move |j| (f64::from(i) + 0.5, f64::from(j) + 0.5)))
         .map(|(i, j)| dvec3(min.x + i * step, min.y + j * step, min.z))
@@ -173,15 +186,17 @@ fn on_outline(room: &SurveyedRoom, per_m2: f64) -> Vec<DVec3> {
         .collect()
 }
 
-/// The places of cameras above `feet` that are free, with the widest clearance that leaves any.
+/// Returns the free camera places above `feet`, with the widest clearance that leaves any.
 fn free_places(scene: &Scene<'_>, nearest: &NearestFaces<'_>, feet: &[DVec3]) -> Vec<[f64; 3]> {
     let eyes: Vec<Vec3> = feet.iter().map(|p| (p + HEIGHT_M * DVec3::Z).as_vec3()).collect();
     let mut around = Vec::new();
     nearest.nearest_many(&eyes, &mut around);
+
     let is_open = |foot: DVec3| {
         let up = (HEIGHT_M - FOOT_M) * DVec3::Z;
         cast_ray(scene, foot + FOOT_M * DVec3::Z, up).is_none_or(|hit| hit.t > 1.0)
     };
+
     for clearance in CLEARANCES_M {
         let free: Vec<[f64; 3]> = feet
             .iter()
@@ -197,32 +212,40 @@ fn free_places(scene: &Scene<'_>, nearest: &NearestFaces<'_>, feet: &[DVec3]) ->
     Vec::new()
 }
 
-/// Spreads locations over free places so that each sees the front of a surface in half of all directions or
-/// more: the floor of a room may go on through a door, to where the scan ends. If no place does, as in a scan
-/// without walls, that is no condition.
+/// Spreads locations over free places so that each sees the front of a surface in at least half of all
+/// directions. The floor of a room may continue through a door, to where the scan ends. If no place fulfils
+/// the condition, as in a scan without walls, it is dropped.
 fn choose(scene: &Scene<'_>, free: Vec<[f64; 3]>, placement: Placement, name: &str) -> Vec<[f64; 3]> {
     let spread = |places: &[[f64; 3]]| -> Vec<[f64; 3]> {
         let chosen = poisson_disk(places, placement.distance_m, placement.seed, name);
         chosen.into_iter().map(|i| places[i]).collect()
     };
+
     let mut places = free.clone();
-    // Each turn takes places away.
+    // Each turn removes places.
     while !places.is_empty() {
         let chosen = spread(&places);
-        let coverage = |p: &[f64; 3]| {
-            let pose = Pose::level(DVec3::from_array(*p), 0.0);
-            let outlook = Outlook::of(scene, &ScanLocation { uuid: String::new(), pose, line: 0 });
-            outlook.coverage * (1.0 - outlook.back_sides)
-        };
-        let blind: Vec<[f64; 3]> = chosen.iter().copied().filter(|p| coverage(p) < LOW_COVERAGE).collect();
+        let is_blind = |place: &[f64; 3]| front_coverage(scene, *place) < LOW_COVERAGE;
+        let blind: Vec<[f64; 3]> = chosen.iter().copied().filter(is_blind).collect();
+
         if blind.is_empty() {
             return chosen;
         }
-        let near =
-            |a: &[f64; 3], b: &[f64; 3]| DVec3::from_array(*a).distance(DVec3::from_array(*b)) < BLIND_M;
-        places.retain(|p| !blind.iter().any(|b| near(p, b)));
+
+        places.retain(|place| !blind.iter().any(|b| is_near(*place, *b)));
     }
     spread(&free)
+}
+
+/// Returns the share of directions in which a camera at a place sees the front of a surface.
+fn front_coverage(scene: &Scene<'_>, place: [f64; 3]) -> f64 {
+    let pose = Pose::level(DVec3::from_array(place), 0.0);
+    let outlook = Outlook::of(scene, &ScanLocation { uuid: String::new(), pose, line: 0 });
+    outlook.coverage * (1.0 - outlook.back_sides)
+}
+
+fn is_near(a: [f64; 3], b: [f64; 3]) -> bool {
+    DVec3::from_array(a).distance(DVec3::from_array(b)) < BLIND_M
 }
 
 #[cfg(test)]
@@ -231,7 +254,7 @@ mod tests {
     use s3d_geom::{FootprintBuilder, FootprintOptions};
     use s3d_label::Label;
 
-    /// A box of a room with a table of 1 m in one corner: floor 4 × 3 m, 2.5 m high.
+    /// A box-shaped room, 2.5 m high, with a table of 1 × 1 m in one corner.
     fn room(width: f32, depth: f32) -> (TriMesh, Vec<Class>) {
         let mut positions = Vec::new();
         let mut faces = Vec::new();
@@ -269,12 +292,14 @@ mod tests {
                 }
             })
             .collect();
+
         let mut builder = FootprintBuilder::new(FootprintOptions::default());
         for i in 0..=100 {
             for j in 0..=100 {
                 builder.add(Vec3::new(width * i as f32 / 100.0, depth * j as f32 / 100.0, 0.0));
             }
         }
+
         let rooms = [SurveyedRoom {
             room: of,
             points: 1,
@@ -282,7 +307,9 @@ mod tests {
             bbox: mesh.aabb(),
             wall_direction_deg: 0,
         }];
-        let (scene, nearest) = (Scene::new(&mesh), NearestFaces::new(&mesh));
+        let scene = Scene::new(&mesh);
+        let nearest = NearestFaces::new(&mesh);
+
         let ground = Ground {
             area: 1,
             scene: &scene,
@@ -291,8 +318,10 @@ mod tests {
             table: &table,
             rooms: &rooms,
         };
+
         let (placed, warnings) = place_locations(&ground, Placement { distance_m, seed: 3 })?;
         assert!(warnings.is_empty());
+
         let mut uuids: Vec<_> = placed.iter().map(|p| p.0.uuid.clone()).collect();
         uuids.sort();
         uuids.dedup();
@@ -328,9 +357,11 @@ mod tests {
             .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
         let mesh = TriMesh::new(parts).unwrap();
         let scene = Scene::new(&mesh);
+
         let places: Vec<[f64; 3]> = (0..60)
             .flat_map(|i| (0..20).map(move |j| [0.6 + 0.1 * f64::from(i), 0.6 + 0.09 * f64::from(j), 1.5]))
             .collect();
+
         let placement = Placement { distance_m: 1.0, seed: 1 };
         let chosen = choose(&scene, places.clone(), placement, "office_1_1");
         assert!(chosen.len() >= 4 && chosen.iter().all(|p| p[0] < 4.3), "{chosen:?}");

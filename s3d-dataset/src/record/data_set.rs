@@ -1,4 +1,4 @@
-//! A complete data set that is read: everything that is read of it is held against its list of files.
+//! A complete data set for reading. Everything read from it is checked against its list of files.
 
 use crate::context::Context;
 use crate::error::{Error, InputError, Result};
@@ -15,8 +15,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// A complete data set, to be read. Whatever is read of it is held against its list of files: sizes before a
-/// file is opened, checksums of what is read as a whole. Files that the list does not name are refused.
+/// A complete data set for reading. Everything read from it is checked against its list of files: the size
+/// before a file is opened, the checksum if the whole file is read. Files that the list does not name are
+/// refused.
 ///
 /// ```no_run
 /// use s3d_dataset::DataSet;
@@ -33,26 +34,25 @@ pub struct DataSet {
     pub(crate) layout: Layout,
     pub(crate) manifest: Manifest,
     pub(crate) files: Listed,
-    /// Which classes and types of rooms its labels have.
+    /// The classes and room types of its labels.
     pub(crate) taxonomy: Taxonomy,
-    /// If its export did not finish.
+    /// Set if the export did not finish.
     pub(crate) unfinished: Option<Unfinished>,
 }
 
-/// What an export that did not finish has, and what it lacks.
+/// What an unfinished export has, and what it lacks.
 pub(crate) struct Unfinished {
-    /// The photographs that are views already, by area.
+    /// The photographs that have views already, by area.
     pub(crate) photographs: BTreeMap<u32, Vec<PhotographRecord>>,
-    /// What is not there yet, a sentence each.
+    /// What is missing, a sentence each.
     pub(crate) missing: Vec<String>,
 }
 
 impl DataSet {
-    /// Opens the data set of this layout: its manifest, its list of files, and its conventions, which must
-    /// agree.
+    /// Opens the data set of this layout. Its manifest, its list of files and its conventions must agree.
     ///
     /// # Errors
-    /// [`Error::File`] with the one that does not.
+    /// [`Error::File`] with the first file that does not agree.
     pub(crate) fn open_in(layout: &Layout) -> Result<Self> {
         let manifest = Manifest::read(layout)?;
         let files = Listed::read(layout, &manifest)?;
@@ -65,7 +65,7 @@ impl DataSet {
         Ok(Self { layout: layout.clone(), manifest, files, taxonomy, unfinished: None })
     }
 
-    /// The photographs of an area that became views.
+    /// Returns the photographs of an area that became views.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File).
@@ -80,8 +80,8 @@ impl DataSet {
     }
 }
 
-/// Refuses the folder of an area, to be read as input, if it is one of a data set of ours and what is read of
-/// it is not as it was written: meshes, points, poses, labels.
+/// Checks the folder of an area before it is read as input. If the folder belongs to a data set of ours, its
+/// meshes, points, poses and labels must be as they were written.
 pub(crate) fn check_area(folder: &Path) -> Result<()> {
     let Ok(folder) = std::fs::canonicalize(folder) else { return Ok(()) };
     let Some(root) = folder.parent() else { return Ok(()) };
@@ -99,15 +99,15 @@ pub(crate) fn check_area(folder: &Path) -> Result<()> {
     for_each_in_order(&Context::default(), &read, || (), |(), path| Ok(files.checked(path).map(drop)?))
 }
 
-/// The files of a data set as they were written. Paths are whole ones; one that the list does not name is
-/// refused.
+/// The files of a data set as they were written. All methods take whole paths, and refuse a path that the
+/// list does not name.
 pub(crate) struct Listed {
     root: PathBuf,
     records: BTreeMap<String, FileRecord>,
 }
 
 impl Listed {
-    /// Those of these records.
+    /// Builds the list from records.
     pub(crate) fn of(root: &Path, records: impl IntoIterator<Item = FileRecord>) -> Self {
         let records = records
             .into_iter()
@@ -116,19 +116,22 @@ impl Listed {
         Self { root: root.to_owned(), records }
     }
 
-    /// Reads the list of a data set, which must be the one that its manifest tells of.
+    /// Reads the list of a data set, and checks it against the manifest.
     pub(crate) fn read(layout: &Layout, manifest: &Manifest) -> Result<Self, FileError> {
         let path = layout.file_list();
         let Some(told) = &manifest.files else {
             return Err(FileError::format(&layout.manifest(), "tells of no files.csv"));
         };
+
         let records = read_file_list(&path)?;
         let (_, sum) = checksum_of_file(&path)?;
         if sum != told.xxh3_128 {
             let message = format!("its checksum is {sum}, and the manifest tells of {}", told.xxh3_128);
             return Err(FileError::format(&path, message));
         }
-        let (count, total) = (records.len() as u64, records.iter().map(|r| r.bytes).sum::<u64>());
+
+        let count = records.len() as u64;
+        let total = records.iter().map(|r| r.bytes).sum::<u64>();
         if (count, total) != (told.count, told.bytes) {
             return Err(FileError::format(
                 &path,
@@ -141,52 +144,54 @@ impl Listed {
         Ok(Self::of(layout.root(), records))
     }
 
-    /// The records, sorted by path.
+    /// Iterates over the records, sorted by path.
     pub(crate) fn records(&self) -> impl Iterator<Item = &FileRecord> {
         self.records.values()
     }
 
-    /// How the list calls a file or folder.
+    /// Returns the name of a file or folder in the list.
     pub(crate) fn name(&self, path: &Path) -> String {
         let below = path.strip_prefix(&self.root).unwrap_or(path);
         let names: Vec<_> = below.iter().map(|name| name.to_string_lossy()).collect();
         names.join("/")
     }
 
-    /// What is told of a file.
+    /// Returns the record of a file.
     pub(crate) fn record(&self, path: &Path) -> Result<&FileRecord, FileError> {
         let record = self.records.get(&self.name(path));
         record.ok_or_else(|| FileError::format(path, "files.csv does not name it"))
     }
 
-    /// The path of a file whose size is the one that was written: one that is not read, or not as a whole.
+    /// Returns the path if the file has the size that was written. For files that are not read, or only in
+    /// part.
     pub(crate) fn sized<'p>(&self, path: &'p Path) -> Result<&'p Path, FileError> {
         self.record(path)?.check_size(&self.root)?;
         Ok(path)
     }
 
-    /// The path of a file whose content is the one that was written.
+    /// Returns the path if the file has the content that was written.
     pub(crate) fn checked<'p>(&self, path: &'p Path) -> Result<&'p Path, FileError> {
         self.record(path)?.check(&self.root)?;
         Ok(path)
     }
 
-    /// The content of a file, if it is the one that was written.
+    /// Returns the content of a file if it is as it was written.
     pub(crate) fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, FileError> {
         self.record(path)?.read(&self.root)
     }
 
-    /// A file to be read piece by piece; its end is an error if it was not the one that was written.
+    /// Opens a file to be read piece by piece. The end of the file is an error if the content is not as
+    /// written.
     pub(crate) fn open(&self, path: &Path) -> Result<CheckedFile, FileError> {
         self.record(path)?.open(&self.root)
     }
 
-    /// The size that was written.
+    /// Returns the size that was written, bytes.
     pub(crate) fn bytes(&self, path: &Path) -> Result<u64, FileError> {
         Ok(self.record(path)?.bytes)
     }
 
-    /// The files below a folder, sorted.
+    /// Returns the files below a folder, sorted.
     pub(crate) fn below(&self, folder: &Path) -> Vec<PathBuf> {
         let prefix = self.name(folder) + "/";
         let from = self.records.range(prefix.clone()..);
@@ -194,7 +199,7 @@ impl Listed {
         inside.map(|(_, record)| record.path_in(&self.root)).collect()
     }
 
-    /// The images of an area, by scan location and room, views by number and the panorama last.
+    /// Returns the images of an area, sorted by scan location and room: views by number, then the panorama.
     pub(crate) fn images(&self, layout: &Layout, area: u32) -> Vec<DatasetImage> {
         let mut found: BTreeMap<_, Vec<Domain>> = BTreeMap::new();
         for path in self.below(&layout.area_dir(area)) {
@@ -207,20 +212,25 @@ impl Listed {
                 found.entry((uuid, room, frame)).or_default().push(domain);
             }
         }
-        let in_order = |there: Vec<Domain>| Domain::ALL.into_iter().filter(|d| there.contains(d)).collect();
-        let image =
-            |((uuid, room, frame), there)| DatasetImage { area, uuid, room, frame, domains: in_order(there) };
-        found.into_iter().map(image).collect()
+
+        found
+            .into_iter()
+            .map(|((uuid, room, frame), there)| {
+                let domains = Domain::ALL.into_iter().filter(|d| there.contains(d)).collect();
+                DatasetImage { area, uuid, room, frame, domains }
+            })
+            .collect()
     }
 
-    /// What is wrong with the files that are `needed`, by path: they are gone, or of another size.
+    /// Returns the faults of the `needed` files by path: the file is missing, or has another size.
     pub(crate) fn faults(
         &self,
         ctx: &Context,
         needed: impl Fn(&Path) -> bool,
     ) -> Result<BTreeMap<String, FileError>> {
-        let path = |record: &&FileRecord| needed(&record.path_in(&self.root));
-        let records: Vec<&FileRecord> = self.records().filter(path).collect();
+        let is_needed = |record: &&FileRecord| needed(&record.path_in(&self.root));
+        let records: Vec<&FileRecord> = self.records().filter(is_needed).collect();
+
         let faults = Mutex::new(BTreeMap::new());
         for_each_in_order(
             ctx,
@@ -239,10 +249,11 @@ impl Listed {
                 Ok(())
             },
         )?;
+
         Ok(faults.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Refuses a data set in which a file that is `needed` is gone, or is of another size.
+    /// Refuses a data set in which a `needed` file is missing or has another size.
     pub(crate) fn require(&self, ctx: &Context, needed: impl Fn(&Path) -> bool) -> Result<()> {
         let faults = self.faults(ctx, needed)?;
         let Some(first) = faults.values().next() else { return Ok(()) };

@@ -1,9 +1,9 @@
-//! Which work of an export is done, and what it wrote: written down as it is finished, so that a later run
-//! takes it as it is.
+//! The journal of an export: which units of work are done, and the files they wrote. A later run continues
+//! from it.
 //!
-//! Every process appends to a file of its own in `.s3d/journal`, a line for each finished unit: JSON, with
-//! the line's own checksum. Nothing is synced: a line, or a file that it tells of, that a power loss takes
-//! away or fills with zeros has another checksum, and the unit is done again.
+//! Every process appends to a file of its own in `.s3d/journal`, one line for each finished unit: JSON with a
+//! checksum of the line. Nothing is synced. If a power loss removes a line or one of its files, or fills it
+//! with zeros, the checksum no longer fits and the unit is done again.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -21,24 +21,24 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A piece of work.
+/// A unit of work.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Unit {
     /// The labels of an area: instances, rooms, votes.
     Labels(u32),
-    /// The entropies of the candidate views of a scan location: area, uuid.
+    /// The entropies of the candidate views of a scan location. Fields: area, uuid.
     Scores(u32, String),
-    /// All images of a scan location: area, uuid.
+    /// All images of a scan location. Fields: area, uuid.
     Location(u32, String),
-    /// The view of a photograph: area, uuid of its camera.
+    /// The view of a photograph. Fields: area, uuid of its camera.
     Photograph(u32, String),
     /// The meshes and points of an area.
     Assets(u32),
 }
 
 impl Unit {
-    /// The area that it is of.
+    /// Returns the area that the unit belongs to.
     pub(crate) fn area(&self) -> u32 {
         match self {
             Self::Labels(area)
@@ -73,29 +73,29 @@ pub(crate) enum Done {
     Assets(AssetsDone),
 }
 
-/// An area is labelled.
+/// A labelled area.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LabelsDone {
-    /// What the manifest will tell of the area: its points, images and inputs are not in it yet.
+    /// The area's entry in the manifest, still without points, images and inputs.
     pub(crate) entry: Box<AreaEntry>,
-    /// The uuids of its scan locations, in their order.
+    /// The uuids of the area's scan locations, in their order.
     pub(crate) locations: Vec<String>,
-    /// The uuids of the cameras of its photographs, in their order.
+    /// The uuids of the cameras of the area's photographs, in their order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) photographs: Vec<String>,
     pub(crate) files: Vec<FileRecord>,
 }
 
-/// The candidate views of a scan location are scored.
+/// A scan location with scored candidate views.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ScoresDone {
     pub(crate) area: u32,
     pub(crate) location: String,
-    /// Nats, by number of the candidate.
+    /// The entropies by number of the candidate, nats.
     pub(crate) entropies: Vec<f64>,
 }
 
-/// All images of a scan location are there.
+/// A scan location with all its images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LocationDone {
     pub(crate) area: u32,
@@ -104,27 +104,27 @@ pub(crate) struct LocationDone {
     pub(crate) files: Vec<FileRecord>,
 }
 
-/// The view of a photograph is there.
+/// A photograph with its view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PhotographDone {
     pub(crate) area: u32,
-    /// What `frames.json` tells of it.
+    /// The photograph's entry in `frames.json`.
     pub(crate) record: PhotographRecord,
     pub(crate) tally: UnitTally,
     pub(crate) files: Vec<FileRecord>,
 }
 
-/// The meshes and points of an area are there.
+/// An area with its meshes and points.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct AssetsDone {
     pub(crate) area: u32,
-    /// Sampled points.
+    /// The number of sampled points.
     pub(crate) points: u64,
     pub(crate) files: Vec<FileRecord>,
 }
 
 impl Done {
-    /// Which unit it is.
+    /// Returns which unit is done.
     pub(crate) fn unit(&self) -> Unit {
         match self {
             Self::Labels(done) => Unit::Labels(done.entry.area),
@@ -135,7 +135,7 @@ impl Done {
         }
     }
 
-    /// The files that it wrote.
+    /// Returns the files that the unit wrote.
     pub(crate) fn files(&self) -> &[FileRecord] {
         match self {
             Self::Labels(done) => &done.files,
@@ -146,7 +146,7 @@ impl Done {
         }
     }
 
-    /// What it adds to the account.
+    /// Returns what the unit adds to the account.
     pub(crate) fn tally(&self) -> UnitTally {
         match self {
             Self::Location(done) => done.tally,
@@ -155,13 +155,13 @@ impl Done {
         }
     }
 
-    /// Its line, with the line feed.
+    /// Returns the unit's line, with the line feed.
     fn to_line(&self) -> serde_json::Result<String> {
         let done = serde_json::to_string(self)?;
         Ok(format!("{BEFORE}{}{BETWEEN}{done}{AFTER}\n", Checksum::of(done.as_bytes())))
     }
 
-    /// From its line, without the line feed; `None` for one that is torn or altered.
+    /// Reads a unit from its line, without the line feed. Returns `None` if the line is torn or altered.
     fn from_line(line: &[u8]) -> Option<Self> {
         let line = line.strip_prefix(BEFORE.as_bytes())?.strip_suffix(AFTER.as_bytes())?;
         let (sum, rest) = line.split_at_checked(32)?;
@@ -178,7 +178,7 @@ const BEFORE: &str = "{\"xxh3_128\":\"";
 const BETWEEN: &str = "\",\"done\":";
 const AFTER: &str = "}";
 
-/// Files and their bytes; no images.
+/// Counts files and their bytes, but no images.
 pub(crate) fn tally_of(files: &[FileRecord]) -> UnitTally {
     let bytes = files.iter().map(|f| f.bytes).sum();
     UnitTally { files: files.len() as u64, bytes, ..UnitTally::default() }
@@ -191,32 +191,32 @@ pub(crate) struct Finished {
 }
 
 impl Finished {
-    /// Adds a unit. One that was done twice wrote the same files both times.
+    /// Adds a unit. A unit that was done twice wrote the same files both times.
     pub(crate) fn insert(&mut self, done: Done) {
         self.units.insert(done.unit(), done);
     }
 
-    /// Whether a unit is done.
+    /// Returns whether a unit is done.
     pub(crate) fn has(&self, unit: &Unit) -> bool {
         self.units.contains_key(unit)
     }
 
-    /// How many there are.
+    /// Returns the number of finished units.
     pub(crate) fn len(&self) -> usize {
         self.units.len()
     }
 
-    /// A unit that is done.
+    /// Returns a unit, if it is done.
     pub(crate) fn get(&self, unit: &Unit) -> Option<&Done> {
         self.units.get(unit)
     }
 
-    /// All of them, in order.
+    /// Iterates over all finished units, in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Done> {
         self.units.values()
     }
 
-    /// The labels of an area.
+    /// Returns the labels of an area.
     pub(crate) fn labels(&self, area: u32) -> Option<&LabelsDone> {
         match self.units.get(&Unit::Labels(area)) {
             Some(Done::Labels(done)) => Some(done),
@@ -224,7 +224,7 @@ impl Finished {
         }
     }
 
-    /// The entropies of a location's candidates.
+    /// Returns the entropies of a location's candidates.
     pub(crate) fn scores(&self, area: u32, location: &str) -> Option<&[f64]> {
         match self.units.get(&Unit::Scores(area, location.to_owned())) {
             Some(Done::Scores(done)) => Some(&done.entropies),
@@ -232,7 +232,7 @@ impl Finished {
         }
     }
 
-    /// The meshes and points of an area.
+    /// Returns the meshes and points of an area.
     pub(crate) fn assets(&self, area: u32) -> Option<&AssetsDone> {
         match self.units.get(&Unit::Assets(area)) {
             Some(Done::Assets(done)) => Some(done),
@@ -240,7 +240,7 @@ impl Finished {
         }
     }
 
-    /// The finished locations of an area.
+    /// Iterates over the finished locations of an area.
     pub(crate) fn locations(&self, area: u32) -> impl Iterator<Item = &LocationDone> {
         self.units.values().filter_map(move |done| match done {
             Done::Location(done) if done.area == area => Some(done),
@@ -248,7 +248,7 @@ impl Finished {
         })
     }
 
-    /// What is known of an area's photographs whose views are there, in their order.
+    /// Iterates over an area's photographs that have their views, in the order of the photographs.
     pub(crate) fn photographs(&self, area: u32) -> impl Iterator<Item = &PhotographDone> {
         let uuids = self.labels(area).map_or(&[][..], |labels| &labels.photographs);
         uuids
@@ -259,7 +259,7 @@ impl Finished {
             })
     }
 
-    /// How many scan locations some areas have, as far as these are labelled.
+    /// Returns the number of scan locations in the labelled ones of these areas.
     pub(crate) fn count_locations(&self, areas: &[u32]) -> usize {
         areas
             .iter()
@@ -268,8 +268,7 @@ impl Finished {
             .sum()
     }
 
-    /// What is written in the journals of an export, lines that are torn left out. Nothing of it is checked
-    /// yet.
+    /// Reads all journals of an export, without torn lines. The files are not checked yet.
     pub(crate) fn read(ctx: &Context, layout: &Layout) -> Result<Self> {
         let mut finished = Self::default();
         let mut torn = 0;
@@ -288,30 +287,31 @@ impl Finished {
         Ok(finished)
     }
 
-    /// Reads the files of all units, and leaves out each unit of which one is missing or not the one that was
-    /// written: it is to be done again.
+    /// Reads the files of all units. Drops every unit with a missing or altered file, to be done again.
     pub(crate) fn checked(self, ctx: &Context, layout: &Layout) -> Result<Self> {
         self.checked_where(ctx, layout, |_| true)
     }
 
-    /// The same for units of which `which` holds; others are taken as they are.
+    /// Does the same for the units that fulfil `which`, and keeps all others.
     pub(crate) fn checked_where(
         mut self,
         ctx: &Context,
         layout: &Layout,
         which: impl Fn(&Unit) -> bool,
     ) -> Result<Self> {
-        let (mut of, mut files) = (Vec::new(), Vec::new());
+        let mut units = Vec::new();
+        let mut files = Vec::new();
         for (unit, done) in self.units.iter().filter(|(unit, _)| which(unit)) {
             for file in done.files() {
-                of.push(unit.clone());
+                units.push(unit.clone());
                 files.push(file);
             }
         }
+
         let faults = faults(ctx, layout, &files)?;
         let mut again: BTreeSet<Unit> = BTreeSet::new();
         for (index, fault) in faults {
-            let Some(unit) = of.get(index) else { continue };
+            let Some(unit) = units.get(index) else { continue };
             if again.insert(unit.clone()) {
                 ctx.warn(format_args!(
                     "{}/{fault}; what it belongs to is made again",
@@ -319,12 +319,13 @@ impl Finished {
                 ));
             }
         }
+
         self.units.retain(|unit, _| !again.contains(unit));
         Ok(self)
     }
 }
 
-/// The journal of this process, and all that it and those before it have finished.
+/// The journal of this process, with everything that it and earlier processes have finished.
 #[derive(Debug)]
 pub(crate) struct Journal {
     path: PathBuf,
@@ -333,7 +334,7 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Begins a journal beside those that are there, whose units are `finished`.
+    /// Begins a journal beside the existing ones, which hold the units in `finished`.
     pub(crate) fn begin(layout: &Layout, finished: Finished) -> Result<Self> {
         let dir = layout.journal_dir();
         create_dir(&dir)?;
@@ -347,7 +348,7 @@ impl Journal {
         Ok(Self { path, file: Mutex::new(file), finished: Mutex::new(finished) })
     }
 
-    /// Writes down that a unit is done. Its files must be there under their names.
+    /// Records that a unit is done. Its files must be in place under their names.
     pub(crate) fn write(&self, done: Done) -> Result<()> {
         let line = done
             .to_line()
@@ -360,13 +361,13 @@ impl Journal {
         Ok(())
     }
 
-    /// Takes a unit for done for the rest of this process alone: its files are another's work.
+    /// Counts a unit as done for the rest of this process only: another process wrote its files.
     pub(crate) fn know(&self, done: Done) {
         self.finished().insert(done);
     }
 
-    /// Reads the files of the finished units of which `which` holds, and takes those for not done of which
-    /// one is not as it was written.
+    /// Reads the files of the finished units that fulfil `which`. Units with a missing or altered file no
+    /// longer count as done.
     pub(crate) fn check(&self, ctx: &Context, layout: &Layout, which: impl Fn(&Unit) -> bool) -> Result<()> {
         let finished = self.finished().clone();
         let checked = finished.checked_where(ctx, layout, which)?;
@@ -374,7 +375,7 @@ impl Journal {
         Ok(())
     }
 
-    /// All that is finished so far.
+    /// Returns everything that is finished so far.
     pub(crate) fn finished(&self) -> MutexGuard<'_, Finished> {
         self.finished.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -408,6 +409,7 @@ mod tests {
         first.write(scores("b")).unwrap();
         let second = Journal::begin(&layout, Finished::read(&Context::default(), &layout).unwrap()).unwrap();
         second.write(location(&layout, "c", b"image")).unwrap();
+
         let read = Finished::read(&Context::default(), &layout).unwrap();
         assert_eq!(read.units, second.finished().units);
         assert_eq!(read.scores(1, "a"), Some(&[0.1, 1.7e-300, 2.564_949_357_461_536_7][..]));
@@ -423,11 +425,14 @@ mod tests {
                 .split(|b| *b == b'\n')
                 .filter(|l| Done::from_line(l).is_some())
                 .count();
+
             assert_eq!(lines(&whole[..cut]), expected);
+
             let mut flipped = whole.clone();
             flipped[cut] ^= 4;
-            // A line with a flipped bit is none; a broken line feed takes both lines.
+            // A line with a flipped bit is dropped; a flipped line feed drops both lines.
             assert!(lines(&flipped) < 3, "byte {cut}");
+
             let mut zeroed = whole.clone();
             zeroed[cut..].fill(0);
             assert!(lines(&zeroed) < 3, "byte {cut}");
@@ -444,9 +449,11 @@ mod tests {
             finished.insert(location(&layout, uuid, uuid.as_bytes()));
         }
         finished.insert(scores("b"));
+
         fs::write(layout.root().join("b.png"), b"\0").unwrap();
         fs::write(layout.root().join("c.png"), b"").unwrap();
         fs::remove_file(layout.root().join("d.png")).unwrap();
+
         let checked = finished.checked(&Context::default(), &layout).unwrap();
         let left: Vec<Unit> = checked.units.into_keys().collect();
         assert_eq!(left, [Unit::Scores(1, "b".into()), Unit::Location(1, "a".into())]);

@@ -1,4 +1,4 @@
-//! `manifest.json`: what made a data set, from what, with which options, and what was lost on the way.
+//! `manifest.json`: what made a data set, from which input, with which options, and what was lost on the way.
 
 use crate::error::{Difference, Result};
 use crate::options::profile::Profile;
@@ -29,11 +29,11 @@ const LIST: &str = "files.csv";
 /// What RGB images are made from: the mesh, or pictures of a kind.
 const RGB_SOURCES: [&str; 4] = ["texture", "skybox", "captures", "panorama"];
 
-/// A larger file is no manifest: a line for each file of the input is most of one.
+/// The largest size of a manifest, bytes. Most of it is a line for each input file.
 const LARGEST: u64 = 1 << 28;
 
-/// The manifest. It names neither threads nor times nor folders of the machine: the same input and options
-/// give the same bytes. Whoever reads a data set reads it by [`Manifest::read`].
+/// The manifest. It holds no thread counts, times or folders of the machine, so the same input and options
+/// give the same bytes. Readers of a data set call [`Manifest::read`].
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Manifest {
     generator: String,
@@ -45,41 +45,42 @@ pub(crate) struct Manifest {
     /// The areas that are in the folder, or will be.
     pub(crate) area_numbers: Vec<u32>,
     pub(crate) areas: Vec<AreaEntry>,
-    /// Entries of the label table, the null label and no padding included; 0 if there are no labels.
+    /// The number of entries of the label table, with the null label and without padding. 0 if there are no
+    /// labels.
     pub(crate) labels: usize,
-    /// Entries of `semantic_labels.json`: null labels fill it up.
+    /// The number of entries of `semantic_labels.json`, which null labels fill up.
     labels_padded_to: usize,
-    /// The name of the taxonomy that `assets/taxonomy.json` holds; not there if the classes are S3DIS's.
+    /// The name of the taxonomy in `assets/taxonomy.json`. Absent if the classes are S3DIS's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) taxonomy: Option<String>,
-    /// The list of all other files; not while the export runs.
+    /// The list of all other files. Absent while the export runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) files: Option<FileList>,
-    /// If the world coordinates were made from depth and pose, by `s3d xyz`.
+    /// How `s3d xyz` made the world coordinates from depth and pose. Absent if it did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     xyz_from_depth: Option<XyzFromDepth>,
 }
 
-/// The list of a data set's files, all but itself and the manifest.
+/// The list of a data set's files, without itself and the manifest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct FileList {
     /// Its name.
     pub(crate) list: String,
-    /// How many files are in it.
+    /// The number of files.
     pub(crate) count: u64,
-    /// Their bytes.
+    /// The size of all files, bytes.
     pub(crate) bytes: u64,
     /// The checksum of the list.
     pub(crate) xxh3_128: Checksum,
 }
 
-/// What made world coordinates from depth, and what that loses.
+/// How world coordinates were made from depth, and what that loses.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct XyzFromDepth {
     #[serde(rename = "type", with = "by_name")]
     kind: XyzType,
-    /// The distance between neighbouring depths, metres: a point is off by at most half of it along its ray,
-    /// or along the optical axis in a view.
+    /// The distance between neighbouring depths, metres. A point is off by at most half of it, along its ray
+    /// in a panorama and along the optical axis in a view.
     depth_step_m: f64,
     /// Points beyond this depth are missing, metres.
     largest_depth_m: f64,
@@ -91,43 +92,44 @@ impl XyzFromDepth {
     }
 }
 
-/// What the manifest tells of an area.
+/// What the manifest says about an area.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct AreaEntry {
     pub(crate) area: u32,
     pub(crate) faces: usize,
-    /// Faces of the input that are not in the data set: without area, or with the corners of an earlier one.
+    /// Faces of the input that are not in the data set: they have no area, or the corners of an earlier face.
     pub(crate) faces_left_out: usize,
     pub(crate) points: u64,
     pub(crate) annotated_points: u64,
-    /// What of it has no votes and no label; not there without labels, or in data sets of earlier versions.
+    /// What has no votes and no label. Absent without labels, and in data sets of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) unlabelled: Option<Unlabelled>,
     pub(crate) rooms: usize,
     pub(crate) locations: usize,
     pub(crate) panoramas: u64,
     pub(crate) views: u64,
-    /// Those among the views that are of photographs; not there if none is.
+    /// The number of views that show photographs. Absent if there is none.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub(crate) frames: u64,
     pub(crate) xyz: XyzLoss,
-    /// What its RGB images are made from.
+    /// What the RGB images are made from.
     pub(crate) rgb: String,
-    /// How far apart scan locations were placed, metres; null if the scene has its own, or `see` is there.
+    /// The distance at which scan locations were placed, metres. Null if the scene has its own, or `see` is
+    /// set.
     pub(crate) place_cameras: Option<f64>,
-    /// Which share of the surface they were placed to see, if they were.
+    /// The share of the surface that placed locations were to see. Absent if they were not placed that way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) see: Option<f64>,
-    /// How much of the surface placed locations see; not there if they were not placed by what they see.
+    /// How much of the surface placed locations see. Absent if they were not placed by what they see.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) surface_seen: Option<SurfaceSeen>,
-    /// What was subtracted from the scan's coordinates, metres; not there if nothing was.
+    /// What was subtracted from the scan's coordinates, metres. Absent if nothing was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) offset_m: Option<[f64; 3]>,
-    /// What the export warned of, a sentence each; not there if it did not.
+    /// The warnings of the export, a sentence each. Absent if there was none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) warnings: Vec<String>,
-    /// What it was made from.
+    /// The files it was made from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) inputs: Vec<InputRecord>,
 }
@@ -142,15 +144,15 @@ fn is_zero(count: &u64) -> bool {
 pub(crate) struct XyzLoss {
     #[serde(rename = "type", with = "by_name")]
     kind: XyzType,
-    /// The farthest that a coordinate of the mesh is from 0, metres.
+    /// The largest absolute coordinate of the mesh, metres.
     largest_coordinate_m: f32,
-    /// The distance between neighbouring numbers of the type there, metres; the error is at most half of it.
-    /// Nothing if there are no coordinates.
+    /// The distance between neighbouring numbers of the type at that coordinate, metres. The error is at most
+    /// half of it. `None` if there are no coordinates.
     largest_step_m: Option<f64>,
 }
 
 impl XyzLoss {
-    /// The loss in a mesh with this box.
+    /// Returns the loss for a mesh with this box.
     pub(crate) fn of(bbox: Aabb, kind: XyzType) -> Self {
         let largest = bbox.to_array().iter().fold(0.0f32, |m, c| m.max(c.abs()));
         let mut loss = Self { kind, largest_coordinate_m: largest, largest_step_m: None };
@@ -168,12 +170,13 @@ impl XyzLoss {
     }
 }
 
-/// The distance between neighbouring 32-bit floats at `value`.
+/// Returns the distance between neighbouring 32-bit floats at `value`.
 fn float_step(value: f32) -> f64 {
     f64::from(value.abs().next_up()) - f64::from(value.abs())
 }
 
-/// The distance between neighbouring half floats at `value`: they have 11 significant bits, down to 2⁻²⁴.
+/// Returns the distance between neighbouring half floats at `value`. They have 11 significant bits, down to
+/// 2⁻²⁴.
 pub(crate) fn half_step(value: f32) -> f64 {
     let mut step = 2f64.powi(-24);
     while step * 2048.0 <= f64::from(value) {
@@ -183,8 +186,8 @@ pub(crate) fn half_step(value: f32) -> f64 {
 }
 
 impl Manifest {
-    /// The manifest of an export that has begun, with this label table: the null label alone stands for no
-    /// labels.
+    /// Returns the manifest of an export that has begun with this label table. A table with only the null
+    /// label stands for no labels.
     pub(crate) fn begin(request: &Request, table: &LabelTable) -> Self {
         let labels = if table.len() > 1 { table.len() } else { 0 };
         let taxonomy = Some(table.taxonomy()).filter(|t| labels > 0 && !t.is_s3dis());
@@ -205,16 +208,16 @@ impl Manifest {
         }
     }
 
-    /// Whether the data set has labels: a table of them, and what is made with it.
+    /// Returns whether the data set has a label table and the files made with it.
     pub(crate) fn is_labelled(&self) -> bool {
         self.labels > 0
     }
 
-    /// The taxonomy of the labels: S3DIS's, or that in a file of its own, which `check` may refuse before it
-    /// is read.
+    /// Returns the taxonomy of the labels: S3DIS's, or the one in `assets/taxonomy.json`. `check` may refuse
+    /// that file before it is read.
     ///
     /// # Errors
-    /// If the file is not as it should be, or holds a taxonomy of another name.
+    /// Fails if the file is damaged, or holds a taxonomy of another name.
     pub(crate) fn read_taxonomy(
         &self,
         layout: &Layout,
@@ -231,12 +234,12 @@ impl Manifest {
         Ok(taxonomy)
     }
 
-    /// How many entries the file of labels has.
+    /// Returns the number of entries of the label file.
     pub(crate) fn labels_padded_to(&self) -> usize {
         self.labels_padded_to
     }
 
-    /// What was asked for when this data set was made.
+    /// Returns the request that made this data set.
     pub(crate) fn request(&self) -> Request {
         let areas = self.areas.iter().map(|entry| RequestedArea {
             area: entry.area,
@@ -245,6 +248,7 @@ impl Manifest {
             offset_m: entry.offset_m,
             inputs: entry.inputs.clone(),
         });
+
         Request {
             version: self.version.clone(),
             seed: self.seed,
@@ -253,7 +257,7 @@ impl Manifest {
         }
     }
 
-    /// In what this data set differs from one that would be made `now`, a sentence each.
+    /// Returns how this data set differs from one that would be made `now`, a sentence each.
     pub(crate) fn differences(&self, now: &Request) -> Vec<Difference> {
         let mut differences = self.request().differences(now);
         if self.xyz_from_depth.is_some() {
@@ -263,11 +267,12 @@ impl Manifest {
         differences
     }
 
-    /// Refuses a folder in which there is no complete data set of ours, however damaged.
+    /// Refuses a folder without a complete data set of ours. The data set may be damaged.
     pub(crate) fn require(layout: &Layout) -> Result<(), FileError> {
         let path = layout.manifest();
         let head: Head = read_manifest(&path)?;
         let fault = |message: String| Err(FileError::format(&path, message));
+
         if head.generator != GENERATOR {
             return fault(format!("written by {:?}, not by s3d", head.generator));
         }
@@ -281,20 +286,22 @@ impl Manifest {
         Ok(())
     }
 
-    /// The manifest of a complete data set.
+    /// Reads the manifest of a complete data set.
     ///
     /// # Errors
-    /// One of the file for all that is wrong with it: it is not there or none of ours, the export did not
-    /// finish, a field is missing or is not what it should be, the data set is half changed.
+    /// All errors are of the file: it is missing or not ours, the export did not finish, a field is missing
+    /// or wrong, or the data set is half changed.
     pub(crate) fn read(layout: &Layout) -> Result<Self, FileError> {
         Self::require(layout)?;
         let path = layout.manifest();
         let fault = |message: String| Err(FileError::format(&path, message));
+
         if let Some(what) = pending(layout)? {
             return fault(format!(
                 "the data set is half changed: make the call {what:?} again, and it goes on"
             ));
         }
+
         let manifest: Self = read_manifest(&path)?;
         match manifest.contradiction() {
             Some(message) => fault(message),
@@ -302,25 +309,28 @@ impl Manifest {
         }
     }
 
-    /// The manifest of an export that did not finish; `None` if that is not what the folder holds.
+    /// Reads the manifest of an export that did not finish. Returns `None` if the folder holds something
+    /// else.
     ///
     /// # Errors
-    /// As [`Manifest::read`].
+    /// The same as for [`Manifest::read`].
     pub(crate) fn read_running(layout: &Layout) -> Result<Option<Self>, FileError> {
         let path = layout.manifest();
         let head: Head = read_manifest(&path)?;
-        match head.generator == GENERATOR && head.status == RUNNING {
-            true => read_manifest(&path).map(Some),
-            false => Ok(None),
+        if head.generator == GENERATOR && head.status == RUNNING {
+            read_manifest(&path).map(Some)
+        } else {
+            Ok(None)
         }
     }
 
-    /// What cannot be, of all that is read.
+    /// Returns a sentence on the first thing that contradicts the rest of the manifest, if there is one.
     fn contradiction(&self) -> Option<String> {
         let numbers: BTreeSet<u32> = self.area_numbers.iter().copied().collect();
         if numbers.is_empty() || numbers.contains(&0) || numbers.len() != self.area_numbers.len() {
             return Some(format!("area_numbers {:?} are no numbers of areas", self.area_numbers));
         }
+
         if !self
             .areas
             .iter()
@@ -330,48 +340,54 @@ impl Manifest {
             let told: Vec<u32> = self.areas.iter().map(|area| area.area).collect();
             return Some(format!("area_numbers {:?}, and areas tells of {told:?}", self.area_numbers));
         }
+
         let padded = self.labels.max(self.options.pad_labels.0);
         if self.labels_padded_to != padded {
             let told = self.labels_padded_to;
             return Some(format!("{} labels, padded to {told}: its options make it {padded}", self.labels));
         }
+
         if !self.is_labelled() && self.options.need_labels() {
             return Some("no labels, and its options ask for what is made of them".to_owned());
         }
         if let Some(files) = self.files.as_ref().filter(|files| files.list != LIST) {
             return Some(format!("tells of a list {:?}; it is called {LIST}", files.list));
         }
+
         let units = self.options.depth_units;
         if let Some(made) = &self.xyz_from_depth
             && (made.kind == XyzType::None || *made != XyzFromDepth::of(made.kind, units))
         {
             return Some(format!("xyz_from_depth does not fit depth units {units}"));
         }
+
         if let Some(area) = self.areas.iter().find(|area| !RGB_SOURCES.contains(&area.rgb.as_str())) {
             return Some(format!("area {}: colours come from {:?}, which is not known", area.area, area.rgb));
         }
+
         self.options.canonical().err().map(|e| format!("in its options: {e}"))
     }
 
-    /// Whether this program wrote it, so that what it always writes is known to the byte.
+    /// Returns whether this version of the program wrote it, so that its standard files are known to the
+    /// byte.
     pub(crate) fn is_of_this_version(&self) -> bool {
         self.version == env!("CARGO_PKG_VERSION")
     }
 
-    /// In which forms numbers are written. `conventions.json` tells the same to other programs.
+    /// Returns how numbers are written. `conventions.json` says the same to other programs.
     pub(crate) fn conventions(&self) -> Conventions {
         let made = self.xyz_from_depth.as_ref().map(|made| made.kind);
         let told = self.options.conventions();
         Conventions { xyz: made.unwrap_or(told.xyz), ..told }
     }
 
-    /// What `conventions.json` says against the manifest, if it does.
+    /// Returns a sentence if `conventions.json` contradicts the manifest.
     pub(crate) fn contradiction_of(&self, found: Conventions) -> Option<String> {
         let told = self.conventions();
         (found != told).then(|| format!("{found}; the manifest tells of {told}"))
     }
 
-    /// The domains that every image has, in their order.
+    /// Returns the domains that every image has, in their order.
     pub(crate) fn domains(&self) -> Vec<Domain> {
         let made_later = |d: &Domain| *d == Domain::GlobalXyz && self.is_xyz_from_depth();
         Domain::ALL
@@ -380,28 +396,28 @@ impl Manifest {
             .collect()
     }
 
-    /// Whether its world coordinates were made by `s3d xyz`.
+    /// Returns whether `s3d xyz` made the world coordinates.
     pub(crate) fn is_xyz_from_depth(&self) -> bool {
         self.xyz_from_depth.is_some()
     }
 
-    /// What is told of an area.
+    /// Returns the entry of an area.
     pub(crate) fn area(&self, number: u32) -> Option<&AreaEntry> {
         self.areas.iter().find(|a| a.area == number)
     }
 
-    /// Whether a location's images were asked for.
+    /// Returns whether a location's images were asked for.
     pub(crate) fn is_chosen(&self, uuid: &str) -> bool {
         self.options.only.is_empty() || self.options.only.iter().any(|o| o == uuid)
     }
 
-    /// Tells that the world coordinates were made from depth.
+    /// Records that the world coordinates were made from depth.
     pub(crate) fn xyz_from_depth(&mut self, kind: XyzType, units: DepthUnits) {
         self.areas.iter_mut().for_each(|area| area.xyz.store_as(kind));
         self.xyz_from_depth = Some(XyzFromDepth::of(kind, units));
     }
 
-    /// Tells that there are profiles besides those that there were.
+    /// Records profiles beside the earlier ones.
     pub(crate) fn add_profiles(&mut self, wanted: &[Profile]) {
         let profiles = &mut self.options.profiles;
         profiles.extend(wanted);
@@ -409,13 +425,13 @@ impl Manifest {
         profiles.dedup();
     }
 
-    /// Writes it as it stands.
+    /// Writes the manifest as it stands.
     pub(crate) fn write(&self, layout: &Layout) -> Result<()> {
         write_json(&layout.manifest(), self)?;
         Ok(())
     }
 
-    /// Writes that the export is complete, with what it holds.
+    /// Writes that the export is complete, and what it holds.
     pub(crate) fn complete(mut self, layout: &Layout, areas: Vec<AreaEntry>, files: FileList) -> Result<()> {
         self.areas = areas;
         self.files = Some(files);
@@ -424,7 +440,7 @@ impl Manifest {
     }
 }
 
-/// Reads a manifest, or as much of one as is asked for.
+/// Reads a manifest, or the fields of one that `T` has.
 fn read_manifest<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
     let size = match std::fs::metadata(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => {
@@ -438,28 +454,27 @@ fn read_manifest<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
     read_json(path)
 }
 
-/// What a manifest of any version tells of the data set beside it: enough to go on with it, to replace it, or
-/// to bring it back.
+/// The fields that manifests of all versions share: enough to continue the data set, to replace it or to
+/// bring it back.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Head {
     generator: String,
     status: String,
-    /// Its areas.
     pub(crate) area_numbers: Vec<u32>,
 }
 
 impl Head {
-    /// The manifest at `path`, if there is one and it is ours, of a complete data set or of one that was
-    /// begun.
+    /// Reads the manifest at `path`, of a complete data set or of one that was begun. Returns `None` if there
+    /// is none, or it is not ours.
     ///
     /// # Errors
-    /// It cannot be read now: as [`if_there`].
+    /// Fails as [`if_there`] does if the file cannot be read now.
     pub(crate) fn read(path: &Path) -> Result<Option<Self>> {
         let head: Option<Self> = if_there(read_manifest(path))?;
         Ok(head.filter(|head| head.generator == GENERATOR))
     }
 
-    /// Whether the export ended.
+    /// Returns whether the export ended.
     pub(crate) fn is_complete(&self) -> bool {
         self.status == COMPLETE
     }

@@ -1,4 +1,4 @@
-//! The paper's tables of statistics, counted from the files of a data set.
+//! The paper's tables of statistics, counted from a data set's files.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -15,16 +15,16 @@ use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// So much of a line is read at once.
+/// The largest part of a line that is read at once, bytes.
 const LONGEST_PART: u64 = 1 << 16;
 
-/// The tables, an entry an area.
+/// The tables, with an entry for each area.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Statistics {
-    /// By number.
+    /// The areas, by number.
     pub areas: Vec<AreaStatistics>,
-    /// Which classes and types of rooms are counted.
+    /// The classes and room types that are counted.
     #[serde(skip)]
     pub taxonomy: Taxonomy,
 }
@@ -33,17 +33,17 @@ pub struct Statistics {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct AreaStatistics {
-    /// Its number.
+    /// The number of the area.
     pub area: u32,
-    /// Points of the sampled cloud.
+    /// The number of points in the sampled cloud.
     pub points: u64,
-    /// Faces of the mesh.
+    /// The number of faces in the mesh.
     pub faces: u64,
-    /// Perspective views, however many modalities each has.
+    /// The number of perspective views. All modalities of a view count as one.
     pub regular_images: u64,
-    /// Panoramas likewise.
+    /// The number of panoramas, counted the same way.
     pub panoramas: u64,
-    /// What there is by label; `None` if there are none.
+    /// The counts by label. `None` without labels.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub labels: Option<LabelStatistics>,
 }
@@ -52,18 +52,18 @@ pub struct AreaStatistics {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LabelStatistics {
-    /// Square metres of all rooms.
+    /// The floor of all rooms, in m².
     pub floor_m2: f64,
     /// Instances by class, rooms by type.
     #[serde(flatten)]
     pub tally: LabelTally,
-    /// The same by what these count as in S3DIS, for the paper's tables; `None` where they are S3DIS's. Rooms
-    /// of types that count as none are left out.
+    /// The same counts in S3DIS's classes and room types, for the paper's tables. `None` if the taxonomy is
+    /// S3DIS's. Rooms without an S3DIS type are left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub as_s3dis: Option<LabelTally>,
 }
 
-/// Instances and rooms, counted.
+/// Counts of instances and rooms.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LabelTally {
@@ -73,13 +73,13 @@ pub struct LabelTally {
     pub rooms_per_type: BTreeMap<&'static str, RoomTypeStatistics>,
 }
 
-/// What rooms of a type there are.
+/// The rooms of a type.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct RoomTypeStatistics {
-    /// How many.
+    /// The number of rooms.
     pub rooms: u64,
-    /// Square metres of all of them.
+    /// Their floor, in m².
     pub floor_m2: f64,
 }
 
@@ -92,9 +92,11 @@ pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
     let data = DataSet::open_in(layout)?;
     let areas = &data.manifest.area_numbers;
     let folders: Vec<PathBuf> = areas.iter().map(|area| layout.area_dir(*area)).collect();
-    // Images are counted, and not read.
+
+    // Images are counted but not read.
     data.files
         .require(&Context::default(), |path| folders.iter().any(|area| path.starts_with(area)))?;
+
     Statistics::count(layout, areas, data.taxonomy(), |path, whole| {
         if whole {
             data.files.checked(path)
@@ -106,8 +108,8 @@ pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
 }
 
 impl Statistics {
-    /// Counts what lies in the folders of a data set of these areas, with labels of a taxonomy or without.
-    /// Before a file is read, as a `whole` or not, `check` may refuse it.
+    /// Counts the files in the folders of these areas, with labels of a taxonomy or without. `check` may
+    /// refuse a file before it is read; its flag says whether the whole file is read.
     pub(crate) fn count(
         layout: &Layout,
         areas: &[u32],
@@ -121,6 +123,7 @@ impl Statistics {
             let read = taxonomy.table_from_names(&read_labels(&path)?);
             table = Some(read.map_err(|e| FileError::format(&path, e.to_string()))?);
         }
+
         let areas = areas
             .iter()
             .map(|n| AreaStatistics::count(layout, *n, table.as_ref(), &check));
@@ -134,28 +137,31 @@ impl Statistics {
         Ok(())
     }
 
-    /// The tables as Markdown: a column an area, and their sum.
+    /// Returns the tables as Markdown, with a column for each area and one for the total.
     pub fn to_markdown(&self) -> String {
         let mut text = String::from("# Statistics\n");
-        let floor_m2 = |a: &AreaStatistics| a.labels.as_ref().map_or(0.0, |labels| labels.floor_m2);
         let mut data: Vec<Row<'_>> = vec![
             ("points", &|a| a.points as f64),
             ("faces", &|a| a.faces as f64),
             ("regular images", &|a| a.regular_images as f64),
             ("panoramas", &|a| a.panoramas as f64),
         ];
+
         let is_labelled = self.areas.iter().any(|a| a.labels.is_some());
         if is_labelled {
             data.push(("floor, m²", &floor_m2));
         }
+
         self.table(&mut text, "Data", &data);
         if !is_labelled {
             text.push_str("\nThere are no labels.\n");
             return text;
         }
+
         let titles = ["Instances of each class", "Rooms of each type", "Floor of each room type, m²"];
         let own = (self.taxonomy.classes(), self.taxonomy.room_types());
         self.tally_tables(&mut text, titles, own, |labels| Some(&labels.tally));
+
         if !self.taxonomy.is_s3dis() {
             let titles = [
                 "Instances by what they count as in S3DIS",
@@ -168,7 +174,7 @@ impl Statistics {
         text
     }
 
-    /// The tables of instances, rooms and floor, a row for each of the classes and types.
+    /// Writes the tables of instances, rooms and floor, with a row for each class or type.
     fn tally_tables(
         &self,
         text: &mut String,
@@ -179,12 +185,14 @@ impl Statistics {
         let of = move |a: &AreaStatistics, value: &dyn Fn(&LabelTally) -> f64| {
             a.labels.as_ref().and_then(tally).map_or(0.0, value)
         };
+
         let class_row = |c: &Class| {
             let name = c.name();
             (name, move |a: &AreaStatistics| of(a, &|tally| tally.instances_per_class[name] as f64))
         };
         let class_rows: Vec<_> = classes.iter().map(class_row).collect();
         self.table(text, instances, &rows_of(&class_rows));
+
         let type_rows = |value: fn(&RoomTypeStatistics) -> f64| -> Vec<_> {
             let row = |t: &RoomType| {
                 let name = t.name();
@@ -192,6 +200,7 @@ impl Statistics {
             };
             types.iter().map(row).collect()
         };
+
         self.table(text, rooms, &rows_of(&type_rows(|of_type| of_type.rooms as f64)));
         self.table(text, floor, &rows_of(&type_rows(|of_type| of_type.floor_m2)));
     }
@@ -202,19 +211,22 @@ impl Statistics {
             let _ = write!(text, " area {} |", a.area);
         });
         let _ = writeln!(text, " total |\n|---|{}", "---:|".repeat(self.areas.len() + 1));
+
         let with_total = |value: &dyn Fn(&AreaStatistics) -> f64| -> Vec<f64> {
             let mut cells: Vec<f64> = self.areas.iter().map(value).collect();
             cells.push(cells.iter().sum());
             cells
         };
-        let is_count = |cell: &f64| cell.fract() == 0.0;
+
         for (name, value) in rows {
             let cells = with_total(value);
-            let digits = if cells.iter().all(is_count) && !title.contains("m²") && !name.contains("m²") {
-                0
-            } else {
-                1
-            };
+            let digits =
+                if cells.iter().copied().all(is_count) && !title.contains("m²") && !name.contains("m²") {
+                    0
+                } else {
+                    1
+                };
+
             let _ = write!(text, "| {name} |");
             for cell in cells {
                 let _ = write!(text, " {cell:.digits$} |");
@@ -222,6 +234,14 @@ impl Statistics {
             text.push('\n');
         }
     }
+}
+
+fn floor_m2(area: &AreaStatistics) -> f64 {
+    area.labels.as_ref().map_or(0.0, |labels| labels.floor_m2)
+}
+
+fn is_count(cell: f64) -> bool {
+    cell.fract() == 0.0
 }
 
 type Row<'a> = (&'a str, &'a dyn Fn(&AreaStatistics) -> f64);
@@ -247,6 +267,7 @@ impl AreaStatistics {
         } else {
             layout.rgb_obj(area)
         };
+
         check(&layout.point_cloud(area), false)?;
         check(&mesh, true)?;
         Ok(Self {
@@ -268,7 +289,9 @@ impl LabelStatistics {
         check: impl Fn(&Path, bool) -> Result<(), FileError>,
     ) -> Result<Self> {
         check(&layout.rooms_json(area), true)?;
-        let (taxonomy, classes) = (table.taxonomy(), ClassCounts::from_table(table));
+        let taxonomy = table.taxonomy();
+        let classes = ClassCounts::from_table(table);
+
         let mut tally = LabelTally::of_none(taxonomy.classes(), taxonomy.room_types());
         let mut as_s3dis = LabelTally::of_none(&Class::S3DIS, &RoomType::S3DIS);
         for class in taxonomy.classes() {
@@ -276,6 +299,7 @@ impl LabelStatistics {
             *tally.instances_per_class.entry(class.name()).or_default() += count;
             *as_s3dis.instances_per_class.entry(class.s3dis().name()).or_default() += count;
         }
+
         let rooms: Vec<RoomRecord> = read_json(&layout.rooms_json(area))?;
         for record in &rooms {
             let room = taxonomy
@@ -287,13 +311,14 @@ impl LabelStatistics {
                 .into_iter()
                 .for_each(|t| as_s3dis.add_room(t, record.floor_m2));
         }
+
         let as_s3dis = Some(as_s3dis).filter(|_| !taxonomy.is_s3dis());
         Ok(Self { floor_m2: rooms.iter().map(|r| r.floor_m2).sum(), tally, as_s3dis })
     }
 }
 
 impl LabelTally {
-    /// A row of nothing for each class and type.
+    /// Returns zero for each class and type.
     fn of_none(classes: &[Class], types: &[RoomType]) -> Self {
         Self {
             instances_per_class: classes.iter().map(|class| (class.name(), 0)).collect(),
@@ -311,13 +336,15 @@ impl LabelTally {
     }
 }
 
-/// The number of faces in an OBJ file.
+/// Returns the number of faces in an OBJ file.
 fn count_faces(path: &Path) -> Result<u64> {
     let mut reader = BufReader::new(open_file(path)?);
-    let (mut part, mut begins, mut faces) = (Vec::new(), true, 0);
+    let mut part = Vec::new();
+    let mut begins = true;
+    let mut faces = 0;
     loop {
         part.clear();
-        // A line is read in parts, however long it is.
+        // A long line is read in parts.
         let read = reader.by_ref().take(LONGEST_PART).read_until(b'\n', &mut part);
         if read.map_err(|e| FileError::io(path, "read", e))? == 0 {
             return Ok(faces);
@@ -327,7 +354,8 @@ fn count_faces(path: &Path) -> Result<u64> {
     }
 }
 
-/// The number of images of a kind: of the modality that has most, since some may not have been asked for.
+/// Returns the number of images of a kind: the largest of the modalities' numbers, since some modalities may
+/// not have been asked for.
 fn count_images(layout: &Layout, area: u32, frame: Frame) -> Result<u64> {
     let mut most = 0;
     for domain in Domain::ALL {

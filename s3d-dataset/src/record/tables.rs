@@ -1,5 +1,5 @@
-//! The tables beside the images: rooms, votes, instance numbers, views, splits. Each is a JSON file that says
-//! what its keys mean by their names.
+//! The tables beside the images: rooms, votes, instance numbers, views, splits. Each is a JSON file whose
+//! keys explain themselves.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -18,15 +18,15 @@ use std::fs;
 /// A room of `rooms.json`.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct RoomRecord {
-    /// Such as `office_3`.
+    /// A name such as `office_3`.
     pub(crate) room: String,
-    /// Annotated points.
+    /// The number of annotated points.
     pub(crate) points: u64,
     pub(crate) floor_m2: f64,
     /// The dominant horizontal direction of the walls, whole degrees in [0, 90).
     pub(crate) wall_direction_deg: u32,
-    /// The floor outline: polygons, each a ring around it (counter-clockwise) and rings around its holes
-    /// (clockwise), of world x and y in metres.
+    /// The floor outline as polygons. Each has a ring around it (counter-clockwise) and rings around its
+    /// holes (clockwise), in world x and y, metres.
     pub(crate) outline: Vec<OutlineRecord>,
 }
 
@@ -39,7 +39,6 @@ pub(crate) struct OutlineRecord {
 
 /// Writes `area_N/3d/rooms.json`.
 pub(crate) fn write_rooms(layout: &Layout, area: u32, annotated: &Annotated) -> Result<()> {
-    let ring = |points: &[glam::DVec2]| points.iter().map(|p| p.to_array()).collect::<Vec<_>>();
     let rooms: Vec<RoomRecord> = annotated
         .rooms
         .iter()
@@ -53,14 +52,19 @@ pub(crate) fn write_rooms(layout: &Layout, area: u32, annotated: &Annotated) -> 
                 .polygons
                 .iter()
                 .map(|p| OutlineRecord {
-                    outer: ring(&p.outer),
-                    holes: p.holes.iter().map(|h| ring(h)).collect(),
+                    outer: coordinates(&p.outer),
+                    holes: p.holes.iter().map(|hole| coordinates(hole)).collect(),
                 })
                 .collect(),
         })
         .collect();
+
     write_json(&layout.rooms_json(area), &rooms)?;
     Ok(())
+}
+
+fn coordinates(points: &[glam::DVec2]) -> Vec<[f64; 2]> {
+    points.iter().map(|p| p.to_array()).collect()
 }
 
 #[derive(Serialize)]
@@ -88,11 +92,10 @@ impl From<&VoteRow> for VoteRecord {
     }
 }
 
-/// Most disputed patches that are named.
+/// The largest number of disputed patches that are listed.
 const MOST_PATCHES: usize = 50;
 
-/// Writes `area_N/3d/votes.json`: the report on the voting, in all, per room and per class, and what is
-/// disputed.
+/// Writes `area_N/3d/votes.json`: the report on the voting, in total, by room and by class, and the disputes.
 pub(crate) fn write_votes(
     layout: &Layout,
     area: u32,
@@ -133,6 +136,7 @@ pub(crate) fn write_votes(
         disputing_classes: Vec<Dispute>,
         disputed_patches: Vec<Patch>,
     }
+
     let dispute =
         |d: &ClassDispute| Dispute { classes: d.classes.map(Class::name), faces: d.faces, m2: d.area_m2 };
     let patch = |p: &DisputedPatch| Patch {
@@ -142,7 +146,9 @@ pub(crate) fn write_votes(
         center: p.center.to_array(),
         bbox: p.bbox.to_array(),
     };
-    let (report, unlabelled) = (&annotated.report, &annotated.unlabelled);
+
+    let report = &annotated.report;
+    let unlabelled = &annotated.unlabelled;
     let votes = Votes {
         faces: report.face_count,
         faces_without_votes: report.faces_without_vote,
@@ -153,7 +159,7 @@ pub(crate) fn write_votes(
         rooms: report
             .rooms
             .iter()
-            // The table has the rooms of all areas.
+            // The report has the rooms of all areas.
             .filter(|(of, ..)| *of == area)
             .map(|(_, r, row)| Named { name: r.to_string(), row: row.into() })
             .collect(),
@@ -165,24 +171,29 @@ pub(crate) fn write_votes(
         disputing_classes: disputes.classes.iter().map(dispute).collect(),
         disputed_patches: disputes.patches.iter().take(MOST_PATCHES).map(patch).collect(),
     };
+
     write_json(&layout.votes_json(area), &votes)?;
     Ok(())
 }
 
-/// Writes `area_N/3d/votes.npz`: the label of each face, and how the votes for it went.
+/// Writes `area_N/3d/votes.npz`: the label of each face, and the votes for it.
 pub(crate) fn write_face_votes(
     layout: &Layout,
     area: u32,
     label_of_face: &[LabelId],
     votes: &FaceLabels,
 ) -> Result<()> {
-    let count = |votes: u64| u32::try_from(votes).unwrap_or(u32::MAX);
     let mut columns =
         FaceVoteColumns { label: label_of_face.iter().map(|l| l.0).collect(), ..Default::default() };
     for face in votes.iter() {
-        let [won, total, runner_up, runner_up_votes] = face
-            .as_ref()
-            .map_or([0; 4], |v| [count(v.votes), count(v.total), v.runner_up.0, count(v.runner_up_votes)]);
+        let [won, total, runner_up, runner_up_votes] = face.as_ref().map_or([0; 4], |v| {
+            [
+                saturating_u32(v.votes),
+                saturating_u32(v.total),
+                v.runner_up.0,
+                saturating_u32(v.runner_up_votes),
+            ]
+        });
         columns.votes.push(won);
         columns.total.push(total);
         columns.runner_up.push(runner_up);
@@ -193,8 +204,12 @@ pub(crate) fn write_face_votes(
     Ok(())
 }
 
-/// Writes `area_N/3d/instance_numbers.json`: which label each instance of the annotation tree, whose numbers
-/// run per room, has in the area.
+fn saturating_u32(votes: u64) -> u32 {
+    u32::try_from(votes).unwrap_or(u32::MAX)
+}
+
+/// Writes `area_N/3d/instance_numbers.json`: the label in the area of each instance of the annotation tree,
+/// where numbers run by room.
 pub(crate) fn write_instance_numbers(layout: &Layout, area: u32, rooms: &[RoomNames]) -> Result<()> {
     #[derive(Serialize)]
     struct Mapping {
@@ -217,8 +232,8 @@ pub(crate) fn write_instance_numbers(layout: &Layout, area: u32, rooms: &[RoomNa
     Ok(())
 }
 
-/// Writes `area_N/views.json`: every candidate view with its draw, its entropy and, if it was kept, its frame
-/// number.
+/// Writes `area_N/views.json`: every candidate view with its draw and its entropy, and the frame numbers of
+/// the kept ones.
 pub(crate) fn write_views(layout: &Layout, area: u32, candidates: &[Candidate]) -> Result<()> {
     let of_area: Vec<&Candidate> = candidates.iter().filter(|c| c.area == area).collect();
     write_json(&layout.views_json(area), &of_area)?;
@@ -235,36 +250,38 @@ pub(crate) fn write_splits(layout: &Layout, folds: &[Fold]) -> Result<()> {
     Ok(())
 }
 
-/// Writes the lists of panoramas that depth loaders read: of all areas, and of both sides of each fold. A
-/// data set without panoramas, or without their colour or depth, has none.
+/// Writes the lists of panoramas that depth loaders read: one for all areas, and one for each side of each
+/// fold. Writes none without panoramas that have both colour and depth.
 pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: &[Fold]) -> Result<()> {
     let mut pairs = Vec::new();
     for area in areas {
-        let (colors, depths) =
-            (panoramas(layout, *area, Domain::Rgb)?, panoramas(layout, *area, Domain::Depth)?);
+        let colors = panoramas(layout, *area, Domain::Rgb)?;
+        let depths = panoramas(layout, *area, Domain::Depth)?;
         let both = colors.intersection(&depths).map(|name| (*area, name.clone()));
         pairs.extend(both.collect::<Vec<_>>());
     }
     if pairs.is_empty() {
         return Ok(());
     }
+
     create_dir(&layout.lists_dir())?;
-    let path = |area: u32, name: &ImageName, domain: Domain| {
-        let name = ImageName { domain, ..name.clone() };
-        format!("area_{area}/{}/{}/{name}", name.frame.folder(), domain.folder())
-    };
-    let of = |areas: &[u32]| -> Vec<(String, String)> {
-        let listed = pairs.iter().filter(|(area, _)| areas.contains(area));
-        listed
-            .map(|(a, name)| (path(*a, name, Domain::Rgb), path(*a, name, Domain::Depth)))
+
+    let listed = |areas: &[u32]| -> Vec<(String, String)> {
+        pairs
+            .iter()
+            .filter(|(area, _)| areas.contains(area))
+            .map(|(area, name)| {
+                (path_in_list(*area, name, Domain::Rgb), path_in_list(*area, name, Domain::Depth))
+            })
             .collect()
     };
-    s3d_io::dataset::write_image_list(&layout.list_of_all(), &of(areas))?;
+    s3d_io::dataset::write_image_list(&layout.list_of_all(), &listed(areas))?;
     for fold in folds {
         for (train, areas) in [(true, &fold.train), (false, &fold.test)] {
-            s3d_io::dataset::write_image_list(&layout.list_of_fold(fold.number, train), &of(areas))?;
+            s3d_io::dataset::write_image_list(&layout.list_of_fold(fold.number, train), &listed(areas))?;
         }
     }
+
     if folds.is_empty() {
         ctx.info(format_args!(
             "these areas leave every fold without its training or its test areas: splits/ lists all \
@@ -274,8 +291,14 @@ pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: 
     Ok(())
 }
 
-/// The names of an area's panoramas that are there in a domain, with the domain left at colour so that they
-/// compare.
+/// Returns the path of a panorama in a domain, as lists give it: below the data set's folder.
+fn path_in_list(area: u32, name: &ImageName, domain: Domain) -> String {
+    let name = ImageName { domain, ..name.clone() };
+    format!("area_{area}/{}/{}/{name}", name.frame.folder(), domain.folder())
+}
+
+/// Returns the names of an area's panoramas in a domain. All names say the domain RGB, so that they compare
+/// between domains.
 fn panoramas(layout: &Layout, area: u32, domain: Domain) -> Result<BTreeSet<ImageName>> {
     let dir = layout.image_dir(area, Frame::Panorama, domain);
     let entries = match fs::read_dir(&dir) {

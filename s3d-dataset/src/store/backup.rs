@@ -1,5 +1,5 @@
-//! Moves in OUT: an earlier data set set aside and brought back, and what a killed export left brought to a
-//! state that has one meaning. The states are those of [`output`](super::output).
+//! Moves in OUT. They set an earlier data set aside, bring it back, and bring the rest of a killed export to
+//! a state with one meaning. [`output`](super::output) lists the states.
 
 use crate::error::{Error, Result};
 use crate::record::manifest::Head;
@@ -13,20 +13,20 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Folders in OUT: an earlier data set while it is set aside, when it is, and when it goes.
+/// Folders in OUT for an earlier data set: while it is set aside, once it is aside, and while it is removed.
 pub(super) const MOVING: &str = ".s3d-previous.part";
 pub(super) const BACKUP: &str = ".s3d-previous";
 pub(super) const TRASH: &str = ".s3d-trash";
 
-/// Brings a folder in which an export was killed to a state that has only one meaning. Returns what it holds
-/// then.
+/// Brings the folder of a killed export to a state with one meaning. Returns what the folder holds then.
 pub(super) fn recover(layout: &Layout) -> Result<OutputState> {
     let inside = |name: &str| layout.root().join(name);
     change::settle(layout)?;
     remove(&inside(TRASH))?;
+
     let moving = Layout::new(inside(MOVING));
     if moving.root().exists() {
-        // The manifest moves last: it is in one of the two.
+        // The manifest moves last, so it is in one of the two folders.
         let mut head = Head::read(&moving.manifest())?;
         if head.is_none() {
             head = Head::read(&layout.manifest())?;
@@ -42,6 +42,7 @@ pub(super) fn recover(layout: &Layout) -> Result<OutputState> {
         }
         return Ok(state.without_request());
     }
+
     if inside(BACKUP).exists() && !state.has_request() {
         restore(layout)?;
         return OutputState::read(layout);
@@ -49,7 +50,7 @@ pub(super) fn recover(layout: &Layout) -> Result<OutputState> {
     Ok(state)
 }
 
-/// Removes what an export keeps while it is unfinished, all but the lock.
+/// Removes the working files of an unfinished export, except the lock.
 pub(super) fn clear(layout: &Layout) -> Result<()> {
     remove(&layout.request())?;
     remove(&layout.journal_dir())?;
@@ -76,19 +77,19 @@ fn children(folder: &Path) -> Result<Vec<PathBuf>> {
     }
 }
 
-/// Removes the data set that lies aside. It goes by one rename, so that half of it is never taken for whole.
+/// Removes the earlier data set. One rename takes it away, so half of it is never mistaken for all of it.
 pub(super) fn discard(layout: &Layout) -> Result<()> {
     let trash = layout.root().join(TRASH);
     rename(&layout.root().join(BACKUP), &trash)?;
     remove(&trash)
 }
 
-/// Puts the data set that lies aside back in its place, instead of what was begun there.
+/// Brings the earlier data set back, in place of the one that was begun.
 pub(super) fn restore(layout: &Layout) -> Result<()> {
     let aside = Layout::new(layout.root().join(BACKUP));
     let head = Head::read(&aside.manifest())?;
     let mut begun = read_request(layout)?.map(|request| request.numbers());
-    // Without a request nobody goes on with what was begun, whatever of it is still there.
+    // Without a request, nobody continues what was begun.
     clear(layout)?;
     if begun.is_none() {
         begun = Head::read(&layout.manifest())?.map(|head| head.area_numbers);
@@ -99,8 +100,8 @@ pub(super) fn restore(layout: &Layout) -> Result<()> {
     take_back(&aside, layout, head)
 }
 
-/// Moves the data set of a folder in OUT back into OUT, and removes the folder; what is in it is never
-/// removed unless its manifest tells that it is all in its place.
+/// Moves the data set of a folder in OUT back into OUT, and removes the folder. The folder's content is
+/// removed only if its manifest says that everything is in place.
 fn take_back(from: &Layout, layout: &Layout, head: Option<Head>) -> Result<()> {
     let Some(head) = head else {
         return match fs::remove_dir(from.root()) {
@@ -115,7 +116,7 @@ fn take_back(from: &Layout, layout: &Layout, head: Option<Head>) -> Result<()> {
     remove(from.root())
 }
 
-/// Moves a data set's entries, those that are there, from one folder to another.
+/// Moves the existing entries of a data set from one folder to another.
 pub(super) fn move_entries(from: &Layout, to: &Layout, areas: &[u32]) -> Result<()> {
     create_dir(to.root())?;
     for (source, target) in from.entries(areas).iter().zip(to.entries(areas)) {
@@ -124,14 +125,15 @@ pub(super) fn move_entries(from: &Layout, to: &Layout, areas: &[u32]) -> Result<
             rename(source, &target)?;
         }
     }
-    // The folders that hold nothing now.
+    // Remove the folders that are empty now.
     for folder in from.shared_dirs() {
         let _ = fs::remove_dir(folder);
     }
     Ok(())
 }
 
-/// Whether something has this name. What cannot be looked at now is not taken for gone.
+/// Returns whether a file or folder of this name exists. One that cannot be looked at now is an error, not
+/// missing.
 fn is_there(path: &Path) -> Result<bool> {
     match fs::symlink_metadata(path) {
         Ok(_) => Ok(true),
@@ -162,7 +164,7 @@ mod tests {
 
     const MANIFEST: &str = r#"{"generator":"s3d","status":"complete","area_numbers":[3]}"#;
 
-    /// A folder with a data set, or what is left of it, in one of the folders aside.
+    /// A folder with a data set, or the rest of one, in one of the folders aside.
     fn interrupted(aside: &str, manifest: Option<&str>) -> (tempfile::TempDir, Layout) {
         let dir = tempfile::tempdir().unwrap();
         let moved = Layout::new(dir.path().join(aside));
@@ -182,7 +184,7 @@ mod tests {
             recover(&layout).unwrap();
             assert!(layout.area_dir(3).join("image.png").exists() && layout.manifest().exists());
             assert!(!dir.path().join(aside).exists());
-            // A manifest that cannot be read, or was lost, tells nothing of what is there.
+            // A missing or damaged manifest says nothing about the files.
             for manifest in [None, Some("{\"generator\":\"s3"), Some("")] {
                 let (dir, layout) = interrupted(aside, manifest);
                 let message = recover(&layout).unwrap_err().to_string();
@@ -190,7 +192,8 @@ mod tests {
                 assert!(dir.path().join(aside).join("area_3/image.png").exists());
             }
         }
-        // Totals, and nothing moved into it yet.
+
+        // A folder aside with nothing moved into it yet.
         let dir = tempfile::tempdir().unwrap();
         create_dir(&dir.path().join(MOVING)).unwrap();
         recover(&Layout::new(dir.path())).unwrap();

@@ -1,18 +1,18 @@
-//! The folder of a data set: what is in it, whether it may be written to, what becomes of an earlier data set
-//! in it, and how an export that was killed goes on.
+//! The folder of a data set: what it holds, whether it may be written to, what happens to an earlier data set
+//! in it, and how a killed export goes on.
 //!
-//! While an export is unfinished, `.s3d/request.json` says what was asked for, `.s3d/journal` what is done of
-//! it, and the manifest says "running". An earlier data set that is replaced lies aside in `.s3d-previous`
-//! until the new one is complete. Every step from one state to the next is one rename or one file, so that
-//! whoever comes after a kill finds one of these:
+//! While an export is unfinished, `.s3d/request.json` holds the request, `.s3d/journal` the finished work,
+//! and the manifest says "running". An earlier data set that is being replaced lies in `.s3d-previous` until
+//! the new one is complete. Every step from one state to the next is one rename or one file, so a process
+//! that comes after a kill finds one of these states:
 //!
 //! | `request.json` | manifest | `.s3d-previous` | |
 //! |---|---|---|---|
 //! | – | – | – | nothing |
-//! | any | complete | any | a complete data set; what else is there is to be cleaned away |
-//! | there | – or running | any | an unfinished export, to go on with |
+//! | any | complete | any | a complete data set; the other files are removed |
+//! | there | – or running | any | an unfinished export, to continue |
 //! | – | – or running | there | the new one had not begun, or failed for good: the earlier one comes back |
-//! | – | running | – | the rest of an export of a version without a journal: nobody's |
+//! | – | running | – | the rest of an export by a version without a journal, which nobody continues |
 
 use crate::account::Account;
 use crate::context::Context;
@@ -39,22 +39,22 @@ pub(crate) enum Begin {
     NothingToDo,
 }
 
-/// An export that holds the lock of its folder. What is on the disk can be gone on with at any moment until
-/// [`Session::end`].
+/// An export that holds the lock of its folder. Until [`Session::end`], it can be continued from the files on
+/// disk at any moment.
 pub(crate) struct Session {
     layout: Layout,
     lock: Lock,
-    /// What is done, by earlier runs too.
+    /// The finished units, from earlier runs too.
     pub(crate) journal: Journal,
 }
 
-/// Begins an export into OUT, or goes on with it. `state` is what OUT held before the lock was taken. `manifest`
-/// is written if the export begins.
+/// Begins or continues an export into OUT. `state` is what OUT held before the lock was taken. `manifest` is
+/// written if the export begins.
 ///
 /// # Errors
-/// [`Error::Usage`] if OUT holds a data set or an unfinished export of another request, and `overwrite` is
-/// not set, or something that is in the way and not ours; [`Error::Temporary`] if another process exports
-/// into it.
+/// [`Error::Usage`] if OUT holds a data set or an unfinished export of another request and `overwrite` is not
+/// set, or if files that are not ours are in the way. [`Error::Temporary`] if another process exports into
+/// OUT.
 pub(crate) fn begin(
     layout: &Layout,
     state: &OutputState,
@@ -64,8 +64,9 @@ pub(crate) fn begin(
     account: &Account<'_>,
 ) -> Result<Begin> {
     let ctx = account.ctx;
-    // What is refused is refused before anything changes, and what is complete may lie where nothing can be
-    // changed.
+
+    // Refusals come before any change. A complete data set needs no lock, since it may be on a read-only
+    // disk.
     let leftovers = [BACKUP, MOVING, TRASH].map(|name| layout.root().join(name));
     if !leftovers.iter().any(|path| path.exists()) {
         let holding = state.compare(request);
@@ -74,9 +75,11 @@ pub(crate) fn begin(
             return Ok(Begin::NothingToDo);
         }
     }
+
     let lock = Lock::take(ctx, layout, Sharing::Alone)?;
     let begun =
         recover(layout).and_then(|state| begin_locked(layout, &state, overwrite, request, manifest, account));
+
     match begun {
         Ok(Some(finished)) => {
             let journal = Journal::begin(layout, finished)?;
@@ -87,7 +90,7 @@ pub(crate) fn begin(
             Ok(Begin::NothingToDo)
         }
         Err(e) => {
-            // An earlier data set that was set aside for nothing comes back.
+            // Bring back an earlier data set if it was set aside but nothing replaced it.
             if matches!(read_request(layout), Ok(None))
                 && let Err(e) = recover(layout)
             {
@@ -99,15 +102,15 @@ pub(crate) fn begin(
     }
 }
 
-/// How often a shard looks whether it may begin, and how long in all.
+/// How often a shard tries to begin, and how long in all.
 const BEGIN_EVERY: Duration = Duration::from_millis(100);
 const BEGIN_WITHIN: Duration = Duration::from_secs(60);
 
-/// Begins a shard's work in OUT, or goes on with it; other shards of the same request may be at work there.
-/// Nothing of what is done is checked yet.
+/// Begins or continues a shard's work in OUT. Other shards of the same request may work there. Finished work
+/// is not checked yet.
 ///
 /// # Errors
-/// As [`begin`]; [`Error::Temporary`] if somebody merges or exports into it alone.
+/// The same as for [`begin`]. [`Error::Temporary`] if another process merges, or exports alone.
 pub(crate) fn begin_shard(
     ctx: &Context,
     layout: &Layout,
@@ -117,7 +120,7 @@ pub(crate) fn begin_shard(
 ) -> Result<Begin> {
     let started = Instant::now();
     loop {
-        // Whoever comes first begins, alone for that moment.
+        // The first shard prepares OUT, alone for that moment.
         match Lock::take(ctx, layout, Sharing::Alone) {
             Ok(lock) => {
                 let begun = begin_alone(ctx, layout, overwrite, request, manifest);
@@ -129,6 +132,7 @@ pub(crate) fn begin_shard(
             Err(Error::Temporary(_)) => {}
             Err(e) => return Err(e),
         }
+
         match Lock::take(ctx, layout, Sharing::Shards) {
             Ok(lock) => {
                 let holding = OutputState::read(layout)?.compare(request);
@@ -150,12 +154,13 @@ pub(crate) fn begin_shard(
             Err(Error::Temporary(_)) => {}
             Err(e) => return Err(e),
         }
+
         ctx.check()?;
         std::thread::sleep(BEGIN_EVERY);
     }
 }
 
-/// Brings OUT to where shards can work; whether there is something to do.
+/// Prepares OUT for the work of shards. Returns whether there is something to do.
 fn begin_alone(
     ctx: &Context,
     layout: &Layout,
@@ -165,7 +170,8 @@ fn begin_alone(
 ) -> Result<bool> {
     let state = recover(layout)?;
     if state.compare(request).is_unfinished() {
-        // Files that are being written stay: where locks hold on one machine alone, others may be at work.
+        // Files that are being written stay: where locks work only within one machine, others may be writing
+        // them.
         remove(&layout.failed())?;
         manifest.write(layout)?;
         return Ok(true);
@@ -173,7 +179,7 @@ fn begin_alone(
     Ok(begin_locked(layout, &state, overwrite, request, manifest, &Account::new(ctx))?.is_some())
 }
 
-/// What is done of an unfinished export, by what its journals and files tell.
+/// Returns the finished units of an unfinished export, checked against their files.
 fn go_on(layout: &Layout, account: &Account<'_>) -> Result<Finished> {
     let ctx = account.ctx;
     let started = Instant::now();
@@ -188,8 +194,8 @@ fn go_on(layout: &Layout, account: &Account<'_>) -> Result<Finished> {
     Ok(finished)
 }
 
-/// Brings OUT, which was recovered and holds `state`, to where work can go on. Returns what is done already;
-/// `None` if everything is.
+/// Prepares OUT for work. OUT was recovered and holds `state`. Returns the finished units, or `None` if
+/// everything is done.
 fn begin_locked(
     layout: &Layout,
     state: &OutputState,
@@ -201,13 +207,15 @@ fn begin_locked(
     let ctx = account.ctx;
     let holding = state.compare(request);
     holding.refuse(layout, overwrite)?;
-    // Whatever the state, what a killed process was writing is of no use. The folders of areas are looked at,
-    // or removed, below.
+
+    // The half-written files of a killed process are of no use in any state. The folders of areas are
+    // cleaned, or removed, below.
     remove_parts(layout.root(), false)?;
     remove_parts(&layout.work_dir(), true)?;
     for folder in layout.shared_dirs() {
         remove_parts(&folder, false)?;
     }
+
     match holding {
         Holding::Complete { .. } if holding.is_complete() && is_intact(ctx, layout, overwrite)? => {
             return Ok(None);
@@ -217,7 +225,7 @@ fn begin_locked(
             for folder in layout.entries(&areas).iter().filter(|entry| entry.is_dir()) {
                 remove_parts(folder, true)?;
             }
-            // It may not have been written yet, or lost its bytes.
+            // The manifest may not have been written yet, or may have lost its bytes.
             manifest.write(layout)?;
             return go_on(layout, account).map(Some);
         }
@@ -239,19 +247,20 @@ fn begin_locked(
                 "{}: what an earlier export left there is replaced",
                 layout.root().display()
             ));
-            // From here on there is nothing to go on with; the lock stays where it is.
+            // From here on there is nothing to continue. The lock stays in place.
             clear(layout)?;
             layout.entries(&areas).iter().try_for_each(|path| remove(path))?;
         }
     }
+
     write_json(&layout.request(), request)?;
-    // Files of an export without a request that tells of them would be nobody's.
+    // Without its request on disk, nobody could continue the export.
     sync_file(&layout.request())?;
     manifest.write(layout)?;
     Ok(Some(Finished::default()))
 }
 
-/// Whether all files of a complete data set are there, by their sizes, or `exactly`, by their content.
+/// Returns whether all files of a complete data set are there, checked by size or, if `exactly`, by content.
 fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
     let records = match read_file_list(&layout.file_list()) {
         Ok(records) => records,
@@ -259,6 +268,7 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
         Err(_) if exactly => return Ok(false),
         Err(e) => return Err(InputError::Remake { what: e.to_string() }.into()),
     };
+
     let faults = if exactly {
         let files: Vec<_> = records.iter().collect();
         crate::record::listing::faults(ctx, layout, &files)?
@@ -273,7 +283,9 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
             .map(|r| r.path.clone())
             .collect::<Vec<String>>()
     };
+
     let Some(first) = faults.first() else { return Ok(true) };
+
     if exactly {
         ctx.warn(format_args!(
             "{}: {} files are not as they were written, the first: {first}; all is made again",
@@ -282,6 +294,7 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
         ));
         return Ok(false);
     }
+
     let what = format!(
         "{}: the data set was complete, but {} of its files are missing or cut, the first: {first}",
         layout.root().display(),
@@ -290,8 +303,7 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
     Err(InputError::Remake { what }.into())
 }
 
-/// Refuses what is in the way of the data set that is asked for, unless it is of one of these areas, which is
-/// ours.
+/// Refuses files in the way of the requested data set, except those of `areas`, which are ours.
 fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Result<()> {
     let ours = if areas.is_empty() {
         Vec::new()
@@ -307,15 +319,17 @@ fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Resul
 }
 
 impl Session {
-    /// Ends the export as `outcome` says. Complete, the data set takes the place of an earlier one. After a
-    /// failure that trying again may mend, everything stays as it is, to go on with; after any other an
-    /// earlier data set comes back, or, where there is none, what is done stays, but does not stand in the
-    /// way of another call.
+    /// Ends the export as `outcome` says.
     ///
-    /// A shard's work ends by dropping it: what is done stays, whatever became of the rest.
+    /// A complete data set takes the place of an earlier one. After a temporary failure everything stays in
+    /// place, to be continued. After any other failure an earlier data set comes back; without one, the
+    /// finished work stays but does not hinder another call.
+    ///
+    /// A shard's session ends when it is dropped: its finished work stays, whatever the outcome.
     pub(crate) fn end<T>(self, ctx: &Context, outcome: Result<T>) -> Result<T> {
         let Self { layout, lock, journal } = self;
         drop(journal);
+
         let ended = match &outcome {
             Ok(_) => end_complete(&layout),
             Err(e) if e.is_temporary() => Ok(()),
@@ -337,12 +351,12 @@ impl Session {
                 Ok(())
             }
             Err(_) => {
-                // On a full disk it may not be possible, and is no reason to say anything else than what
-                // failed.
+                // This may fail on a full disk. The first failure is the one to report.
                 let _ = write_bytes(&layout.failed(), b"");
                 Ok(())
             }
         };
+
         lock.abandon();
         ended.and(outcome)
     }

@@ -1,9 +1,9 @@
-//! Where something is written that is to appear whole: a folder beside its place, held by a lock.
+//! A place for output that must appear whole: a folder beside its final place, held by a lock.
 //!
-//! A process that is killed leaves the folder, and the next that makes the same thing takes it over: what was
-//! written goes, and an earlier thing that was just being replaced comes back. If it was killed after it had
-//! begun to put the new thing in its place, [`Staging::was_placing`] says so: what is there is its own, and
-//! may be replaced by the same call. It says so until a call has come to its end, however many are killed.
+//! A killed process leaves the folder. The next process that makes the same thing takes it over: it removes
+//! what was written, and restores an earlier thing that was just being replaced. If the process was killed
+//! while it moved the new thing into place, [`Staging::was_placing`] says so: the files in place are its own,
+//! and the same call may replace them. It says so until a call comes to its end, however many are killed.
 
 use crate::context::Context;
 use crate::error::{Error, Result, TemporaryError, Work};
@@ -16,7 +16,7 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// A folder to write to.
+/// A folder to write to, beside the final place.
 pub(crate) struct Staging {
     folder: PathBuf,
     new: PathBuf,
@@ -24,7 +24,7 @@ pub(crate) struct Staging {
     was_placing: bool,
 }
 
-/// In that folder: what replaces something, while it is replaced; and a file while things are moved.
+/// Within the folder: the thing that is being replaced, and below a file that exists while things are moved.
 fn old_in(folder: &Path) -> PathBuf {
     folder.join("old")
 }
@@ -33,45 +33,50 @@ fn placing_in(folder: &Path) -> PathBuf {
     folder.join("placing")
 }
 
-/// The folder for what will be called `name` in the folder `parent`. Names may be as long as the system lets
-/// them be, and this one is not longer.
+/// Returns the folder for what will be called `name` in `parent`. Its name has a fixed length, since `name`
+/// may be as long as the system allows.
 fn folder_of(parent: &Path, name: &Path) -> PathBuf {
     let sum = Checksum::of(name.as_os_str().as_encoded_bytes()).to_string();
     parent.join(format!(".s3d-{}.part", sum.get(..8).unwrap_or_default()))
 }
 
 impl Staging {
-    /// Whether a process that was killed has left something of what will be called `name` in `parent`.
+    /// Returns whether a killed process left something of what will be called `name` in `parent`.
     pub(crate) fn is_left(parent: &Path, name: &Path) -> bool {
         folder_of(parent, name).exists()
     }
 
-    /// Begins what will be called `name` in the folder `parent`, which must be there.
+    /// Begins what will be called `name` in `parent`, which must exist.
     ///
     /// # Errors
-    /// [`Error::Temporary`] if another process makes it; [`Error::File`] if no file can be made there, or a
-    /// device or pipe has the name.
+    /// [`Error::Temporary`] if another process makes the same thing. [`Error::File`] if no file can be made
+    /// there, or a device or pipe has the name.
     pub(crate) fn begin(ctx: &Context, parent: &Path, name: &Path) -> Result<Self> {
         let place = parent.join(name);
         let refused = |e| Err(FileError::io(&place, "write", e).into());
+
         if !parent.is_dir() {
             return refused(io::Error::from(ErrorKind::NotFound));
         }
         if fs::metadata(&place).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
             return refused(io::Error::new(ErrorKind::InvalidInput, "it is a device or a pipe, no file"));
         }
+
         let folder = folder_of(parent, name);
         let lock = Lock::take(ctx, &Layout::new(&folder), Sharing::Alone).map_err(|e| match e {
             Error::Temporary(_) => TemporaryError::InUse { path: place.clone(), by: Work::Writing }.into(),
             Error::File(FileError::Io { source, .. }) => FileError::io(&place, "write", source).into(),
             other => other,
         })?;
+
         let staging = Self {
             new: folder.join("new"),
             was_placing: placing_in(&folder).exists(),
             folder,
             lock: Some(lock),
         };
+
+        // An earlier thing that was just being replaced comes back.
         let old = old_in(&staging.folder);
         if old.exists() && !place.exists() {
             rename(&old, &place)?;
@@ -81,7 +86,7 @@ impl Staging {
         Ok(staging)
     }
 
-    /// Whether a process was killed while it put the same thing in its place.
+    /// Returns whether a process was killed while it moved the same thing into place.
     pub(crate) fn was_placing(&self) -> bool {
         self.was_placing
     }
@@ -91,11 +96,12 @@ impl Staging {
         &self.new
     }
 
-    /// Moves the whole folder to its place. What is there goes: all of it if it is to be `replaced`, else no
-    /// more than an empty folder.
+    /// Moves the whole folder into place. If `replaced`, everything in the place is removed; otherwise only
+    /// an empty folder is.
     pub(crate) fn place_folder(self, place: &Path, replaced: bool) -> Result<()> {
         let failed = |e| FileError::io(place, "move what is finished to this name", e);
         self.begin_placing()?;
+
         let old = old_in(&self.folder);
         let moved = if replaced {
             fs::rename(place, &old)
@@ -108,11 +114,12 @@ impl Staging {
                 }
             })
         };
+
         if let Err(e) = moved.and_then(|()| fs::rename(&self.new, place)) {
             if old.exists() {
                 fs::rename(old, place).map_err(failed)?;
             }
-            // All is as it was found.
+            // Everything is as it was before.
             if !self.was_placing {
                 remove(&placing_in(&self.folder))?;
             }
@@ -121,15 +128,17 @@ impl Staging {
         self.clear()
     }
 
-    /// Moves the files, each to the place of its name in a folder, over what is there.
+    /// Moves the files into `folder` under their names, over earlier files.
     pub(crate) fn place_files(self, folder: &Path) -> Result<()> {
         let failed = |e| FileError::io(&self.new, "read the folder", e);
         let mut paths = Vec::new();
         for entry in fs::read_dir(&self.new).map_err(failed)? {
             paths.push(entry.map_err(failed)?.path());
         }
-        // `camera.json`, which says what the images beside it are, comes last.
+
+        // `camera.json` comes last, since it says what the images beside it are.
         paths.sort_by(|a, b| b.cmp(a));
+
         self.begin_placing()?;
         for path in paths {
             let place = folder.join(path.file_name().unwrap_or_default());
@@ -139,15 +148,15 @@ impl Staging {
         self.clear()
     }
 
-    /// Says that the new thing is being put in its place. The file is empty, so that it is there or not; one
-    /// beside it that is yet to be renamed would stay after a kill.
+    /// Records that the new thing is being moved into place. The file is empty, so it either exists or does
+    /// not; a temporary file beside it would stay after a kill.
     fn begin_placing(&self) -> Result<()> {
         let path = placing_in(&self.folder);
         fs::File::create(&path).map_err(|e| FileError::io(&path, "write", e))?;
         Ok(())
     }
 
-    /// Removes all but the lock.
+    /// Removes everything but the lock.
     fn clear(&self) -> Result<()> {
         let paths = [self.new.clone(), old_in(&self.folder), placing_in(&self.folder)];
         paths.iter().try_for_each(|path| remove(path))
@@ -155,8 +164,8 @@ impl Staging {
 }
 
 impl Drop for Staging {
-    /// Leaves nothing behind, unless things are half in their place or what was replaced could not be put
-    /// back.
+    /// Leaves nothing behind, unless some files are in place and others not, or the replaced thing could not
+    /// be restored.
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.new);
         if let Some(lock) = self.lock.take() {
@@ -174,7 +183,7 @@ mod tests {
         Staging::begin(&Context::default(), dir, Path::new("thing")).unwrap()
     }
 
-    /// As a kill leaves it: nothing is tidied up, and the lock is free.
+    /// Leaves things as a kill does: nothing is tidied up, and the lock is free.
     fn killed(mut staging: Staging) {
         drop(staging.lock.take());
         std::mem::forget(staging);
@@ -197,7 +206,7 @@ mod tests {
         staging.place_folder(&place, false).unwrap();
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
 
-        // Killed when the earlier one was aside.
+        // Killed while the earlier thing was aside.
         let staging = begin(dir.path());
         fs::write(placing_in(&staging.folder), "").unwrap();
         fs::rename(&place, old_in(&staging.folder)).unwrap();
@@ -218,7 +227,8 @@ mod tests {
         staging.begin_placing().unwrap();
         fs::write(dir.path().join("a"), "new").unwrap();
         killed(staging);
-        // The next is killed before it places anything, and the one after that is stopped.
+
+        // The next process is killed before it places anything, and the one after that is stopped.
         let staging = begin(dir.path());
         assert!(staging.was_placing());
         killed(staging);
@@ -226,6 +236,7 @@ mod tests {
         assert!(staging.was_placing());
         drop(staging);
         assert!(Staging::is_left(dir.path(), Path::new("thing")));
+
         let staging = begin(dir.path());
         assert!(staging.was_placing());
         fs::write(staging.path().join("b"), "new").unwrap();
