@@ -1,4 +1,4 @@
-//! What a data set tells of itself: conventions, schemas, and a Python module that reads it.
+//! Files that explain a data set: conventions, schemas, and a Python module that reads it.
 
 use crate::error::Result;
 use crate::record::legend;
@@ -7,14 +7,14 @@ use s3d_io::fs::{create_dir, write_bytes};
 use s3d_label::LabelTable;
 use std::path::PathBuf;
 
-/// Reads every kind of file of a data set, in Python.
+/// The Python module that reads every kind of file of a data set.
 const UTILS_PY: &str = include_str!("../../assets/utils.py");
 const POSE_SCHEMA: &str = include_str!("../../assets/pose.schema.json");
 const MANIFEST_SCHEMA: &str = include_str!("../../assets/manifest.schema.json");
 
-/// Writes the names of a label table, unless it has the null label alone, padded to as many as `pad_labels`
-/// if there are fewer, their taxonomy if it is not S3DIS's, and the legend of images of classes if there are
-/// some; `conventions.json`, `assets/utils.py` and `assets/schema`.
+/// Writes `conventions.json`, `assets/utils.py` and `assets/schema`. For a table with more than the null
+/// label, also writes its names, padded to at least `pad_labels`; its taxonomy if that is not S3DIS's; and
+/// the legend of class images if there are any.
 pub(crate) fn write(
     layout: &Layout,
     table: &LabelTable,
@@ -24,6 +24,7 @@ pub(crate) fn write(
     offsets: &WorldOffsets,
 ) -> Result<()> {
     create_dir(&layout.assets_dir())?;
+
     if table.len() > 1 {
         let mut names = table.names();
         s3d_io::dataset::pad_labels(&mut names, pad_labels);
@@ -35,6 +36,7 @@ pub(crate) fn write(
     if table.len() > 1 && modalities.contains(&Domain::SemanticClass) {
         legend::write(layout, table.taxonomy())?;
     }
+
     conventions.write(&layout.conventions(), offsets)?;
     create_dir(&layout.schema_dir())?;
     for (path, text) in texts(layout) {
@@ -43,7 +45,7 @@ pub(crate) fn write(
     Ok(())
 }
 
-/// The assets that are the same in every data set: where they lie, and what they hold.
+/// Returns the assets that are the same in every data set: their paths and contents.
 pub(crate) fn texts(layout: &Layout) -> [(PathBuf, &'static str); 3] {
     [
         (layout.utils_py(), UTILS_PY),
@@ -56,10 +58,10 @@ pub(crate) fn texts(layout: &Layout) -> [(PathBuf, &'static str); 3] {
 mod tests {
     use super::*;
     use crate::options::ExportOptions;
-
-    /// Options that stand beside `options` in a manifest.
-    const STORED_ELSEWHERE: [&str; 3] = ["seed", "place_cameras", "see"];
     use crate::profile::Profile;
+
+    /// Options that the manifest stores beside `options`.
+    const STORED_ELSEWHERE: [&str; 3] = ["seed", "place_cameras", "see"];
 
     #[test]
     fn the_schema_of_manifests_knows_all_options_modalities_and_profiles() {

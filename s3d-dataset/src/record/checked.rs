@@ -1,5 +1,4 @@
-//! Small JSON files that say of themselves whether they are whole: the value on one line, its checksum on the
-//! next.
+//! Small JSON files that show whether they are whole: the value on one line, its checksum on the next.
 
 use crate::error::Result;
 use s3d_io::Error as FileError;
@@ -11,12 +10,12 @@ use std::path::Path;
 /// The second line.
 #[derive(Serialize, Deserialize)]
 struct Seal {
-    /// Of the first line with its line feed.
+    /// The checksum of the first line, with its line feed.
     xxh3_128: Checksum,
 }
 
-/// Writes `value` as a line of JSON and its checksum as another, whole or not at all. Numbers come back
-/// exactly.
+/// Writes `value` as a line of JSON and its checksum as another, whole or not at all. Numbers come back bit
+/// by bit.
 pub(crate) fn write_checked<T: Serialize>(path: &Path, value: &T) -> Result<()> {
     let json = |e: serde_json::Error| FileError::format(path, e.to_string());
     let mut lines = serde_json::to_vec(value).map_err(json)?;
@@ -28,14 +27,15 @@ pub(crate) fn write_checked<T: Serialize>(path: &Path, value: &T) -> Result<()> 
     Ok(())
 }
 
-/// Reads what [`write_checked`] wrote.
+/// Reads a file that [`write_checked`] wrote.
 ///
 /// # Errors
-/// A file that is not there, was cut off, or was changed by as much as a bit.
+/// Fails if the file is missing, was cut off, or was changed by as much as a bit.
 pub(crate) fn read_checked<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let bytes = read_file(path)?;
     let damaged =
         || FileError::format(path, "is damaged: its checksum differs; remove it, and it is made again");
+
     let end = bytes.iter().position(|b| *b == b'\n').ok_or_else(damaged)? + 1;
     let (line, seal) = bytes.split_at(end);
     let seal: Seal = serde_json::from_slice(seal).map_err(|_| damaged())?;
@@ -72,7 +72,7 @@ mod tests {
         write_checked(&path, &("floor", 17)).unwrap();
         let whole = std::fs::read(&path).unwrap();
         assert!(read_checked::<(String, u32)>(&path).is_ok());
-        // The last line feed alone may go.
+        // Only the last line feed may be missing.
         for length in 0..whole.len() - 1 {
             std::fs::write(&path, &whole[..length]).unwrap();
             assert!(read_checked::<(String, u32)>(&path).is_err(), "{length} bytes");
@@ -80,7 +80,7 @@ mod tests {
         for bit in 0..8 * (whole.len() - 1) {
             let mut bytes = whole.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
-            // The same checksum in capitals is the same checksum.
+            // A checksum in capitals is the same checksum.
             let same = bytes.to_ascii_lowercase() == whole;
             std::fs::write(&path, bytes).unwrap();
             assert!(same || read_checked::<(String, u32)>(&path).is_err(), "bit {bit}");

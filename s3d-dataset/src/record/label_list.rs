@@ -1,4 +1,4 @@
-//! The label table as a file, so that no annotation has to be opened to know it.
+//! The label table as a file, so that nobody has to open annotations to know it.
 
 use crate::error::Result;
 use crate::record::checked::{read_checked, write_checked};
@@ -9,11 +9,11 @@ use s3d_label::{LabelTable, Taxonomy, TaxonomyDefinition};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The names of a label table, in order, without padding, and their taxonomy.
+/// The names of a label table in their order, without padding, and their taxonomy.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct LabelList {
     names: Vec<String>,
-    /// S3DIS's if it is not there.
+    /// The taxonomy of the names. Absent if it is S3DIS's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     taxonomy: Option<TaxonomyDefinition>,
 }
@@ -25,12 +25,12 @@ impl LabelList {
         Self { names: table.names(), taxonomy }
     }
 
-    /// Where an unfinished export keeps it.
+    /// Returns where an unfinished export keeps the list.
     pub(crate) fn path(layout: &Layout) -> PathBuf {
         layout.work_dir().join("labels.jsonl")
     }
 
-    /// Writes it; its folder is made.
+    /// Writes the list, and makes its folder.
     pub(crate) fn write(&self, path: &Path) -> Result<()> {
         path.parent().map_or(Ok(()), create_dir)?;
         write_checked(path, self)
@@ -40,19 +40,19 @@ impl LabelList {
         read_checked(path)
     }
 
-    /// The taxonomy of its labels.
+    /// Returns the taxonomy of the labels.
     ///
     /// # Errors
-    /// If what the file at `path` holds is none.
+    /// Fails if the file at `path` holds no valid taxonomy.
     pub(crate) fn taxonomy(&self, path: &Path) -> Result<Taxonomy> {
         let Some(definition) = self.taxonomy.clone() else { return Ok(Taxonomy::s3dis()) };
         Taxonomy::new(definition).map_err(|e| FileError::format(path, e.to_string()).into())
     }
 
-    /// The table.
+    /// Returns the label table.
     ///
     /// # Errors
-    /// If the file at `path` holds names that make no table.
+    /// Fails if the file at `path` holds names that make no table.
     pub(crate) fn table(&self, path: &Path) -> Result<LabelTable> {
         let table = self.taxonomy(path)?.table_from_names(&self.names);
         table.map_err(|e| FileError::format(path, e.to_string()).into())
@@ -73,10 +73,12 @@ mod tests {
         let list = LabelList::read(&path).unwrap();
         assert_eq!((list.names.len(), list.names[0].as_str()), (4, s3d_label::NULL_NAME));
         assert_eq!(list.table(&path).unwrap(), table);
+
         let nyu40 = Taxonomy::built_in("nyu40").unwrap();
         let table = nyu40.table([nyu40.label("bed_1_bedroom_1_1").unwrap()]).unwrap();
         LabelList::of(&table).write(&path).unwrap();
         assert_eq!(LabelList::read(&path).unwrap().table(&path).unwrap(), table);
+
         let names = vec!["floor_1_office_1_1".to_owned()];
         LabelList { names, taxonomy: None }.write(&path).unwrap();
         assert!(LabelList::read(&path).unwrap().table(&path).is_err());

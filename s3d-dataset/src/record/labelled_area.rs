@@ -1,10 +1,10 @@
-//! A labelled area as files: what voting found, so that no other process opens the annotations or votes
-//! again.
+//! A labelled area as files: the result of voting, so that no other process has to open the annotations or
+//! vote again.
 //!
-//! Two files in a folder: `area.jsonl`, small, and `label_of_face.npy`, an array of `<u4` with a label index
-//! a face, and the highest bit where that was filled. The first holds the second's checksum and is written
-//! after it, so that an area which can be read is whole. Processes that write the same area at the same time
-//! write the same bytes.
+//! A folder holds two files: the small `area.jsonl`, and `label_of_face.npy`, an array of `<u4` with a label
+//! index for each face, whose highest bit is set if the label was filled. `area.jsonl` holds the checksum of
+//! the array and is written after it, so an area that can be read is whole. Processes that write the same
+//! area at the same time write the same bytes.
 
 use crate::error::Result;
 use crate::record::checked::{read_checked, write_checked};
@@ -17,11 +17,11 @@ use s3d_label::LabelId;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Marks the label of a face that nobody voted for. No index is as large.
+/// The bit that marks the label of a face without votes. Every index is smaller.
 const FILLED: u32 = 1 << 31;
 
 impl LabelledArea {
-    /// Whether an area was written into `folder`: its files are still to be checked.
+    /// Returns whether an area was written into `folder`. Its files are not checked.
     pub(crate) fn is_in(folder: &Path) -> bool {
         area_file(folder).is_file()
     }
@@ -34,34 +34,40 @@ impl LabelledArea {
             .filled
             .iter()
             .for_each(|&face| label_of_face[face as usize] |= FILLED);
+
         let bytes: Vec<u8> = label_of_face.iter().flat_map(|l| l.to_le_bytes()).collect();
         let mut array = NpyWriter::create(&labels_file(folder), "<u4", &[label_of_face.len() as u64])?;
         array.put(&bytes)?;
         array.finish()?;
+
         let faces = label_of_face.len() as u64;
         let file = AreaFile { faces, label_of_face_xxh3_128: Checksum::of(&bytes), plan: self };
         write_checked(&area_file(folder), &file)
     }
 
-    /// Reads what [`write`](Self::write) wrote.
+    /// Reads an area that [`write`](Self::write) wrote.
     ///
     /// # Errors
-    /// Files that are not there, damaged, or of an area with another number.
+    /// Fails if a file is missing or damaged, or the area has another number.
     pub(crate) fn read(folder: &Path, area: u32) -> Result<Self> {
         let path = area_file(folder);
         let AreaFile { faces, label_of_face_xxh3_128, mut plan } = read_checked::<AreaFile<Self>>(&path)?;
+
         let refused = |message| Err(FileError::format(&path, message).into());
         if plan.area != area {
             return refused(format!("is area {}, not area {area}", plan.area));
         }
-        // They will stand in the names of files.
+        // The uuids will be parts of file names.
         if let Some(location) = plan.locations.iter().find(|l| !is_valid_uuid(&l.uuid)) {
             return refused(format!("{:?} is no uuid of a scan location", location.uuid));
         }
-        let (locations, rooms) = (plan.locations.len(), plan.location_rooms.len());
+
+        let locations = plan.locations.len();
+        let rooms = plan.location_rooms.len();
         if locations != rooms {
             return refused(format!("has {locations} scan locations, and rooms of {rooms}"));
         }
+
         let labels = read_label_of_face(&labels_file(folder), faces, label_of_face_xxh3_128)?;
         let filled = (0u32..).zip(&labels).filter(|(_, label)| **label & FILLED != 0);
         plan.annotated.filled = filled.map(|(face, _)| face).collect();
@@ -78,8 +84,7 @@ fn labels_file(folder: &Path) -> PathBuf {
     folder.join("label_of_face.npy")
 }
 
-/// The labels are what the file ends with, as `area.jsonl` says how many there are and what their checksum
-/// is.
+/// Reads the labels from the end of the file. `area.jsonl` says how many there are, and their checksum.
 fn read_label_of_face(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec<u32>> {
     let bytes = s3d_io::fs::read_file(path)?;
     let labels = usize::try_from(faces)
@@ -99,7 +104,7 @@ fn read_label_of_face(path: &Path, faces: u64, checksum: Checksum) -> Result<Vec
 #[derive(Serialize, Deserialize)]
 struct AreaFile<P> {
     faces: u64,
-    /// Of the labels' bytes, without the array's header.
+    /// The checksum of the labels' bytes, without the array's header.
     label_of_face_xxh3_128: Checksum,
     plan: P,
 }
@@ -235,7 +240,7 @@ mod tests {
             plan.write(dir.path()).unwrap();
             let first = std::fs::read(area_file(dir.path())).unwrap();
             let back = LabelledArea::read(dir.path(), 3).unwrap();
-            // Equal texts mean equal bits.
+            // Equal debug texts mean equal bits.
             prop_assert_eq!(format!("{back:?}"), format!("{plan:?}"));
             back.write(dir.path()).unwrap();
             prop_assert_eq!(std::fs::read(area_file(dir.path())).unwrap(), first);
@@ -251,6 +256,7 @@ mod tests {
         plan.annotated.filled = vec![0, 99];
         plan.write(dir.path()).unwrap();
         assert!(LabelledArea::is_in(dir.path()) && LabelledArea::read(dir.path(), 3).is_ok());
+
         let refusal = |area| {
             LabelledArea::read(dir.path(), area)
                 .err()
@@ -258,6 +264,7 @@ mod tests {
                 .unwrap_or_default()
         };
         assert!(refusal(4).contains("is area 3, not area 4"), "{}", refusal(4));
+
         let labels = labels_file(dir.path());
         let whole = std::fs::read(&labels).unwrap();
         let mut other = whole.clone();
@@ -266,6 +273,7 @@ mod tests {
             std::fs::write(&labels, bytes).unwrap();
             assert!(refusal(3).contains("label_of_face.npy: is damaged"), "{}", refusal(3));
         }
+
         std::fs::remove_file(&labels).unwrap();
         assert!(refusal(3).contains("label_of_face.npy"), "{}", refusal(3));
     }
@@ -284,7 +292,7 @@ mod tests {
         assert!(e.contains("\"../../elsewhere\" is no uuid"), "{e}");
     }
 
-    /// The paths of all values within `value`, itself included.
+    /// Returns the paths of `value` and all values within it.
     fn paths(value: &serde_json::Value, path: &str) -> Vec<String> {
         let inner: Vec<String> = match value {
             serde_json::Value::Array(list) => list
@@ -315,6 +323,7 @@ mod tests {
         let whole: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
         let paths = paths(&whole, "");
         assert!(paths.len() > 100, "{} values", paths.len());
+
         for path in paths {
             for odd in [serde_json::json!({}), serde_json::json!(true)] {
                 let mut file = whole.clone();
@@ -340,9 +349,11 @@ mod tests {
                 .unwrap_or_default()
         };
         assert_eq!(refusal(), "");
+
         file["plan"]["names"][0]["room"] = "kitchen_1".into();
         write_checked(&area_file(dir.path()), &file).unwrap();
         assert!(refusal().contains("kitchen_1") && refusal().contains("area.jsonl"), "{}", refusal());
+
         plan.location_rooms.clear();
         plan.write(dir.path()).unwrap();
         assert!(refusal().contains("1 scan locations, and rooms of 0"), "{}", refusal());

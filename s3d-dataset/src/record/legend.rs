@@ -9,11 +9,11 @@ use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_label::Taxonomy;
 use std::fmt::Write as _;
 
-/// Pixels of a dot of a letter.
+/// The side of a dot of a letter, pixels.
 const DOT: usize = 2;
-/// Pixels of the height of a line.
+/// The height of a line, pixels.
 const LINE: usize = 22;
-/// Pixels of the side of a square of colour.
+/// The side of a colour square, pixels.
 const SQUARE: usize = 18;
 
 /// Writes `assets/class_legend.csv` and `assets/class_legend.png`.
@@ -24,25 +24,31 @@ pub(crate) fn write(layout: &Layout, taxonomy: &Taxonomy) -> Result<()> {
     Ok(())
 }
 
-/// A line a class: what a pixel of it holds, its id, name, colour, whether it is a thing or stuff, and which
-/// class of S3DIS it counts as.
+/// Returns a line for each class: the value of its pixels, its id, name and colour, whether it is a thing or
+/// stuff, and the S3DIS class that it counts as.
 fn csv(taxonomy: &Taxonomy) -> String {
     let mut text = String::from("index,id,name,red,green,blue,kind,counts_as\n");
     for class in taxonomy.classes() {
-        let ([r, g, b], id) = (taxonomy.color(*class), taxonomy.id(*class));
+        let [r, g, b] = taxonomy.color(*class);
+        let id = taxonomy.id(*class);
         let kind = if taxonomy.is_stuff(*class) { "stuff" } else { "thing" };
         let _ = writeln!(text, "{},{id},{class},{r},{g},{b},{kind},{}", class.index(), class.s3dis());
     }
     text
 }
 
-/// A line a class: its colour, its place and its name.
+/// Draws a line for each class: its colour, its index and its name.
 fn picture(taxonomy: &Taxonomy) -> Raster<[u8; 3]> {
-    let text = |(place, name): (usize, &str)| format!("{place:3} {name}");
-    let lines: Vec<String> = taxonomy.classes().iter().map(|c| text((c.index(), c.name()))).collect();
+    let lines: Vec<String> = taxonomy
+        .classes()
+        .iter()
+        .map(|class| format!("{:3} {}", class.index(), class.name()))
+        .collect();
     let longest = lines.iter().map(String::len).max().unwrap_or(0);
     let width = LINE + 8 * DOT * (longest + 1);
+
     let mut pixels = vec![[255; 3]; width * LINE * lines.len()];
+
     for ((line, class), rows) in lines
         .iter()
         .zip(taxonomy.classes())
@@ -52,12 +58,14 @@ fn picture(taxonomy: &Taxonomy) -> Raster<[u8; 3]> {
         for row in rows.chunks_mut(width).skip(margin).take(SQUARE) {
             row[margin..margin + SQUARE].fill(taxonomy.color(*class));
         }
+
         for (column, letter) in line.bytes().enumerate() {
-            // A byte a row, the lowest bit first.
+            // The glyph has a byte for each row, the lowest bit first.
             let glyph = BASIC_LEGACY.get(usize::from(letter)).copied().unwrap_or_default();
             for (y, bits) in glyph.iter().enumerate() {
                 for x in (0..8).filter(|x| bits >> x & 1 == 1) {
-                    let (left, top) = (LINE + 8 * DOT * column + DOT * x, (LINE - 8 * DOT) / 2 + DOT * y);
+                    let left = LINE + 8 * DOT * column + DOT * x;
+                    let top = (LINE - 8 * DOT) / 2 + DOT * y;
                     for row in rows.chunks_mut(width).skip(top).take(DOT) {
                         row[left..left + DOT].fill([0; 3]);
                     }
@@ -65,6 +73,7 @@ fn picture(taxonomy: &Taxonomy) -> Raster<[u8; 3]> {
             }
         }
     }
+
     Raster::from_vec(width as u32, (LINE * lines.len()) as u32, pixels)
 }
 
@@ -82,7 +91,7 @@ mod tests {
         let picture = picture(&taxonomy);
         assert_eq!(picture.height(), 20 * LINE as u32);
         assert_eq!(picture.at(10, 10), [174, 199, 232]);
-        // The names differ, and are all within the picture.
+        // The names differ, and lie within the picture.
         let row = |line: u32| -> Vec<[u8; 3]> {
             (line * LINE as u32..(line + 1) * LINE as u32)
                 .flat_map(|y| picture.row(y)[LINE..].to_vec())

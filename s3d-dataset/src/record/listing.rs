@@ -13,15 +13,15 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Whether a file is one that some process is writing, or was when it was killed: see
+/// Returns whether a file is half-written, by a running process or by a killed one. See
 /// [`s3d_io::fs::AtomicFile`].
 pub(crate) fn is_part(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.starts_with(".s3d-") && name.ends_with(".part")
 }
 
-/// All files in a folder and those below it, sorted; none if there is no such folder. What is being written
-/// is no file yet.
+/// Returns all files in a folder and below, sorted, without half-written ones. Returns none if the folder
+/// does not exist.
 pub(crate) fn walk(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -44,7 +44,7 @@ pub(crate) fn walk(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Removes the files that a killed process was writing in a folder, and if asked for in those below it.
+/// Removes half-written files of a killed process in a folder, and if `below`, in the folders below it.
 pub(crate) fn remove_parts(folder: &Path, below: bool) -> Result<()> {
     let mut folders = vec![folder.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -68,7 +68,7 @@ pub(crate) fn remove_parts(folder: &Path, below: bool) -> Result<()> {
     Ok(())
 }
 
-/// The records of files that are there, sorted. They are read, on all threads.
+/// Returns the records of existing files, sorted. Reads the files on all threads.
 pub(crate) fn records(ctx: &Context, layout: &Layout, paths: &[PathBuf]) -> Result<Vec<FileRecord>> {
     let records = Mutex::new(Vec::with_capacity(paths.len()));
     for_each_in_order(
@@ -86,8 +86,8 @@ pub(crate) fn records(ctx: &Context, layout: &Layout, paths: &[PathBuf]) -> Resu
     Ok(records)
 }
 
-/// What is wrong with files that were recorded, a sentence each, with the index of the file. They are read,
-/// on all threads.
+/// Returns the faults of recorded files, a sentence each, with the index of the file. Reads the files on all
+/// threads.
 pub(crate) fn faults(ctx: &Context, layout: &Layout, files: &[&FileRecord]) -> Result<Vec<(usize, String)>> {
     let faults = Mutex::new(Vec::new());
     let progress = ctx.progress("checking", "files", files.len() as u64);
@@ -112,7 +112,7 @@ pub(crate) fn faults(ctx: &Context, layout: &Layout, files: &[&FileRecord]) -> R
     Ok(faults)
 }
 
-/// Writes `files.csv`, and returns what the manifest tells of it.
+/// Writes `files.csv`. Returns its entry in the manifest.
 pub(crate) fn write(layout: &Layout, records: &[FileRecord]) -> Result<FileList> {
     let path = layout.file_list();
     let (_, xxh3_128) = write_file_list(&path, records)?;
@@ -124,8 +124,8 @@ pub(crate) fn write(layout: &Layout, records: &[FileRecord]) -> Result<FileList>
     })
 }
 
-/// Writes `files.csv` and the manifest of a complete data set as they are after a change: the files of
-/// `changed` are new, and all others for which `is_gone` holds are not there any more.
+/// Writes `files.csv` and the manifest of a complete data set after a change. The files of `changed` are new,
+/// and all others that fulfil `is_gone` no longer exist.
 pub(crate) fn write_changed(
     data: &DataSet,
     manifest: &mut Manifest,

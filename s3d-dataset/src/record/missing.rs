@@ -1,10 +1,10 @@
-//! Which units of work a request still lacks.
+//! The units of work that a request still lacks.
 
 use crate::record::journal::{Finished, Unit};
 use crate::record::request::Request;
 
-/// The units that are still to be done of a request, as far as they are known: those of an area's locations
-/// only once its labels are done.
+/// Returns the known units that a request still lacks. The units of an area's locations are known once its
+/// labels are done.
 pub(crate) fn missing_units(request: &Request, finished: &Finished) -> Vec<Unit> {
     let mut missing = Vec::new();
     for area in request.numbers() {
@@ -22,11 +22,12 @@ pub(crate) fn missing_units(request: &Request, finished: &Finished) -> Vec<Unit>
         missing.extend(photographs.map(|uuid| Unit::Photograph(area, uuid.clone())));
         missing.push(Unit::Assets(area));
     }
+
     missing.retain(|unit| !finished.has(unit));
     missing
 }
 
-/// Whether a location's images are asked for.
+/// Returns whether a location's images were asked for.
 pub(crate) fn is_chosen(request: &Request, uuid: &str) -> bool {
     let only = &request.options.only;
     only.is_empty() || only.iter().any(|o| o == uuid)

@@ -1,4 +1,4 @@
-//! What is written down of a data set: what was asked for, what is done, the manifest, tables, lists of files.
+//! The records of a data set: the request, the finished work, the manifest, tables, and lists of files.
 
 pub(crate) mod assets;
 pub(crate) mod checked;
@@ -20,11 +20,11 @@ use crate::error::{Result, passes_io};
 use s3d_io::Error as FileError;
 use std::io::ErrorKind;
 
-/// What a file holds; nothing if it is not there, or is none of ours.
+/// Returns the content of a file, or `None` if the file is missing or not ours.
 ///
 /// # Errors
-/// Those of the disk or the network at this moment, and of permissions: what cannot be read now may be there
-/// all the same, and must not be taken for gone.
+/// Errors of permissions, and temporary ones of the disk or the network. The file may exist although it
+/// cannot be read now, so it must not count as missing.
 pub(crate) fn if_there<T>(read: s3d_io::Result<T>) -> Result<Option<T>> {
     match read {
         Ok(value) => Ok(Some(value)),

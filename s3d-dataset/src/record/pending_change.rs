@@ -1,4 +1,4 @@
-//! A change of a complete data set that is ready, but not completed: what `store/change.rs` writes of it.
+//! A change of a complete data set that is ready but not completed, as `store/change.rs` writes it.
 
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
@@ -8,27 +8,27 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
-/// What `ready` holds.
+/// The content of the file `ready`.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ready {
-    /// The call that makes the change, in words: the same words are the same call.
+    /// The call that makes the change, in words. Equal words mean the same call.
     pub(crate) call: String,
-    /// Folders that give way as a whole, from the data set's.
+    /// The folders that are replaced as a whole. Paths start at the data set's folder.
     pub(crate) replaced: Vec<PathBuf>,
 }
 
-/// The folder in which a change of a data set is made ready.
+/// Returns the folder in which a change of a data set is prepared.
 pub(crate) fn folder(layout: &Layout) -> PathBuf {
     layout.work_dir().join("change")
 }
 
-/// The file that says that a change is ready, and is to be completed.
+/// Returns the file whose presence says that a change is ready to be completed.
 pub(crate) fn ready_file(layout: &Layout) -> PathBuf {
     folder(layout).join("ready")
 }
 
-/// The call whose change is not completed, if there is one: the data set is half of the old and half of the
-/// new then.
+/// Returns the call whose change is not completed, if there is one. The data set is then half old and half
+/// new.
 pub(crate) fn pending(layout: &Layout) -> Result<Option<String>, FileError> {
     let path = ready_file(layout);
     match fs::symlink_metadata(&path) {

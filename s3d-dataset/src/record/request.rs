@@ -1,5 +1,5 @@
-//! What decides the bytes of a data set: the version of s3d, the options, the input. Two exports of equal
-//! requests write the same files, so that one can go on where the other was killed.
+//! A request: everything that decides the bytes of a data set, which is the version of s3d, the options and
+//! the input. Exports of equal requests write the same files, so one can continue where another was killed.
 
 use crate::error::{Difference, Result};
 use crate::options::ExportOptions;
@@ -10,72 +10,76 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What is asked for. It names neither threads nor folders of the machine.
+/// The request of an export. It names no thread counts and no folders of the machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Request {
-    /// Of s3d.
+    /// The version of s3d.
     pub(crate) version: String,
     pub(crate) seed: u64,
-    /// Without the seed and the distance of placed locations, which stand above and below.
+    /// The options without the seed, which stands above, and the placing of scan locations, which stands
+    /// below.
     pub(crate) options: ExportOptions,
     /// The areas, by number.
     pub(crate) areas: Vec<RequestedArea>,
 }
 
-/// An area that is asked for.
+/// A requested area.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RequestedArea {
     pub(crate) area: u32,
-    /// How far apart scan locations are placed, metres; null if the scene has its own, or `see` is there.
+    /// The distance at which scan locations are placed, metres. Null if the scene has its own, or `see` is
+    /// set.
     pub(crate) place_cameras: Option<f64>,
-    /// Which share of the surface they are placed to see, if they are.
+    /// The share of the surface that placed locations are to see. Absent if they are not placed that way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) see: Option<f64>,
-    /// What is subtracted from the scan's coordinates, metres; not there if nothing is. It follows from what
-    /// is read.
+    /// What is subtracted from the scan's coordinates, metres. Absent if nothing is. It follows from the
+    /// input.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) offset_m: Option<[f64; 3]>,
-    /// What is read.
+    /// The input files and folders.
     pub(crate) inputs: Vec<InputRecord>,
 }
 
 /// A file or folder of the input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct InputRecord {
-    /// From the folder of the scene file; of what is named by a whole path its last part alone. That of a
-    /// folder ends with `/`.
+    /// The path from the folder of the scene file. Only the last part of an input that is named by a whole
+    /// path. The path of a folder ends with `/`.
     pub(crate) path: String,
-    /// Its size; of a folder that of all files in it.
+    /// The size of the file, or of all files in the folder, bytes.
     pub(crate) bytes: u64,
-    /// The checksum of its content; of a folder that of a list of its files, a line `path,bytes,xxh3_128`
-    /// each, paths from the folder and sorted.
+    /// The checksum of the file's content. For a folder, the checksum of a sorted list of its files, with a
+    /// line `path,bytes,xxh3_128` for each and paths from the folder.
     pub(crate) xxh3_128: Checksum,
 }
 
 impl InputRecord {
-    /// Of a text that stands for a file which nobody wrote.
+    /// Records a text that stands for a file on no disk.
     pub(crate) fn of_text(name: &str, text: &str) -> Self {
-        let (bytes, xxh3_128) = (text.len() as u64, Checksum::of(text.as_bytes()));
-        Self { path: format!("memory:{name}"), bytes, xxh3_128 }
+        Self {
+            path: format!("memory:{name}"),
+            bytes: text.len() as u64,
+            xxh3_128: Checksum::of(text.as_bytes()),
+        }
     }
 }
 
-/// What differs between options.
+/// Returns how the options differ.
 fn option_differences(there: &ExportOptions, now: &ExportOptions) -> Vec<Difference> {
     let there = stored_fields(there);
     let now = stored_fields(now);
     // An option that has its default may not be stored.
     let names: BTreeSet<&String> = there.keys().chain(now.keys()).collect();
-    let value = |of: &serde_json::Map<String, Value>, name: &str| of.get(name).cloned().unwrap_or_default();
     names
         .into_iter()
-        .map(|name| (name, value(&there, name), value(&now, name)))
+        .map(|name| (name, stored_value(&there, name), stored_value(&now, name)))
         .filter(|(_, there, now)| there != now)
         .map(|(name, there, now)| difference(name, &there, &now))
         .collect()
 }
 
-/// The options as they are stored.
+/// Returns the options as they are stored.
 fn stored_fields(options: &ExportOptions) -> serde_json::Map<String, Value> {
     match serde_json::to_value(options) {
         Ok(Value::Object(fields)) => fields,
@@ -83,9 +87,12 @@ fn stored_fields(options: &ExportOptions) -> serde_json::Map<String, Value> {
     }
 }
 
-/// How an option differs: a switch is set or not, anything else has a value.
+fn stored_value(fields: &serde_json::Map<String, Value>, name: &str) -> Value {
+    fields.get(name).cloned().unwrap_or_default()
+}
+
+/// Returns how an option differs. A switch is set or not; any other option has a value.
 fn difference(name: &str, there: &Value, now: &Value) -> Difference {
-    let is_smooth = |value: &Value| value == "smooth";
     let switch = |value: Option<String>, now: bool| Difference::Switch { name: name.to_owned(), value, now };
     match (there, now) {
         (Value::Bool(there), _) => switch(None, !there),
@@ -96,7 +103,11 @@ fn difference(name: &str, there: &Value, now: &Value) -> Difference {
     }
 }
 
-/// A difference that is no option's.
+fn is_smooth(value: &Value) -> bool {
+    value == "smooth"
+}
+
+/// Returns a difference outside the options.
 fn other(text: String) -> Difference {
     Difference::Other(text)
 }
@@ -112,7 +123,7 @@ fn words(value: &Value) -> String {
 }
 
 impl Request {
-    /// What is asked for by these options of areas with this input.
+    /// Builds the request for these options and areas.
     pub(crate) fn new(options: &ExportOptions, areas: Vec<RequestedArea>) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
         let stored =
@@ -125,12 +136,12 @@ impl Request {
         self.areas.iter().map(|a| a.area).collect()
     }
 
-    /// What is subtracted from the coordinates of the areas' scans.
+    /// Returns what is subtracted from the coordinates of the areas' scans.
     pub(crate) fn world_offsets(&self) -> WorldOffsets {
         self.areas.iter().filter_map(|a| Some((a.area, a.offset_m?))).collect()
     }
 
-    /// What is known of a file or folder of an area's input, by its name.
+    /// Returns the record of a file or folder of an area's input, by its name.
     pub(crate) fn input(&self, area: u32, name: &str) -> Option<&InputRecord> {
         let area = self.areas.iter().find(|a| a.area == area)?;
         area.inputs
@@ -138,7 +149,7 @@ impl Request {
             .find(|i| i.path.strip_suffix('/').unwrap_or(&i.path) == name)
     }
 
-    /// The same request with nothing asked for but labels and scores: what a plan is made for.
+    /// Returns the same request with labels and scores alone, for a plan.
     pub(crate) fn of_plan(&self) -> Self {
         let ExportOptions { views, size, lenient, fill, entropy_stride, .. } = self.options;
         let options = ExportOptions {
@@ -153,7 +164,7 @@ impl Request {
         Self { options, ..self.clone() }
     }
 
-    /// How the request `now` differs from this one. There is no difference if the two make the same bytes.
+    /// Returns how the request `now` differs from this one. Requests without differences make the same bytes.
     pub(crate) fn differences(&self, now: &Self) -> Vec<Difference> {
         let mut differences = Vec::new();
         if self.version != now.version {
@@ -167,57 +178,48 @@ impl Request {
             });
         }
         differences.extend(option_differences(&self.options, &now.options));
-        let by_number = |areas: &[RequestedArea]| -> BTreeMap<u32, RequestedArea> {
-            areas.iter().map(|a| (a.area, a.clone())).collect()
-        };
-        let (there, now) = (by_number(&self.areas), by_number(&now.areas));
+
+        let there = by_number(&self.areas);
+        let now = by_number(&now.areas);
         for (number, before) in &there {
             match now.get(number) {
                 Some(after) => differences.extend(before.differences(after)),
                 None => differences.push(other(format!("area {number} there, not now"))),
             }
         }
+
         let more = now.keys().filter(|number| !there.contains_key(number));
         differences.extend(more.map(|number| other(format!("area {number} now, not there"))));
         differences
     }
 }
 
+fn by_number(areas: &[RequestedArea]) -> BTreeMap<u32, RequestedArea> {
+    areas.iter().map(|area| (area.area, area.clone())).collect()
+}
+
 impl RequestedArea {
     fn differences(&self, now: &Self) -> Vec<Difference> {
         let mut differences = Vec::new();
         if (self.place_cameras, self.see) != (now.place_cameras, now.see) {
-            let words = |area: &Self| match (area.place_cameras, area.see) {
-                (Some(m), _) => format!("{m} m apart"),
-                (None, Some(share)) => format!("to see {share} of the surface"),
-                (None, None) => "none".to_owned(),
-            };
             differences.push(other(format!(
                 "placed scan locations of area {}: {} there, {} now",
                 self.area,
-                words(self),
-                words(now)
+                self.placing_in_words(),
+                now.placing_in_words()
             )));
         }
         if self.offset_m != now.offset_m {
-            let words = |offset: Option<[f64; 3]>| offset.map_or("none".to_owned(), |o| format!("{o:?}"));
             differences.push(other(format!(
                 "offset_m of area {}: {} there, {} now",
                 self.area,
-                words(self.offset_m),
-                words(now.offset_m)
+                offset_in_words(self.offset_m),
+                offset_in_words(now.offset_m)
             )));
         }
-        let by_path = |inputs: &[InputRecord]| -> BTreeMap<String, Vec<(u64, Checksum)>> {
-            let mut map: BTreeMap<String, Vec<(u64, Checksum)>> = BTreeMap::new();
-            for input in inputs {
-                map.entry(input.path.clone())
-                    .or_default()
-                    .push((input.bytes, input.xxh3_128));
-            }
-            map
-        };
-        let (there, after) = (by_path(&self.inputs), by_path(&now.inputs));
+
+        let there = by_path(&self.inputs);
+        let after = by_path(&now.inputs);
         for (path, before) in &there {
             match after.get(path) {
                 Some(now) if now == before => {}
@@ -225,35 +227,60 @@ impl RequestedArea {
                 None => differences.push(other(format!("{path}: input there, not now"))),
             }
         }
+
         let more = after.keys().filter(|path| !there.contains_key(*path));
         differences.extend(more.map(|path| other(format!("{path}: input now, not there"))));
-        // The same files in another order are another input: meshes are joined in the order of the scene
-        // file.
+
+        // The same files in another order are another input, since meshes are joined in the order of the
+        // scene file.
         if differences.is_empty() && self.inputs != now.inputs {
             differences.push(other(format!("area {}: its input in another order", self.area)));
         }
         differences
     }
+
+    fn placing_in_words(&self) -> String {
+        match (self.place_cameras, self.see) {
+            (Some(m), _) => format!("{m} m apart"),
+            (None, Some(share)) => format!("to see {share} of the surface"),
+            (None, None) => "none".to_owned(),
+        }
+    }
 }
 
-/// The request of an unfinished export, if there is one.
+fn offset_in_words(offset_m: Option<[f64; 3]>) -> String {
+    offset_m.map_or("none".to_owned(), |offset| format!("{offset:?}"))
+}
+
+/// Groups the sizes and checksums of inputs by their path.
+fn by_path(inputs: &[InputRecord]) -> BTreeMap<String, Vec<(u64, Checksum)>> {
+    let mut map: BTreeMap<String, Vec<(u64, Checksum)>> = BTreeMap::new();
+    for input in inputs {
+        map.entry(input.path.clone())
+            .or_default()
+            .push((input.bytes, input.xxh3_128));
+    }
+    map
+}
+
+/// Reads the request of an unfinished export, if there is one.
 ///
 /// # Errors
-/// It cannot be read now: as [`if_there`].
+/// Fails as [`if_there`] does if the file cannot be read now.
 pub(crate) fn read_request(layout: &Layout) -> Result<Option<Request>> {
     if_there(read_json(&layout.request()))
 }
 
-/// The version of s3d that began an unfinished export whose request this one cannot read, for it has other
-/// options.
+/// Returns the version of s3d that began an unfinished export, if it is another one. Its request may have
+/// options that this version cannot read.
 pub(crate) fn begun_by_other_version(layout: &Layout) -> Result<Option<String>> {
     #[derive(Deserialize)]
-    struct Of {
+    struct Begun {
         version: String,
     }
-    let of: Option<Of> = if_there(read_json(&layout.request()))?;
-    Ok(of
-        .map(|of| of.version)
+    let begun: Option<Begun> = if_there(read_json(&layout.request()))?;
+    Ok(begun
+        .map(|begun| begun.version)
         .filter(|version| version != env!("CARGO_PKG_VERSION")))
 }
 
@@ -316,6 +343,7 @@ pub(crate) mod tests {
         assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
         assert_eq!(changed(&|r| r.options.keep_all = true), ["`keep_all` now, not there"]);
         assert_eq!(changed(&|r| r.options.normals = Normals::Smooth), ["`normals = smooth` now, not there"]);
+
         assert_eq!(
             changed(&|r| r.options.only = vec!["a".into(), "b".into()]),
             ["`only` none there, a,b now"]
@@ -324,6 +352,7 @@ pub(crate) mod tests {
             changed(&|r| r.options.profiles = vec![Profile::PointNet]),
             ["`profiles` none there, pointnet now"]
         );
+
         assert_eq!(changed(&|r| r.areas[1].inputs[1].xxh3_128 = Checksum(8)), ["rgb.obj: other bytes"]);
         assert_eq!(changed(&|r| drop(r.areas[0].inputs.remove(2))), ["Area_1/: input there, not now"]);
         assert_eq!(changed(&|r| r.areas[0].inputs.swap(0, 1)), ["area 1: its input in another order"]);
@@ -339,6 +368,7 @@ pub(crate) mod tests {
             changed(&|r| r.areas[0].offset_m = Some([5e5, 0.0, 1.5])),
             ["offset_m of area 1: none there, [500000.0, 0.0, 1.5] now"]
         );
+
         assert_eq!(changed(&|r| drop(r.areas.remove(1))), ["area 3 there, not now"]);
         assert_eq!(changed(&|r| r.areas[1].area = 4), ["area 3 there, not now", "area 4 now, not there"]);
     }
@@ -350,6 +380,7 @@ pub(crate) mod tests {
             change(&mut now);
             texts(&request().of_plan().differences(&now.of_plan()))
         };
+
         let other_images = |r: &mut Request| {
             r.options.pano_width = 64;
             r.options.pool = Pool::Area;
@@ -361,6 +392,7 @@ pub(crate) mod tests {
         assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
         assert_eq!(changed(&|r| r.options.lenient = true), ["`lenient` now, not there"]);
         assert_eq!(changed(&|r| r.seed = 7), ["`seed` 0 there, 7 now"]);
+
         let known = request();
         assert_eq!(known.input(3, "Area_1").map(|i| i.path.as_str()), Some("Area_1/"));
         assert!(known.input(1, "rgb.obj").is_some() && known.input(2, "rgb.obj").is_none());

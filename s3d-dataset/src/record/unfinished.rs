@@ -1,4 +1,4 @@
-//! A data set whose export did not finish, as far as it is.
+//! The finished part of a data set whose export did not finish.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -15,30 +15,37 @@ use s3d_io::dataset::Layout;
 use std::path::PathBuf;
 
 impl DataSet {
-    /// As [`DataSet::open`], of an export that did not finish, too: of that the files of finished units, as
-    /// its journals tell of them. Tables over all units are not there.
+    /// Opens a data set like [`DataSet::open`], but also one whose export did not finish. That one has the
+    /// files of its finished units, as its journals list them, and no tables over all units.
     pub(crate) fn open_unfinished_in(ctx: &Context, layout: &Layout) -> Result<Self> {
         let Some(mut manifest) = Manifest::read_running(layout)? else { return Self::open_in(layout) };
         let Some(request) = read_request(layout)? else {
             let message = "the export did not finish, and what it was to be is not known";
             return Err(FileError::format(&layout.manifest(), message).into());
         };
+
         let finished = Finished::read(ctx, layout)?;
-        let first: Vec<PathBuf> = listing::walk(&layout.assets_dir())?;
-        let first = listing::records(ctx, layout, &[first, vec![layout.conventions()]].concat())?;
+
+        let assets: Vec<PathBuf> = listing::walk(&layout.assets_dir())?;
+        let begun_with = [assets, vec![layout.conventions()]].concat();
+        let begun_with = listing::records(ctx, layout, &begun_with)?;
         let of_units = finished.iter().flat_map(|done| done.files().iter().cloned());
-        let files = Listed::of(layout.root(), of_units.chain(first));
+        let files = Listed::of(layout.root(), of_units.chain(begun_with));
+
         manifest.areas = request
             .numbers()
             .into_iter()
             .filter_map(|area| entry(&finished, area))
             .collect();
-        let photographs = |area| finished.photographs(area).map(|done| done.record.clone()).collect();
         let photographs = request
             .numbers()
             .into_iter()
-            .map(|area| (area, photographs(area)))
+            .map(|area| {
+                let records = finished.photographs(area).map(|done| done.record.clone());
+                (area, records.collect())
+            })
             .collect();
+
         let taxonomy = manifest.read_taxonomy(layout, |_| Ok(()))?;
         let unfinished = Unfinished { photographs, missing: sentences(&request, &finished) };
         let unfinished = Some(unfinished);
@@ -46,7 +53,7 @@ impl DataSet {
     }
 }
 
-/// What the manifest would tell of an area that is labelled.
+/// Returns the manifest's entry for a labelled area, so far.
 fn entry(finished: &Finished, area: u32) -> Option<AreaEntry> {
     let of_photographs = finished.photographs(area).map(|done| done.tally);
     let of_locations = finished.locations(area).map(|done| done.tally);
@@ -66,10 +73,12 @@ fn sentences(request: &Request, finished: &Finished) -> Vec<String> {
     for area in request.numbers() {
         let count =
             |is: fn(&Unit) -> bool| missing.iter().filter(|unit| unit.area() == area && is(unit)).count();
+
         if count(|unit| matches!(unit, Unit::Labels(_))) > 0 {
             sentences.push(format!("area {area} has neither labels nor images yet"));
             continue;
         }
+
         for (n, what) in [
             (count(|unit| matches!(unit, Unit::Location(..))), "scan locations have no images yet"),
             (count(|unit| matches!(unit, Unit::Photograph(..))), "photographs are no views yet"),
@@ -78,10 +87,12 @@ fn sentences(request: &Request, finished: &Finished) -> Vec<String> {
                 sentences.push(format!("area {area}: {n} {what}"));
             }
         }
+
         if count(|unit| matches!(unit, Unit::Assets(_))) > 0 {
             sentences.push(format!("area {area} has neither meshes nor points yet"));
         }
     }
+
     sentences.push("lists of views, statistics and folds are made at the end".to_owned());
     sentences
 }

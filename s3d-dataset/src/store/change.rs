@@ -1,10 +1,10 @@
-//! A change of a complete data set: all of it, or nothing.
+//! A change of a complete data set, made as a whole or not at all.
 //!
-//! What is new is written in `.s3d/change/new`, under the names that it will have, the list of files and the
-//! manifest too. Then `.s3d/change/ready` is written, and from there on the change is only completed: what is
-//! replaced goes, what is new takes its place, the manifest last. A process that is killed before leaves the
-//! data set as it was; one that is killed after leaves one that [`pending`] tells of, and the next that has
-//! the lock completes it.
+//! The new files are written in `.s3d/change/new` under their later names, with the list of files and the
+//! manifest. Then `.s3d/change/ready` is written. From there on the change can only be completed: replaced
+//! files are removed, new files move into place, the manifest last. A process that is killed before leaves
+//! the data set as it was. A process that is killed after leaves a change that [`pending`] reports, and the
+//! next process with the lock completes it.
 
 use crate::error::Result;
 use crate::record::pending_change::{Ready, folder, pending, ready_file};
@@ -26,8 +26,8 @@ fn staged(layout: &Layout) -> Layout {
     Layout::new(folder(layout).join("new"))
 }
 
-/// Completes a change that is ready, and removes one that is not. Returns the call that made the first. The
-/// lock is the caller's.
+/// Completes a ready change, and removes an unready one. Returns the call that made the completed change. The
+/// caller must hold the lock.
 pub(crate) fn settle(layout: &Layout) -> Result<Option<String>> {
     let call = pending(layout)?;
     if call.is_some() {
@@ -38,7 +38,7 @@ pub(crate) fn settle(layout: &Layout) -> Result<Option<String>> {
 }
 
 impl Change {
-    /// Begins a change of a complete data set, whose lock is the caller's.
+    /// Begins a change of a complete data set. The caller must hold the lock.
     pub(crate) fn begin(layout: &Layout) -> Result<Self> {
         remove(&folder(layout))?;
         let staged = staged(layout);
@@ -46,18 +46,20 @@ impl Change {
         Ok(Self { layout: layout.clone(), staged })
     }
 
-    /// Where what is new is written.
+    /// Returns where new files are written.
     pub(crate) fn staged(&self) -> &Layout {
         &self.staged
     }
 
-    /// Puts what was written in its place; of `replaced`, folders of the data set, nothing stays that is not
+    /// Moves the new files into place. Nothing stays of `replaced`, folders of the data set, unless it was
     /// written anew. The list of files and the manifest must have been written.
     pub(crate) fn commit(self, call: &str, replaced: &[PathBuf]) -> Result<()> {
         let below = |path: &PathBuf| path.strip_prefix(self.layout.root()).map(Path::to_owned).ok();
         let ready = Ready { call: call.to_owned(), replaced: replaced.iter().filter_map(below).collect() };
-        // A change that is called ready on a disk that lost some of it could not be completed.
+
+        // A change that is called ready must be whole on the disk, or it could never be completed.
         sync_data_set(self.layout.root(), &entries(self.staged.root())?.1)?;
+
         let path = folder(&self.layout).join("ready");
         write_json(&path, &ready)?;
         sync_file(&path)?;
@@ -67,7 +69,7 @@ impl Change {
 }
 
 impl Drop for Change {
-    /// What was not committed goes; that of a change which is ready stays.
+    /// Removes a change that is not ready. A ready change stays.
     fn drop(&mut self) {
         if matches!(pending(&self.layout), Ok(None)) {
             let _ = remove(&folder(&self.layout));
@@ -75,26 +77,31 @@ impl Drop for Change {
     }
 }
 
-/// Moves what is there still of a change that is ready to its place. Every step can be made again.
+/// Moves the rest of a ready change into place. Every step can be repeated.
 fn complete(layout: &Layout) -> Result<()> {
-    let (staged, root) = (staged(layout), layout.root());
+    let staged = staged(layout);
+    let root = layout.root();
     let path = ready_file(layout);
     let Ready { replaced, .. } = read_json(&path)?;
+
     for folder in &replaced {
-        let (from, to) = (staged.root().join(folder), root.join(folder));
+        let from = staged.root().join(folder);
+        let to = root.join(folder);
         if from.exists() {
             remove(&to)?;
             to.parent().map_or(Ok(()), create_dir)?;
             rename(&from, &to)?;
         }
     }
+
     let (folders, files) = entries(staged.root())?;
     let place = |from: &Path| from.strip_prefix(staged.root()).map(|below| root.join(below)).ok();
     folders
         .iter()
         .filter_map(|from| place(from))
         .try_for_each(|to| create_dir(&to))?;
-    // The manifest last, and before it the list of which it has the checksum.
+
+    // The manifest comes last, and before it the list whose checksum it holds.
     let last = [staged.file_list(), staged.manifest()];
     let first = files.iter().filter(|file| !last.contains(file));
     for from in first.chain(last.iter().filter(|file| files.contains(file))) {
@@ -102,14 +109,17 @@ fn complete(layout: &Layout) -> Result<()> {
             rename(from, &to)?;
         }
     }
-    // From here on it is done, though a folder of nothing may be left.
+
+    // The change is complete from here on, though an empty folder may be left.
     remove(&path)?;
     remove(&folder(layout))
 }
 
-/// The folders and the files below a folder; none if it is not there.
+/// Returns the folders and the files below a folder, or none if it does not exist.
 fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-    let (mut folders, mut files) = (Vec::new(), Vec::new());
+    let mut folders = Vec::new();
+    let mut files = Vec::new();
+
     let mut left = vec![folder.to_owned()];
     while let Some(folder) = left.pop() {
         let failed = |e| FileError::io(&folder, "read the folder", e);
@@ -127,6 +137,7 @@ fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
             }
         }
     }
+
     folders.sort();
     files.sort();
     Ok((folders, files))
@@ -153,7 +164,7 @@ mod tests {
         entries(layout.root()).unwrap().1.into_iter().map(below).collect()
     }
 
-    /// A data set, and a change of it that replaces a folder and adds a file.
+    /// Begins a change of a data set that replaces a folder and adds a file.
     fn begun() -> (tempfile::TempDir, Layout, Change) {
         let dir = tempfile::tempdir().unwrap();
         let layout = Layout::new(dir.path());
@@ -172,17 +183,18 @@ mod tests {
     #[test]
     fn a_change_is_made_as_a_whole_or_not_at_all() {
         let (_dir, layout, change) = begun();
-        let before = { state(&layout).into_iter().filter(|(path, _)| !path.starts_with(".s3d")) };
+        let before = state(&layout).into_iter().filter(|(path, _)| !path.starts_with(".s3d"));
         let before: Vec<_> = before.collect();
         drop(change);
         assert_eq!((state(&layout), pending(&layout).unwrap()), (before.clone(), None));
+
         // Killed before it was ready.
         let (_dir, layout, change) = begun();
         std::mem::forget(change);
         assert_eq!((settle(&layout).unwrap(), state(&layout)), (None, before));
     }
 
-    /// A kill may come between any two renames: the state after each of them ends in the same.
+    /// A kill may come between any two renames. The state after each of them leads to the same end.
     #[test]
     fn a_change_that_is_ready_is_completed_from_every_state() {
         let (_dir, layout, change) = begun();
@@ -197,6 +209,7 @@ mod tests {
                 .iter()
                 .all(|(path, text)| (text == "old") == path.ends_with("mine.txt"))
         );
+
         type Step<'s> = &'s dyn Fn(&Path, &Path);
         let steps: [Step<'_>; 5] = [
             &|root, _| fs::remove_file(root.join("profiles/pointnet/gone")).unwrap(),
@@ -211,6 +224,7 @@ mod tests {
             &|root, new| fs::rename(new.join("files.csv"), root.join("files.csv")).unwrap(),
             &|root, new| fs::rename(new.join("area_1/data/b"), root.join("area_1/data/b")).unwrap(),
         ];
+
         for killed_after in 0..=steps.len() {
             let (_dir, layout, change) = begun();
             let ready = Ready { call: CALL.to_owned(), replaced: vec!["profiles/pointnet".into()] };

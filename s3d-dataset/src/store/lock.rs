@@ -1,4 +1,4 @@
-//! One process at a time exports into a folder.
+//! The lock of an output folder: one process at a time exports into it.
 
 use crate::context::Context;
 use crate::error::{Result, TemporaryError, Work};
@@ -12,21 +12,21 @@ use std::fs::{self, File, TryLockError};
 #[derive(Debug)]
 pub(crate) struct Lock {
     layout: Layout,
-    // It is the lock: closed, it is gone.
+    // The open file holds the lock. Closing it frees the lock.
     _file: File,
 }
 
-/// With whom a lock is shared.
+/// The processes that may hold a lock together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sharing {
-    /// With nobody.
+    /// One process only.
     Alone,
-    /// With other shards of the same export.
+    /// All shards of the same export.
     Shards,
 }
 
 impl Lock {
-    /// Takes the lock of OUT, for which it makes the folder and `.s3d`.
+    /// Takes the lock of OUT. Makes the folder and `.s3d`.
     ///
     /// # Errors
     /// [`Error::Temporary`](crate::Error::Temporary) if another process holds it.
@@ -41,17 +41,18 @@ impl Lock {
                 .read(true)
                 .open(&path);
             let file = match opened {
-                // Whoever had it was just done, and took the folder away.
+                // The earlier holder has just ended and removed the folder.
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound => continue,
                 opened => opened.map_err(|e| FileError::io(&path, "write", e))?,
             };
+
             let taken = match sharing {
                 Sharing::Alone => file.try_lock(),
                 Sharing::Shards => file.try_lock_shared(),
             };
             match taken {
                 Ok(()) if is_still(&file, layout) => return Ok(Self { layout: layout.clone(), _file: file }),
-                // A lock of a file that is not there any more is worth nothing.
+                // The lock belongs to a file that is no longer at the path. Try again.
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
                     let path = layout.root().to_owned();
@@ -70,11 +71,11 @@ impl Lock {
         }
     }
 
-    /// The lock of a complete data set that a command changes, for the time of `work`. That is told which
-    /// call's change, begun by a process that was killed, was completed before.
+    /// Holds the lock of a complete data set while `work` changes it. A change of a killed process is
+    /// completed first, and `work` gets the call that made it.
     ///
     /// # Errors
-    /// As [`Lock::take`], and those of `work`.
+    /// The same as for [`Lock::take`], and those of `work`.
     pub(crate) fn during<T>(
         ctx: &Context,
         layout: &Layout,
@@ -86,17 +87,17 @@ impl Lock {
         done
     }
 
-    /// Gives the lock back, and takes the working folder away if nothing was begun.
+    /// Frees the lock, and removes the working folder if nothing was begun.
     pub(crate) fn abandon(self) {
         if !self.layout.request().exists() {
-            // It holds the lock's file and nothing else; if not, it stays.
+            // Only an empty folder is removed.
             let _ = fs::remove_file(self.layout.lock());
             let _ = fs::remove_dir(self.layout.work_dir());
         }
     }
 }
 
-/// Whether the file is the one that lies at the lock's path.
+/// Returns whether the open file is the one at the lock's path.
 #[cfg(unix)]
 fn is_still(file: &File, layout: &Layout) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -106,7 +107,7 @@ fn is_still(file: &File, layout: &Layout) -> bool {
     }
 }
 
-/// Whether there is a file at the lock's path. An open file cannot be removed here.
+/// Returns whether a file is at the lock's path. On these systems an open file cannot be removed.
 #[cfg(not(unix))]
 fn is_still(_: &File, layout: &Layout) -> bool {
     layout.lock().exists()
@@ -129,14 +130,17 @@ mod tests {
                 "{refused}"
             );
         }
+
         drop(lock);
         let shared = [(); 2].map(|()| Lock::take(&Context::default(), &layout, Sharing::Shards).unwrap());
         assert!(Lock::take(&Context::default(), &layout, Sharing::Alone).is_err());
         drop(shared);
+
         Lock::take(&Context::default(), &layout, Sharing::Alone)
             .unwrap()
             .abandon();
         assert!(!layout.work_dir().exists());
+
         let lock = Lock::take(&Context::default(), &layout, Sharing::Alone).unwrap();
         fs::write(layout.request(), "{}").unwrap();
         lock.abandon();

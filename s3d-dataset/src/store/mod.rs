@@ -1,4 +1,4 @@
-//! The folder of a data set: what state it is in, what is done of an export, and who may write to it.
+//! The folder of a data set: its state, the finished part of an export, and who may write to it.
 
 pub(crate) mod backup;
 pub(crate) mod change;
@@ -13,7 +13,7 @@ use crate::error::{Result, UsageError};
 use s3d_io::Error as FileError;
 use std::path::{Path, PathBuf};
 
-/// Refuses to replace a file unless that was asked for.
+/// Refuses to replace a file unless `overwrite` is set.
 pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<()> {
     match path.try_exists() {
         Ok(true) if !overwrite => Err(UsageError::Exists { path: path.to_owned(), note: None }.into()),
@@ -22,17 +22,17 @@ pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<()> {
     }
 }
 
-/// Whether a folder holds a plan, whose journals must not be taken for those of an export.
+/// Returns whether a folder holds a plan. Its journals must not be mistaken for an export's.
 pub(crate) fn is_plan(folder: &Path) -> bool {
     plan_file(folder).exists()
 }
 
-/// What a plan is for.
+/// Returns the file that describes a plan.
 pub(crate) fn plan_file(folder: &Path) -> PathBuf {
     folder.join("plan.jsonl")
 }
 
-/// The folder that a path lies in.
+/// Returns the folder that holds a path.
 pub(crate) fn parent_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),

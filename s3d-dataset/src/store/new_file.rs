@@ -1,4 +1,4 @@
-//! A file that is made beside its place, and moved there when it is complete.
+//! A file that is written beside its place, and moved there when it is complete.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -6,8 +6,9 @@ use crate::store::staging::Staging;
 use crate::store::{parent_of, refuse_existing};
 use std::path::{Path, PathBuf};
 
-/// A file that is made in a folder beside its place, and moved there when it is complete. Dropped before, it
-/// leaves nothing behind; what a killed process has left is taken over by the next that makes the same file.
+/// A file that is written in a folder beside its place, and moved there when it is complete. Dropped before
+/// that, it leaves nothing behind. The next process that makes the same file takes over what a killed process
+/// left.
 pub struct NewFile {
     parent: PathBuf,
     path: PathBuf,
@@ -15,12 +16,12 @@ pub struct NewFile {
 }
 
 impl NewFile {
-    /// Whether `place` can be written, asked before long work whose result goes there.
+    /// Checks whether `place` can be written, before long work whose result goes there.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) if something is there that is not to be replaced.
+    /// [`Error::Usage`](crate::Error::Usage) if a file is there and `overwrite` is not set.
     pub fn check_free(place: &Path, overwrite: bool) -> Result<()> {
-        // What a killed process left is put in its place.
+        // What a killed process left goes back to its place later.
         if Staging::is_left(&parent_of(place), name_of(place)) {
             Ok(())
         } else {
@@ -28,26 +29,27 @@ impl NewFile {
         }
     }
 
-    /// Begins what will be the file `place`, whose folder must be there.
+    /// Begins the file that will be `place`. Its folder must exist.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) if something is there that is not to be replaced;
-    /// [`Error::Temporary`](crate::Error::Temporary) if another process makes it;
+    /// [`Error::Usage`](crate::Error::Usage) if a file is there and `overwrite` is not set.
+    /// [`Error::Temporary`](crate::Error::Temporary) if another process makes it.
     /// [`Error::File`](crate::Error::File) if no file can be made there.
     pub fn begin(ctx: &Context, place: &Path, overwrite: bool) -> Result<Self> {
         Self::check_free(place, overwrite)?;
-        let (parent, name) = (parent_of(place), name_of(place));
+        let parent = parent_of(place);
+        let name = name_of(place);
         let staging = Staging::begin(ctx, &parent, name)?;
         refuse_existing(place, overwrite || staging.was_placing())?;
         Ok(Self { parent, path: staging.path().join(name), staging })
     }
 
-    /// The file to write.
+    /// Returns the path to write to.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Moves the file to its place, instead of an earlier one.
+    /// Moves the file to its place, over an earlier one.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File).

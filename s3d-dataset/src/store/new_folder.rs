@@ -1,4 +1,4 @@
-//! A folder of a kind that is made of a data set: beside its place, and moved there when it is complete.
+//! A folder that is made from a data set: beside its place, and moved there when it is complete.
 
 use crate::context::Context;
 use crate::error::{Overwriting, Result, UsageError};
@@ -11,22 +11,22 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A kind of folder that is made of a data set, and how one is known again: a JSON file in it has the member
-/// `"generator"` with the name of the program.
+/// A kind of folder that is made from a data set. A folder of the kind is recognised by a JSON file in it,
+/// whose member `"generator"` names the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FolderKind {
-    /// The JSON file that says what made the folder, such as `pack.json`.
+    /// The JSON file that describes the folder, such as `pack.json`.
     pub about: &'static str,
-    /// What its member `generator` says: `s3d pack`.
+    /// The value of its member `generator`: `s3d pack`.
     pub generator: &'static str,
-    /// What such a folder is called in messages: `the package`.
+    /// The name of such a folder in messages: `the package`.
     pub noun: &'static str,
-    /// What cannot be done with a file that has the folder's name, in messages.
+    /// The action that fails if a file has the folder's name, in messages.
     pub action: &'static str,
 }
 
 impl FolderKind {
-    /// Whether a folder is of this kind.
+    /// Returns whether a folder is of this kind.
     pub fn is_of(&self, folder: &Path) -> bool {
         #[derive(Deserialize)]
         struct About {
@@ -41,23 +41,25 @@ impl FolderKind {
             Err(e) => return Err(FileError::io(place, self.action, e).into()),
             Ok(entries) => entries,
         };
+
         let Some(first) = entries.next() else { return Ok(()) };
         let first = first.map_err(|e| FileError::io(place, "read", e))?.file_name();
+
         let folder = place.to_owned();
         let entry = first.display().to_string();
-        match (self.is_of(place), overwrite) {
-            (true, true) => Ok(()),
-            (true, false) => {
-                let overwriting = Overwriting::Replaces(self.noun);
-                Err(UsageError::Holds { folder, entry, overwriting }.into())
-            }
-            (false, _) => Err(UsageError::Foreign { folder, entry, generator: self.generator }.into()),
+        if !self.is_of(place) {
+            return Err(UsageError::Foreign { folder, entry, generator: self.generator }.into());
         }
+        if overwrite {
+            return Ok(());
+        }
+        let overwriting = Overwriting::Replaces(self.noun);
+        Err(UsageError::Holds { folder, entry, overwriting }.into())
     }
 }
 
-/// A folder that is made beside its place, and moved there when it is complete. Dropped before, it leaves
-/// nothing behind; what a killed process has left is taken over by the next that makes the same folder.
+/// A folder that is made beside its place, and moved there when it is complete. Dropped before that, it
+/// leaves nothing behind. The next process that makes the same folder takes over what a killed process left.
 pub struct NewFolder {
     place: PathBuf,
     kind: FolderKind,
@@ -65,11 +67,12 @@ pub struct NewFolder {
 }
 
 impl NewFolder {
-    /// Begins what will be the folder `place`, made of the data set in `root`.
+    /// Begins the folder that will be `place`, made from the data set in `root`.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) if it lies in the data set or holds it, or if there is something in it that is not of
-    /// this kind, or is not to be replaced; [`Error::Temporary`](crate::Error::Temporary) if another process makes it;
+    /// [`Error::Usage`](crate::Error::Usage) if `place` lies in the data set or holds it, or if it holds
+    /// something that is of another kind, or of this kind while `overwrite` is not set.
+    /// [`Error::Temporary`](crate::Error::Temporary) if another process makes it.
     /// [`Error::File`](crate::Error::File) if no file can be made there.
     pub fn begin(
         ctx: &Context,
@@ -79,43 +82,46 @@ impl NewFolder {
         overwrite: bool,
     ) -> Result<Self> {
         check_apart(place, root)?;
-        let (parent, name) = (parent_of(place), Path::new(place.file_name().unwrap_or_default()));
-        // What a killed process left may be about to come back.
+        let parent = parent_of(place);
+        let name = Path::new(place.file_name().unwrap_or_default());
+
+        // After a kill, an earlier folder may be about to come back.
         if !Staging::is_left(&parent, name) {
             kind.check_free(place, overwrite)?;
         }
+
         create_dir(&parent)?;
         let staging = Staging::begin(ctx, &parent, name)?;
         kind.check_free(place, overwrite || staging.was_placing())?;
         Ok(Self { place: place.to_owned(), kind, staging })
     }
 
-    /// The folder to write to.
+    /// Returns the folder to write to.
     pub fn path(&self) -> &Path {
         self.staging.path()
     }
 
-    /// The folder that it will be.
+    /// Returns the final place of the folder.
     pub fn place(&self) -> &Path {
         &self.place
     }
 
-    /// Moves the folder to its place, instead of an earlier one. [`FolderKind::about`] must be in it by now.
+    /// Moves the folder to its place, over an earlier one. It must hold [`FolderKind::about`] by now.
     ///
     /// # Errors
-    /// [`Error::File`](crate::Error::File); what was there before is there again.
+    /// [`Error::File`](crate::Error::File). The earlier folder is then back in place.
     pub fn finish(self) -> Result<()> {
         self.staging.place_folder(&self.place, self.kind.is_of(&self.place))
     }
 }
 
-/// The path beside the folder of a data set that is called after it: `…/OUT` and `_report` give
+/// Returns the path beside a data set's folder, with its name and an ending: `…/OUT` and `_report` give
 /// `…/OUT_report`.
 ///
 /// # Errors
-/// [`Error::File`](crate::Error::File) if the folder has no name of its own, as `.` has none, and is not there to be asked.
+/// [`Error::File`](crate::Error::File) if the path has no name, like `.`, and the folder does not exist.
 pub fn beside(dataset: &Path, ending: &str) -> Result<PathBuf> {
-    // The name of "." is that of the folder it is.
+    // The name of "." is the name of the folder it stands for.
     let named = match dataset.file_name() {
         Some(_) => dataset.to_owned(),
         None => resolved(dataset).map_err(|e| FileError::io(dataset, "look for", e))?,
@@ -125,7 +131,7 @@ pub fn beside(dataset: &Path, ending: &str) -> Result<PathBuf> {
     Ok(named.with_file_name(name))
 }
 
-/// Refuses a place in the data set in `root`, or one that holds it.
+/// Refuses a place that lies in the data set in `root`, or holds it.
 ///
 /// # Errors
 /// [`Error::Usage`](crate::Error::Usage).
@@ -137,7 +143,7 @@ pub fn check_apart(place: &Path, root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// An absolute path without links, also if its end is not there yet.
+/// Returns an absolute path without links, even if its end does not exist yet.
 pub(crate) fn resolved(path: &Path) -> std::io::Result<PathBuf> {
     match fs::canonicalize(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => {

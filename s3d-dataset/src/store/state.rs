@@ -1,4 +1,4 @@
-//! What an output folder holds, read once, and whether an export may go into it.
+//! The state of an output folder, read once, and whether an export may go into it.
 
 use crate::context::Context;
 use crate::error::{Difference, Held, Overwriting, Result, UsageError, passes};
@@ -11,12 +11,12 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What an output folder held at the moment that it was read.
+/// The state of an output folder when it was read.
 #[derive(Debug)]
 pub(crate) struct OutputState {
-    /// The beginning of its manifest, if it has one of ours.
+    /// The head of its manifest, if the manifest is ours.
     head: Option<Head>,
-    /// The manifest of a complete data set, or why this version of s3d cannot read it.
+    /// The manifest of a complete data set, or the reason why this version of s3d cannot read it.
     manifest: Option<Result<Manifest, String>>,
     /// The request of an unfinished export.
     request: Option<Request>,
@@ -26,7 +26,7 @@ pub(crate) struct OutputState {
     failed: bool,
 }
 
-/// What an output folder holds, compared with a request.
+/// The content of an output folder, compared with a request.
 #[derive(Debug)]
 pub(super) enum Holding {
     /// Nothing of ours.
@@ -43,23 +43,22 @@ pub(super) enum Holding {
         differences: Vec<Difference>,
         failed: bool,
     },
-    /// The rest of an unfinished export of these areas that nobody can go on with.
+    /// The rest of an unfinished export of these areas that cannot be continued.
     Leftover { areas: Vec<u32> },
 }
 
 impl OutputState {
-    /// Reads what a folder holds.
+    /// Reads the state of a folder.
     ///
     /// # Errors
-    /// If a file cannot be read now, but may be there all the same: see
-    /// [`if_there`](crate::record::if_there).
+    /// Fails if a file cannot be read now but may exist: see [`if_there`](crate::record::if_there).
     pub(crate) fn read(layout: &Layout) -> Result<Self> {
         let head = Head::read(&layout.manifest())?;
         let manifest = if head.as_ref().is_some_and(Head::is_complete) {
             match Manifest::read(layout) {
                 Ok(manifest) => Some(Ok(manifest)),
                 Err(e) if passes(&e) => return Err(e.into()),
-                // It is of another version, or half changed.
+                // The manifest is of another version, or the data set is half changed.
                 Err(e) => Some(Err(e.to_string())),
             }
         } else {
@@ -75,32 +74,32 @@ impl OutputState {
         Ok(Self { head, manifest, request, other_version, failed: layout.failed().exists() })
     }
 
-    /// Whether an export into the folder has begun, or is complete.
+    /// Returns whether an export into the folder has begun, or is complete.
     pub(crate) fn is_begun(&self) -> bool {
         self.head.is_some() || self.request.is_some()
     }
 
-    /// Whether the folder holds a complete data set.
+    /// Returns whether the folder holds a complete data set.
     pub(super) fn is_complete(&self) -> bool {
         self.manifest.is_some()
     }
 
-    /// Whether an export was begun that is not complete.
+    /// Returns whether an export was begun and is not complete.
     pub(super) fn has_request(&self) -> bool {
         self.request.is_some() || self.other_version.is_some()
     }
 
-    /// The same after the rest of an export beside a complete data set is cleared away.
+    /// Returns the state after the rest of an export beside a complete data set is removed.
     pub(super) fn without_request(self) -> Self {
         Self { request: None, other_version: None, failed: false, ..self }
     }
 
-    /// The areas that its manifest tells of.
+    /// Returns the areas that the manifest lists.
     pub(super) fn areas_of_manifest(&self) -> Vec<u32> {
         self.head.as_ref().map_or(Vec::new(), |head| head.area_numbers.clone())
     }
 
-    /// Compares what the folder holds with a request.
+    /// Compares the folder with a request.
     pub(super) fn compare(&self, request: &Request) -> Holding {
         if let Some(manifest) = &self.manifest {
             let differences = match manifest {
@@ -109,6 +108,7 @@ impl OutputState {
             };
             return Holding::Complete { differences };
         }
+
         if let Some(begun) = &self.request {
             return Holding::Unfinished {
                 areas: begun.numbers(),
@@ -116,6 +116,7 @@ impl OutputState {
                 failed: self.failed,
             };
         }
+
         if self.head.is_none() {
             return Holding::Nothing;
         }
@@ -133,8 +134,8 @@ impl OutputState {
         }
     }
 
-    /// Refuses a folder that holds something that s3d did not write, unless it may be overwritten or its name is
-    /// one of the `allowed`. Changes nothing.
+    /// Refuses a folder with an entry that s3d did not write, unless `overwrite` is set or the entry's name
+    /// is one of `allowed`. Changes nothing.
     pub(crate) fn check(
         &self,
         ctx: &Context,
@@ -150,10 +151,12 @@ impl OutputState {
                 root.display()
             ));
         }
-        // Its journals would be taken for those of an export.
+
+        // A plan's journals would be mistaken for an export's.
         if crate::store::is_plan(root) {
             return Err(UsageError::HoldsPlan { folder: root.to_owned() }.into());
         }
+
         let entries = match fs::read_dir(root) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
             entries => entries.map_err(|e| FileError::io(root, "use as the output folder", e))?,
@@ -162,7 +165,7 @@ impl OutputState {
             return Ok(());
         }
 
-        // An unfinished export without a request left these, and nobody goes on with it.
+        // An unfinished export without a request left these, and they cannot be continued.
         let leftover = layout.entries(&self.areas_of_manifest());
         let is_leftover = |path: &Path| self.head.is_some() && leftover.iter().any(|b| b.starts_with(path));
         for entry in entries {
@@ -181,8 +184,8 @@ impl OutputState {
         Ok(())
     }
 
-    /// Refuses a folder in which the data set, or an earlier one that it replaces, would lie on its own input:
-    /// on one of the files or folders `inputs` of the areas with these numbers.
+    /// Refuses a folder in which the data set, or an earlier one that it replaces, would overwrite its own
+    /// input: one of the files or folders `inputs` of these areas.
     pub(crate) fn check_inputs<'p>(
         &self,
         layout: &Layout,
@@ -191,7 +194,7 @@ impl OutputState {
     ) -> Result<()> {
         let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
 
-        // The areas of a data set that is there give way too.
+        // The areas of an earlier data set are replaced too.
         areas.extend(self.areas_of_manifest());
         areas.extend(self.request.as_ref().map_or(Vec::new(), Request::numbers));
         let mut entries = Layout::new(&root).entries(&areas);
@@ -210,7 +213,7 @@ impl OutputState {
 }
 
 impl Holding {
-    /// Refuses to replace the data set or export of another call, unless that was asked for.
+    /// Refuses to replace the data set or export of another call, unless `overwrite` is set.
     pub(super) fn refuse(&self, layout: &Layout, overwrite: bool) -> Result<()> {
         let (held, differences) = match self {
             Self::Complete { differences } => (&Held::DataSet, differences),
@@ -225,18 +228,18 @@ impl Holding {
         Err(UsageError::OtherCall { folder, held: *held, differences: differences.clone() }.into())
     }
 
-    /// Whether this is a complete data set of the same request.
+    /// Returns whether this is a complete data set of the same request.
     pub(super) fn is_complete(&self) -> bool {
         matches!(self, Self::Complete { differences } if differences.is_empty())
     }
 
-    /// Whether this is an unfinished export of the same request.
+    /// Returns whether this is an unfinished export of the same request.
     pub(super) fn is_unfinished(&self) -> bool {
         matches!(self, Self::Unfinished { differences, .. } if differences.is_empty())
     }
 }
 
-/// Whether a name in an output folder is one that an export uses while it works.
+/// Returns whether an export uses this name in an output folder while it works.
 pub(crate) fn is_working_name(name: &OsStr) -> bool {
     let name = name.to_string_lossy();
     name == ".s3d" || name.starts_with(".s3d-")
