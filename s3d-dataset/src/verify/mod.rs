@@ -1,13 +1,13 @@
-//! Reading a data set back: is it what its manifest says, does it contradict itself, and do its images show
+//! Reads a data set back: does it match its manifest, is it free of contradictions, and do its images show
 //! its mesh?
 //!
-//! Nothing here stops at a fault. What is found goes to a [`Report`]; only what keeps everything else from
-//! being checked, such as a manifest that cannot be read, ends it early.
+//! No fault stops a check: all go to a [`Report`]. Only a fault that prevents every other check, such as a
+//! manifest that cannot be read, ends it early.
 //!
 //! Images are rendered again from the exported mesh. Its files hold every coordinate to the bit and every
-//! face in order, and pose files the rotation: so every pixel of every image must be equal to the bit,
-//! colours included. That costs less than reading the files, so nothing is left to a sample. With `full`
-//! candidate views are scored again too, and the points are read in all their forms.
+//! face in order, and pose files hold the rotation to the bit. So every pixel of every image must be equal to
+//! the bit, colours included. Rendering costs less than reading the files, so every image is checked. `full`
+//! also scores the candidate views again, and reads the points in all their forms.
 
 mod files;
 pub(crate) mod images;
@@ -44,18 +44,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use views::Views;
 
-/// So many files of a domain that differ from the mesh get a second look at what they look like.
+/// The number of mismatching files of a domain that are diagnosed.
 const MAX_DIAGNOSES: usize = 25;
 
 /// How a data set is checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VerifyOptions {
-    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point
+    /// Also score all candidate views again, and compare the S3DIS tree and pointcloud.mat with the point
     /// cloud. Every pixel of every image is compared in either case.
     pub full: bool,
 }
 
-/// What all areas share.
+/// The inputs that all areas share.
 struct Common<'a> {
     ctx: &'a Context,
     layout: &'a Layout,
@@ -68,10 +68,11 @@ struct Common<'a> {
     report: &'a Report,
 }
 
-/// Checks the data set of this layout.
+/// Checks the data set in the folder `root`. Faults are not errors: the report has them.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if no data set is there; [`Error::Cancelled`](crate::Error::Cancelled). Faults are no error.
+/// [`Error::Usage`](crate::Error::Usage) if no data set is there;
+/// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn verify(root: impl Into<PathBuf>, options: &VerifyOptions, ctx: &Context) -> Result<VerifyReport> {
     let layout = &Layout::new(root.into());
     if !layout.manifest().is_file() {
@@ -88,6 +89,7 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
     tables::conventions(layout, &manifest, &report);
     let views = Views::read(layout, &manifest, &report);
     let photographs = Photographs::read(layout, &manifest, &report);
+
     let common = Common {
         ctx,
         layout,
@@ -99,6 +101,7 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
         full,
         report: &report,
     };
+
     let mut all = Vec::new();
     for &area in &manifest.area_numbers {
         let images = report
@@ -107,10 +110,13 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
         check_area(&common, area, &images)?;
         all.extend(images);
     }
+
+    // Checks that need the images of all areas.
     views.check_images(layout, &manifest, &all, &photographs, &report);
     tables::splits(layout, &manifest, &all, &report);
     tables::statistics(layout, &manifest, &report);
     files.check_rest(ctx, layout, &manifest, &report)?;
+
     Ok(report)
 }
 
@@ -119,16 +125,19 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     if manifest.is_labelled() {
         tables::rooms(layout, area, manifest, labels, report);
     }
+
     let mesh = labels.and_then(|labels| {
         if manifest.is_labelled() {
             instances::check(layout, area, manifest, labels, report);
         }
         mesh::read_and_check(layout, area, manifest, labels, report)
     });
+
     let (Some(labels), Some(mesh)) = (labels, &mesh) else {
         report.note(format!("area {area}: images were not held against the mesh, which cannot be used"));
         return check_images(common, area, images, None);
     };
+
     let scene = Scene::new(&mesh.file.mesh);
     let textures = MipMaps::new(&mesh.file.mesh);
     let pretty = |label: &u32| {
@@ -141,6 +150,8 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     let pretty_of_face: Vec<[u8; 3]> = mesh.label_of_face.iter().map(pretty).collect();
     let class = |label: &u32| labels.classes.get(*label as usize).copied().unwrap_or(NO_CLASS);
     let class_of_face: Vec<u8> = mesh.label_of_face.iter().map(class).collect();
+
+    // Colours that were not drawn from the mesh cannot be compared.
     let source = manifest.area(area).map_or("texture", |a| a.rgb.as_str());
     let domains = manifest.domains();
     if source != "texture" && domains.contains(&Domain::Rgb) {
@@ -149,6 +160,7 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
              set; they were not compared"
         ));
     }
+
     let photographs = common.photographs.count(area);
     if photographs > 0 && domains.contains(&Domain::Rgb) {
         report.note(format!(
@@ -157,9 +169,11 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
              not compared"
         ));
     }
+
     if !domains.is_empty() && !domains.contains(&Domain::Pose) {
         report.note(format!("area {area}: images were not held against the mesh: they have no poses"));
     }
+
     let reference = Reference {
         layout,
         manifest,
@@ -192,8 +206,8 @@ enum Work {
     Image(usize),
 }
 
-/// Holds what the manifest tells of pixels without votes and without a label against the images, if all of
-/// them could be read.
+/// Compares the manifest's counts of pixels without votes and without a label with the images, if all of them
+/// could be read.
 fn check_unlabelled(common: &Common<'_>, area: u32, images: &[DatasetImage], found: &UnlabelledPixels) {
     let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
     let with_labels = images.iter().filter(|image| image.has(Domain::Semantic)).count() as u64;
@@ -221,7 +235,8 @@ fn check_images(
 ) -> Result<()> {
     let ctx = common.ctx;
     let Common { layout, manifest, labels, views, photographs, files, full, report, .. } = *common;
-    let (mismatches, cameras) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
+    let mismatches = Mutex::new(Vec::new());
+    let cameras = Mutex::new(Vec::new());
     let unlabelled = UnlabelledPixels::default();
     let domains = manifest.domains();
     let check = ImageCheck {
@@ -238,10 +253,12 @@ fn check_images(
         cameras: &cameras,
         unlabelled: &unlabelled,
     };
+
     let progress = ctx.progress("verifying", "images", images.len() as u64);
     let works: Vec<Work> = std::iter::once(Work::Points)
         .chain((0..images.len()).map(Work::Image))
         .collect();
+
     for_each_in_order(
         ctx,
         &works,
@@ -262,15 +279,18 @@ fn check_images(
             Ok(())
         },
     )?;
+
     drop(progress);
     check_unlabelled(common, area, images, &unlabelled);
     let unlocked = |e: PoisonError<_>| e.into_inner();
     let mut cameras = cameras.into_inner().unwrap_or_else(unlocked);
     cameras.sort_by_key(|(index, _)| *index);
+
     let Some((reference, ..)) = reference else { return Ok(()) };
     if full {
         scores::check(ctx, reference, area, images, &cameras, views)?;
     }
+
     diagnose_mismatches(
         ctx,
         reference,
@@ -281,7 +301,7 @@ fn check_images(
     )
 }
 
-/// Tells of the files that differ from the mesh, and what they look like.
+/// Reports the files that differ from the mesh, with a guess at what is wrong with them.
 fn diagnose_mismatches(
     ctx: &Context,
     reference: &Reference<'_>,
@@ -301,6 +321,7 @@ fn diagnose_mismatches(
             *n <= MAX_DIAGNOSES
         })
         .collect();
+
     let works: Vec<usize> = (0..mismatches.len()).collect();
     let guesses: Mutex<BTreeMap<usize, Vec<Option<String>>>> = Mutex::default();
     let progress = ctx.progress("looking again", "files", mismatches.len() as u64);
@@ -309,16 +330,19 @@ fn diagnose_mismatches(
         &works,
         || (),
         |(), &i| {
-            let (o, image) = (&mismatches[i], &images[mismatches[i].image]);
+            let o = &mismatches[i];
+            let image = &images[o.image];
             let guess = if chosen[i] {
                 images::diagnosis::diagnose(reference, images, cameras, o)
             } else {
                 None
             };
+
             let mut sentence = o.difference.sentence("what the mesh shows there");
             if let Some(guess) = &guess {
                 sentence += &format!("; {guess}");
             }
+
             let kind = o.domain.folder();
             report.fault(Topic::Rays, kind, &image.path(reference.layout, o.domain), sentence);
             let mut all = guesses.lock().unwrap_or_else(PoisonError::into_inner);
@@ -327,7 +351,8 @@ fn diagnose_mismatches(
             Ok(())
         },
     )?;
-    // Where all files of an image say the same of its camera, it is the pose that is wrong.
+
+    // If all files of an image have the same diagnosis, its pose is wrong.
     for (image, guesses) in guesses.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let image = &images[image];
         let rgb_from_mesh = reference.rgb_from_mesh && photographs.of(image).is_none();
@@ -347,5 +372,6 @@ fn diagnose_mismatches(
             report.fault(Topic::Poses, "poses that do not fit their images", &path, message);
         }
     }
+
     Ok(())
 }

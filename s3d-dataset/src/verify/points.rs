@@ -1,4 +1,5 @@
-//! The sampled points: on their faces, with their faces' labels, and the same in every form.
+//! Checks the sampled points: they lie on their faces, have the labels of their faces, and are the same in
+//! every form.
 
 use super::labels::Labels;
 use super::mesh::LabelledMesh;
@@ -15,13 +16,13 @@ use std::path::{Path, PathBuf};
 const POINTS: (Topic, &str) = (Topic::Points, "points and their faces");
 const FORMS: (Topic, &str) = (Topic::Points, "points in several forms");
 
-/// Points that are read at once.
+/// The number of points that are read at once.
 const CHUNK: usize = 1 << 16;
 
-/// How far a point may be from its face: the rounding of its coordinates, relative to them.
+/// The largest distance of a point from its face, relative to its coordinates: their rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Checks an area's points. With `full` those of the S3DIS tree and of `pointcloud.mat` too.
+/// Checks an area's points. With `full` also checks the S3DIS tree and `pointcloud.mat`.
 pub(crate) fn check(
     layout: &Layout,
     area: u32,
@@ -38,8 +39,13 @@ pub(crate) fn check(
             format!("{} points, and the manifest tells of {}", points.count(), manifest.points)
         });
     }
+
     let mut forms = full.then(|| Forms::open(layout, area, labels, report));
-    let (mut chunk, mut faults, mut first, mut at) = (Vec::new(), 0u64, None, 0u64);
+    let mut chunk = Vec::new();
+    let mut faults = 0u64;
+    let mut first = None;
+    let mut at = 0u64;
+
     loop {
         match report.ok(Topic::Points, points.read(CHUNK, &mut chunk)) {
             Some(true) => {}
@@ -59,6 +65,7 @@ pub(crate) fn check(
                 .for_each(|run| forms.meet(run));
         }
     }
+
     report.check(faults == 0, POINTS, &path, || {
         let (index, why) = first.unwrap_or_default();
         format!("{faults} of {at} points do not fit their faces, the first is point {index} (from 0): {why}")
@@ -68,12 +75,14 @@ pub(crate) fn check(
     }
 }
 
+/// Checks a point against its face, and returns what is wrong with it.
 fn fits(point: &LabelledPoint, mesh: &LabelledMesh, labels: &Labels) -> Result<(), String> {
     let Some(&label) = mesh.label_of_face.get(point.face as usize) else {
         return Err(format!("there is no face {}", point.face));
     };
     if label != point.label {
-        let (is, of) = (labels.name_of(point.label), labels.name_of(label));
+        let is = labels.name_of(point.label);
+        let of = labels.name_of(label);
         return Err(format!("its label is {} ({is}), its face's {label} ({of})", point.label));
     }
     let distance = distance_m(&mesh.file.mesh, point);
@@ -83,14 +92,15 @@ fn fits(point: &LabelledPoint, mesh: &LabelledMesh, labels: &Labels) -> Result<(
     Ok(())
 }
 
-/// A bound on how far a point is from its face.
+/// An upper bound on the distance of a point from its face, in m.
 fn distance_m(mesh: &TriMesh, point: &LabelledPoint) -> f64 {
     let [a, b, c] = mesh.triangle(point.face).map(|p| p.as_dvec3());
     let p = point.position.as_dvec3();
-    let (normal, edges) = ((b - a).cross(c - a), [(a, b), (b, c), (c, a)]);
+    let normal = (b - a).cross(c - a);
+    let edges = [(a, b), (b, c), (c, a)];
     let twice_area = normal.length();
     let height = ((p - a).dot(normal) / twice_area).abs();
-    // How far beyond each edge, in the plane of the face.
+    // The distance beyond each edge, in the plane of the face.
     let beyond = edges.map(|(from, to)| {
         let along = to - from;
         -along.cross(p - from).dot(normal) / (twice_area * along.length())
@@ -106,13 +116,13 @@ struct Number {
     label: String,
 }
 
-/// The other files that hold the labelled points, read in step with the cloud.
+/// The other files with the labelled points, read in step with the cloud.
 struct Forms<'a> {
     layout: &'a Layout,
     area: u32,
     labels: &'a Labels,
     report: &'a Report,
-    /// Room and file of each label in the tree.
+    /// The room and file in the tree, by label.
     places: BTreeMap<String, (String, String)>,
     objects: BTreeMap<String, MatObject>,
     label: u32,
@@ -126,8 +136,8 @@ struct Forms<'a> {
 struct Reader {
     path: PathBuf,
     points: PointReader,
-    /// Whether it was told that it differs: once is enough.
-    manifest: bool,
+    /// Whether a difference was reported. One report a file is enough.
+    is_reported: bool,
 }
 
 impl<'a> Forms<'a> {
@@ -140,11 +150,13 @@ impl<'a> Forms<'a> {
             .iter()
             .map(|n| (n.label.clone(), (n.room.clone(), file(n))))
             .collect();
+
         let mat = report.read(Topic::Points, &layout.point_cloud_mat(area), MatArea::open);
         let objects = mat.into_iter().flat_map(|m| m.rooms).flat_map(|r| r.objects);
         let objects = objects
             .map(|o| (o.global_name.clone().unwrap_or_else(|| o.name.clone()), o))
             .collect();
+
         Self {
             layout,
             area,
@@ -161,7 +173,7 @@ impl<'a> Forms<'a> {
         }
     }
 
-    /// The cloud's next points, all of one label.
+    /// Compares the next points of the cloud, all of one label.
     fn meet(&mut self, run: &[LabelledPoint]) {
         let label = run[0].label;
         if label == 0 {
@@ -170,12 +182,14 @@ impl<'a> Forms<'a> {
         if label != self.label {
             self.begin(label);
         }
+
         for reader in [self.instance.as_mut(), self.room.as_mut().map(|(_, r)| r)]
             .into_iter()
             .flatten()
         {
             reader.compare(run, self.report);
         }
+
         let end = self.object_at + run.len();
         let same = self.object.positions.get(self.object_at..end).is_some_and(|positions| {
             let colors = &self.object.colors[self.object_at..end];
@@ -183,6 +197,7 @@ impl<'a> Forms<'a> {
                 .zip(positions.iter().zip(colors))
                 .all(|(p, (q, c))| near(p, *q, *c))
         });
+
         self.report
             .check(same, FORMS, &self.layout.point_cloud_mat(self.area), || {
                 format!("the points of {} are not those of pointcloud.ply", self.labels.name_of(label))
@@ -190,6 +205,7 @@ impl<'a> Forms<'a> {
         self.object_at = end;
     }
 
+    /// Opens the files of the next label.
     fn begin(&mut self, label: u32) {
         self.end();
         self.label = label;
@@ -205,6 +221,7 @@ impl<'a> Forms<'a> {
                 self.room = reader.map(|reader| (room.clone(), reader));
             }
         }
+
         self.met.extend(self.instance.as_ref().map(|r| r.path.clone()));
         self.met.extend(self.room.as_ref().map(|(_, r)| r.path.clone()));
         if let Some(object) = self.objects.get(name) {
@@ -212,7 +229,7 @@ impl<'a> Forms<'a> {
         }
     }
 
-    /// What was open has nothing left.
+    /// Closes the files of a label, and checks that they have no more points.
     fn end(&mut self) {
         if let Some(reader) = self.instance.take() {
             reader.end(self.report);
@@ -227,6 +244,7 @@ impl<'a> Forms<'a> {
         self.object_at = 0;
     }
 
+    /// Closes all files, and checks that the tree has no other files.
     fn finish(mut self) {
         self.end();
         if let Some((_, reader)) = self.room.take() {
@@ -242,7 +260,7 @@ impl<'a> Forms<'a> {
     }
 }
 
-/// Text has three digits behind the point.
+/// Whether a point equals one in another form. Text has three decimal places.
 fn near(p: &LabelledPoint, q: glam::Vec3, color: [u8; 3]) -> bool {
     let far = 5.1e-4 + 1e-6 * p.position.abs().max_element();
     p.position.abs_diff_eq(q, far) && p.color == color
@@ -251,13 +269,15 @@ fn near(p: &LabelledPoint, q: glam::Vec3, color: [u8; 3]) -> bool {
 impl Reader {
     fn open(path: PathBuf, report: &Report) -> Option<Self> {
         let points = report.read(Topic::Points, &path, PointReader::open)?;
-        Some(Self { path, points, manifest: false })
+        Some(Self { path, points, is_reported: false })
     }
 
+    /// Compares the next points of the file with those of the cloud.
     fn compare(&mut self, run: &[LabelledPoint], report: &Report) {
-        if self.manifest {
+        if self.is_reported {
             return;
         }
+
         let mut cloud = PointCloud::default();
         let fault = loop {
             let at = cloud.len();
@@ -271,19 +291,21 @@ impl Reader {
                 }
                 Err(e) => {
                     report.unreadable(Topic::Points, &e);
-                    self.manifest = true;
+                    self.is_reported = true;
                     return;
                 }
             }
         };
-        self.manifest = fault.is_some();
+
+        self.is_reported = fault.is_some();
         let path: &Path = &self.path;
         report.check(fault.is_none(), FORMS, path, || fault.unwrap_or_default());
     }
 
+    /// Checks that the file has no more points.
     fn end(mut self, report: &Report) {
         let mut cloud = PointCloud::default();
-        let more = !self.manifest && self.points.read_chunk(1, &mut cloud).is_ok_and(|n| n > 0);
+        let more = !self.is_reported && self.points.read_chunk(1, &mut cloud).is_ok_and(|n| n > 0);
         report.check(!more, FORMS, &self.path, || "has more points than pointcloud.ply".to_owned());
     }
 }

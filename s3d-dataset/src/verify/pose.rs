@@ -1,4 +1,4 @@
-//! Pose files: each against itself, against its name, and against the draw of its view.
+//! Checks pose files against themselves, their names, and the draws of their views.
 
 use super::report::{OfFile, Report, Topic};
 use glam::{DMat3, DVec3};
@@ -8,18 +8,18 @@ use s3d_io::fs::read_json;
 use serde_json::Value;
 use std::path::Path;
 
-/// How far rotations may be apart: Euler angles lose the last bits of a rotation, and half of them where two
-/// axes nearly coincide.
+/// The largest difference between equal rotations. Euler angles lose the last bits of a rotation, and half of
+/// the bits where two axes nearly coincide.
 const ROTATION: f64 = 1e-7;
 
 const FAULT: (Topic, &str) = (Topic::Poses, "contradictions in a pose file");
 
-/// Reads an image's pose and holds it against itself and the image's name. `size` is that of the image's
-/// files. A photograph's focal lengths and principal point are its own; those of other views follow from the
+/// Reads an image's pose and checks it against itself and the image's name. `size` is the size of the image's
+/// files. A photograph has its own focal lengths and principal point; for other views they follow from the
 /// angle of view.
 ///
-/// The result's pose is exact to the bit, that of `camera_rt_matrix`, unless the file contradicts itself:
-/// then `is_consistent` is false, and the pose is that of its angles.
+/// The pose in the result is `camera_rt_matrix`, exact to the bit. If the file contradicts itself,
+/// `is_consistent` is false and the pose comes from the angles.
 pub(crate) fn read_and_check(
     layout: &Layout,
     image: &DatasetImage,
@@ -36,15 +36,18 @@ pub(crate) fn read_and_check(
             return None;
         }
     };
+
     let checks = report.of(FAULT, &path);
     names(&file, image, &checks);
     misspelt_key(&raw, &checks);
     let exact = matrix(&file, &checks);
     angles(&file, &checks);
+
     let pose = exact.unwrap_or_else(|| file.pose());
-    let camera = match is_photograph {
-        true => photographs_camera(&file, pose, size, &checks)?,
-        false => camera(&file, pose, image.frame, size, &checks)?,
+    let camera = if is_photograph {
+        photographs_camera(&file, pose, size, &checks)?
+    } else {
+        camera(&file, pose, image.frame, size, &checks)?
     };
     Some(CheckedPose { is_consistent: checks.all_hold(), file, camera })
 }
@@ -53,11 +56,11 @@ pub(crate) fn read_and_check(
 pub(crate) struct CheckedPose {
     pub(crate) file: PoseFile,
     pub(crate) camera: Camera,
-    /// Whether everything in it fits together.
+    /// Whether the file has no contradictions.
     pub(crate) is_consistent: bool,
 }
 
-/// Holds what the pose tells of the world's frame against what the manifest does.
+/// Compares the world's frame in the pose with the manifest.
 pub(crate) fn check_frame(pose: &CheckedPose, offset_m: Option<[f64; 3]>, path: &Path, report: &Report) {
     let told = pose.file.world_offset_m;
     report.check(told == offset_m, FAULT, path, || {
@@ -65,6 +68,7 @@ pub(crate) fn check_frame(pose: &CheckedPose, offset_m: Option<[f64; 3]>, path: 
     });
 }
 
+/// Checks the identifiers in the file against its name.
 fn names(file: &PoseFile, image: &DatasetImage, checks: &OfFile<'_>) {
     for (key, value) in [("camera_uuid", &file.camera_uuid), ("point_uuid", &file.point_uuid)] {
         checks.check(*value == image.uuid, || {
@@ -80,9 +84,10 @@ fn names(file: &PoseFile, image: &DatasetImage, checks: &OfFile<'_>) {
     });
 }
 
-/// Reading a pose takes one of two keys that hold the same.
+/// Checks that both spellings of the final rotation hold the same. Reading a pose takes only one of them.
 fn misspelt_key(raw: &Value, checks: &OfFile<'_>) {
-    let (a, b) = (&raw["final_camera_rotation"], &raw["camera_rotation_final"]);
+    let a = &raw["final_camera_rotation"];
+    let b = &raw["camera_rotation_final"];
     let same = a.is_null() || b.is_null() || a == b;
     checks.check(same, || format!("final_camera_rotation is {a}, camera_rotation_final {b}"));
 }
@@ -99,11 +104,12 @@ fn close(a: DMat3, b: DMat3) -> bool {
     a.abs_diff_eq(b, ROTATION)
 }
 
-/// Holds `camera_rt_matrix` against angles and location; the exact pose if it holds.
+/// Checks `camera_rt_matrix` against angles and location. Returns the exact pose if it holds.
 fn matrix(file: &PoseFile, checks: &OfFile<'_>) -> Option<Pose> {
     let (rotation, translation) = parts_of_matrix(file);
     let location = DVec3::from_array(file.camera_location);
     let expected = file.pose().opencv_from_world();
+
     let orthonormal = close(rotation * rotation.transpose(), DMat3::IDENTITY)
         && (rotation.determinant() - 1.0).abs() <= ROTATION;
     let mut holds = checks.check(orthonormal, || {
@@ -118,6 +124,7 @@ fn matrix(file: &PoseFile, checks: &OfFile<'_>) -> Option<Pose> {
             )
         });
     }
+
     let tolerance = 1e-9 * (1.0 + location.abs().max_element());
     let fits = |r: DMat3| (translation + r * location).abs().max_element() <= tolerance;
     holds &= checks.check(fits(rotation), || {
@@ -132,12 +139,14 @@ fn matrix(file: &PoseFile, checks: &OfFile<'_>) -> Option<Pose> {
         };
         format!("the last column of camera_rt_matrix is not −R · camera_location{why}")
     });
-    // D·E(final)ᵀ row by row is right, down and forward.
+
+    // The rows of D·E(final)ᵀ are right, down and forward.
     let rows = rotation.transpose();
     let world_from_camera = DMat3::from_cols(rows.x_axis, -rows.y_axis, -rows.z_axis);
     holds.then_some(Pose { location, world_from_camera })
 }
 
+/// Names the usual mistake that turns the expected rotation into this one.
 fn looks_like(rotation: DMat3, expected: DMat3) -> &'static str {
     let flip = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
     let guesses = [
@@ -151,10 +160,11 @@ fn looks_like(rotation: DMat3, expected: DMat3) -> &'static str {
         .map_or("", |(_, words)| words)
 }
 
+/// Checks that the three rotations in the file fit together.
 fn angles(file: &PoseFile, checks: &OfFile<'_>) {
     let rotation = |angles| rotation_from_euler(DVec3::from_array(angles));
-    let (between, original) =
-        (rotation(file.rotation_from_original_to_point), rotation(file.camera_original_rotation));
+    let between = rotation(file.rotation_from_original_to_point);
+    let original = rotation(file.camera_original_rotation);
     let last = rotation(file.final_camera_rotation);
     checks.check(close(between * original, last), || {
         let why = if close(original * between, last) {
@@ -168,7 +178,7 @@ fn angles(file: &PoseFile, checks: &OfFile<'_>) {
     });
 }
 
-/// The camera of a photograph's view, and whether its angle of view is that of K.
+/// Reads the camera of a photograph's view, and checks that its angle of view matches K.
 fn photographs_camera(
     file: &PoseFile,
     pose: Pose,
@@ -187,6 +197,7 @@ fn photographs_camera(
     Some(camera)
 }
 
+/// Reads the camera of a view or a panorama, and checks that K matches its angle of view.
 fn camera(
     file: &PoseFile,
     pose: Pose,
@@ -200,18 +211,23 @@ fn camera(
     if !checks.check(usable, || format!("no camera: field_of_view_rads {fov}, location {}", pose.location)) {
         return None;
     }
+
     let camera = match frame {
         Frame::View(_) => Camera::perspective(pose, fov, width, height),
         Frame::Panorama => Camera::equirectangular(pose, width),
     };
+
     checks.check((camera.fov_rad() - fov).abs() <= 1e-12, || {
         format!("field_of_view_rads is {fov}; a panorama's is π/2")
     });
-    let (k, expected) = (file.camera_k_matrix, camera.k_matrix());
+
+    let k = file.camera_k_matrix;
+    let expected = camera.k_matrix();
     let same = |k: [[f64; 3]; 3]| {
         let pairs = k.as_flattened().iter().zip(expected.as_flattened());
         pairs.fold(true, |same, (a, b)| same && (a - b).abs() <= 1e-9 * (1.0 + b.abs()))
     };
+
     checks.check(same(k), || {
         let transposed = std::array::from_fn(|i| std::array::from_fn(|j| k[j][i]));
         if same(transposed) {
@@ -224,21 +240,25 @@ fn camera(
              view and size make that {f} px and ({x}, {y})"
         )
     });
+
     Some(camera)
 }
 
-/// Holds the pose of a view against its draw, and that of a panorama against the scanner's.
+/// Checks the pose of a view against its draw, and the pose of a panorama against the scanner's.
 pub(crate) fn check_draw(pose: &CheckedPose, draw: Option<&ViewRecord>, path: &Path, report: &Report) {
     let checks = report.of(FAULT, path);
     let file = &pose.file;
     let original = file.original();
     let (yaw, pitch) = draw.map_or((0.0, 0.0), |d| (d.yaw_rad, d.pitch_rad));
-    let (expected, found) = (original.turned(yaw, pitch).world_from_camera, file.pose().world_from_camera);
+    let expected = original.turned(yaw, pitch).world_from_camera;
+    let found = file.pose().world_from_camera;
+
     let what = if draw.is_some() {
         "as views.json drew it"
     } else {
         "the scanner's own, as a panorama's is"
     };
+
     checks.check(close(expected, found), || {
         let transposed = if close(expected.transpose(), found) {
             ": it is transposed"
@@ -251,6 +271,7 @@ pub(crate) fn check_draw(pose: &CheckedPose, draw: Option<&ViewRecord>, path: &P
             file.final_camera_rotation
         )
     });
+
     if let Some(draw) = draw {
         let fov = file.field_of_view_rads;
         checks.check(fov == draw.fov_rad, || {
@@ -266,8 +287,8 @@ mod tests {
 
     const UUID: &str = "00112233445566778899aabbccddeeff";
 
-    /// What is told of a pose file after `change`.
-    fn manifest(change: impl FnOnce(&mut PoseFile)) -> (String, bool) {
+    /// The report on a pose file after `change`, and whether its pose is consistent.
+    fn report_after(change: impl FnOnce(&mut PoseFile)) -> (String, bool) {
         let dir = tempfile::tempdir().unwrap();
         let layout = Layout::new(dir.path());
         let original = Pose::level(DVec3::new(1.0, -2.0, 1.5), 0.7);
@@ -279,14 +300,16 @@ mod tests {
             frame: Frame::View(3),
             domains: vec![Domain::Pose],
         };
+
         let mut file = PoseFile::new(&camera, &original, UUID, "WC_1_2", image.frame);
         change(&mut file);
         create_dir(&layout.image_dir(2, image.frame, Domain::Pose)).unwrap();
         file.write(&image.path(&layout, Domain::Pose)).unwrap();
+
         let report = Report::new(&layout);
         let pose = read_and_check(&layout, &image, (64, 64), false, &report).unwrap();
         if pose.is_consistent {
-            // To the bit, so that images can be.
+            // Equal images need an equal camera.
             assert_eq!(pose.camera, camera);
         }
         (report.finish().to_string(), pose.is_consistent)
@@ -294,7 +317,7 @@ mod tests {
 
     #[test]
     fn a_good_file_gives_its_camera_to_the_bit() {
-        let (text, consistent) = manifest(|_| ());
+        let (text, consistent) = report_after(|_| ());
         assert!(consistent && text.ends_with(" 0 faults\n"), "{text}");
     }
 
@@ -312,9 +335,11 @@ mod tests {
                 *row = [of.x, of.y, of.z, t];
             }
         }
+
         let flip = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
         let location = DVec3::new(1.0, -2.0, 1.5);
         type Change<'c> = &'c dyn Fn(&mut PoseFile);
+
         let cases: [(&str, Change<'_>); 9] = [
             ("final_camera_rotation: it is transposed", &|f| rows(f, |r, t| (r.transpose(), t))),
             ("not −R · camera_location, but it is with that of the angles", &|f| {
@@ -334,8 +359,9 @@ mod tests {
                 (f.camera_k_matrix[0][2], f.camera_k_matrix[1][2]) = (31.5, 31.5)
             }),
         ];
+
         for (words, change) in cases {
-            let (text, consistent) = manifest(|f| change(f));
+            let (text, consistent) = report_after(|f| change(f));
             assert!(text.contains(words) && !consistent, "{words}: {text}");
         }
     }

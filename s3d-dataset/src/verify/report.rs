@@ -1,4 +1,4 @@
-//! What was checked and what is wrong: faults by topic and kind, few lines of each.
+//! Collects what was checked and what is wrong: faults by topic and kind, with a few lines for each kind.
 
 use crate::error::passes;
 use s3d_io::Error as FileError;
@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Lines of one kind of fault; the rest is counted.
+/// The most lines for one kind of fault. Further ones are only counted.
 const MAX_LINES: usize = 20;
 
-/// Bytes that can be read whatever they are.
+/// Files up to this many bytes are read even if their size is wrong.
 const SMALL: u64 = 1 << 26;
 
-/// What a fault is about; the report is grouped by it, in this order.
+/// The subject of a fault. The report is grouped by it, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Topic {
     Files,
@@ -61,11 +61,11 @@ struct Kind {
 struct State {
     faults: BTreeMap<(Topic, &'static str), Kind>,
     notes: BTreeSet<String>,
-    /// What kept a file from being read, and may not the next time.
+    /// The first error that kept a file from being read and may not occur the next time.
     again: Option<String>,
 }
 
-/// Collects faults from any number of threads. What it says depends on what is found and not on when.
+/// Collects faults from any number of threads. Its text does not depend on their order.
 #[derive(Debug)]
 pub(crate) struct Report {
     root: PathBuf,
@@ -83,7 +83,7 @@ struct Sizes {
 }
 
 impl Report {
-    /// Nothing found yet in the data set of this layout.
+    /// An empty report on the data set of this layout.
     pub(crate) fn new(layout: &Layout) -> Self {
         Self {
             root: layout.root().to_owned(),
@@ -110,7 +110,7 @@ impl Report {
         parts.join("/")
     }
 
-    /// Something is wrong with the file `path`. Faults of one `kind` share a limit of lines.
+    /// Records a fault of the file `path`. Faults of one `kind` share a limit of lines.
     pub(crate) fn fault(&self, topic: Topic, kind: &'static str, path: &Path, message: impl Into<String>) {
         let line = (self.relative(path), message.into());
         let mut state = self.state();
@@ -122,7 +122,7 @@ impl Report {
         }
     }
 
-    /// One check, and the fault that it is if it does not hold.
+    /// Counts a check, and records a fault if it does not hold.
     pub(crate) fn check(
         &self,
         holds: bool,
@@ -137,25 +137,25 @@ impl Report {
         holds
     }
 
-    /// Checks of one file.
+    /// Checks of one file that share a kind of fault.
     pub(crate) fn of<'a>(&'a self, fault: (Topic, &'static str), path: &'a Path) -> OfFile<'a> {
         OfFile { report: self, fault, path, all_hold: Cell::new(true) }
     }
 
-    /// From now on no file is read that is much larger than it is listed; where there is no list,
-    /// none that is larger than `most` bytes, those of all files.
+    /// Sets the sizes that files may have. A file much larger than its listed size is not read. Without a
+    /// list, no file larger than `most` bytes is read, the size of all files together.
     pub(crate) fn expect(&self, listed: Option<Vec<FileRecord>>, most: u64) {
         let listed = listed.map(|all| all.into_iter().map(|record| (record.path.clone(), record)).collect());
         let _ = self.sizes.set(Sizes { listed, most });
     }
 
-    /// Whether a file has a size with which it may be read. One that no list names is told of elsewhere.
+    /// Checks that a file's size allows reading it. Files that are not listed are reported elsewhere.
     pub(crate) fn check_size(&self, path: &Path) -> Result<(), FileError> {
         let Some(sizes) = self.sizes.get() else { return Ok(()) };
         if let Some(listed) = &sizes.listed
             && let Some(record) = listed.get(&self.relative(path))
         {
-            // Of what is damaged it may be told what it looks like.
+            // A small damaged file may still be diagnosed.
             let is_small = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() <= SMALL);
             return if is_small {
                 Ok(())
@@ -172,7 +172,7 @@ impl Report {
         Ok(())
     }
 
-    /// The same of all files that are listed and `chosen`.
+    /// Does the same for all listed files that are `chosen`.
     pub(crate) fn check_sizes(&self, chosen: impl Fn(&Path) -> bool) -> Result<(), FileError> {
         let listed = self.sizes.get().and_then(|sizes| sizes.listed.as_ref());
         let records = listed.into_iter().flat_map(BTreeMap::values);
@@ -182,7 +182,7 @@ impl Report {
             .try_for_each(|path| self.check_size(&path))
     }
 
-    /// What `read` gives of a file; what cannot be read is a fault of the file.
+    /// Reads a file with `read`. A file that cannot be read is a fault.
     pub(crate) fn read<T>(
         &self,
         topic: Topic,
@@ -192,18 +192,18 @@ impl Report {
         self.ok(topic, self.check_size(path).and_then(|()| read(path)))
     }
 
-    /// What could be read; what could not is a fault of its file.
+    /// Returns the value if it could be read, and otherwise records a fault of its file.
     pub(crate) fn ok<T>(&self, topic: Topic, result: Result<T, FileError>) -> Option<T> {
         self.checked(1);
         result.map_err(|e| self.unreadable(topic, &e)).ok()
     }
 
-    /// A file that cannot be read: a fault of it.
+    /// Records that a file cannot be read.
     pub(crate) fn unreadable(&self, topic: Topic, error: &FileError) {
         self.wrong((topic, "cannot be read"), error);
     }
 
-    /// An error of a file: a fault of it, or of the system if it may do better the next time.
+    /// Records an error as a fault of its file, or as a passing error of the system.
     pub(crate) fn wrong(&self, (topic, kind): (Topic, &'static str), error: &FileError) {
         if passes(error) {
             self.state().again.get_or_insert_with(|| error.to_string());
@@ -218,22 +218,22 @@ impl Report {
         self.fault(topic, kind, error.path(), message);
     }
 
-    /// Something that was left out, and why.
+    /// Notes a check that was left out, and why.
     pub(crate) fn note(&self, note: impl Into<String>) {
         self.state().notes.insert(note.into());
     }
 
-    /// So many checks were made.
+    /// Counts this many checks.
     pub(crate) fn checked(&self, checks: u64) {
         self.checks.fetch_add(checks, Ordering::Relaxed);
     }
 
-    /// So many files were looked at.
+    /// Counts this many files.
     pub(crate) fn looked_at(&self, files: u64) {
         self.files.fetch_add(files, Ordering::Relaxed);
     }
 
-    /// What was found.
+    /// Returns the finished report.
     pub(crate) fn finish(self) -> VerifyReport {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         let groups = state.faults.into_iter().map(|((topic, kind), faults)| FaultGroup {
@@ -252,40 +252,41 @@ impl Report {
     }
 }
 
-/// Faults of one kind.
+/// The faults of one kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct FaultGroup {
-    /// What they are about, such as "images against the mesh".
+    /// The subject, such as "images against the mesh".
     pub topic: &'static str,
-    /// What they have in common, such as a modality.
+    /// The kind, such as a modality.
     pub kind: &'static str,
-    /// The first twenty by path: the file, from the folder of the data set, and what is wrong with it.
+    /// The first twenty by path: the file, relative to the folder of the data set, and what is wrong with it.
     pub first: Vec<(String, String)>,
-    /// How many there are.
+    /// The number of faults of this kind, listed or not.
     pub count: u64,
 }
 
-/// What [`verify`](crate::verify()) found in a data set.
+/// The faults that [`verify`](crate::verify()) found in a data set.
 ///
 /// Displayed, it is the text that `s3d verify` prints.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct VerifyReport {
-    /// Those of one topic follow each other.
+    /// The faults by topic and kind. The groups of one topic follow each other.
     pub faults: Vec<FaultGroup>,
-    /// What was left out, and why, a sentence each.
+    /// The checks that were left out, and why, a sentence each.
     pub notes: Vec<String>,
-    /// Files that were looked at.
+    /// The number of files that were examined.
     pub files: u64,
-    /// Checks that were made.
+    /// The number of checks that were made.
     pub checks: u64,
-    /// What kept a file from being read that may be read the next time: the report is not complete.
+    /// An error that kept a file from being read and may not occur the next time. With it the report is
+    /// incomplete.
     pub unread: Option<String>,
 }
 
 impl VerifyReport {
-    /// How many faults there are.
+    /// The number of faults.
     pub fn fault_count(&self) -> u64 {
         self.faults.iter().map(|group| group.count).sum()
     }
@@ -307,13 +308,19 @@ impl fmt::Display for VerifyReport {
                 writeln!(f, "  … and {more} more like this ({})", group.kind)?;
             }
         }
+
         for note in &self.notes {
             writeln!(f, "note: {note}")?;
         }
-        let count = |n: u64, noun: &str| format!("{n} {noun}{}", if n == 1 { "" } else { "s" });
-        let (files, checks) = (count(self.files, "file"), count(self.checks, "check"));
+
+        let files = count(self.files, "file");
+        let checks = count(self.checks, "check");
         writeln!(f, "{files}, {checks}, {}", count(self.fault_count(), "fault"))
     }
+}
+
+fn count(n: u64, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
 /// The checks of one file.
@@ -325,7 +332,7 @@ pub(crate) struct OfFile<'a> {
 }
 
 impl OfFile<'_> {
-    /// One check, and the fault that it is if it does not hold.
+    /// Counts a check, and records a fault if it does not hold.
     pub(crate) fn check(&self, holds: bool, message: impl FnOnce() -> String) -> bool {
         if !self.report.check(holds, self.fault, self.path, message) {
             self.all_hold.set(false);

@@ -1,5 +1,5 @@
-//! What a file looks like that is not what the mesh shows: the usual diagnosis, each tried on some of its
-//! pixels.
+//! Guesses what is wrong with a file that differs from the mesh. Each of the usual suspects is tried on some
+//! of its pixels.
 //!
 //! A suspect says what a pixel would show if the fault were that one. It is named if it explains nearly all
 //! pixels that differ, and nearly all others.
@@ -12,13 +12,13 @@ use s3d_geom::{Camera, Pose};
 use s3d_io::dataset::{DatasetImage, DepthUnits, Domain, Frame};
 use s3d_render::{Hit, MISSING_DEPTH, cast_ray};
 
-/// Pixels that a suspect is tried on, of those that differ and of all.
+/// The number of differing pixels that a suspect is tried on, and the number of others.
 const PIXELS: usize = 300;
-/// Fewer pixels that differ clearly say nothing.
+/// The fewest differing pixels that allow a guess.
 const FEWEST: usize = 12;
-/// The share that a suspect explains at least.
+/// The smallest share of pixels that a suspect must explain to be named.
 const EXPLAINED: f64 = 0.93;
-/// The most other images that a file may be of.
+/// The largest number of other images that a file is compared with.
 const MOST_OTHERS: usize = 400;
 
 /// Which ray a pixel shows instead of its own.
@@ -29,14 +29,15 @@ pub(crate) enum Ray {
     MirroredY,
     Turned,
     Transposed,
-    /// By pixels to the right and down.
+    /// Shifted by pixels to the right and down.
     Shifted(f64, f64),
-    /// Of another camera.
+    /// The ray of another camera.
     Of(Camera),
 }
 
 impl Ray {
-    /// The camera and the place in its image whose ray it is, for the pixel (x, y) of an image of `camera`.
+    /// The camera and the place in its image that this ray goes through, for the pixel (x, y) of an image of
+    /// `camera`.
     pub(crate) fn place(self, camera: &Camera, x: u32, y: u32) -> (Camera, f64, f64) {
         let (w, h) = (f64::from(camera.width), f64::from(camera.height));
         let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
@@ -56,11 +57,11 @@ impl Ray {
 struct Suspect {
     words: String,
     ray: Ray,
-    /// What becomes of the numbers that the pixel should have.
+    /// Changes the expected values of a pixel to those that the fault would give.
     change: fn(&Seen<'_>, [f64; 3]) -> [f64; 3],
 }
 
-/// What a pixel sees, as far as changes need it.
+/// A pixel's ray and what it hits.
 struct Seen<'a> {
     reference: &'a Reference<'a>,
     camera: Camera,
@@ -72,37 +73,40 @@ fn as_is(_: &Seen<'_>, value: [f64; 3]) -> [f64; 3] {
     value
 }
 
-/// What the file `odd` of `image` looks like; `None` if no suspect explains it. `others` are the cameras of
-/// the area's images.
+/// Guesses what is wrong with the file of a mismatch. Returns `None` if no suspect explains it. `others` are
+/// the cameras of the area's images.
 pub(crate) fn diagnose(
     reference: &Reference<'_>,
     images: &[DatasetImage],
     others: &[(usize, Camera)],
-    mismatches: &Mismatch,
+    mismatch: &Mismatch,
 ) -> Option<String> {
-    let image = &images[mismatches.image];
-    let pixels = Pixels::read(mismatches.domain, &image.path(reference.layout, mismatches.domain)).ok()?;
-    let shade = Shade::new(reference, mismatches.domain);
-    let sample = sample(reference, &shade, mismatches, &pixels);
+    let image = &images[mismatch.image];
+    let pixels = Pixels::read(mismatch.domain, &image.path(reference.layout, mismatch.domain)).ok()?;
+    let shade = Shade::new(reference, mismatch.domain);
+    let sample = sample(reference, &shade, mismatch, &pixels);
+
     if sample.iter().filter(|p| p.differs).count() < FEWEST {
         return None;
     }
-    if mismatches.domain == Domain::Semantic
+    if mismatch.domain == Domain::Semantic
         && let Some(words) = other_table(reference, &sample)
     {
         return Some(words);
     }
+
     let mut best: Option<(f64, String)> = None;
-    for suspect in diagnosis(image, images, others, mismatches) {
-        let share = explained(reference, &shade, mismatches, &sample, &suspect);
+    for suspect in suspects(image, images, others, mismatch) {
+        let share = explained(reference, &shade, mismatch, &sample, &suspect);
         if share >= EXPLAINED && best.as_ref().is_none_or(|(b, _)| share > b + 0.002) {
             best = Some((share, suspect.words));
         }
     }
+
     best.map(|(_, words)| words)
 }
 
-/// A pixel, what the file has there, and whether it differs.
+/// A pixel: the value in the file, the expected value, and whether they differ.
 struct Probe {
     at: (u32, u32),
     found: [f64; 3],
@@ -110,24 +114,23 @@ struct Probe {
     differs: bool,
 }
 
-/// Pixels spread over the image: some that differ, and some of all.
-fn sample(
-    reference: &Reference<'_>,
-    shade: &Shade<'_>,
-    mismatches: &Mismatch,
-    pixels: &Pixels,
-) -> Vec<Probe> {
+/// Samples pixels all over the image, up to [`PIXELS`] that differ and as many others.
+fn sample(reference: &Reference<'_>, shade: &Shade<'_>, mismatch: &Mismatch, pixels: &Pixels) -> Vec<Probe> {
     let (w, h) = pixels.size();
-    let (mut probes, mut differing, mut all) = (Vec::new(), 0, 0);
-    // Steps of the golden ratio and of its like in two dimensions reach everywhere, and never in a pattern.
+    let mut probes = Vec::new();
+    let mut differing = 0;
+    let mut all = 0;
+    // Steps of the plastic number, the golden ratio's counterpart in two dimensions, reach everywhere without
+    // a pattern.
     let spread =
         |i: u32, ratio: f64, size: u32| ((0.5 + f64::from(i) * ratio).fract() * f64::from(size)) as u32;
+
     for i in 0..40_000 {
         let at =
             (spread(i, 0.754_877_666_246_693, w).min(w - 1), spread(i, 0.569_840_290_998_053, h).min(h - 1));
         let found = pixels.value(at.0, at.1);
-        let (_, expected) = predict(reference, shade, mismatches, Ray::Own, at);
-        let differs = !near(mismatches.domain, found, expected);
+        let (_, expected) = predict(reference, shade, mismatch, Ray::Own, at);
+        let differs = !near(mismatch.domain, found, expected);
         let room = if differs { &mut differing } else { &mut all };
         if *room < PIXELS {
             *room += 1;
@@ -137,44 +140,50 @@ fn sample(
             break;
         }
     }
+
     probes
 }
 
+/// Returns what the pixel would see along `ray`, and the values that its file would hold.
 fn predict<'a>(
     reference: &'a Reference<'a>,
     shade: &Shade<'_>,
-    mismatches: &Mismatch,
+    mismatch: &Mismatch,
     ray: Ray,
     (x, y): (u32, u32),
 ) -> (Seen<'a>, [f64; 3]) {
-    let (camera, px, py) = ray.place(&mismatches.camera, x, y);
+    let (camera, px, py) = ray.place(&mismatch.camera, x, y);
     let direction = camera.direction(px, py);
     let hit = cast_ray(reference.channels.scene, camera.pose.location, direction);
     let value = shade.value(&camera, direction, hit);
     (Seen { reference, camera, direction, hit }, value)
 }
 
-/// The share of pixels that a suspect explains, the smaller of that of differing pixels and of the others.
+/// The share of pixels that a suspect explains: the smaller of its shares among differing pixels and among
+/// others.
 fn explained(
     reference: &Reference<'_>,
     shade: &Shade<'_>,
-    mismatches: &Mismatch,
+    mismatch: &Mismatch,
     sample: &[Probe],
     suspect: &Suspect,
 ) -> f64 {
-    let (mut counts, mut right) = ([0usize; 2], [0usize; 2]);
-    // Pixels that differ first: most diagnosis fail there.
+    let mut counts = [0usize; 2];
+    let mut right = [0usize; 2];
+
+    // Differing pixels come first, because most suspects fail there.
     let (differing, others): (Vec<_>, Vec<_>) = sample.iter().partition(|p| p.differs);
     for (n, probe) in differing.into_iter().chain(others).enumerate() {
-        let (seen, value) = predict(reference, shade, mismatches, suspect.ray, probe.at);
+        let (seen, value) = predict(reference, shade, mismatch, suspect.ray, probe.at);
         let value = (suspect.change)(&seen, value);
         let which = usize::from(probe.differs);
         counts[which] += 1;
-        right[which] += usize::from(near(mismatches.domain, probe.found, value));
+        right[which] += usize::from(near(mismatch.domain, probe.found, value));
         if n == 40 && right[0] + right[1] < 20 {
             return 0.0;
         }
     }
+
     let share = |k: usize| {
         if counts[k] == 0 {
             1.0
@@ -185,7 +194,7 @@ fn explained(
     share(0).min(share(1))
 }
 
-/// Whether two values are the same but for rounding, and for what resampling does.
+/// Whether two values are equal within rounding and the effect of resampling.
 fn near(domain: Domain, found: [f64; 3], expected: [f64; 3]) -> bool {
     let within = |k: usize| match domain {
         Domain::Depth => 1.5 + 5e-4 * expected[k],
@@ -197,7 +206,8 @@ fn near(domain: Domain, found: [f64; 3], expected: [f64; 3]) -> bool {
     (0..3).all(|k| (found[k] - expected[k]).abs() <= within(k))
 }
 
-/// Whether the indices are those of another label table: each stands for one label, but not for its own.
+/// Checks whether the indices come from another label table, in which each stands for one label but not for
+/// its own.
 fn other_table(reference: &Reference<'_>, sample: &[Probe]) -> Option<String> {
     let index = |c: [f64; 3]| c[0] as u32 * 65_536 + c[1] as u32 * 256 + c[2] as u32;
     let mut meanings: std::collections::BTreeMap<u32, std::collections::BTreeMap<u32, u32>> =
@@ -209,7 +219,10 @@ fn other_table(reference: &Reference<'_>, sample: &[Probe]) -> Option<String> {
             .entry(index(probe.expected))
             .or_default() += 1;
     }
-    let (mut best, mut all, mut labels) = (0, 0, std::collections::BTreeSet::new());
+
+    let mut best = 0;
+    let mut all = 0;
+    let mut labels = std::collections::BTreeSet::new();
     let mut example = None;
     for (found, expected) in &meanings {
         let (label, count) = expected.iter().max_by_key(|(_, n)| **n)?;
@@ -220,8 +233,9 @@ fn other_table(reference: &Reference<'_>, sample: &[Probe]) -> Option<String> {
             example.get_or_insert((*found, *label));
         }
     }
+
     let (found, label) = example?;
-    // One to one, or it is not a table.
+    // A table maps labels one to one.
     let one_to_one = labels.len() == meanings.len() && meanings.len() > 1;
     (one_to_one && f64::from(best) >= 0.99 * f64::from(all)).then(|| {
         format!(
@@ -233,16 +247,19 @@ fn other_table(reference: &Reference<'_>, sample: &[Probe]) -> Option<String> {
     })
 }
 
-fn diagnosis(
+/// All suspects for a file.
+fn suspects(
     image: &DatasetImage,
     images: &[DatasetImage],
     others: &[(usize, Camera)],
-    mismatches: &Mismatch,
+    mismatch: &Mismatch,
 ) -> Vec<Suspect> {
-    let camera = &mismatches.camera;
+    let camera = &mismatch.camera;
     let panorama = camera.is_panorama();
     let mut all = Vec::new();
     let mut of = |words: &str, ray: Ray| all.push(Suspect { words: words.to_owned(), ray, change: as_is });
+
+    // Images that were flipped, turned or shifted.
     of("it is mirrored left to right", Ray::MirroredX);
     of("it is mirrored upside down", Ray::MirroredY);
     of("it is turned by 180°", Ray::Turned);
@@ -255,6 +272,7 @@ fn diagnosis(
             of(&format!("it is turned about the vertical by {words}"), Ray::Shifted(k * quarter, 0.0));
         }
     }
+
     for (size, name) in [(0.5, "half a pixel"), (1.0, "one pixel")] {
         for (dx, dy, way) in [
             (1.0, 0.0, "to the left"),
@@ -269,26 +287,31 @@ fn diagnosis(
             of(&format!("it is shifted by {name} {way}"), Ray::Shifted(size * dx, size * dy));
         }
     }
+
+    // Poses in other conventions.
     let turned = |r: DMat3| Ray::Of(Camera { pose: Pose { world_from_camera: r, ..camera.pose }, ..*camera });
     let r = camera.pose.world_from_camera;
     let d = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
     of("it fits the pose with its rotation transposed", turned(r.transpose()));
-    // camera_rt_matrix is D·Eᵀ: what a transposed one of those means for E.
+    // `camera_rt_matrix` is D·Eᵀ. This is what transposing it means for E.
     of("it fits the pose with the rotation of camera_rt_matrix transposed", turned(d * r.transpose() * d));
     of("it fits the pose in the axes of OpenCV taken for Blender's", turned(r * d));
-    changes(mismatches.domain, panorama, &mut all);
-    all.extend(of_others(image, images, others, mismatches));
+
+    changes(mismatch.domain, panorama, &mut all);
+    all.extend(of_others(image, images, others, mismatch));
     all
 }
 
-/// What tools do to numbers.
+/// Adds the changes that tools make to values.
 fn changes(domain: Domain, panorama: bool, all: &mut Vec<Suspect>) {
     let mut of = |words: &str, change: fn(&Seen<'_>, [f64; 3]) -> [f64; 3]| {
         all.push(Suspect { words: words.to_owned(), ray: Ray::Own, change });
     };
+
     if matches!(domain, Domain::Rgb | Domain::Normal | Domain::Semantic | Domain::SemanticPretty) {
         of("its red and blue are swapped", |_, [r, g, b]| [b, g, r]);
     }
+
     match domain {
         Domain::Depth => {
             of("it is in the other unit of depth", |seen, [d, ..]| {
@@ -347,34 +370,35 @@ fn changes(domain: Domain, panorama: bool, all: &mut Vec<Suspect>) {
     }
 }
 
+/// The colour of the normal in the world's axes.
 fn world_normal(seen: &Seen<'_>) -> Option<[f64; 3]> {
     let n = seen.reference.channels.scene.mesh().normal(seen.hit?.face).as_dvec3();
     let n = if n.dot(seen.direction) > 0.0 { -n } else { n };
     Some((n * 127.5 + 128.0).to_array().map(f64::floor))
 }
 
-/// The other images of the area, those of the same location first.
+/// The other images of the area as suspects, the same location first.
 fn of_others(
     image: &DatasetImage,
     images: &[DatasetImage],
     others: &[(usize, Camera)],
-    mismatches: &Mismatch,
+    mismatch: &Mismatch,
 ) -> Vec<Suspect> {
     let mut found: Vec<(bool, usize, Camera)> = others
         .iter()
-        .filter(|(i, camera)| {
-            *i != mismatches.image && camera.is_panorama() == mismatches.camera.is_panorama()
-        })
+        .filter(|(i, camera)| *i != mismatch.image && camera.is_panorama() == mismatch.camera.is_panorama())
         .map(|(i, camera)| (images[*i].uuid != image.uuid, *i, *camera))
         .collect();
     found.sort_by_key(|(elsewhere, i, _)| (*elsewhere, *i));
     found.truncate(MOST_OTHERS);
+
     let name = |i: usize, elsewhere: bool| match (images[i].frame, elsewhere) {
         (Frame::View(n), false) => {
             format!("it is what frame {n} of this location shows ({}): swapped?", images[i].stem())
         }
         _ => format!("it is what {} shows: swapped?", images[i].stem()),
     };
+
     found
         .into_iter()
         .map(|(elsewhere, i, camera)| Suspect {

@@ -1,4 +1,4 @@
-//! One image after another: its files against each other, and against the mesh.
+//! Checks images one after another: their files against each other, and against the mesh.
 
 pub(crate) mod diagnosis;
 pub(crate) mod pixels;
@@ -34,11 +34,11 @@ const PRETTY: (Topic, &str) = (Topic::Images, "colours of labels");
 const NOTHING: (Topic, &str) = (Topic::Images, "pixels that see nothing");
 const COORDINATES: (Topic, &str) = (Topic::Images, "coordinates and depth");
 
-/// An image whose pose contradicts itself may differ from the mesh in a share of pixels: its camera is not
-/// exact.
+/// The share of pixels in which an image may differ from the mesh if its pose contradicts itself. The camera
+/// of such an image is not exact.
 const SLACK: f64 = 0.005;
 
-/// What the images of an area are held against.
+/// The exported mesh and its tables, which the images of an area are compared with.
 pub(crate) struct Reference<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) manifest: &'a Manifest,
@@ -50,7 +50,7 @@ pub(crate) struct Reference<'a> {
     pub(crate) report: &'a Report,
 }
 
-/// What every image of an area is checked with.
+/// The inputs and shared results of the checks of an area's images.
 pub(crate) struct ImageCheck<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) manifest: &'a Manifest,
@@ -58,19 +58,19 @@ pub(crate) struct ImageCheck<'a> {
     pub(crate) views: &'a Views,
     pub(crate) photographs: &'a Photographs,
     pub(crate) files: &'a Files,
-    /// None if the meshes cannot be used.
+    /// `None` if the meshes cannot be used.
     pub(crate) reference: Option<&'a Reference<'a>>,
     pub(crate) report: &'a Report,
     pub(crate) domains: &'a [Domain],
-    /// What differs from the mesh, for a second look.
+    /// Files that differ from the mesh, kept for a second look.
     pub(crate) mismatches: &'a Mutex<Vec<Mismatch>>,
-    /// The cameras of the images, as far as they could be read.
+    /// The cameras that could be read, each with the index of its image.
     pub(crate) cameras: &'a Mutex<Vec<(usize, Camera)>>,
-    /// What images of labels show without votes and without a label.
+    /// Pixels of the label images without votes and without a label.
     pub(crate) unlabelled: &'a UnlabelledPixels,
 }
 
-/// Counts of the images of labels of an area, from all threads.
+/// Counts over the label images of an area, from all threads.
 #[derive(Default)]
 pub(crate) struct UnlabelledPixels {
     /// Images whose rays were cast.
@@ -81,14 +81,14 @@ pub(crate) struct UnlabelledPixels {
 
 /// A file that differs from the mesh.
 pub(crate) struct Mismatch {
-    /// Its image, by place in the list.
+    /// The index of its image in the list.
     pub(crate) image: usize,
     pub(crate) domain: Domain,
     pub(crate) difference: Difference,
     pub(crate) camera: Camera,
 }
 
-/// What a thread keeps from image to image.
+/// Buffers that a thread keeps from image to image.
 pub(crate) struct Scratch<'s> {
     caster: Option<Caster<'s, 's>>,
     hits: Hits,
@@ -119,6 +119,8 @@ impl ImageCheck<'_> {
                 (self.manifest.options.pano_width, self.manifest.options.pano_width / 2)
             }
         };
+
+        // Every modality of the manifest must be there, and no other.
         for &domain in self.domains {
             let path = image.path(self.layout, domain);
             report.check(image.has(domain), MISSING, &path, || {
@@ -136,6 +138,7 @@ impl ImageCheck<'_> {
                 "the manifest does not tell of this modality",
             );
         }
+
         let read = || pose::read_and_check(self.layout, image, size, photograph.is_some(), report);
         let pose = image.has(Domain::Pose).then(read).flatten();
         if let Some(pose) = &pose {
@@ -151,6 +154,7 @@ impl ImageCheck<'_> {
                 .unwrap_or_else(std::sync::PoisonError::into_inner)
                 .push((index, pose.camera));
         }
+
         let cast = match (&pose, &mut memory.caster) {
             (Some(pose), Some(caster)) => {
                 caster.cast_into(&pose.camera, 1, &mut memory.hits);
@@ -158,6 +162,7 @@ impl ImageCheck<'_> {
             }
             _ => false,
         };
+
         if let (Some(pose), Some(reference), true) = (&pose, self.reference, cast) {
             let drawn = self.domains.iter().filter(|domain| image.has(**domain));
             let drawn = drawn.filter(|domain| self.is_of_mesh(reference, **domain, photograph));
@@ -165,6 +170,7 @@ impl ImageCheck<'_> {
             let channels = &reference.channels;
             channels.draw_together(&drawn, &memory.hits, &pose.camera, &mut memory.buffers);
         }
+
         let mut reader = std::mem::take(&mut memory.reader);
         let mut files = ImageFiles {
             check: self,
@@ -177,6 +183,7 @@ impl ImageCheck<'_> {
             depth: None,
             semantic: None,
         };
+
         for &domain in self.domains.iter().filter(|d| **d != Domain::Pose && image.has(**d)) {
             let path = image.path(self.layout, domain);
             let Some(opened) = self.open(domain, &path, &mut reader) else { continue };
@@ -188,10 +195,11 @@ impl ImageCheck<'_> {
                 files.domain(domain, opened, &path, memory);
             }
         }
+
         memory.reader = reader;
     }
 
-    /// Whether the mesh shows what a file of a domain should hold.
+    /// Whether the mesh shows the contents of a file of this domain.
     fn is_of_mesh(&self, reference: &Reference<'_>, domain: Domain, of: Option<&PhotographRecord>) -> bool {
         match domain {
             Domain::Rgb => reference.rgb_from_mesh && of.is_none(),
@@ -200,13 +208,13 @@ impl ImageCheck<'_> {
         }
     }
 
-    /// Reads a file once: its checksum and its pixels.
+    /// Reads a file once, and checks its checksum and its pixels.
     fn open<'r>(&self, domain: Domain, path: &Path, reader: &'r mut PngReader) -> Option<Opened<'r>> {
         let report = self.report;
         let bytes = report.check_size(path).and_then(|()| read_file(path));
         match &bytes {
             Ok(bytes) => self.files.check_bytes(path, bytes, report),
-            // It tells more of why.
+            // This check says more about the reason.
             Err(_) => self.files.check(path, report),
         }
         report.ok(Topic::Images, bytes.and_then(|bytes| Opened::new(domain, &bytes, path, reader)))
@@ -217,28 +225,31 @@ impl ImageCheck<'_> {
 struct ImageFiles<'a> {
     check: &'a ImageCheck<'a>,
     index: usize,
-    /// What is told of the photograph that it is the view of.
+    /// The record of the photograph, if the image is the view of one.
     photograph: Option<&'a PhotographRecord>,
     pose: Option<&'a CheckedPose>,
-    /// Whether the memory holds the image's hits.
+    /// Whether the scratch memory holds the image's hits.
     cast: bool,
-    /// The domains whose files were found to be what the mesh shows before their pixels were read.
+    /// The domains whose files were found equal to the drawn mesh before their pixels were read.
     as_mesh: Vec<Domain>,
-    /// Where nothing is seen, by the first domain that says so exactly; of one of those the hits tell.
+    /// The pixels that see nothing, as the first domain says that tells them exactly. `None` inside stands
+    /// for the pixels without a hit: the file of that domain equals the drawn mesh.
     seen: Option<(Domain, Option<Vec<bool>>)>,
-    /// Depth and labels, unless they are among those.
+    /// Depth and label indices, if their pixels were read.
     depth: Option<Raster<u16>>,
     semantic: Option<Raster<[u8; 3]>>,
 }
 
 impl ImageFiles<'_> {
+    /// Checks the file of one domain.
     fn domain(&mut self, domain: Domain, opened: Opened<'_>, path: &Path, memory: &mut Scratch<'_>) {
-        // What a photograph shows need not be in the mesh, and the other way round.
+        // A photograph may show things that the mesh lacks, and the other way round.
         if let Some(record) = self.photograph.filter(|_| domain == Domain::Rgb) {
             return self.photograph(record, &opened.into_pixels(), path, memory);
         }
+
         let Some(pixels) = self.unlike_mesh(domain, opened, memory) else {
-            // What holds of the mesh's images need not be looked for in the files.
+            // The mesh's own images have these properties, so the files need no check.
             match (domain, &self.seen) {
                 (Domain::GlobalXyz, _) => self.check.report.checked(1),
                 (Domain::Depth, None) => {}
@@ -255,7 +266,9 @@ impl ImageFiles<'_> {
             }
             return;
         };
+
         self.nothing(domain, &pixels, path, &memory.hits);
+
         match (domain, pixels) {
             (Domain::Depth, Pixels::Depth(depth)) => self.depth = Some(depth),
             (Domain::Semantic, Pixels::Color(indices)) => {
@@ -284,7 +297,7 @@ impl ImageFiles<'_> {
         }
     }
 
-    /// The label indices of the file, likewise.
+    /// The label indices of the file, read or drawn.
     fn semantic<'m>(&'m self, memory: &'m Scratch<'_>) -> Option<&'m Raster<[u8; 3]>> {
         match self.drawn(Domain::Semantic, memory) {
             Some(Drawn::Color(indices)) => Some(indices),
@@ -292,13 +305,13 @@ impl ImageFiles<'_> {
         }
     }
 
-    /// What was drawn of a domain, if its file is that.
+    /// The drawn image of a domain, if its file equals it.
     fn drawn<'m>(&self, domain: Domain, memory: &'m Scratch<'_>) -> Option<Drawn<'m>> {
         let image = Image::of(domain).filter(|_| self.as_mesh.contains(&domain))?;
         Some(self.check.reference?.channels.drawn(image, &memory.buffers))
     }
 
-    /// A photograph's colours against what is told of it.
+    /// Checks the colours of a photograph against its record.
     fn photograph(&self, record: &PhotographRecord, pixels: &Pixels, path: &Path, memory: &Scratch<'_>) {
         let report = self.check.report;
         let share = |count: usize| count as f64 / f64::from(record.width) / f64::from(record.height);
@@ -320,9 +333,9 @@ impl ImageFiles<'_> {
         }
     }
 
-    /// Modalities agree on where nothing is seen. Depth also is missing where it is too large, and
-    /// coordinates that are made from depth are missing with it: those two are compared in
-    /// [`Self::coordinates`]. Images of classes do not tell nothing from no class.
+    /// Checks that modalities agree on the pixels that see nothing. Depth is also missing where it is too
+    /// large, and coordinates made from depth are missing with it: [`Self::coordinates`] compares those two.
+    /// Class images cannot tell nothing from no class.
     fn nothing(&mut self, domain: Domain, pixels: &Pixels, path: &Path, hits: &Hits) {
         if matches!(domain, Domain::GlobalXyz | Domain::SemanticClass) {
             return;
@@ -333,10 +346,13 @@ impl ImageFiles<'_> {
             }
             return;
         };
+
         let of_hits = || hits.face.pixels().iter().map(|face| *face == NO_FACE).collect();
-        let (missing, expected) = (pixels.missing(domain), expected.clone().unwrap_or_else(of_hits));
-        // Too far for a depth is no fault.
+        let missing = pixels.missing(domain);
+        let expected = expected.clone().unwrap_or_else(of_hits);
+        // A missing depth may also be one that is too far.
         let wrong = |(m, e): (&bool, &bool)| if domain == Domain::Depth { *e && !*m } else { m != e };
+
         let mut pairs = missing.iter().zip(&expected);
         let first = if missing == expected {
             None
@@ -348,8 +364,10 @@ impl ImageFiles<'_> {
         } else {
             0
         };
+
         self.check.report.check(first.is_none(), NOTHING, path, || {
-            let (at, width) = (first.unwrap_or_default() as u32, pixels.size().0);
+            let at = first.unwrap_or_default() as u32;
+            let width = pixels.size().0;
             let says = if missing[at as usize] {
                 "is missing, and is not"
             } else {
@@ -363,7 +381,7 @@ impl ImageFiles<'_> {
         });
     }
 
-    /// Counts what has no votes, and no label.
+    /// Counts the pixels without votes, and the pixels without a label.
     fn unlabelled(&self, indices: Option<&Raster<[u8; 3]>>, memory: &Scratch<'_>) {
         let reference = self.check.reference.filter(|_| self.cast);
         let (Some(reference), Some(indices)) = (reference, indices) else { return };
@@ -376,13 +394,15 @@ impl ImageFiles<'_> {
         images.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// Checks that every label index is in the table.
     fn indices(&self, indices: &Raster<[u8; 3]>, path: &Path) {
         let Some(labels) = self.check.labels else { return };
         let of = |[r, g, b]: [u8; 3]| u32::from_be_bytes([0, r, g, b]);
         let wrong = |p: &[u8; 3]| of(*p) as usize >= labels.len() && *p != MISSING_INDEX;
         let first = indices.pixels().iter().position(wrong);
         self.check.report.check(first.is_none(), INDICES, path, || {
-            let (at, width) = (first.unwrap_or_default(), indices.width() as usize);
+            let at = first.unwrap_or_default();
+            let width = indices.width() as usize;
             let count = indices.pixels().iter().filter(|p| wrong(p)).count();
             let value = indices.pixels()[at];
             format!(
@@ -396,7 +416,7 @@ impl ImageFiles<'_> {
         });
     }
 
-    /// Colours are those of the indices.
+    /// Checks that the colours belong to the label indices.
     fn pretty(&self, colors: &Raster<[u8; 3]>, path: &Path, memory: &Scratch<'_>) {
         let (Some(labels), Some(indices)) = (self.check.labels, self.semantic(memory)) else { return };
         let expected = |[r, g, b]: [u8; 3]| {
@@ -415,7 +435,7 @@ impl ImageFiles<'_> {
         });
     }
 
-    /// Classes are those of the indices, and their colours those of the taxonomy.
+    /// Checks that the classes belong to the label indices, and their colours to the taxonomy.
     fn classes(&self, places: &Raster<u8>, colors: &[[u8; 3]], path: &Path, memory: &Scratch<'_>) {
         let Some(labels) = self.check.labels else { return };
         self.check
@@ -440,31 +460,36 @@ impl ImageFiles<'_> {
         });
     }
 
-    /// Coordinates are what depth and pose give, as far as both are rounded.
+    /// Checks that coordinates equal those from depth and pose, within the rounding of both.
     fn coordinates(&self, points: &Raster<[f32; 3]>, path: &Path, memory: &Scratch<'_>) {
         let (Some(pose), Some(depth)) = (self.pose, self.depth(memory)) else { return };
         let units = self.check.manifest.conventions().depth_units;
-        let (camera, rays) = (&pose.camera, pose.camera.rays());
+        let camera = &pose.camera;
+        let rays = camera.rays();
         let origin = camera.pose.location;
         let from_depth = self.check.manifest.is_xyz_from_depth();
-        // What depth is rounded to, and what is too far for it.
-        let (half_depth, far) = (0.5 / units.per_m(), 65_534.0 / units.per_m());
+
+        // Depth is rounded by up to half a unit, and has no value beyond `far`.
+        let half_depth = 0.5 / units.per_m();
+        let far = 65_534.0 / units.per_m();
         let is_half = self.check.manifest.conventions().xyz == XyzType::Half;
         // A half float has 11 significant bits; a 32-bit one 24.
         let (relative, absolute) = if is_half { (4.9e-4, 3e-8) } else { (6e-8, 0.0) };
         let of_depth = if from_depth { 0.0 } else { half_depth };
         let always = 1e-6 * (1.0 + origin.abs()) + absolute;
+
         let is_wrong = |point: [f32; 3], depth: u16, ray: DVec3| {
             let p = DVec3::from_array(point.map(f64::from));
             let Some(metres) = units.metres(depth) else {
-                // Beyond what depth can say there may be a point.
+                // A point may lie beyond the largest depth.
                 return point != [0.0; 3] && (from_depth || (p - origin).length() < far * 0.999);
             };
             let off = (p - (origin + ray * metres)).abs();
             let most = of_depth * ray.abs() + relative * p.abs() + always;
-            // Written so that what is no number is wrong.
+            // Negated, so that NaN counts as wrong.
             !off.cmple(most).all()
         };
+
         let mut first = None;
         let mut count = 0u64;
         for y in 0..points.height() {
@@ -475,6 +500,7 @@ impl ImageFiles<'_> {
                 }
             }
         }
+
         self.check.report.check(count == 0, COORDINATES, path, || {
             let (x, y) = first.unwrap_or_default();
             let seen = units
@@ -490,8 +516,8 @@ impl ImageFiles<'_> {
         });
     }
 
-    /// Holds a file against what the mesh shows. `None` if it is that, and all that its pixels could be asked is
-    /// known; otherwise they are read.
+    /// Compares a file with what the mesh shows. Returns `None` if they are equal and the pixels need no
+    /// other check, and the pixels otherwise.
     fn unlike_mesh(
         &mut self,
         domain: Domain,
@@ -503,6 +529,7 @@ impl ImageFiles<'_> {
         else {
             return Some(opened.into_pixels());
         };
+
         let of_depth;
         let expected = if self.check.is_of_mesh(reference, domain, self.photograph) {
             let Scratch { hits, buffers, .. } = memory;
@@ -514,7 +541,9 @@ impl ImageFiles<'_> {
         } else {
             return Some(opened.into_pixels());
         };
+
         self.check.report.checked(1);
+        // Equal files need no reading if every other check of their pixels is known to hold.
         let is_known = !matches!(self.seen, Some((_, Some(_))))
             && match domain {
                 Domain::Semantic => reference.mesh.all_in_table,
@@ -523,10 +552,12 @@ impl ImageFiles<'_> {
                 Domain::SemanticClass => false,
                 _ => true,
             };
+
         if is_known && opened.are_of(expected) {
             self.as_mesh.push(domain);
             return None;
         }
+
         let pixels = opened.into_pixels();
         if let Some(difference) = difference(reference, image, &pixels, expected)
             && (pose.is_consistent || difference.count as f64 >= SLACK * difference.of as f64)
