@@ -16,6 +16,7 @@ use crate::options::ExportOptions;
 use crate::record::journal::{AssetsDone, Done, Journal, LocationDone, Unit, tally_of};
 use crate::record::listing;
 use crate::stage::Stage;
+use crate::survey::annotated::{Annotated, SurveyedRoom};
 use crate::survey::candidate::Candidate;
 use crate::survey::labelled_area::LabelledArea;
 use s3d_geom::{Density, NearestFaces};
@@ -38,7 +39,7 @@ pub(crate) struct Common<'a> {
     pub(crate) options: &'a ExportOptions,
     pub(crate) journal: &'a Journal,
     pub(crate) account: &'a Account<'a>,
-    /// Where labelled areas are kept, a folder each.
+    /// Holds a folder for each labelled area.
     pub(crate) cache: &'a Path,
     /// Which units this process writes.
     pub(crate) is_ours: &'a (dyn Fn(&Unit) -> bool + Sync),
@@ -51,8 +52,8 @@ impl Common<'_> {
     }
 }
 
-/// With more faces than this, what is only needed while two hierarchies are built, 200 bytes a face each,
-/// should not be in memory twice.
+/// The two hierarchies of a mesh with more faces than this are built one after the other: the temporary
+/// memory of a build, 200 bytes a face, should not be taken twice.
 const LARGE_MESH: usize = 2_000_000;
 
 /// A mesh that is ready for rays.
@@ -62,8 +63,8 @@ pub(crate) struct PreparedMesh<'m> {
 }
 
 impl<'m> PreparedMesh<'m> {
-    /// Prepares the mesh, and its nearest faces (at the same time, unless it is large), which are needed for
-    /// its labels only.
+    /// Prepares the mesh for rays and for nearest faces, at the same time unless it is large. Only labelling
+    /// needs the nearest faces.
     pub(crate) fn new(file: &'m MeshFile) -> (Self, NearestFaces<'m>) {
         let (scene, nearest) = match file.mesh.faces().len() {
             0..=LARGE_MESH => rayon::join(|| Scene::new(&file.mesh), || NearestFaces::new(&file.mesh)),
@@ -86,13 +87,13 @@ impl<'m> PreparedMesh<'m> {
         NearestFaces::new(&self.file.mesh)
     }
 
-    /// Prepares the mesh for rays alone.
+    /// Prepares the mesh for rays only.
     pub(crate) fn for_rays(file: &'m MeshFile) -> Self {
         Self { file, scene: Scene::new(&file.mesh) }
     }
 }
 
-/// Writes an area's meshes and points, all but its images.
+/// Writes an area's meshes and points: everything but its images.
 fn write_area_assets(
     area: &AreaInput,
     file: &MeshFile,
@@ -101,7 +102,9 @@ fn write_area_assets(
 ) -> Result<()> {
     let ctx = common.account.ctx;
     let Common { table, layout, options, journal, account, .. } = common;
-    let (number, started) = (area.number, Instant::now());
+    let number = area.number;
+    let started = Instant::now();
+
     let meshes = account.stage(Stage::Meshes, Some(number));
     let mesh_dir = layout.mesh_dir(number);
     let label_of_face: Vec<u32> = plan.annotated.label_of_face.iter().map(|l| l.0).collect();
@@ -110,23 +113,30 @@ fn write_area_assets(
         s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &label_of_face, &table.names())?;
     }
     meshes.end();
+
     ctx.check()?;
+
     let sampling = account.stage(Stage::Points, Some(number));
     let density = Density::PerM2(options.points_per_m2);
     let points = write_points(ctx, layout, &file.mesh, plan, table, (density, options.seed), file.offset_m)?;
+
+    // The files of the labels are another unit's.
     let mut paths = listing::walk(&mesh_dir)?;
     let labels = label_files(layout, number);
     paths.retain(|path| !labels.contains(path));
     paths.extend(listing::walk(&layout.s3dis_area_dir(number))?);
     let files = listing::records(ctx, layout, &paths)?;
+
     let tally = tally_of(&files);
     journal.write(Done::Assets(AssetsDone { area: number, points, files }))?;
     sampling.end();
     account.unit_finished(UnitKind::Assets, number, None, &tally, started);
+
     Ok(())
 }
 
-/// Writes the mesh with its textures: their files as they were found, where they were used as they are.
+/// Writes the mesh with its textures. A texture that was used unchanged keeps the bytes of its file; any
+/// other becomes a PNG.
 fn write_colored_mesh(dir: &Path, file: &MeshFile, compression: Compression) -> Result<()> {
     let files: Vec<(String, Cow<'_, [u8]>)> = file
         .mesh
@@ -147,14 +157,16 @@ fn write_colored_mesh(dir: &Path, file: &MeshFile, compression: Compression) -> 
             }
         })
         .collect();
+
     let textures: Vec<TextureOut<'_>> =
         files.iter().map(|(name, bytes)| TextureOut { name, bytes }).collect();
+
     s3d_io::mesh::write_rgb_obj(dir, &file.mesh, &textures)?;
     Ok(())
 }
 
-/// Renders those locations of an area that are to be done, and beside them writes its meshes and points if
-/// they are.
+/// Renders the locations and photographs of an area that `todo` holds. Writes the meshes and points of the
+/// area at the same time if `todo` holds them.
 pub(crate) fn render_area(
     area: &AreaInput,
     prepared: &PreparedMesh<'_>,
@@ -168,9 +180,13 @@ pub(crate) fn render_area(
     let Common { layout, options, journal, account, .. } = common;
     let LabelledArea { annotated, locations, location_rooms, .. } = plan;
     let PreparedMesh { file, scene } = prepared;
+
     let number = area.number;
+
     check_faces(plan, prepared)?;
     create_dir(&layout.mesh_dir(number))?;
+
+    // What the images show of each face.
     let textures = MipMaps::new(&file.mesh);
     let label_of_face: Vec<u32> = annotated.label_of_face.iter().map(|l| l.0).collect();
     let pretty_of_face: Vec<[u8; 3]> = label_of_face.iter().map(|l| s3d_label::pretty_color(*l)).collect();
@@ -180,18 +196,15 @@ pub(crate) fn render_area(
         class_of_face.extend(label_of_face.iter().map(|label| classes[*label as usize]));
     }
     let palette = palette(common.table.taxonomy());
-    let mut is_filled = Vec::new();
-    if !annotated.filled.is_empty() {
-        is_filled.resize(label_of_face.len(), false);
-        annotated
-            .filled
-            .iter()
-            .for_each(|face| is_filled[*face as usize] = true);
-    }
+    let is_filled = filled_faces(annotated);
+
+    // What is rendered.
     let chosen: Vec<bool> = locations
         .iter()
         .map(|l| todo.contains(&Unit::Location(number, l.uuid.clone())))
         .collect();
+
+    // Each finished unit is written to the journal.
     let finish_location = |written: WrittenLocation| {
         let WrittenLocation { location, tally, files, started } = written;
         let uuid = &locations[location].uuid;
@@ -199,24 +212,18 @@ pub(crate) fn render_area(
         account.unit_finished(UnitKind::Location, number, Some(uuid), &tally, started);
         Ok(())
     };
-    let is_asked = |uuid: &str| todo.contains(&Unit::Photograph(number, uuid.to_owned()));
-    let photographs: Vec<photographs::Shot<'_>> = area
-        .photographs
-        .all
-        .iter()
-        .filter(|p| is_asked(&p.uuid))
-        .map(|photograph| {
-            let room = room_of(&annotated.rooms, photograph.camera.pose.location);
-            photographs::Shot { photograph, room }
-        })
-        .collect();
+
+    let photographs = wanted_photographs(area, &annotated.rooms, todo);
+
     let finish_photograph = |written: WrittenPhotograph| {
         let WrittenPhotograph { done, started } = written;
-        let (uuid, tally) = (done.record.camera_uuid.clone(), done.tally);
+        let uuid = done.record.camera_uuid.clone();
+        let tally = done.tally;
         journal.write(Done::Photograph(done))?;
         account.unit_finished(UnitKind::Photograph, number, Some(&uuid), &tally, started);
         Ok(())
     };
+
     let job = ImageJob {
         layout,
         area: number,
@@ -246,10 +253,40 @@ pub(crate) fn render_area(
         each: &finish_location,
         each_photograph: &finish_photograph,
     };
+
     let rendering = account.stage(Stage::Render, Some(number));
     let assets = || write_area_assets(area, file, plan, common);
     let writes_assets = todo.contains(&Unit::Assets(number));
     write_images(ctx, &job, candidates, if writes_assets { Some(&assets) } else { None })?;
     rendering.end();
     Ok(())
+}
+
+/// Whether each face got its label by filling. Empty if no face did.
+fn filled_faces(annotated: &Annotated) -> Vec<bool> {
+    if annotated.filled.is_empty() {
+        return Vec::new();
+    }
+    let mut is_filled = vec![false; annotated.label_of_face.len()];
+    for face in &annotated.filled {
+        is_filled[*face as usize] = true;
+    }
+    is_filled
+}
+
+/// The photographs of an area whose views `todo` holds, each with its room.
+fn wanted_photographs<'a>(
+    area: &'a AreaInput,
+    rooms: &[SurveyedRoom],
+    todo: &BTreeSet<&Unit>,
+) -> Vec<photographs::Shot<'a>> {
+    area.photographs
+        .all
+        .iter()
+        .filter(|p| todo.contains(&Unit::Photograph(area.number, p.uuid.clone())))
+        .map(|photograph| {
+            let room = room_of(rooms, photograph.camera.pose.location);
+            photographs::Shot { photograph, room }
+        })
+        .collect()
 }

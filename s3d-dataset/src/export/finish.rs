@@ -1,5 +1,5 @@
-//! The end of an export: what is made of all areas together, once every unit is done. It needs nothing but
-//! the files on the disk, the request and what the journals tell.
+//! The end of an export: what is made from all areas together once every unit is done. It needs only the
+//! files on the disk, the request and the journals.
 
 use crate::context::Context;
 use crate::error::{InputError, Result};
@@ -14,7 +14,7 @@ use crate::record::missing::missing_units;
 use crate::record::request::Request;
 use crate::record::statistics::Statistics;
 use crate::record::tables;
-use crate::summary::{UnitTally, Unlabelled, ViewTally};
+use crate::summary::{ImageTally, UnitTally, Unlabelled, ViewTally};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FileRecord, Frame, Layout, PhotographRecord};
 use s3d_io::fs::{SyncAhead, create_dir, sync_data_set, sync_file, write_json};
@@ -23,12 +23,12 @@ use s3d_sample::folds;
 use std::fs;
 use std::path::PathBuf;
 
-/// A share of pixels without a label that is warned of.
+/// A larger share of pixels without a label causes a warning.
 pub(crate) const MUCH_UNLABELLED: f64 = 0.02;
 
 /// What an export has made.
 pub(crate) struct Totals {
-    /// All files, the manifest too.
+    /// The number of all files, including the manifest.
     pub(crate) files: u64,
     pub(crate) bytes: u64,
     pub(crate) locations: usize,
@@ -37,10 +37,10 @@ pub(crate) struct Totals {
     pub(crate) unlabelled: Option<Unlabelled>,
 }
 
-/// Writes the tables, the list of files and, when all of it is on the disk, the manifest that says that the
-/// data set is complete. Beside the units' files there must be `assets` and `conventions.json`. `manifest` is
-/// the one that was written when the export began; `disk` what brings the units' files to the disk, if
-/// something does.
+/// Writes the tables and the list of files. When everything is on the disk, writes the manifest that declares
+/// the data set complete. The units' files, `assets` and `conventions.json` must be there. `manifest` is the
+/// one that was written when the export began. `disk` is the syncing of the units' files to the disk, if it
+/// has begun.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) if a unit is missing.
@@ -57,33 +57,35 @@ pub(crate) fn finish(
         let what = format!("{}: {unit} missing", layout.root().display());
         return Err(InputError::Incomplete { what, remedy: "make the same call again".into() }.into());
     }
+
     let areas = request.numbers();
     let (candidates, views) = select_requested(request, finished)?;
-    let (mut entries, mut files, mut locations) = (Vec::new(), Vec::new(), 0);
+
+    let mut entries = Vec::new();
+    let mut locations = 0;
     let mut all_unlabelled: Option<Unlabelled> = None;
+
     for requested in &request.areas {
         let area = requested.area;
         tables::write_views(layout, area, &candidates)?;
         let Some(labels) = finished.labels(area) else { continue };
+
         let photographs: Vec<&PhotographRecord> =
             finished.photographs(area).map(|done| &done.record).collect();
         if !labels.photographs.is_empty() {
             write_json(&layout.frames_json(area), &photographs)?;
             ctx.warn_each(doubts(area, &photographs));
         }
+
         let of_photographs = finished.photographs(area).map(|done| done.tally);
         let of_locations = finished.locations(area).map(|done| done.tally);
         let tally: UnitTally = of_locations.chain(of_photographs).sum();
         locations += labels.locations.len();
+
         let mut pixels = tally.panoramas;
         pixels += tally.views;
-        if let Some(share) = pixels.share_unlabelled().filter(|share| *share > MUCH_UNLABELLED) {
-            ctx.warn(format_args!(
-                "area {area}: {:.0} % of the pixels show faces without a label: no annotated point is next \
-                 to them (the option `fill` gives them the label of the surface beside them)",
-                100.0 * share
-            ));
-        }
+        warn_unlabelled(ctx, area, &pixels);
+
         let mut unlabelled = labels.entry.unlabelled;
         if let Some(of) = unlabelled
             .as_mut()
@@ -95,6 +97,7 @@ pub(crate) fn finish(
         if let Some(of) = unlabelled {
             *all_unlabelled.get_or_insert_default() += of;
         }
+
         let warnings = labels.entry.warnings.iter().cloned().chain(ctx.take_notes()).collect();
         entries.push(AreaEntry {
             unlabelled,
@@ -107,22 +110,20 @@ pub(crate) fn finish(
             ..(*labels.entry).clone()
         });
     }
+
+    let mut files = Vec::new();
     for done in finished.iter().filter(|done| areas.contains(&done.unit().area())) {
         files.extend_from_slice(done.files());
     }
-    // A merge makes none for images that no shard has.
-    for &domain in &request.options.modalities {
-        for (area, frame) in areas
-            .iter()
-            .flat_map(|area| [(*area, Frame::Panorama), (*area, Frame::View(0))])
-        {
-            create_dir(&layout.image_dir(area, frame, domain))?;
-        }
-    }
+
+    // A merge makes no folders for images that no shard has.
+    create_image_dirs(layout, &areas, &request.options.modalities)?;
     ctx.check()?;
+
     let folds = folds(&areas);
     tables::write_splits(layout, &folds)?;
     tables::write_lists(ctx, layout, &areas, &folds)?;
+
     let taxonomy = manifest.read_taxonomy(layout, |_| Ok(()))?;
     write_profiles(ctx, layout, request, &areas, &files, &taxonomy)?;
     let of_labels = Some(&taxonomy).filter(|_| manifest.is_labelled());
@@ -132,13 +133,17 @@ pub(crate) fn finish(
     let tables = listing::records(ctx, layout, &table_files(layout, &areas)?)?;
     files.extend_from_slice(&tables);
     let list = listing::write(layout, &files)?;
-    let (count, listed) = (list.count, list.bytes);
-    // A manifest that says "complete" on a disk that lost what it tells of would be a lie.
+    let count = list.count;
+    let listed = list.bytes;
+
+    // Files reach the disk before a manifest calls them complete.
     let paths: Vec<PathBuf> = files.iter().map(|f| f.path_in(layout.root())).collect();
     disk.map_or(Ok(()), SyncAhead::end)?;
     sync_data_set(layout.root(), &paths)?;
+
     manifest.complete(layout, entries, list)?;
     sync_file(&layout.manifest())?;
+
     let own = [layout.file_list(), layout.manifest()].map(|p| fs::metadata(p).map_or(0, |found| found.len()));
     Ok(Totals {
         files: count + 2,
@@ -149,8 +154,31 @@ pub(crate) fn finish(
     })
 }
 
-/// Writes the profiles that are asked for, anew: some of their files are second names of files of the tree,
-/// which must not be written to. `files` are those of the tree, and others.
+/// Warns of a large share of pixels that show unlabelled faces.
+fn warn_unlabelled(ctx: &Context, area: u32, pixels: &ImageTally) {
+    if let Some(share) = pixels.share_unlabelled().filter(|share| *share > MUCH_UNLABELLED) {
+        ctx.warn(format_args!(
+            "area {area}: {:.0} % of the pixels show faces without a label: no annotated point is next \
+             to them (the option `fill` gives them the label of the surface beside them)",
+            100.0 * share
+        ));
+    }
+}
+
+/// Makes the folders of all images.
+fn create_image_dirs(layout: &Layout, areas: &[u32], modalities: &[Domain]) -> Result<()> {
+    for &domain in modalities {
+        for &area in areas {
+            for frame in [Frame::Panorama, Frame::View(0)] {
+                create_dir(&layout.image_dir(area, frame, domain))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Writes the requested profiles anew: some of their files are hard links to files of the tree, which must
+/// not be written to. `files` are the files of the tree, among others.
 fn write_profiles(
     ctx: &Context,
     layout: &Layout,
@@ -169,6 +197,7 @@ fn write_profiles(
             _ => {}
         }
     }
+
     if wanted.is_empty() {
         return Ok(());
     }
@@ -186,6 +215,7 @@ fn table_files(layout: &Layout, areas: &[u32]) -> Result<Vec<PathBuf>> {
             .map(|area| layout.frames_json(*area))
             .filter(|path| path.is_file()),
     );
+
     for entry in layout.entries(&[]) {
         if entry == layout.manifest() || entry == layout.file_list() {
             continue;
@@ -196,5 +226,6 @@ fn table_files(layout: &Layout, areas: &[u32]) -> Result<Vec<PathBuf>> {
             files.push(entry);
         }
     }
+
     Ok(files)
 }

@@ -1,4 +1,5 @@
-//! The images of an area: each view cast once, every modality from the same hits, each file written whole.
+//! The images of an area. Each view is cast once, every modality is made from the same hits, and each file is
+//! written whole.
 
 use crate::context::{Context, Progress};
 use crate::error::Result;
@@ -18,37 +19,37 @@ use s3d_render::{Caster, Hits, NO_FACE};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// What is rendered, and where it goes.
+/// What is rendered, and where the files go.
 #[derive(Clone, Copy)]
 pub(crate) struct ImageJob<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) area: u32,
     pub(crate) channels: Channels<'a>,
-    /// Where colours come from, if not from the mesh.
+    /// The source of colours; `None` takes them from the mesh.
     pub(crate) pictures: Option<&'a Pictures>,
     pub(crate) locations: &'a [ScanLocation],
-    /// The room of each location; none if rooms are not known.
+    /// The room of each location; `None` if rooms are not known.
     pub(crate) rooms: &'a [Option<Room>],
-    /// Whether a face has its label by filling; empty if none has.
+    /// Whether each face got its label by filling. Empty if no face did.
     pub(crate) is_filled: &'a [bool],
-    /// Whether a location's images are to be written.
+    /// Whether each location's images are written.
     pub(crate) chosen: &'a [bool],
-    /// Photographs whose views are to be written.
+    /// The photographs whose views are written.
     pub(crate) photographs: &'a [photographs::Shot<'a>],
     pub(crate) modalities: &'a [Domain],
     pub(crate) size: u32,
     pub(crate) pano_width: u32,
-    /// What was subtracted from the scan's coordinates, if something was.
+    /// What was subtracted from the scan's coordinates, metres; `None` if nothing was.
     pub(crate) offset_m: Option<[f64; 3]>,
-    /// ReadManifest of every location whose images are all there, by whichever thread wrote the last.
+    /// Called for every location whose images are all written, by the thread that wrote the last of them.
     pub(crate) each: &'a (dyn Fn(WrittenLocation) -> Result<()> + Sync),
-    /// Told of every photograph whose view is there.
+    /// Called for every photograph whose view is written.
     pub(crate) each_photograph: &'a (dyn Fn(WrittenPhotograph) -> Result<()> + Sync),
 }
 
-/// A location all of whose images are there.
+/// A location whose images are all written.
 pub(crate) struct WrittenLocation {
-    /// Its index.
+    /// The location's index.
     pub(crate) location: usize,
     pub(crate) tally: UnitTally,
     /// Sorted.
@@ -57,10 +58,10 @@ pub(crate) struct WrittenLocation {
     pub(crate) started: Instant,
 }
 
-/// A location some of whose images are not there yet.
+/// A location with images still to write.
 #[derive(Default)]
 struct OpenLocation {
-    /// Images that are still to be written.
+    /// How many images are still to be written.
     left: usize,
     tally: UnitTally,
     files: Vec<FileRecord>,
@@ -74,7 +75,7 @@ struct Shot {
     camera: Camera,
 }
 
-/// What else is to be written of an area: one thread's work, which the others need not wait for.
+/// Writes the rest of an area: work for one thread, which the others need not wait for.
 type AssetsWriter<'a> = &'a (dyn Fn() -> Result<()> + Sync);
 
 /// One piece of an area's work.
@@ -84,8 +85,8 @@ enum Work<'a> {
     Photograph(&'a photographs::Shot<'a>),
 }
 
-/// Renders and writes the panoramas of the chosen locations and their kept views. `assets` is done once, by
-/// one of the threads, meanwhile; none if it is done already.
+/// Renders and writes the panoramas and kept views of the chosen locations, and the views of the photographs.
+/// One thread does `assets` at the same time, once; `None` if that is done already.
 pub(crate) fn write_images(
     ctx: &Context,
     job: &ImageJob<'_>,
@@ -93,22 +94,27 @@ pub(crate) fn write_images(
     assets: Option<AssetsWriter<'_>>,
 ) -> Result<()> {
     let shots = shots(job, candidates);
+
     let mut open: Vec<OpenLocation> = job.locations.iter().map(|_| OpenLocation::default()).collect();
     for shot in &shots {
         open[shot.location].left += 1;
     }
     let open: Vec<Mutex<OpenLocation>> = open.into_iter().map(Mutex::new).collect();
+
     for domain in job.modalities {
         for frame in [Frame::Panorama, Frame::View(0)] {
             create_dir(&job.layout.image_dir(job.area, frame, *domain))?;
         }
     }
+
     let progress = ctx.progress("rendering", "images", (shots.len() + job.photographs.len()) as u64);
     let Some(pictures) = job.pictures else {
         return write_shots(ctx, job, &shots, &open, assets, &progress);
     };
+
     let alone = ImageJob { photographs: &[], ..*job };
-    // A location after another: one cube map is in memory, and all threads work with it.
+
+    // Locations take turns, so that one cube map at a time is in memory. All threads work with it.
     let mut assets = assets;
     for shots in shots.chunk_by(|a, b| a.location == b.location) {
         let location = shots[0].location;
@@ -132,6 +138,7 @@ fn write_shots(
         hits: Hits::default(),
         buffers: ImageBuffers::default(),
     };
+
     let photographs = job.photographs.iter().map(Work::Photograph);
     let works: Vec<Work<'_>> = assets
         .map(Work::Assets)
@@ -139,6 +146,7 @@ fn write_shots(
         .chain(shots.iter().map(Work::Shot))
         .chain(photographs)
         .collect();
+
     for_each_in_order(ctx, &works, memory, |memory, work| match work {
         Work::Assets(assets) => assets(),
         Work::Photograph(shot) => {
@@ -150,11 +158,14 @@ fn write_shots(
             let started = Instant::now();
             let written = write_shot(job, shot, memory)?;
             progress.add(1);
+
             let mut location = open[shot.location].lock().unwrap_or_else(PoisonError::into_inner);
             location.add(shot.frame, written, started);
             if location.left > 0 {
                 return Ok(());
             }
+
+            // The last image of the location is written.
             let OpenLocation { tally, mut files, started, .. } = std::mem::take(&mut *location);
             drop(location);
             files.sort();
@@ -164,17 +175,20 @@ fn write_shots(
     })
 }
 
-/// The images to take: of each location its panorama, which takes longest, and then its views.
+/// The images to take: for each location its panorama, which takes longest, then its views.
 fn shots(job: &ImageJob<'_>, candidates: &[Candidate]) -> Vec<Shot> {
     let mut shots = Vec::new();
     let mut views = candidates.iter().filter(|c| c.area == job.area).peekable();
+
     for (location, scan) in job.locations.iter().enumerate() {
         if job.chosen[location] {
             let camera = Camera::equirectangular(scan.pose, job.pano_width);
             shots.push(Shot { location, frame: Frame::Panorama, camera });
         }
         while let Some(c) = views.next_if(|c| c.location == location) {
-            if let (true, Some(number)) = (job.chosen[location], c.frame_num) {
+            if job.chosen[location]
+                && let Some(number) = c.frame_num
+            {
                 shots.push(Shot { location, frame: Frame::View(number), camera: c.camera(scan, job.size) });
             }
         }
@@ -189,7 +203,7 @@ pub(crate) struct Memory<'s> {
     pub(crate) buffers: ImageBuffers,
 }
 
-/// What was written of a shot.
+/// What was written for a shot.
 #[derive(Default)]
 struct WrittenShot {
     files: Vec<FileRecord>,
@@ -217,31 +231,36 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
     let scan = &job.locations[shot.location];
     let room = room_name(job.rooms[shot.location]);
     let mut written = WrittenShot::default();
+
     let write = |domain: Domain, bytes: &[u8]| -> Result<FileRecord> {
         let path = job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain);
         write_bytes(&path, bytes)?;
         Ok(FileRecord::of_bytes(job.layout.root(), &path, bytes)?)
     };
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
+
     // Poses alone need no rays.
     if !images.is_empty() {
         caster.cast_into(&shot.camera, 1, hits);
         let each = |image: Image, file: Vec<u8>| write(image.domain(), &file);
         written.files = job.channels.encode(&images, hits, &shot.camera, buffers, each)?;
     }
+
     if job.modalities.contains(&Domain::Pose) {
         let room = format!("{room}_{}", job.area);
         let mut pose = PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame);
         pose.world_offset_m = job.offset_m;
         written.files.push(write(Domain::Pose, &pose.to_json())?);
     }
+
     if !images.is_empty() {
         written.tally = count(job, &images, hits, buffers);
     }
+
     Ok(written)
 }
 
-/// The pixels of an image that was cast and encoded; it counts for none itself.
+/// Counts the pixels of an image that was cast and encoded. The tally counts no image itself.
 pub(crate) fn count(job: &ImageJob<'_>, images: &[Image], hits: &Hits, buffers: &ImageBuffers) -> ImageTally {
     let faces = hits.face.pixels();
     let is_filled = |face: &&u32| **face != NO_FACE && job.is_filled[**face as usize];

@@ -1,4 +1,5 @@
-//! The work of an export: units of labels, scores, images and assets, done where they are not done yet.
+//! The work of an export: units of labels, scores, images and assets. Units that are done already are
+//! skipped.
 
 use crate::account::Account;
 use crate::context::Context;
@@ -39,20 +40,20 @@ use std::sync::Arc;
 /// An export whose input is open and checked.
 pub(crate) struct Job<'a> {
     pub(crate) inputs: Inputs,
-    /// What decides the bytes.
+    /// Everything that decides the bytes of the data set.
     pub(crate) request: Request,
     options: ExportOptions,
-    /// The pictures of each area, if colours are taken from some.
+    /// The pictures that each area's colours are taken from, if there are any.
     pictures: Vec<Option<Pictures>>,
-    /// The mesh, if there is one area.
+    /// The mesh, if there is only one area.
     single: Option<Arc<MeshFile>>,
     /// How large the data set becomes.
     estimate: Estimate,
-    /// Where labels and scores come from, if they were made before.
+    /// The plan that labels and scores are taken from, if there is one.
     pub(crate) plan: Option<&'a Plan>,
 }
 
-/// What is known after labelling: by area, unless all of it was done before.
+/// What is known after labelling. An area is `None` if all its units were done before.
 pub(crate) struct Labelled<'j> {
     single: Option<PreparedMesh<'j>>,
     pub(crate) areas: Vec<Option<LabelledArea>>,
@@ -61,12 +62,13 @@ pub(crate) struct Labelled<'j> {
 /// Which areas are labelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scope {
-    /// Those of which something is still to be done.
+    /// The areas with units still to do.
     Unfinished,
     All,
 }
 
-/// Turns scenes into a data set. With a plan, labels and scores are taken from there.
+/// Turns scenes into a data set. With a plan, labels and scores are taken from it. Returns `None` if the data
+/// set is there already.
 pub(crate) fn export(
     ctx: &Context,
     scenes: &[SceneSource],
@@ -86,6 +88,7 @@ pub(crate) fn export(
     let Some(session) = run.begin(&state, &job.request, &manifest, Sharing::Alone)? else {
         return Ok(None);
     };
+
     let made = job.run(layout, &session.journal, &run.account).and_then(|disk| {
         let tables = run.account.stage(Stage::Tables, None);
         let made = finish(ctx, layout, &job.request, manifest, &session.journal.finished(), Some(disk))?;
@@ -109,27 +112,33 @@ impl<'a> Job<'a> {
         let ctx = account.ctx;
         let loading = account.stage(Stage::Load, None);
         ctx.debug(format_args!("{options:?}"));
-        let (placing, lenient) = (options.placing(), options.lenient);
+        let placing = options.placing();
+        let lenient = options.lenient;
+
         let inputs = match plan {
             Some(plan) => Inputs::open_planned(scenes, placing, lenient, plan.table()?)?,
             None => Inputs::open(scenes, placing, lenient)?,
         };
+
         let options = if inputs.are_labelled() {
             options.clone()
         } else {
             options.without_labels()?
         };
         let options = &options;
+
         check_only(&inputs, &options.only)?;
         let input_files = inputs.areas.iter().flat_map(|area| &area.files);
         state.check_inputs(layout, inputs.numbers(), input_files)?;
         check_label_count(inputs.table.len() - 1)?;
+
         let mut pictures = Vec::new();
         for area in &inputs.areas {
             pictures.push(area_pictures(ctx, area, options)?);
         }
-        // Every mesh is read before OUT is touched, so that a bad one costs nothing that was there. That of a
-        // single area stays in memory; several are read again where they are needed.
+
+        // Every mesh is read before OUT is touched, so that a bad one destroys nothing that was there. The
+        // mesh of a single area stays in memory; several are read again where they are needed.
         let mut single: Option<Arc<MeshFile>> = None;
         let mut companions = Vec::new();
         let mut estimate = Estimate::default();
@@ -142,34 +151,40 @@ impl<'a> Job<'a> {
             companions.push(file.companions.clone());
             single = (inputs.areas.len() == 1).then_some(file);
         }
+
         let known = plan.map(Plan::request);
         let request = Request::new(options, requested_areas(ctx, &inputs.areas, &companions, known)?);
         if let Some(plan) = plan {
             plan.refuse_other(&request)?;
             plan.require_complete()?;
         }
+
         loading.end();
         ctx.check()?;
         ctx.debug(format_args!("the data set will have {estimate}"));
         Ok(Self { estimate, inputs, request, options: options.clone(), pictures, single, plan })
     }
 
-    /// The manifest that says that this export runs.
+    /// Returns the manifest of an export under way.
     pub(crate) fn manifest(&self) -> Manifest {
         Manifest::begin(&self.request, &self.inputs.table)
     }
 
-    /// Does all units that are not done yet. What it has written goes to the disk meanwhile, and on after it.
+    /// Does all units that are not done yet. Written files are synced to the disk meanwhile. Returns that
+    /// work, which goes on afterwards.
     fn run(&self, layout: &Layout, journal: &Journal, account: &Account<'_>) -> Result<SyncAhead> {
         let ctx = account.ctx;
         let disk = SyncAhead::start(layout.root());
         self.write_assets(layout)?;
+
         let cache = layout.work_dir();
         let common = self.common(layout, journal, account, &cache, &|_| true);
         let labelled = self.label(common, Scope::Unfinished)?;
+
         let (candidates, _) = select_requested(&self.request, &journal.finished())?;
         let kept = candidates.iter().filter(|c| c.frame_num.is_some()).count();
         ctx.info(format_args!("selected {kept} of {} candidate views", candidates.len()));
+
         self.render(common, &labelled, &candidates)?;
         disk.sync_now();
         Ok(disk)
@@ -196,16 +211,17 @@ impl<'a> Job<'a> {
         cache: &'b Path,
         is_ours: &'b (dyn Fn(&Unit) -> bool + Sync),
     ) -> Common<'b> {
-        let (table, options) = (&self.inputs.table, &self.options);
+        let table = &self.inputs.table;
+        let options = &self.options;
         Common { table, layout, options, journal, account, cache, is_ours }
     }
 
-    /// Labels areas, those of which something is still to be done or all, and scores those of their locations
-    /// that are not scored. The files of an area's labels are written if that unit is ours; if not, what it
-    /// tells is known to the journal, but not written in it.
+    /// Labels the areas of `scope`, and scores their unscored locations. The label files of an area are
+    /// written if that unit is ours. Otherwise the journal knows the unit, but does not write it down.
     pub(crate) fn label(&self, common: Common<'_>, scope: Scope) -> Result<Labelled<'_>> {
         let missing = missing_units(&self.request, &common.journal.finished());
         let is_needed = |area: u32| scope == Scope::All || missing.iter().any(|unit| unit.area() == area);
+
         let mut labelled = Labelled { single: None, areas: Vec::new() };
         for area in &self.inputs.areas {
             let plan = match self.plan {
@@ -215,15 +231,17 @@ impl<'a> Job<'a> {
             };
             labelled.areas.push(plan);
         }
+
         let finished = common.journal.finished();
         let labels = self.request.areas.iter().filter_map(|a| finished.labels(a.area));
         let uuids = labels.flat_map(|l| l.locations.iter().chain(&l.photographs));
         only_known(uuids.map(String::as_str), &self.options.only)?;
+
         Ok(labelled)
     }
 
-    /// Labels an area, or takes it as it was labelled before, and scores what is ours and not scored. Its
-    /// mesh, ready for rays, is kept in `single` if there is but one area.
+    /// Labels an area, or takes the labels of an earlier run, and scores the locations that are ours and
+    /// unscored. If there is only one area, its mesh, ready for rays, is kept in `single`.
     fn label_area<'j>(
         &'j self,
         area: &AreaInput,
@@ -234,10 +252,12 @@ impl<'a> Job<'a> {
         if let Some(plan) = &before {
             label_area::know_labels(area, plan, &common);
         }
+
         let before = match before {
             Some(plan) if !scoring::is_unscored(&plan, &common) => return Ok(plan),
             before => before,
         };
+
         let is_labelled = before.is_some();
         let finish = |prepared: &PreparedMesh<'_>, nearest: Option<NearestFaces<'_>>| {
             let plan = match (before, nearest) {
@@ -248,12 +268,14 @@ impl<'a> Job<'a> {
             scoring::score(&plan, prepared, common)?;
             Ok(plan)
         };
+
         if let Some(file) = &self.single {
             let (prepared, nearest) = PreparedMesh::prepare(file, !is_labelled);
             let plan = finish(&prepared, nearest)?;
             *single = Some(prepared);
             return Ok(plan);
         }
+
         let loading = common.account.stage(Stage::Load, Some(area.number));
         let file = area.read_mesh()?;
         let (prepared, nearest) = PreparedMesh::prepare(&file, !is_labelled);
@@ -261,7 +283,7 @@ impl<'a> Job<'a> {
         finish(&prepared, nearest)
     }
 
-    /// The part of a plan that an area is: its labels and those scores that are ours.
+    /// Makes an area's part of a plan: its labels and the scores that are ours.
     pub(crate) fn plan_area(
         &self,
         area: &AreaInput,
@@ -283,15 +305,18 @@ impl<'a> Job<'a> {
     ) -> Result<()> {
         let missing = missing_units(&self.request, &common.journal.finished());
         let Labelled { single, areas } = labelled;
+
         for ((area, plan), pictures) in self.inputs.areas.iter().zip(areas).zip(&self.pictures) {
             let todo: BTreeSet<&Unit> = missing
                 .iter()
                 .filter(|unit| unit.area() == area.number && (common.is_ours)(unit))
                 .collect();
             let Some(plan) = plan.as_ref().filter(|_| !todo.is_empty()) else { continue };
+
             let render = |prepared: &PreparedMesh<'_>| {
                 area::render_area(area, prepared, plan, pictures.as_ref(), common, candidates, &todo)
             };
+
             match (single, &self.single) {
                 (Some(prepared), _) => render(prepared)?,
                 (None, Some(file)) => render(&PreparedMesh::for_rays(file))?,
@@ -304,11 +329,13 @@ impl<'a> Job<'a> {
                 }
             }
         }
+
         Ok(())
     }
 }
 
-/// The pictures that an area's RGB images are made from, if they are.
+/// Opens the pictures that an area's RGB images are made from. Returns `None` if there are none, or no RGB
+/// images are asked for.
 fn area_pictures(ctx: &Context, area: &AreaInput, options: &ExportOptions) -> Result<Option<Pictures>> {
     if !options.modalities.contains(&Domain::Rgb) {
         return Ok(None);
@@ -330,7 +357,8 @@ fn check_label_count(labels: usize) -> Result<()> {
     Err(InputError::TooManyLabels { labels, most }.into())
 }
 
-/// Refuses a `--only` that names no location, as far as they are known before the areas are labelled.
+/// Refuses a `--only` that names an unknown location. If locations are placed, nothing is refused here: they
+/// are known only after labelling.
 fn check_only(inputs: &Inputs, only: &[String]) -> Result<()> {
     if inputs.areas.iter().any(|a| matches!(a.cameras, Cameras::Placed(_))) {
         return Ok(());

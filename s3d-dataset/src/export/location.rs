@@ -15,8 +15,8 @@ use s3d_io::camera::ScanLocation;
 use s3d_label::{LabelTable, Room, UNKNOWN_ROOM};
 use s3d_render::Scene;
 
-/// An area's scan locations, each with its room if there are rooms, and what they see if they were placed by
-/// it.
+/// An area's scan locations, each with its room if there are rooms. `surface_seen` is there if the locations
+/// were placed by it.
 #[derive(Default)]
 pub(crate) struct Located {
     pub(crate) locations: Vec<ScanLocation>,
@@ -24,7 +24,7 @@ pub(crate) struct Located {
     pub(crate) surface_seen: Option<SurfaceSeen>,
 }
 
-/// An area's scan locations: those that are listed, or some that are placed.
+/// Returns an area's scan locations: the listed ones, or placed ones.
 pub(crate) fn locate(
     ctx: &Context,
     area: &AreaInput,
@@ -35,6 +35,7 @@ pub(crate) fn locate(
     seed: u64,
 ) -> Result<Located> {
     let room = |l: &ScanLocation| room_of(&annotated.rooms, l.pose.location);
+
     match &area.cameras {
         Cameras::Listed(locations, told) => {
             let is_known = |room: &Room| annotated.rooms.iter().any(|r| r.room == *room);
@@ -53,22 +54,29 @@ pub(crate) fn locate(
                 table,
                 rooms: &annotated.rooms,
             };
+
             let (placed, warnings) = place_locations(&ground, Placement { distance_m: *distance_m, seed })?;
             warnings.iter().for_each(|w| ctx.warn(w));
             ctx.info(format_args!("area {}: {} scan locations placed", area.number, placed.len()));
+
             let (locations, rooms) = placed.into_iter().map(|(l, room)| (l, Some(room))).unzip();
             Ok(Located { locations, rooms, surface_seen: None })
         }
         Cameras::Placed(_) => {
-            let (distance_m, share) = (area.cameras.distance_m(), area.cameras.share().unwrap_or(SHARE));
+            let distance_m = area.cameras.distance_m();
+            let share = area.cameras.share().unwrap_or(SHARE);
             let wanted = FreeSpaceOptions { share, distance_m, seed };
             let placed = place_in_free_space(ctx, area.number, scene, nearest, wanted)?;
             placed.warnings.iter().for_each(|w| ctx.warn(w));
+
             let seen = placed.seen;
-            let (number, count, floor_m2) = (area.number, placed.locations.len(), placed.floor.inside_m2);
+            let number = area.number;
+            let count = placed.locations.len();
+            let floor_m2 = placed.floor.inside_m2;
             ctx.info(format_args!(
                 "area {number}: {count} scan locations placed on {floor_m2:.0} m² of floor: {seen}"
             ));
+
             let rooms = placed.locations.iter().map(room).collect();
             Ok(Located { locations: placed.locations, rooms, surface_seen: Some(seen) })
         }
@@ -80,15 +88,17 @@ pub(crate) fn room_name(room: Option<Room>) -> String {
     room.map_or_else(|| UNKNOWN_ROOM.to_owned(), |room| room.to_string())
 }
 
-/// The room in which a point stands: the one whose floor outline holds it, or else the nearest outline; the
-/// first by name where several do. A room with too few points for an outline has its points' box instead. A
-/// building of one storey an area is assumed, as in the data set. `None` if there is no room.
+/// Returns the room in which a point stands: the room whose floor outline holds it, or else the room with the
+/// nearest outline. The first by name wins a tie. A room with too few points for an outline has the box of
+/// its points instead. An area is taken for one storey, as in the data set. Returns `None` if there is no
+/// room.
 pub(crate) fn room_of(rooms: &[SurveyedRoom], point: DVec3) -> Option<Room> {
     let mut best = (f64::INFINITY, rooms.first()?.room);
     for r in rooms {
-        let (min, max) = (r.bbox.min.as_dvec3().truncate(), r.bbox.max.as_dvec3().truncate());
+        let min = r.bbox.min.as_dvec3().truncate();
+        let max = r.bbox.max.as_dvec3().truncate();
         let mut distance = point.truncate().distance(point.truncate().clamp(min, max));
-        // An outline lies in the box: it is no nearer, but for rounding.
+        // The outline lies in the box: it is no nearer, but for rounding.
         if distance > 1.000_001 * best.0 {
             continue;
         }

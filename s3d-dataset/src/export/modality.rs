@@ -1,5 +1,5 @@
-//! From hits to the bytes of image files, in two steps. `draw` makes the images: those that can be in one
-//! walk over the hits (`together`), the others one after another. `file` makes a file of each.
+//! From hits to the bytes of image files, in two steps. `draw` makes the images: some of them together in one
+//! walk over the hits (`together`), the others one after another. `file` encodes each.
 
 use crate::export::input::pictures::PictureColors;
 use half::f16;
@@ -16,10 +16,10 @@ use s3d_render::{
     rgb_image_into, sample_edges, view_images_into, xyz_image_half_into, xyz_image_into,
 };
 
-/// In `semantic_class` images: no class, or nothing.
+/// The byte of `semantic_class` images where a face has no class, or no face is seen.
 pub(crate) const NO_CLASS: u8 = MAX_CLASSES as u8;
 
-/// The place of each label's class in the taxonomy, or [`NO_CLASS`].
+/// The index of each label's class in the taxonomy, or [`NO_CLASS`].
 pub(crate) fn classes_of_labels(table: &LabelTable) -> Vec<u8> {
     let class = |index| {
         table
@@ -29,7 +29,7 @@ pub(crate) fn classes_of_labels(table: &LabelTable) -> Vec<u8> {
     (0..table.len() as u32).map(class).collect()
 }
 
-/// The palette of `semantic_class` images: a colour for each byte, black for what is no class.
+/// The palette of `semantic_class` images: a colour for each byte, black for bytes without a class.
 pub(crate) fn palette(taxonomy: &Taxonomy) -> Vec<[u8; 3]> {
     let mut palette: Vec<[u8; 3]> = taxonomy.classes().iter().map(|c| taxonomy.color(*c)).collect();
     palette.resize(MAX_CLASSES + 1, [0; 3]);
@@ -41,27 +41,27 @@ pub(crate) fn palette(taxonomy: &Taxonomy) -> Vec<[u8; 3]> {
 pub(crate) struct Channels<'a> {
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) textures: &'a MipMaps,
-    /// Colours that are not the textures'.
+    /// The source of colours in place of the textures, if there is one.
     pub(crate) pictures: Option<PictureColors<'a>>,
     pub(crate) normals: Normals,
-    /// How many places of a pixel at an edge tell its colour; 1 for its centre alone.
+    /// How many samples decide the colour of a pixel at an edge; 1 samples the centre only.
     pub(crate) rgb_samples: u32,
     /// The label index of each face; may be empty if no semantic image is asked for.
     pub(crate) label_of_face: &'a [u32],
     /// The colour of each face in pretty images; may be empty likewise.
     pub(crate) pretty_of_face: &'a [[u8; 3]],
-    /// The place of each face's class in the taxonomy, or [`NO_CLASS`]; may be empty likewise.
+    /// The index of each face's class in the taxonomy, or [`NO_CLASS`]; may be empty likewise.
     pub(crate) class_of_face: &'a [u8],
     /// The colours of `semantic_class` images, [`NO_CLASS`]'s last.
     pub(crate) palette: &'a [[u8; 3]],
-    /// How much time their files may take.
+    /// How much time the compression of the files may take.
     pub(crate) compression: Compression,
-    /// Units of depth, axes of normals, type of coordinates (of which none counts as half: it is not asked
-    /// for then).
+    /// The units of depth, the axes of normals and the type of coordinates. [`XyzType::None`] counts as half
+    /// floats: no coordinates are asked for then.
     pub(crate) conventions: Conventions,
 }
 
-/// A domain that is an image: all but the pose.
+/// A domain that is an image: every domain but the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Image {
     Rgb,
@@ -74,7 +74,7 @@ pub(crate) enum Image {
 }
 
 impl Image {
-    /// The image that a domain is.
+    /// The image of a domain; `None` for the pose.
     pub(crate) fn of(domain: Domain) -> Option<Self> {
         Some(match domain {
             Domain::Rgb => Self::Rgb,
@@ -88,7 +88,7 @@ impl Image {
         })
     }
 
-    /// The domain that it is.
+    /// The image's domain.
     pub(crate) fn domain(self) -> Domain {
         match self {
             Self::Rgb => Domain::Rgb,
@@ -102,19 +102,20 @@ impl Image {
     }
 }
 
-/// Memory of the images of a view, for one view after another.
+/// The memory for the images of a view, used for one view after another.
 pub(crate) struct ImageBuffers {
     images: ViewImages,
     class: Raster<u8>,
     xyz_float: Raster<[f32; 3]>,
-    /// Which of `images` are those of the view at hand.
+    /// Which of `images` belong to the current view.
     made: Modalities,
-    /// Pixels of the last semantic image whose face has no label.
+    /// The number of pixels of the last semantic image whose face has no label.
     pub(crate) unlabelled: u64,
 }
 
 impl ImageBuffers {
-    /// A view's memory may stay. A panorama's, eight times as large and rarer, should not.
+    /// Larger images give their memory back. A view's memory may stay; a panorama's, eight times as large and
+    /// rarer, should not.
     const MAX_PIXELS: usize = 1 << 22;
 }
 
@@ -137,12 +138,12 @@ pub(crate) enum Drawn<'a> {
 }
 
 impl Channels<'_> {
-    /// What `each` makes of the files of some images of a view, from the view's hits, in the order of
-    /// `images`. Threads of the current rayon pool that have nothing else to do take part. Nothing but time
-    /// depends on what `prints` were used for before.
+    /// Encodes some images of a view from the view's hits. Gives each file to `each`, and returns its results
+    /// in the order of `images`. Idle threads of the current rayon pool take part. What `buffers` were used
+    /// for before changes the time, never the result.
     ///
     /// # Errors
-    /// That of `each`, which is given every file.
+    /// The error of `each`, which is given every file.
     pub(crate) fn encode<T: Send, E: Send>(
         &self,
         images: &[Image],
@@ -153,7 +154,9 @@ impl Channels<'_> {
     ) -> Result<Vec<T>, E> {
         let large = hits.face.len() > ImageBuffers::MAX_PIXELS;
         self.draw_together(images, hits, camera, buffers);
-        let (mut done, mut unlabelled) = (Vec::new(), 0);
+
+        let mut done = Vec::new();
+        let mut unlabelled = 0;
         for &image in images {
             self.draw(image, hits, camera, buffers);
             if image == Image::Semantic {
@@ -164,17 +167,20 @@ impl Channels<'_> {
                 *buffers = ImageBuffers::default();
             }
         }
+
+        // Files of small images are made in parallel.
         if !large {
             let files = images.par_iter().with_max_len(1);
             done = files
                 .map(|&image| each(image, self.file(image, buffers)))
                 .collect::<Result<_, E>>()?;
         }
+
         buffers.unlabelled = unlabelled;
         Ok(done)
     }
 
-    /// Draws those of the images that can be in one walk over the hits, unless they are large. [`Self::draw`]
+    /// Draws the images that can be made in one walk over the hits, unless they are large. [`Self::draw`]
     /// draws the others.
     pub(crate) fn draw_together(
         &self,
@@ -189,6 +195,7 @@ impl Channels<'_> {
         } else {
             self.together(images)
         };
+
         if buffers.made != Modalities::default() {
             let shading = Shading {
                 scene: self.scene,
@@ -223,6 +230,7 @@ impl Channels<'_> {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
         let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, made, .. } =
             buffers;
+
         let is_made = match image {
             Image::Rgb => made.rgb,
             Image::Depth => made.depth,
@@ -230,12 +238,14 @@ impl Channels<'_> {
             Image::SemanticClass => false,
             Image::GlobalXyz => made.xyz,
         };
+
         if is_made {
             if image == Image::Rgb {
                 self.sample_edges(hits, camera, rgb);
             }
             return;
         }
+
         match image {
             Image::Rgb => match &self.pictures {
                 Some(pictures) => pictures.image_into(self, hits, camera, rgb),
@@ -262,13 +272,13 @@ impl Channels<'_> {
         }
     }
 
-    /// Takes more samples at the edges of colours that are the mesh's, if they are asked for.
+    /// Takes more samples at the edges of an RGB image of the mesh's own colours, if they are asked for.
     fn sample_edges(&self, hits: &Hits, camera: &Camera, rgb: &mut Raster<[u8; 3]>) {
         let filter = TextureFilter::default();
         sample_edges(self.scene, self.textures, hits, camera, &filter, self.rgb_samples, rgb);
     }
 
-    /// An image that is drawn.
+    /// Returns an image that was drawn.
     pub(crate) fn drawn<'a>(&self, image: Image, buffers: &'a ImageBuffers) -> Drawn<'a> {
         let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, .. } = buffers;
         match image {
@@ -283,7 +293,7 @@ impl Channels<'_> {
         }
     }
 
-    /// Its file.
+    /// Encodes an image that was drawn.
     fn file(&self, image: Image, buffers: &ImageBuffers) -> Vec<u8> {
         let compression = self.compression;
         let content = match image {
@@ -291,6 +301,7 @@ impl Channels<'_> {
             Image::Semantic | Image::SemanticPretty => Content::Labels,
             _ => Content::Photo,
         };
+
         match self.drawn(image, buffers) {
             Drawn::Color(colors) => encode_rgb8(colors, content, compression),
             Drawn::Depth(depth) => encode_gray16(depth, compression),
@@ -301,15 +312,16 @@ impl Channels<'_> {
     }
 }
 
-/// How many pixels of a label image are those of the null label. Four pixels at a time are four times
-/// as fast as one: that would be 3 % of a large panorama's time.
+/// Counts the pixels of a label image that have the null label. Four pixels at a time are four times as fast
+/// as one, which would take 3 % of a large panorama's time.
 pub(crate) fn null_pixels(pixels: &[[u8; 3]]) -> u64 {
     let (fours, rest) = pixels.as_chunks::<4>();
     let mut count = rest.iter().filter(|pixel| **pixel == [0; 3]).count() as u64;
     for four in fours {
         let bytes = four.as_flattened();
         let (Some(first), Some(last)) = (bytes.first_chunk(), bytes.last_chunk()) else { continue };
-        let (first, last) = (u64::from_le_bytes(*first), u64::from_le_bytes(*last));
+        let first = u64::from_le_bytes(*first);
+        let last = u64::from_le_bytes(*last);
         for pixel in [first << 40, first >> 24 << 40, last >> 16 << 40, last >> 40] {
             count += u64::from(pixel == 0);
         }

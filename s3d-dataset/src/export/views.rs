@@ -17,22 +17,22 @@ use s3d_sample::{Pool, PoolItem, Selection, View, ViewDistribution, draw_view, e
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// What a view shows in a pixel, by the pixel's face: views are scored by the entropy of it.
+/// What a view shows in a pixel, by the face seen there. Views are scored by its entropy.
 pub(crate) enum Kinds {
-    /// The place of the face's class among so many, or [`NO_CLASS`].
+    /// The index of each face's class or [`NO_CLASS`], and the number of classes.
     Classes(Vec<u8>, usize),
-    /// Without labels: which of [`DIRECTIONS`] its normal is nearest to.
+    /// Without labels: which of the [`DIRECTIONS`] each face's normal is nearest to.
     Directions(Vec<u8>),
 }
 
-/// In place of a class's: a face without one.
+/// The index of a face without a class.
 const NO_CLASS: u8 = MAX_CLASSES as u8;
 
 /// The directions to the faces, edges and corners of a cube.
 const DIRECTIONS: usize = 26;
 
 impl Kinds {
-    /// Of a mesh with these labels: directions if the table has none.
+    /// Returns the kinds of a mesh's faces: their classes, or their directions if the table has no labels.
     pub(crate) fn of(table: &LabelTable, label_of_face: &[LabelId], mesh: &TriMesh) -> Self {
         if table.len() > 1 {
             let class =
@@ -40,11 +40,13 @@ impl Kinds {
             let class_of_face = label_of_face.iter().map(class).collect();
             return Self::Classes(class_of_face, table.taxonomy().classes().len());
         }
+
         let steps = [-1.0, 0.0, 1.0];
         let all = steps
             .iter()
             .flat_map(|x| steps.iter().flat_map(move |y| steps.map(|z| vec3(*x, *y, z))));
         let directions: Vec<Vec3> = all.filter_map(Vec3::try_normalize).collect();
+
         let nearest = |face: u32| {
             let normal = mesh.normal(face);
             let cosines = directions.iter().map(|d| d.dot(normal));
@@ -56,7 +58,7 @@ impl Kinds {
         Self::Directions((0..mesh.faces().len() as u32).into_par_iter().map(nearest).collect())
     }
 
-    /// The entropy of what a view's hits show, nats.
+    /// The entropy of what a view's hits show, in nats.
     fn entropy_of(&self, hits: &Hits) -> f64 {
         let seen = hits.face.pixels().iter().filter(|face| **face != NO_FACE);
         match self {
@@ -79,16 +81,16 @@ impl Kinds {
 pub(crate) struct Scoring {
     /// The area of the locations.
     pub(crate) area: u32,
-    /// Candidates a location.
+    /// Candidates per location.
     pub(crate) views: u32,
     /// Image size in pixels.
     pub(crate) size: u32,
-    /// Every which pixel of both axes is looked at.
+    /// The step between the pixels that are looked at, along both axes.
     pub(crate) stride: u32,
     pub(crate) seed: u64,
 }
 
-/// Draws the candidates of a location; `entropies` are theirs, if they are scored already.
+/// Draws the candidates of a location. `entropies` are their scores, if they are scored already.
 fn draw(
     area: u32,
     location: usize,
@@ -98,6 +100,7 @@ fn draw(
     entropies: Option<&[f64]>,
 ) -> Vec<Candidate> {
     let distribution = ViewDistribution::default();
+
     let candidate = |candidate| {
         let View { yaw_rad, pitch_rad, fov_rad } = draw_view(&distribution, seed, uuid, candidate);
         Candidate {
@@ -115,12 +118,12 @@ fn draw(
             frame_num: None,
         }
     };
+
     (0..views).map(candidate).collect()
 }
 
-/// Draws the candidates of those locations of an area that are asked for, and scores each by the entropy of
-/// what it sees. What is done goes to `each`, a location at a time, by whichever thread: its uuid, and the
-/// entropies of its candidates.
+/// Draws the candidates of some locations of an area, and scores each by the entropy of what it sees. The
+/// thread that completes a location calls `each` with its uuid and the entropies of its candidates.
 pub(crate) fn score_area(
     ctx: &Context,
     locations: &[&ScanLocation],
@@ -133,15 +136,18 @@ pub(crate) fn score_area(
     for (index, location) in locations.iter().enumerate() {
         candidates.extend(draw(scoring.area, index, &location.uuid, scoring.views, scoring.seed, None));
     }
+
     if scoring.views == 0 {
         return locations
             .iter()
             .try_for_each(|location| each(&location.uuid, Vec::new()));
     }
+
     let left: Vec<AtomicU32> = locations.iter().map(|_| AtomicU32::new(scoring.views)).collect();
     let progress = ctx.progress("scoring", "views", candidates.len() as u64);
     let scores: Vec<OnceLock<f64>> = candidates.iter().map(|_| OnceLock::new()).collect();
     let items: Vec<usize> = (0..candidates.len()).collect();
+
     let memory = || (Caster::new(scene), Hits::default());
     for_each_in_order(ctx, &items, memory, |(caster, hits), &i| {
         let c = &candidates[i];
@@ -149,22 +155,24 @@ pub(crate) fn score_area(
         caster.cast_into(&camera, scoring.stride, hits);
         let _ = scores[i].set(kinds.entropy_of(hits));
         progress.add(1);
-        // Whoever scores the last of a location hands it on.
+
+        // The thread that scores the last candidate of a location hands the location on.
         if left[c.location].fetch_sub(1, Ordering::AcqRel) == 1 {
             let views = scoring.views as usize;
             let of_location = scores.iter().skip(c.location * views).take(views);
             let entropies = of_location.map(|score| score.get().copied().unwrap_or(0.0)).collect();
             each(&c.camera_uuid, entropies)?;
         }
+
         Ok(())
     })
 }
 
-/// All candidates of a request whose areas are labelled and whose locations are scored, with the selection
-/// made, and what became of them.
+/// Returns all candidates of a request after the selection, and what became of them. The areas must be
+/// labelled and the locations scored.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) if something of that is missing.
+/// [`Error::Input`](crate::Error::Input) if labels or scores are missing.
 pub(crate) fn select_requested(
     request: &Request,
     finished: &Finished,
@@ -174,10 +182,12 @@ pub(crate) fn select_requested(
     for area in request.numbers() {
         let missing = |what: &str| InputError::UnfitArea { area, why: format!("{what} missing") };
         let labels = finished.labels(area).ok_or_else(|| missing("its labels are"))?;
+
         for (index, uuid) in labels.locations.iter().enumerate() {
             let entropies = finished.scores(area, uuid);
             let entropies = entropies.ok_or_else(|| missing(&format!("the scores of {uuid} are")))?;
-            // No more is drawn than was scored, whatever a request claims.
+
+            // No more candidates are drawn than were scored, whatever a request claims.
             if entropies.len() != options.views as usize {
                 return Err(InputError::UnfitArea {
                     area,
@@ -189,19 +199,23 @@ pub(crate) fn select_requested(
                 }
                 .into());
             }
+
             candidates.extend(draw(area, index, uuid, options.views, request.seed, Some(entropies)));
         }
     }
+
     let pool = options.pool;
     select(&mut candidates, pool, options.keep_all, request.seed);
     let tally = tally(&candidates, pool, options.keep_all, &options.only);
     Ok((candidates, tally))
 }
 
-/// Counts candidates after their selection; those of an area, and of a location in it, follow each other.
-/// `only` are the locations whose images are asked for, all if it is empty.
+/// Counts candidates after their selection. The candidates of an area follow each other, and so do the
+/// candidates of each of its locations. `only` are the locations whose images are asked for; all are if it is
+/// empty.
 pub(crate) fn tally(candidates: &[Candidate], pool: Pool, keep_all: bool, only: &[String]) -> ViewTally {
     let kept: Vec<&Candidate> = candidates.iter().filter(|c| c.frame_num.is_some()).collect();
+
     let same_pool = |a: &Candidate, b: &Candidate| match pool {
         Pool::Dataset => true,
         Pool::Area => a.area == b.area,
@@ -210,7 +224,9 @@ pub(crate) fn tally(candidates: &[Candidate], pool: Pool, keep_all: bool, only: 
     let discarded = |pool: &[Candidate]| Selection::default().discarded(pool.len()) as u64;
     let pools = candidates.chunk_by(same_pool);
     let dropped_lowest = if keep_all { 0 } else { pools.map(discarded).sum() };
+
     let asked = |c: &&&Candidate| only.is_empty() || only.contains(&c.camera_uuid);
+
     ViewTally {
         candidates: candidates.len() as u64,
         kept: kept.len() as u64,
@@ -220,7 +236,7 @@ pub(crate) fn tally(candidates: &[Candidate], pool: Pool, keep_all: bool, only: 
     }
 }
 
-/// Selects views over the pool, or all of them, and numbers the kept ones of each location from 0.
+/// Selects views from each pool, or all of them, and numbers the kept ones of each location from 0.
 pub(crate) fn select(candidates: &mut [Candidate], pool: Pool, keep_all: bool, seed: u64) {
     let kept = if keep_all {
         vec![true; candidates.len()]
@@ -231,6 +247,7 @@ pub(crate) fn select(candidates: &mut [Candidate], pool: Pool, keep_all: bool, s
             .collect();
         select_pooled(&items, pool, &Selection::default(), seed)
     };
+
     let mut of_location = (u32::MAX, usize::MAX);
     let mut next = 0;
     for (c, kept) in candidates.iter_mut().zip(kept) {
@@ -254,13 +271,14 @@ mod tests {
 
     #[test]
     fn directions_are_counted_where_there_are_no_labels() {
-        // A floor, a wall, and one between the two.
+        // A floor, a wall and a face between the two.
         let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [0., -1., 1.]];
         let mesh = TriMesh::from_faces(
             corners.map(Vec3::from_array).to_vec(),
             vec![[0, 1, 2], [0, 1, 3], [0, 1, 4]],
         );
-        let (mesh, table) = (mesh.unwrap(), LabelTable::from_labels([]).unwrap());
+        let mesh = mesh.unwrap();
+        let table = LabelTable::from_labels([]).unwrap();
         let Kinds::Directions(kinds) = Kinds::of(&table, &[LabelId::NULL; 3], &mesh) else { panic!() };
         assert!(kinds.iter().all(|kind| usize::from(*kind) < DIRECTIONS));
         assert!(kinds[0] != kinds[1] && kinds[1] != kinds[2] && kinds[0] != kinds[2]);
