@@ -1,64 +1,65 @@
-//! What differs between two data sets, as data.
+//! The differences between two data sets, as data.
 
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::ops::AddAssign;
 
-/// What stands for the class of surface without a label; no class has such a name.
+/// Stands for the class of surface without a label. No class has this name.
 pub(crate) const UNLABELLED: &str = "<UNK>";
 
-/// What stands for the class of a pixel that sees nothing.
+/// Stands for the class of a pixel that sees nothing.
 pub(crate) const NOTHING: &str = "<nothing>";
 
-/// What differs between two data sets, A and B: what [`compare`](crate::compare()) returns.
+/// The differences between two data sets, A and B, as [`compare`](crate::compare()) returns them.
 ///
-/// Displayed, it is the text that `s3d compare` prints; serialized, the JSON that `--json` writes.
+/// Displayed, it is the text that `s3d compare` prints; serialized, it is the JSON that `--json` writes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Comparison {
     /// Whether both hold the same data; see [`Comparison::is_equal`].
     pub equal: bool,
-    /// Whether every file of both was read and held against its checksum. Otherwise the sizes of all were,
-    /// and the checksums of those that were read.
+    /// Whether every file of both was read and compared with its checksum. Otherwise the sizes of all files
+    /// were compared, and the checksums of the files that were read.
     pub full: bool,
-    /// The first.
+    /// The first data set.
     pub a: ComparedSet,
-    /// The second.
+    /// The second data set.
     pub b: ComparedSet,
-    /// What the manifests tell differently of how the data sets were made, but for the input.
+    /// Values in the manifests, other than the input, that say the data sets were made differently.
     pub settings: Vec<SettingChange>,
     /// Files and folders of the input that differ.
     pub inputs: Vec<InputChange>,
     /// The files, by kind.
     pub files: Vec<FileKindChanges>,
-    /// The meshes, by area; what differs of their labels.
+    /// The changed labels of the meshes, by area.
     pub areas: Vec<AreaChanges>,
-    /// The labels; `None` if neither has some.
+    /// The labels; `None` if neither data set has any.
     pub labels: Option<LabelChanges>,
-    /// Candidate views that were kept, photographs and scan locations.
+    /// Kept candidate views, photographs and scan locations.
     pub views: ViewChanges,
     /// The images, by modality.
     pub modalities: Vec<ModalityChanges>,
-    /// Images whose pixels differ: by modality those with the largest share of such pixels first.
+    /// Images whose pixels differ, by modality. Within a modality, the largest share of differing pixels
+    /// comes first.
     pub images: Vec<ImageChange>,
-    /// The cameras of images that are in both.
+    /// The cameras of images that are in both data sets.
     pub poses: PoseChanges,
-    /// What was not compared, or otherwise than by itself, a sentence each.
+    /// What was not compared, or only together with something else, a sentence each.
     pub notes: Vec<String>,
-    /// What could not be compared: files that are missing, damaged, or do not hold what they should.
+    /// Files that could not be compared: they are missing, damaged, or do not hold what they should.
     pub unread: Vec<UnreadFile>,
 }
 
 impl Comparison {
-    /// Whether both hold the same data: the same files with the same bytes, all of which are there. Manifests
-    /// tell how they were made; what differs there is listed, and decides nothing.
+    /// Whether both hold the same data: the same files with the same bytes, all present. Manifests say how
+    /// the data sets were made; their differences are listed but do not count.
     pub fn is_equal(&self) -> bool {
         self.equal
     }
 }
 
-/// One of the two.
+/// One of the two data sets.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ComparedSet {
@@ -68,17 +69,17 @@ pub struct ComparedSet {
     pub version: String,
     /// Its seed.
     pub seed: u64,
-    /// Files but `manifest.json` and `files.csv`.
+    /// The number of files, without `manifest.json` and `files.csv`.
     pub files: u64,
-    /// Their bytes.
+    /// The size of these files in bytes.
     pub bytes: u64,
     /// The numbers of its areas.
     pub areas: Vec<u32>,
-    /// The taxonomy of its labels; `None` if it has none.
+    /// The taxonomy of its labels; `None` without labels.
     pub taxonomy: Option<String>,
 }
 
-/// Which of the two.
+/// One of the two data sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
@@ -88,15 +89,15 @@ pub enum Side {
     B,
 }
 
-/// A value of the manifests that differs.
+/// A value that differs between the manifests.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct SettingChange {
     /// Its key in the manifest: `seed`, `options.size`, `area 1: see`.
     pub name: String,
-    /// Null if it is not there.
+    /// The value in A; null if A has none.
     pub a: Value,
-    /// Likewise.
+    /// The value in B; null if B has none.
     pub b: Value,
 }
 
@@ -104,35 +105,35 @@ pub struct SettingChange {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct InputChange {
-    /// The area that it is the input of.
+    /// The area that reads it.
     pub area: u32,
-    /// From the folder of the scene; that of a folder ends with `/`.
+    /// The path relative to the folder of the scene. The path of a folder ends with `/`.
     pub path: String,
-    /// Its checksum; `None` if it is not there.
+    /// The checksum in A; `None` if it is not there.
     pub a: Option<String>,
-    /// Likewise.
+    /// The checksum in B; `None` if it is not there.
     pub b: Option<String>,
 }
 
-/// How many files of a kind differ.
+/// The number of files of a kind that differ.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct FileKindChanges {
-    /// The folder of an area that they are in (`data/rgb`, `3d`), a folder or a file of the data set.
+    /// A folder of an area (`data/rgb`, `3d`), or a folder or a file of the data set.
     pub kind: String,
-    /// Those with the same bytes.
+    /// Files with the same bytes.
     pub same: u64,
-    /// Those with other bytes.
+    /// Files with other bytes.
     pub changed: u64,
-    /// Those that only A has.
+    /// Files that only A has.
     pub only_a: u64,
-    /// Those that only B has.
+    /// Files that only B has.
     pub only_b: u64,
-    /// The first twenty of those that are not the same, by path.
+    /// The first twenty files that are not the same, by path.
     pub first: Vec<String>,
 }
 
-/// So much surface, and so many pixels of panoramas and views that show it.
+/// An amount of surface, and the pixels of panoramas and views that show it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LabelCounts {
@@ -152,43 +153,43 @@ impl AddAssign for LabelCounts {
     }
 }
 
-/// Whether two meshes are the same, but for their labels and colours.
+/// Whether two meshes are the same apart from their labels and colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Geometry {
     /// Each face has the same corners.
     Same,
-    /// They differ: their faces cannot be compared.
+    /// The corners differ, so faces cannot be compared.
     Other,
     /// A mesh could not be read.
     Unread,
-    /// Only one has the area.
+    /// Only one data set has the area.
     OneSided,
-    /// The meshes were not needed: one or both have no labels.
+    /// The meshes were not compared, because one or both have no labels.
     Unlabelled,
 }
 
-/// What differs between the meshes of an area.
+/// The differences between the meshes of an area.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct AreaChanges {
-    /// Its number.
+    /// The number of the area.
     pub area: u32,
     /// Faces of A's mesh.
     pub faces_a: Option<u64>,
     /// Faces of B's mesh.
     pub faces_b: Option<u64>,
-    /// Whether they are the same.
+    /// Whether both meshes are the same.
     pub geometry: Geometry,
-    /// Faces with another label.
+    /// The number of faces with another label.
     pub faces_changed: u64,
     /// Their area, square metres.
     pub m2_changed: f64,
-    /// Which they are, by number. Not in the JSON.
+    /// The faces with another label, by number. Not in the JSON.
     #[serde(skip)]
     pub faces: Vec<FaceChange>,
-    /// Where they lie: the largest patches, those of another class first. Not in the JSON.
+    /// The largest patches of such faces; patches with another class come first. Not in the JSON.
     #[serde(skip)]
     pub patches: Vec<ChangedPatch>,
 }
@@ -197,54 +198,55 @@ pub struct AreaChanges {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct FaceChange {
-    /// Its place in `semantic.obj`, from 0.
+    /// Its index in `semantic.obj`, from 0.
     pub face: u32,
-    /// Its label's index in A's `semantic_labels.json`.
+    /// The index of its label in A's `semantic_labels.json`.
     pub a: u32,
-    /// The same in B's.
+    /// The index of its label in B's `semantic_labels.json`.
     pub b: u32,
 }
 
-/// Faces that changed from one label to another and hang together by their corners.
+/// Faces with the same label in A and the same other label in B, connected by their corners.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ChangedPatch {
     /// The index of their label in A's `semantic_labels.json`.
     pub a: u32,
-    /// The same in B's.
+    /// The index of their label in B's `semantic_labels.json`.
     pub b: u32,
-    /// How many they are.
+    /// The number of faces.
     pub faces: u64,
     /// Their area, square metres.
     pub m2: f64,
-    /// The centre of the face that is nearest to the centre of their area; world, metres.
+    /// The centre of the face that is nearest to the centre of the patch's area; world, metres.
     pub center: [f64; 3],
 }
 
-/// What differs between the labels. They are compared by their names; their indices may be others.
+/// The differences between the labels. Labels are compared by name; their indices may differ.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LabelChanges {
-    /// How many A has.
+    /// The number of labels in A.
     pub a: u64,
-    /// How many B has.
+    /// The number of labels in B.
     pub b: u64,
-    /// Those that only B has.
+    /// Labels that only B has.
     pub added: Vec<String>,
-    /// Those that only A has.
+    /// Labels that only A has.
     pub gone: Vec<String>,
-    /// What has another label, of the same class or of another.
+    /// Surface and pixels with another label, of the same class or of another.
     pub changed: LabelCounts,
-    /// What has a label of another class.
+    /// Surface and pixels with a label of another class.
     pub class_changed: LabelCounts,
-    /// What has another label, by class in A and in B, the largest surface first: `<UNK>` stands for no
-    /// label, `<nothing>` for pixels that see nothing. Two equal classes stand for another instance of it.
+    /// Surface and pixels with another label, by class in A and in B, the largest surface first. `<UNK>`
+    /// stands for no label, `<nothing>` for pixels that see nothing. Two equal classes stand for another
+    /// instance of the class.
     pub matrix: Vec<ClassPair>,
-    /// The fifty instances that changed most: first those with the largest surface of another class.
+    /// The fifty instances that changed most. The largest surface with another class comes first.
     pub instances: Vec<InstanceChange>,
 }
 
-/// What has labels of one class in A, and of one in B.
+/// Surface and pixels with labels of one class in A and of another in B.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ClassPair {
@@ -252,22 +254,22 @@ pub struct ClassPair {
     pub a: &'static str,
     /// The class in B.
     pub b: &'static str,
-    /// How much of it.
+    /// The amount of surface and pixels.
     #[serde(flatten)]
     pub counts: LabelCounts,
 }
 
-/// What an instance lost and gained.
+/// The surface and pixels that an instance lost and gained.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct InstanceChange {
-    /// Its label.
+    /// The instance's label.
     pub name: String,
-    /// What has it in A alone.
+    /// Surface and pixels with this label in A alone.
     pub lost: LabelCounts,
-    /// What has it in B alone.
+    /// Surface and pixels with this label in B alone.
     pub gained: LabelCounts,
-    /// What of both is of another class on the other side.
+    /// The part of both that has another class on the other side.
     pub class_changed: LabelCounts,
 }
 
@@ -279,7 +281,7 @@ pub struct ViewName {
     pub area: u32,
     /// Its scan location.
     pub uuid: String,
-    /// Which of the location's candidate views it is.
+    /// Its number among the location's candidate views.
     pub candidate: u32,
 }
 
@@ -293,35 +295,36 @@ pub struct LocationName {
     pub uuid: String,
 }
 
-/// Which views were kept. A view is what its location and its number among the location's candidates name.
+/// The views that were kept. A view is identified by its location and its number among the location's
+/// candidates.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct ViewChanges {
-    /// How many A keeps.
+    /// The number of views that A keeps.
     pub kept_a: u64,
-    /// How many B keeps.
+    /// The number of views that B keeps.
     pub kept_b: u64,
-    /// Those that A keeps alone.
+    /// Views that A alone keeps.
     pub lost: Vec<ViewName>,
-    /// Those that B keeps alone.
+    /// Views that B alone keeps.
     pub gained: Vec<ViewName>,
-    /// Those that both keep, at other angles.
+    /// Views that both keep, at other angles.
     pub redrawn: Vec<ViewName>,
-    /// Scan locations that A has alone.
+    /// Scan locations that A alone has.
     pub locations_lost: Vec<LocationName>,
-    /// Scan locations that B has alone.
+    /// Scan locations that B alone has.
     pub locations_gained: Vec<LocationName>,
-    /// Photographs that A has alone.
+    /// Photographs that A alone has.
     pub photographs_lost: Vec<LocationName>,
-    /// Photographs that B has alone.
+    /// Photographs that B alone has.
     pub photographs_gained: Vec<LocationName>,
 }
 
-/// What differs between the images of a modality.
+/// The differences between the images of a modality.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ModalityChanges {
-    /// Its folder: `rgb`, `depth`.
+    /// The modality's folder: `rgb`, `depth`.
     pub modality: &'static str,
     /// Images with the same bytes.
     pub same: u64,
@@ -329,9 +332,9 @@ pub struct ModalityChanges {
     pub same_pixels: u64,
     /// Images with other pixels.
     pub changed: u64,
-    /// Images of other cameras, with other bytes: their pixels were not compared.
+    /// Images with other cameras and other bytes, whose pixels were not compared.
     pub other_pose: u64,
-    /// Images of another size, in other units or axes: their pixels were not compared.
+    /// Images with another size, unit or axes, whose pixels were not compared.
     pub other_form: u64,
     /// Images that could not be compared.
     pub unread: u64,
@@ -344,20 +347,20 @@ pub struct ModalityChanges {
     pub pixels: PixelChanges,
 }
 
-/// How the pixels of images differ.
+/// The differences between the pixels of images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct PixelChanges {
-    /// All pixels of these images.
+    /// The number of pixels of these images.
     pub pixels: u64,
-    /// Those that differ.
+    /// The number of pixels that differ.
     pub pixels_changed: u64,
-    /// Of colours: the peak signal-to-noise ratio, decibels. `None` if there is no difference.
+    /// For colours, the peak signal-to-noise ratio in decibels. `None` if there is no difference.
     pub psnr_db: Option<f64>,
-    /// Of normals the angle between them, degrees; of depth and world coordinates the distance, metres: the
-    /// mean over the pixels that see something in both.
+    /// The mean difference over the pixels that see something in both. For normals it is the angle between
+    /// them, degrees; for depth and world coordinates the distance, metres.
     pub mean: Option<f64>,
-    /// The largest of them.
+    /// The largest of these differences.
     pub largest: Option<f64>,
 }
 
@@ -369,19 +372,20 @@ pub struct ImageChange {
     pub modality: &'static str,
     /// Its area.
     pub area: u32,
-    /// Its file in A, from the data set's folder.
+    /// Its file in A, relative to the data set's folder.
     pub a: String,
-    /// Its file in B.
+    /// Its file in B, relative to the data set's folder.
     pub b: String,
-    /// How they differ.
+    /// The differences between their pixels.
     #[serde(flatten)]
     pub pixels: PixelChanges,
-    /// Of labels: the pixels that differ by class in A and in B, the most first; at most 256 pairs.
+    /// For labels, the pixels that differ by class in A and in B, at most 256 pairs. The most frequent pair
+    /// comes first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub classes: Vec<ClassPixels>,
 }
 
-/// Pixels with labels of one class in A, and of one in B, named as in [`LabelChanges::matrix`].
+/// Pixels with labels of one class in A and of another in B, named as in [`LabelChanges::matrix`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct ClassPixels {
@@ -389,11 +393,11 @@ pub struct ClassPixels {
     pub a: &'static str,
     /// The class in B.
     pub b: &'static str,
-    /// How many they are.
+    /// The number of pixels.
     pub pixels: u64,
 }
 
-/// What differs between the poses of images that are in both, but for views at other angles.
+/// The differences between the poses of images that are in both data sets, without views at other angles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct PoseChanges {
@@ -401,9 +405,9 @@ pub struct PoseChanges {
     pub same: u64,
     /// Poses with other bytes and the same camera.
     pub same_camera: u64,
-    /// Poses of other cameras: the farthest first.
+    /// Poses of other cameras. The farthest comes first.
     pub moved: Vec<PoseChange>,
-    /// The largest difference of places, metres.
+    /// The largest distance between two locations, metres.
     pub largest_m: f64,
     /// The largest angle between two rotations, degrees.
     pub largest_degrees: f64,
@@ -415,15 +419,15 @@ pub struct PoseChanges {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct PoseChange {
-    /// Its file in A, from the data set's folder.
+    /// Its file in A, relative to the data set's folder.
     pub a: String,
-    /// Its file in B.
+    /// Its file in B, relative to the data set's folder.
     pub b: String,
-    /// The distance between both, metres.
+    /// The distance between both locations, metres.
     pub m: f64,
     /// The angle between both rotations, degrees.
     pub degrees: f64,
-    /// The largest difference in K, pixels; `None` if the images have other sizes.
+    /// The largest difference in K, pixels; `None` if the images differ in size.
     pub k_px: Option<f64>,
 }
 
@@ -431,13 +435,14 @@ pub struct PoseChange {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[non_exhaustive]
 pub struct UnreadFile {
-    /// Whose file it is.
+    /// The data set that the file belongs to.
     pub side: Side,
-    /// From the data set's folder, with `/`.
+    /// The path relative to the data set's folder, with `/`.
     pub path: String,
     /// What is wrong with it.
     pub message: String,
 }
 
-/// Counts by pairs of labels, as A and B name them together; see [`super::names::Names`].
+/// Counts by pairs of labels: the label in A, then the label in B, by their numbers in
+/// [`super::names::Names`].
 pub(crate) type LabelPairs = BTreeMap<(u32, u32), LabelCounts>;

@@ -1,4 +1,4 @@
-//! The images that are in both data sets, one pair after another.
+//! Compares the images of both data sets, one pair after another.
 
 use super::comparison::{ClassPixels, ImageChange, LabelPairs, ModalityChanges, PoseChanges, Side};
 use super::names::Names;
@@ -14,16 +14,16 @@ use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, PoseFile};
 use std::path::PathBuf;
 
-/// What differs between the images.
+/// The differences between the images.
 pub(crate) struct Images {
     pub(crate) modalities: Vec<ModalityChanges>,
     pub(crate) changed: Vec<ImageChange>,
     pub(crate) poses: PoseChanges,
-    /// Images without poses on both sides, whose pixels were compared all the same.
+    /// The number of images without poses on both sides. Their pixels were still compared.
     pub(crate) without_poses: u64,
 }
 
-/// What became of the files of a modality, in both an image.
+/// The result for the files of a modality of one image.
 #[derive(Clone, Copy)]
 enum Found {
     Same,
@@ -35,25 +35,25 @@ enum Found {
     OnlyB,
 }
 
-/// What became of an image.
+/// The result for an image.
 struct Outcome {
     found: Vec<(Domain, Found)>,
     pose: PoseFound,
     pairs: LabelPairs,
 }
 
-/// What became of its pose.
+/// The result for the pose of an image.
 #[derive(Clone, Copy)]
 enum PoseFound {
-    /// Not in both, or could not be read.
+    /// It is not in both, or could not be read.
     None,
-    /// Not to be told: of a view at other angles.
+    /// The view has other angles. The views report this already.
     Redrawn,
     Same,
     Moved(Moved),
 }
 
-/// Whether both see the same.
+/// Whether both images have the same camera.
 #[derive(Clone, Copy, PartialEq)]
 enum SameCamera {
     Yes,
@@ -61,7 +61,7 @@ enum SameCamera {
     Unread,
 }
 
-/// Compares all images; pixels with other labels come to `pairs`.
+/// Compares all images, and adds the pixels with other labels to `pairs`.
 pub(crate) fn compare_all(
     sides: &Sides,
     views: &Views,
@@ -71,6 +71,7 @@ pub(crate) fn compare_all(
 ) -> Result<Images> {
     let jobs: Vec<(&ImageKey, &[Option<FoundImage>; 2])> = views.images.iter().collect();
     let progress = ctx.progress("comparing", "images", jobs.len() as u64);
+
     let work = Work { sides, views, names };
     let outcomes = map_in_order(
         ctx,
@@ -83,6 +84,7 @@ pub(crate) fn compare_all(
         },
     )?;
     drop(progress);
+
     let mut images = Images {
         modalities: Domain::ALL
             .map(|domain| ModalityChanges { modality: domain.folder(), ..ModalityChanges::default() })
@@ -91,6 +93,7 @@ pub(crate) fn compare_all(
         poses: PoseChanges::default(),
         without_poses: 0,
     };
+
     let mut sums = [Sums::default(); Domain::ALL.len()];
     for ((key, pair), outcome) in jobs.iter().zip(outcomes) {
         let classes = names
@@ -105,38 +108,44 @@ pub(crate) fn compare_all(
             images.add((key, pair), domain, (found, classes), &mut sums);
         }
     }
+
     for (modality, sums) in images.modalities.iter_mut().zip(&sums) {
         modality.pixels = sums.changes();
     }
     images
         .modalities
         .retain(|of| of.modality != Domain::Pose.folder() && *of != empty(of.modality));
+
     images.poses.sort();
     images.sort();
     Ok(images)
 }
 
+/// The changes of a modality without images.
 fn empty(modality: &'static str) -> ModalityChanges {
     ModalityChanges { modality, pixels: Sums::default().changes(), ..ModalityChanges::default() }
 }
 
 impl Images {
+    /// Adds the result for the pose of an image.
     fn add_pose(&mut self, pair: &[Option<FoundImage>; 2], pose: PoseFound) {
         let [Some(a), Some(b)] = pair else { return };
         match pose {
             PoseFound::None => {
-                let has = |of: &FoundImage| of.image.has(Domain::Pose);
-                self.without_poses += u64::from(!has(a) || !has(b));
+                let without = !a.image.has(Domain::Pose) || !b.image.has(Domain::Pose);
+                self.without_poses += u64::from(without);
             }
             PoseFound::Redrawn => {}
             PoseFound::Same => self.poses.same += 1,
             PoseFound::Moved(moved) => {
-                let path = |of: &FoundImage| of.image.relative_path(Domain::Pose);
-                self.poses.add((path(a), path(b)), moved, a.size == b.size);
+                let path_a = a.image.relative_path(Domain::Pose);
+                let path_b = b.image.relative_path(Domain::Pose);
+                self.poses.add((path_a, path_b), moved, a.size == b.size);
             }
         }
     }
 
+    /// Adds the result for one modality of an image.
     fn add(
         &mut self,
         (key, pair): (&ImageKey, &[Option<FoundImage>; 2]),
@@ -146,6 +155,7 @@ impl Images {
     ) {
         let place = Domain::ALL.iter().position(|d| *d == domain).unwrap_or_default();
         let modality = &mut self.modalities[place];
+
         match found {
             Found::Same => modality.same += 1,
             Found::OtherPose => modality.other_pose += 1,
@@ -171,7 +181,7 @@ impl Images {
         }
     }
 
-    /// By modality, in their order; of one those with the largest share of pixels first.
+    /// Sorts images by modality, then by the share of pixels that differ, the largest first.
     fn sort(&mut self) {
         let order = |of: &ImageChange| Domain::ALL.iter().position(|d| d.folder() == of.modality);
         let share = |of: &ImageChange| of.pixels.pixels_changed as f64 / of.pixels.pixels as f64;
@@ -180,7 +190,7 @@ impl Images {
     }
 }
 
-/// What all images are compared with.
+/// The inputs of all comparisons.
 struct Work<'a> {
     sides: &'a Sides,
     views: &'a Views,
@@ -188,12 +198,15 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
+    /// Compares all files of an image. The cameras are compared once, when the first pair of files needs
+    /// them.
     fn image(&self, key: &ImageKey, pair: &[Option<FoundImage>; 2]) -> Result<Outcome> {
         let mut outcome = Outcome { found: Vec::new(), pose: PoseFound::None, pairs: LabelPairs::new() };
-        let has = |of: &Option<FoundImage>, domain| of.as_ref().is_some_and(|of| of.image.has(domain));
+
         let mut camera = None;
         for domain in Domain::ALL {
-            let found = match (has(&pair[0], domain), has(&pair[1], domain), pair) {
+            let [in_a, in_b] = [0, 1].map(|side| has(&pair[side], domain));
+            let found = match (in_a, in_b, pair) {
                 (true, true, [Some(a), Some(b)]) => {
                     let camera = match camera {
                         Some(camera) => camera,
@@ -212,31 +225,35 @@ impl Work<'_> {
                 (_, true, _) => Found::OnlyB,
                 _ => continue,
             };
+
             outcome.found.push((domain, found));
         }
         Ok(outcome)
     }
 
-    /// Whether both cameras see the same, and how they differ.
+    /// Compares both cameras: how they differ, and whether they are the same.
     fn camera(&self, key: &ImageKey, a: &FoundImage, b: &FoundImage) -> Result<(PoseFound, SameCamera)> {
         if self.views.redrawn.contains(key) {
             return Ok((PoseFound::Redrawn, SameCamera::No));
         }
         if !a.image.has(Domain::Pose) || !b.image.has(Domain::Pose) {
-            // Views are drawn alike, and panoramas stand where their location is.
+            // Without poses, views are drawn at the same angles and panoramas stand at their location.
             return Ok((PoseFound::None, SameCamera::Yes));
         }
+
         let path_a = a.image.path(self.sides.a.layout(), Domain::Pose);
         let path_b = b.image.path(self.sides.b.layout(), Domain::Pose);
         if self.sides.are_same(&path_a, &path_b) {
             return Ok((PoseFound::Same, SameCamera::Yes));
         }
+
         let read = |side: Side, of: &FoundImage| -> Result<Option<PoseFile>> {
             self.sides.keep(side, self.sides.of(side).pose(&of.image))
         };
         let (Some(pose_a), Some(pose_b)) = (read(Side::A, a)?, read(Side::B, b)?) else {
             return Ok((PoseFound::None, SameCamera::Unread));
         };
+
         let moved = Moved::between(&pose_a, &pose_b);
         let camera = if moved.is_same_camera() {
             SameCamera::Yes
@@ -246,6 +263,7 @@ impl Work<'_> {
         Ok((PoseFound::Moved(moved), camera))
     }
 
+    /// Compares the files of one modality.
     fn domain(
         &self,
         domain: Domain,
@@ -255,7 +273,10 @@ impl Work<'_> {
         pairs: &mut LabelPairs,
     ) -> Result<Found> {
         let path = |side: Side, of: &FoundImage| of.image.path(self.sides.of(side).layout(), domain);
-        let (path_a, path_b) = (path(Side::A, a), path(Side::B, b));
+        let path_a = path(Side::A, a);
+        let path_b = path(Side::B, b);
+
+        // Equal bytes are the same unless their numbers mean something else.
         let has_other_labels = domain.is_semantic() && !self.means_same(domain);
         if self.sides.are_same(&path_a, &path_b) && !has_other_labels {
             return Ok(Found::Same);
@@ -268,6 +289,7 @@ impl Work<'_> {
             SameCamera::No => return Ok(Found::OtherPose),
             SameCamera::Unread => return Ok(Found::Unread),
         }
+
         let read = |side: Side, path: &PathBuf| {
             let files = &self.sides.of(side).files;
             let read = files.checked(path).and_then(|path| Pixels::read(domain, path));
@@ -277,9 +299,10 @@ impl Work<'_> {
             return Ok(Found::Unread);
         };
         if domain == Domain::Semantic && self.names.is_none() {
-            // The table that could not be read is told of.
+            // The table that could not be read is reported elsewhere.
             return Ok(Found::Unread);
         }
+
         let meaning = Meaning {
             depth_units: self.sides.a.options().depth_units,
             names: self.names,
@@ -297,7 +320,7 @@ impl Work<'_> {
         }
     }
 
-    /// Whether equal numbers of a modality of labels mean the same in both.
+    /// Whether label or class numbers of this modality mean the same in both.
     fn means_same(&self, domain: Domain) -> bool {
         match domain {
             Domain::SemanticClass => {
@@ -311,7 +334,7 @@ impl Work<'_> {
         }
     }
 
-    /// Whether numbers of a modality have the same units and axes in both.
+    /// Whether the values of a modality have the same units and axes in both.
     fn has_same_form(&self, domain: Domain) -> bool {
         let [a, b] = [&self.sides.a, &self.sides.b].map(|data| data.options());
         match domain {
@@ -320,4 +343,9 @@ impl Work<'_> {
             _ => true,
         }
     }
+}
+
+/// Whether an image is there and has a file of this domain.
+fn has(of: &Option<FoundImage>, domain: Domain) -> bool {
+    of.as_ref().is_some_and(|of| of.image.has(domain))
 }

@@ -1,4 +1,4 @@
-//! How the pixels of two images of a modality differ.
+//! Compares the pixels of two images of a modality.
 
 use super::comparison::{LabelCounts, LabelPairs, PixelChanges, Side};
 use super::names::{MISSING, Names};
@@ -9,7 +9,7 @@ use s3d_io::dataset::{DepthUnits, Domain};
 use s3d_label::Taxonomy;
 use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
 
-/// What the numbers of both mean.
+/// What the numbers of both images mean.
 pub(crate) struct Meaning<'a> {
     pub(crate) depth_units: DepthUnits,
     pub(crate) names: Option<&'a Names>,
@@ -21,17 +21,17 @@ pub(crate) struct Meaning<'a> {
 pub(crate) struct Sums {
     pub(crate) pixels: u64,
     pub(crate) changed: u64,
-    /// Of colours: the sum of squares, and how many numbers there are.
+    /// For colours, the sum of squared differences and the number of channel values.
     squares: u64,
     samples: u64,
-    /// Of what has a distance: over pixels that see something in both.
+    /// For modalities with a distance, sums over the pixels that see something in both.
     total: f64,
     seen: u64,
     largest: f64,
 }
 
 impl Sums {
-    /// These and those of another image.
+    /// Adds the sums of another image.
     pub(crate) fn add(&mut self, other: &Self) {
         self.pixels += other.pixels;
         self.changed += other.changed;
@@ -54,7 +54,8 @@ impl Sums {
         }
     }
 
-    /// Compares pixel by pixel: whether they are the same, and how far apart if both see something.
+    /// Compares pixel by pixel: whether the pixels are the same, and how far apart they are if both see
+    /// something.
     fn of<T: Copy>(
         a: &Raster<T>,
         b: &Raster<T>,
@@ -77,8 +78,8 @@ impl Sums {
     }
 }
 
-/// Compares two images of a modality; labels that differ come to `pairs`. An error is what is wrong with the
-/// image of a side; `None`, if they have other sizes.
+/// Compares two images of a modality, and adds differing labels to `pairs`. Returns `None` if the sizes
+/// differ. An error says which side's image is wrong, and why.
 pub(crate) fn compare(
     (a, b): (&Pixels, &Pixels),
     domain: Domain,
@@ -88,14 +89,15 @@ pub(crate) fn compare(
     if a.size() != b.size() {
         return Ok(None);
     }
+
     Ok(Some(match (a, b) {
         (Pixels::Color(a), Pixels::Color(b)) => match domain {
             Domain::Semantic => labels(a, b, meaning, pairs)?,
             Domain::Normal => Sums::of(a, b, |a, b| a == b, normal_angle),
             Domain::Rgb => colors(a, b),
-            // Their colours tell instances apart, and nothing else.
+            // Their colours only tell instances apart.
             Domain::SemanticPretty => Sums::of(a, b, |a, b| a == b, |_, _| None),
-            // These have no colours.
+            // These modalities have no colours.
             Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => return Ok(None),
         },
         (Pixels::Depth(a), Pixels::Depth(b)) => {
@@ -108,7 +110,7 @@ pub(crate) fn compare(
             let is_same = |a: [f32; 3], b: [f32; 3]| a.map(f32::to_bits) == b.map(f32::to_bits);
             Sums::of(a, b, is_same, distance)
         }
-        // A modality has one kind of pixels.
+        // All images of a modality have the same kind of pixels.
         _ => return Ok(None),
     }))
 }
@@ -116,13 +118,14 @@ pub(crate) fn compare(
 fn colors(a: &Raster<[u8; 3]>, b: &Raster<[u8; 3]>) -> Sums {
     let mut sums = Sums::of(a, b, |a, b| a == b, |_, _| None);
     let square = |(a, b): (&u8, &u8)| u64::from(a.abs_diff(*b)).pow(2);
-    let (a, b) = (a.pixels().as_flattened(), b.pixels().as_flattened());
+    let a = a.pixels().as_flattened();
+    let b = b.pixels().as_flattened();
     sums.squares = a.iter().zip(b).map(square).sum();
     sums.samples = a.len() as u64;
     sums
 }
 
-/// The angle between two normals, degrees.
+/// The angle between two normals, degrees. `None` if one is missing.
 fn normal_angle(a: [u8; 3], b: [u8; 3]) -> Option<f64> {
     if a == MISSING_NORMAL || b == MISSING_NORMAL {
         return None;
@@ -130,17 +133,23 @@ fn normal_angle(a: [u8; 3], b: [u8; 3]) -> Option<f64> {
     if a == b {
         return Some(0.0);
     }
-    let of = |n: [u8; 3]| glam::DVec3::from_array(n.map(|c| f64::from(c) - 127.5));
-    let (a, b) = (of(a), of(b));
+    let a = direction(a);
+    let b = direction(b);
     Some(libm::atan2(a.cross(b).length(), a.dot(b)).to_degrees())
 }
 
-fn distance(a: [f32; 3], b: [f32; 3]) -> Option<f64> {
-    let of = |p: [f32; 3]| glam::DVec3::from_array(p.map(f64::from));
-    (a != [0.0; 3] && b != [0.0; 3]).then(|| of(a).distance(of(b)))
+/// The direction of a normal's colour, not of unit length.
+fn direction(color: [u8; 3]) -> glam::DVec3 {
+    glam::DVec3::from_array(color.map(|c| f64::from(c) - 127.5))
 }
 
-/// Images of labels: by name.
+/// The distance between two points, metres. `None` if one is missing.
+fn distance(a: [f32; 3], b: [f32; 3]) -> Option<f64> {
+    let [p, q] = [a, b].map(|point| glam::DVec3::from_array(point.map(f64::from)));
+    (a != [0.0; 3] && b != [0.0; 3]).then(|| p.distance(q))
+}
+
+/// Compares label images by the names of labels.
 fn labels(
     a: &Raster<[u8; 3]>,
     b: &Raster<[u8; 3]>,
@@ -148,6 +157,7 @@ fn labels(
     pairs: &mut LabelPairs,
 ) -> Result<Sums, (Side, String)> {
     let Some(names) = meaning.names else { return Err((Side::A, "the labels could not be read".to_owned())) };
+
     let number = |side, pixel: [u8; 3]| {
         if pixel == MISSING_INDEX {
             return Ok(MISSING);
@@ -158,6 +168,7 @@ fn labels(
             (side, format!("a pixel has label {index}, and the data set has {count} labels"))
         })
     };
+
     let mut sums = Sums { pixels: a.len() as u64, ..Sums::default() };
     let both: Vec<([u8; 3], [u8; 3])> = a.pixels().iter().copied().zip(b.pixels().iter().copied()).collect();
     for run in both.chunk_by(|one, next| one == next) {
@@ -169,10 +180,11 @@ fn labels(
             *pairs.entry(labels).or_default() += LabelCounts { pixels, ..LabelCounts::default() };
         }
     }
+
     Ok(sums)
 }
 
-/// Images of classes: by name.
+/// Compares class images by the names of classes.
 fn classes(a: &Raster<u8>, b: &Raster<u8>, meaning: &Meaning<'_>) -> Result<Sums, (Side, String)> {
     let names = |side, taxonomy: &Taxonomy, image: &Raster<u8>| {
         let all: Vec<&str> = taxonomy.classes().iter().map(|class| class.name()).collect();
@@ -184,6 +196,7 @@ fn classes(a: &Raster<u8>, b: &Raster<u8>, meaning: &Meaning<'_>) -> Result<Sums
             }
         }
     };
+
     let names_a = names(Side::A, meaning.taxonomies[0], a)?;
     let names_b = names(Side::B, meaning.taxonomies[1], b)?;
     let is_same = |a: u8, b: u8| names_a.get(usize::from(a)) == names_b.get(usize::from(b));
@@ -214,7 +227,7 @@ mod tests {
         let same = sums(color(&[[1, 2, 3]; 2]), color(&[[1, 2, 3]; 2]), Domain::Rgb);
         assert_eq!((same.pixels, same.pixels_changed, same.psnr_db), (2, 0, None));
         let other = sums(color(&[[1, 2, 3]; 2]), color(&[[1, 2, 3], [1, 8, 3]]), Domain::Rgb);
-        // 36 / 6 numbers: a mean of 6.
+        // 36 over 6 channel values is a mean of 6.
         let expected = 10.0 * (255.0f64 * 255.0 / 6.0).log10();
         assert_eq!((other.pixels_changed, other.mean), (1, None));
         assert!((other.psnr_db.unwrap() - expected).abs() < 1e-9, "{other:?}");
@@ -249,6 +262,7 @@ mod tests {
         assert_ne!(place(&s3dis, "chair"), place(&nyu40, "chair"));
         let meaning = Meaning { depth_units: DepthUnits::Per512, names: None, taxonomies: [&s3dis, &nyu40] };
         let of = |b: &Pixels| compare((&a, b), Domain::SemanticClass, &meaning, &mut LabelPairs::new());
+
         assert_eq!(of(&image(&b)).unwrap().unwrap().changed, 1);
         let e = of(&image(&[b[0], 77, b[2]])).unwrap_err();
         assert_eq!(e, (Side::B, "a pixel has class 77, and the taxonomy has 40".to_owned()));
@@ -265,11 +279,13 @@ mod tests {
             taxonomies: [&taxonomy, &taxonomy],
         };
         let mut pairs = LabelPairs::new();
+
         let mut of = |a: &Pixels, b: &Pixels| compare((a, b), Domain::Semantic, &meaning, &mut pairs);
         let chair = [0, 0, 1];
         assert_eq!(of(&color(&[chair]), &color(&[chair; 2])), Ok(None));
         let e = of(&color(&[chair]), &color(&[[0, 1, 0]])).unwrap_err();
         assert_eq!(e, (Side::B, "a pixel has label 256, and the data set has 2 labels".to_owned()));
+
         let a = color(&[chair, chair, [0; 3], MISSING_INDEX]);
         let b = color(&[chair, MISSING_INDEX, chair, MISSING_INDEX]);
         assert_eq!(of(&a, &b).unwrap().unwrap().changed, 2);

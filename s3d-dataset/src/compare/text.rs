@@ -2,24 +2,24 @@
 
 use super::comparison::{
     ClassPair, ComparedSet, Comparison, FileKindChanges, Geometry, ImageChange, InstanceChange, LabelChanges,
-    LabelCounts, ModalityChanges, Side,
+    LabelCounts, ModalityChanges, PoseChange, Side,
 };
 use super::lines::{Lines, grouped, percent, significant};
 use serde_json::Value;
 use std::fmt;
 
-/// Rows of a table that may be long.
+/// The most rows of a long table.
 const MAX_ROWS: usize = 10;
 
-/// Files that could not be compared.
+/// The most files that are listed as not comparable.
 const MAX_UNREAD: usize = 20;
 
-/// Digits of checksums.
+/// The most digits of a checksum.
 const MAX_DIGITS: usize = 12;
 
 impl fmt::Display for Comparison {
-    /// Lines for a person: tables with the largest differences first, of which the first rows are there. What
-    /// is equal has no lines. Characters of names that would steer a terminal are replaced.
+    /// Writes lines for a person: tables with the first rows, the largest differences first. Equal things
+    /// have no lines. Characters in names that would control a terminal are replaced.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let text = &mut Lines::default();
         about(text, "A", &self.a);
@@ -30,6 +30,7 @@ impl fmt::Display for Comparison {
             self.labels(text, labels);
         }
         self.views(text);
+
         self.images(text);
         self.poses(text);
         self.notes.iter().for_each(|note| text.add(format!("note: {note}")));
@@ -52,6 +53,7 @@ impl ModalityChanges {
 }
 
 impl Comparison {
+    /// The settings and the input files that differ.
     fn made(&self, text: &mut Lines) {
         let settings = self
             .settings
@@ -59,39 +61,41 @@ impl Comparison {
             .map(|of| [of.name.clone(), words(&of.a), words(&of.b)]);
         let mut rows: Vec<[String; 3]> = settings.collect();
         for of in self.inputs.iter().take(MAX_ROWS) {
-            let sum = |sum: &Option<String>| {
-                sum.as_ref()
-                    .map_or("none".to_owned(), |sum| sum.chars().take(MAX_DIGITS).collect())
-            };
-            rows.push([format!("area {}: {}", of.area, of.path), sum(&of.a), sum(&of.b)]);
+            rows.push([
+                format!("area {}: {}", of.area, of.path),
+                short_checksum(of.a.as_ref()),
+                short_checksum(of.b.as_ref()),
+            ]);
         }
+
         text.table(["made with", "A", "B"], &rows, 3);
         text.more(self.inputs.len().saturating_sub(MAX_ROWS));
     }
 
+    /// The files that differ, by kind.
     fn files(&self, text: &mut Lines) {
-        let row = |of: &FileKindChanges| {
-            let [same, changed, a, b] = [of.same, of.changed, of.only_a, of.only_b].map(grouped);
-            [of.kind.clone(), same, changed, a, b]
-        };
-        let rows: Vec<_> = self.files.iter().filter(|of| of.is_changed()).map(row).collect();
+        let changed = self.files.iter().filter(|of| of.is_changed());
+        let rows: Vec<_> = changed.map(file_row).collect();
         text.table(["files", "same", "changed", "only A", "only B"], &rows, 1);
     }
 
+    /// The labels, classes and instances that differ.
     fn labels(&self, text: &mut Lines, labels: &LabelChanges) {
         let LabelChanges { a, b, added, gone, changed, class_changed, matrix, instances } = labels;
         if added.is_empty() && gone.is_empty() && matrix.is_empty() {
             return;
         }
+
         text.add(format!("labels: {} in A, {} in B", grouped(*a), grouped(*b)));
         names(text, "only A", gone);
         names(text, "only B", added);
         if matrix.is_empty() {
             return;
         }
+
         let total = |what: &str, of: &LabelCounts| {
             let [faces, m2, pixels] = cells(of);
-            // Faces that nobody could compare are not none.
+            // If no faces could be compared, their number is left out: it is unknown, not 0.
             let by_face = self.areas.iter().any(|of| of.geometry == Geometry::Same);
             let surface = if by_face {
                 format!("{faces} faces of {m2} m², ")
@@ -102,31 +106,21 @@ impl Comparison {
         };
         text.add(total("another label", changed));
         text.add(total("another class", class_changed));
-        let row = |pair: &ClassPair| {
-            let [faces, m2, pixels] = cells(&pair.counts);
-            let class_b = if pair.a == pair.b {
-                format!("another {}", pair.b)
-            } else {
-                pair.b.to_owned()
-            };
-            [pair.a.to_owned(), class_b, faces, m2, pixels]
-        };
-        let rows: Vec<_> = matrix.iter().take(MAX_ROWS).map(row).collect();
+
+        let rows: Vec<_> = matrix.iter().take(MAX_ROWS).map(class_row).collect();
         text.table(["class in A", "class in B", "faces", "m²", "pixels"], &rows, 2);
         text.more(matrix.len().saturating_sub(MAX_ROWS));
-        let row = |of: &InstanceChange| {
-            let ([_, lost_m2, lost], [_, gained_m2, gained]) = (cells(&of.lost), cells(&of.gained));
-            [of.name.clone(), lost_m2, lost, gained_m2, gained]
-        };
-        // Those that bear another number alone stand behind those of another class.
+
+        // Instances with only another number come last, and are shown if no class changed.
         let is_of_another = |of: &&InstanceChange| of.class_changed != LabelCounts::default();
         let of_another = instances.iter().filter(is_of_another).count();
         let told = if of_another == 0 { instances.len() } else { of_another };
-        let rows: Vec<_> = instances.iter().take(told.min(MAX_ROWS)).map(row).collect();
+        let rows: Vec<_> = instances.iter().take(told.min(MAX_ROWS)).map(instance_row).collect();
         text.table(["instance", "lost m²", "pixels", "gained m²", "pixels"], &rows, 1);
         text.more(told.saturating_sub(MAX_ROWS));
     }
 
+    /// The views, scan locations and photographs that differ.
     fn views(&self, text: &mut Lines) {
         let of = &self.views;
         let rows = [
@@ -134,68 +128,49 @@ impl Comparison {
             ("scan locations", of.locations_lost.len(), of.locations_gained.len()),
             ("photographs", of.photographs_lost.len(), of.photographs_gained.len()),
         ];
+
         let changed = rows.into_iter().filter(|(_, lost, gained)| lost + gained > 0);
         let row = |(what, lost, gained): (&str, usize, usize)| {
             [what.to_owned(), grouped(lost as u64), grouped(gained as u64)]
         };
         let rows: Vec<_> = changed.map(row).collect();
         text.table(["there", "only A", "only B"], &rows, 1);
+
         if !of.redrawn.is_empty() {
             let count = grouped(of.redrawn.len() as u64);
             text.add(format!("views in both that look elsewhere: {count}"));
         }
     }
 
+    /// The images that differ, by modality.
     fn images(&self, text: &mut Lines) {
-        let row = |of: &ModalityChanges| {
-            let counts = [of.same, of.same_pixels, of.changed, of.other_pose];
-            let [same, same_pixels, changed, other_pose] = counts.map(grouped);
-            let [other_form, unread, a, b] = [of.other_form, of.unread, of.only_a, of.only_b].map(grouped);
-            let modality = of.modality.to_owned();
-            [modality, same, same_pixels, changed, other_pose, other_form, unread, a, b]
-        };
-        let rows: Vec<_> = self.modalities.iter().filter(|of| of.is_changed()).map(row).collect();
+        let changed = self.modalities.iter().filter(|of| of.is_changed());
+        let rows: Vec<_> = changed.map(modality_row).collect();
         let titles = ["images", "same", "same pixels", "changed", "other pose", "other form", "unread"];
         let [images, same, same_pixels, changed, other_pose, other_form, unread] = titles;
         let titles = [images, same, same_pixels, changed, other_pose, other_form, unread, "only A", "only B"];
         text.table(titles, &rows, 1);
-        let row = |of: &ModalityChanges| {
-            let unit = if of.modality == "normal" { "°" } else { " m" };
-            let number = |value: Option<f64>, unit: &str| {
-                value.map_or_else(String::new, |value| significant(value) + unit)
-            };
-            let pixels = &of.pixels;
-            [
-                of.modality.to_owned(),
-                percent(pixels.pixels_changed, pixels.pixels),
-                number(pixels.psnr_db, " dB"),
-                number(pixels.mean, unit),
-                number(pixels.largest, unit),
-            ]
-        };
-        let rows: Vec<_> = self.modalities.iter().filter(|of| of.changed > 0).map(row).collect();
+
+        let changed = self.modalities.iter().filter(|of| of.changed > 0);
+        let rows: Vec<_> = changed.map(pixels_row).collect();
         text.table(["images that changed", "pixels", "PSNR", "mean", "largest"], &rows, 1);
-        let row = |of: &ImageChange| {
-            let share = percent(of.pixels.pixels_changed, of.pixels.pixels);
-            [of.modality.to_owned(), share, of.a.clone()]
-        };
-        let first = self
+
+        let first: Vec<_> = self
             .images
             .chunk_by(|a, b| a.modality == b.modality)
-            .filter_map(|of| of.first());
-        text.table(["most changed", "pixels", "image"], &first.map(row).collect::<Vec<_>>(), 3);
+            .filter_map(|of| of.first())
+            .map(image_row)
+            .collect();
+        text.table(["most changed", "pixels", "image"], &first, 3);
     }
 
+    /// The poses that moved.
     fn poses(&self, text: &mut Lines) {
         let of = &self.poses;
         if of.moved.is_empty() {
             return;
         }
-        let row = |moved: &super::comparison::PoseChange| {
-            let k = moved.k_px.map_or_else(|| "other size".to_owned(), significant);
-            [moved.a.clone(), significant(moved.m), significant(moved.degrees), k]
-        };
-        let mut rows: Vec<_> = of.moved.iter().take(3).map(row).collect();
+        let mut rows: Vec<_> = of.moved.iter().take(3).map(pose_row).collect();
         let largest = [of.largest_m, of.largest_degrees, of.largest_k_px].map(significant);
         let [m, degrees, k] = largest;
         rows.push(["largest".to_owned(), m, degrees, k]);
@@ -203,6 +178,7 @@ impl Comparison {
         text.table([title.as_str(), "m", "degrees", "K, pixels"], &rows, 1);
     }
 
+    /// The files that could not be compared, and the result.
     fn end(&self, text: &mut Lines) {
         if !self.unread.is_empty() {
             text.add("could not be compared");
@@ -212,6 +188,7 @@ impl Comparison {
             }
             text.more(self.unread.len().saturating_sub(MAX_UNREAD));
         }
+
         let files = grouped(self.a.files);
         let is_changed = self.files.iter().any(FileKindChanges::is_changed);
         text.add(match (self.equal, is_changed) {
@@ -227,17 +204,19 @@ impl Comparison {
     }
 }
 
+/// The line on one of the data sets.
 fn about(text: &mut Lines, name: &str, of: &ComparedSet) {
     let taxonomy = of
         .taxonomy
         .as_ref()
         .map_or("no labels".to_owned(), |name| format!("classes of {name}"));
-    let (files, megabytes) = (grouped(of.files), significant(of.bytes as f64 / 1e6));
+    let files = grouped(of.files);
+    let megabytes = significant(of.bytes as f64 / 1e6);
     let ComparedSet { folder, version, .. } = of;
     text.add(format!("{name}: {folder} (s3d {version}, {taxonomy}, {files} files, {megabytes} MB)"));
 }
 
-/// Names in a line, the first of them.
+/// Adds a line with the first few of these names.
 fn names(text: &mut Lines, what: &str, all: &[String]) {
     let first: Vec<&str> = all.iter().take(5).map(String::as_str).collect();
     if !first.is_empty() {
@@ -246,11 +225,72 @@ fn names(text: &mut Lines, what: &str, all: &[String]) {
     }
 }
 
-/// Faces, m² and pixels.
+/// The cells for faces, m² and pixels.
 fn cells(of: &LabelCounts) -> [String; 3] {
     [grouped(of.faces), significant(of.m2), grouped(of.pixels)]
 }
 
+/// The first digits of a checksum.
+fn short_checksum(checksum: Option<&String>) -> String {
+    checksum.map_or("none".to_owned(), |digits| digits.chars().take(MAX_DIGITS).collect())
+}
+
+fn file_row(of: &FileKindChanges) -> [String; 5] {
+    let [same, changed, a, b] = [of.same, of.changed, of.only_a, of.only_b].map(grouped);
+    [of.kind.clone(), same, changed, a, b]
+}
+
+fn class_row(pair: &ClassPair) -> [String; 5] {
+    let [faces, m2, pixels] = cells(&pair.counts);
+    let class_b = if pair.a == pair.b {
+        format!("another {}", pair.b)
+    } else {
+        pair.b.to_owned()
+    };
+    [pair.a.to_owned(), class_b, faces, m2, pixels]
+}
+
+fn instance_row(of: &InstanceChange) -> [String; 5] {
+    let [_, lost_m2, lost] = cells(&of.lost);
+    let [_, gained_m2, gained] = cells(&of.gained);
+    [of.name.clone(), lost_m2, lost, gained_m2, gained]
+}
+
+fn modality_row(of: &ModalityChanges) -> [String; 9] {
+    let counts = [of.same, of.same_pixels, of.changed, of.other_pose];
+    let [same, same_pixels, changed, other_pose] = counts.map(grouped);
+    let [other_form, unread, a, b] = [of.other_form, of.unread, of.only_a, of.only_b].map(grouped);
+    [of.modality.to_owned(), same, same_pixels, changed, other_pose, other_form, unread, a, b]
+}
+
+fn pixels_row(of: &ModalityChanges) -> [String; 5] {
+    let unit = if of.modality == "normal" { "°" } else { " m" };
+    let pixels = &of.pixels;
+    [
+        of.modality.to_owned(),
+        percent(pixels.pixels_changed, pixels.pixels),
+        number(pixels.psnr_db, " dB"),
+        number(pixels.mean, unit),
+        number(pixels.largest, unit),
+    ]
+}
+
+/// A value with its unit; empty if there is none.
+fn number(value: Option<f64>, unit: &str) -> String {
+    value.map_or_else(String::new, |value| significant(value) + unit)
+}
+
+fn image_row(of: &ImageChange) -> [String; 3] {
+    let share = percent(of.pixels.pixels_changed, of.pixels.pixels);
+    [of.modality.to_owned(), share, of.a.clone()]
+}
+
+fn pose_row(moved: &PoseChange) -> [String; 4] {
+    let k = moved.k_px.map_or_else(|| "other size".to_owned(), significant);
+    [moved.a.clone(), significant(moved.m), significant(moved.degrees), k]
+}
+
+/// A value of a manifest as a person reads it.
 fn words(value: &Value) -> String {
     match value {
         Value::Null => "not set".to_owned(),
