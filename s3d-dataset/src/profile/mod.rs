@@ -1,7 +1,8 @@
-//! What single loaders of point clouds want, made from the S3DIS tree of a data set, in `profiles/NAME`.
+//! Profiles: files for single point-cloud loaders, made from the S3DIS tree of a data set, in
+//! `profiles/NAME`.
 //!
-//! Each file below says at its top what its loader reads, and where it would stop. A profile reads the tree's
-//! text files piece by piece; what is in memory does not grow with a room.
+//! The head of each file below says what its loader reads, and where it would stop. A profile reads the
+//! tree's text files piece by piece, so its memory does not grow with a room.
 
 mod arrays;
 mod open3d_ml;
@@ -26,22 +27,23 @@ use s3d_label::Taxonomy;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The areas that loaders ask for, there or not.
+/// The areas that loaders ask for, whether they exist or not.
 const AREAS_OF_LOADERS: std::ops::RangeInclusive<u32> = 1..=6;
 
 /// How profiles are written into a data set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ProfileOptions {
-    /// Replace those that are there.
+    /// Replace existing profiles.
     pub overwrite: bool,
 }
 
-/// Writes what these loaders want into the data set in the folder `root`, to `profiles/NAME`.
+/// Writes the profiles into the data set in the folder `root`, to `profiles/NAME`.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if one is there and not to be replaced; [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled);
-/// [`Error::Temporary`](crate::Error::Temporary). The data set stays as it was then; so it does when the process is killed, or the
-/// same call completes what it had begun.
+/// [`Error::Usage`](crate::Error::Usage) if a profile exists and is not to be replaced.
+/// [`Error::File`](crate::Error::File), [`Error::Cancelled`](crate::Error::Cancelled) or
+/// [`Error::Temporary`](crate::Error::Temporary). After an error the data set is as it was before. After a
+/// kill it is too, or the same call completes the change.
 pub fn profile(
     root: impl Into<PathBuf>,
     wanted: &[Profile],
@@ -54,8 +56,10 @@ pub fn profile(
     wanted.dedup();
     let names: Vec<&str> = wanted.iter().map(|profile| profile.name()).collect();
     let call = format!("profile {}", names.join(","));
+
     Manifest::require(layout)?;
-    // Nobody may replace the data set meanwhile.
+
+    // The lock keeps others from replacing the data set.
     Lock::during(ctx, layout, |completed| {
         if completed.as_ref() == Some(&call) {
             ctx.info(format_args!(
@@ -81,18 +85,22 @@ fn add(ctx: &Context, data: &DataSet, wanted: &[Profile], overwrite: bool, call:
         let dataset = layout.root().to_owned();
         return Err(InputError::WithoutLabels { dataset, needs: "profiles need" }.into());
     }
+
     let areas = &data.manifest.area_numbers;
     let trees: Vec<PathBuf> = areas.iter().map(|area| layout.s3dis_area_dir(*area)).collect();
     data.files
         .require(ctx, |path| trees.iter().any(|tree| path.starts_with(tree)))?;
+
     let change = Change::begin(layout)?;
     let staged = change.staged();
     write(&Source { ctx, layout, files: &data.files, taxonomy: &data.taxonomy }, staged, areas, wanted)?;
+
     let mut files = Vec::new();
     for profile in wanted {
         files.extend(listing::walk(&staged.profile_dir(profile.name()))?);
     }
     let changed = listing::records(ctx, staged, &files)?;
+
     let mut manifest = Manifest::read(layout)?;
     manifest.add_profiles(wanted);
     let is_gone = |path: &str| {
@@ -100,12 +108,13 @@ fn add(ctx: &Context, data: &DataSet, wanted: &[Profile], overwrite: bool, call:
             .iter()
             .any(|profile| path.starts_with(&format!("profiles/{}/", profile.name())))
     };
+
     listing::write_changed(data, &mut manifest, changed, is_gone, staged)?;
     change.commit(call, &dirs)
 }
 
-/// Writes the profiles of a data set of these areas, whose S3DIS tree is written, to where they have their
-/// places in `staged`.
+/// Writes the profiles of a data set with these areas to their places in `staged`. The S3DIS tree must be
+/// written.
 pub(crate) fn write(source: &Source<'_>, staged: &Layout, areas: &[u32], profiles: &[Profile]) -> Result<()> {
     if profiles.is_empty() {
         return Ok(());
@@ -114,6 +123,7 @@ pub(crate) fn write(source: &Source<'_>, staged: &Layout, areas: &[u32], profile
     for area in areas {
         rooms.extend(rooms_of(source.layout, source.taxonomy, *area)?);
     }
+
     for profile in profiles {
         let dir = staged.profile_dir(profile.name());
         create_dir(&dir)?;
@@ -123,6 +133,7 @@ pub(crate) fn write(source: &Source<'_>, staged: &Layout, areas: &[u32], profile
             Profile::Open3dMl => open3d_ml::write(source, &dir, &rooms)?,
             Profile::Pointcept => pointcept::write(source, &dir, areas, &rooms)?,
         }
+
         let place = source.layout.profile_dir(profile.name());
         source
             .ctx
@@ -131,17 +142,17 @@ pub(crate) fn write(source: &Source<'_>, staged: &Layout, areas: &[u32], profile
     Ok(())
 }
 
-/// What profiles are made from.
+/// The source of profiles.
 pub(crate) struct Source<'a> {
     pub(crate) ctx: &'a Context,
     pub(crate) layout: &'a Layout,
     pub(crate) files: &'a Listed,
-    /// What the tree's names of classes and rooms are of.
+    /// The taxonomy of the tree's class and room names.
     pub(crate) taxonomy: &'a Taxonomy,
 }
 
 impl Source<'_> {
-    /// Gives a file of the data set a second name, or copies it where the file system knows no such thing.
+    /// Gives a file of the data set a second name, or copies it if the file system has no hard links.
     fn link(&self, from: &Path, to: &Path) -> Result<()> {
         let from = self.files.checked(from)?;
         match fs::hard_link(from, to) {
@@ -153,7 +164,7 @@ impl Source<'_> {
     }
 }
 
-/// Does `work` on every room, on all threads.
+/// Runs `work` on every room, on all threads.
 fn for_each_room(
     ctx: &Context,
     rooms: &[TreeRoom],
@@ -172,7 +183,7 @@ fn for_each_room(
     )
 }
 
-/// Writes a text file of lines.
+/// Writes a text file, a line for each string.
 fn write_lines(path: &Path, lines: impl IntoIterator<Item = String>) -> Result<()> {
     write_whole(path, |w| lines.into_iter().try_for_each(|line| writeln!(w, "{line}")))?;
     Ok(())

@@ -1,15 +1,15 @@
-//! Open3D-ML: a room's points and boxes in a pickle.
+//! Open3D-ML: the points and boxes of a room in a pickle.
 //!
-//! Its `S3DIS` data set (`ml3d/datasets/s3dis.py`) reads `original_pkl/*.pkl` if there is that folder.
-//! Otherwise it makes it from a list of the 272 published rooms that comes with it, and stops at the first
-//! that is not there: so another data set can only come as pickles. `Area_1_office_3.pkl` is a list of two:
-//! the points, float64, N × 7, a row `x y z r g b label` in world metres (not moved; classes as PointNet's),
-//! and the boxes, a list of `[class, x, y, z, w, h, l, yaw]` an instance: the middle; the extents along the
-//! two principal axes of its points seen from above (w, l) and upwards (h); and the angle of the first of
-//! these axes, in radians. Here the first axis is the longer spread; the loader takes whichever its linear
-//! algebra gives first.
+//! Its `S3DIS` data set (`ml3d/datasets/s3dis.py`) reads `original_pkl/*.pkl` if the folder exists. Otherwise
+//! it makes the folder from its own list of the 272 published rooms, and stops at the first that is missing,
+//! so another data set can only come as pickles. `Area_1_office_3.pkl` is a list of two. The first is the
+//! points: float64, N × 7, with rows `x y z r g b label` in world metres (not moved; classes as for
+//! PointNet). The second is a list of boxes, `[class, x, y, z, w, h, l, yaw]` for each instance: the middle;
+//! the extents along the two principal axes of its points seen from above (w, l) and upwards (h); and the
+//! angle of the first axis, in radians. Here the first axis has the longer spread; the loader takes the one
+//! that its linear algebra returns first.
 //!
-//! `dataset_path` is the profile's folder; `test_area_idx` picks the area to test on.
+//! `dataset_path` is the profile's folder. `test_area_idx` picks the area to test on.
 
 use super::pickle::Pickle;
 use super::room::{TreeInstance, TreeRoom, as_written, for_each_piece};
@@ -29,6 +29,7 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Resu
             .iter()
             .map(|i| OrientedBox::of(source, i))
             .collect::<Result<Vec<_>>>()?;
+
         let mut pickle = Pickle::create(&dir.join(format!("{}.pkl", room.stem())))?;
         pickle.list(|pickle| {
             pickle.begin_array(boxes.iter().map(|b| b.points).sum(), 7)?;
@@ -60,68 +61,88 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Resu
                 Ok(())
             })
         })?;
+
         pickle.finish()?;
         Ok(())
     })
 }
 
-/// The box of an instance along the principal axes of its points seen from above.
+/// The box of an instance, along the principal axes of its points seen from above.
 struct OrientedBox {
     points: u64,
     middle: DVec3,
-    /// Along the first axis, the second, and upwards.
+    /// The extents along the first axis, the second axis, and upwards.
     extent: DVec3,
     yaw_rad: f64,
 }
 
 impl OrientedBox {
     fn of(source: &Source<'_>, instance: &TreeInstance) -> Result<Self> {
-        // Sums of what lies around the first point, so that little is lost.
-        let (mut points, mut origin) = (0u64, DVec2::ZERO);
-        let (mut sum, mut xx, mut xy, mut yy) = (DVec2::ZERO, 0.0, 0.0, 0.0);
-        let place = |p: &glam::Vec3| dvec3(as_written(p.x), as_written(p.y), as_written(p.z));
+        // The sums are relative to the first point, so that little precision is lost.
+        let mut points = 0u64;
+        let mut origin = DVec2::ZERO;
+        let mut sum = DVec2::ZERO;
+        let mut xx = 0.0;
+        let mut xy = 0.0;
+        let mut yy = 0.0;
         for_each_piece(source, &instance.path, |piece| {
             for p in &piece.positions {
-                let p = place(p).truncate();
+                let p = point_as_written(p).truncate();
                 if points == 0 {
                     origin = p;
                 }
                 let d = p - origin;
                 points += 1;
                 sum += d;
-                (xx, xy, yy) = (xx + d.x * d.x, xy + d.x * d.y, yy + d.y * d.y);
+                xx += d.x * d.x;
+                xy += d.x * d.y;
+                yy += d.y * d.y;
             }
             Ok(())
         })?;
+
+        // The angle of the first principal axis, from the covariance.
         let mean = sum / points.max(1) as f64;
         let n = points as f64;
-        let (xx, xy, yy) = (xx - n * mean.x * mean.x, xy - n * mean.x * mean.y, yy - n * mean.y * mean.y);
+        xx -= n * mean.x * mean.x;
+        xy -= n * mean.x * mean.y;
+        yy -= n * mean.y * mean.y;
         let yaw_rad = if points > 1 {
             0.5 * libm::atan2(2.0 * xy, xx - yy)
         } else {
             0.0
         };
+
         let (sin, cos) = libm::sincos(yaw_rad);
         let axes = DMat2::from_cols(dvec2(cos, sin), dvec2(-sin, cos));
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
         for_each_piece(source, &instance.path, |piece| {
             for p in &piece.positions {
-                let p = place(p);
+                let p = point_as_written(p);
                 let turned = (axes.transpose() * p.truncate()).extend(p.z);
-                (low, high) = (low.min(turned), high.max(turned));
+                low = low.min(turned);
+                high = high.max(turned);
             }
             Ok(())
         })?;
+
         let middle = 0.5 * (low + high);
         let middle = (axes * middle.truncate()).extend(middle.z);
         Ok(Self { points, middle, extent: high - low, yaw_rad })
     }
 
-    /// x y z w h l yaw.
+    /// Returns x y z w h l yaw.
     fn numbers(&self) -> [f64; 7] {
-        let (m, e) = (self.middle, self.extent);
-        [m.x, m.y, m.z, e.x, e.z, e.y, self.yaw_rad]
+        let middle = self.middle;
+        let extent = self.extent;
+        [middle.x, middle.y, middle.z, extent.x, extent.z, extent.y, self.yaw_rad]
     }
+}
+
+fn point_as_written(p: &glam::Vec3) -> DVec3 {
+    dvec3(as_written(p.x), as_written(p.y), as_written(p.z))
 }
 
 #[cfg(test)]
@@ -145,21 +166,25 @@ mod tests {
                 text += &format!("{x:.3} {y:.3} 0.7 0 0 0\n{x:.3} {y:.3} 0.75 0 0 0\n");
             }
         }
+
         let of = |text: String| {
             std::fs::write(&path, text).unwrap();
             let files = Listed::of(dir.path(), [FileRecord::of_file(dir.path(), &path).unwrap()]);
-            let (ctx, layout) = (&Context::default(), &Layout::new(dir.path()));
+            let ctx = &Context::default();
+            let layout = &Layout::new(dir.path());
             let table =
                 TreeInstance { class: Class::TABLE, name: "table_1.txt".to_owned(), path: path.clone() };
             OrientedBox::of(&Source { ctx, layout, files: &files, taxonomy: &Default::default() }, &table)
                 .unwrap()
         };
+
         let b = of(text);
         assert_eq!(b.points, 2 * 101 * 41);
         let expected = [4.0, -3.0, 0.725, 2.0, 0.05, 0.8, 0.5];
         for (got, expected) in b.numbers().into_iter().zip(expected) {
             assert!((got - expected).abs() < 0.002, "{:?}", b.numbers());
         }
+
         let b = of("1 2 3 4 5 6\n".to_owned());
         assert_eq!(b.numbers(), [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
     }

@@ -1,20 +1,21 @@
-//! As much of Python's pickle format as a list of texts, numbers and one kind of array needs.
+//! Writes Python's pickle format, as far as a list of texts, numbers and one kind of array needs it.
 //!
-//! Protocol 4 (Python 3.4 and later), whose opcodes are described in Python's `pickletools`. An array is
-//! written as `numpy.reshape(numpy.frombuffer(bytes, "<f8"), (rows, columns))`: public functions, the same in
-//! numpy 1 and 2, where numpy's own pickles name internal ones. It is read-only when read, as is any array
-//! that views bytes.
+//! The protocol is 4 (Python 3.4 and later), and Python's `pickletools` describes its opcodes. An array is
+//! written as `numpy.reshape(numpy.frombuffer(bytes, "<f8"), (rows, columns))`. These are public functions,
+//! the same in numpy 1 and 2, while numpy's own pickles name internal ones. Such an array is read-only, like
+//! any array that views bytes.
 
 use crate::error::Result as DatasetResult;
 use s3d_io::Result;
 use s3d_io::fs::AtomicFile;
 use std::path::Path;
 
-/// Writes one object, piece by piece.
+/// A pickle of one object, written piece by piece.
 pub(super) struct Pickle {
     file: AtomicFile,
-    /// Rows and columns of the array that was begun, and the bytes that it still needs.
+    /// The rows and columns of the current array.
     array: (u64, u64),
+    /// The bytes that the current array still lacks.
     missing: u64,
 }
 
@@ -25,7 +26,7 @@ impl Pickle {
         Ok(Self { file, array: (0, 0), missing: 0 })
     }
 
-    /// A list of what `items` writes.
+    /// Writes a list of the items that `items` writes.
     pub(super) fn list(&mut self, items: impl FnOnce(&mut Self) -> DatasetResult<()>) -> DatasetResult<()> {
         // EMPTY_LIST MARK … APPENDS
         self.file.put(b"](")?;
@@ -33,7 +34,7 @@ impl Pickle {
         Ok(self.file.put(b"e")?)
     }
 
-    /// A text of less than 256 bytes.
+    /// Writes a text of less than 256 bytes.
     pub(super) fn text(&mut self, text: &str) -> Result<()> {
         // SHORT_BINUNICODE
         let length = u8::try_from(text.len()).expect("a short text");
@@ -54,8 +55,8 @@ impl Pickle {
         self.file.put(&[0])
     }
 
-    /// Begins an array of `f64`, whose numbers follow through [`put`](Self::put), lowest byte first and row
-    /// by row.
+    /// Begins an array of `f64`. Its numbers follow through [`put`](Self::put), lowest byte first and row by
+    /// row.
     pub(super) fn begin_array(&mut self, rows: u64, columns: u64) -> Result<()> {
         self.array = (rows, columns);
         self.missing = 8 * rows * columns;
@@ -91,8 +92,8 @@ impl Pickle {
 mod tests {
     use super::*;
 
-    /// Byte by byte what Python's `pickletools.dis` shows as the opcodes named above; that numpy reads it is
-    /// tested in Python, with the other loaders.
+    /// The opcodes are named above, as Python's `pickletools.dis` shows them. The Python tests check that
+    /// numpy reads the file, together with the other loaders.
     #[test]
     fn opcodes() {
         let dir = tempfile::tempdir().unwrap();

@@ -1,20 +1,20 @@
-//! Pointcept: the S3DIS tree as its preprocessing wants it.
+//! Pointcept: the S3DIS tree as its preprocessing expects it.
 //!
-//! `preprocess_s3dis.py --splits Area_1 Area_2 … --dataset_root profiles/pointcept` reads, for each area that
-//! is named, `Area_k/Area_k_alignmentAngle.txt` with `numpy.loadtxt`, and of every room that it names all
-//! `Area_k/ROOM/Annotations/*.txt`, with `numpy.loadtxt` too. So it stops
-//! - where an area has no angle file: areas 1 to 6 that are not in the data set get one without rooms (up to
-//!   version 1.5.1 all six are read);
-//! - at an angle file with one room, since its two words are no table: the room is named twice, and processed
-//!   twice with the same result;
-//! - at a room of the angle file without points: it is not named;
-//! - at an instance of one point, whose numbers are no table: the point stands twice.
+//! `preprocess_s3dis.py --splits Area_1 Area_2 … --dataset_root profiles/pointcept` reads
+//! `Area_k/Area_k_alignmentAngle.txt` of each named area with `numpy.loadtxt`. For every room in that file it
+//! reads all `Area_k/ROOM/Annotations/*.txt`, also with `numpy.loadtxt`. So it stops
+//! - at an area without an angle file: areas 1 to 6 that are not in the data set get a file without rooms
+//! (versions up to 1.5.1 read all six);
+//! - at an angle file with one room, since its two words are not read as a table: the room is named twice,
+//! and processed twice with the same result;
+//! - at a room of the angle file without points: the room is left out;
+//! - at an instance of one point, whose numbers are not read as a table: the point is written twice.
 //!
-//! All but these are second names of the files in `s3dis/` (copies where the file system has none).
+//! All other files are second names of the files in `s3dis/` (copies if the file system has no hard links).
 //!
 //! For normals, `--parse_normal --raw_root profiles/pointcept/raw`, it reads `Area_k/3d/rgb.obj` (`area_k` up
-//! to version 1.5.1), and for area 5 `Area_5a` and `Area_5b`, moving 5b: area 5 of a data set is in one frame
-//! already and comes as `Area_5a` alone.
+//! to version 1.5.1). For area 5 it reads `Area_5a` and `Area_5b`, and moves 5b. Area 5 of a data set is in
+//! one frame already and comes as `Area_5a` alone.
 
 use super::room::{TreeRoom, count_and_min};
 use super::{AREAS_OF_LOADERS, Source, write_lines};
@@ -30,6 +30,7 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, areas: &[u32], rooms: &[Tre
     for area in areas.iter().filter(|a| !AREAS_OF_LOADERS.contains(*a)) {
         ctx.warn(format_args!("area {area}: Pointcept's preprocessing reads areas 1 to 6 only"));
     }
+
     for area in AREAS_OF_LOADERS {
         let tree = dir.join(format!("Area_{area}"));
         create_dir(&tree)?;
@@ -42,6 +43,7 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, areas: &[u32], rooms: &[Tre
             }
             link_mesh(source, area, &dir.join("raw"))?;
         }
+
         if let [only] = &named[..] {
             ctx.warn(format_args!(
                 "area {area} has one room: Pointcept's preprocessing stops at such an area, so its angle \
@@ -50,6 +52,7 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, areas: &[u32], rooms: &[Tre
             ));
             named.push(only.clone());
         }
+
         let header = [
             format!("## Global alignment angle per disjoint space in Area_{area} ##"),
             "## Disjoint Space Name Global Alignment Angle ##".to_owned(),
@@ -59,7 +62,7 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, areas: &[u32], rooms: &[Tre
     Ok(())
 }
 
-/// The angle of each room, as it is written.
+/// Returns the angle of each room, as it is written in the tree.
 fn read_angles(source: &Source<'_>, area: u32) -> Result<BTreeMap<String, String>> {
     let path = source
         .layout
@@ -80,7 +83,7 @@ fn write_room(source: &Source<'_>, dir: &Path, room: &TreeRoom) -> Result<()> {
     source.link(&source.layout.s3dis_area_dir(room.area).join(&room.name).join(&name), &dir.join(&name))?;
     for instance in &room.instances {
         let to = dir.join("Annotations").join(&instance.name);
-        // A line is at most some hundred bytes.
+        // One line has at most some hundred bytes, so larger files have more points.
         let size = source.files.bytes(&instance.path)?;
         if size < 1024 && count_and_min(source, &instance.path)?.0 == 1 {
             let line = source.files.read_bytes(&instance.path)?;
@@ -92,7 +95,7 @@ fn write_room(source: &Source<'_>, dir: &Path, room: &TreeRoom) -> Result<()> {
     Ok(())
 }
 
-/// The mesh of an area with its materials and textures, where the preprocessing looks for it.
+/// Links the mesh of an area, with its materials and textures, to where the preprocessing looks for it.
 fn link_mesh(source: &Source<'_>, area: u32, raw: &Path) -> Result<()> {
     let from = source.layout.mesh_dir(area);
     let name = if area == 5 {

@@ -1,4 +1,4 @@
-//! The rooms of an S3DIS tree, and their points as numpy would read them.
+//! The rooms of an S3DIS tree, with their points as numpy would read them.
 
 use super::Source;
 use crate::error::Result;
@@ -9,46 +9,46 @@ use s3d_label::{Class, Taxonomy};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Points that are read at a time.
+/// The number of points that are read at a time.
 const CHUNK: usize = 1 << 16;
 
-/// A room of the S3DIS tree of a data set, as its [profiles](crate::Profile) hand it to loaders: they put the
-/// points of one instance after those of another, each in the order of its file.
+/// A room of a data set's S3DIS tree, as its [profiles](crate::Profile) give it to loaders. Loaders
+/// concatenate the points of the instances, each in the order of its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TreeRoom {
     /// The number of its area.
     pub area: u32,
-    /// Such as `office_3`.
+    /// Its name, such as `office_3`.
     pub name: String,
     /// Its instances, in the order of their file names as strings: `chair_10` before `chair_2`, as
-    /// `sorted(glob(…))` gives them.
+    /// `sorted(glob(…))` orders them.
     pub instances: Vec<TreeInstance>,
 }
 
 /// An instance of a room of the S3DIS tree.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TreeInstance {
-    /// Which class of S3DIS it counts as: loaders of S3DIS know no others.
+    /// The S3DIS class that it counts as. S3DIS loaders know no other classes.
     pub class: Class,
-    /// The name of its file for them, `chair_1.txt`.
+    /// The name of its file for loaders, such as `chair_1.txt`.
     pub name: String,
-    /// The file of its points in the data set.
+    /// The path of its points in the data set.
     pub path: PathBuf,
 }
 
 impl TreeRoom {
-    /// `Area_1_office_3`: how loaders call it.
+    /// Returns the room's name for loaders: `Area_1_office_3`.
     pub(super) fn stem(&self) -> String {
         format!("Area_{}_{}", self.area, self.name)
     }
 
-    /// `Area_1/office_3/Annotations`: how their lists call it.
+    /// Returns the room's name in their lists: `Area_1/office_3/Annotations`.
     pub(super) fn annotations(&self) -> String {
         format!("Area_{}/{}/Annotations", self.area, self.name)
     }
 }
 
-/// The rooms of an area that hold points, by type and number.
+/// Returns the rooms of an area that have points, by type and number.
 pub(crate) fn rooms_of(layout: &Layout, taxonomy: &Taxonomy, area: u32) -> Result<Vec<TreeRoom>> {
     let dir = layout.s3dis_area_dir(area);
     let is_empty = std::fs::read_dir(&dir).is_ok_and(|mut e| !e.any(|e| e.is_ok_and(|e| e.path().is_dir())));
@@ -58,7 +58,7 @@ pub(crate) fn rooms_of(layout: &Layout, taxonomy: &Taxonomy, area: u32) -> Resul
     let options = TreeOptions { taxonomy: taxonomy.clone(), ..TreeOptions::default() };
     let tree = AnnotationTree::open_with(&dir, &options)?;
     let rooms = tree.rooms.into_iter().map(|room| {
-        // Classes that count as one share its numbers.
+        // Classes that count as the same S3DIS class share its numbers.
         let mut last: BTreeMap<Class, u32> = BTreeMap::new();
         let named = room.instances.into_iter().map(|i| {
             let class = i.class.s3dis();
@@ -73,7 +73,7 @@ pub(crate) fn rooms_of(layout: &Layout, taxonomy: &Taxonomy, area: u32) -> Resul
     Ok(rooms.collect())
 }
 
-/// Hands out the points of a file, some at a time.
+/// Reads the points of a file, and hands them out piece by piece.
 pub(super) fn for_each_piece(
     source: &Source<'_>,
     path: &Path,
@@ -89,16 +89,17 @@ pub(super) fn for_each_piece(
     Ok(())
 }
 
-/// The number that stands in the file, as the nearest `f64`. Files hold millimetres, and a coordinate in them
-/// is the nearest `f32`, so that the whole millimetre next to it is what stood there, or nothing lies between
-/// the two.
+/// Returns the number in the file, as the nearest `f64`. Files hold millimetres, and a coordinate is the
+/// nearest `f32` to its text. So the nearest whole millimetre is the number in the file, unless the `f32` are
+/// farther apart.
 pub(super) fn as_written(coordinate: f32) -> f64 {
     (f64::from(coordinate) * 1000.0).round() / 1000.0
 }
 
-/// The number of points of an instance, and their least coordinates.
+/// Returns the number of points of an instance, and their smallest coordinates.
 pub(super) fn count_and_min(source: &Source<'_>, path: &Path) -> Result<(u64, [f64; 3])> {
-    let (mut count, mut min) = (0, [f64::INFINITY; 3]);
+    let mut count = 0;
+    let mut min = [f64::INFINITY; 3];
     for_each_piece(source, path, |piece| {
         count += piece.len() as u64;
         for p in &piece.positions {

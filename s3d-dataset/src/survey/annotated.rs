@@ -1,4 +1,4 @@
-//! What annotations tell of an area's mesh and rooms.
+//! The result of annotations for an area's mesh and rooms.
 
 use crate::summary::{Surface, Unlabelled};
 use s3d_geom::{Aabb, Footprint, TriMesh};
@@ -8,53 +8,56 @@ use serde::{Deserialize, Serialize};
 /// An annotated area.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Annotated {
-    /// The label of each face of the mesh; [`LabelId::NULL`] where no point voted and nothing was filled. As
-    /// data it has a file of its own.
+    /// The label of each face of the mesh. [`LabelId::NULL`] where no point voted and nothing was filled.
+    /// Stored in a file of its own.
     #[serde(skip)]
     pub(crate) label_of_face: Vec<LabelId>,
-    /// The faces that were filled: they have a label without a vote. Ascending; in that file too.
+    /// The filled faces, which have a label without a vote, in ascending order. Stored in the same file.
     #[serde(skip)]
     pub(crate) filled: Vec<u32>,
-    /// What has no label.
+    /// The surface without votes, and without a label.
     pub(crate) unlabelled: Unlabelled,
     pub(crate) report: VoteReport,
     /// The rooms, in the order of their names.
     pub(crate) rooms: Vec<SurveyedRoom>,
-    /// Annotated points.
+    /// The number of annotated points.
     pub(crate) points: u64,
     #[serde(skip)]
     pub(crate) skipped: SkippedLines,
 }
 
 impl Annotated {
-    /// Gives faces without a label that of the surface next to them, if it is asked for.
+    /// Gives unlabelled faces the label of the surface next to them, if a distance is given.
     pub(crate) fn fill(&mut self, mesh: &TriMesh, within_m: Option<f64>) {
-        let null = |labels: &[LabelId]| {
-            let mut sum = Surface::default();
-            for (face, _) in (0u32..).zip(labels).filter(|(_, label)| label.is_null()) {
-                sum += Surface { faces: 1, m2: mesh.area(face), pixels: None };
-            }
-            sum
-        };
-        let without_votes = null(&self.label_of_face);
+        let without_votes = unlabelled_surface(mesh, &self.label_of_face);
         if let Some(within_m) = within_m {
             self.filled = fill_labels(mesh, &mut self.label_of_face, within_m);
         }
-        self.unlabelled = Unlabelled { without_votes, without_label: null(&self.label_of_face) };
+        let without_label = unlabelled_surface(mesh, &self.label_of_face);
+        self.unlabelled = Unlabelled { without_votes, without_label };
     }
 }
 
-/// What a lenient reading left out of the files of instances.
+/// Returns the faces with the null label, as a number and an area.
+fn unlabelled_surface(mesh: &TriMesh, labels: &[LabelId]) -> Surface {
+    let mut sum = Surface::default();
+    for (face, _) in (0u32..).zip(labels).filter(|(_, label)| label.is_null()) {
+        sum += Surface { faces: 1, m2: mesh.area(face), pixels: None };
+    }
+    sum
+}
+
+/// What lenient reading left out of instance files.
 #[derive(Debug, Default)]
 pub(crate) struct SkippedLines {
     pub(crate) lines: u64,
     pub(crate) empty_instances: u64,
-    /// The first place.
+    /// The first place where something was left out.
     pub(crate) first: Option<String>,
 }
 
 impl SkippedLines {
-    /// A sentence on it, if there is something.
+    /// Returns a sentence on it, if something was left out.
     pub(crate) fn sentence(&self) -> Option<String> {
         let first = self.first.as_ref()?;
         Some(format!(
@@ -64,13 +67,13 @@ impl SkippedLines {
     }
 }
 
-/// What is known of a room from its points and faces.
+/// What the points and faces of a room tell about it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct SurveyedRoom {
     pub(crate) room: Room,
     pub(crate) points: u64,
     pub(crate) footprint: Footprint,
-    /// The box of its points.
+    /// The bounding box of its points.
     pub(crate) bbox: Aabb,
     /// The dominant horizontal direction of its walls, whole degrees in [0, 90).
     pub(crate) wall_direction_deg: u32,

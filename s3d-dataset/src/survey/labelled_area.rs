@@ -1,4 +1,4 @@
-//! An area whose faces are labelled and whose scan locations are known.
+//! An area with labelled faces and known scan locations.
 
 use crate::survey::annotated::Annotated;
 use crate::survey::room_names::RoomNames;
@@ -8,32 +8,32 @@ use s3d_io::camera::ScanLocation;
 use s3d_label::Room;
 use serde::{Deserialize, Serialize};
 
-/// All that an export needs to know of an area's annotations once it is labelled.
+/// Everything an export needs from an area's annotations once it is labelled.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct LabelledArea {
     /// Its number, from 1.
     pub(crate) area: u32,
     pub(crate) annotated: Annotated,
-    /// The rooms, in the order of their names, each with the names of its instances.
+    /// The rooms in the order of their names, each with the names of its instances.
     pub(crate) names: Vec<RoomNames>,
     /// The scan locations, listed or placed.
     #[serde(with = "locations_as_data")]
     pub(crate) locations: Vec<ScanLocation>,
-    /// The room of each location; none in an area without labels.
+    /// The room of each location. Empty in an area without labels.
     pub(crate) location_rooms: Vec<Option<Room>>,
-    /// What placed locations see.
+    /// The surface that placed locations see. `None` for listed ones.
     pub(crate) surface_seen: Option<SurfaceSeen>,
-    /// The box of the mesh.
+    /// The bounding box of the mesh.
     pub(crate) mesh_box: Aabb,
-    /// The area of its faces.
+    /// The area of the mesh's faces, in m².
     pub(crate) mesh_area_m2: f64,
-    /// Faces of its file that the mesh has not.
+    /// The number of faces in the mesh's file that the mesh lacks.
     pub(crate) faces_left_out: usize,
-    /// What should be looked at, a sentence each.
+    /// What the user should look at, a sentence each.
     pub(crate) warnings: Vec<String>,
 }
 
-/// Scan locations as data: a tuple each.
+/// Scan locations as data: a tuple for each.
 mod locations_as_data {
     use s3d_geom::Pose;
     use s3d_io::camera::ScanLocation;

@@ -1,4 +1,4 @@
-//! What is known of an area, as data: labels of faces, rooms, scan locations and what they see, candidate views.
+//! The survey of an area, as data: labels of faces, rooms, scan locations and what they see, candidate views.
 
 pub(crate) mod annotated;
 pub(crate) mod candidate;

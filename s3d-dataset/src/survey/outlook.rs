@@ -8,26 +8,26 @@ use s3d_io::camera::ScanLocation;
 use s3d_label::LabelId;
 use s3d_render::{NO_FACE, Scene, cast};
 
-/// Width of the small panorama that tells what a location sees.
+/// The width of the small panorama that probes what a location sees, pixels.
 const PROBE_WIDTH: u32 = 256;
 
-/// A location that sees less of the mesh than this is told of.
+/// The share of directions with a surface below which a location gets a warning.
 pub(crate) const LOW_COVERAGE: f64 = 0.5;
 
-/// A location that sees more back sides than this is told of.
+/// The share of back sides above which a location gets a warning.
 const MANY_BACK_SIDES: f64 = 0.5;
 
-/// A location nearer to a surface than this is told of, in metres.
+/// The distance to a surface below which a location gets a warning, metres.
 const VERY_NEAR_M: f32 = 0.1;
 
 /// What a location sees of the mesh, by solid angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Outlook {
-    /// Share of all directions in which there is a surface.
+    /// The share of all directions in which there is a surface.
     pub(crate) coverage: f64,
-    /// Share of those in which its back side is seen.
+    /// The share of these directions in which the back side is seen.
     pub(crate) back_sides: f64,
-    /// The nearest surface seen, metres; infinite if there is none.
+    /// The distance to the nearest visible surface, metres. Infinite if there is none.
     pub(crate) nearest_m: f32,
 }
 
@@ -35,14 +35,20 @@ impl Outlook {
     /// Looks around from `location`.
     pub(crate) fn of(scene: &Scene<'_>, location: &ScanLocation) -> Self {
         let camera = Camera::equirectangular(location.pose, PROBE_WIDTH);
-        let (hits, rays) = (cast(scene, &camera), camera.rays());
-        let (mut all, mut seen, mut back, mut nearest_m) = (0.0, 0.0, 0.0, f32::INFINITY);
+        let hits = cast(scene, &camera);
+        let rays = camera.rays();
+
+        let mut all = 0.0;
+        let mut seen = 0.0;
+        let mut back = 0.0;
+        let mut nearest_m = f32::INFINITY;
         for y in 0..camera.height {
             for x in 0..camera.width {
                 let direction = rays.at(x, y);
                 // A row's pixels cover the sphere in proportion to the cosine of its latitude.
                 let weight = (direction.x * direction.x + direction.y * direction.y).sqrt();
                 all += weight;
+
                 let face = hits.face.at(x, y);
                 if face == NO_FACE {
                     continue;
@@ -54,14 +60,15 @@ impl Outlook {
                 }
             }
         }
+
         Self { coverage: seen / all, back_sides: if seen > 0.0 { back / seen } else { 0.0 }, nearest_m }
     }
 
-    /// What looks wrong about it, as a sentence for each.
+    /// Returns a sentence for each thing that looks wrong.
     pub(crate) fn warnings(&self, location: &ScanLocation) -> Vec<String> {
         let mut warnings = Vec::new();
         let name = &location.uuid;
-        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+
         if self.coverage == 0.0 {
             warnings.push(format!(
                 "location {name} sees nothing of the mesh (coverage 0 %): is it in the mesh's frame?"
@@ -73,6 +80,7 @@ impl Outlook {
                 percent(self.coverage)
             ));
         }
+
         if self.back_sides > MANY_BACK_SIDES {
             warnings.push(format!(
                 "location {name} sees back sides in {} of what it sees (coverage {}): it may stand inside \
@@ -81,6 +89,7 @@ impl Outlook {
                 percent(self.coverage)
             ));
         }
+
         if self.nearest_m < VERY_NEAR_M {
             warnings.push(format!(
                 "location {name} is {:.0} mm from a surface (coverage {}): it may stand inside a wall or a \
@@ -89,11 +98,16 @@ impl Outlook {
                 percent(self.coverage)
             ));
         }
+
         warnings
     }
 }
 
-/// What each scan location sees.
+fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+/// Returns what each scan location sees.
 pub(crate) fn look_around(
     ctx: &Context,
     scene: &Scene<'_>,
@@ -106,7 +120,8 @@ pub(crate) fn look_around(
     outlooks.collect()
 }
 
-/// Of what scan locations see, by solid angle, the share that has no label; nothing if they see nothing.
+/// Returns the unlabelled share of what scan locations see, by solid angle. Returns `None` if they see
+/// nothing.
 pub(crate) fn unlabelled_share(
     scene: &Scene<'_>,
     locations: &[ScanLocation],
@@ -115,7 +130,9 @@ pub(crate) fn unlabelled_share(
     let seen_and_unlabelled = |location: &ScanLocation| {
         let camera = Camera::equirectangular(location.pose, PROBE_WIDTH);
         let faces = cast(scene, &camera).face;
-        let (mut seen, mut unlabelled) = (0.0, 0.0);
+
+        let mut seen = 0.0;
+        let mut unlabelled = 0.0;
         for y in 0..camera.height {
             let latitude = (0.5 - (f64::from(y) + 0.5) / f64::from(camera.height)) * std::f64::consts::PI;
             for x in 0..camera.width {
@@ -130,8 +147,10 @@ pub(crate) fn unlabelled_share(
                 }
             }
         }
+
         (seen, unlabelled)
     };
+
     let each: Vec<(f64, f64)> = locations.par_iter().map(seen_and_unlabelled).collect();
     let (seen, unlabelled) = each.iter().fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
     (seen > 0.0).then(|| unlabelled / seen)

@@ -1,4 +1,4 @@
-//! What the annotated instances of an area are called.
+//! The names of an area's annotated instances.
 
 use s3d_label::{Label, Room};
 use serde::{Deserialize, Serialize};
@@ -10,11 +10,11 @@ pub(crate) struct RoomNames {
     pub(crate) instances: Vec<InstanceName>,
 }
 
-/// What an instance is called.
+/// The names of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct InstanceName {
-    /// In the data set.
+    /// Its label in the data set.
     pub(crate) label: Label,
-    /// In its room, among those of its class.
+    /// Its number in its room, among the instances of its class.
     pub(crate) number_in_room: u32,
 }

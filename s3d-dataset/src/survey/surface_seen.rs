@@ -1,16 +1,16 @@
-//! How much of a mesh's surface scan locations see.
+//! How much of a mesh's surface is seen by scan locations.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// How much surface is seen, m². A surface is seen where its front is, from 10 m or nearer, not edge-on.
+/// How much surface is seen, m². A surface is seen if its front is seen from at most 10 m, and not edge-on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SurfaceSeen {
-    /// All of it.
+    /// The whole surface.
     pub(crate) surface_m2: f64,
-    /// By any place at which a location could be.
+    /// The surface that is seen from any possible location.
     pub(crate) visible_m2: f64,
-    /// By one location or more, by two or more, by three or more.
+    /// The surface that is seen by at least one, two and three locations.
     pub(crate) seen_m2: [f64; 3],
 }
 

@@ -1,4 +1,4 @@
-//! How large a data set becomes, before its first byte is written.
+//! Estimates of a data set's size, before its first byte is written.
 
 use super::{Condition, Finding};
 use crate::error::{InputError, Result};
@@ -8,21 +8,21 @@ use s3d_io::dataset::{Domain, XyzType};
 use std::fmt;
 use std::path::Path;
 
-/// More points than this in one cloud are taken for a slip: the largest area of the published data set has
-/// 470 million.
+/// The number of points above which a cloud is probably a mistake. The largest area of the published data set
+/// has 470 million.
 const MANY_POINTS: f64 = 3e9;
 
-/// More cannot be meant, and are refused whatever is allowed.
+/// The number of points above which a cloud is always refused.
 const MOST_POINTS: f64 = 1e11;
 
-/// Bytes of a point in `pointcloud.ply`; all of it.
+/// The size of a point in `pointcloud.ply`, bytes. The file has little else.
 pub(crate) const PLY_POINT_BYTES: f64 = 23.0;
 
-/// Bytes of a point in all files of points: PLY, the S3DIS tree, `pointcloud.mat`.
+/// The size of a point in all files of points together, bytes: PLY, the S3DIS tree, `pointcloud.mat`.
 const POINT_BYTES: f64 = 100.0;
 
-/// Bytes of a pixel with the default compression: the mean of a synthetic office, the built-in building and a
-/// real scan.
+/// Returns the bytes per pixel with the default compression: the mean of a synthetic office, the built-in
+/// building and a real scan.
 fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
     match domain {
         Domain::Rgb => 0.65,
@@ -37,47 +37,51 @@ fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
     }
 }
 
-/// Nanoseconds that one core takes for a pixel of all images of a view, scored, cast, shaded and compressed:
-/// on the machine of docs/performance.md.
+/// The time of one core for a pixel of all images of a view, scored, cast, shaded and compressed,
+/// nanoseconds. Measured on the machine of docs/performance.md.
 const PIXEL_NS: f64 = 50.0;
 
-/// The same for a sampled point: drawn and written in three formats.
+/// The same for a sampled point, drawn and written in three formats.
 const POINT_NS: f64 = 400.0;
 
 /// The share of candidate views that are kept.
 const KEPT: f64 = 0.725;
 
-/// About how large an export becomes.
+/// A rough size of an export.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Estimate {
-    /// Sampled points.
+    /// The number of sampled points.
     pub points: f64,
-    /// Kept views and panoramas, of every modality.
+    /// The number of images: kept views and panoramas, in every modality.
     pub images: f64,
-    /// Files.
+    /// The number of files.
     pub files: f64,
-    /// Bytes.
+    /// The size of all files, bytes.
     pub bytes: f64,
-    /// Seconds of one core.
+    /// The time on one core, seconds.
     pub core_seconds: f64,
 }
 
 impl Estimate {
-    /// Of an export of so many scan locations in meshes of so many square metres.
+    /// Estimates an export of `locations` scan locations in meshes of `area_m2`.
     pub(crate) fn new(area_m2: f64, locations: f64, options: &ExportOptions) -> Self {
         let share = if options.keep_all { 1.0 } else { KEPT };
         let written = match options.only.len() {
             0 => locations,
             only => locations.min(only as f64),
         };
-        let (views, panoramas) = (written * f64::from(options.views) * share, written);
+
+        let views = written * f64::from(options.views) * share;
+        let panoramas = written;
         let view_pixels = f64::from(options.size).powi(2);
         let panorama_pixels = f64::from(options.pano_width).powi(2) / 2.0;
         let pixels = views * view_pixels + panoramas * panorama_pixels;
+
         let points = area_m2 * options.points_per_m2;
         let bytes_per_pixel: f64 = options.modalities.iter().map(|d| pixel_bytes(*d, options.xyz)).sum();
         let images = (views + panoramas) * options.modalities.len() as f64;
+
         Self {
             points,
             images,
@@ -87,7 +91,7 @@ impl Estimate {
         }
     }
 
-    /// The same with views of so many pixels each besides.
+    /// Adds views with these numbers of pixels.
     pub(crate) fn with_views(self, views: impl Iterator<Item = f64>, options: &ExportOptions) -> Self {
         let (count, pixels) = views.fold((0.0, 0.0), |(count, sum), pixels| (count + 1.0, sum + pixels));
         let bytes_per_pixel: f64 = options.modalities.iter().map(|d| pixel_bytes(*d, options.xyz)).sum();
@@ -120,11 +124,12 @@ impl fmt::Display for Estimate {
         } else {
             format!("{minutes:.0} minutes")
         };
+
         write!(f, "about {:.0} files, {}, {time} of one core", self.files, Bytes(self.bytes))
     }
 }
 
-/// Bytes as people say them: powers of 1000.
+/// A number of bytes in words, with powers of 1000.
 struct Bytes(f64);
 
 impl fmt::Display for Bytes {
@@ -138,7 +143,7 @@ impl fmt::Display for Bytes {
     }
 }
 
-/// Refuses a number of points that cannot be meant.
+/// Refuses a number of points that cannot be intended.
 pub(crate) fn check_points(points: f64) -> Result<()> {
     if points <= MOST_POINTS {
         return Ok(());
@@ -146,12 +151,13 @@ pub(crate) fn check_points(points: f64) -> Result<()> {
     Err(InputError::TooManyPoints { points, most: MOST_POINTS }.into())
 }
 
-/// What looks wrong about the number of points sampled of a mesh.
+/// Returns what looks wrong about the number of points sampled on a mesh.
 ///
 /// # Errors
-/// [`check_points`].
+/// The same as for [`check_points`].
 pub(crate) fn size_findings(mesh: &TriMesh, points_per_m2: f64) -> Result<Vec<Finding>> {
-    let (area_m2, points) = (mesh.total_area(), mesh.total_area() * points_per_m2);
+    let area_m2 = mesh.total_area();
+    let points = area_m2 * points_per_m2;
     let text = format!(
         "{points_per_m2} points a m² on {area_m2:.1} m² are {points:.1e} points: is the mesh in metres? or \
          ask for fewer points"
@@ -165,7 +171,7 @@ pub(crate) fn size_findings(mesh: &TriMesh, points_per_m2: f64) -> Result<Vec<Fi
         .collect())
 }
 
-/// Refuses exactly so many bytes where the disk of `folder` has not the space.
+/// Refuses to write exactly `bytes` if the disk of `folder` has less space.
 pub(crate) fn check_space(bytes: f64, folder: &Path) -> Result<()> {
     match lack_of_space(bytes, folder) {
         Some((_, why)) => Err(InputError::NoSpace { why }.into()),
@@ -173,8 +179,8 @@ pub(crate) fn check_space(bytes: f64, folder: &Path) -> Result<()> {
     }
 }
 
-/// What looks wrong about writing about so many bytes on the disk of `folder`. How small images become
-/// depends on what they show: what stops is less space than half of what is expected.
+/// Returns what looks wrong about writing about `bytes` on the disk of `folder`. Image sizes depend on what
+/// images show, so only a disk with less than half of the space stops an export.
 pub(crate) fn space_findings(bytes: f64, folder: &Path) -> Vec<Finding> {
     let lack = lack_of_space(bytes, folder);
     lack.map(|(free, text)| Finding::new(Condition::Size, bytes > 2.0 * free, text))
@@ -182,20 +188,12 @@ pub(crate) fn space_findings(bytes: f64, folder: &Path) -> Vec<Finding> {
         .collect()
 }
 
-/// The free bytes on the disk of `folder`, which need not be there yet, and a sentence, if there are fewer
-/// than `bytes`. Nothing where the system does not tell.
+/// Returns the free bytes on the disk of `folder`, and a sentence, if they are fewer than `bytes`. The folder
+/// need not exist yet. Returns `None` if the system does not tell.
 fn lack_of_space(bytes: f64, folder: &Path) -> Option<(f64, String)> {
-    let named = |folder: &Path| {
-        if folder.as_os_str().is_empty() {
-            Path::new(".")
-        } else {
-            folder
-        }
-        .to_owned()
-    };
     let free = folder
         .ancestors()
-        .find_map(|folder| fs4::available_space(named(folder)).ok())? as f64;
+        .find_map(|folder| fs4::available_space(or_current(folder)).ok())? as f64;
     let text = format!(
         "about {} are to be written, and {} are free at {}: make room, choose another folder, or write less",
         Bytes(bytes),
@@ -205,14 +203,23 @@ fn lack_of_space(bytes: f64, folder: &Path) -> Option<(f64, String)> {
     (bytes > free).then_some((free, text))
 }
 
+/// Returns the current folder for an empty path.
+fn or_current(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn an_estimate_is_near_what_was_written() {
-        // A synthetic office, a made building, a real scan: their exports' files, bytes of images and points,
-        // and seconds of one core.
+        // A synthetic office, a generated building and a real scan: the files of their exports, the bytes of
+        // images and points, and the seconds of one core.
         let demo = ExportOptions {
             size: 540,
             pano_width: 2048,

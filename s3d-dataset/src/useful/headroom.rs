@@ -1,4 +1,4 @@
-//! What is above level surfaces: how high rooms are, and on how many storeys.
+//! The free height above level surfaces: how high rooms are, and how many storeys a building has.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -6,33 +6,33 @@ use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use s3d_render::{Scene, cast_ray};
 use std::fmt;
 
-/// The cosine of 18°: what is tilted less is level.
+/// The cosine of 18°. A surface tilted less is level.
 const LEVEL: f32 = 0.95;
 
-/// Points from which is looked up.
+/// The number of points from which rays look up.
 const POINTS: u64 = 20_000;
 
-/// Who stands needs as much, metres.
+/// The height that a standing person needs, metres.
 const STANDING_M: f64 = 1.8;
 
-/// Floors that are nearer than this belong to one storey, metres.
+/// Floors that are nearer than this in height belong to one storey, metres.
 const STOREY_M: f64 = 1.5;
 
-/// A smaller floor, square metres, or one with a smaller share of the largest, is no storey.
+/// A floor is no storey if it is smaller than this, m², or has a smaller share of the largest floor.
 const SMALL_M2: f64 = 3.0;
 const SMALL_SHARE: f64 = 0.1;
 
-/// Uniform samples of a mesh's level surfaces that face up, with what is above each.
+/// Uniform samples of a mesh's level surfaces that face up, with the free height above each.
 pub(crate) struct Headroom {
-    /// The height of each, the free height above it (infinite under the sky), and whether it ends at an
-    /// underside.
+    /// For each sample its height, the free height above it (infinite under the sky), and whether that ends
+    /// at an underside.
     samples: Vec<(f64, f64, bool)>,
-    /// The area that each stands for.
+    /// The area that each sample stands for, in the mesh's unit squared.
     m2: f64,
 }
 
 impl Headroom {
-    /// Of a mesh in any unit, where `up` points up.
+    /// Samples a mesh in any unit. `up` points up.
     pub(crate) fn of(scene: &Scene<'_>, up: DVec3) -> Self {
         let mesh = scene.mesh();
         let is_level = |face: &u32| mesh.normal(*face).dot(up.as_vec3()) > LEVEL;
@@ -41,8 +41,10 @@ impl Headroom {
         if faces.is_empty() {
             return Self { samples: Vec::new(), m2: 0.0 };
         }
+
         let mut cloud = PointCloud::default();
         SurfaceSampler::over_faces(mesh, faces, Density::Total(POINTS), 0).sample(0..POINTS, &mut cloud);
+
         let above = 1e-5 * f64::from(mesh.aabb().size().max_element());
         let look_up = |point: &glam::Vec3| {
             let from = point.as_dvec3() + up * above;
@@ -50,26 +52,30 @@ impl Headroom {
             let ends_below = hit.is_some_and(|hit| mesh.normal(hit.face).dot(up.as_vec3()) < -LEVEL);
             (from.dot(up), hit.map_or(f64::INFINITY, |hit| hit.t), ends_below)
         };
+
         let samples: Vec<_> = cloud.positions.par_iter().map(look_up).collect();
         Self { m2: area / samples.len().max(1) as f64, samples }
     }
 
-    /// How high ceilings are above floors, in the unit of the mesh; `None` without a ceiling. Floors are most
-    /// of what lies beneath ceilings, and lower than all else: three quarters lie less deep.
+    /// Returns the height of ceilings above floors, in the unit of the mesh. Returns `None` without a
+    /// ceiling. Most of what lies beneath ceilings is floor, and everything else is higher, so three quarters
+    /// of the samples have less free height.
     pub(crate) fn of_rooms(&self) -> Option<f64> {
         let mut free: Vec<f64> = self.samples.iter().filter(|s| s.2).map(|s| s.1).collect();
         free.sort_by(f64::total_cmp);
         free.get(free.len() * 3 / 4).copied()
     }
 
-    /// The storeys of a mesh in metres, from below.
+    /// Returns the storeys of a mesh in metres, from the lowest.
     pub(crate) fn storeys(&self) -> Vec<Storey> {
         let standing = || self.samples.iter().filter(|s| s.1 >= STANDING_M);
-        // Where ceilings were captured, what lies under the sky is a roof.
+
+        // Where ceilings were captured, a surface under the sky is a roof.
         let covered = 4 * standing().filter(|s| s.2).count() >= standing().count();
         let mut heights: Vec<(f64, f64)> =
             standing().filter(|s| s.2 || !covered).map(|s| (s.0, s.1)).collect();
         heights.sort_by(|a, b| a.0.total_cmp(&b.0));
+
         let mut storeys: Vec<Storey> = Vec::new();
         while let Some(storey) = self.largest_floor(&heights) {
             let largest = storeys.first().map_or(storey.floor_m2, |first| first.floor_m2);
@@ -79,11 +85,12 @@ impl Headroom {
             heights.retain(|(z, _)| (z - storey.z_m).abs() >= STOREY_M);
             storeys.push(storey);
         }
+
         storeys.sort_by(|a, b| a.z_m.total_cmp(&b.z_m));
         storeys
     }
 
-    /// The largest surface within 20 cm of height, of samples sorted by it.
+    /// Returns the largest surface within 20 cm of height. `heights` are sorted by height.
     fn largest_floor(&self, heights: &[(f64, f64)]) -> Option<Storey> {
         let end = |start: usize| {
             let top = heights.get(start).map_or(0.0, |(z, _)| z + 0.2);
@@ -108,15 +115,15 @@ impl Headroom {
 pub struct Storey {
     /// The height of its floor, world metres.
     pub z_m: f64,
-    /// About how large its floor is where a person can stand.
+    /// The area of its floor where a person can stand, about, in m².
     pub floor_m2: f64,
-    /// From its floor to its ceiling; `None` under the sky.
+    /// The height from its floor to its ceiling, metres. `None` under the sky.
     pub height_m: Option<f64>,
 }
 
 impl fmt::Display for Storey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // A floor at −1 mm is at 0.
+        // A floor at −1 mm is shown at 0.
         let z_m = (100.0 * self.z_m).round() / 100.0 + 0.0;
         write!(f, "{:.0} m² at z = {z_m:.2} m", self.floor_m2)?;
         self.height_m.map_or(Ok(()), |height| write!(f, ", {height:.2} m high"))

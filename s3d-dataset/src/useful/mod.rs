@@ -1,7 +1,7 @@
-//! Whether a data set would be of use: what looks wrong in a scene, and what stops an export of it.
+//! Checks whether a data set would be useful: what looks wrong in a scene, and what stops an export of it.
 //!
-//! Each [`Finding`] belongs to a [`Condition`]. Beyond a limit it stops an export, unless the caller allows
-//! the condition; nearer it is a warning. `info` and `export` find the same.
+//! Each [`Finding`] belongs to a [`Condition`]. Beyond a limit it stops an export unless the caller allows
+//! the condition; within the limit it is a warning. `info` and `export` have the same findings.
 
 mod estimate;
 mod headroom;
@@ -24,9 +24,9 @@ use s3d_label::{Class, LabelId, LabelTable, VoteReport};
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Finding {
     condition: Condition,
-    /// Whether the data set would be of no use.
+    /// Whether the data set would be useless.
     stops: bool,
-    /// A sentence on it.
+    /// A sentence for the user.
     text: String,
 }
 
@@ -35,12 +35,12 @@ impl Finding {
         Self { condition, stops, text }
     }
 
-    /// What it says.
+    /// Returns the sentence.
     pub(crate) fn text(&self) -> String {
         self.text.clone()
     }
 
-    /// What `info` says of it.
+    /// Returns the sentence of `info`.
     pub(crate) fn sentence(&self) -> String {
         let Self { condition, stops, text } = self;
         if *stops {
@@ -51,15 +51,15 @@ impl Finding {
     }
 }
 
-/// Warns of what was found, unless some of it stops the export and is not allowed.
+/// Warns about the findings, unless one of them stops the export and is not allowed.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) with all that stops it.
+/// [`Error::Input`](crate::Error::Input) with all findings that stop it.
 pub(crate) fn judge(ctx: &Context, findings: &[Finding], allowed: &[Condition]) -> Result<()> {
     judge_of(("the data set", "export it"), ctx, findings, allowed)
 }
 
-/// As [`judge`], of something else than a data set: what it is, and what is done with it.
+/// Judges like [`judge`], but for something other than a data set: `what` it is, and the `action` on it.
 pub(crate) fn judge_of(
     (what, action): (&'static str, &'static str),
     ctx: &Context,
@@ -69,12 +69,15 @@ pub(crate) fn judge_of(
     let stops = |f: &&Finding| f.stops && !allowed.contains(&f.condition);
     let stopping: Vec<&Finding> = findings.iter().filter(stops).collect();
     findings.iter().filter(|f| !stops(f)).for_each(|f| ctx.warn(&f.text));
+
     if stopping.is_empty() {
         return Ok(());
     }
+
     let mut conditions: Vec<Condition> = stopping.iter().map(|f| f.condition).collect();
     conditions.sort_unstable();
     conditions.dedup();
+
     Err(InputError::Useless {
         what,
         action,
@@ -84,25 +87,28 @@ pub(crate) fn judge_of(
     .into())
 }
 
-/// Whether something would stop an export that allows nothing.
+/// Returns whether a finding would stop an export that allows nothing.
 pub(crate) fn stops_any(findings: &[Finding]) -> bool {
     findings.iter().any(|f| f.stops)
 }
 
-/// A share as a whole percentage.
+/// Returns a share as a whole percentage.
 fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 
-/// What looks wrong about the place, size and colours of a mesh. `makes_rgb` says whether images are coloured
-/// by it.
+/// Returns what looks wrong about the place, size and colours of a mesh. `makes_rgb` says whether the mesh
+/// colours the images.
 pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
     /// The largest number that a half float can hold.
     const LARGEST_HALF_M: f32 = 65_504.0;
     const UNITS: &str = "the option units of a mesh, or units = \"cm\" under [mesh], says another unit";
+
     let mut findings = Vec::new();
     let bbox = mesh.aabb();
-    let (length, farthest) = (bbox.size().max_element(), bbox.min.abs().max(bbox.max.abs()).max_element());
+    let length = bbox.size().max_element();
+    let farthest = bbox.min.abs().max(bbox.max.abs()).max_element();
+
     if length > 1000.0 {
         let text = format!("the mesh is {length:.0} m long: is it in metres? ({UNITS})");
         findings.push(Finding::new(Condition::Scale, length > 3000.0, text));
@@ -111,6 +117,7 @@ pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
         let text = format!("the mesh is only {:.1} cm long: is it in metres? ({UNITS})", 100.0 * length);
         findings.push(Finding::new(Condition::Scale, length < 0.1, text));
     }
+
     let moving = "give [mesh] offset_m, or move mesh, points and cameras nearer to it";
     if farthest > LARGEST_HALF_M {
         let text = format!(
@@ -126,16 +133,18 @@ pub(crate) fn mesh_findings(mesh: &TriMesh, makes_rgb: bool) -> Vec<Finding> {
         );
         findings.push(Finding::new(Condition::Scale, false, text));
     }
+
     if makes_rgb && !has_colors(mesh) {
         let text = "the mesh has no texture and no colours, so that its RGB images would be flat: leave rgb \
                     out of the modalities, name the scanner's pictures, or write colors = \"points\" under \
                     [mesh] if annotated points have colours";
         findings.push(Finding::new(Condition::Colour, true, text.to_owned()));
     }
+
     findings
 }
 
-/// Whether a mesh has more colours than one.
+/// Returns whether a mesh has more than one colour.
 fn has_colors(mesh: &TriMesh) -> bool {
     if !mesh.textures().is_empty() || !mesh.parts().colors.is_empty() {
         return true;
@@ -146,7 +155,7 @@ fn has_colors(mesh: &TriMesh) -> bool {
     colors.any(|color| Some(color) != first)
 }
 
-/// What looks wrong between mesh and annotations.
+/// Returns what looks wrong between mesh and annotations.
 pub(crate) fn label_findings(mesh: &TriMesh, annotated: &Annotated, table: &LabelTable) -> Vec<Finding> {
     let mut findings = vote_findings(&annotated.report);
     findings.extend(level_finding(mesh, &annotated.label_of_face, table));
@@ -177,11 +186,12 @@ fn vote_findings(report: &VoteReport) -> Vec<Finding> {
     findings
 }
 
-/// Floors and ceilings are level if the axis that points up is the right one.
+/// Checks that floors and ceilings are level, as they are if the right axis points up.
 fn level_finding(mesh: &TriMesh, label_of_face: &[LabelId], table: &LabelTable) -> Option<Finding> {
     /// The cosine of 30°.
     const LEVEL: f32 = 0.866;
-    let (mut level_m2, mut all_m2) = (0.0, 0.0);
+    let mut level_m2 = 0.0;
+    let mut all_m2 = 0.0;
     for (face, label) in (0u32..).zip(label_of_face) {
         let class = table.get(*label).map(|label| label.class.s3dis());
         if matches!(class, Some(Class::FLOOR | Class::CEILING)) {
@@ -192,8 +202,9 @@ fn level_finding(mesh: &TriMesh, label_of_face: &[LabelId], table: &LabelTable) 
             }
         }
     }
+
     let share = level_m2 / all_m2;
-    // Without floors and ceilings it is no number, and no less than anything.
+    // Without floors and ceilings the share is NaN, which is not less than anything.
     (share < 0.5).then(|| {
         let text = format!(
             "only {} of the floors and ceilings are level: does another axis point up? see `up` in the scene \
@@ -226,7 +237,8 @@ fn room_findings(rooms: &[SurveyedRoom]) -> Vec<Finding> {
     findings
 }
 
-/// What looks wrong about the number of scan locations; `count` may be how many would be placed.
+/// Returns what looks wrong about the number of scan locations. `count` may be the number that would be
+/// placed.
 pub(crate) fn count_findings(count: f64, rooms: &[SurveyedRoom]) -> Vec<Finding> {
     let floor_m2: f64 = rooms.iter().map(|r| r.footprint.area_m2).sum();
     let per_m2 = count / floor_m2.max(1.0);
@@ -240,7 +252,7 @@ pub(crate) fn count_findings(count: f64, rooms: &[SurveyedRoom]) -> Vec<Finding>
     vec![Finding::new(Condition::Locations, count > 1000.0 && per_m2 > 4.0, text)]
 }
 
-/// What looks wrong about the views of a list of cameras, of which `blind` see nothing of the mesh.
+/// Returns what looks wrong about the views of a camera list, if `blind` of them see nothing of the mesh.
 pub(crate) fn poses_findings(
     blind: u64,
     views: u64,
@@ -248,27 +260,27 @@ pub(crate) fn poses_findings(
     mesh: &Aabb,
     hint: &str,
 ) -> Vec<Finding> {
-    let boxes = || {
-        let [a, b, c, d] = [cameras.min, cameras.max, mesh.min, mesh.max];
-        format!("cameras stand between {a} and {b}, the mesh lies between {c} and {d} (Z-up metres)")
-    };
     if blind == 0 {
         return Vec::new();
     }
+
+    let [a, b, c, d] = [cameras.min, cameras.max, mesh.min, mesh.max];
+    let boxes = format!("cameras stand between {a} and {b}, the mesh lies between {c} and {d} (Z-up metres)");
     let text = if blind == views {
-        format!("no camera sees anything: {}. Do they share a frame and a unit? See {hint}", boxes())
+        format!("no camera sees anything: {boxes}. Do they share a frame and a unit? See {hint}")
     } else {
-        format!("{blind} of {views} cameras see nothing of the mesh; {}", boxes())
+        format!("{blind} of {views} cameras see nothing of the mesh; {boxes}")
     };
     vec![Finding::new(Condition::Coverage, blind == views, text)]
 }
 
-/// What looks wrong about what all scan locations see together.
+/// Returns what looks wrong about the view of all scan locations together.
 pub(crate) fn outlook_findings(outlooks: &[Outlook]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let count = outlooks.len().max(1) as f64;
     let coverage = outlooks.iter().map(|o| o.coverage).sum::<f64>() / count;
     let back_sides = outlooks.iter().map(|o| o.coverage * o.back_sides).sum::<f64>() / count / coverage;
+
     if coverage < LOW_COVERAGE {
         let text = format!(
             "scan locations see the mesh in {} of all directions: are they in its frame, and inside?",
