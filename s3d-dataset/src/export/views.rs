@@ -282,6 +282,7 @@ mod tests {
         let Kinds::Directions(kinds) = Kinds::of(&table, &[LabelId::NULL; 3], &mesh) else { panic!() };
         assert!(kinds.iter().all(|kind| usize::from(*kind) < DIRECTIONS));
         assert!(kinds[0] != kinds[1] && kinds[1] != kinds[2] && kinds[0] != kinds[2]);
+
         let kinds = Kinds::Directions(kinds);
         let entropy_of = |face| kinds.entropy_of(&Hits { face, ..Hits::default() });
         let all = Raster::from_vec(4, 2, vec![0, 0, 1, 1, 2, 2, NO_FACE, NO_FACE]);
@@ -300,6 +301,7 @@ mod tests {
             "locations": 1, "panoramas": 0, "views": 0, "rgb": "texture", "place_cameras": null,
             "xyz": { "type": "half", "largest_coordinate_m": 0.0, "largest_step_m": null },
         });
+
         let mut finished = Finished::default();
         finished.insert(Done::Labels(LabelsDone {
             entry: Box::new(serde_json::from_value(entry).unwrap()),
@@ -307,6 +309,7 @@ mod tests {
             photographs: Vec::new(),
             files: Vec::new(),
         }));
+
         let scores = |n| Done::Scores(ScoresDone { area, location: "a".into(), entropies: vec![1.0; n] });
         finished.insert(scores(3));
         assert_eq!(select_requested(&request, &finished).unwrap().0.len(), 3);
@@ -315,6 +318,7 @@ mod tests {
             let e = select_requested(&request, &finished).unwrap_err().to_string();
             assert!(e.contains(&format!("{n} scores instead of 3")), "{e}");
         }
+
         request.options.views = u32::MAX;
         assert!(select_requested(&request, &finished).is_err());
     }

@@ -5,12 +5,12 @@ use crate::error::{Error, InputError, Result};
 use crate::export::input::AreaInput;
 use crate::summary::Unlabelled;
 use crate::survey::annotated::{Annotated, SkippedLines, SurveyedRoom};
-use s3d_geom::{Aabb, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
+use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance as InstancePoints, InstanceReader, PointPasses};
 use s3d_label::{FaceLabels, Label, LabelId, LabelTable, Labeler, wall_directions_deg};
 
-/// Points that are in memory, three times: while some are looked up, those that follow are read.
+/// The points of a block. Three blocks are in memory: while some points are looked up, the next are read.
 const BLOCK_POINTS: usize = 1 << 19;
 
 /// One instance with its points, as [`annotate`] hands it out.
@@ -19,14 +19,14 @@ pub(crate) struct AnnotatedInstance<'a> {
     pub(crate) id: LabelId,
     /// The box of its points.
     pub(crate) bbox: Aabb,
-    /// Its points, at least one, to be gone through again.
+    /// Its points, at least one, for another pass over them.
     pub(crate) points: &'a mut dyn PointPasses,
 }
 
-/// Reads an area's annotated points, one instance at a time and block by block, and lets each vote for its
-/// nearest face. `each` gets every instance with its box and points, in the order of rooms and of numbers in
-/// the room. Faces without a vote that are nearer to labelled surface than `fill_m` are filled, if that is
-/// there. Returns the votes behind the labels too.
+/// Reads an area's annotated points, one instance at a time and block by block, and lets each point vote for
+/// its nearest face. Calls `each` with every instance, its box and its points, in the order of rooms and of
+/// numbers in the room. Fills faces without a vote that are nearer to labelled surface than `fill_m`, metres;
+/// `None` fills none. Returns the labels and the votes behind them.
 pub(crate) fn annotate(
     ctx: &Context,
     area: &AreaInput,
@@ -40,24 +40,33 @@ pub(crate) fn annotate(
     let mut rooms = Rooms::default();
     let mut total = 0u64;
     let mut skipped = SkippedLines::default();
+
     let lenient = area.lenient;
     let files = area.rooms.iter().map(|r| r.instances.len()).sum::<usize>();
     let progress = ctx.progress("labelling", "instances", files as u64);
+
     let mut reader = InstanceReader::new(BLOCK_POINTS);
     let mut following = area.rooms.iter().flat_map(|r| &r.instances).skip(1);
+
     for room in &area.rooms {
         let mut builder = FootprintBuilder::new(FootprintOptions::default());
-        let (mut points, mut room_bbox) = (0u64, Aabb::EMPTY);
+        let mut points = 0u64;
+        let mut room_bbox = Aabb::EMPTY;
+
         for instance in &room.instances {
             let id = table.id_of(&instance.label).unwrap_or(LabelId::NULL);
             let then = following.next().map(|instance| &instance.points);
             ctx.check()?;
-            let (mut bbox, mut is_handed_out) = (Aabb::EMPTY, false);
+
+            let mut bbox = Aabb::EMPTY;
+            let mut is_handed_out = false;
+
             let take = |block: &PointCloud, is_whole: bool| -> Result<()> {
                 ctx.check()?;
                 bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
+
                 let vote = || vote(&mut labeler, &instance.points, block, id);
-                // Votes are counted by one thread; the others draw the floor's outline, and write.
+                // One thread counts votes; the others draw the floor's outline, and write.
                 let outline = || block.positions.iter().for_each(|p| builder.add(*p));
                 let hand_out = || {
                     if !is_whole {
@@ -67,16 +76,19 @@ pub(crate) fn annotate(
                     let points = &mut &block.positions[..];
                     each(AnnotatedInstance { label: instance.label, id, bbox, points })
                 };
+
                 let (voted, ((), handed_out)) = rayon::join(vote, || rayon::join(outline, hand_out));
                 voted?;
                 handed_out
             };
+
             let (mut passes, left_out) = rooms.draw_beside(|| reader.read(&instance.points, then, take))?;
             skipped.lines += left_out.count;
             if let Some(first) = left_out.first {
                 skipped.first.get_or_insert(first.to_string());
             }
             progress.add(1);
+
             if passes.is_empty() {
                 let source = instance.points.source();
                 if lenient {
@@ -87,30 +99,43 @@ pub(crate) fn annotate(
                 let message = "no point in it: remove the file, or annotate the instance";
                 return Err(FileError::format(instance.points.path(), message).into());
             }
+
             points += passes.len();
             room_bbox = room_bbox.union(bbox);
+
             if !is_handed_out {
                 each(AnnotatedInstance { label: instance.label, id, bbox, points: &mut passes })?;
             }
         }
         total += points;
-        let (footprint, wall_direction_deg) = Default::default();
-        let room = SurveyedRoom { room: room.room, points, footprint, bbox: room_bbox, wall_direction_deg };
+
+        // The outline and the direction of the walls follow later.
+        let room = SurveyedRoom {
+            room: room.room,
+            points,
+            footprint: Footprint::default(),
+            bbox: room_bbox,
+            wall_direction_deg: 0,
+        };
         rooms.push(room, builder);
     }
+
     if rooms.surveyed.is_empty() {
         return Err(Error::unfit(&area.path, "no room in it"));
     }
+
     let (labels, directions_deg, report) = rooms.draw_beside(|| {
         let labels = labeler.finish();
         let directions = || wall_directions_deg(mesh, table, labels.label_of_face());
         let (directions_deg, report) = rayon::join(directions, || labels.report(table));
         (labels, directions_deg, report)
     });
+
     let mut rooms = rooms.surveyed;
     for room in &mut rooms {
         room.wall_direction_deg = directions_deg.get(&room.room).copied().unwrap_or(0);
     }
+
     let report = report.map_err(|e| InputError::Labels { why: e.to_string() })?;
     let mut annotated = Annotated {
         label_of_face: labels.label_of_face().to_vec(),
@@ -121,6 +146,7 @@ pub(crate) fn annotate(
         points: total,
         skipped,
     };
+
     annotated.fill(mesh, fill_m);
     Ok((annotated, labels))
 }
@@ -142,7 +168,7 @@ pub(crate) fn unannotated(nearest_faces: &NearestFaces<'_>, table: &LabelTable) 
     })
 }
 
-/// The rooms so far. The outline of the last one is drawn beside what follows.
+/// The rooms so far. The last room's outline is drawn beside the work that follows.
 #[derive(Default)]
 struct Rooms {
     surveyed: Vec<SurveyedRoom>,
@@ -157,7 +183,7 @@ impl Rooms {
         self.undrawn = Some(points);
     }
 
-    /// Does some work, and draws the last room's outline on another thread if that is still to be done.
+    /// Does `work`, and draws the last room's outline on another thread if it is not drawn yet.
     fn draw_beside<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> T {
         let undrawn = self.undrawn.take();
         let (done, outline) = rayon::join(work, || undrawn.map(|points| points.finish()));
@@ -168,8 +194,8 @@ impl Rooms {
     }
 }
 
-/// Lets the points of a block of an instance vote: for the faces that they belong to, as far as the source of
-/// the annotations knows these, and else for the nearest.
+/// Lets a block of an instance's points vote: for the faces that they belong to if the annotations tell them,
+/// and otherwise for the nearest.
 fn vote(labeler: &mut Labeler<'_>, instance: &InstancePoints, block: &PointCloud, id: LabelId) -> Result<()> {
     let voted = if instance.are_vertices() {
         labeler.add_vertices(&block.positions, id)
@@ -181,8 +207,8 @@ fn vote(labeler: &mut Labeler<'_>, instance: &InstancePoints, block: &PointCloud
     voted.map_err(|e| FileError::format(instance.path(), e.to_string()).into())
 }
 
-/// A sentence on the instances that no face is labelled with, if there are some: they are in the label table,
-/// but in no image and no sampled point.
+/// Returns a sentence on the instances that no face is labelled with, if there are any. They are in the label
+/// table, but in no image and no sampled point.
 pub(crate) fn hidden_instances(
     area: &AreaInput,
     label_of_face: &[LabelId],

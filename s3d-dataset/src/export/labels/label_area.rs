@@ -29,8 +29,8 @@ use s3d_label::{Disputes, FaceLabels, LabelTable};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// An area that was labelled before, if it can be taken as it is: not where the files of its labels are still
-/// to be written.
+/// Returns the labels that an earlier run kept for this area. Returns `None` if there are none, if they
+/// cannot be read, or if the label files still have to be written.
 pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<LabelledArea> {
     let ctx = common.account.ctx;
     let unit = Unit::Labels(area);
@@ -48,8 +48,8 @@ pub(crate) fn labelled_before(area: u32, common: &Common<'_>) -> Option<Labelled
     }
 }
 
-/// Labels an area, keeps the result for later runs, and writes the files of its labels if they are ours to write
-/// and are not there yet.
+/// Labels an area, keeps the result for later runs, and writes the label files if they are ours and not there
+/// yet.
 pub(crate) fn label_area(
     area: &AreaInput,
     prepared: &PreparedMesh<'_>,
@@ -72,7 +72,7 @@ pub(crate) fn label_area(
         ctx.warn_each(outlook.warnings(location));
     }
 
-    // What is known now is kept before the journal tells of it.
+    // The result is kept before the journal mentions it.
     let labelled = labelled_area(ctx, area, prepared.file, survey, options)?;
     labelled.write(&common.cache_of(area.number))?;
     if let Some(files) = files {
@@ -84,8 +84,8 @@ pub(crate) fn label_area(
     Ok(labelled)
 }
 
-/// Takes an area's labels and scores from a plan. Label files and scores that are ours are written, the rest is
-/// only known.
+/// Takes an area's labels and scores from a plan. Label files and scores that are ours are written; the
+/// journal only knows the others.
 pub(crate) fn take_from_plan(area: &AreaInput, from: &Plan, common: &Common<'_>) -> Result<LabelledArea> {
     let Common { layout, journal, is_ours, .. } = *common;
     let started = Instant::now();
@@ -113,7 +113,7 @@ pub(crate) fn take_from_plan(area: &AreaInput, from: &Plan, common: &Common<'_>)
     Ok(labelled)
 }
 
-/// Tells the journal of an area's labels, if it does not know of them: their files are another's work.
+/// Tells the journal of an area's labels, if it does not know them. Another process writes their files.
 pub(crate) fn know_labels(area: &AreaInput, labelled: &LabelledArea, common: &Common<'_>) {
     if !common.journal.finished().has(&Unit::Labels(area.number)) {
         common
@@ -122,7 +122,7 @@ pub(crate) fn know_labels(area: &AreaInput, labelled: &LabelledArea, common: &Co
     }
 }
 
-/// What looks wrong about an area's mesh alone.
+/// Returns what looks wrong about an area's mesh alone.
 pub(crate) fn mesh_doubts(area: &AreaInput, mesh: &TriMesh, options: &ExportOptions) -> Result<Vec<Finding>> {
     let makes_rgb = area.pictures.is_none() && options.modalities.contains(&Domain::Rgb);
     let mut findings = mesh_findings(mesh, makes_rgb);
@@ -130,7 +130,7 @@ pub(crate) fn mesh_doubts(area: &AreaInput, mesh: &TriMesh, options: &ExportOpti
     Ok(findings)
 }
 
-/// What was odd in the annotations, a sentence each.
+/// Returns a sentence for each oddity of the annotations.
 pub(crate) fn label_doubts(area: &AreaInput, annotated: &Annotated, table: &LabelTable) -> Vec<String> {
     let mut doubts: Vec<String> = annotated.skipped.sentence().into_iter().collect();
     doubts.extend(hidden_instances(area, &annotated.label_of_face, table));
@@ -144,7 +144,7 @@ fn writes_labels(area: u32, common: &Common<'_>) -> bool {
     !common.journal.finished().has(&unit) && (common.is_ours)(&unit)
 }
 
-/// Writes down that an area's labels are done, and what `files` they are.
+/// Writes to the journal that an area's labels are done, with the records of their files.
 fn finish_labels(
     area: &AreaInput,
     labelled: &LabelledArea,
@@ -162,8 +162,8 @@ fn finish_labels(
     Ok(())
 }
 
-/// What an export does with the results of a survey: it writes the files of labels, and stops at what makes the
-/// data set useless.
+/// What an export does with the results of a survey: it writes the label files, and stops at findings that
+/// make the data set useless.
 struct ExportSurveyor<'a, 'f> {
     ctx: &'a Context,
     area: &'a AreaInput,
@@ -171,7 +171,7 @@ struct ExportSurveyor<'a, 'f> {
     /// The conditions that the data set need not meet.
     allow: &'a [Condition],
     started: Instant,
-    /// The files of labels, if they are to be written.
+    /// The label files, if they are to be written.
     files: Option<&'f mut LabelFiles<'a>>,
 }
 
@@ -200,18 +200,18 @@ impl Surveyor for ExportSurveyor<'_, '_> {
     }
 }
 
-/// The files of an area's labels while they are written.
+/// The label files of an area while they are written.
 struct LabelFiles<'a> {
     layout: &'a Layout,
     area: u32,
     mesh: &'a TriMesh,
     table: &'a LabelTable,
-    /// `instances.json` and `instances.npz`; none for an area without labels.
+    /// `instances.json` and `instances.npz`; `None` for an area without labels.
     instances: Option<InstanceWriter>,
 }
 
 impl<'a> LabelFiles<'a> {
-    /// Begins them. Returns `None` if they are not ours to write, or are there already.
+    /// Begins the files. Returns `None` if they are not ours to write, or are there already.
     fn begin(area: &AreaInput, mesh: &'a TriMesh, common: &Common<'a>) -> Result<Option<Self>> {
         let Common { layout, table, .. } = *common;
         let number = area.number;
@@ -250,7 +250,7 @@ impl<'a> LabelFiles<'a> {
         tables::write_face_votes(layout, area, &annotated.label_of_face, votes)
     }
 
-    /// Writes the rest of them. Returns their records: none for an area without labels.
+    /// Writes the remaining files. Returns the records of all files: none for an area without labels.
     fn finish(self, ctx: &Context, labelled: &LabelledArea) -> Result<Vec<FileRecord>> {
         let Self { layout, area, instances, .. } = self;
         let Some(instances) = instances else { return Ok(Vec::new()) };
@@ -262,7 +262,7 @@ impl<'a> LabelFiles<'a> {
     }
 }
 
-/// The files of an area's labels, if it has some.
+/// The label files of an area, if it has labels.
 pub(crate) fn label_files(layout: &Layout, area: u32) -> [PathBuf; 6] {
     [
         layout.instances_json(area),
@@ -274,7 +274,7 @@ pub(crate) fn label_files(layout: &Layout, area: u32) -> [PathBuf; 6] {
     ]
 }
 
-/// All that is known of an area once it is surveyed. `ctx` has noted the warnings of the survey.
+/// Gathers all that is known of a surveyed area. `ctx` has noted the warnings of the survey.
 fn labelled_area(
     ctx: &Context,
     area: &AreaInput,
@@ -284,7 +284,8 @@ fn labelled_area(
 ) -> Result<LabelledArea> {
     let mesh = &file.mesh;
 
-    // The warnings of the area and its mesh were told when the area was opened, which every call does.
+    // Every call logs the warnings of the area and its mesh when it opens the area, so they are not in the
+    // notes.
     let mut warnings: Vec<String> = area.doubts(file).cloned().collect();
     warnings.extend(mesh_doubts(area, mesh, options)?.iter().map(Finding::text));
     warnings.extend(ctx.take_notes());
@@ -317,7 +318,7 @@ fn labels_done(
     LabelsDone { entry: Box::new(area_entry(area, labelled, options)), locations, photographs, files }
 }
 
-/// What the manifest tells of an area that is labelled.
+/// The manifest's entry of a labelled area.
 fn area_entry(area: &AreaInput, labelled: &LabelledArea, options: &ExportOptions) -> AreaEntry {
     AreaEntry {
         area: area.number,
@@ -351,6 +352,7 @@ fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
         total.faces,
         started.elapsed().as_secs_f64()
     ));
+
     let Unlabelled { without_votes, without_label } = annotated.unlabelled;
     if !annotated.filled.is_empty() {
         ctx.info(format_args!(
@@ -360,6 +362,7 @@ fn tell_labels(ctx: &Context, annotated: &Annotated, started: Instant) {
             without_votes.m2
         ));
     }
+
     for (_, room, row) in &annotated.report.rooms {
         ctx.debug(format_args!(
             "{room}: {} points, {} faces, {} of them contested",

@@ -1,4 +1,4 @@
-//! Labels of an area: points vote for faces; what is known then is kept for the rest of the export.
+//! The labels of an area: points vote for faces, and the result is kept for the rest of the export.
 
 pub(crate) mod annotate;
 pub(crate) mod label_area;

@@ -1,11 +1,11 @@
-//! How well a photograph and the mesh agree: by their edges, since light and shade differ.
+//! How well a photograph and the mesh agree. Their edges are compared, since light and shade differ.
 //!
-//! The view is looked at small, its longer side [`SIDE`] pixels, so that an error of a pixel or two in a pose
-//! does not count, and one of a few degrees does. An edge of the photograph is where its grey changes; an
-//! edge of the mesh where its colours do, or its depth, or the direction of its surface. Both are blurred by
-//! a pixel or so, and made less dependent on how strong an edge is. The agreement is the correlation of the
-//! photograph's edges with those of the mesh, over the pixels that show both; chance is the mean of the same
-//! with the two displaced against each other in eight directions.
+//! The view is reduced to [`SIDE`] pixels along its longer side. An error of a pixel or two in a pose does
+//! not count then, and an error of a few degrees does. The photograph has an edge where its grey changes. The
+//! mesh has an edge where its colours, its depth or the direction of its surface change. Both edge images are
+//! blurred by about a pixel, and strong edges are weakened. The agreement is the correlation of the two edge
+//! images over the pixels that show both. The chance agreement is the mean correlation with the two displaced
+//! against each other in eight directions.
 
 use crate::export::input::photographs::Photograph;
 use glam::DVec3;
@@ -15,13 +15,13 @@ use s3d_render::{Caster, Hits, MipMaps, NO_FACE, Scene, rgb_image, undistort};
 /// Pixels of the longer side.
 const SIDE: u32 = 384;
 
-/// How far two pictures are displaced for what chance gives, as a share of the longer side.
+/// How far two pictures are displaced to measure the chance agreement, as a share of the longer side.
 const DISPLACED: f64 = 0.1;
 
-/// Fewer pixels that show both say nothing.
+/// Fewer pixels that show both give no correlation.
 const FEWEST: usize = 500;
 
-/// A change of depth by this share counts as much as one of the surface's direction by a right angle.
+/// A change of depth by this share counts as much as a turn of the surface by a right angle.
 const STEP: f64 = 0.2;
 
 /// How well a photograph and the mesh agree.
@@ -29,17 +29,17 @@ const STEP: f64 = 0.2;
 pub(crate) struct Agreement {
     /// The correlation of their edges.
     pub(crate) correlation: Option<f64>,
-    /// Its mean where they are displaced.
+    /// The mean correlation where they are displaced.
     pub(crate) chance: Option<f64>,
 }
 
 impl Agreement {
-    /// Whether there is no more agreement than by chance: no pose that fits does so badly.
+    /// Whether the agreement is no better than chance. No pose that fits does so badly.
     pub(crate) fn is_chance(correlation: f64, chance: f64) -> bool {
         correlation < chance + 0.05 || correlation < 0.1
     }
 
-    /// Of a photograph at hand, and the mesh as `camera` sees it.
+    /// Compares `photo`, the picture of `photograph`, with the mesh as its camera sees it.
     pub(crate) fn of(
         photo: &Raster<[u8; 3]>,
         photograph: &Photograph,
@@ -51,17 +51,20 @@ impl Agreement {
         let mut hits = Hits::default();
         Caster::new(scene).cast_into(&camera, 1, &mut hits);
         let shown = rgb_image(scene, textures, &hits, &camera);
+
         let valid: Vec<bool> = seen
             .pixels()
             .iter()
             .zip(hits.face.pixels())
             .map(|(p, f)| *p != [0; 3] && *f != NO_FACE)
             .collect();
+
         let size = [camera.width as usize, camera.height as usize];
         let photo_edges = edges(&grey(&seen), size, &valid);
         let colour = edges(&grey(&shown), size, &valid);
         let shape = shape_edges(scene, &hits, &camera, &valid);
-        // A mesh may have no colours worth the name, or no shape: whichever agrees.
+
+        // A mesh may have hardly any colours, or hardly any shape: the better agreement counts.
         let [a, b] = [colour, shape].map(|edges| Self::between(&photo_edges, &edges, size, &valid));
         match (a.correlation, b.correlation) {
             (Some(x), Some(y)) if y > x => b,
@@ -76,6 +79,7 @@ impl Agreement {
         let ring = steps
             .iter()
             .flat_map(|x| steps.iter().map(move |y| (x * away, y * away)));
+
         let displaced: Vec<f64> = ring
             .filter(|by| *by != (0, 0))
             .filter_map(|by| correlation(photo, mesh, size, valid, by))
@@ -93,15 +97,15 @@ fn small(photograph: &Photograph) -> Camera {
     photograph.lens.pinhole(pose, width).unwrap_or(photograph.camera)
 }
 
-/// Luma of sRGB, as ITU-R BT.601 has it, of 1.
+/// The luma of sRGB pixels, 0 to 1, as ITU-R BT.601 defines it.
 fn grey(image: &Raster<[u8; 3]>) -> Vec<f64> {
     let of =
         |[r, g, b]: &[u8; 3]| (0.299 * f64::from(*r) + 0.587 * f64::from(*g) + 0.114 * f64::from(*b)) / 255.0;
     image.pixels().iter().map(of).collect()
 }
 
-/// How much a picture changes at each pixel: the length of its gradient by central differences, 0 beside what
-/// is not valid.
+/// How much a picture changes at each pixel: the length of its gradient by central differences, 0 beside
+/// pixels that are not valid.
 fn edges(values: &[f64], size: [usize; 2], valid: &[bool]) -> Vec<f64> {
     let found = at_inner(size, |i| {
         let [left, right, up, down] = around(i, size[0]);
@@ -115,18 +119,20 @@ fn edges(values: &[f64], size: [usize; 2], valid: &[bool]) -> Vec<f64> {
     softened(&found, size)
 }
 
-/// The same of what the mesh is: jumps of depth, and turns of its surface.
+/// How much the mesh's shape changes at each pixel: jumps of depth, and turns of its surface.
 fn shape_edges(scene: &Scene<'_>, hits: &Hits, camera: &Camera, valid: &[bool]) -> Vec<f64> {
     let size = [camera.width as usize, camera.height as usize];
-    let (depth, faces) = (hits.depth.pixels(), hits.face.pixels());
+    let depth = hits.depth.pixels();
+    let faces = hits.face.pixels();
     let normal = |i: usize| scene.mesh().normal(faces[i]).as_dvec3();
+
     let found = at_inner(size, |i| {
         let [left, right, up, down] = around(i, size[0]);
         if ![i, left, right, up, down].iter().all(|k| valid[*k]) {
             return 0.0;
         }
         let across = |a: usize, b: usize| {
-            // The depth between two neighbours of a plane is their harmonic mean.
+            // On a plane, the depth of a pixel is the harmonic mean of its two neighbours.
             let inverse = |k: usize| 1.0 / f64::from(depth[k]).max(1e-6);
             let bend = (inverse(a) + inverse(b) - 2.0 * inverse(i)).abs() / inverse(i);
             let turn = 1.0 - normal(a).dot(normal(b)).clamp(-1.0, 1.0);
@@ -141,7 +147,7 @@ fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }
 
-/// `of` at each pixel that has four neighbours, 0 at the border.
+/// The value of `of` at each pixel that has four neighbours, 0 at the border.
 fn at_inner([width, height]: [usize; 2], of: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut found = vec![0.0; width * height];
     for (y, row) in found
@@ -160,7 +166,7 @@ fn around(i: usize, width: usize) -> [usize; 4] {
     [i - 1, i + 1, i - width, i + width]
 }
 
-/// The square root of each, so that a few strong edges do not decide, blurred twice over 3 × 3 pixels.
+/// The square roots of the values, so that a few strong edges do not decide, blurred twice over 3 × 3 pixels.
 fn softened(values: &[f64], size: [usize; 2]) -> Vec<f64> {
     let [width, height] = size;
     let mut blurred: Vec<f64> = values.iter().map(|v| v.sqrt()).collect();
@@ -176,7 +182,8 @@ fn softened(values: &[f64], size: [usize; 2]) -> Vec<f64> {
     blurred
 }
 
-/// Pearson's correlation of two pictures, one displaced by so many pixels, over what is valid in both places.
+/// Pearson's correlation of two pictures, the second displaced by some pixels, over the pixels that are valid
+/// in both places. `None` if these are few, or a picture is flat.
 fn correlation(
     a: &[f64],
     b: &[f64],
@@ -184,12 +191,16 @@ fn correlation(
     valid: &[bool],
     (right, down): (isize, isize),
 ) -> Option<f64> {
-    let (mut count, mut sums, mut squares) = (0usize, [0.0; 2], DVec3::ZERO);
+    let mut count = 0usize;
+    let mut sums = [0.0; 2];
+    let mut squares = DVec3::ZERO;
+
     for y in 0..height {
         let Some(v) = y.checked_add_signed(down).filter(|v| *v < height) else { continue };
         for x in 0..width {
             let Some(u) = x.checked_add_signed(right).filter(|u| *u < width) else { continue };
-            let (i, j) = (y * width + x, v * width + u);
+            let i = y * width + x;
+            let j = v * width + u;
             if !valid[i] || !valid[j] {
                 continue;
             }
@@ -198,6 +209,7 @@ fn correlation(
             squares += DVec3::new(a[i] * a[i], b[j] * b[j], a[i] * b[j]);
         }
     }
+
     let n = count as f64;
     let covariance = squares.z - sums[0] * sums[1] / n;
     let variances = [squares.x - sums[0] * sums[0] / n, squares.y - sums[1] * sums[1] / n];
@@ -205,6 +217,7 @@ fn correlation(
         .iter()
         .zip([squares.x, squares.y])
         .any(|(v, s)| *v <= 1e-9 * s);
+
     if count < FEWEST || is_flat {
         None
     } else {
@@ -227,14 +240,17 @@ mod tests {
             })
             .collect();
         let valid = vec![true; 2400];
+
         let itself = correlation(&noise, &noise, size, &valid, (0, 0)).unwrap();
         assert!((itself - 1.0).abs() < 1e-9, "{itself}");
         assert!(correlation(&noise, &noise, size, &valid, (7, 3)).unwrap().abs() < 0.1);
+
         let shifted: Vec<f64> = (0..2400)
             .map(|i| if i % 60 >= 7 { noise[i - 7] } else { 0.0 })
             .collect();
         assert!((correlation(&noise, &shifted, size, &valid, (7, 0)).unwrap() - 1.0).abs() < 1e-9);
         assert_eq!(correlation(&noise, &vec![0.5; 2400], size, &valid, (0, 0)), None);
+
         let few: Vec<bool> = (0..2400).map(|i| i < FEWEST - 1).collect();
         assert_eq!(correlation(&noise, &noise, size, &few, (0, 0)), None);
     }

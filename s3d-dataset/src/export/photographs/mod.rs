@@ -24,30 +24,30 @@ use s3d_label::Room;
 use s3d_render::{Caster, Hits, NO_FACE, Scene, undistort};
 use std::time::Instant;
 
-/// The number of a photograph's view: each has a camera of its own.
+/// The frame of a photograph's view, the only view of its camera.
 pub(crate) const VIEW: Frame = Frame::View(0);
 
 /// A photograph whose view is to be written.
 pub(crate) struct Shot<'a> {
     pub(crate) photograph: &'a Photograph,
-    /// Where it was taken; none if rooms are not known.
+    /// The room it was taken in; `None` if rooms are not known.
     pub(crate) room: Option<Room>,
 }
 
-/// A photograph whose files are all there, and when they were begun.
+/// A photograph whose files are all written, and when the first was begun.
 pub(crate) struct WrittenPhotograph {
     pub(crate) done: PhotographDone,
     pub(crate) started: Instant,
 }
 
-/// Refuses photographs none of which sees the mesh, and warns of some that do not.
+/// Refuses photographs if none of them sees the mesh, and warns if some do not.
 pub(crate) fn judge_sight(
     ctx: &Context,
     photographs: &Photographs,
     scene: &Scene<'_>,
     allow: &[Condition],
 ) -> Result<()> {
-    /// Pixels across that are looked at.
+    /// Pixels that are looked at along the width.
     const ACROSS: u32 = 48;
     let see = photographs.all.par_iter().map_init(
         || (Caster::new(scene), Hits::default()),
@@ -57,7 +57,10 @@ pub(crate) fn judge_sight(
             u64::from(hits.face.pixels().iter().all(|face| *face == NO_FACE))
         },
     );
-    let (blind, all): (u64, u64) = (see.sum(), photographs.all.len() as u64);
+
+    let blind: u64 = see.sum();
+    let all = photographs.all.len() as u64;
+
     let places = Aabb::from_points(photographs.all.iter().map(|p| p.camera.pose.location.as_vec3()));
     let hint = "up and transform under [frames]";
     let findings = poses_findings(blind, all, &places, &scene.mesh().aabb(), hint);
@@ -75,45 +78,55 @@ pub(crate) fn write_photograph(
     let Shot { photograph, room } = shot;
     let Photograph { name, uuid, picture, lens, camera } = photograph;
     let room = room_name(*room);
+
     let write = |domain: Domain, bytes: &[u8]| -> Result<FileRecord> {
         let path = job.layout.image_path(job.area, uuid, &room, VIEW, domain);
         write_bytes(&path, bytes)?;
         Ok(FileRecord::of_bytes(job.layout.root(), &path, bytes)?)
     };
+
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
     let mut tally =
         UnitTally { views: ImageTally { images: 1, ..ImageTally::default() }, ..UnitTally::default() };
-    let (mut files, mut agreement, mut masked, mut seen) = (Vec::new(), Agreement::default(), 0.0, 0.0);
+    let mut files = Vec::new();
+    let mut agreement = Agreement::default();
+    let mut masked = 0.0;
+    let mut seen = 0.0;
+
     // Poses alone need no photograph.
     if !images.is_empty() {
         let photo = read_picture(picture)?;
         if [photo.width(), photo.height()] != lens.size() {
             return Err(FileError::format(picture, "has another size than when the export began").into());
         }
+
         agreement = Agreement::of(&photo, photograph, job.channels.scene, job.channels.textures);
         let colors = undistort(&photo, lens, camera);
         drop(photo);
         caster.cast_into(camera, 1, hits);
+
         let channels = Channels { pictures: Some(PictureColors::Photograph(&colors)), ..job.channels };
         let each = |image: Image, file: Vec<u8>| write(image.domain(), &file);
         files = channels.encode(&images, hits, camera, buffers, each)?;
+
         let pixels = count(job, &images, hits, buffers);
         let share = |count: u64| count as f64 / colors.len() as f64;
         masked = share(colors.pixels().iter().filter(|color| **color == [0; 3]).count() as u64);
         seen = 1.0 - share(pixels.pixels_missing);
         tally.views += pixels;
     }
+
     if job.modalities.contains(&Domain::Pose) {
         let room = format!("{room}_{}", job.area);
         let mut pose = PoseFile::new(camera, &camera.pose, uuid, &room, VIEW);
         pose.world_offset_m = job.offset_m;
         files.push(write(Domain::Pose, &pose.to_json())?);
     }
+
     files.sort();
     tally.files = files.len() as u64;
     tally.bytes = files.iter().map(|f| f.bytes).sum();
-    // To the sixth digit, so that the last bits of a sum do not show.
-    let rounded = |value: f64| (value * 1e6).round() / 1e6;
+
     let record = PhotographRecord {
         camera_uuid: uuid.clone(),
         name: name.clone(),
@@ -125,17 +138,23 @@ pub(crate) fn write_photograph(
         agreement: agreement.correlation.map(rounded),
         chance: agreement.chance.map(rounded),
     };
+
     Ok(WrittenPhotograph { done: PhotographDone { area: job.area, record, tally, files }, started })
 }
 
-/// What the agreement of an area's photographs with the mesh says, a sentence each.
+/// Rounds to the sixth digit, so that the last bits of a sum do not show.
+fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+/// Returns what is doubtful about the masks and poses of an area's photographs, a sentence each.
 pub(crate) fn doubts(area: u32, records: &[&PhotographRecord]) -> Vec<String> {
     let mut doubts: Vec<String> = mask_doubt(area, records).into_iter().collect();
     doubts.extend(agreement_doubt(area, records));
     doubts
 }
 
-/// Whether views show little of their photographs.
+/// Returns a sentence if photographs fill little of their views.
 fn mask_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
     let count = records.iter().filter(|r| r.masked > 0.5).count();
     let worst = records
@@ -152,13 +171,14 @@ fn mask_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
     ))
 }
 
-/// Whether poses fit, as edges tell.
+/// Returns a sentence if the edges of photographs and mesh show that poses do not fit.
 fn agreement_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
     let mut known: Vec<(f64, f64, &str)> = records
         .iter()
         .filter_map(|r| Some((r.agreement?, r.chance.unwrap_or(0.0), r.name.as_str())))
         .collect();
     known.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(b.2)));
+
     let &(median, of_chance, _) = known.get(known.len() / 2)?;
     if Agreement::is_chance(median, of_chance) {
         return Some(format!(
@@ -169,6 +189,7 @@ fn agreement_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
              transposed, or camera axes exchanged? frames.json has each one's"
         ));
     }
+
     let bad: Vec<&(f64, f64, &str)> = known.iter().filter(|(a, c, _)| Agreement::is_chance(*a, *c)).collect();
     let named: Vec<String> = bad
         .iter()
@@ -205,6 +226,7 @@ mod tests {
             agreement,
             chance: Some(0.1),
         };
+
         let of = |scores: &[Option<f64>]| {
             let records: Vec<_> = scores
                 .iter()
@@ -213,15 +235,18 @@ mod tests {
                 .collect();
             doubts(3, &records.iter().collect::<Vec<_>>())
         };
+
         assert!(of(&[]).is_empty() && of(&[None]).is_empty() && of(&[Some(0.5), Some(0.4), None]).is_empty());
         let some = of(&[Some(0.5), Some(0.12), Some(0.4), Some(0.6)]);
         assert!(
             some[0].contains("1 of 4 photographs") && some[0].contains("the worst 2.jpg (0.12)"),
             "{some:?}"
         );
+
         let masked = PhotographRecord { masked: 0.75, ..record("m.jpg", Some(0.5)) };
         let of_mask = doubts(3, &[&record("a.jpg", Some(0.5)), &masked]);
         assert!(of_mask[0].contains("1 of 2 photographs fill less than half of their views, m.jpg 25 %"));
+
         let most = of(&[Some(0.5), Some(0.12), Some(0.0)]);
         assert!(
             most[0].contains("no more than by chance: the median") && most[0].contains("0.12"),
