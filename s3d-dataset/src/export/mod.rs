@@ -1,8 +1,8 @@
 //! The export: load → label → sample → score → select → render → tables. The one place that composes the
 //! stages.
 //!
-//! An export is begun or gone on with in a folder (`store/output.rs`), its units of work are done ([`job`])
-//! and written down in the journal, and then finished ([`finish`]).
+//! An export is begun or continued in a folder (`store/output.rs`). Its units of work are done ([`job`]) and
+//! written down in the journal; then it is finished ([`finish`]).
 
 pub(crate) mod area;
 pub(crate) mod finish;
@@ -34,7 +34,7 @@ use run::{Run, Target};
 use s3d_io::dataset::Layout;
 use std::path::{Path, PathBuf};
 
-/// An export: scenes to a data set. See the crate's page for an example.
+/// An export, which turns scenes into a data set. See the crate's page for an example.
 #[derive(Clone, Debug)]
 pub struct Export {
     scenes: Vec<SceneSource>,
@@ -46,8 +46,8 @@ pub struct Export {
 }
 
 impl Export {
-    /// Of these scenes, one an area: paths of scene files (`scene.toml`) or of folders of published areas
-    /// (`area_3`), or [values in memory](crate::MemoryScene).
+    /// Makes an export of these scenes, one an area: paths of scene files (`scene.toml`) or of folders of
+    /// published areas (`area_3`), or [values in memory](crate::MemoryScene).
     pub fn new<S: Into<SceneSource>>(scenes: impl IntoIterator<Item = S>) -> Self {
         Self {
             scenes: scenes.into_iter().map(Into::into).collect(),
@@ -59,37 +59,37 @@ impl Export {
         }
     }
 
-    /// With these options.
+    /// Sets the options.
     pub fn options(self, options: ExportOptions) -> Self {
         Self { options, ..self }
     }
 
-    /// Whether an earlier data set, or an unfinished one of another call, is replaced. Other files stay.
+    /// Sets whether an earlier data set, or an unfinished one of another call, is replaced. Other files stay.
     pub fn overwrite(self, overwrite: bool) -> Self {
         Self { overwrite, ..self }
     }
 
-    /// A name in the output folder that may be there beforehand.
+    /// Allows a name in the output folder to be there beforehand.
     pub fn allow(mut self, name: impl Into<String>) -> Self {
         self.allowed.push(name.into());
         self
     }
 
-    /// Only one of several parts of the work. The parts may be done anywhere, in any order, into one folder
-    /// or one each; [`merge`](crate::merge()) makes the data set of them.
+    /// Does only one of several parts of the work. The parts may be done anywhere, in any order, into one
+    /// folder or one each; [`merge`](crate::merge()) makes one data set from them.
     pub fn shard(self, shard: Option<Shard>) -> Self {
         Self { shard, ..self }
     }
 
-    /// With the labels and scores of the folder that [`plan`](crate::plan()) made, instead of making them.
+    /// Takes labels and scores from the folder that [`plan`](crate::plan()) made, instead of making them.
     pub fn plan(self, plan: Option<PathBuf>) -> Self {
         Self { plan, ..self }
     }
 
-    /// Looks whether the folder `output` may be exported into, and changes nothing.
+    /// Checks whether the folder `output` may be exported into, and changes nothing.
     ///
     /// # Errors
-    /// [`Usage`](crate::Error::Usage) if it holds something else, and is not to be replaced.
+    /// [`Usage`](crate::Error::Usage) if the folder holds something else that is not to be replaced.
     pub fn check_output(&self, output: &Path, ctx: &Context) -> Result<()> {
         Run::new(ctx, &self.target(output.into())).look().map(drop)
     }
@@ -99,12 +99,12 @@ impl Export {
         Target { layout: Layout::new(output), overwrite: self.overwrite, allowed }
     }
 
-    /// Makes the data set in the folder `output`, on the threads of the current rayon pool, or goes on with
-    /// it where an equal call was stopped. What is there when this returns
-    /// [`Cancelled`](crate::Error::Cancelled) or [`Temporary`](crate::Error::Temporary) is kept for the same
-    /// call; any other failure leaves what was there before.
+    /// Makes the data set in the folder `output`, on the threads of the current rayon pool. Continues where
+    /// an equal call was stopped. After [`Cancelled`](crate::Error::Cancelled) or
+    /// [`Temporary`](crate::Error::Temporary), the work so far is kept for the same call. After any other
+    /// failure, the folder is as it was before.
     ///
-    /// Returns what was made; `None` if it was all there already.
+    /// Returns what was made; `None` if all of it was there already.
     ///
     /// # Errors
     /// [`Usage`](crate::Error::Usage) if the options are out of range or the folder holds something else;

@@ -17,7 +17,7 @@ pub(crate) struct Target<'a> {
     pub(crate) layout: Layout,
     /// Whether OUT may hold something already.
     pub(crate) overwrite: bool,
-    /// Names in OUT that do not count as something.
+    /// Names in OUT that do not count.
     pub(crate) allowed: Vec<&'a str>,
 }
 
@@ -38,7 +38,7 @@ impl<'a> Run<'a> {
         &self.target.layout
     }
 
-    /// Reads what OUT holds, and refuses what is not ours.
+    /// Reads what OUT holds, and refuses to touch what is not ours.
     pub(crate) fn look(&self) -> Result<OutputState> {
         let Target { layout, overwrite, allowed } = self.target;
         let state = OutputState::read(layout)?;
@@ -46,8 +46,8 @@ impl<'a> Run<'a> {
         Ok(state)
     }
 
-    /// Takes the lock of OUT, which held `state` before, and begins or goes on with what is asked for. Returns
-    /// `None`, and says so, if the data set is there already.
+    /// Takes the lock of OUT, which held `state` before, and begins or continues the request. Returns `None`,
+    /// and says so, if the data set is there already.
     pub(crate) fn begin(
         &self,
         state: &OutputState,
@@ -77,13 +77,13 @@ impl<'a> Run<'a> {
         ));
     }
 
-    /// Tells what the complete data set holds.
+    /// Returns the summary of the complete data set.
     pub(crate) fn finish(self, request: &Request, made: &Totals) -> Summary {
         self.account.set_files(made.files, made.bytes);
         self.summarize(request, made.locations, made.views, made.unlabelled)
     }
 
-    /// Tells what was made.
+    /// Returns the summary of a run.
     pub(crate) fn summarize(
         self,
         request: &Request,

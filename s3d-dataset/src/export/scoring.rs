@@ -20,21 +20,23 @@ fn unscored<'p>(plan: &'p LabelledArea, common: &Common<'_>) -> Vec<&'p ScanLoca
     todo
 }
 
-/// Whether something of an area is still to be scored.
+/// Whether any location of an area is still to be scored.
 pub(crate) fn is_unscored(plan: &LabelledArea, common: &Common<'_>) -> bool {
     !unscored(plan, common).is_empty()
 }
 
-/// Scores the candidates of those locations of an area that are ours and not scored yet.
+/// Scores the candidates of the locations of an area that are ours and not scored yet.
 pub(crate) fn score(plan: &LabelledArea, prepared: &PreparedMesh<'_>, common: Common<'_>) -> Result<()> {
     let ctx = common.account.ctx;
     let Common { table, options, journal, account, .. } = common;
     let number = plan.area;
     check_faces(plan, prepared)?;
+
     let missing = unscored(plan, &common);
     if missing.is_empty() {
         return Ok(());
     }
+
     let step = account.stage(Stage::Score, Some(number));
     let scoring = Scoring {
         area: number,
@@ -43,10 +45,12 @@ pub(crate) fn score(plan: &LabelledArea, prepared: &PreparedMesh<'_>, common: Co
         stride: options.entropy_stride,
         seed: options.seed,
     };
+
     let kinds = Kinds::of(table, &plan.annotated.label_of_face, &prepared.file.mesh);
     score_area(ctx, &missing, &prepared.scene, &kinds, scoring, |uuid, entropies| {
         journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))
     })?;
+
     step.end();
     ctx.debug(format_args!("area {number}: {} of {} locations scored", missing.len(), plan.locations.len()));
     Ok(())
@@ -54,7 +58,8 @@ pub(crate) fn score(plan: &LabelledArea, prepared: &PreparedMesh<'_>, common: Co
 
 /// Refuses labels of another mesh.
 pub(crate) fn check_faces(plan: &LabelledArea, prepared: &PreparedMesh<'_>) -> Result<()> {
-    let (labels, faces) = (plan.annotated.label_of_face.len(), prepared.file.mesh.faces().len());
+    let labels = plan.annotated.label_of_face.len();
+    let faces = prepared.file.mesh.faces().len();
     if labels == faces {
         return Ok(());
     }

@@ -19,9 +19,9 @@ use s3d_render::Scene;
 pub(crate) struct SurveyOptions<'a> {
     /// The labels of all areas.
     pub(crate) table: &'a LabelTable,
-    /// Faces without a vote are filled from labelled surface within this distance, metres; `None`: not at all.
+    /// Faces without a vote are filled from labelled surface within this distance, metres; `None` fills none.
     pub(crate) fill_m: Option<f64>,
-    /// Placed locations follow from it.
+    /// The seed of placed locations.
     pub(crate) seed: u64,
 }
 

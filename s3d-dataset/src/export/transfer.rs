@@ -1,4 +1,4 @@
-//! Recorded files from one folder to another.
+//! Brings recorded files from one folder to another.
 
 use crate::error::Result;
 use s3d_io::Error as FileError;
@@ -8,20 +8,23 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-/// Gives a file of the folder `from` the same name in `to`: as a second name of the same bytes where the file
-/// systems can do that, and else as a copy. Then it is read there; what is wrong with it is returned:
-/// nothing, if it is the file that was recorded.
+/// Brings a file of the folder `from` to the same name in `to`: as a hard link where the file systems can do
+/// that, and otherwise as a copy. Then reads it there. Returns what is wrong with it; `None` if it is the
+/// file that was recorded.
 pub(crate) fn bring(record: &FileRecord, from: &Path, to: &Path) -> Result<Option<String>> {
-    let (source, target) = (record.path_in(from), record.path_in(to));
+    let source = record.path_in(from);
+    let target = record.path_in(to);
+
     // Refuses a path that leads out of the folder.
     FileRecord::of_bytes(to, &target, b"")?;
     if let Some(folder) = target.parent() {
         create_dir(folder)?;
     }
-    // Of a link to a file a second name would be a link too, to a file that somebody else may remove.
-    // Whatever else keeps it from being linked, a name that is taken among that, a copy says it better: it
-    // takes its place only when it is whole, so that nothing is lost should the two be one file, as through
-    // two paths to one folder.
+
+    // A hard link to a symbolic link would be a symbolic link too, to a file that somebody else may remove.
+    // If hard linking fails for another reason, such as a name that is taken, a copy reports the reason
+    // better. The copy takes its place only when it is whole, so that nothing is lost if the two are one
+    // file, as through two paths to one folder.
     let is_link = fs::symlink_metadata(&source).is_ok_and(|found| found.is_symlink());
     if is_link || fs::hard_link(&source, &target).is_err() {
         let mut reader = match record.check_size(from).and_then(|()| open_file(&source)) {
@@ -35,6 +38,7 @@ pub(crate) fn bring(record: &FileRecord, from: &Path, to: &Path) -> Result<Optio
         io::copy(&mut reader, &mut file).map_err(|e| FileError::io(&target, "copy to", e))?;
         file.commit()?;
     }
+
     Ok(record.fault(to))
 }
 
@@ -50,9 +54,11 @@ mod tests {
         fs::write(from.join("a/b"), b"content").unwrap();
         let record = FileRecord::of_file(&from, &from.join("a/b")).unwrap();
         create_dir(&to.join("a")).unwrap();
+
         fs::write(to.join("a/b"), b"another").unwrap();
         assert_eq!(bring(&record, &from, &to).unwrap(), None);
         assert_eq!(fs::read(to.join("a/b")).unwrap(), b"content");
+
         fs::write(from.join("a/b"), b"contenu").unwrap();
         assert!(
             bring(&record, &from, &to)
@@ -60,15 +66,18 @@ mod tests {
                 .unwrap()
                 .contains("a/b: is damaged: other content")
         );
+
         fs::remove_file(from.join("a/b")).unwrap();
         assert!(bring(&record, &from, &to).unwrap().unwrap().starts_with("a/b: "));
-        // Between file systems it is copied.
+
+        // Files are copied between file systems.
         fs::write(from.join("a/b"), b"content").unwrap();
         if let Ok(memory) = tempfile::tempdir_in("/dev/shm") {
             let elsewhere = memory.path().join("to");
             assert_eq!(bring(&record, &from, &elsewhere).unwrap(), None);
             assert_eq!(fs::read(elsewhere.join("a/b")).unwrap(), b"content");
         }
+
         for path in ["../c", "/c", "a/../../c"] {
             let outside = FileRecord { path: path.into(), ..record.clone() };
             assert!(bring(&outside, &from, &to).is_err(), "{path}");

@@ -17,28 +17,30 @@ use std::str::FromStr;
 /// One of several processes among which the units of an export are shared out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// From 1.
+    /// The shard's number, from 1.
     pub(crate) number: u32,
-    /// How many there are.
+    /// How many shards there are.
     pub(crate) of: u32,
 }
 
-/// More shards than this are taken for a slip.
+/// More shards than this are taken for a typing error.
 const MAX_SHARDS: u32 = 1_000_000;
 
 impl Shard {
     /// The one process that does everything.
     pub(crate) const ALL: Self = Self { number: 1, of: 1 };
 
-    /// Which thing of every so many this shard does, if things come one after another and cost alike.
+    /// Whether this shard does the thing at a position, if all things cost alike.
     pub(crate) fn takes(self, position: usize) -> bool {
         position % self.of as usize == self.number as usize - 1
     }
 
-    /// Its part in an area of so many, if it has one: the shards are spread over the areas, so that each
-    /// opens as few as can be, and areas over the shards where there are more of them.
+    /// The shard's part in the area at `position` of `areas`, if it has one. Shards are spread over the
+    /// areas, so that each opens as few as possible. Where there are fewer shards than areas, areas are
+    /// spread over the shards.
     pub(crate) fn within(self, position: usize, areas: usize) -> Option<Self> {
-        let (index, of) = (self.number as usize - 1, self.of as usize);
+        let index = self.number as usize - 1;
+        let of = self.of as usize;
         if of <= areas {
             return self.takes(position).then_some(Self::ALL);
         }
@@ -70,27 +72,29 @@ impl fmt::Display for Shard {
     }
 }
 
-/// Deals units with these costs among `shards`: the dearest first, each to the shard with the least so far,
-/// the first by number where several have as little. Returns the number of each unit's shard, from 1.
+/// Deals units with these costs among `shards` shards: the dearest first, each to the shard with the least so
+/// far. The lowest number wins a tie. Returns the number of each unit's shard, from 1.
 ///
-/// No shard gets more than 4/3 of what the best assignment would give to its fullest (Graham, "Bounds on
-/// multiprocessing timing anomalies", 1969, whose bound is 4/3 − 1/3N). The result depends on nothing but the
-/// arguments.
+/// No shard gets more than 4/3 of the largest load of the best assignment (Graham, "Bounds on multiprocessing
+/// timing anomalies", 1969, whose bound is 4/3 − 1/3N). The result depends only on the arguments.
 ///
 /// # Panics
-/// If there is no shard.
+/// If `shards` is 0.
 pub(crate) fn assign_by_cost(costs: &[u64], shards: u32) -> Vec<u32> {
     assert!(shards > 0, "units need a shard");
+
     let mut order: Vec<usize> = (0..costs.len()).collect();
-    // Stable, so that equal costs stay in the order of the units.
+    // The sort is stable, so that equal costs stay in the order of the units.
     order.sort_by_key(|i| Reverse(costs[*i]));
-    // More shards than units stay empty; the heap holds no more than are needed.
+
+    // Shards beyond the number of units stay empty: the heap holds no more than are needed.
     let needed = shards.min(u32::try_from(costs.len()).unwrap_or(u32::MAX));
     let mut least: BinaryHeap<Reverse<(u128, u32)>> = (1..=needed).map(|n| Reverse((0, n))).collect();
+
     let mut assigned = vec![0; costs.len()];
     for i in order {
         if let Some(mut top) = least.peek_mut() {
-            // A unit costs something, or else one shard might get all that cost nothing.
+            // Every unit costs something: otherwise one shard might get all units that cost nothing.
             top.0.0 += u128::from(costs[i].max(1));
             assigned[i] = top.0.1;
         }
@@ -98,13 +102,13 @@ pub(crate) fn assign_by_cost(costs: &[u64], shards: u32) -> Vec<u32> {
     assigned
 }
 
-/// How long units take, in nanoseconds of one core: measured on the built-in scene on a machine of 2026, and
-/// rounded. Their ratios matter alone. A pixel is cast, shaded in every modality, compressed and written, in
-/// views as in panoramas.
+/// The time of a pixel, in nanoseconds of one core: it is cast, shaded in every modality, compressed and
+/// written, in views as in panoramas. The times were measured on the built-in scene on a machine of 2026, and
+/// rounded. Only their ratios matter.
 const NS_PER_PIXEL: u64 = 55;
-/// A face is written to two OBJ files.
+/// The time of a face, which is written to two OBJ files.
 const NS_PER_FACE: u64 = 1_000;
-/// A point is drawn, and written to a PLY file, a text file and two arrays.
+/// The time of a point, which is drawn, and written to a PLY file, a text file and two arrays.
 const NS_PER_POINT: u64 = 110;
 
 /// The cost of a scan location: its panorama and its kept views.
@@ -115,7 +119,7 @@ pub(crate) fn location_cost(pano_width: u32, size: u32, kept_views: u64) -> u64 
     NS_PER_PIXEL.saturating_mul(panorama).saturating_add(views)
 }
 
-/// The cost of a photograph's view: its photograph is read and undistorted, too.
+/// The cost of a photograph's view. The photograph is also read and undistorted.
 pub(crate) fn photograph_cost(camera: &Camera) -> u64 {
     2 * NS_PER_PIXEL * u64::from(camera.width) * u64::from(camera.height)
 }
@@ -127,8 +131,8 @@ pub(crate) fn assets_cost(faces: u64, points: u64) -> u64 {
         .saturating_add(NS_PER_POINT.saturating_mul(points))
 }
 
-/// Who does which units, among a number of shards: kept in the folder in which they work, so that a merge can
-/// tell which of them is to be run again, and a shard that is run again knows at once what is its own.
+/// Which shard does which units, for one number of shards. It is kept in the folder in which they work, so
+/// that a merge can tell which shards to run again, and a shard that is run again knows its units at once.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Assignment {
     shards: u32,
@@ -144,7 +148,7 @@ impl Assignment {
         Self { shards, units: units.into_iter().map(|(unit, _)| unit).zip(assigned).collect() }
     }
 
-    /// Gives a unit that does not count to a shard.
+    /// Gives a unit whose cost does not count to a shard.
     pub(crate) fn assign(&mut self, unit: Unit, number: u32) {
         self.units.push((unit, number));
     }
@@ -163,7 +167,7 @@ impl Assignment {
             .collect()
     }
 
-    /// The numbers of the shards that have some of these units, ascending.
+    /// The numbers of the shards that have any of these units, ascending.
     pub(crate) fn shards_of(&self, units: &[Unit]) -> BTreeSet<u32> {
         let wanted: BTreeSet<&Unit> = units.iter().collect();
         self.units
@@ -173,18 +177,18 @@ impl Assignment {
             .collect()
     }
 
-    /// Writes it into the folder of an unfinished export.
+    /// Writes the assignment into the folder of an unfinished export.
     pub(crate) fn write(&self, layout: &Layout) -> Result<()> {
         create_dir(&Self::folder(layout))?;
         write_checked(&Self::path(layout, self.shards), self)
     }
 
-    /// That among so many shards, if it was written and is whole.
+    /// Reads the assignment among so many shards. Returns `None` if it was not written, or is damaged.
     pub(crate) fn read(layout: &Layout, shards: u32) -> Option<Self> {
         read_checked(&Self::path(layout, shards)).ok()
     }
 
-    /// Those among any number of shards.
+    /// Reads the assignments among any number of shards.
     pub(crate) fn read_all(layout: &Layout) -> Result<Vec<Self>> {
         let files = walk(&Self::folder(layout))?;
         Ok(files.iter().filter_map(|path| read_checked(path).ok()).collect())
@@ -224,7 +228,7 @@ mod tests {
                 costs.iter().enumerate().map(|(i, cost)| (Unit::Scores(1, i.to_string()), *cost)).collect();
             let all: Vec<Unit> = units.iter().map(|(unit, _)| unit.clone()).collect();
             for number in 1..=shards {
-                // As each shard finds it by itself.
+                // Each shard finds its units by itself.
                 let assignment = Assignment::new(units.clone(), shards);
                 for unit in assignment.own(number) {
                     owners[all.iter().position(|u| *u == unit).unwrap()] += 1;
@@ -262,9 +266,10 @@ mod tests {
         ) {
             let assigned = assign_by_cost(&costs, shards);
             let fullest = *loads(&costs, &assigned, shards).iter().max().unwrap();
-            // What even the best assignment cannot go below: the mean, and the dearest unit; the bound of any
-            // list scheduling follows from them.
-            let (sum, dearest) = (costs.iter().sum::<u64>(), *costs.iter().max().unwrap());
+            // Even the best assignment cannot go below the mean or the dearest unit. The bound of any list
+            // scheduling follows from these.
+            let sum = costs.iter().sum::<u64>();
+            let dearest = *costs.iter().max().unwrap();
             let n = u64::from(shards);
             prop_assert!(n * fullest <= sum + (n - 1) * dearest);
         }

@@ -19,7 +19,8 @@ use s3d_io::fs::create_dir;
 use std::fs;
 use std::path::Path;
 
-/// Makes a plan of scenes in a folder, or a shard's part of it; what is there already is not made again.
+/// Makes a plan of scenes in a folder, or a shard's part of one. Anything that is there already is not made
+/// again.
 ///
 /// # Errors
 /// [`Error::Usage`](crate::Error::Usage) if the folder holds something else, or a plan of another call.
@@ -41,17 +42,20 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         lenient: options.lenient,
         fill: options.fill,
         modalities: vec![Domain::Pose],
-        // Of panoramas and points nothing is asked.
+        // A plan needs no panoramas and no points.
         pano_width: 8,
         points_per_m2: f64::MIN_POSITIVE,
         ..ExportOptions::default()
     };
     let options = &options.canonical()?;
+
     let account = Account::new(ctx);
     let layout = Layout::new(folder);
     refuse_foreign(folder)?;
+
     let scenes: Vec<SceneSource> = scenes.iter().cloned().map(Into::into).collect();
     let job = Job::open(&scenes, &layout, &OutputState::read(&layout)?, options, None, &account)?;
+
     let path = plan_file(folder);
     if path.exists() {
         let there = read_plan_file(&path)?;
@@ -61,16 +65,20 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         let labels = LabelList::of(&job.inputs.table);
         write_checked(&path, &PlanFile { request: job.request.of_plan(), labels })?;
     }
+
     let journal = Journal::begin(&layout, Finished::default())?;
     let areas = &job.inputs.areas;
     for (position, area) in areas.iter().enumerate() {
         ctx.check()?;
         let Some(part) = shard.within(position, areas.len()) else { continue };
+
         let number = area.number;
-        // What others have done meanwhile counts too.
+
+        // Work that others have done meanwhile counts too.
         let there = Finished::read(ctx, &layout)?
             .checked_where(ctx, &layout, |unit| *unit == Unit::Labels(number))?;
         there.iter().for_each(|done| journal.know(done.clone()));
+
         let position_of = |uuid: &str| -> Option<usize> {
             let finished = journal.finished();
             finished
@@ -79,13 +87,16 @@ pub fn plan<S: Clone + Into<SceneSource>>(
                 .iter()
                 .position(|other| other == uuid)
         };
+
         let is_ours = |unit: &Unit| match unit {
             Unit::Scores(_, uuid) => position_of(uuid).is_some_and(|position| part.takes(position)),
             Unit::Labels(_) => true,
             Unit::Location(..) | Unit::Photograph(..) | Unit::Assets(_) => false,
         };
+
         job.plan_area(area, &layout, &journal, &account, &is_ours)?;
     }
+
     let done = match shard {
         Shard::ALL => "complete".to_owned(),
         shard => format!("shard {shard} is done"),
@@ -94,7 +105,7 @@ pub fn plan<S: Clone + Into<SceneSource>>(
     Ok(())
 }
 
-/// Refuses a folder that holds something, and no plan.
+/// Refuses a folder that is not empty and holds no plan.
 fn refuse_foreign(folder: &Path) -> Result<()> {
     let entries = match fs::read_dir(folder) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),

@@ -1,5 +1,5 @@
-//! Shards of an export to one data set: the files of all units linked or copied into one folder, each
-//! checked, and the tables written.
+//! Merges the shards of an export into one data set: the files of all units are linked or copied into one
+//! folder and checked, and the tables are written.
 
 use crate::account::Account;
 use crate::context::Context;
@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// Most units that a message names.
+/// The most units that a message names.
 const MAX_NAMED: usize = 8;
 
 /// What a shard has left in its folder.
@@ -38,16 +38,17 @@ struct Part {
     layout: Layout,
     request: Request,
     finished: Finished,
-    /// Who does what, for each number of shards that worked in this folder.
+    /// The assignment for each number of shards that worked in this folder.
     assignments: Vec<Assignment>,
 }
 
-/// Makes one data set of the folders of shards, in any order; OUT may be one of them.
+/// Makes one data set from the folders of shards, in any order. OUT may be one of them. Returns `None` if the
+/// data set is there already.
 ///
 /// # Errors
-/// [`Error::Usage`] if they are of different calls, or OUT holds another data set; [`Error::Input`] with the
-/// shards that are to be run again if something is missing or damaged; [`Error::Temporary`] if a shard is
-/// still at work.
+/// [`Error::Usage`] if the shards are of different calls, or OUT holds another data set; [`Error::Input`]
+/// with the shards to run again if something is missing or damaged; [`Error::Temporary`] if a shard is still
+/// at work.
 pub fn merge(
     folders: &[PathBuf],
     output: impl Into<PathBuf>,
@@ -56,6 +57,7 @@ pub fn merge(
 ) -> Result<Option<Summary>> {
     let target = Target { layout: Layout::new(output.into()), overwrite, allowed: Vec::new() };
     let run = Run::new(ctx, &target);
+
     let layout = run.layout();
     let folders = distinct(folders)?;
     if is_done(&folders, layout)? {
@@ -69,9 +71,11 @@ pub fn merge(
     let Some(first) = parts.first() else {
         return Err(UsageError::NoShards.into());
     };
+
     let request = &first.request;
     refuse_mixed(&parts)?;
     refuse_other_version(first)?;
+
     let mut all = Finished::default();
     for done in parts.iter().flat_map(|part| part.finished.iter()) {
         all.insert(done.clone());
@@ -80,6 +84,7 @@ pub fn merge(
     if !missing.is_empty() {
         return Err(told_missing(&parts, &missing, "is missing"));
     }
+
     let labels = label_list(&parts)?;
     loading.end();
 
@@ -89,19 +94,22 @@ pub fn merge(
     let Some(session) = run.begin(&state, request, &manifest, Sharing::Alone)? else {
         return Ok(None);
     };
+
     let merging = Merging { parts: &parts, all: &all, labels: &labels, table: &table, request };
     let outcome = merging.merge(&run, &session, manifest);
     let works_in_out = parts.iter().any(|part| is_same(part.layout.root(), layout.root()));
+
     let made = match outcome {
         // The work of the shards in OUT stays.
         Err(e) if works_in_out => return Err(e),
         outcome => session.end(ctx, outcome)?,
     };
+
     Ok(Some(run.finish(request, &made)))
 }
 
-/// Reads what shards left in their folders. Returns it with the locks of all folders but OUT: that one's lock is
-/// taken again when the merge begins in it, and until then nobody may be at work there either.
+/// Reads what shards left in their folders. Returns it with the locks of all folders but OUT. OUT is locked
+/// only while it is read: its lock is taken again when the merge begins there.
 fn read_parts(ctx: &Context, folders: &[PathBuf], layout: &Layout) -> Result<(Vec<Lock>, Vec<Part>)> {
     let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
         folders.iter().partition(|folder| is_same(folder, layout.root()));
@@ -135,7 +143,7 @@ impl Merging<'_> {
         let layout = run.layout();
 
         let merging = run.account.stage(Stage::Merge, None);
-        // The table is needed should this OUT be merged again, or gone on with.
+        // The table is needed if this OUT is merged again, or its export is continued.
         labels.write(&LabelList::path(layout))?;
         gather(layout, parts, all, session, &run.account)?;
         merging.end();
@@ -155,13 +163,14 @@ impl Merging<'_> {
     }
 }
 
-/// Whether OUT, one of the folders, holds what they make already: they were merged before.
+/// Whether the folders were merged before: OUT is one of them, and holds the data set that they make.
 fn is_done(folders: &[PathBuf], layout: &Layout) -> Result<bool> {
     let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
         folders.iter().partition(|folder| is_same(folder, layout.root()));
     if inside.is_empty() || read_request(layout)?.is_some() {
         return Ok(false);
     }
+
     let Ok(manifest) = Manifest::read(layout) else { return Ok(false) };
     for folder in apart {
         let of = read_request(&Layout::new(folder))?;
@@ -172,8 +181,8 @@ fn is_done(folders: &[PathBuf], layout: &Layout) -> Result<bool> {
     Ok(true)
 }
 
-/// The label table, from the first that has it whole: a shard that was killed early has none, nor has an
-/// export that was begun without shards.
+/// Reads the label table of the first folder that has it whole. A shard that was killed early has none, and
+/// neither has an export that was begun without shards.
 fn label_list(parts: &[Part]) -> Result<LabelList> {
     let found = parts
         .iter()
@@ -185,7 +194,7 @@ fn label_list(parts: &[Part]) -> Result<LabelList> {
     })
 }
 
-/// The folders, each once, as they are on the disk.
+/// Returns the folders as they are on the disk, each once.
 fn distinct(folders: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut distinct: Vec<PathBuf> = Vec::new();
     for folder in folders {
@@ -208,8 +217,8 @@ fn is_same(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Holds a shard's folder, so that nobody is at work in it; one that cannot be written to holds still by
-/// itself.
+/// Locks a shard's folder, so that nobody is at work in it. Returns `None` for a folder that was never
+/// locked, or that cannot be written to: nobody is at work there.
 fn lock(ctx: &Context, folder: &Path) -> Result<Option<Lock>> {
     let layout = Layout::new(folder);
     if !layout.lock().exists() {
@@ -263,7 +272,7 @@ fn refuse_mixed(parts: &[Part]) -> Result<()> {
     Ok(())
 }
 
-/// Refuses shards of another version of s3d, whose tables would be others.
+/// Refuses shards of another version of s3d, whose tables would differ.
 fn refuse_other_version(part: &Part) -> Result<()> {
     let there = &part.request.version;
     if there == env!("CARGO_PKG_VERSION") {
@@ -276,14 +285,15 @@ fn other_version(folder: &Path, there: &str) -> Error {
     UsageError::OtherVersion { folder: folder.to_owned(), there: there.to_owned() }.into()
 }
 
-/// What is to be done about units that are not there.
+/// The error for missing or damaged units, with the shards to run again.
 fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
     let named: Vec<String> = missing.iter().take(MAX_NAMED).map(Unit::to_string).collect();
     let more = match missing.len() - named.len() {
         0 => String::new(),
         n => format!(" and {n} more"),
     };
-    // By number of shards, which of them are to be run.
+
+    // The shards to run again, by the number of shards that share the work.
     let mut shards: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
     for assignment in parts.iter().flat_map(|part| &part.assignments) {
         shards
@@ -291,6 +301,7 @@ fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
             .or_default()
             .extend(assignment.shards_of(missing));
     }
+
     let calls = shards
         .into_iter()
         .filter(|(_, numbers)| !numbers.is_empty())
@@ -304,6 +315,7 @@ fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
     } else {
         calls.join(", or ")
     };
+
     InputError::Incomplete {
         what: format!("{}{more} {what}", named.join(", ")),
         remedy: format!("run again {calls}, and merge then"),
@@ -311,7 +323,7 @@ fn told_missing(parts: &[Part], missing: &[Unit], what: &str) -> Error {
     .into()
 }
 
-/// Brings the files of all units that OUT has not yet into it, and checks each there.
+/// Brings the files of all units that OUT lacks into it, and checks each there.
 fn gather(
     layout: &Layout,
     parts: &[Part],
@@ -321,6 +333,7 @@ fn gather(
 ) -> Result<()> {
     let ctx = account.ctx;
     let started = Instant::now();
+
     let units: Vec<Unit> = all
         .iter()
         .map(Done::unit)
@@ -332,8 +345,10 @@ fn gather(
         .filter_map(|unit| all.get(unit))
         .map(|done| done.files().len())
         .sum();
+
     let progress = ctx.progress("merging", "files", files as u64);
     let faults: Mutex<Vec<(Unit, String)>> = Mutex::new(Vec::new());
+
     for_each_in_order(
         ctx,
         &units,
@@ -341,8 +356,7 @@ fn gather(
         |(), unit| {
             let mut fault = None;
             for part in parts {
-                // OUT's own were looked at when the merge began, and this one is not among those that are
-                // whole.
+                // OUT's own units were checked when the merge began, and this one was not whole.
                 let Some(done) = part
                     .finished
                     .get(unit)
@@ -360,6 +374,7 @@ fn gather(
                     }
                 }
             }
+
             let fault = fault.unwrap_or_else(|| format!("{}: {unit} is damaged", layout.root().display()));
             faults
                 .lock()
@@ -368,8 +383,10 @@ fn gather(
             Ok(())
         },
     )?;
+
     let mut faults = faults.into_inner().unwrap_or_else(PoisonError::into_inner);
     faults.sort();
+
     match faults.first() {
         None => {
             account.units_taken(units.len() as u64, &tally, started);
@@ -382,7 +399,7 @@ fn gather(
     }
 }
 
-/// Brings the files of a unit into OUT; tells what is wrong with the first that is not the one that was
+/// Brings the files of a unit into OUT. Returns what is wrong with the first file that is not as it was
 /// written.
 fn bring_unit(ctx: &Context, layout: &Layout, part: &Part, done: &Done) -> Result<Option<String>> {
     for record in done.files() {

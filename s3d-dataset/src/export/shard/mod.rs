@@ -1,5 +1,5 @@
-//! A shard: one of several processes, on any machines, that share the work of an export. Each finds by itself
-//! what is its own, and does that.
+//! A shard: one of several processes, on any machines, that share the work of an export. Each finds out by
+//! itself which part is its own, and does it.
 
 pub(crate) mod assignment;
 pub(crate) mod make_plan;
@@ -27,8 +27,8 @@ use s3d_io::fs::Checksum;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-/// Does a shard's part of an export into OUT, which other shards may share. It is no data set until it is
-/// merged.
+/// Does a shard's part of an export into OUT, which other shards may share. OUT is no data set until it is
+/// merged. Returns `None` if there is nothing to do.
 pub(crate) fn export_shard(
     ctx: &Context,
     scenes: &[SceneSource],
@@ -57,8 +57,8 @@ pub(crate) fn export_shard(
 }
 
 impl Job<'_> {
-    /// Does the units of a shard that are not done yet, and tells what became of the candidate views of the
-    /// whole; nothing if all of the shard's units are done.
+    /// Does the units of a shard that are not done yet. Returns what became of the candidate views of the
+    /// whole export; `None` if all units of the shard were done before.
     fn run_shard(
         &self,
         layout: &Layout,
@@ -67,7 +67,7 @@ impl Job<'_> {
         shard: Shard,
     ) -> Result<Option<ViewTally>> {
         let ctx = account.ctx;
-        // A shard that is run again knows its own before anything is labelled.
+        // A shard that is run again knows its units before anything is labelled.
         if let Some(assignment) = Assignment::read(layout, shard.of) {
             let own = assignment.own(shard.number);
             journal.check(ctx, layout, |unit| own.contains(unit))?;
@@ -76,52 +76,64 @@ impl Job<'_> {
                 return Ok(None);
             }
         }
+
         let cache = layout.work_dir();
         LabelList::of(&self.inputs.table).write(&LabelList::path(layout))?;
+
         let positions: BTreeMap<u32, usize> = self.request.numbers().into_iter().zip(0..).collect();
         let labels_are_ours = |unit: &Unit| {
             positions
                 .get(&unit.area())
                 .is_some_and(|position| shard.takes(*position))
         };
-        // With a plan every shard writes down its share of the scores, for the merge; else every one has made
-        // them all.
+
+        // With a plan, every shard writes down its share of the scores, for the merge. Without one, every
+        // shard has made all scores.
         let is_ours = |unit: &Unit| match unit {
             Unit::Labels(_) => labels_are_ours(unit),
             Unit::Scores(_, uuid) => self.plan.is_none() || keeper(uuid, shard.of) == shard.number,
             Unit::Location(..) | Unit::Photograph(..) | Unit::Assets(_) => false,
         };
+
         journal.check(ctx, layout, |unit| matches!(unit, Unit::Labels(_)) && is_ours(unit))?;
         let labelled = self.label(self.common(layout, journal, account, &cache, &is_ours), Scope::All)?;
+
         let (candidates, views) = select_requested(&self.request, &journal.finished())?;
         let assignment = self.assignment(&labelled, &candidates, shard.of);
         assignment.write(layout)?;
+
         let own = assignment.own(shard.number);
         take_own(layout, journal, account, &own)?;
+
         let is_ours = |unit: &Unit| own.contains(unit);
         self.render(self.common(layout, journal, account, &cache, &is_ours), &labelled, &candidates)?;
+
         Ok(Some(views))
     }
 
-    /// Who does what among so many shards: the same in each of them.
+    /// Assigns all units to so many shards, in the same way in each of them.
     fn assignment(&self, labelled: &Labelled<'_>, candidates: &[Candidate], shards: u32) -> Assignment {
         let options = &self.request.options;
         let mut kept: BTreeMap<(u32, &str), u64> = BTreeMap::new();
         for c in candidates.iter().filter(|c| c.frame_num.is_some()) {
             *kept.entry((c.area, c.camera_uuid.as_str())).or_default() += 1;
         }
+
         let plans = || labelled.areas.iter().flatten();
         let mut units = Vec::new();
+
         for plan in plans() {
             let points = (plan.mesh_area_m2 * options.points_per_m2) as u64;
             let faces = plan.annotated.label_of_face.len() as u64;
             units.push((Unit::Assets(plan.area), assets_cost(faces, points)));
+
             for location in plan.locations.iter().filter(|l| is_chosen(&self.request, &l.uuid)) {
                 let views = kept.get(&(plan.area, location.uuid.as_str())).copied().unwrap_or(0);
                 let cost = location_cost(options.pano_width, options.size, views);
                 units.push((Unit::Location(plan.area, location.uuid.clone()), cost));
             }
         }
+
         for area in &self.inputs.areas {
             for photograph in area
                 .photographs
@@ -133,6 +145,7 @@ impl Job<'_> {
                 units.push((Unit::Photograph(area.number, photograph.uuid.clone()), cost));
             }
         }
+
         let mut assignment = Assignment::new(units, shards);
         for (position, plan) in plans().enumerate() {
             assignment.assign(Unit::Labels(plan.area), (position % shards as usize) as u32 + 1);
@@ -145,12 +158,13 @@ impl Job<'_> {
     }
 }
 
-/// Which of so many shards keeps the scores of a location.
+/// The number of the shard that keeps the scores of a location.
 fn keeper(uuid: &str, shards: u32) -> u32 {
     (Checksum::of(uuid.as_bytes()).0 % u128::from(shards)) as u32 + 1
 }
 
-/// Checks what an earlier run of this shard, or another, has done of its own, and takes it as it is.
+/// Checks the units of this shard that an earlier run, or another shard, has done, and takes them as they
+/// are.
 fn take_own(layout: &Layout, journal: &Journal, account: &Account<'_>, own: &BTreeSet<Unit>) -> Result<()> {
     let ctx = account.ctx;
     let started = Instant::now();

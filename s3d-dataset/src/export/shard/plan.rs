@@ -1,9 +1,9 @@
 //! A plan: labels and scores, made before an export and shared by its shards.
 //!
-//! PLAN holds `plan.jsonl` (what it is for, and the label table), `area_N` (the area as [`LabelledArea`] has it,
-//! and in `area_N/3d` the files of its labels as the data set has them), and journals of labels and scores in
-//! `.s3d/journal`, a file for each process that worked at it. Processes need not know of one another: each
-//! labels the areas that it scores in, if nobody has, and scores its share of their locations.
+//! The folder of a plan holds `plan.jsonl` (its request, and the label table), `area_N` (a [`LabelledArea`],
+//! with its label files in `area_N/3d` as the data set has them), and journals of labels and scores in
+//! `.s3d/journal`, a file for each process that worked on it. Processes need not know of one another: each
+//! labels the areas that it scores in, if no other has, and scores its share of their locations.
 
 use crate::context::Context;
 use crate::error::{Error, Held, InputError, Result, UsageError};
@@ -20,7 +20,7 @@ use s3d_label::LabelTable;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Most units that a message names.
+/// The most units that a message names.
 const MAX_NAMED: usize = 4;
 
 /// A plan that was made.
@@ -33,13 +33,13 @@ pub(crate) struct Plan {
 /// `plan.jsonl`.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct PlanFile {
-    /// What it is for; of the options those that labels and scores depend on.
+    /// What the plan is for, with only the options that labels and scores depend on.
     pub(crate) request: Request,
     pub(crate) labels: LabelList,
 }
 
 pub(crate) fn read_plan_file(path: &Path) -> Result<PlanFile> {
-    // Without it, nobody knows what the rest of the folder is for.
+    // Without this file, nothing tells what the rest of the folder is for.
     let again = "remove the folder, and call `s3d plan` again";
     read_checked(path).map_err(|e| match e {
         Error::File(FileError::Format { .. }) => {
@@ -57,7 +57,7 @@ impl Plan {
     /// Opens the plan in a folder.
     ///
     /// # Errors
-    /// If there is none, or it is damaged.
+    /// If the folder holds no plan, or a damaged one.
     pub(crate) fn open(ctx: &Context, folder: &Path) -> Result<Self> {
         let path = plan_file(folder);
         if !is_plan(folder) {
@@ -74,12 +74,12 @@ impl Plan {
         self.file.labels.table(&plan_file(self.layout.root()))
     }
 
-    /// What it was made for.
+    /// The request that the plan was made for.
     pub(crate) fn request(&self) -> &Request {
         &self.file.request
     }
 
-    /// Refuses an export that it was not made for.
+    /// Refuses an export that the plan was not made for.
     pub(crate) fn refuse_other(&self, request: &Request) -> Result<()> {
         refuse_other(self.layout.root(), &self.file.request, request)
     }
@@ -96,13 +96,16 @@ impl Plan {
                 None => missing.push(Unit::Labels(area)),
             }
         }
+
         missing.retain(|unit| matches!(unit, Unit::Labels(_)) || !self.finished.has(unit));
         if missing.is_empty() {
             return Ok(());
         }
+
         let named: Vec<String> = missing.iter().take(MAX_NAMED).map(Unit::to_string).collect();
         let more = if missing.len() > MAX_NAMED { " and more" } else { "" };
         let root = self.layout.root().display();
+
         Err(InputError::Incomplete {
             what: format!("{root} is not complete: {}{more} missing", named.join(", ")),
             remedy: "call `s3d plan` again, each shard of it if it has some".to_owned(),
@@ -110,13 +113,13 @@ impl Plan {
         .into())
     }
 
-    /// A labelled area.
+    /// Reads a labelled area.
     pub(crate) fn area(&self, area: u32) -> Result<LabelledArea> {
         let taxonomy = self.file.labels.taxonomy(&plan_file(self.layout.root()))?;
         taxonomy.reading(|| LabelledArea::read(&area_folder(self.layout.root(), area), area))
     }
 
-    /// Brings the files of an area's labels into a data set.
+    /// Brings the label files of an area into a data set. Returns their records.
     pub(crate) fn bring_labels(&self, area: u32, to: &Layout) -> Result<Vec<FileRecord>> {
         let files = self
             .finished
