@@ -1,97 +1,33 @@
 //! One area of an export: labelled, scored, rendered, with its meshes and points.
 
-use crate::account::Account;
 use crate::error::Result;
 use crate::event::UnitKind;
+use crate::export::common::{Common, PreparedMesh};
+use crate::export::images::photographs::{self, WrittenPhotograph};
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
 use crate::export::input::AreaInput;
 use crate::export::input::pictures::Pictures;
 use crate::export::labels::label_area::label_files;
 use crate::export::location::room_of;
 use crate::export::modality::{Channels, classes_of_labels, palette};
-use crate::export::photographs::{self, WrittenPhotograph};
 use crate::export::points::write_points;
 use crate::export::scoring::check_faces;
-use crate::options::ExportOptions;
-use crate::record::journal::{AssetsDone, Done, Journal, LocationDone, Unit, tally_of};
+use crate::record::journal::{AssetsDone, Done, LocationDone, Unit, tally_of};
 use crate::record::listing;
 use crate::stage::Stage;
 use crate::survey::annotated::{Annotated, SurveyedRoom};
 use crate::survey::candidate::Candidate;
 use crate::survey::labelled_area::LabelledArea;
-use s3d_geom::{Density, NearestFaces};
-use s3d_io::dataset::{Domain, Layout};
+use s3d_geom::Density;
+use s3d_io::dataset::Domain;
 use s3d_io::fs::create_dir;
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{MeshFile, TextureOut};
-use s3d_label::LabelTable;
-use s3d_render::{MipMaps, Scene};
+use s3d_render::MipMaps;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
-
-/// What all areas share.
-#[derive(Clone, Copy)]
-pub(crate) struct Common<'a> {
-    pub(crate) table: &'a LabelTable,
-    pub(crate) layout: &'a Layout,
-    pub(crate) options: &'a ExportOptions,
-    pub(crate) journal: &'a Journal,
-    pub(crate) account: &'a Account<'a>,
-    /// Holds a folder for each labelled area.
-    pub(crate) cache: &'a Path,
-    /// Which units this process writes.
-    pub(crate) is_ours: &'a (dyn Fn(&Unit) -> bool + Sync),
-}
-
-impl Common<'_> {
-    /// The folder of a labelled area.
-    pub(crate) fn cache_of(&self, area: u32) -> PathBuf {
-        self.cache.join(format!("area_{area}"))
-    }
-}
-
-/// The two hierarchies of a mesh with more faces than this are built one after the other: the temporary
-/// memory of a build, 200 bytes a face, should not be taken twice.
-const LARGE_MESH: usize = 2_000_000;
-
-/// A mesh that is ready for rays.
-pub(crate) struct PreparedMesh<'m> {
-    pub(crate) file: &'m MeshFile,
-    pub(crate) scene: Scene<'m>,
-}
-
-impl<'m> PreparedMesh<'m> {
-    /// Prepares the mesh for rays and for nearest faces, at the same time unless it is large. Only labelling
-    /// needs the nearest faces.
-    pub(crate) fn new(file: &'m MeshFile) -> (Self, NearestFaces<'m>) {
-        let (scene, nearest) = match file.mesh.faces().len() {
-            0..=LARGE_MESH => rayon::join(|| Scene::new(&file.mesh), || NearestFaces::new(&file.mesh)),
-            _ => (Scene::new(&file.mesh), NearestFaces::new(&file.mesh)),
-        };
-        (Self { file, scene }, nearest)
-    }
-
-    /// Prepares the mesh, with its nearest faces if they are needed.
-    pub(crate) fn prepare(file: &'m MeshFile, with_nearest: bool) -> (Self, Option<NearestFaces<'m>>) {
-        if !with_nearest {
-            return (Self::for_rays(file), None);
-        }
-        let (prepared, nearest) = Self::new(file);
-        (prepared, Some(nearest))
-    }
-
-    /// The mesh's nearest faces.
-    pub(crate) fn nearest(&self) -> NearestFaces<'m> {
-        NearestFaces::new(&self.file.mesh)
-    }
-
-    /// Prepares the mesh for rays only.
-    pub(crate) fn for_rays(file: &'m MeshFile) -> Self {
-        Self { file, scene: Scene::new(&file.mesh) }
-    }
-}
 
 /// Writes an area's meshes and points: everything but its images.
 fn write_area_assets(

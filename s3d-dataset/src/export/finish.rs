@@ -3,7 +3,7 @@
 
 use crate::context::Context;
 use crate::error::{InputError, Result};
-use crate::export::photographs::doubts;
+use crate::export::images::photographs::doubts;
 use crate::export::views::select_requested;
 use crate::profile::{self};
 use crate::record::data_set::Listed;

@@ -5,6 +5,7 @@
 //! written down in the journal; then it is finished ([`finish`]).
 
 pub(crate) mod area;
+pub(crate) mod common;
 pub(crate) mod finish;
 pub(crate) mod images;
 pub(crate) mod input;
@@ -12,20 +13,20 @@ pub(crate) mod job;
 pub(crate) mod labels;
 pub(crate) mod location;
 pub(crate) mod modality;
-pub(crate) mod photographs;
+pub(crate) mod picture_colors;
+pub(crate) mod plan;
 pub(crate) mod points;
 pub(crate) mod run;
 pub(crate) mod scoring;
 pub(crate) mod shard;
-pub(crate) mod survey;
 pub(crate) mod transfer;
 pub(crate) mod views;
 
 use crate::context::Context;
 use crate::error::Result;
+use crate::export::plan::Plan;
 use crate::export::shard::assignment::Shard;
 use crate::export::shard::export_shard;
-use crate::export::shard::plan::Plan;
 use crate::options::ExportOptions;
 use crate::summary::Summary;
 use input::memory::SceneSource;

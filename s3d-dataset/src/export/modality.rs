@@ -1,7 +1,7 @@
 //! From hits to the bytes of image files, in two steps. `draw` makes the images: some of them together in one
 //! walk over the hits (`together`), the others one after another. `file` encodes each.
 
-use crate::export::input::pictures::PictureColors;
+use crate::export::picture_colors::PictureColors;
 use half::f16;
 use rayon::prelude::*;
 use s3d_geom::{Camera, Raster};

@@ -1,7 +1,7 @@
 //! Which candidate views of an area are still to be scored, and their scores.
 
 use crate::error::{InputError, Result};
-use crate::export::area::{Common, PreparedMesh};
+use crate::export::common::{Common, PreparedMesh};
 use crate::export::views::{Kinds, Scoring, score_area};
 use crate::record::journal::{Done, ScoresDone, Unit};
 use crate::stage::Stage;

@@ -5,18 +5,15 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::AreaInput;
 use crate::export::input::cameras::Cameras;
-use crate::export::modality::Channels;
+use crate::export::picture_colors::PictureColors;
 use glam::DVec3;
-use s3d_geom::{Camera, Raster};
+use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::camera::{
     CAPTURES_A_LOCATION, CaptureFile, PictureFolder, ScanLocation, check_picture, read_picture,
 };
-use s3d_io::scene::{PictureKind, PictureSource, SkyBoxCaps, UnseenColor};
-use s3d_render::{
-    Capture, CubeMap, Hits, Scene, SkyBoxTurn, StitchOptions, TextureFilter, Unseen, picture_image_into,
-    stitch,
-};
+use s3d_io::scene::{PictureKind, PictureSource, SkyBoxCaps};
+use s3d_render::{Capture, CubeMap, Scene, SkyBoxTurn, StitchOptions, stitch};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -240,41 +237,5 @@ fn check_sky_box(first: &Path, sizes: [(u32, u32); 6]) -> Result<()> {
             );
             Err(FileError::format(first, message).into())
         }
-    }
-}
-
-/// Colours that are not the mesh's.
-#[derive(Clone, Copy)]
-pub(crate) enum PictureColors<'a> {
-    /// From a cube map of the scanner's pictures.
-    Cube {
-        cube: &'a CubeMap,
-        /// What is shown where it has nothing.
-        unseen: UnseenColor,
-    },
-    /// The view itself, of a photograph.
-    Photograph(&'a Raster<[u8; 3]>),
-}
-
-impl PictureColors<'_> {
-    /// The RGB image of a view.
-    pub(crate) fn image_into(
-        &self,
-        channels: &Channels<'_>,
-        hits: &Hits,
-        camera: &Camera,
-        out: &mut Raster<[u8; 3]>,
-    ) {
-        let (cube, unseen) = match self {
-            Self::Cube { cube, unseen: UnseenColor::Mesh } => {
-                (cube, Unseen::Mesh(channels.scene, channels.textures))
-            }
-            Self::Cube { cube, unseen: UnseenColor::Nearby } => (cube, Unseen::Nearby),
-            Self::Photograph(image) => {
-                out.clone_from(image);
-                return;
-            }
-        };
-        picture_image_into(cube, unseen, hits, camera, &TextureFilter::default(), out);
     }
 }

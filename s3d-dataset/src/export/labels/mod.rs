@@ -3,3 +3,4 @@
 pub(crate) mod annotate;
 pub(crate) mod label_area;
 pub(crate) mod overlap;
+pub(crate) mod survey;

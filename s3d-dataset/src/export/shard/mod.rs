@@ -4,16 +4,15 @@
 pub(crate) mod assignment;
 pub(crate) mod make_plan;
 pub(crate) mod merge;
-pub(crate) mod plan;
 
 use crate::account::Account;
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::memory::SceneSource;
 use crate::export::job::{Job, Labelled, Scope};
+use crate::export::plan::Plan;
 use crate::export::run::{Run, Target};
 use crate::export::shard::assignment::{Assignment, Shard, assets_cost, location_cost, photograph_cost};
-use crate::export::shard::plan::Plan;
 use crate::export::views::select_requested;
 use crate::options::ExportOptions;
 use crate::record::journal::{Done, Journal, Unit};

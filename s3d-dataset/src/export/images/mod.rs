@@ -1,12 +1,14 @@
 //! The images of an area. Each view is cast once, every modality is made from the same hits, and each file is
 //! written whole.
 
+pub(crate) mod photographs;
+
 use crate::context::{Context, Progress};
 use crate::error::Result;
+use crate::export::images::photographs::{WrittenPhotograph, write_photograph};
 use crate::export::input::pictures::Pictures;
 use crate::export::location::room_name;
 use crate::export::modality::{Channels, Image, ImageBuffers};
-use crate::export::photographs::{self, WrittenPhotograph, write_photograph};
 use crate::parallel::for_each_in_order;
 use crate::summary::{ImageTally, UnitTally};
 use crate::survey::candidate::Candidate;
