@@ -1,4 +1,4 @@
-//! The account of an export while it runs: what it takes and makes, and who watches.
+//! The account of a running export: the time it takes, and what it makes.
 
 use crate::context::Context;
 use crate::event::{Event, UnitKind};
@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The account of an export while it runs: stages are timed and units counted in it, by any thread, and
-/// whoever watches is told.
+/// The account of a running export. Any thread can time stages and count units in it, and observers hear of
+/// both.
 pub(crate) struct Account<'c> {
     pub(crate) ctx: &'c Context,
     warnings_before: u64,
@@ -24,7 +24,7 @@ struct State {
 }
 
 impl<'c> Account<'c> {
-    /// Opens it: the export begins.
+    /// Opens the account at the start of an export.
     pub(crate) fn new(ctx: &'c Context) -> Self {
         Self { ctx, warnings_before: ctx.warnings(), started: Instant::now(), state: Mutex::default() }
     }
@@ -33,13 +33,13 @@ impl<'c> Account<'c> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Begins a stage, of one area or of all together.
+    /// Begins a stage, of one area or of all areas together.
     pub(crate) fn stage(&self, stage: Stage, area: Option<u32>) -> StageTimer<'_> {
         self.ctx.tell(&Event::StageStarted { stage, area });
         StageTimer { account: self, stage, area, started: Instant::now() }
     }
 
-    /// A unit of work is on the disk.
+    /// Counts a unit of work that is on the disk.
     pub(crate) fn unit_finished(
         &self,
         unit: UnitKind,
@@ -54,20 +54,20 @@ impl<'c> Account<'c> {
             .tell(&Event::UnitFinished { unit, area, location, tally, seconds });
     }
 
-    /// Units that an earlier run finished were checked and are taken as they are.
+    /// Counts units of an earlier run, which were checked and are kept.
     pub(crate) fn units_taken(&self, units: u64, tally: &UnitTally, started: Instant) {
         self.state().tally += *tally;
         let seconds = thousandths(started.elapsed().as_secs_f64());
         self.ctx.tell(&Event::UnitsTaken { units, tally, seconds });
     }
 
-    /// Takes the count of all files of the complete data set, those that belong to no unit too.
+    /// Sets the count of all files of the complete data set, with those that belong to no unit.
     pub(crate) fn set_files(&self, files: u64, bytes: u64) {
         let mut state = self.state();
         state.tally = UnitTally { files, bytes, ..state.tally };
     }
 
-    /// Closes it: the export is complete, and its summary is told.
+    /// Closes the account of a complete export, and reports its summary.
     pub(crate) fn summarize(
         self,
         output: &str,
@@ -91,12 +91,13 @@ impl<'c> Account<'c> {
                 .collect(),
             seconds: thousandths(self.started.elapsed().as_secs_f64()),
         };
+
         self.ctx.tell(&Event::Summary(&summary));
         summary
     }
 }
 
-/// A stage under way. One that is dropped without [`StageTimer::end`] failed, and is not told of.
+/// A stage in progress. A stage dropped without [`StageTimer::end`] has failed, and is not reported.
 #[must_use = "a stage is counted when it ends"]
 pub(crate) struct StageTimer<'a> {
     account: &'a Account<'a>,
@@ -106,7 +107,7 @@ pub(crate) struct StageTimer<'a> {
 }
 
 impl StageTimer<'_> {
-    /// The stage is done.
+    /// Ends the stage.
     pub(crate) fn end(self) {
         let Self { account, stage, area, started } = self;
         let seconds = started.elapsed().as_secs_f64();
@@ -117,7 +118,7 @@ impl StageTimer<'_> {
     }
 }
 
-/// A number of seconds, rounded to what is worth telling.
+/// Rounds seconds to thousandths for reports.
 fn thousandths(seconds: f64) -> f64 {
     (1000.0 * seconds).round() / 1000.0
 }

@@ -1,17 +1,17 @@
-//! What a data set must be to be of use.
+//! The conditions of a useful data set.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What a data set must be to be of use.
+/// A condition that a useful data set fulfils.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Condition {
-    /// The mesh has colours where RGB images are made from it.
+    /// The mesh has colours, if RGB images are made from it.
     Colour,
     /// Scan locations see the mesh in most directions.
     Coverage,
-    /// Mesh and annotations lie on each other.
+    /// Mesh and annotations lie in the same place.
     Frame,
     /// Scan locations see the front of faces.
     InsideOut,
@@ -19,7 +19,7 @@ pub enum Condition {
     Labels,
     /// There are not many more scan locations than the floor needs.
     Locations,
-    /// Mesh and rooms are as large as buildings are.
+    /// Mesh and rooms have the size of buildings.
     Scale,
     /// The data set fits on the disk.
     Size,
@@ -28,7 +28,7 @@ pub enum Condition {
 }
 
 impl Condition {
-    /// All of them, by name.
+    /// All conditions, sorted by name.
     pub const ALL: [Self; 9] = [
         Self::Colour,
         Self::Coverage,
@@ -41,7 +41,7 @@ impl Condition {
         Self::Up,
     ];
 
-    /// Its name, as `--allow` takes it.
+    /// Returns the name, as `--allow` takes it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Colour => "colour",

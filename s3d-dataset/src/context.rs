@@ -1,4 +1,4 @@
-//! What a long call is handed by its caller: a way to end it early, and somebody to tell what happens.
+//! The context of a long call: a way to end it early, and an observer of what happens.
 
 use crate::error::{Error, Result};
 use crate::event::{Event, Level, Task};
@@ -6,7 +6,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Ends calls early, from any thread or a signal handler's thread. Clones are the same switch.
+/// Ends calls early, from any thread, such as a signal handler's. Clones share one switch.
 ///
 /// ```
 /// let cancel = s3d_dataset::Cancel::default();
@@ -18,34 +18,34 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
-    /// Asks for an end. Calls that were handed this switch end at the next file, chunk of points or instance
-    /// with [`Error::Cancelled`].
+    /// Asks for an end. Calls with this switch end at the next file, chunk of points or instance with
+    /// [`Error::Cancelled`].
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether an end was asked for.
+    /// Returns whether an end was asked for.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Takes the wish back, so that the switch serves for another call.
+    /// Resets the switch, so that it serves for another call.
     pub fn reset(&self) {
         self.0.store(false, Ordering::Relaxed);
     }
 }
 
 impl From<Arc<AtomicBool>> for Cancel {
-    /// The switch that this flag is, such as one that a handler of signals sets.
+    /// Makes a switch of a flag, such as one that a signal handler sets.
     fn from(flag: Arc<AtomicBool>) -> Self {
         Self(flag)
     }
 }
 
-/// Who is told what happens during a call: see [`Event`]. It is called from all threads that work, and should
-/// return soon. Closures are observers.
+/// An observer of what happens during a call: see [`Event`]. All working threads call it, so it should return
+/// soon. Closures are observers.
 pub trait Observer: Send + Sync {
-    /// Something happened.
+    /// Receives an event.
     fn observe(&self, event: &Event<'_>);
 }
 
@@ -55,7 +55,7 @@ impl<F: Fn(&Event<'_>) + Send + Sync> Observer for F {
     }
 }
 
-/// What calls of this crate are handed besides their options. The default watches nothing and never ends
+/// The context of a call of this crate, beside its options. The default observes nothing and never ends
 /// early.
 ///
 /// ```
@@ -70,12 +70,12 @@ impl<F: Fn(&Event<'_>) + Send + Sync> Observer for F {
 /// ```
 #[derive(Clone, Default)]
 pub struct Context {
-    /// Ends the call early.
+    /// The switch that ends the call early.
     pub cancel: Cancel,
-    /// Is told what happens; nobody if `None`.
+    /// The observer of the call, if there is one.
     pub observer: Option<Arc<dyn Observer>>,
     warnings: Arc<AtomicU64>,
-    /// Where warnings are written down, if they are.
+    /// The list of warnings, if they are to be kept.
     notes: Option<Arc<Mutex<Vec<String>>>>,
 }
 
@@ -89,17 +89,17 @@ impl fmt::Debug for Context {
 }
 
 impl Context {
-    /// The same, ended early by `cancel`.
+    /// Returns the same context, ended early by `cancel`.
     pub fn cancelled_by(self, cancel: Cancel) -> Self {
         Self { cancel, ..self }
     }
 
-    /// The same, watched by `observer`.
+    /// Returns the same context, observed by `observer`.
     pub fn observed_by(self, observer: impl Observer + 'static) -> Self {
         Self { observer: Some(Arc::new(observer)), ..self }
     }
 
-    /// Between two pieces of work.
+    /// Checks between two pieces of work whether the call must end.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if an end was asked for.
@@ -123,12 +123,12 @@ impl Context {
         }
     }
 
-    /// How many warnings there were so far, with this context and its clones.
+    /// Returns the number of warnings so far, from this context and its clones.
     pub fn warnings(&self) -> u64 {
         self.warnings.load(Ordering::Relaxed)
     }
 
-    /// Tells of something that should be looked at, and counts it.
+    /// Reports something that the user should look at, and counts it.
     pub fn warn(&self, text: impl fmt::Display) {
         self.warnings.fetch_add(1, Ordering::Relaxed);
         if let Some(notes) = &self.notes {
@@ -140,12 +140,12 @@ impl Context {
         self.message(Level::Warning, text);
     }
 
-    /// The same, which writes its warnings down as well.
+    /// Returns the same context, which also keeps its warnings.
     pub(crate) fn noting(&self) -> Self {
         Self { notes: Some(Arc::default()), ..self.clone() }
     }
 
-    /// The warnings that were written down since they were taken last.
+    /// Returns the kept warnings since the last call.
     pub(crate) fn take_notes(&self) -> Vec<String> {
         let notes = self
             .notes
@@ -154,7 +154,7 @@ impl Context {
         notes.map(|mut notes| std::mem::take(&mut *notes)).unwrap_or_default()
     }
 
-    /// Tells of what was done.
+    /// Reports what was done.
     pub fn info(&self, text: impl fmt::Display) {
         self.message(Level::Info, text);
     }
@@ -163,13 +163,13 @@ impl Context {
         self.message(Level::Debug, text);
     }
 
-    /// A warning for each sentence.
+    /// Gives a warning for each sentence.
     pub(crate) fn warn_each<T: fmt::Display>(&self, texts: impl IntoIterator<Item = T>) {
         texts.into_iter().for_each(|text| self.warn(text));
     }
 
-    /// Begins `total` units of long work, named by what is done ("rendering") to what ("images").
-    /// What is returned is told of every unit, and ends the task when it is dropped.
+    /// Begins a task of `total` units, named by the action ("rendering") and the unit ("images"). The result
+    /// counts the finished units, and ends the task when it is dropped.
     pub fn progress(&self, what: &'static str, unit: &'static str, total: u64) -> Progress<'_> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let task = Task { id: NEXT.fetch_add(1, Ordering::Relaxed), what, unit, total };
@@ -178,7 +178,7 @@ impl Context {
     }
 }
 
-/// Tells how far a [`Task`] is, by any thread; dropped, the task has ended.
+/// Reports the progress of a [`Task`] from any thread. The task ends when it is dropped.
 pub struct Progress<'a> {
     pub(crate) context: &'a Context,
     task: Task,
@@ -186,7 +186,7 @@ pub struct Progress<'a> {
 }
 
 impl Progress<'_> {
-    /// `n` more units are done.
+    /// Counts `n` more finished units.
     pub fn add(&self, n: u64) {
         let done = self.done.fetch_add(n, Ordering::Relaxed) + n;
         self.context.tell(&Event::TaskAdvanced { task: self.task, done });

@@ -1,11 +1,11 @@
-//! What an observer is told while a call runs.
+//! The events that an observer receives while a call runs.
 
 use crate::stage::Stage;
 use crate::summary::{Summary, UnitTally};
 use serde::Serialize;
 use std::fmt;
 
-/// One thing that happened.
+/// An event during a call.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -13,32 +13,32 @@ pub enum Event<'a> {
     /// A sentence for a person.
     #[serde(skip)]
     Message {
-        /// How much it matters.
+        /// The level of importance.
         level: Level,
         /// The sentence, in English.
         text: &'a str,
     },
-    /// Long work whose end can be foreseen begins.
+    /// A task begins: long work of a known size.
     #[serde(skip)]
     TaskStarted {
-        /// What it is.
+        /// The task.
         task: Task,
     },
-    /// More of it is done.
+    /// More of a task is done.
     #[serde(skip)]
     TaskAdvanced {
-        /// What it is.
+        /// The task.
         task: Task,
-        /// Units done so far. Threads may tell out of order.
+        /// The units done so far. Threads may report out of order.
         done: u64,
     },
-    /// It has ended, done or not.
+    /// A task has ended, done or not.
     #[serde(skip)]
     TaskEnded {
-        /// What it is.
+        /// The task.
         task: Task,
     },
-    /// A unit of work is done and on the disk: what is done again if everything stops now is the rest.
+    /// A unit of work is done and on the disk. A later run does not repeat it.
     UnitFinished {
         /// Its kind.
         unit: UnitKind,
@@ -47,68 +47,68 @@ pub enum Event<'a> {
         /// The camera's uuid, if the unit is a scan location.
         #[serde(skip_serializing_if = "Option::is_none")]
         location: Option<&'a str>,
-        /// What it wrote.
+        /// What the unit wrote.
         #[serde(flatten)]
         tally: &'a UnitTally,
-        /// How long it took.
+        /// The time it took, seconds.
         seconds: f64,
     },
-    /// Units that an earlier run finished were found to be whole.
+    /// Units of an earlier run were checked and found whole.
     UnitsTaken {
-        /// How many.
+        /// The number of units.
         units: u64,
         /// What they had written.
         #[serde(flatten)]
         tally: &'a UnitTally,
-        /// How long the check took.
+        /// The time of the check, seconds.
         seconds: f64,
     },
     /// A stage of a call begins.
     #[serde(skip)]
     StageStarted {
-        /// Which.
+        /// The stage.
         stage: Stage,
-        /// The area that goes through it; `None` if all do together.
+        /// The area in this stage. `None` if all areas go through it together.
         area: Option<u32>,
     },
-    /// A stage of a call is done. A stage that several areas go through comes once for each.
+    /// A stage of a call is done. It comes once for each area if areas go through it one by one.
     StageFinished {
-        /// Which.
+        /// The stage.
         stage: Stage,
-        /// The area that went through it; `None` if all did together.
+        /// The area in this stage. `None` if all areas went through it together.
         area: Option<u32>,
-        /// How long it took.
+        /// The time it took, seconds.
         seconds: f64,
     },
-    /// What an export has made.
+    /// An export is complete, with this summary.
     Summary(&'a Summary),
 }
 
-/// A piece of long work whose end can be foreseen.
+/// A piece of long work of a known size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Task {
-    /// Tells apart what is under way at the same time; never the same twice in a process.
+    /// A number that tells tasks apart. It is unique within a process.
     pub id: u64,
-    /// What is done: "rendering".
+    /// The action, such as "rendering".
     pub what: &'static str,
-    /// To what: "images".
+    /// What it is done to, such as "images".
     pub unit: &'static str,
-    /// How many units there are.
+    /// The number of units.
     pub total: u64,
 }
 
-/// How much a message matters.
+/// How important a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// Something may be wrong with the input or the result.
     Warning,
-    /// What a person wants to know.
+    /// Something a person wants to know.
     Info,
     /// Details.
     Debug,
 }
 
-/// A kind of a unit of work.
+/// A kind of unit of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

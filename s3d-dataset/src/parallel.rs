@@ -1,15 +1,14 @@
-//! Many independent pieces of work on all threads.
+//! Runs many independent pieces of work on all threads.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// Does `work` on every item, on every thread of the current pool. Items are handed out one at a time and in
-/// order, so that a slow one delays nobody else; at most one an item a thread is under way. After a failure,
-/// or a signal that asks for an end, no further item is begun, and the failure of the first item (by order)
-/// that failed is returned. Each thread works with a state of its own, which `state` makes: memory to be used
-/// again, nothing that a result depends on.
+/// Runs `work` on every item, on all threads of the current pool. Items are handed out one at a time and in
+/// order, so a slow item delays no other, and each thread works on at most one. After a failure or a request
+/// to end, no further item is begun. Returns the failure of the first failed item, by order. `state` makes a
+/// state for each thread: memory to use again, on which no result may depend.
 pub(crate) fn for_each_in_order<T: Sync, S>(
     ctx: &Context,
     items: &[T],
@@ -19,6 +18,7 @@ pub(crate) fn for_each_in_order<T: Sync, S>(
     let next = AtomicUsize::new(0);
     let ended = AtomicBool::new(false);
     let failure: Mutex<Option<(usize, Error)>> = Mutex::new(None);
+
     rayon::scope(|scope| {
         for _ in 0..rayon::current_num_threads().min(items.len()) {
             scope.spawn(|_| {
@@ -37,19 +37,20 @@ pub(crate) fn for_each_in_order<T: Sync, S>(
             });
         }
     });
+
     match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
         Some((_, e)) => Err(e),
         None => Ok(()),
     }
 }
 
-/// Does `work` on every item, on every thread of the current rayon pool; the results are in the order of the
-/// items. Items are handed out one at a time and in order. After a failure no further item is begun, and the
-/// failure of the first item that failed is returned. `state` makes what a thread works with: memory to be
-/// used again, nothing that a result depends on.
+/// Runs `work` on every item, on all threads of the current rayon pool, and returns the results in the order
+/// of the items. Items are handed out one at a time and in order. After a failure no further item is begun,
+/// and the failure of the first failed item is returned. `state` makes a state for each thread: memory to use
+/// again, on which no result may depend.
 ///
 /// # Errors
-/// What `work` returns; [`Error::Cancelled`].
+/// The errors of `work`, and [`Error::Cancelled`].
 pub fn map_in_order<T: Sync, S, R: Send + Sync>(
     ctx: &Context,
     items: &[T],

@@ -1,4 +1,4 @@
-//! A data set that is read by other crates.
+//! Reading a data set from other crates.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -20,49 +20,50 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 impl DataSet {
-    /// Opens the data set in a folder: its manifest, its list of files and its conventions, which must agree.
+    /// Opens the data set in a folder. Its manifest, its list of files and its conventions must agree.
     ///
     /// # Errors
-    /// [`Error::File`](crate::Error::File) with the one that does not, or if the export did not finish.
+    /// [`Error::File`](crate::Error::File) with the first file that does not agree, or if the export did not
+    /// finish.
     pub fn open(folder: &Path) -> Result<Self> {
         Self::open_in(&Layout::new(folder))
     }
 
-    /// The same, of an export that did not finish, too: what is there of it so far. [`DataSet::missing_yet`]
-    /// tells what is not.
+    /// Opens a data set, also one whose export did not finish, with the files so far.
+    /// [`DataSet::missing_yet`] tells what is missing.
     ///
     /// # Errors
-    /// As [`DataSet::open`].
+    /// The same as for [`DataSet::open`].
     pub fn open_as_far_as_it_is(folder: &Path, ctx: &Context) -> Result<Self> {
         Self::open_unfinished_in(ctx, &Layout::new(folder))
     }
 
-    /// What an export that did not finish lacks, a sentence each; `None` if it is complete.
+    /// Returns what an unfinished export lacks, a sentence each. Returns `None` if the data set is complete.
     pub fn missing_yet(&self) -> Option<&[String]> {
         self.unfinished.as_ref().map(|unfinished| &*unfinished.missing)
     }
 
-    /// Where its files lie.
+    /// Returns the paths of its files.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// The version of s3d that made it.
+    /// Returns the version of s3d that made it.
     pub fn version(&self) -> &str {
         &self.manifest.version
     }
 
-    /// The seed that it was made with.
+    /// Returns the seed that it was made with.
     pub fn seed(&self) -> u64 {
         self.manifest.seed
     }
 
-    /// The options that it was made with, but for the seed.
+    /// Returns the options that it was made with, except for the seed.
     pub fn options(&self) -> &ExportOptions {
         &self.manifest.options
     }
 
-    /// How many files it has, all but `manifest.json` and `files.csv`, and their bytes.
+    /// Returns the number and the bytes of its files, without `manifest.json` and `files.csv`.
     pub fn size(&self) -> (u64, u64) {
         self.manifest
             .files
@@ -70,25 +71,25 @@ impl DataSet {
             .map_or((0, 0), |list| (list.count, list.bytes))
     }
 
-    /// The numbers of its areas.
+    /// Returns the numbers of its areas.
     pub fn areas(&self) -> &[u32] {
         &self.manifest.area_numbers
     }
 
-    /// What the manifest tells of its areas: the entries of `areas`, which serialize as they stand there.
+    /// Iterates over the manifest's entries of `areas`. They serialize as they stand there.
     pub fn area_entries(&self) -> impl Iterator<Item = impl Serialize + use<'_>> {
         self.manifest.areas.iter()
     }
 
-    /// The classes and types of rooms of its labels; `None` if it has no labels.
+    /// Returns the classes and room types of its labels. Returns `None` if it has no labels.
     pub fn taxonomy(&self) -> Option<&Taxonomy> {
         self.manifest.is_labelled().then_some(&self.taxonomy)
     }
 
-    /// Its labels; `None` if it has none.
+    /// Returns its label table. Returns `None` if it has no labels.
     ///
     /// # Errors
-    /// [`Error::File`](crate::Error::File) if the table is damaged, or holds what is no label.
+    /// [`Error::File`](crate::Error::File) if the table is damaged, or holds something other than labels.
     pub fn labels(&self) -> Result<Option<LabelTable>> {
         let Some(taxonomy) = self.taxonomy() else { return Ok(None) };
         let path = self.layout().labels_json();
@@ -96,15 +97,17 @@ impl DataSet {
         Ok(Some(table.map_err(|e| FileError::format(&path, e.to_string()))?))
     }
 
-    /// The coloured mesh of an area with its textures: the one that its images show. Faces are in the order
-    /// of the file. `None` if it is not there yet.
+    /// Returns the coloured mesh of an area with its textures, as its images show it. Faces are in the order
+    /// of the file. Returns `None` if the mesh does not exist yet.
     ///
     /// # Errors
-    /// [`Error::File`](crate::Error::File) if it, a material or a texture is missing or damaged, or it has
-    /// not as many faces as the manifest tells of.
+    /// [`Error::File`](crate::Error::File) if the mesh, a material or a texture is missing or damaged, or the
+    /// number of faces is not the manifest's.
     pub fn mesh(&self, area: u32) -> Result<Option<MeshFile>> {
-        let (path, folder) = (self.layout().rgb_obj(area), self.layout().mesh_dir(area));
-        let (materials, textures) = (path.with_extension("mtl"), folder.join("rgb_textures"));
+        let path = self.layout().rgb_obj(area);
+        let folder = self.layout().mesh_dir(area);
+        let materials = path.with_extension("mtl");
+        let textures = folder.join("rgb_textures");
         if !self.names(&path) {
             return Ok(None);
         }
@@ -118,8 +121,8 @@ impl DataSet {
         Ok(Some(file))
     }
 
-    /// How the points of the annotations voted for each face of [`DataSet::mesh`]; `None` if the area has no
-    /// labels.
+    /// Returns how the annotated points voted for each face of [`DataSet::mesh`]. Returns `None` if the area
+    /// has no labels.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File).
@@ -133,7 +136,7 @@ impl DataSet {
         Ok(Some(votes))
     }
 
-    /// Refuses a file that tells of another number of faces than the manifest.
+    /// Refuses a file whose number of faces is not the manifest's.
     fn fits(&self, area: u32, path: &Path, faces: usize) -> Result<()> {
         match self.manifest.area(area) {
             Some(entry) if entry.faces != faces => {
@@ -144,8 +147,8 @@ impl DataSet {
         }
     }
 
-    /// The annotated rooms of an area, by type and number: those of its S3DIS tree; none if the data set has
-    /// no labels.
+    /// Returns the annotated rooms of an area's S3DIS tree, by type and number. Returns none if the data set
+    /// has no labels.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File) if the tree is damaged.
@@ -156,7 +159,7 @@ impl DataSet {
         }
     }
 
-    /// How many points an instance of [`DataSet::tree_rooms`] has.
+    /// Returns the number of points of an instance of [`DataSet::tree_rooms`].
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File) if its file is missing or damaged;
@@ -164,10 +167,11 @@ impl DataSet {
     pub fn point_count(&self, instance: &TreeInstance, ctx: &Context) -> Result<u64> {
         let path = &instance.path;
         let mut file = self.files.open(path)?;
-        let (mut block, mut lines) = (vec![0; 1 << 18], 0);
+        let mut block = vec![0; 1 << 18];
+        let mut lines = 0;
         loop {
             ctx.check()?;
-            // Its end is an error if these are not the lines that were written, each a point.
+            // The end of the file is an error if its lines, a point each, are not as written.
             let n = file.read(&mut block).map_err(|e| match e.kind() {
                 ErrorKind::InvalidData => FileError::format(path, e.to_string()),
                 _ => FileError::io(path, "read", e),
@@ -179,7 +183,7 @@ impl DataSet {
         }
     }
 
-    /// The instances of an area, with their boxes; none if it has no labels.
+    /// Returns the instances of an area with their boxes. Returns none if the area has no labels.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File).
@@ -191,12 +195,12 @@ impl DataSet {
         Ok(read_instances(self.files.checked(&path)?)?)
     }
 
-    /// The images of an area, by scan location and room, views by number and the panorama last.
+    /// Returns the images of an area, sorted by scan location and room: views by number, then the panorama.
     pub fn images(&self, area: u32) -> Vec<DatasetImage> {
         self.files.images(self.layout(), area)
     }
 
-    /// Every candidate view of an area, kept or dropped; none if they are not listed yet.
+    /// Returns every candidate view of an area, kept or dropped. Returns none if they are not listed yet.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File).
@@ -208,7 +212,7 @@ impl DataSet {
         Ok(read_views(self.files.checked(&path)?)?)
     }
 
-    /// The pose of an image.
+    /// Returns the pose of an image.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File).
@@ -216,11 +220,11 @@ impl DataSet {
         Ok(read_pose(self.files.checked(&image.path(self.layout(), Domain::Pose))?)?)
     }
 
-    /// The camera of an image of so many pixels, of which `pose` is the pose: a panorama, or the pinhole that
-    /// its K describes.
+    /// Returns the camera of an image from its pose and its size in pixels: a panorama, or the pinhole camera
+    /// of its matrix K.
     ///
     /// # Errors
-    /// [`Error::File`](crate::Error::File) if the two do not make a camera.
+    /// [`Error::File`](crate::Error::File) if pose and size do not make a camera.
     pub fn camera(&self, image: &DatasetImage, pose: &PoseFile, size: [u32; 2]) -> Result<Camera> {
         let path = image.path(self.layout(), Domain::Pose);
         let [width, height] = size;
@@ -235,12 +239,12 @@ impl DataSet {
         Ok(of_k.map_err(|e| FileError::format(&path, e.to_string()))?)
     }
 
-    /// Whether the list of files names this path.
+    /// Returns whether the list of files names this path.
     pub fn names(&self, path: &Path) -> bool {
         self.files.bytes(path).is_ok()
     }
 
-    /// The content of a file.
+    /// Returns the content of a file.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File) if it is missing or damaged, or the list does not name it.
@@ -248,8 +252,8 @@ impl DataSet {
         Ok(self.files.read_bytes(path)?)
     }
 
-    /// The files that are gone or of another size than was written: paths below the data set's folder, and
-    /// what is wrong with each, without its path. No file is opened.
+    /// Returns the files that are missing or have another size than was written: their paths below the data
+    /// set's folder, each with a message without the path. Opens no file.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled); [`Error::Temporary`](crate::Error::Temporary).

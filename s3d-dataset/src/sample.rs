@@ -1,4 +1,4 @@
-//! A mesh's file to a dense coloured point cloud.
+//! Samples a mesh file into a dense coloured point cloud.
 
 use crate::context::Context;
 use crate::error::{Result, UsageError};
@@ -11,21 +11,21 @@ use s3d_io::mesh::{LengthUnit, MeshOptions, MeshOrigin, UpAxis};
 use std::path::Path;
 use std::time::Instant;
 
-/// Points drawn at a time: what is in memory of a cloud of any size.
+/// The number of points that are drawn and in memory at a time.
 const CHUNK: u64 = 1 << 20;
 
 /// How a mesh is sampled.
 #[derive(Clone, Debug)]
 pub struct SampleOptions {
-    /// Which axis of the mesh's file points up.
+    /// The axis of the mesh file that points up.
     pub up: UpAxis,
-    /// The unit of the mesh's file; `None`: what it says, or else metres.
+    /// The unit of the mesh file. `None`: the unit that the file states, or else metres.
     pub units: Option<LengthUnit>,
-    /// How many points there are.
+    /// The number of points, in all or per m².
     pub density: Density,
-    /// Everything random comes from it.
+    /// The seed of everything random.
     pub seed: u64,
-    /// Replace the file if it is there.
+    /// Replace an existing file.
     pub overwrite: bool,
 }
 
@@ -35,13 +35,14 @@ impl Default for SampleOptions {
     }
 }
 
-/// Samples a mesh's file densely and uniformly into the PLY file `output`: world metres, Z-up, with colours.
-/// From a mesh far from the origin an offset is subtracted ([`MeshOrigin::Near`]). Returns the number of
+/// Samples a mesh file densely and uniformly into the PLY file `output`: world metres, Z-up, with colours. If
+/// the mesh is far from the origin, an offset is subtracted ([`MeshOrigin::Near`]). Returns the number of
 /// points.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if the file's name is not that of a PLY file, if it is there and not to be replaced, or
-/// the points are too many; [`Error::File`](crate::Error::File); [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Error::Usage`](crate::Error::Usage) if `output` does not end in `.ply`, exists and is not to be
+/// replaced, or there are too many points. [`Error::File`](crate::Error::File).
+/// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context) -> Result<u64> {
     if !output
         .extension()
@@ -51,17 +52,21 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
         return Err(UsageError::WrongEnding { path: output.to_owned(), why }.into());
     }
     NewFile::check_free(output, options.overwrite)?;
+
     let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
     let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
     ctx.warn_each(&file.warnings);
+
     let points = match options.density {
         Density::PerM2(points_per_m2) => file.mesh.total_area() * points_per_m2,
         Density::Total(points) => points as f64,
     };
     check_points(points)?;
-    // What a killed process left takes no space after this.
+
+    // A killed process's file is removed here, so it takes no space afterwards.
     let file_of_points = NewFile::begin(ctx, output, options.overwrite)?;
     check_space(points * PLY_POINT_BYTES, output)?;
+
     if file.offset_m != DVec3::ZERO {
         ctx.info(format_args!(
             "the mesh lies far from the origin: {:?} is subtracted from its coordinates, which the cloud's \
@@ -69,10 +74,12 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
             file.offset_m.to_array()
         ));
     }
+
     let started = Instant::now();
     let sampler = SurfaceSampler::new(&file.mesh, options.density, options.seed);
     let mut ply = PlyPointWriter::create_moved(file_of_points.path(), sampler.len(), file.offset_m)?;
     let progress = ctx.progress("sampling", "points", sampler.len());
+
     let mut cloud = PointCloud::default();
     let mut at = 0;
     while at < sampler.len() {
@@ -83,9 +90,11 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
         progress.add(end - at);
         at = end;
     }
+
     ply.finish()?;
     file_of_points.finish()?;
     drop(progress);
+
     ctx.info(format_args!(
         "{}: {} points on {:.1} m² in {:.1} s",
         output.display(),

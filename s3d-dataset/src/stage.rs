@@ -1,4 +1,4 @@
-//! The stages of an export, by which time is told.
+//! The stages of an export, for reports of time.
 
 use serde::Serialize;
 
@@ -19,14 +19,14 @@ pub enum Stage {
     Meshes,
     /// Points are sampled and written.
     Points,
-    /// Of shards: their files come into one folder.
+    /// The files of shards move into one folder.
     Merge,
-    /// What is made of all areas together.
+    /// Files over all areas together are made.
     Tables,
 }
 
 impl Stage {
-    /// Its name in logs.
+    /// Returns its name in logs.
     pub fn name(self) -> &'static str {
         match self {
             Self::Load => "load",

@@ -1,4 +1,4 @@
-//! What an export has made: files, bytes, images, missing pixels, views that were dropped, time per stage.
+//! The summary of an export: files, bytes, images, missing pixels, dropped views, and the time of each stage.
 
 use crate::stage::Stage;
 use serde::{Deserialize, Serialize};
@@ -6,52 +6,52 @@ use std::collections::BTreeMap;
 use std::iter::Sum;
 use std::ops::AddAssign;
 
-/// Images of one kind, and what of them was cast.
+/// The number of images of one kind, and of their pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ImageTally {
-    /// Panoramas or views, however many modalities each has.
+    /// The number of panoramas or views, however many modalities each has.
     pub images: u64,
-    /// Pixels that were cast: none where only poses are asked for.
+    /// The number of pixels that were cast. 0 if only poses are asked for.
     pub pixels: u64,
-    /// Those among them whose ray meets no face: missing in every modality.
+    /// The number of cast pixels whose ray meets no face. They are missing in every modality.
     pub pixels_missing: u64,
-    /// Those whose face has no label: 0 where no semantic image is asked for.
+    /// The number of cast pixels whose face has no label. 0 if no semantic image is asked for.
     pub pixels_unlabelled: u64,
-    /// Those whose face has a label by filling alone: without it they would have none.
+    /// The number of cast pixels whose face has a label only by filling.
     pub pixels_filled: u64,
 }
 
-/// So much of a mesh, and of what its images show.
+/// A part of a mesh's surface, and of what images show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Surface {
-    /// Faces.
+    /// The number of faces.
     pub faces: u64,
-    /// Square metres.
+    /// The area, in m².
     pub m2: f64,
-    /// Pixels of panoramas and views together; none without images of labels.
+    /// The number of pixels in panoramas and views together. `None` without images of labels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pixels: Option<u64>,
 }
 
-/// Surface that nobody voted for, and what of it has no label: the rest was filled.
+/// The surface without votes, and the part of it without a label. The rest was filled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Unlabelled {
     /// Before filling.
     pub without_votes: Surface,
-    /// After it.
+    /// After filling.
     pub without_label: Surface,
 }
 
-/// What a unit of work wrote. Kept in the journal, so that a run that goes on can tell of the whole.
+/// What a unit of work wrote. The journal keeps it, so that a later run can report the whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnitTally {
-    /// Files.
+    /// The number of files.
     pub files: u64,
-    /// Their bytes.
+    /// The bytes of all files.
     pub bytes: u64,
-    /// Panoramas among them.
+    /// The panoramas among them.
     pub panoramas: ImageTally,
-    /// Perspective views among them.
+    /// The perspective views among them.
     pub views: ImageTally,
 }
 
@@ -100,48 +100,48 @@ impl Sum for UnitTally {
     }
 }
 
-/// What became of the candidate views.
+/// What happened to the candidate views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ViewTally {
-    /// All that were drawn.
+    /// The number of drawn candidates.
     pub candidates: u64,
-    /// Those that were selected.
+    /// The number of kept ones.
     pub kept: u64,
-    /// Dropped since their entropies are the lowest of their pool.
+    /// Dropped because their entropies are the lowest of their pool.
     pub dropped_lowest: u64,
-    /// Dropped since they were not drawn from the middle of their pool.
+    /// Dropped because they were not drawn from the middle of their pool.
     pub dropped_not_drawn: u64,
-    /// Kept, but of scan locations that `--only` leaves out: not written.
+    /// Kept but not written, since `--only` leaves out their scan locations.
     pub not_asked: u64,
 }
 
-/// What an export has made, all areas together, earlier runs of the same export included.
+/// What an export has made over all areas, in this run and in earlier ones.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
     /// The data set's folder.
     pub output: String,
-    /// Number of areas.
+    /// The number of areas.
     pub areas: u64,
-    /// Number of scan locations.
+    /// The number of scan locations.
     pub locations: u64,
     /// All files of the data set, and its images.
     #[serde(flatten)]
     pub tally: UnitTally,
-    /// What became of the candidate views.
+    /// What happened to the candidate views.
     pub candidate_views: ViewTally,
-    /// What has no votes and no label: none of a shard, and of a data set without labels.
+    /// The surface without votes and without a label. `None` for a shard, and for a data set without labels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unlabelled: Option<Unlabelled>,
-    /// Warnings of this run.
+    /// The warnings of this run.
     pub warnings: u64,
-    /// Of this run, by stage.
+    /// The time of each stage in this run, seconds.
     pub stage_seconds: BTreeMap<Stage, f64>,
-    /// Of this run, in all.
+    /// The time of this run, seconds.
     pub seconds: f64,
 }
 
 impl Summary {
-    /// What it says to a person, a few lines.
+    /// Returns the summary in a few lines for a person.
     pub fn lines(&self) -> Vec<String> {
         let Self { output, locations, tally, candidate_views: views, .. } = self;
         let mut lines = vec![
@@ -151,6 +151,7 @@ impl Summary {
             ),
             format!("{} files, {}", tally.files, size(tally.bytes)),
         ];
+
         let stages: Vec<String> = self
             .stage_seconds
             .iter()
@@ -159,6 +160,7 @@ impl Summary {
         if !stages.is_empty() {
             lines.push(format!("{} (meshes and points are written beside the images)", stages.join(", ")));
         }
+
         let missing: Vec<String> = [("panoramas", tally.panoramas), ("views", tally.views)]
             .iter()
             .filter_map(|(kind, t)| Some(format!("{} of the pixels of {kind}", percent(t.share_missing()?))))
@@ -166,6 +168,7 @@ impl Summary {
         if !missing.is_empty() {
             lines.push(format!("missing, for no face is there: {}", missing.join(", ")));
         }
+
         let unlabelled: Vec<String> = [("panoramas", tally.panoramas), ("views", tally.views)]
             .iter()
             .filter_map(|(kind, t)| Some((kind, t.share_unlabelled().filter(|share| *share > 0.0)?)))
@@ -177,6 +180,7 @@ impl Summary {
                 unlabelled.join(", ")
             ));
         }
+
         if let Some(Unlabelled { without_votes, without_label }) = self.unlabelled
             && without_label.faces < without_votes.faces
         {
@@ -190,6 +194,7 @@ impl Summary {
                 without_votes.m2
             ));
         }
+
         if views.candidates > views.kept {
             lines.push(format!(
                 "{} of {} candidate views dropped: {} for the lowest entropies of their pool, {} not drawn \
@@ -200,32 +205,35 @@ impl Summary {
                 views.dropped_not_drawn
             ));
         }
+
         if views.not_asked > 0 {
             lines.push(format!(
                 "{} kept views are of locations whose images were not asked for",
                 views.not_asked
             ));
         }
+
         if self.warnings > 0 {
             lines.push(format!("{} warnings above", self.warnings));
         }
+
         lines
     }
 }
 
 impl ImageTally {
-    /// The share of missing pixels, if any was cast.
+    /// Returns the share of missing pixels, if any was cast.
     fn share_missing(&self) -> Option<f64> {
         (self.pixels > 0).then(|| self.pixels_missing as f64 / self.pixels as f64)
     }
 
-    /// The share of pixels whose face has no label, if any was cast.
+    /// Returns the share of pixels whose face has no label, if any was cast.
     pub(crate) fn share_unlabelled(&self) -> Option<f64> {
         (self.pixels > 0).then(|| self.pixels_unlabelled as f64 / self.pixels as f64)
     }
 }
 
-/// "0 %" is none at all, and "100 %" all.
+/// Writes a share as a percentage. "0 %" means none at all, and "100 %" all.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     if share > 0.0 && percent < 0.01 {
@@ -239,11 +247,11 @@ fn percent(share: f64) -> String {
     }
 }
 
-/// Bytes in powers of 1000, as disks are sold.
+/// Writes bytes in powers of 1000, as disks are sold.
 pub(crate) fn size(bytes: u64) -> String {
     let mut value = bytes as f64;
     for unit in ["bytes", "kB", "MB", "GB"] {
-        // What would be rounded up to 1000 is of the next unit.
+        // A value that would round up to 1000 belongs to the next unit.
         if value < 999.95 {
             return if unit == "bytes" {
                 format!("{bytes} bytes")
@@ -296,6 +304,7 @@ mod tests {
         };
         let lines = summary.lines();
         assert_eq!(lines, ["out: 0 panoramas and 0 views of 2 locations in 1.2 s", "4 files, 2.5 kB"]);
+
         summary.tally.views = ImageTally {
             images: 7,
             pixels: 1000,
@@ -306,8 +315,10 @@ mod tests {
         let surface = |faces, m2, pixels| Surface { faces, m2, pixels: Some(pixels) };
         summary.unlabelled =
             Some(Unlabelled { without_votes: surface(9, 2.5, 150), without_label: surface(4, 0.5, 120) });
+
         summary.candidate_views =
             ViewTally { candidates: 20, kept: 15, dropped_lowest: 3, dropped_not_drawn: 2, not_asked: 8 };
+
         summary.stage_seconds = [(Stage::Render, 0.5), (Stage::Load, 0.25)].into();
         let text = summary.lines().join("\n");
         for part in [

@@ -1,4 +1,4 @@
-//! `s3d xyz`: the world coordinates of a data set's images, from depth and pose.
+//! `s3d xyz`: makes the world coordinates of a data set's images from depth and pose.
 
 use crate::context::Context;
 use crate::error::{Result, UsageError};
@@ -18,14 +18,14 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// How world coordinates are made again.
+/// How world coordinates are made from depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct XyzOptions {
     /// [`XyzType::Half`] or [`XyzType::Float`].
     pub xyz: XyzType,
-    /// Replace coordinates that are there, though they may be more exact.
+    /// Replace existing coordinates, though they may be more exact.
     pub overwrite: bool,
-    /// How much time the images' files may take.
+    /// How much time the compression of images may take.
     pub compression: Compression,
 }
 
@@ -35,23 +35,25 @@ impl Default for XyzOptions {
     }
 }
 
-/// Makes the world coordinates of a data set's images again, from depth and pose: off by half of a step of
-/// depth along the ray. Returns the number of images.
+/// Makes the world coordinates of a data set's images from depth and pose. They are off by at most half a
+/// step of depth along the ray. Returns the number of images.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if coordinates are there and not to be replaced; [`Error::File`](crate::Error::File) if there is no data set,
-/// or no image with both depth and pose, or one of these is damaged; [`Error::Cancelled`](crate::Error::Cancelled);
-/// [`Error::Temporary`](crate::Error::Temporary). The data set stays as it was then; so it does when the process is killed, or the
-/// same call completes what it had begun.
+/// [`Error::Usage`](crate::Error::Usage) if coordinates exist and are not to be replaced.
+/// [`Error::File`](crate::Error::File) if there is no data set, no image has both depth and pose, or one of
+/// these is damaged. [`Error::Cancelled`](crate::Error::Cancelled) or
+/// [`Error::Temporary`](crate::Error::Temporary). After an error the data set is as it was before. After a
+/// kill it is too, or the same call completes the change.
 pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Result<usize> {
     if options.xyz == XyzType::None {
         let range = "half or float".to_owned();
         return Err(UsageError::OutOfRange { option: "xyz", range }.into());
     }
+
     let layout = &Layout::new(root.into());
     Manifest::require(layout)?;
     let call = format!("xyz as {}, {}", options.xyz, options.compression);
-    // Nobody may replace the data set meanwhile.
+    // The lock keeps others from replacing the data set.
     Lock::during(ctx, layout, |completed| {
         let data = DataSet::open_in(layout)?;
         let works = works(&data)?;
@@ -75,7 +77,7 @@ struct Work {
     is_photograph: bool,
 }
 
-/// The images that have depth and pose, by area.
+/// Returns the images with depth and pose, by area.
 fn works(data: &DataSet) -> Result<Vec<Work>> {
     let mut works = Vec::new();
     for area in &data.manifest.area_numbers {
@@ -104,8 +106,10 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
         }
         .into());
     }
+
     let needed: BTreeSet<&Path> = works.iter().flat_map(|w| [&*w.pose, &*w.depth]).collect();
     data.files.require(ctx, |path| needed.contains(path))?;
+
     let change = Change::begin(layout)?;
     let staged = change.staged();
     for area in &data.manifest.area_numbers {
@@ -113,6 +117,7 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
             create_dir(&staged.image_dir(*area, kind, Domain::GlobalXyz))?;
         }
     }
+
     let conventions = data.manifest.conventions();
     let progress = ctx.progress("coordinates", "images", works.len() as u64);
     let changed = Mutex::new(Vec::with_capacity(works.len() + 1));
@@ -130,6 +135,7 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
         },
     )?;
     drop(progress);
+
     let mut changed = changed.into_inner().unwrap_or_else(PoisonError::into_inner);
     let mut manifest = Manifest::read(layout)?;
     manifest.xyz_from_depth(args.xyz, conventions.depth_units);
@@ -139,6 +145,7 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
     changed.push(FileRecord::of_file(staged.root(), &staged.conventions())?);
     listing::write_changed(data, &mut manifest, changed, |_| false, staged)?;
     change.commit(call, &[])?;
+
     ctx.info(format_args!(
         "{}: world coordinates of {} images from depth and pose",
         layout.root().display(),
@@ -147,7 +154,7 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
     Ok(works.len())
 }
 
-/// The file of an image's world coordinates.
+/// Returns the file of an image's world coordinates.
 fn make_one(
     files: &Listed,
     work: &Work,
@@ -157,6 +164,7 @@ fn make_one(
 ) -> Result<Vec<u8>> {
     let pose = read_pose(files.checked(&work.pose)?)?;
     let depth = decode_gray16(&files.read_bytes(&work.depth)?, &work.depth)?;
+
     let camera = if work.frame == Frame::Panorama {
         if depth.width() != 2 * depth.height() {
             let size =
@@ -171,15 +179,16 @@ fn make_one(
             return Err(FileError::format(&work.pose, message).into());
         }
         let camera = Camera::perspective(pose.pose(), fov, depth.width(), depth.height());
-        // A photograph's focal lengths and principal point are its own.
-        if !work.is_photograph {
-            camera
-        } else {
+        // A photograph has focal lengths and a principal point of its own.
+        if work.is_photograph {
             Camera::from_k_rt(pose.camera_k_matrix, camera.pose.rt_matrix(), depth.width(), depth.height())
                 .map(|of_k| Camera { pose: camera.pose, ..of_k })
                 .map_err(|e| FileError::format(&work.pose, e.to_string()))?
+        } else {
+            camera
         }
     };
+
     let points = points(&camera, &depth, units);
     Ok(match kind {
         XyzType::Float => encode_xyz_float(&points, compression),
@@ -187,7 +196,8 @@ fn make_one(
     })
 }
 
-/// location + direction × depth, the direction through the middle of the pixel; 0 where depth is missing.
+/// Returns location + direction × depth for each pixel, along the ray through its middle. Missing depth gives
+/// 0.
 pub(crate) fn points(camera: &Camera, depth: &Raster<u16>, units: DepthUnits) -> Raster<[f32; 3]> {
     let rays = camera.rays();
     let mut points = Raster::filled(depth.width(), depth.height(), [0.0; 3]);

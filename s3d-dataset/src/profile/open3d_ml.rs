@@ -161,8 +161,10 @@ mod tests {
         let mut text = String::new();
         for i in -50..=50 {
             for j in -20..=20 {
-                let (u, v) = (f64::from(i) * 0.02, f64::from(j) * 0.02);
-                let (x, y) = (4.0 + u * cos - v * sin, -3.0 + u * sin + v * cos);
+                let u = f64::from(i) * 0.02;
+                let v = f64::from(j) * 0.02;
+                let x = 4.0 + u * cos - v * sin;
+                let y = -3.0 + u * sin + v * cos;
                 text += &format!("{x:.3} {y:.3} 0.7 0 0 0\n{x:.3} {y:.3} 0.75 0 0 0\n");
             }
         }

@@ -75,7 +75,7 @@ impl Lock {
     /// completed first, and `work` gets the call that made it.
     ///
     /// # Errors
-    /// The same as for [`Lock::take`], and those of `work`.
+    /// The errors of [`Lock::take`] and of `work`.
     pub(crate) fn during<T>(
         ctx: &Context,
         layout: &Layout,

@@ -1,23 +1,23 @@
-//! Few places that together see much: the greedy cover of the art-gallery problem.
+//! Chooses few places that together see much: the greedy cover of the art-gallery problem.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// A candidate of whose view less than this share is seen by the chosen ones asks for one more: so a small
+/// A candidate asks for one more place if the chosen ones see less than this share of its view. So a small
 /// room is not left out because it is little of a large building.
 const SHARE_OF_EVERY_VIEW: f64 = 0.5;
 
-/// How many samples are seen.
+/// Numbers of samples that are seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cover {
-    /// By any candidate.
+    /// The samples seen by any candidate.
     pub(super) visible: usize,
-    /// By one chosen place or more, by two or more, by three or more.
+    /// The samples seen by at least one, two and three chosen places.
     pub(super) seen_by: [usize; 3],
 }
 
 impl Cover {
-    /// What is seen by the chosen places, of what is by all that there are.
+    /// Counts what the chosen places see, and what all places see.
     pub(super) fn of<'a>(
         chosen: &[Vec<u32>],
         all: impl Iterator<Item = &'a Vec<u32>>,
@@ -29,30 +29,34 @@ impl Cover {
     }
 }
 
-/// Chooses places one by one, each that with the largest `weight` times the number of samples that it sees
-/// and no place before it does; of equal ones the first. Ends when `share` of what all together see is seen,
-/// and of what each of them sees at least half.
+/// Chooses places one by one. The next place has the largest product of `weight` and the number of its
+/// samples that no chosen place sees; the first wins a tie. Ends when the chosen places see `share` of what
+/// all places see together, and at least half of what each place sees.
 ///
-/// The gain of a place only shrinks, so that it need not be counted again while the old count of another is
+/// The gain of a place only shrinks. So a place with a new gain above the old gain of every other is the
+/// best, and those others need not be counted again (Minoux 1978).
 /// smaller than its new one (Minoux 1978).
 pub(super) fn greedy(lists: &[Vec<u32>], weights: &[u64], samples: usize, share: f64) -> (Vec<usize>, Cover) {
     let visible = visible(lists.iter(), samples);
     let enough = (share * visible as f64).ceil() as usize;
     let mut times = vec![0u8; samples];
-    let (mut chosen, mut seen) = (Vec::new(), 0);
+    let mut chosen = Vec::new();
+    let mut seen = 0;
+
     let mut heap: BinaryHeap<(u64, Reverse<usize>)> = lists
         .iter()
         .zip(weights)
         .enumerate()
         .map(|(i, (l, w))| (l.len() as u64 * w, Reverse(i)))
         .collect();
+
     while seen < enough
         && let Some((old, Reverse(place))) = heap.pop()
     {
         let new = unseen(&times, &lists[place]);
         let gain = new as u64 * weights[place];
         if gain < old {
-            // Again when it is its turn; what adds nothing never is.
+            // It gets another turn with its new gain, unless it adds nothing.
             heap.extend((gain > 0).then_some((gain, Reverse(place))));
             continue;
         }
@@ -60,7 +64,8 @@ pub(super) fn greedy(lists: &[Vec<u32>], weights: &[u64], samples: usize, share:
         see(&mut times, &lists[place]);
         chosen.push(place);
     }
-    // Those that ask for one more are never more than before.
+
+    // The set of asking candidates only shrinks.
     let mut asking: Vec<usize> = (0..lists.len()).collect();
     loop {
         asking.retain(|&i| {
@@ -73,6 +78,7 @@ pub(super) fn greedy(lists: &[Vec<u32>], weights: &[u64], samples: usize, share:
         see(&mut times, &lists[place]);
         chosen.push(place);
     }
+
     (chosen, Cover { visible, seen_by: seen_by(&times) })
 }
 
@@ -87,7 +93,7 @@ fn see(times: &mut [u8], list: &[u32]) {
     }
 }
 
-/// How many samples are in any of some lists.
+/// Returns how many samples are in at least one list.
 fn visible<'a>(lists: impl Iterator<Item = &'a Vec<u32>>, samples: usize) -> usize {
     let mut times = vec![0; samples];
     lists.for_each(|list| see(&mut times, list));
@@ -108,7 +114,8 @@ mod tests {
         let (chosen, cover) = greedy(&lists, &[1; 4], 10, 1.0);
         assert_eq!(chosen, [1, 3, 0]);
         assert_eq!(cover, Cover { visible: 9, seen_by: [9, 0, 0] });
-        // Twice the weight: four samples count eight.
+
+        // With twice the weight, four samples count as eight.
         let (chosen, cover) = greedy(&lists, &[1, 1, 2, 1], 10, 1.0);
         assert_eq!(chosen, [2, 0, 1, 3]);
         assert_eq!(cover.seen_by, [9, 4, 0]);
@@ -116,11 +123,12 @@ mod tests {
 
     #[test]
     fn a_small_room_is_not_left_out_for_being_small() {
-        // Two samples of a hundred are in a room of their own.
+        // Two of a hundred samples are in a room of their own.
         let lists = [(0..98).collect::<Vec<u32>>(), (0..50).collect(), vec![98, 99]];
         let (chosen, cover) = greedy(&lists, &[1; 3], 100, 0.9);
         assert_eq!((chosen, cover.seen_by[0]), (vec![0, 2], 100));
-        // Half of what the third sees is seen already.
+
+        // Half of the third view is seen already.
         let lists = [(0..98).collect::<Vec<u32>>(), vec![], vec![96, 97, 98, 99]];
         assert_eq!(greedy(&lists, &[1; 3], 100, 0.9).0, [0]);
     }

@@ -1,44 +1,45 @@
-//! A grid of vertical lines, and where they meet surfaces.
+//! A grid of vertical lines, and the points where they meet surfaces.
 
 use crate::error::{InputError, Result};
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 use s3d_geom::TriMesh;
 
-/// The distance of the grid's lines, metres; larger where there is very much floor.
+/// The distance between the grid's lines, metres. It is larger if there is very much floor.
 pub(super) const STEP_M: f64 = 0.1;
 
-/// The largest distance of lines: diagonal neighbours are then as far apart as two balls of 0.2 m reach.
+/// The largest distance between lines, metres. The balls of free space of diagonal neighbours, of radius 0.2
+/// m, then just touch.
 pub(super) const MOST_STEP_M: f64 = 0.28;
 
-/// With more feet than this the grid is made coarser.
+/// The number of feet above which the grid is made coarser.
 const MANY_FEET: f64 = 400_000.0;
 
-/// With more feet than this on the coarsest grid, 300,000 m² of floors, nothing is placed.
+/// The number of feet on the coarsest grid above which nothing is placed. It means 300,000 m² of floors.
 const MOST_FEET: f64 = 4_000_000.0;
 
-/// Nor is on a mesh that is longer than this.
+/// The length of a mesh above which nothing is placed, metres.
 const MOST_EXTENT_M: f64 = 20_000.0;
 
-/// Layers of one floor, such as a rug on it, are one foot if nearer than this, metres.
+/// Layers of one floor, such as a rug on it, are one foot if they are nearer than this, metres.
 const LAYER_M: f64 = 0.08;
 
 /// A direction in the grid.
 pub(super) type Side = (i32, i32);
 
-/// A meeting of a line of the grid and a surface that faces up.
+/// A foot: the point where a grid line meets a surface that faces up.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Foot {
     pub(super) column: u64,
     pub(super) z: f64,
     pub(super) has_headroom: bool,
-    /// Free at the hips and above.
+    /// Whether a person fits: free at the hips and above.
     pub(super) walkable: bool,
-    /// Free space around, metres, or what it is not measured beyond.
+    /// The free space around, metres, up to the largest distance that is measured.
     pub(super) clearance_m: f32,
 }
 
-/// All sides of a foot up to so many lines away, and at least the next.
+/// Returns all sides of a foot up to a distance of `lines`, and at least its neighbours.
 pub(super) fn sides_within(lines: f64) -> Vec<Side> {
     let most = lines.floor().max(1.0) as i32;
     let all = (-most..=most).flat_map(|i| (-most..=most).map(move |j| (i, j)));
@@ -46,7 +47,7 @@ pub(super) fn sides_within(lines: f64) -> Vec<Side> {
     all.filter(|side| *side != (0, 0) && is_near(side)).collect()
 }
 
-/// Vertical lines at equal distances. They miss the lines on which builders of models put their edges.
+/// Vertical lines at equal distances. They are shifted off the round numbers on which modellers put edges.
 #[derive(Clone, Copy)]
 pub(super) struct Grid {
     pub(super) origin: DVec3,
@@ -55,7 +56,8 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// A grid for so many square metres that face up.
+    /// Builds a grid for `m2` of surface that faces up.
+
     pub(super) fn new(mesh: &TriMesh, m2: f64) -> Result<Self> {
         let step = (m2 / MANY_FEET).sqrt().clamp(STEP_M, MOST_STEP_M);
         let size = mesh.aabb().size().as_dvec3();
@@ -70,13 +72,14 @@ impl Grid {
             }
             .into());
         }
+
         let aabb = mesh.aabb();
         let min = aabb.min.as_dvec3();
         let columns = [size.x, size.y].map(|length| (length / step).ceil() as u64 + 1);
         Ok(Self { origin: min - dvec3(0.618, 0.382, 0.0) * step, step, columns })
     }
 
-    /// The longer side.
+    /// Returns the length of the longer side, metres.
     pub(super) fn extent_m(&self) -> f64 {
         self.columns[0].max(self.columns[1]) as f64 * self.step
     }
@@ -94,7 +97,7 @@ impl Grid {
         i * (self.columns[1] + 1) + j
     }
 
-    /// The column at one side of another.
+    /// Returns the column at one side of another.
     pub(super) fn beside(&self, column: u64, side: Side) -> Option<u64> {
         let [i, j] = self.indices(column);
         let i = i.checked_add_signed(side.0.into()).filter(|&i| i <= self.columns[0])?;
@@ -102,13 +105,15 @@ impl Grid {
         Some(self.column(i, j))
     }
 
-    /// Where the lines meet some faces, none of them upright; layers of one floor are one foot, the highest.
+    /// Returns the feet on some faces, none of them upright. Layers of one floor are one foot, at the
+    /// highest.
     pub(super) fn feet(&self, mesh: &TriMesh, faces: &[u32]) -> Vec<Foot> {
         let mut all: Vec<(u64, f64)> = faces
             .par_iter()
             .flat_map_iter(|&face| self.meetings(mesh.triangle(face)))
             .collect();
         all.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+
         let mut feet: Vec<Foot> = Vec::new();
         for (column, z) in all {
             match feet.last_mut() {
@@ -125,17 +130,19 @@ impl Grid {
         feet
     }
 
-    /// Where the lines meet a triangle.
+    /// Returns the columns and heights at which the lines meet a triangle.
     fn meetings(&self, corners: [Vec3; 3]) -> impl Iterator<Item = (u64, f64)> {
         let grid = *self;
         let [a, b, c] = corners.map(|p| (p.as_dvec3() - grid.origin) / dvec3(grid.step, grid.step, 1.0));
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        let cross = |p: DVec3, q: DVec3, x: f64, y: f64| (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
+        let low = a.min(b).min(c);
+        let high = a.max(b).max(c);
         let area = cross(a, b, c.x, c.y);
-        // Row by row: a long and narrow triangle is met by few of the lines around it.
+
+        // Go row by row, since a long and narrow triangle meets few of the lines around it.
         let row = move |i: u64| {
             let x = i as f64;
-            let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+            let mut from = f64::INFINITY;
+            let mut to = f64::NEG_INFINITY;
             for (p, q) in [(a, b), (b, c), (c, a)] {
                 if (p.x - x) * (q.x - x) <= 0.0 {
                     let t = if p.x == q.x {
@@ -144,21 +151,29 @@ impl Grid {
                         [(x - p.x) / (q.x - p.x); 2]
                     };
                     for y in t.map(|t| p.y + (q.y - p.y) * t) {
-                        (from, to) = (from.min(y), to.max(y));
+                        from = from.min(y);
+                        to = to.max(y);
                     }
                 }
             }
-            // For the rounding; the weights decide.
+            // The margin is for rounding; the weights below decide.
             (from.max(low.y) - 1e-6).ceil().max(0.0) as u64..=(to.min(high.y) + 1e-6).floor().max(0.0) as u64
         };
+
         let rows = low.x.ceil().max(0.0) as u64..=high.x.floor().max(0.0) as u64;
         rows.flat_map(move |i| row(i).map(move |j| (i, j)))
             .filter_map(move |(i, j)| {
-                let (x, y) = (i as f64, j as f64);
+                let x = i as f64;
+                let y = j as f64;
                 let [wa, wb, wc] =
                     [cross(b, c, x, y), cross(c, a, x, y), cross(a, b, x, y)].map(|w| w / area);
                 let is_in = wa >= 0.0 && wb >= 0.0 && wc >= 0.0;
                 is_in.then(|| (grid.column(i, j), grid.origin.z + wa * a.z + wb * b.z + wc * c.z))
             })
     }
+}
+
+/// Returns twice the signed area of the triangle `p`, `q`, (x, y), seen from above.
+fn cross(p: DVec3, q: DVec3, x: f64, y: f64) -> f64 {
+    (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x)
 }

@@ -1,8 +1,9 @@
-//! Scan locations for a scan without labels: where a tripod could stand inside, few of them, that see much.
+//! Places scan locations for a scan without labels: few of them, inside, where a tripod could stand, that see
+//! much.
 //!
-//! Three steps, a file each: `standing` (on a `grid`) finds where a person with a tripod can stand and walk,
-//! `visibility` what is seen from there, `cover` which few of these places to take. docs/formats.md ("Scan
-//! locations by free space") has every number.
+//! There are three steps, in a file each. `standing` (on a `grid`) finds where a person with a tripod can
+//! stand and walk, `visibility` finds what such places see, and `cover` chooses few of them. docs/formats.md
+//! ("Scan locations by free space") has every number.
 
 mod cover;
 mod grid;
@@ -24,66 +25,67 @@ use s3d_sample::poisson_disk_where;
 use standing::{Facing, Ground, Place};
 use visibility::{Enclosure, Surface};
 
-/// One candidate a square of this edge, metres, unless there would be more than [`MOST_CANDIDATES`].
+/// The edge of the squares with one candidate each, metres. Squares grow if there would be more than
+/// [`MOST_CANDIDATES`].
 const CELL_M: f64 = 0.5;
 
-/// From how many places the surface that is seen is counted.
+/// The largest number of places whose view is counted.
 const MOST_CANDIDATES: usize = 4000;
 
-/// How many places a pattern of given distance is chosen from.
+/// The largest number of places from which a pattern is chosen.
 const MOST_OF_PATTERN: usize = 12_000;
 
-/// A share of the surface below which locations are refused: what they would show is not the scan.
+/// The share of the surface below which locations are refused, since they would not show the scan.
 const LEAST_SEEN: f64 = 0.05;
 
-/// A share of the surface below which a warning says so.
+/// The share of the surface below which there is a warning.
 const FEW_SEEN: f64 = 0.4;
 
-/// What is asked for.
+/// How places are chosen.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FreeSpaceOptions {
-    /// Of the surface that can be seen from anywhere, the share to be seen, above 0 and at most 1.
+    /// The share of the visible surface that locations must see, above 0 and at most 1.
     pub(crate) share: f64,
-    /// A Poisson-disk pattern of this distance instead, metres.
+    /// The distance of a Poisson-disk pattern, which replaces `share`, metres.
     pub(crate) distance_m: Option<f64>,
     pub(crate) seed: u64,
 }
 
-/// Where a person could be, m² of floor.
+/// The floor where a person could be, in m².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FloorFound {
-    /// What faces up.
+    /// All surface that faces up.
     pub(crate) up_facing_m2: f64,
-    /// Of it what is free up to the height of a location.
+    /// The part of it that is free up to the height of a location.
     pub(crate) headroom_m2: f64,
-    /// Of it what is free around, and no top of a table or the like.
+    /// The part of that with free space around, without table tops and the like.
     pub(crate) walkable_m2: f64,
-    /// Of it what is inside.
+    /// The part of that inside.
     pub(crate) inside_m2: f64,
 }
 
-/// What [`place_in_free_space`] found.
+/// The result of [`place_in_free_space`].
 #[derive(Clone, Debug)]
 pub(crate) struct FreeSpace {
-    /// The locations: those that were chosen for the surface that they see, in the order of choice.
+    /// The locations. Those chosen by what they see are in the order of choice.
     pub(crate) locations: Vec<ScanLocation>,
     pub(crate) seen: SurfaceSeen,
     pub(crate) floor: FloorFound,
-    /// A sentence each.
+    /// Warnings, a sentence each.
     pub(crate) warnings: Vec<String>,
 }
 
-/// Puts scan locations where a tripod could stand inside: 1.5 m above surfaces that face up, with free space
-/// above and around, where rays end on front sides. They are chosen one by one, each where most surface is
-/// seen that was not seen before, until `share` of what can be seen from anywhere is, and from no place more
-/// than half of what it sees is unseen. With a distance they follow a Poisson-disk pattern instead: no two
-/// that see each other are nearer. All look along +Y.
+/// Places scan locations inside, where a tripod could stand: 1.5 m above surfaces that face up, with free
+/// space above and around, where rays end on front sides. Places are chosen one by one. Each sees as much new
+/// surface as possible, until `share` of the visible surface is seen, and at least half of what each place
+/// sees. With a distance they follow a Poisson-disk pattern instead: two that see each other are never
+/// nearer. All look along +Y.
 ///
-/// The same for the same mesh, options and seed, for any number of threads.
+/// The same mesh, options and seed give the same locations, for any number of threads.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) if there is no such place, or if hardly any surface is seen: what was found, and what may
-/// be wrong. [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Error::Input`](crate::Error::Input) if there is no such place, or hardly any surface is seen; the error
+/// says what was found and what may be wrong. [`Error::Cancelled`](crate::Error::Cancelled).
 pub(crate) fn place_in_free_space(
     ctx: &Context,
     area: u32,
@@ -94,21 +96,25 @@ pub(crate) fn place_in_free_space(
     let most = options.distance_m.map_or(MOST_CANDIDATES, |_| MOST_OF_PATTERN);
     let cell_m = options.distance_m.map_or(CELL_M, |d| (0.25 * d).clamp(STEP_M, CELL_M));
     let mesh = scene.mesh();
+
+    // Find the places, and what can be seen from them.
     let search = Search { ctx, scene, nearest, cell_m, most };
     let found = search.run(Facing::Fronts)?;
     if found.places.is_empty() {
         return Err(InputError::UnfitArea { area, why: search.explain(&found)? }.into());
     }
+
     let surface = Surface::sample(mesh, options.seed);
     let eyes: Vec<DVec3> = found.places.iter().map(Place::eye).collect();
     let lists = if eyes.len() <= MOST_CANDIDATES {
         surface.seen_from(ctx, scene, &eyes)?
     } else {
-        // A part of them, spread evenly, tells what can be seen.
+        // An evenly spread part of the places tells what can be seen.
         let every = eyes.len().div_ceil(MOST_CANDIDATES);
         let some: Vec<DVec3> = eyes.iter().step_by(every).copied().collect();
         surface.seen_from(ctx, scene, &some)?
     };
+
     let (chosen, cover) = match options.distance_m {
         None => {
             let weights: Vec<u64> = found.places.iter().map(Place::weight).collect();
@@ -122,12 +128,14 @@ pub(crate) fn place_in_free_space(
             (chosen, cover)
         }
     };
+
     let m2 = |samples: usize| samples as f64 * surface.m2_per_sample;
     let seen = SurfaceSeen {
         surface_m2: m2(surface.len()),
         visible_m2: m2(cover.visible),
         seen_m2: cover.seen_by.map(m2),
     };
+
     let mut warnings = Vec::new();
     let share = seen.seen_m2[0] / seen.surface_m2;
     if share < LEAST_SEEN {
@@ -151,6 +159,7 @@ pub(crate) fn place_in_free_space(
             100.0 * share
         ));
     }
+
     let locate = |(number, &index): (usize, &usize)| {
         let [x, y, z] = eyes[index].to_array();
         let name = format!("s3d free space {area} {number} {} {x} {y} {z}", options.seed);
@@ -160,8 +169,8 @@ pub(crate) fn place_in_free_space(
     Ok(FreeSpace { locations, seen, floor: found.floor, warnings })
 }
 
-/// Places on a Poisson-disk pattern: of those with room enough around, and of narrower ones where none of
-/// these is near. The wall between two rooms lets both have places.
+/// Chooses places on a Poisson-disk pattern: wide ones, and narrow ones where no wide one is near. Rooms on
+/// both sides of a wall get places.
 fn pattern(
     scene: &Scene<'_>,
     places: &[Place],
@@ -173,28 +182,30 @@ fn pattern(
     let (wide, narrow): (Vec<usize>, Vec<usize>) = (0..places.len()).partition(|&i| places[i].is_wide());
     let is_near =
         |a: usize, b: usize| eyes[a].distance(eyes[b]) < distance_m && sees(scene, eyes[a], eyes[b]);
+
     let mut offered: Vec<usize> = narrow
         .into_par_iter()
         .filter(|&a| !wide.iter().any(|&b| is_near(a, b)))
         .collect();
     offered.extend(wide);
     offered.sort_unstable();
+
     let points: Vec<[f64; 3]> = offered.iter().map(|&i| eyes[i].to_array()).collect();
     let is_in_sight = |a: usize, b: usize| sees(scene, eyes[offered[a]], eyes[offered[b]]);
     let chosen = poisson_disk_where(&points, distance_m, seed, &format!("area_{area}"), is_in_sight);
     chosen.into_iter().map(|i| offered[i]).collect()
 }
 
-/// What to look at where nothing is found.
+/// What the user should check if nothing is found.
 const HINTS: &str =
     "is `up` the axis that points up, is `units` right, and do faces have their fronts inside?";
 
-/// Whether nothing is between two eyes.
+/// Returns whether nothing is between two eyes.
 fn sees(scene: &Scene<'_>, from: DVec3, to: DVec3) -> bool {
     cast_ray(scene, from, to - from).is_none_or(|hit| hit.t >= 1.0)
 }
 
-/// A search for places.
+/// A search for places inside.
 struct Search<'a> {
     ctx: &'a Context,
     scene: &'a Scene<'a>,
@@ -203,11 +214,11 @@ struct Search<'a> {
     most: usize,
 }
 
-/// Places inside, and how much floor there was on the way to them.
+/// Places inside, and the floor on the way to them.
 struct Found {
     places: Vec<Place>,
     floor: FloorFound,
-    /// What was around the places that are not inside: mean shares of all directions.
+    /// The mean enclosure of the places that are not inside.
     around: Enclosure,
 }
 
@@ -223,7 +234,9 @@ impl Search<'_> {
             })
             .collect::<Result<Vec<_>>>()?;
         let mut floor = ground.floor;
-        let (mut places, mut outside) = (Vec::new(), Vec::new());
+
+        let mut places = Vec::new();
+        let mut outside = Vec::new();
         for (place, around) in candidates.into_iter().zip(around) {
             if around.is_inside() {
                 floor.inside_m2 += place.stands_for_m2;
@@ -235,7 +248,7 @@ impl Search<'_> {
         Ok(Found { places, floor, around: Enclosure::mean(&outside) })
     }
 
-    /// Why no place was found.
+    /// Returns why no place was found.
     fn explain(&self, found: &Found) -> Result<String> {
         let floor = found.floor;
         let size = size_of(self.scene.mesh());
@@ -254,6 +267,8 @@ impl Search<'_> {
                  directions, on a back side in {back:.0} %, on nothing in {none:.0} %"
             );
         }
+
+        // Exchanging fronts and backs tells whether the mesh is inside out.
         let turned = self.run(Facing::Backs)?;
         text += &if turned.floor.inside_m2 > 0.0 {
             format!(
@@ -268,13 +283,13 @@ impl Search<'_> {
     }
 }
 
-/// How large a mesh is, as words.
+/// Returns the size of a mesh in words.
 fn size_of(mesh: &TriMesh) -> String {
     let size = mesh.aabb().size();
     format!("a mesh of {:.2} × {:.2} × {:.2} m (x, y, up)", size.x, size.y, size.z)
 }
 
-// Two feet a step apart have balls of free space that meet: see `standing`.
+// The balls of free space of two feet a step apart must meet: see `standing`.
 const _: () = assert!(STEP_M < MOST_STEP_M && CELL_M > MOST_STEP_M);
 
 #[cfg(test)]

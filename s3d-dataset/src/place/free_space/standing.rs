@@ -1,9 +1,9 @@
-//! Where a person with a tripod can stand and walk.
+//! Finds where a person with a tripod can stand and walk.
 //!
-//! A grid of vertical lines meets every surface that faces up: each meeting is a foot. A foot that has
-//! headroom and room around is walkable. Walkable feet of neighbouring lines are joined if a person can step
-//! from one to the other; what is joined is a component, such as all floors and stairs of a building.
-//! Components that end in a drop around, table tops for one, are left out.
+//! A grid of vertical lines meets every surface that faces up, and each meeting is a foot. A foot with
+//! headroom and free space around is walkable. Walkable feet of neighbouring lines are joined if a person can
+//! step from one to the other. Joined feet form a component, such as all floors and stairs of a building.
+//! Components with a drop around them, such as table tops, are left out.
 
 use super::FloorFound;
 use super::grid::{Foot, Grid, Side, sides_within};
@@ -16,52 +16,53 @@ use s3d_geom::{NearestFaces, TriMesh};
 use s3d_render::{Scene, cast_ray};
 use std::collections::BTreeMap;
 
-/// Half the width of a person, metres: so much is free around at 1 m and at 1.5 m.
+/// Half the width of a person, metres. This much must be free around at 1 m and at 1.5 m.
 const BODY_M: f32 = 0.2;
 
-/// Heights above a foot at which room around is looked for, metres: of knees, hips, and the location.
+/// The heights above a foot at which the free space around is measured, metres: at the knees, the hips, and
+/// the location.
 const KNEE_M: f64 = 0.6;
 const HIP_M: f64 = 1.0;
 
-/// A location wants this much free around itself; with less a place counts for less.
+/// The free space that a location wants around itself, metres. A place with less has less weight.
 const CLEARANCE_M: f32 = 0.5;
 
-/// A place has at least this much free around.
+/// The free space that a place needs around itself, metres.
 const LEAST_CLEARANCE_M: f32 = 0.1;
 
-/// Above a foot what is nearer than this, metres, is the surface itself.
+/// A surface nearer than this above a foot is the foot's own surface, metres.
 const SKIN_M: f64 = 0.005;
 
-/// A person climbs this much, metres, and a slope of 35° besides.
+/// The height of a step that a person can climb, metres, and the slope in addition, 35°.
 const RISER_M: f64 = 0.13;
 const SLOPE: f64 = 0.7;
 
-/// A tripod stands where the floor differs by no more than this, metres, so far around: not on stairs.
+/// A tripod stands where the floor is even to the first distance within the second, metres, so not on stairs.
 const UNEVEN_M: f64 = 0.05;
 const LEGS_M: f64 = 0.3;
 
-/// Furniture ends in a drop of at most this, metres: a storey is higher.
+/// The largest drop around furniture, metres. A storey is higher.
 const DROP_M: f64 = 2.2;
 
-/// A component of which this share of the rim is such a drop is furniture …
+/// A component is furniture if at least this share of its rim is such a drop, …
 const DROP_SHARE: f64 = 0.25;
 
 /// … unless it has more floor than any table, m².
 const LARGEST_TABLE_M2: f64 = 20.0;
 
-/// Components of less floor are left out, m².
+/// The smallest floor of a component that is kept, m².
 const SMALLEST_M2: f64 = 0.25;
 
-/// Which side of a face counts as its front.
+/// The side of a face that counts as its front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Facing {
     Fronts,
-    /// To tell whether a mesh is inside out.
+    /// Tells whether a mesh is inside out.
     Backs,
 }
 
 impl Facing {
-    /// The normal of a face on the side that counts.
+    /// Returns the normal of a face on the side that counts.
     pub(super) fn normal(self, mesh: &TriMesh, face: u32) -> Vec3 {
         match self {
             Self::Fronts => mesh.normal(face),
@@ -70,28 +71,29 @@ impl Facing {
     }
 }
 
-/// Where a location could be.
+/// A place where a location could be.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) foot: DVec3,
-    /// Free space around, metres, at most [`CLEARANCE_M`].
+    /// The free space around, metres, at most [`CLEARANCE_M`].
     clearance_m: f32,
-    /// How much walkable floor this place was taken from.
+    /// The walkable floor that this place represents, in m².
     pub(super) stands_for_m2: f64,
 }
 
 impl Place {
     pub(super) fn eye(&self) -> DVec3 {
-        // As it is written: coordinates of the mesh have no more digits.
+        // The position is rounded to `f32` as it is written, since the mesh has no more digits.
         (self.foot + HEIGHT_M * DVec3::Z).as_vec3().as_dvec3()
     }
 
-    /// Whether there is as much room around as a location wants.
+    /// Returns whether there is as much room around as a location wants.
     pub(super) fn is_wide(&self) -> bool {
         self.clearance_m >= CLEARANCE_M
     }
 
-    /// What a square metre that it sees counts: less with less clearance than a location wants.
+    /// Returns the weight of a square metre that the place sees. It is less with less clearance than a
+    /// location wants.
     pub(super) fn weight(&self) -> u64 {
         (1000.0 * self.clearance_m) as u64
     }
@@ -101,15 +103,15 @@ impl Place {
 pub(super) struct Ground {
     grid: Grid,
     feet: Vec<Foot>,
-    /// Of each foot, the first foot of its component.
+    /// The first foot of each foot's component.
     component: Vec<u32>,
-    /// Whether a tripod may stand there: walkable, level, and of a component that is kept.
+    /// Whether a tripod may stand on each foot: walkable, level, and in a component that is kept.
     is_place: Vec<bool>,
     pub(super) floor: FloorFound,
 }
 
 impl Ground {
-    /// Looks for feet, and which of them are places.
+    /// Finds all feet, and which of them are places.
     pub(super) fn find(
         ctx: &Context,
         scene: &Scene<'_>,
@@ -125,11 +127,13 @@ impl Ground {
             .iter()
             .map(|&f| mesh.area(f) * f64::from(mesh.normal(f).z.abs()))
             .sum();
+
         let grid = Grid::new(mesh, m2)?;
         ctx.check()?;
         let mut feet = grid.feet(mesh, &up);
         drop(up);
         ctx.check()?;
+
         feet.par_iter_mut().try_for_each(|foot| {
             ctx.check()?;
             foot.has_headroom = has_headroom(scene, grid.at(foot), facing);
@@ -137,11 +141,13 @@ impl Ground {
         })?;
         room_around(&grid, nearest, &mut feet);
         ctx.check()?;
+
         let square = grid.step * grid.step;
         let count = |has: &dyn Fn(&Foot) -> bool| feet.iter().filter(|f| has(f)).count() as f64 * square;
         let floor =
             FloorFound { up_facing_m2: m2, headroom_m2: count(&|f| f.has_headroom), ..FloorFound::default() };
         let mut ground = Self { component: Vec::new(), is_place: vec![false; feet.len()], grid, feet, floor };
+
         ground.join(scene);
         ground.judge();
         Ok(ground)
@@ -156,11 +162,13 @@ impl Ground {
             }
             for (side, b) in self.neighbours(a, &HALF) {
                 if self.feet[b].walkable && self.is_step(a, b, side) && self.is_way(scene, a, b) {
-                    let (a, b) = (root(&mut parents, a as u32), root(&mut parents, b as u32));
+                    let a = root(&mut parents, a as u32);
+                    let b = root(&mut parents, b as u32);
                     parents[a.max(b) as usize] = a.min(b);
                 }
             }
         }
+
         for foot in 0..self.feet.len() as u32 {
             let first = root(&mut parents, foot);
             parents[foot as usize] = first;
@@ -176,7 +184,9 @@ impl Ground {
             rim: u64,
             drops: u64,
         }
+
         let mut tallies: BTreeMap<u32, Tally> = BTreeMap::new();
+        // Count each component's feet, and the sides on which it ends or drops.
         for a in (0..self.feet.len()).filter(|&a| self.feet[a].walkable) {
             let tally = tallies.entry(self.component[a]).or_default();
             tally.feet += 1;
@@ -191,6 +201,7 @@ impl Ground {
                 tally.drops += u64::from(self.is_drop(a, side));
             }
         }
+
         let square = self.grid.step * self.grid.step;
         let is_floor = |tally: &Tally| {
             let m2 = tally.feet as f64 * square;
@@ -202,67 +213,75 @@ impl Ground {
             .filter(|(_, t)| is_floor(t))
             .map(|(&first, _)| first)
             .collect();
+
         let mut walkable = 0;
         for a in 0..self.feet.len() {
             self.feet[a].walkable &= floors.binary_search(&self.component[a]).is_ok();
             walkable += u64::from(self.feet[a].walkable);
         }
-        let is_free = |f: &Foot| f.walkable && f.clearance_m >= LEAST_CLEARANCE_M;
+
         let around = sides_within(LEGS_M / self.grid.step);
         let is_place = |a| is_free(&self.feet[a]) && self.is_level(a, &around);
         self.is_place = (0..self.feet.len()).into_par_iter().map(is_place).collect();
         self.floor.walkable_m2 = walkable as f64 * square;
+
         if !self.is_place.contains(&true) {
-            // Nowhere level, as in a rough scan: then the tripod stands askew.
+            // No foot is level, as in a rough scan. The tripod then stands askew.
             self.is_place = self.feet.iter().map(is_free).collect();
         }
     }
 
-    /// The lowest and the highest foot of the component that has most.
+    /// Returns the lowest and the highest foot of the component with the most feet.
     #[cfg(test)]
     pub(super) fn heights_of_largest(&self) -> [f64; 2] {
         let mut all: BTreeMap<u32, (usize, [f64; 2])> = BTreeMap::new();
         for (foot, component) in self.feet.iter().zip(&self.component).filter(|(foot, _)| foot.walkable) {
             let (feet, [low, high]) = all.entry(*component).or_insert((0, [f64::MAX, f64::MIN]));
             *feet += 1;
-            (*low, *high) = (low.min(foot.z), high.max(foot.z));
+            *low = low.min(foot.z);
+            *high = high.max(foot.z);
         }
         all.into_values().max_by_key(|(feet, _)| *feet).unwrap().1
     }
 
-    /// The places with most room around, one for each square of `cell_m` or larger: `most` at the most, or
-    /// one a component. In the order of the grid.
+    /// Returns the places with most room around, one for each square of `cell_m` or larger, in the order of
+    /// the grid. There are at most `most` places, or one for each component if that is more.
     pub(super) fn candidates(&self, cell_m: f64, most: usize) -> Vec<Place> {
         let square = self.grid.step * self.grid.step;
         let mut cell_m = cell_m.max(self.grid.step);
         loop {
-            // Of each square the best place, if there is one, and how much floor it has.
+            // The best place of each square, if it has one, and its walkable floor.
             let mut cells: BTreeMap<(u32, [i64; 3]), (Option<usize>, f64)> = BTreeMap::new();
             for a in (0..self.feet.len()).filter(|&a| self.feet[a].walkable) {
                 let at = self.grid.at(&self.feet[a]) - self.grid.origin;
-                // A component goes over storeys.
+                // The height is part of the key, since a component may span storeys.
                 let cell = [at.x / cell_m, at.y / cell_m, at.z / DROP_M].map(|c| c.floor() as i64);
                 let best = cells.entry((self.component[a], cell)).or_insert((None, 0.0));
                 best.1 += square;
                 if !self.is_place[a] {
                     continue;
                 }
+
                 let off = |b: usize| {
                     let at = self.grid.at(&self.feet[b]) - self.grid.origin;
                     let off = |c: f64, i: i64| (c / cell_m - i as f64 - 0.5).powi(2);
                     off(at.x, cell[0]) + off(at.y, cell[1])
                 };
                 let is_better = |old: usize| {
-                    let (this, old_m) = (self.feet[a].clearance_m, self.feet[old].clearance_m);
+                    let this = self.feet[a].clearance_m;
+                    let old_m = self.feet[old].clearance_m;
                     this > old_m || this == old_m && off(a) < off(old)
                 };
+
                 if best.0.is_none_or(is_better) {
                     best.0 = Some(a);
                 }
             }
+
             let mut found: Vec<(usize, f64)> =
                 cells.into_values().filter_map(|(a, m2)| Some((a?, m2))).collect();
-            // Squares that are larger than the building do not become fewer.
+
+            // Stop also if squares are larger than the building, since they do not become fewer.
             if found.len() <= most || cell_m > self.grid.extent_m() {
                 found.sort_by_key(|(a, _)| *a);
                 let place = |(a, stands_for_m2): (usize, f64)| Place {
@@ -272,11 +291,12 @@ impl Ground {
                 };
                 return found.into_iter().map(place).collect();
             }
+
             cell_m *= (found.len() as f64 / most as f64).sqrt().max(1.1);
         }
     }
 
-    /// Whether the floor goes on at all of some sides, if anything is known there, without a step.
+    /// Returns whether the floor continues evenly at all of these sides, as far as anything is known there.
     fn is_level(&self, a: usize, sides: &[Side]) -> bool {
         sides.iter().all(|&side| {
             let mut steps = self.beside(a, side).filter(|&b| self.is_step(a, b, side));
@@ -284,34 +304,35 @@ impl Ground {
         })
     }
 
-    /// Whether at one side there is nothing to step on, but something below that is not the next storey.
+    /// Returns whether one side has nothing to step on, but something below that is not the next storey.
     fn is_drop(&self, a: usize, side: Side) -> bool {
         let mut next = self.beside(a, side);
         let below = |b: usize| self.feet[a].z - self.feet[b].z;
         !next.clone().any(|b| self.is_step(a, b, side)) && next.any(|b| (0.0..DROP_M).contains(&below(b)))
     }
 
-    /// Whether a person can step from `a` to `b` on the line at `side`.
+    /// Returns whether a person can step from `a` to `b` on the line at `side`.
     fn is_step(&self, a: usize, b: usize, side: Side) -> bool {
         let along = self.grid.step * (f64::from(side.0 * side.0 + side.1 * side.1)).sqrt();
         (self.feet[a].z - self.feet[b].z).abs() <= RISER_M + SLOPE * along
     }
 
-    /// Whether the way is free. Balls of free space at both ends leave no gap for a surface if they overlap.
+    /// Returns whether the way is free. If the balls of free space at both ends overlap, no surface fits
+    /// between.
     fn is_way(&self, scene: &Scene<'_>, a: usize, b: usize) -> bool {
         let [from, to] = [a, b].map(|i| self.grid.at(&self.feet[i]) + HIP_M * DVec3::Z);
         from.distance(to) <= 2.0 * f64::from(BODY_M)
             || cast_ray(scene, from, to - from).is_none_or(|h| h.t > 1.0)
     }
 
-    /// Feet on the lines at some sides of a foot.
+    /// Returns the feet on the lines at some sides of a foot.
     fn neighbours<'a>(&'a self, a: usize, sides: &'a [Side]) -> impl Iterator<Item = (Side, usize)> + 'a {
         sides
             .iter()
             .flat_map(move |&side| self.beside(a, side).map(move |b| (side, b)))
     }
 
-    /// Feet on the line at one side of a foot.
+    /// Returns the feet on the line at one side of a foot.
     fn beside(&self, a: usize, side: Side) -> std::ops::Range<usize> {
         let Some(column) = self.grid.beside(self.feet[a].column, side) else { return 0..0 };
         let start = self.feet.partition_point(|f| f.column < column);
@@ -322,10 +343,15 @@ impl Ground {
 
 const SIDES: [Side; 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// Every pair of neighbours once.
+/// Half of the sides, so that every pair of neighbours comes once.
 const HALF: [Side; 4] = [(1, 0), (1, 1), (0, 1), (-1, 1)];
 
-/// The first foot of a component, and a shorter way to it.
+/// Returns whether a tripod has room at a foot.
+fn is_free(foot: &Foot) -> bool {
+    foot.walkable && foot.clearance_m >= LEAST_CLEARANCE_M
+}
+
+/// Returns the first foot of a component, and shortens the path to it.
 fn root(parents: &mut [u32], mut foot: u32) -> u32 {
     while parents[foot as usize] != foot {
         let next = parents[foot as usize];
@@ -335,8 +361,8 @@ fn root(parents: &mut [u32], mut foot: u32) -> u32 {
     foot
 }
 
-/// Whether nothing is above a foot up to the height of a location. Right above it what does not face down
-/// like a ceiling is the floor's own unevenness.
+/// Returns whether nothing is above a foot up to the height of a location. A surface right above it that does
+/// not face down like a ceiling is the floor's own unevenness.
 fn has_headroom(scene: &Scene<'_>, foot: DVec3, facing: Facing) -> bool {
     let hit_above = |from: f64| {
         let way = (HEIGHT_M - from) * DVec3::Z;
@@ -349,7 +375,7 @@ fn has_headroom(scene: &Scene<'_>, foot: DVec3, facing: Facing) -> bool {
     }
 }
 
-/// Measures the free space around feet that have headroom.
+/// Measures the free space around feet with headroom.
 fn room_around(grid: &Grid, nearest: &NearestFaces<'_>, feet: &mut [Foot]) {
     let mut found = Vec::new();
     let mut measure = |feet: &mut [Foot], height: f64, least: f32| {
@@ -364,8 +390,13 @@ fn room_around(grid: &Grid, nearest: &NearestFaces<'_>, feet: &mut [Foot]) {
             feet[i].walkable = n.distance_m >= least;
         }
     };
-    feet.iter_mut()
-        .for_each(|f| (f.walkable, f.clearance_m) = (f.has_headroom, CLEARANCE_M));
+
+    for foot in feet.iter_mut() {
+        foot.walkable = foot.has_headroom;
+        foot.clearance_m = CLEARANCE_M;
+    }
+
+    // Each height narrows what the one before left.
     measure(feet, HEIGHT_M, BODY_M);
     measure(feet, HIP_M, BODY_M);
     measure(feet, KNEE_M, 0.0);

@@ -10,7 +10,8 @@ use std::collections::BTreeSet;
 const SHARE: FreeSpaceOptions = FreeSpaceOptions { share: 0.95, distance_m: None, seed: 1 };
 
 fn place(mesh: &TriMesh, options: FreeSpaceOptions) -> Result<FreeSpace> {
-    let (scene, nearest) = (Scene::new(mesh), NearestFaces::new(mesh));
+    let scene = Scene::new(mesh);
+    let nearest = NearestFaces::new(mesh);
     place_in_free_space(&Context::default(), 1, &scene, &nearest, options)
 }
 
@@ -31,7 +32,7 @@ impl Quads {
             .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
 
-    /// The sides of a box: down, up, −y, +x, +y, −x; fronts outside, or inside.
+    /// Adds sides of a box: down, up, −y, +x, +y, −x, with fronts outside, or inside for a room.
     fn sides(&mut self, low: [f32; 3], high: [f32; 3], sides: &[usize], is_room: bool) {
         let corner = |i: usize| {
             let [x, y, z] = [i & 1, i >> 1 & 1, i >> 2].map(|b| b == 1);
@@ -61,10 +62,12 @@ impl Quads {
     }
 }
 
-/// Every place is in a room, free, on a floor, and looks at fronts; every room has one; none is counted
-/// twice.
+/// Checks that every place is in a room, free, on a floor, and looks at fronts; that every room has one; and
+/// that no uuid comes twice.
 fn check(building: &Building, scene: &AnnotatedScene, found: &FreeSpace) {
-    let (rays, nearest) = (Scene::new(&scene.mesh), NearestFaces::new(&scene.mesh));
+    let rays = Scene::new(&scene.mesh);
+    let nearest = NearestFaces::new(&scene.mesh);
+
     let mut rooms: BTreeSet<Room> = BTreeSet::new();
     let mut uuids = BTreeSet::new();
     for location in &found.locations {
@@ -77,20 +80,25 @@ fn check(building: &Building, scene: &AnnotatedScene, found: &FreeSpace) {
             .collect();
         assert_eq!(inside.len(), 1, "{at} is in {inside:?}");
         rooms.insert(inside[0]);
+
         let clearance = nearest.nearest(at.as_vec3()).distance_m;
         assert!(clearance > 0.19, "{at}: {clearance} m");
+
         let below = cast_ray(&rays, at, -DVec3::Z).unwrap();
         let on = scene.instances[scene.instance_of_face[below.face as usize] as usize];
         let is_rug = on.class == Class::CLUTTER && below.t > 1.48;
         assert!((below.t - 1.5).abs() < 0.03, "{at}: {} m above {on:?}", below.t);
         assert!(on.class == Class::FLOOR || is_rug, "{at}: on {on:?}");
+
         let outlook = Outlook::of(&rays, location);
         assert!(outlook.coverage > 0.9 && outlook.back_sides < 0.1, "{at}: {outlook:?}");
         assert!(uuids.insert(&location.uuid));
     }
+
     assert_eq!(rooms.len(), building.rooms.len(), "{rooms:?}");
     let seen = found.seen;
     assert!(seen.visible_m2 <= seen.surface_m2 && seen.seen_m2.is_sorted_by(|a, b| a >= b));
+
     let floor = found.floor;
     let m2 = [floor.up_facing_m2, floor.headroom_m2, floor.walkable_m2, floor.inside_m2];
     assert!(m2.is_sorted_by(|a, b| a >= b) && floor.inside_m2 > 1.0, "{floor:?}");
@@ -126,13 +134,15 @@ fn both_storeys_and_every_room_get_a_location() {
 fn stairs_join_storeys() {
     let heights = |building: &Building| {
         let scene = built(building);
-        let (rays, nearest) = (Scene::new(&scene.mesh), NearestFaces::new(&scene.mesh));
+        let rays = Scene::new(&scene.mesh);
+        let nearest = NearestFaces::new(&scene.mesh);
         let ground = Ground::find(&Context::default(), &rays, &nearest, Facing::Fronts).unwrap();
         ground.heights_of_largest()
     };
     let mut building = Building::two_storeys();
     let [low, high] = heights(&building);
     assert!(low < 0.01 && high > 2.84, "{low} {high}");
+
     // Without its stairs.
     building.rooms[0].items.remove(0);
     let [low, high] = heights(&building);
@@ -179,13 +189,13 @@ fn units_that_are_wrong_are_asked_for() {
     }
 }
 
-/// A room of 6 × 5 m with the furniture that tempts: a table, a bed, a wardrobe and a box.
+/// A room of 6 × 5 m with tempting furniture: a table, a bed, a wardrobe and a box.
 fn furnished() -> TriMesh {
     let mut room = Quads::default();
     room.room([0., 0., 0.], [6., 5., 3.8]);
     room.block([0.6, 0.6, 0.7], [3.0, 2.2, 0.75]);
     room.block([4.0, 0., 0.], [6.0, 2.0, 0.45]);
-    // In the corner: two of its sides are walls.
+    // In the corner, so two of its sides are walls.
     room.block([0., 4.2, 0.], [2.5, 5.0, 2.0]);
     room.block([5.3, 4.3, 0.], [6.0, 5.0, 0.4]);
     room.mesh()
@@ -200,13 +210,14 @@ fn nobody_stands_on_furniture() {
         for at in positions(&found) {
             assert!((at.z - 1.5).abs() < 1e-5, "{at}");
         }
-        let (walkable, all) = (found.floor.walkable_m2, found.floor.up_facing_m2);
+        let walkable = found.floor.walkable_m2;
+        let all = found.floor.up_facing_m2;
         assert!((40.3..40.4).contains(&all) && (13.0..18.0).contains(&walkable), "{:?}", found.floor);
     }
 }
 
-/// A house with thick walls on stilts over a yard, its roof flat: everything that faces up but its floor is
-/// outside, under it, or in its walls.
+/// A house with thick walls on stilts over a yard, with a flat roof. Everything that faces up, except its
+/// floor, is outside, under it, or in its walls.
 fn house(has_underside: bool) -> TriMesh {
     let mut house = Quads::default();
     house.room([0., 0., 0.], [8., 6., 2.7]);
@@ -214,7 +225,7 @@ fn house(has_underside: bool) -> TriMesh {
     if has_underside {
         house.sides([-0.6, -0.6, -0.3], [8.6, 6.6, 3.0], &[0], false);
     }
-    // Something in the wall that faces up, with room above it.
+    // A surface in the wall that faces up, with free space above it.
     house.add([[-0.55, 0., 0.], [-0.05, 0., 0.], [-0.05, 6., 0.], [-0.55, 6., 0.]]);
     house.add([[-20., -20., -2.4], [28., -20., -2.4], [28., 26., -2.4], [-20., 26., -2.4]]);
     house.mesh()
@@ -242,7 +253,8 @@ fn nobody_stands_outside_under_or_in_a_wall() {
     }
 }
 
-/// Under eaves there is a floor, a ceiling and a wall, in the corner of two wings two of them: outside it is.
+/// Under eaves there is a floor, a ceiling and a wall, and two walls in the corner of two wings. It is still
+/// outside.
 #[test]
 fn nobody_stands_under_eaves() {
     let mut house = Quads::default();
@@ -279,7 +291,7 @@ fn a_yard_with_nothing_around_is_no_place_and_says_what_rays_meet() {
 fn rooms_behind_shut_doors_get_places_too() {
     let mut rooms = Quads::default();
     rooms.room([0.; 3], [9., 7., 2.7]);
-    // 0.2 % of the surface, and nobody else sees it.
+    // The closet is 0.2 % of the surface, and is seen from nowhere else.
     rooms.room([9.2, 0., 0.], [10.2, 1.2, 2.2]);
     let found = place(&rooms.mesh(), SHARE).unwrap();
     let closet = positions(&found).into_iter().filter(|p| p.x > 9.2 && p.x < 10.2);
@@ -295,15 +307,11 @@ fn a_mesh_of_any_measures_ends() {
         room.add([[1., 1., 1.2], [1.001, 1., 1.2], to, to.map(|c| c + 1e-3)]);
         let parts = TriMesh::new(room.0).unwrap();
         let found = place(&parts, SHARE);
-        match is_long {
-            true => assert!(
-                found
-                    .map(|f| f.floor)
-                    .unwrap_err()
-                    .to_string()
-                    .contains("`units` right")
-            ),
-            false => assert!(!found.unwrap().locations.is_empty()),
+        if is_long {
+            let message = found.map(|f| f.floor).unwrap_err().to_string();
+            assert!(message.contains("`units` right"));
+        } else {
+            assert!(!found.unwrap().locations.is_empty());
         }
     }
 }
@@ -314,7 +322,8 @@ fn a_room_without_a_ceiling_is_a_room() {
     room.sides([0.; 3], [5., 4., 2.2], &[0, 2, 3, 4, 5], true);
     let found = place(&room.mesh(), SHARE).unwrap();
     assert!(!found.locations.is_empty());
-    // A floor with two walls is none.
+
+    // A floor with two walls is not a room.
     let mut corner = Quads::default();
     corner.sides([0.; 3], [5., 4., 2.2], &[0, 2, 3], true);
     assert!(message(&corner.mesh()).contains("none of these is inside"));
@@ -326,11 +335,14 @@ fn places_of_a_pattern_keep_apart_where_they_see_each_other_alone() {
     let scene = built(&building);
     let found = place(&scene.mesh, FreeSpaceOptions { distance_m: Some(3.0), ..SHARE }).unwrap();
     check(&building, &scene, &found);
-    let (rays, at) = (Scene::new(&scene.mesh), positions(&found));
+
+    let rays = Scene::new(&scene.mesh);
+    let at = positions(&found);
     let nearest = NearestFaces::new(&scene.mesh);
     let narrow = at.iter().filter(|p| nearest.nearest(p.as_vec3()).distance_m < 0.49);
-    // Here there is room enough almost everywhere.
+    // Almost every place here has room enough.
     assert!(narrow.count() <= 1);
+
     let mut through_walls = 0;
     for (i, a) in at.iter().enumerate() {
         for b in at[..i].iter().filter(|b| b.distance(*a) < 3.0) {
@@ -360,7 +372,8 @@ fn the_number_of_threads_changes_nothing() {
 #[test]
 fn it_can_be_cancelled() {
     let mesh = furnished();
-    let (scene, nearest) = (Scene::new(&mesh), NearestFaces::new(&mesh));
+    let scene = Scene::new(&mesh);
+    let nearest = NearestFaces::new(&mesh);
     let context = Context::default();
     context.cancel.cancel();
     let found = place_in_free_space(&context, 1, &scene, &nearest, SHARE);

@@ -1,4 +1,4 @@
-//! What is seen from a place: the surface, and whether the place is inside.
+//! What a place sees of the surface, and whether the place is inside.
 
 use super::standing::Facing;
 use crate::context::Context;
@@ -9,29 +9,31 @@ use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_render::{Scene, Sight, cast_ray};
 use std::f64::consts::PI;
 
-/// Samples of the surface a square metre, and how few and how many there are at least and at most.
+/// The number of surface samples per m², and the smallest and largest number of them in all.
 const SAMPLES_PER_M2: f64 = 5.0;
 const FEWEST_SAMPLES: u64 = 3000;
 const MOST_SAMPLES: u64 = 30_000;
 
-/// What is farther is not seen, metres: a texel of a scanner's picture is then a centimetre or so wide.
+/// The distance beyond which a surface is not seen, metres. A texel of a scanner's picture is then about a
+/// centimetre wide.
 const REACH_M: f64 = 10.0;
 
-/// What is seen at a smaller angle than this is not seen: the cosine of 78°.
+/// The cosine of 78°. A surface seen at a flatter angle is not seen.
 const GRAZING: f64 = 0.2;
 
-/// What is hit this much nearer than a sample, metres, hides it.
+/// A surface hides a sample if the ray hits it this much before the sample, metres.
 const HIDES_M: f64 = 0.01;
 
-/// Directions that tell whether a place is inside.
+/// The number of directions that tell whether a place is inside.
 const DIRECTIONS: u32 = 256;
 
-/// Inside, rays end on front sides in this share of all directions …
+/// A place is inside if rays end on front sides in this share of all directions, …
 const FRONT_SHARE: f64 = 0.5;
-/// … on back sides in no more than this share of those in which they end, …
+/// … on back sides in at most this share of the directions in which they end, …
 const BACK_SHARE: f64 = 0.25;
-/// … and on front sides in this share of directions a little above the horizon. A ceiling may not have been
-/// captured; and one that reaches over a wall, as eaves do, makes no room outside of it.
+/// … and on front sides in this share of directions a little above the horizon. The last condition is needed
+/// since a ceiling may not have been captured, and a ceiling that reaches over a wall, as eaves do, makes no
+/// room outside.
 const AROUND_SHARE: f64 = 0.85;
 
 /// Samples of the surface of a mesh, each of the same area.
@@ -59,7 +61,7 @@ impl Surface {
         self.points.len()
     }
 
-    /// The samples that each of some places sees, in ascending order.
+    /// Returns the samples that each place sees, in ascending order.
     pub(super) fn seen_from(
         &self,
         ctx: &Context,
@@ -80,7 +82,7 @@ impl Surface {
             .collect()
     }
 
-    /// Whether a sample is near, with its front towards `eye`.
+    /// Returns whether a sample is near, with its front towards `eye`.
     fn faces(&self, eye: DVec3, sample: usize) -> bool {
         let way = self.points[sample] - eye;
         let m = way.length();
@@ -88,20 +90,21 @@ impl Surface {
     }
 }
 
-/// What ends rays from a place: shares of directions.
+/// What rays from a place hit, as shares of directions.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Enclosure {
-    /// Front sides and back sides, of all directions.
+    /// Front sides and back sides, as shares of all directions.
     front: f64,
     back: f64,
-    /// Front sides, of directions up to 15° above the horizon.
+    /// Front sides, as a share of the directions up to 15° above the horizon.
     around: f64,
 }
 
 impl Enclosure {
     pub(super) fn of(scene: &Scene<'_>, eye: DVec3, facing: Facing) -> Self {
-        // How many directions, and in how many of them a front side is hit.
-        let (mut all, mut around) = ([0.0; 3], [0.0; 2]);
+        // Counts of front sides, back sides and nothing; of all directions, and near the horizon.
+        let mut all = [0.0; 3];
+        let mut around = [0.0; 2];
         for direction in directions() {
             let hit = cast_ray(scene, eye, direction);
             let is_front = |face| facing.normal(scene.mesh(), face).as_dvec3().dot(direction) < 0.0;
@@ -111,12 +114,13 @@ impl Enclosure {
                 around[usize::from(kind != 0)] += 1.0;
             }
         }
+
         let n = f64::from(DIRECTIONS);
         let [front, other] = around;
         Self { front: all[0] / n, back: all[1] / n, around: front / (front + other) }
     }
 
-    /// Whether a place is in a room or in a yard that is walled all around.
+    /// Returns whether a place is in a room, or in a yard with walls all around.
     pub(super) fn is_inside(&self) -> bool {
         self.front >= FRONT_SHARE
             && self.back <= BACK_SHARE * (self.front + self.back)
@@ -129,13 +133,13 @@ impl Enclosure {
         Self { front: mean(|e| e.front), back: mean(|e| e.back), around: mean(|e| e.around) }
     }
 
-    /// In how many of a hundred directions there is a front side, a back side, nothing.
+    /// Returns the percentages of directions with a front side, a back side and nothing.
     pub(super) fn percent(&self) -> [f64; 3] {
         [self.front, self.back, 1.0 - self.front - self.back].map(|share| 100.0 * share)
     }
 }
 
-/// Directions all around, evenly: a Fibonacci lattice.
+/// Returns evenly spread directions, a Fibonacci lattice.
 fn directions() -> impl Iterator<Item = DVec3> {
     (0..DIRECTIONS).map(|i| {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(DIRECTIONS);
