@@ -5,21 +5,21 @@ use s3d_geom::{Camera, Raster};
 use s3d_io::scene::UnseenColor;
 use s3d_render::{CubeMap, Hits, TextureFilter, Unseen, picture_image_into};
 
-/// Colours that are not the mesh's.
+/// Colours from pictures instead of the mesh.
 #[derive(Clone, Copy)]
 pub(crate) enum PictureColors<'a> {
     /// From a cube map of the scanner's pictures.
     Cube {
         cube: &'a CubeMap,
-        /// What is shown where it has nothing.
+        /// What is shown where the cube map has no colour.
         unseen: UnseenColor,
     },
-    /// The view itself, of a photograph.
+    /// The view of a photograph, as it is.
     Photograph(&'a Raster<[u8; 3]>),
 }
 
 impl PictureColors<'_> {
-    /// The RGB image of a view.
+    /// Makes the RGB image of a view.
     pub(crate) fn image_into(
         &self,
         channels: &Channels<'_>,
@@ -37,6 +37,7 @@ impl PictureColors<'_> {
                 return;
             }
         };
+
         picture_image_into(cube, unseen, hits, camera, &TextureFilter::default(), out);
     }
 }

@@ -10,14 +10,14 @@ use std::path::PathBuf;
 
 /// Where an area is looked at from.
 pub(crate) enum Cameras {
-    /// At these scan locations, in the order of their list, each with its room if the list tells.
+    /// Listed scan locations, in the order of their list, each with its room if the list tells it.
     Listed(Vec<ScanLocation>, Vec<Option<Room>>),
-    /// At places that are chosen once its rooms are known.
+    /// Places that are chosen once the rooms are known.
     Placed(Placing),
 }
 
 impl Cameras {
-    /// These, or, if there are none, places by free space.
+    /// Returns these locations, or, if there are none, places by free space.
     pub(super) fn listed_or_placed(locations: Vec<ScanLocation>, rooms: Vec<Option<Room>>) -> Self {
         if locations.is_empty() {
             return Self::Placed(Placing::Seeing(SHARE));
@@ -25,8 +25,9 @@ impl Cameras {
         Self::Listed(locations, rooms)
     }
 
-    /// Those that a scene file names, less the mesh's offset, or that are to be placed, and the file that
-    /// says so. What is asked for goes before what the file says.
+    /// Returns the scan locations of a scene file, or how to place them, with the file that says so. Listed
+    /// locations are moved by the mesh's offset. `asked` goes before the scene file. Returns `None` if
+    /// neither says anything.
     pub(super) fn of_scene(
         scene: &SceneFile,
         asked: Option<Placing>,
@@ -59,7 +60,7 @@ impl Cameras {
         }
     }
 
-    /// How far apart they are placed, metres, if they are placed so.
+    /// The distance between placed locations, metres, if they are placed by it.
     pub(crate) fn distance_m(&self) -> Option<f64> {
         if let Self::Placed(Placing::Apart(distance_m)) = self {
             Some(*distance_m)
@@ -68,7 +69,7 @@ impl Cameras {
         }
     }
 
-    /// Which share of the surface they are to see, if they are placed so.
+    /// The share of the surface that placed locations are to see, if they are placed by it.
     pub(crate) fn share(&self) -> Option<f64> {
         if let Self::Placed(Placing::Seeing(share)) = self {
             Some(*share)
@@ -77,9 +78,9 @@ impl Cameras {
         }
     }
 
-    /// How many there are, or about how many places are on so many m² of floor: those that keep a distance
-    /// fill a floor with about one on 0.7 times its square; those that are to see a share are about one
-    /// on 15 m².
+    /// The number of listed locations, or about how many are placed on `floor_m2` of floor. Locations that
+    /// keep a distance take about 0.7 times its square each. Locations that see a share take about 15 m²
+    /// each.
     pub(crate) fn count_on(&self, floor_m2: f64) -> f64 {
         match self {
             Self::Listed(locations, _) => locations.len() as f64,

@@ -5,14 +5,14 @@ use s3d_geom::{ColoredVertices, NearestFaces, TriMesh, VertexColors};
 use s3d_io::cloud::{Annotations, InstanceReader};
 use std::path::Path;
 
-/// Points that are in memory, three times.
+/// The points of a block. Three blocks are in memory.
 const BLOCK_POINTS: usize = 1 << 19;
 
-/// The shares of a mesh's surface without points of its own that are worth a word.
+/// Larger shares of a mesh's surface without points of its own cause a warning.
 const MUCH_BARE: f64 = 0.01;
 const MUCH_SPREAD: f64 = 0.1;
 
-/// The share of it whose points show more than its vertices can hold.
+/// A larger share of surface whose points show more than its vertices can hold causes a warning.
 const MUCH_BLURRED: f64 = 0.2;
 
 /// What the points gave.
@@ -22,15 +22,17 @@ pub(super) struct PointColors {
 }
 
 impl PointColors {
-    /// Of all points of `annotations`, which the scene file `scene` asks for.
+    /// Colours the mesh from all points of `annotations`, as the scene file `scene` asks for.
     pub(super) fn of(scene: &Path, mesh: &TriMesh, annotations: &Annotations) -> Result<Self> {
         let fault = |message: &str| Error::unfit(scene, format!("mesh.colors = \"points\": {message}"));
         if !mesh.textures().is_empty() {
             return Err(fault("the mesh has textures, which would cover these colours: leave the key out"));
         }
+
         let nearest_faces = NearestFaces::new(mesh);
         let mut colors = VertexColors::new(&nearest_faces);
         let mut reader = InstanceReader::new(BLOCK_POINTS);
+
         let mut is_black = true;
         let mut instances = annotations.rooms.iter().flat_map(|room| &room.instances).peekable();
         while let Some(instance) = instances.next() {
@@ -40,13 +42,16 @@ impl PointColors {
                 Ok::<(), Error>(())
             })?;
         }
+
         if is_black {
             return Err(fault("the annotated points have no colours"));
         }
+
         let vertices = colors.finish();
         if vertices.far_points == vertices.points {
             return Err(fault("no annotated point is within 10 cm of the mesh: do they share a frame?"));
         }
+
         Ok(Self { vertices, area_m2: mesh.total_area() })
     }
 

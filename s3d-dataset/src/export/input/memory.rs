@@ -10,7 +10,7 @@ use s3d_io::mesh::{LengthUnit, MeshFile, UpAxis};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What the mesh of a [`MemoryScene`] is called in messages and the manifest.
+/// The name of a [`MemoryScene`]'s mesh in messages and the manifest.
 const MESH: &str = "mesh in memory";
 
 /// One area whose mesh, annotations and scan locations the caller has at hand.
@@ -21,7 +21,7 @@ pub struct MemoryScene {
     /// Its surface, world metres, Z-up. No two faces may have the same corners
     /// ([`TriMesh::without_repeated_faces`]).
     pub mesh: TriMesh,
-    /// What its surface is; `None` makes a data set without labels.
+    /// The annotations of its surface; `None` makes a data set without labels.
     pub annotations: Option<Annotations>,
     /// Where images are rendered, each with a uuid of its own. If there are none, some are placed: see
     /// [`ExportOptions::see`](crate::ExportOptions::see).
@@ -45,7 +45,7 @@ pub enum SceneSource {
         /// file says, or else guessed by the height of rooms.
         units: Option<LengthUnit>,
     },
-    /// At hand.
+    /// Values in memory.
     Memory(Arc<SharedScene>),
 }
 
@@ -61,7 +61,7 @@ impl<P: Into<PathBuf>> From<P> for SceneSource {
 }
 
 impl SceneSource {
-    /// One for each path, but one for all meshes among them.
+    /// Makes a source of each path, and a single one of all meshes among them.
     pub fn list(
         paths: impl IntoIterator<Item = PathBuf>,
         up: Option<UpAxis>,
@@ -77,7 +77,7 @@ impl SceneSource {
     }
 }
 
-/// Whether a path is that of a mesh, by its ending.
+/// Whether a path names a mesh, by its ending.
 fn is_mesh(path: &Path) -> bool {
     let ending = path
         .extension()
@@ -111,7 +111,7 @@ pub struct SharedScene {
 }
 
 impl SharedScene {
-    /// A [`MemoryScene`] whose mesh its caller shares.
+    /// Makes a [`MemoryScene`] whose mesh the caller shares.
     pub fn new(
         area: u32,
         mesh: Arc<MeshFile>,
@@ -121,18 +121,19 @@ impl SharedScene {
         Self { area, mesh, annotations, locations }
     }
 
-    /// What messages call it.
+    /// Its name in messages.
     pub(crate) fn name(&self) -> PathBuf {
         format!("area {} in memory", self.area).into()
     }
 
-    /// Refuses what files could not hold.
+    /// Refuses values that files could not hold.
     pub(crate) fn check(&self) -> Result<()> {
         let name = self.name();
         let refuse = |what: String| Err(Error::unfit(&name, what));
         if self.area == 0 {
             return refuse("areas count from 1".to_owned());
         }
+
         let (_, repeated) = self.mesh.mesh.clone().without_repeated_faces();
         if repeated > 0 {
             return refuse(format!(
@@ -140,15 +141,18 @@ impl SharedScene {
                  (TriMesh::without_repeated_faces)"
             ));
         }
+
         for location in &self.locations {
             if crate::options::canonical_uuid(&location.uuid).ok().as_deref() != Some(&location.uuid) {
                 return refuse(format!("uuid {:?} is not 32 lower-case hexadecimal digits", location.uuid));
             }
         }
+
         Ok(())
     }
 
-    /// Its parts by name with the checksums of their values, by which the same call goes on.
+    /// The records of its parts, with the checksums of their values. They tell whether a later call is the
+    /// same, and continues this one.
     pub(crate) fn records(&self) -> Result<Vec<InputRecord>> {
         let mut record = Vec::new();
         let mut push = |name: &str, sum: ChecksumOfParts| {
@@ -172,7 +176,8 @@ impl SharedScene {
         let mut sum = ChecksumOfParts::default();
         for location in &self.locations {
             sum.add(location.uuid.as_bytes());
-            let (at, rt) = (location.pose.location.to_array(), location.pose.rt_matrix());
+            let at = location.pose.location.to_array();
+            let rt = location.pose.rt_matrix();
             let numbers = at.into_iter().chain(rt.into_iter().flatten());
             numbers.for_each(|number| sum.add(&number.to_le_bytes()));
         }
@@ -197,7 +202,7 @@ fn sum_of_annotations(annotations: &Annotations) -> Result<ChecksumOfParts> {
     Ok(sum)
 }
 
-/// The length of a column, and its elements.
+/// Adds the length of a column, and its elements.
 fn add<T, const N: usize, const M: usize>(
     sum: &mut ChecksumOfParts,
     column: &[T],
@@ -216,6 +221,7 @@ fn add<T, const N: usize, const M: usize>(
 fn sum_of_mesh(parts: &MeshParts) -> ChecksumOfParts {
     let mut sum = ChecksumOfParts::default();
     let triple = |t: &[u32; 3]| t.map(u32::to_le_bytes);
+
     add(&mut sum, &parts.positions, |p| p.to_array().map(f32::to_le_bytes));
     add(&mut sum, &parts.faces, triple);
     add(&mut sum, &parts.colors, |c| [*c]);
@@ -224,12 +230,14 @@ fn sum_of_mesh(parts: &MeshParts) -> ChecksumOfParts {
     add(&mut sum, &parts.normals, |p| p.to_array().map(f32::to_le_bytes));
     add(&mut sum, &parts.face_normals, triple);
     add(&mut sum, &parts.face_materials, |m| [m.to_le_bytes()]);
+
     for material in &parts.materials {
         sum.add(material.name.as_bytes());
         sum.add(&[0]);
         sum.add(&material.color);
         sum.add(&material.texture.map_or(u64::MAX, u64::from).to_le_bytes());
     }
+
     for texture in &parts.textures {
         sum.add(texture.name.as_bytes());
         sum.add(&[0]);

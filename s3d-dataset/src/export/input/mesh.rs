@@ -1,4 +1,4 @@
-//! The mesh of an area: where it is read from, and where it is.
+//! The mesh of an area: where it is read from, and where it lies.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ pub(crate) enum MeshSource {
         paths: Vec<PathBuf>,
         up: UpAxis,
         options: MeshOptions,
-        /// Colours of its vertices in place of those of the files, if there are any.
+        /// Colours that its vertices get instead of the colours of the files; empty if there are none.
         colors: Vec<[u8; 3]>,
     },
     Published(Box<PublishedArea>),
@@ -60,22 +60,22 @@ impl MeshSource {
     }
 }
 
-/// Where a mesh is.
+/// Where a mesh lies.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MeshFrame {
     /// Its box.
     pub(crate) bounds: Aabb,
-    /// What was subtracted from the scan's coordinates, in the world's axes.
+    /// What was subtracted from the scan's coordinates, metres, in the world's axes.
     pub(crate) offset_m: DVec3,
 }
 
 impl MeshFrame {
-    /// Of a mesh that was read.
+    /// The frame of a mesh that was read.
     pub(crate) fn of(file: &MeshFile) -> Self {
         Self { bounds: file.mesh.aabb(), offset_m: file.offset_m }
     }
 
-    /// The offset, if there is one, as tables have it.
+    /// The offset as tables have it; `None` if it is zero.
     pub(crate) fn offset(&self) -> Option<[f64; 3]> {
         (self.offset_m != DVec3::ZERO).then(|| self.offset_m.to_array())
     }
@@ -91,7 +91,7 @@ impl MeshFrame {
         }
     }
 
-    /// Refuses annotated points, at hand as `name`, that all lie far from the mesh.
+    /// Refuses annotated points that all lie far from the mesh. Messages call them `name`.
     pub(crate) fn refuse_far_points(&self, name: &Path, annotations: &Annotations) -> Result<()> {
         let Some(gap) = annotations.frame_gap(DVec3::ZERO, self.bounds) else { return Ok(()) };
         let [x, y, z] = gap.offset_m.to_array();

@@ -68,25 +68,25 @@ pub(crate) struct AreaInput {
     pub(crate) notes: Vec<String>,
     /// What was odd in the annotations, as a sentence each.
     pub(crate) warnings: Vec<String>,
-    /// Whether what is not as it should be in the annotations is skipped and counted.
+    /// Whether faults in the annotations are skipped and counted.
     pub(crate) lenient: bool,
-    /// All files and folders that it is made from: the data set must not lie on them.
+    /// All files and folders that the area is made from. The data set must not lie on them.
     pub(crate) files: Vec<PathBuf>,
-    /// Those that are read, and whose bytes decide those of the data set; but for what its mesh names.
+    /// The files that are read and whose bytes decide the data set, without the files that its mesh names.
     pub(crate) sources: Vec<PathBuf>,
-    /// Those among them that are annotations and nothing else.
+    /// The sources that are annotations and nothing else.
     pub(crate) annotations: Vec<PathBuf>,
-    /// What it is made from that is no file.
+    /// The records of inputs that are no files.
     pub(crate) records: Vec<InputRecord>,
 }
 
-/// What of an area is opened.
+/// Which parts of an area are opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Opened {
-    /// Whether its annotations are; if not, a plan stands for them, and it has no rooms.
+    /// Whether the annotations are opened. If not, a plan replaces them, and the area has no rooms.
     annotations: bool,
-    /// Whether its mesh stays in memory. Several are read again where they are needed, so that they never
-    /// share it.
+    /// Whether the mesh stays in memory. Several meshes are read again where they are needed, so that they
+    /// never share the memory.
     keep_mesh: bool,
 }
 
@@ -110,16 +110,16 @@ pub(crate) struct Inputs {
 }
 
 impl Inputs {
-    /// Reads the scene files, the names in their annotations (of clouds, all points) and their lists of scan
-    /// locations, instead of which locations are placed if `asked` says how.
+    /// Reads the scene files, the names in their annotations (all points, if these are clouds) and their
+    /// lists of scan locations. If `asked` says how, locations are placed instead.
     pub(crate) fn open(scenes: &[SceneSource], asked: Option<Placing>, lenient: bool) -> Result<Self> {
         let mut areas = Self::open_areas(scenes, asked, lenient, true)?;
         let table = label_table(&mut areas)?;
         Ok(Self { areas, table })
     }
 
-    /// The same without the annotations, for which a plan stands that has this table: rooms are not known
-    /// then.
+    /// Opens the scenes without their annotations: a plan that has this `table` replaces them. Rooms are not
+    /// known then.
     pub(crate) fn open_planned(
         scenes: &[SceneSource],
         asked: Option<Placing>,
@@ -137,9 +137,11 @@ impl Inputs {
         annotations: bool,
     ) -> Result<Vec<AreaInput>> {
         let opened = Opened { annotations, keep_mesh: scenes.len() == 1 };
+
         let mut areas: Vec<AreaInput> = Vec::new();
         let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
+
         for scene in scenes {
             let area = match scene {
                 SceneSource::Memory(scene) => AreaInput::in_memory(scene, asked, opened)?,
@@ -151,20 +153,22 @@ impl Inputs {
                     let mut scene = s3d_io::scene::read_scene(path)?;
                     let options = &mut scene.annotation_options;
                     options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
-                    // Areas wait beside one another.
+                    // The annotations of all areas wait in memory together.
                     options.points_in_memory /= scenes.len() as u64;
                     AreaInput::open(scene, asked, opened)?
                 }
             };
+
             let path = &area.path;
             if let Some(other) = area_of.insert(area.number, path.clone()) {
                 return Err(
                     InputError::SameArea { first: other, second: path.clone(), area: area.number }.into()
                 );
             }
+
             let list = &area.cameras_path;
             for location in area.cameras.listed() {
-                // Files of two uuids that differ by case alone would be one on many file systems.
+                // On many file systems, uuids that differ only by case would give one file.
                 if let Some(other) = location_of.insert(location.uuid.to_ascii_lowercase(), list.clone()) {
                     let message = format!("uuid {} is also in {}", location.uuid, other.display());
                     return Err(match location.line {
@@ -174,24 +178,12 @@ impl Inputs {
                     .into());
                 }
             }
+
             areas.push(area);
         }
+
         areas.sort_by_key(|a| a.number);
-        let without = areas.iter().find(|area| !area.is_labelled);
-        if let (Some(without), Some(with)) = (without, areas.iter().find(|area| area.is_labelled)) {
-            return Err(
-                InputError::MixedLabels { with: with.path.clone(), without: without.path.clone() }.into()
-            );
-        }
-        let taxonomy = areas.first().map(|area| (&area.taxonomy, &area.path));
-        let other = |area: &&AreaInput| taxonomy.is_some_and(|(first, _)| area.taxonomy != *first);
-        if let (Some((taxonomy, path)), Some(other)) = (taxonomy, areas.iter().find(other)) {
-            return Err(InputError::MixedTaxonomies {
-                first: (path.clone(), taxonomy.name().to_owned()),
-                second: (other.path.clone(), other.taxonomy.name().to_owned()),
-            }
-            .into());
-        }
+        refuse_mixed(&areas)?;
         Ok(areas)
     }
 
@@ -227,11 +219,12 @@ impl AreaInput {
             let folder = folder.clone();
             return Self::published(&folder, Some(scene), asked, opened);
         }
+
         let options = &scene.annotation_options;
         let mut source = MeshSource::Files {
             paths: scene.mesh.clone(),
             up: scene.up,
-            // The columns that are named are those of the annotations.
+            // Named columns are columns of the annotations, if there are any.
             options: MeshOptions {
                 class_column: options.class_column.clone().filter(|_| scene.annotations.is_empty()),
                 instance_column: options.instance_column.clone().filter(|_| scene.annotations.is_empty()),
@@ -240,26 +233,21 @@ impl AreaInput {
             },
             colors: Vec::new(),
         };
-        // The mesh comes first: what lies far from it need not be read.
+
+        // The mesh is read first: annotations that lie far from it need not be read.
         let mut file = source.read()?;
         let frame = MeshFrame::of(&file);
         let takes_colors = scene.mesh_colors == MeshColors::Points;
-        let (mut rooms, mut notes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+
+        let mut rooms = Vec::new();
+        let mut notes = Vec::new();
+        let mut warnings = Vec::new();
+
         if (opened.annotations || takes_colors) && scene.is_labelled {
-            let mut annotations = match scene.annotations.is_empty() {
-                true => Annotations::of_mesh(&file, options)?,
-                false => {
-                    let given = Some(options.offset_m).filter(|_| scene.annotations_have_offset);
-                    let options = AnnotationOptions {
-                        offset_m: given.unwrap_or(frame.offset_m),
-                        mesh_bounds: Some(frame.bounds),
-                        ..options.clone()
-                    };
-                    Annotations::open(&scene.annotations, &options)?
-                }
-            };
+            let mut annotations = open_annotations(&scene, &file, &frame)?;
             warnings = std::mem::take(&mut annotations.warnings);
-            if let (true, MeshSource::Files { colors, .. }) = (takes_colors, &mut source) {
+
+            if takes_colors && let MeshSource::Files { colors, .. } = &mut source {
                 let found = PointColors::of(&scene.path, &file.mesh, &annotations)?;
                 notes.push(found.sentence());
                 warnings.extend(found.doubts());
@@ -268,23 +256,28 @@ impl AreaInput {
                 colored.mesh = colored.mesh.with_vertex_colors(colors.clone());
                 file = Arc::new(colored);
             }
+
             let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
             if opened.annotations {
                 rooms = number(scene.area, annotations).map_err(|e| Error::unfit(of, e.to_string()))?;
             }
         }
+
         let mesh_file = opened.keep_mesh.then_some(file);
         let photographs = photographs_of(&scene, &frame)?;
+
         let (cameras, cameras_path) =
             Cameras::of_scene(&scene, asked, frame.offset_m)?.unwrap_or_else(|| {
-                // Who has photographs asks for nothing else.
-                let cameras = match photographs.all.is_empty() {
-                    true => Cameras::listed_or_placed(Vec::new(), Vec::new()),
-                    false => Cameras::Listed(Vec::new(), Vec::new()),
+                // An area with photographs needs no other locations.
+                let cameras = if photographs.all.is_empty() {
+                    Cameras::listed_or_placed(Vec::new(), Vec::new())
+                } else {
+                    Cameras::Listed(Vec::new(), Vec::new())
                 };
                 (cameras, scene.path.clone())
             });
         frame.refuse_far_locations(&cameras_path, cameras.listed())?;
+
         Ok(Self {
             number: scene.area,
             source,
@@ -314,24 +307,15 @@ impl AreaInput {
         })
     }
 
-    /// An area of meshes alone. Which axis of theirs points up, and in which unit they are, is guessed if
-    /// nobody says it.
+    /// Opens an area of meshes alone. Their up axis and their unit are guessed if nobody says them.
     fn of_meshes(
         paths: &[PathBuf],
         (up, units): (Option<UpAxis>, Option<LengthUnit>),
         asked: Option<Placing>,
         opened: Opened,
     ) -> Result<Self> {
-        let ending = |path: &Path| {
-            path.extension()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .to_ascii_lowercase()
-        };
         // By glTF's definition +Y points up, and the unit is the metre.
-        let first = paths
-            .first()
-            .filter(|path| !["gltf", "glb"].contains(&ending(path).as_str()));
+        let first = paths.first().filter(|path| !is_gltf(path));
         let first = match first.filter(|_| up.is_none() || units.is_none()) {
             Some(path) => {
                 let options = MeshOptions { origin: MeshOrigin::Near, units, ..MeshOptions::default() };
@@ -339,11 +323,13 @@ impl AreaInput {
             }
             None => None,
         };
+
         let guess = first
             .as_ref()
             .filter(|_| up.is_none())
             .map(|file| UpGuess::of(&file.mesh));
         let up = up.or(guess.map(|guess| guess.up())).unwrap_or(UpAxis::Y);
+
         let unsaid = first
             .as_ref()
             .filter(|file| units.is_none() && file.unit_said.is_none());
@@ -352,35 +338,44 @@ impl AreaInput {
             .map(|guess| guess.unit())
             .filter(|unit| *unit != LengthUnit::Metre));
         drop(first);
+
         let scene = SceneFile { units, ..SceneFile::of_meshes(paths.to_vec(), up) };
         let mut text = format!("area = {}\n[mesh]\nup = {:?}\n", scene.area, up.name());
         text.extend(units.map(|unit| format!("units = {:?}\n", unit.name())));
+
         let mut area = Self::open(scene, asked, opened)?;
         area.notes.extend(guess.map(|guess| guess.sentence()));
         area.notes.extend(unit_guess.and_then(|guess| guess.sentence()));
         area.warnings.extend(guess.and_then(|guess| guess.doubt()));
         area.warnings.extend(unit_guess.and_then(|guess| guess.doubt()));
+
         area.records.push(InputRecord::of_text("scene", &text));
         Ok(area)
     }
 
-    /// Takes an area that is no file.
+    /// Opens an area that is in memory.
     fn in_memory(scene: &SharedScene, asked: Option<Placing>, opened: Opened) -> Result<Self> {
         scene.check()?;
         let name = scene.name();
-        let (mut rooms, mut warnings) = (Vec::new(), Vec::new());
+
         let frame = MeshFrame::of(&scene.mesh);
-        if let (true, Some(annotations)) = (opened.annotations, &scene.annotations) {
+        let mut rooms = Vec::new();
+        let mut warnings = Vec::new();
+        if opened.annotations
+            && let Some(annotations) = &scene.annotations
+        {
             frame.refuse_far_points(&name, annotations)?;
             let mut annotations = annotations.clone();
             warnings = std::mem::take(&mut annotations.warnings);
             rooms = number(scene.area, annotations).map_err(|e| Error::unfit(&name, e.to_string()))?;
         }
+
         let cameras = match asked {
             Some(placing) => Cameras::Placed(placing),
             None => Cameras::listed_or_placed(scene.locations.clone(), vec![None; scene.locations.len()]),
         };
         frame.refuse_far_locations(&name, cameras.listed())?;
+
         Ok(Self {
             number: scene.area,
             source: MeshSource::Memory(Arc::clone(&scene.mesh)),
@@ -408,7 +403,8 @@ impl AreaInput {
         })
     }
 
-    /// Opens the folder of a published area; `scene` is what names it, if that is no command line.
+    /// Opens the folder of a published area. `scene` is the scene file that names it; `None` if the command
+    /// line does.
     fn published(
         folder: &Path,
         scene: Option<SceneFile>,
@@ -419,11 +415,13 @@ impl AreaInput {
             area: scene.as_ref().map(|s| s.area),
             world_from_area: scene.as_ref().map_or(DAffine3::IDENTITY, |s| s.world_from_published),
         };
+
         check_area(folder)?;
         let mut area = PublishedArea::open_with(folder, &options)?;
         let mut warnings = std::mem::take(&mut area.warnings);
         let mut rooms = Vec::new();
         let mut mesh = area.read_mesh()?;
+
         let is_labelled = area.semantic_mesh.is_some();
         if opened.annotations && is_labelled {
             for label in &mut mesh.labels {
@@ -433,7 +431,9 @@ impl AreaInput {
             warnings.append(&mut annotations.warnings);
             rooms = published_numbers(&mesh.labels, annotations);
         }
+
         let taxonomy = area.taxonomy.clone();
+
         let listed = match &scene {
             Some(scene) => Cameras::of_scene(scene, asked, DVec3::ZERO)?,
             None => asked.map(|placing| (Cameras::Placed(placing), folder.to_owned())),
@@ -445,30 +445,26 @@ impl AreaInput {
                 .unzip();
             (Cameras::Listed(locations, rooms), folder.to_owned())
         });
+
         let mut files = vec![folder.to_owned()];
-        let mut sources = vec![area.mesh.clone()];
-        sources.extend(area.semantic_mesh.iter().chain(&area.labels).cloned());
-        if !area.taxonomy.is_s3dis() {
-            sources.push(area.taxonomy_json());
-        }
-        if area.world_offset_m != DVec3::ZERO {
-            sources.push(area.conventions());
-        }
-        let poses = ["data/pose", "pano/pose"].map(|name| folder.join(name));
-        sources.extend(poses.into_iter().filter(|path| path.is_dir()));
+        let mut sources = published_sources(folder, &area);
         if let Some(scene) = &scene {
             files.extend(files_of(scene));
             sources.extend(files_of(scene).into_iter().filter(|path| path != folder));
         }
+
         let file = Arc::new(mesh.file);
         let frame = MeshFrame::of(&file);
         frame.refuse_far_locations(&cameras_path, cameras.listed())?;
+
         let photographs = match &scene {
             Some(scene) => photographs_of(scene, &MeshFrame { offset_m: DVec3::ZERO, ..frame })?,
             None => Photographs::default(),
         };
+
         files.extend(photographs.files().cloned());
         sources.extend(photographs.by_folder().into_keys());
+
         Ok(Self {
             number: area.area,
             path: scene.as_ref().map_or(folder, |s| &s.path).to_owned(),
@@ -492,15 +488,16 @@ impl AreaInput {
         })
     }
 
-    /// The mesh, read again if it is not in memory.
+    /// Returns the mesh, read again if it is not in memory.
     pub(crate) fn read_mesh(&self) -> Result<Arc<MeshFile>> {
         self.mesh_file
             .as_ref()
             .map_or_else(|| self.source.read(), |file| Ok(Arc::clone(file)))
     }
 
-    /// About how much an export of it writes. Where locations are placed, a fifth of the mesh counts as
-    /// floor, with no more of them than 2 m apart: a slip in their distance is another finding.
+    /// Estimates how much an export of the area writes. Where locations are placed, a fifth of the mesh
+    /// counts as floor, and no more of them are counted than stand 2 m apart: a slip in their distance is
+    /// another finding.
     pub(crate) fn estimate(&self, mesh: &TriMesh, options: &ExportOptions) -> Estimate {
         let area_m2 = mesh.total_area();
         let floor_m2 = area_m2 / 5.0;
@@ -508,18 +505,19 @@ impl AreaInput {
         let count = self.cameras.count_on(floor_m2);
         let is_listed = matches!(self.cameras, Cameras::Listed(..));
         let locations = if is_listed { count } else { count.min(most) };
+
         let pixels = |c: &Camera| f64::from(c.width) * f64::from(c.height);
         let photographs = self.photographs.all.iter().map(|p| pixels(&p.camera));
         Estimate::new(area_m2, locations, options).with_views(photographs, options)
     }
 
-    /// What looks wrong about the number of its scan locations.
+    /// Returns what looks wrong about the number of its scan locations.
     pub(crate) fn count_findings(&self, rooms: &[SurveyedRoom]) -> Vec<Finding> {
         let floor_m2: f64 = rooms.iter().map(|r| r.footprint.area_m2).sum();
         count_findings(self.cameras.count_on(floor_m2), rooms)
     }
 
-    /// The data set's list of labels that the area's folder came with.
+    /// The list of labels of a published area.
     fn published_labels(&self) -> Option<&PathBuf> {
         match &self.source {
             MeshSource::Published(area) => area.labels.as_ref(),
@@ -527,7 +525,7 @@ impl AreaInput {
         }
     }
 
-    /// What was odd in mesh, annotations and photographs, a sentence each.
+    /// Returns what was odd in mesh, annotations and photographs, a sentence each.
     pub(crate) fn doubts<'a>(&'a self, file: &'a MeshFile) -> impl Iterator<Item = &'a String> {
         self.warnings
             .iter()
@@ -535,14 +533,14 @@ impl AreaInput {
             .chain(&file.warnings)
     }
 
-    /// A sentence about this area with its files named as the manifest names them, which is the same wherever
-    /// the scene lies.
+    /// Returns a sentence about this area with its files named as in the manifest. These names are the same
+    /// wherever the scene lies.
     pub(crate) fn with_short_names(&self, sentence: &str, companions: &[PathBuf]) -> String {
         let mut paths: Vec<&PathBuf> = self.sources.iter().chain(&self.files).chain(companions).collect();
         paths.push(&self.path);
         // A name without folders is short already, and might be a word of the sentence.
         paths.retain(|path| path.components().count() > 1);
-        // What lies in a folder before the folder.
+        // Long paths come first, so that files are named before the folder they lie in.
         paths.sort_by_key(|path| std::cmp::Reverse(path.as_os_str().len()));
         paths.iter().fold(sentence.to_owned(), |text, path| {
             text.replace(&*path.to_string_lossy(), &requested::name_of(&self.path, path))
@@ -566,7 +564,66 @@ impl AreaInput {
     }
 }
 
-/// The photographs that a scene file names.
+/// Refuses areas with and without labels, and areas of different taxonomies.
+fn refuse_mixed(areas: &[AreaInput]) -> Result<()> {
+    let with = areas.iter().find(|area| area.is_labelled);
+    let without = areas.iter().find(|area| !area.is_labelled);
+    if let (Some(with), Some(without)) = (with, without) {
+        return Err(InputError::MixedLabels { with: with.path.clone(), without: without.path.clone() }.into());
+    }
+
+    let Some(first) = areas.first() else { return Ok(()) };
+    match areas.iter().find(|area| area.taxonomy != first.taxonomy) {
+        None => Ok(()),
+        Some(other) => Err(InputError::MixedTaxonomies {
+            first: (first.path.clone(), first.taxonomy.name().to_owned()),
+            second: (other.path.clone(), other.taxonomy.name().to_owned()),
+        }
+        .into()),
+    }
+}
+
+/// Opens the annotations of a scene file: its own, or the labels of its mesh.
+fn open_annotations(scene: &SceneFile, file: &MeshFile, frame: &MeshFrame) -> Result<Annotations> {
+    let options = &scene.annotation_options;
+    if scene.annotations.is_empty() {
+        return Ok(Annotations::of_mesh(file, options)?);
+    }
+    let given = Some(options.offset_m).filter(|_| scene.annotations_have_offset);
+    let options = AnnotationOptions {
+        offset_m: given.unwrap_or(frame.offset_m),
+        mesh_bounds: Some(frame.bounds),
+        ..options.clone()
+    };
+    Ok(Annotations::open(&scene.annotations, &options)?)
+}
+
+/// Whether a path names a glTF file, by its ending.
+fn is_gltf(path: &Path) -> bool {
+    let ending = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
+    ["gltf", "glb"].contains(&ending.as_str())
+}
+
+/// The files and folders of a published area that decide the bytes of the data set.
+fn published_sources(folder: &Path, area: &PublishedArea) -> Vec<PathBuf> {
+    let mut sources = vec![area.mesh.clone()];
+    sources.extend(area.semantic_mesh.iter().chain(&area.labels).cloned());
+    if !area.taxonomy.is_s3dis() {
+        sources.push(area.taxonomy_json());
+    }
+    if area.world_offset_m != DVec3::ZERO {
+        sources.push(area.conventions());
+    }
+    let poses = ["data/pose", "pano/pose"].map(|name| folder.join(name));
+    sources.extend(poses.into_iter().filter(|path| path.is_dir()));
+    sources
+}
+
+/// Opens the photographs that a scene file names.
 fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Photographs> {
     let Some(source) = &scene.frames else { return Ok(Photographs::default()) };
     let photographs = Photographs::open(source, scene.area, frame.offset_m)?;
@@ -574,7 +631,7 @@ fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Photographs> {
     Ok(photographs)
 }
 
-/// What a scene file names, and itself.
+/// The scene file, and the files and folders that it names.
 fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
     let mut files = vec![scene.path.clone()];
     files.extend(

@@ -6,8 +6,9 @@ use s3d_io::cloud::Annotations;
 use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
 use std::collections::BTreeMap;
 
-/// The table of all labels. That of a published data set is kept whole if it has them all, so that an index
-/// means the same in its images and in ours; else it is made of the labels at hand.
+/// Returns the table of all labels. The table of a published data set is kept whole if it has all of them, so
+/// that an index means the same in its images and in ours. Otherwise a new table is made from the labels of
+/// the areas.
 pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
     let labels: Vec<Label> = areas
         .iter()
@@ -15,6 +16,7 @@ pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
         .flat_map(|r| &r.instances)
         .map(|i| i.label)
         .collect();
+
     for area in areas.iter_mut() {
         let Some(path) = area.published_labels().cloned() else { continue };
         let names = s3d_io::dataset::read_labels(&path)?;
@@ -30,13 +32,14 @@ pub(super) fn label_table(areas: &mut [AreaInput]) -> Result<LabelTable> {
                 .push(format!("{}: {e}; the table is made anew", path.display())),
         }
     }
+
     let taxonomy = areas.first().map(|area| area.taxonomy.clone()).unwrap_or_default();
     taxonomy
         .table(labels)
         .map_err(|e| InputError::Labels { why: e.to_string() }.into())
 }
 
-/// Gives every instance, whose numbers run per room, its number in the area.
+/// Gives every instance its number in the area. The numbers of the annotations run per room.
 pub(super) fn number(area: u32, annotations: Annotations) -> Result<Vec<RoomInput>, NumberingError> {
     let keys = annotations
         .rooms
@@ -50,8 +53,8 @@ pub(super) fn number(area: u32, annotations: Annotations) -> Result<Vec<RoomInpu
     Ok(named(annotations, &labels))
 }
 
-/// Gives every instance the label that it was published with: those of a class and room were numbered there
-/// in the order of their labels.
+/// Gives every instance the label that it was published with. The instances of a class and room were numbered
+/// there in the order of their labels.
 pub(super) fn published_numbers(labels: &[Label], annotations: Annotations) -> Vec<RoomInput> {
     let mut sorted: Vec<Label> = labels.to_vec();
     sorted.sort_by_key(|l| (l.room, l.class, l.instance));
@@ -83,6 +86,7 @@ fn named(annotations: Annotations, labels: &BTreeMap<(Room, Class, u32), Label>)
                 .collect(),
         })
         .collect();
+
     rooms
         .iter_mut()
         .for_each(|r| r.instances.sort_by_key(|i| (i.label.class, i.number_in_room)));

@@ -13,7 +13,7 @@ use s3d_io::scene::FrameSource;
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// How many photographs that are not there are named in a message.
+/// How many missing photographs a message names.
 const MAX_NAMED: usize = 20;
 
 /// The endings that a name in a list may lack.
@@ -26,11 +26,11 @@ pub(crate) struct Photographs {
     pub(crate) list: PathBuf,
     /// In the list's order.
     pub(crate) all: Vec<Photograph>,
-    /// What is to be said of them, a sentence each.
+    /// What the log says of them, a sentence each.
     pub(crate) notes: Vec<String>,
     /// What was odd about them, a sentence each.
     pub(crate) warnings: Vec<String>,
-    /// The files that the list is: it may be a folder with much besides.
+    /// The files of the list. The list may be a folder that holds much else.
     list_files: Vec<PathBuf>,
 }
 
@@ -39,24 +39,27 @@ pub(crate) struct Photographs {
 pub(crate) struct Photograph {
     /// What the list calls it.
     pub(crate) name: String,
-    /// The camera of its view.
+    /// The uuid of its view's camera.
     pub(crate) uuid: String,
     pub(crate) picture: PathBuf,
-    /// What it was taken through, in its own pixels.
+    /// The lens that it was taken through, in its own pixels.
     pub(crate) lens: PhotoLens,
-    /// What takes the view: a pinhole.
+    /// The pinhole camera of its view.
     pub(crate) camera: Camera,
 }
 
 impl Photographs {
-    /// Finds the photographs that a scene of this area names, in a world less `offset_m`.
+    /// Finds the photographs that a scene of this area names. `offset_m` is subtracted from their places.
     ///
     /// # Errors
-    /// For those that are not there, all of them; for the first whose camera or size is not as it should be.
+    /// If photographs are missing, with all of them; for the first whose camera or size is not as it should
+    /// be.
     pub(crate) fn open(source: &FrameSource, area: u32, offset_m: DVec3) -> Result<Self> {
         let PosedCameras { cameras, untracked, files } =
             read_posed_cameras(&source.path, &source.world_from_file)?;
-        let (listed, list) = (cameras.len(), &source.path);
+        let listed = cameras.len();
+        let list = &source.path;
+
         let mut notes = Vec::new();
         if untracked > 0 {
             notes.push(format!(
@@ -66,20 +69,24 @@ impl Photographs {
                 listed + untracked
             ));
         }
+
         let chosen = choose(cameras, source);
         notes.push(format!("{}: {} of {listed} photographs are taken", list.display(), chosen.len()));
+
         let mut names = HashSet::new();
         if let Some(twice) = chosen.iter().find(|camera| !names.insert(camera.name.as_str())) {
             return Err(at(list, twice, "is listed twice: each photograph needs a name of its own".into()));
         }
+
         let pictures = find(source, &chosen)?;
-        // Of several faults the first of the list is told, whichever thread finds its own first.
+        // The first fault in the order of the list is reported, whichever thread finds its own first.
         let opened: Vec<Result<_>> = chosen
             .par_iter()
             .zip(pictures)
             .map(|(posed, picture)| open_one(source, area, offset_m, posed, picture))
             .collect();
         let found: Vec<(Photograph, u8)> = opened.into_iter().collect::<Result<_>>()?;
+
         let mut warnings = Vec::new();
         let turned = found.iter().filter(|(_, turn)| *turn != 1).count();
         if let Some((first, turn)) = found.iter().find(|(_, turn)| *turn != 1) {
@@ -90,6 +97,7 @@ impl Photographs {
                 first.picture.display()
             ));
         }
+
         let all = found.into_iter().map(|(photograph, _)| photograph).collect();
         Ok(Self { list: list.clone(), all, notes, warnings, list_files: files })
     }
@@ -100,19 +108,20 @@ impl Photographs {
         self.all.iter().map(location).collect()
     }
 
-    /// All files that are read of them.
+    /// All files that are read for the photographs.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.list_files.iter().chain(self.all.iter().map(|p| &p.picture))
     }
 
-    /// The same by folder: the list's, if it is one, or else each one's own; and files that have no folder's
-    /// place in a record stand for themselves.
+    /// The same files by folder. A file of the list belongs to the list, whether that is a folder or a file;
+    /// any other file belongs to its own folder.
     pub(crate) fn by_folder(&self) -> BTreeMap<PathBuf, Vec<PathBuf>> {
         let mut folders: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
         for file in self.files() {
-            let folder = match file.starts_with(&self.list) {
-                true => self.list.as_path(),
-                false => file.parent().unwrap_or(Path::new("")),
+            let folder = if file.starts_with(&self.list) {
+                self.list.as_path()
+            } else {
+                file.parent().unwrap_or(Path::new(""))
             };
             folders.entry(folder.to_owned()).or_default().push(file.clone());
         }
@@ -120,10 +129,11 @@ impl Photographs {
     }
 }
 
-/// Every which photograph, and of those at most so many, evenly spread.
+/// Takes one photograph of every `source.every`, and of these at most `source.max`, evenly spread.
 fn choose(cameras: Vec<PosedCamera>, source: &FrameSource) -> Vec<PosedCamera> {
     let mut chosen: Vec<PosedCamera> = cameras.into_iter().step_by(source.every.get() as usize).collect();
-    let (count, most) = (chosen.len(), source.max.map_or(usize::MAX, |max| max.get() as usize));
+    let count = chosen.len();
+    let most = source.max.map_or(usize::MAX, |max| max.get() as usize);
     if count > most {
         let mut kept = vec![false; count];
         (0..most).for_each(|i| kept[i * count / most] = true);
@@ -143,9 +153,11 @@ fn at(list: &Path, camera: &PosedCamera, message: String) -> Error {
     .into()
 }
 
-/// The file of each photograph.
+/// Finds the file of each photograph.
 fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
-    let (mut found, mut missing) = (Vec::new(), Vec::new());
+    let mut found = Vec::new();
+    let mut missing = Vec::new();
+
     for camera in cameras {
         let candidates: Vec<PathBuf> = match (&source.images, &camera.picture) {
             (Some(folder), picture) => {
@@ -157,11 +169,13 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
             (None, Some(picture)) => vec![picture.clone()],
             (None, None) => Vec::new(),
         };
+
         if candidates.is_empty() && source.images.is_none() {
             let message =
                 "no photograph was found for it: say which folder they are in, images = \"…\" under [frames]";
             return Err(at(&source.path, camera, message.into()));
         }
+
         match candidates.iter().find_map(|path| with_ending(path)) {
             Some(path) => found.push(path),
             None => missing.push(
@@ -171,15 +185,19 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
             ),
         }
     }
+
     if missing.is_empty() {
         return Ok(found);
     }
-    let (count, more) = (missing.len(), missing.len().saturating_sub(MAX_NAMED));
+
+    let count = missing.len();
+    let more = count.saturating_sub(MAX_NAMED);
     missing.truncate(MAX_NAMED);
     let mut names = missing.join(", ");
     if more > 0 {
         names += &format!(" and {more} more");
     }
+
     let message = format!(
         "{count} of {} photographs are not there: {names}; images = \"…\" under [frames] names another \
          folder",
@@ -188,7 +206,7 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
     Err(FileError::format(&source.path, message).into())
 }
 
-/// The file of this name, which may lack its ending.
+/// Finds the file of this name, which may lack its ending.
 fn with_ending(path: &Path) -> Option<PathBuf> {
     let longer = |ending: &str| {
         let mut name = path.as_os_str().to_owned();
@@ -201,7 +219,7 @@ fn with_ending(path: &Path) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-/// A photograph with its lens and the camera of its view, and how it asks to be turned.
+/// Opens a photograph with its lens and the camera of its view. Returns its EXIF orientation too.
 fn open_one(
     source: &FrameSource,
     area: u32,
@@ -211,6 +229,7 @@ fn open_one(
 ) -> Result<(Photograph, u8)> {
     let (width, height) = check_picture(&picture)?;
     let turn = read_picture_turn(&picture)?;
+
     let lens = posed.photo_lens([width, height]).map_err(|e| match e {
         IntrinsicsError::NoOptics => at(
             &source.path,
@@ -221,7 +240,7 @@ fn open_one(
                      intrinsic/intrinsic_color.txt, or fx or fov in a table"
             ),
         ),
-        // The four turns to a side.
+        // Orientations from 5 lay a picture on its side.
         IntrinsicsError::OtherSize { told, .. } if turn >= 5 && posed.photo_lens([height, width]).is_ok() => {
             let message = format!(
                 "is stored with {width} × {height} pixels, to be turned when it is shown (EXIF orientation \
@@ -234,12 +253,15 @@ fn open_one(
         IntrinsicsError::OtherSize { .. } => FileError::format(&picture, e.to_string()).into(),
         _ => at(&source.path, posed, e.to_string()),
     })?;
+
     let mut pose = posed.pose;
     pose.location -= offset_m;
     let camera = lens
         .pinhole(pose, source.width.unwrap_or(width))
         .map_err(|e| at(&source.path, posed, e.to_string()))?;
-    let (name, uuid) = (posed.name.clone(), uuid_from_name(&format!("area_{area}/{}", posed.name)));
+
+    let name = posed.name.clone();
+    let uuid = uuid_from_name(&format!("area_{area}/{name}"));
     Ok((Photograph { name, uuid, picture, lens, camera }, turn))
 }
 
@@ -251,9 +273,14 @@ mod tests {
     use std::num::NonZeroU32;
 
     fn source(every: u32, max: Option<u32>) -> FrameSource {
-        let (every, max) = (NonZeroU32::new(every).unwrap(), max.and_then(NonZeroU32::new));
-        let (path, world_from_file) = (PathBuf::from("list"), DAffine3::IDENTITY);
-        FrameSource { path, images: None, world_from_file, every, max, width: None }
+        FrameSource {
+            path: PathBuf::from("list"),
+            images: None,
+            world_from_file: DAffine3::IDENTITY,
+            every: NonZeroU32::new(every).unwrap(),
+            max: max.and_then(NonZeroU32::new),
+            width: None,
+        }
     }
 
     #[test]

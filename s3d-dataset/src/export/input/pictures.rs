@@ -17,13 +17,13 @@ use s3d_render::{Capture, CubeMap, Scene, SkyBoxTurn, StitchOptions, stitch};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// How many locations without pictures are named in a message.
+/// How many locations without pictures a message names.
 const MAX_NAMED: usize = 20;
 
 /// An area's pictures.
 pub(crate) struct Pictures {
     source: PictureSource,
-    /// By location; `None` where no image is asked for.
+    /// The pictures of each location; `None` where no image is asked for.
     found: Vec<Option<Found>>,
     /// What was odd about them, as a sentence each.
     pub(crate) warnings: Vec<String>,
@@ -37,11 +37,11 @@ enum Found {
 }
 
 impl Pictures {
-    /// Finds the pictures of an area's locations, if it has a source of pictures, and looks at their sizes.
-    /// Locations that `is_asked` is false for need none.
+    /// Finds the pictures of an area's locations, and checks their sizes. Returns `None` if the area has no
+    /// source of pictures. Locations need pictures only where `is_asked` is true.
     ///
     /// # Errors
-    /// For what is missing, all of it; for the first picture that is not what it should be.
+    /// If pictures are missing, with all of them; for the first picture that is not as it should be.
     pub(crate) fn open(area: &AreaInput, is_asked: impl Fn(&ScanLocation) -> bool) -> Result<Option<Self>> {
         let Some(source) = &area.pictures else { return Ok(None) };
         if matches!(area.cameras, Cameras::Placed(_)) {
@@ -55,8 +55,12 @@ impl Pictures {
             )
             .into());
         }
+
         let folder = PictureFolder::open(&source.path)?;
-        let (mut found, mut missing, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+        let mut found = Vec::new();
+        let mut missing = Vec::new();
+        let mut warnings = Vec::new();
+
         for location in area.cameras.listed() {
             let uuid = &location.uuid;
             let of_location = if is_asked(location) {
@@ -64,6 +68,7 @@ impl Pictures {
             } else {
                 None
             };
+
             found.push(match of_location {
                 Some(Ok(mut pictures)) => {
                     pictures.check()?;
@@ -86,14 +91,17 @@ impl Pictures {
                 None => None,
             });
         }
+
         if !missing.is_empty() {
-            let (count, of) = (missing.len(), area.cameras.listed().len());
+            let count = missing.len();
+            let of = area.cameras.listed().len();
             let more = count.saturating_sub(MAX_NAMED);
             missing.truncate(MAX_NAMED);
             let mut names = missing.join("; ");
             if more > 0 {
                 names += &format!("; and those of {more} more");
             }
+
             let message = format!(
                 "pictures of {count} of {of} locations are missing (rgb = \"{}\" in {}): {names}",
                 source.kind,
@@ -101,16 +109,17 @@ impl Pictures {
             );
             return Err(FileError::format(&source.path, message).into());
         }
+
         Ok(Some(Self { source: source.clone(), found, warnings }))
     }
 
-    /// What they are, in a line.
+    /// Describes the pictures in a line.
     pub(crate) fn summary(&self) -> String {
         let locations = self.found.iter().flatten().count();
         format!("{} of {locations} locations in {}", self.source.kind, self.source.path.display())
     }
 
-    /// Makes a location's cube map, on all threads. `None` if it was not asked for.
+    /// Makes a location's cube map, on all threads. Returns `None` if no image of the location is asked for.
     pub(crate) fn cube(
         &self,
         ctx: &Context,
@@ -120,7 +129,9 @@ impl Pictures {
     ) -> Result<Option<CubeMap>> {
         let Some(found) = &self.found[index] else { return Ok(None) };
         let started = Instant::now();
-        let (options, pose) = (&self.source.options, &location.pose);
+        let options = &self.source.options;
+        let pose = &location.pose;
+
         let cube = match found {
             Found::SkyBox(paths) => {
                 let pictures = read_all(paths)?;
@@ -149,6 +160,7 @@ impl Pictures {
                 stitch(captures, pose, scene, &StitchOptions { size: options.size, gains: options.gains })
             }
         };
+
         ctx.debug(format_args!(
             "{}: a cube map of 6 × {}² pixels, {:.1} % of it seen ({:.2} s)",
             location.uuid,
@@ -156,6 +168,7 @@ impl Pictures {
             100.0 * cube.coverage(),
             started.elapsed().as_secs_f64()
         ));
+
         Ok(Some(cube))
     }
 
@@ -165,7 +178,7 @@ impl Pictures {
     }
 }
 
-/// Does `work` on every item at once; results in the items' order.
+/// Does `work` on all items in parallel. The results are in the items' order.
 fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
     use rayon::prelude::*;
     items.par_iter().map(work).collect()
@@ -177,7 +190,7 @@ fn read_all(paths: &[PathBuf]) -> Result<Vec<Raster<[u8; 3]>>> {
         .collect::<s3d_io::Result<_>>()?)
 }
 
-/// The pictures of a location, or the names of those that are missing.
+/// Finds the pictures of a location, or returns the names of the missing ones.
 fn find(folder: &PictureFolder, kind: PictureKind, uuid: &str) -> s3d_io::Result<Result<Found, String>> {
     Ok(match kind {
         PictureKind::SkyBox => folder.sky_box(uuid).map(Found::SkyBox),
@@ -190,7 +203,7 @@ fn find(folder: &PictureFolder, kind: PictureKind, uuid: &str) -> s3d_io::Result
 }
 
 impl Found {
-    /// Takes the poses of captures, which are in the frame of the mesh's file, to where the mesh is.
+    /// Moves the poses of captures from the frame of the mesh's file to where the mesh lies.
     fn subtract(&mut self, offset_m: DVec3) {
         if let Self::Captures(captures) = self {
             captures
@@ -199,7 +212,7 @@ impl Found {
         }
     }
 
-    /// Looks at sizes and ends, without reading whole pictures.
+    /// Checks the sizes and the ends of the files, without reading whole pictures.
     fn check(&self) -> Result<()> {
         match self {
             Self::SkyBox(paths) => {
@@ -219,7 +232,7 @@ impl Found {
                 }
                 Ok(())
             }
-            // Those were looked at when they were found.
+            // Captures were checked when they were found.
             Self::Captures(_) => Ok(()),
         }
     }

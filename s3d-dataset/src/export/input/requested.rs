@@ -13,9 +13,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// What each area asks for. All files that they read are read once, on all threads. `companions` are the
-/// files that their meshes were read from besides. Of annotations and folders that are `known` from a plan,
-/// and have as many bytes as then, the checksum is taken from there.
+/// Size in bytes and checksum of each file.
+type Sums<'a> = BTreeMap<&'a Path, (u64, Checksum)>;
+
+/// Returns what each area asks for. All input files are read once, on all threads. `companions` are the
+/// further files of each area's meshes. Annotations and folders that are `known` from a plan, and have as
+/// many bytes as then, keep the plan's checksum.
 pub(crate) fn requested_areas(
     ctx: &Context,
     areas: &[AreaInput],
@@ -27,11 +30,13 @@ pub(crate) fn requested_areas(
         .zip(companions)
         .map(|(area, besides)| [&area.sources[..], besides].concat())
         .collect();
-    // The files of each path: itself, or what is in it; and what a plan knows of the path.
+
+    // The files of each path: the path itself, or the files in it. `taken` are the records that a plan knows.
     let mut files: Vec<Vec<Vec<PathBuf>>> = Vec::new();
     let mut taken: BTreeMap<(u32, &Path), InputRecord> = BTreeMap::new();
     for (area, of_area) in areas.iter().zip(&paths) {
         let mut listed = Vec::new();
+
         // A folder of photographs may hold much that is not read.
         let mut photographs = area.photographs.by_folder();
         for path in of_area {
@@ -40,6 +45,7 @@ pub(crate) fn requested_areas(
                 None if path.is_dir() => walk(path)?,
                 None => vec![path.clone()],
             };
+
             let record = known.and_then(|known| known.input(area.number, &name_of(&area.path, path)));
             if (path.is_dir() || area.annotations.contains(path))
                 && let Some(record) = record
@@ -51,54 +57,67 @@ pub(crate) fn requested_areas(
                 listed.push(files);
             }
         }
+
         files.push(listed);
     }
+
     let mut all: Vec<&PathBuf> = files.iter().flatten().flatten().collect();
     all.sort();
     all.dedup();
     let sums = checksums(ctx, &all)?;
-    let record = |area: &AreaInput, path: &Path, files: &[PathBuf]| -> Result<InputRecord> {
-        if let Some(record) = taken.get(&(area.number, path)) {
-            return Ok(record.clone());
-        }
-        let name = name_of(&area.path, path);
-        if !path.is_dir() {
-            let (bytes, xxh3_128) = sums.get(path).copied().unwrap_or((0, Checksum::of(b"")));
-            return Ok(InputRecord { path: name, bytes, xxh3_128 });
-        }
-        let mut lines = ChecksumOfParts::default();
-        let mut total = 0;
-        let mut listed: Vec<(String, u64, Checksum)> = Vec::new();
-        for file in files {
-            let (bytes, sum) = sums.get(file.as_path()).copied().unwrap_or((0, Checksum::of(b"")));
-            listed.push((below(path, file), bytes, sum));
-            total += bytes;
-        }
-        listed.sort();
-        for (path, bytes, xxh3_128) in listed {
-            lines.add(FileRecord { path, bytes, xxh3_128 }.to_line().as_bytes());
-            lines.add(b"\n");
-        }
-        let (_, xxh3_128) = lines.finish();
-        Ok(InputRecord { path: format!("{name}/"), bytes: total, xxh3_128 })
-    };
+
     let mut requested = Vec::new();
     for ((area, paths), files) in areas.iter().zip(&paths).zip(&files) {
-        let inputs = paths.iter().zip(files).map(|(path, files)| record(area, path, files));
+        let record = |path: &PathBuf, files: &[PathBuf]| match taken.get(&(area.number, path.as_path())) {
+            Some(record) => record.clone(),
+            None => record_of(&area.path, path, files, &sums),
+        };
+        let mut inputs: Vec<InputRecord> = paths
+            .iter()
+            .zip(files)
+            .map(|(path, files)| record(path, files))
+            .collect();
+        inputs.extend(area.records.iter().cloned());
+
         requested.push(RequestedArea {
             area: area.number,
             place_cameras: area.cameras.distance_m(),
             see: area.cameras.share(),
             offset_m: area.frame.offset(),
-            inputs: inputs
-                .chain(area.records.iter().cloned().map(Ok))
-                .collect::<Result<_>>()?,
+            inputs,
         });
     }
     Ok(requested)
 }
 
-/// How many bytes some files have, without reading them.
+/// The record of an input: a file, or a folder with `files` in it.
+fn record_of(scene: &Path, path: &Path, files: &[PathBuf], sums: &Sums<'_>) -> InputRecord {
+    let sum_of = |file: &Path| sums.get(file).copied().unwrap_or((0, Checksum::of(b"")));
+    let name = name_of(scene, path);
+    if !path.is_dir() {
+        let (bytes, xxh3_128) = sum_of(path);
+        return InputRecord { path: name, bytes, xxh3_128 };
+    }
+
+    let mut total = 0;
+    let mut listed: Vec<(String, u64, Checksum)> = Vec::new();
+    for file in files {
+        let (bytes, sum) = sum_of(file);
+        listed.push((below(path, file), bytes, sum));
+        total += bytes;
+    }
+    listed.sort();
+
+    let mut lines = ChecksumOfParts::default();
+    for (path, bytes, xxh3_128) in listed {
+        lines.add(FileRecord { path, bytes, xxh3_128 }.to_line().as_bytes());
+        lines.add(b"\n");
+    }
+    let (_, xxh3_128) = lines.finish();
+    InputRecord { path: format!("{name}/"), bytes: total, xxh3_128 }
+}
+
+/// The total size of some files in bytes, without reading them.
 fn total_bytes(files: &[PathBuf]) -> Result<u64> {
     let mut total = 0;
     for file in files {
@@ -110,7 +129,7 @@ fn total_bytes(files: &[PathBuf]) -> Result<u64> {
 }
 
 /// Size and checksum of each file.
-fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<BTreeMap<&'a Path, (u64, Checksum)>> {
+fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<Sums<'a>> {
     let sums = Mutex::new(BTreeMap::new());
     let progress = ctx.progress("reading", "input files", files.len() as u64);
     for_each_in_order(
@@ -129,7 +148,7 @@ fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<BTreeMap<&'a Pa
     Ok(sums.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// What an input is called: its path from the folder of what the user named, or else its last part.
+/// The name of an input: its path from the folder of the scene that the user named, or else its last part.
 pub(super) fn name_of(scene: &Path, path: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     match path.strip_prefix(folder) {

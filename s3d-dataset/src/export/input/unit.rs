@@ -1,4 +1,4 @@
-//! The unit of a mesh's file, where nobody says it.
+//! Guesses the unit of a mesh's file, where nobody says it.
 
 use crate::useful::Headroom;
 use glam::DVec3;
@@ -6,40 +6,41 @@ use s3d_geom::TriMesh;
 use s3d_io::mesh::{LengthUnit, UpAxis};
 use s3d_render::Scene;
 
-/// Heights of rooms, metres.
+/// The usual heights of rooms, metres.
 const HEIGHTS_M: std::ops::Range<f64> = 1.8..6.0;
 
 /// A guess by the height of rooms: how far ceilings are above floors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct UnitGuess {
-    /// The height of rooms in the file's unit; nothing without ceilings.
+    /// The height of rooms in the file's unit; `None` without ceilings.
     height: Option<f64>,
 }
 
 impl UnitGuess {
-    /// Of a mesh in the unit of its file.
+    /// Guesses from a mesh in the unit of its file.
     pub(super) fn of(mesh: &TriMesh, up: UpAxis) -> Self {
         let up = up.rotation().transpose() * DVec3::Z;
         Self { height: Headroom::of(&Scene::new(mesh), up).of_rooms() }
     }
 
-    /// The unit in which rooms are as high as rooms are, if that is clear. Feet are not: what would be 8 feet
-    /// may be a hall of 8 metres.
+    /// The unit that gives rooms a usual height, if that is clear; otherwise the metre. Feet are never clear:
+    /// a height of 8 may be 8 feet, or a hall of 8 metres.
     pub(super) fn unit(self) -> LengthUnit {
         let fits = |unit: &LengthUnit| {
             self.height
                 .is_some_and(|height| HEIGHTS_M.contains(&(height * unit.metres())))
         };
-        // Of what is as high as a room in centimetres and in inches, the lower room is the likelier.
+        // If a height fits both centimetres and inches, the lower room is the likelier.
         [LengthUnit::Millimetre, LengthUnit::Centimetre, LengthUnit::Inch]
             .into_iter()
             .find(fits)
             .unwrap_or_default()
     }
 
-    /// What was guessed and why, if it is no metre.
+    /// What was guessed and why, if it is not the metre.
     pub(super) fn sentence(self) -> Option<String> {
-        let (unit, height) = (self.unit(), self.height?);
+        let unit = self.unit();
+        let height = self.height?;
         (unit != LengthUnit::Metre).then(|| {
             format!(
                 "its unit is taken for the {unit}: ceilings are {height:.0} above floors, which makes rooms \
@@ -49,7 +50,7 @@ impl UnitGuess {
         })
     }
 
-    /// A sentence if it could as well be another.
+    /// A sentence if the unit could as well be the foot.
     pub(super) fn doubt(self) -> Option<String> {
         let height = self.height.filter(|_| self.unit() == LengthUnit::Metre)?;
         let feet = HEIGHTS_M.contains(&(height * LengthUnit::Foot.metres())) && !HEIGHTS_M.contains(&height);
@@ -87,7 +88,7 @@ mod tests {
         let feet = UnitGuess::of(&scaled(1.0 / 0.3048), UpAxis::Z);
         assert_eq!((feet.unit(), feet.sentence()), (LengthUnit::Metre, None));
         assert!(feet.doubt().unwrap().contains("--units ft"));
-        // On its side there are neither floors nor ceilings but tops and undersides of things.
+        // A building on its side has neither floors nor ceilings, only tops and undersides of things.
         let side = UnitGuess::of(&scaled(1.0), UpAxis::Y);
         assert_eq!(side.unit(), LengthUnit::Metre);
         let open = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();

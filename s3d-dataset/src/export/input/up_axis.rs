@@ -1,10 +1,10 @@
-//! Which axis of a mesh's file points up, where nobody says it.
+//! Guesses which axis of a mesh's file points up, where nobody says it.
 
 use glam::Vec3;
 use s3d_geom::TriMesh;
 use s3d_io::mesh::UpAxis;
 
-/// The cosine of 18°: what is tilted less is level.
+/// The cosine of 18°: a face that is tilted less is level.
 const LEVEL: f32 = 0.95;
 
 /// Axes whose level surfaces differ by less than this factor cannot be told apart.
@@ -19,7 +19,7 @@ pub(super) struct UpGuess {
 }
 
 impl UpGuess {
-    /// Of a mesh in the axes of its file.
+    /// Guesses from a mesh in the axes of its file.
     pub(super) fn of(mesh: &TriMesh) -> Self {
         let level = [Vec3::Y, Vec3::Z].map(|up| {
             let faces = (0..mesh.faces().len() as u32).filter(|f| mesh.normal(*f).dot(up).abs() > LEVEL);
@@ -46,7 +46,7 @@ impl UpGuess {
         )
     }
 
-    /// A sentence if it could as well be the other.
+    /// A sentence if the other axis is nearly as likely.
     pub(super) fn doubt(self) -> Option<String> {
         let [y, z] = self.level;
         (y.max(z) < CLEAR * y.min(z)).then(|| {
