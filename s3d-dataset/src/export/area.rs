@@ -49,7 +49,6 @@ fn write_area_assets(
         s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &label_of_face, &table.names())?;
     }
     meshes.end();
-
     ctx.check()?;
 
     let sampling = account.stage(Stage::Points, Some(number));
@@ -67,7 +66,6 @@ fn write_area_assets(
     journal.write(Done::Assets(AssetsDone { area: number, points, files }))?;
     sampling.end();
     account.unit_finished(UnitKind::Assets, number, None, &tally, started);
-
     Ok(())
 }
 
@@ -116,9 +114,7 @@ pub(crate) fn render_area(
     let Common { layout, options, journal, account, .. } = common;
     let LabelledArea { annotated, locations, location_rooms, .. } = plan;
     let PreparedMesh { file, scene } = prepared;
-
     let number = area.number;
-
     check_faces(plan, prepared)?;
     create_dir(&layout.mesh_dir(number))?;
 
@@ -139,6 +135,7 @@ pub(crate) fn render_area(
         .iter()
         .map(|l| todo.contains(&Unit::Location(number, l.uuid.clone())))
         .collect();
+    let photographs = wanted_photographs(area, &annotated.rooms, todo);
 
     // Each finished unit is written to the journal.
     let finish_location = |written: WrittenLocation| {
@@ -148,8 +145,6 @@ pub(crate) fn render_area(
         account.unit_finished(UnitKind::Location, number, Some(uuid), &tally, started);
         Ok(())
     };
-
-    let photographs = wanted_photographs(area, &annotated.rooms, todo);
 
     let finish_photograph = |written: WrittenPhotograph| {
         let WrittenPhotograph { done, started } = written;

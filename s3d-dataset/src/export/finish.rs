@@ -7,11 +7,11 @@ use crate::export::images::photographs::doubts;
 use crate::export::views::select_requested;
 use crate::profile::{self};
 use crate::record::data_set::Listed;
-use crate::record::journal::Finished;
+use crate::record::journal::{Finished, LabelsDone};
 use crate::record::listing;
 use crate::record::manifest::{AreaEntry, Manifest};
 use crate::record::missing::missing_units;
-use crate::record::request::Request;
+use crate::record::request::{Request, RequestedArea};
 use crate::record::statistics::Statistics;
 use crate::record::tables;
 use crate::summary::{ImageTally, UnitTally, Unlabelled, ViewTally};
@@ -64,51 +64,15 @@ pub(crate) fn finish(
     let mut entries = Vec::new();
     let mut locations = 0;
     let mut all_unlabelled: Option<Unlabelled> = None;
-
     for requested in &request.areas {
-        let area = requested.area;
-        tables::write_views(layout, area, &candidates)?;
-        let Some(labels) = finished.labels(area) else { continue };
-
-        let photographs: Vec<&PhotographRecord> =
-            finished.photographs(area).map(|done| &done.record).collect();
-        if !labels.photographs.is_empty() {
-            write_json(&layout.frames_json(area), &photographs)?;
-            ctx.warn_each(doubts(area, &photographs));
-        }
-
-        let of_photographs = finished.photographs(area).map(|done| done.tally);
-        let of_locations = finished.locations(area).map(|done| done.tally);
-        let tally: UnitTally = of_locations.chain(of_photographs).sum();
+        tables::write_views(layout, requested.area, &candidates)?;
+        let Some(labels) = finished.labels(requested.area) else { continue };
+        let entry = finish_area(ctx, layout, request, finished, requested, labels)?;
         locations += labels.locations.len();
-
-        let mut pixels = tally.panoramas;
-        pixels += tally.views;
-        warn_unlabelled(ctx, area, &pixels);
-
-        let mut unlabelled = labels.entry.unlabelled;
-        if let Some(of) = unlabelled
-            .as_mut()
-            .filter(|_| request.options.modalities.contains(&Domain::Semantic))
-        {
-            of.without_label.pixels = Some(pixels.pixels_unlabelled);
-            of.without_votes.pixels = Some(pixels.pixels_unlabelled + pixels.pixels_filled);
-        }
-        if let Some(of) = unlabelled {
+        if let Some(of) = entry.unlabelled {
             *all_unlabelled.get_or_insert_default() += of;
         }
-
-        let warnings = labels.entry.warnings.iter().cloned().chain(ctx.take_notes()).collect();
-        entries.push(AreaEntry {
-            unlabelled,
-            warnings,
-            points: finished.assets(area).map_or(0, |assets| assets.points),
-            panoramas: tally.panoramas.images,
-            views: tally.views.images,
-            frames: photographs.len() as u64,
-            inputs: requested.inputs.clone(),
-            ..(*labels.entry).clone()
-        });
+        entries.push(entry);
     }
 
     let mut files = Vec::new();
@@ -140,7 +104,6 @@ pub(crate) fn finish(
     let paths: Vec<PathBuf> = files.iter().map(|f| f.path_in(layout.root())).collect();
     disk.map_or(Ok(()), SyncAhead::end)?;
     sync_data_set(layout.root(), &paths)?;
-
     manifest.complete(layout, entries, list)?;
     sync_file(&layout.manifest())?;
 
@@ -151,6 +114,51 @@ pub(crate) fn finish(
         locations,
         views,
         unlabelled: all_unlabelled,
+    })
+}
+
+/// Writes the list of an area's photographs, warns of what is odd about its images, and returns its entry in
+/// the manifest.
+fn finish_area(
+    ctx: &Context,
+    layout: &Layout,
+    request: &Request,
+    finished: &Finished,
+    requested: &RequestedArea,
+    labels: &LabelsDone,
+) -> Result<AreaEntry> {
+    let area = requested.area;
+    let photographs: Vec<&PhotographRecord> = finished.photographs(area).map(|done| &done.record).collect();
+    if !labels.photographs.is_empty() {
+        write_json(&layout.frames_json(area), &photographs)?;
+        ctx.warn_each(doubts(area, &photographs));
+    }
+
+    let of_photographs = finished.photographs(area).map(|done| done.tally);
+    let of_locations = finished.locations(area).map(|done| done.tally);
+    let tally: UnitTally = of_locations.chain(of_photographs).sum();
+    let mut pixels = tally.panoramas;
+    pixels += tally.views;
+    warn_unlabelled(ctx, area, &pixels);
+
+    // Pixels are counted in semantic images.
+    let mut unlabelled = labels.entry.unlabelled;
+    if let Some(of) = &mut unlabelled
+        && request.options.modalities.contains(&Domain::Semantic)
+    {
+        of.without_label.pixels = Some(pixels.pixels_unlabelled);
+        of.without_votes.pixels = Some(pixels.pixels_unlabelled + pixels.pixels_filled);
+    }
+
+    Ok(AreaEntry {
+        unlabelled,
+        warnings: labels.entry.warnings.iter().cloned().chain(ctx.take_notes()).collect(),
+        points: finished.assets(area).map_or(0, |assets| assets.points),
+        panoramas: tally.panoramas.images,
+        views: tally.views.images,
+        frames: photographs.len() as u64,
+        inputs: requested.inputs.clone(),
+        ..(*labels.entry).clone()
     })
 }
 
@@ -201,6 +209,7 @@ fn write_profiles(
     if wanted.is_empty() {
         return Ok(());
     }
+
     let files = Listed::of(layout.root(), files.iter().cloned());
     let source = profile::Source { ctx, layout, files: &files, taxonomy };
     profile::write(&source, layout, areas, wanted)

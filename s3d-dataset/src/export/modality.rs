@@ -48,9 +48,9 @@ pub(crate) struct Channels<'a> {
     pub(crate) rgb_samples: u32,
     /// The label index of each face; may be empty if no semantic image is asked for.
     pub(crate) label_of_face: &'a [u32],
-    /// The colour of each face in pretty images; may be empty likewise.
+    /// The colour of each face in pretty images; may be empty without such images.
     pub(crate) pretty_of_face: &'a [[u8; 3]],
-    /// The index of each face's class in the taxonomy, or [`NO_CLASS`]; may be empty likewise.
+    /// The index of each face's class in the taxonomy, or [`NO_CLASS`]; may be empty without such images.
     pub(crate) class_of_face: &'a [u8],
     /// The colours of `semantic_class` images, [`NO_CLASS`]'s last.
     pub(crate) palette: &'a [[u8; 3]],

@@ -37,7 +37,6 @@ pub(crate) fn write_points(
         let label = annotated.label_of_face[*face as usize];
         (place.get(&label).map_or((true, None), |(room, _)| (false, Some(*room))), label)
     };
-
     let mut faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
     faces.sort_by_cached_key(key);
     let rooms: Vec<(Option<Room>, Vec<Run>)> = runs(&faces, &annotated.label_of_face, &place);
@@ -82,7 +81,6 @@ pub(crate) fn write_points(
                 (Some(files), Some(label)) if !points.is_empty() => {
                     let class = label.class.name();
                     let number = run.number_in_room;
-
                     let mut instance = files.instance(class, number)?;
                     mat.object(&format!("{class}_{number}"), &label.to_string())?;
                     sink.write(points, run.label, |cloud| {

@@ -45,7 +45,6 @@ pub(crate) fn score(plan: &LabelledArea, prepared: &PreparedMesh<'_>, common: Co
         stride: options.entropy_stride,
         seed: options.seed,
     };
-
     let kinds = Kinds::of(table, &plan.annotated.label_of_face, &prepared.file.mesh);
     score_area(ctx, &missing, &prepared.scene, &kinds, scoring, |uuid, entropies| {
         journal.write(Done::Scores(ScoresDone { area: number, location: uuid.to_owned(), entropies }))

@@ -49,7 +49,8 @@ mod tests {
     #[test]
     fn a_file_comes_whole_in_place_of_another_or_its_fault_is_told() {
         let dir = tempfile::tempdir().unwrap();
-        let (from, to) = (dir.path().join("from"), dir.path().join("to"));
+        let from = dir.path().join("from");
+        let to = dir.path().join("to");
         create_dir(&from.join("a")).unwrap();
         fs::write(from.join("a/b"), b"content").unwrap();
         let record = FileRecord::of_file(&from, &from.join("a/b")).unwrap();
@@ -89,7 +90,8 @@ mod tests {
     #[test]
     fn one_folder_by_two_paths_keeps_its_files_and_links_become_files() {
         let dir = tempfile::tempdir().unwrap();
-        let (from, two) = (dir.path().join("from"), dir.path().join("two"));
+        let from = dir.path().join("from");
+        let two = dir.path().join("two");
         create_dir(&from).unwrap();
         std::os::unix::fs::symlink(&from, &two).unwrap();
         fs::write(from.join("b"), b"content").unwrap();
@@ -97,7 +99,8 @@ mod tests {
         assert_eq!(bring(&record, &from, &two).unwrap(), None);
         assert_eq!(fs::read(from.join("b")).unwrap(), b"content");
 
-        let (linked, to) = (dir.path().join("linked"), dir.path().join("to"));
+        let linked = dir.path().join("linked");
+        let to = dir.path().join("to");
         create_dir(&linked).unwrap();
         std::os::unix::fs::symlink(from.join("b"), linked.join("b")).unwrap();
         assert_eq!(bring(&record, &linked, &to).unwrap(), None);

@@ -96,7 +96,6 @@ pub(crate) fn write_images(
     assets: Option<AssetsWriter<'_>>,
 ) -> Result<()> {
     let shots = shots(job, candidates);
-
     let mut open: Vec<OpenLocation> = job.locations.iter().map(|_| OpenLocation::default()).collect();
     for shot in &shots {
         open[shot.location].left += 1;
@@ -115,7 +114,6 @@ pub(crate) fn write_images(
     };
 
     let alone = ImageJob { photographs: &[], ..*job };
-
     // Locations take turns, so that one cube map at a time is in memory. All threads work with it.
     let mut assets = assets;
     for shots in shots.chunk_by(|a, b| a.location == b.location) {
@@ -258,7 +256,6 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
     if !images.is_empty() {
         written.tally = count(job, &images, hits, buffers);
     }
-
     Ok(written)
 }
 

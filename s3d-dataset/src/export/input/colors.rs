@@ -32,7 +32,6 @@ impl PointColors {
         let nearest_faces = NearestFaces::new(mesh);
         let mut colors = VertexColors::new(&nearest_faces);
         let mut reader = InstanceReader::new(BLOCK_POINTS);
-
         let mut is_black = true;
         let mut instances = annotations.rooms.iter().flat_map(|room| &room.instances).peekable();
         while let Some(instance) = instances.next() {
@@ -51,7 +50,6 @@ impl PointColors {
         if vertices.far_points == vertices.points {
             return Err(fault("no annotated point is within 10 cm of the mesh: do they share a frame?"));
         }
-
         Ok(Self { vertices, area_m2: mesh.total_area() })
     }
 

@@ -74,7 +74,8 @@ mod tests {
     #[test]
     fn floors_and_ceilings_tell_what_is_up() {
         let mesh = Building::demo().build().unwrap().mesh;
-        let (z, y) = (UpGuess::of(&mesh), UpGuess::of(&turned(&mesh)));
+        let z = UpGuess::of(&mesh);
+        let y = UpGuess::of(&turned(&mesh));
         assert_eq!((z.up(), y.up()), (UpAxis::Z, UpAxis::Y));
         assert!(z.doubt().is_none() && z.sentence().starts_with("+Z is taken for up: "), "{}", z.sentence());
         let even = UpGuess { level: [0.3, 0.31] };

@@ -40,11 +40,8 @@ pub(crate) fn annotate(
     let mut rooms = Rooms::default();
     let mut total = 0u64;
     let mut skipped = SkippedLines::default();
-
-    let lenient = area.lenient;
     let files = area.rooms.iter().map(|r| r.instances.len()).sum::<usize>();
     let progress = ctx.progress("labelling", "instances", files as u64);
-
     let mut reader = InstanceReader::new(BLOCK_POINTS);
     let mut following = area.rooms.iter().flat_map(|r| &r.instances).skip(1);
 
@@ -60,11 +57,9 @@ pub(crate) fn annotate(
 
             let mut bbox = Aabb::EMPTY;
             let mut is_handed_out = false;
-
             let take = |block: &PointCloud, is_whole: bool| -> Result<()> {
                 ctx.check()?;
                 bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
-
                 let vote = || vote(&mut labeler, &instance.points, block, id);
                 // One thread counts votes; the others draw the floor's outline, and write.
                 let outline = || block.positions.iter().for_each(|p| builder.add(*p));
@@ -76,7 +71,6 @@ pub(crate) fn annotate(
                     let points = &mut &block.positions[..];
                     each(AnnotatedInstance { label: instance.label, id, bbox, points })
                 };
-
                 let (voted, ((), handed_out)) = rayon::join(vote, || rayon::join(outline, hand_out));
                 voted?;
                 handed_out
@@ -90,19 +84,12 @@ pub(crate) fn annotate(
             progress.add(1);
 
             if passes.is_empty() {
-                let source = instance.points.source();
-                if lenient {
-                    skipped.empty_instances += 1;
-                    skipped.first.get_or_insert(format!("{source}: no point in it"));
-                    continue;
-                }
-                let message = "no point in it: remove the file, or annotate the instance";
-                return Err(FileError::format(instance.points.path(), message).into());
+                note_empty(&instance.points, area.lenient, &mut skipped)?;
+                continue;
             }
 
             points += passes.len();
             room_bbox = room_bbox.union(bbox);
-
             if !is_handed_out {
                 each(AnnotatedInstance { label: instance.label, id, bbox, points: &mut passes })?;
             }
@@ -146,9 +133,20 @@ pub(crate) fn annotate(
         points: total,
         skipped,
     };
-
     annotated.fill(mesh, fill_m);
     Ok((annotated, labels))
+}
+
+/// Counts an instance without points if `lenient`, and refuses it otherwise.
+fn note_empty(instance: &InstancePoints, lenient: bool, skipped: &mut SkippedLines) -> Result<()> {
+    if !lenient {
+        let message = "no point in it: remove the file, or annotate the instance";
+        return Err(FileError::format(instance.path(), message).into());
+    }
+    skipped.empty_instances += 1;
+    let source = instance.source();
+    skipped.first.get_or_insert(format!("{source}: no point in it"));
+    Ok(())
 }
 
 /// An area without annotations: no face has a label, and no room is known.

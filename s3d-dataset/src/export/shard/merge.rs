@@ -57,7 +57,6 @@ pub fn merge(
 ) -> Result<Option<Summary>> {
     let target = Target { layout: Layout::new(output.into()), overwrite, allowed: Vec::new() };
     let run = Run::new(ctx, &target);
-
     let layout = run.layout();
     let folders = distinct(folders)?;
     if is_done(&folders, layout)? {
@@ -71,7 +70,6 @@ pub fn merge(
     let Some(first) = parts.first() else {
         return Err(UsageError::NoShards.into());
     };
-
     let request = &first.request;
     refuse_mixed(&parts)?;
     refuse_other_version(first)?;
@@ -98,13 +96,11 @@ pub fn merge(
     let merging = Merging { parts: &parts, all: &all, labels: &labels, table: &table, request };
     let outcome = merging.merge(&run, &session, manifest);
     let works_in_out = parts.iter().any(|part| is_same(part.layout.root(), layout.root()));
-
     let made = match outcome {
         // The work of the shards in OUT stays.
         Err(e) if works_in_out => return Err(e),
         outcome => session.end(ctx, outcome)?,
     };
-
     Ok(Some(run.finish(request, &made)))
 }
 

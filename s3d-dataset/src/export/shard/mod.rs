@@ -49,6 +49,7 @@ pub(crate) fn export_shard(
         ctx.info(format_args!("{root}: shard {shard} was done before; nothing to do"));
         return Ok(None);
     };
+
     let locations = session.journal.finished().count_locations(&job.request.numbers());
     drop(session);
     ctx.info(format_args!("{root}: shard {shard} is done; when all are, `s3d merge` makes the data set"));
@@ -78,7 +79,6 @@ impl Job<'_> {
 
         let cache = layout.work_dir();
         LabelList::of(&self.inputs.table).write(&LabelList::path(layout))?;
-
         let positions: BTreeMap<u32, usize> = self.request.numbers().into_iter().zip(0..).collect();
         let labels_are_ours = |unit: &Unit| {
             positions
@@ -96,7 +96,6 @@ impl Job<'_> {
 
         journal.check(ctx, layout, |unit| matches!(unit, Unit::Labels(_)) && is_ours(unit))?;
         let labelled = self.label(self.common(layout, journal, account, &cache, &is_ours), Scope::All)?;
-
         let (candidates, views) = select_requested(&self.request, &journal.finished())?;
         let assignment = self.assignment(&labelled, &candidates, shard.of);
         assignment.write(layout)?;
@@ -106,7 +105,6 @@ impl Job<'_> {
 
         let is_ours = |unit: &Unit| own.contains(unit);
         self.render(self.common(layout, journal, account, &cache, &is_ours), &labelled, &candidates)?;
-
         Ok(Some(views))
     }
 

@@ -78,7 +78,6 @@ pub(crate) fn write_photograph(
     let Shot { photograph, room } = shot;
     let Photograph { name, uuid, picture, lens, camera } = photograph;
     let room = room_name(*room);
-
     let write = |domain: Domain, bytes: &[u8]| -> Result<FileRecord> {
         let path = job.layout.image_path(job.area, uuid, &room, VIEW, domain);
         write_bytes(&path, bytes)?;
@@ -138,7 +137,6 @@ pub(crate) fn write_photograph(
         agreement: agreement.correlation.map(rounded),
         chance: agreement.chance.map(rounded),
     };
-
     Ok(WrittenPhotograph { done: PhotographDone { area: job.area, record, tally, files }, started })
 }
 
