@@ -1,4 +1,4 @@
-//! What a command found out: text on standard output, and JSON where it is asked for.
+//! The answer of a command: text on standard output, and JSON on request.
 
 use crate::commands::print;
 use crate::failure::Outcome;
@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 /// Where the answer goes as JSON.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct JsonArgs {
-    /// Write all of it as JSON, besides the text; to standard output instead of the text with `-`.
+    /// Write the whole answer as JSON, besides the text. With `-`, JSON replaces the text on standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Replace FILE if it is there.
+    /// Replace FILE if it exists.
     #[arg(long, requires = "json")]
     overwrite: bool,
 }
@@ -26,13 +26,13 @@ impl JsonArgs {
         self.json.as_deref().filter(|file| *file != Path::new("-"))
     }
 
-    /// Refuses a file that is there, before the answer is looked for.
+    /// Refuses a file that exists already, before the work begins.
     pub(crate) fn check_free(&self) -> Result<()> {
         self.file()
             .map_or(Ok(()), |file| NewFile::check_free(file, self.overwrite))
     }
 
-    /// Writes the file, if there is one.
+    /// Writes the answer to the file, if one is named.
     pub(crate) fn write(&self, answer: &impl Serialize, context: &Context) -> Result<()> {
         let Some(path) = self.file() else { return Ok(()) };
         let file = NewFile::begin(context, path, self.overwrite)?;
@@ -40,12 +40,13 @@ impl JsonArgs {
         file.finish()
     }
 
-    /// Writes to standard output: `text`, or JSON.
+    /// Writes `text` or JSON to standard output.
     pub(crate) fn print(&self, answer: &impl Serialize, text: impl FnOnce() -> String) -> Outcome<()> {
         if self.json.is_none() || self.file().is_some() {
             return print(&text());
         }
-        let failed = |e| FileError::io("standard output".as_ref(), "write", io::Error::from(e));
-        print(&(serde_json::to_string_pretty(answer).map_err(failed)? + "\n"))
+        let json = serde_json::to_string_pretty(answer)
+            .map_err(|e| FileError::io("standard output".as_ref(), "write", io::Error::from(e)))?;
+        print(&(json + "\n"))
     }
 }

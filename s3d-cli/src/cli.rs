@@ -35,8 +35,8 @@ pub(crate) struct Cli {
     /// Log warnings and errors only, and show no progress.
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
-    /// Write to standard error for a person, or one JSON object a line for a program: log lines, progress, a
-    /// line for each finished unit of work, and a summary (docs/log.md).
+    /// Write standard error as text for a person, or as one JSON object a line for a program: log lines,
+    /// progress, a line for each finished unit of work, and a summary (docs/log.md).
     #[arg(
         long,
         global = true,
@@ -57,10 +57,10 @@ pub(crate) enum Command {
             "  s3d demo -o s3d-demo\n",
             "The scene's own files are in OUT/scan; export them again, larger, with\n",
             "  s3d export s3d-demo/scan/scene.toml -o dataset\n",
-            "Six generated areas, as a detector of objects needs them, without images:\n",
+            "Six generated areas to train a detector of objects on, without images:\n",
             "  s3d demo --areas 6 --seed 1 --no-images -o areas\n",
-            "What is learnt and measured on generated areas tests programs; it is not comparable with results on \
-             the six licensed areas of 2D-3D-S.",
+            "Results on generated areas test programs; they are not comparable with results on the six licensed \
+             areas of 2D-3D-S.",
         )
     )]
     Demo(demo::DemoArgs),
@@ -72,8 +72,7 @@ pub(crate) enum Command {
             "  s3d export scan.glb -o dataset\n",
             "  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n",
             "  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\n",
-            "An export that was stopped or killed goes on where it was when it is called again with the same \
-             arguments.",
+            "Call an export that was stopped or killed again with the same arguments: it goes on where it was.",
         )
     )]
     Export(export::ExportArgs),
@@ -83,25 +82,26 @@ pub(crate) enum Command {
             "Examples:\n",
             "  s3d plan scan/scene.toml -o plan\n",
             "  s3d export scan/scene.toml -o dataset --plan plan --shard 1/4\n",
-            "The options are those of the export that labels and scores depend on. docs/cluster has files \
-             for Slurm and others.",
+            "The options are the options of `s3d export` on which labels and scores depend. docs/cluster has \
+             files for Slurm and others.",
         )
     )]
     Plan(plan::PlanArgs),
-    /// Make one data set of what the shards of an export have written.
+    /// Merge the shards of an export into one data set.
     #[command(
         after_help = concat!(
             "Examples:\n",
             "  s3d merge dataset -o dataset\n",
             "  s3d merge shard_1 shard_2 shard_3 -o dataset\n",
-            "It is that of a single run, byte for byte. What is missing is told with the shard to run again.",
+            "The result equals the data set of a single run, byte for byte. If something is missing, the message \
+             names the shard to run again.",
         )
     )]
     Merge(merge::MergeArgs),
     /// Sample a mesh densely and uniformly into a coloured point cloud.
     #[command(after_help = "Example:\n  s3d sample scan/rgb.obj -o cloud.ply --points-per-m2 10000")]
     Sample(sample::SampleArgs),
-    /// Render one view of a mesh, or those of a list of cameras, in every modality that needs no annotation.
+    /// Render a mesh from one camera or a list of cameras, in every modality that needs no annotation.
     #[command(
         after_help = concat!(
             "Examples:\n",
@@ -112,7 +112,7 @@ pub(crate) enum Command {
         )
     )]
     Render(render::RenderArgs),
-    /// Tell what a scene holds, and what looks wrong in it.
+    /// Print what a scene holds, and what looks wrong in it.
     #[command(after_help = "Examples:\n  s3d info scan/scene.toml\n  s3d info scan.glb")]
     Info(info::InfoArgs),
     /// Package a data set for a trainer: WebDataset, COLMAP, nerfstudio, COCO panoptic, or a Parquet table of
@@ -128,23 +128,24 @@ pub(crate) enum Command {
         )
     )]
     Pack(pack::PackArgs),
-    /// Make the world coordinates of a data set's images again, from depth and pose.
+    /// Compute the world coordinates of a data set's images again, from depth and pose.
     #[command(
         after_help = concat!(
             "Example:\n",
             "  s3d xyz dataset --type float --overwrite\n",
-            "Depth is stored in steps of 2 mm (or 1 mm), so what comes out is off by half of that along the \
-             ray; a pixel\n",
-            "beyond the depth's range is missing. What `s3d export` writes comes from the hits themselves.",
+            "Depth is stored in steps of 2 mm (or 1 mm), so the coordinates are off by up to half a step along \
+             the ray.\n",
+            "A pixel beyond the range of the depth is missing. `s3d export` writes the coordinates of the hits \
+             themselves.",
         )
     )]
     Xyz(xyz::XyzArgs),
-    /// Write what a point cloud loader wants from an existing data set.
+    /// Write the files that point cloud loaders read, from an existing data set.
     #[command(
         after_help = concat!(
             "Example:\n",
             "  s3d profile dataset --to pointnet --to pointcept\n",
-            "Each comes to dataset/profiles/NAME.",
+            "Each loader's files are in dataset/profiles/NAME.",
         )
     )]
     Profile(profile::ProfileArgs),
@@ -172,7 +173,7 @@ pub(crate) enum Command {
         )
     )]
     Verify(verify::VerifyArgs),
-    /// Tell what differs between two data sets: options, files, labels, views, pixels, poses.
+    /// Print the differences between two data sets: options, files, labels, views, pixels, poses.
     #[command(
         after_help = concat!(
             "Examples:\n",
@@ -180,12 +181,13 @@ pub(crate) enum Command {
             "  s3d compare dataset other --json - | jq .labels.matrix\n",
             "Exit code 0 if both hold the same data, 1 if they differ or could not be compared, 2 for a \
              wrong call.\n",
-            "The same data are the same files with the same bytes. The manifests tell how they were made:\n",
-            "what differs there is listed, and decides nothing.",
+            "Data sets hold the same data if their files have the same bytes. The manifests tell how they were \
+             made:\n",
+            "differences between them are listed but do not count.",
         )
     )]
     Compare(compare::CompareArgs),
-    /// Hold predictions against a data set, by the definition that others report by.
+    /// Score predictions against a data set, by the definitions that published results use.
     #[command(
         after_help = concat!(
             "Examples:\n",
@@ -202,20 +204,22 @@ pub(crate) enum Command {
             "  s3d detect table dataset --seeds 5\n",
             "  s3d detect train dataset --areas 1,2,3,4,6 -o model.json\n",
             "  s3d detect run dataset model.json --areas 5 -o found.json\n",
-            "docs/detector.md tells how it works, and what its numbers mean.",
+            "docs/detector.md explains how it works and what its numbers mean.",
         )
     )]
     Detect(detect::DetectArgs),
 }
 
 impl Command {
-    /// Whether a signal stops it between files. The others write one thing or nothing, and are ended by the
-    /// system.
+    /// Whether a signal stops this command between files. The other commands write one thing or nothing, and
+    /// the system ends them.
     pub(crate) fn stops_between_files(&self) -> bool {
         match self {
-            Self::Demo(_) | Self::Export(_) | Self::Sample(_) => true,
-            Self::Plan(_)
+            Self::Demo(_)
+            | Self::Export(_)
+            | Self::Plan(_)
             | Self::Merge(_)
+            | Self::Sample(_)
             | Self::Pack(_)
             | Self::Xyz(_)
             | Self::Profile(_)

@@ -1,5 +1,5 @@
-//! What is written to standard error while a command runs: log lines, and progress with rate and time left;
-//! for a person, or as a JSON object a line.
+//! Standard error while a command runs: log lines, and progress with its rate and the time left. It is text
+//! for a person, or one JSON object a line for a program.
 
 use clap::ValueEnum;
 use indicatif::{
@@ -19,17 +19,17 @@ use tracing_subscriber::fmt::format::{FormatEvent, FormatFields, Writer};
 use tracing_subscriber::fmt::{FmtContext, MakeWriter};
 use tracing_subscriber::registry::LookupSpan;
 
-/// Without a terminal, long work says how far it is about this often.
+/// The time between two lines of progress in a text log, where no terminal shows bars.
 const LOG_EVERY: Duration = Duration::from_secs(15);
 
-/// The same in JSON.
+/// The time between two lines of progress in JSON.
 const EVENT_EVERY: Duration = Duration::from_secs(3);
 
 static CONSOLE: OnceLock<Console> = OnceLock::new();
-/// What is under way, by the id of its task.
+/// The progress of the tasks under way, by their ids.
 static TASKS: Mutex<BTreeMap<u64, Progress>> = Mutex::new(BTreeMap::new());
 
-/// For whom standard error is written.
+/// The form of standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum LogFormat {
     /// For a person.
@@ -46,18 +46,22 @@ struct Console {
     started: Instant,
 }
 
-/// Starts logging to standard error: `-v` details, `-q` warnings only. Progress bars are drawn if that is a
-/// terminal and the log is for a person.
+/// Starts logging to standard error: `-v` details, `-q` warnings only. Progress bars are drawn if standard
+/// error is a terminal and the log is text.
 pub(crate) fn start(verbose: bool, quiet: bool, format: LogFormat) {
-    let level = match (verbose, quiet) {
-        (true, _) => LevelFilter::DEBUG,
-        (_, true) => LevelFilter::WARN,
-        _ => LevelFilter::INFO,
+    let level = if verbose {
+        LevelFilter::DEBUG
+    } else if quiet {
+        LevelFilter::WARN
+    } else {
+        LevelFilter::INFO
     };
+
     let json = format == LogFormat::Json;
     let terminal = io::stderr().is_terminal() && !json;
     let bars = (terminal && !quiet).then(|| MultiProgress::with_draw_target(ProgressDrawTarget::stderr()));
     let _ = CONSOLE.set(Console { json, quiet, bars, started: Instant::now() });
+
     let log = tracing_subscriber::fmt()
         .with_max_level(level)
         .with_target(false)
@@ -72,12 +76,12 @@ pub(crate) fn start(verbose: bool, quiet: bool, format: LogFormat) {
     }
 }
 
-/// Whether standard error is for a program.
+/// Whether standard error is JSON for a program.
 fn is_json() -> bool {
     CONSOLE.get().is_some_and(|c| c.json)
 }
 
-/// Takes away what bars are drawn.
+/// Removes the bars from the terminal.
 pub(crate) fn clear() {
     if let Some(bars) = bars() {
         let _ = bars.clear();
@@ -88,17 +92,17 @@ fn bars() -> Option<&'static MultiProgress> {
     CONSOLE.get()?.bars.as_ref()
 }
 
-/// A line of JSON that no call of the library tells of.
+/// A line of JSON that is no event of the library.
 #[derive(Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 enum Line<'a> {
-    /// The first: the command has begun.
+    /// The first line: the command has begun.
     Started {
         version: &'a str,
         /// The command line.
         command: &'a [String],
     },
-    /// What else is a log line.
+    /// A line that the text log has as well.
     Log {
         /// `error`, `warning`, `info` or `debug`.
         level: &'a str,
@@ -106,38 +110,39 @@ enum Line<'a> {
     },
     /// How far a piece of long work is.
     Progress {
-        /// What is done: "rendering".
+        /// The work: "rendering".
         what: &'a str,
-        /// To what: "images".
+        /// The units that are counted: "images".
         unit: &'a str,
         done: u64,
         total: u64,
-        /// Units a second since it began.
+        /// Units a second since the work began.
         rate: f64,
-        /// At that rate; null before the first is done.
+        /// The time left at that rate; null before the first unit is done.
         seconds_left: Option<f64>,
     },
-    /// The last: the command ends with this exit code.
+    /// The last line: the command ends with this exit code.
     Finished { exit_code: u8 },
 }
 
-/// The command with these words has begun.
+/// Writes that the command with these words has begun, if the log is JSON.
 pub(crate) fn started(command: &[String]) {
     write_json(&Line::Started { version: env!("CARGO_PKG_VERSION"), command }, false);
 }
 
-/// The command ends with this exit code.
+/// Writes that the command ends with this exit code, if the log is JSON.
 pub(crate) fn finished(exit_code: u8) {
     write_json(&Line::Finished { exit_code }, true);
 }
 
-/// Tells of what happens during a call: as lines of JSON with `--log json`; else what a person wants to know
-/// of it is a log line or a bar.
+/// Writes an event of a call: a line of JSON with `--log json`, otherwise a log line or a bar if a person
+/// wants to know it.
 pub(crate) fn observe(event: &Event<'_>) {
     match event {
         Event::Message { level: Level::Warning, text } => warn!("{text}"),
         Event::Message { level: Level::Info, text } => info!("{text}"),
         Event::Message { text, .. } => debug!("{text}"),
+
         Event::TaskStarted { task } => {
             tasks().insert(task.id, Progress::new(task));
         }
@@ -147,12 +152,15 @@ pub(crate) fn observe(event: &Event<'_>) {
             }
         }
         Event::TaskEnded { task } => {
-            // Its bar goes once nobody else waits for the lock.
+            // The lock is released before the bar is cleared.
             let ended = tasks().remove(&task.id);
             drop(ended);
         }
+
+        // Everything below is one line in JSON.
         Event::StageStarted { .. } => {}
         event if is_json() => write_json(event, matches!(event, Event::Summary(_))),
+
         Event::UnitFinished { unit, area, location, tally, seconds } => {
             let location = location.map_or_else(String::new, |l| format!(" {l}"));
             let UnitTally { files, bytes, .. } = tally;
@@ -174,15 +182,14 @@ fn tasks() -> MutexGuard<'static, BTreeMap<u64, Progress>> {
     TASKS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A line on standard error with `--log json`; one of work under way only if the caller did not ask for
-/// quiet.
+/// Writes a line to standard error if the log is JSON. With `--quiet` only essential lines are written.
 fn write_json(line: &impl Serialize, essential: bool) {
     if is_json() && (essential || !CONSOLE.get().is_some_and(|c| c.quiet)) {
         let _ = LineAboveBars.write(json_line(line).as_bytes());
     }
 }
 
-/// The line with the time of the process, and its end.
+/// Returns the line with the seconds since the console started, and a line feed.
 fn json_line(line: &impl Serialize) -> String {
     #[derive(Serialize)]
     struct Timed<'a, T> {
@@ -191,19 +198,19 @@ fn json_line(line: &impl Serialize) -> String {
         at_seconds: f64,
     }
     let at_seconds = CONSOLE.get().map_or(0.0, |c| c.started.elapsed().as_secs_f64());
-    // Nothing in a line can fail to be JSON: keys are texts, and numbers that are none become null.
+    // Every line can be JSON: keys are texts, and numbers that are not finite become null.
     let mut text = serde_json::to_string(&Timed { line, at_seconds: thousandths(at_seconds) })
         .unwrap_or_else(|_| String::from("{\"event\":\"unknown\"}"));
     text.push('\n');
     text
 }
 
-/// A number of seconds, rounded to what is worth telling.
+/// Rounds seconds to milliseconds.
 fn thousandths(seconds: f64) -> f64 {
     (1000.0 * seconds).round() / 1000.0
 }
 
-/// Log lines as events.
+/// Formats log lines as events in JSON.
 struct JsonLines;
 
 impl<S, N> FormatEvent<S, N> for JsonLines
@@ -254,7 +261,7 @@ impl MakeWriter<'_> for AboveBars {
 struct LineAboveBars;
 
 impl Write for LineAboveBars {
-    /// Never fails: that nobody reads the log any more is no reason to end hours of work.
+    /// Never fails: hours of work go on although nobody reads the log any more.
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         let _ = match bars() {
             Some(bars) => bars.suspend(|| io::stderr().write_all(line)),
@@ -273,7 +280,7 @@ impl Write for LineAboveBars {
 struct Progress {
     bar: Option<ProgressBar>,
     started: Instant,
-    /// The most that was told.
+    /// The largest count so far.
     done: u64,
     said: Instant,
 }
@@ -298,32 +305,37 @@ impl Progress {
         Self { bar, started: now, done: 0, said: now }
     }
 
-    /// So much of it is done. Threads tell in any order.
+    /// Records that `done` units are done. Threads report in any order.
     fn advance(&mut self, task: &Task, done: u64) {
         self.done = self.done.max(done);
         if let Some(bar) = &self.bar {
             return bar.set_position(self.done);
         }
+
+        // The last count is a line in JSON only.
         let json = is_json();
         let ended = self.done >= task.total;
         let due = self.said.elapsed() >= if json { EVENT_EVERY } else { LOG_EVERY };
-        if if json { due || ended } else { due && !ended } {
-            self.said = Instant::now();
-            let rate = self.done as f64 / self.started.elapsed().as_secs_f64();
-            let left = task.total.saturating_sub(self.done) as f64 / rate;
-            let Task { what, unit, total, .. } = *task;
-            if json {
-                let seconds_left = left.is_finite().then(|| thousandths(left));
-                let rate = thousandths(rate);
-                write_json(&Line::Progress { what, unit, done: self.done, total, rate, seconds_left }, false);
-                return;
-            }
+        let is_said = if json { due || ended } else { due && !ended };
+        if !is_said {
+            return;
+        }
+
+        self.said = Instant::now();
+        let rate = self.done as f64 / self.started.elapsed().as_secs_f64();
+        let left = task.total.saturating_sub(self.done) as f64 / rate;
+        let Task { what, unit, total, .. } = *task;
+        if json {
+            let seconds_left = left.is_finite().then(|| thousandths(left));
+            let rate = thousandths(rate);
+            write_json(&Line::Progress { what, unit, done: self.done, total, rate, seconds_left }, false);
+        } else {
             info!("{what} {}/{total} {unit}, {rate:.1}/s, {left:.0} s left", self.done);
         }
     }
 }
 
-/// Rates below 10 with one digit behind the point, others whole.
+/// Rounds a rate: below 10 to one decimal, otherwise to a whole number.
 fn round_rate(rate: f64) -> f64 {
     if rate < 10.0 {
         (10.0 * rate).round() / 10.0

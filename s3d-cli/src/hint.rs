@@ -1,17 +1,17 @@
-//! The command that goes on where this one ends, to be copied into a shell.
+//! The command that continues the work of a failed one, to be copied into a shell.
 
 use std::sync::OnceLock;
 
 /// The command line as it was called.
 static WORDS: OnceLock<Vec<String>> = OnceLock::new();
 
-/// What [`resume_hint`] tells.
+/// Keeps the command line for [`resume_hint`].
 pub(crate) fn remember(words: Vec<String>) {
     let _ = WORDS.set(words);
 }
 
-/// "go on with: s3d export scan/scene.toml -o 'data set'": the command line as it was called, quoted for a
-/// shell. Every failure that may pass ends with it.
+/// Returns "go on with: s3d export scan/scene.toml -o 'data set'": the command line as it was called, quoted
+/// for a shell. The message of every failure that may pass ends with it.
 pub(crate) fn resume_hint() -> String {
     format!("go on with: {}", command_line(WORDS.get().into_iter().flatten()))
 }
@@ -24,10 +24,9 @@ fn command_line(words: impl IntoIterator<Item = impl AsRef<str>>) -> String {
         .join(" ")
 }
 
-/// A word as a shell takes it: as it is if nothing in it means something there, else in quotes.
+/// Quotes a word for a shell, unless every character of it is plain there.
 fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "_-./:=,+@%".contains(c) || (cfg!(windows) && c == '\\');
-    if !word.is_empty() && word.chars().all(plain) {
+    if !word.is_empty() && word.chars().all(is_plain) {
         word.to_owned()
     } else if cfg!(windows) {
         format!("\"{}\"", word.replace('"', "\"\""))
@@ -36,15 +35,20 @@ fn quoted(word: &str) -> String {
     }
 }
 
+fn is_plain(c: char) -> bool {
+    c.is_alphanumeric() || "_-./:=,+@%".contains(c) || (cfg!(windows) && c == '\\')
+}
+
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
 
     #[test]
     fn words_are_quoted_where_a_shell_needs_it() {
-        let line = |words: &[&str]| command_line(words);
-        assert_eq!(line(&["s3d", "export", "a/b.toml", "-o", "Büro-1_x"]), "s3d export a/b.toml -o Büro-1_x");
-        assert_eq!(line(&["s3d", "my scan", "", "$x", "it's", "*"]), r"s3d 'my scan' '' '$x' 'it'\''s' '*'");
+        let plain = command_line(["s3d", "export", "a/b.toml", "-o", "Büro-1_x"]);
+        assert_eq!(plain, "s3d export a/b.toml -o Büro-1_x");
+        let special = command_line(["s3d", "my scan", "", "$x", "it's", "*"]);
+        assert_eq!(special, r"s3d 'my scan' '' '$x' 'it'\''s' '*'");
     }
 
     #[test]

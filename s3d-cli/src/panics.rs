@@ -1,10 +1,10 @@
-//! What is told of a panic: it is a fault of this program, unless a reader caught that of a decoder.
+//! The report of a panic: a fault of this program, unless a decoder panicked and a reader caught it.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::panic::{self, PanicHookInfo};
 use tracing::{debug, error};
 
-/// Tells of panics in the log instead of beside it: nothing of those that become an error of the file.
+/// Reports panics in the log instead of beside it. A panic that becomes an error of the file is only a detail.
 pub(crate) fn install() {
     panic::set_hook(Box::new(tell));
 }

@@ -1,4 +1,4 @@
-//! What words of the command line mean: the parsers of options' values.
+//! The parsers of the values of options.
 
 use glam::DVec3;
 pub(crate) use s3d_dataset::words::{even_width, finite, parsed, positive};
