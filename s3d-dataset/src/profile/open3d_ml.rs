@@ -23,6 +23,7 @@ use std::path::Path;
 pub(super) fn write(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Result<()> {
     let dir = dir.join("original_pkl");
     create_dir(&dir)?;
+
     for_each_room(source.ctx, rooms, |room| {
         let boxes = room
             .instances
@@ -51,6 +52,7 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Resu
                 })?;
             }
             pickle.end_array()?;
+
             pickle.list(|pickle| {
                 for (instance, b) in room.instances.iter().zip(&boxes) {
                     pickle.list(|pickle| {

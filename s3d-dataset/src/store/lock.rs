@@ -34,6 +34,7 @@ impl Lock {
         let path = layout.lock();
         loop {
             create_dir(&layout.work_dir())?;
+
             let opened = File::options()
                 .create(true)
                 .truncate(false)
@@ -50,6 +51,7 @@ impl Lock {
                 Sharing::Alone => file.try_lock(),
                 Sharing::Shards => file.try_lock_shared(),
             };
+
             match taken {
                 Ok(()) if is_still(&file, layout) => return Ok(Self { layout: layout.clone(), _file: file }),
                 // The lock belongs to a file that is no longer at the path. Try again.

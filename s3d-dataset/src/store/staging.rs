@@ -24,11 +24,12 @@ pub(crate) struct Staging {
     was_placing: bool,
 }
 
-/// Within the folder: the thing that is being replaced, and below a file that exists while things are moved.
+/// Returns where the replaced thing lies while the new one moves into place.
 fn old_in(folder: &Path) -> PathBuf {
     folder.join("old")
 }
 
+/// Returns the file that exists while things move into place.
 fn placing_in(folder: &Path) -> PathBuf {
     folder.join("placing")
 }

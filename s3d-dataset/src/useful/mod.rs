@@ -190,6 +190,7 @@ fn vote_findings(report: &VoteReport) -> Vec<Finding> {
 fn level_finding(mesh: &TriMesh, label_of_face: &[LabelId], table: &LabelTable) -> Option<Finding> {
     /// The cosine of 30°.
     const LEVEL: f32 = 0.866;
+
     let mut level_m2 = 0.0;
     let mut all_m2 = 0.0;
     for (face, label) in (0u32..).zip(label_of_face) {

@@ -57,7 +57,9 @@ pub(super) struct Grid {
 
 impl Grid {
     /// Builds a grid for `m2` of surface that faces up.
-
+    ///
+    /// # Errors
+    /// Fails if the mesh is too large for locations to be placed.
     pub(super) fn new(mesh: &TriMesh, m2: f64) -> Result<Self> {
         let step = (m2 / MANY_FEET).sqrt().clamp(STEP_M, MOST_STEP_M);
         let size = mesh.aabb().size().as_dvec3();

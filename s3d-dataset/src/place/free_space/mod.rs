@@ -252,6 +252,8 @@ impl Search<'_> {
     fn explain(&self, found: &Found) -> Result<String> {
         let floor = found.floor;
         let size = size_of(self.scene.mesh());
+
+        // Each number is told only if the one before it is not 0.
         let mut text =
             format!("no place for a scan location inside: of {size}, {:.2} m² face up", floor.up_facing_m2);
         if floor.up_facing_m2 > 0.0 {
