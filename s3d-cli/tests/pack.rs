@@ -236,11 +236,8 @@ fn wrong_calls_are_told() {
     };
     call(&["--to", "zip"], &["webdataset", "parquet"]);
     call(&["--to", "colmap", "--areas", "4"], &["--areas 4", "there are 1, 2"]);
-    call(
-        &["--to", "parquet", "--points", "3"],
-        &["--points is an option of --to colmap and nerfstudio only"],
-    );
-    call(&["--to", "colmap", "--images", "panoramas"], &["--to nerfstudio"]);
+    call(&["--to", "parquet", "--points", "3"], &["--points belongs to colmap and nerfstudio only"]);
+    call(&["--to", "colmap", "--images", "panoramas"], &["--images panoramas", "for nerfstudio"]);
     for kind in KINDS {
         let inside = dataset().join("area_1/packed");
         s3d_fails(&["pack", out, "--to", kind, "-o", text(&inside)], 2, &["in one another"]);

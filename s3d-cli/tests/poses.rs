@@ -227,7 +227,7 @@ fn a_list_in_another_frame_is_turned_or_refused() {
         s3d_fails(&[&args, more].concat(), code, parts);
         assert!(!out.exists(), "something was written");
     };
-    let boxes = ["no camera sees anything", "[2, 1.5, -1.2]", "[0, 0, 0]", "[4, 3, 2.5]", "--poses-up"];
+    let boxes = ["no camera sees anything", "[2, 1.5, -1.2]", "[0, 0, 0]", "[4, 3, 2.5]", "poses_up"];
     fails(&[], 1, &boxes);
     fails(&[], 1, &["--allow coverage"]);
     let log = render(&mesh, &list, &out, &["--allow", "coverage"]);
@@ -298,7 +298,7 @@ fn only_views_of_ours_are_replaced() {
     assert!(files(&out).keys().eq(first.keys()) && files(&out) != first);
     fs::write(out.join("transforms.json"), "{\"frames\": []}").unwrap();
     let before = files(&out);
-    s3d_fails(&[&args, &narrow[..]].concat(), 2, &["was not written by s3d render --poses"]);
+    s3d_fails(&[&args, &narrow[..]].concat(), 2, &["was not written by s3d render"]);
     assert!(files(&out) == before);
 }
 

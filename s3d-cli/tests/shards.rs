@@ -271,7 +271,7 @@ fn a_shard_that_is_killed_is_run_again() {
     trial.merge(&[&out], &out);
     // The other one's own folder has half of it.
     let halves = trial.path("halves");
-    s3d_fails(&merging(&[&own], &halves), 1, &["--shard 2/2"]);
+    s3d_fails(&merging(&[&own], &halves), 1, &["run again shard 2/2"]);
     assert!(!halves.exists());
     let second = trial.path("second");
     trial.shard(&second, 2, 2, &[]);
@@ -287,7 +287,7 @@ fn a_shard_that_is_missing_damaged_or_of_another_call_is_named() {
     }
     let out = trial.path("merged");
     let all = [outs[0].as_path(), &outs[1], &outs[2]];
-    s3d_fails(&merging(&[all[0], all[2]], &out), 1, &["--shard 2/3"]);
+    s3d_fails(&merging(&[all[0], all[2]], &out), 1, &["run again shard 2/3"]);
     s3d_fails(&merging(&[all[0], &trial.path("nowhere")], &out), 1, &["nowhere"]);
     assert!(!out.exists());
     // One byte of an image.
@@ -300,7 +300,7 @@ fn a_shard_that_is_missing_damaged_or_of_another_call_is_named() {
     let mut damaged = whole.clone();
     *damaged.last_mut().unwrap() ^= 1;
     fs::write(&path, &damaged).unwrap();
-    s3d_fails(&merging(&all, &out), 1, &["other content", "--shard 3/3"]);
+    s3d_fails(&merging(&all, &out), 1, &["other content", "run again shard 3/3"]);
     // Run again it mends that, and the merge goes on.
     trial.shard(all[2], 3, 3, &[]);
     assert_eq!(fs::read(&path).unwrap(), whole);
@@ -416,7 +416,7 @@ fn merged_too_early_again_or_by_another_version() {
     lock.lock_shared().unwrap();
     s3d_fails(&merging(&[&one], &one), 75, &["another process", "go on with: "]);
     drop(lock);
-    s3d_fails(&merging(&[&one], &one), 1, &["--shard 2/2"]);
+    s3d_fails(&merging(&[&one], &one), 1, &["run again shard 2/2"]);
     trial.shard(&two, 2, 2, &[]);
     // As in the folder of one that was killed early, or of an export without shards.
     fs::remove_file(two.join(".s3d/labels.jsonl")).unwrap();

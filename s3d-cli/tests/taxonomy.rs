@@ -438,7 +438,7 @@ fn faults_of_a_taxonomy_are_told_before_anything_is_written() {
     fs::write(scan.join("mine.toml"), class("")).unwrap();
     let toml = toml.replace("bedroom_1", "office_1");
     fs::write(&scene, &toml).unwrap();
-    let unknown = ["none of the 2 of mine", "\"couch\"", "= \"bed\""];
+    let unknown = ["not among the 2 of mine", "\"couch\"", "= \"bed\""];
     s3d_fails(&["export", text(&scene), "-o", text(&out)], 1, &unknown);
     fs::write(&scene, toml.replace("[cameras]", "unknown_as_clutter = true\n[cameras]")).unwrap();
     s3d_fails(&["export", text(&scene), "-o", text(&out)], 1, &["unknown_as_clutter", "clutter = "]);

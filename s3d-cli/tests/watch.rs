@@ -438,7 +438,7 @@ fn a_person_reads_the_same_summary() {
         &format!("{share:.2} % of the pixels of panoramas"),
         "6 of 24 candidate views dropped: 2 for the lowest entropies of their pool, 4 not drawn from its \
          middle",
-        "9 kept views are of locations that --only leaves out",
+        "9 kept views are of locations whose images were not asked for",
         "load ",
     ] {
         assert!(log.contains(part), "{part:?} in {log}");

@@ -194,7 +194,7 @@ fn bytes_do_not_depend_on_threads_and_earlier_reports_are_replaced_when_asked() 
     assert!(first == files(&dir.path().join("other")));
 
     let again = report(&out, &to, &SMALL, &Context::default()).unwrap_err();
-    assert!(matches!(&again, Error::Dataset(_)) && again.to_string().contains("--overwrite"), "{again}");
+    assert!(matches!(&again, Error::Dataset(_)) && again.to_string().contains("`overwrite`"), "{again}");
     assert!(first == files(&to));
     let larger = ReportOptions { thumbs: 32, overwrite: true, ..SMALL };
     made(&out, &to, &larger);
@@ -360,7 +360,7 @@ fn one_file_has_all_of_it() {
     let again = report(&out, &file, &single, &Context::default())
         .unwrap_err()
         .to_string();
-    assert!(again.contains("--overwrite"), "{again}");
+    assert!(again.contains("`overwrite`"), "{again}");
     made(&out, &file, &ReportOptions { overwrite: true, ..single.clone() });
     assert_eq!(fs::read_to_string(&file).unwrap(), page);
     let letter = dir.path().join("letter.html");

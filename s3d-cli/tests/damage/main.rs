@@ -184,7 +184,7 @@ fn what_is_wrong_in_a_manifest_is_told_by_all_alike() {
         }),
         ("\"ell\" is none of 512 and mm", |m| m["options"]["depth_units"] = "ell".into()),
         ("\"half a\" is none of", |m| m["areas"][0]["xyz"]["type"] = "half a".into()),
-        ("size: must be from 8", |m| m["options"]["size"] = 0.into()),
+        ("`size`: must be from 8", |m| m["options"]["size"] = 0.into()),
         ("area_numbers [1, 1]", |m| m["area_numbers"] = vec![1, 1].into()),
         ("area_numbers [2], and areas tells of [1]", |m| m["area_numbers"] = vec![2].into()),
         ("missing field `faces`", |m| drop(m["areas"][0].as_object_mut().unwrap().remove("faces"))),

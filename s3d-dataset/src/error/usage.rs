@@ -229,8 +229,6 @@ impl UsageError {
                 format!("{what}: give {}", groups.join(", or "))
             }
             Self::ForeignOption { option, packages } => {
-                let packages: Vec<String> =
-                    packages.iter().map(|kind| names.option("to", Some(kind))).collect();
                 format!("{} belongs to {} only", names.option(option, None), packages.join(" and "))
             }
             Self::Exists { path, note: None } => {

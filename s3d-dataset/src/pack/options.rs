@@ -403,7 +403,7 @@ mod tests {
         let coco = PackageArguments { stuff: Some(stuff), ..PackageArguments::default() };
         assert!(matches!(coco.clone().package(PackageKind::Coco), Ok(Package::Coco(_))));
         let e = coco.package(PackageKind::Parquet).unwrap_err().to_string();
-        assert_eq!(e, "`stuff` belongs to `to = coco` only");
+        assert_eq!(e, "`stuff` belongs to coco only");
 
         let points = PackageArguments { points: Some(0), copy_images: true, ..PackageArguments::default() };
         points.clone().package(PackageKind::Nerfstudio).unwrap();
