@@ -17,13 +17,15 @@ use s3d_label::{Class, Taxonomy};
 use s3d_render::MISSING_INDEX;
 use std::path::Path;
 
-/// The folder of panoptic images, and the file about them.
+/// The folder of panoptic images.
 const FOLDER: &str = "panoptic";
+/// The file on the panoptic images.
 const FILE: &str = "panoptic.json";
-/// Boxes and masks of things.
+/// The file of boxes and masks of things.
 const INSTANCES: &str = "instances.json";
 const ABOUT: &str = "2D-3D-Semantic data set, exported by s3d";
 
+/// Writes panoptic images and annotations. Returns notes on how to use them.
 pub(super) fn pack(
     ctx: &Context,
     source: &Source,
@@ -36,9 +38,12 @@ pub(super) fn pack(
     };
     source.require(Domain::Rgb, "COCO")?;
     source.require(Domain::Semantic, "COCO")?;
+
     let taxonomy = table.taxonomy();
     let stuff = stuff(options, taxonomy)?;
     let compression = options.compression;
+
+    // Panoptic images have the same names as the RGB images.
     let folder = destination.path().join(FOLDER);
     for image in &source.images {
         let below = image.relative_path(Domain::Rgb);
@@ -46,6 +51,7 @@ pub(super) fn pack(
             .parent()
             .map_or(Ok(()), |parent| create_dir(&folder.join(parent)))?;
     }
+
     let progress = ctx.progress("packing", "images", source.images.len() as u64);
     let numbered: Vec<(u32, &DatasetImage)> = (1..).zip(&source.images).collect();
     let images = map_in_order(
@@ -55,7 +61,7 @@ pub(super) fn pack(
         |(), (id, image)| {
             let path = image.path(&source.layout, Domain::Semantic);
             let mut semantic = source.rgb8(image, Domain::Semantic)?;
-            // What is not in the photograph is nothing that could be learnt.
+            // Pixels outside of the photograph teach nothing.
             if source.photograph(image).is_some_and(|p| p.masked > 0.0) {
                 let color = source.rgb8(image, Domain::Rgb)?;
                 let pairs = semantic.pixels_mut().iter_mut().zip(color.pixels());
@@ -63,21 +69,26 @@ pub(super) fn pack(
                     .filter(|(_, color)| **color == [0; 3])
                     .for_each(|(label, _)| *label = MISSING_INDEX);
             }
+
             let (panoptic, segments) = coco_panoptic(&semantic, &table, &stuff).map_err(|e| {
                 FileError::format(&path, format!("{e} in {}", source.layout.labels_json().display()))
             })?;
             let file_name = image.relative_path(Domain::Rgb);
             write_bytes(&folder.join(&file_name), &encode_rgb8(&panoptic, Content::Labels, compression))?;
+
             progress.add(1);
             let is_thing = |id: u32| segments.iter().any(|s| s.id == id && !s.is_stuff());
             let masks = coco_masks(&panoptic, is_thing);
-            let (width, height) = (semantic.width(), semantic.height());
+            let width = semantic.width();
+            let height = semantic.height();
             Ok(CocoImage { id: *id, file_name, width, height, segments, masks })
         },
     )?;
+
     let categories = coco_categories(taxonomy, &stuff);
     write_coco(&destination.path().join(FILE), ABOUT, &images, &categories)?;
     write_coco_instances(&destination.path().join(INSTANCES), ABOUT, &images, &categories)?;
+
     Ok(vec![
         format!(
             "images are below the data set's folder, and their panoptic images, of the same names, below \
@@ -89,7 +100,7 @@ pub(super) fn pack(
     ])
 }
 
-/// The classes of which all instances in an image are one segment.
+/// The stuff classes, whose instances in an image form one segment.
 pub(super) fn stuff(options: &CocoOptions, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
     match &options.stuff {
         Some(list) => list.classes(taxonomy),

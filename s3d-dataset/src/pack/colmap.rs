@@ -11,6 +11,7 @@ use s3d_io::dataset::Domain;
 use s3d_io::fs::create_dir;
 use s3d_io::package::{ColmapImage, ColmapModel};
 
+/// Writes the models of all areas. Returns notes on how to use them.
 pub(super) fn pack(
     ctx: &Context,
     source: &Source,
@@ -27,17 +28,20 @@ pub(super) fn pack(
             ctx.warn(format_args!("area {area} has no views: it is left out"));
             continue;
         };
+
         let folder = destination.path().join(format!("area_{area}"));
         let copies = folder.join("images");
         if options.copy_images {
             create_dir(&copies)?;
         }
+
         let models = map_in_order(
             ctx,
             &images,
             || (),
             |(), image| {
-                let (pose, (width, height)) = (source.pose(image)?, source.size(image)?);
+                let pose = source.pose(image)?;
+                let (width, height) = source.size(image)?;
                 let name = format!("{}_domain_rgb.png", image.stem());
                 if options.copy_images {
                     source.copy(image, Domain::Rgb, &copies.join(&name))?;
@@ -46,13 +50,16 @@ pub(super) fn pack(
                 Ok(ColmapImage { name, width, height, k: pose.camera_k_matrix, rt: pose.camera_rt_matrix })
             },
         )?;
+
         let points = area_points(source, area, options.points)?;
-        let (model, dir) = (ColmapModel::new(&models, &points), folder.join("sparse").join("0"));
+        let model = ColmapModel::new(&models, &points);
+        let dir = folder.join("sparse").join("0");
         if options.binary {
             model.write_binary(&dir)
         } else {
             model.write_text(&dir)
         }?;
+
         let images = if options.copy_images {
             format!("area_{area}/images")
         } else {
@@ -66,6 +73,7 @@ pub(super) fn pack(
         };
         notes.push(format!("the model area_{area}/sparse/0 is of the images in {images}"));
     }
+
     notes.push("panoramas are not in it; points have no tracks".into());
     Ok(notes)
 }

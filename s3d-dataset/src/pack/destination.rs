@@ -1,4 +1,4 @@
-//! Where a package goes: whole, or not at all.
+//! The folder of a package, which appears whole or not at all.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::path::{Component, Path};
 
-/// The file in a package's folder that says what it is.
+/// The file in a package's folder that describes it.
 const ABOUT: &str = "pack.json";
 
 const GENERATOR: &str = "s3d pack";
 
-/// What `pack.json` says. No paths and no times: the same data set gives the same bytes.
+/// The content of `pack.json`. It has no paths and no times, so the same data set gives the same bytes.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct About {
     generator: String,
@@ -22,28 +22,34 @@ pub(crate) struct About {
     pub(crate) package: String,
     pub(crate) areas: Vec<u32>,
     pub(crate) images: usize,
-    /// How to use it, a sentence each.
+    /// How to use the package, a sentence each.
     pub(crate) notes: Vec<String>,
 }
 
 impl About {
     pub(crate) fn new(package: String, areas: &[u32], images: usize, notes: Vec<String>) -> Self {
-        let (generator, version) = (GENERATOR.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
-        Self { generator, version, package, areas: areas.to_vec(), images, notes }
+        Self {
+            generator: GENERATOR.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            package,
+            areas: areas.to_vec(),
+            images,
+            notes,
+        }
     }
 }
 
 const KIND: FolderKind =
     FolderKind { about: ABOUT, generator: GENERATOR, noun: "package", action: "use as the package's folder" };
 
-/// The folder of a package: there whole, or not at all.
+/// The folder of a package. It appears whole or not at all.
 pub(crate) struct Destination(NewFolder);
 
 impl Destination {
     /// Begins the package that will be the folder `place`.
     ///
     /// # Errors
-    /// As [`NewFolder::begin`].
+    /// The errors of [`NewFolder::begin`].
     pub(crate) fn begin(ctx: &Context, place: &Path, root: &Path, overwrite: bool) -> Result<Self> {
         NewFolder::begin(ctx, place, root, KIND, overwrite).map(Self)
     }
@@ -53,22 +59,23 @@ impl Destination {
         self.0.path()
     }
 
-    /// The folder that it will be.
+    /// The final folder of the package.
     pub(crate) fn place(&self) -> &Path {
         self.0.place()
     }
 
-    /// Moves the package to its place, instead of an earlier one.
+    /// Moves the package to its place. An earlier package there is replaced.
     pub(crate) fn finish(self, about: &About) -> Result<()> {
         write_json(&self.path().join(ABOUT), about)?;
         self.0.finish()
     }
 }
 
-/// The path by which `target` is found from the folder `from`, with `/`; absolute where there is none
-/// (another drive). Both are absolute and without links.
+/// The relative path from the folder `from` to `target`, with `/`. The path is absolute if none leads there
+/// (another drive). Both must be absolute and without links.
 pub(crate) fn relative_path(from: &Path, target: &Path) -> String {
-    let (mut a, mut b) = (from.components().peekable(), target.components().peekable());
+    let mut a = from.components().peekable();
+    let mut b = target.components().peekable();
     let mut common = 0;
     while let (Some(x), Some(y)) = (a.peek(), b.peek()) {
         if x != y {
@@ -78,9 +85,11 @@ pub(crate) fn relative_path(from: &Path, target: &Path) -> String {
         a.next();
         b.next();
     }
+
     if common == 0 {
         return target.to_string_lossy().into_owned();
     }
+
     let up = a.map(|_| OsString::from(".."));
     let down = b.map(|c: Component<'_>| c.as_os_str().to_owned());
     let parts: Vec<String> = up.chain(down).map(|p| p.to_string_lossy().into_owned()).collect();

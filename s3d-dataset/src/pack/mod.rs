@@ -27,14 +27,16 @@ use source::Source;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Points of an area's cloud in a package, if nothing else is said.
+/// The default number of points of an area's cloud in a package.
 const POINTS: u32 = 100_000;
 
-/// Makes a package of the data set in the folder `dataset`, in which nothing is altered. Returns where it is.
+/// Makes a package of the data set in the folder `dataset`, which is not changed. Returns the place of the
+/// package.
 ///
 /// # Errors
-/// [`Error::Usage`] if something is in the way; [`Error::Input`] if the data set lacks what the package needs;
-/// [`Error::File`]; [`Error::Cancelled`]; [`Error::Temporary`]. No half of a package is left behind.
+/// [`Error::Usage`] if something is in the way; [`Error::Input`] if the data set lacks what the package
+/// needs; [`Error::File`]; [`Error::Cancelled`]; [`Error::Temporary`]. A failed run leaves no partial
+/// package.
 pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Context) -> Result<PathBuf> {
     let started = Instant::now();
     let kind = package.kind();
@@ -52,6 +54,7 @@ pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Cont
         let about = About::new(kind.to_string(), &source.areas, source.images.len(), notes);
         destination.finish(&about)
     };
+
     match package {
         Package::Webdataset(webdataset) => {
             into_folder(&|folder| webdataset::pack(ctx, &source, folder, webdataset))?;
@@ -63,6 +66,7 @@ pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Cont
         Package::Coco(coco) => into_folder(&|folder| coco::pack(ctx, &source, folder, coco))?,
         Package::Parquet(_) => pack_table(ctx, &source, dataset, &place, options.overwrite)?,
     }
+
     ctx.info(format_args!(
         "{}: {} images for {} in {:.1} s",
         place.display(),
@@ -73,7 +77,7 @@ pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Cont
     Ok(place)
 }
 
-/// Writes the Parquet table of all images, which is a file and no folder.
+/// Writes the Parquet table of all images, a file instead of a folder.
 fn pack_table(ctx: &Context, source: &Source, dataset: &Path, place: &Path, overwrite: bool) -> Result<()> {
     check_apart(place, dataset)?;
     NewFile::check_free(place, overwrite)?;
@@ -85,7 +89,7 @@ fn pack_table(ctx: &Context, source: &Source, dataset: &Path, place: &Path, over
     Ok(())
 }
 
-/// Where a package goes if nothing is said: beside the data set, named after it.
+/// The default place of a package: beside the data set, named after it.
 fn default_place(dataset: &Path, kind: PackageKind) -> Result<PathBuf> {
     match kind {
         PackageKind::Parquet => beside(dataset, "_images.parquet"),
@@ -93,7 +97,7 @@ fn default_place(dataset: &Path, kind: PackageKind) -> Result<PathBuf> {
     }
 }
 
-/// Some points of an area's cloud; none if none are asked for.
+/// Some points of an area's cloud; none if `max` is 0.
 fn area_points(source: &Source, area: u32, max: Option<u32>) -> Result<PointCloud> {
     match max.unwrap_or(POINTS) {
         0 => Ok(PointCloud::default()),

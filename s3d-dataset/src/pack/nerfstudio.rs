@@ -1,5 +1,5 @@
-//! `s3d pack --to nerfstudio`: `transforms.json` for each area, another for its panoramas, and a cloud to
-//! begin from.
+//! `s3d pack --to nerfstudio`: for each area a `transforms.json`, a second one for its panoramas, and a point
+//! cloud to start from.
 
 use super::area_points;
 use super::destination::{Destination, relative_path};
@@ -19,11 +19,13 @@ use s3d_io::package::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 use s3d_render::MISSING_DEPTH;
 use std::path::{Path, PathBuf};
 
+/// The point cloud of an area.
 const PLY: &str = "points.ply";
 
 /// The folder of masks.
 const MASKS: &str = "masks";
 
+/// Writes the folders of all areas. Returns notes on how to use them.
 pub(super) fn pack(
     ctx: &Context,
     source: &Source,
@@ -32,15 +34,8 @@ pub(super) fn pack(
 ) -> Result<Vec<String>> {
     source.require(Domain::Rgb, "nerfstudio")?;
     source.require(Domain::Pose, "nerfstudio")?;
-    let depth = match options.depth {
-        Some(DepthFiles::None) => DepthFiles::None,
-        Some(asked) => {
-            source.require(Domain::Depth, "depth for nerfstudio")?;
-            asked
-        }
-        None if source.has(Domain::Depth) => DepthFiles::Millimetres,
-        None => DepthFiles::None,
-    };
+    let depth = depth_files(source, options)?;
+
     let progress = ctx.progress("packing", "images", source.images.len() as u64);
     let mut notes = Vec::new();
     for &area in &source.areas {
@@ -48,6 +43,7 @@ pub(super) fn pack(
         if images.is_empty() {
             continue;
         }
+
         let below = format!("area_{area}");
         let is_masked = |image: &&DatasetImage| source.photograph(image).is_some_and(|p| p.masked > 0.0);
         let masks = images.iter().any(is_masked);
@@ -58,11 +54,13 @@ pub(super) fn pack(
                 "{below}: {MASKS} are 0 where a view lies outside of its photograph; all its views have one"
             ));
         }
+
         let points = area_points(source, area, options.points)?;
         let ply = (!points.is_empty()).then_some(PLY);
         if ply.is_some() {
             write_colored_points(&job.folder.join(PLY), &points)?;
         }
+
         let (panoramas, views): (Vec<_>, Vec<_>) =
             images.into_iter().partition(|image| image.frame == Frame::Panorama);
         for (images, camera, name) in [
@@ -86,6 +84,7 @@ pub(super) fn pack(
             notes.push(format!("ns-train … --data {below}/{name}"));
         }
     }
+
     match depth {
         DepthFiles::Millimetres => {
             notes.push("depth is in millimetres, 0 where missing: nerfstudio's default".into());
@@ -100,13 +99,27 @@ pub(super) fn pack(
     Ok(notes)
 }
 
-/// What the frames of an area need.
+/// The kind of depth files to write.
+fn depth_files(source: &Source, options: &NerfstudioOptions) -> Result<DepthFiles> {
+    match options.depth {
+        Some(DepthFiles::None) => Ok(DepthFiles::None),
+        Some(asked) => {
+            source.require(Domain::Depth, "depth for nerfstudio")?;
+            Ok(asked)
+        }
+        None if source.has(Domain::Depth) => Ok(DepthFiles::Millimetres),
+        None => Ok(DepthFiles::None),
+    }
+}
+
+/// The inputs for the frames of an area.
 struct Job<'a> {
     source: &'a Source,
-    /// The area's folder while it is written.
+    /// The area's folder while it is being written.
     folder: PathBuf,
-    /// The same folder as it will be, and the data set; absolute.
+    /// The area's final folder, absolute.
     place: PathBuf,
+    /// The data set's folder, absolute.
     root: PathBuf,
     depth: DepthFiles,
     /// Whether views have masks.
@@ -115,6 +128,7 @@ struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
+    /// Creates the folders of an area.
     fn new(
         source: &'a Source,
         destination: &Destination,
@@ -122,7 +136,6 @@ impl<'a> Job<'a> {
         depth: DepthFiles,
         options: &'a NerfstudioOptions,
     ) -> Result<Self> {
-        let absolute = |path: &Path| resolved(path).map_err(|e| FileError::io(path, "look for", e));
         let folder = destination.path().join(below);
         create_dir(&folder)?;
         if options.copy_images {
@@ -131,13 +144,16 @@ impl<'a> Job<'a> {
         if depth == DepthFiles::Millimetres || depth == DepthFiles::Original && options.copy_images {
             create_dir(&folder.join("depths"))?;
         }
-        let (place, root) = (absolute(destination.place())?.join(below), absolute(source.layout.root())?);
+
+        let place = absolute(destination.place())?.join(below);
+        let root = absolute(source.layout.root())?;
         Ok(Self { source, folder, place, root, depth, masks: false, options })
     }
 
-    /// Writes what belongs to an image, and tells of it.
+    /// Writes the files of an image, and returns its frame.
     fn frame(&self, image: &DatasetImage, camera: NerfstudioCamera) -> Result<NerfstudioFrame> {
-        let (pose, size) = (self.source.pose(image)?, self.source.size(image)?);
+        let pose = self.source.pose(image)?;
+        let size = self.source.size(image)?;
         let rgb = self.file(image, Domain::Rgb, "images")?;
         let mut frame = match camera {
             NerfstudioCamera::Perspective => NerfstudioFrame::perspective(rgb, &pose, size),
@@ -151,11 +167,13 @@ impl<'a> Job<'a> {
                 NerfstudioFrame::equirectangular(rgb, &pose, size)
             }
         };
+
         if self.masks && camera == NerfstudioCamera::Perspective {
             let name = format!("{MASKS}/{}_mask.png", image.stem());
             write_bytes(&self.folder.join(&name), &encode_gray8(&self.mask(image, size)?))?;
             frame.mask_path = Some(name);
         }
+
         frame.depth_file_path = match self.depth {
             DepthFiles::None => None,
             DepthFiles::Original => Some(self.file(image, Domain::Depth, "depths")?),
@@ -170,10 +188,11 @@ impl<'a> Job<'a> {
                 Some(name)
             }
         };
+
         Ok(frame)
     }
 
-    /// 255 where an image has something to say: of a photograph where it is, of others everywhere.
+    /// The mask of an image: 255 in a photograph's own pixels, and everywhere in other images.
     fn mask(&self, image: &DatasetImage, (width, height): (u32, u32)) -> Result<Raster<u8>> {
         if self.source.photograph(image).is_none() {
             return Ok(Raster::filled(width, height, 255));
@@ -182,7 +201,7 @@ impl<'a> Job<'a> {
         Ok(color.map(|color| if color == [0; 3] { 0 } else { 255 }))
     }
 
-    /// The path of an image's file from the area's folder: the data set's, or a copy in `copies`.
+    /// The path of an image's file from the area's folder: the data set's file, or a copy in `copies`.
     fn file(&self, image: &DatasetImage, domain: Domain, copies: &str) -> Result<String> {
         if !self.options.copy_images {
             return Ok(relative_path(&self.place, &self.root.join(image.relative_path(domain))));
@@ -193,7 +212,11 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Depth in millimetres, rounded; 0 where there is none or where it is beyond 65.535 m.
+fn absolute(path: &Path) -> Result<PathBuf, FileError> {
+    resolved(path).map_err(|e| FileError::io(path, "look for", e))
+}
+
+/// Depth in millimetres, rounded; 0 if missing or beyond 65.535 m.
 fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
     let convert = |v: &u16| {
         let mm = (f64::from(*v) * (1000.0 / units_per_m)).round();

@@ -1,4 +1,4 @@
-//! Which package is made of which images, and the options of each package.
+//! The options of each package, and the images that it holds.
 
 use crate::error::{Result, UsageError};
 use s3d_io::dataset::Domain;
@@ -11,22 +11,22 @@ use std::str::FromStr;
 /// Options of all packages. `Default` packs all areas, beside the data set.
 #[derive(Clone, Debug, Default)]
 pub struct PackOptions {
-    /// The package's folder, or the file of a Parquet table. `None` for a place beside the data set, named after
-    /// it.
+    /// The package's folder, or the file of a Parquet table. `None` for a place beside the data set, named
+    /// after it.
     pub output: Option<PathBuf>,
-    /// Replace an earlier package there.
+    /// Replace an earlier package at this place.
     pub overwrite: bool,
-    /// Pack these areas only; all if empty.
+    /// The areas to pack; all if empty.
     pub areas: Vec<u32>,
 }
 
-/// A package, with the options that it has.
+/// A package and its options.
 #[derive(Clone, Debug)]
 pub enum Package {
-    /// Tar shards, a sample an image.
+    /// Tar shards with one sample for each image.
     Webdataset(WebdatasetOptions),
-    /// Cameras, images and points as COLMAP writes a sparse model: perspective views only, since COLMAP's cameras
-    /// are pinholes.
+    /// Cameras, images and points in the form of COLMAP's sparse model. It holds perspective views only,
+    /// since COLMAP's cameras are pinholes.
     Colmap(ColmapOptions),
     /// `transforms.json` of nerfstudio.
     Nerfstudio(NerfstudioOptions),
@@ -39,111 +39,112 @@ pub enum Package {
 /// Options of [`Package::Webdataset`].
 #[derive(Clone, Debug, Default)]
 pub struct WebdatasetOptions {
-    /// Which images are packed.
+    /// The images that are packed.
     pub images: PackedImages,
-    /// Which files of an image go into its sample; `None` for all that there are.
+    /// The files of an image that go into its sample; `None` for all files.
     pub modalities: Option<Vec<Domain>>,
-    /// Megabytes (1,000,000 bytes) of a shard, at most. `None` for 1000.
+    /// The most megabytes (1,000,000 bytes) in a shard. `None` for 1000.
     pub max_size: Option<u32>,
-    /// Samples of a shard, at most. `None` for an eighth of a series, so that eight workers have work, or 10,000
-    /// where `max_size` is given.
+    /// The most samples in a shard. `None` for an eighth of a series, so that eight workers have work, or for
+    /// 10,000 if `max_size` is given.
     pub max_count: Option<u32>,
-    /// One series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar and
-    /// area_N_panoramas-000000.tar for each.
+    /// Write one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar and
+    /// area_N_panoramas-000000.tar for each area.
     pub prefix: Option<ShardPrefix>,
-    /// The seed of a random order of samples; `None` for their order by scan location.
+    /// The seed of a random order of samples. `None` sorts them by scan location.
     pub shuffle: Option<u64>,
 }
 
 /// Options of [`Package::Colmap`].
 #[derive(Clone, Debug, Default)]
 pub struct ColmapOptions {
-    /// Points of each area's cloud, evenly spaced; 0 for none, `None` for 100,000.
+    /// The number of points of each area's cloud, evenly spaced; 0 for none, `None` for 100,000.
     pub points: Option<u32>,
     /// Write cameras.bin, images.bin and points3D.bin instead of text.
     pub binary: bool,
-    /// Copy the RGB images into the package, which can be moved then, instead of pointing to those of the data
-    /// set.
+    /// Copy the RGB images into the package, so that it can be moved. Otherwise the package points to the
+    /// images of the data set.
     pub copy_images: bool,
 }
 
 /// Options of [`Package::Nerfstudio`].
 #[derive(Clone, Debug, Default)]
 pub struct NerfstudioOptions {
-    /// Which images are packed.
+    /// The images that are packed.
     pub images: PackedImages,
-    /// Points of each area's cloud, evenly spaced; 0 for none, `None` for 100,000.
+    /// The number of points of each area's cloud, evenly spaced; 0 for none, `None` for 100,000.
     pub points: Option<u32>,
-    /// Copy the RGB images into the package, which can be moved then, instead of pointing to those of the data
-    /// set.
+    /// Copy the RGB images into the package, so that it can be moved. Otherwise the package points to the
+    /// images of the data set.
     pub copy_images: bool,
-    /// Which depth files nerfstudio gets; `None` for millimetres where there is depth.
+    /// The kind of depth files for nerfstudio. `None` writes millimetres if there is depth.
     pub depth: Option<DepthFiles>,
-    /// How much time the images' files may take.
+    /// The time that compressing image files may take.
     pub compression: Compression,
 }
 
 /// Options of [`Package::Coco`].
 #[derive(Clone, Debug, Default)]
 pub struct CocoOptions {
-    /// Which images are packed.
+    /// The images that are packed.
     pub images: PackedImages,
-    /// Classes of which all instances in an image are one segment. `None` for those that the taxonomy calls
-    /// stuff: ceiling, floor and wall of S3DIS.
+    /// Stuff classes: all instances of such a class in an image form one segment. `None` for the stuff
+    /// classes of the taxonomy; in S3DIS they are ceiling, floor and wall.
     pub stuff: Option<ClassList>,
-    /// How much time the images' files may take.
+    /// The time that compressing image files may take.
     pub compression: Compression,
 }
 
 /// Options of [`Package::Parquet`].
 #[derive(Clone, Debug, Default)]
 pub struct ParquetOptions {
-    /// Which images are packed.
+    /// The images that are packed.
     pub images: PackedImages,
 }
 
-/// The options of all packages side by side, as words or arguments give them. [`package`](Self::package) makes a
-/// [`Package`] of them. An option that was not given is `None` or false.
+/// The options of all packages side by side, as words or arguments give them. [`package`](Self::package)
+/// makes a [`Package`] from them. An option that was not given is `None` or false.
 #[derive(Clone, Debug, Default)]
 pub struct PackageArguments {
-    /// Of all but COLMAP.
+    /// For all packages but COLMAP.
     pub images: Option<PackedImages>,
-    /// Of WebDataset.
+    /// For WebDataset.
     pub modalities: Option<Vec<Domain>>,
-    /// Of WebDataset.
+    /// For WebDataset.
     pub max_size: Option<u32>,
-    /// Of WebDataset.
+    /// For WebDataset.
     pub max_count: Option<u32>,
-    /// Of WebDataset.
+    /// For WebDataset.
     pub prefix: Option<ShardPrefix>,
-    /// Of WebDataset.
+    /// For WebDataset.
     pub shuffle: Option<u64>,
-    /// Of COLMAP and nerfstudio.
+    /// For COLMAP and nerfstudio.
     pub points: Option<u32>,
-    /// Of COLMAP.
+    /// For COLMAP.
     pub binary: bool,
-    /// Of COLMAP and nerfstudio.
+    /// For COLMAP and nerfstudio.
     pub copy_images: bool,
-    /// Of nerfstudio.
+    /// For nerfstudio.
     pub depth: Option<DepthFiles>,
-    /// Of COCO.
+    /// For COCO.
     pub stuff: Option<ClassList>,
-    /// Of COCO and nerfstudio.
+    /// For COCO and nerfstudio.
     pub compression: Option<Compression>,
 }
 
 impl PackageArguments {
-    /// Makes a package of a kind.
+    /// Makes a package of this kind.
     ///
     /// # Errors
     /// [`UsageError::ForeignOption`] if an option is given that only another package has;
-    /// [`UsageError::InvalidValue`] if COLMAP is to have panoramas.
+    /// [`UsageError::InvalidValue`] if COLMAP is asked for panoramas.
     pub fn package(self, kind: PackageKind) -> Result<Package> {
         self.check(kind)?;
         let Self { modalities, max_size, max_count, prefix, shuffle, points, .. } = self;
         let Self { binary, copy_images, depth, stuff, .. } = self;
         let images = self.images.unwrap_or_default();
         let compression = self.compression.unwrap_or_default();
+
         Ok(match kind {
             PackageKind::Webdataset => Package::Webdataset(WebdatasetOptions {
                 images,
@@ -162,7 +163,7 @@ impl PackageArguments {
         })
     }
 
-    /// Refuses options that only another package has.
+    /// Refuses options that the package does not have.
     fn check(&self, kind: PackageKind) -> Result<()> {
         use PackageKind::{Coco, Colmap, Nerfstudio, Webdataset};
         let options: [(&'static str, bool, &[PackageKind]); 11] = [
@@ -178,12 +179,14 @@ impl PackageArguments {
             ("stuff", self.stuff.is_some(), &[Coco]),
             ("compression", self.compression.is_some(), &[Coco, Nerfstudio]),
         ];
+
         for (option, given, kinds) in options {
             if given && !kinds.contains(&kind) {
                 let packages = kinds.iter().map(|kind| kind.name()).collect();
                 return Err(UsageError::ForeignOption { option, packages }.into());
             }
         }
+
         if kind == Colmap && self.images == Some(PackedImages::Panoramas) {
             let value = PackedImages::Panoramas.to_string();
             let why =
@@ -195,7 +198,7 @@ impl PackageArguments {
 }
 
 impl Package {
-    /// Its kind.
+    /// The kind of the package.
     pub fn kind(&self) -> PackageKind {
         match self {
             Self::Webdataset(_) => PackageKind::Webdataset,
@@ -206,7 +209,7 @@ impl Package {
         }
     }
 
-    /// Which images it holds.
+    /// The images that the package holds.
     pub(crate) fn images(&self) -> PackedImages {
         match self {
             Self::Webdataset(options) => options.images,
@@ -242,7 +245,7 @@ impl PackageKind {
         ("parquet", Self::Parquet),
     ];
 
-    /// Its name, which `FromStr` reads.
+    /// The name, which `FromStr` reads.
     pub fn name(self) -> &'static str {
         name_of(&Self::ALL, self)
     }
@@ -262,14 +265,14 @@ impl FromStr for PackageKind {
     }
 }
 
-/// Which images are packed.
+/// The images that a package holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PackedImages {
     /// Perspective views.
     Views,
     /// Panoramas.
     Panoramas,
-    /// Both.
+    /// Views and panoramas.
     #[default]
     All,
 }
@@ -293,14 +296,14 @@ impl FromStr for PackedImages {
     }
 }
 
-/// Which depth files nerfstudio gets.
+/// The depth files of a nerfstudio package.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthFiles {
-    /// Written anew: 16 bits, millimetres, 0 for missing.
+    /// New files: 16 bits, millimetres, 0 if missing.
     Millimetres,
-    /// The files of the data set. nerfstudio must be told their unit, and missing pixels seem to be 128 m away.
+    /// The files of the data set. nerfstudio must be given their unit, and missing pixels appear 128 m away.
     Original,
-    /// None.
+    /// No depth files.
     None,
 }
 
@@ -317,25 +320,27 @@ impl FromStr for DepthFiles {
     }
 }
 
+/// The name of a value; empty if it has none.
 fn name_of<T: PartialEq>(all: &[(&'static str, T)], value: T) -> &'static str {
     all.iter().find(|(_, v)| *v == value).map_or("", |(name, _)| name)
 }
 
+/// The value with this name. The error lists all names.
 fn choice<T: Copy>(all: &[(&'static str, T)], word: &str) -> std::result::Result<T, String> {
     let found = all.iter().find(|(name, _)| *name == word).map(|(_, value)| *value);
     let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
     found.ok_or_else(|| format!("there are {}", names.join(", ")))
 }
 
-/// Names of classes, of whatever taxonomy the data set has.
+/// Names of classes, from any taxonomy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClassList(pub Vec<String>);
 
 impl ClassList {
-    /// The classes, in their order and once each.
+    /// The classes in the taxonomy's order, without duplicates.
     ///
     /// # Errors
-    /// [`UsageError::InvalidValue`] for a name that no class has.
+    /// [`UsageError::InvalidValue`] if no class has a name.
     pub fn classes(&self, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
         let mut classes = Vec::with_capacity(self.0.len());
         for name in &self.0 {
@@ -355,7 +360,7 @@ impl ClassList {
 impl FromStr for ClassList {
     type Err = String;
 
-    /// Names of classes between commas, or `none`.
+    /// Reads names of classes between commas, or `none`.
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         if text.trim() == "none" {
             return Ok(Self(Vec::new()));
@@ -370,7 +375,7 @@ impl FromStr for ClassList {
     }
 }
 
-/// The beginning of shards' names: it can stand in a file's name and in a brace expansion.
+/// The prefix of shards' names. It fits into a file name and a brace expansion.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ShardPrefix(String);
 

@@ -1,4 +1,4 @@
-//! `s3d pack --to parquet`: a table of all images, with what their pixels show.
+//! `s3d pack --to parquet`: a table of all images and what their pixels show.
 
 use super::source::Source;
 use crate::context::Context;
@@ -14,12 +14,13 @@ use s3d_sample::entropy;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What is no pixel of a surface in a semantic image.
+/// The colour of pixels without a surface in a semantic image.
 const MISSING: [u8; 3] = [13; 3];
 
-/// Kept views, by scan location and number.
+/// Kept views, by scan location and frame number.
 type Views = BTreeMap<(String, u32), ViewRecord>;
 
+/// Writes the table to the file `place`.
 pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
     let mut views: BTreeMap<u32, Views> = BTreeMap::new();
     for &area in &source.areas {
@@ -29,6 +30,7 @@ pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
         });
         views.insert(area, kept.collect());
     }
+
     let table = source.labels()?;
     let progress = ctx.progress("packing", "images", source.images.len() as u64);
     let rows = map_in_order(
@@ -41,10 +43,12 @@ pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
             Ok(row)
         },
     )?;
+
     write_image_index(place, source.taxonomy.classes(), &rows)?;
     Ok(())
 }
 
+/// The row of an image. `counts` has an entry for each label, all 0, and is left so.
 fn row(
     source: &Source,
     image: &DatasetImage,
@@ -53,7 +57,10 @@ fn row(
     counts: &mut [u64],
 ) -> Result<ImageRow> {
     let path = |domain| image.path(&source.layout, domain);
-    // The walk takes any word for a room's type; the data set has some, and one for what is not known.
+
+    // Reading the data set accepts any word for a room's type. Only those of the taxonomy are valid here, and
+    // the one for unknown rooms.
+
     let (room_type, room_number) = match source.taxonomy.room(&image.room) {
         Ok(room) => (room.room_type.name(), room.number),
         Err(_) if table.is_none() && image.room == UNKNOWN_ROOM => ("unknown", 1),
@@ -61,6 +68,7 @@ fn row(
             return Err(FileError::format(&path(image.domains[0]), format!("in the file's name: {e}")).into());
         }
     };
+
     let mut row = ImageRow {
         area: image.area,
         camera_uuid: image.uuid.clone(),
@@ -72,6 +80,7 @@ fn row(
         photograph: source.photograph(image).map(|p| p.name.clone()),
         ..ImageRow::default()
     };
+
     let view = match image.frame {
         Frame::View(number) => {
             row.frame_num = Some(number);
@@ -79,6 +88,7 @@ fn row(
         }
         Frame::Panorama => None,
     };
+
     if image.has(Domain::Pose) {
         let pose = source.pose(image)?;
         row.fov_rad = Some(pose.field_of_view_rads);
@@ -90,21 +100,25 @@ fn row(
             row.yaw_pitch_rad = Some([yaw, pitch]);
         }
     }
+
     if let Some(view) = view {
         row.fov_rad = Some(view.fov_rad);
         row.yaw_pitch_rad = Some([view.yaw_rad, view.pitch_rad]);
         row.selection_entropy = Some(view.entropy);
     }
+
     if image.has(Domain::Depth) {
         let (coverage, depth_m) = depth_row(&source.depth(image)?, source.depth_units_per_m);
-        (row.coverage, row.depth_m) = (Some(coverage), depth_m);
+        row.coverage = Some(coverage);
+        row.depth_m = depth_m;
     } else if image.has(Domain::Rgb) && !image.has(Domain::Semantic) {
         row.coverage = Some(share(&source.rgb8(image, Domain::Rgb)?, |p| *p != [0; 3]));
     }
+
     if let Some(table) = table
         && image.has(Domain::Semantic)
     {
-        // Depth misses what is beyond 128 m; labels do not.
+        // Labels have no limit of distance, but depth is missing beyond 128 m.
         let semantic = source.rgb8(image, Domain::Semantic)?;
         row.coverage = Some(share(&semantic, |p| *p != MISSING));
         let known = semantic_row(&semantic, table, counts).map_err(|index| {
@@ -115,9 +129,11 @@ fn row(
         })?;
         row.semantic = Some(known);
     }
+
     Ok(row)
 }
 
+/// The numbers of a matrix, row by row.
 fn flat<const N: usize, const M: usize, const L: usize>(matrix: &[[f64; N]; M]) -> [f64; L] {
     let flat = matrix.as_flattened();
     std::array::from_fn(|i| flat[i])
@@ -127,22 +143,27 @@ fn share<T: Copy>(image: &Raster<T>, is: impl Fn(&T) -> bool) -> f64 {
     image.pixels().iter().filter(|p| is(p)).count() as f64 / image.len() as f64
 }
 
-/// The share of pixels with a depth, and the least, mean and greatest of them in metres.
+/// The share of pixels with a depth, and the least, mean and greatest depth in metres.
 fn depth_row(depth: &Raster<u16>, units_per_m: f64) -> (f64, Option<[f64; 3]>) {
-    let (mut min, mut max, mut sum, mut count) = (u16::MAX, 0, 0u64, 0u64);
+    let mut min = u16::MAX;
+    let mut max = 0;
+    let mut sum = 0u64;
+    let mut count = 0u64;
     for &v in depth.pixels().iter().filter(|v| **v != MISSING_DEPTH) {
-        (min, max) = (min.min(v), max.max(v));
+        min = min.min(v);
+        max = max.max(v);
         sum += u64::from(v);
         count += 1;
     }
+
     let metres = |units: f64| units / units_per_m;
     let depth_m =
         (count > 0).then(|| [f64::from(min), sum as f64 / count as f64, f64::from(max)].map(metres));
     (count as f64 / depth.len() as f64, depth_m)
 }
 
-/// What the pixels of a semantic image show. `counts` has an entry a label, all 0, and is left so. The error
-/// is a label that is not in the table.
+/// Counts the labels of a semantic image. `counts` has an entry for each label, all 0, and is left so. The
+/// error is a label that is not in the table.
 fn semantic_row(
     semantic: &Raster<[u8; 3]>,
     table: &LabelTable,
@@ -150,6 +171,7 @@ fn semantic_row(
 ) -> Result<SemanticRow, u32> {
     let mut seen: Vec<u32> = Vec::new();
     let mut unknown = None;
+
     for run in semantic.pixels().chunk_by(|a, b| a == b) {
         let [r, g, b] = run[0];
         let index = u32::from_be_bytes([0, r, g, b]);
@@ -164,8 +186,11 @@ fn semantic_row(
             None => unknown = unknown.or(Some(index)),
         }
     }
+
+    // Only the counts of this image's labels are read, and reset to 0.
     let mut histogram = vec![0u64; table.taxonomy().classes().len()];
-    let (mut unlabelled, mut instances) = (0, 0);
+    let mut unlabelled = 0;
+    let mut instances = 0;
     for index in seen {
         let count = std::mem::take(&mut counts[index as usize]);
         match table.class_of(LabelId(index)) {
@@ -176,9 +201,11 @@ fn semantic_row(
             None => unlabelled += count,
         }
     }
+
     if let Some(index) = unknown {
         return Err(index);
     }
+
     let share = |count: u64| count as f64 / semantic.len() as f64;
     let shares = histogram.iter().copied().map(share).collect();
     Ok(SemanticRow { shares, unlabelled: share(unlabelled), entropy: entropy(&histogram), instances })

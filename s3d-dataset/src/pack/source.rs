@@ -1,4 +1,4 @@
-//! The data set that is packed: its images, and what is known of them.
+//! The data set that is packed: its images and tables.
 
 use super::options::PackedImages;
 use crate::context::Context;
@@ -16,22 +16,23 @@ use s3d_label::{LabelTable, Taxonomy};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// A data set, or some of it. All that is read of it is held against its list of files.
+/// A data set or a part of it. Everything read from it is checked against its list of files.
 pub(crate) struct Source {
     pub(crate) layout: Layout,
     files: Listed,
-    /// Which classes and types of rooms there are.
+    /// The classes and the types of rooms.
     pub(crate) taxonomy: Taxonomy,
-    /// The areas that are packed, and all of their images that are.
+    /// The areas that are packed.
     pub(crate) areas: Vec<u32>,
+    /// The images that are packed, of all these areas.
     pub(crate) images: Vec<DatasetImage>,
-    /// Units a metre of depth images.
+    /// The depth units in a metre.
     pub(crate) depth_units_per_m: f64,
-    /// What was subtracted from the coordinates of the areas' scans.
+    /// The offsets that were subtracted from the coordinates of the areas' scans.
     offsets: WorldOffsets,
     /// Whether there are labels.
     is_labelled: bool,
-    /// What is told of photographs, by area and camera.
+    /// The records of photographs, by area and camera.
     photographs: BTreeMap<(u32, String), PhotographRecord>,
 }
 
@@ -44,6 +45,7 @@ impl Source {
             let of_area = data.photographs(area)?.into_iter();
             photographs.extend(of_area.map(|record| ((area, record.camera_uuid.clone()), record)));
         }
+
         let DataSet { layout, manifest, files, taxonomy, .. } = data;
         let there = &manifest.area_numbers;
         if let Some(area) = areas.iter().find(|a| !there.contains(a)) {
@@ -59,9 +61,11 @@ impl Source {
             }
             .into());
         }
+
         let chosen = |a: &u32| areas.is_empty() || areas.contains(a);
         let mut areas: Vec<u32> = there.iter().copied().filter(chosen).collect();
         areas.sort_unstable();
+
         let mut images: Vec<DatasetImage> =
             areas.iter().flat_map(|area| files.images(&layout, *area)).collect();
         images.retain(|image| match which {
@@ -69,6 +73,7 @@ impl Source {
             PackedImages::Panoramas => image.frame == Frame::Panorama,
             PackedImages::All => true,
         });
+
         check_images_complete(&layout, &images)?;
         if images.is_empty() {
             let what = if which == PackedImages::All {
@@ -78,18 +83,17 @@ impl Source {
             };
             return Err(InputError::NothingToPack { dataset: root.to_owned(), what }.into());
         }
-        let of_image = |image: &DatasetImage| -> Vec<PathBuf> {
-            image
-                .domains
-                .iter()
-                .map(|domain| image.path(&layout, *domain))
-                .collect()
-        };
-        let needed: BTreeSet<PathBuf> = images.iter().flat_map(of_image).collect();
+
+        let needed: BTreeSet<PathBuf> = images
+            .iter()
+            .flat_map(|image| image.domains.iter().map(|domain| image.path(&layout, *domain)))
+            .collect();
         files.require(ctx, |path| needed.contains(path))?;
+
         let depth_units_per_m = manifest.conventions().depth_units.per_m();
         let offsets = manifest.request().world_offsets();
         let is_labelled = manifest.is_labelled();
+
         Ok(Self {
             layout,
             files,
@@ -103,7 +107,7 @@ impl Source {
         })
     }
 
-    /// Which frame coordinates are in, a sentence for each area whose scan has another.
+    /// A sentence on the coordinates of each area whose scan has another frame.
     pub(crate) fn frame_notes(&self) -> Vec<String> {
         let packed = self.offsets.iter().filter(|(area, _)| self.areas.contains(area));
         let note = |(area, offset_m): (&u32, &[f64; 3])| {
@@ -112,7 +116,7 @@ impl Source {
         packed.map(note).collect()
     }
 
-    /// What is told of the photograph that an image is the view of.
+    /// The record of the photograph that an image is the view of.
     pub(crate) fn photograph(&self, image: &DatasetImage) -> Option<&PhotographRecord> {
         let record = self.photographs.get(&(image.area, image.uuid.clone()));
         record.filter(|_| image.frame == Frame::View(0))
@@ -123,7 +127,7 @@ impl Source {
         self.images.iter().filter(|image| image.area == area).collect()
     }
 
-    /// Refuses a data set in which images lack what the package needs.
+    /// Fails if images lack a modality that the package needs.
     pub(crate) fn require(&self, domain: Domain, whom: &str) -> Result<()> {
         match self.images.iter().find(|image| !image.has(domain)) {
             None => Ok(()),
@@ -145,21 +149,21 @@ impl Source {
         Ok(read_pose(self.files.checked(&image.path(&self.layout, Domain::Pose))?)?)
     }
 
-    /// Its size in pixels.
+    /// The size of an image in pixels.
     ///
     /// # Panics
-    /// If it has no PNG file.
+    /// If the image has no PNG file.
     pub(crate) fn size(&self, image: &DatasetImage) -> Result<(u32, u32)> {
         let size = image.size(&self.layout)?;
         Ok(size.expect("packages that ask for a size require an image"))
     }
 
-    /// The content of a file of an image.
+    /// The bytes of a file of an image.
     pub(crate) fn bytes(&self, image: &DatasetImage, domain: Domain) -> Result<Vec<u8>> {
         Ok(self.files.read_bytes(&image.path(&self.layout, domain))?)
     }
 
-    /// How many bytes that is.
+    /// The number of bytes of a file of an image.
     pub(crate) fn byte_count(&self, image: &DatasetImage, domain: Domain) -> Result<u64> {
         Ok(self.files.bytes(&image.path(&self.layout, domain))?)
     }
@@ -169,7 +173,7 @@ impl Source {
         Ok(write_bytes(to, &self.bytes(image, domain)?).map(drop)?)
     }
 
-    /// The pixels of a file of an image, 8-bit R G B.
+    /// The pixels of a file of an image, 8-bit RGB.
     pub(crate) fn rgb8(&self, image: &DatasetImage, domain: Domain) -> Result<Raster<[u8; 3]>> {
         Ok(decode_rgb8(&self.bytes(image, domain)?, &image.path(&self.layout, domain))?)
     }
@@ -184,14 +188,14 @@ impl Source {
         Ok(read_views(self.files.checked(&self.layout.views_json(area))?)?)
     }
 
-    /// Points of an area's cloud, at most so many.
+    /// Points of an area's cloud, at most `most`.
     pub(crate) fn points(&self, area: u32, most: usize) -> Result<PointCloud> {
-        // Of a large cloud little is read.
+        // Only a small part of a large cloud is read.
         Ok(s3d_io::cloud::read_point_sample(self.files.sized(&self.layout.point_cloud(area))?, most)?)
     }
 
-    /// The files that say what the numbers in images mean, by name: the conventions; if there are
-    /// labels their table, and their taxonomy unless it is S3DIS's.
+    /// The files that say what the numbers in images mean, by name: the conventions, the label table if there
+    /// are labels, and the taxonomy unless it is S3DIS's.
     pub(crate) fn tables(&self) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let mut tables = vec![("conventions.json", self.files.read_bytes(&self.layout.conventions())?)];
         if self.is_labelled {
@@ -203,7 +207,7 @@ impl Source {
         Ok(tables)
     }
 
-    /// The labels of the data set, if it has some.
+    /// The label table, if the data set has labels.
     pub(crate) fn labels(&self) -> Result<Option<LabelTable>> {
         if !self.is_labelled {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! `s3d pack --to webdataset`: tar shards, one sample an image.
+//! `s3d pack --to webdataset`: tar shards with one sample for each image.
 
 use super::destination::Destination;
 use super::options::{ShardPrefix, WebdatasetOptions};
@@ -13,19 +13,20 @@ use s3d_io::package::{
     ShardEntry, ShardLimits, TarWriter, plan_shards, sample_key, sample_member, write_shard_index,
 };
 
-/// A series has so many shards or more unless limits are given, if it has as many samples: each worker of a
-/// loader reads shards of its own.
+/// The smallest number of shards in a series without limits, if it has enough samples. Each worker of a
+/// loader reads its own shards.
 const SHARDS: usize = 8;
 
-/// The folder in a shard of what belongs to all samples. Readers pass over names of this form.
+/// The folder in each shard for the files that belong to all samples. Readers skip names of this form.
 const META: &str = "__s3d__";
 
-/// A shard to write: its file, and the samples that go into it.
+/// A shard to write: its file and its samples.
 struct Shard<'a> {
     url: String,
     images: Vec<&'a DatasetImage>,
 }
 
+/// Writes the shards and their index. Returns notes on how to use them.
 pub(super) fn pack(
     ctx: &Context,
     source: &Source,
@@ -39,6 +40,8 @@ pub(super) fn pack(
         }
         None => Domain::ALL.to_vec(),
     };
+
+    // Every shard begins with the tables.
     let meta: Vec<(String, Vec<u8>)> = source
         .tables()?
         .into_iter()
@@ -48,6 +51,7 @@ pub(super) fn pack(
         .iter()
         .map(|(name, bytes)| TarWriter::entry_bytes(name, bytes.len() as u64))
         .sum();
+
     let most = ShardLimits::default();
     let max_bytes = options.max_size.map_or(most.max_bytes, |mb| u64::from(mb) * 1_000_000);
     let mut shards = Vec::new();
@@ -56,6 +60,7 @@ pub(super) fn pack(
         if let Some(seed) = options.shuffle {
             shuffle(&mut images, seed);
         }
+
         let sizes = map_in_order(ctx, &images, || (), |(), image| sample_bytes(source, image, &domains))?;
         let max_samples = match (options.max_count, options.max_size) {
             (Some(count), _) => count as usize,
@@ -63,11 +68,13 @@ pub(super) fn pack(
             (None, None) => (images.len() / SHARDS).clamp(1, most.max_samples),
         };
         let limits = ShardLimits { max_bytes: max_bytes.saturating_sub(meta_bytes), max_samples };
+
         let plan = plan_shards(&sizes, limits);
         names.push(match plan.len() {
             1 => format!("{name}-000000.tar"),
             n => format!("{name}-{{000000..{:06}}}.tar", n - 1),
         });
+
         shards.extend(
             plan.into_iter().enumerate().map(|(i, range)| Shard {
                 url: format!("{name}-{i:06}.tar"),
@@ -95,7 +102,9 @@ pub(super) fn pack(
             Ok(ShardEntry { url: shard.url.clone(), nsamples: shard.images.len(), filesize })
         },
     )?;
+
     write_shard_index(&destination.path().join("shards.json"), "s3d", &entries)?;
+
     let mut notes: Vec<String> = names
         .iter()
         .map(|n| format!("webdataset.WebDataset(\"{n}\")"))
@@ -117,8 +126,8 @@ pub(super) fn pack(
     Ok(notes)
 }
 
-/// The series of shards: of each area its views and its panoramas, or one of all images under the user's
-/// name.
+/// The series of shards: the views and the panoramas of each area, or one series of all images if the user
+/// named a prefix.
 fn series<'a>(source: &'a Source, options: &WebdatasetOptions) -> Vec<(String, Vec<&'a DatasetImage>)> {
     if let Some(prefix) = options.prefix.as_ref().map(ShardPrefix::as_str) {
         return vec![(prefix.to_owned(), source.images.iter().collect())];
@@ -136,7 +145,7 @@ fn series<'a>(source: &'a Source, options: &WebdatasetOptions) -> Vec<(String, V
     series
 }
 
-/// Puts images in a random order that `seed` decides.
+/// Puts images in a random order, decided by `seed`.
 fn shuffle(images: &mut [&DatasetImage], seed: u64) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut drawn: Vec<(u64, &DatasetImage)> = images.iter().map(|i| (random.next_u64(), *i)).collect();
@@ -152,7 +161,7 @@ fn present(image: &DatasetImage, domains: &[Domain]) -> impl Iterator<Item = Dom
     domains.iter().copied().filter(|d| image.has(*d))
 }
 
-/// What a sample takes in a shard.
+/// The number of bytes that a sample takes in a shard.
 fn sample_bytes(source: &Source, image: &DatasetImage, domains: &[Domain]) -> Result<u64> {
     let key = sample_key(image);
     let mut bytes = 0;
