@@ -12,32 +12,32 @@ use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;
 use s3d_io::image::Compression;
 use s3d_synth::{
-    Building, BuildingError, BuildingOptions, ScanError, ScanOptions, SightOptions, is_area_scan,
-    is_demo_scan,
+    AnnotatedScene, Building, BuildingError, BuildingOptions, ScanError, ScanOptions, SightOptions,
+    is_area_scan, is_demo_scan,
 };
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use tracing::info;
 
-/// Folder of the scene's own files in OUT.
+/// The folder of the scene's own files in OUT.
 const SCAN: &str = "scan";
 
-/// The same while they are written.
+/// The folder of the scene's own files while they are written.
 const SCAN_PART: &str = ".s3d-scan.part";
 
 #[derive(Debug, Args)]
 pub(crate) struct DemoArgs {
-    /// The folder to make; the scene's own files come to OUT/scan.
+    /// The folder to make. The scene's own files are in OUT/scan.
     #[arg(short, long, value_name = "OUT", default_value = "s3d-demo")]
     pub(crate) output: PathBuf,
-    /// Instead of the built-in scene make the first N of six generated areas to train on, drawn from --seed:
-    /// 264 rooms in three buildings (areas 1, 3, 6; 2, 4; 5), whose rooms and things are as frequent as in
-    /// 2D-3D-S. Their files come to OUT/scan/area_K.
+    /// Make the first N of six generated areas to train on, instead of the built-in scene. They depend on
+    /// --seed. All six have 264 rooms in three buildings (areas 1, 3, 6; 2, 4; 5); rooms and objects are as
+    /// frequent as in 2D-3D-S. Their files are in OUT/scan/area_K.
     #[arg(long, value_name = "N",
         value_parser = value_parser!(u32).range(1..=i64::from(BuildingOptions::AREAS)))]
     pub(crate) areas: Option<u32>,
-    /// Make no images: meshes, points, labels and tables alone.
+    /// Make no images, only meshes, points, labels and tables.
     #[arg(long, conflicts_with_all = ["views", "size", "pano_width"])]
     pub(crate) no_images: bool,
     /// Replace an earlier data set in OUT.
@@ -52,23 +52,25 @@ pub(crate) struct DemoArgs {
 /// The demo's options are the export's, at a reduced size.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SizeArgs {
-    /// Candidate views a scan location [default: 24, or 4 with --areas]
+    /// The number of candidate views at each scan location [default: 24, or 4 with --areas]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(0..=100_000))]
     pub(crate) views: Option<u32>,
     /// Width and height of a view in pixels [default: 540, or 256 with --areas]
     #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(8..=16_384))]
     pub(crate) size: Option<u32>,
-    /// Width of a panorama in pixels, even; it is half as high [default: 2048, or 1024 with --areas]
+    /// Width of a panorama in pixels, an even number; its height is half of that [default: 2048, or 1024 with
+    /// --areas]
     #[arg(long, value_name = "PX", value_parser = even_width)]
     pub(crate) pano_width: Option<u32>,
-    /// Everything random comes from it.
+    /// The source of everything random.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Density of the point cloud [default: 2500, or 400 with --areas, where the scanner measures as many]
+    /// Points per m² of the point cloud and, with --areas, of the scan as well [default: 2500, or 400 with
+    /// --areas]
     #[arg(long, value_name = "N", value_parser = positive)]
     pub(crate) points_per_m2: Option<f64>,
-    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make
-    /// them) or small (slowest). The pixels are the same.
+    /// Compression of the image files: fast, balanced (about as small as files by libpng and OpenEXR) or
+    /// small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
 }
@@ -76,17 +78,13 @@ pub(crate) struct SizeArgs {
 impl DemoArgs {
     fn export_options(&self) -> ExportOptions {
         let SizeArgs { views, size, pano_width, seed, points_per_m2, compression } = self.options;
-        let (small_views, small_size, small_width, few) = if self.areas.is_some() {
-            (4, 256, 1024, 400.0)
-        } else {
-            (24, 540, 2048, 2500.0)
-        };
+        let is_generated = self.areas.is_some();
         let all = ExportOptions {
-            views: views.unwrap_or(small_views),
-            size: size.unwrap_or(small_size),
-            pano_width: pano_width.unwrap_or(small_width),
+            views: views.unwrap_or(if is_generated { 4 } else { 24 }),
+            size: size.unwrap_or(if is_generated { 256 } else { 540 }),
+            pano_width: pano_width.unwrap_or(if is_generated { 1024 } else { 2048 }),
             seed,
-            points_per_m2: points_per_m2.unwrap_or(few),
+            points_per_m2: points_per_m2.unwrap_or(if is_generated { 400.0 } else { 2500.0 }),
             compression,
             ..ExportOptions::default()
         };
@@ -100,20 +98,19 @@ impl DemoArgs {
 
 /// A scene that the demo writes.
 struct Scene {
-    /// Its folder.
     folder: PathBuf,
     /// The number of a generated area; the built-in scene has none.
     area: Option<u32>,
 }
 
 impl Scene {
-    /// What it is called in messages.
+    /// The name of the scene in messages.
     fn name(&self) -> String {
         self.area
             .map_or("the built-in scene".to_owned(), |area| format!("the generated area {area}"))
     }
 
-    /// Whether its folder may be written again.
+    /// Whether a demo made the folder, so that it may be written again.
     fn is_ours(&self) -> bool {
         if self.area.is_some() {
             is_area_scan(&self.folder)
@@ -123,34 +120,42 @@ impl Scene {
     }
 
     fn write(&self, folder: &Path, options: &ExportOptions, cancel: &Cancel) -> Result<PathBuf> {
-        let wrong = |e: BuildingError| InputError::Unfit { path: folder.to_owned(), why: e.to_string() };
-        let (scene, scan) = match self.area {
-            None => (Building::demo().build().map_err(wrong)?, ScanOptions::default()),
-            Some(area) => {
-                let building = BuildingOptions::area(area, options.seed).map_err(BuildingError::from);
-                let building = building
-                    .and_then(|options| Building::generate(&options))
-                    .map_err(wrong)?;
-                let sight = SightOptions::default();
-                let seen = building.build().and_then(|scene| scene.seen(&sight)).map_err(wrong)?;
-                let scan = ScanOptions {
-                    points_per_m2: options.points_per_m2,
-                    seed: ScanOptions::default().seed.wrapping_add(options.seed),
-                    area,
-                    sight: Some(sight),
-                    ..ScanOptions::default()
-                };
-                (seen, scan)
-            }
+        let made = match self.area {
+            None => Building::demo().build().map(|scene| (scene, ScanOptions::default())),
+            Some(area) => generated(area, options),
         };
+        let (scene, scan) = made.map_err(|e| unfit(folder, &e))?;
+
         scene
             .write_scan(folder, &scan, || !cancel.is_cancelled())
             .map_err(|e| match e {
                 ScanError::File(e) => e.into(),
                 ScanError::Cancelled => Error::Cancelled,
-                other => InputError::Unfit { path: folder.to_owned(), why: other.to_string() }.into(),
+                other => unfit(folder, &other).into(),
             })
     }
+}
+
+/// Generates an area, and returns its visible part with the options of its scan.
+fn generated(
+    area: u32,
+    options: &ExportOptions,
+) -> std::result::Result<(AnnotatedScene, ScanOptions), BuildingError> {
+    let building = Building::generate(&BuildingOptions::area(area, options.seed)?)?;
+    let sight = SightOptions::default();
+    let seen = building.build()?.seen(&sight)?;
+    let scan = ScanOptions {
+        points_per_m2: options.points_per_m2,
+        seed: ScanOptions::default().seed.wrapping_add(options.seed),
+        area,
+        sight: Some(sight),
+        ..ScanOptions::default()
+    };
+    Ok((seen, scan))
+}
+
+fn unfit(folder: &Path, why: &impl ToString) -> InputError {
+    InputError::Unfit { path: folder.to_owned(), why: why.to_string() }
 }
 
 pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
@@ -168,6 +173,7 @@ pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
         .overwrite(args.overwrite)
         .allow(SCAN)
         .allow(SCAN_PART);
+
     on_threads(args.threads, |context| {
         Ok(make(&scenes, &export, &output, &options, args.overwrite, context))
     })??;
@@ -192,6 +198,7 @@ fn make(
     overwrite: bool,
     context: &Context,
 ) -> Outcome<()> {
+    // Nothing is written before every folder is found fit.
     export.check_output(output, context)?;
     for scene in scenes {
         if scene.folder.exists() && !scene.is_ours() {
@@ -212,8 +219,9 @@ fn make(
     Ok(())
 }
 
-/// Writes the scene and gives it its place. One that is there already, of a demo that was stopped, may stay
-/// if it is the same to the byte: somebody may have changed it since.
+/// Writes the scene to `part`, then moves it to its folder. A scene that is in the folder already, from a
+/// demo that was stopped, stays if it is the same to the byte. If it differs, somebody may have changed it,
+/// and only `overwrite` replaces it.
 fn put(
     scene: &Scene,
     part: &Path,
@@ -221,30 +229,34 @@ fn put(
     overwrite: bool,
     context: &Context,
 ) -> Outcome<()> {
-    let (folder, cancel) = (&scene.folder, &context.cancel);
+    let folder = &scene.folder;
+    let cancel = &context.cancel;
     context.check()?;
     remove(part)?;
     scene.write(part, options, cancel)?;
-    if folder.exists() {
-        if same(part, folder).map_err(|e| FileError::io(folder, "read", e))? {
-            return Ok(remove(part)?);
-        }
-        remove(part)?;
-        if !overwrite {
-            return Err(Failure::Usage(format!(
-                "{} is there and differs from {}: choose another folder, or replace it with --overwrite",
-                folder.display(),
-                scene.name()
-            )));
-        }
-        // Whatever else is in it stays.
-        scene.write(folder, options, cancel)?;
-    } else {
+
+    if !folder.exists() {
         if let Some(parent) = folder.parent() {
             create_dir(parent)?;
         }
-        fs::rename(part, folder).map_err(|e| FileError::io(folder, "move the scene to", e))?;
+        return Ok(fs::rename(part, folder).map_err(|e| FileError::io(folder, "move the scene to", e))?);
     }
+
+    let is_same = same(part, folder).map_err(|e| FileError::io(folder, "read", e))?;
+    remove(part)?;
+    if is_same {
+        return Ok(());
+    }
+    if !overwrite {
+        return Err(Failure::Usage(format!(
+            "{} is there and differs from {}: choose another folder, or replace it with --overwrite",
+            folder.display(),
+            scene.name()
+        )));
+    }
+
+    // Other files in the folder stay.
+    scene.write(folder, options, cancel)?;
     Ok(())
 }
 

@@ -15,15 +15,15 @@ pub(crate) struct ExportArgs {
     /// The data set's folder [default: SCENE_2d3ds beside the first scene]
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
-    /// Write into an OUT that holds something: an earlier data set there, or an unfinished one of another
-    /// call, is replaced, other files stay.
+    /// Write into an OUT that is not empty. An earlier data set there, or an unfinished one of another call,
+    /// is replaced; other files stay.
     #[arg(long)]
     pub(crate) overwrite: bool,
-    /// Do one of N parts of the work, such as 2/4. The parts may be done anywhere, in any order, into one OUT
-    /// or one each; `s3d merge` makes the data set of them.
+    /// Do one of N parts of the work, such as 2/4. The parts may be done anywhere, in any order, into the
+    /// same OUT or into one OUT each; `s3d merge` joins them into the data set.
     #[arg(long, value_name = "i/N", value_parser = parsed::<Shard>)]
     pub(crate) shard: Option<Shard>,
-    /// Take labels and scores from the folder that `s3d plan` made, instead of making them.
+    /// Take labels and scores from the folder that `s3d plan` made, instead of computing them.
     #[arg(long, value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
     #[command(flatten)]
@@ -42,7 +42,7 @@ pub(crate) fn run(args: ExportArgs) -> Outcome<()> {
     on_threads(args.threads, |context| export.run(output, context).map(drop))
 }
 
-/// The data set's folder if none is given: beside the scene file, named after it.
+/// The default folder of the data set: beside the scene file, named after it.
 fn default_output(scene: &Path) -> PathBuf {
     let mut name = scene.file_stem().unwrap_or("scene".as_ref()).to_owned();
     name.push("_2d3ds");

@@ -11,22 +11,22 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// The scene file, a mesh, the folder of a data set, or that of a published area.
+    /// A scene file, a mesh, or the folder of a data set or of a published area.
     #[arg(value_name = "SCENE.toml")]
     pub(crate) scene: PathBuf,
-    /// Which axis of a mesh points up [default: y in glTF, guessed in others]
+    /// The axis of a mesh that points up [default: y in glTF, guessed in others]
     #[arg(long, value_parser = parsed::<UpAxis>, value_name = "y|z")]
     pub(crate) up: Option<UpAxis>,
-    /// The unit of a mesh [default: metres in glTF; in others what the file says, or else guessed by the
+    /// The unit of a mesh [default: metres in glTF; in others what the file says, or else guessed from the
     /// height of rooms]
     #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
     pub(crate) units: Option<LengthUnit>,
     #[command(flatten)]
     pub(crate) placing: Placing,
-    /// The seed by which they would be placed.
+    /// The seed of the placing of scan locations.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Skip and count what is not as it should be in the annotations, as in an export with --lenient.
+    /// Skip and count faults in the annotations, like an export with --lenient.
     #[arg(long)]
     pub(crate) lenient: bool,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `s3d pack`: a data set to what a trainer reads.
+//! `s3d pack`: a data set to a package that a trainer reads.
 
 use super::on_threads;
 use crate::args::Threads;
@@ -17,21 +17,21 @@ pub(crate) struct PackArgs {
     /// The data set's folder. Nothing in it is altered.
     #[arg(value_name = "OUT")]
     pub(crate) dataset: PathBuf,
-    /// What to make of it.
+    /// The kind of package.
     #[arg(long, value_parser = parsed::<PackageKind>,
         value_name = "webdataset|colmap|nerfstudio|coco|parquet")]
     pub(crate) to: PackageKind,
-    /// The package's folder, of parquet its file [default: beside OUT: OUT_webdataset, …,
+    /// The package's folder, or its file for parquet [default: beside OUT: OUT_webdataset, …,
     /// OUT_images.parquet]
     #[arg(short, long, value_name = "DEST")]
     pub(crate) output: Option<PathBuf>,
     /// Replace an earlier package in DEST.
     #[arg(long)]
     pub(crate) overwrite: bool,
-    /// Of these areas only, such as 1,3 [default: all]
+    /// Pack only these areas, such as 1,3 [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = value_parser!(u32).range(1..))]
     pub(crate) areas: Vec<u32>,
-    /// Of perspective views only, of panoramas only, or of both [default: all; COLMAP has views only]
+    /// Pack perspective views only, panoramas only, or both [default: all; COLMAP has views only]
     #[arg(long, value_name = "views|panoramas|all", value_parser = parsed::<PackedImages>)]
     pub(crate) images: Option<PackedImages>,
     #[command(flatten)]
@@ -40,68 +40,66 @@ pub(crate) struct PackArgs {
     pub(crate) options: SpecificArgs,
 }
 
-/// What belongs to some packages only; `None` (or false) where it was not said.
+/// The options of single packages. An option that was not given is `None` (or false).
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct SpecificArgs {
-    /// webdataset: which files of an image go into its sample [default: all that there are]
+    /// webdataset: the files of an image that its sample holds [default: all that exist]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parsed::<Domain>)]
     pub(crate) modalities: Option<Vec<Domain>>,
-    /// webdataset: megabytes (1,000,000 bytes) of a shard, at most [default: 1000]
+    /// webdataset: the largest size of a shard, in megabytes (1,000,000 bytes) [default: 1000]
     #[arg(long, value_name = "MB", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_size: Option<u32>,
-    /// webdataset: samples of a shard, at most [default: an eighth of a series, so that eight workers have
-    /// work]
+    /// webdataset: the largest number of samples in a shard [default: an eighth of a series, so that eight
+    /// workers have work]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_count: Option<u32>,
     /// webdataset: one series of shards PREFIX-000000.tar for all areas, instead of area_N_views-000000.tar
     /// and area_N_panoramas-000000.tar for each
     #[arg(long, value_name = "PREFIX", value_parser = parsed::<ShardPrefix>)]
     pub(crate) prefix: Option<ShardPrefix>,
-    /// webdataset: samples in a random order that this number decides, instead of by scan location
+    /// webdataset: shuffle the samples with this seed, instead of ordering them by scan location
     #[arg(long, value_name = "SEED")]
     pub(crate) shuffle: Option<u64>,
-    /// colmap, nerfstudio: points of each area's cloud, evenly spaced [default: 100000; 0 for none]
+    /// colmap, nerfstudio: the number of points of each area's cloud, evenly spaced [default: 100000; 0 for
+    /// none]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32))]
     pub(crate) points: Option<u32>,
-    /// colmap: cameras.bin, images.bin and points3D.bin instead of text
+    /// colmap: write cameras.bin, images.bin and points3D.bin instead of text
     #[arg(long)]
     pub(crate) binary: bool,
-    /// colmap, nerfstudio: copy the RGB images into DEST, which can be moved then, instead of pointing to
-    /// those in OUT
+    /// colmap, nerfstudio: copy the RGB images into DEST, so that DEST can be moved, instead of pointing to
+    /// the images in OUT
     #[arg(long)]
     pub(crate) copy_images: bool,
-    /// nerfstudio: depth written anew in millimetres with 0 for missing, as it is read by default; OUT's own
-    /// files, for which ns-train's --depth-unit-scale-factor must be 0.001953125 (1/512) and missing pixels
-    /// seem to be 128 m away; or none [default: millimetres]
+    /// nerfstudio: the depth files: new files in millimetres with 0 for missing, which is nerfstudio's
+    /// default; OUT's original files, which need --depth-unit-scale-factor 0.001953125 (1/512) of ns-train,
+    /// and in which missing pixels seem to be 128 m away; or none [default: millimetres]
     #[arg(long, value_name = "millimetres|original|none", value_parser = parsed::<DepthFiles>)]
     pub(crate) depth: Option<DepthFiles>,
-    /// coco: classes of which all instances in an image are one segment, or none [default:
+    /// coco: the classes whose instances in an image are joined into one segment, or none [default:
     /// ceiling,floor,wall]
     #[arg(long, value_name = "LIST|none", value_parser = parsed::<ClassList>)]
     pub(crate) stuff: Option<ClassList>,
-    /// coco, nerfstudio: how much time the images' files may take: fast, balanced or small [default:
-    /// balanced]
+    /// coco, nerfstudio: compression of the image files: fast, balanced or small [default: balanced]
     #[arg(long, value_name = "fast|balanced|small", value_parser = parsed::<Compression>)]
     pub(crate) compression: Option<Compression>,
 }
 
 impl SpecificArgs {
     fn arguments(self, images: Option<PackedImages>) -> PackageArguments {
-        let Self { modalities, max_size, max_count, prefix, shuffle, points, .. } = self;
-        let Self { binary, copy_images, depth, stuff, compression, .. } = self;
         PackageArguments {
             images,
-            modalities,
-            max_size,
-            max_count,
-            prefix,
-            shuffle,
-            points,
-            binary,
-            copy_images,
-            depth,
-            stuff,
-            compression,
+            modalities: self.modalities,
+            max_size: self.max_size,
+            max_count: self.max_count,
+            prefix: self.prefix,
+            shuffle: self.shuffle,
+            points: self.points,
+            binary: self.binary,
+            copy_images: self.copy_images,
+            depth: self.depth,
+            stuff: self.stuff,
+            compression: self.compression,
         }
     }
 }

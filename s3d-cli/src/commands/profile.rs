@@ -1,4 +1,4 @@
-//! `s3d profile`: what point cloud loaders want, from an existing data set.
+//! `s3d profile`: the files that point cloud loaders read, from an existing data set.
 
 use super::on_threads;
 use crate::args::Threads;
@@ -13,7 +13,7 @@ pub(crate) struct ProfileArgs {
     /// The data set's folder.
     #[arg(value_name = "OUT")]
     pub(crate) output: PathBuf,
-    /// Which loader; may be repeated.
+    /// The loader to write for; may be repeated.
     #[arg(long = "to", required = true, value_delimiter = ',', value_parser = parsed::<Profile>,
         value_name = "pointcept|open3d-ml|mmdet3d|pointnet")]
     pub(crate) profiles: Vec<Profile>,

@@ -18,63 +18,62 @@ use std::path::PathBuf;
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) mesh: MeshArgs,
-    /// Where the camera stands: metres, Z-up.
+    /// The position of the camera: metres, Z-up.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true,
         required_unless_present = "poses")]
     pub(crate) at: Option<DVec3>,
-    /// Render all cameras of a list instead: transforms.json, a COLMAP model, ScanNet's pose folder, a
-    /// trajectory of TUM's, or a CSV table (name,x,y,z and a quaternion, look_x,look_y,look_z or
-    /// yaw,pitch).
+    /// Render all cameras of a list instead: transforms.json, a COLMAP model, ScanNet's pose folder, a TUM
+    /// trajectory, or a CSV table (name,x,y,z and a quaternion, look_x,look_y,look_z or yaw,pitch).
     #[arg(long, value_name = "FILE", conflicts_with_all = ["at", "yaw", "pitch", "pano", "size"])]
     pub(crate) poses: Option<PathBuf>,
-    /// Which axis of the list's frame points up.
+    /// The axis of the list's frame that points up.
     #[arg(long, default_value = "z", value_parser = parsed::<UpAxis>, value_name = "y|z",
         conflicts_with = "at")]
     pub(crate) poses_up: UpAxis,
-    /// Width of the images of --poses; what the list says is scaled to it [default: the list's]
+    /// Width of the images of --poses; the intrinsics of the list are scaled to it [default: the list's]
     #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(1..=32_768),
         conflicts_with = "at")]
     pub(crate) width: Option<u32>,
-    /// Their height.
+    /// Height of the images of --poses.
     #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(1..=32_768),
         conflicts_with = "at")]
     pub(crate) height: Option<u32>,
-    /// Their focal lengths and principal point in pixels [default: the list's]
+    /// Focal lengths and principal point of the images of --poses, in pixels [default: the list's]
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = intrinsics, allow_hyphen_values = true,
         conflicts_with_all = ["at", "fov"])]
     pub(crate) k: Option<[f64; 4]>,
-    /// Write views of which none sees the mesh.
+    /// Write the views even if none of them sees the mesh.
     #[arg(long, value_name = "coverage", value_parser = parsed::<Condition>, conflicts_with = "at")]
     pub(crate) allow: Vec<Condition>,
     /// Heading in degrees: 0 along +Y, growing to the left.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
     pub(crate) yaw: f64,
-    /// Degrees above the horizon.
+    /// Pitch in degrees above the horizon.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
     pub(crate) pitch: f64,
     /// Horizontal angle of view in degrees [default: 75, or the list's]
     #[arg(long, value_name = "DEG", value_parser = field_of_view, conflicts_with = "pano")]
     pub(crate) fov: Option<f64>,
-    /// A panorama instead of a perspective view.
+    /// Render a panorama instead of a perspective view.
     #[arg(long)]
     pub(crate) pano: bool,
-    /// Width in pixels [default: 1080, a panorama's 4096]
+    /// Width in pixels [default: 1080, or 4096 for a panorama]
     #[arg(long, value_name = "PX", value_parser = value_parser!(u32).range(8..=32_768))]
     pub(crate) size: Option<u32>,
-    /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
+    /// Interpolate the mesh's own normals where it has some, instead of using the normals of the faces.
     #[arg(long)]
     pub(crate) smooth_normals: bool,
-    /// Take N samples of the colour of a pixel where surfaces end or turn; all other images keep one.
+    /// Take N colour samples in a pixel where surfaces end or turn. All other images keep one sample.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=64))]
     pub(crate) rgb_samples: u32,
-    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make
-    /// them) or small (slowest). The pixels are the same.
+    /// Compression of the image files: fast, balanced (about as small as files by libpng and OpenEXR) or
+    /// small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
     /// The folder for the images.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// Replace images that are there.
+    /// Replace existing images.
     #[arg(long)]
     pub(crate) overwrite: bool,
     #[command(flatten)]
@@ -95,6 +94,7 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
         overwrite: args.overwrite,
     };
     let Some(at) = args.at else { return run_poses(args, options) };
+
     let pose = Pose::level(at, args.yaw.to_radians()).turned(0.0, args.pitch.to_radians());
     let camera = if args.pano {
         let width = args.size.unwrap_or(4096);
@@ -107,19 +107,22 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
         let size = args.size.unwrap_or(1080);
         Camera::perspective(pose, args.fov.unwrap_or(75.0).to_radians(), size, size)
     };
+
     on_threads(args.threads, |context| {
         s3d_dataset::render(&args.mesh.mesh, &camera, &args.output, &options, context)
     })
 }
 
 fn run_poses(args: RenderArgs, render: RenderOptions) -> Outcome<()> {
-    let of_k = |[fx, fy, cx, cy]: [f64; 4]| Optics::Pinhole {
-        focal_px: dvec2(fx, fy),
-        center_px: Some(dvec2(cx, cy)),
-        distortion: Distortion::None,
+    let optics = match (args.k, args.fov) {
+        (Some([fx, fy, cx, cy]), _) => Some(Optics::Pinhole {
+            focal_px: dvec2(fx, fy),
+            center_px: Some(dvec2(cx, cy)),
+            distortion: Distortion::None,
+        }),
+        (None, Some(deg)) => Some(Optics::AngleOfView { fov_rad: deg.to_radians() }),
+        (None, None) => None,
     };
-    let of_fov = |deg: f64| Optics::AngleOfView { fov_rad: deg.to_radians() };
-    let optics = args.k.map(of_k).or(args.fov.map(of_fov));
     let options = PosesOptions {
         render,
         poses_up: args.poses_up,

@@ -13,20 +13,20 @@ use std::path::PathBuf;
 pub(crate) struct SampleArgs {
     #[command(flatten)]
     pub(crate) mesh: MeshArgs,
-    /// The point cloud to write, PLY (Z-up metres).
+    /// The PLY file of the point cloud (metres, Z-up).
     #[arg(short, long, value_name = "CLOUD.ply")]
     pub(crate) output: PathBuf,
-    /// Density of the points.
+    /// Points per m² of surface.
     #[arg(long, value_name = "N", default_value_t = 10_000.0, value_parser = positive,
         conflicts_with = "points")]
     pub(crate) points_per_m2: f64,
-    /// How many points in all, instead of a density.
+    /// The number of points in all, instead of a density.
     #[arg(long, value_name = "N")]
     pub(crate) points: Option<u64>,
-    /// Everything random comes from it.
+    /// The source of everything random.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Replace the file if it is there.
+    /// Replace the file if it exists.
     #[arg(long)]
     pub(crate) overwrite: bool,
     #[command(flatten)]

@@ -12,7 +12,7 @@ pub(crate) struct VerifyArgs {
     /// The data set's folder.
     #[arg(value_name = "OUT")]
     pub(crate) output: PathBuf,
-    /// Besides, score all candidate views again, and hold the S3DIS tree and pointcloud.mat against the point
+    /// Also score all candidate views again, and compare the S3DIS tree and pointcloud.mat with the point
     /// cloud. Every pixel of every image is compared in either case.
     #[arg(long)]
     pub(crate) full: bool,

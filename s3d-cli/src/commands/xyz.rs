@@ -15,13 +15,13 @@ pub(crate) struct XyzArgs {
     /// The data set's folder.
     #[arg(value_name = "OUT")]
     pub(crate) output: PathBuf,
-    /// Half floats or 32-bit floats.
+    /// The stored numbers: half floats or 32-bit floats.
     #[arg(long = "type", default_value = "half", value_parser = stored_xyz, value_name = "half|float")]
     pub(crate) xyz: XyzType,
-    /// Replace coordinates that are there, though they may be more exact.
+    /// Replace existing coordinates, although they may be more exact.
     #[arg(long)]
     pub(crate) overwrite: bool,
-    /// How much time the images' files may take: fast, balanced or small.
+    /// Compression of the image files: fast, balanced or small.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
     #[command(flatten)]

@@ -29,7 +29,7 @@ enum Command {
     Table(TableArgs),
 }
 
-/// What to learn from.
+/// The spaces to learn from.
 #[derive(Clone, Debug, Args)]
 struct Learning {
     /// The source of everything random.
@@ -153,9 +153,11 @@ fn print_table(args: &TableArgs) -> Outcome<()> {
     let tables = on_threads_or(args.threads, failure, |context| {
         let options = args.learning.options();
         let areas = read(&args.dataset, &[], options.spaces, context)?;
-        let of_seed = |seed| cross_validate(&areas, &TrainOptions { seed, ..options.clone() }, context);
         (0..args.seeds)
-            .map(|i| of_seed(options.seed.wrapping_add(i)))
+            .map(|i| {
+                let seed = options.seed.wrapping_add(i);
+                cross_validate(&areas, &TrainOptions { seed, ..options.clone() }, context)
+            })
             .collect::<Result<Vec<_>>>()
     })?;
     print(&if args.json {
@@ -165,7 +167,7 @@ fn print_table(args: &TableArgs) -> Outcome<()> {
     })
 }
 
-/// Says an error of the detector in the words of the command line.
+/// Translates an error of the detector into the words of the command line.
 fn failure(error: Error) -> Failure {
     match error {
         Error::Dataset(error) => error.into(),

@@ -29,14 +29,14 @@ pub(crate) struct EvalArgs {
     /// The areas to test together: all of them, each by itself (six-fold), or the paper's three folds.
     #[arg(long, value_enum, default_value_t, value_name = "all|each|paper", hide_possible_values = true)]
     pub(crate) folds: FoldsArg,
-    /// Test only these areas, together. Most results on S3DIS are of area 5.
+    /// Test only these areas, together. Most published results on S3DIS are for area 5.
     #[arg(long, value_name = "N,…", value_delimiter = ',', conflicts_with = "folds")]
     pub(crate) areas: Vec<u32>,
     /// det: the classes to detect [default: the paper's 12]
     #[arg(long, value_name = "CLASS,…", value_delimiter = ',')]
     pub(crate) classes: Vec<String>,
-    /// panoptic: the stuff classes, of which each image has one segment, or none [default: the stuff of the
-    /// taxonomy: ceiling,floor,wall]
+    /// panoptic: the stuff classes, each of which has one segment in an image, or none [default: the stuff of
+    /// the taxonomy: ceiling,floor,wall]
     #[arg(long, value_name = "CLASS,…|none", value_parser = parsed::<ClassList>)]
     pub(crate) stuff: Option<ClassList>,
     /// depth: scale each predicted image to the median of its truth first.
@@ -91,7 +91,7 @@ pub(crate) fn run(args: EvalArgs) -> Outcome<()> {
     json.print(&evaluation, || evaluation.to_markdown())
 }
 
-/// Says an error of the evaluation in the words of the command line.
+/// Translates an error of the evaluation into the words of the command line.
 fn failure(error: Error) -> Failure {
     match error {
         Error::Dataset(error) => error.into(),

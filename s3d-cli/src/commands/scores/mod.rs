@@ -8,8 +8,8 @@ use crate::commands::on_threads;
 use crate::failure::{Failure, Outcome};
 use s3d_dataset::Context;
 
-/// Makes a call whose error is not that of `s3d_dataset`. `failure` says what the error means on the command
-/// line.
+/// Makes a call that has its own type of error. `failure` translates such an error into the words of the
+/// command line.
 fn on_threads_or<T: Send, E: Send>(
     threads: Threads,
     failure: fn(E) -> Failure,

@@ -8,13 +8,13 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct MergeArgs {
-    /// The folders that shards of the same export wrote into, in any order; OUT may be one of them.
+    /// The folders into which shards of the same export wrote, in any order; OUT may be one of them.
     #[arg(required = true, value_name = "SHARD")]
     pub(crate) shards: Vec<PathBuf>,
     /// The data set's folder.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
-    /// Write into an OUT that holds something: an earlier data set there is replaced, other files stay.
+    /// Write into an OUT that is not empty. An earlier data set there is replaced; other files stay.
     #[arg(long)]
     pub(crate) overwrite: bool,
     #[command(flatten)]

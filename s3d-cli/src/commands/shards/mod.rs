@@ -1,4 +1,4 @@
-//! An export in parts: what is planned before them, and what is made of them.
+//! An export in parts: the plan before them, and the merge after them.
 
 pub(crate) mod merge;
 pub(crate) mod plan;

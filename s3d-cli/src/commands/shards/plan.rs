@@ -12,20 +12,20 @@ use std::path::PathBuf;
 pub(crate) struct PlanArgs {
     #[command(flatten)]
     pub(crate) scenes: Scenes,
-    /// The plan's folder; called again, what is missing in it is made.
+    /// The plan's folder. A second call makes only what is missing in it.
     #[arg(short, long, value_name = "PLAN")]
     pub(crate) output: PathBuf,
-    /// Make the first, second, ... of N parts of the plan; the parts may be made anywhere, in any order.
+    /// Make one of N parts of the plan, such as 2/4. The parts may be made anywhere, in any order.
     #[arg(long, value_name = "i/N", value_parser = parsed::<Shard>)]
     pub(crate) shard: Option<Shard>,
-    /// Candidate views a scan location.
+    /// The number of candidate views at each scan location.
     #[arg(long, value_name = "N", default_value_t = 72, value_parser = value_parser!(u32).range(0..=100_000))]
     views: u32,
     /// Width and height of a view in pixels.
     #[arg(long, value_name = "PX", default_value_t = 1080,
         value_parser = value_parser!(u32).range(8..=16_384))]
     size: u32,
-    /// Everything random comes from it.
+    /// The source of everything random.
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
@@ -33,11 +33,11 @@ pub(crate) struct PlanArgs {
     /// Count the classes of a candidate view on every Nth pixel of both axes.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = value_parser!(u32).range(1..=64))]
     entropy_stride: u32,
-    /// Skip and count what is not as it should be in the annotations.
+    /// Skip and count faults in the annotations.
     #[arg(long)]
     lenient: bool,
-    /// Give faces that no annotated point voted for the label of the surface next to them, if it is no
-    /// farther than this.
+    /// Give each face without a vote of an annotated point the label of the surface next to it, if that
+    /// surface is no farther than this.
     #[arg(long, value_name = "METRES", value_parser = positive)]
     fill: Option<f64>,
     #[command(flatten)]
