@@ -221,9 +221,13 @@ pub(crate) fn tally(candidates: &[Candidate], pool: Pool, keep_all: bool, only: 
         Pool::Area => a.area == b.area,
         Pool::Location => (a.area, a.location) == (b.area, b.location),
     };
-    let discarded = |pool: &[Candidate]| Selection::default().discarded(pool.len()) as u64;
+    let selection = Selection::default();
     let pools = candidates.chunk_by(same_pool);
-    let dropped_lowest = if keep_all { 0 } else { pools.map(discarded).sum() };
+    let dropped_lowest = if keep_all {
+        0
+    } else {
+        pools.map(|pool| selection.discarded(pool.len()) as u64).sum()
+    };
 
     let asked = |c: &&&Candidate| only.is_empty() || only.contains(&c.camera_uuid);
 

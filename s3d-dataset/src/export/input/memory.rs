@@ -218,9 +218,13 @@ fn add<T, const N: usize, const M: usize>(
     }
 }
 
+/// The bytes of a face's three indices.
+fn triple(indices: &[u32; 3]) -> [[u8; 4]; 3] {
+    indices.map(u32::to_le_bytes)
+}
+
 fn sum_of_mesh(parts: &MeshParts) -> ChecksumOfParts {
     let mut sum = ChecksumOfParts::default();
-    let triple = |t: &[u32; 3]| t.map(u32::to_le_bytes);
 
     add(&mut sum, &parts.positions, |p| p.to_array().map(f32::to_le_bytes));
     add(&mut sum, &parts.faces, triple);

@@ -506,7 +506,6 @@ impl AreaInput {
         let is_listed = matches!(self.cameras, Cameras::Listed(..));
         let locations = if is_listed { count } else { count.min(most) };
 
-        let pixels = |c: &Camera| f64::from(c.width) * f64::from(c.height);
         let photographs = self.photographs.all.iter().map(|p| pixels(&p.camera));
         Estimate::new(area_m2, locations, options).with_views(photographs, options)
     }
@@ -564,11 +563,18 @@ impl AreaInput {
     }
 }
 
+/// The number of pixels of a camera's image.
+fn pixels(camera: &Camera) -> f64 {
+    f64::from(camera.width) * f64::from(camera.height)
+}
+
 /// Refuses areas with and without labels, and areas of different taxonomies.
 fn refuse_mixed(areas: &[AreaInput]) -> Result<()> {
     let with = areas.iter().find(|area| area.is_labelled);
     let without = areas.iter().find(|area| !area.is_labelled);
-    if let (Some(with), Some(without)) = (with, without) {
+    if let Some(with) = with
+        && let Some(without) = without
+    {
         return Err(InputError::MixedLabels { with: with.path.clone(), without: without.path.clone() }.into());
     }
 

@@ -104,8 +104,10 @@ impl Photographs {
 
     /// Where they were taken, as a list of locations.
     pub(crate) fn locations(&self) -> Vec<ScanLocation> {
-        let location = |p: &Photograph| ScanLocation { uuid: p.uuid.clone(), pose: p.camera.pose, line: 0 };
-        self.all.iter().map(location).collect()
+        self.all
+            .iter()
+            .map(|p| ScanLocation { uuid: p.uuid.clone(), pose: p.camera.pose, line: 0 })
+            .collect()
     }
 
     /// All files that are read for the photographs.

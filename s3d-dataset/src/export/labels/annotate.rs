@@ -185,7 +185,9 @@ impl Rooms {
     fn draw_beside<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> T {
         let undrawn = self.undrawn.take();
         let (done, outline) = rayon::join(work, || undrawn.map(|points| points.finish()));
-        if let (Some(room), Some(outline)) = (self.surveyed.last_mut(), outline) {
+        if let Some(outline) = outline
+            && let Some(room) = self.surveyed.last_mut()
+        {
             room.footprint = outline;
         }
         done

@@ -99,9 +99,11 @@ fn small(photograph: &Photograph) -> Camera {
 
 /// The luma of sRGB pixels, 0 to 1, as ITU-R BT.601 defines it.
 fn grey(image: &Raster<[u8; 3]>) -> Vec<f64> {
-    let of =
-        |[r, g, b]: &[u8; 3]| (0.299 * f64::from(*r) + 0.587 * f64::from(*g) + 0.114 * f64::from(*b)) / 255.0;
-    image.pixels().iter().map(of).collect()
+    image.pixels().iter().map(luma).collect()
+}
+
+fn luma([r, g, b]: &[u8; 3]) -> f64 {
+    (0.299 * f64::from(*r) + 0.587 * f64::from(*g) + 0.114 * f64::from(*b)) / 255.0
 }
 
 /// How much a picture changes at each pixel: the length of its gradient by central differences, 0 beside
