@@ -1,13 +1,12 @@
 //! The answer of a command: text on standard output, and JSON on request.
 
-use crate::commands::print;
 use crate::failure::Outcome;
 use clap::Args;
-use s3d_dataset::{Context, NewFile, Result};
+use s3d_dataset::{Context, Error, NewFile, Result};
 use s3d_io::Error as FileError;
 use s3d_io::fs::write_json;
 use serde::Serialize;
-use std::io;
+use std::io::{self, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
 /// Where the answer goes as JSON.
@@ -48,5 +47,16 @@ impl JsonArgs {
         let json = serde_json::to_string_pretty(answer)
             .map_err(|e| FileError::io("standard output".as_ref(), "write", io::Error::from(e)))?;
         print(&(json + "\n"))
+    }
+}
+
+/// Writes the answer of a command to standard output.
+pub(crate) fn print(text: &str) -> Outcome<()> {
+    match stdout().write_all(text.as_bytes()) {
+        // Whoever reads may stop early: `s3d stats OUT | head`.
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::from(FileError::io("standard output".as_ref(), "write", e)).into())
+        }
+        _ => Ok(()),
     }
 }

@@ -1,6 +1,7 @@
 //! `s3d info`: what a scene holds, and what looks wrong in it.
 
-use super::{on_threads, print};
+use super::on_threads;
+use crate::answer::print;
 use crate::args::{Placing, Threads};
 use crate::failure::Outcome;
 use crate::values::parsed;

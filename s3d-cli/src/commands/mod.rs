@@ -19,9 +19,9 @@ use crate::args::Threads;
 use crate::console;
 use crate::failure::Outcome;
 use crate::stop;
-use s3d_dataset::{Context, Error, Result};
+use s3d_dataset::{Context, Result};
 use s3d_io::Error as FileError;
-use std::io::{self, ErrorKind, Write, stdout};
+use std::io;
 
 /// Makes a call on a pool of the threads asked for. It tells the console, and a signal cancels it.
 fn on_threads<T: Send>(threads: Threads, call: impl FnOnce(&Context) -> Result<T> + Send) -> Outcome<T> {
@@ -33,15 +33,4 @@ fn on_threads<T: Send>(threads: Threads, call: impl FnOnce(&Context) -> Result<T
         .cancelled_by(stop::cancel())
         .observed_by(console::observe);
     Ok(pool.install(|| call(&context))?)
-}
-
-/// Writes the answer of a command to standard output.
-pub(crate) fn print(text: &str) -> Outcome<()> {
-    match stdout().write_all(text.as_bytes()) {
-        // Whoever reads may stop early: `s3d stats OUT | head`.
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
-            Err(Error::from(FileError::io("standard output".as_ref(), "write", e)).into())
-        }
-        _ => Ok(()),
-    }
 }

@@ -1,6 +1,6 @@
 //! `s3d stats`: the tables of statistics of a data set, counted from its files.
 
-use super::print;
+use crate::answer::print;
 use crate::failure::Outcome;
 use clap::Args;
 use std::path::PathBuf;

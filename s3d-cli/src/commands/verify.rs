@@ -1,6 +1,7 @@
 //! `s3d verify`: whether a data set is what its manifest and its own files say.
 
-use super::{on_threads, print};
+use super::on_threads;
+use crate::answer::print;
 use crate::args::Threads;
 use crate::failure::{Failure, Outcome};
 use clap::Args;

@@ -1,7 +1,7 @@
 //! `s3d detect`: the paper's baseline detector, trained, run, and measured.
 
+use crate::answer::print;
 use crate::args::Threads;
-use crate::commands::print;
 use crate::commands::scores::on_threads_or;
 use crate::failure::{Failure, Outcome};
 use crate::values::parsed;
