@@ -32,17 +32,23 @@ impl Reading {
         let taxonomy = Taxonomy::built_in(&self.taxonomy).ok_or_else(|| {
             usage(format!("taxonomy={:?}: must be one of {}", self.taxonomy, Taxonomy::BUILT_IN.join(", ")))
         })?;
-        let meant = |(name, class): (String, Option<String>)| {
-            let class = class.map(|class| taxonomy.class(&class).map_err(|e| usage(format!("classes: {e}"))));
-            Ok((name, class.transpose()?))
-        };
-        let classes = self.classes.into_iter().map(meant).collect::<PyResult<_>>()?;
+
+        let classes = self
+            .classes
+            .into_iter()
+            .map(|(name, class)| {
+                let class = class.map(|class| taxonomy.class(&class));
+                Ok((name, class.transpose().map_err(|e| usage(format!("classes: {e}")))?))
+            })
+            .collect::<PyResult<_>>()?;
         let room = self
             .room
-            .map(|room| taxonomy.room(&room).map_err(|e| usage(format!("room: {e}"))));
+            .map(|room| taxonomy.room(&room).map_err(|e| usage(format!("room: {e}"))))
+            .transpose()?;
+
         Ok(AnnotationOptions {
             classes,
-            room: room.transpose()?,
+            room,
             taxonomy,
             on_fault: if self.lenient { OnFault::Skip } else { OnFault::Stop },
             unknown_as_clutter: self.lenient,
@@ -56,11 +62,11 @@ impl Reading {
     }
 }
 
-/// Positions, colours, of each point the place of its instance's name, and these names.
+/// The position, the colour and the index of the instance's name of each point, and the names.
 type Annotated<'py> =
     (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>, Bound<'py, PyArray1<i32>>, Vec<String>);
 
-/// The annotated points of an area, instance by instance.
+/// Reads the annotated points of an area, instance by instance.
 #[pyfunction]
 pub(crate) fn read_points<'py>(
     py: Python<'py>,
@@ -79,7 +85,10 @@ pub(crate) fn read_points<'py>(
         }
         let instances = found.rooms.iter().map(|room| room.instances.len() as u64).sum();
         let progress = ctx.progress("reading", "instances", instances);
-        let (mut cloud, mut places, mut names) = (PointCloud::default(), Vec::new(), Vec::new());
+
+        let mut cloud = PointCloud::default();
+        let mut places = Vec::new();
+        let mut names = Vec::new();
         for room in &found.rooms {
             for instance in &room.instances {
                 ctx.check()?;
@@ -94,6 +103,7 @@ pub(crate) fn read_points<'py>(
         }
         Ok((cloud, places, names))
     })?;
+
     Ok((
         arrays::rows::<f32, 3>(py, bytemuck::cast_vec(cloud.positions))?,
         arrays::rows(py, cloud.colors)?,

@@ -1,4 +1,4 @@
-//! Arrays of NumPy from values and back.
+//! Values to arrays of NumPy, and back.
 
 use crate::error::{fault, usage};
 use crate::mesh::Mesh;
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use s3d_geom::glam::{DMat3, DVec3, Vec3};
 use s3d_geom::{Raster, TriMesh};
 
-/// A read-only array of rows that a mesh has, without a copy.
+/// Returns rows of a mesh as a read-only array, without a copy.
 pub(crate) fn view<'py, T: Element, const N: usize>(
     mesh: &Bound<'py, Mesh>,
     rows: impl for<'m> FnOnce(&'m TriMesh) -> &'m [[T; N]],
@@ -16,15 +16,15 @@ pub(crate) fn view<'py, T: Element, const N: usize>(
     let rows = rows(mesh.get().mesh());
     let shaped = ArrayView2::from_shape((rows.len(), N), rows.as_flattened());
     let shaped = shaped.map_err(|e| fault(e.to_string()))?;
-    // SAFETY: the rows are the mesh's, whose class is frozen: they are neither written nor moved as long as
-    // there is the object, which the array keeps.
+    // SAFETY: the rows belong to the mesh. Its class is frozen, so they are neither written nor moved while
+    // the object lives, and the array keeps the object alive.
     #[allow(unsafe_code)]
     let array = unsafe { PyArray2::borrow_from_array(&shaped, mesh.clone().into_any()) };
     array.readwrite().make_nonwriteable();
     Ok(array)
 }
 
-/// The array n × N of rows, which it takes over.
+/// Turns rows into an array n × N, without a copy.
 pub(crate) fn rows<T: Element, const N: usize>(
     py: Python<'_>,
     rows: Vec<[T; N]>,
@@ -33,13 +33,13 @@ pub(crate) fn rows<T: Element, const N: usize>(
     PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
 }
 
-/// The array height × width of an image, which it takes over.
+/// Turns an image into an array height × width, without a copy.
 pub(crate) fn image<T: Element + Copy>(py: Python<'_>, image: Raster<T>) -> PyResult<Bound<'_, PyArray2<T>>> {
     let size = [image.height() as usize, image.width() as usize];
     PyArray1::from_vec(py, image.into_vec()).reshape(size)
 }
 
-/// The array height × width × N of an image, which it takes over.
+/// Turns an image into an array height × width × N, without a copy.
 pub(crate) fn image_of_rows<T: Element, const N: usize>(
     py: Python<'_>,
     image: Raster<[T; N]>,
@@ -51,7 +51,7 @@ where
     PyArray1::from_vec(py, image.into_vec().into_flattened()).reshape(size)
 }
 
-/// The rows of an array n × N, which `what` is.
+/// Returns the rows of an array n × N. Errors name the array as `what`.
 pub(crate) fn from_rows<T: Element + Copy, const N: usize>(
     what: &str,
     array: &PyReadonlyArray2<'_, T>,
@@ -70,17 +70,17 @@ pub(crate) fn from_rows<T: Element + Copy, const N: usize>(
     Ok(rows.to_vec())
 }
 
-/// Points or directions as vectors.
+/// Returns the rows of an array n × 3 as vectors.
 pub(crate) fn points(what: &str, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<Vec3>> {
     Ok(bytemuck::cast_vec(from_rows::<f32, 3>(what, array)?))
 }
 
-/// The same in 64 bits.
+/// Returns the rows of an array n × 3 of 64-bit numbers as vectors.
 pub(crate) fn points_f64(what: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<DVec3>> {
     Ok(bytemuck::cast_vec(from_rows::<f64, 3>(what, array)?))
 }
 
-/// Camera → world in OpenCV's axes, 4 × 4, row by row.
+/// The matrix camera → world in OpenCV's axes, 4 × 4, row by row.
 pub(crate) fn world_from_opencv(pose: &s3d_geom::Pose) -> [[f64; 4]; 4] {
     let rotation: DMat3 = pose.opencv_from_world();
     // The rows of world → camera are the columns of camera → world.

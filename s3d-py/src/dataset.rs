@@ -1,4 +1,4 @@
-//! `_native.DataSet`: a data set that is read, image by image, as arrays.
+//! `_native.DataSet`: a data set whose images are read as arrays.
 
 use crate::arrays;
 use crate::error::{exception, usage};
@@ -17,27 +17,27 @@ use s3d_label::{LabelId, LabelTable};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What a pixel of an image of label indices is where nothing is seen. Source: formats.md.
+/// The colour of a pixel of an image of label indices where nothing is seen. Source: formats.md.
 const UNSEEN: [u8; 3] = [0x0d; 3];
 
-/// A complete data set. Nothing of it ever changes; many threads may read it.
+/// A complete data set. It never changes, so many threads may read it.
 #[pyclass(frozen)]
 pub(crate) struct DataSet {
     data: s3d_dataset::DataSet,
-    /// Of all areas, in the order of areas.
+    /// The images of all areas, in the order of areas.
     images: Vec<DatasetImage>,
     labels: Option<LabelTable>,
-    /// Of each index into the table of labels the place of its class; −1 for none.
+    /// The index of the class of each label in the table; −1 for none.
     class_of_label: Vec<i16>,
 }
 
-/// K and camera → world.
+/// The matrices K and camera → world.
 type CameraMatrices = ([[f64; 3]; 3], [[f64; 4]; 4]);
 
 /// Area, scan location, room, number of a view, and the modalities that have a file.
 type ImageEntry = (u32, String, String, Option<u32>, Vec<&'static str>);
 
-/// Name, place of the class, number of the instance, room, area.
+/// Name, index of the class, number of the instance, room, area.
 type LabelEntry = (String, i16, u32, String, u32);
 
 /// Label, its index, class, room, points, box.
@@ -64,11 +64,7 @@ impl DataSet {
             let data = s3d_dataset::DataSet::open(&folder)?;
             let images = data.areas().iter().flat_map(|area| data.images(*area)).collect();
             let labels = data.labels()?;
-            let class_of = |table: &LabelTable| {
-                let of = |id| table.class_of(LabelId(id)).map_or(-1, |class| class.index() as i16);
-                (0..table.len() as u32).map(of).collect()
-            };
-            let class_of_label = labels.as_ref().map(class_of).unwrap_or_default();
+            let class_of_label = labels.as_ref().map(classes_of_labels).unwrap_or_default();
             Ok(Self { data, images, labels, class_of_label })
         })
         .map_err(|error: Error| exception(&error))
@@ -94,7 +90,7 @@ impl DataSet {
         self.data.areas().to_vec()
     }
 
-    /// The options that it was made with, as JSON.
+    /// The options of the export that made it, as JSON.
     #[getter]
     fn options(&self) -> PyResult<String> {
         serde_json::to_string(self.data.options()).map_err(|e| crate::error::fault(e.to_string()))
@@ -142,27 +138,31 @@ impl DataSet {
 
     /// The rooms of the labels: area and name.
     fn rooms(&self) -> PyResult<Vec<(u32, String)>> {
-        let of_area = |area: &u32| self.data.tree_rooms(*area).map_err(|e| exception(&e));
-        let rooms = self.data.areas().iter().map(of_area).collect::<PyResult<Vec<_>>>()?;
-        Ok(rooms.into_iter().flatten().map(|room| (room.area, room.name)).collect())
+        let mut rooms = Vec::new();
+        for area in self.data.areas() {
+            let found = self.data.tree_rooms(*area).map_err(|e| exception(&e))?;
+            rooms.extend(found.into_iter().map(|room| (room.area, room.name)));
+        }
+        Ok(rooms)
     }
 
     fn instances(&self, area: u32) -> PyResult<Vec<InstanceEntry>> {
         self.check_area(area)?;
         let entries = self.data.instances(area).map_err(|e| exception(&e))?;
-        let entry =
-            |i: s3d_io::dataset::InstanceEntry| (i.label, i.label_index, i.class, i.room, i.points, i.bbox);
-        Ok(entries.into_iter().map(entry).collect())
+        Ok(entries
+            .into_iter()
+            .map(|i| (i.label, i.label_index, i.class, i.room, i.points, i.bbox))
+            .collect())
     }
 
     /// Every candidate view of an area, kept or dropped.
     fn candidates(&self, area: u32) -> PyResult<Vec<ViewEntry>> {
         self.check_area(area)?;
         let records = self.data.views(area).map_err(|e| exception(&e))?;
-        let entry = |v: s3d_io::dataset::ViewRecord| {
-            (v.camera_uuid, v.candidate, v.yaw_rad, v.pitch_rad, v.fov_rad, v.entropy, v.frame_num)
-        };
-        Ok(records.into_iter().map(entry).collect())
+        Ok(records
+            .into_iter()
+            .map(|v| (v.camera_uuid, v.candidate, v.yaw_rad, v.pitch_rad, v.fov_rad, v.entropy, v.frame_num))
+            .collect())
     }
 
     /// The mesh that the images of an area show.
@@ -173,33 +173,37 @@ impl DataSet {
         Ok(Mesh { file: Arc::new(file) })
     }
 
-    /// How points voted for each face of the mesh; `None` without labels.
+    /// The votes of points for each face of the mesh; `None` without labels.
     fn votes<'py>(&self, py: Python<'py>, area: u32) -> PyResult<Option<VoteColumns<'py>>> {
         self.check_area(area)?;
         let votes = py.detach(|| self.data.face_votes(area)).map_err(|e| exception(&e))?;
-        let columns = |v: s3d_io::dataset::FaceVoteColumns| {
-            let of = |column| PyArray1::from_vec(py, column);
-            let [label, votes] = [v.label, v.votes].map(of);
-            let [runner_up, runner_up_votes, total] = [v.runner_up, v.runner_up_votes, v.total].map(of);
-            (label, votes, runner_up, runner_up_votes, total, PyArray1::from_vec(py, v.farthest_m))
-        };
-        Ok(votes.map(columns))
+        Ok(votes.map(|v| {
+            (
+                PyArray1::from_vec(py, v.label),
+                PyArray1::from_vec(py, v.votes),
+                PyArray1::from_vec(py, v.runner_up),
+                PyArray1::from_vec(py, v.runner_up_votes),
+                PyArray1::from_vec(py, v.total),
+                PyArray1::from_vec(py, v.farthest_m),
+            )
+        }))
     }
 
-    /// The file of an image, whether it is there or not.
+    /// The path of a file of an image, whether it exists or not.
     fn path(&self, image: usize, modality: &str) -> PyResult<PathBuf> {
         let domain = domain(modality)?;
         Ok(self.image(image)?.path(self.data.layout(), domain))
     }
 
-    /// The content of a file of an image, as it is.
+    /// The bytes of a file of an image.
     fn file<'py>(&self, py: Python<'py>, image: usize, modality: &str) -> PyResult<Bound<'py, PyBytes>> {
-        let (image, domain) = (self.image(image)?, domain(modality)?);
+        let image = self.image(image)?;
+        let domain = domain(modality)?;
         let bytes = py.detach(|| self.bytes(image, domain)).map_err(|e| exception(&e))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Width and height, pixels.
+    /// Width and height in pixels.
     fn size(&self, py: Python<'_>, image: usize) -> PyResult<(u32, u32)> {
         let image = self.image(image)?;
         let size = py
@@ -208,7 +212,7 @@ impl DataSet {
         size.ok_or_else(|| usage(format!("{} has no PNG file that tells its size", image.stem())))
     }
 
-    /// K, row by row, and the pose camera → world, 4 × 4, in OpenCV's axes.
+    /// The matrix K, row by row, and the pose camera → world, 4 × 4, in OpenCV's axes.
     fn camera(&self, py: Python<'_>, image: usize) -> PyResult<CameraMatrices> {
         let image = self.image(image)?;
         let pose = py.detach(|| self.data.pose(image)).map_err(|e| exception(&e))?;
@@ -230,7 +234,7 @@ impl DataSet {
 
     fn normal<'py>(&self, py: Python<'py>, image: usize) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let image = self.image(image)?;
-        // A view's are told with z forward, whatever axes are stored.
+        // The normals of a view are returned with z forward, whatever axes are stored.
         let is_flipped =
             self.data.options().normal_axes == NormalAxes::Paper && image.frame != Frame::Panorama;
         let decoded = |pixel: [u8; 3]| {
@@ -254,14 +258,14 @@ impl DataSet {
         arrays::image_of_rows(py, py.detach(read).map_err(|e: Error| exception(&e))?)
     }
 
-    /// Indices into the table of labels, −1 where nothing is seen.
+    /// The index of each pixel's label in the table, −1 where nothing is seen.
     fn label<'py>(&self, py: Python<'py>, image: usize) -> PyResult<Bound<'py, PyArray2<i32>>> {
         let image = self.image(image)?;
         let indices = py.detach(|| Ok(self.rgb8(image, Domain::Semantic)?.map(label_index)));
         arrays::image(py, indices.map_err(|e: Error| exception(&e))?)
     }
 
-    /// Places of classes, −1 where there is none.
+    /// The index of each pixel's class, −1 where there is none.
     #[pyo3(name = "class_")]
     fn class<'py>(&self, py: Python<'py>, image: usize) -> PyResult<Bound<'py, PyArray2<i16>>> {
         let image = self.image(image)?;
@@ -273,10 +277,14 @@ impl DataSet {
     fn points<'py>(&self, py: Python<'py>, image: usize) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let image = self.image(image)?;
         let read = || {
-            let (depth, pose) = (self.metres(image)?, self.data.pose(image)?);
-            let (width, height) = (depth.width(), depth.height());
+            let depth = self.metres(image)?;
+            let pose = self.data.pose(image)?;
+            let width = depth.width();
+            let height = depth.height();
             let camera = self.data.camera(image, &pose, [width, height])?;
-            let (rays, origin) = (camera.rays(), camera.pose.location);
+            let rays = camera.rays();
+            let origin = camera.pose.location;
+
             let mut points = Raster::filled(width, height, [f32::NAN; 3]);
             for (k, (point, depth)) in points.pixels_mut().iter_mut().zip(depth.pixels()).enumerate() {
                 if !depth.is_nan() {
@@ -289,7 +297,7 @@ impl DataSet {
         arrays::image_of_rows(py, py.detach(read).map_err(|e: Error| exception(&e))?)
     }
 
-    /// Of each of `images` the share of its pixels that each class has.
+    /// The share of the pixels of each class, for each of `images`.
     fn class_shares(
         &self,
         py: Python<'_>,
@@ -302,6 +310,7 @@ impl DataSet {
             .map(|image| self.image(image))
             .collect::<PyResult<Vec<_>>>()?;
         let count = self.data.taxonomy().map_or(0, |taxonomy| taxonomy.classes().len());
+
         watched(py, threads, &sink, |ctx| {
             let progress = ctx.progress("counting classes", "images", images.len() as u64);
             map_in_order(
@@ -332,9 +341,10 @@ impl DataSet {
 
     fn check_area(&self, area: u32) -> PyResult<()> {
         let areas = self.data.areas();
-        match areas.contains(&area) {
-            true => Ok(()),
-            false => Err(usage(format!("area {area}: the data set has {areas:?}"))),
+        if areas.contains(&area) {
+            Ok(())
+        } else {
+            Err(usage(format!("area {area}: the data set has {areas:?}")))
         }
     }
 
@@ -351,9 +361,10 @@ impl DataSet {
         Ok(decode_rgb8(&self.bytes(image, domain)?, &path)?)
     }
 
-    /// Depth in metres, NaN where it is missing.
+    /// The depth in metres, NaN where it is missing.
     fn metres(&self, image: &DatasetImage) -> Result<Raster<f32>> {
-        let (path, units) = (image.path(self.data.layout(), Domain::Depth), self.data.options().depth_units);
+        let path = image.path(self.data.layout(), Domain::Depth);
+        let units = self.data.options().depth_units;
         let stored = decode_gray16(&self.bytes(image, Domain::Depth)?, &path)?;
         Ok(stored.map(|value| units.metres(value).map_or(f32::NAN, |metres| metres as f32)))
     }
@@ -374,13 +385,20 @@ impl DataSet {
     }
 }
 
+/// The index of the class of each label; −1 for none.
+fn classes_of_labels(table: &LabelTable) -> Vec<i16> {
+    (0..table.len() as u32)
+        .map(|id| table.class_of(LabelId(id)).map_or(-1, |class| class.index() as i16))
+        .collect()
+}
+
 pub(crate) fn domain(modality: &str) -> PyResult<Domain> {
     modality
         .parse()
         .map_err(|e: s3d_io::dataset::UnknownDomain| usage(e.to_string()))
 }
 
-/// The index that a colour stands for, −1 where nothing is seen.
+/// The label index that a colour stands for, −1 where nothing is seen.
 fn label_index(pixel: [u8; 3]) -> i32 {
     if pixel == UNSEEN {
         return -1;

@@ -1,4 +1,4 @@
-//! The baseline detector: trained, kept, run.
+//! The baseline detector: training, model files, detection.
 
 use crate::error::{exception, input, usage};
 use crate::mesh::parsed;
@@ -80,7 +80,7 @@ impl Detector {
         self.0.seed
     }
 
-    /// The boxes that are found, as JSON.
+    /// Returns the boxes found, as JSON.
     fn run(
         &self,
         py: Python<'_>,

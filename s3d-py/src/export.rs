@@ -14,29 +14,29 @@ use s3d_label::{Label, Taxonomy};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What labels of a mesh in memory are called in messages.
+/// The name of the labels of a mesh in memory, for messages.
 const LABELS: &str = "labels in memory";
 
-/// An area whose mesh is at hand.
+/// An area whose mesh is in memory.
 #[derive(FromPyObject)]
 pub(crate) struct Area<'py> {
     area: u32,
     mesh: Bound<'py, Mesh>,
-    /// The names of labels, which of them each face has (−1 for none), and the taxonomy of their classes.
+    /// The names of labels, the index of each face's name (−1 for none), and the taxonomy of their classes.
     labels: Option<(Vec<String>, PyReadonlyArray1<'py, i32>, String)>,
-    /// By uuid, camera → world.
+    /// The uuid and the matrix camera → world of each scan location.
     locations: Vec<(String, [[f64; 4]; 4])>,
 }
 
-/// Scenes: paths, of which those of meshes are one scene; or areas in memory.
+/// Scenes: areas in memory, or paths. All paths of meshes together are one scene.
 #[derive(FromPyObject)]
 pub(crate) enum Scenes<'py> {
     Paths(Vec<PathBuf>),
     Areas(Vec<Area<'py>>),
 }
 
-/// Makes a data set, or goes on with it. Options are JSON. Returns a summary as JSON; None if all was there
-/// already.
+/// Makes a data set, or goes on with it. `options` is JSON. Returns a summary as JSON, or `None` if the data
+/// set was complete already.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn export(
@@ -50,6 +50,7 @@ pub(crate) fn export(
     sink: Py<PyAny>,
 ) -> PyResult<Option<String>> {
     let mut options: ExportOptions = serde_json::from_str(options).map_err(|e| usage(e.to_string()))?;
+
     let conditions = Condition::ALL.map(|condition| condition.to_string()).join(", ");
     options.allow = allow
         .iter()
@@ -59,10 +60,10 @@ pub(crate) fn export(
         Scenes::Paths(paths) => SceneSource::list(paths, None, None),
         Scenes::Areas(areas) => areas.iter().map(source).collect::<PyResult<_>>()?,
     };
+
     let export = Export::new(sources).options(options).overwrite(overwrite);
     let summary = watched(py, threads, &sink, |ctx| export.run(output, ctx))?;
-    let text = |summary| serde_json::to_string(&summary).map_err(|e| crate::error::fault(e.to_string()));
-    summary.map(text).transpose()
+    summary.map(|summary| crate::calls::json(&summary)).transpose()
 }
 
 fn source(area: &Area<'_>) -> PyResult<SceneSource> {
@@ -88,12 +89,13 @@ fn annotations(
     let taxonomy = Taxonomy::built_in(taxonomy).ok_or_else(|| {
         usage(format!("taxonomy={taxonomy:?}: must be one of {}", Taxonomy::BUILT_IN.join(", ")))
     })?;
-    let label = |name: &String| {
-        let label = taxonomy.label(&format!("{name}_{area}"));
-        label
-            .map_err(|e| usage(format!("labels: {e} (CLASS_INSTANCE_ROOM_NUMBER, such as chair_1_office_2)")))
-    };
-    let labels = names.iter().map(label).collect::<PyResult<Vec<Label>>>()?;
+
+    let labels = names
+        .iter()
+        .map(|name| taxonomy.label(&format!("{name}_{area}")))
+        .collect::<Result<Vec<Label>, _>>()
+        .map_err(|e| usage(format!("labels: {e} (CLASS_INSTANCE_ROOM_NUMBER, such as chair_1_office_2)")))?;
+
     let of_face = of_face.to_vec().map_err(|e| usage(format!("labels: {e}")))?;
     let faces = mesh.mesh.faces().len();
     if of_face.len() != faces {
@@ -105,19 +107,20 @@ fn annotations(
         _ => Err(usage(format!("labels: face {face} has {place}, and there are {} names", labels.len()))),
     };
     let of_face = of_face.iter().enumerate().map(place).collect::<PyResult<Vec<u32>>>()?;
+
     let found = Annotations::from_face_labels(Path::new(LABELS), &mesh.mesh, &labels, &of_face);
     let mut found = found.map_err(|e| exception(&Error::from(e)))?;
     found.taxonomy = taxonomy;
     Ok(found)
 }
 
-/// The uuid of a scan location that has a name alone.
+/// The uuid of a scan location that has only a name.
 #[pyfunction]
 pub(crate) fn uuid_of_name(name: &str) -> String {
     s3d_io::camera::uuid_from_name(name)
 }
 
-/// The names of the options of an export, but `allow`.
+/// The names of the options of an export, except `allow`.
 #[pyfunction]
 pub(crate) fn export_option_names() -> Vec<&'static str> {
     ExportOptions::names().to_vec()

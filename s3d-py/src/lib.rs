@@ -1,7 +1,7 @@
-//! The compiled part of the Python package `s3d_py`: what `python/s3d_py` is made of. Nothing here is public
-//! in Python; what is, and what it means, stands there.
+//! The compiled part of the Python package `s3d_py`. Nothing here is public in Python: the modules in
+//! `python/s3d_py` wrap it, and document what they publish.
 
-// What is handed over or read must not make it panic.
+// No argument and no file may cause a panic.
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::string_slice)]
 
 mod annotations;

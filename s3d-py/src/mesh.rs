@@ -13,16 +13,16 @@ use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis, read_m
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What a mesh of arrays is called in messages.
+/// The name of a mesh of arrays, for messages.
 const IN_MEMORY: &str = "mesh in memory";
 
-/// A mesh as it was read or given. Nothing of it ever changes.
+/// A mesh from a file or from arrays. It never changes.
 #[pyclass(frozen)]
 pub(crate) struct Mesh {
     pub(crate) file: Arc<MeshFile>,
 }
 
-/// A word that means something, or an error that says which do.
+/// Parses a word. The error lists the `choices`.
 pub(crate) fn parsed<T: std::str::FromStr>(what: &str, word: &str, choices: &str) -> PyResult<T> {
     word.parse()
         .map_err(|_| usage(format!("{what}={word:?}: must be one of {choices}")))
@@ -32,7 +32,7 @@ type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 
 #[pymethods]
 impl Mesh {
-    /// Reads a mesh's file.
+    /// Reads the file of a mesh.
     #[staticmethod]
     fn read(
         py: Python<'_>,
@@ -56,7 +56,7 @@ impl Mesh {
         Ok(Self { file: Arc::new(file) })
     }
 
-    /// A mesh of arrays.
+    /// Makes a mesh of arrays.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)]
     fn from_arrays(
@@ -81,6 +81,7 @@ impl Mesh {
             None if textures.is_empty() => Vec::new(),
             None => vec![0; faces.len()],
         };
+
         let parts = MeshParts {
             positions: arrays::points("vertices", &vertices)?,
             colors: vertex_colors
@@ -100,6 +101,7 @@ impl Mesh {
             faces,
             ..MeshParts::default()
         };
+
         let made = detached(py, None, || TriMesh::new(parts).map(TriMesh::without_repeated_faces))?;
         let (mesh, repeated) =
             made.map_err(|source| exception(&FileError::Mesh { path: IN_MEMORY.into(), source }.into()))?;
@@ -141,7 +143,7 @@ impl Mesh {
             .transpose()
     }
 
-    /// Of each face its texture, u32's maximum for none.
+    /// The texture of each face, 2³² − 1 for none.
     #[getter]
     fn texture_of_face<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
         let materials = self.mesh().materials();
@@ -155,25 +157,26 @@ impl Mesh {
     /// The names and pixels of the textures.
     #[getter]
     fn textures<'py>(slf: &Bound<'py, Self>) -> PyResult<Vec<(String, Bound<'py, PyArray3<u8>>)>> {
-        let show = |(number, texture): (usize, &Texture)| {
+        let mut shown = Vec::new();
+        for (number, texture) in slf.get().mesh().textures().iter().enumerate() {
             let rows = arrays::view(slf, |mesh| {
                 mesh.textures()
                     .get(number)
                     .map_or(&[], |texture| texture.image.pixels())
             })?;
             let size = [texture.image.height() as usize, texture.image.width() as usize, 3];
-            Ok((texture.name.clone(), rows.reshape(size)?))
-        };
-        slf.get().mesh().textures().iter().enumerate().map(show).collect()
+            shown.push((texture.name.clone(), rows.reshape(size)?));
+        }
+        Ok(shown)
     }
 
-    /// The unit normals of faces, by their winding.
+    /// The unit normals of the faces, by their winding.
     fn face_normals<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py, f32>> {
         let normals = (0..self.mesh().faces().len() as u32).map(|face| self.mesh().normal(face).to_array());
         arrays::rows(py, normals.collect())
     }
 
-    /// The areas of faces, m².
+    /// The areas of the faces, in m².
     fn face_areas<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, (0..self.mesh().faces().len() as u32).map(|face| self.mesh().area(face)))
     }
@@ -227,7 +230,7 @@ fn texture((number, array): (usize, &PyReadonlyArray3<'_, u8>)) -> PyResult<Text
     Ok(Texture { name: format!("texture_{number}.png"), image, wrap: [Wrap::Repeat; 2] })
 }
 
-/// The image of an array height × width × 3, which `what` is.
+/// Returns an array height × width × 3 as an image. Errors name the array as `what`.
 pub(crate) fn raster(what: &str, array: &PyReadonlyArray3<'_, u8>) -> PyResult<Raster<[u8; 3]>> {
     let shape = array.shape();
     let sides = (u32::try_from(shape[0]), u32::try_from(shape[1]));

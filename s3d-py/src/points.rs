@@ -1,4 +1,4 @@
-//! Points of a mesh: sampled from it, and voting for its faces.
+//! Points of a mesh: sampling, and votes for the labels of faces.
 
 use crate::arrays;
 use crate::error::usage;
@@ -10,13 +10,14 @@ use s3d_dataset::InputError;
 use s3d_geom::{Density, NearestFaces, PointCloud, SurfaceSampler};
 use s3d_label::{FaceVotes, LabelId, Labeler, MAX_LABELS, VoteError, VoteOptions, fill_labels};
 
-/// Points that are drawn, or vote, between two looks at signals.
+/// The number of points that are drawn or vote between two checks for cancelling.
 const CHUNK: usize = 1 << 20;
 
 type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
 
-/// Positions, colours and faces of points spread evenly over a mesh: so many in all, or else a square metre.
+/// Returns the positions, colours and faces of points spread evenly over a mesh: `total` points, or `per_m2`
+/// a square metre if `total` is `None`.
 #[pyfunction]
 pub(crate) fn sample<'py>(
     py: Python<'py>,
@@ -32,10 +33,12 @@ pub(crate) fn sample<'py>(
     }
     let density = total.map_or(Density::PerM2(per_m2), Density::Total);
     let mesh = mesh.get();
+
     let cloud = watched(py, threads, &sink, |ctx| {
         let sampler = SurfaceSampler::new(mesh.mesh(), density, seed);
         let progress = ctx.progress("sampling", "points", sampler.len());
-        let (mut cloud, mut part) = (PointCloud::default(), PointCloud::default());
+        let mut cloud = PointCloud::default();
+        let mut part = PointCloud::default();
         for start in (0..sampler.len()).step_by(CHUNK) {
             ctx.check()?;
             let end = sampler.len().min(start + CHUNK as u64);
@@ -47,6 +50,7 @@ pub(crate) fn sample<'py>(
         }
         Ok(cloud)
     })?;
+
     Ok((
         arrays::rows::<f32, 3>(py, bytemuck::cast_vec(cloud.positions))?,
         arrays::rows(py, cloud.colors)?,
@@ -54,8 +58,8 @@ pub(crate) fn sample<'py>(
     ))
 }
 
-/// How a vote went, a column a value: label, votes, runner-up, its votes, all votes, mean and largest
-/// distance. Labels are −1 where there is none.
+/// The columns of votes: label, its votes, runner-up, its votes, all votes, mean and largest distance. A
+/// label is −1 where there is none.
 type VoteColumns<'py> = (
     Column<'py, i32>,
     Column<'py, u32>,
@@ -66,7 +70,7 @@ type VoteColumns<'py> = (
     Column<'py, f32>,
 );
 
-/// The votes of labelled points for the faces that are nearest to them.
+/// Lets each labelled point vote for the face that is nearest to it.
 #[pyfunction]
 pub(crate) fn vote<'py>(
     py: Python<'py>,
@@ -82,6 +86,7 @@ pub(crate) fn vote<'py>(
     if points.len() != labels.len() {
         return Err(usage(format!("{} labels for {} points: one for each", labels.len(), points.len())));
     }
+
     let mesh = mesh.get();
     let faces: Vec<Option<FaceVotes>> = watched(py, threads, &sink, |ctx| {
         let nearest = NearestFaces::new(mesh.mesh());
@@ -96,20 +101,19 @@ pub(crate) fn vote<'py>(
         }
         Ok(labeler.finish().iter().collect())
     })?;
-    let of = |face: &Option<FaceVotes>, value: fn(&FaceVotes) -> u64| face.as_ref().map_or(0, value) as u32;
-    let label = |id: LabelId| id.0 as i32 - 1;
+
     Ok((
-        PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(-1, |f| label(f.label)))),
-        PyArray1::from_iter(py, faces.iter().map(|f| of(f, |f| f.votes))),
-        PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(-1, |f| label(f.runner_up)))),
-        PyArray1::from_iter(py, faces.iter().map(|f| of(f, |f| f.runner_up_votes))),
-        PyArray1::from_iter(py, faces.iter().map(|f| of(f, |f| f.total))),
+        PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(-1, |f| python_label(f.label)))),
+        PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(0, |f| f.votes as u32))),
+        PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(-1, |f| python_label(f.runner_up)))),
+        PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(0, |f| f.runner_up_votes as u32))),
+        PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(0, |f| f.total as u32))),
         PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(f32::NAN, |f| f.mean_m))),
         PyArray1::from_iter(py, faces.iter().map(|f| f.map_or(f32::NAN, |f| f.farthest_m))),
     ))
 }
 
-/// Labels of faces, with those that have none given that of the labelled surface next to them.
+/// Returns the labels of faces, in which a face without one has the label of the labelled surface next to it.
 #[pyfunction]
 pub(crate) fn fill<'py>(
     py: Python<'py>,
@@ -126,23 +130,25 @@ pub(crate) fn fill<'py>(
     if within.is_nan() || within < 0.0 {
         return Err(usage(format!("within={within}: must be metres, from 0")));
     }
-    let none_is_null = |(k, label): (usize, &i64)| {
-        if *label == -1 {
-            Ok(LabelId::NULL)
-        } else {
-            label_id((k, label))
-        }
-    };
+
     let mut ids = labels
         .iter()
         .enumerate()
-        .map(none_is_null)
+        .map(|(place, label)| match label {
+            -1 => Ok(LabelId::NULL),
+            _ => label_id((place, label)),
+        })
         .collect::<PyResult<Vec<_>>>()?;
     crate::work::detached(py, None, || fill_labels(mesh.mesh(), &mut ids, within))?;
-    Ok(PyArray1::from_iter(py, ids.iter().map(|id| id.0 as i32 - 1)))
+    Ok(PyArray1::from_iter(py, ids.iter().map(|id| python_label(*id))))
 }
 
-/// Labels count from 0 in Python; here 0 is none.
+/// The label of an id. Labels count from 0 in Python, and −1 is none; here 0 is none.
+fn python_label(id: LabelId) -> i32 {
+    id.0 as i32 - 1
+}
+
+/// The id of a label, which counts from 0.
 fn label_id((place, label): (usize, &i64)) -> PyResult<LabelId> {
     match u32::try_from(*label) {
         Ok(label) if (label as usize) < MAX_LABELS - 1 => Ok(LabelId(label + 1)),

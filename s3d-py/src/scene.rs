@@ -37,8 +37,8 @@ pub(crate) struct Scene {
     mip_maps: MipMaps,
 }
 
-/// What a view is asked for: modalities, smooth normals, samples of the colour of a pixel, and whether pixels
-/// are those that the files of a data set store, instead of numbers in metres.
+/// The request for a view: modalities, smooth normals, colour samples of a pixel, and whether pixels are as
+/// the files of a data set store them, instead of numbers in metres.
 #[derive(FromPyObject)]
 struct Request(Vec<String>, bool, u32, bool);
 
@@ -65,7 +65,7 @@ impl Scene {
         })
     }
 
-    /// The images that a camera sees, by name: of a pinhole if there is a K, else of a panorama.
+    /// Returns the images of a camera by name: a pinhole camera if there is a K, otherwise a panorama.
     fn render<'py>(
         &self,
         py: Python<'py>,
@@ -82,9 +82,10 @@ impl Scene {
         if !(1..=64).contains(rgb_samples) {
             return Err(usage(format!("rgb_samples={rgb_samples}: must be from 1 to 64")));
         }
+
         let images = py.detach(|| {
             let mut hits = cast(self.tree(), &camera);
-            // Depth and faces are the hits themselves, and so the last to be made.
+            // Depth and faces take the hits themselves, so they are made last.
             let mut words: Vec<&str> = modalities.iter().map(String::as_str).collect();
             words.sort_by_key(|word| (*word == "depth" && !*stored) || *word == "face");
             let made = words
@@ -92,6 +93,7 @@ impl Scene {
                 .map(|word| (*word, self.draw(word, &mut hits, &camera, &request)));
             made.collect::<Vec<_>>()
         });
+
         let dict = PyDict::new(py);
         for (word, image) in images {
             dict.set_item(word, array(py, image)?)?;
@@ -99,7 +101,8 @@ impl Scene {
         Ok(dict)
     }
 
-    /// What rays hit: t, the multiple of the direction, NaN for nothing; and the face, −1 for nothing.
+    /// Returns the first hit of each ray: t, the multiple of the direction (NaN for no hit), and the face (−1
+    /// for no hit).
     fn cast<'py>(
         &self,
         py: Python<'py>,
@@ -110,10 +113,14 @@ impl Scene {
         let origins = arrays::points_f64("origins", &origins)?;
         let directions = arrays::points_f64("directions", &directions)?;
         if origins.len() != 1 && origins.len() != directions.len() {
-            let (n, m) = (origins.len(), directions.len());
-            return Err(usage(format!("{n} origins for {m} directions: one for all, or one for each")));
+            return Err(usage(format!(
+                "{} origins for {} directions: one for all, or one for each",
+                origins.len(),
+                directions.len()
+            )));
         }
         let Some(&first) = origins.first() else { return Err(usage("origins: there are none")) };
+
         let hits: (Vec<f64>, Vec<i32>) = detached(py, threads, || {
             let ray = |(k, direction): (usize, &_)| {
                 let origin = if origins.len() == 1 {
@@ -129,7 +136,7 @@ impl Scene {
         Ok((PyArray1::from_vec(py, hits.0), PyArray1::from_vec(py, hits.1)))
     }
 
-    /// Scan locations: uuid and camera → world of each.
+    /// Places scan locations, and returns the uuid and the matrix camera → world of each.
     fn place_cameras(
         &self,
         py: Python<'_>,
@@ -159,6 +166,7 @@ impl Scene {
         let scene = self.tree();
         let Request(_, smooth, rgb_samples, stored) = request;
         let normals = if *smooth { Normals::Smooth } else { Normals::Flat };
+
         match (word, *stored) {
             ("rgb", _) => {
                 let mut rgb = rgb_image(scene, &self.mip_maps, hits, camera);
@@ -189,7 +197,7 @@ impl Scene {
                 }
                 Modality::Xyz(xyz)
             }
-            // Those that were asked for are known.
+            // `render` has refused unknown words.
             _ => Modality::Face(hits.face.map(|face| face as i32)),
         }
     }
@@ -208,7 +216,7 @@ fn array<'py>(py: Python<'py>, modality: Modality) -> PyResult<Bound<'py, PyAny>
 
 /// A pinhole camera, or a panorama if there is no K.
 pub(crate) fn camera(k: Option<[[f64; 3]; 3]>, pose: [[f64; 4]; 4], size: [u32; 2]) -> PyResult<Camera> {
-    /// The most pixels of a side of an image.
+    /// The largest width or height of an image.
     const MOST: u32 = 32_768;
     let [width, height] = size;
     if !(1..=MOST).contains(&width) || !(1..=MOST).contains(&height) {
@@ -223,11 +231,11 @@ pub(crate) fn camera(k: Option<[[f64; 3]; 3]>, pose: [[f64; 4]; 4], size: [u32; 
     };
     let camera =
         Camera::from_k_rt(k, pose.rt_matrix(), width, height).map_err(|e| usage(format!("K: {e}")))?;
-    // The pose itself, not what the way there and back makes of it.
+    // The pose is kept as given: the way through the matrix and back would round it.
     Ok(Camera { pose, ..camera })
 }
 
-/// The file PNG of an image of colours, height × width × 3.
+/// Encodes an image of colours, height × width × 3, as a PNG file.
 #[pyfunction]
 pub(crate) fn encode_png<'py>(
     py: Python<'py>,
@@ -238,7 +246,7 @@ pub(crate) fn encode_png<'py>(
     Ok(PyBytes::new(py, &png))
 }
 
-/// Camera → world of a camera at a place that looks at another.
+/// The matrix camera → world of a camera at `eye` that looks at `target`.
 #[pyfunction]
 pub(crate) fn look_at(eye: [f64; 3], target: [f64; 3], up: [f64; 3]) -> PyResult<[[f64; 4]; 4]> {
     let pose = Pose::look_at(eye.into(), target.into(), up.into());

@@ -1,4 +1,4 @@
-//! Work away from Python's lock: on a pool of threads, told of, and ended by Ctrl-C.
+//! Work without Python's lock: it runs on a pool of threads, reports progress, and ends at Ctrl-C.
 
 use crate::error::{exception, fault};
 use pyo3::prelude::*;
@@ -12,22 +12,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How often Python is asked for signals and told of progress.
+/// The time between two looks for signals and news of the work.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// The pool that calls share, and the process that started its threads.
 static POOL: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
 
-/// A pool of so many threads; of one a core, which calls share, if none are named. A process that was forked
-/// has none of the threads of its parent, and gets a pool of its own.
+/// Returns a pool of `threads` threads, or the pool that calls share, of one thread a core, if that is
+/// `None`. A forked process has none of the threads of its parent, so it gets a pool of its own.
 fn pool(threads: Option<usize>) -> PyResult<Arc<rayon::ThreadPool>> {
-    let start = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.map(Arc::new)
-            .map_err(|e| fault(format!("threads cannot be started: {e}")))
-    };
     if let Some(threads) = threads {
-        return start(threads);
+        return start_pool(threads);
     }
     let mut shared = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((id, pool)) = &*shared
@@ -35,10 +30,17 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<rayon::ThreadPool>> {
     {
         return Ok(Arc::clone(pool));
     }
-    let pool = start(0)?;
-    // The one of the parent would wait for threads that are not there.
+    let pool = start_pool(0)?;
+    // The parent's pool is not dropped: that would wait for threads that do not exist here.
     std::mem::forget(shared.replace((process::id(), Arc::clone(&pool))));
     Ok(pool)
+}
+
+/// Starts a pool of `threads` threads; 0 means one a core.
+fn start_pool(threads: usize) -> PyResult<Arc<rayon::ThreadPool>> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map(Arc::new)
+        .map_err(|e| fault(format!("threads cannot be started: {e}")))
 }
 
 /// Makes a short call on a pool, without Python's lock.
@@ -50,9 +52,10 @@ pub(crate) fn detached<T: Send>(
     py.detach(|| Ok(pool(threads)?.install(call)))
 }
 
-/// Makes a long call on a pool, without Python's lock. Meanwhile this thread tells `sink` (`_progress.Sink`)
-/// what happens, and asks Python for signals: one that raises, such as Ctrl-C, cancels the call, and so does
-/// what `sink` raises or its answer False. The exception is raised when the call has come to its end.
+/// Makes a long call on a pool, without Python's lock. Meanwhile this thread passes news to `sink`
+/// (`_progress.Sink`) and asks Python for signals. An exception cancels the call, whether a signal such as
+/// Ctrl-C or `sink` raises it, and is raised when the call has ended. The answer False of `sink` cancels the
+/// call as well.
 pub(crate) fn watched<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -73,7 +76,7 @@ pub(crate) fn watched<T: Send>(
         });
         let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
         match raised {
-            // What was done before the exception came is no answer to it.
+            // The exception counts even if the call succeeded before it took effect.
             Some(error) => Err(error),
             None => outcome.map_err(|error| exception(&error)),
         }
@@ -97,12 +100,12 @@ fn observer(told: Sender<News>) -> impl Fn(&Event<'_>) + Send + Sync {
             Event::TaskEnded { task } => News::Ended(task.id),
             _ => return,
         };
-        // Nobody listens when the call has been waited for.
+        // Nobody receives news after the end of the call.
         let _ = told.send(news);
     }
 }
 
-/// Passes news on until the work is done, and returns what Python raised first.
+/// Passes news on until the work is done, and returns the first exception of Python.
 fn wait(
     news: &Receiver<News>,
     sink: &Py<PyAny>,
@@ -127,6 +130,7 @@ fn wait(
             break;
         }
     }
+
     let rest: Vec<News> = news.try_iter().collect();
     if raised.is_none() {
         raised = Python::attach(|py| tell(py, sink, rest, cancel)).err();
@@ -134,7 +138,7 @@ fn wait(
     raised
 }
 
-/// What is told until it is time to look again, and whether that was the last.
+/// Returns the news of one [`LOOK_EVERY`], and whether they were the last.
 fn next_batch(news: &Receiver<News>) -> (Vec<News>, bool) {
     let until = Instant::now() + LOOK_EVERY;
     let mut batch = Vec::new();
@@ -144,14 +148,14 @@ fn next_batch(news: &Receiver<News>) -> (Vec<News>, bool) {
             Ok(one) => batch.push(one),
             Err(end) => return (batch, end == RecvTimeoutError::Disconnected),
         }
-        // News may come faster than they are taken.
+        // News may come without a pause.
         if left.is_zero() {
             return (batch, false);
         }
     }
 }
 
-/// Of each task, tells how far it is once.
+/// Passes news to the sink. Each task's progress is passed once, with its largest count.
 fn tell(py: Python<'_>, sink: &Py<PyAny>, batch: Vec<News>, cancel: &Cancel) -> PyResult<()> {
     let mut done_of: BTreeMap<u64, u64> = BTreeMap::new();
     for news in &batch {
@@ -160,6 +164,7 @@ fn tell(py: Python<'_>, sink: &Py<PyAny>, batch: Vec<News>, cancel: &Cancel) -> 
             *most = (*most).max(*done);
         }
     }
+
     let advance = |id: u64, done: Option<u64>| -> PyResult<()> {
         let Some(done) = done else { return Ok(()) };
         let answer = sink.call_method1(py, "advanced", (id, done))?;
@@ -168,6 +173,7 @@ fn tell(py: Python<'_>, sink: &Py<PyAny>, batch: Vec<News>, cancel: &Cancel) -> 
         }
         Ok(())
     };
+
     for news in batch {
         match news {
             News::Message(level, text) => {
@@ -191,7 +197,7 @@ fn tell(py: Python<'_>, sink: &Py<PyAny>, batch: Vec<News>, cancel: &Cancel) -> 
     done_of.into_iter().try_for_each(|(id, done)| advance(id, Some(done)))
 }
 
-/// Readers make errors of the panics of some decoders; nothing of these is to be printed.
+/// Keeps the panics of decoders that readers catch and turn into errors from being printed.
 pub(crate) fn hide_caught_panics() {
     let others = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
