@@ -53,7 +53,7 @@ fn a_texture_bomb_is_refused_with_its_size_and_the_limit() {
 #[test]
 fn one_bad_line_among_many_is_named() {
     // Both the line and the ones before it are read as a stream. (With a hundred million lines: see
-    // docs/formats.md, "Limits".)
+    // `s3d_io::formats`, "Limits".)
     let scan = Scan::new();
     let path = "Area_1/office_1/Annotations/floor_1.txt";
     let mut points = "1.234 2.345 0.001 120 130 140\n".repeat(1_500_000);

@@ -1,5 +1,5 @@
 //! An export's memory does not grow with the points of an instance. The example `large_scene` and
-//! `docs/reliability/curves.py` measure the same on clouds of hundreds of millions.
+//! `s3d-cli/tests/reliability/curves.py` measure the same on clouds of hundreds of millions.
 #![allow(clippy::print_stderr, reason = "says why it measures nothing")]
 
 use crate::common;

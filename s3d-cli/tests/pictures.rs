@@ -35,8 +35,8 @@ impl<'m> Studio<'m> {
         rgb_image(&self.scene, &self.mip_maps, &cast(&self.scene, camera), camera)
     }
 
-    /// What each face of a sky box shows, by the words of formats.md; up and down are held as one looks up
-    /// and down from `heading`.
+    /// What each face of a sky box shows, by the words of `s3d_io::formats`; up and down are held as one
+    /// looks up and down from `heading`.
     fn sky_box(&self, pose: &Pose, heading: f64, size: u32) -> Vec<Raster<[u8; 3]>> {
         let turns = [
             (heading, FRAC_PI_2),

@@ -17,7 +17,7 @@ use s3d_label::{LabelId, LabelTable};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// The colour of a pixel of an image of label indices where nothing is seen. Source: formats.md.
+/// The colour of a pixel of an image of label indices where nothing is seen. Source: `s3d_io::formats`.
 const UNSEEN: [u8; 3] = [0x0d; 3];
 
 /// A complete data set. It never changes, so many threads may read it.

@@ -501,7 +501,7 @@ mod tests {
 
     #[test]
     fn steps_of_half_floats() {
-        // formats.md: 1.6 cm at 20 m, 6.3 cm at 100 m.
+        // `s3d_io::formats`: 1.6 cm at 20 m, 6.3 cm at 100 m.
         assert_eq!(half_step(20.0), 1.0 / 64.0);
         assert_eq!(half_step(100.0), 1.0 / 16.0);
         assert_eq!(half_step(1.0), 1.0 / 1024.0);

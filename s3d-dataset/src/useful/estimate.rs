@@ -38,7 +38,7 @@ fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
 }
 
 /// The time of one core for a pixel of all images of a view, scored, cast, shaded and compressed,
-/// nanoseconds. Measured on the machine of docs/performance.md.
+/// nanoseconds. Measured on the machine of the book's page on speed.
 const PIXEL_NS: f64 = 50.0;
 
 /// The same for a sampled point, drawn and written in three formats.

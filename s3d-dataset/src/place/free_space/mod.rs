@@ -2,8 +2,8 @@
 //! much.
 //!
 //! There are three steps, in a file each. `standing` (on a `grid`) finds where a person with a tripod can
-//! stand and walk, `visibility` finds what such places see, and `cover` chooses few of them. docs/formats.md
-//! ("Scan locations by free space") has every number.
+//! stand and walk, `visibility` finds what such places see, and `cover` chooses few of them.
+//! [`s3d_io::formats`] ("Scan locations by free space") has every number.
 
 mod cover;
 mod grid;
