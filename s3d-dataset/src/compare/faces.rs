@@ -1,4 +1,4 @@
-//! The labels of faces, where both data sets have the same mesh.
+//! Compares the labels of faces if both data sets have the same mesh.
 
 use super::comparison::{AreaChanges, ChangedPatch, FaceChange, Geometry, LabelCounts, LabelPairs, Side};
 use super::names::{NULL, Names};
@@ -10,16 +10,16 @@ use s3d_geom::{TriMesh, face_patches};
 use s3d_io::Error as FileError;
 use s3d_io::mesh::{UpAxis, read_mesh};
 
-/// So many patches of an area are told.
+/// The most patches that are reported for an area.
 const MAX_PATCHES: usize = 300;
 
-/// A mesh with the number of each face's label.
+/// A mesh with the number of each face's label, as in [`Names`].
 struct Labelled {
     mesh: TriMesh,
     label_of_face: Vec<u32>,
 }
 
-/// Compares the meshes of all areas; faces with other labels come to `pairs`.
+/// Compares the meshes of all areas, and adds the faces with other labels to `pairs`.
 pub(crate) fn compare(
     sides: &Sides,
     names: Option<&Names>,
@@ -29,6 +29,7 @@ pub(crate) fn compare(
     let areas = sides.areas();
     let progress = ctx.progress("comparing", "meshes", areas.len() as u64);
     let mut all = Vec::new();
+
     for area in areas {
         ctx.check()?;
         let faces = |side| sides.of(side).manifest.area(area).map(|entry| entry.faces as u64);
@@ -42,15 +43,18 @@ pub(crate) fn compare(
             faces: Vec::new(),
             patches: Vec::new(),
         };
+
         if changes.faces_a.is_some() && changes.faces_b.is_some() {
             changes.geometry = of_area(sides, names, area, &mut changes, pairs)?;
         }
         all.push(changes);
         progress.add(1);
     }
+
     Ok(all)
 }
 
+/// Compares the meshes of one area.
 fn of_area(
     sides: &Sides,
     names: Option<&Names>,
@@ -68,43 +72,43 @@ fn of_area(
             Geometry::Unlabelled
         });
     }
-    // Materials are labels, and named in the mesh itself.
+
+    // The mesh names its materials, which are the labels. So equal files have equal labels.
     if sides.are_same(&a, &b) {
         return Ok(Geometry::Same);
     }
+
     let Some(names) = names else { return Ok(Geometry::Unread) };
     let read = |side| sides.keep(side, labelled_mesh(sides, side, names, area));
     let (a, b) = rayon::join(|| read(Side::A), || read(Side::B));
     let (Some(a), Some(b)) = (a?, b?) else { return Ok(Geometry::Unread) };
+
     let faces = a.mesh.faces().len();
     let is_same = |face: u32| a.mesh.triangle(face) == b.mesh.triangle(face);
     if faces != b.mesh.faces().len() || !(0..faces as u32).all(is_same) {
         return Ok(Geometry::Other);
     }
+
     for (face, labels) in (0..).zip(a.label_of_face.iter().copied().zip(b.label_of_face.iter().copied())) {
         if labels.0 != labels.1 {
             let m2 = a.mesh.area(face);
             *pairs.entry(labels).or_default() += LabelCounts { faces: 1, m2, pixels: 0 };
             changes.faces_changed += 1;
             changes.m2_changed += m2;
-            let (a, b) = (names.index(Side::A, labels.0), names.index(Side::B, labels.1));
+            let a = names.index(Side::A, labels.0);
+            let b = names.index(Side::B, labels.1);
             changes.faces.push(FaceChange { face, a, b });
         }
     }
+
     changes.patches = patches(&a.mesh, names, &changes.faces);
     Ok(Geometry::Same)
 }
 
-/// The largest patches of changed faces, those of another class first.
+/// The largest patches of changed faces; patches with another class come first.
 fn patches(mesh: &TriMesh, names: &Names, changes: &[FaceChange]) -> Vec<ChangedPatch> {
     let faces: Vec<(u32, (u32, u32))> = changes.iter().map(|of| (of.face, (of.a, of.b))).collect();
-    let center = |face: u32| {
-        mesh.triangle(face)
-            .map(|corner| corner.as_dvec3())
-            .iter()
-            .sum::<DVec3>()
-            / 3.0
-    };
+
     let patch = |places: Vec<usize>| {
         let of_patch: Vec<FaceChange> = places
             .into_iter()
@@ -114,24 +118,34 @@ fn patches(mesh: &TriMesh, names: &Names, changes: &[FaceChange]) -> Vec<Changed
         let m2: f64 = of_patch.iter().map(|of| mesh.area(of.face)).sum();
         let middle = of_patch
             .iter()
-            .map(|of| mesh.area(of.face) * center(of.face))
+            .map(|of| mesh.area(of.face) * center(mesh, of.face))
             .sum::<DVec3>()
             / m2;
-        let away = |of: &&FaceChange| center(of.face).distance_squared(middle);
+
+        let away = |of: &&FaceChange| center(mesh, of.face).distance_squared(middle);
         let nearest = of_patch.iter().min_by(|x, y| away(x).total_cmp(&away(y)))?;
-        let (FaceChange { face, a, b }, faces) = (*nearest, of_patch.len() as u64);
-        Some(ChangedPatch { a, b, faces, m2, center: center(face).to_array() })
+        let FaceChange { face, a, b } = *nearest;
+        let faces = of_patch.len() as u64;
+        Some(ChangedPatch { a, b, faces, m2, center: center(mesh, face).to_array() })
     };
+
     let mut patches: Vec<ChangedPatch> = face_patches(mesh, &faces).into_iter().filter_map(patch).collect();
     patches.sort_by(|x, y| {
         let same_class = |of: &ChangedPatch| names.have_same_class(of.a, of.b);
         same_class(x).cmp(&same_class(y)).then(y.m2.total_cmp(&x.m2))
     });
+
     patches.truncate(MAX_PATCHES);
     patches
 }
 
-/// Reads `semantic.obj`.
+/// The centre of a face's corners.
+fn center(mesh: &TriMesh, face: u32) -> DVec3 {
+    let corners = mesh.triangle(face).map(|corner| corner.as_dvec3());
+    corners.iter().sum::<DVec3>() / 3.0
+}
+
+/// Reads `semantic.obj`, and numbers the labels of its faces.
 fn labelled_mesh(sides: &Sides, side: Side, names: &Names, area: u32) -> Result<Labelled> {
     let data = sides.of(side);
     let path = data.layout.semantic_obj(area);

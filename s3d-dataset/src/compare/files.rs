@@ -1,4 +1,4 @@
-//! Which files differ, and what the manifests tell of how they were made.
+//! Compares the lists of files, and what the manifests say about how the data sets were made.
 
 use super::comparison::{FileKindChanges, InputChange, SettingChange, Side};
 use super::sides::{Sides, have_same_bytes, records};
@@ -11,11 +11,10 @@ use s3d_io::dataset::FileRecord;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Names of files of a kind that are told.
+/// The most names of files that are listed for a kind.
 const MAX_NAMES: usize = 20;
 
-/// Looks at every file of both: whether it is there with its size, and if all are to be read, with its
-/// checksum.
+/// Checks that every file of both data sets is there with its size, and with its checksum if `full`.
 pub(crate) fn check(sides: &Sides, full: bool, ctx: &Context) -> Result<()> {
     let of = |(side, data): (Side, &'_ DataSet)| -> Vec<(Side, FileRecord)> {
         data.files.records().map(|record| (side, record.clone())).collect()
@@ -40,11 +39,14 @@ pub(crate) fn check(sides: &Sides, full: bool, ctx: &Context) -> Result<()> {
     )
 }
 
-/// The files of both, by kind. Lists are compared; no file is opened.
+/// Compares the files of both lists, by kind. No file is opened.
 pub(crate) fn changes(sides: &Sides) -> Vec<FileKindChanges> {
-    let (a, b) = (records(&sides.a), records(&sides.b));
+    let a = records(&sides.a);
+    let b = records(&sides.b);
     let paths: BTreeSet<&str> = a.keys().chain(b.keys()).copied().collect();
+
     let mut kinds: BTreeMap<String, FileKindChanges> = BTreeMap::new();
+
     for path in paths {
         let kind = kinds.entry(kind_of(path)).or_default();
         match (a.get(path), b.get(path)) {
@@ -60,13 +62,14 @@ pub(crate) fn changes(sides: &Sides) -> Vec<FileKindChanges> {
             kind.first.push(path.to_owned());
         }
     }
+
     kinds
         .into_iter()
         .map(|(kind, changes)| FileKindChanges { kind, ..changes })
         .collect()
 }
 
-/// The kind of a file: `data/rgb` of an area, a folder or a file of the data set.
+/// The kind of a file: a folder of an area such as `data/rgb`, or a folder or a file of the data set.
 fn kind_of(path: &str) -> String {
     let parts: Vec<&str> = path.split('/').collect();
     match parts.as_slice() {
@@ -78,21 +81,23 @@ fn kind_of(path: &str) -> String {
     }
 }
 
-/// What the manifests tell differently: settings, then files of the input.
+/// The differences between the manifests: settings, and files of the input.
 ///
 /// # Errors
-/// If options cannot be written as JSON.
+/// Fails if options cannot be written as JSON.
 pub(crate) fn made(sides: &Sides) -> Result<(Vec<SettingChange>, Vec<InputChange>)> {
-    let (a, b) = (settings(&sides.a)?, settings(&sides.b)?);
+    let a = settings(&sides.a)?;
+    let b = settings(&sides.b)?;
     let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
-    let value = |of: &BTreeMap<String, Value>, name: &str| of.get(name).cloned().unwrap_or_default();
     let both = names.into_iter().map(|name| SettingChange {
         name: name.clone(),
-        a: value(&a, name),
-        b: value(&b, name),
+        a: a.get(name).cloned().unwrap_or_default(),
+        b: b.get(name).cloned().unwrap_or_default(),
     });
     let settings = both.filter(|change| change.a != change.b).collect();
-    let (a, b) = (inputs(&sides.a), inputs(&sides.b));
+
+    let a = inputs(&sides.a);
+    let b = inputs(&sides.b);
     let keys: BTreeSet<&(u32, String)> = a.keys().chain(b.keys()).collect();
     let both = keys.into_iter().map(|key| InputChange {
         area: key.0,
@@ -100,10 +105,11 @@ pub(crate) fn made(sides: &Sides) -> Result<(Vec<SettingChange>, Vec<InputChange
         a: a.get(key).cloned(),
         b: b.get(key).cloned(),
     });
+
     Ok((settings, both.filter(|change| change.a != change.b).collect()))
 }
 
-/// What made a data set, by key of its manifest.
+/// The settings that made a data set, by key of its manifest.
 fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
     let manifest = &data.manifest;
     let mut all = BTreeMap::new();
@@ -112,6 +118,7 @@ fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
     all.insert("areas".to_owned(), Value::from(data.areas()));
     all.insert("taxonomy".to_owned(), Value::from(data.taxonomy().map(|taxonomy| taxonomy.name())));
     all.insert("world coordinates from depth".to_owned(), Value::from(manifest.is_xyz_from_depth()));
+
     let options = serde_json::to_value(data.options());
     let failed = |e: serde_json::Error| FileError::format(&data.layout().manifest(), e.to_string());
     if let Value::Object(options) = options.map_err(failed)? {
@@ -121,6 +128,7 @@ fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
                 .map(|(name, value)| (format!("options.{name}"), value)),
         );
     }
+
     for entry in &manifest.areas {
         let area = entry.area;
         all.insert(format!("area {area}: rgb"), Value::from(entry.rgb.as_str()));
@@ -129,10 +137,11 @@ fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
         let offset = entry.offset_m.map_or(Value::Null, |offset| offset.to_vec().into());
         all.insert(format!("area {area}: offset_m"), offset);
     }
+
     Ok(all)
 }
 
-/// The checksums of files and folders of the input.
+/// The checksums of files and folders of the input, by area and path.
 fn inputs(data: &DataSet) -> BTreeMap<(u32, String), String> {
     let areas = &data.manifest.areas;
     let of = areas

@@ -1,6 +1,6 @@
-//! Lines, tables and numbers of a text for a person.
+//! Formats lines, tables and numbers for a person.
 
-/// Lines without characters that would steer a terminal, or turn the order of others around.
+/// Lines without characters that would control a terminal or reverse the order of text.
 #[derive(Default)]
 pub(crate) struct Lines(String);
 
@@ -15,14 +15,13 @@ impl Lines {
         self.0.push('\n');
     }
 
-    /// A table with a line of titles; nothing if it has no rows. The first `left` columns are aligned to the
-    /// left, the others to the right.
+    /// Adds a table with a line of titles, or nothing if there are no rows. The first `left` columns are
+    /// aligned to the left, the others to the right.
     pub(crate) fn table<const N: usize>(&mut self, titles: [&str; N], rows: &[[String; N]], left: usize) {
         if rows.is_empty() {
             return;
         }
-        // Rows are indented under the first title.
-        let indent = |column: usize| if column == 0 { 2 } else { 0 };
+
         let widths: [usize; N] = std::array::from_fn(|column| {
             let cells = rows.iter().map(|row| row[column].chars().count() + indent(column));
             cells.chain([titles[column].chars().count()]).max().unwrap_or(0)
@@ -31,17 +30,19 @@ impl Lines {
             width if column < left => format!("{cell:<width$}"),
             width => format!("{cell:>width$}"),
         };
+
         let line = |cell: &dyn Fn(usize) -> String| {
             let cells: [String; N] = std::array::from_fn(|column| padded(column, &cell(column)));
             cells.join("  ")
         };
+
         self.add(line(&|column| titles[column].to_owned()));
         for row in rows {
             self.add(line(&|column| format!("{:1$}{2}", "", indent(column), row[column])));
         }
     }
 
-    /// So many rows are not there.
+    /// Adds a line on rows that are left out.
     pub(crate) fn more(&mut self, rows: usize) {
         if rows > 0 {
             self.add(format!("  … and {rows} more"));
@@ -53,6 +54,12 @@ impl Lines {
     }
 }
 
+/// Rows are indented under the first title.
+fn indent(column: usize) -> usize {
+    if column == 0 { 2 } else { 0 }
+}
+
+/// Whether a character controls a terminal or the direction of text.
 fn is_odd(c: char) -> bool {
     let turns = ['\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'].contains(&c);
     c.is_control()
@@ -61,7 +68,7 @@ fn is_odd(c: char) -> bool {
         || ('\u{2066}'..='\u{2069}').contains(&c)
 }
 
-/// Three digits that count, or all before the point.
+/// A number with three significant digits, or with all digits before the point.
 pub(crate) fn significant(value: f64) -> String {
     let decimals = match value.abs() {
         0.0 | 100.0.. => 0,
@@ -75,7 +82,7 @@ pub(crate) fn significant(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A share of a hundred.
+/// A share in percent.
 pub(crate) fn percent(part: u64, of: u64) -> String {
     let share = 100.0 * part as f64 / of as f64;
     if share > 0.0 && share < 0.01 {
@@ -85,7 +92,7 @@ pub(crate) fn percent(part: u64, of: u64) -> String {
     }
 }
 
-/// 1,234,567.
+/// A number with commas, such as 1,234,567.
 pub(crate) fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut text = String::new();

@@ -1,8 +1,8 @@
-//! What differs between two data sets: by their lists of files first, then by what they hold.
+//! Compares two data sets, first by their lists of files, then by their contents.
 //!
 //! Areas are matched by number, scan locations by uuid, views by their number among the candidates of their
-//! location, labels and classes by name. Files to which both lists give the same bytes are not read, but for
-//! images of labels whose indices mean others. What cannot be read is told, and the rest is compared.
+//! location, labels and classes by name. Files with the same bytes in both lists are not read, except label
+//! images whose indices differ in meaning. Unreadable files are reported, and the rest is compared.
 
 pub(crate) mod comparison;
 mod faces;
@@ -28,28 +28,30 @@ use std::path::Path;
 /// How two data sets are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CompareOptions {
-    /// Besides, read every file of both and hold it against its checksum. Otherwise all sizes are, and the
-    /// checksums of what is read.
+    /// Also read every file of both data sets and compare it with its checksum. Otherwise all sizes are
+    /// compared, and the checksums of the files that are read.
     pub full: bool,
 }
 
-/// Compares two data sets, in the folders `a` and `b`. Neither is altered.
+/// Compares the two data sets in the folders `a` and `b`. Neither is changed.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if one is not there;
-/// [`Error::File`](crate::Error::File) if it is not complete, or its manifest, list of files or conventions
-/// are damaged; [`Error::Cancelled`](crate::Error::Cancelled). Other files that are missing or damaged are
-/// no error: [`Comparison::unread`] has them.
+/// [`Error::Usage`](crate::Error::Usage) if one is not there; [`Error::File`](crate::Error::File) if one is
+/// not complete, or its manifest, list of files or conventions are damaged;
+/// [`Error::Cancelled`](crate::Error::Cancelled). Other missing or damaged files are not errors:
+/// [`Comparison::unread`] has them.
 pub fn compare(a: &Path, b: &Path, options: &CompareOptions, ctx: &Context) -> Result<Comparison> {
     let sides = Sides::open(a, b)?;
     files::check(&sides, options.full, ctx)?;
     let (settings, inputs) = files::made(&sides)?;
     let files = files::changes(&sides);
+
     let names = Names::read(&sides)?;
     let mut pairs = LabelPairs::new();
     let areas = faces::compare(&sides, names.as_ref(), &mut pairs, ctx)?;
     let views = views::compare(&sides)?;
     let images = images::compare_all(&sides, &views, names.as_ref(), &mut pairs, ctx)?;
+
     let mut notes = notes(&sides, &images);
     notes.extend(
         areas
@@ -57,9 +59,12 @@ pub fn compare(a: &Path, b: &Path, options: &CompareOptions, ctx: &Context) -> R
             .filter(|of| of.geometry == Geometry::Other)
             .map(|of| format!("area {}: the meshes differ; labels were compared by pixels alone", of.area)),
     );
+
     let same = files.iter().all(|kind| kind.changed + kind.only_a + kind.only_b == 0);
-    let (about_a, about_b) = (about(a, &sides.a), about(b, &sides.b));
+    let about_a = about(a, &sides.a);
+    let about_b = about(b, &sides.b);
     let unread = sides.into_unread();
+
     Ok(Comparison {
         equal: same && unread.is_empty(),
         full: options.full,
@@ -79,7 +84,7 @@ pub fn compare(a: &Path, b: &Path, options: &CompareOptions, ctx: &Context) -> R
     })
 }
 
-/// What was not compared, or otherwise than by itself.
+/// Notes on what was not compared, or only together with something else.
 fn notes(sides: &Sides, images: &Images) -> Vec<String> {
     let mut notes = Vec::new();
     for (side, other) in [(&sides.a, &sides.b), (&sides.b, &sides.a)] {
@@ -97,12 +102,14 @@ fn notes(sides: &Sides, images: &Images) -> Vec<String> {
             notes.push(format!("only {} has labels", name(side)));
         }
     }
+
     if let (Some(a), Some(b)) = (sides.a.taxonomy(), sides.b.taxonomy())
         && a.definition() != b.definition()
     {
         let (a, b) = (a.name(), b.name());
         notes.push(format!("classes are those of {a} in A and of {b} in B; they were compared by name"));
     }
+
     let forms = [sides.a.options().conventions(), sides.b.options().conventions()];
     let has = |domain| {
         images
@@ -118,6 +125,7 @@ fn notes(sides: &Sides, images: &Images) -> Vec<String> {
         let [a, b] = forms.map(|form| form.normal_axes.name());
         notes.push(format!("normals have the axes {a} in A and {b} in B; their pixels were not compared"));
     }
+
     if images.without_poses > 0 {
         let images = images.without_poses;
         notes.push(format!(
@@ -125,5 +133,6 @@ fn notes(sides: &Sides, images: &Images) -> Vec<String> {
              were taken to see the same"
         ));
     }
+
     notes
 }

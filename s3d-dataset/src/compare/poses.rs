@@ -1,11 +1,11 @@
-//! The cameras of an image in both data sets.
+//! Compares the cameras of an image in both data sets.
 
 use super::comparison::{PoseChange, PoseChanges};
 use s3d_geom::Pose;
 use s3d_geom::glam::DMat3;
 use s3d_io::dataset::PoseFile;
 
-/// Cameras nearer than this are the same: no pixel sees the difference.
+/// Cameras within these limits are the same: no pixel shows the difference.
 const SAME_M: f64 = 1e-6;
 const SAME_DEGREES: f64 = 1e-5;
 const SAME_PX: f64 = 1e-3;
@@ -19,9 +19,10 @@ pub(crate) struct Moved {
 }
 
 impl Moved {
-    /// By what both files tell twice, angles and matrix: the larger difference counts.
+    /// Compares angles and matrix, which both give the pose. The larger difference counts.
     pub(crate) fn between(a: &PoseFile, b: &PoseFile) -> Self {
-        let (pose_a, pose_b) = (a.pose(), b.pose());
+        let pose_a = a.pose();
+        let pose_b = b.pose();
         let mut m = pose_a.location.distance(pose_b.location);
         let mut degrees = angle(pose_a.world_from_camera, pose_b.world_from_camera);
         match (Pose::from_rt(a.camera_rt_matrix), Pose::from_rt(b.camera_rt_matrix)) {
@@ -30,7 +31,7 @@ impl Moved {
                 degrees = degrees.max(angle(a.world_from_camera, b.world_from_camera));
             }
             (Err(_), Err(_)) if a.camera_rt_matrix == b.camera_rt_matrix => {}
-            // One of them is no rotation and translation.
+            // One of the matrices is no rotation and translation.
             _ => degrees = 180.0,
         }
         let k = a
@@ -42,16 +43,16 @@ impl Moved {
         Self { m, degrees, k_px }
     }
 
-    /// Whether images of one size see the same.
+    /// Whether images of one size show the same.
     pub(crate) fn is_same_camera(&self) -> bool {
         self.m <= SAME_M && self.degrees <= SAME_DEGREES && self.k_px <= SAME_PX
     }
 }
 
-/// The angle of the rotation between two, degrees.
+/// The angle between two rotations, degrees.
 fn angle(a: DMat3, b: DMat3) -> f64 {
     let between = a.transpose() * b;
-    // Twice the sine and the cosine of it: exact for small angles too.
+    // The sine and cosine, both doubled. Together they are exact for small angles too.
     let [x, y, z] = between.to_cols_array_2d();
     let (sx, sy, sz) = (y[2] - z[1], z[0] - x[2], x[1] - y[0]);
     let sine = (sx * sx + sy * sy + sz * sz).sqrt();
@@ -60,9 +61,9 @@ fn angle(a: DMat3, b: DMat3) -> f64 {
 }
 
 impl PoseChanges {
-    /// One more pose whose bytes differ.
+    /// Adds a pose whose bytes differ.
     pub(crate) fn add(&mut self, (a, b): (String, String), moved: Moved, is_of_one_size: bool) {
-        // K is in pixels, of which images of other sizes have others.
+        // K is in pixels, so it cannot be compared between images of different sizes.
         let Moved { m, degrees, k_px } = moved;
         if (Moved { k_px: if is_of_one_size { k_px } else { 0.0 }, ..moved }).is_same_camera() {
             self.same_camera += 1;
@@ -75,7 +76,7 @@ impl PoseChanges {
         self.moved.push(PoseChange { a, b, m, degrees, k_px });
     }
 
-    /// Brings the farthest to the front; of equal ones the order stays.
+    /// Sorts the farthest to the front. Ties keep their order.
     pub(crate) fn sort(&mut self) {
         let k = |of: &PoseChange| of.k_px.unwrap_or(0.0);
         self.moved.sort_by(|a, b| {
@@ -107,10 +108,12 @@ mod tests {
             assert!((moved.m - 0.05).abs() < 1e-12 && (moved.degrees - degrees).abs() < 1e-9, "{moved:?}");
             assert!(moved.k_px == 0.0 && !moved.is_same_camera());
         }
+
         let focal = |fov: f64| 50.0 / (fov / 2.0).tan();
         let moved = Moved::between(&a, &file(DVec3::ZERO, 0.0, 1.1));
         assert!((moved.k_px - (focal(1.0) - focal(1.1))).abs() < 1e-9, "{moved:?}");
-        // The matrix alone is another.
+
+        // Only the matrix differs.
         let mut b = a.clone();
         b.camera_rt_matrix[0][3] += 0.5;
         assert!((Moved::between(&a, &b).m - 0.5).abs() < 1e-9);

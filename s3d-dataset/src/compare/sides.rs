@@ -1,4 +1,4 @@
-//! The two data sets as they are read, and what is wrong in them.
+//! The two data sets while they are compared, and the files that could not be read.
 
 use super::comparison::{ComparedSet, Side, UnreadFile};
 use crate::error::{Error, Result, UsageError};
@@ -16,13 +16,13 @@ pub(crate) struct Sides {
 }
 
 impl Sides {
-    /// Opens both.
+    /// Opens both data sets.
     ///
     /// # Errors
-    /// [`Error::Usage`] if one is not there; else of [`DataSet::open`].
+    /// [`Error::Usage`] if one is not there; otherwise the errors of [`DataSet::open`].
     pub(crate) fn open(a: &Path, b: &Path) -> Result<Self> {
         for folder in [a, b] {
-            // What is no regular file is told of by its reader.
+            // A manifest that is no regular file is reported by its reader.
             if std::fs::symlink_metadata(Layout::new(folder).manifest()).is_err() {
                 return Err(UsageError::NoDataSet { folder: folder.to_owned() }.into());
             }
@@ -41,7 +41,7 @@ impl Sides {
         }
     }
 
-    /// The areas of either, by number.
+    /// The areas of both data sets, by number.
     pub(crate) fn areas(&self) -> Vec<u32> {
         let mut areas: Vec<u32> = self.a.areas().iter().chain(self.b.areas()).copied().collect();
         areas.sort_unstable();
@@ -49,14 +49,14 @@ impl Sides {
         areas
     }
 
-    /// Whether both lists give these files the same bytes; false if one does not name it.
+    /// Whether both lists give these files the same bytes. False if a list lacks its file.
     pub(crate) fn are_same(&self, a: &Path, b: &Path) -> bool {
         let [a, b] = [(&self.a, a), (&self.b, b)].map(|(data, path)| data.files.record(path));
         a.is_ok_and(|a| b.is_ok_and(|b| have_same_bytes(a, b)))
     }
 
-    /// What was read. A file that is wrong is one that could not be compared, and `None`; an error that may
-    /// pass stays one.
+    /// Returns the value that was read. An unusable file is noted and gives `None`; other errors are
+    /// returned.
     pub(crate) fn keep<T>(&self, side: Side, read: Result<T>) -> Result<Option<T>> {
         match read {
             Ok(value) => Ok(Some(value)),
@@ -68,13 +68,13 @@ impl Sides {
         }
     }
 
-    /// A file that could not be compared; the first that is told of one is kept.
+    /// Notes a file that could not be compared. The first message on a file is kept.
     pub(crate) fn add(&self, side: Side, path: String, message: String) {
         let mut unread = self.unread.lock().unwrap_or_else(PoisonError::into_inner);
         unread.entry((side, path)).or_insert(message);
     }
 
-    /// How a file is called below the data set's folder.
+    /// The name of a file, relative to the data set's folder.
     pub(crate) fn name(&self, side: Side, path: &Path) -> String {
         self.of(side).files.name(path)
     }
@@ -101,7 +101,7 @@ pub(crate) fn have_same_bytes(a: &FileRecord, b: &FileRecord) -> bool {
     (a.bytes, a.xxh3_128) == (b.bytes, b.xxh3_128)
 }
 
-/// What is told of a data set as a whole.
+/// Describes a data set as a whole.
 pub(crate) fn about(folder: &Path, data: &DataSet) -> ComparedSet {
     let (files, bytes) = data.size();
     ComparedSet {

@@ -1,4 +1,4 @@
-//! Which views, photographs and scan locations each data set has, and which images of both are the same one.
+//! Compares the views, photographs and scan locations of both data sets, and pairs their images.
 
 use super::comparison::{LocationName, Side, ViewChanges, ViewName};
 use super::sides::Sides;
@@ -6,7 +6,7 @@ use crate::error::Result;
 use s3d_io::dataset::{DatasetImage, Frame, PhotographRecord, ViewRecord};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What makes an image the same in both, in the order in which images are compared.
+/// Identifies an image in both data sets. Images are compared in this order.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ImageKey {
     pub(crate) area: u32,
@@ -16,39 +16,40 @@ pub(crate) struct ImageKey {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum ImageKind {
-    /// The view of so many among its location's candidates.
+    /// A view, by its number among its location's candidates.
     Candidate(u32),
-    /// A view of which only the number in its name is known.
+    /// A view with only a frame number, the one in its name.
     Frame(u32),
     Photograph,
     Panorama,
 }
 
-/// An image, and what it would be of.
+/// An image and its expected size.
 #[derive(Clone, Debug)]
 pub(crate) struct FoundImage {
     pub(crate) image: DatasetImage,
-    /// Width and height that the manifest tells of.
+    /// Width and height, as the manifest says.
     pub(crate) size: [u32; 2],
 }
 
-/// Images by what they are; those of A and of B.
+/// The images of A and of B, paired.
 pub(crate) type ImagePairs = BTreeMap<ImageKey, [Option<FoundImage>; 2]>;
 
-/// The views of both.
+/// The views and images of both data sets.
 pub(crate) struct Views {
     pub(crate) changes: ViewChanges,
     pub(crate) images: ImagePairs,
-    /// Those that both keep at other angles.
+    /// Views that both keep, at other angles.
     pub(crate) redrawn: BTreeSet<ImageKey>,
 }
 
-/// What is listed of an area.
+/// The lists of an area.
 struct Listed {
     views: Option<Vec<ViewRecord>>,
     photographs: BTreeMap<String, PhotographRecord>,
 }
 
+/// Reads the lists of an area; empty lists if the data set lacks it.
 fn listed(sides: &Sides, side: Side, area: u32) -> Result<Listed> {
     let data = sides.of(side);
     if !data.areas().contains(&area) {
@@ -63,18 +64,20 @@ fn listed(sides: &Sides, side: Side, area: u32) -> Result<Listed> {
     Ok(Listed { views, photographs })
 }
 
-/// Reads what both list, and pairs their images.
+/// Reads both lists, and pairs the images.
 pub(crate) fn compare(sides: &Sides) -> Result<Views> {
     let mut views =
         Views { changes: ViewChanges::default(), images: BTreeMap::new(), redrawn: BTreeSet::new() };
     for area in sides.areas() {
-        let (a, b) = (listed(sides, Side::A, area)?, listed(sides, Side::B, area)?);
+        let a = listed(sides, Side::A, area)?;
+        let b = listed(sides, Side::B, area)?;
         let both = [(Side::A, &a), (Side::B, &b)];
         let mut numbers: [BTreeMap<(&str, u32), u32>; 2] = Default::default();
         if let (Some(views_a), Some(views_b)) = (&a.views, &b.views) {
             views.drawn(area, views_a, views_b);
             numbers = [views_a, views_b].map(|all| candidates(all));
         }
+
         for (place, (side, listed)) in both.into_iter().enumerate() {
             let data = sides.of(side);
             for image in data.images(area) {
@@ -87,16 +90,19 @@ pub(crate) fn compare(sides: &Sides) -> Result<Views> {
                         candidate(frame).map_or(ImageKind::Frame(frame), ImageKind::Candidate)
                     }
                 };
+
                 let options = data.options();
                 let size = match (kind, photograph) {
                     (ImageKind::Panorama, _) => [options.pano_width, options.pano_width / 2],
                     (_, Some(record)) => [record.width, record.height],
                     (_, None) => [options.size; 2],
                 };
+
                 let key = ImageKey { area, uuid: image.uuid.clone(), kind };
                 views.images.entry(key).or_default()[place] = Some(FoundImage { image, size });
             }
         }
+
         let [locations_a, locations_b] = both.map(|(side, listed)| locations(sides, side, listed, area));
         let named = |uuids: &BTreeSet<String>, others: &BTreeSet<String>| -> Vec<LocationName> {
             uuids
@@ -104,6 +110,7 @@ pub(crate) fn compare(sides: &Sides) -> Result<Views> {
                 .map(|uuid| LocationName { area, uuid: uuid.clone() })
                 .collect()
         };
+
         let [photos_a, photos_b] = [&a, &b].map(|of| of.photographs.keys().cloned().collect());
         let changes = &mut views.changes;
         changes.locations_lost.extend(named(&locations_a, &locations_b));
@@ -111,10 +118,11 @@ pub(crate) fn compare(sides: &Sides) -> Result<Views> {
         changes.photographs_lost.extend(named(&photos_a, &photos_b));
         changes.photographs_gained.extend(named(&photos_b, &photos_a));
     }
+
     Ok(views)
 }
 
-/// The candidates of kept views, by location and the number in their files' names.
+/// The candidate numbers of kept views, by location and frame number.
 fn candidates(views: &[ViewRecord]) -> BTreeMap<(&str, u32), u32> {
     let kept = views
         .iter()
@@ -122,7 +130,7 @@ fn candidates(views: &[ViewRecord]) -> BTreeMap<(&str, u32), u32> {
     kept.collect()
 }
 
-/// The scan locations of an area: those that candidates or panoramas are of.
+/// The scan locations of an area: those of its candidate views and panoramas.
 fn locations(sides: &Sides, side: Side, listed: &Listed, area: u32) -> BTreeSet<String> {
     let of_views = listed.views.iter().flatten().map(|view| view.camera_uuid.clone());
     let images = sides.of(side).images(area).into_iter();
@@ -142,10 +150,14 @@ impl Views {
             kept.map(|view| ((view.camera_uuid.as_str(), view.candidate), view))
                 .collect()
         }
+
         let changes = &mut self.changes;
         changes.kept_a += kept(a);
         changes.kept_b += kept(b);
-        let (a, b) = (by_name(a), by_name(b));
+
+        let a = by_name(a);
+        let b = by_name(b);
+
         let name = |(uuid, candidate): (&str, u32)| ViewName { area, uuid: uuid.to_owned(), candidate };
         changes
             .lost
@@ -153,11 +165,13 @@ impl Views {
         changes
             .gained
             .extend(b.keys().filter(|key| !a.contains_key(*key)).map(|key| name(*key)));
+
         let angles = |view: &ViewRecord| [view.yaw_rad, view.pitch_rad, view.fov_rad];
         for (key, view) in a {
             if b.get(&key).is_some_and(|other| angles(view) != angles(other)) {
                 changes.redrawn.push(name(key));
-                let (uuid, kind) = (key.0.to_owned(), ImageKind::Candidate(key.1));
+                let uuid = key.0.to_owned();
+                let kind = ImageKind::Candidate(key.1);
                 self.redrawn.insert(ImageKey { area, uuid, kind });
             }
         }
@@ -181,9 +195,11 @@ mod tests {
         };
         let a = [view(0, 0.0, Some(0)), view(1, 0.5, Some(1)), view(2, 1.0, None), view(3, 1.5, Some(2))];
         let b = [view(0, 0.0, None), view(1, 0.5, Some(0)), view(2, 1.0, Some(1)), view(3, 1.6, Some(2))];
+
         let mut views =
             Views { changes: ViewChanges::default(), images: BTreeMap::new(), redrawn: BTreeSet::new() };
         views.drawn(7, &a, &b);
+
         let ViewChanges { kept_a, kept_b, lost, gained, redrawn, .. } = views.changes;
         let name = |candidate| ViewName { area: 7, uuid: "a".into(), candidate };
         assert_eq!((kept_a, kept_b), (3, 3));

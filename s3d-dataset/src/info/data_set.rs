@@ -1,4 +1,4 @@
-//! What a data set holds, and what looks wrong in it.
+//! Describes a data set: what it holds, and what looks wrong.
 
 use super::{InfoOptions, SceneInfo, info};
 use crate::context::Context;
@@ -9,7 +9,7 @@ use s3d_io::dataset::Layout;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What a data set holds. Displayed, it is the text that `s3d info OUT` prints.
+/// The contents of a data set. Displayed, it is the text that `s3d info OUT` prints.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct DataSetInfo {
@@ -17,30 +17,31 @@ pub struct DataSetInfo {
     pub folder: PathBuf,
     /// The version of s3d that made it.
     pub version: String,
-    /// The seed that it was made with.
+    /// The seed of the export.
     pub seed: u64,
-    /// Files, all but `manifest.json` and `files.csv`.
+    /// The number of files, without `manifest.json` and `files.csv`.
     pub files: u64,
-    /// Their bytes.
+    /// The size of these files in bytes.
     pub bytes: u64,
-    /// Labels, the null label included; 0 if it has none.
+    /// The number of labels, including the null label; 0 without labels.
     pub labels: usize,
     /// The name of the taxonomy of its labels.
     pub taxonomy: String,
-    /// What of all areas has no votes and no label; `None` without labels, and of earlier versions.
+    /// The surface and pixels without votes and without a label in all areas; `None` without labels, and for
+    /// earlier versions.
     pub unlabelled: Option<Unlabelled>,
-    /// Number of panoramas.
+    /// The number of panoramas.
     pub panoramas: u64,
-    /// Number of views.
+    /// The number of views.
     pub views: u64,
-    /// Its areas: what their scenes would be told of.
+    /// Its areas, described like scenes.
     pub areas: Vec<SceneInfo>,
 }
 
-/// Looks at a complete data set: its manifest, and each of its areas as the scene that it is in itself.
+/// Reads a complete data set: its manifest, and each of its areas as a scene.
 ///
 /// # Errors
-/// [`Error::File`](crate::Error::File) if it is not complete, or not as it was written;
+/// [`Error::File`](crate::Error::File) if it is not complete, or was changed;
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn data_set_info(folder: &Path, ctx: &Context) -> Result<DataSetInfo> {
     let layout = Layout::new(folder);
@@ -53,8 +54,10 @@ pub fn data_set_info(folder: &Path, ctx: &Context) -> Result<DataSetInfo> {
             sum += area;
             sum
         });
+
     let area = |number: &u32| info(layout.area_dir(*number), &InfoOptions::default(), ctx);
     let list = manifest.files.as_ref();
+
     Ok(DataSetInfo {
         folder: folder.to_owned(),
         version: manifest.version.clone(),
@@ -70,7 +73,7 @@ pub fn data_set_info(folder: &Path, ctx: &Context) -> Result<DataSetInfo> {
     })
 }
 
-/// Whether a folder is that of a data set, complete or not.
+/// Whether a folder has a data set, complete or not.
 pub fn is_data_set(folder: &Path) -> bool {
     folder.is_dir() && Layout::new(folder).manifest().is_file()
 }

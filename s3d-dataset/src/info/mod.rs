@@ -1,4 +1,4 @@
-//! What a scene holds, and what looks wrong in it.
+//! Describes a scene: what it holds, and what looks wrong.
 
 mod data_set;
 
@@ -25,21 +25,21 @@ use s3d_render::Scene;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// How a scene is looked at.
+/// The options of [`info`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InfoOptions {
-    /// Show the scan locations that an export would put on the floor, no two of a room nearer than this,
-    /// metres.
+    /// Show the scan locations that an export would place on the floor. No two of a room are nearer than
+    /// this, metres.
     pub place_cameras: Option<f64>,
-    /// Show those that see this share of the surface.
+    /// Show the placed scan locations that together see this share of the surface.
     pub see: Option<f64>,
-    /// The seed by which they would be placed.
+    /// The seed for placing them.
     pub seed: u64,
-    /// Skip and count what is not as it should be in the annotations, as in an export that is lenient.
+    /// Skip and count faults in the annotations, like a lenient export.
     pub lenient: bool,
 }
 
-/// What a scene holds. Displayed, it is the text that `s3d info` prints.
+/// The contents of a scene. Displayed, it is the text that `s3d info` prints.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct SceneInfo {
@@ -47,30 +47,31 @@ pub struct SceneInfo {
     pub area: u32,
     /// Its mesh.
     pub mesh: MeshInfo,
-    /// Its storeys, from below.
+    /// Its storeys, from the lowest.
     pub storeys: Vec<Storey>,
-    /// What was found out about it, a sentence each.
+    /// Findings about it, a sentence each.
     pub notes: Vec<String>,
-    /// Whether there are labels: if not, it has no rooms either.
+    /// Whether there are labels. Without labels it has no rooms.
     pub is_labelled: bool,
     /// Its rooms, by name.
     pub rooms: Vec<RoomInfo>,
-    /// Annotated points.
+    /// The number of annotated points.
     pub points: u64,
-    /// Faces that get a label, and those of them that labels dispute.
+    /// The number of faces that get a label, contested faces included.
     pub labelled_faces: u64,
-    /// Faces for which several labels have votes.
+    /// The number of faces with votes for several labels.
     pub contested_faces: u64,
-    /// Points farther than 5 cm from every face.
+    /// The number of points farther than 5 cm from every face.
     pub far_points: u64,
-    /// The pictures that colours come from, in a sentence; `None` if they are the mesh's own, or cannot be
-    /// used.
+    /// The pictures that colours come from, in a sentence; `None` if the mesh has its own colours, or the
+    /// pictures cannot be used.
     pub pictures: Option<String>,
     /// Its scan locations.
     pub locations: Vec<LocationInfo>,
-    /// How much of the surface they see, in a sentence; `None` if they were not placed by what they see.
+    /// The share of the surface that the locations see, in a sentence; `None` if they were not placed by what
+    /// they see.
     pub surface_seen: Option<String>,
-    /// About how large an export with the default options becomes.
+    /// The estimated size of an export with the default options.
     pub estimate: Estimate,
     /// What looks wrong, a sentence each.
     pub doubts: Vec<String>,
@@ -80,20 +81,20 @@ pub struct SceneInfo {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct MeshInfo {
-    /// Number of faces.
+    /// The number of faces.
     pub faces: usize,
-    /// Number of vertices.
+    /// The number of vertices.
     pub vertices: usize,
-    /// Number of materials.
+    /// The number of materials.
     pub materials: usize,
     /// Names of its textures, with width and height in pixels.
     pub textures: Vec<(String, u32, u32)>,
-    /// Square metres.
+    /// The area of its surface, square metres.
     pub area_m2: f64,
     /// Its box, world metres, Z-up.
     pub bounds: Aabb,
-    /// What was subtracted from the coordinates of its files, and is from those of points and locations; 0
-    /// if nothing is.
+    /// The offset that was subtracted from the coordinates of its files, and is subtracted from those of
+    /// points and locations, metres; 0 without one.
     pub offset_m: [f64; 3],
 }
 
@@ -103,13 +104,13 @@ pub struct MeshInfo {
 pub struct RoomInfo {
     /// Its name.
     pub room: Room,
-    /// Its annotated points.
+    /// The number of its annotated points.
     pub points: u64,
-    /// Square metres of floor.
+    /// The area of its floor, square metres.
     pub floor_m2: f64,
     /// The direction of its walls, degrees from +X, in [0, 90).
     pub wall_direction_deg: u32,
-    /// How many instances it has of each class.
+    /// The number of its instances, by class.
     pub instances: BTreeMap<Class, u32>,
 }
 
@@ -117,18 +118,18 @@ pub struct RoomInfo {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct LocationInfo {
-    /// Where it is.
+    /// The uuid and pose.
     pub location: ScanLocation,
     /// Its room, if there are rooms.
     pub room: Option<Room>,
     /// The share of directions in which it sees the mesh, 0 to 1.
     pub coverage: f64,
-    /// The distance to the nearest of what it sees, metres.
+    /// The distance to the nearest surface that it sees, metres.
     pub nearest_m: f32,
 }
 
-/// Looks at a scene file, or the folder of a published area. All of the scene is read, and labelled as an
-/// export would.
+/// Describes a scene file, or the folder of a published area. The whole scene is read, and labelled as in an
+/// export.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be
@@ -186,6 +187,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
             nearest_m: outlook.nearest_m,
         })
         .collect();
+
     let total = &annotated.report.total;
     Ok(SceneInfo {
         area: area.number,
@@ -206,8 +208,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     })
 }
 
-/// What `info` does with the results of a survey: it keeps all that looks wrong, and stops at nothing that an
-/// export would stop at.
+/// Collects everything that looks wrong in a survey. It stops at nothing that would stop an export.
 struct InfoSurveyor<'a> {
     doubts: &'a mut Vec<String>,
     findings: &'a mut Vec<Finding>,
@@ -215,7 +216,7 @@ struct InfoSurveyor<'a> {
 
 impl Surveyor for InfoSurveyor<'_> {
     fn label_findings(&mut self, labels: Vec<Finding>, locations: Vec<Finding>) -> Result<Locating> {
-        // So many locations would take hours to place.
+        // This many locations would take hours to place.
         let too_many = stops_any(&locations);
         self.findings.extend(labels);
         self.findings.extend(locations);
@@ -223,7 +224,7 @@ impl Surveyor for InfoSurveyor<'_> {
     }
 
     fn unplaced(&mut self, why: Error) -> Result<()> {
-        // Whatever else there is to know is no less true.
+        // The rest of the description is still true.
         let Error::Input(why) = why else { return Err(why) };
         self.doubts.push(format!("{why}; an export stops here"));
         Ok(())
@@ -235,8 +236,8 @@ impl Surveyor for InfoSurveyor<'_> {
     }
 }
 
-/// A sentence on the scanner's pictures that colours come from; `None` if colours are the mesh's own, or the
-/// pictures cannot be used. What looks wrong about them goes to `doubts`.
+/// A sentence on the scanner's pictures that colours come from. `None` if the mesh has its own colours, or
+/// the pictures cannot be used. Doubts about the pictures go to `doubts`.
 fn picture_summary(area: &AreaInput, doubts: &mut Vec<String>) -> Option<String> {
     match Pictures::open(area, |_| true) {
         Ok(pictures) => pictures.map(|pictures| {
@@ -251,7 +252,7 @@ fn picture_summary(area: &AreaInput, doubts: &mut Vec<String>) -> Option<String>
     }
 }
 
-/// A sentence on what scan locations see of the unlabelled surface, if it is much.
+/// A sentence on the unlabelled surface that scan locations see, if it is much.
 fn unlabelled_doubt(scene: &Scene<'_>, locations: &[ScanLocation], annotated: &Annotated) -> Option<String> {
     let share = unlabelled_share(scene, locations, &annotated.label_of_face)?;
     (share > MUCH_UNLABELLED).then(|| {
@@ -302,12 +303,14 @@ impl MeshInfo {
 impl fmt::Display for SceneInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "area {}\n\n{}", self.area, self.mesh)?;
+
         if !self.storeys.is_empty() {
             let storeys: Vec<String> = self.storeys.iter().map(Storey::to_string).collect();
             let plural = if storeys.len() == 1 { "storey" } else { "storeys" };
             writeln!(f, "  {} {plural}: {}", storeys.len(), storeys.join("; "))?;
         }
         self.notes.iter().try_for_each(|note| writeln!(f, "  {note}"))?;
+
         if self.is_labelled {
             writeln!(f, "annotations: {} points, {} rooms", self.points, self.rooms.len())?;
             self.rooms.iter().try_for_each(|room| writeln!(f, "{room}"))?;
@@ -320,12 +323,16 @@ impl fmt::Display for SceneInfo {
         } else {
             writeln!(f, "annotations: none, so that a data set of it has no labels")?;
         }
+
         if let Some(pictures) = &self.pictures {
             writeln!(f, "\ncolours: {pictures}")?;
         }
+
         writeln!(f, "\nscan locations: {}", self.locations.len())?;
         for LocationInfo { location, room, coverage, nearest_m } in &self.locations {
-            let (uuid, at, room) = (&location.uuid, location.pose.location, room_name(*room));
+            let uuid = &location.uuid;
+            let at = location.pose.location;
+            let room = room_name(*room);
             writeln!(
                 f,
                 "  {uuid}  ({:.2}, {:.2}, {:.2})  {room}  sees the mesh in {:.0} %, the nearest of it at \
@@ -336,9 +343,11 @@ impl fmt::Display for SceneInfo {
                 100.0 * coverage
             )?;
         }
+
         if let Some(seen) = &self.surface_seen {
             writeln!(f, "  {seen}")?;
         }
+
         writeln!(f, "\nan export with the default options: {}", self.estimate)?;
         let verdict = if self.doubts.is_empty() {
             "nothing looks wrong"
@@ -352,7 +361,8 @@ impl fmt::Display for SceneInfo {
 
 impl fmt::Display for MeshInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (b, s) = (self.bounds, self.bounds.size());
+        let b = self.bounds;
+        let s = b.size();
         writeln!(
             f,
             "mesh: {} faces, {} vertices, {} materials, {} textures, {:.1} m²",
@@ -367,9 +377,11 @@ impl fmt::Display for MeshInfo {
             "  {:.2} × {:.2} × {:.2} m, from ({:.2}, {:.2}, {:.2}) to ({:.2}, {:.2}, {:.2}), Z-up",
             s.x, s.y, s.z, b.min.x, b.min.y, b.min.z, b.max.x, b.max.y, b.max.z
         )?;
+
         if self.offset_m != [0.0; 3] {
             writeln!(f, "  less offset_m = {:?}, as are points and scan locations", self.offset_m)?;
         }
+
         self.textures
             .iter()
             .try_for_each(|(name, width, height)| writeln!(f, "  {name} {width} × {height}"))

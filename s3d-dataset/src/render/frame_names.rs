@@ -1,24 +1,17 @@
-//! Names for the files of a list of cameras.
+//! Names the files of a list of cameras.
 
 use s3d_io::camera::PosedCamera;
 use s3d_io::fs::{UniqueNames, portable_file_name};
 
-/// Endings of pictures, which the files made of them do not keep. A time stamp keeps its decimals.
+/// Endings of pictures, which are left out of the names. Other endings stay, such as the decimals of a time
+/// stamp.
 const ENDINGS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "bmp", "tif", "tiff", "exr", "heic"];
 
-/// A file name without ending for each camera, none twice: its name in the list without folders, or with them
-/// if that would not tell cameras apart.
+/// A unique file name without ending for each camera: its name in the list without folders, or with them if
+/// the short names are not unique.
 pub(super) fn frame_names(cameras: &[PosedCamera]) -> Vec<String> {
-    let stem = |name: &str| {
-        let cut = name
-            .rsplit_once('.')
-            .filter(|(_, e)| ENDINGS.iter().any(|ending| e.eq_ignore_ascii_case(ending)));
-        let name = portable_file_name(cut.map_or(name, |(stem, _)| stem));
-        if name.is_empty() { "view".to_owned() } else { name }
-    };
-    let last = |name: &str| stem(name.rsplit(['/', '\\']).next().unwrap_or(name));
     let mut seen = UniqueNames::default();
-    let short: Vec<String> = cameras.iter().map(|camera| last(&camera.name)).collect();
+    let short: Vec<String> = cameras.iter().map(|camera| last_stem(&camera.name)).collect();
     if short.iter().all(|name| seen.add(name) == *name) {
         return short;
     }
@@ -27,6 +20,20 @@ pub(super) fn frame_names(cameras: &[PosedCamera]) -> Vec<String> {
         .iter()
         .map(|camera| names.add(&stem(camera.name.trim_start_matches("./"))))
         .collect()
+}
+
+/// The name without the ending of a picture, as a portable file name.
+fn stem(name: &str) -> String {
+    let cut = name
+        .rsplit_once('.')
+        .filter(|(_, e)| ENDINGS.iter().any(|ending| e.eq_ignore_ascii_case(ending)));
+    let name = portable_file_name(cut.map_or(name, |(stem, _)| stem));
+    if name.is_empty() { "view".to_owned() } else { name }
+}
+
+/// The stem of a name without its folders.
+fn last_stem(name: &str) -> String {
+    stem(name.rsplit(['/', '\\']).next().unwrap_or(name))
 }
 
 #[cfg(test)]

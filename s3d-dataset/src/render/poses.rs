@@ -1,4 +1,4 @@
-//! The views of a list of cameras: the mesh is loaded once, cameras are shared among all threads.
+//! Renders the views of a list of cameras. The mesh is loaded once, and all threads share the cameras.
 
 use super::frame_names::frame_names;
 use super::view::{IMAGES, RenderOptions, channels, face_image, faces_fit};
@@ -25,24 +25,24 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// The file that says what the images are.
+/// The file that describes the images.
 const CAMERAS: &str = "transforms.json";
 
 const GENERATOR: &str = "s3d render";
 
-/// The most pixels of a side of an image.
+/// The largest width or height of an image, pixels.
 const MAX_SIDE: u32 = 32_768;
 
-/// How the views of a list of cameras are rendered.
+/// The options of [`render_poses`].
 #[derive(Clone, Debug)]
 pub struct PosesOptions {
-    /// As for one view.
+    /// The options of a single view.
     pub render: RenderOptions,
-    /// Which axis of the list's frame points up.
+    /// The axis of the list's frame that points up.
     pub poses_up: UpAxis,
-    /// Size, focal lengths or angle of view, instead of what the list says or where it says nothing.
+    /// Size, focal lengths or angle of view. They replace the values of the list, or fill in missing ones.
     pub intrinsics: GivenIntrinsics,
-    /// Conditions that need not be met: [`Condition::Coverage`] alone is looked at.
+    /// Conditions that need not be met. Only [`Condition::Coverage`] is used.
     pub allow: Vec<Condition>,
 }
 
@@ -53,24 +53,24 @@ impl Default for PosesOptions {
     }
 }
 
-/// What [`render_poses`] made.
+/// The counts that [`render_poses`] returns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct RenderedPoses {
-    /// Cameras, each with an image of every kind.
+    /// The number of cameras, each with an image of every kind.
     pub views: u64,
-    /// Those that see nothing of the mesh.
+    /// The number of cameras that see nothing of the mesh.
     pub blind: u64,
-    /// Entries of the list that were left out since it says that their pose is not known.
+    /// The number of entries that were left out because the list has no pose for them.
     pub untracked: u64,
 }
 
-/// `transforms.json`, as nerfstudio reads it. What it does not know it passes over.
+/// `transforms.json` for nerfstudio, which ignores unknown keys.
 #[derive(Serialize)]
 struct Transforms<'a> {
     generator: &'static str,
     camera_model: &'static str,
-    /// What was subtracted from the coordinates of the mesh's file, and from the cameras'.
+    /// The offset that was subtracted from the coordinates of the mesh's file and of the cameras, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     world_offset_m: Option<[f64; 3]>,
     frames: Vec<ListedFrame<'a>>,
@@ -78,7 +78,7 @@ struct Transforms<'a> {
 
 #[derive(Serialize)]
 struct ListedFrame<'a> {
-    /// The camera's name in the list that was read.
+    /// The camera's name in the given list.
     name: &'a str,
     #[serde(flatten)]
     frame: NerfstudioFrame,
@@ -92,13 +92,13 @@ struct Frame<'a> {
     camera: Camera,
 }
 
-/// Renders what the cameras of a list see of a mesh's file: `rgb/NAME.png`, `depth/NAME.png`,
-/// `normal/NAME.png`, `global_xyz/NAME.exr` and `faces/NAME.png` in the folder `output`, and
-/// `transforms.json` with every camera. See [`read_posed_cameras`] for the lists that are read. The folder
-/// appears whole or not at all: after a kill the same call begins anew.
+/// Renders what the cameras of a list see of a mesh. Writes `rgb/NAME.png`, `depth/NAME.png`,
+/// `normal/NAME.png`, `global_xyz/NAME.exr` and `faces/NAME.png` into the folder `output`, and
+/// `transforms.json` with every camera. [`read_posed_cameras`] describes the accepted lists. The folder
+/// appears whole or not at all: a killed call starts again from the beginning.
 ///
 /// # Errors
-/// [`Error::Usage`] if the folder is not empty and not to be replaced, or the list lacks sizes or focal
+/// [`Error::Usage`] if the folder is not empty and may not be replaced, or the list lacks sizes or focal
 /// lengths that the options do not give; [`Error::File`]; [`Error::Input`] if no camera sees anything;
 /// [`Error::Cancelled`].
 pub fn render_poses(
@@ -108,11 +108,13 @@ pub fn render_poses(
     options: &PosesOptions,
     ctx: &Context,
 ) -> Result<RenderedPoses> {
-    let (parent, folder_name) = (parent_of(output), Path::new(output.file_name().unwrap_or_default()));
+    let parent = parent_of(output);
+    let folder_name = Path::new(output.file_name().unwrap_or_default());
     let overwrite = options.render.overwrite;
     if !Staging::is_left(&parent, folder_name) {
         check_free(output, overwrite)?;
     }
+
     let world_from_poses = DAffine3::from_mat3(options.poses_up.rotation());
     let PosedCameras { cameras, untracked, .. } = read_posed_cameras(poses, &world_from_poses)?;
     let mut frames = frames(poses, &cameras, &options.intrinsics)?;
@@ -122,7 +124,7 @@ pub fn render_poses(
         MeshOptions { origin: MeshOrigin::Near, units: options.render.units, ..MeshOptions::default() };
     let file = s3d_io::mesh::read_mesh_with(mesh, options.render.up, &near)?;
     ctx.warn_each(&file.warnings);
-    // What is written is in the frame of the mesh as it was read.
+    // Images are in the frame of the mesh, so cameras have its offset subtracted too.
     frames
         .iter_mut()
         .for_each(|frame| frame.camera.pose.location -= file.offset_m);
@@ -133,6 +135,7 @@ pub fn render_poses(
              cameras', which {CAMERAS} tells"
         ));
     }
+
     create_dir(&parent)?;
     let staging = Staging::begin(ctx, &parent, folder_name)?;
     check_free(output, overwrite || staging.was_placing())?;
@@ -141,9 +144,11 @@ pub fn render_poses(
     let seconds = started.elapsed().as_secs_f64();
 
     let places = frames.iter().map(|frame| frame.camera.pose.location.as_vec3());
-    let (places, count) = (Aabb::from_points(places), frames.len() as u64);
+    let places = Aabb::from_points(places);
+    let count = frames.len() as u64;
     let findings = poses_findings(blind, count, &places, &file.mesh.aabb(), "up and poses_up");
     judge_of(("the views", "write them"), ctx, &findings, &options.allow)?;
+
     let is_panorama = frames.first().is_some_and(|frame| frame.camera.is_panorama());
     let listed = |frame: &Frame<'_>| NerfstudioFrame::new(format!("rgb/{}.png", frame.stem), &frame.camera);
     let transforms = Transforms {
@@ -155,6 +160,7 @@ pub fn render_poses(
             .map(|f| ListedFrame { name: f.name, frame: listed(f) })
             .collect(),
     };
+
     write_json(&staging.path().join(CAMERAS), &transforms)?;
     staging.place_folder(output, is_ours(output))?;
     ctx.info(format_args!("{}: {} views in {seconds:.1} s", output.display(), frames.len()));
@@ -187,6 +193,7 @@ fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics)
                 _ => at(e.to_string()).into(),
             }
         })?;
+
         let (w, h) = (camera.width, camera.height);
         if w > MAX_SIDE || h > MAX_SIDE {
             let what = at(format!("images of {w} × {h} pixels")).to_string();
@@ -195,6 +202,7 @@ fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics)
         }
         frames.push(Frame { name: &posed.name, stem, camera });
     }
+
     let panoramas = frames.iter().filter(|frame| frame.camera.is_panorama()).count();
     if panoramas > 0 && panoramas < frames.len() {
         let message = format!(
@@ -204,10 +212,11 @@ fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics)
         );
         return Err(FileError::format(poses, message).into());
     }
+
     Ok(frames)
 }
 
-/// What is left out of what the list says.
+/// Warns of entries that were left out and of lenses that are ignored.
 fn tell_of_list(ctx: &Context, cameras: &[PosedCamera], untracked: usize) {
     if untracked > 0 {
         let all = cameras.len() + untracked;
@@ -225,7 +234,7 @@ fn tell_of_list(ctx: &Context, cameras: &[PosedCamera], untracked: usize) {
     }
 }
 
-/// Writes the images of all views into folders by kind; returns how many views see nothing.
+/// Writes the images of all views into folders by kind. Returns the number of views that see nothing.
 fn write_images(
     ctx: &Context,
     mesh: &s3d_geom::TriMesh,
@@ -239,11 +248,14 @@ fn write_images(
     let faces = faces_fit(ctx, mesh.faces().len()).then(|| folder.join("faces"));
     let folders: Vec<PathBuf> = IMAGES.into_iter().map(folder_of).chain(faces.clone()).collect();
     folders.iter().try_for_each(|folder| create_dir(folder))?;
-    let (scene, textures) = (Scene::new(mesh), MipMaps::new(mesh));
+
+    let scene = Scene::new(mesh);
+    let textures = MipMaps::new(mesh);
     let channels = channels(&scene, &textures, options);
     let progress = ctx.progress("rendering", "views", frames.len() as u64);
     let blind = AtomicU64::new(0);
     let memory = || (Caster::new(&scene), Hits::default(), ImageBuffers::default());
+
     for_each_in_order(ctx, frames, memory, |(caster, hits, buffers), frame| {
         let Frame { stem, camera, name } = frame;
         caster.cast_into(camera, 1, hits);
@@ -263,7 +275,7 @@ fn write_images(
     Ok(blind.into_inner())
 }
 
-/// Refuses a folder that holds something, unless it is one of ours that may be replaced.
+/// Refuses a folder that holds anything, unless this command wrote it and may replace it.
 fn check_free(output: &Path, overwrite: bool) -> Result<()> {
     let mut entries = match fs::read_dir(output) {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
@@ -272,6 +284,7 @@ fn check_free(output: &Path, overwrite: bool) -> Result<()> {
     };
     let Some(first) = entries.next() else { return Ok(()) };
     let first = first.map_err(|e| FileError::io(output, "read", e))?.file_name();
+
     let folder = output.to_owned();
     let entry = first.display().to_string();
     match (is_ours(output), overwrite) {
@@ -284,7 +297,7 @@ fn check_free(output: &Path, overwrite: bool) -> Result<()> {
     }
 }
 
-/// Whether a folder was written here.
+/// Whether this command wrote a folder.
 fn is_ours(folder: &Path) -> bool {
     #[derive(Deserialize)]
     struct Told {

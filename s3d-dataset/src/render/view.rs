@@ -1,4 +1,4 @@
-//! One view of a mesh.
+//! Renders one view of a mesh.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -16,41 +16,41 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 
-/// Colours for faces: all but (255, 255, 255), which means that nothing is seen.
+/// The number of colours for faces. (255, 255, 255) is not one: it means that nothing is seen.
 const FACES_IN_COLORS: usize = 0xff_ffff;
 
-/// What `camera.json` tells: enough to put the images back into the world.
+/// The content of `camera.json`, enough to place the images in the world.
 #[derive(Serialize)]
 struct View {
     width: u32,
     height: u32,
     projection: &'static str,
     camera_location: [f64; 3],
-    /// Row by row; a panorama has none.
+    /// Row by row; `None` for a panorama.
     #[serde(skip_serializing_if = "Option::is_none")]
     camera_k_matrix: Option<[[f64; 3]; 3]>,
     /// World → camera, OpenCV axes, 3 × 4.
     camera_rt_matrix: [[f64; 4]; 3],
     field_of_view_rads: f64,
-    /// What was subtracted from the coordinates of the mesh's file.
+    /// The offset that was subtracted from the coordinates of the mesh's file, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     world_offset_m: Option<[f64; 3]>,
 }
 
-/// One view of a mesh.
+/// The options of [`render`].
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
-    /// Which axis of the mesh's file points up.
+    /// The axis of the mesh's file that points up.
     pub up: UpAxis,
-    /// The unit of the mesh's file; `None`: what it says, or else metres.
+    /// The unit of the mesh's file. `None` uses the unit that the file names, or metres.
     pub units: Option<LengthUnit>,
-    /// The faces' normals, or those interpolated from the mesh's own where it has some.
+    /// Normals of faces, or interpolated from the mesh's own if it has any.
     pub normals: Normals,
-    /// As [`ExportOptions::rgb_samples`](crate::ExportOptions::rgb_samples).
+    /// See [`ExportOptions::rgb_samples`](crate::ExportOptions::rgb_samples).
     pub rgb_samples: u32,
-    /// How much time the images' files may take.
+    /// The time that compressing image files may take.
     pub compression: Compression,
-    /// Replace images that are there.
+    /// Replace existing images.
     pub overwrite: bool,
 }
 
@@ -67,10 +67,10 @@ impl Default for RenderOptions {
     }
 }
 
-/// The images of a view that need no annotation, but that of faces.
+/// The images of a view that need no annotation, without the image of faces.
 pub(super) const IMAGES: [Image; 4] = [Image::Rgb, Image::Depth, Image::Normal, Image::GlobalXyz];
 
-/// What they are made from.
+/// The inputs of these images.
 pub(super) fn channels<'a>(
     scene: &'a Scene<'a>,
     textures: &'a MipMaps,
@@ -91,7 +91,7 @@ pub(super) fn channels<'a>(
     }
 }
 
-/// Whether every face has a colour of its own in an image of faces; warns if not.
+/// Whether every face has its own colour in an image of faces. Warns if not.
 pub(super) fn faces_fit(ctx: &Context, faces: usize) -> bool {
     if faces >= FACES_IN_COLORS {
         ctx.warn(format_args!("no images of faces: {faces} faces are more than 24 bits can tell apart"));
@@ -99,12 +99,12 @@ pub(super) fn faces_fit(ctx: &Context, faces: usize) -> bool {
     faces < FACES_IN_COLORS
 }
 
-/// Renders what a camera sees of a mesh's file, in every modality that needs no annotation: `rgb.png`,
-/// `depth.png`, `normals.png`, `global_xyz.exr`, `faces.png` (indices of faces as R·65536 + G·256 + B; 255,
-/// 255, 255 where nothing is seen) and `camera.json` in the folder `output`.
+/// Renders what a camera sees of a mesh, in every modality that needs no annotation. Writes `rgb.png`,
+/// `depth.png`, `normals.png`, `global_xyz.exr`, `faces.png` and `camera.json` into the folder `output`.
+/// Faces are indices as R·65536 + G·256 + B, or (255, 255, 255) where nothing is seen.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if one of them is there and not to be replaced;
+/// [`Error::Usage`](crate::Error::Usage) if one of the files exists and may not be replaced;
 /// [`Error::File`](crate::Error::File).
 pub fn render(
     mesh: &Path,
@@ -113,19 +113,13 @@ pub fn render(
     options: &RenderOptions,
     ctx: &Context,
 ) -> Result<()> {
-    let name_of = |image: Image| match image {
-        Image::Rgb => "rgb.png",
-        Image::Depth => "depth.png",
-        Image::Normal => "normals.png",
-        _ => "global_xyz.exr",
-    };
     let names = IMAGES.into_iter().map(name_of).chain(["faces.png", "camera.json"]);
     let refuse = |overwrite| {
         names
             .clone()
             .try_for_each(|name| refuse_existing(&output.join(name), overwrite))
     };
-    // For what is made of several files, all of them or none.
+    // Several files make one result: all of them appear or none.
     let whole = Path::new("render");
     if !Staging::is_left(output, whole) {
         refuse(options.overwrite)?;
@@ -133,7 +127,7 @@ pub fn render(
 
     let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
     let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
-    // What is written is in the frame of the mesh as it was read.
+    // Images are in the frame of the mesh, so the camera has its offset subtracted too.
     let mut camera = *camera;
     camera.pose.location -= file.offset_m;
     let camera = &camera;
@@ -145,11 +139,13 @@ pub fn render(
         ));
     }
     file.warnings.iter().for_each(|w| ctx.warn(w));
+
     let scene = Scene::new(&file.mesh);
     let textures = MipMaps::new(&file.mesh);
     let started = Instant::now();
     let hits = cast(&scene, camera);
     let cast_seconds = started.elapsed().as_secs_f64();
+
     if coverage(&hits) == 0.0 {
         let b = file.mesh.aabb();
         ctx.warn(format_args!(
@@ -157,6 +153,7 @@ pub fn render(
             camera.pose.location, b.min, b.max
         ));
     }
+
     let channels = channels(&scene, &textures, options);
     create_dir(output)?;
     let staging = Staging::begin(ctx, output, whole)?;
@@ -168,6 +165,7 @@ pub fn render(
     if faces_fit(ctx, file.mesh.faces().len()) {
         write_bytes(&folder.join("faces.png"), &face_image(&hits, options.compression))?;
     }
+
     let is_panorama = camera.is_panorama();
     let view = View {
         width: camera.width,
@@ -179,6 +177,7 @@ pub fn render(
         field_of_view_rads: camera.fov_rad(),
         world_offset_m,
     };
+
     write_json(&folder.join("camera.json"), &view)?;
     staging.place_files(output)?;
     ctx.info(format_args!(
@@ -190,6 +189,16 @@ pub fn render(
         cast_seconds
     ));
     Ok(())
+}
+
+/// The file name of an image.
+fn name_of(image: Image) -> &'static str {
+    match image {
+        Image::Rgb => "rgb.png",
+        Image::Depth => "depth.png",
+        Image::Normal => "normals.png",
+        _ => "global_xyz.exr",
+    }
 }
 
 /// Face indices as colours, R·65536 + G·256 + B; (255, 255, 255) where nothing is seen.

@@ -1,4 +1,4 @@
-//! The files of a data set against the list of them: which there are, their sizes and checksums.
+//! Checks the files of a data set against their list: which there are, their sizes and checksums.
 
 use super::report::{Report, Topic};
 use crate::context::Context;
@@ -21,20 +21,22 @@ const EXTRA: (Topic, &str) = (Topic::Files, "files that no list names");
 
 /// The list of files, if the data set has one.
 pub(crate) struct Files {
-    /// By path, and whether it was looked at.
+    /// The records by path, each with a flag that is set once its file was checked.
     listed: Option<BTreeMap<String, (FileRecord, AtomicBool)>>,
 }
 
 impl Files {
-    /// Reads the list, and holds it against the manifest.
+    /// Reads the list, and checks it against the manifest.
     pub(crate) fn read(layout: &Layout, manifest: &Manifest, report: &Report) -> Self {
         let path = layout.file_list();
         let Some(told) = &manifest.files else {
             let _ = report.ok(Topic::Files, Listed::read(layout, manifest));
             return Self { listed: None };
         };
+
         let records = report.read(Topic::Files, &path, read_file_list);
         report.expect(records.clone(), told.bytes);
+
         if let (Some(records), Some((bytes, sum))) =
             (&records, report.read(Topic::Files, &path, checksum_of_file))
         {
@@ -42,7 +44,8 @@ impl Files {
             checks.check(sum == told.xxh3_128, || {
                 format!("{bytes} bytes with the checksum {sum}, and the manifest tells of {}", told.xxh3_128)
             });
-            let (count, bytes) = (records.len() as u64, records.iter().map(|r| r.bytes).sum::<u64>());
+            let count = records.len() as u64;
+            let bytes = records.iter().map(|r| r.bytes).sum::<u64>();
             checks.check((count, bytes) == (told.count, told.bytes), || {
                 format!(
                     "{count} files of {bytes} bytes, and the manifest tells of {} of {}",
@@ -50,6 +53,7 @@ impl Files {
                 )
             });
         }
+
         let listed = |r: FileRecord| (r.path.clone(), (r, AtomicBool::new(false)));
         Self { listed: records.map(|records| records.into_iter().map(listed).collect()) }
     }
@@ -59,7 +63,7 @@ impl Files {
         self.check_by(path, report, |record| record.check(report.root()));
     }
 
-    /// The same with the bytes that were read of it.
+    /// Does the same with bytes that were read from the file.
     pub(crate) fn check_bytes(&self, path: &Path, bytes: &[u8], report: &Report) {
         self.check_by(path, report, |record| record.check_bytes(report.root(), bytes));
     }
@@ -73,7 +77,7 @@ impl Files {
         }
     }
 
-    /// Checks all that was not looked at yet, and tells of files that are not listed.
+    /// Checks all files that were not checked yet, and reports files that are not listed.
     pub(crate) fn check_rest(
         &self,
         ctx: &Context,
@@ -92,18 +96,22 @@ impl Files {
             }
             return Ok(());
         };
+
         for path in &there {
             report.check(listed.contains_key(&report.relative(path)), EXTRA, path, || {
                 "files.csv does not name it".to_owned()
             });
         }
+
         let mut left: Vec<&FileRecord> = listed
             .values()
             .filter(|(_, seen)| !seen.load(Ordering::Relaxed))
             .map(|(r, _)| r)
             .collect();
-        // The largest first, so that no thread is left with one at the end.
+
+        // The largest come first, so that no thread is left with a large one at the end.
         left.sort_by_key(|r| std::cmp::Reverse(r.bytes));
+
         let progress = ctx.progress("reading", "files", left.len() as u64);
         for_each_in_order(
             ctx,
@@ -119,9 +127,10 @@ impl Files {
     }
 }
 
-/// Whether a file has the size and checksum that are listed.
+/// Whether a file has its listed size and checksum.
 type Checked = std::result::Result<(), FileError>;
 
+/// Counts both checks of a file, and reports a fault.
 fn tell(checked: Checked, report: &Report) {
     report.checked(2);
     if let Err(e) = checked {
@@ -129,7 +138,7 @@ fn tell(checked: Checked, report: &Report) {
     }
 }
 
-/// All files of the data set but its manifest and list, sorted.
+/// All files of the data set without its manifest and list, sorted.
 fn all_files(layout: &Layout, areas: &[u32], report: &Report) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in layout.entries(areas).into_iter().chain(layout.shared_dirs()) {
@@ -145,7 +154,7 @@ fn all_files(layout: &Layout, areas: &[u32], report: &Report) -> Vec<PathBuf> {
     files
 }
 
-/// Whether a file lies where images do.
+/// Whether a file lies in a folder of images.
 fn is_in_images(layout: &Layout, areas: &[u32], path: &Path) -> bool {
     areas.iter().any(|a| {
         [Frame::Panorama, Frame::View(0)].into_iter().any(|frame| {
@@ -156,9 +165,11 @@ fn is_in_images(layout: &Layout, areas: &[u32], path: &Path) -> bool {
     })
 }
 
-/// All files below a folder, sorted; none if it is not there.
+/// All files below a folder, sorted; none if the folder is not there.
 pub(crate) fn walk(folder: &Path, report: &Report) -> Vec<PathBuf> {
-    let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    let mut files = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+
     while let Some(folder) = folders.pop() {
         let entries = match fs::read_dir(&folder) {
             Ok(entries) => entries,
@@ -177,6 +188,7 @@ pub(crate) fn walk(folder: &Path, report: &Report) -> Vec<PathBuf> {
             }
         }
     }
+
     files.sort();
     files
 }

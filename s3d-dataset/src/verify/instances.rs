@@ -1,4 +1,4 @@
-//! The tables of instances: boxes, voxels and numbers, each against the others.
+//! Checks the tables of instances against each other: boxes, voxels and numbers.
 
 use super::labels::Labels;
 use super::report::{OfFile, Report, Topic};
@@ -13,9 +13,11 @@ const INSTANCES: (Topic, &str) = (Topic::Instances, "tables of instances");
 
 /// Checks `instances.json`, `instances.npz` and `instance_numbers.json` of an area.
 pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &Labels, report: &Report) {
-    let (json, npz) = (layout.instances_json(area), layout.instances_npz(area));
+    let json = layout.instances_json(area);
+    let npz = layout.instances_npz(area);
     let entries = report.read(Topic::Instances, &json, read_instances);
     let arrays = report.read(Topic::Instances, &npz, read_instance_arrays);
+
     if let Some(entries) = &entries {
         let checks = report.of(INSTANCES, &json);
         let mut seen = BTreeSet::new();
@@ -32,6 +34,7 @@ pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &La
             checks.check((0..3).all(|k| e.bbox[k] <= e.bbox[k + 3]), || {
                 format!("{name} has the box {:?}", e.bbox)
             });
+
             let sum: u64 = e.points_per_voxel.iter().map(|n| u64::from(*n)).sum();
             checks.check(sum == e.points, || {
                 format!("{name} has {} points, and {sum} in its voxels", e.points)
@@ -43,6 +46,7 @@ pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &La
                 )
             });
         }
+
         if let Some(manifest) = manifest.area(area) {
             let points: u64 = entries.iter().map(|e| e.points).sum();
             checks.check(points == manifest.annotated_points, || {
@@ -50,6 +54,7 @@ pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &La
             });
         }
     }
+
     if let (Some(entries), Some(arrays)) = (&entries, &arrays) {
         let checks = report.of(INSTANCES, &npz);
         let same = arrays.labels.iter().eq(entries.iter().map(|e| &e.label))
@@ -68,12 +73,15 @@ pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &La
                 .eq(entries.iter().flat_map(|e| &e.points_per_voxel));
         checks.check(same, || "its voxels are not those of instances.json".to_owned());
     }
+
     if let Some(arrays) = &arrays {
         members(arrays, &npz, report);
     }
+
     numbers(layout, area, labels, report);
 }
 
+/// Checks that a label has this index.
 fn label(name: &str, index: u32, labels: &Labels, checks: &OfFile<'_>) {
     checks.check(labels.index_of(name) == Some(index), || {
         format!(
@@ -86,7 +94,8 @@ fn label(name: &str, index: u32, labels: &Labels, checks: &OfFile<'_>) {
     });
 }
 
-/// Every instance's points are numbered from 0, each in one voxel, as many as the instance has.
+/// Checks that the points of every instance are numbered from 0, each in one voxel, as many as the instance
+/// has.
 fn members(arrays: &InstanceArrays, path: &Path, report: &Report) {
     let checks = report.of(INSTANCES, path);
     let mut seen = Vec::new();
@@ -99,6 +108,7 @@ fn members(arrays: &InstanceArrays, path: &Path, report: &Report) {
         checks.check(once, || {
             format!("point_index of {} names a point twice, or one that is not there", arrays.labels[i])
         });
+
         let counts = &arrays.points_per_voxel[216 * i..216 * (i + 1)];
         let sum: u64 = counts.iter().map(|n| u64::from(*n)).sum();
         checks.check(sum == members.len() as u64, || {
@@ -109,6 +119,7 @@ fn members(arrays: &InstanceArrays, path: &Path, report: &Report) {
             )
         });
     };
+
     report.read(Topic::Instances, path, |path| read_instance_members(path, &arrays.point_start, each));
 }
 
@@ -120,11 +131,13 @@ struct Number {
     label: String,
 }
 
+/// Checks `instance_numbers.json`.
 fn numbers(layout: &Layout, area: u32, labels: &Labels, report: &Report) {
     let path = layout.instance_numbers_json(area);
     let Some(numbers) = report.read(Topic::Instances, &path, read_json::<Vec<Number>>) else { return };
     let checks = report.of(INSTANCES, &path);
-    let (mut names, mut places) = (BTreeSet::new(), BTreeSet::new());
+    let mut names = BTreeSet::new();
+    let mut places = BTreeSet::new();
     for n in &numbers {
         checks
             .check(labels.index_of(&n.label).is_some(), || format!("{:?} is no label of the table", n.label));

@@ -1,4 +1,4 @@
-//! The label table, and the labels that the meshes give their faces.
+//! Reads and checks the label table.
 
 use super::report::{Report, Topic};
 use crate::export::modality::NO_CLASS;
@@ -10,21 +10,21 @@ use std::collections::HashMap;
 
 const ORDER: (Topic, &str) = (Topic::Labels, "the label table");
 
-/// Names and indices, as the file has them, in order or not.
+/// The names and indices in the file, in order or not.
 pub(crate) struct Labels {
-    /// All, without the null labels at the end that fill the table up.
+    /// All names, without the null labels that pad the end of the table.
     pub(crate) names: Vec<String>,
     indices: HashMap<String, u32>,
-    /// What the names are of.
+    /// The taxonomy of the names.
     pub(crate) taxonomy: Taxonomy,
-    /// A colour an index.
+    /// The colour of each index.
     pub(crate) pretty: Vec<[u8; 3]>,
-    /// By index the place of its class in the taxonomy, or [`NO_CLASS`].
+    /// The class of each index, by its place in the taxonomy, or [`NO_CLASS`].
     pub(crate) classes: Vec<u8>,
 }
 
 impl Labels {
-    /// Those of a data set that has none: nothing but the null label.
+    /// The labels of a data set without any: only the null label.
     fn none() -> Self {
         Self {
             names: vec![NULL_NAME.to_owned()],
@@ -44,6 +44,7 @@ impl Labels {
         let taxonomy = report.ok(Topic::Labels, taxonomy)?;
         let path = layout.labels_json();
         let mut names = report.read(Topic::Labels, &path, read_labels)?;
+
         let checks = report.of(ORDER, &path);
         if let Err(e) = taxonomy.table_from_names(&names) {
             checks.check(false, || format!("out of order, or no table: {e}"));
@@ -51,6 +52,7 @@ impl Labels {
         checks.check(names.len() == manifest.labels_padded_to(), || {
             format!("{} entries, and the manifest tells of {}", names.len(), manifest.labels_padded_to())
         });
+
         let count = names
             .iter()
             .rposition(|name| name != NULL_NAME)
@@ -59,6 +61,7 @@ impl Labels {
         checks.check(count == manifest.labels, || {
             format!("{count} labels, the null label included, and the manifest tells of {}", manifest.labels)
         });
+
         let indices = names
             .iter()
             .enumerate()
@@ -70,6 +73,7 @@ impl Labels {
             _ => NO_CLASS,
         };
         let classes = names.iter().map(class).collect();
+
         Some(Self { names, indices, taxonomy, pretty, classes })
     }
 
@@ -93,7 +97,7 @@ impl Labels {
         format!("{place} ({name})")
     }
 
-    /// How many there are, the null label included.
+    /// The number of labels, including the null label.
     pub(crate) fn len(&self) -> usize {
         self.names.len()
     }

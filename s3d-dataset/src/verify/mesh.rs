@@ -1,4 +1,5 @@
-//! The exported meshes: one for colours, the same for labels, and the votes that made these.
+//! Checks the exported meshes against each other and against the votes: one mesh has colours, the other
+//! labels.
 
 use super::labels::Labels;
 use super::report::{Report, Topic};
@@ -22,11 +23,11 @@ pub(crate) const NOT_IN_TABLE: u32 = 0xff_fffe;
 /// An area's mesh with the label of each face.
 pub(crate) struct LabelledMesh {
     pub(crate) file: MeshFile,
-    /// Its index in the label table, or [`NOT_IN_TABLE`].
+    /// The index of the face's label in the label table, or [`NOT_IN_TABLE`].
     pub(crate) label_of_face: Vec<u32>,
-    /// Whether none is that.
+    /// Whether no face has [`NOT_IN_TABLE`].
     pub(crate) all_in_table: bool,
-    /// Whether each face has votes, and not its label by filling.
+    /// Whether each face has votes. Other faces have a label by filling, or none.
     pub(crate) is_voted: Vec<bool>,
 }
 
@@ -38,9 +39,10 @@ pub(crate) fn read_and_check(
     labels: &Labels,
     report: &Report,
 ) -> Option<LabelledMesh> {
-    let (colored, semantic) = (layout.rgb_obj(area), layout.semantic_obj(area));
+    let colored = layout.rgb_obj(area);
+    let semantic = layout.semantic_obj(area);
     let read = |path: &Path| {
-        // The mesh names them, and they are read with it.
+        // The mesh names these files, and they are read with it.
         let with_it = path.with_extension("mtl");
         let textures = layout.mesh_dir(area).join("rgb_textures");
         let fits = |other: &Path| *other == *with_it || other.starts_with(&textures);
@@ -53,11 +55,14 @@ pub(crate) fn read_and_check(
         }
         Some(file)
     };
+
     let semantic_file = if manifest.is_labelled() { read(&semantic) } else { None };
     let names = semantic_file.map(|file| (label_names(&file.mesh, labels, &semantic, report), file.mesh));
+
     let file = read(&colored)?;
     let faces = file.mesh.faces().len();
     let kind = manifest.conventions().xyz;
+
     if let Some(manifest) = manifest.area(area) {
         report.check(faces == manifest.faces, MESH, &colored, || {
             format!("{faces} faces, and the manifest tells of {}", manifest.faces)
@@ -75,10 +80,13 @@ pub(crate) fn read_and_check(
             },
         );
     }
+
     if !manifest.is_labelled() {
-        let (label_of_face, is_voted) = (vec![0; faces], vec![false; faces]);
+        let label_of_face = vec![0; faces];
+        let is_voted = vec![false; faces];
         return Some(LabelledMesh { file, label_of_face, all_in_table: true, is_voted });
     }
+
     let (label_of_face, other) = names?;
     let same = report.check(faces == other.faces().len(), MESH, &semantic, || {
         format!("{} faces, and rgb.obj has {faces}", other.faces().len())
@@ -86,6 +94,7 @@ pub(crate) fn read_and_check(
     if !same {
         return None;
     }
+
     let differs = (0..faces as u32).find(|&f| file.mesh.triangle(f) != other.triangle(f));
     report.check(differs.is_none(), MESH, &semantic, || {
         let face = differs.unwrap_or_default();
@@ -95,10 +104,13 @@ pub(crate) fn read_and_check(
             file.mesh.triangle(face)
         )
     });
+
     drop(other);
     let all_in_table = !label_of_face.contains(&NOT_IN_TABLE);
     let mut labelled = LabelledMesh { file, label_of_face, all_in_table, is_voted: Vec::new() };
     labelled.is_voted = check_votes(layout, area, &labelled, (labels, manifest.options.fill), report);
+
+    // The manifest's surface without votes and without a label.
     if let Some(told) = manifest.area(area).and_then(|entry| entry.unlabelled) {
         let LabelledMesh { file, label_of_face, is_voted, .. } = &labelled;
         let surface = |is_without: &dyn Fn(usize) -> bool| {
@@ -116,10 +128,11 @@ pub(crate) fn read_and_check(
             });
         }
     }
+
     Some(labelled)
 }
 
-/// The index of each face's label.
+/// The index of each face's label, found by the names of materials.
 fn label_names(mesh: &TriMesh, labels: &Labels, path: &Path, report: &Report) -> Vec<u32> {
     let indices: Vec<u32> = mesh
         .materials()
@@ -156,8 +169,9 @@ struct VotesRecord {
     classes: Vec<VoteRecord>,
 }
 
-/// Holds the labels of `semantic.obj` against the votes, and against the report on them: faces in all, by
-/// room and by class. Labels without votes must be those that filling the others gives.
+/// Checks the labels of `semantic.obj` against the votes, and against the report on them: faces in all, by
+/// room and by class. Labels of faces without votes must be those that filling gives. Returns whether each
+/// face has votes.
 fn check_votes(
     layout: &Layout,
     area: u32,
@@ -167,9 +181,11 @@ fn check_votes(
 ) -> Vec<bool> {
     let LabelledMesh { file, label_of_face, .. } = mesh;
     let path = layout.votes_npz(area);
-    // Labels by votes alone: what is without votes has none.
+    // Labels by votes alone, 0 without votes.
     let mut voted = label_of_face.clone();
-    // Data sets of earlier versions have none; where one is listed and gone, the list of files tells.
+
+    // Data sets of earlier versions have no votes. A file that is listed but missing is reported with the
+    // list of files.
     if path.exists()
         && let Some(votes) = report.read(Topic::Mesh, &path, read_face_votes)
     {
@@ -178,6 +194,7 @@ fn check_votes(
         for (label, _) in voted.iter_mut().zip(&votes.total).filter(|(_, total)| **total == 0) {
             *label = 0;
         }
+
         let mut filled: Vec<LabelId> = voted.iter().map(|label| LabelId(*label)).collect();
         if let Some(within_m) = fill_m.filter(|_| won) {
             fill_labels(&file.mesh, &mut filled, within_m);
@@ -190,6 +207,7 @@ fn check_votes(
         report.check(!won || odd == 0, VOTES, &path, || {
             format!("{odd} faces have other labels than votes and filling give them")
         });
+
         let sums = votes.votes.iter().zip(&votes.runner_up_votes).zip(&votes.total);
         let odd = sums.filter(|((first, second), total)| {
             first < second || u64::from(**first) + u64::from(**second) > u64::from(**total)
@@ -197,15 +215,18 @@ fn check_votes(
         let odd = odd.count();
         report.check(odd == 0, VOTES, &path, || format!("{odd} faces have votes that do not add up"));
     }
+
     let is_voted = voted.iter().map(|label| *label != 0).collect();
     let path = layout.votes_json(area);
     let Some(votes) = report.read(Topic::Mesh, &path, read_json::<VotesRecord>) else { return is_voted };
+
     let mut per_label = vec![0u64; labels.len()];
     for label in voted {
         if let Some(count) = per_label.get_mut(label as usize) {
             *count += 1;
         }
     }
+
     let mut rooms: BTreeMap<String, u64> = BTreeMap::new();
     let mut classes: BTreeMap<&str, u64> = labels.taxonomy.classes().iter().map(|c| (c.name(), 0)).collect();
     let mut others = 0;
@@ -218,6 +239,7 @@ fn check_votes(
             _ => others += count,
         }
     }
+
     let checks = report.of(VOTES, &path);
     let is = |what: &str, manifest: u64, found: u64| {
         checks.check(manifest == found, || format!("{manifest} faces {what}, and semantic.obj has {found}"));
@@ -225,7 +247,7 @@ fn check_votes(
     is("in all", votes.faces, label_of_face.len() as u64);
     is("without votes", votes.faces_without_votes, others);
     is("with votes", votes.total.faces_voted, per_label.iter().sum::<u64>() - others);
-    // Rooms of other areas may bear the same name: they have no face here.
+    // A room of the same name in another area has no faces here.
     let mut manifest: BTreeMap<String, u64> = BTreeMap::new();
     votes
         .rooms
@@ -239,6 +261,7 @@ fn check_votes(
         let of = |map: &BTreeMap<String, u64>| map.get(room).copied().unwrap_or(0);
         is(&format!("of {room}"), of(&manifest), of(&rooms));
     }
+
     for class in &votes.classes {
         is(
             &format!("of class {}", class.name),
@@ -246,5 +269,6 @@ fn check_votes(
             classes.get(&*class.name).copied().unwrap_or(0),
         );
     }
+
     is_voted
 }

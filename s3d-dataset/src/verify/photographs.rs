@@ -1,4 +1,4 @@
-//! The list of photographs against the images that are there.
+//! Checks the list of photographs against the images.
 
 use super::report::{Report, Topic};
 use crate::record::manifest::Manifest;
@@ -25,42 +25,47 @@ impl Photographs {
             checks.check(records.len() as u64 == area.frames, || {
                 format!("{} photographs, and the manifest tells of {}", records.len(), area.frames)
             });
+
             for record in records {
                 let PhotographRecord { camera_uuid, name, masked, seen, .. } = &record;
                 let expected = uuid_from_name(&format!("area_{}/{name}", area.area));
                 checks.check(*camera_uuid == expected, || {
                     format!("{name:?} has the camera {camera_uuid}, and its name gives {expected}")
                 });
+
                 let is_share = |share: &f64| (0.0..=1.0).contains(share);
                 checks.check(is_share(masked) && is_share(seen), || {
                     format!("{name:?}: masked {masked} and seen {seen} are no shares")
                 });
-                let (uuid, text) = (camera_uuid.clone(), name.clone());
+
+                let uuid = camera_uuid.clone();
+                let text = name.clone();
                 let earlier = photographs.by_camera.insert((area.area, uuid), record);
                 checks.check(earlier.is_none(), || format!("{text:?} stands there twice"));
             }
         }
+
         photographs
     }
 
-    /// What the list tells of an image, if it is the view of a photograph.
+    /// The record of an image, if it is the view of a photograph.
     pub(crate) fn of(&self, image: &DatasetImage) -> Option<&PhotographRecord> {
         let record = self.by_camera.get(&(image.area, image.uuid.clone()))?;
         (image.frame == Frame::View(0)).then_some(record)
     }
 
-    /// All of them: area and camera.
+    /// The area and camera of each photograph.
     pub(crate) fn cameras(&self) -> impl Iterator<Item = (u32, &str)> {
         self.by_camera.keys().map(|(area, uuid)| (*area, uuid.as_str()))
     }
 
-    /// How many there are in an area.
+    /// The number of photographs in an area.
     pub(crate) fn count(&self, area: u32) -> usize {
         self.by_camera.keys().filter(|(of, _)| *of == area).count()
     }
 }
 
-/// Holds a share of the list against the one that was counted, of which it has six digits.
+/// Checks a share in the list, which has six digits, against the counted one.
 pub(crate) fn check_share(
     what: &str,
     (told, counted): (f64, f64),

@@ -1,4 +1,4 @@
-//! The tables beside the images: rooms, folds, lists, statistics, conventions.
+//! Checks the tables beside the images: rooms, folds, lists, statistics, conventions.
 
 use super::labels::Labels;
 use super::report::{Report, Topic};
@@ -21,20 +21,22 @@ const ROOMS: (Topic, &str) = (Topic::Tables, "rooms");
 const SPLITS: (Topic, &str) = (Topic::Tables, "folds and lists");
 const STATISTICS: (Topic, &str) = (Topic::Tables, "statistics");
 
-/// Holds `conventions.json` against the options, and what is the same in every data set of this version
-/// against that; profiles that are told of are there.
+/// Checks `conventions.json` against the options, profiles against the manifest, and the files that are the
+/// same in every data set of this version.
 pub(crate) fn conventions(layout: &Layout, manifest: &Manifest, report: &Report) {
     let path = layout.conventions();
     if let Some(found) = report.read(Topic::Tables, &path, read_conventions) {
         let contradiction = manifest.contradiction_of(found);
         report.check(contradiction.is_none(), CONVENTIONS, &path, || contradiction.unwrap_or_default());
     }
+
     if let Some(found) = report.read(Topic::Tables, &path, read_world_offsets) {
         let told = manifest.request().world_offsets();
         report.check(found == told, CONVENTIONS, &path, || {
             format!("world.offset_m is {found:?}; the manifest tells of {told:?}")
         });
     }
+
     for profile in Profile::ALL {
         let dir = layout.profile_dir(profile.name());
         match (dir.is_dir(), manifest.options.profiles.contains(&profile)) {
@@ -57,6 +59,7 @@ pub(crate) fn conventions(layout: &Layout, manifest: &Manifest, report: &Report)
             _ => report.checked(1),
         }
     }
+
     if !manifest.is_of_this_version() {
         report.note(format!(
             "written by s3d {}: draws, selection and assets were not compared with those of this version",
@@ -64,6 +67,7 @@ pub(crate) fn conventions(layout: &Layout, manifest: &Manifest, report: &Report)
         ));
         return;
     }
+
     for (path, text) in assets::texts(layout) {
         if let Some(found) = report.read(Topic::Tables, &path, read_file) {
             report.check(found == text.as_bytes(), CONVENTIONS, &path, || {
@@ -91,7 +95,7 @@ struct RoomRecord {
     outline: Vec<Outline>,
 }
 
-/// Checks `rooms.json` of an area, and the angles of its S3DIS tree.
+/// Checks `rooms.json` of an area, and the angles in its S3DIS tree.
 pub(crate) fn rooms(
     layout: &Layout,
     area: u32,
@@ -101,12 +105,14 @@ pub(crate) fn rooms(
 ) {
     let path = layout.rooms_json(area);
     let Some(rooms) = report.read(Topic::Tables, &path, read_json::<Vec<RoomRecord>>) else { return };
+
     let checks = report.of(ROOMS, &path);
     if let Some(manifest) = manifest.area(area) {
         checks.check(rooms.len() == manifest.rooms, || {
             format!("{} rooms, and the manifest tells of {}", rooms.len(), manifest.rooms)
         });
     }
+
     let mut names = BTreeSet::new();
     for r in &rooms {
         let is_room = labels.is_none_or(|labels| labels.taxonomy.room(&r.room).is_ok());
@@ -115,24 +121,29 @@ pub(crate) fn rooms(
         checks.check(r.wall_direction_deg < 90, || {
             format!("{}: wall_direction_deg {}", r.room, r.wall_direction_deg)
         });
+
         let area_of = |ring: &[[f64; 2]]| {
-            // About the first corner, so that numbers are small.
+            // Relative to the first corner, so that numbers are small.
             let Some(&[x, y]) = ring.first() else { return 0.0 };
             let twice = |p: [f64; 2], q: [f64; 2]| (p[0] - x) * (q[1] - y) - (q[0] - x) * (p[1] - y);
             ring.windows(2).map(|w| 0.5 * twice(w[0], w[1])).sum::<f64>()
         };
+
         let inside = r
             .outline
             .iter()
             .map(|o| area_of(&o.outer) + o.holes.iter().map(|h| area_of(h)).sum::<f64>());
         let inside: f64 = inside.sum();
+
         checks.check((inside - r.floor_m2).abs() <= 1e-6 * (1.0 + inside), || {
             format!("{}: floor_m2 is {}, and the outline holds {inside}", r.room, r.floor_m2)
         });
     }
+
     let tree = layout.s3dis_area_dir(area);
     let list = tree.join(format!("Area_{area}_alignmentAngle.txt"));
     let Some(text) = report.read(Topic::Tables, &list, read_text) else { return };
+
     let checks = report.of(ROOMS, &list);
     let mut listed = BTreeSet::new();
     for line in text.lines().filter(|l| !l.starts_with('#')) {
@@ -143,6 +154,7 @@ pub(crate) fn rooms(
         });
         checks.check(known.is_some(), || format!("{line:?} is not in rooms.json"));
     }
+
     let entries = std::fs::read_dir(&tree).into_iter().flatten().flatten();
     for folder in entries.filter(|e| e.path().is_dir()) {
         let name = folder.file_name().to_string_lossy().into_owned();
@@ -150,9 +162,12 @@ pub(crate) fn rooms(
     }
 }
 
-/// Checks `splits.json` and the lists of panoramas: what they name is there, and all that is there is named.
+/// Checks `splits.json` and the lists of panoramas: everything they name must be there, and everything there
+/// must be named.
 pub(crate) fn splits(layout: &Layout, manifest: &Manifest, images: &[DatasetImage], report: &Report) {
-    let (areas, path) = (&manifest.area_numbers, layout.splits());
+    let areas = &manifest.area_numbers;
+    let path = layout.splits();
+
     let expected = folds(areas);
     if let Some(splits) = report.read(Topic::Tables, &path, read_splits) {
         let same = splits.len() == expected.len()
@@ -162,21 +177,25 @@ pub(crate) fn splits(layout: &Layout, manifest: &Manifest, images: &[DatasetImag
                 .all(|(s, f)| (s.fold, &s.train_areas, &s.test_areas) == (f.number, &f.train, &f.test));
         report.check(same, SPLITS, &path, || format!("its folds are not those of the areas {areas:?}"));
     }
+
     let is_listed =
         |i: &&DatasetImage| i.frame == Frame::Panorama && i.has(Domain::Rgb) && i.has(Domain::Depth);
     if !images.iter().any(|i| is_listed(&i)) {
         return;
     }
+
     let list = |path: &Path, areas: &[u32]| {
         let Some(text) = report.read(Topic::Tables, path, read_text) else { return };
         let checks = report.of(SPLITS, path);
         let pair =
             |i: &DatasetImage| format!("{} {}", i.relative_path(Domain::Rgb), i.relative_path(Domain::Depth));
+
         let mut left: BTreeSet<String> = images
             .iter()
             .filter(|i| is_listed(i) && areas.contains(&i.area))
             .map(pair)
             .collect();
+
         for (n, line) in (1..).zip(text.lines()) {
             checks.check(left.remove(line), || {
                 let missing = line.split(' ').find(|name| !layout.root().join(name).is_file());
@@ -188,11 +207,13 @@ pub(crate) fn splits(layout: &Layout, manifest: &Manifest, images: &[DatasetImag
                 }
             });
         }
+
         checks.check(left.is_empty(), || {
             let first = left.iter().next().cloned().unwrap_or_default();
             format!("{} panoramas are not listed, the first is {first:?}", left.len())
         });
     };
+
     list(&layout.list_of_all(), areas);
     for fold in &expected {
         list(&layout.list_of_fold(fold.number, true), &fold.train);
@@ -200,9 +221,9 @@ pub(crate) fn splits(layout: &Layout, manifest: &Manifest, images: &[DatasetImag
     }
 }
 
-/// Holds the statistics against what is counted from the files.
+/// Checks the statistics against counts from the files.
 pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) {
-    // A taxonomy that cannot be read is told of where the labels are.
+    // An unreadable taxonomy is reported with the labels.
     let Ok(taxonomy) = manifest.read_taxonomy(layout, |_| Ok(())) else { return };
     let taxonomy = Some(&taxonomy).filter(|_| manifest.is_labelled());
     let check = |path: &Path, _| report.check_size(path);
@@ -218,6 +239,7 @@ pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) 
             return;
         }
     };
+
     let path = layout.statistics_json();
     if let (Some(found), Ok(expected)) =
         (report.read(Topic::Tables, &path, read_json::<Value>), serde_json::to_value(&counted))
@@ -228,6 +250,7 @@ pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) 
             format!("not what is counted from the files: {}", differences.join("; "))
         });
     }
+
     let path = layout.statistics_md();
     if let Some(text) = report.read(Topic::Tables, &path, read_text) {
         let expected = counted.to_markdown();
@@ -242,7 +265,7 @@ pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) 
     }
 }
 
-/// Where two documents differ.
+/// Lists the places where two documents differ.
 fn differ(found: &Value, expected: &Value, place: &str, out: &mut Vec<String>) {
     match (found, expected) {
         (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {

@@ -1,4 +1,4 @@
-//! The list of views against its own draws and selection, and against the images that are there.
+//! Checks the list of views against its draws and selection, and against the images.
 
 use super::photographs::Photographs;
 use super::report::{Report, Topic};
@@ -46,24 +46,25 @@ impl Views {
                 None => all_there = false,
             }
         }
-        // Another version may draw otherwise.
+
+        // Another version may draw differently.
         if manifest.is_of_this_version() {
             views.check_draws(layout, manifest, report);
         }
-        // The selection is over the whole pool.
+        // The selection uses all candidates, so every list must be there.
         if manifest.is_of_this_version() && all_there {
             views.check_selection(layout, manifest, report);
         }
         views
     }
 
-    /// The draw of a view.
+    /// The record of a kept view.
     pub(crate) fn draw_of(&self, image: &DatasetImage) -> Option<&ViewRecord> {
         let Frame::View(number) = image.frame else { return None };
         self.kept.get(&(image.area, image.uuid.clone(), number))
     }
 
-    /// The candidates of a location, in their order.
+    /// The candidates of a location, in the order of the list.
     pub(crate) fn of_location<'a>(
         &'a self,
         area: u32,
@@ -76,12 +77,13 @@ impl Views {
             .filter(move |r| r.camera_uuid == uuid)
     }
 
-    /// How many candidates the first location of an area has; `None` if there is none.
+    /// The number of candidates of an area's first location; `None` without one.
     pub(crate) fn candidates_of_a_location(&self, area: u32) -> Option<u32> {
         let first = self.by_area.get(&area)?.first()?;
         u32::try_from(self.of_location(area, &first.camera_uuid).count()).ok()
     }
 
+    /// Checks that every candidate is what the seed draws.
     fn check_draws(&self, layout: &Layout, manifest: &Manifest, report: &Report) {
         let distribution = ViewDistribution::default();
         for (area, records) in &self.by_area {
@@ -105,6 +107,7 @@ impl Views {
         }
     }
 
+    /// Checks that the kept views are those that selection by entropies gives.
     fn check_selection(&self, layout: &Layout, manifest: &Manifest, report: &Report) {
         let mut candidates = Vec::new();
         for (&area, records) in manifest
@@ -128,12 +131,15 @@ impl Views {
                 });
             }
         }
+
         select(&mut candidates, manifest.options.pool, manifest.options.keep_all, manifest.seed);
+
         let found = manifest
             .area_numbers
             .iter()
             .filter_map(|a| self.by_area.get(a))
             .flatten();
+
         for (c, r) in candidates.iter().zip(found) {
             report.check(c.frame_num == r.frame_num, DRAWS, &layout.views_json(c.area), || {
                 format!(
@@ -144,7 +150,7 @@ impl Views {
         }
     }
 
-    /// Holds the images that are there against the list: each view that was kept, a panorama a location, and
+    /// Checks the images against the list. There must be each kept view, each location's panorama, and
     /// nothing else.
     pub(crate) fn check_images(
         &self,
@@ -161,8 +167,10 @@ impl Views {
                 .or_default()
                 .extend(records.iter().map(|r| r.camera_uuid.as_str()));
         }
+
         let mut there = BTreeSet::new();
-        let (mut panoramas, mut views): (BTreeMap<u32, u64>, BTreeMap<u32, u64>) = Default::default();
+        let mut panoramas: BTreeMap<u32, u64> = BTreeMap::new();
+        let mut views: BTreeMap<u32, u64> = BTreeMap::new();
         for image in images {
             let path = image.path(layout, image.domains.first().copied().unwrap_or(Domain::Pose));
             let known = match image.frame {
@@ -170,11 +178,12 @@ impl Views {
                     let is_listed = self.draw_of(image).is_some() || photographs.of(image).is_some();
                     is_listed || !self.by_area.contains_key(&image.area)
                 }
-                // Without candidates there is no list of locations.
+                // Areas without candidates have no list of locations.
                 Frame::Panorama => locations
                     .get(&image.area)
                     .is_none_or(|known| known.is_empty() || known.contains(image.uuid.as_str())),
             };
+
             report.check(known, THERE, &path, || {
                 "neither views.json nor frames.json tells of this image".to_owned()
             });
@@ -185,6 +194,7 @@ impl Views {
             report.check(first, THERE, &path, || {
                 "another room has an image of this number and location".to_owned()
             });
+
             let count = if image.frame == Frame::Panorama {
                 &mut panoramas
             } else {
@@ -192,9 +202,11 @@ impl Views {
             };
             *count.entry(image.area).or_default() += 1;
         }
+
         if manifest.domains().is_empty() {
             return;
         }
+
         let missing = |area: u32, uuid: &str, frame: Frame| {
             let name = format!("camera_{uuid}_…_frame_{frame}_…");
             let folder = layout.area_dir(area).join(frame.folder());
@@ -214,6 +226,8 @@ impl Views {
         photographs
             .cameras()
             .for_each(|(area, uuid)| missing(area, uuid, Frame::View(0)));
+
+        // The counts of the manifest.
         for area in &manifest.areas {
             let path = layout.manifest();
             let checks = report.of((Topic::Manifest, "counts"), &path);

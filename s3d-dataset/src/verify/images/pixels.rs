@@ -1,4 +1,4 @@
-//! The files of one image: what each should hold, and where it does not.
+//! Reads the pixels of image files, and describes their differences.
 
 use crate::export::modality::{Drawn, NO_CLASS};
 use half::f16;
@@ -13,17 +13,17 @@ use std::path::Path;
 
 /// The pixels of a file.
 pub(crate) enum Pixels {
-    /// 8-bit R G B.
+    /// 8-bit RGB.
     Color(Raster<[u8; 3]>),
     Depth(Raster<u16>),
     /// Places in a palette, and the palette.
     Class(Raster<u8>, Vec<[u8; 3]>),
     Xyz(Raster<[f32; 3]>),
-    /// The same of a file that holds half floats.
+    /// Coordinates from a file with half floats.
     XyzHalf(Raster<[f16; 3]>),
 }
 
-/// A file that was inflated: PNG's filters are still on its pixels.
+/// An inflated file. PNG filters are not yet removed from its pixels.
 pub(crate) enum Opened<'r> {
     Color(PngLines<'r, 3>),
     Depth(PngLines<'r, 2>),
@@ -31,7 +31,7 @@ pub(crate) enum Opened<'r> {
 }
 
 impl<'r> Opened<'r> {
-    /// The file of a domain, from its bytes.
+    /// Opens the file of a domain from its bytes.
     ///
     /// # Panics
     /// For poses, which have no pixels.
@@ -62,7 +62,8 @@ impl<'r> Opened<'r> {
         }
     }
 
-    /// Whether its pixels are surely these, bit by bit: asked in the quickest way.
+    /// Whether the pixels equal the drawn ones, bit by bit. This is the fastest comparison; it may be false
+    /// for equal pixels in other forms.
     pub(crate) fn are_of(&self, drawn: Drawn<'_>) -> bool {
         match (self, drawn) {
             (Self::Color(lines), Drawn::Color(image)) => lines.are_of(image),
@@ -85,18 +86,19 @@ impl<'r> Opened<'r> {
 }
 
 impl Pixels {
-    /// Reads a file; coordinates in 32-bit floats, whatever it holds.
+    /// Reads a file. Coordinates become 32-bit floats, whatever the file holds.
     ///
     /// # Panics
-    /// As [`Opened::new`].
+    /// See [`Opened::new`].
     pub(crate) fn read(domain: Domain, path: &Path) -> Result<Self> {
-        let (bytes, mut reader) = (read_file(path)?, PngReader::default());
+        let bytes = read_file(path)?;
+        let mut reader = PngReader::default();
         Ok(Opened::new(domain, &bytes, path, &mut reader)?
             .into_pixels()
             .in_floats())
     }
 
-    /// As if they were drawn.
+    /// The pixels in the form of a drawn image.
     pub(crate) fn as_drawn(&self) -> Drawn<'_> {
         match self {
             Self::Color(image) => Drawn::Color(image),
@@ -107,7 +109,7 @@ impl Pixels {
         }
     }
 
-    /// Coordinates in 32-bit floats.
+    /// Converts half floats to 32-bit floats.
     pub(crate) fn in_floats(self) -> Self {
         match self {
             Self::XyzHalf(points) => Self::Xyz(points.map(|p| p.map(f16::to_f32))),
@@ -126,7 +128,7 @@ impl Pixels {
         }
     }
 
-    /// A pixel's numbers as they stand in the file; a depth or a class is the first of the three.
+    /// The values of a pixel as the file has them. A depth or a class is the first of the three.
     pub(crate) fn value(&self, x: u32, y: u32) -> [f64; 3] {
         match self {
             Self::Color(r) => r.at(x, y).map(f64::from),
@@ -137,13 +139,13 @@ impl Pixels {
         }
     }
 
-    /// For each pixel, whether it says that nothing is seen there.
+    /// Whether each pixel says that nothing is seen there.
     pub(crate) fn missing(&self, domain: Domain) -> Vec<bool> {
         let color = match domain {
             Domain::Normal => MISSING_NORMAL,
             Domain::Semantic => MISSING_INDEX,
             Domain::Rgb | Domain::SemanticPretty => [0; 3],
-            // These have no colours.
+            // These modalities have no colours.
             Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => [0; 3],
         };
         match self {
@@ -156,7 +158,8 @@ impl Pixels {
     }
 }
 
-/// Whether each pixel is `color`. Few are, so that a part where no three bytes are those is done at once.
+/// Whether each pixel is `color`. Few pixels are, so a part without these three bytes in a row is done at
+/// once.
 fn equal_to(pixels: &[[u8; 3]], color @ [r, g, b]: [u8; 3]) -> Vec<bool> {
     const PART: usize = 1024;
     let mut equal = vec![false; pixels.len()];
@@ -177,21 +180,22 @@ fn equal_to(pixels: &[[u8; 3]], color @ [r, g, b]: [u8; 3]) -> Vec<bool> {
     equal
 }
 
-/// How the pixels of a file differ from what they should be.
+/// The difference between a file's pixels and the expected ones.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Difference {
     pub(crate) count: u64,
-    /// How many pixels were compared.
+    /// The number of pixels that were compared.
     pub(crate) of: u64,
-    /// Column and row of the first.
+    /// The column and row of the first difference.
     pub(crate) first: (u32, u32),
-    /// What stands there, and what should.
+    /// The value in the file.
     pub(crate) found: String,
+    /// The value that it should have.
     pub(crate) expected: String,
 }
 
 impl Difference {
-    /// Compares images of one size; `None` if they are equal.
+    /// Compares images of one size. Returns `None` if they are equal.
     pub(crate) fn of<T: Copy + PartialEq, U: Copy>(
         found: &Raster<T>,
         expected: &Raster<U>,
@@ -222,7 +226,7 @@ impl Difference {
         difference
     }
 
-    /// As a sentence: `what` is where the expected values come from.
+    /// Describes the difference in a sentence. `what` names the source of the expected values.
     pub(crate) fn sentence(&self, what: &str) -> String {
         let Self { count, of, first: (x, y), found, expected } = self;
         let percent = 100.0 * *count as f64 / *of as f64;
@@ -246,7 +250,7 @@ mod tests {
     fn pixels_of_a_color_are_found_at_any_place() {
         let missing = MISSING_INDEX;
         for width in [1, 2, 1023, 1024, 2500] {
-            // Bytes of the colour across pixels are none of it.
+            // Bytes of the colour that straddle two pixels do not count.
             let mut pixels = vec![[missing[0], missing[1], 0], [missing[2]; 3]];
             pixels.resize(width, [1, 2, 3]);
             for at in [None, Some(0), Some(width / 2), Some(width - 1)] {

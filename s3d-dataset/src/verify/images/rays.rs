@@ -1,4 +1,4 @@
-//! What the mesh shows: the pixels that a file should have.
+//! Draws the pixels that a file should have, and compares them with the file.
 
 use crate::export::modality::{Drawn, Image};
 use crate::verify::images::Reference;
@@ -10,7 +10,7 @@ use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::XyzType;
 use s3d_render::MISSING_INDEX;
 
-/// Points from depth and pose, as `s3d xyz` makes them: from the pose as its angles give it.
+/// Points from depth and pose, made like those of `s3d xyz`: from the pose that the angles give.
 pub(super) fn points_of_depth(reference: &Reference<'_>, pose: &CheckedPose, depth: &Raster<u16>) -> Pixels {
     let camera = Camera { pose: pose.file.pose(), ..pose.camera };
     let conventions = reference.channels.conventions;
@@ -21,8 +21,8 @@ pub(super) fn points_of_depth(reference: &Reference<'_>, pose: &CheckedPose, dep
     }
 }
 
-/// How a file differs from what the mesh shows: exactly, for the meshes of an export are those that it was
-/// rendered from, to the bit.
+/// The difference between a file and what the mesh shows. The comparison is exact: the exported meshes equal
+/// those that the file was rendered from, to the bit.
 pub(super) fn difference(
     reference: &Reference<'_>,
     image: Image,
@@ -32,6 +32,7 @@ pub(super) fn difference(
     let labels = reference.labels;
     let point = |p: [f32; 3]| format!("{p:?}");
     let to_f32 = |p: [f16; 3]| p.map(f16::to_f32);
+
     match (pixels, expected) {
         (Pixels::Color(found), Drawn::Color(expected)) => {
             let index = |c: [u8; 3]| u32::from_be_bytes([0, c[0], c[1], c[2]]);

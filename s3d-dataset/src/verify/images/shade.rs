@@ -1,4 +1,5 @@
-//! What single rays should write into the files of a domain: slower than images, for any ray.
+//! Computes the values that single rays should write into files. This is slower than drawing images, but
+//! works for any ray.
 
 use crate::export::modality::NO_CLASS;
 use crate::verify::images::Reference;
@@ -18,7 +19,7 @@ impl<'a> Shade<'a> {
         Self { reference, domain }
     }
 
-    /// What the file has where the ray along `direction` ends at `hit`.
+    /// The value of a pixel whose ray along `direction` ends at `hit`.
     pub(crate) fn value(&self, camera: &Camera, direction: DVec3, hit: Option<Hit>) -> [f64; 3] {
         let reference = self.reference;
         let conventions = reference.channels.conventions;
@@ -31,6 +32,7 @@ impl<'a> Shade<'a> {
                 Domain::Rgb | Domain::SemanticPretty | Domain::GlobalXyz | Domain::Pose => [0.0; 3],
             };
         };
+
         match self.domain {
             Domain::Depth => {
                 [(hit.t * conventions.depth_units.per_m() + 0.5).floor().min(65_535.0), 0.0, 0.0]
