@@ -106,7 +106,8 @@ fn notes(sides: &Sides, images: &Images) -> Vec<String> {
     if let (Some(a), Some(b)) = (sides.a.taxonomy(), sides.b.taxonomy())
         && a.definition() != b.definition()
     {
-        let (a, b) = (a.name(), b.name());
+        let a = a.name();
+        let b = b.name();
         notes.push(format!("classes are those of {a} in A and of {b} in B; they were compared by name"));
     }
 

@@ -54,7 +54,9 @@ fn angle(a: DMat3, b: DMat3) -> f64 {
     let between = a.transpose() * b;
     // The sine and cosine, both doubled. Together they are exact for small angles too.
     let [x, y, z] = between.to_cols_array_2d();
-    let (sx, sy, sz) = (y[2] - z[1], z[0] - x[2], x[1] - y[0]);
+    let sx = y[2] - z[1];
+    let sy = z[0] - x[2];
+    let sz = x[1] - y[0];
     let sine = (sx * sx + sy * sy + sz * sz).sqrt();
     let cosine = x[0] + y[1] + z[2] - 1.0;
     libm::atan2(sine, cosine).to_degrees()

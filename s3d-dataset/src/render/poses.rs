@@ -194,7 +194,8 @@ fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics)
             }
         })?;
 
-        let (w, h) = (camera.width, camera.height);
+        let w = camera.width;
+        let h = camera.height;
         if w > MAX_SIDE || h > MAX_SIDE {
             let what = at(format!("images of {w} × {h} pixels")).to_string();
             let range = format!("at most {MAX_SIDE} ({what})");

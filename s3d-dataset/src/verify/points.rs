@@ -272,7 +272,7 @@ impl Reader {
         Some(Self { path, points, is_reported: false })
     }
 
-    /// Compares the next points of the file with those of the cloud.
+    /// Compares the next points of the file with the cloud's.
     fn compare(&mut self, run: &[LabelledPoint], report: &Report) {
         if self.is_reported {
             return;

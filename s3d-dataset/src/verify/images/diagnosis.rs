@@ -39,8 +39,10 @@ impl Ray {
     /// The camera and the place in its image that this ray goes through, for the pixel (x, y) of an image of
     /// `camera`.
     pub(crate) fn place(self, camera: &Camera, x: u32, y: u32) -> (Camera, f64, f64) {
-        let (w, h) = (f64::from(camera.width), f64::from(camera.height));
-        let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let w = f64::from(camera.width);
+        let h = f64::from(camera.height);
+        let x = f64::from(x) + 0.5;
+        let y = f64::from(y) + 0.5;
         match self {
             Self::Own => (*camera, x, y),
             Self::MirroredX => (*camera, w - x, y),

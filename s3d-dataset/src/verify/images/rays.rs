@@ -10,7 +10,7 @@ use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::XyzType;
 use s3d_render::MISSING_INDEX;
 
-/// Points from depth and pose, made like those of `s3d xyz`: from the pose that the angles give.
+/// Points from depth and pose, as `s3d xyz` makes them: from the pose that the angles give.
 pub(super) fn points_of_depth(reference: &Reference<'_>, pose: &CheckedPose, depth: &Raster<u16>) -> Pixels {
     let camera = Camera { pose: pose.file.pose(), ..pose.camera };
     let conventions = reference.channels.conventions;
