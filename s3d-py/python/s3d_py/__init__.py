@@ -1,12 +1,12 @@
-"""Scans rendered, sampled and labelled; 2D-3D-Semantic data sets made and read.
+"""Renders, samples and labels scans; makes and reads 2D-3D-Semantic data sets.
 
 ```python
 import s3d_py as s3d
 ```
 
-World frame everywhere: metres, Z up, right-handed. Cameras are OpenCV's: `K` is a 3 × 3 matrix of intrinsics
-in pixels (the centre of the first pixel is at 0.5, 0.5), `T_world_cam` the 4 × 4 pose camera → world with x
-right, y down, z forward.
+The world frame is the same everywhere: metres, Z up, right-handed. Cameras are OpenCV's: `K` is a 3 × 3
+matrix of intrinsics in pixels (the centre of the first pixel is at 0.5, 0.5), and `T_world_cam` is the 4 × 4
+pose camera → world with x right, y down, z forward.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ Vector = Union[Sequence[float], npt.NDArray[Any]]
 
 
 def matrix(what: str, values: npt.ArrayLike, shape: tuple[int, int]) -> Matrix:
-    """The values as a matrix of this shape."""
+    """Returns the values as a matrix of this shape."""
     try:
         array = np.asarray(values, np.float64)
     except (TypeError, ValueError) as error:
@@ -29,9 +29,9 @@ def matrix(what: str, values: npt.ArrayLike, shape: tuple[int, int]) -> Matrix:
 
 
 def intrinsics(size: tuple[int, int], fov: float) -> Matrix:
-    """The matrix K, 3 × 3, of a pinhole camera with square pixels and its optical axis in the middle.
+    """Returns the matrix K, 3 × 3, of a pinhole camera with square pixels and its optical axis in the middle.
 
-    `size` is (width, height) in pixels, `fov` the horizontal angle of view in degrees, between 0 and 180.
+    `size` is (width, height) in pixels. `fov` is the horizontal angle of view in degrees, between 0 and 180.
     """
     if not 0 < fov < 180:
         raise UsageError(f"fov={fov}: must be degrees between 0 and 180")
@@ -41,32 +41,32 @@ def intrinsics(size: tuple[int, int], fov: float) -> Matrix:
 
 
 def look_at(eye: Vector, target: Vector, up: Vector = (0.0, 0.0, 1.0)) -> Matrix:
-    """`T_world_cam`, 4 × 4, of a camera at `eye` that looks at `target`, world metres; `up` points to the
-    image's top.
+    """Returns `T_world_cam`, 4 × 4, of a camera at `eye` that looks at `target`, in world metres. `up` points
+    to the top of the image.
 
-    Raises `UsageError` if the two places are one, or `up` lies along the view.
+    Raises `UsageError` if the two points are the same, or `up` lies along the view.
     """
     return np.array(_native.look_at(list(eye), list(target), list(up)))
 
 
 def level(eye: Vector) -> Matrix:
-    """`T_world_cam`, 4 × 4, of a level camera at `eye`, world metres, that looks along +Y."""
+    """Returns `T_world_cam`, 4 × 4, of a level camera at `eye`, in world metres, that looks along +Y."""
     x, y, z = eye
     return np.array([[1.0, 0, 0, x], [0, 0, 1, y], [0, -1, 0, z], [0, 0, 0, 1]])
 
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """A scan location: where all views and the panorama of one tripod are taken."""
+    """A scan location: the position of a tripod, from which views and a panorama are taken."""
 
     uuid: str
     """Its name, 32 hexadecimal digits."""
     T_world_cam: Matrix
-    """Camera → world, 4 × 4, OpenCV's axes. Locations that are placed are level and look along +Y."""
+    """Camera → world, 4 × 4, OpenCV's axes. Placed locations are level and look along +Y."""
 
     @property
     def xyz(self) -> Matrix:
-        """Where it stands, world metres, (3,)."""
+        """The position, (3,), in world metres."""
         return self.T_world_cam[:3, 3]
 
     def __repr__(self) -> str:
@@ -75,11 +75,11 @@ class Location:
 
 
 PoseLike = Union[Location, npt.ArrayLike]
-"""`T_world_cam` as 4 × 4; a `Location`; or a place (3,), of a level camera that looks along +Y."""
+"""`T_world_cam` as 4 × 4; a `Location`; or the position (3,) of a level camera that looks along +Y."""
 
 
 def pose_of(pose: PoseLike) -> Matrix:
-    """`T_world_cam` of what calls take as a pose."""
+    """Returns `T_world_cam` of a pose in any of its forms."""
     if isinstance(pose, Location):
         return pose.T_world_cam
     array: npt.NDArray[Any] = np.asarray(pose)

@@ -1,4 +1,4 @@
-"""Data sets: read image by image, checked, compared, scored, and made into what trainers read."""
+"""Data sets: read them image by image, check, compare and score them, and pack them for trainers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from ._results import (
 from ._scene import Scene, picture
 
 ARRAYS = ("rgb", "depth", "normal", "xyz", "labels", "classes", "instances", "pretty")
-"""What a view shows; `View` says what each is."""
+"""The arrays of a view. `View` describes each."""
 
 _FILE_OF = {
     "labels": "semantic",
@@ -47,16 +47,16 @@ _FILE_OF = {
 
 @dataclass(frozen=True)
 class Label:
-    """An entry of the table of labels: an instance."""
+    """An instance, as an entry of the table of labels."""
 
     index: int
-    """What pixels of `View.labels` are."""
+    """The index that pixels of `View.labels` have."""
     name: str
     """Class, number, room, area: "chair_3_office_5_1"."""
     class_name: str | None
-    """Its class; None for the entry that stands for no label."""
+    """The class; None for the entry that stands for no label."""
     instance: int
-    """Its number among those of its class in the room's area, from 1."""
+    """The number among the instances of its class in the area, from 1."""
     room: str
     """Type and number: "office_5"."""
     area: int
@@ -72,24 +72,24 @@ class Room:
 
     @property
     def type(self) -> str:
-        """Its type: "office"."""
+        """The type: "office"."""
         return self.name.rpartition("_")[0]
 
 
 @dataclass(frozen=True)
 class Instance:
-    """What the points of one instance of an area fill."""
+    """An instance of an area, with the bounding box of its points."""
 
     label: str
-    """Its name in the table of labels."""
+    """The name in the table of labels."""
     index: int
-    """Its index there."""
+    """The index in the table of labels."""
     class_name: str
     room: str
     points: int
-    """How many annotated points it has."""
+    """The number of annotated points."""
     bounds: list[float]
-    """xmin, ymin, zmin, xmax, ymax, zmax: world metres."""
+    """xmin, ymin, zmin, xmax, ymax, zmax, in world metres."""
 
 
 @dataclass(frozen=True)
@@ -97,47 +97,47 @@ class Candidate:
     """A view that was drawn at a scan location, kept or dropped by the selection."""
 
     location: str
-    """The scan location's name."""
+    """The name of the scan location."""
     number: int
     yaw: float
     """Radians to the left of the location's original camera."""
     pitch: float
-    """Radians above its horizon."""
+    """Radians above the horizon."""
     fov: float
-    """Horizontal angle of view, radians."""
+    """Horizontal angle of view in radians."""
     entropy: float
-    """Of the classes of its pixels, nats: what it was scored by."""
+    """The entropy of the classes of its pixels in nats, which is its score."""
     frame: int | None
-    """The number of the view that it became; None if it was dropped."""
+    """The number of the view, if it was kept; None if it was dropped."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FaceVotes:
-    """How the annotated points voted for the label of each of F faces of `DataSet.mesh`."""
+    """The votes of annotated points for the label of each of the F faces of `DataSet.mesh`."""
 
     label: npt.NDArray[np.uint32]
-    """(F,), index into the table of labels: of most votes, or what the face was filled with; 0 for none."""
+    """(F,), index of the label with the most votes, or of the label that filled the face; 0 for none."""
     votes: npt.NDArray[np.uint32]
-    """(F,), its votes."""
+    """(F,), number of votes for `label`."""
     runner_up: npt.NDArray[np.uint32]
-    """(F,), the label of the second most votes; 0 if all were for one."""
+    """(F,), index of the label with the second most votes; 0 if all votes were for one label."""
     runner_up_votes: npt.NDArray[np.uint32]
-    """(F,), its votes."""
+    """(F,), number of votes for `runner_up`."""
     total: npt.NDArray[np.uint32]
-    """(F,), all votes."""
+    """(F,), number of all votes."""
     max_distance: npt.NDArray[np.float32]
-    """(F,), metres from the farthest voter to the face; 0 without votes."""
+    """(F,), distance of the farthest voter from the face in metres; 0 without votes."""
 
     def __repr__(self) -> str:
         return f"FaceVotes({int((self.label > 0).sum()):,} of {len(self.label):,} faces labelled)"
 
 
 class View:
-    """An image of a data set, perspective or a panorama: its modalities are registered pixel to pixel. A file
-    is read when it is asked for the first time, held against its checksum, and kept as long as the view.
-    Arrays are the view's own: to change one, copy it.
+    """A perspective view or panorama of a data set. Its modalities are registered pixel to pixel.
 
-    Getters raise `UsageError` for a modality that has no file, and `FileError` for one that is damaged.
+    The first access to a modality reads its file and compares it with its checksum; the view keeps the array.
+    Arrays are read-only: to change one, copy it. Getters raise `UsageError` for a modality without a file,
+    and `FileError` for a damaged file.
     """
 
     def __init__(self, dataset: DataSet, index: int) -> None:
@@ -149,10 +149,10 @@ class View:
         return View, (self._dataset, self.index)
 
     index: int
-    """Its place in the data set: `dataset[view.index]` is the same image."""
+    """The index in the data set: `dataset[view.index]` is the same image."""
     area: int
     location: str
-    """The scan location's name, 32 hexadecimal digits."""
+    """The name of the scan location, 32 hexadecimal digits."""
     room: str
     """Type and number: "office_5"."""
     frame: int | None
@@ -162,12 +162,12 @@ class View:
 
     @property
     def is_panorama(self) -> bool:
-        """Whether it looks all around; else it is a perspective view."""
+        """Whether the image is a panorama; otherwise it is a perspective view."""
         return self.frame is None
 
     @property
     def name(self) -> str:
-        """What its files' names begin with: unique in its area."""
+        """The beginning of the names of its files, unique in its area."""
         frame = "equirectangular" if self.frame is None else self.frame
         return f"camera_{self.location}_{self.room}_frame_{frame}"
 
@@ -188,14 +188,14 @@ class View:
 
     @property
     def T_world_cam(self) -> Matrix:
-        """Camera → world, 4 × 4, OpenCV's axes (x right, y down, z forward), metres. A panorama's middle
-        column looks along z, projected to the horizon; its rows are level whatever its tilt.
+        """Camera → world, 4 × 4, OpenCV's axes (x right, y down, z forward), metres. The middle column of a
+        panorama looks along z, projected to the horizon; its rows are level whatever the tilt of the pose.
         """
         return self._camera[1]
 
     @cached_property
     def pose(self) -> dict[str, Any]:
-        """What its pose file holds, under the published keys."""
+        """The content of the pose file, under the published keys."""
         return json.loads(self._dataset._native.file(self.index, "pose"))  # type: ignore[no-any-return]
 
     @property
@@ -205,63 +205,61 @@ class View:
 
     @property
     def depth(self) -> npt.NDArray[np.float32]:
-        """(H, W), metres: along z in a view, along the ray in a panorama. NaN where nothing is seen, or it is
-        beyond what the file can hold.
+        """(H, W), metres: along z in a view, along the ray in a panorama. NaN where nothing is seen, or where
+        the depth is larger than the file can hold.
         """
         return self["depth"]
 
     @property
     def normal(self) -> npt.NDArray[np.float32]:
-        """(H, W, 3), unit vectors, right to 0.5°: in a view in the camera's axes, x right, y down, z forward,
-        whatever axes the file has; in a panorama (X, −Z, Y) of the world. NaN where nothing is seen.
+        """(H, W, 3), unit vectors, exact to 0.5°. A view has the camera's axes, x right, y down, z forward,
+        whatever axes the file has; a panorama has (X, −Z, Y) of the world. NaN where nothing is seen.
         """
         return self["normal"]
 
     @property
     def xyz(self) -> npt.NDArray[np.float32]:
-        """(H, W, 3), world metres as stored (half precision: centimetres). NaN where nothing is seen. Those
-        of `points` come from depth.
+        """(H, W, 3), world metres as stored (half precision: centimetres). NaN where nothing is seen.
+        `points` computes the coordinates from depth instead.
         """
         return self["xyz"]
 
     @property
     def labels(self) -> npt.NDArray[np.int32]:
-        """(H, W), index into `DataSet.labels`: 0 without a label, −1 where nothing is seen."""
+        """(H, W), index into `DataSet.labels`; 0 without a label, −1 where nothing is seen."""
         return self["labels"]
 
     @property
     def classes(self) -> npt.NDArray[np.int16]:
-        """(H, W), place in `DataSet.classes`: −1 without a label and where nothing is seen."""
+        """(H, W), index into `DataSet.classes`; −1 without a label and where nothing is seen."""
         return self["classes"]
 
     @property
     def instances(self) -> npt.NDArray[np.int32]:
-        """(H, W), index into `DataSet.labels` of the instance: −1 without a label and where nothing is
-        seen.
-        """
+        """(H, W), index of the instance in `DataSet.labels`; −1 without a label and where nothing is seen."""
         return self["instances"]
 
     @property
     def pretty(self) -> npt.NDArray[np.uint8]:
-        """(H, W, 3), a colour an instance, for looking at."""
+        """(H, W, 3), one colour for each instance, to look at."""
         return self["pretty"]
 
     def points(self) -> npt.NDArray[np.float32]:
-        """(H, W, 3), world metres, from depth and pose. NaN where depth is missing."""
+        """Returns world metres, (H, W, 3), from depth and pose. NaN where depth is missing."""
         return self._dataset._native.points(self.index)
 
     @cached_property
     def shares(self) -> dict[str, float]:
-        """The share of its pixels that each class has, of those that are there."""
+        """The share of the pixels of each class that occurs in the image."""
         found = self._dataset._class_shares([self.index])[0]
         return {name: share for name, share in zip(self._dataset.classes or (), found) if share > 0}
 
     def path(self, modality: str) -> Path:
-        """Where the file of a modality lies: a word of `files` or of `ARRAYS`."""
+        """Returns the path of the file of a modality, which is a word of `files` or of `ARRAYS`."""
         return self._dataset._native.path(self.index, _FILE_OF.get(modality, modality))
 
     def load(self, *modalities: str) -> View:
-        """Reads these modalities at the same time, on a thread each; all that there are if none is named."""
+        """Reads these modalities at the same time, each on its own thread; without names, all that exist."""
         wanted = modalities or tuple(name for name in ARRAYS if _FILE_OF.get(name, name) in self.files)
         with ThreadPoolExecutor(max(len(wanted), 1)) as pool:
             for _ in pool.map(self.__getitem__, wanted):
@@ -316,9 +314,7 @@ class View:
 
 
 class Views(Sequence[View]):
-    """Images of a data set, in its order. Every access makes a new `View`, so that a loop over all of them
-    keeps one in memory.
-    """
+    """Images of a data set, in its order. Every access makes a new `View`: a loop keeps only one in memory."""
 
     def __init__(self, dataset: DataSet, indices: Sequence[int]) -> None:
         self.dataset, self.indices = dataset, list(indices)
@@ -341,7 +337,7 @@ class Views(Sequence[View]):
     def torch(
         self, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None = None
     ) -> TorchDataset:
-        """These images as a data set for torch: see `DataSet.torch`."""
+        """Returns these images as a data set for torch: see `DataSet.torch`."""
         return TorchDataset(self, modalities, transform)
 
     def __repr__(self) -> str:
@@ -350,7 +346,7 @@ class Views(Sequence[View]):
 
 
 class TorchDataset:
-    """A map-style data set: what `torch.utils.data.DataLoader` takes, with any number of workers."""
+    """A map-style data set for `torch.utils.data.DataLoader`, with any number of workers."""
 
     def __init__(
         self, views: Views, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None
@@ -385,8 +381,8 @@ class TorchDataset:
 
 
 class DataSet(Sequence[View]):
-    """A complete data set: all its images, by area, location and number. Whatever is read is held against its
-    list of files. It may be shared by threads, and pickled: what is unpickled opens the same folder.
+    """A complete data set: all its images, by area, location and number. Everything read is checked against
+    its list of files. Threads may share it. It can be pickled; the copy opens the same folder.
     """
 
     def __init__(self, folder: PathLike) -> None:
@@ -399,7 +395,7 @@ class DataSet(Sequence[View]):
 
     @property
     def root(self) -> Path:
-        """Its folder."""
+        """The folder of the data set."""
         return self._native.root
 
     @property
@@ -409,12 +405,12 @@ class DataSet(Sequence[View]):
 
     @property
     def seed(self) -> int:
-        """The seed that it was made with."""
+        """The seed of its export."""
         return self._native.seed
 
     @cached_property
     def options(self) -> dict[str, Any]:
-        """The options that it was made with."""
+        """The options of its export."""
         return json.loads(self._native.options)  # type: ignore[no-any-return]
 
     @property
@@ -436,7 +432,7 @@ class DataSet(Sequence[View]):
 
     @cached_property
     def labels(self) -> list[Label]:
-        """The table of labels, by index: pixels of `View.labels` are places in it. Empty without labels."""
+        """The table of labels. Pixels of `View.labels` are indices into it. Empty without labels."""
         names = self.classes or []
         return [
             Label(index, name, names[of_class] if of_class >= 0 else None, instance, room, area)
@@ -445,12 +441,12 @@ class DataSet(Sequence[View]):
 
     @cached_property
     def class_of_label(self) -> npt.NDArray[np.int16]:
-        """(labels,), of each index into `labels` the place of its class in `classes`; −1 for none."""
+        """(labels,), the index in `classes` of the class of each label; −1 for none."""
         return self._native.class_of_label
 
     @cached_property
     def rooms(self) -> list[Room]:
-        """Its rooms: those of the labels, or without labels those that images are of."""
+        """The rooms of the labels; without labels, the rooms of the images."""
         found = self._native.rooms() or sorted({(image[0], image[2]) for image in self._images})
         return [Room(area, name) for area, name in found]
 
@@ -467,7 +463,7 @@ class DataSet(Sequence[View]):
     @overload
     def __getitem__(self, index: slice) -> Views: ...
     def __getitem__(self, index: int | str | slice) -> View | Views:
-        """An image by its place, or by what its files' names begin with (`View.name`); some by a slice."""
+        """Returns an image by its index or its `View.name`, or several images by a slice."""
         if isinstance(index, str):
             found = self._by_name.get(index)
             if found is None:
@@ -494,9 +490,9 @@ class DataSet(Sequence[View]):
         min_share: Mapping[str, float] | None = None,
         progress: Progress = None,
     ) -> Views:
-        """Its perspective views: those of an area, a room ("office_5"), a scan location (its name or the
-        beginning of it), and those of which each class of `min_share` has at least its share of the pixels.
-        For that the images of labels are read once; shares are kept.
+        """Returns its perspective views, all or a selection: an area, a room ("office_5"), a scan location
+        (its name or its beginning), and views in which each class of `min_share` has at least its share
+        of the pixels. For `min_share` the images of labels are read once; shares are kept.
         """
         return self._select(False, area, room, location, min_share, progress)
 
@@ -509,7 +505,7 @@ class DataSet(Sequence[View]):
         min_share: Mapping[str, float] | None = None,
         progress: Progress = None,
     ) -> Views:
-        """Its panoramas, selected likewise."""
+        """Returns its panoramas, selected like `views`."""
         return self._select(True, area, room, location, min_share, progress)
 
     def _select(
@@ -570,36 +566,36 @@ class DataSet(Sequence[View]):
     def torch(
         self, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None = None
     ) -> TorchDataset:
-        """Its perspective views as a map-style data set for torch, which is imported with the first sample:
-        for others, `dataset.views(room=…).torch(…)`, `dataset.panoramas().torch(…)`.
+        """Returns its perspective views as a map-style data set for torch. For other images, call
+        `dataset.views(room=…).torch(…)` or `dataset.panoramas().torch(…)`. The first sample imports torch.
 
-        A sample is a dict of tensors: each of `modalities` — words of `ARRAYS` as (C, H, W) or (H, W),
-        indices as int64 (−1 for none: `ignore_index=-1`), "points", "K", "T_world_cam" — and "index".
-        `transform` makes of it what the loader returns. It pickles, so that any number of workers read at the
-        same time.
+        A sample is a dict of tensors: each of `modalities` and "index". The modalities are words of `ARRAYS`,
+        as (C, H, W) or (H, W) with indices as int64 (−1 for none: `ignore_index=-1`), "points", "K" and
+        "T_world_cam". `transform` turns a sample into the value that the loader returns. The data set can be
+        pickled, so any number of workers read at the same time.
         """
         return self.views().torch(modalities, transform)
 
     def mesh(self, area: int | None = None, *, progress: Progress = None) -> Mesh:
-        """The coloured mesh of an area, in the frame of its images; faces in the order of the file."""
+        """Returns the coloured mesh of an area, in the frame of its images and the face order of its file."""
         return Mesh._of(self._native.mesh(self._area(area), sink(progress)))
 
     def scene(self, area: int | None = None) -> Scene:
-        """The same, to be rendered."""
+        """Returns the mesh of an area as a scene to render."""
         return Scene(self.mesh(area))
 
     def votes(self, area: int | None = None) -> FaceVotes | None:
-        """How points voted for each face of `mesh(area)`; None without labels."""
+        """Returns the votes of points for each face of `mesh(area)`; None without labels."""
         found = self._native.votes(self._area(area))
         return None if found is None else FaceVotes(*found)
 
     def instances(self, area: int | None = None) -> list[Instance]:
-        """The instances of an area with their boxes; of all areas if none is named. Empty without labels."""
+        """Returns the instances of an area, or of all areas, with their boxes. Empty without labels."""
         areas = self.areas if area is None else [area]
         return [Instance(*entry) for number in areas for entry in self._native.instances(number)]
 
     def candidates(self, area: int | None = None) -> list[Candidate]:
-        """Every view that was drawn in an area, kept or dropped; of all areas if none is named."""
+        """Returns every candidate view of an area, or of all areas, whether it was kept or dropped."""
         areas = self.areas if area is None else [area]
         return [Candidate(*entry) for number in areas for entry in self._native.candidates(number)]
 
@@ -613,7 +609,7 @@ class DataSet(Sequence[View]):
     def verify(
         self, *, full: bool = False, threads: int | None = None, progress: Progress = None
     ) -> VerifyReport:
-        """Reads every file back, and renders every image again: see `s3d_py.verify`."""
+        """Reads every file back and renders every image again: see `s3d_py.verify`."""
         return verify(self, full=full, threads=threads, progress=progress)
 
     def evaluate(self, protocol: str, pred: PathLike, **options: Any) -> Evaluation:
@@ -623,11 +619,11 @@ class DataSet(Sequence[View]):
     def compare(
         self, other: DataSet | PathLike, *, full: bool = False, progress: Progress = None
     ) -> Comparison:
-        """What differs between it and another data set: see `s3d_py.compare`."""
+        """Returns the differences between it and another data set: see `s3d_py.compare`."""
         return compare(self, other, full=full, progress=progress)
 
     def statistics(self) -> Statistics:
-        """The paper's tables, counted from its files."""
+        """Returns the paper's tables of statistics, counted from its files."""
         data, markdown = _native.statistics(self.root)
         return Statistics(json.loads(data), markdown)
 
@@ -645,13 +641,13 @@ class DataSet(Sequence[View]):
         threads: int | None = None,
         progress: Progress = None,
     ) -> Path:
-        """Writes a page that shows it, to be opened from the disk, and returns the page's path.
+        """Writes a page that shows the data set and opens from the disk, and returns the path of the page.
 
-        - `to`: the report's folder, or its file if it is `single`; beside the data set by default.
-        - `against`: another data set, shown beside it where both differ.
-        - `pano_width`, `thumbs`: width of panoramas and of views in the report, pixels.
-        - `mesh_faces`: a mesh of more faces is simplified.
-        - `verify`: verify it as well, and show what was found.
+        - `to`: the folder of the report, or its file if it is `single`; beside the data set by default.
+        - `against`: another data set, shown beside this one where both differ.
+        - `pano_width`, `thumbs`: width of panoramas and of views in the report, in pixels.
+        - `mesh_faces`: a mesh with more faces is simplified.
+        - `verify`: verify the data set as well, and show the result.
         """
         how = SimpleNamespace(
             pano_width=pano_width,
@@ -687,10 +683,10 @@ class DataSet(Sequence[View]):
         threads: int | None = None,
         progress: Progress = None,
     ) -> Path:
-        """Makes a package of it, and returns its path: `kind` is "webdataset", "colmap", "nerfstudio", "coco"
-        or "parquet", `to` its folder (of Parquet its file), beside the data set by default. The other
-        arguments are the options of `s3d pack`, which `s3d pack --help` explains; an empty `stuff` stands for
-        none.
+        """Packs the data set for a trainer, and returns the path of the package. `kind` is "webdataset",
+        "colmap", "nerfstudio", "coco" or "parquet". `to` is the folder of the package, or its file for
+        Parquet; beside the data set by default. `s3d pack --help` explains the other arguments. An empty
+        `stuff` means none.
         """
         how = SimpleNamespace(
             output=_path(to),
@@ -712,8 +708,8 @@ class DataSet(Sequence[View]):
         return _native.pack(self.root, kind, how, threads, sink(progress))
 
     def profile(self, *loaders: str, overwrite: bool = False, progress: Progress = None) -> Path:
-        """Writes what loaders of point clouds want, "pointcept", "open3d-ml", "mmdet3d" or "pointnet", into
-        `profiles/` of the data set, and returns that folder.
+        """Writes the files that loaders of point clouds read into `profiles/` of the data set, and returns
+        that folder. The loaders are "pointcept", "open3d-ml", "mmdet3d" and "pointnet".
         """
         _native.profile(self.root, list(loaders), overwrite, sink(progress))
         return self.root / "profiles"
@@ -726,8 +722,8 @@ class DataSet(Sequence[View]):
         threads: int | None = None,
         progress: Progress = None,
     ) -> DataSet:
-        """Makes the images of world coordinates again, from depth and pose, in "half" or "float" precision,
-        and returns the data set with them.
+        """Computes the images of world coordinates again from depth and pose, in "half" or "float" precision,
+        and returns the data set with the new images.
         """
         _native.write_xyz(self.root, kind, overwrite, threads, sink(progress))
         return DataSet(self.root)
@@ -744,5 +740,5 @@ def _path(path: PathLike | None) -> Path | None:
 
 
 def open(folder: PathLike) -> DataSet:  # noqa: A001
-    """Opens the data set in a folder, to be read."""
+    """Opens the data set in a folder for reading."""
     return DataSet(folder)

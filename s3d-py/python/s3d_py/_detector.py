@@ -19,19 +19,19 @@ class FoundBox:
 
     area: int
     room: str
-    """The room that most of its points are of: "office_5"."""
+    """The room of most of its points: "office_5"."""
     class_name: str
     score: float
-    """In context: comparable within a class."""
+    """The score in context, comparable within a class."""
     min: tuple[float, float, float]
-    """The least corner, world metres."""
+    """The smallest coordinates, in world metres."""
     max: tuple[float, float, float]
-    """The largest corner, world metres."""
+    """The largest coordinates, in world metres."""
 
 
 class Detector:
-    """A linear classifier a class on voxels of proposed boxes, with context (docs/detector.md): it reads the
-    points of a data set alone, without labels.
+    """A linear classifier for each class on the voxels of proposed boxes, with context (docs/detector.md). To
+    detect, it reads only the points of a data set, not the labels.
     """
 
     def __init__(self, native: _native.Detector) -> None:
@@ -49,13 +49,13 @@ class Detector:
         threads: int | None = None,
         progress: Progress = None,
     ) -> Detector:
-        """Trains on areas of a `DataSet` or its folder; on all if none are named.
+        """Trains on areas of a `DataSet` or its folder; on all areas if none are named.
 
-        - `spaces`: what is searched: "parsed", spaces that are found in the points, or annotated "rooms".
-        - `most_spaces`: how many are learnt from at most, drawn at random: time and memory follow.
+        - `spaces`: the spaces to search: "parsed" spaces, found in the points, or annotated "rooms".
+        - `most_spaces`: learn from at most this many spaces, drawn at random. Time and memory grow with it.
 
         The same areas and seed give the same detector for any number of threads. Raises `InputError` if
-        nothing is annotated, `UsageError` for an area that is none.
+        nothing is annotated, and `UsageError` for an unknown area.
         """
         root = root_of(dataset)
         return cls(
@@ -64,21 +64,21 @@ class Detector:
 
     @classmethod
     def load(cls, path: PathLike) -> Detector:
-        """Reads one that `save` or `s3d detect train` wrote."""
+        """Reads a detector that `save` or `s3d detect train` wrote."""
         return cls(_native.Detector.load(Path(path)))
 
     def save(self, path: PathLike) -> None:
-        """Writes it as JSON; a file that is there is replaced."""
+        """Writes the detector as JSON. An existing file is replaced."""
         self._native.save(Path(path))
 
     @property
     def areas(self) -> list[int]:
-        """The areas that it was trained on."""
+        """The areas of its training."""
         return self._native.areas
 
     @property
     def seed(self) -> int:
-        """The seed that it was trained with."""
+        """The seed of its training."""
         return self._native.seed
 
     def run(
@@ -89,7 +89,7 @@ class Detector:
         threads: int | None = None,
         progress: Progress = None,
     ) -> list[FoundBox]:
-        """Finds the elements of areas of a `DataSet` or its folder; of all if none are named."""
+        """Finds the elements in areas of a `DataSet` or its folder; in all areas if none are named."""
         found = json.loads(self._native.run(root_of(dataset), list(areas), threads, sink(progress)))
         return [
             FoundBox(
@@ -103,7 +103,7 @@ class Detector:
 
 
 def save_boxes(path: PathLike, boxes: Sequence[FoundBox]) -> None:
-    """Writes boxes as `evaluate("det", …)` and `s3d eval det` read them."""
+    """Writes boxes to a file that `evaluate("det", …)` and `s3d eval det` read."""
     entries = [asdict(box) for box in boxes]
     for entry in entries:
         entry["class"] = entry.pop("class_name")

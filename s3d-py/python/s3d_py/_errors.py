@@ -1,14 +1,14 @@
-"""What calls raise. Every message says what is wrong, where, and what to do."""
+"""The exceptions of this package. Every message says what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
 
 class Error(Exception):
-    """What all errors of this package are."""
+    """The base class of all errors of this package."""
 
 
 class UsageError(Error, ValueError):
-    """What is asked for cannot be: arguments out of range or that exclude each other, a folder in use."""
+    """The call is not possible: arguments are out of range or exclude each other, or a folder is in use."""
 
 
 class InputError(Error, ValueError):
@@ -16,13 +16,13 @@ class InputError(Error, ValueError):
 
 
 class TemporaryError(Error):
-    """Something that may pass, such as a full disk. What was done is kept: the same call goes on."""
+    """A cause that may pass, such as a full disk. Finished work is kept: the same call goes on from it."""
 
 
 class CancelledError(Error):
-    """A callback of `progress` returned False. What was done is kept: the same call goes on.
+    """A callback of `progress` returned False. Finished work is kept, and the same call goes on from it.
 
-    Ctrl-C raises `KeyboardInterrupt` instead, and the same call goes on as well.
+    Ctrl-C raises `KeyboardInterrupt` instead. The same call goes on then as well.
     """
 
 
@@ -30,9 +30,9 @@ class FileError(Error):
     """A file is wrong, or the system refuses it."""
 
     path: str | None
-    """The file; a name in words for what came from memory."""
+    """The file; a name in words for data in memory."""
     line: int | None
-    """The line in it, from 1; None for the file as a whole."""
+    """The line in the file, from 1; None for the file as a whole."""
 
     def __init__(self, message: str, *, path: str | None = None, line: int | None = None) -> None:
         super().__init__(message)
@@ -44,7 +44,7 @@ class FileError(Error):
 
 
 class FileAccessError(FileError, OSError):
-    """The system refuses: permissions, a disk, a folder in place of a file. `errno` tells why."""
+    """The system refuses access: permissions, a disk, a folder in place of a file. `errno` tells why."""
 
     def __init__(self, message: str, *, path: str | None = None, errno: int | None = None) -> None:
         super().__init__(message, path=path)
@@ -64,4 +64,4 @@ class MeshError(FormatError):
 
 
 class UnsupportedError(FileError):
-    """The file uses something that is not read; the message names a way out."""
+    """The file uses an unsupported feature. The message names a way out."""
