@@ -314,7 +314,7 @@ class View:
 
 
 class Views(Sequence[View]):
-    """Images of a data set, in its order. Every access makes a new `View`: a loop keeps only one in memory."""
+    """Images of a data set, in its order. Every access makes a new `View`: a loop keeps one in memory."""
 
     def __init__(self, dataset: DataSet, indices: Sequence[int]) -> None:
         self.dataset, self.indices = dataset, list(indices)
@@ -386,7 +386,7 @@ class DataSet(Sequence[View]):
     """
 
     def __init__(self, folder: PathLike) -> None:
-        """Raises `FileError` if there is no data set, its export did not finish, or its tables are damaged."""
+        """Raises `FileError` if there is no data set, its export did not finish, or a table is damaged."""
         self._native = _native.DataSet.open(Path(folder))
         self._images = self._native.images
 

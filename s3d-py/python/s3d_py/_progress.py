@@ -1,4 +1,4 @@
-"""What is told of long work: bars, lines of the log, or calls of a function."""
+"""Progress of long work: bars, log lines, or calls of a function."""
 
 from __future__ import annotations
 
