@@ -1,4 +1,4 @@
-"""What calls on whole data sets find out."""
+"""Calls on whole data sets, and their results."""
 
 from __future__ import annotations
 
@@ -195,8 +195,8 @@ def evaluate(
     - `variant`: whose definition; the first of the protocol by default.
     - `folds`: "all" areas together, "each" for itself, or the three of the "paper"; or `areas`, together.
     - `bootstrap`: so many draws for 95 % intervals, by `seed`.
-    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` (det), `stuff` (panoptic): see
-      the protocols.
+    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` (det), `stuff`
+      (panoptic): see the protocols.
 
     Raises `FileError` for a prediction that is missing, double, or of the wrong size.
     """
