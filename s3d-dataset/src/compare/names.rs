@@ -240,7 +240,8 @@ impl Numbered {
     }
 }
 
-/// A key to sort counts by surface, then by pixels. Areas are finite and not negative, so their bits have the same order.
+/// A key to sort counts by surface, then by pixels. Areas are finite and not negative, so their bits have the
+/// same order.
 fn size(counts: &LabelCounts) -> (u64, u64, u64) {
     (counts.m2.to_bits(), counts.pixels, counts.faces)
 }
