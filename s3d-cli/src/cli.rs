@@ -268,7 +268,7 @@ mod tests {
 
     fn options(args: &[&str]) -> ExportOptions {
         match Cli::parse_from(["s3d", "export", "s.toml"].iter().chain(args)).command {
-            Command::Export(args) => args.options.into(),
+            Command::Export(args) => args.options,
             _ => panic!("another command"),
         }
     }

@@ -4,9 +4,9 @@
 //! `Area_k/Area_k_alignmentAngle.txt` of each named area with `numpy.loadtxt`. For every room in that file it
 //! reads all `Area_k/ROOM/Annotations/*.txt`, also with `numpy.loadtxt`. So it stops
 //! - at an area without an angle file: areas 1 to 6 that are not in the data set get a file without rooms
-//! (versions up to 1.5.1 read all six);
+//!   (versions up to 1.5.1 read all six);
 //! - at an angle file with one room, since its two words are not read as a table: the room is named twice,
-//! and processed twice with the same result;
+//!   and processed twice with the same result;
 //! - at a room of the angle file without points: the room is left out;
 //! - at an instance of one point, whose numbers are not read as a table: the point is written twice.
 //!
