@@ -159,6 +159,6 @@ fn filling_needs_labels_and_a_distance() {
         error.to_string()
     };
     let unlabelled = MemoryScene { annotations: None, ..memory_scene() };
-    assert!(refused(unlabelled, 0.1).contains("--fill needs labels"));
-    assert!(refused(memory_scene(), 0.0).contains("fill: must be above 0"));
+    assert!(refused(unlabelled, 0.1).contains("`fill` needs labels"));
+    assert!(refused(memory_scene(), 0.0).contains("`fill`: must be above 0"));
 }

@@ -22,7 +22,7 @@ fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Co
     };
     let error = export(&[], &Context::default()).unwrap_err();
     assert!(matches!(&error, Error::Input(e) if e.to_string().contains(words)), "{error}");
-    assert!(error.to_string().contains(&format!("--allow {condition}")), "{error}");
+    assert!(error.to_string().contains(&format!("`allow = {condition}`")), "{error}");
     let manifest = || std::fs::read_to_string(out.join("manifest.json")).unwrap_or_default();
     assert!(!manifest().contains("complete"), "nothing passes for a data set");
     let others: Vec<Condition> = Condition::ALL.into_iter().filter(|c| *c != condition).collect();
@@ -33,7 +33,7 @@ fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Co
     let named = info
         .doubts
         .iter()
-        .any(|d| d.contains(words) && d.contains(&format!("--allow {condition}")));
+        .any(|d| d.contains(words) && d.contains(&format!("unless {condition} is allowed")));
     assert!(named || condition == Condition::Size, "{info}");
 
     let warnings = Arc::new(Mutex::new(Vec::new()));
@@ -159,7 +159,7 @@ fn a_location_outside() {
         .unwrap_err();
     assert!(
         error.to_string().contains("scan locations see the mesh in")
-            && error.to_string().contains("--allow coverage")
+            && error.to_string().contains("`allow = coverage`")
     );
 }
 

@@ -44,7 +44,7 @@ impl UnitGuess {
         (unit != LengthUnit::Metre).then(|| {
             format!(
                 "its unit is taken for the {unit}: ceilings are {height:.0} above floors, which makes rooms \
-                 {:.2} m high (--units says it)",
+                 {:.2} m high (units says it)",
                 height * unit.metres()
             )
         })
@@ -87,7 +87,7 @@ mod tests {
         }
         let feet = UnitGuess::of(&scaled(1.0 / 0.3048), UpAxis::Z);
         assert_eq!((feet.unit(), feet.sentence()), (LengthUnit::Metre, None));
-        assert!(feet.doubt().unwrap().contains("--units ft"));
+        assert!(feet.doubt().unwrap().contains("units = ft"));
         // A building on its side has neither floors nor ceilings, only tops and undersides of things.
         let side = UnitGuess::of(&scaled(1.0), UpAxis::Y);
         assert_eq!(side.unit(), LengthUnit::Metre);
