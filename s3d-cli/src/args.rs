@@ -2,7 +2,8 @@
 
 use crate::values::{parsed, positive};
 use clap::{Args, value_parser};
-use s3d_dataset::{Condition, SceneSource};
+use s3d_dataset::export::SceneSource;
+use s3d_dataset::options::Condition;
 use s3d_io::mesh::{LengthUnit, UpAxis};
 use std::path::PathBuf;
 

@@ -12,7 +12,6 @@ pub(crate) mod manifest;
 pub(crate) mod missing;
 pub(crate) mod pending_change;
 pub(crate) mod request;
-pub(crate) mod statistics;
 pub(crate) mod tables;
 pub(crate) mod unfinished;
 

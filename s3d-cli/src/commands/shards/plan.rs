@@ -5,7 +5,8 @@ use crate::commands::on_threads;
 use crate::failure::Outcome;
 use crate::values::{parsed, positive};
 use clap::{Args, value_parser};
-use s3d_dataset::{ExportOptions, Shard};
+use s3d_dataset::ExportOptions;
+use s3d_dataset::export::Shard;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
