@@ -150,8 +150,7 @@ fn buildings_differ_in_the_shape_of_things_and_areas_of_one_do_not() {
         sizes.iter().map(|size| size[axis]).sum::<f32>() / sizes.len() as f32
     };
 
-    // For work tables, chairs and bookcases: how many models there are, and how they differ between
-    // buildings.
+    // For work tables, chairs and bookcases: an axis, and the least difference along it between buildings.
     let table = |thing: &Thing| match *thing {
         Thing::ModelTable { size_m, .. } if size_m[0] >= 1.4 => Some(size_m),
         _ => None,
