@@ -1,31 +1,31 @@
-// The files of a mesh: unpacked, and held against what they and the index say of them.
+// The files of a mesh: unpacked, and checked against their own numbers and the index.
 
 import { type Mesh, type Rgb, load } from "../data.js";
 import { unpack } from "../faces.js";
 
-/** A part of a mesh, its faces by material. */
+/** A part of a mesh, its faces sorted by material. */
 export interface Part {
   origin: Rgb;
   step: Rgb;
   /** In steps from the origin, 3 a vertex. */
   position: Uint16Array;
-  /** Of faces without a texture, 3 a vertex; null if those of the materials count. */
+  /** Colours for faces without a texture, 3 a vertex; null if the materials have the colours. */
   color: Uint8Array | null;
-  /** Vertices, 3 a face. */
+  /** Indices of vertices, 3 a face. */
   index: Uint32Array;
-  /** In steps from their origin, 2 a corner. */
+  /** In steps from the coordinates' origin, 2 a corner. */
   uv: Uint16Array | null;
   uvOrigin: [number, number];
   uvStep: [number, number];
-  /** Numbers of the faces in the data set's mesh. */
+  /** Indices of the faces in the data set's mesh. */
   face: Uint32Array;
-  /** Places in the mesh's materials. */
+  /** Indices into the mesh's materials. */
   material: Uint16Array;
 }
 
 export interface Box {
   label: number;
-  /** Lowest and highest x, y, z. */
+  /** The smallest and the largest x, y, z. */
   box: number[];
 }
 
