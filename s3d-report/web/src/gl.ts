@@ -175,7 +175,7 @@ function numbers(element: HTMLImageElement): { width: number; height: number; va
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [width, height];
   const context = canvas.getContext("2d", { willReadFrequently: true, colorSpace: "srgb" });
-  if (!context) throw new Error("this browser draws on no canvas");
+  if (!context) throw new Error("this browser cannot draw on a canvas");
   context.drawImage(element, 0, 0);
   const bytes = context.getImageData(0, 0, width, height).data;
   const values = new Uint32Array(width * height);
@@ -233,7 +233,7 @@ export class Renderer {
         throw new Error(`WebGL 2: ${log ?? "no shader"}`);
     }
     gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error("WebGL 2 links no program");
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error("WebGL 2 cannot link the program");
     return program;
   }
 

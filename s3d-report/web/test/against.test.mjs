@@ -271,7 +271,7 @@ test("the line moves, its place is in the link, and one goes from image to image
   await page.getByLabel("Image that differs more").click();
   await page.waitForFunction((was) => document.querySelector("h1").textContent === was, name);
   await go(page, "#/compare/9999");
-  assert.match(await page.locator("[role=alert]").textContent(), /no such image/);
+  assert.match(await page.locator("[role=alert]").textContent(), /not among those that differ/);
   assert.deepEqual(faults, []);
   await close();
 });
@@ -310,7 +310,7 @@ test("a cell of the matrix leads to the images that show the change, and back", 
   );
   const sum = pixels.reduce((a, b) => a + b, 0);
   assert.equal(sum, pixelPairs.get("chair table"));
-  assert.ok((await list.textContent()).includes(`${grouped(sum)} pixels that changed so`));
+  assert.ok((await list.textContent()).includes(`${grouped(sum)} pixels with this change`));
   // From image to image of these alone, and back.
   await list.locator(".card a").first().click();
   await page.waitForSelector(".viewer canvas");

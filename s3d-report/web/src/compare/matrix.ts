@@ -87,8 +87,8 @@ export function matrix(against: Against): HTMLElement | null {
     return h("tr", {}, h("th", { scope: "row" }, classWords(row)), ...cells);
   });
   const caption =
-    "Class in A by row, class in B by column. Shaded by the share of what is of another class; " +
-    `in the diagonal, of what is another instance of its class (${bySurface ? "surface" : "pixels"}). ` +
+    "Class in A by row, class in B by column. The shade is a cell's share of all changes of class, " +
+    `or on the diagonal of all changes of instance, by ${bySurface ? "surface" : "pixels"}. ` +
     "A cell leads to the images that show it.";
   const grid = h(
     "table",

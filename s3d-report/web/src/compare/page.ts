@@ -70,7 +70,7 @@ function overview(index: Index, against: Against, change: Change | null): Page {
 /** The heading of the list of images: all that differ, or those that show a change. */
 function heading(against: Against, change: Change | null, images: number): HTMLElement[] {
   if (!change) {
-    const words = `${several(images, "image")} with other pixels, those that differ most first.`;
+    const words = `${several(images, "image")} with different pixels, the most different first.`;
     return [h("h2", {}, "Images that differ"), h("p", { class: "quiet" }, words)];
   }
   const counts = against.comparison.labels?.matrix.find(({ a, b }) => a === change.was && b === change.is);
@@ -78,8 +78,8 @@ function heading(against: Against, change: Change | null, images: number): HTMLE
   const words =
     images === 0
       ? "No image shows this change."
-      : `${several(images, "image")} with ${count(counts?.pixels ?? 0)} pixels that changed so, ` +
-        "those with most first.";
+      : `${several(images, "image")} with ${count(counts?.pixels ?? 0)} pixels with this change, ` +
+        "the image with the most first.";
   const places = h("p", { class: "places" });
   append(places, [
     h("a", { href: link("compare") }, "All images that differ"),

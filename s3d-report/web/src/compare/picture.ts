@@ -145,7 +145,7 @@ export async function pairPage(index: Index, against: Against, route: Route): Pr
   const number = /^\d+$/.test(place) ? Number(place) : -1;
   const changed = against.pictures[number];
   const shown = changed ? shownBy(index, changed) : null;
-  if (!changed || !shown) return sentence("There is no such image among those that differ.");
+  if (!changed || !shown) return sentence("This image is not among those that differ.");
   const change = changeOf(route);
   const order = orderOf(against, change).numbers;
   const at = order.indexOf(number);
@@ -170,7 +170,9 @@ export async function pairPage(index: Index, against: Against, route: Route): Pr
   const { a, b } = await loadPair(index, changed, number);
   if (!a || !b) {
     const side = a ? against.comparison.b.folder : index.data_set.name;
-    append(element, [h("p", {}, `Its images of ${side} are missing or damaged; see Notes and Compared.`)]);
+    append(element, [
+      h("p", {}, `Its image files in ${side} are missing or damaged; see Notes and Compared.`),
+    ]);
     return { element, close: () => {} };
   }
   const gaze: Gaze = {

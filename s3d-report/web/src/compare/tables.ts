@@ -63,7 +63,7 @@ export function labelsSection(against: Against): HTMLElement | null {
       const words = {
         other: "its meshes differ, so labels are compared by pixels alone",
         unread: "a mesh could not be read, so labels are compared by pixels alone",
-        one_sided: "only one of both has it",
+        one_sided: "only one of the data sets has it",
       }[geometry as "other"];
       return h("p", {}, `Area ${area}: ${words}.`);
     });
@@ -72,11 +72,10 @@ export function labelsSection(against: Against): HTMLElement | null {
   const words = none
     ? "No face and no pixel has another label."
     : `Another class: ${countsWords(other)}. ` +
-      `Another label, instances of the same class too: ${countsWords(changed)}.`;
+      `Another label, including other instances of the same class: ${countsWords(changed)}.`;
   const solid = against.changed_faces.flatMap((area) => {
     if (!against.both.meshes.some((mesh) => mesh.area === area)) return [];
-    const words =
-      against.both.meshes.length > 1 ? `What changed of area ${area} in 3D` : "What changed, in 3D";
+    const words = against.both.meshes.length > 1 ? `Changes of area ${area} in 3D` : "Changes in 3D";
     return [h("a", { href: link("space", [area], { show: "changed" }) }, words)];
   });
   const places = solid.length > 0 ? h("p", { class: "places" }, ...solid) : null;

@@ -116,9 +116,9 @@ function spreads({ votes, margin }: VoteSpread): HTMLElement[] {
   const range = (k: number): string =>
     fewest(k) === most(k) ? count(most(k)) : `${count(fewest(k))} to ${count(most(k))}`;
   const words =
-    "Shares of the faces, and beside them in grey of their surface. The margin is how many more votes the " +
-    "first label has than the second, as a share of all votes of the face. Point at a bar, or go from bar to " +
-    "bar with arrow keys, to read it.";
+    "Shares of the faces, and in grey beside them the shares of their surface. The margin is the lead of the " +
+    "first label over the second, as a share of all votes of the face. Point at a bar, or go from bar to bar " +
+    "with arrow keys, to read it.";
   const charts = [
     spread({
       title: "Votes of a face, up to",
@@ -170,8 +170,8 @@ export function votesSection(index: Index): HTMLElement | null {
       h(
         "p",
         { class: "quiet" },
-        "Faces that were won with less than three quarters of the votes, by the classes of the first label and of " +
-          "the second. A number leads to the largest patch.",
+        "Faces that were won with less than three quarters of the votes, by the classes of the first and the " +
+          "second label. A number leads to the largest patch.",
       ),
       matrix(index, area, votes),
     ]);

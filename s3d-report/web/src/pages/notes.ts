@@ -105,7 +105,7 @@ function surface(index: Index): HTMLElement | null {
           "li",
           {},
           `${of}${count(area.faces_left_out)} faces of the input were left out: ` +
-            "without area, or with the corners of an earlier one.",
+            "they have no area, or the corners of an earlier face.",
         ),
       );
     }
@@ -131,10 +131,16 @@ function surface(index: Index): HTMLElement | null {
     const filled = (area.unlabelled?.without_votes.faces ?? 0) - (bare?.faces ?? 0);
     if (filled > 0)
       items.push(
-        h("li", {}, `${of}${count(filled)} faces have no votes, and the label of the surface beside them.`),
+        h(
+          "li",
+          {},
+          `${of}${count(filled)} faces have no votes, and took the label of the surface beside them.`,
+        ),
       );
     if (area.offset_m)
-      items.push(h("li", {}, `${of}coordinates are those of the scan less ${area.offset_m.join(", ")} m.`));
+      items.push(
+        h("li", {}, `${of}${area.offset_m.join(", ")} m were subtracted from the coordinates of the scan.`),
+      );
   }
   return items.length === 0 ? null : h("section", {}, h("h2", {}, "Surface"), h("ul", {}, ...items));
 }

@@ -191,7 +191,7 @@ function distributions(index: Index): HTMLElement | null {
     }),
   ];
   const words =
-    "Kept views, dropped candidates on top of them in grey, and the curve that candidates are drawn from. " +
+    "Kept views, with dropped candidates on top in grey, and the distribution that candidates are drawn from. " +
     "A bar leads to its views; arrow keys go from bar to bar.";
   return h(
     "section",

@@ -9,8 +9,8 @@ import { Viewer, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
 
 /** A sentence that says why a view was kept or dropped. */
 export function reasonOf(view: View): string {
-  if (view.photograph !== null) return "A photograph: every one is a view.";
-  if (!view.place) return "views.json does not tell of it.";
+  if (view.photograph !== null) return "A photograph: each photograph is a view.";
+  if (!view.place) return "views.json does not list it.";
   const { reason, rank, pool } = view.place;
   const place = `its entropy is number ${rank} of ${pool} candidates`;
   switch (reason) {
@@ -19,9 +19,9 @@ export function reasonOf(view: View): string {
     case "highest":
       return `Kept: ${place}, among the highest 60 %.`;
     case "drawn":
-      return `Kept: ${place}, between the highest and the lowest, and it was drawn.`;
+      return `Kept: ${place}, between the highest and the lowest, and drawn at random.`;
     case "not_drawn":
-      return `Dropped: ${place}, between the highest and the lowest, and it was not drawn.`;
+      return `Dropped: ${place}, between the highest and the lowest, and not drawn at random.`;
     case "lowest":
       return `Dropped: ${place}, among the lowest 15 %.`;
   }

@@ -92,8 +92,8 @@ export async function loadPart(mesh: Mesh, part: number): Promise<Part> {
     face: new Uint32Array(face),
     material: new Uint16Array(material),
   };
-  if (!all(made.index, vertices)) throw damaged(key, "a face has a vertex that is not there");
-  if (!all(made.face, mesh.faces)) throw damaged(key, "a face has a number that the mesh has not");
+  if (!all(made.index, vertices)) throw damaged(key, "a face has a vertex that does not exist");
+  if (!all(made.face, mesh.faces)) throw damaged(key, "a face has a number that the mesh does not have");
   if (!all(made.material, mesh.materials.length)) throw damaged(key, "a face has no material");
   return made;
 }
@@ -119,6 +119,6 @@ export async function loadBoxes(area: number): Promise<Box[]> {
   const key = `boxes_${area}`;
   const boxes = await load<Box[]>(key);
   if (!Array.isArray(boxes) || !boxes.every((b) => are([b.label], 1) && are(b.box, 6)))
-    throw damaged(key, "a box is not one");
+    throw damaged(key, "a box is invalid");
   return boxes;
 }

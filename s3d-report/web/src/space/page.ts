@@ -238,6 +238,6 @@ function simplified(mesh: Mesh): HTMLElement {
     mesh.cell_m === null
       ? `All ${count(mesh.faces)} faces of the mesh.`
       : `Simplified: ${count(mesh.shown)} of ${count(mesh.faces)} faces. The vertices in each cube of ` +
-        `${(100 * mesh.cell_m).toFixed(1)} cm were made one, and what collapsed was left out.`;
+        `${(100 * mesh.cell_m).toFixed(1)} cm were merged, and collapsed faces were left out.`;
   return h("p", { class: "quiet" }, words);
 }

@@ -98,7 +98,7 @@ export class SpaceView {
   async load(): Promise<void> {
     const { mesh, options } = this;
     if (mesh.has_votes) {
-      options.progress("Loading what the faces voted.");
+      options.progress("Loading the votes of the faces.");
       this.votes = await this.tried(loadFaceVotes(mesh.area));
     }
     if (mesh.has_boxes) this.boxes = (await this.tried(loadBoxes(mesh.area))) ?? [];
