@@ -90,7 +90,10 @@ fn the_stuff_classes_can_be_chosen() {
     let evaluation = panoptic(&package, |o| o.stuff = Some(stuff.clone())).unwrap();
     assert_perfect(&evaluation);
     let definition = evaluation.definition.join(" ");
-    assert!(definition.contains("but of floor, door all of an image is one"), "{definition}");
+    assert!(
+        definition.contains("each stuff class (floor, door) has one segment in an image"),
+        "{definition}"
+    );
     let told = panoptic(&package, |o| o.stuff = Some("grass".parse().unwrap()))
         .unwrap_err()
         .to_string();
