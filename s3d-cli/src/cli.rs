@@ -36,7 +36,7 @@ pub(crate) struct Cli {
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
     /// Write standard error as text for a person, or as one JSON object a line for a program: log lines,
-    /// progress, a line for each finished unit of work, and a summary (docs/log.md).
+    /// progress, a line for each finished unit of work, and a summary.
     #[arg(
         long,
         global = true,
@@ -82,8 +82,8 @@ pub(crate) enum Command {
             "Examples:\n",
             "  s3d plan scan/scene.toml -o plan\n",
             "  s3d export scan/scene.toml -o dataset --plan plan --shard 1/4\n",
-            "The options are the options of `s3d export` on which labels and scores depend. docs/cluster has \
-             files for Slurm and others.",
+            "The options are the options of `s3d export` on which labels and scores depend. The page \"Many \
+             machines\" of the documentation has files for Slurm and others.",
         )
     )]
     Plan(plan::PlanArgs),
@@ -193,7 +193,8 @@ pub(crate) enum Command {
             "Examples:\n",
             "  s3d eval sem3d --truth dataset --pred predictions --areas 5\n",
             "  s3d eval det --truth dataset --pred boxes.json --folds paper --json result.json\n",
-            "docs/evaluation.md describes each protocol and the files of its predictions.",
+            "The page \"Evaluation\" of the documentation (the module `s3d_eval::protocols`) describes each protocol \
+             and the files of its predictions.",
         )
     )]
     Eval(eval::EvalArgs),
@@ -204,7 +205,7 @@ pub(crate) enum Command {
             "  s3d detect table dataset --seeds 5\n",
             "  s3d detect train dataset --areas 1,2,3,4,6 -o model.json\n",
             "  s3d detect run dataset model.json --areas 5 -o found.json\n",
-            "docs/detector.md explains how it works and what its numbers mean.",
+            "The page \"The baseline detector\" of the documentation explains how it works and what its numbers mean.",
         )
     )]
     Detect(detect::DetectArgs),

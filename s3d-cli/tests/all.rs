@@ -1,5 +1,5 @@
-//! All tests of the command line, in one program: each of two dozen would be compiled and linked with all crates.
-//! `cargo test -p s3d-cli kill::` runs the tests of one file.
+//! All tests of the command line in one program. As two dozen programs, each would be compiled and linked
+//! with all crates. `cargo test -p s3d-cli kill::` runs the tests of one file.
 
 mod common;
 

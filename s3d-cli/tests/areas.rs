@@ -1,4 +1,5 @@
-//! `s3d demo --areas`: a data set of generated areas that is whole, is gone on with, and is not written over.
+//! `s3d demo --areas`: the generated areas make a complete data set. A killed run goes on, and no other files
+//! are overwritten.
 
 use crate::common;
 use common::{s3d_fails, s3d_ok, text};
@@ -25,7 +26,8 @@ fn two_generated_areas_are_a_data_set_that_verify_passes() {
         assert!(out.join(format!("scan/area_{area}/scene.toml")).exists());
         assert!(fs::read_dir(layout.area_dir(area).join("pano/rgb")).unwrap().count() > 60);
     }
-    // The published folds: areas 1 and 2 are of two buildings, so each is tested with the other's training.
+    // The published folds: areas 1 and 2 are in different buildings, so each is tested after training on the
+    // other.
     let splits = read_splits(&layout.splits()).unwrap();
     assert!(splits.len() >= 2 && splits.iter().all(|split| split.train_areas != split.test_areas));
 }
@@ -41,7 +43,7 @@ fn a_demo_of_areas_goes_on_and_writes_over_nothing_else() {
     assert!(!layout.area_dir(1).join("pano").exists());
     let list = fs::read(out.join("files.csv")).unwrap();
 
-    // Killed after the scan was written, and while the next one was.
+    // Leaves what a kill between the scan and the data set leaves: the whole scan alone.
     for entry in fs::read_dir(&out).unwrap() {
         let path = entry.unwrap().path();
         match path.is_dir() {
@@ -55,7 +57,7 @@ fn a_demo_of_areas_goes_on_and_writes_over_nothing_else() {
     assert_eq!(fs::read(out.join("files.csv")).unwrap(), list);
     assert!(!out.join(".s3d-scan.part").exists());
 
-    // A scan that somebody changed, and one that is not ours.
+    // One scan was changed by a user, and the other was not generated.
     let other = dir.path().join("other");
     fs::create_dir_all(other.join("scan")).unwrap();
     fs::rename(out.join("scan/area_1"), other.join("scan/area_1")).unwrap();

@@ -1,5 +1,5 @@
-//! Input that is broken, hostile or absurd: every export of it ends soon, with exit code 1 and a message that
-//! names the file; nothing that a file says makes the program write outside of OUT.
+//! Broken, hostile or absurd input: every export of it ends soon, with exit code 1 and a message that names
+//! the file. No content of a file makes the program write outside OUT.
 
 use crate::common;
 use common::scan::{SMALL, Scan, png_that_claims, run, wait};
@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// A JPEG file that ends behind a header of this size.
+/// A JPEG file that ends after a header with this size.
 fn jpeg_that_claims(width: u16, height: u16) -> Vec<u8> {
     let mut jpeg = b"\xff\xd8\xff\xe0\0\x10JFIF\0\x01\x01\0\0\x01\0\x01\0\0\xff\xc0\0\x11\x08".to_vec();
     jpeg.extend(height.to_be_bytes());
@@ -27,10 +27,11 @@ fn a_texture_bomb_is_refused_with_its_size_and_the_limit() {
         scan.replace("room.mtl", "newmtl floor\n", &format!("newmtl floor\nmap_Kd {name}\n"));
         scan.refused(&[name, "60000 × 60000 pixels", "536870912"]);
     }
-    // Many that are not too large by themselves.
+    // Many textures, none of them too large alone.
     let scan = Scan::new();
     let (mut obj, mut mtl) = (fs::read_to_string(scan.file("room.obj")).unwrap(), String::new());
-    // Behind the end of an image anything may follow; here it makes the size one that the file could hold.
+    // Any bytes may follow the end of an image. They make this file large enough for the size that its header
+    // claims.
     let mut large = png_that_claims(23_000, 23_000);
     large.resize(70_000, 0);
     scan.write("large.png", large);
@@ -42,7 +43,7 @@ fn a_texture_bomb_is_refused_with_its_size_and_the_limit() {
     scan.write("room.obj", obj);
     scan.write("room.mtl", mtl);
     scan.refused(&["large_16.png", "8589934592"]);
-    // An image that claims what its bytes cannot hold is as one that is damaged.
+    // An image that claims more pixels than its bytes can hold counts as damaged.
     let scan = Scan::new();
     scan.write("claim.png", png_that_claims(16_000, 16_000));
     scan.replace("room.mtl", "newmtl floor\n", "newmtl floor\nmap_Kd claim.png\n");
@@ -52,7 +53,7 @@ fn a_texture_bomb_is_refused_with_its_size_and_the_limit() {
 
 #[test]
 fn one_bad_line_among_many_is_named() {
-    // Both the line and the ones before it are read as a stream. (With a hundred million lines: see
+    // The long line and the lines before it are read as a stream. (A file of a hundred million lines: see
     // `s3d_io::formats`, "Limits".)
     let scan = Scan::new();
     let path = "Area_1/office_1/Annotations/floor_1.txt";
@@ -96,13 +97,14 @@ fn a_camera_inside_a_wall_is_told() {
     assert!(!log.contains(&format!("location {UUID_A} is")), "{log}");
 }
 
-/// Names of files of every kind that is read, by the part of a scan that they are.
+/// Names of files of every kind that is read, by the part of the scan that they make up.
 const MESHES: [&str; 4] = ["m.obj", "m.ply", "m.gltf", "m.glb"];
 const ANNOTATIONS: [&str; 8] =
     ["a.ply", "a.npy", "a.npz", "a.las", "a.laz", "a.e57", "a.mat", "scene0000_00.aggregation.json"];
 const CAMERAS: [&str; 4] = ["c.csv", "images.txt", "images.bin", "transforms.json"];
 
-/// Refuses a scan of which one file was put there by `make`, once for each kind of file, naming it.
+/// Lets `make` put each kind of file into a scan of its own. The export must refuse each scan and name the
+/// file.
 fn every_kind_is_refused(make: impl Fn(&Path), parts: &[&str]) {
     type Choose = fn(&Scan, &str);
     let kinds: [(&[&str], Choose); 3] =
@@ -121,7 +123,7 @@ fn every_kind_is_refused(make: impl Fn(&Path), parts: &[&str]) {
         make(&scan.file(name));
         let file = name.rsplit('/').next().unwrap();
         if scan.file(name).is_dir() && file == "floor_1.txt" {
-            // What else lies in the folders of annotations is left out.
+            // Anything but files in the folders of annotations is left out.
             assert!(scan.exported().contains("floor_1.txt: not a file of points, left out"));
         } else {
             scan.refused(&[file]);
@@ -161,14 +163,14 @@ fn links_that_lead_nowhere_are_refused() {
     fs::remove_dir_all(scan.file("Area_1/office_1/Annotations")).unwrap();
     circle(&scan.file("Area_1/office_1/Annotations"));
     scan.refused(&["Area_1/office_1"]);
-    // A texture is only drawn without.
+    // A texture that cannot be opened is left out; the mesh is drawn without it.
     let scan = Scan::new();
     circle(&scan.file("wall.png"));
     scan.replace("room.mtl", "newmtl floor\n", "newmtl floor\nmap_Kd wall.png\n");
     assert!(scan.exported().contains("wall.png"));
 }
 
-/// A pipe that nobody writes to: opening it would wait for ever.
+/// A pipe without a writer: a program that opens it waits for ever.
 #[cfg(target_os = "linux")]
 #[test]
 fn pipes_in_place_of_files_are_refused() {
@@ -188,7 +190,7 @@ fn pipes_in_place_of_files_are_refused() {
     }
 }
 
-/// Files that may not be read. The superuser may read everything, so the binary is run as somebody else then.
+/// Unreadable files. The superuser may read everything, so for it the binary runs as another user.
 #[cfg(target_os = "linux")]
 #[test]
 fn files_that_may_not_be_read_are_refused() {
@@ -215,7 +217,7 @@ fn files_that_may_not_be_read_are_refused() {
             command.uid(NOBODY).gid(NOBODY);
         }
         let (code, log) = wait(&mut command);
-        // Without its library a mesh would be drawn gray.
+        // The export must fail: without its material library the mesh would be drawn gray.
         assert_eq!(code, Some(1), "{name}: {log}");
         assert!(log.contains(name.rsplit('/').next().unwrap()) && log.contains("ermission denied"), "{log}");
     }
@@ -230,7 +232,7 @@ fn names_that_are_no_text_are_no_trouble() {
     let scan = Scan::new();
     fs::write(scan.file("Area_1/office_1/Annotations").join(odd), "1 2 3 4 5 6\n").unwrap();
     scan.refused(&["Annotations/a", "names no instance"]);
-    // The scan's own folder may be called anything.
+    // The folder of the scan may have any name.
     let scan = Scan::new();
     let moved = scan.dir.path().join(OsStr::from_bytes(b"sc\xffan"));
     fs::rename(scan.file(""), &moved).unwrap();
@@ -267,7 +269,7 @@ fn deep_nesting_is_refused() {
         scan.use_mesh(name);
         scan.refused(&[name]);
     }
-    // Nodes of nodes, each in the next: as deep as a file likes.
+    // A chain of nested nodes, as deep as a file may make it.
     let nodes: Vec<String> = (1..50_000).map(|n| format!("{{\"children\":[{n}]}}")).collect();
     let scan = Scan::new();
     let nodes = format!("{},{{}}", nodes.join(","));
@@ -307,7 +309,8 @@ fn coordinates_that_are_none_are_refused() {
 
 #[test]
 fn enormous_and_tiny_numbers_are_no_trouble() {
-    // Finite, and absurd: a mesh as large as floats go, points as far and as near to each other as they go.
+    // Finite but absurd coordinates: a mesh as large as floats allow, points as far apart and as close
+    // together as floats allow.
     for (name, from, to) in [
         ("room.obj", "v 0 0 -0\n", "v -3e38 -3e38 -3e38\n"),
         ("room.obj", "v 0 0 -0\n", "v 1e-44 1e-44 -1e-44\n"),

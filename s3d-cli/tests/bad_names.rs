@@ -1,5 +1,5 @@
-//! Names in the input that are paths, or names of devices, or the same but for case: nothing that a file says
-//! makes the program write outside of OUT.
+//! Names in the input that are paths, names of devices, or differ in case alone: no content of a file makes
+//! the program write outside OUT.
 
 use crate::common;
 use common::scan::{Scan, listing, png_that_claims};
@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
-/// A glTF box of one triangle whose names lead elsewhere.
+/// A glTF box of one triangle whose names are paths to other folders.
 fn gltf_with_names(names: &[&str]) -> String {
     use std::fmt::Write as _;
     let (mut materials, mut textures, mut images, mut primitives) =
@@ -30,7 +30,7 @@ fn gltf_with_names(names: &[&str]) -> String {
             "{comma}{{\"attributes\":{{\"POSITION\":{i},\"TEXCOORD_0\":{i}}},\"material\":{i}}}"
         );
     }
-    // Texture coordinates are positions here: which they are does not matter.
+    // The positions serve as texture coordinates; their values do not matter.
     let primitives = primitives.replace(",\"TEXCOORD_0\"", ",\"_IGNORED\"");
     let accessors =
         vec!["{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}"; names.len()]
@@ -46,7 +46,7 @@ fn gltf_with_names(names: &[&str]) -> String {
     )
 }
 
-/// Exports, which must succeed; all that is new lies in OUT, under names that every system takes.
+/// Exports, which must succeed. All new files must lie in OUT, under names that every system accepts.
 fn exports_only_into_out(scan: &Scan) -> BTreeMap<PathBuf, (String, u64)> {
     let before = listing(scan.dir.path());
     scan.exported();
@@ -93,7 +93,7 @@ fn names_in_a_mesh_lead_nowhere() {
     scan.write("m.gltf", gltf_with_names(&names));
     scan.use_mesh("m.gltf");
     exports_only_into_out(&scan);
-    // An OBJ file's images may lie elsewhere; their copies do not.
+    // Images of an OBJ file may lie in other folders; their copies must not.
     let scan = Scan::new();
     let png = {
         let mut png = png_that_claims(1, 1);
@@ -107,7 +107,7 @@ fn names_in_a_mesh_lead_nowhere() {
     scan.replace("room.mtl", "newmtl wall\n", "newmtl wall\nmap_Kd Wall.png\n");
     scan.replace("room.mtl", "newmtl table\n", "newmtl table\nmap_Kd wall.png\n");
     exports_only_into_out(&scan);
-    // What is no image is not copied, wherever it is.
+    // A file that is no image is never copied.
     let scan = Scan::new();
     fs::write(scan.dir.path().join("secret"), "a password").unwrap();
     scan.replace("room.mtl", "newmtl floor\n", "newmtl floor\nmap_Kd ../secret\n");
@@ -143,11 +143,11 @@ fn names_in_lists_and_annotations_lead_nowhere() {
         scan.write("cameras.csv", format!("\"{uuid}\",2,1.2,1.5,0,0,0,1\n"));
         match uuid {
             "" => scan.refused(&["cameras.csv, line 1", "no name"]),
-            // Another name becomes a hash.
+            // Any other name becomes a hash.
             _ => drop(exports_only_into_out(&scan)),
         }
     }
-    // Uuids that differ in case alone would share files where case does not count.
+    // Uuids that differ in case alone would share files on a system that ignores case.
     let scan = Scan::new();
     fs::create_dir(scan.file("poses")).unwrap();
     for (name, uuid) in [("a", "ABCDEF"), ("b", "abcdef")] {
@@ -161,7 +161,7 @@ fn names_in_lists_and_annotations_lead_nowhere() {
     }
     scan.use_cameras("poses");
     scan.refused(&["b.json", "abcdef differs from ABCDEF of another file in case only"]);
-    // Rooms and classes of annotations are known words and numbers.
+    // Room types and classes in annotations must be known words, and their indices numbers.
     for room in ["../../evil_1", "office_../1", "office_1/..", "CON_1"] {
         let scan = Scan::new();
         scan.use_annotations("a.ply");

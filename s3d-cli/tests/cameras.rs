@@ -1,4 +1,4 @@
-//! Scan locations from other forms than the table, and placed ones.
+//! Scan locations that are placed, or read from other forms than the table.
 
 use crate::common;
 use common::{files, s3d, s3d_fails, s3d_ok, text, write_scan};
@@ -90,7 +90,7 @@ fn locations_are_placed_by_option_and_by_scene_file() {
     let dir = tempfile::tempdir().unwrap();
     let scene = write_scan(&dir.path().join("scan"), 1);
     let bare = with_cameras(&scene, "");
-    // Without a word they are placed by what they see; the room sees all of itself.
+    // Without an option, locations are placed until they see enough; one location sees all of this room.
     let seen = dir.path().join("seen");
     export(&bare, &seen, &[]);
     let manifest = fs::read_to_string(seen.join("manifest.json")).unwrap();
@@ -113,7 +113,7 @@ fn locations_are_placed_by_option_and_by_scene_file() {
     let info = s3d(&["info", text(&bare), "--place-cameras", "1.2"]);
     let info = String::from_utf8(info.stdout).unwrap();
     assert!(placed.keys().all(|uuid| info.contains(uuid)), "{info}");
-    // Known only once rooms are.
+    // The error is found once the rooms are known.
     s3d_fails(
         &[
             "export",

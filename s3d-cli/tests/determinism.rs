@@ -54,7 +54,7 @@ fn threads_change_no_byte_of_other_forms() {
     }
 }
 
-/// What runs are widths of registers: a processor that has none of them runs the same three times.
+/// The levels are widths of vector registers. On a processor without them, all three runs are the same.
 #[test]
 fn instructions_change_no_byte() {
     let dir = tempfile::tempdir().unwrap();
@@ -155,9 +155,9 @@ fn compression_changes_sizes_and_nothing_that_is_read_back() {
             Some("exr") => {
                 s3d_io::image::read_xyz(&there(i)).unwrap() == s3d_io::image::read_xyz(&there(1)).unwrap()
             }
-            // It has other sizes and checksums.
+            // The list has other sizes and checksums.
             _ if path.ends_with("files.csv") => true,
-            // It names the option.
+            // The manifest names the option.
             _ if path.ends_with("manifest.json") => {
                 let manifest = std::fs::read_to_string(there(i)).unwrap();
                 let name = ["fast", "balanced", "small"][i];

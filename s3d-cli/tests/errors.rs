@@ -1,5 +1,5 @@
-//! Wrong calls and bad input: one clear message that names the file and the place, the right exit code,
-//! nothing lost.
+//! Wrong calls and bad input end with one clear message that names the file and the place, and with the right
+//! exit code. Nothing is lost.
 
 use crate::common;
 use common::scan::Scan;
@@ -226,7 +226,7 @@ fn bad_input_leaves_an_earlier_data_set_as_it_was() {
     s3d_fails(&args, 1, &["999"]);
     assert!(files(&out) == before);
 
-    // What is wrong deep in the annotations is found only after the new data set was begun.
+    // An error deep in the annotations is found only after the new data set was begun.
     scan.replace("room.obj", "999", "3");
     fs::write(scan.annotation("wall_2.txt"), "1 2 3\n").unwrap();
     s3d_fails(&args, 1, &["wall_2.txt", "line 1"]);
@@ -252,7 +252,7 @@ fn what_is_in_the_way_and_not_ours_is_refused_and_kept() {
     fs::write(out.join("assets/logo.png"), "mine").unwrap();
     let mut args = scan.args(&out);
     args.push("--overwrite");
-    // A first and a second data set leave what is somebody else's.
+    // The first and the second data set leave the user's own files alone.
     for _ in 0..2 {
         s3d_ok(&args);
         assert!(out.join("area_7").is_dir());
@@ -277,7 +277,7 @@ fn a_data_set_is_not_written_over_its_own_input() {
     s3d_fails(&args, 2, &["its own input"]);
     assert!(files(&annotations) == before);
 
-    // The scan's folder may hold the data set too, but not where they would meet.
+    // The folder of the scan may hold the data set too, unless files of both would have the same path.
     fs::create_dir(scan.file("s3dis")).unwrap();
     fs::rename(&annotations, scan.file("s3dis/Area_1")).unwrap();
     scan.replace("scene.toml", "path = \"Area_1\"", "path = \"s3dis/Area_1\"");
@@ -297,7 +297,7 @@ fn the_demo_does_not_write_over_a_scan() {
     assert!(files(scan.dir.path()) == before);
 }
 
-/// Whatever the moment at which an export that replaces another was killed: the next one finds one of the two
+/// After an export that replaces another was killed at any moment, the next export finds one of the two
 /// whole.
 #[test]
 fn a_killed_replacement_is_mended() {
@@ -353,7 +353,7 @@ fn a_killed_replacement_is_mended() {
     bad("while the earlier one was removed");
 }
 
-/// An export that failed for good stands in the way of no other call.
+/// An export that failed for good blocks no other call.
 #[test]
 fn a_mended_input_is_exported_into_the_same_folder() {
     let scan = Scan::new();
@@ -363,7 +363,7 @@ fn a_mended_input_is_exported_into_the_same_folder() {
     s3d_fails(&scan.args(&out), 1, &["wall_2.txt"]);
     fs::write(&wall, points).unwrap();
     s3d_ok(&scan.args(&out));
-    // The same call again is no mistake: all that it asks for is there.
+    // The same call again is no mistake: all the files that it asks for exist.
     let log = s3d_ok(&scan.args(&out));
     assert!(log.contains("nothing to do"), "{log}");
     s3d_fails(&[&scan.args(&out)[..], &["--seed", "7"]].concat(), 2, &["--overwrite"]);
@@ -398,7 +398,7 @@ fn an_export_that_cannot_be_written_names_the_file_and_leaves_none_by_halves() {
     assert!(!files(&out).keys().any(|path| text(path).ends_with(".part")), "half a file is left");
 }
 
-/// Nobody reads the log: the work goes on.
+/// If nobody reads the log, the work still goes on.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_log_that_cannot_be_written_ends_nothing() {
@@ -438,12 +438,12 @@ fn a_pipe_is_not_replaced() {
 #[test]
 fn instances_that_no_image_shows_are_told() {
     let scan = Scan::new();
-    // The same points as another instance: it loses every vote to the one with the smaller index.
+    // The same points as another instance, which loses every vote to the instance with the smaller index.
     fs::copy(scan.annotation("table_1.txt"), scan.annotation("table_2.txt")).unwrap();
     scan.warns(&["1 annotated instances win no face", "table_2.txt"]);
 }
 
-/// A device that is always full stands in for a disk: what cannot be written is an error with its name, not a
+/// A device that is always full stands in for a disk: a failed write is an error that names the file, not a
 /// panic.
 #[test]
 #[cfg(target_os = "linux")]
@@ -459,7 +459,7 @@ fn a_full_disk_is_told() {
     assert!(log.contains("; go on with: "), "{log}");
 }
 
-/// A data set that is made from one in OUT that it would replace, of another area.
+/// The input is another area of the data set in OUT, which the export would replace.
 #[test]
 fn an_earlier_data_set_that_is_the_input_is_not_overwritten() {
     let dir = tempfile::tempdir().unwrap();

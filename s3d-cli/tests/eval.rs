@@ -1,4 +1,4 @@
-//! `s3d eval`: answers as text and JSON, and what is wrong with a call or a prediction.
+//! `s3d eval`: results as text and JSON, and the messages for a wrong call or prediction.
 
 use crate::common;
 use common::{s3d, s3d_fails, s3d_ok, text, write_scan};
@@ -29,11 +29,11 @@ fn a_data_set_against_its_own_package_is_perfect_in_text_and_json() {
         .filter(|value| !value.is_null())
         .collect();
     assert!(defined.len() > 4 && defined.iter().all(|value| **value == 1.0), "{answer}");
-    // The same on standard output, and for any number of threads.
+    // The same result on standard output, and for any number of threads.
     let said = s3d(&[&call[..], &["--json", "-", "--threads", "1"]].concat());
     assert_eq!(serde_json::from_slice::<Value>(&said.stdout).unwrap(), result);
 
-    // A file that is there is kept, and refused before anything is evaluated.
+    // An existing file is kept: the call is refused before the evaluation starts.
     let there = fs::read(&file).unwrap();
     s3d_fails(&[&call[..], &["--json", text(&file)]].concat(), 2, &["result.json", "--overwrite"]);
     assert_eq!(fs::read(&file).unwrap(), there);

@@ -1,4 +1,4 @@
-//! Points, scan locations and meshes that are in different frames, or in one that is far from the origin.
+//! Points, scan locations and meshes in different frames, or in one frame far from the origin.
 
 use crate::common;
 use common::scan::{SMALL, Scan};
@@ -11,7 +11,7 @@ use std::path::Path;
 const UTM: [f64; 3] = [500_000.0, 5_400_000.0, 300.0];
 const UTM_LINE: &str = "offset_m = [500000.0, 5400000.0, 300.0]";
 
-/// The scan's annotated points, each with the word of its class and its instance.
+/// The annotated points of the scan, each with its class and its instance.
 fn points(scan: &Scan) -> Vec<([f64; 3], &'static str, u32)> {
     let mut all = Vec::new();
     let instances =
@@ -32,7 +32,7 @@ fn moved(p: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| p[k] + UTM[k])
 }
 
-/// Moves the points of the scan's tree.
+/// Moves the points of the scan's annotations.
 fn move_tree(scan: &Scan) {
     for path in files(&scan.file("Area_1")).into_keys() {
         let mut moved_lines = String::new();
@@ -47,11 +47,11 @@ fn move_tree(scan: &Scan) {
 
 const CLASSES: [&str; 4] = ["floor", "ceiling", "wall", "table"];
 
-/// What a scene file says of a cloud whose classes are numbers.
+/// Scene file entries for a cloud whose classes are numbers.
 const CLASS_TABLE: &str = "room = \"office_1\"\n[annotations.classes]\n\
                            0 = \"floor\"\n1 = \"ceiling\"\n2 = \"wall\"\n3 = \"table\"\n";
 
-/// The moved points as LAS 1.2, millimetres from the offset of the header.
+/// The moved points as LAS 1.2, in millimetres from the header's offset.
 fn las(scan: &Scan) -> Vec<u8> {
     let points = points(scan);
     let mut header = vec![0; 227];
@@ -80,7 +80,7 @@ fn las(scan: &Scan) -> Vec<u8> {
     header
 }
 
-/// `info`, `export` and `plan` fail with these words and write nothing.
+/// `info`, `export` and `plan` must fail with these words and write nothing.
 fn refused(scan: &Scan, parts: &[&str]) {
     scan.fails(parts);
     s3d_fails(&["info", text(&scan.scene)], 1, parts);
@@ -127,7 +127,7 @@ fn annotations_in_another_frame_are_refused_with_the_line_that_mends_it() {
 #[test]
 fn a_cloud_in_another_frame_is_refused_before_it_is_read() {
     let scan = Scan::new();
-    // Its last row is no point, which nobody finds out.
+    // The last row is no point, but the cloud is refused before it is read.
     let mut ply = String::from(
         "ply\nformat ascii 1.0\nelement vertex 70001\nproperty double x\nproperty double y\n\
          property double z\n\
@@ -168,12 +168,12 @@ fn a_part_of_the_points_elsewhere_is_no_other_frame() {
     assert!(info.status.success() && told.contains("1 points are farther than 5 cm"), "{told}");
 }
 
-/// Numbers that are exact in `f64` at home and in UTM.
+/// A number that is exact in `f64` both at home and in UTM.
 fn snapped(v: f64) -> f64 {
     (v * 4096.0).round() / 4096.0
 }
 
-/// Takes mesh, points and locations to `at`, without a word in the scene file.
+/// Moves mesh, points and locations by `at`. The scene file does not mention it.
 fn move_all(scan: &Scan, at: [f64; 3]) {
     let numbers = |line: &str| -> Vec<f64> { line.split(' ').map(|w| snapped(w.parse().unwrap())).collect() };
     let mut obj = String::new();
@@ -206,7 +206,7 @@ fn move_all(scan: &Scan, at: [f64; 3]) {
 
 const OFFSET_JSON: &str = "[500000.0,5400000.0,300.0]";
 
-/// A file of an export without what states the offset.
+/// Removes the statement of the offset from a file of an export.
 fn without_offset(path: &Path, bytes: &[u8]) -> Vec<u8> {
     let comment = b"comment offset_m 500000.0 5400000.0 300.0: add it for the scan's own coordinates\n";
     let in_pose = format!(",\"world_offset_m\":{OFFSET_JSON}");
@@ -232,7 +232,7 @@ fn assert_same(home: &Path, moved: &Path) {
     assert!(home.keys().eq(out.keys()));
     for (path, bytes) in &home {
         let name = text(path);
-        // Checksums of input and output; both say so.
+        // These three hold checksums, or state the offset in another form.
         if !["manifest.json", "files.csv", "conventions.json"].contains(&name) {
             assert!(*bytes == without_offset(path, &out[path]), "{name} differs");
         }
@@ -288,7 +288,7 @@ fn clouds_of_a_scan_in_utm_line_up_and_an_offset_of_their_own_wins() {
         move_all(&scan, UTM);
         let mut bytes = cloud.clone();
         if own {
-            // The cloud is elsewhere: its header's offset is another.
+            // The header's offset is wrong: the cloud lies elsewhere.
             for (axis, at) in [7000.0, 8000.0, 9.0f64].into_iter().enumerate() {
                 bytes[155 + 8 * axis..163 + 8 * axis].copy_from_slice(&at.to_le_bytes());
             }
@@ -334,7 +334,7 @@ fn what_follows_an_export_keeps_the_offset() {
     }
     s3d_ok(&["merge", text(&parts), "-o", text(&merged)]);
     assert!(files(&merged) == files(&out));
-    // An export of the export is still in that frame.
+    // A new export of the export is still in that frame.
     let again = dir.join("again");
     let mut args = vec!["export", text(&out), "-o", text(&again)];
     let area = out.join("area_1");
@@ -342,7 +342,7 @@ fn what_follows_an_export_keeps_the_offset() {
     args.extend(SMALL);
     s3d_ok(&args);
     assert_eq!(json(&again, "conventions.json")["world"], json(&out, "conventions.json")["world"]);
-    // Packages say so.
+    // Packages state the offset.
     for kind in ["colmap", "nerfstudio", "webdataset"] {
         let place = dir.join(kind);
         s3d_ok(&["pack", text(&out), "--to", kind, "-o", text(&place)]);
@@ -359,11 +359,11 @@ fn what_follows_an_export_keeps_the_offset() {
             assert!(here == there, "{kind}");
         }
     }
-    // Coordinates that are made again, in the same frame.
+    // Coordinate images that are made again are in the same frame.
     s3d_ok(&["xyz", text(&out), "--type", "float", "--overwrite"]);
     assert_eq!(json(&out, "conventions.json")["world"]["offset_m"]["1"], serde_json::json!(UTM));
     s3d_ok(&["verify", text(&out)]);
-    // A pose that is silent about it, or says another, is found.
+    // `verify` finds a pose that has another offset or none.
     let folder = out.join("area_1/pano/pose");
     let pose = folder.join(files(&folder).into_keys().next().unwrap());
     let content = fs::read_to_string(&pose).unwrap();

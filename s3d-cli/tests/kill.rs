@@ -1,5 +1,5 @@
-//! An export that is killed at any moment, on a disk that loses or mangles what was written lately, goes on
-//! with the same arguments and ends with the same bytes as one that nobody disturbed.
+//! An export is killed at any moment, on a disk that loses or mangles recently written files. The same call
+//! then goes on and ends with the same bytes as an undisturbed export.
 #![cfg(unix)]
 
 use crate::common;
@@ -29,7 +29,7 @@ const OPTIONS: [&str; 10] = [
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;
 
-/// Numbers that look random and are always the same.
+/// Numbers that look random and are the same in every run.
 struct Random(u64);
 
 impl Random {
@@ -52,7 +52,7 @@ impl Random {
     }
 }
 
-/// Two areas of two scan locations each, and what an undisturbed export of them is.
+/// Two areas of two scan locations each, and the files of an undisturbed export of them.
 struct Scene {
     dir: tempfile::TempDir,
     scenes: [PathBuf; 2],
@@ -63,8 +63,8 @@ struct Scene {
 
 impl Scene {
     fn new() -> Self {
-        // A disk in memory, where there is one: what is tested is what a killed process leaves there, and a
-        // busy disk would be most of the wait.
+        // A disk in memory, if there is one. The test is about the files that a killed process leaves there;
+        // on a busy disk it would mostly wait.
         let memory = Path::new("/dev/shm");
         let dir = if memory.is_dir() {
             tempfile::tempdir_in(memory)
@@ -89,7 +89,7 @@ impl Scene {
         [&["export", text(a), text(b), "-o", text(out)], &OPTIONS[..], more].concat()
     }
 
-    /// The files of an export that nobody disturbs.
+    /// The files of an undisturbed export.
     fn undisturbed(&self, more: &[&str]) -> Files {
         let out = self.out(&format!("undisturbed{}", more.concat()));
         s3d_ok(&self.args(&out, more));
@@ -106,7 +106,7 @@ impl Scene {
             .unwrap()
     }
 
-    /// Lets an export run for a while and kills it; false if it was done before.
+    /// Lets an export run for a while and kills it. Returns false if it had finished before.
     fn run_for(&self, out: &Path, more: &[&str], delay: Duration) -> bool {
         let mut child = self.start(out, more);
         let until = Instant::now() + delay;
@@ -118,7 +118,7 @@ impl Scene {
             thread::sleep(Duration::from_millis(1));
         }
         child.kill().unwrap();
-        // It may have been done at that moment.
+        // It may have finished at that moment.
         !child.wait().unwrap().success()
     }
 }
@@ -134,8 +134,8 @@ fn assert_whole(out: &Path, whole: &Files, when: &str) {
     assert!(!out.join(".s3d").exists(), "{when}: the working folder is still there");
 }
 
-/// Whatever the moment of a kill: a file under its final name is the one that it should be, as long as the
-/// disk keeps what it was given.
+/// At whatever moment the kill came, a file under its final name has its final content, if the disk keeps
+/// what was written.
 fn assert_no_half_files(out: &Path, whole: &Files) {
     if !out.exists() {
         return;
@@ -152,7 +152,7 @@ fn assert_no_half_files(out: &Path, whole: &Files) {
     }
 }
 
-/// How many units of work are written down as done.
+/// The number of units of work that are recorded as done.
 fn finished_units(out: &Path) -> usize {
     let journals = fs::read_dir(out.join(".s3d/journal")).into_iter().flatten();
     let lines = journals.map(|journal| {
@@ -168,7 +168,7 @@ fn killed_at_any_moment_it_goes_on_to_the_same_bytes() {
     let mut random = Random(1);
     let (mut kills, mut cycles, mut deepest) = (0, 0, 0);
     let mut stages = BTreeSet::new();
-    // On a busy machine kills come early, or late: then it takes more of them to come everywhere.
+    // On a busy machine kills come early or late, and it takes more of them to reach every stage.
     while kills < KILLS || (stages.len() < 5 && kills < 10 * KILLS) {
         let out = scene.out(&format!("killed_{cycles}"));
         let threads = ["1", "2", "3"][cycles % 3];
@@ -185,7 +185,7 @@ fn killed_at_any_moment_it_goes_on_to_the_same_bytes() {
         cycles += 1;
     }
     assert!(cycles >= 3 && deepest >= 2, "{kills} kills in {cycles} cycles, {deepest} at most in one");
-    // Of two areas labelled, four locations scored and rendered, two areas' meshes and points: 12.
+    // 12 units: two areas labelled, four locations scored and rendered, meshes and points of two areas.
     assert!(stages.len() >= 5, "kills came only when {stages:?} units of work were done");
 }
 
@@ -198,7 +198,7 @@ fn stopped_by_a_signal_it_goes_on_to_the_same_bytes() {
         let out = scene.out(&format!("stopped_{cycle}"));
         let signal = ["-TERM", "-INT"][cycle % 2];
         let mut child = scene.start(&out, &[]);
-        // The first milliseconds are the system's, which knows of no way to end but its own.
+        // In the first milliseconds the program does not handle signals yet, and the system ends it.
         thread::sleep(scene.took.mul_f64(0.2) + random.delay(scene.took.mul_f64(0.6)));
         let pid = child.id().to_string();
         let _ = Command::new("kill")
@@ -217,7 +217,7 @@ fn stopped_by_a_signal_it_goes_on_to_the_same_bytes() {
     assert!(stops > 0, "no export was stopped");
 }
 
-/// What a power loss does to a file that was written lately.
+/// Damages a recently written file as a power loss does.
 fn mangle(path: &Path, random: &mut Random) {
     let mut bytes = fs::read(path).unwrap();
     if bytes.is_empty() {
@@ -231,7 +231,7 @@ fn mangle(path: &Path, random: &mut Random) {
         3 => bytes[at] ^= 1 << random.below(8),
         _ => bytes.clear(),
     }
-    // A new file: profiles have second names of some.
+    // A new file, since profiles hold hard links to some.
     fs::remove_file(path).unwrap();
     if random.below(6) > 0 {
         fs::write(path, bytes).unwrap();
@@ -247,11 +247,11 @@ fn after_a_power_loss_what_was_lost_is_made_again() {
         let out = scene.out(&format!("power_{cycle}"));
         let late = scene.took.mul_f64(0.5) + random.delay(scene.took.mul_f64(0.4));
         while scene.run_for(&out, &["--threads", "2"], late) {
-            // What a manifest calls complete was brought to the disk before.
+            // A data set was flushed to the disk before its manifest says "complete".
             if fs::read_to_string(out.join("manifest.json")).is_ok_and(|text| text.contains("\"complete\"")) {
                 continue;
             }
-            // Every file may be hit but the request, which is brought to the disk before any other is
+            // Any file may be hit except the request, which is flushed to the disk before any other file is
             // written.
             let request = Path::new(".s3d/request.json");
             let all: Vec<PathBuf> = files(&out).into_keys().filter(|path| path != request).collect();
@@ -262,7 +262,7 @@ fn after_a_power_loss_what_was_lost_is_made_again() {
                     lost += 1;
                 }
             }
-            // The next one gets to the end.
+            // The next run must finish.
             s3d_ok(&scene.args(&out, &[]));
         }
         assert_whole(&out, &scene.whole, &format!("power loss {cycle}"));
@@ -311,7 +311,7 @@ fn other_arguments_are_refused_with_what_differs() {
     s3d_fails(&[&one, &OPTIONS[..]].concat(), 2, &["area 2 there, not now"]);
     assert!(files(&out) == before, "a refused call changed something");
 
-    // Other threads and another name of the same folder are the same call.
+    // Another number of threads, or another path of the same folder, is still the same call.
     let again = scene.dir.path().join("./other");
     s3d_ok(&scene.args(&again, &["--threads", "1", "-q"]));
     assert_whole(&out, &scene.whole, "the same call");
@@ -354,7 +354,7 @@ fn one_process_at_a_time_exports_into_a_folder() {
     s3d_ok(&scene.args(&out, &[]));
     assert_whole(&out, &scene.whole, "after the lock was given back");
 
-    // Two at once: one does it, and the other is told or finds it done.
+    // Two processes at once: one does the work. The other is refused, or finds it done.
     let both = scene.out("both");
     let mut children = [scene.start(&both, &[]), scene.start(&both, &[])];
     let codes = children.each_mut().map(|child| child.wait().unwrap().code().unwrap());
@@ -375,7 +375,7 @@ fn a_killed_replacement_goes_on_or_gives_way_to_another() {
         fs::write(out.join("notes.txt"), "mine").unwrap();
         let killed = scene.run_for(&out, &seven, random.delay(scene.took));
         if killed && out.join(".s3d").exists() {
-            // What a process was writing in folders that hold files of others too.
+            // The unfinished files that a killed process left in folders that hold other files too.
             for folder in ["", "assets", ".s3d"]
                 .map(|name| out.join(name))
                 .iter()
@@ -385,11 +385,11 @@ fn a_killed_replacement_goes_on_or_gives_way_to_another() {
             }
         }
         let (then, whole) = match cycle % 3 {
-            // The same again, with or without the word.
+            // The same call again.
             0 => (&seven[..], &whole_seven),
             1 => (&nine[..], &whole_nine),
             _ => {
-                // The earlier call: what it asked for is there, whole, or lies aside.
+                // The call before the replacement: its files are there, complete, or they were moved aside.
                 let log = s3d(&scene.args(&out, &[]));
                 match log.status.code() {
                     Some(0) => kept += 1,
@@ -415,11 +415,11 @@ fn a_replacement_that_fails_for_good_gives_the_earlier_one_back() {
     let out = scene.out("back");
     s3d_ok(&scene.args(&out, &[]));
     let seven = ["--seed", "7", "--overwrite"];
-    // Half of it, and the earlier one aside.
+    // Half of the new data set, and the earlier one moved aside.
     while !scene.run_for(&out, &seven, scene.took.mul_f64(0.6)) || !out.join(".s3d-previous").exists() {
         s3d_ok(&scene.args(&out, &["--overwrite"]));
     }
-    // A folder where a file belongs, so that it cannot be written.
+    // A folder in place of a file, which then cannot be written.
     let blocked = out.join("area_2/3d/rgb.obj/in/the/way");
     let _ = fs::remove_file(out.join("area_2/3d/rgb.obj"));
     fs::create_dir_all(blocked).unwrap();
@@ -436,7 +436,7 @@ fn what_was_done_before_the_disk_refused_is_not_lost() {
     let mut sizes: Vec<usize> = scene.whole.values().map(Vec::len).collect();
     sizes.sort_unstable_by(|a, b| b.cmp(a));
     for place in [9, 2, 0] {
-        // In units of 512 bytes; a file of this many is one too large.
+        // The limit is in units of 512 bytes, one too small for a file of this size.
         let blocks = (sizes[place] - 1) / 512;
         let run = Command::new("sh")
             .args(["-c", &format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"")])
@@ -448,13 +448,13 @@ fn what_was_done_before_the_disk_refused_is_not_lost() {
         assert!(!run.status.success() && log.contains("cannot write"), "{log}");
         assert_no_half_files(&out, &scene.whole);
     }
-    // It is not in the way of a call with other arguments, and goes on with the same.
+    // The failed export blocks no call with other arguments; the same call goes on.
     let log = s3d_ok(&scene.args(&out, &[]));
     assert!(log.contains("goes on where it stopped"), "{log}");
     assert_whole(&out, &scene.whole, "after the disk refused");
 }
 
-/// A disk of its own that is too small, where one may be made.
+/// A file system of its own that is too small, if the test may make one.
 #[test]
 #[cfg(target_os = "linux")]
 #[allow(clippy::print_stderr, reason = "a test that is skipped says so")]

@@ -1,5 +1,5 @@
-//! An export's memory does not grow with the points of an instance. The example `large_scene` and
-//! `s3d-cli/tests/reliability/curves.py` measure the same on clouds of hundreds of millions.
+//! The memory of an export does not grow with the points of an instance. The example `large_scene` and
+//! `s3d-cli/tests/reliability/curves.py` measure the same on clouds of hundreds of millions of points.
 #![allow(clippy::print_stderr, reason = "says why it measures nothing")]
 
 use crate::common;
@@ -11,8 +11,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Runs `s3d` and returns the largest memory that was seen of it, in bytes; `None` where the system does not
-/// tell.
+/// Runs `s3d` and returns its largest observed memory in bytes; `None` if the system does not tell it.
 fn peak_of(args: &[&str]) -> Option<u64> {
     let mut child = Command::new(env!("CARGO_BIN_EXE_s3d"))
         .args(args)
@@ -21,7 +20,7 @@ fn peak_of(args: &[&str]) -> Option<u64> {
         .expect("the binary starts");
     let mut peak = None;
     loop {
-        // A mark that only rises: what is seen last is the peak but for the last milliseconds.
+        // The peak so far, which only rises: the last reading misses the last milliseconds alone.
         let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
         if let Some(line) = status.lines().find_map(|l| l.strip_prefix("VmHWM:")) {
             let kb: u64 = line
@@ -39,7 +38,7 @@ fn peak_of(args: &[&str]) -> Option<u64> {
     }
 }
 
-/// The room of `write_scan`, its floor of this many points.
+/// The room of `write_scan`; its floor has this many points.
 fn scan(dir: &Path, points: u32) -> std::path::PathBuf {
     let scene = write_scan(dir, 1);
     let path = dir.join("Area_1/office_1/Annotations/floor_1.txt");
@@ -56,7 +55,7 @@ fn scan(dir: &Path, points: u32) -> std::path::PathBuf {
 fn memory_does_not_grow_with_the_points_of_an_instance() {
     let dir = tempfile::tempdir().unwrap();
     let mut peaks = Vec::new();
-    // Both are more than a block.
+    // Both counts exceed a block of points.
     for points in [800_000, 2_400_000] {
         let scan_dir = dir.path().join("scan");
         let scene = scan(&scan_dir, points);
@@ -85,7 +84,7 @@ fn memory_does_not_grow_with_the_points_of_an_instance() {
         eprintln!("not measured: the system tells no peak memory");
         return;
     };
-    // Held whole, 1.6 million points more are 64 MB more: 40 bytes each.
+    // Held in memory as a whole, 1.6 million points more would take 64 MB more, at 40 bytes each.
     let more = many.saturating_sub(few) >> 20;
     assert!(more < 24, "{more} MiB more, {} MiB in all, for 1.6 million points more", many >> 20);
 }

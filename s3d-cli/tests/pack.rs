@@ -1,5 +1,5 @@
-//! `s3d pack`, run as a process on a small data set: packages are whole, the same for any number of threads,
-//! and never touch the data set; what is wrong is told with the file's name.
+//! `s3d pack`, run as a process on a small data set. Packages are complete, the same for any number of
+//! threads, and never change the data set; error messages name the file.
 
 use crate::common;
 use common::{files, list_files, s3d_fails, s3d_ok, text, write_scan};
@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// A data set of two areas, made once: to be read only.
+/// A data set of two areas, made once. Tests only read it.
 fn dataset() -> &'static Path {
     static DATASET: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
     let (_, out) = DATASET.get_or_init(|| {
@@ -37,7 +37,7 @@ fn dataset() -> &'static Path {
 
 const KINDS: [&str; 5] = ["webdataset", "colmap", "nerfstudio", "coco", "parquet"];
 
-/// Packs into `dir`, and gives all that was written, by its path.
+/// Packs into `dir`, and returns all files written, by path.
 fn pack(dir: &Path, kind: &str, more: &[&str]) -> BTreeMap<PathBuf, Vec<u8>> {
     let place = dir.join("package");
     s3d_ok(&[&["pack", text(dataset()), "--to", kind, "-o", text(&place)], more].concat());
@@ -48,7 +48,7 @@ fn pack(dir: &Path, kind: &str, more: &[&str]) -> BTreeMap<PathBuf, Vec<u8>> {
     }
 }
 
-/// Images of an area's kind, as the data set has them.
+/// The names of an area's images of a kind, as in the data set.
 fn image_names(area: u32, kind: &str) -> Vec<String> {
     let folder = dataset().join(format!("area_{area}/{kind}/rgb"));
     let mut names: Vec<String> = fs::read_dir(folder)
@@ -75,7 +75,7 @@ fn the_same_bytes_for_any_number_of_threads_and_nothing_altered() {
         };
         let one = pack(a.path(), kind, &[more, &["--threads", "1"]].concat());
         let four = pack(b.path(), kind, &[more, &["--threads", "4"]].concat());
-        // nerfstudio's paths lead from the package to the data set; both packages are as deep.
+        // nerfstudio's paths lead from the package to the data set, so both packages must lie equally deep.
         assert!(one.keys().eq(four.keys()), "{kind}");
         for (path, bytes) in &one {
             assert!(*bytes == four[path], "{kind}: {path:?}");
@@ -103,7 +103,7 @@ fn shards_hold_every_file_once() {
         let bytes = &package[Path::new(shard["url"].as_str().unwrap())];
         assert_eq!(bytes.len() as u64, shard["filesize"].as_u64().unwrap());
         assert!(shard["nsamples"].as_u64().unwrap() <= 3);
-        // Every file of an image is somewhere in the shards, byte by byte.
+        // Every file of an image is in some shard, byte by byte.
         let mut meta = 0;
         for header in bytes.chunks(512).filter(|b| b.len() == 512 && b[257..262] == *b"ustar") {
             if header.starts_with(b"__s3d__/") {
@@ -126,7 +126,7 @@ fn shards_hold_every_file_once() {
     let more = ["--prefix", "train", "--images", "views", "--modalities", "rgb,depth", "--areas", "2"];
     let package = pack(dir.path(), "webdataset", &more);
     let names: Vec<_> = package.keys().map(|p| p.to_str().unwrap()).collect();
-    // A shard for each of a few samples.
+    // One shard for each sample.
     let samples = image_names(2, "data").len();
     let shards: Vec<_> = (0..samples).map(|i| format!("train-{i:06}.tar")).collect();
     assert!(samples > 1 && samples <= 8);
@@ -265,7 +265,7 @@ fn packages_are_replaced_only_when_asked() {
     }
 }
 
-/// A copy of the data set with a fault.
+/// A damaged copy of the data set.
 fn damaged(dir: &Path, damage: impl FnOnce(&Path)) -> PathBuf {
     let out = dir.join("damaged");
     for (path, bytes) in files(dataset()) {
@@ -297,12 +297,12 @@ fn a_damaged_data_set_is_told_by_the_file() {
     }
     fs::copy(dataset().join(&of_depth), out.join(&of_depth)).unwrap();
 
-    // What follows is what a tool may make that knows of files.csv.
+    // The faults from here on are a tool's that also updates files.csv.
     fs::write(out.join(&of_semantic), "no image").unwrap();
     list_files(&out);
     fails("coco", &[&of_semantic, "PNG"]);
     fails("parquet", &[&of_semantic, "PNG"]);
-    // A label that is in no table.
+    // A label that no table has.
     let labels = out.join("assets/semantic_labels.json");
     fs::copy(dataset().join(&of_semantic), out.join(&of_semantic)).unwrap();
     fs::write(&labels, "[\"<UNK>_0_<UNK>_0_0\"]").unwrap();
@@ -372,7 +372,7 @@ fn a_data_set_without_a_modality_says_what_is_needed() {
     for (kind, modality) in [("colmap", "rgb"), ("nerfstudio", "rgb"), ("coco", "rgb")] {
         s3d_fails(&["pack", text(&out), "--to", kind], 1, &["missing", &format!("needs {modality}")]);
     }
-    // The others take what there is; the default lies beside the data set.
+    // Other packages need no single modality. By default they lie beside the data set.
     s3d_ok(&["pack", text(&out), "--to", "parquet"]);
     s3d_ok(&["pack", text(&out), "--to", "webdataset"]);
     assert!(dir.path().join("poses_images.parquet").is_file());

@@ -1,6 +1,6 @@
-//! RGB from the scanner's pictures, there and back: pictures that our own renderer took in the built-in scene
-//! — a sky box, a panorama, 18 captures through a lens that distorts — must give the images that the mesh
-//! itself gives.
+//! RGB from the scanner's pictures, there and back. Our own renderer takes pictures in the built-in scene: a
+//! sky box, a panorama, and 18 captures through a lens that distorts. They must give the same images as the
+//! mesh.
 
 use crate::common;
 use common::{UUID_A, UUID_B, files, s3d_fails, s3d_ok, text, write_scan};
@@ -35,8 +35,8 @@ impl<'m> Studio<'m> {
         rgb_image(&self.scene, &self.mip_maps, &cast(&self.scene, camera), camera)
     }
 
-    /// What each face of a sky box shows, by the words of `s3d_io::formats`; up and down are held as one
-    /// looks up and down from `heading`.
+    /// The six faces of a sky box, as `s3d_io::formats` defines them. The camera looks up and down from
+    /// `heading`.
     fn sky_box(&self, pose: &Pose, heading: f64, size: u32) -> Vec<Raster<[u8; 3]>> {
         let turns = [
             (heading, FRAC_PI_2),
@@ -53,7 +53,7 @@ impl<'m> Studio<'m> {
             .into()
     }
 
-    /// A picture through a lens: a straight one of more pixels, bent.
+    /// A picture through a lens: an undistorted one of more pixels, bent.
     fn capture(&self, pose: Pose, lens: &Lens) -> Raster<[u8; 3]> {
         let reach = 1.02 * lens.reach();
         let width = 2 * (reach * lens.focal_px().x).ceil() as u32;
@@ -74,7 +74,7 @@ impl<'m> Studio<'m> {
         let (w, h) = (lens.width(), lens.height());
         let pixel = |i: u32| {
             let p = dvec2(f64::from(i % w) + 0.5, f64::from(i / w) + 0.5);
-            // Four samples: the straight picture has twice the pixels.
+            // Four samples: the undistorted picture has twice the pixels.
             let samples = [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)]
                 .map(|(x, y)| at(p + dvec2(x, y)));
             std::array::from_fn(|k| (samples.iter().map(|s| s[k]).sum::<f64>() / 4.0).round() as u8)
@@ -83,7 +83,7 @@ impl<'m> Studio<'m> {
     }
 }
 
-/// Three lenses that differ, bent as real ones are.
+/// Three lenses that differ, bent as much as real ones.
 fn lenses() -> [(Lens, String); 3] {
     [0.0, 1.0, 2.0].map(|k| {
         let (size, f) = ([640u32, 512u32], [472.0 + k, 471.0]);
@@ -120,9 +120,9 @@ fn write_captures(studio: &Studio<'_>, uuid: &str, pose: &Pose, dir: &Path) {
     }
 }
 
-/// Whether a pixel or one beside it is at an edge of the depth, a step or a crease. Along a plane the
-/// reciprocal of the depth is linear, so its second difference tells, from 3 steps of the depth's
-/// quantisation and a five hundredth on.
+/// Whether a pixel or one beside it is at an edge of the depth, a step or a crease. The reciprocal of the
+/// depth is linear along a plane. An edge is a second difference of at least 3 steps of the depth's
+/// quantisation plus a five hundredth.
 fn is_near_edge(depth: &Raster<u16>, x: u32, y: u32) -> bool {
     let bends = |x: u32, y: u32| {
         let at = |x: u32, y: u32| 1.0 / f64::from(depth.at(x, y));
@@ -133,8 +133,8 @@ fn is_near_edge(depth: &Raster<u16>, x: u32, y: u32) -> bool {
     (y - 1..=y + 1).any(|y| (x - 1..=x + 1).any(|x| bends(x, y)))
 }
 
-/// The lowest peak signal-to-noise ratio, in dB, of a kind of images against those of the same name in
-/// another data set, over all pixels that are not near an edge of the depth, and how many images there were.
+/// The lowest peak signal-to-noise ratio, in dB, of the images of a kind against the images of the same name
+/// in another data set, over all pixels that are not near an edge of the depth; and the number of images.
 fn worst_psnr(ours: &Path, reference: &Path, kind: &str) -> (f64, usize) {
     let folder = |out: &Path, what: &str| out.join("area_1").join(kind).join(what);
     let (mut worst, mut count) = (f64::INFINITY, 0);
@@ -161,7 +161,7 @@ fn worst_psnr(ours: &Path, reference: &Path, kind: &str) -> (f64, usize) {
     (worst, count)
 }
 
-/// A location of the built-in scene in which all of it can be seen.
+/// A location of the built-in scene from which all of it can be seen.
 const UUID: &str = "0c5a7d1e93b84f62a1d7e0f4b2683c95";
 
 fn export(scan: &Path, rgb: &str) -> PathBuf {
@@ -194,12 +194,12 @@ fn export(scan: &Path, rgb: &str) -> PathBuf {
     out
 }
 
-/// A pixel of a picture that is spoilt.
+/// The pixel of a spoilt picture.
 type Pixel = fn(&Raster<[u8; 3]>, u32, u32) -> [u8; 3];
 
 #[test]
 fn pictures_of_the_scene_give_its_images() {
-    // Kept, to be looked at.
+    // Kept after the test, for a look.
     let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures");
     let _ = fs::remove_dir_all(&dir);
     let demo = ["--views", "0", "--size", "16", "--pano-width", "32", "--points-per-m2", "50"];
@@ -216,7 +216,7 @@ fn pictures_of_the_scene_give_its_images() {
         .iter()
         .enumerate()
         .for_each(|(k, face)| write(&scan.join("skybox").join(name(k)), face));
-    // Held as Matterport's viewers have it: up and down meet the right.
+    // In Matterport's form up and down border on the right face.
     let matterport = studio.sky_box(&pose, -FRAC_PI_2, 768);
     matterport
         .iter()
@@ -239,11 +239,11 @@ fn pictures_of_the_scene_give_its_images() {
             assert!(psnr > 35.0, "{rgb}: {psnr:.1} dB in {kind}");
             assert_eq!(count, images);
         }
-        // Only colours come from pictures.
+        // Only the colours come from pictures.
         assert_eq!(files(&out.join("area_1/pano/depth")), files(&direct.join("area_1/pano/depth")));
     }
 
-    // A face that is mirrored or turned is far off.
+    // A mirrored or turned face differs by far.
     let spoil = |k: usize, pixel: Pixel| {
         let image =
             Raster::from_vec(768, 768, (0..768 * 768).map(|i| pixel(&faces[k], i % 768, i / 768)).collect());
@@ -259,7 +259,7 @@ fn pictures_of_the_scene_give_its_images() {
     assert!(mirrored < 28.0 && turned < 28.0, "{mirrored:.1} dB mirrored, {turned:.1} dB turned");
 }
 
-/// The small scan with its scene file's `rgb`.
+/// The small scan with this `rgb` in its scene file.
 fn small_scan(dir: &Path, rgb: &str) -> PathBuf {
     let scene = write_scan(&dir.join("scan"), 1);
     let toml = fs::read_to_string(&scene).unwrap();
@@ -295,7 +295,7 @@ fn what_is_missing_is_named_before_anything_is_written() {
     fails(&["--only", UUID_B], &["1 of 2 locations", &b]);
     write(&folder.join(format!("{UUID_B}.png")), &Raster::filled(64, 48, [40, 50, 60]));
     fails(&[], &[&format!("{UUID_B}.png"), "64 × 48", "twice as wide as high"]);
-    // The other location's are not asked for.
+    // The pictures of the other location are not needed.
     let ok = args(&["--only", UUID_A]);
     s3d_ok(&ok.iter().map(String::as_str).collect::<Vec<_>>());
     let pano = files(&out.join("area_1/pano/rgb"));
@@ -332,7 +332,7 @@ fn the_same_pictures_give_the_same_bytes() {
             >= 6
     );
     assert!(one == run("3"), "threads change the images");
-    // One capture less is a hole, and told.
+    // Without one capture there is a hole, which is reported.
     fs::remove_file(dir.path().join(format!("scan/captures/{UUID_A}_i0_3.png"))).unwrap();
     let out = dir.path().join("out");
     let args = [&["export", text(&scene), "-o", text(&out)][..], &SMALL].concat();

@@ -38,7 +38,7 @@ fn export(scene: &Path, out: &Path, more: &[&str]) -> String {
     s3d_ok(&[&["export", text(scene), "-o", text(out)], &SMALL[..], more].concat())
 }
 
-/// The mean of the differences between the colours of points and those of the mesh around them.
+/// The mean difference between the colours of points and of the mesh around them.
 fn difference(mesh: &TriMesh, cloud: &PointCloud) -> f64 {
     let nearest = s3d_geom::NearestFaces::new(mesh);
     let color = |p| match mesh.color_of(nearest.nearest(p).face) {
@@ -74,7 +74,7 @@ fn a_mesh_without_texture_shows_the_colours_of_the_points() {
     assert!(log.contains("the mesh takes its colours from 2800 points for 26047 vertices"), "{log}");
     assert!(s3d_ok(&["verify", text(&out), "--full"]).is_empty());
 
-    // The mesh of the data set has them, and so has every image.
+    // The mesh of the data set has these colours, and so has every image.
     let mesh = read_mesh(&out.join("area_1/3d/rgb.obj"), UpAxis::Y).unwrap().mesh;
     let points: Vec<PathBuf> = files(&scan.file("Area_1")).into_keys().collect();
     assert_eq!(points.len(), 7);
@@ -123,7 +123,7 @@ fn several_areas_have_colours_of_their_own() {
 
 #[test]
 fn what_cannot_be_is_refused() {
-    // No colours, no points near, no cloud.
+    // A cloud without colours, points too far away, no cloud at all.
     let scan = untextured();
     scan.replace("scene.toml", "path = \"room.obj\"", POINTS);
     let scene = fs::read_to_string(&scan.scene).unwrap();

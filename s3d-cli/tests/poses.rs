@@ -1,4 +1,4 @@
-//! `s3d render --poses`: the cameras of any list, registered with what an export makes of the same cameras.
+//! `s3d render --poses`: the cameras of any list give the same images as an export with these cameras.
 
 use crate::common;
 use common::scan::Scan;
@@ -30,7 +30,7 @@ fn posed(list: &Path) -> Vec<PosedCamera> {
     read_posed_cameras(list, &DAffine3::IDENTITY).unwrap().cameras
 }
 
-/// What an export shows, its packages show too: every pixel of every view, from each form of its cameras.
+/// Packages show the same as their export: every pixel of every view, from each form of its cameras.
 #[test]
 fn packed_cameras_show_what_the_export_shows() {
     let scan = Scan::new();
@@ -71,12 +71,12 @@ fn packed_cameras_show_what_the_export_shows() {
                 assert!(other * 500 <= a.len(), "{list}: {other} pixels of {domain} of {stem} differ");
             }
         }
-        // Angles and quaternions round a pose: a depth between two steps may go to the other.
+        // Angles and quaternions round a pose, so a depth close to the middle of two steps may change.
         assert!(differ * 5000 <= pixels, "{list}: {differ} of {pixels} depths differ");
     }
 }
 
-/// The same two cameras in every form; and what is written is such a form itself.
+/// The same two cameras in every form; the output is such a form as well.
 #[test]
 fn every_form_gives_the_same_images() {
     let scan = Scan::new();
@@ -134,7 +134,7 @@ fn every_form_gives_the_same_images() {
         assert_eq!(log.contains("1 of 3 poses are not known"), list == "scannet", "{log}");
     }
 
-    // What was written is a list of the same cameras.
+    // The output is a list of the same cameras.
     let written = posed(&first);
     for (posed, pose) in written.iter().zip(poses) {
         let read = posed.camera(&GivenIntrinsics::default()).unwrap();
@@ -146,7 +146,7 @@ fn every_form_gives_the_same_images() {
     render(&mesh, &first, &again, &["--threads", "1"]);
     assert!(images(&again) == expected);
 
-    // A pixel of the list is where its depth says: at K and the pose of the file.
+    // A pixel's point lies where its depth says, at the file's K and pose.
     let depth = read_gray16(&first.join("depth/1.png")).unwrap();
     let read = written[1].camera(&GivenIntrinsics::default()).unwrap();
     let point = read.pose.location + read.direction(7.5, 33.5) * f64::from(depth.at(7, 33)) / 512.0;
@@ -202,11 +202,11 @@ fn far_from_the_origin_cameras_move_with_the_mesh() {
     let ((near, _), (found, log)) =
         (view(&home, "list.csv", "v", &size), view(&scan, "list.csv", "v", &size));
     assert!(log.contains("far from the origin"), "{log}");
-    // The offset is what puts the box's corner at the origin, or near it: coordinates differ, depths do not.
+    // The offset moves the box's corner to the origin, or near it: coordinates differ, depths do not.
     for path in ["depth/a.png", "normal/a.png", "faces/a.png"].map(Path::new) {
         assert!(near[path] == found[path], "{}", path.display());
     }
-    // The list that was written is in the frame of the file again.
+    // The written list is in the frame of the file again.
     let back = posed(&scan.file("v"))[0].pose.location;
     assert!(back.abs_diff_eq(dvec3(500_002.0, 5_400_001.25, 301.5), 1e-6), "{back}");
     let (again, _) = view(&scan, "v", "again", &[]);
@@ -217,7 +217,8 @@ fn far_from_the_origin_cameras_move_with_the_mesh() {
 fn a_list_in_another_frame_is_turned_or_refused() {
     let scan = Scan::new();
     let (mesh, out) = (scan.file("room.obj"), scan.out());
-    // As the mesh's file has its axes: y is up. The camera looks along −z of the file, +y of the world.
+    // The matrix has the axes of the mesh's file: y is up. The camera looks along −z of the file, +y of the
+    // world.
     let rows = "[[1,0,0,2],[0,1,0,1.5],[0,0,1,-1.2],[0,0,0,1]]";
     let keys = r#""w": 40, "h": 30, "fl_x": 30"#;
     let frame = |name: &str| format!(r#"{{"file_path": "{name}", "transform_matrix": {rows}}}"#);
@@ -237,7 +238,7 @@ fn a_list_in_another_frame_is_turned_or_refused() {
     let depth = read_gray16(&out.join("depth/a.png")).unwrap();
     assert_eq!(depth.at(20, 15), 922, "the wall at y = 3: 1.8 m");
     assert_eq!(posed(&out)[0].pose.location, dvec3(2.0, 1.2, 1.5));
-    // Some of them are warned about.
+    // If only some of them see nothing, that is a warning.
     let level = "name,x,y,z,yaw,width,height,fov\na,2,1.2,1.5,0,40,30,70\nb,-9,1.2,1.5,90,40,30,70\n";
     scan.write("some.csv", level);
     let log = render(&mesh, &scan.file("some.csv"), &out, &["--overwrite"]);
@@ -273,7 +274,7 @@ fn what_a_list_lacks_is_asked_for_by_option() {
     fails("two.json", &["--width", "32768"], 1, &["1 panoramas"]);
     scan.write("large.csv", "name,x,y,z,yaw,width,height,fov\na,2,1,1,0,40000,30,70\n");
     fails("large.csv", &[], 2, &["large.csv, line 2", "40000 × 30 pixels", "--width"]);
-    // A lens that bends is told of.
+    // A lens that bends gives a warning.
     scan.write(
         "lens.json",
         r#"{"w": 40, "h": 30, "fl_x": 30, "k1": 0.1, "frames": [{"file_path": "a.png",
@@ -303,7 +304,7 @@ fn only_views_of_ours_are_replaced() {
     assert!(files(&out) == before);
 }
 
-/// A caller ends it between two views: nothing is left, and the same call makes it.
+/// A caller cancels between two views: nothing is left, and the same call then makes all of it.
 #[test]
 fn it_tells_how_far_it_is_and_ends_when_asked() {
     let scan = Scan::new();
@@ -333,7 +334,7 @@ fn it_tells_how_far_it_is_and_ends_when_asked() {
     assert!(!out.exists() && fs::read_dir(scan.dir.path()).unwrap().count() == 1, "something is left");
     cancel.reset();
     let made = call();
-    // The seventh view asked again.
+    // The seventh view had asked.
     assert!(matches!(made, Err(Error::Cancelled)));
     let made = render_poses(&mesh, &list, &out, &PosesOptions::default(), &Context::default()).unwrap();
     assert_eq!((made.views, made.blind, made.untracked), (40, 0, 0));

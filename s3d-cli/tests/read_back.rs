@@ -1,5 +1,5 @@
-//! Exports are read back and held against their own mesh, poses and tables: the built-in scene, and the real
-//! scan.
+//! Exports of the built-in scene and of the real scan are read back and compared with their own mesh, poses
+//! and tables.
 
 use crate::common;
 use common::{copyroom, s3d, s3d_ok, text};
@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// Holds all images of an area against the exported mesh; returns how many there were.
+/// Compares all images of an area with the exported mesh. Returns the number of images.
 fn check_images(layout: &Layout, area: u32) -> usize {
     let table = LabelTable::from_names(&read_labels(&layout.labels_json()).unwrap()).unwrap();
     let colored = read_mesh(&layout.mesh_dir(area).join("rgb.obj"), UpAxis::Y).unwrap();
@@ -69,7 +69,7 @@ fn check_image(layout: &Layout, area: u32, name: &str, scene: &Scene<'_>, labels
     assert_eq!(pose.camera_uuid, name.uuid);
     assert_eq!(pose.room, format!("{}_{area}", name.room));
 
-    // The camera as a reader of the pose file makes it.
+    // The camera as a reader derives it from the pose file.
     let location = DVec3::from_array(pose.camera_location);
     let seen_from = Pose {
         location,
@@ -190,7 +190,7 @@ fn the_demo_is_a_whole_and_correct_data_set() {
     assert!(info.contains("hallway_1") && info.contains("nothing looks wrong"), "{info}");
 }
 
-/// A room's file holds the points of its instances, six numbers a line.
+/// The file of a room holds the points of its instances, six numbers a line.
 fn s3dis_tree_is_well_formed(area: &Path) {
     let mut rooms = 0;
     for room in fs::read_dir(area)
@@ -255,8 +255,8 @@ fn one_view_of_a_mesh_needs_no_annotation() {
     common::s3d_fails(&["sample", text(&mesh), "-o", text(&cloud)], 2, &["--overwrite"]);
 }
 
-/// `files.csv` lists every file of the data set but itself and the manifest, as it is, and the manifest tells
-/// of the list.
+/// `files.csv` lists every file of the data set except itself and the manifest, with its true size and
+/// checksum, and the manifest describes the list.
 fn assert_list_is_true(out: &Path) {
     let layout = Layout::new(out);
     let listed = read_file_list(&layout.file_list()).unwrap();
@@ -296,13 +296,14 @@ fn the_list_of_files_is_true_and_stays_so() {
     assert!(fs::read(out.join("files.csv")).unwrap() != before);
     s3d_ok(&["profile", text(&out), "--to", "pointnet", "--to", "open3d-ml"]);
     assert_list_is_true(&out);
-    // A profile that is made again: what it had before is not in the list any more.
+    // A profile that is made again: its old files leave the list.
     fs::write(out.join("profiles/pointnet/mine.txt"), "").unwrap();
     s3d_ok(&["profile", text(&out), "--to", "pointnet", "--overwrite"]);
     assert_list_is_true(&out);
 }
 
-/// A command that changes a complete data set, and fails on the way, can be called again as it was.
+/// A command that changes a complete data set and fails on the way can be called again with the same
+/// arguments.
 #[test]
 fn coordinates_and_profiles_that_failed_are_made_by_the_same_call() {
     let dir = tempfile::tempdir().unwrap();
@@ -335,7 +336,7 @@ fn coordinates_and_profiles_that_failed_are_made_by_the_same_call() {
     s3d_ok(&["profile", text(&out), "--to", "pointnet"]);
     assert_list_is_true(&out);
 
-    // Not while somebody else changes it.
+    // It is refused while another process changes the data set.
     fs::create_dir(out.join(".s3d")).unwrap();
     let lock = fs::File::create(out.join(".s3d/lock")).unwrap();
     lock.lock().unwrap();

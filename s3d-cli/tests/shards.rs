@@ -1,4 +1,4 @@
-//! Shards of an export, merged, are byte for byte what a single run writes.
+//! Merged shards of an export are byte for byte what a single run writes.
 
 use crate::common;
 use common::{UUID_A, UUID_B, files, s3d, s3d_fails, s3d_ok, text, write_scan};
@@ -15,7 +15,7 @@ const SCORING: [&str; 4] = ["--size", "48", "--views", "8"];
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;
 
-/// Scenes, a folder for everything, and what a single run of them with these options writes.
+/// Scenes, a folder for all files, and the result of a single run with these options.
 struct Trial {
     dir: tempfile::TempDir,
     scenes: Vec<PathBuf>,
@@ -68,7 +68,7 @@ impl Trial {
         s3d_ok(&args);
     }
 
-    /// Merges, and compares with the single run.
+    /// Merges the shards, and compares the result with the single run.
     fn merge(&self, shards: &[&Path], out: &Path) {
         s3d_ok(&merging(shards, out));
         self.assert_single(out);
@@ -95,7 +95,7 @@ fn merging<'a>(shards: &[&'a Path], out: &'a Path) -> Vec<&'a str> {
     args
 }
 
-/// Starts `s3d` and lets it run.
+/// Starts `s3d` without waiting for it.
 fn begin(args: &[&str]) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_s3d"));
     command
@@ -109,10 +109,10 @@ fn begin(args: &[&str]) -> Child {
 #[test]
 fn any_number_of_shards_with_an_out_of_their_own() {
     let trial = Trial::two_areas(&[]);
-    // The last: more shards than there is work.
+    // The last number: more shards than units of work.
     for n in [1, 3, 17] {
         let outs: Vec<PathBuf> = (1..=n).map(|i| trial.path(&format!("own-{n}-{i}"))).collect();
-        // From the last to the first, and one twice.
+        // In reverse order, and the first shard twice.
         for i in (1..=n).rev().chain([1]) {
             trial.shard(&outs[i as usize - 1], i, n, &[]);
         }
@@ -121,7 +121,7 @@ fn any_number_of_shards_with_an_out_of_their_own() {
         shards.push(&outs[0]);
         let out = trial.path(&format!("merged-{n}"));
         trial.merge(&shards, &out);
-        // Twice by mistake.
+        // Again, by mistake.
         trial.merge(&shards, &out);
     }
 }
@@ -141,17 +141,17 @@ fn shards_that_share_an_out() {
             .unwrap()
             .contains("\"running\"")
     );
-    // While a shard is at work nobody merges.
+    // A merge is refused while a shard is at work.
     let lock = fs::File::open(out.join(".s3d/lock")).unwrap();
     lock.lock_shared().unwrap();
     s3d_fails(&merging(&[&out], &out), 75, &["another process", "go on with: "]);
     s3d_fails(&merging(&[&out], &trial.path("elsewhere")), 75, &["another process"]);
     drop(lock);
     trial.merge(&[&out], &out);
-    // A shard that comes late finds all done, and so does another merge.
+    // A late shard finds all work done, and so does another merge.
     trial.shard(&out, 3, 3, &[]);
     trial.merge(&[&out], &out);
-    // Other numbers of shards go together: a unit is a unit.
+    // Shards of different numbers go together: the units are the same.
     let mixed = trial.path("mixed");
     for (i, n) in [(1, 2), (1, 3), (2, 3), (3, 3)] {
         trial.shard(&mixed, i, n, &[]);
@@ -176,11 +176,11 @@ fn with_a_plan_that_is_made_by_one_or_by_many() {
         trial.shard(&out, i, 2, &["--plan", text(&parts)]);
     }
     trial.merge(&[&out], &out);
-    // Nor does a plan keep a single run from being the single run.
+    // A single run with a plan writes the same as one without.
     let whole = trial.path("whole");
     s3d_ok(&words(&trial.export(&whole, &["--plan", text(&plan)])));
     trial.assert_single(&whole);
-    // Annotations are not opened again: what is in them now is not even text, of the same length.
+    // Annotations are not opened again: they now have bytes that are not even text, of the same length.
     for folder in &annotations {
         for name in files(folder).keys() {
             let length = fs::metadata(folder.join(name)).unwrap().len();
@@ -210,7 +210,7 @@ fn what_a_plan_is_not_for_is_refused() {
     fails(&["--seed", "7"], 2, &["--seed 0 there, 7 now"]);
     let other = trial.plan_again(&plan, &["--seed", "7"]);
     assert!(other.contains("--seed 0 there, 7 now"), "{other}");
-    // A journal that was damaged, a table, the labels of faces: made again by another call.
+    // A damaged journal, table or file of face labels is made again by another call.
     for (part, message) in [
         ("journal", "is not complete"),
         ("instances.json", "instances.json: "),
@@ -230,7 +230,7 @@ fn what_a_plan_is_not_for_is_refused() {
     trial.shard(&out, 1, 1, &["--plan", text(&plan)]);
     trial.merge(&[&out], &out);
     fs::remove_dir_all(&out).unwrap();
-    // An input that has changed.
+    // A changed input.
     let mesh = trial.path("one/room.obj");
     let obj = fs::read_to_string(&mesh).unwrap();
     fs::write(&mesh, obj.replacen("v 4 ", "v 4.5 ", 1)).unwrap();
@@ -238,7 +238,7 @@ fn what_a_plan_is_not_for_is_refused() {
 }
 
 impl Trial {
-    /// What a plan with other options is refused with.
+    /// The message that refuses a plan with other options.
     fn plan_again(&self, plan: &Path, extra: &[&str]) -> String {
         let mut args = vec!["plan"];
         args.extend(self.scenes.iter().map(|s| text(s)));
@@ -256,7 +256,7 @@ fn a_shard_that_is_killed_is_run_again() {
     let trial = Trial::two_areas(&["--modalities", "rgb,depth,pose"]);
     let (out, own) = (trial.path("shared"), trial.path("own"));
     trial.shard(&out, 1, 2, &[]);
-    // Killed at some moments of its run, each a little later, and at last left alone.
+    // The shard is killed several times, each time a little later, and at last finishes.
     let started = Instant::now();
     for (out, i) in [(&out, 2), (&own, 1)] {
         for delay in [5, 20, 60, 120] {
@@ -269,7 +269,7 @@ fn a_shard_that_is_killed_is_run_again() {
     }
     assert!(started.elapsed() < Duration::from_secs(600));
     trial.merge(&[&out], &out);
-    // The other one's own folder has half of it.
+    // The shard with a folder of its own has half of the work.
     let halves = trial.path("halves");
     s3d_fails(&merging(&[&own], &halves), 1, &["run again shard 2/2"]);
     assert!(!halves.exists());
@@ -301,22 +301,22 @@ fn a_shard_that_is_missing_damaged_or_of_another_call_is_named() {
     *damaged.last_mut().unwrap() ^= 1;
     fs::write(&path, &damaged).unwrap();
     s3d_fails(&merging(&all, &out), 1, &["other content", "run again shard 3/3"]);
-    // Run again it mends that, and the merge goes on.
+    // Another run of this shard mends that, and the merge goes on.
     trial.shard(all[2], 3, 3, &[]);
     assert_eq!(fs::read(&path).unwrap(), whole);
     trial.merge(&all, &out);
-    // Other options, and other input.
+    // Shards with other options or other input are refused.
     let other = trial.path("other");
     trial.shard(&other, 2, 3, &["--seed", "7"]);
     s3d_fails(&merging(&[all[0], &other, all[2]], &trial.path("mix")), 2, &["--seed 0 there, 7 now"]);
-    // An OUT that holds something else is left alone unless it may be replaced.
+    // An OUT that holds something else is left alone unless `--overwrite` is given.
     s3d_fails(&merging(&[all[0], all[1], all[2]], &trial.path("single")), 0, &["nothing to do"]);
     let single_of_seven = trial.path("seven");
     s3d_ok(&words(&trial.export(&single_of_seven, &["--seed", "7"])));
     s3d_fails(&merging(&all, &single_of_seven), 2, &["--seed 7 there, 0 now", "--overwrite"]);
     s3d_ok(&[&merging(&all, &single_of_seven)[..], &["--overwrite"]].concat());
     trial.assert_single(&single_of_seven);
-    // Shards may begin there as well, if all of them say that they mean it.
+    // Shards may begin in such an OUT as well, if each is called with `--overwrite`.
     let call = trial.export(&other, &["--shard", "1/2"]);
     s3d_fails(&words(&call), 2, &["an unfinished export of another call", "--seed 7 there, 0 now"]);
     let again = trial.path("seven-again");
@@ -407,18 +407,18 @@ fn folders(dir: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn merged_too_early_again_or_by_another_version() {
-    // The second area has no images: its folders are there all the same.
+    // The second area has no images, but still has its folders.
     let trial = Trial::two_areas(&["--only", UUID_A, "--modalities", "depth"]);
     let [one, two] = ["one-of-two", "two-of-two"].map(|name| trial.path(name));
     trial.shard(&one, 1, 2, &[]);
-    // What is missing may come yet, as long as some shard is at work.
+    // Missing work may still come while some shard is at work.
     let lock = fs::File::open(one.join(".s3d/lock")).unwrap();
     lock.lock_shared().unwrap();
     s3d_fails(&merging(&[&one], &one), 75, &["another process", "go on with: "]);
     drop(lock);
     s3d_fails(&merging(&[&one], &one), 1, &["run again shard 2/2"]);
     trial.shard(&two, 2, 2, &[]);
-    // As in the folder of one that was killed early, or of an export without shards.
+    // The file is missing too where a shard was killed early, and in an export without shards.
     fs::remove_file(two.join(".s3d/labels.jsonl")).unwrap();
     let out = trial.path("merged");
     let log = s3d_ok(&merging(&[&two, &one], &out));
@@ -433,7 +433,7 @@ fn merged_too_early_again_or_by_another_version() {
     }
     let call = trial.path("other-version");
     s3d_fails(&merging(&[&one, &two], &call), 2, &["version 0.0.1 of s3d", "merge with that version"]);
-    // One with other options is no less of a shard, and nobody's to remove.
+    // Folders of shards with other options are still shards, and must not be removed.
     for (path, text) in requests.iter().zip(&written) {
         let other = text
             .replace(env!("CARGO_PKG_VERSION"), "0.0.1")
@@ -452,7 +452,7 @@ fn merged_too_early_again_or_by_another_version() {
         .zip(&written)
         .for_each(|(path, text)| fs::write(path, text).unwrap());
 
-    // Into one of them, and twice by mistake.
+    // The merge goes into one of the shards, and is repeated by mistake.
     trial.merge(&[&one, &two], &one);
     let log = s3d_ok(&merging(&[&one, &two], &one));
     assert!(log.contains("nothing to do"), "{log}");
@@ -471,7 +471,7 @@ fn a_plan_is_no_folder_for_a_data_set() {
         s3d_fails(&call, 2, &["holds a plan"]);
         assert_eq!(files(&plan), before);
     }
-    // Nobody can say what a plan is for that lost its first file.
+    // A plan without its first line does not say what it is for.
     fs::write(plan.join("plan.jsonl"), "{").unwrap();
     let call = [&["plan", text(&scenes[0]), "-o", text(&plan)], &SCORING[..]].concat();
     s3d_fails(&call, 1, &["plan.jsonl", "remove the folder"]);

@@ -1,4 +1,4 @@
-//! Scans in other forms than one OBJ and an S3DIS tree: published areas, labels that came with the mesh,
+//! Scans in other forms than one OBJ and annotations of S3DIS: published areas, labels inside the mesh,
 //! several files.
 
 use crate::common;
@@ -35,7 +35,7 @@ fn an_export_is_exported_again_as_published_areas_are() {
     let (a, b) = (images(&first), images(&second));
     assert!(a.len() > 40 && a.keys().eq(b.keys()));
     for (path, bytes) in &a {
-        // Poses go through Euler angles once more.
+        // Poses go through Euler angles once more, which rounds them.
         if path.extension().is_some_and(|e| e == "json") {
             let pose = |bytes: &[u8]| {
                 serde_json::from_slice::<s3d_io::dataset::PoseFile>(bytes)
@@ -55,7 +55,7 @@ fn an_export_is_exported_again_as_published_areas_are() {
     // More views of the same area.
     export(&first.join("area_3"), &more, &["--views", "12", "--keep-all", "--seed", "5"]);
     assert!(images(&more).len() > images(&first).len());
-    // Moved, under another number, at places of its own.
+    // The area is moved, has another number, and gets locations of its own.
     let toml = dir.path().join("moved.toml");
     let table = format!(
         "area = 5\n[published]\npath = {:?}\ntransform = [[0,-1,0,7],[1,0,0,0],[0,0,1,0],[0,0,0,1]]\n",
@@ -73,7 +73,7 @@ fn an_export_is_exported_again_as_published_areas_are() {
     };
     let (a, b) = (pose(&first, 3), pose(&moved, 5));
     assert!((b.x - (7.0 - a.y)).abs() < 1e-9 && (b.y - a.x).abs() < 1e-9, "{a} {b}");
-    // A turn by 90° about +Z changes no distance, so no panorama's depth.
+    // A turn by 90° about +Z changes no distance, so the depth of panoramas stays the same.
     let depth =
         |out: &Path, area: u32| files(&out.join(format!("area_{area}/pano/depth"))).into_values().next();
     let (a, b) = (depth(&first, 3).unwrap(), depth(&moved, 5).unwrap());
@@ -86,7 +86,7 @@ fn an_export_is_exported_again_as_published_areas_are() {
     );
 }
 
-/// The scan's mesh as PLY, with a class and an object of each face, in as many files as there are `parts`.
+/// Writes the mesh of the scan as PLY files with a class and an object for each face, `parts` in number.
 fn write_ply(scan: &Path, parts: usize) -> Vec<PathBuf> {
     let obj = fs::read_to_string(scan.join("room.obj")).unwrap();
     let vertices: Vec<&str> = obj.lines().filter_map(|l| l.strip_prefix("v ")).collect();
@@ -162,7 +162,7 @@ fn labels_of_the_mesh_give_what_the_tree_gives() {
             let of = |out: &Path| files(&out.join("area_3/data").join(domain));
             assert!(of(&expected) == of(&out), "{domain}");
         }
-        // A class without a meaning is named.
+        // The message names a class without a meaning.
         fs::write(&toml, table.replace("3 = \"table\"\n", "")).unwrap();
         s3d_fails(&["export", text(&toml), "-o", text(&dir.path().join("x"))], 1, &["part_", "3"]);
     }
@@ -222,7 +222,7 @@ fn vertices_of_a_scannet_scan_vote_for_all_faces_around_them() {
     fs::create_dir(&folder).unwrap();
     let ply = folder.join("scene0000_00_vh_clean_2.ply");
     fs::rename(mesh, &ply).unwrap();
-    // A segment a quad; objects as the annotators call them, walls one by one.
+    // One segment for each quad. Objects have the annotators' names; each wall is an object.
     let names = ["floor", "ceiling", "wall", "wall", "wall", "wall", "table"];
     let segments: Vec<String> = (0..4 * names.len()).map(|v| (v / 4).to_string()).collect();
     let segs = format!("{{\"sceneId\": \"scene0000_00\", \"segIndices\": [{}]}}", segments.join(", "));

@@ -1,4 +1,4 @@
-//! Scenes whose classes are not S3DIS's: what is made of them, and what is said of taxonomies that are none.
+//! Scenes whose classes are not S3DIS's: the data sets made of them, and the errors for invalid taxonomies.
 
 use crate::common;
 use common::{files, s3d, s3d_fails, s3d_ok, text, write_scan};
@@ -20,10 +20,10 @@ const SMALL: [&str; 10] = [
     "colour,coverage,inside-out,up",
 ];
 
-/// What the annotators of the scan called the sides of the room and the table in it.
+/// The annotators' names for the sides of the room and the table in it.
 const OBJECTS: [&str; 7] = ["floor", "ceiling", "wall", "wall", "shower curtain", "couch", "bed"];
 
-/// A room as ScanNet has it: a mesh, a segment a quad, and objects. Returns the scene file.
+/// A room in ScanNet's form: a mesh, one segment for each quad, and objects. Returns the scene file.
 fn write_scannet(dir: &Path, taxonomy: &str) -> PathBuf {
     write_scan(dir, 3);
     let folder = dir.join("scene0000_00");
@@ -88,7 +88,7 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
     let out = dir.path().join("out");
     export(&scene, &out, &["--profile", "pointcept", "--profile", "pointnet"]);
 
-    // The benchmark has no ceiling: its faces have no label.
+    // The benchmark has no class for the ceiling: its faces have no label.
     let expected = [
         "bed_1_bedroom_1_3",
         "floor_1_bedroom_1_3",
@@ -138,7 +138,7 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
         out.join("s3dis/Area_3/bedroom_1/Annotations/showerCurtain_1.txt")
             .is_file()
     );
-    // Loaders of S3DIS know a bed and a curtain as clutter.
+    // S3DIS's loaders have no bed and no curtain; both become clutter.
     let mut profile: Vec<PathBuf> = files(&out.join("profiles/pointcept/Area_3/bedroom_1/Annotations"))
         .into_keys()
         .collect();
@@ -148,7 +148,7 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
     assert_eq!(profile, of_s3dis.map(PathBuf::from));
     s3d_ok(&["verify", text(&out), "--full"]);
 
-    // Packages.
+    // Packages use the taxonomy as well.
     let coco = dir.path().join("coco");
     s3d_ok(&["pack", text(&out), "--to", "coco", "-o", text(&coco)]);
     let panoptic = json(&coco.join("panoptic.json"));
@@ -172,7 +172,7 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
     {
         category_of.insert(segment["id"].as_u64().unwrap(), segment["category_id"].as_u64().unwrap());
     }
-    // Labels by their indices; walls and floors by the ids of their classes.
+    // Segments of things have their label's index as id; walls and floors have ids made from their classes.
     let of_labels = [(1, 4), (3, 28), (4, 6), (0xff_0001, 1), (0xff_0002, 2)];
     assert_eq!(category_of, BTreeMap::from(of_labels));
     let instances = json(&coco.join("instances.json"));
@@ -217,7 +217,7 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
     let has = |word: &str| table.windows(word.len()).any(|w| w == word.as_bytes());
     assert!(has("share_showerCurtain") && has("bedroom") && !has("share_clutter"));
 
-    // Exported again as a published area is, and in shards.
+    // Exported again as a published area, and in shards.
     let again = dir.path().join("again");
     export(&out.join("area_3"), &again, &[]);
     for name in ["assets/semantic_labels.json", "assets/taxonomy.json", "area_3/3d/semantic.obj"] {
@@ -248,7 +248,7 @@ fn a_scan_of_scannet_keeps_classes_that_s3dis_has_not() {
         .collect();
     assert!(differs.is_empty(), "{differs:?}");
 
-    // A taxonomy that is not the one that was written is told.
+    // `verify` reports a taxonomy that changed after the export.
     let path = out.join("assets/taxonomy.json");
     fs::write(&path, fs::read_to_string(&path).unwrap().replace("scannet20", "scannet21")).unwrap();
     let verified = s3d(&["verify", text(&out)]);
@@ -271,7 +271,7 @@ fn images_of_classes_have_the_taxonomys_places_and_colours() {
     export(&scene, &plain, &[]);
     let asked = ["--modalities", "rgb,depth,normal,semantic,semantic_pretty,semantic_class,global_xyz,pose"];
     export(&scene, &out, &asked);
-    // Nobody gets them without asking, and nothing else changes.
+    // The images of classes are made on demand alone, and change nothing else.
     let (with, without) = (files(&out), files(&plain));
     let is_new = |path: &Path| {
         path.to_string_lossy().contains("semantic_class") || path.to_string_lossy().contains("class_legend")
@@ -315,7 +315,7 @@ fn images_of_classes_have_the_taxonomys_places_and_colours() {
     assert!(legend.contains("\n15,28,showerCurtain,158,218,229,thing,clutter\n"), "{legend}");
     assert!(s3d_io::image::read_rgb8(&out.join("assets/class_legend.png")).is_ok());
     s3d_ok(&["verify", text(&out), "--full"]);
-    // One place wrong in an image, another palette, and a legend that is gone.
+    // One wrong pixel, another palette, and a missing legend.
     let path = with
         .keys()
         .find(|path| path.to_string_lossy().ends_with("domain_semantic_class.png"))
@@ -371,12 +371,12 @@ fn a_taxonomy_of_ones_own_in_a_file_or_in_the_scene() {
     ];
     assert_eq!(names(&labels)[1..7], expected);
     s3d_ok(&["verify", text(&out)]);
-    // The file belongs to the input: another one makes another data set.
+    // The file belongs to the input: with a changed file the data set is another one.
     fs::write(scan.join("mine.toml"), mine.replace("[1, 2, 3]", "[3, 2, 1]")).unwrap();
     let mut args = vec!["export", text(&scene), "-o", text(&out)];
     args.extend(SMALL);
     s3d_fails(&args, 2, &["--overwrite"]);
-    // The same in the scene itself.
+    // The same taxonomy written in the scene file.
     let table: String = mine
         .replace("[[", "[[taxonomy.")
         .replace("[aliases]", "[taxonomy.aliases]");
@@ -434,7 +434,7 @@ fn faults_of_a_taxonomy_are_told_before_anything_is_written() {
         fs::write(&scene, toml).unwrap();
         s3d_fails(&["export", text(&scene), "-o", text(&out)], 1, &parts);
     }
-    // Words that the taxonomy does not know, and none to take them for.
+    // Words that the taxonomy does not know, first without a class that may stand in for them.
     fs::write(scan.join("mine.toml"), class("")).unwrap();
     let toml = toml.replace("bedroom_1", "office_1");
     fs::write(&scene, &toml).unwrap();

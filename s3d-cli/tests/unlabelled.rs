@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A scan whose scene file names no annotations.
+/// A scan whose scene file has no annotations.
 fn unlabelled() -> Scan {
     let scan = Scan::new();
     scan.replace("scene.toml", "[annotations]\npath = \"Area_1\"\n", "");
@@ -38,7 +38,7 @@ fn uuids(out: &Path) -> Vec<String> {
     uuids
 }
 
-/// The images of a data set without poses, by name without their room.
+/// The images of a data set except the poses, by name without their room.
 fn images(out: &Path) -> BTreeMap<String, Vec<u8>> {
     let is_image = |path: &PathBuf| text(path).contains("_domain_") && !text(path).ends_with(".json");
     let all = files(out).into_iter().filter(|(path, _)| is_image(path));
@@ -50,7 +50,7 @@ fn images(out: &Path) -> BTreeMap<String, Vec<u8>> {
 fn all_but_the_labels_is_as_with_them() {
     let (labelled, scan) = (Scan::new(), unlabelled());
     let (with, without) = (labelled.out(), scan.out());
-    // Views are selected by other scores: all of them, then.
+    // Without labels views have other scores, so all are kept.
     export(&labelled.scene, &with, &["--keep-all"]);
     export(&scan.scene, &without, &["--keep-all"]);
     let (mut with_images, without_images) = (images(&with), images(&without));
@@ -94,7 +94,7 @@ fn views_are_selected_by_what_they_show_of_the_geometry() {
         .collect();
     assert!(entropies.iter().all(|e| (0.0..=26f64.ln()).contains(e)));
     assert!(entropies.iter().any(|e| *e > 0.5), "{entropies:?}");
-    // What is scored again by verify has the same scores, and others are found.
+    // `verify` computes the scores again: they are the same, and a changed score is found.
     fs::write(
         out.join("area_1/views.json"),
         fs::read_to_string(out.join("area_1/views.json")).unwrap().replacen(
@@ -133,7 +133,7 @@ fn what_needs_labels_says_so_before_work_begins() {
     s3d_ok(&["pack", text(&out), "--to", "parquet", "-o", text(&package)]);
     assert!(package.is_file());
 
-    // Beside a scene with labels it is refused.
+    // An unlabelled scene cannot be exported together with a labelled one.
     let other = write_scan(&scan.dir.path().join("other"), 2);
     let both = scan.dir.path().join("both");
     let args = ["export", text(&scan.scene), text(&other), "-o", text(&both)];
@@ -158,7 +158,7 @@ fn the_same_bytes_for_threads_shards_and_a_plan() {
     let merged = scan.dir.path().join("merged");
     s3d_ok(&["merge", text(&parts[0]), text(&parts[1]), "-o", text(&merged)]);
     assert!(files(&merged) == expected);
-    // It is an input like any other area.
+    // It can be an input like any other area.
     let again = scan.dir.path().join("again");
     let log = export(&whole.join("area_1"), &again, &[]);
     assert!(log.contains("so that there are no labels") && uuids(&again) == uuids(&whole), "{log}");
@@ -178,7 +178,8 @@ fn a_mesh_alone_is_enough() {
     let [one, visible] = [&seen["seen_m2"][0], &seen["visible_m2"]].map(|v| v.as_f64().unwrap());
     assert!(one >= 0.95 * visible && visible > 40.0, "{seen}");
 
-    // What was asked for is known: nothing is left to do, and another axis or share is another data set.
+    // The request is remembered: the same call has nothing to do, and another axis or share is another data
+    // set.
     assert!(export(&mesh, &out, &[]).contains("nothing to do"));
     let mut args = vec!["export", text(&mesh), "-o", text(&out)];
     args.extend(SMALL);
@@ -187,7 +188,7 @@ fn a_mesh_alone_is_enough() {
     s3d_fails(&with(&["--see", "0.9", "--place-cameras", "2"]), 2, &["cannot be used with"]);
     s3d_fails(&with(&["--see", "1.5"]), 2, &["see: must be above 0, and at most 1"]);
 
-    // A pattern instead, in two files that are one area.
+    // A pattern of names instead, for two files that are one area.
     let text_of_mesh = fs::read_to_string(&mesh).unwrap();
     let (walls, table) = text_of_mesh.split_once("usemtl table").unwrap();
     scan.write("walls.obj", walls);
@@ -211,7 +212,7 @@ fn a_mesh_alone_is_enough() {
 fn a_wrong_axis_writes_no_black_images() {
     let scan = Scan::new();
     let (mesh, out) = (scan.file("room.obj"), scan.out());
-    // Turned upside down there is no floor: nobody stands on the inside of a ceiling's back.
+    // The mesh is upside down and has no floor: nobody can stand on the back of a ceiling.
     let turned: String = fs::read_to_string(&mesh)
         .unwrap()
         .lines()

@@ -1,4 +1,4 @@
-//! `s3d verify` finds what was planted, by name, and nothing where nothing is.
+//! `s3d verify` names every planted fault, and finds no fault in a good data set.
 
 use crate::common;
 use common::{UUID_A, list_files, s3d, s3d_ok, text, write_scan};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use tempfile::TempDir;
 
-/// What `s3d verify` says, and its exit code.
+/// Runs `s3d verify`. Returns its report and its exit code.
 fn verify(out: &Path, extra: &[&str]) -> (String, i32) {
     let result = s3d(&[&["verify", text(out)], extra].concat());
     let log = String::from_utf8_lossy(&result.stderr).into_owned();
@@ -30,7 +30,7 @@ fn is_clean(out: &Path, extra: &[&str]) -> String {
     report
 }
 
-/// A line of the report names the file and holds all of the words.
+/// Asserts that a line of the report names the file and contains all of the words.
 #[track_caller]
 fn tells(report: &str, file: &str, words: &[&str]) {
     let found = report
@@ -39,7 +39,7 @@ fn tells(report: &str, file: &str, words: &[&str]) {
     assert!(found, "no line tells of {file}: {words:?}\n{report}");
 }
 
-/// The built-in scene, exported once: with textures, all classes, two rooms and more.
+/// The built-in scene, exported once. It has textures, all classes and several rooms.
 fn demo() -> &'static Path {
     static DEMO: OnceLock<TempDir> = OnceLock::new();
     let dir = DEMO.get_or_init(|| {
@@ -55,7 +55,7 @@ fn demo() -> &'static Path {
     PATH.get_or_init(|| dir.path().join("demo"))
 }
 
-/// A copy to plant faults in: files are shared until they are replaced.
+/// A copy for planted faults: hard links, so a file is shared until it is replaced.
 fn copy(of: &Path) -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("copy");
@@ -83,7 +83,7 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The first file below `folder` whose name ends so.
+/// The first file below `folder` whose name ends like this.
 fn first(out: &Path, folder: &str, ending: &str) -> String {
     let files = walk(&out.join(folder));
     let found = files.iter().find(|p| p.to_string_lossy().ends_with(ending));
@@ -104,7 +104,7 @@ fn images(out: &Path) -> Vec<DatasetImage> {
     dataset_images(&Layout::new(out), 1).unwrap()
 }
 
-/// The views of the location that has most.
+/// The views of the location that has the most.
 fn views(out: &Path) -> Vec<DatasetImage> {
     let all = images(out);
     let of = |uuid: &str| -> Vec<DatasetImage> {
@@ -187,11 +187,11 @@ fn a_flipped_bit_in_every_kind_of_file_is_found() {
     let (report, code) = verify(&out, &[]);
     assert_eq!(code, 1);
     for file in &files {
-        // The first 20 files of a kind of fault are named: two runs show them all.
+        // A report names the first 20 files of a kind of fault.
         let named = report.lines().any(|l| l.trim_start().starts_with(&format!("{file}: ")));
         assert!(named || report.contains("more like this (sizes and checksums)"), "{file}\n{report}");
     }
-    // Each for itself, so that none hides behind the limit of lines.
+    // In small groups, so that the limit of lines hides none.
     for chunk in files.chunks(14) {
         let (_dir, out) = copy(demo());
         chunk.iter().for_each(|file| flip(&out, file));
@@ -201,7 +201,7 @@ fn a_flipped_bit_in_every_kind_of_file_is_found() {
             .iter()
             .for_each(|file| tells(&report, file, &["other content than was written"]));
     }
-    // The list itself, and the manifest.
+    // The list of files and the manifest.
     let (_dir, out) = copy(demo());
     flip(&out, "files.csv");
     let (report, code) = verify(&out, &[]);
@@ -239,8 +239,8 @@ fn missing_extra_and_swapped_files_are_found() {
     }
 }
 
-/// The pixels of a view as the rays through their corners would have them, as a tool that forgets half a
-/// pixel does.
+/// The depth of a view as a tool makes it that forgets half a pixel: the rays go through the corners of the
+/// pixels.
 fn shifted_depth(out: &Path, image: &DatasetImage) -> Raster<u16> {
     let layout = Layout::new(out);
     let mesh = read_mesh(&layout.rgb_obj(1), UpAxis::Y).unwrap().mesh;
@@ -266,7 +266,7 @@ fn swap(out: &Path, a: &str, b: &str) {
     write_bytes(&out.join(b), &bytes[0]).unwrap();
 }
 
-/// Faults that tools make, with the list of files brought up to date: only the content tells.
+/// Faults of tools that also update the list of files: only the content shows them.
 #[test]
 fn what_tools_get_wrong_is_called_by_its_name() {
     let (_dir, out) = copy(demo());
@@ -275,7 +275,7 @@ fn what_tools_get_wrong_is_called_by_its_name() {
     assert!(views.len() >= 4 && panoramas.len() >= 4, "{} {}", views.len(), panoramas.len());
     let path = |image: &DatasetImage, domain| out.join(image.relative_path(domain));
 
-    // A mirrored panorama: all of its images, but not its pose.
+    // A mirrored panorama: all of its images, but not the pose.
     let mirror = &panoramas[0];
     for domain in [Domain::Rgb, Domain::Normal, Domain::Semantic, Domain::SemanticPretty] {
         let image = mirrored(&read_rgb8(&path(mirror, domain)).unwrap());
@@ -283,7 +283,7 @@ fn what_tools_get_wrong_is_called_by_its_name() {
     }
     let depth = mirrored(&read_gray16(&path(mirror, Domain::Depth)).unwrap());
     write_gray16(&path(mirror, Domain::Depth), &depth, Compression::Fast).unwrap();
-    // Half a pixel, one pixel.
+    // Shifts by half a pixel and by one pixel.
     let half = &views[0];
     write_gray16(&path(half, Domain::Depth), &shifted_depth(&out, half), Compression::Fast).unwrap();
     let one = &panoramas[1];
@@ -291,11 +291,11 @@ fn what_tools_get_wrong_is_called_by_its_name() {
     let rows = semantic.rows().flat_map(|r| [&r[1..], &r[..1]].concat());
     let moved = Raster::from_vec(semantic.width(), semantic.height(), rows.collect());
     write_rgb8(&path(one, Domain::Semantic), &moved, Content::Labels, Compression::Fast).unwrap();
-    // Files of two views, swapped: colours, and depth of panoramas.
+    // Swapped files of two views: colours, and depth of panoramas.
     let [a, b] = [&views[1], &views[2]];
     swap(&out, &a.relative_path(Domain::Rgb), &b.relative_path(Domain::Rgb));
     swap(&out, &panoramas[2].relative_path(Domain::Depth), &panoramas[3].relative_path(Domain::Depth));
-    // A transposed matrix in an otherwise good file, and a pose that is transposed throughout.
+    // A transposed matrix in an otherwise good file, and a pose with every rotation transposed.
     let matrix = &panoramas[1];
     let mut pose = read_pose(&path(matrix, Domain::Pose)).unwrap();
     let rt = pose.camera_rt_matrix;
@@ -312,7 +312,7 @@ fn what_tools_get_wrong_is_called_by_its_name() {
     PoseFile::new(&camera, &pose.original(), &pose.camera_uuid, &pose.room, pose.frame_num)
         .write(&path(turned, Domain::Pose))
         .unwrap();
-    // Channels in the other order; K transposed.
+    // Swapped colour channels, and a transposed K.
     let swapped = &views[1];
     let normals = read_rgb8(&path(swapped, Domain::Normal))
         .unwrap()
@@ -328,7 +328,7 @@ fn what_tools_get_wrong_is_called_by_its_name() {
         if listed {
             list_files(&out);
         } else {
-            // An older data set without a list.
+            // As in an older data set, there is no list.
             fs::remove_file(layout.file_list()).unwrap();
             let manifest = fs::read(layout.manifest()).unwrap();
             let mut manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
@@ -342,7 +342,8 @@ fn what_tools_get_wrong_is_called_by_its_name() {
             tells(&report, &image.relative_path(domain), words)
         };
         for domain in [Domain::Rgb, Domain::Depth, Domain::Normal, Domain::Semantic, Domain::SemanticPretty] {
-            // A mirrored normal is that of another direction: the picture is mirrored all the same.
+            // A mirrored image of normals has the wrong directions, but the picture still shows that it is
+            // mirrored.
             is(mirror, domain, &["not what the mesh shows", "mirrored left to right"]);
         }
         is(mirror, Domain::GlobalXyz, &["not where depth and pose put them"]);
@@ -368,7 +369,7 @@ fn a_label_table_out_of_order_is_found() {
     let layout = Layout::new(&out);
     let mut names = read_labels(&layout.labels_json()).unwrap();
     let last = names.iter().rposition(|n| n != "<UNK>_0_<UNK>_0_0").unwrap();
-    // Two walls.
+    // The swapped names are two walls.
     let i = names.iter().position(|n| n.starts_with("wall_")).unwrap();
     names.swap(i, i + 1);
     write_labels(&layout.labels_json(), &names).unwrap();
@@ -379,13 +380,13 @@ fn a_label_table_out_of_order_is_found() {
     tells(&report, "area_1/3d/instances.json", &[&names[i], "has the index"]);
     tells(&report, "area_1/3d/pointcloud.ply", &["do not fit their faces"]);
 
-    // Images made with another table: indices sorted as numbers are, not as words.
+    // The image was made with another table, whose indices are sorted as numbers, not as words.
     names.swap(i, i + 1);
     write_labels(&layout.labels_json(), &names).unwrap();
     let mut natural: Vec<usize> = (1..=last).collect();
     let number = |n: &str| n.split('_').nth(1).and_then(|n| n.parse::<u32>().ok());
     natural.sort_by_key(|&i| (names[i].split('_').next().map(str::to_owned), number(&names[i])));
-    // A table that differs somewhere: the first two labels of a class with two in the other order otherwise.
+    // If both orders are the same, the order is reversed instead.
     if natural.is_sorted() {
         natural.reverse();
     }
@@ -407,7 +408,7 @@ fn a_label_table_out_of_order_is_found() {
     assert_eq!(code, 1);
     tells(&report, &image.relative_path(Domain::Semantic), &["those of another label table"]);
 
-    // Tables that are not those of the meshes: votes and statistics.
+    // Votes and statistics that do not match the meshes.
     let (_dir, out) = copy(demo());
     for (file, key) in [("area_1/3d/votes.json", "faces_voted"), ("statistics.json", "panoramas")] {
         let text = fs::read_to_string(out.join(file)).unwrap();
@@ -439,7 +440,7 @@ fn an_unfinished_data_set_and_none_are_told() {
 const SMALL: [&str; 10] =
     ["--size", "32", "--pano-width", "64", "--views", "4", "--points-per-m2", "50", "--compression", "fast"];
 
-/// No option of an export makes a fault.
+/// A good export has no fault, whatever its options.
 #[test]
 fn exports_of_every_kind_are_clean() {
     let dir = tempfile::tempdir().unwrap();
@@ -481,7 +482,7 @@ fn exports_of_every_kind_are_clean() {
         &export("placed", &[&one], &["--seed", "9", "--place-cameras", "1.2", "--entropy-stride", "1"]),
         &["--full"],
     );
-    // An export of an export, and textures that do not repeat: colours at their edges would show it.
+    // An export of an export; and textures that do not repeat, since colours at their edges would show it.
     let published = dir.path().join("published");
     s3d_ok(&[&["export", text(&demo().join("area_1")), "-o", text(&published)][..], &SMALL].concat());
     is_clean(&published, &["--full"]);
@@ -511,7 +512,7 @@ fn exports_of_every_kind_are_clean() {
 
 #[test]
 fn a_rotation_and_its_transposed_differ() {
-    // What the tests above transpose is not its own transposed.
+    // The tests above transpose this matrix, which is not symmetric.
     let pose = read_pose(&views(demo())[3].path(&Layout::new(demo()), Domain::Pose)).unwrap();
     let r: DMat3 = pose.pose().world_from_camera;
     assert!(!r.abs_diff_eq(r.transpose(), 0.1));

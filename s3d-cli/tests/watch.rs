@@ -1,5 +1,5 @@
-//! What a program that watches sees: events and exit codes, what a signal does at every stage, what the
-//! summary counts.
+//! What a program that watches an export can rely on: events and exit codes, the effect of a signal at every
+//! stage, and the counts of the summary.
 #![cfg(unix)]
 
 use crate::common;
@@ -19,13 +19,14 @@ use std::time::{Duration, Instant};
 
 const SMALL: [&str; 8] = ["--size", "64", "--pano-width", "128", "--views", "12", "--points-per-m2", "300"];
 
-/// From a signal to the end, where the work is cut in small pieces: one file of this size, on a busy machine.
+/// The longest time from a signal to the end, where the work is cut into small pieces: one file of this size,
+/// on a busy machine.
 const SOON: Duration = Duration::from_secs(4);
 
-/// The same inside one long call: 5 seconds, and time to notice.
+/// The longest time within one long call: 5 seconds, and time to notice the signal.
 const AT_LAST: Duration = Duration::from_secs(9);
 
-/// The lines of a log that is JSON, all of them.
+/// The events of a JSON log; every line must be one.
 fn events(log: &str) -> Vec<Value> {
     let events = log.lines().map(|line| match serde_json::from_str::<Value>(line) {
         Ok(event) => event,
@@ -66,7 +67,7 @@ impl Run {
         Self { child, log, seen: String::new() }
     }
 
-    /// Reads on to the first line that is what is looked for.
+    /// Reads on to the first line that `is_it` accepts.
     fn wait_for(&mut self, what: &str, is_it: impl Fn(&Value) -> bool) {
         loop {
             let from = self.seen.len();
@@ -89,8 +90,8 @@ impl Run {
         assert!(kill.success(), "{}", self.seen);
     }
 
-    /// Waits for the end: how long that took, the exit status, and the whole log. Nothing is on standard
-    /// output.
+    /// Waits for the end. Returns the time that took, the exit status, and the whole log. Standard output
+    /// must be empty.
     fn end(mut self) -> (Duration, ExitStatus, String) {
         let started = Instant::now();
         self.log.read_to_string(&mut self.seen).unwrap();
@@ -103,7 +104,7 @@ impl Run {
     }
 }
 
-/// The command that the last error tells of.
+/// The command that the last error recommends.
 fn command_told(log: &str) -> String {
     let all = events(log);
     let told = all
@@ -119,7 +120,7 @@ fn command_told(log: &str) -> String {
         .to_owned()
 }
 
-/// Runs a command line as a person does who copies it.
+/// Runs a command line in a shell, as a person does who copies it.
 fn shell(line: &str) -> String {
     let out = Command::new("sh").args(["-c", line]).output().unwrap();
     let log = String::from_utf8_lossy(&out.stderr).into_owned();
@@ -135,8 +136,8 @@ fn assert_same(a: &Path, b: &Path) {
     }
 }
 
-/// A stopped run: exit code 75, soon, every line of the log an event and the last of them the end, and a
-/// command that makes what the undisturbed run makes.
+/// Asserts that a stopped run ends soon with exit code 75, that every line of its log is an event and the
+/// last one is the end, and that the recommended command makes the same files as an undisturbed run.
 fn assert_stopped(run: Run, signal: &str, within: Duration) -> String {
     run.signal(signal);
     let (took, status, log) = run.end();
@@ -153,9 +154,10 @@ fn assert_stopped(run: Run, signal: &str, within: Duration) -> String {
 #[test]
 fn a_signal_stops_each_stage_soon_and_the_command_told_goes_on() {
     let dir = tempfile::tempdir().unwrap();
-    // A name that a shell needs quotes for.
+    // A shell needs quotes for this name.
     let scene = write_scan(&dir.path().join("it's a scan"), 1);
-    // Each is long in one stage: (options, the stage before the signal).
+    // Each case: a long stage, the options that make it long, and the stage before it. The signal is sent
+    // between the two.
     let cases: [(&str, &[&str], &str); 4] = [
         ("score", &["--views", "4000", "--entropy-stride", "1", "--size", "128", "--only", UUID_A], "label"),
         ("render", &["--views", "60", "--size", "512", "--pano-width", "256", "--keep-all"], "score"),
@@ -182,8 +184,8 @@ fn a_signal_stops_each_stage_soon_and_the_command_told_goes_on() {
     }
 }
 
-/// Starts an export that reads its mesh for minutes, in one call: faces whose many corners have no order take
-/// long to be cut into triangles.
+/// Starts an export that spends minutes in one call, reading its mesh: to cut faces with many unordered
+/// corners into triangles takes long.
 fn start_endless(dir: &Path) -> Run {
     let (scene, out) = (write_scan(dir, 1), dir.join("out"));
     let mut obj = fs::OpenOptions::new().append(true).open(dir.join("room.obj")).unwrap();
@@ -208,7 +210,7 @@ fn start_endless(dir: &Path) -> Run {
     obj.write_all(text_of_faces.as_bytes()).unwrap();
     let mut run = Run::start(&["export", text(&scene), "-o", text(&out)]);
     run.wait_for("start", |e| kind(e) == "started");
-    // All that comes before is done by then.
+    // All earlier work is done by then.
     sleep(Duration::from_secs(1));
     run
 }
@@ -237,7 +239,7 @@ fn a_second_signal_kills() {
     }
 }
 
-/// Labelling: many files stop between two, and a single one of millions of points between chunks of them.
+/// Labelling stops between two of many files, and between chunks of a file of millions of points.
 #[test]
 fn a_signal_stops_the_votes() {
     let dir = tempfile::tempdir().unwrap();
@@ -287,7 +289,7 @@ fn other_commands_stop_too() {
     assert!(!names.iter().any(|n| n.to_string_lossy().starts_with('.')), "{names:?}");
 }
 
-/// A room without a ceiling: rays go out of it.
+/// A room without a ceiling, so that rays leave it.
 fn write_open_scan(dir: &Path, area: u32) -> PathBuf {
     let scene = write_scan(dir, area);
     let obj = fs::read_to_string(dir.join("room.obj")).unwrap();
@@ -300,8 +302,8 @@ fn write_open_scan(dir: &Path, area: u32) -> PathBuf {
     scene
 }
 
-/// Files, images and missing pixels of the images of a kind, read back from the disk; one that is missing in
-/// the depth image has no face in this scene.
+/// Files, images and missing pixels of a kind of images, read back from the disk. In this scene a pixel that
+/// is missing in the depth image sees no face.
 fn read_images(layout: &Layout, areas: &[u32], frame: Frame) -> (u64, u64, u64) {
     let (mut images, mut pixels, mut missing) = (0, 0, 0);
     for area in areas {
@@ -431,7 +433,8 @@ fn a_person_reads_the_same_summary() {
     assert!(run.status.success() && run.stdout.is_empty(), "{log}");
     let (_, pixels, missing) = read_images(&Layout::new(out.clone()), &[1], Frame::Panorama);
     let share = 100.0 * missing as f64 / pixels as f64;
-    // Of each pool of 12, 1 goes, 7 stay, and of the other 4 so many that 8.7, rounded, stay in all.
+    // In each pool of 12 views, 1 is dropped and 7 are kept; of the other 4, as many stay as make 8.7 in all,
+    // rounded.
     for part in [
         "1 panoramas and 9 views of 2 locations",
         &format!("{} files, ", files(&out).len()),
@@ -464,7 +467,7 @@ fn wrong_calls_and_bad_input_have_their_own_codes() {
     let dir = tempfile::tempdir().unwrap();
     let scene = write_scan(dir.path(), 1);
     let out = dir.path().join("out");
-    // What clap refuses is told as text: the options are not known yet.
+    // Errors of the argument parser are text, since `--log json` is not known yet.
     let run = s3d(&["--log", "json", "export"]);
     assert_eq!(run.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&run.stderr).contains("Usage"));
@@ -534,14 +537,14 @@ fn a_full_disk_is_told_and_the_same_call_goes_on_if_it_was_insisted_on() {
     }
 }
 
-/// A LAZ file whose table of chunks has none: the decoder's own code panics at it.
+/// A LAZ file whose table lists no chunk, which makes the decoder's own code panic.
 fn write_broken_laz(path: &Path) {
     let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../s3d-io/tests/fixtures/clouds/1_4_format_7.laz");
     let mut bytes = fs::read(fixture).unwrap();
     let record = bytes.windows(14).position(|w| w == b"laszip encoded").unwrap() - 2 + 54;
     let four = |at: usize, bytes: &[u8]| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let table = four(four(96, &bytes), &bytes);
-    // Chunks of any size, and no chunk.
+    // Chunks of variable size, and a count of 0.
     bytes[record + 12..record + 16].fill(0xff);
     bytes[table + 4..table + 8].fill(0);
     fs::write(path, bytes).unwrap();

@@ -1,4 +1,4 @@
-//! Faces that nobody voted for take the label of the surface next to them, if that is asked for.
+//! Faces without votes take the label of the surface next to them, on demand.
 
 mod common;
 
@@ -13,7 +13,7 @@ use s3d_synth::Building;
 use serde_json::Value;
 use std::path::Path;
 
-/// Each face in four, `times` times; with it, the face that each was part of.
+/// Divides each face into four, `times` times. Returns the original face of each part as well.
 fn subdivided(mesh: &TriMesh, times: u32) -> (TriMesh, Vec<usize>) {
     let mut faces: Vec<(usize, [Vec3; 3])> = (0..mesh.faces().len())
         .map(|face| (face, mesh.triangle(face as u32)))
@@ -32,7 +32,7 @@ fn subdivided(mesh: &TriMesh, times: u32) -> (TriMesh, Vec<usize>) {
     (mesh, faces.into_iter().map(|(face, _)| face).collect())
 }
 
-/// Labels of a building that are hidden around hundreds of places come back, and hardly any of them wrong.
+/// Labels of a building are hidden around hundreds of places. Filling restores them with hardly an error.
 #[test]
 fn labels_that_are_hidden_are_found_again() {
     let building = Building::two_storeys().build().unwrap();
@@ -99,9 +99,9 @@ fn an_export_tells_what_it_filled() {
     );
     assert!(unfilled.without_label.faces > 1000 && unfilled.without_label.m2 > 1.0);
     assert!(unfilled.without_label.pixels.unwrap() > 1000);
-    // Some in the corners of walls are farther from the next point.
+    // Some faces in the corners of walls are too far from the next point.
     assert!(filled.without_label.faces < 10 && filled.without_label.pixels.unwrap() < 50, "{filled:?}");
-    // What was voted for stays, and the tables tell both.
+    // Voted labels stay, and the tables tell voted and filled labels apart.
     assert_eq!(json(&as_voted.join("manifest.json"))["options"].get("fill"), None);
     let manifest = json(&out.join("manifest.json"));
     assert_eq!(manifest["options"]["fill"], 0.2);
@@ -118,13 +118,13 @@ fn an_export_tells_what_it_filled() {
     assert_eq!((&a.votes, &a.total, &a.farthest_m), (&b.votes, &b.total, &b.farthest_m));
     let changed: Vec<usize> = (0..a.label.len()).filter(|i| a.label[*i] != b.label[*i]).collect();
     assert!(changed.iter().all(|i| a.label[*i] == 0 && a.total[*i] == 0) && changed.len() > 1000);
-    // A label that filling does not give is found.
+    // `verify` finds a label that filling does not give.
     std::fs::copy(as_voted.join("area_2/3d/votes.npz"), out.join("area_2/3d/votes.npz")).unwrap();
     let report = verify(&out, &VerifyOptions::default(), &Context::default()).unwrap();
     assert!(format!("{report:?}").contains("other labels won"), "{report:?}");
 }
 
-/// Whoever takes labels from a plan knows which of them were filled.
+/// An export that takes its labels from a plan knows which of them were filled.
 #[test]
 fn a_plan_keeps_what_was_filled() {
     let dir = tempfile::tempdir().unwrap();
@@ -139,7 +139,7 @@ fn a_plan_keeps_what_was_filled() {
     };
     let direct = manifest(export.clone(), "direct");
     assert_eq!(direct, manifest(export.clone().plan(Some(plan.clone())), "planned"));
-    // A plan without filling is of another call.
+    // A plan without filling belongs to another call.
     let other = ExportOptions { fill: None, ..common::options(3) };
     let refused = export
         .options(other)

@@ -1,4 +1,4 @@
-//! What a program does that depends on this crate alone: exports, cancels, goes on, verifies and packs.
+//! A program that depends on this crate alone exports, cancels, resumes, verifies and packs.
 
 mod common;
 
@@ -74,7 +74,7 @@ fn an_export_that_is_cancelled_half_way_goes_on_to_the_same_bytes() {
             match event {
                 Event::UnitFinished { unit: UnitKind::Location, .. } => {
                     seen.0 += 1;
-                    // From another thread than the caller's.
+                    // Cancels from a thread that is not the caller's.
                     theirs.cancel();
                 }
                 Event::StageStarted { stage: Stage::Render, .. } => seen.1 = true,
@@ -85,7 +85,7 @@ fn an_export_that_is_cancelled_half_way_goes_on_to_the_same_bytes() {
     assert!(events.lock().unwrap().0 >= 1 && events.lock().unwrap().1);
     assert!(!stopped.join("manifest.json").exists() || stopped.join(".s3d/request.json").exists());
 
-    // Another call is refused, the same one goes on.
+    // Another call is refused; the same one goes on.
     let other = Export::new([&scene])
         .options(options(4))
         .run(&stopped, &Context::default());
@@ -137,7 +137,7 @@ fn values_in_memory_become_a_data_set_that_verifies_and_packs() {
     assert_eq!(report.fault_count(), 0, "{report}");
     assert!(report.checks > 100, "{report}");
 
-    // The same values are the same call; others are not.
+    // The same values make the same call; changed values do not.
     assert!(export(memory_scene()).run(&out, &context).unwrap().is_none());
     let mut moved = memory_scene();
     moved.locations[0].pose = Pose::level(dvec3(2.0, 1.0, 1.4), 0.3);
@@ -186,7 +186,7 @@ fn options_out_of_range_are_refused_before_anything_is_written() {
     assert!(!out.exists());
 }
 
-/// Runs an example of this crate, which is built if no call of cargo has done that yet.
+/// Runs an example of this crate. Builds it if no call of cargo has done so yet.
 fn example(name: &str, args: &[&Path]) -> String {
     let mut folder = std::env::current_exe().unwrap();
     folder.pop();
@@ -214,7 +214,7 @@ fn the_examples_do_what_they_say() {
     let out = dir.path().join("memory");
     assert!(example("in_memory", &[&out]).contains("1 panorama"));
     assert!(example("verify", &[&out]).ends_with(" 0 faults\n"));
-    // Through scene files: what was just made is a published area, which is one.
+    // The new data set is a published area, which can be exported as a scene file is.
     let again = dir.path().join("again");
     assert!(example("export", &[&out.join("area_1"), &again]).contains(" files, "));
     assert!(example("export", &[&out.join("area_1"), &again]).contains("complete already"));

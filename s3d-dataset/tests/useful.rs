@@ -1,4 +1,4 @@
-//! Data sets that would be of no use are not made, unless the caller insists; `info` says the same.
+//! Useless data sets are not made, unless the caller insists; `info` agrees.
 
 mod common;
 
@@ -14,8 +14,8 @@ use s3d_synth::{Building, ScanOptions};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-/// Refused by this condition, with these words; `info` names it too, and with the condition allowed there is
-/// a data set, and a warning in the same words.
+/// The export must be refused for this condition, with these words, and `info` must name it too. With the
+/// condition allowed there is a data set, and a warning in the same words.
 #[track_caller]
 fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Condition, words: &str) {
     let dir = tempfile::tempdir().unwrap();
@@ -47,21 +47,21 @@ fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Co
             seen.lock().unwrap().push((*text).to_owned());
         }
     });
-    // What the limits of an image's size and of the disk say is another thing than what these scenes are.
+    // These two are limits on the size of an image and on the disk, not properties of the scene.
     if condition == Condition::Size || condition == Condition::Locations {
         return;
     }
     assert!(export(&[condition], &context).unwrap().is_some(), "an export that is insisted on");
     assert!(warnings.lock().unwrap().iter().any(|w| w.contains(words)), "{:?}", warnings.lock().unwrap());
     assert!(manifest().contains("complete") && !manifest().contains("allow"));
-    // Who looks at the data set later is told the same.
+    // The manifest has the same warnings for later readers.
     let noted = noted(&out);
     for warning in &*warnings.lock().unwrap() {
         assert!(noted.contains(warning), "{warning}: {noted:?}");
     }
 }
 
-/// What the manifest says that the export of its first area warned of.
+/// The warnings in the manifest about the first area.
 fn noted(out: &Path) -> Vec<String> {
     let manifest = std::fs::read(out.join("manifest.json")).unwrap();
     let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
@@ -117,7 +117,7 @@ fn points_beside_the_mesh() {
 
 #[test]
 fn another_axis_that_points_up() {
-    // Mesh and points lie on their side, and a location in the middle of both.
+    // Mesh and points lie on their side, with a location in the middle.
     let turned = |p: Vec3| vec3(p.x, -p.z, p.y);
     let scene = move || {
         let mut scene = scene_of(turned, turned);
@@ -189,7 +189,7 @@ fn a_mesh_without_colours() {
         scene
     };
     stops(scene, &options(0), Condition::Colour, "no texture and no colours");
-    // Without RGB images it is none the worse.
+    // Without RGB images the data set is not impaired.
     let modalities = options(0)
         .modalities
         .into_iter()
@@ -240,7 +240,7 @@ fn a_data_set_is_told_of_as_a_whole_and_by_area() {
     assert!(refused.to_string().contains("files.csv"), "{refused}");
 }
 
-/// A mesh without a place for a scanner: what else there is to know is told all the same.
+/// A mesh without a place for a scanner: `info` still reports all the rest.
 #[test]
 fn a_table_top_is_no_room_but_is_told_of() {
     let dir = tempfile::tempdir().unwrap();

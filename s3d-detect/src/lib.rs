@@ -20,7 +20,7 @@
 //! and returns a [`table::Table`] in the form of the paper.
 //!
 //! The same data, options and seed give the same bytes for any number of threads. Each module says what
-//! the paper has and what is chosen here; `docs/detector.md` has all of it, with figures.
+//! the paper has and what is chosen here; `docs/detector.md` of the repository has all of it, with figures.
 //!
 //! # Example
 //!

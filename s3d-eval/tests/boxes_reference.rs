@@ -62,7 +62,7 @@ fn same(ours: f64, theirs: &Value, error: f64) -> bool {
 
 #[test]
 fn mmdetection3d_gives_the_same() {
-    // It rounds each average precision and their mean to f32.
+    // The program rounds each average precision and their mean to f32.
     const F32: f64 = 1.2e-7;
     for (name, (case, numbers)) in cases() {
         let theirs = &numbers["mmdetection3d"];
@@ -178,6 +178,6 @@ fn mmdetection3d_gives_the_same_for_detections_of_our_detector() {
             }
         }
     }
-    // Enough numbers are neither 0 nor 1.
+    // Enough numbers lie between 0 and 1.
     assert!(between > 30, "{between}");
 }

@@ -205,7 +205,7 @@ fn known_differences_have_their_scores() {
     );
     assert_eq!(one.install(|| run(Protocol::Normal, &truth, &out, &intervals)), result);
 
-    // Everything is a wall, by a list of classes beside the predictions.
+    // Every pixel is predicted as wall, in the order of a list of classes beside the predictions.
     let out = dir.path().join("classes");
     predict(&data, &out, ImageKind::Panoramas, "png", |_, path| {
         fs::write(path, encode_gray8(&Raster::filled(1024, 512, 1))).unwrap();

@@ -189,7 +189,7 @@ fn metres(units: &[u16]) -> Vec<f64> {
         .collect()
 }
 
-/// The scripts average the shares below the limits of δ in 32 bits.
+/// The scripts average the shares of pixels within the limits of δ in 32 bits.
 #[track_caller]
 fn same_depth(ours: &[f64], theirs: &Value, what: &str) {
     let theirs = numbers(theirs);

@@ -63,7 +63,7 @@ fn a_data_set_against_itself_is_perfect() {
     let (views, panoramas) = (evaluation.counted["views"], evaluation.counted["panoramas"]);
     assert!(views + panoramas == count && views > 0 && panoramas > 0 && evaluation.notes.is_empty());
 
-    // The file by its name; then only panoramas, in folds, with intervals; then one area.
+    // The file by its name; then panoramas alone, in folds, with intervals; then one area.
     assert_perfect(&panoptic(&package.join("panoptic.json"), |_| ()).unwrap());
     let (_folder, package) = packed(|o| o.images = PackedImages::Panoramas);
     let evaluation = panoptic(&package, |o| (o.folds, o.bootstrap) = (Folds::EachArea, Some(20))).unwrap();
@@ -89,14 +89,17 @@ fn the_stuff_classes_can_be_chosen() {
     let evaluation = panoptic(&package, |o| o.stuff = Some(stuff.clone())).unwrap();
     assert_perfect(&evaluation);
     let definition = evaluation.definition.join(" ");
-    assert!(definition.contains("but of floor, door all of an image is one"), "{definition}");
+    assert!(
+        definition.contains("each stuff class (floor, door) has one segment in an image"),
+        "{definition}"
+    );
     let told = panoptic(&package, |o| o.stuff = Some("grass".parse().unwrap()))
         .unwrap_err()
         .to_string();
     assert!(told.contains("stuff: \"grass\" is no class"), "{told}");
 }
 
-/// There is nothing to find where a view reaches beyond its photograph.
+/// A view has nothing to find where it reaches beyond its photograph.
 #[test]
 fn outside_of_photographs_is_void() {
     let folder = tempfile::tempdir().unwrap();

@@ -55,7 +55,7 @@ fn panopticapi_gives_the_same() {
             assert!(same(counts.iou, &theirs[3]), "{name}, class {class}: {counts:?}, {theirs}");
         }
         if let Some(scores) = theirs["scores"].as_array().filter(|scores| !scores.is_empty()) {
-            // It gives 0 to the classes that it leaves out of means.
+            // The script gives 0 to the classes that it leaves out of means.
             let there = classes.iter().zip(scores).filter(|(counts, _)| !counts.is_absent());
             there.for_each(|(counts, theirs)| assert_same(counts.score(), theirs, name));
         }

@@ -315,7 +315,7 @@ fn damaged_files_are_errors_or_other_points() {
         let bytes = std::fs::read(path).unwrap();
         for turn in 0..60 {
             let mut damaged = bytes.clone();
-            // Half of the damage is in the header, where it does most.
+            // Half of the damage goes to the header, where it has the most effect.
             for _ in 0..1 + turn % 4 {
                 let end = if turn % 2 == 0 {
                     bytes.len().min(400)

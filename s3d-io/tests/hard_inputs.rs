@@ -47,7 +47,7 @@ fn outcome(path: &Path) -> (String, Vec<String>) {
 fn meshes_below(dir: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
-        // People's files are whole scans, which are read with what lies beside them.
+        // Scans from the field are whole folders, and are read with the files beside them.
         if path.ends_with("hard-inputs/field") {
             continue;
         }

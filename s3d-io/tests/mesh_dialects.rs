@@ -185,9 +185,9 @@ fn nested_and_mirroring_nodes_and_instances() {
     let p = f.corners();
     let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
 
-    // The square as it is; mirrored twice in x, so that it stays; mirrored once, so that it lies beside and
-    // still faces +Z; turned by half about Z with a matrix, below a node that moves it. Then a second mesh of
-    // two primitives.
+    // Four instances of the square: as it is; mirrored twice in x, so that it stays; mirrored once, so that
+    // it lies beside and still faces +Z; turned by half about Z with a matrix, below a node that moves it.
+    // Then a second mesh of two primitives.
     let file = f
         .read(&format!(
             r#""meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}}}, "indices": {i}}}]}},

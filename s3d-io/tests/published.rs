@@ -120,7 +120,7 @@ fn faces_in_another_order_are_matched() {
     let folder = dir.path().join("area_3");
     let path = folder.join("3d/semantic.obj");
     let text = fs::read_to_string(&path).unwrap();
-    // The floor's faces, which stand first, come last.
+    // The faces of the floor stand first, and are moved to the end.
     let (head, rest) = text.split_once("usemtl floor_7_office_5_3\n").unwrap();
     let (floor, rest) = rest.split_once("usemtl").unwrap();
     fs::write(&path, format!("{head}usemtl{rest}usemtl floor_7_office_5_3\n{floor}")).unwrap();

@@ -1,5 +1,5 @@
-//! Functions that take a reader or a writer give the same as those that take a path, and their errors name
-//! the file as they were told.
+//! Functions that take a reader or a writer give the same results as those with a path, and their errors use
+//! the given file name.
 
 use s3d_geom::PointCloud;
 use s3d_geom::glam::vec3;
@@ -150,7 +150,7 @@ fn meshes_come_from_a_reader_with_the_files_beside_their_name() {
     for (name, text) in [("a.ply", ply), ("a.OBJ", obj)] {
         let path = folder.path().join(name);
         let options = MeshOptions::default();
-        // Only the files beside it exist so far.
+        // So far only the mesh's other files exist.
         let by_reader = read_mesh_from(text.as_bytes(), &path, UpAxis::Z, &options).unwrap();
         fs::write(&path, text).unwrap();
         let by_path = read_mesh(&path, UpAxis::Z).unwrap();

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Pixels to points, and to other pixels
 #
-# Every modality of an image shows the same hit of a ray, so that depth and pose put each pixel where it is in the world.
+# Every modality of an image shows the same hit of a ray, so depth and pose give the world position of each pixel.
 
 # %%
 import subprocess
@@ -37,7 +37,7 @@ view
 # %% [markdown]
 # ## A cloud of all images of a room
 #
-# Panoramas tell the distance along the ray; `points` knows. The cloud is a PLY file for any viewer.
+# Depth of panoramas is the distance along the ray, which `points` takes into account. The cloud is a PLY file for any viewer.
 
 # %%
 room = view.room
@@ -49,8 +49,8 @@ s3d.save_points("room.ply", xyz[seen], rgb[seen])
 print(f"{seen.sum():,} points of {len(images)} images in room.ply")
 
 # %% [markdown]
-# They lie on the mesh: a ray from the camera through each meets the mesh there, within the step of the depth images
-# (1/512 m).
+# The points lie on the mesh: a ray from the camera through each point meets the mesh there, within the step of the depth
+# images (1/512 m).
 
 # %%
 scene = ds.scene()

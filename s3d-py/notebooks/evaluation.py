@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Predictions scored
 #
-# Each protocol is one that published code uses, by its definition and to the digit. A prediction is a file an image or a room.
+# Each protocol is used by published code, and gives the same digits as that code. A prediction has a file for each image or room.
 
 # %%
 import subprocess
@@ -20,7 +20,7 @@ ds = s3d.open("s3d-demo")
 # %% [markdown]
 # ## Depth of panoramas
 #
-# A prediction that is wrong by 5 % and some noise, as a NumPy file a panorama, metres.
+# A prediction that is wrong by 5 % and some noise: a NumPy file for each panorama, in metres.
 
 # %%
 random = np.random.default_rng(0)
@@ -37,8 +37,8 @@ scores = ds.evaluate("depth", "depth", bootstrap=200)
 print(scores)
 
 # %% [markdown]
-# The mean over panoramas of |d − d̂| / d, counted by hand, is the same where the data set's panoramas are of the size that the
-# protocol looks at, 1024 × 512.
+# The mean over panoramas of |d − d̂| / d, computed by hand, is the same if the data set's panoramas have the protocol's size,
+# 1024 × 512.
 
 # %%
 AbsRel = scores.score("mean", "AbsRel")
@@ -48,8 +48,8 @@ assert abs(AbsRel - np.mean(by_hand)) < 1e-5
 # %% [markdown]
 # ## Normals of views
 #
-# Turned by ten degrees about the camera's x axis: the angle of a normal depends on how it lies to the axis, and is ten degrees
-# at most.
+# The prediction is turned by ten degrees about the camera's x axis. A normal across the axis is wrong by ten degrees, any
+# other by less.
 
 # %%
 Path("normal").mkdir(exist_ok=True)
@@ -67,7 +67,7 @@ assert 1 < mean < 10.5
 # %% [markdown]
 # ## Boxes
 #
-# The true boxes are all right. Moved by ten centimetres along each axis, thin ones no longer overlap by half.
+# The true boxes score 1. Moved by ten centimetres along each axis, thin boxes no longer overlap by half.
 
 # %%
 for moved in (0.0, 0.1):

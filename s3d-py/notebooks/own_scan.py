@@ -1,8 +1,8 @@
 # %% [markdown]
 # # From a scan to a data set
 #
-# A mesh alone is enough: scan locations are placed, images rendered, and what labels there are carried over. The scan
-# here is that of the built-in scene; put the path of your own in its place.
+# A mesh alone is enough: scan locations are placed, images are rendered, and labels are carried over if there are any. The
+# scan here is the built-in scene; put the path of your own scan in its place.
 
 # %%
 import subprocess
@@ -18,8 +18,8 @@ if not Path("s3d-demo").exists():
 # %% [markdown]
 # ## The mesh
 #
-# What is wrong with a scan is told before hours go into it: `info` has its size, its rooms' height, and what looks
-# wrong; `warnings` what had to be mended.
+# Look for faults in a scan before you spend hours on it: `info` has its size, the height of its rooms, and anything that
+# looks wrong; `warnings` lists the repairs.
 
 # %%
 scan = "s3d-demo/scan/rgb.obj"
@@ -30,7 +30,7 @@ print(mesh, *mesh.warnings, sep="\n")
 # %% [markdown]
 # ## Where to look from
 #
-# As few places as see 90 % of the surface, each where a tripod could stand. The first sees the most.
+# As few places as possible see 90 % of the surface, each where a tripod could stand. The first sees the most.
 
 # %%
 scene = s3d.Scene(mesh)
@@ -44,7 +44,7 @@ panorama
 # ## Labels
 #
 # Without labels the data set has everything else. Annotated points of the scan, in any format that `read_points` knows,
-# vote for the label of each face; faces that no point is near take that of the surface beside them.
+# vote for the label of each face. Faces without a vote take the label of the surface beside them.
 
 # %%
 points = s3d.read_points("s3d-demo/scan/Area_1")
@@ -55,7 +55,7 @@ print(points, votes, sep="\n")
 # %% [markdown]
 # ## The data set
 #
-# An export that is stopped goes on when this is called again. Leave `size`, `views` and `pano_width` out for the paper's.
+# A stopped export goes on when this is called again. Without `size`, `views` and `pano_width`, it has the paper's values.
 
 # %%
 s3d.export(mesh, "own", locations=places[:4], labels=labels, views=8, size=256, pano_width=1024, progress=True)

@@ -2,7 +2,7 @@
 # # A tiny segmentation
 #
 # Classes of pixels from colour, distance, normal and height, learnt from some panoramas and tested on the others. It needs
-# scikit-learn and Pillow. What is measured on the built-in scene tests a program; it says nothing about real rooms.
+# scikit-learn and Pillow. A score on the built-in scene tests a program; it says nothing about real rooms.
 
 # %%
 import subprocess
@@ -24,9 +24,9 @@ print(panoramas, ds.classes)
 
 
 # %% [markdown]
-# ## What a pixel is told by
+# ## The features of a pixel
 #
-# Everything is registered, so that a pixel's features are those of one place on one surface.
+# All modalities are registered, so a pixel's features belong to one place on one surface.
 
 
 # %%
@@ -40,7 +40,7 @@ def features(view: s3d.View) -> np.ndarray:
 # %% [markdown]
 # ## Two folds
 #
-# Rooms of even and odd numbers in turn: no pixel is predicted by what saw its room.
+# Rooms with even numbers and rooms with odd numbers are two folds: no pixel is predicted by a model that saw its room.
 
 # %%
 rooms = sorted({view.room for view in panoramas})
@@ -80,7 +80,7 @@ assert learnt > 3 * guessed
 # %% [markdown]
 # ## With torch
 #
-# The same images for a network of your own: `ignore_index=-1` leaves out what has no label.
+# The same images for a network of your own: `ignore_index=-1` leaves out unlabelled pixels.
 #
 # ```python
 # train = ds.views().torch(["rgb", "depth", "classes"], transform=augment)

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # From labelled points to labelled faces
 #
-# Each annotated point votes for the face that is nearest to it; a face has the label of most votes. How sure that is, and
-# what happens where points are sparse, can be looked at.
+# Each annotated point votes for the face nearest to it; a face has the label with the most votes. This notebook shows how
+# sure the votes are, and what happens where points are sparse.
 
 # %%
 import subprocess
@@ -44,7 +44,7 @@ for place in np.argsort(-count)[:5]:
 # %% [markdown]
 # ## Seen in an image
 #
-# Columns of faces become images by the image of faces: here bright where the vote was sure, black where nobody voted.
+# The image of faces turns columns of faces into images: here bright where the vote was sure, black without votes.
 
 # %%
 scene = s3d.Scene(mesh)
@@ -57,8 +57,8 @@ print(f"a pixel's face was won by {shown[shown > 0].mean():.1%} of its votes on 
 # %% [markdown]
 # ## Fewer points
 #
-# One point in 200 of the scan leaves faces without a vote. `filled` gives them the label of the surface beside them, not
-# around an edge and no farther than it is told.
+# With one point in 200 of the scan, some faces have no vote. `filled` gives them the label of the surface beside them, up to
+# the given distance and not around an edge.
 
 # %%
 thin = np.random.default_rng(0).random(len(points)) < 1 / 200
@@ -66,7 +66,7 @@ sparse = s3d.vote(mesh, points.xyz[thin], points.label[thin])
 
 
 def told(label: np.ndarray) -> tuple[float, float]:
-    """Of the surface that all points label: the share that has a label, and the share of it that has the same."""
+    """Returns the labelled share of the surface that all points label, and the share of it with the same label."""
     both = labelled & (label >= 0)
     return area[both].sum() / area[labelled].sum(), area[both & (label == votes.label)].sum() / area[both].sum()
 

@@ -1,4 +1,4 @@
-"""What tests share."""
+"""Shared by the tests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import s3d_py as s3d
 
 
 def box(size: tuple[float, float, float] = (4.0, 3.0, 2.5)) -> s3d.Mesh:
-    """A closed room whose faces show their fronts inside, with a table top of 1 m² in a corner, 0.7 m
+    """A closed room whose faces have their fronts inside, with a table top of 1 m² in a corner, 0.7 m
     high.
     """
     w, d, h = size

@@ -1,4 +1,4 @@
-"""Scenes that tests share."""
+"""Scenes shared by the tests."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from common import box
 
 @pytest.fixture(scope="session")
 def room() -> s3d.Mesh:
-    """A closed room, 4 × 3 × 2.5 m, with a table, of 14 faces."""
+    """A closed room of 4 × 3 × 2.5 m with a table: 14 faces."""
     return box()
 
 
 @pytest.fixture(scope="session")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The built-in scene, as files in scan/, and its data set."""
+    """The built-in scene as files in scan/, and its data set."""
     folder = tmp_path_factory.mktemp("demo") / "demo"
     words = ["demo", "-o", str(folder), "--views", "8", "--size", "160", "--pano-width", "256", "--quiet"]
     subprocess.run([sys.executable, "-m", "s3d_py", *words], check=True)

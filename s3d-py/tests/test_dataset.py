@@ -1,4 +1,4 @@
-"""A data set, read: held against its files as other programs read them."""
+"""Reads a data set, and compares it with its files as other programs read them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def ds(demo: Path) -> s3d.DataSet:
 
 
 def stored(view: s3d.View, modality: str) -> npt.NDArray[Any]:
-    """The pixels of a PNG file, by Pillow."""
+    """Returns the pixels of a PNG file, decoded by Pillow."""
     pillow = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
     return np.array(pillow.open(view.path(modality)))
 
@@ -75,7 +75,7 @@ def test_pixels_are_those_of_the_files(ds: s3d.DataSet) -> None:
         assert (names[view.classes[seen] + 1] == np.array(of_label)[index[seen]]).all()
         assert (view.classes[unseen] == -1).all() and (view.instances[unseen] == -1).all()
         assert np.array_equal(view.instances > 0, view.labels > 0)
-        # Decoded once, and nobody's to change.
+        # The image is decoded once, and its array is read-only.
         assert view.rgb is view.rgb
         with pytest.raises(ValueError, match="read-only"):
             view.rgb[0, 0, 0] = 1
@@ -85,7 +85,7 @@ def test_points_come_from_depth_and_pose(ds: s3d.DataSet) -> None:
     for view in (ds.views()[5], ds.panoramas()[0]):
         points = view.points()
         assert np.array_equal(np.isnan(points[..., 0]), np.isnan(view.depth))
-        # Coordinates are halves: a centimetre at 10 m.
+        # Coordinates are half floats, which step by a centimetre at 10 m.
         apart = np.linalg.norm(points - view.xyz, axis=-1)
         assert np.nanmax(apart) < 0.02
         eye = view.T_world_cam[:3, 3]
@@ -107,7 +107,7 @@ def test_a_view_is_rendered_again_to_the_bit(ds: s3d.DataSet) -> None:
     made = ds.scene(view.area).render_stored(
         view.K, view.T_world_cam, view.size, modalities=["depth", "normal"]
     )
-    # The mesh of the data set is written with fewer digits than the scan's has.
+    # The mesh of the data set is written with fewer digits than the scan's mesh.
     assert (np.abs(made["depth"].astype(int) - stored(view, "depth")) > 1).mean() < 0.01
     assert (made["normal"] != stored(view, "normal")).any(-1).mean() < 0.02
 
@@ -134,7 +134,7 @@ def test_views_are_selected(ds: s3d.DataSet) -> None:
 def test_tables_are_those_of_the_files(ds: s3d.DataSet, demo: Path) -> None:
     table = json.loads((demo / "assets/semantic_labels.json").read_text())
     names = [label.name for label in ds.labels]
-    # The file is padded, for published loaders, with what is no label.
+    # The file is padded with entries that are no labels, for published loaders.
     assert table[: len(names)] == names and set(table[len(names) :]) <= {names[0]}
     assert len(ds.class_of_label) == len(ds.labels) and ds.labels[0].class_name is None
     instances = json.loads((demo / "area_1/3d/instances.json").read_text())["instances"]

@@ -25,7 +25,7 @@ def test_it_is_trained_kept_run_and_scored(demo: Path, tmp_path: Path) -> None:
     assert boxes and all(box.area == 1 and box.room in rooms for box in boxes)
     assert all(least <= largest for box in boxes for least, largest in zip(box.min, box.max))
     s3d.save_boxes(tmp_path / "found.json", boxes)
-    # On what it learnt from.
+    # Detects in the areas of the training.
     assert ds.evaluate("det", tmp_path / "found.json").score("mean", "AP@0.25") > 0.2
 
     with pytest.raises(s3d.UsageError, match="no area 7"):

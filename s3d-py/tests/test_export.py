@@ -1,4 +1,4 @@
-"""Data sets of scene files and of meshes in memory; stopped, and gone on with."""
+"""Exports scene files and meshes in memory, and resumes stopped exports."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NAMES = ["floor_1", "ceiling_1", "wall_1", "wall_2", "wall_3", "wall_4", "table_
 
 
 def bytes_of(folder: Path) -> dict[str, str]:
-    """Checksums of all files; the manifest's alone depends on where the input lay."""
+    """Returns checksums of all files. Of these only the manifest depends on the place of the input."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
 
@@ -79,7 +79,7 @@ def test_a_labelled_mesh_in_memory_makes_a_data_set(room: s3d.Mesh, tmp_path: Pa
     assert np.array(pose["camera_rt_matrix"]) == pytest.approx(
         np.linalg.inv(place.T_world_cam)[:3], abs=1e-12
     )
-    # Names face by face are the same, and so is an Area.
+    # One name for each face gives the same data set, and so does an Area.
     by_name = np.array(names)[of_face]
     area = s3d.Area(room, locations=[place], labels=by_name)
     assert s3d.export([area], tmp_path / "b", **SMALL) is not None

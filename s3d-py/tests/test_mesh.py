@@ -120,7 +120,7 @@ def test_a_mesh_far_away_is_moved_and_says_so(tmp_path: Path) -> None:
 
 
 class _Trimesh:
-    """What trimesh's meshes have."""
+    """Has the attributes of trimesh's meshes."""
 
     def __init__(self, visual: object) -> None:
         self.vertices = np.eye(3)
@@ -139,7 +139,7 @@ def test_objects_of_other_packages_are_taken() -> None:
 
 
 def _textured(folder: Path) -> Path:
-    """A wall at y = 5 in a file that points up along Z, whose picture has four colours."""
+    """A wall at y = 5 in a file with Z up. Its image has four colours."""
     image = np.full((64, 64, 3), 40, np.uint8)
     image[:32, :32], image[:32, 32:], image[32:, :32] = (220, 0, 0), (0, 220, 0), (0, 0, 220)
     pillow = pytest.importorskip("PIL.Image")
@@ -154,7 +154,7 @@ def _textured(folder: Path) -> Path:
 
 
 def _picture(mesh: s3d.Mesh) -> list[list[int]]:
-    """The colours in the middle of each quarter of the wall."""
+    """Returns the colours in the middle of each quarter of the wall."""
     view, k = s3d.look_at((2, 0, 2), (2, 5, 2)), s3d.intrinsics((64, 64), 40)
     rgb = s3d.Scene(mesh).render(k, view, (64, 64), modalities=["rgb"]).rgb
     return [rgb[j, i].tolist() for j in (16, 48) for i in (16, 48)]

@@ -1,4 +1,4 @@
-"""The notebooks run from an empty folder, one after the other; what they claim they assert."""
+"""Runs the notebooks one after the other, starting in an empty folder. They assert their own claims."""
 
 from __future__ import annotations
 

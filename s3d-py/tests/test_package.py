@@ -1,4 +1,4 @@
-"""What every call has in common: versions, errors, the command."""
+"""What every call has in common: versions, errors, the command line."""
 
 from __future__ import annotations
 
@@ -90,5 +90,5 @@ def test_ctrl_c_ends_the_command_as_it_does_the_binary(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     told = process.communicate(timeout=60)[1]
     assert process.returncode == 75, told
-    # The command that goes on is the one that was called, not Python's.
+    # The command that a message recommends is the one that was called, not Python's.
     assert "stopped by SIGINT; go on with: s3d demo -o demo" in told and "Traceback" not in told

@@ -21,7 +21,7 @@ def test_samples_lie_evenly_on_the_surface(room: s3d.Mesh) -> None:
     )
     counts = np.bincount(cloud.face, minlength=14)
     assert np.abs(counts - 500 * room.face_areas).max() <= 2
-    # In the planes of their faces, in their colours.
+    # The points lie in the planes of their faces and have their colours.
     corner = room.vertices[room.faces[cloud.face, 0]]
     assert np.abs(((cloud.xyz - corner) * room.face_normals[cloud.face]).sum(-1)).max() < 1e-6
     assert room.vertex_colors is not None
@@ -62,7 +62,7 @@ def test_faces_without_votes_have_none_and_can_be_filled(room: s3d.Mesh) -> None
         and np.isnan(votes.mean_distance[empty]).all()
         and np.isnan(votes.share[empty]).all()
     )
-    # The other half of the floor and of the ceiling; not around the edges to the walls.
+    # Fills the other half of the floor and of the ceiling, but not around the edges to the walls.
     filled = votes.filled(within=10)
     assert (filled[:2] == 3).all() and (filled[2:4] == 0).all() and (filled[4:] == -1).all()
     assert np.array_equal(votes.filled(within=0), votes.label)
@@ -77,7 +77,7 @@ def test_columns_of_other_packages_are_taken(room: s3d.Mesh) -> None:
     expected = s3d.vote(room, points, [3, 0]).label
 
     class Las(dict[str, object]):
-        """What laspy's points have."""
+        """Has the attributes of laspy's points."""
 
         xyz = points
 
@@ -136,10 +136,10 @@ def test_annotated_points_are_those_of_the_files(demo: Path) -> None:
         of_instance = points.label == points.names.index(name)
         assert np.allclose(points.xyz[of_instance], rows[:, :3], atol=1e-6)
         assert np.array_equal(points.rgb[of_instance], rows[:, 3:6])
-    # A data set has them by room as well.
+    # A data set has the points by room as well.
     exported = s3d.read_points(demo / "s3dis" / "Area_1")
     labels = [label for label in s3d.open(demo).labels if label.class_name]
-    # Numbered in each room here, in the area there.
+    # Instances are numbered by room here, and by area in the data set.
     parts = [name.split("_") for name in exported.names]
     assert sorted((words[0], "_".join(words[2:])) for words in parts) == sorted(
         (str(label.class_name), label.room) for label in labels

@@ -1,4 +1,4 @@
-"""What cameras and rays see."""
+"""Images of cameras, and hits of rays."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def scene(room: s3d.Mesh) -> s3d.Scene:
 
 
 def open_box() -> s3d.Mesh:
-    """A wall at x = 2 that a camera at the origin sees half of."""
+    """A wall at x = 2; a camera at the origin sees it in half of its image."""
     return s3d.Mesh([[2, -9, 0], [2, 9, 0], [2, 9, 9], [2, -9, 9]], [[0, 2, 1], [0, 3, 2]])
 
 
@@ -39,10 +39,11 @@ def test_a_wall_ahead_is_where_it_stands(scene: s3d.Scene) -> None:
     assert images.rgb[24, 32].tolist() == [170] * 3
     assert images.depth.dtype == np.float32 and images.depth[24, 32] == 2.0
     assert np.array_equal(images.normal[24, 32], [0, 0, -1])
-    # The pixel's centre is half a pixel right of the middle and half below: right is −Y, 2 m away.
+    # The centre of the pixel is half a pixel right of the middle and half a pixel below. The wall is 2 m
+    # away; right is −Y.
     assert images.xyz[24, 32] == pytest.approx([4.0, 1.5 - 1 / 32, 1.2 - 1 / 32], abs=1e-6)
     assert set(images.face[24, [0, 32]].tolist()) <= set(range(4, 12))
-    # In the world, and where depth says.
+    # The world coordinates agree with the depth.
     rays = np.linalg.inv(K) @ [32.5, 24.5, 1.0]
     assert AHEAD[:3, :3] @ (rays * images.depth[24, 32]) + AHEAD[:3, 3] == pytest.approx(
         images.xyz[24, 32], abs=1e-6
@@ -78,7 +79,7 @@ def test_a_panorama_looks_all_around(scene: s3d.Scene) -> None:
     for pose in ((2.0, 1.5, 1.2), s3d.Location("", s3d.look_at((2, 1.5, 1.2), (2, 3, 1.2)))):
         images = scene.panorama(pose, 64, modalities=ALL)
         assert images.K is None and images.size == (64, 32)
-        # Ahead is +Y, to the right of it +X; distances, not depths.
+        # +Y is ahead, +X to the right. A panorama has distances, not depths.
         assert images.depth[16, 32] == pytest.approx(1.5, abs=0.01) and images.depth[16, 48] == pytest.approx(
             2, abs=0.02
         )
@@ -130,7 +131,7 @@ def test_many_views_are_those_of_single_calls_in_order(scene: s3d.Scene) -> None
             alone = scene.render(K, pose, (64, 48), modalities=ALL)
             assert np.array_equal(images.T_world_cam, pose)
             assert all(np.array_equal(images[name], alone[name], equal_nan=name != "rgb") for name in ALL)
-    # It may be left early, and be endless.
+    # The generator may be left early, and its input may be endless.
     first = list(itertools.islice(scene.render_many(itertools.repeat(AHEAD), K, (64, 48)), 3))
     assert len(first) == 3
     with pytest.raises(s3d.UsageError, match="T_world_cam"):
@@ -252,7 +253,7 @@ def test_images_are_those_of_the_command_to_the_bit(demo: Path, tmp_path: Path) 
         "--quiet",
     ]
     subprocess.run(command, check=True)
-    # The reader that comes with a data set, of numpy alone.
+    # The reader that comes with a data set and needs numpy alone.
     spec = importlib.util.spec_from_file_location("utils", demo / "assets" / "utils.py")
     assert spec and spec.loader
     utils = importlib.util.module_from_spec(spec)
@@ -267,7 +268,7 @@ def test_images_are_those_of_the_command_to_the_bit(demo: Path, tmp_path: Path) 
         assert np.array_equal(np.where(index == 0xFFFFFF, -1, index), stored["face"])
         xyz = utils.read_xyz(out / "global_xyz" / f"{number:03}.exr")
         assert np.array_equal(np.nan_to_num(xyz), stored["xyz"].astype(xyz.dtype))
-        # Numbers in metres are what was rounded.
+        # The stored numbers are these, rounded.
         seen = exact.face >= 0
         assert seen.mean() > 0.9 and np.array_equal(exact.rgb, stored["rgb"])
         depth = np.floor(exact.depth[seen].astype(np.float64) * 512 + 0.5)

@@ -1,4 +1,4 @@
-"""The package as a whole: what a first session with it does, in one go."""
+"""A first session with the whole package."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def test_python_runs_on_while_work_is_done(room: s3d.Mesh) -> None:
     ended = time.monotonic()
     stop.set()
     thread.join()
-    # A call that kept Python's lock would leave a gap as long as itself.
+    # If a call kept Python's lock, there would be a gap as long as the call.
     during = [began, *(t for t in ticks if began < t < ended), ended]
     assert max(b - a for a, b in zip(during, during[1:])) < 0.5 * (ended - began)
 
@@ -107,7 +107,7 @@ def test_ctrl_c_ends_a_long_call() -> None:
             s3d.sample(mesh, points=100_000_000, progress=lambda task: print(task.done, flush=True))
         except KeyboardInterrupt:
             print("interrupted", flush=True)
-        # What comes after works as ever.
+        # Later calls work as before.
         print(len(s3d.sample(mesh, points=10)), flush=True)
         """
     )

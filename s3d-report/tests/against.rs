@@ -1,4 +1,4 @@
-//! A report of a data set against another, read back by `s3d_report::files`.
+//! The report of a data set against another, read back by `s3d_report::files`.
 
 mod common;
 
@@ -33,7 +33,7 @@ fn unpacked(value: &Value) -> Vec<u32> {
     all.as_chunks().0.iter().map(|le| u32::from_le_bytes(*le)).collect()
 }
 
-/// Brings the lists of a data set up to date.
+/// Writes the lists of a data set anew.
 fn list_files(out: &Path) {
     let layout = Layout::new(out);
     let paths = files(out).into_keys().map(|path| out.join(path));
@@ -48,8 +48,8 @@ fn list_files(out: &Path) {
     fs::write(layout.manifest(), manifest.to_string()).unwrap();
 }
 
-/// A copy in which a chair of the mesh is a wall, and so is what has no label, and pixels of two images are
-/// others.
+/// A changed copy: in the mesh, a chair and all unlabelled faces become wall, and two images have other
+/// pixels.
 fn altered(out: &Path, to: &Path) -> (u32, u32) {
     for (path, bytes) in files(out) {
         fs::create_dir_all(to.join(&path).parent().unwrap()).unwrap();
@@ -81,7 +81,7 @@ fn altered(out: &Path, to: &Path) -> (u32, u32) {
             write_rgb8(&path, &pixels, Content::Photo, Compression::Fast).unwrap();
         }
     }
-    // Of what no picture shows, one more.
+    // One more change, in an image that the report's pictures do not use.
     let path = images[1].path(&layout, Domain::SemanticPretty);
     let pixels = read_rgb8(&path).unwrap().map(|[r, g, b]| [r, g, b ^ 1]);
     write_rgb8(&path, &pixels, Content::Photo, Compression::Fast).unwrap();
@@ -102,12 +102,12 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
     let written = files(&to);
     assert_eq!(made.bytes, written.values().map(|bytes| bytes.len() as u64).sum::<u64>());
 
-    // Any number of threads, the same bytes.
+    // The bytes are the same for any number of threads.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     one.install(|| report_against(&out, &other, &again, &SMALL, &ctx))
         .unwrap();
     assert!(files(&again) == written);
-    // The page of the data set alone has the same files; its index says that there is no other.
+    // The report of the data set alone has the same files, except that its index names no other data set.
     for (path, bytes) in files(&plain) {
         assert!(path.ends_with("index.js") || written[&path] == bytes, "{}", path.display());
     }
@@ -126,7 +126,7 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
     );
     assert_eq!(compared["labels"], index["labels"]);
 
-    // Two images differ in what is shown: a panorama and a view.
+    // A panorama and a view differ in the labels that are shown.
     let pretty = comparison["modalities"].as_array().unwrap().iter();
     assert_eq!(
         pretty
@@ -153,7 +153,7 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
         assert_eq!((&picture["of"], &picture["size"]), (&own["of"], &own["size"]));
         assert_ne!(picture["label"], own["label"]);
         assert!(picture["face"].is_null());
-        // Not reduced, the labels are those of the file.
+        // The picture is not reduced, so it has the labels of the image file.
         let image = if entry["pano"].is_null() {
             images.first()
         } else {
@@ -203,7 +203,8 @@ fn what_differs_is_in_the_report_and_the_rest_as_without() {
     assert!(a.len() == face.len() && b.len() == face.len() && b.iter().all(|label| *label == wall));
     assert_eq!(comparison["labels"]["matrix"][0]["faces"].as_u64().unwrap() as usize, none.len());
 
-    // Patches of both, the largest 300: found from face to face.
+    // Connected patches of the changed faces of both instances, found from face to face; the report has the
+    // 300 largest.
     let mesh = data.mesh(1).unwrap().unwrap().mesh;
     let mut patches: Vec<(f64, u32, usize)> = Vec::new();
     for (label, mut left) in [(chair, chairs), (0, none)] {

@@ -1,5 +1,4 @@
-//! A report that is read back by its contract (`s3d_report::files`), and held against the data set's own
-//! files.
+//! A report is read back as `s3d_report::files` says, and compared with the files of the data set.
 
 mod common;
 
@@ -34,7 +33,7 @@ fn numbers3(value: &Value) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|i| value[i].as_f64().unwrap()))
 }
 
-/// The images of the data set that a picture was made of.
+/// The images of the data set that a picture is made from.
 struct Own {
     depth: Raster<u16>,
     label: Raster<[u8; 3]>,
@@ -54,8 +53,8 @@ impl Own {
         }
     }
 
-    /// Holds some pixels of a picture against these images; `point` is the world point of a place of the
-    /// image, in pixels, at a depth.
+    /// Compares some pixels of a picture with these images. `point` returns the world point of a position in
+    /// the image, in pixels, at a depth.
     fn hold(&self, picture: &Value, count: u32, point: impl Fn(f64, f64, f64) -> DVec3) {
         let (of, size) = (pair(&picture["of"]), pair(&picture["size"]));
         let (depth, label) = (numbers(&picture["depth"]), numbers(&picture["label"]));
@@ -64,7 +63,7 @@ impl Own {
         assert!(size[0] < of[0], "the test is of reduced images");
         let mut seen = 0;
         for k in 0..count {
-            // Spread over the image, in no line.
+            // The pixels are spread over the image, not along a line.
             let (i, j) = ((k * 37 + 5) % size[0], (k * 23 + 3) % size[1]);
             let source = |i: u32, axis: usize| (2 * i + 1) * of[axis] / (2 * size[axis]);
             let (x, y) = (source(i, 0), source(j, 1));
@@ -75,13 +74,13 @@ impl Own {
                 let metres = f64::from(depth.at(i, j)) / 512.0;
                 let found = point(f64::from(x) + 0.5, f64::from(y) + 0.5, metres);
                 let own = DVec3::from_array(self.xyz.at(x, y).map(f64::from));
-                // Half a step of half floats below 32 m is 8 mm, of depth 1 mm.
+                // Half a step of half floats below 32 m is 8 mm; half a step of depth is 1 mm.
                 assert!((found - own).abs().max_element() < 0.01, "{i}, {j}: {found} and {own}");
                 seen += 1;
             }
         }
         assert!(seen > count / 2, "{seen} of {count} pixels see something");
-        // Colours are means, as good as JPEG has them.
+        // Colours are means, as exact as JPEG stores them.
         let rgb = image::load_from_memory(&url_bytes(&picture["rgb"], "jpeg"))
             .unwrap()
             .to_rgb8();
@@ -156,7 +155,7 @@ fn pictures_are_the_data_sets_own() {
     let reasons: Vec<&str> = dropped.map(|view| view["place"]["reason"].as_str().unwrap()).collect();
     assert!(reasons.len() == 36 - made.views && reasons.iter().all(|r| ["lowest", "not_drawn"].contains(r)));
 
-    // Pixels by class are those of full-size images.
+    // Pixels are counted by class in the full-size images.
     let mut pixels = 0;
     for image in &images {
         let path = image.path(data.layout(), Domain::Semantic);
@@ -200,7 +199,7 @@ fn bytes_do_not_depend_on_threads_and_earlier_reports_are_replaced_when_asked() 
     let larger = ReportOptions { thumbs: 32, overwrite: true, ..SMALL };
     made(&out, &to, &larger);
     assert!(first != files(&to));
-    // What is not ours stays, and so does the data set.
+    // Files of others stay, and so does the data set.
     let strange = dir.path().join("thesis");
     fs::create_dir(&strange).unwrap();
     fs::write(strange.join("chapter.tex"), "").unwrap();
@@ -245,7 +244,7 @@ fn what_is_missing_or_damaged_is_told_and_the_rest_is_shown() {
             .all(|fault| !fault.message.is_empty() && !fault.message.contains("data set/"))
     );
     let missing = DataSet::open(&out).unwrap().missing(&context).unwrap();
-    // What is only seen when it is read has its size.
+    // The third file has its size, so its fault shows only when it is read.
     assert_eq!(missing.len(), 2);
     for fault in made.faults.iter().filter(|fault| missing.contains_key(&fault.path)) {
         assert!(missing[&fault.path] == fault.message && !fault.message.contains(&fault.path), "{fault:?}");
@@ -263,7 +262,7 @@ fn what_is_missing_or_damaged_is_told_and_the_rest_is_shown() {
     let picture = value(&to, &format!("pano_{at}"));
     assert!(picture["depth"].is_null() && picture["rgb"].is_string() && picture["label"].is_string());
 
-    // Without its list of files nothing can be held against anything.
+    // Without its list of files, a data set cannot be checked.
     fs::remove_file(out.join("files.csv")).unwrap();
     let e = report(&out, &dir.path().join("none"), &SMALL, &context)
         .unwrap_err()
@@ -291,7 +290,7 @@ fn without_labels_there_is_all_that_needs_none() {
 fn an_export_that_did_not_finish_is_shown_as_far_as_it_is() {
     let dir = tempfile::tempdir().unwrap();
     let (export, out) = (export(dir.path(), true), dir.path().join("data set"));
-    // Ended when two scan locations have their images.
+    // Cancelled when two scan locations have their images.
     let cancel = Cancel::default();
     let (theirs, done) = (cancel.clone(), AtomicU32::new(0));
     let context = Context::default()
@@ -320,7 +319,7 @@ fn an_export_that_did_not_finish_is_shown_as_far_as_it_is() {
     assert!(index["rooms"].as_array().unwrap().len() == 4 && index["views"].as_array().unwrap().len() > 2);
     assert!(value(&to, "pano_0")["rgb"].is_string());
 
-    // Once it has gone on, nothing is missing.
+    // After the export was resumed, nothing is missing.
     export.run(&out, &Context::default()).unwrap().unwrap();
     assert_eq!(
         report(&out, &to, &ReportOptions { overwrite: true, ..SMALL }, &context)
@@ -346,7 +345,7 @@ fn one_file_has_all_of_it() {
     let report_of_one = made(&out, &file, &single);
     let page = fs::read_to_string(&file).unwrap();
     assert_eq!((&report_of_one.page, report_of_one.bytes), (&file, page.len() as u64));
-    // The same values, before the program that reads them.
+    // The page has the same values, ahead of the program that reads them.
     let (before, program) = page.split_once("</head>").unwrap();
     assert!(program.contains("s3dReport"));
     let mut found = 0;

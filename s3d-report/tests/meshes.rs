@@ -1,5 +1,5 @@
-//! The meshes of a report and the faces of its pictures, read back by `s3d_report::files` and held against
-//! the data set's own files.
+//! The meshes of a report and the faces of its pictures are read back by `s3d_report::files` and compared
+//! with the files of the data set.
 
 mod common;
 
@@ -28,7 +28,7 @@ const SMALL: ReportOptions = ReportOptions {
     overwrite: false,
 };
 
-/// Packed numbers of so many bytes each.
+/// Packed numbers of this many bytes each.
 fn unpacked(value: &Value, bytes: usize) -> Vec<u32> {
     let stream = BASE64_STANDARD.decode(value.as_str().unwrap()).unwrap();
     let mut all = Vec::new();
@@ -44,7 +44,7 @@ struct Face {
     material: usize,
 }
 
-/// All faces of the mesh of area 1, by their numbers in the data set.
+/// All faces of the mesh of area 1, by their indices in the data set.
 fn faces(to: &Path, mesh: &Value) -> BTreeMap<u32, Face> {
     let mut faces = BTreeMap::new();
     for k in 0..mesh["files"].as_u64().unwrap() {
@@ -78,7 +78,7 @@ fn faces(to: &Path, mesh: &Value) -> BTreeMap<u32, Face> {
     faces
 }
 
-/// How far a place is from a triangle's plane, and from its box.
+/// The distance of a point from a triangle's plane, and from its box.
 fn off(place: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let plane = (place - a).dot((b - a).cross(c - a).normalize()).abs();
     let (low, high) = (a.min(b).min(c), a.max(b).max(c));
@@ -122,7 +122,7 @@ fn faces_have_their_places_textures_and_votes_and_pictures_show_them() {
                 assert_eq!(material["texture"].as_u64(), Some(u64::from(texture)));
                 textured += 1;
                 let found = found.uvs.unwrap();
-                // The same place of a picture that repeats, and the same piece of it.
+                // Repeated textures: coordinates may differ by whole numbers, the same for all corners.
                 for c in 0..3 {
                     for axis in 0..2 {
                         let apart = f64::from(uvs[c][axis]) - found[c][axis];
@@ -170,7 +170,7 @@ fn faces_have_their_places_textures_and_votes_and_pictures_show_them() {
     assert_eq!(boxes.as_array().unwrap().len(), instances.len());
     assert!(boxes[0]["label"] == instances[0].label_index && boxes[0]["box"][5] == instances[0].bbox[5]);
 
-    // Each pixel's face has the pixel's label and its place.
+    // Each pixel's face has the pixel's label and contains its point.
     let views = index["views"].as_array().unwrap();
     let mut held = 0;
     for image in data.images(1) {
@@ -243,7 +243,7 @@ fn the_spread_of_votes_is_that_of_the_faces() {
         });
     }
     assert_eq!(sum, votes.total.iter().filter(|all| **all > 0).count());
-    // More than one part has faces, so that no two can be exchanged.
+    // More than one bin has faces, so that exchanged bins would be found.
     assert!(
         spread["margin"]
             .as_array()
@@ -275,7 +275,7 @@ fn a_large_mesh_is_simplified_and_its_faces_keep_their_numbers() {
             assert!(p.distance(q) <= far, "face {face}: {p} and {q}, cells of {cell} m");
         }
     }
-    // What is told by number is told of all.
+    // Tables by face index have an entry for every face.
     let told = value(&to, "faces_1");
     assert_eq!(unpacked(&told["label"], 4).len(), file.mesh.faces().len());
     assert!(value(&to, "pano_0")["face"].is_string());

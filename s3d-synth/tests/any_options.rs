@@ -1,4 +1,4 @@
-//! Options from the whole of their ranges, furniture of several models and wings among them. The generator
+//! Options from the whole of their ranges, with furniture of several models and with wings. The generator
 //! refuses them for a reason that no seed changes, or it makes a building that can be built.
 
 use proptest::prelude::*;
@@ -15,22 +15,22 @@ const TYPES: [RoomType; 10] = [
     RoomType::PANTRY,
     RoomType::COPY_ROOM,
     RoomType::STORAGE,
-    // These need models.
+    // These room types need models.
     RoomType::AUDITORIUM,
     RoomType::WC,
 ];
 
-/// From `low` to `high`, at one of the ends rather often.
+/// Lengths from `low` to `high`, often exactly at one of the ends.
 fn length(low: f32, high: f32) -> BoxedStrategy<f32> {
     prop_oneof![1 => Just(low), 1 => Just(high), 6 => low..high].boxed()
 }
 
-/// A side of a room, long ones seldom: they take long to build.
+/// Sides of rooms, seldom long ones, since these take long to build.
 fn side(low: f32) -> BoxedStrategy<f32> {
     prop_oneof![4 => Just(low), 24 => low..low + 4.0, 6 => low..10.0, 1 => low..40.0].boxed()
 }
 
-/// Two of them, in any order.
+/// Two such lengths, in any order.
 fn range(low: f32, high: f32) -> BoxedStrategy<[f32; 2]> {
     prop_oneof![length(low, high).prop_map(|m| [m; 2]), [length(low, high), length(low, high)]].boxed()
 }
@@ -55,7 +55,7 @@ fn room() -> BoxedStrategy<RoomOptions> {
     .boxed()
 }
 
-/// Models for rooms whose lowest ceiling is at `lowest`, and hallways so wide.
+/// Models for a lowest ceiling at `lowest` and hallways of this width.
 fn models(lowest: f32, is_level: bool, hallway_width_m: f32) -> BoxedStrategy<Models> {
     let sofa = [range(0.5, 0.9), range(0.65, 1.2), range(0.6, 1.2)];
     let furniture = (
@@ -118,12 +118,12 @@ fn models(lowest: f32, is_level: bool, hallway_width_m: f32) -> BoxedStrategy<Mo
         .boxed()
 }
 
-/// Rooms, and what is wanted of the building but for models.
+/// Rooms and all other options of a building except models.
 fn plain_options() -> BoxedStrategy<BuildingOptions> {
     let rooms = prop_oneof![
         20 => prop::collection::vec(room(), 1..4),
         2 => prop::collection::vec(room(), 4..9),
-        // Many of a kind.
+        // Many rooms of one kind.
         1 => (room(), 9usize..80).prop_map(|(room, count)| vec![room; count]),
     ];
     let lengths = [length(1.2, 10.0), length(2.4, 10.0), length(0.1, 1.0)];
@@ -173,7 +173,7 @@ fn options() -> impl Strategy<Value = BuildingOptions> {
     prop_oneof![plain_options().prop_map(without_models), plain_options().prop_flat_map(with_models)]
 }
 
-/// Whether it is a reason to refuse options that are all in range: the whole is too large, or the ceiling too
+/// Whether this error may refuse options that are all in range: the building is too large, or the ceiling too
 /// low for a board above a sofa.
 fn is_refusal(error: &BuildingError) -> bool {
     let BuildingError::Range(error) = error else { return false };

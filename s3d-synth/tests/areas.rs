@@ -1,5 +1,5 @@
-//! The six generated areas: rooms and things as frequent as published, buildings that differ, points where
-//! they are seen.
+//! The six generated areas: rooms and things are as frequent as published, buildings differ, and points lie
+//! where the scanner sees them.
 
 mod common;
 
@@ -28,7 +28,7 @@ fn scene(number: u32) -> AnnotatedScene {
     area(number).build().unwrap()
 }
 
-/// The instances of each room, as its plan names them.
+/// The instances of each room, from the plan.
 fn planned(building: &Building) -> Vec<(Room, Class)> {
     let mut all = Vec::new();
     for plan in &building.rooms {
@@ -45,7 +45,7 @@ fn planned(building: &Building) -> Vec<(Room, Class)> {
     all
 }
 
-/// Rooms of areas 1 to 6, counted from the names in the published table of labels.
+/// Rooms of areas 1 to 6, counted by their names in the published table of labels.
 const ROOMS: [(RoomType, [usize; 6]); 11] = [
     (RoomType::OFFICE, [31, 14, 10, 22, 42, 37]),
     (RoomType::CONFERENCE_ROOM, [2, 1, 1, 3, 3, 1]),
@@ -60,7 +60,7 @@ const ROOMS: [(RoomType, [usize; 6]); 11] = [
     (RoomType::WC, [1, 2, 2, 4, 2, 0]),
 ];
 
-/// Instances of areas 1 to 6, counted from the same names.
+/// Instances of areas 1 to 6, counted by the same names.
 const INSTANCES: [(Class, [usize; 6]); 12] = [
     (Class::CEILING, [55, 81, 37, 73, 76, 63]),
     (Class::FLOOR, [44, 50, 23, 50, 68, 49]),
@@ -83,7 +83,7 @@ fn rooms_are_those_of_the_published_areas() {
         for (room_type, published) in ROOMS {
             let made = rooms.iter().filter(|plan| plan.room.room_type == room_type).count();
             let published = published[number as usize - 1];
-            // Area 5 has 60 of its 68 rooms.
+            // The generated area 5 has 60 of the 68 published rooms.
             let fewer = if number == 5 { 6 } else { 0 };
             assert!(
                 (published - fewer.min(published)..=published).contains(&made),
@@ -95,7 +95,7 @@ fn rooms_are_those_of_the_published_areas() {
     }
 }
 
-/// Instances per room over all areas. Walls and ceilings are not divided as in real rooms, and rooms have
+/// Instances per room over all areas. Walls and ceilings are not divided as in real rooms, and a room has
 /// only as many things as find a place.
 #[test]
 fn instances_a_room_are_about_as_frequent_as_published() {
@@ -150,7 +150,7 @@ fn buildings_differ_in_the_shape_of_things_and_areas_of_one_do_not() {
         sizes.iter().map(|size| size[axis]).sum::<f32>() / sizes.len() as f32
     };
 
-    // Work tables, chairs, bookcases: an axis of each, and the difference between buildings.
+    // For work tables, chairs and bookcases: an axis, and the least difference along it between buildings.
     let table = |thing: &Thing| match *thing {
         Thing::ModelTable { size_m, .. } if size_m[0] >= 1.4 => Some(size_m),
         _ => None,
@@ -214,7 +214,7 @@ fn doors_stand_open_at_many_angles_or_are_shut() {
     assert!(tens.len() >= 6, "{tens:?}");
 }
 
-/// The scene is whole: closed, labelled, no face on another, a location in every room.
+/// The scene is complete: closed, labelled, no face on another, a location in every room.
 #[test]
 fn a_generated_area_is_whole() {
     let seen = Seen::new(scene(3));
@@ -247,7 +247,7 @@ fn a_generated_area_is_whole() {
     }
 }
 
-/// Doors, beams and columns do not either: the boxes along the axes do not meet.
+/// Doors, beams and columns do not interpenetrate either; the boxes along the axes do not meet.
 #[test]
 fn no_two_pieces_of_furniture_interpenetrate() {
     let solid = [
@@ -317,7 +317,7 @@ fn points_are_where_a_location_sees_them() {
     let left = seen.mesh.faces().len();
     assert!(left * 10 > all * 4 && left * 10 < all * 9, "{left} of {all} faces");
 
-    // The back of a bookcase is gone, its front is not.
+    // The backs of bookcases are removed, but not their fronts.
     let backs = |scene: &AnnotatedScene| {
         let faces = 0..scene.mesh.faces().len() as u32;
         faces
@@ -331,7 +331,7 @@ fn points_are_where_a_location_sees_them() {
     for (_, cloud) in look.scene.scan(&scan_options()).unwrap() {
         for (p, face) in cloud.positions.iter().zip(&cloud.faces).step_by(4001) {
             checked += 1;
-            // Some location sees the front of its face.
+            // Some location must see the front of the point's face.
             let sees = |location: &s3d_synth::building::ScanLocation| {
                 let d = p.as_dvec3() - location.position;
                 look.scene.mesh.normal(*face).as_dvec3().dot(d) < 0.0

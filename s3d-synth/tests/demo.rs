@@ -135,7 +135,7 @@ fn doors_let_one_see_from_room_to_room() {
             .find(|(_, room)| room.contains(l.position.as_vec3()))
             .unwrap()
             .0;
-        // Between knee and head, where doors are.
+        // Nearly level rays, which pass through doors.
         for d in directions(1500).filter(|d| d.z.abs() < 0.15) {
             if let Some((face, _)) = SEEN.first_hit(l.position, d) {
                 let other = SEEN.instance_of(face);

@@ -1,11 +1,11 @@
-//! What is impossible in a building is an error that says where.
+//! An impossible building gives an error that names the place.
 
 use s3d_geom::glam::{dvec3, vec2, vec3};
 use s3d_synth::building::{Filling, Item, Opening, Thing, Wall};
 use s3d_synth::look::OAK;
 use s3d_synth::{Building, BuildingError};
 
-/// What building the demo's building says after a change.
+/// The error from building the demo's building after a change.
 fn error(change: impl FnOnce(&mut Building)) -> BuildingError {
     let mut building = Building { texture_scale: 0.02, ..Building::demo() };
     change(&mut building);
@@ -24,7 +24,7 @@ fn rooms() {
     assert!(message(|b| b.rooms[2].low.x = f32::NAN).starts_with("lounge_1: the smallest x is NaN"));
     assert!(message(|b| b.rooms[0].heights_m[1] = 1.9).contains("the height of the ceiling is 1.9"));
     assert!(message(|b| b.texture_scale = 0.0).contains("the scale of textures is 0"));
-    // A storey above is no overlap.
+    // A storey above does not overlap.
     let mut building = Building { texture_scale: 0.02, ..Building::demo() };
     let mut above = building.rooms[0].clone();
     (above.room.number, above.floor_m) = (2, 3.0);

@@ -53,7 +53,7 @@ fn options() -> impl Strategy<Value = BuildingOptions> {
     )
 }
 
-/// How many instances of each class the plans of a building's rooms name.
+/// The number of instances of each class in the plans of a building's rooms.
 fn planned(building: &Building) -> BTreeMap<(String, Class), usize> {
     let mut count = BTreeMap::new();
     for plan in &building.rooms {
@@ -73,7 +73,7 @@ fn planned(building: &Building) -> BTreeMap<(String, Class), usize> {
     count
 }
 
-/// Whatever was asked for: the scene is whole.
+/// Checks that the scene is complete for these options.
 fn check(options: &BuildingOptions) {
     let building = Building::generate(options).unwrap();
     let seen = Seen::new(building.build().unwrap());
@@ -81,7 +81,7 @@ fn check(options: &BuildingOptions) {
     seen.check_colors();
     seen.check_no_overlaps();
 
-    // Every planned thing is annotated, and nothing else is.
+    // Exactly the planned things are annotated.
     let mut annotated = BTreeMap::new();
     for instance in &seen.scene.instances {
         *annotated
@@ -90,7 +90,7 @@ fn check(options: &BuildingOptions) {
     }
     assert_eq!(annotated, planned(&building));
 
-    // As many rooms as wanted, of the types wanted, and a hallway a storey.
+    // The rooms are as many as wanted, of the types wanted, with one hallway a storey.
     let mut types: Vec<RoomType> = options.rooms.iter().map(|room| room.room_type).collect();
     types.extend(vec![RoomType::HALLWAY; options.storeys as usize]);
     let mut built: Vec<RoomType> = building.rooms.iter().map(|plan| plan.room.room_type).collect();
@@ -116,7 +116,8 @@ fn check(options: &BuildingOptions) {
     assert_eq!(stood_in.len(), building.rooms.len(), "a location in every room");
 }
 
-/// Once drawn by the property below: a bookcase of two shelves went through the sill of the window behind it.
+/// The property below once drew this: a bookcase of two shelves went through the sill of the window behind
+/// it.
 #[test]
 fn bookcases_keep_away_from_window_sills() {
     let storage = RoomOptions {
@@ -146,12 +147,12 @@ fn random_tests_draw_the_same_cases_in_every_run() {
         return;
     }
 
-    // As a property does it: a generator of its own for each run.
+    // Like a property, each run has a generator of its own.
     let draw = || options().new_tree(&mut TestRunner::default()).unwrap().current();
     assert_eq!(draw(), draw(), "is PROPTEST_RNG_SEED of {workspace} in the environment?");
 }
 
-/// Once drawn by the property below: a desk lamp, turned beside a wall, reached through it.
+/// The property below once drew this: a desk lamp, turned beside a wall, reached through it.
 #[test]
 fn lamps_beside_walls_stay_in_their_room() {
     let office = RoomOptions {

@@ -1,4 +1,4 @@
-//! A house of two storeys: whole, and one building.
+//! A house of two storeys is complete, and is one building.
 
 mod common;
 
@@ -31,7 +31,7 @@ fn it_is_closed_and_labelled() {
 #[test]
 fn stairs_lead_from_one_floor_to_the_other() {
     let seen = Seen::new(house().build().unwrap());
-    // Downwards from 1 m above where a person goes: floor, fifteen treads, the floor above.
+    // Downwards from 1 m above a person's path, a ray meets floor, fifteen treads, and the floor above.
     let height = |y: f64, above: f64| {
         let (face, down) = seen.first_hit(DVec3::new(0.6, y, above), -DVec3::Z).unwrap();
         (above - down, seen.instance_of(face).class)
@@ -43,7 +43,7 @@ fn stairs_lead_from_one_floor_to_the_other() {
         assert!(next - z > -1e-4 && next - z < 0.179, "from {z} to {next}");
         risers += u32::from(next - z > 0.1);
         assert_eq!(class == Class::FLOOR, risers == 0 || risers == 16);
-        // Free above a head.
+        // There is free space above the head.
         let up = seen
             .first_hit(DVec3::new(0.6, 1.0 + 0.07 * f64::from(k), next + 0.1), DVec3::Z)
             .unwrap();

@@ -76,8 +76,8 @@ pub(crate) struct SpecificArgs {
     /// and in which missing pixels seem to be 128 m away; or none [default: millimetres]
     #[arg(long, value_name = "millimetres|original|none", value_parser = parsed::<DepthFiles>)]
     pub(crate) depth: Option<DepthFiles>,
-    /// coco: the classes whose instances in an image are joined into one segment, or none [default:
-    /// ceiling,floor,wall]
+    /// coco: the classes whose instances in an image are joined into one segment, or none [default: the stuff
+    /// of the taxonomy: ceiling,floor,wall]
     #[arg(long, value_name = "LIST|none", value_parser = parsed::<ClassList>)]
     pub(crate) stuff: Option<ClassList>,
     /// coco, nerfstudio: compression of the image files: fast, balanced or small [default: balanced]

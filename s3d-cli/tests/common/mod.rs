@@ -1,4 +1,4 @@
-//! What the tests of the command line share: running the real binary, and a small scan to run it on.
+//! Shared by the tests of the command line: runs the real binary and writes a small scan for it.
 #![allow(dead_code)]
 
 pub(crate) mod scan;
@@ -19,7 +19,7 @@ pub(crate) fn s3d(args: &[&str]) -> Output {
         .expect("the binary starts")
 }
 
-/// Runs `s3d`, which must succeed; returns what it logged.
+/// Runs `s3d`, which must succeed; returns its log.
 pub(crate) fn s3d_ok(args: &[&str]) -> String {
     let out = s3d(args);
     let log = String::from_utf8_lossy(&out.stderr).into_owned();
@@ -27,8 +27,8 @@ pub(crate) fn s3d_ok(args: &[&str]) -> String {
     log
 }
 
-/// Runs `s3d`, which must fail with this exit code and a message that holds each of these parts, without a
-/// panic.
+/// Runs `s3d`, which must fail with this exit code, without a panic, and with a message that contains every
+/// one of these parts.
 pub(crate) fn s3d_fails(args: &[&str], code: i32, parts: &[&str]) {
     let out = s3d(args);
     let log = String::from_utf8_lossy(&out.stderr);
@@ -53,8 +53,8 @@ pub(crate) fn write_scan(dir: &Path, area: u32) -> PathBuf {
     let mut obj = String::from("mtllib room.mtl\n");
     let mut corners = 0;
     let mut annotations: BTreeMap<&str, String> = BTreeMap::new();
-    // A quad o, o + u, o + u + v, o + v in world coordinates, counter-clockwise from the inside; the file is
-    // Y-up.
+    // A quad o, o + u, o + u + v, o + v in world coordinates, counter-clockwise as seen from inside. The file
+    // is Y-up.
     let mut quad = |name: &'static str, o: [f64; 3], u: [f64; 3], v: [f64; 3]| {
         let at = |s: f64, t: f64| -> [f64; 3] { std::array::from_fn(|k| o[k] + s * u[k] + t * v[k]) };
         let _ = writeln!(obj, "usemtl {}", name.split('_').next().unwrap());
@@ -119,7 +119,7 @@ fn uuids_of(area: u32) -> (String, String) {
     (format!("{area:032x}"), format!("{:032x}", area + 1000))
 }
 
-/// Every file below `dir`, by its path there.
+/// Every file below `dir`, by its path relative to it.
 pub(crate) fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut all = BTreeMap::new();
     let mut folders = vec![dir.to_owned()];
@@ -136,8 +136,8 @@ pub(crate) fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     all
 }
 
-/// Brings the list of files, and what the manifest tells of it, up to date: the tool that made a fault knew
-/// of both.
+/// Writes the list of files anew, and its entry in the manifest, as a tool would that knew of both and made
+/// the fault.
 pub(crate) fn list_files(out: &Path) {
     let layout = Layout::new(out);
     let ours = |path: &PathBuf| {

@@ -1,4 +1,4 @@
-//! A scan that a test spoils, and what an export of it may do: end by itself, say why, write into OUT alone.
+//! A scan for a test to spoil. An export of it must end by itself, say why, and write into OUT alone.
 
 use super::{s3d_fails, s3d_ok, text, write_scan};
 use std::collections::BTreeMap;
@@ -8,14 +8,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The longest that refusing something may take. It is a fraction of a second on a machine that does nothing
-/// else.
+/// The longest time that a refusal may take. On an idle machine it takes a fraction of a second.
 pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 pub(crate) const SMALL: [&str; 8] =
     ["--size", "32", "--pano-width", "64", "--views", "3", "--points-per-m2", "50"];
 pub(crate) const ALL_CONDITIONS: &str = "colour,coverage,frame,inside-out,labels,locations,scale,size,up";
 
-/// A small scan in a folder of its own, to be spoilt.
+/// A small scan in a folder of its own.
 pub(crate) struct Scan {
     pub(crate) dir: tempfile::TempDir,
     pub(crate) scene: PathBuf,
@@ -46,7 +45,7 @@ impl Scan {
         self.write(name, content.replacen(from, to, 1));
     }
 
-    /// Makes `name` the mesh, the annotations or the list of cameras; the room of a cloud is `office_1`.
+    /// Makes `name` the mesh, the annotations or the list of cameras. A cloud becomes the room `office_1`.
     pub(crate) fn use_mesh(&self, name: &str) {
         self.replace("scene.toml", "path = \"room.obj\"", &format!("path = \"{name}\""));
     }
@@ -59,8 +58,8 @@ impl Scan {
         self.replace("scene.toml", "path = \"cameras.csv\"", &format!("path = \"{name}\""));
     }
 
-    /// An export fails with exit code 1, says so, and leaves everything beside OUT as it was, and no OUT that
-    /// looks complete.
+    /// The export must fail with exit code 1 and these words. It must leave everything beside OUT as it was,
+    /// and no OUT that looks complete.
     pub(crate) fn refused(&self, parts: &[&str]) {
         let before = listing(self.dir.path());
         let out = self.out();
@@ -74,12 +73,13 @@ impl Scan {
         let mut after = listing(self.dir.path());
         after.retain(|path, _| !path.starts_with(&out));
         assert_eq!(after, before, "a refused export left something beside OUT: {log}");
-        // Points are read late: what was begun until then says so.
+        // Points are read late, so OUT may exist by then; its manifest must say that the export is not
+        // complete.
         let manifest = fs::read_to_string(out.join("manifest.json")).unwrap_or_default();
         assert!(!out.exists() || manifest.contains("\"running\""), "OUT looks complete: {manifest}");
     }
 
-    /// An export succeeds, of whatever use its data set is; its log.
+    /// The export must succeed, even if the data set is of little use. Returns its log.
     pub(crate) fn exported(&self) -> String {
         let out = self.out();
         let mut args = vec!["export", text(&self.scene), "-o", text(&out), "--allow", ALL_CONDITIONS];
@@ -97,14 +97,14 @@ impl Scan {
         args
     }
 
-    /// An export fails with exit code 1, says so, and leaves no OUT.
+    /// The export must fail with exit code 1 and these words, and leave no OUT.
     pub(crate) fn fails(&self, parts: &[&str]) {
         let out = self.out();
         s3d_fails(&self.args(&out), 1, parts);
         assert!(!out.exists(), "a failed export of bad input wrote something");
     }
 
-    /// An export succeeds and logs each of these parts.
+    /// The export must succeed and log each of these parts.
     pub(crate) fn warns(&self, parts: &[&str]) {
         let log = s3d_ok(&self.args(&self.out()));
         for part in parts {
@@ -113,7 +113,7 @@ impl Scan {
     }
 }
 
-/// Runs `s3d`, which must end by itself, soon, and without a panic: its exit code and what it logged.
+/// Runs `s3d`, which must end by itself, soon, and without a panic. Returns its exit code and its log.
 pub(crate) fn run(args: &[&str]) -> (Option<i32>, String) {
     wait(Command::new(env!("CARGO_BIN_EXE_s3d")).args(args))
 }
@@ -127,7 +127,7 @@ pub(crate) fn wait(command: &mut Command) -> (Option<i32>, String) {
     let started = Instant::now();
     let mut child = loop {
         match command.spawn() {
-            // A copy that was just written: a process that another test started had it open for a moment.
+            // The binary was just copied, and a process that another test started still had the copy open.
             Err(e) if e.kind() == ErrorKind::ExecutableFileBusy && started.elapsed() < LIMIT => {
                 std::thread::sleep(Duration::from_millis(10));
             }
@@ -153,7 +153,7 @@ pub(crate) fn wait(command: &mut Command) -> (Option<i32>, String) {
     (status.code(), text)
 }
 
-/// Every path below `dir` with what it is and its size; nothing is opened, and no link is followed.
+/// Every path below `dir` with its kind and size. Opens nothing and follows no link.
 pub(crate) fn listing(dir: &Path) -> BTreeMap<PathBuf, (String, u64)> {
     let mut all = BTreeMap::new();
     let mut folders = vec![dir.to_owned()];
@@ -171,7 +171,7 @@ pub(crate) fn listing(dir: &Path) -> BTreeMap<PathBuf, (String, u64)> {
     all
 }
 
-/// A PNG file of one gray pixel whose header claims another size, its checksum right.
+/// A PNG file of one gray pixel. Its header claims another size, with a correct checksum.
 pub(crate) fn png_that_claims(width: u32, height: u32) -> Vec<u8> {
     let mut header = b"IHDR".to_vec();
     header.extend(width.to_be_bytes());
@@ -183,7 +183,7 @@ pub(crate) fn png_that_claims(width: u32, height: u32) -> Vec<u8> {
     let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\r".to_vec();
     png.extend(header);
     png.extend(crc.to_be_bytes());
-    // One chunk of data with two bytes, and the end.
+    // One data chunk of two bytes, and the end chunk.
     png.extend(b"\0\0\0\x0aIDAT\x78\x9c\x63\x60\0\0\0\x02\0\x01\x48\xaf\xa4\x71\0\0\0\0IEND\xae\x42\x60\x82");
     png
 }

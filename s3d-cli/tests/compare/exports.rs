@@ -1,4 +1,4 @@
-//! Small exports, each made once, and copies to be altered.
+//! Small exports, each made once, and copies of them for tests to change.
 
 use super::common::{files, list_files, s3d_ok, text, write_scan};
 use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, dataset_images};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use tempfile::TempDir;
 
-/// Options with their values, unless a test has others.
+/// Options with their values, unless a test gives others.
 const SMALL: [[&str; 2]; 5] = [
     ["--size", "48"],
     ["--pano-width", "96"],
@@ -43,15 +43,15 @@ pub(crate) fn whole() -> &'static Path {
     OUT.get_or_init(|| export("scene.toml", "whole", &["--keep-all", "--modalities", MODALITIES]))
 }
 
-/// All modalities that there are.
+/// All modalities.
 const MODALITIES: &str = "rgb,depth,normal,semantic,semantic_pretty,semantic_class,global_xyz,pose";
 
-/// The room as it is selected with a seed, without points.
+/// The room with its views selected with this seed, without points.
 pub(crate) fn seeded(seed: u32) -> PathBuf {
     export("scene.toml", &format!("seed_{seed}"), &["--seed", &seed.to_string(), "--views", "12"])
 }
 
-/// The room as another scene file of its folder has it.
+/// The room exported with a changed copy of its scene file.
 pub(crate) fn with_scene(name: &str, alter: impl Fn(&str) -> String, more: &[&str]) -> PathBuf {
     let folder = room().join("scan");
     let scene = fs::read_to_string(folder.join("scene.toml")).unwrap();
@@ -59,7 +59,7 @@ pub(crate) fn with_scene(name: &str, alter: impl Fn(&str) -> String, more: &[&st
     export(&format!("{name}.toml"), name, &[&["--keep-all"], more].concat())
 }
 
-/// The room with its table moved, as another mesh.
+/// The room with its table moved in the mesh.
 pub(crate) fn with_table_moved(more: &[&str]) -> PathBuf {
     let folder = room().join("scan");
     let mesh = fs::read_to_string(folder.join("room.obj")).unwrap();
@@ -69,12 +69,12 @@ pub(crate) fn with_table_moved(more: &[&str]) -> PathBuf {
     with_scene("moved", |scene| scene.replace("room.obj", "moved.obj"), more)
 }
 
-/// A copy to be altered: files are shared until they are replaced.
+/// A copy to change: hard links, so a file is shared until it is replaced.
 pub(crate) fn copy(of: &Path) -> (TempDir, PathBuf) {
     copy_to(of, "copy")
 }
 
-/// The same in a folder of this name.
+/// Makes the same copy in a folder of this name.
 pub(crate) fn copy_to(of: &Path, name: &str) -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join(name);
@@ -88,7 +88,7 @@ pub(crate) fn copy_to(of: &Path, name: &str) -> (TempDir, PathBuf) {
     (dir, out)
 }
 
-/// A copy that a tool altered which knows of the lists.
+/// A changed copy whose lists of files are up to date.
 pub(crate) fn altered(of: &Path, alter: impl Fn(&Path)) -> (TempDir, PathBuf) {
     let (dir, out) = copy(of);
     alter(&out);
@@ -105,7 +105,7 @@ pub(crate) fn first(out: &Path, is_panorama: bool) -> DatasetImage {
         .unwrap()
 }
 
-/// Its file of a modality.
+/// The file of a modality of that first image.
 pub(crate) fn file(out: &Path, is_panorama: bool, domain: Domain) -> PathBuf {
     first(out, is_panorama).path(&Layout::new(out), domain)
 }

@@ -28,7 +28,7 @@ fn a_data_set_is_equal_to_itself_and_to_a_copy() {
     for (other, more) in [(whole(), &[][..]), (&out, &["--threads", "1"]), (&out, &["--full"])] {
         let (answer, json, code) = compare_with(whole(), other, more);
         assert_eq!(code, 0, "{answer}");
-        // Two lines tell which they are, one that they are equal.
+        // Two lines name the data sets, one says that they are equal.
         assert_eq!(answer.lines().count(), 3, "{answer}");
         let empty = ["settings", "inputs", "images", "notes", "unread"];
         assert!(empty.iter().all(|key| count(&json[*key]) == 0), "{json:#}");
@@ -38,7 +38,7 @@ fn a_data_set_is_equal_to_itself_and_to_a_copy() {
     }
 }
 
-/// The manifest tells how the data were made: another version of s3d that makes the same data is told of.
+/// The manifest says how the data were made. Another version of s3d that makes the same data is reported.
 #[test]
 fn what_the_manifest_alone_tells_does_not_make_data_differ() {
     let (_dir, out) = copy(whole());
@@ -67,7 +67,7 @@ fn one_pixel_is_found_and_measured() {
         let mut at = 0..;
         let image = image.map(|v| if at.next() == Some(middle) { v + 256 } else { v });
         write_gray16(&depth, &image, Compression::Fast).unwrap();
-        // The same pixels in other bytes.
+        // The same pixels, encoded in other bytes.
         let same = file(out, true, Domain::Rgb);
         let image = read_rgb8(&same).unwrap();
         s3d_io::fs::write_bytes(&same, &encode_rgb8(&image, Content::Photo, Compression::Small)).unwrap();
@@ -78,7 +78,7 @@ fn one_pixel_is_found_and_measured() {
     let rgb = of("rgb");
     assert_eq!((&rgb["same"], &rgb["same_pixels"], &rgb["changed"]), (&10.into(), &1.into(), &1.into()));
     assert_eq!((&rgb["pixels"], &rgb["pixels_changed"]), (&(48 * 48).into(), &1.into()));
-    // One of three times 48² numbers is off by 60.
+    // One of the 3 · 48² numbers is off by 60.
     let psnr = 10.0 * (255f64.powi(2) / (60f64.powi(2) / (3.0 * 48.0 * 48.0))).log10();
     assert!((rgb["psnr_db"].as_f64().unwrap() - psnr).abs() < 1e-9, "{rgb}");
     let depth = of("depth");
@@ -110,7 +110,7 @@ fn a_moved_pose_is_measured_and_its_pixels_are_not_compared() {
         pose.camera_k_matrix[0][2] += 1.5;
         pose.write(&path).unwrap();
         repaint(&file(out, false, Domain::Rgb), |[r, g, b]| [r ^ 7, g, b]);
-        // Another room in the file, the same camera.
+        // The pose file names another room for the same camera.
         let path = file(out, true, Domain::Pose);
         let mut pose = read_pose(&path).unwrap();
         pose.room = "lobby_7_1".to_owned();
@@ -152,7 +152,7 @@ fn another_seed_keeps_other_views() {
     let gained: BTreeSet<_> = in_b.difference(&in_a).cloned().collect();
     assert!(!lost.is_empty() && !gained.is_empty());
     assert_eq!((named(&views["lost"]), named(&views["gained"])), (lost.clone(), gained.clone()));
-    // All views are drawn anew.
+    // All views in both were drawn anew.
     assert_eq!(named(&views["redrawn"]), in_a.intersection(&in_b).cloned().collect());
     let rgb = entry(&json["modalities"], "modality", "rgb");
     assert_eq!((&rgb["only_a"], &rgb["only_b"]), (&lost.len().into(), &gained.len().into()));
@@ -173,14 +173,14 @@ fn another_mesh_and_another_size_are_told_and_not_compared() {
     assert!(answer.contains(depth) && answer.contains("axes paper in A and opencv in B"), "{answer}");
     assert_eq!(entry(&json["settings"], "name", "options.size")["b"], 40);
     let of = |modality: &str| entry(&json["modalities"], "modality", modality).clone();
-    // Views have another size; panoramas show the table elsewhere.
+    // The views differ in size; the panoramas show the table in another place.
     assert_eq!((&of("rgb")["other_form"], &of("depth")["other_form"]), (&10.into(), &12.into()));
     assert!(of("rgb")["changed"].as_u64().unwrap() > 0, "{answer}");
     let labels = &json["labels"];
     let pixels = of("semantic")["pixels_changed"].as_u64().unwrap();
     assert!(pixels > 0 && labels["changed"]["pixels"] == pixels && labels["changed"]["faces"] == 0);
     assert_eq!((&of("semantic_class")["only_a"], &of("semantic_class")["only_b"]), (&12.into(), &0.into()));
-    // K is compared where sizes are equal: of panoramas.
+    // K is compared only where sizes are equal: for panoramas.
     let poses = &json["poses"];
     assert_eq!((&poses["same"], &poses["same_camera"], count(&poses["moved"])), (&2.into(), &10.into(), 0));
     assert!(!answer.contains("0 faces of"), "{answer}");

@@ -1,5 +1,5 @@
-//! `s3d compare`: what differs is told, by name and by number; what is equal is not; what cannot be read is
-//! named.
+//! `s3d compare` reports every difference by name and number, nothing that is equal, and every file that it
+//! cannot read by name.
 
 mod exports;
 mod images;
@@ -11,7 +11,7 @@ use common::{s3d, text};
 use serde_json::Value;
 use std::path::Path;
 
-/// What `s3d compare` says: its text, its JSON and its exit code, which must agree.
+/// Runs `s3d compare`. Returns its text, its JSON and its exit code, which must agree.
 #[track_caller]
 fn compare_with(a: &Path, b: &Path, more: &[&str]) -> (String, Value, i32) {
     let said = s3d(&[&["compare", text(a), text(b)], more].concat());
@@ -39,7 +39,7 @@ fn entry<'v>(list: &'v Value, key: &str, value: &str) -> &'v Value {
     found.unwrap_or_else(|| panic!("no {key} {value:?} in {list:#}"))
 }
 
-/// So many entries.
+/// The number of entries.
 fn count(list: &Value) -> usize {
     list.as_array().unwrap().len()
 }

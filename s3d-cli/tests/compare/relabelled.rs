@@ -1,4 +1,4 @@
-//! A chair that became a table, counted again from the files by other code.
+//! A chair relabelled as a table. The differences are counted again from the files by other code.
 
 use super::common::{s3d_ok, text};
 use super::exports::{whole, with_scene};
@@ -28,7 +28,7 @@ const SMALL: [&str; 12] = [
     "semantic,pose",
 ];
 
-/// The built-in scene, and the same after somebody made a table of a chair.
+/// The built-in scene, and a copy in which a chair became a table.
 fn scenes() -> (PathBuf, PathBuf) {
     static SCENES: OnceLock<TempDir> = OnceLock::new();
     let dir = SCENES.get_or_init(|| {
@@ -51,10 +51,10 @@ fn scenes() -> (PathBuf, PathBuf) {
     (dir.path().join("before"), dir.path().join("after"))
 }
 
-/// Faces, m² and pixels by name in A and name in B, where these differ.
+/// Faces, m² and pixels by name in A and name in B, where the names differ.
 type Recount = BTreeMap<(String, String), (u64, f64, u64)>;
 
-/// The corners and the label of each face of `semantic.obj`, line by line.
+/// The corners and the label of each face of `semantic.obj`, in file order.
 fn faces(out: &Path) -> Vec<([[f64; 3]; 3], String)> {
     let (mut vertices, mut faces, mut name) = (Vec::new(), Vec::new(), String::new());
     for line in fs::read_to_string(out.join("area_1/3d/semantic.obj")).unwrap().lines() {
@@ -75,7 +75,7 @@ fn faces(out: &Path) -> Vec<([[f64; 3]; 3], String)> {
     faces
 }
 
-/// By Heron's formula.
+/// The area by Heron's formula.
 fn area(corners: [[f64; 3]; 3]) -> f64 {
     let side = |i: usize, j: usize| -> f64 {
         (0..3)
@@ -101,7 +101,7 @@ fn recount(a: &Path, b: &Path) -> Recount {
     }
     let [names_a, names_b] = [a, b].map(|out| read_labels(&Layout::new(out).labels_json()).unwrap());
     for image in dataset_images(&Layout::new(a), 1).unwrap() {
-        // All candidates are kept: names of files are the same.
+        // All candidates are kept, so the names of files are the same.
         let [one, other] =
             [a, b].map(|out| read_rgb8(&out.join(image.relative_path(Domain::Semantic))).unwrap());
         for (&p, &q) in one.pixels().iter().zip(other.pixels()) {
@@ -136,7 +136,7 @@ fn a_chair_that_became_a_table_is_told_by_faces_surface_and_pixels() {
     let all = recount(&a, &b);
     let labels = &json["labels"];
 
-    // Instances are numbered by class: the chairs behind it, and the tables, have other names now.
+    // Instances are numbered by class: the later chairs and the tables have other names now.
     let [names_a, names_b] = [&a, &b].map(|out| read_labels(&Layout::new(out).labels_json()).unwrap());
     let alone = |names: &[String], others: &[String]| -> BTreeSet<String> {
         names.iter().filter(|name| !others.contains(name)).cloned().collect()
@@ -173,7 +173,7 @@ fn a_chair_that_became_a_table_is_told_by_faces_surface_and_pixels() {
     let area = &json["areas"][0];
     assert_eq!(area["faces_changed"], labels["changed"]["faces"]);
 
-    // Of each instance, what it lost and gained. First come the two that changed class.
+    // What each instance lost and gained. First come the two that changed class.
     let of_both = all
         .iter()
         .filter(|((one, other), _)| class(one) == "chair" && class(other) == "table");
@@ -213,7 +213,7 @@ fn a_chair_that_became_a_table_is_told_by_faces_surface_and_pixels() {
     );
     assert!(begins(&[chair.as_str()]) && begins(&[table_name.as_str()]), "{answer}");
 
-    // The other way round, lost and gained change places.
+    // In the other order, lost and gained change places.
     let (_, back, _) = compare(&b, &a);
     assert_eq!(back["labels"]["gone"], labels["added"]);
     let pair = back["labels"]["matrix"].as_array().unwrap();
@@ -232,11 +232,11 @@ fn other_classes_are_compared_by_name() {
     assert_eq!(code, 1);
     let note = "note: classes are those of s3dis in A and of nyu40 in B; they were compared by name";
     assert!(answer.contains(note), "{answer}");
-    // Floor, ceiling, wall and table are called so in both.
+    // Floor, ceiling, wall and table have the same names in both.
     assert_eq!((count(&json["labels"]["added"]), count(&json["labels"]["gone"])), (0, 0), "{answer}");
     assert_eq!((count(&json["labels"]["matrix"]), &json["areas"][0]["geometry"]), (0, &"same".into()));
     let of = |modality: &str| entry(&json["modalities"], "modality", modality).clone();
-    // Their numbers are others, and their pixels mean the same.
+    // The numbers of the classes differ, but the pixels mean the same.
     let class = of("semantic_class");
     assert_eq!((&class["same_pixels"], &class["changed"]), (&12.into(), &0.into()), "{answer}");
     assert_eq!(of("semantic")["changed"], 0);
@@ -258,7 +258,7 @@ fn one_without_labels_is_compared_by_all_else() {
     assert_eq!((count(&labels["matrix"]), &json["b"]["taxonomy"]), (0, &Value::Null));
     let of = |modality: &str| entry(&json["modalities"], "modality", modality).clone();
     assert_eq!((&of("rgb")["same"], &of("depth")["same"]), (&12.into(), &12.into()), "{answer}");
-    // Poses name another room, and files do.
+    // The poses and the names of the files name another room.
     let poses = &json["poses"];
     assert_eq!((&of("semantic")["only_a"], &poses["same_camera"]), (&12.into(), &12.into()), "{answer}");
     let (answer, json, code) = compare(&bare, &bare);

@@ -1,4 +1,4 @@
-//! Data sets that are damaged, incomplete or not there, and names that mean to steer a terminal.
+//! Data sets that are damaged, incomplete or absent, and names that would steer a terminal.
 
 use super::common::{s3d, s3d_fails, s3d_ok, text};
 use super::exports::{altered, copy, copy_to, file, whole};
@@ -17,7 +17,7 @@ fn flip(path: &Path) {
     write_bytes(path, &bytes).unwrap();
 }
 
-/// Everything that could not be compared, by path.
+/// Every file that could not be compared, by path.
 fn unread(json: &serde_json::Value) -> Vec<(String, String)> {
     let all = json["unread"].as_array().unwrap().iter();
     let word = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
@@ -29,7 +29,7 @@ fn unread(json: &serde_json::Value) -> Vec<(String, String)> {
 fn what_is_missing_or_damaged_is_named_and_the_rest_is_compared() {
     let depth = file(whole(), false, Domain::Depth);
     let depth = text(depth.strip_prefix(whole()).unwrap());
-    // Gone or cut off: told without opening a file.
+    // Missing or truncated: found without opening a file.
     for cut in [true, false] {
         let (_dir, out) = copy(whole());
         let bytes = fs::read(out.join(depth)).unwrap();
@@ -44,7 +44,7 @@ fn what_is_missing_or_damaged_is_named_and_the_rest_is_compared() {
         assert!(answer.ends_with("not all of it is there\n"), "{answer}");
         assert_eq!(entry(&json["modalities"], "modality", "rgb")["same"], 12);
     }
-    // A bit of a file to which both lists give the same checksum: told by whoever reads all.
+    // A flipped bit in a file that has the same checksum in both lists: found only if all files are read.
     let (_dir, out) = copy(whole());
     flip(&out.join(depth));
     assert_eq!(compare(whole(), &out).2, 0);
@@ -53,7 +53,7 @@ fn what_is_missing_or_damaged_is_named_and_the_rest_is_compared() {
     assert_eq!((code, all.len(), all[0].0.as_str()), (1, 1, &*format!("a:{depth}")), "{answer}");
     assert!(all[0].1.contains("other content than was written"), "{all:?}");
 
-    // Files that are read since they differ, and are not what the list tells.
+    // Files that are read because they differ, and do not match the list.
     let semantic = "area_1/3d/semantic.obj";
     let (_dir, out) = altered(whole(), |out| {
         for name in [semantic, "area_1/views.json", depth] {
@@ -76,7 +76,7 @@ fn what_is_missing_or_damaged_is_named_and_the_rest_is_compared() {
     assert_eq!(entry(&json["modalities"], "modality", "rgb")["same"], 12);
 }
 
-/// Files that are as the list has them, and hold what they should not.
+/// Files that match the list but have impossible content.
 #[test]
 fn what_no_data_set_holds_is_named() {
     let semantic = file(whole(), false, Domain::Semantic);

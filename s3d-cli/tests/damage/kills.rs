@@ -1,7 +1,7 @@
-//! Every command that writes, killed at any moment: no file is there by halves, what is half made does not
-//! pass for whole, and the same call ends with the same files as one that nobody disturbed.
+//! Kills every command that writes, at any moment. No file is half written, nothing unfinished passes for
+//! complete, and the same call then ends with the same files as an undisturbed one.
 //!
-//! `S3D_KILLS=100 cargo test -p s3d-cli damage::kills` kills each of them so often.
+//! `S3D_KILLS=100 cargo test -p s3d-cli damage::kills` kills each command 100 times.
 
 use super::structured::{Random, number_of};
 use super::{SMALL, common, folder};
@@ -14,8 +14,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// The commands, as they are called in a folder with `scan` (the input), `out` (an export) and `shard_1`,
-/// `shard_2` (its shards). Whoever adds a command that writes adds a line.
+/// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
+/// shards). A new command that writes needs a line here.
 const COMMANDS: [&str; 30] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
@@ -51,7 +51,7 @@ const COMMANDS: [&str; 30] = [
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;
 
-/// What each command finds.
+/// The folder that each command starts from.
 struct Template {
     dir: TempDir,
     files: Files,
@@ -94,7 +94,7 @@ impl Template {
         Self { dir, files }
     }
 
-    /// A folder of a command's own.
+    /// A new folder for one run of a command.
     fn begin(&self, name: &str) -> PathBuf {
         let folder = self.dir.path().join(name);
         for (path, bytes) in &self.files {
@@ -130,36 +130,37 @@ fn run(folder: &Path, command: &str, delay: Option<Duration>) -> ExitStatus {
     child.wait().unwrap()
 }
 
-/// What a process keeps for itself while it is not done.
+/// Whether a file is a process's own while it works.
 fn is_working(path: &Path) -> bool {
     path.components()
         .any(|name| name.as_os_str().to_str().is_some_and(|name| name.starts_with(".s3d")))
 }
 
-/// Every process that makes a plan keeps a journal of its own in it.
+/// The result of a command. Every process that makes a plan keeps a journal of its own in it, which does not
+/// count.
 fn made(folder: &Path, command: &str) -> Files {
     let mut all = files(folder);
     all.retain(|path, _| !(command.starts_with("plan") && is_working(path)));
     all
 }
 
-/// Whatever the moment of a kill: a file is the one that was there, or the one that will be.
+/// At whatever moment the kill came, a file has the content from before the command, or the final one.
 fn assert_nothing_by_halves(folder: &Path, before: &Files, whole: &Files, command: &str) {
     for (path, bytes) in files(folder) {
-        // A manifest of an export under way says so.
+        // The manifest of an export under way says so.
         let says_so =
             path.ends_with("manifest.json") && String::from_utf8_lossy(&bytes).contains("\"running\"");
         let known = [before, whole].iter().any(|files| files.get(&path) == Some(&bytes));
         assert!(known || is_working(&path) || says_so, "{command}: {} is there by halves", path.display());
     }
-    // A package is there as a whole, or not at all.
+    // A package exists as a whole or not at all.
     for place in whole.keys().filter(|path| path.ends_with("pack.json")) {
         if fs::read(folder.join(place)).ok().as_ref() == whole.get(place) {
             let inside = |path: &&PathBuf| path.starts_with(place.parent().unwrap());
             assert!(whole.keys().filter(inside).all(|path| folder.join(path).exists()), "{command}");
         }
     }
-    // So is a data set, or `verify` tells of it.
+    // A data set is whole too, or `verify` reports it.
     for name in ["out", "new"] {
         let out = folder.join(name);
         if command.contains(&format!(" {name}")) && out.join("manifest.json").exists() {
@@ -196,7 +197,7 @@ fn killed_commands_are_made_whole_by_the_same_call() {
                 if status.success() {
                     break;
                 }
-                // It was killed when all was done, and is told so.
+                // It was killed after all was done, so the next call says that the files exist.
                 if status.code() == Some(2) && made(&folder, command) == whole {
                     break;
                 }

@@ -1,5 +1,5 @@
-//! Exports that are damaged: `verify` tells of it, and whoever else reads an export refuses it, leaves it as
-//! it is, and ends.
+//! Damaged exports: `verify` reports the damage. Every other reader of an export refuses it, leaves it as it
+//! is, and ends.
 #![cfg(unix)]
 
 mod kills;
@@ -20,8 +20,8 @@ use tempfile::TempDir;
 const SMALL: [&str; 10] =
     ["--size", "32", "--pano-width", "64", "--views", "3", "--points-per-m2", "60", "--compression", "fast"];
 
-/// A folder on a disk in memory, where there is one: commands that change an export wait for the disk, which
-/// may be busy.
+/// A folder on a disk in memory, if there is one: commands that change an export wait for the disk, which may
+/// be busy.
 fn folder() -> TempDir {
     let memory = Path::new("/dev/shm");
     if memory.is_dir() {
@@ -45,7 +45,7 @@ fn export() -> &'static Path {
     out
 }
 
-/// A copy to be damaged, in a folder of its own: files are shared until they are replaced.
+/// A copy to damage, in a folder of its own: hard links, so a file is shared until it is replaced.
 fn copy() -> (TempDir, PathBuf) {
     let dir = folder();
     let out = dir.path().join("copy");
@@ -57,7 +57,7 @@ fn copy() -> (TempDir, PathBuf) {
     (dir, out)
 }
 
-/// Everything that reads an export. What it writes goes to the folder that holds the export, or into it.
+/// Every command that reads an export. Each writes into the folder that holds the export, or into the export.
 const READERS: [&[&str]; 13] = [
     &["verify", "OUT"],
     &["stats", "OUT"],
@@ -74,7 +74,7 @@ const READERS: [&[&str]; 13] = [
     &["compare", "OUT", "OUT", "--full"],
 ];
 
-/// Runs a command, with so much memory as it may need and no more, until it ends, which must be soon.
+/// Runs a command with a limit on its memory. It must end soon.
 fn run(out: &Path, args: &[&str]) -> Output {
     let args = args.iter().map(|arg| if *arg == "OUT" { text(out) } else { arg });
     let mut child = Command::new("sh")
@@ -95,7 +95,7 @@ fn run(out: &Path, args: &[&str]) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// What `s3d verify` reports, which must be faults.
+/// The report of `s3d verify`, which must name faults.
 fn verified(out: &Path) -> String {
     let said = run(out, &["verify", "OUT"]);
     let report = String::from_utf8(said.stdout).unwrap();
@@ -103,7 +103,7 @@ fn verified(out: &Path) -> String {
     report
 }
 
-/// Everything that lies in a folder, with the kind of what is no file.
+/// Everything in a folder; an entry that is no regular file comes with its kind.
 fn state(folder: &Path) -> Vec<(PathBuf, u64)> {
     let mut all = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -120,7 +120,7 @@ fn state(folder: &Path) -> Vec<(PathBuf, u64)> {
     all
 }
 
-/// These readers refuse the export with a message that holds all the words, and change nothing.
+/// These readers must refuse the export with a message that contains all the words, and change nothing.
 #[track_caller]
 fn refuse<'a>(out: &Path, readers: impl IntoIterator<Item = &'a &'a [&'a str]>, words: &[&str]) {
     let folder = out.parent().unwrap();
@@ -148,7 +148,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
-/// The first file below a folder whose path ends so.
+/// The first file below a folder whose path ends like this.
 fn first(out: &Path, folder: &str, ending: &str) -> String {
     let found = files(&out.join(folder))
         .into_keys()
@@ -172,7 +172,7 @@ fn a_whole_export_is_read_by_all() {
     }
 }
 
-/// One reader of the manifest: what is wrong in it is told by all in the same words.
+/// All commands use one reader of the manifest, so all report a fault in it in the same words.
 #[test]
 fn what_is_wrong_in_a_manifest_is_told_by_all_alike() {
     type Spoil = fn(&mut Value);
@@ -206,7 +206,7 @@ fn what_is_wrong_in_a_manifest_is_told_by_all_alike() {
             .lines()
             .find(|line| line.trim_start().starts_with("manifest.json: ") && line.contains(words));
         let told = told.unwrap_or_else(|| panic!("verify should tell of {words:?}: {report}"));
-        // Reports and errors have the line of a file in other places.
+        // Reports and errors put the line number of a file in different places.
         let message = told.split_once(": ").unwrap().1;
         let message = if message.starts_with("line ") {
             message.split_once(": ").unwrap().1
@@ -217,7 +217,7 @@ fn what_is_wrong_in_a_manifest_is_told_by_all_alike() {
     }
 }
 
-/// Units are those of the manifest, and `conventions.json` may say nothing else.
+/// The manifest says the units, and `conventions.json` must agree with it.
 #[test]
 fn conventions_that_are_gone_or_others_are_refused() {
     let name = "conventions.json";
@@ -232,7 +232,7 @@ fn conventions_that_are_gone_or_others_are_refused() {
     conventions["depth"]["units_per_m"] = 512.into();
     write_bytes(&out.join(name), conventions.to_string().as_bytes()).unwrap();
     refuse(&out, &READERS[1..], &[name, "is damaged"]);
-    // A tool that knows of the list and of the manifest.
+    // As changed by a tool that also updates the list and the manifest.
     list_files(&out);
     let words = "depth units 512, normal axes paper, coordinates half; the manifest tells of depth units mm";
     assert!(verified(&out).contains(&format!("  conventions.json: {words}")));
@@ -281,7 +281,7 @@ fn a_file_that_is_gone_cut_or_altered_is_refused_by_whoever_reads_it() {
             refuse(&out, readers(commands).chain(readers(&["compare"])), &[name]);
         }
     }
-    // As input of another export.
+    // The damaged export as the input of another export.
     for name in ["area_1/3d/semantic.obj".to_owned(), whole("area_1/data/pose", ".json")] {
         let (_dir, out) = copy();
         flip(&out.join(&name));
@@ -291,14 +291,14 @@ fn a_file_that_is_gone_cut_or_altered_is_refused_by_whoever_reads_it() {
         fs::remove_file(out.join(&name)).unwrap();
         refuse(&out, &calls[..1], &[&name]);
     }
-    // What no list names is not taken for a part of the data set: a wall more, an image more.
+    // Files that no list names are no part of the data set: here one wall more, and one image more.
     let (_dir, out) = copy();
     let wall = out.join("s3dis/Area_1/office_1/Annotations/wall_9.txt");
     fs::write(&wall, "1 1 1 1 1 1\n").unwrap();
     refuse(&out, readers(&["profile"]), &["wall_9.txt", "files.csv does not name it"]);
 }
 
-/// Only regular files are opened, and only those of the size that was written.
+/// Only regular files of the listed size are opened.
 #[test]
 fn pipes_and_files_without_end_stop_nobody_and_take_no_memory() {
     let out = export();
@@ -333,7 +333,7 @@ fn pipes_and_files_without_end_stop_nobody_and_take_no_memory() {
             if pipe {
                 assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
             } else {
-                // A few bytes and a hole of twelve gigabytes.
+                // A few bytes, then a hole of twelve gigabytes.
                 write_bytes(&path, &bytes).unwrap();
                 File::options()
                     .write(true)
@@ -347,7 +347,7 @@ fn pipes_and_files_without_end_stop_nobody_and_take_no_memory() {
                 let log = String::from_utf8_lossy(&said.stderr);
                 let clean = !log.contains("panicked") && !log.contains("memory allocation");
                 assert!(clean && said.status.code().is_some(), "{name} {args:?}: {log}");
-                // Not everybody reads everything.
+                // Only `verify` reads every file.
                 if args[0] == "verify" {
                     let report = String::from_utf8_lossy(&said.stdout);
                     let told = report.contains(&format!("  {name}: ")) || log.contains("no manifest.json");

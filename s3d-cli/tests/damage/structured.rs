@@ -1,6 +1,6 @@
-//! Whole small exports, damaged at random: `verify` finds it, or nothing changed that it could know of.
+//! Small exports damaged at random: `verify` finds the damage, or it changed nothing that `verify` can know.
 //!
-//! `S3D_DAMAGES=2000 cargo test -p s3d-cli damage::structured` tries more; `S3D_SEED` others.
+//! `S3D_DAMAGES=2000 cargo test -p s3d-cli damage::structured` tries more; `S3D_SEED` tries others.
 
 use super::{copy, export, files};
 use s3d_dataset::verify::VerifyOptions;
@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What nothing else in a data set tells: of how it was made.
+/// Entries about how the data set was made, which no other file repeats.
 const TOLD_BY_THE_MANIFEST_ALONE: [&str; 9] = [
     "/version",
     "/options/lenient",
@@ -22,7 +22,7 @@ const TOLD_BY_THE_MANIFEST_ALONE: [&str; 9] = [
     "/areas/0/rgb",
 ];
 
-/// Numbers that look random and are always the same.
+/// Numbers that look random and are the same in every run.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -40,13 +40,13 @@ pub(crate) fn number_of(variable: &str, otherwise: u64) -> u64 {
     std::env::var(variable).map_or(otherwise, |text| text.parse().expect("a number"))
 }
 
-/// A file that is written anew: others have second names of it.
+/// Replaces a file; it is not written in place, since hard links share it.
 fn put(path: &Path, bytes: &[u8]) {
     fs::remove_file(path).unwrap();
     fs::write(path, bytes).unwrap();
 }
 
-/// The numbers, texts and flags of a document, by their places.
+/// The numbers, texts and flags of a document, by their JSON pointers.
 fn leaves(value: &Value, place: &str, out: &mut Vec<String>) {
     match value {
         Value::Object(map) => map
@@ -60,7 +60,7 @@ fn leaves(value: &Value, place: &str, out: &mut Vec<String>) {
     }
 }
 
-/// Changes one value of a JSON file to another of its kind, or removes it. Says which.
+/// Changes one value of a JSON file to another of its kind, or removes it. Returns a description.
 fn change_value(path: &Path, random: &mut Random) -> String {
     let mut json: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
     let mut places = Vec::new();
@@ -82,7 +82,7 @@ fn change_value(path: &Path, random: &mut Random) -> String {
     place
 }
 
-/// Damages an export, and says how.
+/// Damages an export. Returns a description.
 fn damage(out: &Path, random: &mut Random) -> String {
     let all: Vec<PathBuf> = files(out).into_keys().collect();
     let pick = |random: &mut Random| out.join(&all[random.below(all.len())]);
@@ -127,7 +127,7 @@ fn damage(out: &Path, random: &mut Random) -> String {
                 .iter()
                 .filter(|p| p.extension().is_some_and(|e| e == "json"))
                 .collect();
-            // Of the manifest nothing but its content tells.
+            // No list names the manifest: a change shows in its content alone.
             let name = if random.below(3) > 0 {
                 Path::new("manifest.json")
             } else {
@@ -139,7 +139,7 @@ fn damage(out: &Path, random: &mut Random) -> String {
     format!("{}: {how}", path.display())
 }
 
-/// What of an export can be known to be right or wrong.
+/// The part of an export that can be known to be right or wrong.
 fn what_matters(out: &Path) -> (Option<Value>, Vec<(PathBuf, Vec<u8>)>) {
     let manifest = fs::read(out.join("manifest.json")).ok();
     let mut manifest: Option<Value> = manifest.and_then(|bytes| serde_json::from_slice(&bytes).ok());
@@ -148,7 +148,7 @@ fn what_matters(out: &Path) -> (Option<Value>, Vec<(PathBuf, Vec<u8>)>) {
             *value = Value::Null;
         }
     }
-    // A copy beside the tables is somebody's own.
+    // A new file in the top folder may be the user's own.
     let ours = |path: &PathBuf| path.components().count() > 1 || export().join(path).exists();
     let files = files(out)
         .into_iter()

@@ -1,5 +1,5 @@
-//! Photographs with poses, there and back: pictures that our own renderer took in the built-in scene, ray by
-//! ray through lenses that bend, become views that lie on those of the mesh.
+//! Photographs with poses, there and back. Our own renderer takes the photographs in the built-in scene, ray
+//! by ray through lenses that bend. The views made of them must coincide with the views of the mesh.
 
 mod studio;
 
@@ -33,7 +33,7 @@ fn photographs_through_a_lens_that_bends_lie_on_the_mesh() {
     assert!(off.len() > 40, "{off:?}");
     assert!(off[off.len() / 2] < 0.1 && off[off.len() - 1] < 0.3, "{off:?}");
 
-    // No locations are placed beside photographs, unless they are asked for.
+    // With photographs, no locations are placed unless the user asks for them.
     let manifest: Value = serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
     let area = &manifest["areas"][0];
     assert_eq!([&area["frames"], &area["views"], &area["panoramas"], &area["locations"]], [4, 4, 0, 0]);
@@ -41,7 +41,7 @@ fn photographs_through_a_lens_that_bends_lie_on_the_mesh() {
     let manifest: Value = serde_json::from_slice(&fs::read(both.join("manifest.json")).unwrap()).unwrap();
     let area = &manifest["areas"][0];
     assert!(area["frames"] == 4 && area["panoramas"].as_u64() > Some(1) && area["views"].as_u64() > Some(6));
-    // The views of photographs are the same.
+    // The views of the photographs stay the same.
     for record in &records {
         let of = |out: &Path| -> Vec<Vec<u8>> {
             let all = files(&out.join("area_1/data"));
@@ -53,7 +53,7 @@ fn photographs_through_a_lens_that_bends_lie_on_the_mesh() {
         assert!(of(&out).len() == 5 && of(&out) == of(&both));
     }
 
-    // A principal point that is a pixel off is found by the same measure.
+    // The same measure finds a principal point that is one pixel off.
     let mut wrong = transforms(&poses());
     wrong["cx"] = json!(CENTER.x + 1.0);
     project.write("transforms.json", &wrong.to_string());
@@ -62,7 +62,7 @@ fn photographs_through_a_lens_that_bends_lie_on_the_mesh() {
     assert!((0.8..2.0).contains(&off[off.len() / 2]), "{off:?}");
 }
 
-/// The same through a fisheye lens, from COLMAP's list, in a smaller size, beside labels and locations.
+/// The same through a fisheye lens: poses from COLMAP's list, a smaller size, with labels and locations.
 #[test]
 fn a_fisheyes_photographs_of_a_colmap_model_become_smaller_views() {
     let scan = demo();
@@ -83,7 +83,7 @@ fn a_fisheyes_photographs_of_a_colmap_model_become_smaller_views() {
         images +=
             &format!("{} {} {} {} {} {} {} {} 3 hall/{i}.jpg\n\n", i + 1, q.w, q.x, q.y, q.z, t.x, t.y, t.z);
         if i % 2 == 0 {
-            // A name may lack its ending, or its folder.
+            // A listed name may lack its ending or its folder.
             write(
                 &project.at(&format!("photos/{}{i}.jpg", if i == 0 { "hall/" } else { "" })),
                 &take(pose, &fisheye()),
@@ -100,7 +100,8 @@ fn a_fisheyes_photographs_of_a_colmap_model_become_smaller_views() {
         assert!(record.agreement.unwrap() > record.chance.unwrap() + 0.3, "{record:?}");
         assert!(!record.room.starts_with("unknown"), "{record:?}");
     }
-    // Views of the mesh have another size and no list of photographs: those alone are compared.
+    // Only views of photographs are compared; views of the mesh have another size and are in no list of
+    // photographs.
     let layout = Layout::new(&out);
     let all = dataset_images(&layout, 1).unwrap();
     assert!(all.len() > 10 && all.iter().all(|image| image.domains.len() == Domain::PUBLISHED.len()));
@@ -118,7 +119,7 @@ fn a_fisheyes_photographs_of_a_colmap_model_become_smaller_views() {
     assert!(off.len() > 10 && off[off.len() / 2] < 0.1 && off[off.len() - 1] < 0.3, "{off:?}");
 }
 
-/// A pose that is off, or a matrix that is transposed, shows in the report and is warned of.
+/// A wrong pose or a transposed matrix shows in the report and gives a warning.
 #[test]
 fn poses_that_do_not_fit_show_in_their_agreement() {
     let project = Project::with_photographs(LISTED);
@@ -150,7 +151,7 @@ fn poses_that_do_not_fit_show_in_their_agreement() {
     assert!(log.contains("images/2.png ("), "{log}");
 }
 
-/// The same bytes for any number of threads, in shards, with a plan, and after a stop.
+/// The bytes are the same for any number of threads, in shards, with a plan, and after a stop.
 #[test]
 fn threads_shards_and_plans_change_no_byte() {
     let project = Project::with_photographs(&format!("[cameras]\nplace = 6.0\n{LISTED}"));
@@ -168,7 +169,7 @@ fn threads_shards_and_plans_change_no_byte() {
     }
     s3d_ok(&["merge", text(&shared), "-o", text(&shared)]);
     assert!(files(&shared) == expected, "shards change something");
-    // A photograph that is another is another input.
+    // Another photograph is another input.
     write(&project.at("images/1.png"), &Raster::filled(SIZE[0], SIZE[1], [90, 80, 70]));
     let args = project.args(&scene, &one);
     s3d_fails(&args, 2, &["images/: other bytes"]);
@@ -200,7 +201,7 @@ fn what_is_wrong_with_photographs_is_said_before_anything_is_written() {
     with(&|list| list["frames"][2] = list["frames"][0].clone());
     project.fails(&["\"images/0.png\": is listed twice"]);
     with(&|list| list["frames"][0]["transform_matrix"][0][3] = json!(4e5));
-    // One may be far off; all of them have another frame.
+    // A single camera may be far off; if all are, they are in another frame.
     with(&|list| (0..4).for_each(|i| list["frames"][i]["transform_matrix"][0][3] = json!(4e5)));
     project.fails(&["lie", "[[1, 0, 0, "]);
     with(&|list| (0..4).for_each(|i| list["frames"][i]["transform_matrix"][2][3] = json!(60.0)));
@@ -222,7 +223,7 @@ fn what_is_wrong_with_photographs_is_said_before_anything_is_written() {
     turn(&project.at("images/0.png"), 6);
     project.fails(&["stored with 320 × 240 pixels", "EXIF orientation 6", "for 240 × 320: store it upright"]);
     with(&|_| ());
-    // Half a turn does not show in the size.
+    // A turn by 180° keeps the size.
     turn(&project.at("images/1.png"), 3);
     let (_, log) = project.export("turned", &["--modalities", "pose"]);
     assert!(log.contains("2 photographs ask to be turned when they are shown"), "{log}");
@@ -230,7 +231,7 @@ fn what_is_wrong_with_photographs_is_said_before_anything_is_written() {
     project.fails(&["images/3.png", "no picture that can be read"]);
 }
 
-/// Gives a PNG file a chunk that says how it is to be turned.
+/// Gives a PNG file a chunk with this EXIF orientation.
 fn turn(path: &Path, turn: u8) {
     let tiff =
         [b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0", &[turn, 0, 0, 0, 0, 0, 0][..]].concat();
@@ -239,13 +240,13 @@ fn turn(path: &Path, turn: u8) {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 * (crc & 1)))
     });
     let png = fs::read(path).unwrap();
-    // Behind the signature and the header.
+    // The chunk follows the signature and the header.
     let (head, rest) = png.split_at(33);
     let length = (tiff.len() as u32).to_be_bytes();
     fs::write(path, [head, &length, &chunk, &crc.to_be_bytes(), rest].concat()).unwrap();
 }
 
-/// ScanNet's folders: poses that are not known are left out and counted, and names have no endings.
+/// ScanNet's folders: unknown poses are left out and counted, and names have no endings.
 #[test]
 fn a_scannet_folder_is_taken_with_the_poses_that_it_knows() {
     let project = Project::new("[frames]\npath = \"scan\"\nmax = 2\n");
@@ -270,7 +271,7 @@ fn a_scannet_folder_is_taken_with_the_poses_that_it_knows() {
     );
     let names: Vec<String> = photographs(&out).into_iter().map(|r| r.name).collect();
     assert_eq!(names, ["0", "1"]);
-    // A pinhole's photograph is its view, pixel by pixel.
+    // The view of a pinhole's photograph equals the photograph, pixel by pixel.
     let (view, photo) =
         (read_rgb8(&first_of(&out, "0")).unwrap(), read_rgb8(&project.at("scan/color/0.png")).unwrap());
     assert!(
@@ -286,7 +287,7 @@ fn a_scannet_folder_is_taken_with_the_poses_that_it_knows() {
     );
 }
 
-/// The colours of the view of the photograph of this name.
+/// The path of the colours of the photograph's view.
 fn first_of(out: &Path, name: &str) -> PathBuf {
     let uuid = photographs(out)
         .into_iter()
@@ -298,14 +299,14 @@ fn first_of(out: &Path, name: &str) -> PathBuf {
     folder.join(names.into_iter().find(|p| p.to_string_lossy().contains(&uuid)).unwrap())
 }
 
-/// Polycam's folders: optimized cameras, Y-up, with what takes them to the mesh's frame.
+/// Polycam's folders: optimized cameras, Y-up, with the transform to the frame of the mesh.
 #[test]
 fn a_polycam_capture_lies_on_its_mesh() {
     let project = Project::new("[frames]\npath = \"capture\"\nmax = 1\n");
     let pinhole = PhotoLens::Straight(Lens::new(SIZE, FOCAL, CENTER, [0.0; 5]).unwrap());
     let pose = poses()[1];
     write(&project.at("capture/keyframes/corrected_images/77.png"), &take(&pose, &pinhole));
-    // Z-up (x, y, z) is Y-up (x, z, −y); the capture's frame lies 5 m beside the mesh's.
+    // Z-up (x, y, z) is Y-up (x, z, −y). The frame of the capture lies 5 m beside the frame of the mesh.
     let rows = rows(&pose, 1.0);
     let y_up = [rows[0], rows[2], rows[1].map(|v| -v)];
     let mut camera =
@@ -322,12 +323,11 @@ fn a_polycam_capture_lies_on_its_mesh() {
     assert!(records[0].agreement.unwrap() > 0.6, "{records:?}");
 }
 
-/// Packages have the photographs with their own cameras; where a view lies outside of its photograph they say
-/// so.
+/// Packages give photographs their own cameras, and mask the pixels of a view outside its photograph.
 #[test]
 fn packages_know_photographs_and_their_masks() {
     let project = Project::with_photographs(&format!("[cameras]\nplace = 6.0\n{LISTED}"));
-    // Pincushion distortion: the view reaches beyond the photograph.
+    // With pincushion distortion the view reaches beyond the photograph.
     let mut list = transforms(&poses());
     (list["k1"], list["k2"]) = (json!(0.3), json!(0.0));
     project.write("transforms.json", &list.to_string());
@@ -346,7 +346,7 @@ fn packages_know_photographs_and_their_masks() {
     let mut own = 0;
     for frame in frames {
         let mask = nerfstudio.join(frame["mask_path"].as_str().unwrap());
-        // The kind of its pixels: gray.
+        // The PNG header says 8 bits, gray.
         assert_eq!(fs::read(&mask).unwrap()[24..26], [8, 0]);
         let mask = s3d_io::camera::read_picture(&mask).unwrap();
         let zeros = mask.pixels().iter().filter(|p| **p == [0; 3]).count();
@@ -377,7 +377,8 @@ fn packages_know_photographs_and_their_masks() {
             .windows(14)
             .any(|w| w == b"images/3.png\0\0" || w.starts_with(b"images/3.png"))
     );
-    // Coordinates that are made again are those of the photographs' own cameras, but for steps of depth.
+    // Coordinates that are made again use the photographs' own cameras; they differ by the steps of depth
+    // alone.
     let layout = Layout::new(&out);
     let all = dataset_images(&layout, 1).unwrap();
     let of_photographs = all
@@ -397,7 +398,7 @@ fn packages_know_photographs_and_their_masks() {
         assert!(off.fold(0.0, f32::max) < 0.03);
     }
     assert_eq!(before.len(), 4);
-    // Exported anew, its photographs are no scan locations.
+    // In an export of the export, the photographs are no scan locations.
     let again = project.at("again");
     let small = [
         "--points-per-m2",
@@ -421,7 +422,7 @@ fn packages_know_photographs_and_their_masks() {
     );
 }
 
-/// COCO's images are void where a view lies outside of its photograph, whatever the mesh shows there.
+/// In COCO's images, pixels of a view outside its photograph are void, whatever the mesh shows there.
 #[test]
 fn coco_is_void_outside_of_a_photograph() {
     let tree = text(&demo().join("Area_1")).to_owned();
@@ -455,7 +456,7 @@ fn coco_is_void_outside_of_a_photograph() {
     }
 }
 
-/// Colours with more samples at edges differ there alone; everything else is the same, and verify knows.
+/// Colours with more samples at edges differ at edges alone. All else is the same, and `verify` accepts it.
 #[test]
 fn samples_at_edges_change_colours_alone() {
     let project = Project::new("[cameras]\nplace = 6.0\n");

@@ -1,4 +1,4 @@
-//! A photographer in the built-in scene, projects with photographs of it, and how far views are displaced.
+//! Takes photographs in the built-in scene, makes projects of them, and measures how far views are displaced.
 
 use crate::common::{s3d_fails, s3d_ok, text};
 use glam::{DMat2, DVec2, DVec3, dvec2, dvec3};
@@ -16,7 +16,7 @@ pub(crate) const SIZE: [u32; 2] = [320, 240];
 pub(crate) const FOCAL: DVec2 = dvec2(210.0, 212.0);
 pub(crate) const CENTER: DVec2 = dvec2(163.25, 117.5);
 
-/// Barrel distortion, as of a wide phone lens.
+/// Barrel distortion like a wide phone lens.
 pub(crate) const RADIAL: [f64; 5] = [-0.21, 0.06, 0.0015, -0.0011, 0.004];
 pub(crate) const ANGULAR: [f64; 4] = [0.03, -0.012, 0.004, -0.0006];
 
@@ -28,7 +28,7 @@ pub(crate) fn fisheye() -> PhotoLens {
     PhotoLens::Fisheye(FisheyeLens::new(SIZE, FOCAL, CENTER, ANGULAR).unwrap())
 }
 
-/// Where photographs are taken: in rooms with much in them, tilted and rolled.
+/// Photographs are taken in rooms with many objects, tilted and rolled.
 pub(crate) fn poses() -> [Pose; 4] {
     let rolled = |at: DVec3, target: DVec3, up: DVec3| Pose::look_at(at, target, up).unwrap();
     let scan = demo();
@@ -57,11 +57,11 @@ pub(crate) fn mesh() -> &'static TriMesh {
     MESH.get_or_init(|| read_mesh(&demo().join("rgb.obj"), UpAxis::Y).unwrap().mesh)
 }
 
-/// What a camera behind a lens sees, four rays a pixel.
+/// The picture of a camera behind a lens, four rays a pixel.
 pub(crate) fn take(pose: &Pose, lens: &PhotoLens) -> Raster<[u8; 3]> {
     let (scene, mip_maps) = (Scene::new(mesh()), MipMaps::new(mesh()));
     let [w, h] = lens.size();
-    // How large a pixel is, for textures.
+    // Gives the size of a pixel, for textures.
     let camera = Camera::pinhole(*pose, lens.focal_px() * 2.0, DVec2::ZERO, w, h).unwrap();
     let color = |place: DVec2| -> DVec3 {
         let Some(d) = lens.direction(place) else { return DVec3::ZERO };
@@ -85,7 +85,7 @@ pub(crate) fn write(path: &Path, image: &Raster<[u8; 3]>) {
     write_rgb8(path, image, Content::Photo, Compression::Fast).unwrap();
 }
 
-/// Camera → world, 4 × 4: in OpenGL's axes for `s` = 1, in OpenCV's for −1.
+/// The 4 × 4 matrix from camera to world, in OpenGL's axes for `s` = 1 and OpenCV's for −1.
 pub(crate) fn rows(pose: &Pose, s: f64) -> [[f64; 4]; 4] {
     let (m, p) = (pose.world_from_camera, pose.location);
     let row = |k: usize| [m.x_axis[k], s * m.y_axis[k], s * m.z_axis[k], p[k]];
@@ -106,7 +106,7 @@ pub(crate) fn transforms(poses: &[Pose]) -> Value {
     })
 }
 
-/// A folder with a scene of the demo's mesh, whose `[frames]` has these keys, beside the rest of `scene`.
+/// A folder whose scene file has the mesh of the demo, and further tables.
 pub(crate) struct Project {
     pub(crate) dir: tempfile::TempDir,
 }
@@ -119,7 +119,7 @@ impl Project {
         project
     }
 
-    /// With the photographs of the first lens, and their list.
+    /// A project with the photographs of the first lens, and their list.
     pub(crate) fn with_photographs(rest: &str) -> Self {
         static TAKEN: OnceLock<Vec<Raster<[u8; 3]>>> = OnceLock::new();
         let project = Self::new(rest);
@@ -147,7 +147,7 @@ impl Project {
         [&["export", text(scene), "-o", text(out)][..], &small].concat()
     }
 
-    /// Exports into the folder `name`, and checks what is there.
+    /// Exports into the folder `name`, which `verify` must accept.
     pub(crate) fn export(&self, name: &str, more: &[&str]) -> (PathBuf, String) {
         let (scene, out) = (self.at("scene.toml"), self.at(name));
         let log = s3d_ok(&[&self.args(&scene, &out)[..], more].concat());
@@ -168,8 +168,9 @@ pub(crate) fn photographs(out: &Path) -> Vec<PhotographRecord> {
     read_photographs(&Layout::new(out).frames_json(1)).unwrap()
 }
 
-/// How far two pictures of the same are displaced against each other, by squares of 32 pixels: what Lucas and
-/// Kanade's equations say, of squares in which they have an answer. `is_known` of both.
+/// The displacements of one picture against another of the same view, in pixels, for squares of 32 pixels.
+/// They solve the equations of Lucas and Kanade; squares without a reliable solution are left out. `is_known`
+/// holds for both.
 pub(crate) fn displacements(a: &Raster<[u8; 3]>, b: &Raster<[u8; 3]>) -> Vec<f64> {
     const SQUARE: u32 = 32;
     let grey =
@@ -188,7 +189,7 @@ pub(crate) fn displacements(a: &Raster<[u8; 3]>, b: &Raster<[u8; 3]>) -> Vec<f64
             normal += DMat2::from_cols(g * g.x, g * g.y);
             right += g * (grey(a, x, y) - grey(b, x, y));
         }
-        // The smaller eigenvalue: how well the worse direction is known.
+        // The smaller eigenvalue: how well the worse direction is determined.
         let (trace, det) = (normal.x_axis.x + normal.y_axis.y, normal.determinant());
         let least = 0.5 * (trace - (trace * trace - 4.0 * det).max(0.0).sqrt());
         if all_known && least > 15_000.0 {
@@ -198,7 +199,7 @@ pub(crate) fn displacements(a: &Raster<[u8; 3]>, b: &Raster<[u8; 3]>) -> Vec<f64
     found
 }
 
-/// What a camera sees, four samples a pixel: as many as the photographs have.
+/// The image of a camera at four samples a pixel, as many as the photographs have.
 pub(crate) fn smooth(scene: &Scene<'_>, mip_maps: &MipMaps, camera: &Camera) -> Raster<[u8; 3]> {
     let (f, c) = (2.0 * camera.focal_px(), 2.0 * camera.center_px());
     let large = Camera::pinhole(camera.pose, f, c, 2 * camera.width, 2 * camera.height).unwrap();
@@ -213,7 +214,8 @@ pub(crate) fn smooth(scene: &Scene<'_>, mip_maps: &MipMaps, camera: &Camera) -> 
     Raster::from_vec(camera.width, camera.height, all.map(pixel).collect())
 }
 
-/// Each view of a photograph against the mesh as its own pose file has the camera; returns all displacements.
+/// Compares each view of a photograph with the mesh, seen by the camera of the view's pose file. Returns all
+/// displacements.
 pub(crate) fn registered(out: &Path) -> Vec<f64> {
     let layout = Layout::new(out);
     let (scene, mip_maps) = (Scene::new(mesh()), MipMaps::new(mesh()));
@@ -230,7 +232,7 @@ pub(crate) fn registered(out: &Path) -> Vec<f64> {
             .iter()
             .zip(expected.pixels())
             .filter(|(a, b)| a.abs_diff(**b) > 1);
-        // A pose from its matrix is off in the last digits: at silhouettes that shows.
+        // A pose read from its matrix differs in the last digits, which shows at silhouettes.
         assert!(off.count() * 1000 < depth.len());
         all.extend(displacements(&photo, &smooth(&scene, &mip_maps, &camera)));
     }

@@ -1,4 +1,4 @@
-"""Fixtures of the tests that hold `s3d` against other people's readers and writers.
+"""Fixtures of the tests that compare `s3d` with the readers and writers of other projects.
 
 S3D_BIN names the binary; without it `cargo build` makes one. `s3d-cli/tests/python/run` installs what the tests need in
 target/python and runs them all; its arguments go to pytest.
@@ -14,8 +14,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 
-# Packages that need libraries of the system fail to load with an OSError or an ImportError where these are missing, which
-# pytest.importorskip does not take for a missing package.
+# A package that needs a missing library of the system fails with an OSError or an ImportError. pytest.importorskip does
+# not count that as a missing package.
 for name in ["open3d", "pye57"]:
     try:
         importlib.import_module(name)
@@ -31,7 +31,7 @@ def s3d():
     """Runs the binary: `s3d("info", path)` gives its CompletedProcess and fails the test unless it ends with `code`."""
     binary = os.environ.get("S3D_BIN")
     if binary is not None:
-        # Tests may change the folder.
+        # Tests may change the working folder.
         binary = Path(binary).resolve()
     else:
         subprocess.run(["cargo", "build", "-q", "-p", "s3d-cli"], cwd=ROOT, check=True)
@@ -47,7 +47,9 @@ def s3d():
 
 @pytest.fixture(scope="session")
 def demo(s3d, tmp_path_factory):
-    """The built-in scene, exported small: the data set's folder. Its own input files are in `scan`. Only to be read."""
+    """The folder of the built-in scene's data set, exported small. Its input is in `scan`. Tests only read
+    it.
+    """
     out = tmp_path_factory.mktemp("demo") / "dataset"
     s3d("demo", "-o", out, "--views", "6", "--size", "96", "--pano-width", "256", "--points-per-m2", "400")
     return out

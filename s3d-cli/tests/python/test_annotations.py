@@ -1,5 +1,5 @@
-"""Annotated points in every form: the built-in scene's, in files that other people's libraries write, give the export that its
-S3DIS tree gives."""
+"""Annotated points in every form: the points of the built-in scene, written by libraries of other projects, give the same
+export as its S3DIS tree."""
 
 import json
 import re
@@ -16,7 +16,9 @@ EXPORT = ["--views", "2", "--size", "64", "--pano-width", "128", "--points-per-m
 
 @pytest.fixture(scope="module")
 def points(demo):
-    """The scene's annotated points as columns, in the order of its tree: rooms, classes and numbers by name and number."""
+    """Returns the annotated points of the scene as columns, in the order of its tree: by room, class and
+    number.
+    """
     columns = {"xyz": [], "rgb": [], "room": [], "class": [], "instance": []}
     for file in sorted((demo / "scan" / "Area_1").glob("*/Annotations/*.txt")):
         name, number = re.fullmatch(r"(\w+)_(\d+)", file.stem).groups()
@@ -28,21 +30,21 @@ def points(demo):
         columns["class"].append(np.full(n, CLASSES.index(name)))
         columns["instance"].append(np.full(n, int(number)))
     columns = {key: np.concatenate(parts) for key, parts in columns.items()}
-    # Clouds are in no order: neither may anything depend on it.
+    # Points of a cloud may come in any order, and nothing may depend on it.
     order = np.random.default_rng(1).permutation(len(columns["xyz"]))
     return {key: column[order] for key, column in columns.items()}
 
 
 @pytest.fixture(scope="module")
 def reference(s3d, demo, tmp_path_factory):
-    """What an export from the tree gives: see `results`."""
+    """Returns the results of an export from the tree: see `results`."""
     out = tmp_path_factory.mktemp("tree") / "dataset"
     s3d("-q", "export", demo / "scan" / "scene.toml", "-o", out, *EXPORT)
     return results(out)
 
 
 def results(out):
-    """All that follows from annotations: labels of faces, semantic images, instances, rooms."""
+    """Returns all that follows from annotations: labels of faces, semantic images, instances, rooms."""
     area = out / "area_1"
     files = [out / "assets" / "semantic_labels.json", area / "3d" / "semantic.obj"]
     files += sorted(area.glob("*/semantic/*.png")) + sorted(area.rglob("instances.*")) + sorted(area.rglob("rooms.*"))
@@ -52,7 +54,7 @@ def results(out):
 
 @pytest.fixture
 def export(s3d, demo, tmp_path):
-    """Exports the scene with another table of annotations, whose files are in `tmp_path`."""
+    """Exports the scene with another table of annotations. Their files are in `tmp_path`."""
     scan = demo / "scan"
     for file in scan.iterdir():
         if file.is_dir() and file.name.startswith("Area_"):
@@ -83,7 +85,7 @@ def room_numbers(points):
     return list(names), numbers
 
 
-# Points of an instance come in another order: what lists them by voxel is not the same.
+# The points of an instance are in another order, so their order by voxel differs.
 ORDER = ("instances.npz",)
 
 
@@ -94,7 +96,7 @@ def test_las_a_room(export, points, reference, tmp_path, version, form, suffix):
     for room in np.unique(points["room"]):
         mask = points["room"] == room
         header = laspy.LasHeader(version=version, point_format=form)
-        # As the tree has them: to a tenth of a millimetre or better.
+        # Coordinates as in the tree, which has a tenth of a millimetre or better.
         header.scales, header.offsets = [1e-6] * 3, [0] * 3
         las = laspy.LasData(header)
         las.x, las.y, las.z = points["xyz"][mask].T
@@ -115,13 +117,13 @@ def test_las_offset_and_unlabelled_points(export, points, reference, tmp_path):
     header.scales, header.offsets = [1e-6] * 3, [1000, -2000, 3]
     n = len(rooms)
     las = laspy.LasData(header)
-    # One point in ten more, of nothing.
+    # One point in ten is added without a label.
     xyz = np.vstack([points["xyz"], points["xyz"][: n // 10] + 1.0]) + [1000, -2000, 3]
     las.x, las.y, las.z = xyz.T
     las["label"] = np.append(points["class"] + 100 * rooms, np.full(n // 10, 999))
     las.point_source_id = np.append(points["instance"], np.zeros(n // 10))
     las.write(tmp_path / "all.laz")
-    # Without a room in the file, what is not said stops.
+    # The file has no rooms, so an export without a named room fails.
     table = '[annotations]\npath = "all.laz"\nclass = "label"\noffset_m = [1000, -2000, 3]\nroom = "office_1"\n'
     message = export(table, code=1)
     assert "all.laz" in message and "classes that are not among the 13" in message and "[annotations.classes]" in message
@@ -131,14 +133,14 @@ def test_las_offset_and_unlabelled_points(export, points, reference, tmp_path):
     labels = json.loads(found["assets/semantic_labels.json"])
     first = points["room"] == names[0]
     there = {(int(c), int(i)) for c, i in zip(points["class"][first], points["instance"][first])}
-    # Null labels pad the table.
+    # The table is padded with null labels.
     assert len([name for name in labels if not name.startswith("<UNK>")]) == len(there)
 
 
 @pytest.mark.parametrize("text", [True, False])
 def test_ply_with_a_column_of_rooms(export, points, reference, tmp_path, text):
     plyfile = pytest.importorskip("plyfile")
-    # The scene's rooms are of several types: a cloud for each of them.
+    # The rooms have several types, so each becomes a cloud of its own.
     paths = []
     for room in np.unique(points["room"]):
         mask = points["room"] == room
@@ -197,7 +199,7 @@ def test_e57_without_labels_says_what_to_do(export, points, tmp_path):
 
 
 def scannet(points, folder):
-    """ScanNet's files of a scene whose vertices are `points`, a triangle to three of them."""
+    """Writes ScanNet's files of a scene with the vertices `points`, three vertices to a triangle."""
     plyfile = pytest.importorskip("plyfile")
     n = len(points["xyz"])
     vertex = np.empty(n, [("x", "f4"), ("y", "f4"), ("z", "f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")])
@@ -222,7 +224,7 @@ def test_scannet(export, points, tmp_path):
     room = {key: column[points["room"] == names[0]] for key, column in points.items()}
     scannet(room, tmp_path / "scene0")
     found = export(f'[annotations]\npath = "scene0"\nroom = "{names[0]}"\n')
-    # The same instances as the tree of that room alone.
+    # The instances are the same as in the tree of that room alone.
     shutil.rmtree(tmp_path / "out")
     paths = [f"Area_1_{names[0]}.npy"]
     np.save(tmp_path / paths[0], np.column_stack([room[k] for k in ("xyz", "rgb", "class", "instance")]))

@@ -1,5 +1,5 @@
-"""The files of docs/cluster that other programs read: Kubernetes' by their schema, Snakemake's by running them. Slurm's
-have a test of their own, docs/cluster/slurm/test."""
+"""Tests the files of docs/cluster that other programs read: Kubernetes' files by their schema, Snakemake's by running them.
+Slurm's files have a test of their own, docs/cluster/slurm/test."""
 
 import filecmp
 import json
@@ -19,7 +19,7 @@ def test_kubernetes_takes_the_files(path):
     kubernetes_validate = pytest.importorskip("kubernetes_validate")
     documents = list(yaml.safe_load_all(path.read_text()))
     assert documents
-    # The first that has a limit of tries for each index, and the last that the package knows.
+    # The first version with a limit of retries for each index, and the last version that the package knows.
     for version in ["1.29", kubernetes_validate.latest_version()]:
         for document in documents:
             kubernetes_validate.validate(document, version, strict=True)
@@ -63,7 +63,7 @@ def test_snakemake_makes_the_data_set_of_a_single_run(s3d, demo, tmp_path):
         "memory_mb": 500,
         "minutes": 10,
     }
-    # JSON is YAML.
+    # JSON is valid YAML.
     (tmp_path / "config.yaml").write_text(json.dumps(config))
     call = [sys.executable, "-m", "snakemake", "--cores", "2", "--snakefile", CLUSTER / "snakemake" / "Snakefile"]
     done = subprocess.run([*call, "--directory", tmp_path], capture_output=True, text=True)

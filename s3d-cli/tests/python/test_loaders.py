@@ -1,4 +1,4 @@
-"""What loaders of the field read, read as they read it: label tables, S3DIS rooms, lists, and utils.py of the data set.
+"""Files for the loaders of other projects, read as these do: label tables, S3DIS rooms, lists, and utils.py of the data set.
 
 Each loader's *contract* is written anew here: which files it opens, how it parses them, in which type and order it looks
 things up. Where the loader itself is installed (Open3D-ML comes with open3d), it is asked too.
@@ -29,7 +29,7 @@ def scan(demo):
 
 @pytest.fixture(scope="module")
 def variant(s3d, scan, tmp_path_factory):
-    """The demo in all its other forms, with all profiles."""
+    """The demo in all other forms, with all profiles."""
     out = tmp_path_factory.mktemp("variant") / "dataset"
     options = ["--xyz", "float", "--normal-axes", "opencv", "--depth-units", "mm", "--pad-labels", "off"]
     profiles = [word for name in PROFILES for word in ("--profile", name)]
@@ -49,7 +49,7 @@ def read_image(path):
 
 
 def another_scene(scan, folder, area=1, keep_room=None):
-    """A copy of the demo's scan as another area, perhaps with one room's annotations only."""
+    """Copies the demo's scan as another area, optionally with the annotations of one room only."""
     shutil.copytree(scan.parent, folder)
     scene = folder / "scene.toml"
     text = scene.read_text()
@@ -73,14 +73,14 @@ def another_scene(scan, folder, area=1, keep_room=None):
 
 
 def class_table(out):
-    """HoHoNet's and 360BEV's: a class number for every index of semantic_labels.json, 0 for none."""
+    """HoHoNet and 360BEV: a class number for every index of semantic_labels.json, 0 for none."""
     names = json.loads((out / "assets/semantic_labels.json").read_text())
     numbers = {name: i for i, name in enumerate(CLASSES, 1)}
     return np.array([numbers.get(name.split("_")[0], 0) for name in names])
 
 
 def look_up(table, pixels):
-    """They look all pixels up before they throw those with R out."""
+    """They look up all pixels before they drop those with R."""
     pixels = pixels.astype(np.int32)
     found = table[pixels[..., 1] * 256 + pixels[..., 2]]
     found[pixels[..., 0] != 0] = 0
@@ -130,7 +130,8 @@ def test_more_labels_than_loaders_tell_apart_are_refused(s3d, scan, tmp_path):
 
 
 def unifuse_pairs(out, name):
-    """UniFuse's: a line is the colour image and the depth image, relative to the root, split at a space."""
+    """UniFuse: a line names the colour image and the depth image relative to the root, with a space between.
+    """
     return [line.strip().split(" ") for line in (out / "splits" / name).read_text().splitlines()]
 
 
@@ -149,14 +150,14 @@ def test_folds_have_lists_of_both_sides(s3d, scan, tmp_path):
     out = tmp_path / "out"
     s3d("export", scan, five, "-o", out, *SMALL, "--modalities", "rgb,depth,pose", "--profile", "pointcept")
     lists = {p.name: unifuse_pairs(out, p.name) for p in (out / "splits").iterdir()}
-    # Areas 1 and 5 leave fold 1 (tests on 5) and fold 3 (trains on 2 4 5) both of their sides.
+    # With areas 1 and 5, fold 1 (tests on 5) and fold 3 (trains on 2, 4, 5) have areas on both sides.
     assert set(lists) == {"all.txt", "fold_1_train.txt", "fold_1_test.txt", "fold_3_train.txt", "fold_3_test.txt"}
     areas = {name: {pair[0].split("/")[0] for pair in pairs} for name, pairs in lists.items()}
     assert areas["fold_1_train.txt"] == areas["fold_3_test.txt"] == {"area_1"}
     assert areas["fold_1_test.txt"] == areas["fold_3_train.txt"] == {"area_5"}
     assert sorted(lists["fold_1_train.txt"] + lists["fold_1_test.txt"]) == sorted(lists["all.txt"])
     assert all((out / path).is_file() for pairs in lists.values() for pair in pairs for path in pair)
-    # Where Pointcept looks for area 5's mesh.
+    # Pointcept looks for the mesh of area 5 here.
     assert (out / "profiles/pointcept/raw/Area_5a/3d/rgb.obj").is_file()
     assert not (out / "profiles/pointcept/raw/Area_5").exists()
 
@@ -165,7 +166,7 @@ def test_folds_have_lists_of_both_sides(s3d, scan, tmp_path):
 
 
 def annotations_of(room):
-    """The files of a room as loaders collect them, sorted."""
+    """Returns the files of a room as loaders collect them, sorted."""
     return sorted(str(path) for path in (room / "Annotations").glob("*.txt"))
 
 
@@ -200,7 +201,7 @@ def test_mmdetection3d_arrays_are_what_its_script_makes(variant):
     pandas = pytest.importorskip("pandas")
     folder = variant / "profiles/mmdet3d"
     for area in range(1, 7):
-        # Its converter lists the rooms of all six areas by their folders.
+        # Its converter finds the rooms of all six areas by their folders.
         listed = os.listdir(folder / f"Stanford3dDataset_v1.2_Aligned_Version/Area_{area}")
         assert len(listed) == (4 if area == 1 else 0)
     for room in rooms(variant):
@@ -214,7 +215,7 @@ def test_mmdetection3d_arrays_are_what_its_script_makes(variant):
         stem = str(folder / f"s3dis_data/Area_1_{room.name}")
         points, classes, numbers = (np.load(f"{stem}_{kind}.npy") for kind in ("point", "sem_label", "ins_label"))
         assert (points.dtype, classes.dtype, numbers.dtype) == (np.float32, np.int64, np.int64)
-        # pandas' own reading of decimals may be off by the last bit of a double.
+        # pandas' own parser of decimals may be off by the last bit of a double.
         assert np.allclose(points, expected[:, :6].astype(np.float32), rtol=0, atol=2e-6)
         assert np.array_equal(classes, expected[:, 6]) and np.array_equal(numbers, expected[:, 7])
         assert numbers.min() == 1
@@ -224,7 +225,9 @@ def test_mmdetection3d_arrays_are_what_its_script_makes(variant):
 
 
 def pointcept_rooms(root, splits=range(1, 7)):
-    """Its preprocessing: the areas of --splits, the rooms of their angle files, all annotations of each."""
+    """Pointcept's preprocessing: the areas of --splits, the rooms in their angle files, all annotations of
+    each room.
+    """
     found = {}
     for area in splits:
         table = np.loadtxt(root / f"Area_{area}" / f"Area_{area}_alignmentAngle.txt", dtype=str)
@@ -247,7 +250,7 @@ def test_pointcept_reads_its_tree(variant):
     for name, (coords, colors, kinds, angle) in found.items():
         assert len(coords) == len(kinds) > 100 and 0 <= angle < 90
         assert colors.min() >= 0 and colors.max() <= 255
-    assert set(pointcept_rooms(root, [1])) == set(found)  # `--splits Area_1`; up to 1.5.1 all six are read
+    assert set(pointcept_rooms(root, [1])) == set(found)  # `--splits Area_1`; up to 1.5.1 it read all six
     mesh = root / "raw/Area_1/3d/rgb.obj"
     assert mesh.read_bytes() == (variant / "area_1/3d/rgb.obj").read_bytes()
 
@@ -294,14 +297,15 @@ def test_open3d_ml_pickles(variant):
                 assert np.isclose(along.max(), extent / 2, atol=1e-9) and np.isclose(along.min(), -extent / 2, atol=1e-9)
             assert np.isclose(h, np.ptp(part[:, 2])) and np.isclose(z, (part[:, 2].min() + part[:, 2].max()) / 2)
             if len(part) > 1:
-                # Principal axes: what lies along one says nothing of the other, and the first is the longer spread.
+                # Along principal axes, the coordinates are uncorrelated, and the first axis has the largest
+                # spread.
                 centred = off - off.mean(axis=0)
                 cov = centred.T @ centred / len(part)
                 assert abs(first @ cov @ second) < 1e-9 and first @ cov @ first >= second @ cov @ second - 1e-12
 
 
 def test_open3d_ml_itself_reads_them(variant):
-    """The data set class that comes with open3d, in its own words."""
+    """The data set class that comes with open3d."""
     probe = (
         "import sys\n"
         "from open3d._ml3d.datasets.s3dis import S3DIS\n"
@@ -335,12 +339,12 @@ def test_profiles_of_an_existing_data_set_are_the_same(s3d, scan, variant, tmp_p
     assert "profiles/pointnet is there already" in done.stderr
     s3d("profile", out, "--to", "pointnet", "--overwrite")
     assert files(out / "profiles") == files(variant / "profiles")
-    # Another export takes all of it away.
+    # Another export removes all of it.
     s3d("export", scan, "-o", out, *SMALL, "--modalities", "pose", "--overwrite")
     assert not (out / "profiles").exists()
 
 
-# ---- What a data set tells of itself ----------------------------------------------------------------------------------
+# ---- How a data set describes itself ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["demo", "variant"])
@@ -397,7 +401,7 @@ def test_utils_finds_what_is_wrong(demo, tmp_path):
     pytest.importorskip("PIL")
     out = tmp_path / "out"
     shutil.copytree(demo, out, ignore=shutil.ignore_patterns("scan"))
-    # Depth in other units than conventions.json says.
+    # The depth has another unit than conventions.json says.
     path = out / "conventions.json"
     path.write_text(path.read_text().replace('"units_per_m": 512.0', '"units_per_m": 1000.0'))
     done = subprocess.run([sys.executable, out / "assets/utils.py", out], capture_output=True, text=True)
@@ -425,7 +429,8 @@ def test_options_change_what_they_say_and_nothing_else(s3d, scan, variant, tmp_p
             assert (a.xyz(image).dtype, b.xyz(image).dtype) == (np.float16, np.float32)
             seen = ~np.isnan(depths[0])
             assert np.array_equal(a.xyz(image)[seen], b.xyz(image)[seen].astype(np.float16))
-            # The same normals in the world, whatever their axes in the file; half a step of 127.5 in each.
+            # The normals are the same in the world, whatever their axes in the file, within half a step of
+            # 127.5 in each channel.
             assert np.nanmax(np.abs(a.world_normals(image) - b.world_normals(image))) < 0.02
             channels = [read_image(d.path(image, "normal"))[seen].astype(int) for d in (a, b)]
             if kind == "pano":
@@ -476,7 +481,7 @@ def test_schemas_hold(request, name):
         check[kind] = jsonschema.Draft202012Validator(content)
     manifest = read(out / "manifest.json")
     check["manifest"].validate(manifest)
-    # Every key is described, so that a new one does not slip past the schema.
+    # Every key must be described, so that the schema does not miss a new one.
     assert set(manifest) <= set(schema["manifest"]["properties"])
     options = schema["manifest"]["properties"]["options"]["properties"]
     assert set(manifest["options"]) == set(options) - {"fill", "rgb_samples"}

@@ -1,4 +1,6 @@
-"""`pointcloud.mat` against h5py, mat73, pymatreader and hdf5storage: what `s3d` writes, and what they write."""
+"""`pointcloud.mat` against h5py, mat73, pymatreader and hdf5storage: they read the files of `s3d`, and `s3d`
+reads theirs.
+"""
 
 import json
 
@@ -19,7 +21,7 @@ def text(dataset):
 
 
 def structs(file, group):
-    """The elements of a struct array: a dict of objects each."""
+    """Returns the elements of a struct array: a dict for each object."""
     assert group.attrs["MATLAB_class"] == b"struct"
     fields = [b"".join(name).decode() for name in group.attrs["MATLAB_fields"]]
     assert sorted(fields) == sorted(group)
@@ -87,7 +89,7 @@ def test_boxes_and_voxels_are_those_of_the_points(rooms):
             for voxel, rows in zip(voxels, members):
                 inside = points[rows.astype(int) - 1]
                 assert (inside >= voxel[:3]).all() and (inside <= voxel[3:]).all()
-            # z is the fastest axis, as in instances.npz.
+            # z varies fastest, as in instances.npz.
             size = (box[3:] - box[:3]) / 6
             order = np.stack(np.meshgrid(*[np.arange(6)] * 3, indexing="ij"), -1).reshape(-1, 3)
             assert np.allclose(voxels[:, :3], box[:3] + order * size, atol=1e-4)
@@ -102,7 +104,8 @@ def test_labels_and_boxes_agree_with_the_annotated_instances(demo, rooms):
             label = fields["global_name"]
             assert label in labels and label in box_of
             assert label.split("_")[0] == name.split("_")[0] and label.split("_", 2)[2] == f"{room}_1"
-            # Those boxes are of the annotated points, and these of points on faces that they won: near, not equal.
+            # The boxes there belong to the annotated points, the boxes here to points on the faces that these
+            # won: close, not equal.
             assert (np.abs(fields["Bbox"][0] - box_of[label]) < 1.0).all(), label
 
 
@@ -139,7 +142,7 @@ def test_hdf5storage_reads_it(path, rooms):
 
 
 class Mat:
-    """A v7.3 file put together with h5py: structs, struct arrays and what is in them."""
+    """Writes a v7.3 file with h5py: structs, struct arrays and their content."""
 
     def __init__(self, path):
         self.file = h5py.File(path, "w", userblock_size=512)
@@ -185,7 +188,7 @@ def write_tree_as_mat(tree, path):
 
 
 def scene_with(scan, annotations):
-    """The demo's scene file, to stand elsewhere, with other annotations."""
+    """Copies the demo's scene file to another folder, with other annotations."""
     text = (scan / "scene.toml").read_text()
     for name in ["rgb.obj", "Area_1", "cameras.csv"]:
         assert f'"{name}"' in text
@@ -194,7 +197,7 @@ def scene_with(scan, annotations):
 
 
 def test_a_file_by_h5py_gives_the_labels_that_its_text_files_give(s3d, demo, tmp_path):
-    """The demo's annotations, once as they are and once as double, chunked and deflated arrays."""
+    """Writes the demo's annotations twice: as they are, and as arrays of doubles, chunked and deflated."""
     scan = demo / "scan"
     write_tree_as_mat(scan / "Area_1", tmp_path / "other.mat")
     (tmp_path / "other.toml").write_text(scene_with(scan, tmp_path / "other.mat"))

@@ -1,5 +1,5 @@
-"""Meshes that trimesh, plyfile and Open3D wrote, read by `s3d sample` and `s3d render`, and compared with what those
-libraries say about them: area, number of points, and for every point its face, its place on it and its colour."""
+"""Meshes written by trimesh, plyfile and Open3D are read by `s3d sample` and `s3d render`, and compared with these
+libraries' own results: area, number of points, and for every point its face, its place on it and its colour."""
 
 import re
 
@@ -12,7 +12,9 @@ POINTS = 4000
 
 
 def sample(s3d, path, out):
-    """The points that `s3d sample` draws on a mesh, Z up so that coordinates stay, and the area that it tells."""
+    """Returns the points that `s3d sample` draws on a mesh, with Z up so that coordinates stay, and the area
+    that it reports.
+    """
     done = s3d("sample", path, "-o", out, "--up", "z", "--points", POINTS, "--overwrite")
     area = float(re.search(r"points on ([\d.]+) m²", done.stdout + done.stderr).group(1))
     rows = plyfile.PlyData.read(str(out))["vertex"].data
@@ -23,7 +25,7 @@ def sample(s3d, path, out):
 
 
 def barycentric(triangles, points):
-    """Coordinates of points on triangles (n × 3 × 3), and the points' distances from them."""
+    """Returns the coordinates of points on triangles (n × 3 × 3), and their distances from the triangles."""
     a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     w = points - a
     uu, uv, vv, wu, wv = ((p * q).sum(1) for p, q in ((u, u), (u, v), (v, v), (w, u), (w, v)))
@@ -33,7 +35,7 @@ def barycentric(triangles, points):
 
 
 def check(s3d, path, vertices, faces, tmp_path, vertex_colors=None, face_colors=None):
-    """Holds the sampled points of the file at `path` against the mesh that is in it."""
+    """Compares the sampled points of the file at `path` with the mesh in it."""
     vertices, faces = np.asarray(vertices, np.float64), np.asarray(faces)
     triangles = vertices[faces]
     areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1) / 2
@@ -52,19 +54,20 @@ def check(s3d, path, vertices, faces, tmp_path, vertex_colors=None, face_colors=
 
 
 def box():
-    """A box with 24 vertices, so that each side can have a colour of its own: vertices, quads, triangles, colours."""
+    """A box with 24 vertices, so that each side can have its own colour: vertices, quads, triangles, colours.
+    """
     corners = np.array([[x, y, z] for x in (0.0, 3.0) for y in (0.0, 2.0) for z in (0.0, 2.5)])
     sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     vertices = corners[np.concatenate(sides)]
     quads = np.arange(24).reshape(6, 4)
-    # Quads are cut along the shorter diagonal, of two equal ones at their first corner.
+    # Quads are cut along the shorter diagonal; of two equal diagonals, along the one at the first corner.
     triangles = np.concatenate([[q[[0, 1, 2]], q[[0, 2, 3]]] for q in quads])
     colors = np.array([[250, 10, 20], [30, 240, 50], [60, 70, 230], [200, 210, 0], [0, 180, 190], [160, 0, 170]])
     return vertices, quads, triangles, np.repeat(colors, 4, axis=0).astype(np.uint8)
 
 
 def rows(columns):
-    """A structured array of columns, each (name, type, values)."""
+    """Makes a structured array from columns, each (name, type, values)."""
     out = np.empty(len(columns[0][2]), dtype=[(name, kind) for name, kind, _ in columns])
     for name, _, values in columns:
         out[name] = values
@@ -103,7 +106,7 @@ def test_plyfile_float_colours_and_a_texture_named_by_a_comment(s3d, tmp_path):
     plyfile.PlyData([describe(vertex, "vertex"), describe(face, "face")]).write(str(path))
     check(s3d, path, vertices, triangles, tmp_path, vertex_colors=colors)
 
-    # A strip of six colours, coordinates of corners as MeshLab writes them: v points up.
+    # A strip of six colours. Texture coordinates are by corner, as MeshLab writes them: v points up.
     image.fromarray(np.repeat(colors[None, ::4], 8, axis=0).repeat(8, axis=1)).save(tmp_path / "six colours.png")
     texcoord = [np.tile([(i + 0.5) / 6, 0.5], 4).astype(np.float32) for i in range(6)]
     face = np.empty(6, dtype=[("vertex_indices", "O"), ("texcoord", "O"), ("texnumber", "i4")])
@@ -138,7 +141,7 @@ def test_open3d(s3d, tmp_path, ending, ascii):
     mesh.vertex_colors = o3d.utility.Vector3dVector(colors / 255)
     path = tmp_path / f"torus.{ending}"
     assert o3d.io.write_triangle_mesh(str(path), mesh, write_ascii=ascii)
-    # glTF's colours are light: Open3D writes those of the screen as they are.
+    # glTF's colours are linear, but Open3D writes sRGB values unchanged.
     gltf = ending in ("glb", "gltf")
     check(s3d, path, vertices, mesh.triangles, tmp_path, vertex_colors=None if gltf else colors)
 
@@ -157,7 +160,7 @@ def test_trimesh_textured(s3d, tmp_path, ending):
     path = tmp_path / f"box.{ending}"
     mesh.export(path)
     if ending == "ply":
-        # trimesh names no image, and s3d says so.
+        # trimesh's file names no image, and s3d says so.
         done = check(s3d, path, vertices, triangles, tmp_path)
         assert "TextureFile" in path.read_bytes().split(b"end_header")[0].decode() or "TextureFile" in done.stderr
     else:
@@ -195,7 +198,7 @@ def test_a_ply_mesh_is_rendered_in_its_colours(s3d, tmp_path):
     plyfile.PlyData([describe(vertex, "vertex"), describe(face, "face")], byte_order=">").write(str(path))
     out = tmp_path / "view"
     s3d("render", path, "--up", "z", "--at", "1.5,0.5,1.25", "--yaw", "0", "--size", "64", "--fov", "40", "-o", out)
-    # The side y = 2 is 1.5 m ahead: 512 units a metre.
+    # The side y = 2 is 1.5 m ahead, at 512 units a metre.
     assert (np.asarray(image.open(out / "depth.png")) == 768).all()
     rgb = np.asarray(image.open(out / "rgb.png")).astype(int)
     assert np.abs(rgb[..., :3] - colors[12].astype(int)).max() <= 1

@@ -1,4 +1,6 @@
-"""What `s3d pack` writes, read by the packages that trainers read it with, and held against the data set's own files."""
+"""Reads the output of `s3d pack` with the packages that trainers use, and compares it with the data set's own
+files.
+"""
 
 import io
 import json
@@ -18,7 +20,7 @@ EXTENSION = {"global_xyz": "exr", "pose": "json"}
 
 @pytest.fixture(scope="module")
 def pack(s3d, demo, tmp_path_factory):
-    """Packs the demo: `pack("colmap", "--binary")` gives the package's folder or file."""
+    """Packs the demo. `pack("colmap", "--binary")` returns the package's folder or file."""
 
     def run(kind, *more):
         place = tmp_path_factory.mktemp("packs") / ("images.parquet" if kind == "parquet" else "package")
@@ -43,14 +45,14 @@ def array(path):
 
 
 def labels_of(demo, stem):
-    """The label index of each pixel, -1 where nothing was seen."""
+    """Returns the label index of each pixel, -1 where nothing was seen."""
     rgb = array(image_path(demo, stem, "semantic")).astype(np.int64)
     index = rgb[..., 0] * 65536 + rgb[..., 1] * 256 + rgb[..., 2]
     return np.where((rgb == 13).all(-1), -1, index)
 
 
 def depth_of(demo, stem):
-    """Metres, NaN where there is none."""
+    """Returns metres, NaN where nothing was seen."""
     depth = array(image_path(demo, stem, "depth")).astype(np.float64)
     return np.where(depth == 65535, np.nan, depth / 512)
 
@@ -69,7 +71,7 @@ def test_webdataset_gives_every_image_with_all_its_fields(pack, demo):
     index = json.loads((place / "shards.json").read_text())
     urls = [str(place / s["url"]) for s in index["shardlist"] if "_views-" in s["url"]]
     assert len(urls) == -(-len(stems(demo, "data")) // 10)
-    # "pil" alone would make 8-bit RGB of everything.
+    # With "pil" alone, every image would become 8-bit RGB.
     depth = wds.autodecode.handle_extension("depth.png", lambda data: np.asarray(Image.open(io.BytesIO(data))))
     samples = list(wds.WebDataset(urls, shardshuffle=False).decode(depth, "pil"))
     assert len(samples) == len(stems(demo, "data"))
@@ -93,7 +95,7 @@ def test_workers_share_shards_without_a_word(pack, demo):
     assert count >= 8 and name == f"area_1_views-{{000000..{count - 1:06}}}.tar"
     keys = []
     for worker in range(2):
-        # What a DataLoader with two workers does: each takes every second shard.
+        # A DataLoader with two workers: each takes every second shard.
         urls = list(wds.shardlists.expand_urls(str(place / name)))[worker::2]
         assert urls
         keys += [sample["__key__"] for sample in wds.WebDataset(urls, shardshuffle=False)]
@@ -108,7 +110,7 @@ def test_shards_are_plain_tar_files(pack, demo):
         assert labels == json.loads((demo / "assets/semantic_labels.json").read_text())
         assert {(m.mtime, m.uid, m.gid, m.mode, m.type) for m in members} == {(0, 0, 0, 0o644, tarfile.REGTYPE)}
         keys = list(dict.fromkeys(m.name.split(".")[0] for m in members))
-        # The files of a sample stand together.
+        # The files of a sample are adjacent.
         assert len(members) == 7 * len(keys)
         assert all(m.name.split(".")[0] == keys[i // 7] for i, m in enumerate(members))
         everything = [f"area_1/{s}" for kind in ("data", "pano") for s in stems(demo, kind)]
@@ -163,14 +165,14 @@ def test_colmap_points_fall_where_the_depth_images_have_them(pack, demo):
         np.testing.assert_allclose([fx, fy, cx, cy], [k[0, 0], k[1, 1], k[0, 2], k[1, 2]], rtol=1e-12)
         r = rotation(qw, qx, qy, qz)
         np.testing.assert_allclose(np.c_[r, t], rt, atol=1e-9)
-        # Points of the cloud are on the surfaces that the depth image shows, or hidden behind them.
+        # Points of the cloud lie on the surfaces of the depth image, or are hidden behind them.
         x, y, z = r @ points[:, 1:4].T + np.array(t)[:, None]
         front = z > 0.05
         u, v = np.floor(fx * x[front] / z[front] + cx), np.floor(fy * y[front] / z[front] + cy)
         inside = (u >= 0) & (u < w) & (v >= 0) & (v < h)
         u, v, z = u[inside].astype(int), v[inside].astype(int), z[front][inside]
         image = depth_of(demo, stem)
-        # Around a pixel, to leave out what lies within one pixel of an edge.
+        # The pixel and its neighbours, to leave out points within one pixel of an edge.
         padded = np.pad(image, 1, mode="edge")
         around = np.stack([padded[1 + dy : 1 + dy + h, 1 + dx : 1 + dx + w] for dy in (-1, 0, 1) for dx in (-1, 0, 1)])
         near, far = np.nanmin(around, 0)[v, u], np.nanmax(around, 0)[v, u]
@@ -203,7 +205,7 @@ def test_colmap_binary_holds_what_text_holds(pack):
     stream = io.BytesIO((binary / "points3D.bin").read_bytes())
     points = [take("Q3d3BdQ") for _ in range(take("Q")[0])]
     expected = np.loadtxt(text / "points3D.txt")
-    # Text holds the shortest decimals of single precision.
+    # The text has the shortest decimals of single precision.
     np.testing.assert_allclose(np.array(points)[:, :8], expected, atol=1e-6)
     assert not stream.read()
 

@@ -1,4 +1,4 @@
-"""What docs/recipes.md says works as it is written: its own lines are run, in a folder as it supposes it."""
+"""Runs the lines of docs/recipes.md, in a folder as the recipes expect it: they must work as printed."""
 
 import json
 import os
@@ -12,7 +12,7 @@ from conftest import ROOT
 
 
 def blocks(heading):
-    """The code below a heading of the recipes, as (language, text)."""
+    """Returns the code below a heading of the recipes, as (language, text)."""
     text = (ROOT / "docs" / "recipes.md").read_text()
     part = re.split(rf"^#+ {re.escape(heading)}\n", text, flags=re.MULTILINE)[1]
     part = re.split(r"^#{2,3} ", part, flags=re.MULTILINE)[0]
@@ -37,7 +37,7 @@ def run(s3d, heading, folder):
 
 @pytest.fixture
 def beside(demo, tmp_path, monkeypatch):
-    """The folder that recipes suppose: the data set is `dataset` in it."""
+    """The folder that recipes expect: the data set is `dataset` in it."""
     (tmp_path / "dataset").symlink_to(demo)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -67,7 +67,7 @@ def test_packages(s3d, beside, heading):
         "COLMAP and Gaussian splatting": "dataset_colmap/area_1/sparse/0",
         "COCO panoptic": "coco_train/panoptic.json",
     }[heading]
-    # Of the areas that the recipe names, there is one.
+    # Of the areas in the recipe, only one exists.
     for _, text in blocks(heading):
         for line in (line for line in text.splitlines() if line.startswith("s3d ")):
             words = shlex.split(line.replace("1,2,3,4,6", "1"), comments=True)

@@ -1,4 +1,4 @@
-"""A data set whose classes are ScanNet's: in utils.py, in pycocotools, and in its panoptic images."""
+"""A data set with ScanNet's classes: in utils.py, in pycocotools, and in its panoptic images."""
 
 import importlib.util
 import json
@@ -15,7 +15,7 @@ MODALITIES = "rgb,depth,normal,semantic,semantic_class,pose"
 
 @pytest.fixture(scope="module")
 def scannet(s3d, demo, tmp_path_factory):
-    """The demo with words of ScanNet's annotators for some of its things."""
+    """The demo, with words of ScanNet's annotators for some of its objects."""
     scan = tmp_path_factory.mktemp("scan") / "scan"
     shutil.copytree(demo / "scan", scan)
     for old, new in [("table_1", "bed_1"), ("sofa_1", "couch_1"), ("bookcase_1", "shower curtain_1")]:

@@ -5,8 +5,8 @@ exports each, and writes `large.csv` beside itself and the picture docs/reliabil
     cargo build --release -p s3d-cli -p s3d-synth --bin s3d --example large_scene
     s3d-cli/tests/reliability/curves.py --work /somewhere/with/25/GB [--only points,tree,faces,materials,locations,labels] [--most N]
 
-Measured are the process's wall clock, its user and system time and its peak memory (getrusage of the child), beside the
-times of the stages that it logs. Images are few and small, so that what grows is what is measured. `--most` leaves out
+It measures the process's wall clock, its user and system time and its peak memory (getrusage of the child), and the times
+of the stages that the process logs. Images are few and small, so that the growing quantity decides. `--most` leaves out
 larger scans. Rows of other curves in `large.csv` are kept, so that curves can be measured one at a time.
 """
 
@@ -24,7 +24,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 FEW_IMAGES = ["--views", "1", "--size", "64", "--modalities", "pose", "--points-per-m2", "10"]
 
-# Name: what grows, its sizes, the other arguments of the scene, those of the export.
+# Name: the growing quantity, its sizes, further arguments of the scene, further arguments of the export.
 CURVES = {
     "points": ("points of one PLY cloud", [470_000, 4_700_000, 47_000_000, 470_000_000],
                ["--labels", "1000", "--faces", "1000000", "--cameras", "1"], FEW_IMAGES),
@@ -48,7 +48,7 @@ COLUMNS = ["curve", "size", "wall_s", "user_s", "sys_s", "peak_mb", "label_s", "
 
 
 def run(command, log):
-    """The command's wall clock, and what the system says that it took."""
+    """Runs the command. Returns its wall clock, and the system's report about it."""
     started = time.monotonic()
     with open(log, "wb") as out:
         pid = os.posix_spawnp(command[0], command, os.environ, file_actions=[
@@ -88,7 +88,9 @@ def measure(args, curve, size):
 
 
 def draw(rows, path):
-    """A row of two plots a curve: seconds of the processors and peak memory, both axes by tens."""
+    """Draws two plots a curve in a row: seconds of the processors, and peak memory. Both axes are
+    logarithmic.
+    """
     width, height, left, top = 330, 190, 62, 46
     plots = []
     for i, (curve, (what, *_)) in enumerate(CURVES.items()):
@@ -131,7 +133,7 @@ def plot(x0, y0, width, height, what, unit, data):
 
 
 def table_of(rows):
-    """The rows for people, as Markdown."""
+    """Prints the rows as Markdown."""
     lines = ["| what grows | size | processor s | of which system | wall clock s | peak MB | data set MB |",
              "|---|---:|---:|---:|---:|---:|---:|"]
     for r in rows:

@@ -5,8 +5,8 @@
     python3 s3d-cli/tests/reliability/same_bytes.py OUT_A OUT_B
 
 The first form runs both binaries: the demo, and each scene at full size, into a temporary folder. The second compares two
-data sets that are there. Files are compared byte for byte, but for the version of s3d: in manifest.json it is left out, and
-so are, in files.csv, the manifest's size and the lines of what holds a version. Exit code 0 if all is the same, 1 if not.
+existing data sets. Files are compared byte for byte, except for the version of s3d: it is ignored in manifest.json. In
+files.csv, the manifest's size and the lines of files with a version are ignored. Exit code 0 if all is the same, else 1.
 """
 
 import argparse
@@ -34,7 +34,7 @@ def content(name, path):
         data = file.read()
     if name == "manifest.json":
         data = VERSION.sub(rb'\1"-"', data)
-        # The list of files holds checksums only of files that are compared here by themselves.
+        # Its checksums belong to files that are compared here themselves.
         told = json.loads(data)
         told.pop("files", None)
         return json.dumps(told).encode()

@@ -3,9 +3,9 @@
 
     python3 s3d-cli/tests/reliability/soak.py S3D [--runs N] [--seed SEED] [--check CHECKER [--python PYTHON]]
 
-Each run draws options from SEED and its number, exports with 1 and with 2 threads, holds the two against each other byte
-for byte, and verifies one. CHECKER is a program of your own that takes the folder of a data set, and exits with 0 if it
-finds nothing: it is run where an export has views, the published forms and every modality. A line a run; exit code 1 if one failed.
+Each run draws options from SEED and its number, exports with 1 and with 2 threads, compares the two byte for byte, and
+verifies one. CHECKER is your own program: it takes the folder of a data set, and exits with 0 if it finds nothing. It runs
+on exports with views, the published forms and every modality. Prints a line a run; exit code 1 if one failed.
 """
 
 import argparse
@@ -21,7 +21,7 @@ MODALITIES = ["rgb", "depth", "normal", "semantic", "semantic_pretty", "global_x
 
 
 def draw(rng):
-    """Options of an export, and whether it has views, and the published forms."""
+    """Returns options of an export, whether it has views, and whether it has the published forms."""
     options = ["--seed", rng.randrange(2**64), "--size", rng.randrange(8, 120), "--pano-width", 2 * rng.randrange(4, 120)]
     views = rng.randrange(0, 7)
     options += ["--views", views, "--points-per-m2", rng.choice([0.5, 5, 60])]

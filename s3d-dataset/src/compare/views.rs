@@ -130,7 +130,7 @@ fn candidates(views: &[ViewRecord]) -> BTreeMap<(&str, u32), u32> {
     kept.collect()
 }
 
-/// The scan locations of an area: those of its candidate views and panoramas.
+/// The scan locations of an area, from its candidate views and panoramas.
 fn locations(sides: &Sides, side: Side, listed: &Listed, area: u32) -> BTreeSet<String> {
     let of_views = listed.views.iter().flatten().map(|view| view.camera_uuid.clone());
     let images = sides.of(side).images(area).into_iter();

@@ -88,7 +88,7 @@ pub(crate) fn passes(error: &(dyn StdError + 'static)) -> bool {
             if passes_io(io) {
                 return true;
             }
-            // The source of an error made by `io::Error::other` is that of what is in it.
+            // `source` of an `io::Error` skips the error that it holds.
             if let Some(inner) = io.get_ref()
                 && passes(inner)
             {

@@ -115,7 +115,7 @@ pub enum UsageError {
         first: PathBuf,
         /// Another folder.
         other: PathBuf,
-        /// How the call of `other` ("now") differs from that of `first` ("there").
+        /// The differences between the calls for `first` ("there") and `other` ("now").
         differences: Vec<Difference>,
     },
     /// A shard was made by another version of s3d.

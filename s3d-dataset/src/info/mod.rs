@@ -94,8 +94,8 @@ pub struct MeshInfo {
     pub area_m2: f64,
     /// Its box, world metres, Z-up.
     pub bounds: Aabb,
-    /// The offset that was subtracted from the coordinates of its files, and is subtracted from those of
-    /// points and locations, metres; 0 without one.
+    /// The offset in metres that was subtracted from the coordinates of its files, and is subtracted from
+    /// points and locations too; 0 without one.
     pub offset_m: [f64; 3],
 }
 

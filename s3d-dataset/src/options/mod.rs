@@ -91,7 +91,7 @@ pub struct ExportOptions {
     /// Write every candidate view, whatever its entropy.
     #[cfg_attr(feature = "clap", arg(display_order = 17, long))]
     pub keep_all: bool,
-    /// Write the images of these scan locations only. The selection stays that of all locations.
+    /// Write the images of these scan locations only. Views are still selected among all locations.
     #[cfg_attr(feature = "clap", arg(display_order = 18, long, value_name = "UUID", num_args = 1.., value_delimiter = ',', value_parser = words::uuid))]
     pub only: Vec<String>,
     /// Normals interpolated from the mesh's own where it has some, instead of the faces'.

@@ -20,7 +20,7 @@ impl Profile {
     /// All of them, by name.
     pub const ALL: [Self; 4] = [Self::Mmdet3d, Self::Open3dMl, Self::Pointcept, Self::PointNet];
 
-    /// Its name, and that of its folder.
+    /// The name of the profile and of its folder.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mmdet3d => "mmdet3d",

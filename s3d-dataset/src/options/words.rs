@@ -50,7 +50,7 @@ pub(super) fn uuid(text: &str) -> Result<String, String> {
     canonical_uuid(text).map_err(|_| "no uuid of 32 hexadecimal digits; scene files come first".to_owned())
 }
 
-/// Parses a switch: smooth normals where it is set, else those of faces.
+/// Parses a switch: smooth normals if it is set, flat ones if not.
 pub(super) fn smooth_normals() -> MapValueParser<BoolValueParser, fn(bool) -> Normals> {
     let normals: fn(bool) -> Normals = |smooth| if smooth { Normals::Smooth } else { Normals::Flat };
     BoolValueParser::new().map(normals)

@@ -58,8 +58,8 @@ fn row(
 ) -> Result<ImageRow> {
     let path = |domain| image.path(&source.layout, domain);
 
-    // Reading the data set accepts any word for a room's type. Only those of the taxonomy are valid here, and
-    // the one for unknown rooms.
+    // Reading the data set accepts any word for a room's type. Here only the taxonomy's words are valid, and
+    // the word for unknown rooms.
 
     let (room_type, room_number) = match source.taxonomy.room(&image.room) {
         Ok(room) => (room.room_type.name(), room.number),

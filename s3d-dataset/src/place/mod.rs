@@ -137,7 +137,7 @@ pub(crate) fn place_locations(ground: &Ground<'_>, placement: Placement) -> Resu
 
         for (number, [x, y, z]) in choose(ground.scene, free, placement, &name).into_iter().enumerate() {
             let pose = Pose::level(dvec3(x, y, z), 0.0);
-            // The position makes the uuid differ from those of other buildings.
+            // The position makes the uuid differ from uuids in other buildings.
             let uuid = uuid_from_name(&format!("s3d place {name} {number} {} {x} {y} {z}", placement.seed));
             placed.push((ScanLocation { uuid, pose, line: 0 }, room.room));
         }

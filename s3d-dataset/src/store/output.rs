@@ -303,7 +303,7 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
     Err(InputError::Remake { what }.into())
 }
 
-/// Refuses files in the way of the requested data set, except those of `areas`, which are ours.
+/// Refuses files in the way of the requested data set, except the files of `areas`, which are ours.
 fn refuse_in_the_way(layout: &Layout, request: &Request, areas: &[u32]) -> Result<()> {
     let ours = if areas.is_empty() {
         Vec::new()

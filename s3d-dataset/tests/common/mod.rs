@@ -1,4 +1,4 @@
-//! A scene that is made in memory.
+//! A scene made in memory.
 
 use s3d_dataset::ExportOptions;
 use s3d_dataset::export::MemoryScene;
@@ -8,7 +8,7 @@ use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::{AnnotatedPoints, Annotations};
 use s3d_label::Class;
 
-/// An export that takes little time.
+/// Options for a quick export.
 pub(crate) fn options(seed: u64) -> ExportOptions {
     ExportOptions {
         seed,
@@ -20,12 +20,12 @@ pub(crate) fn options(seed: u64) -> ExportOptions {
     }
 }
 
-/// A room of 4 × 3 × 2.5 m with coloured corners, its points by wall, and one location in it.
+/// A room of 4 × 3 × 2.5 m with coloured corners, annotated points for each wall, and one location.
 pub(crate) fn memory_scene() -> MemoryScene {
     scene_of(|p| p, |p| p)
 }
 
-/// The same, its mesh and its points moved.
+/// The same room. The functions move its mesh and its points.
 pub(crate) fn scene_of(mesh_at: impl Fn(Vec3) -> Vec3, points_at: impl Fn(Vec3) -> Vec3) -> MemoryScene {
     let corner = |i: u32| vec3((i & 1) as f32 * 4.0, (i >> 1 & 1) as f32 * 3.0, (i >> 2) as f32 * 2.5);
     let quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];

@@ -117,7 +117,7 @@ fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>)> {
             Some(pickle) => FileError::format(
                 pickle,
                 format!(
-                    "pickles are not read: docs/evaluation.md has the lines that make JSON of them; {FORMS}"
+                    "pickles are not read: s3d_eval::protocols has the lines that make JSON of them; {FORMS}"
                 ),
             ),
             None => FileError::format(path, format!("has no JSON file: {FORMS}")),

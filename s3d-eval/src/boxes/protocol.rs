@@ -18,30 +18,30 @@ const THRESHOLDS: [f64; 2] = [0.25, 0.5];
 const COLUMNS: [&str; 4] = ["AP@0.25", "AR@0.25", "AP@0.50", "AR@0.50"];
 
 const MMDETECTION3D: [&str; 5] = [
-    "Detections of all rooms are pooled by class and sorted by score, the highest first; of equal ones the \
-     first room by area, type and number, and in a room the first of the predictions. Each is held against \
-     the box of its class in its room with which its IoU is largest: it is true if that IoU is more than \
-     the threshold, 0.25 or 0.50, and no detection before it was true by this box.",
-    "AP is the area under precision over recall, each precision the largest at that recall or more. AR is \
+    "Detections of all rooms are pooled by class and sorted by score, the highest first. In a tie, rooms \
+     come by area, type and number, and detections of a room in the order of the predictions. Each detection \
+     is compared with the box of its class in its room with which its IoU is largest. It is true if that IoU \
+     is more than the threshold, 0.25 or 0.50, and no detection before it was true by this box.",
+    "AP is the area under precision over recall; each precision is the largest at that recall or more. AR is \
      the recall of all detections.",
-    "A class of the truth without detections has AP 0; one that is in neither is left out of means; of one \
-     that is detected alone AP, AR and their means are not defined.",
-    "Widths in x and y of less than 0.1 mm are 0.1 mm for the volume that two boxes share but not for the \
-     volume of each, and IoU is divided by 1e-8 m³ at least: a box that is flat in z is never found.",
+    "A class of the truth without detections has AP 0. A class in neither is left out of means. For a class \
+     that is only detected, AP, AR and their means are not defined.",
+    "Widths in x and y of less than 0.1 mm count as 0.1 mm in the volume that two boxes share, but not in \
+     the volume of each. IoU is divided by at least 1e-8 m³: a box that is flat in z is never found.",
     "As in mmdetection3d fe25f7a (mmdet3d/evaluation/functional/indoor_eval.py), but in 64 bits throughout.",
 ];
 
 const OPEN3D_ML: [&str; 4] = [
-    "A detection is true if its IoU with a box of its class in its room is the threshold, 0.25 or 0.50, or \
-     more, and it is the one with the largest IoU for that or another box, whatever its score; of equal \
-     ones the first of the predictions. One whose IoU with a box is not defined, both being flat, counts as \
+    "A detection is true if its IoU with a box of its class in its room is at least the threshold, 0.25 or \
+     0.50, and it has the largest IoU for that or another box, whatever its score; in a tie, the first of \
+     the predictions has it. A detection whose IoU with a box is not defined, since both are flat, counts as \
      neither.",
-    "AP: precision is taken at the scores of true detections, 41 at most, the nearest to even steps of \
-     recall, and made the largest at that recall or more. It is the mean of every fourth of 41, or of all \
-     if there are fewer: a low recall does not lower it. AR is not defined.",
-    "A class without true detections has AP 0, be it in the truth or not, and counts in means.",
-    "As in Open3D-ML 5e81f52 (ml3d/metrics/mAP.py, boxes in 3D), but in 64 bits throughout, and a share of \
-     1 instead of 100.",
+    "AP: precision is taken at the scores of at most 41 true detections, the nearest to even steps of \
+     recall, and raised to the largest precision at that recall or more. AP is the mean of every fourth of \
+     41, or of all if there are fewer: a low recall does not lower it. AR is not defined.",
+    "A class without true detections has AP 0, whether it is in the truth or not, and counts in means.",
+    "As in Open3D-ML 5e81f52 (ml3d/metrics/mAP.py, boxes in 3D), but in 64 bits throughout, and as a share \
+     of 1 instead of 100.",
 ];
 
 /// The boxes of a class in a room.
@@ -90,11 +90,10 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
         &OPEN3D_ML
     };
     let truth = format!(
-        "Truth: the boxes along the world axes of each instance's annotated points (instances.json), of \
-         {}.{}",
+        "Truth: the box along the world axes of each instance's annotated points (instances.json), for {}.{}",
         classes.names(),
         if task.options.classes.is_none() {
-            " A class of another taxonomy is the one that it counts as."
+            " A class of another taxonomy is replaced by the S3DIS class that it counts as."
         } else {
             ""
         }
@@ -152,7 +151,7 @@ fn invented(folds: &[Fold], rooms: &[(usize, Vec<OfClass>)], classes: &[Class]) 
         names.map(|name| format!("{name} in {}", fold.name)).collect::<Vec<_>>()
     };
     let names: Vec<String> = folds.iter().enumerate().flat_map(in_fold).collect();
-    let told = "Detected where the truth has none, so that means are not defined there";
+    let told = "Detected, but not in the truth, so that means are not defined there";
     (!names.is_empty()).then(|| format!("{told}: {}.", names.join(", ")))
 }
 

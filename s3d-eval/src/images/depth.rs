@@ -15,30 +15,30 @@ use s3d_io::dataset::Domain;
 use s3d_io::image::read_gray16;
 
 const HOHONET: [&str; 5] = [
-    "Panoramas are evaluated at 1024 × 512 pixels, of which each takes the pixel of the panorama that its \
-     middle lies in, as scikit-image and Pillow do; a prediction of the panorama's own size is sampled at \
-     the same pixels.",
-    "Evaluated are pixels whose true distance is there and above 0; truth and prediction are both brought \
-     between 0.01 m and 10 m first.",
-    "Scores are those of a panorama; the table has their mean over panoramas.",
-    "δ is the larger of prediction ÷ truth and truth ÷ prediction; logarithms are decimal.",
-    "As HoHoNet's test_depth.py (commit 2bbc0866), which has no SqRel and computes in 32 bits: here in 64.",
+    "Panoramas are evaluated at 1024 × 512 pixels. Each takes the panorama's pixel at its centre, as in \
+     scikit-image and Pillow. A prediction of the panorama's own size is sampled at the same pixels.",
+    "Pixels whose true distance exists and is above 0 are evaluated. Truth and prediction are first clamped \
+     to 0.01 m to 10 m.",
+    "Scores are computed for each panorama; the table has their mean over panoramas.",
+    "δ is the larger of prediction ÷ truth and truth ÷ prediction. Logarithms are decimal.",
+    "As in HoHoNet's test_depth.py (commit 2bbc0866), which has no SqRel and computes in 32 bits; here it is \
+     64.",
 ];
 
 const UNIFUSE: [&str; 6] = [
-    "Panoramas are evaluated at 1024 × 512 pixels, of which each takes the pixel of the panorama that its \
-     start lies in, as OpenCV does; a prediction of the panorama's own size is sampled at the same pixels.",
-    "Evaluated are pixels whose true distance is above 0 and at most 10 m; truth and prediction are at least \
-     0.1 m.",
-    "A fault of that script, kept: where a prediction is beyond 10 m the truth is set to 10 m, and the \
-     prediction stays as it is.",
-    "Scores are those of a panorama; the table has their mean over panoramas.",
-    "δ is the larger of prediction ÷ truth and truth ÷ prediction; logarithms are decimal.",
-    "As UniFuse's metrics.py (commit 5da3a4e6).",
+    "Panoramas are evaluated at 1024 × 512 pixels. Each takes the panorama's pixel at its upper left corner, \
+     as in OpenCV. A prediction of the panorama's own size is sampled at the same pixels.",
+    "Pixels whose true distance is above 0 and at most 10 m are evaluated. Truth and prediction are raised \
+     to at least 0.1 m.",
+    "A fault of the script is kept: where a prediction is beyond 10 m, the truth becomes 10 m and the \
+     prediction stays.",
+    "Scores are computed for each panorama; the table has their mean over panoramas.",
+    "δ is the larger of prediction ÷ truth and truth ÷ prediction. Logarithms are decimal.",
+    "As in UniFuse's metrics.py (commit 5da3a4e6).",
 ];
 
-const MEDIAN_SCALE: &str = "Predictions are scaled, panorama by panorama, so that the median of those that \
-     are evaluated is the truth's; of two middle values the lower is the median.";
+const MEDIAN_SCALE: &str = "The predictions of each panorama are scaled so that the median of its evaluated \
+     pixels is the truth's median. Of two middle values the lower is the median.";
 
 pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
     let median_scale = task.options.median_scale;
@@ -82,14 +82,14 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
     let empty = units.iter().filter(|(_, scores)| scores.pixels == 0).count();
     if empty > 0 {
         notes.push(format!(
-            "Left out for want of a pixel to evaluate: {empty} panoramas, which make all scores NaN in the \
-             script."
+            "{empty} panoramas without a pixel to evaluate were left out; in the script they make all scores \
+             NaN."
         ));
     }
     let replaced: u64 = units.iter().map(|(_, scores)| scores.replaced).sum();
     if replaced > 0 {
         notes.push(format!(
-            "{replaced} pixels were predicted beyond 10 m and held against 10 m instead of their truth."
+            "{replaced} pixels were predicted beyond 10 m and compared with 10 m instead of their truth."
         ));
     }
 

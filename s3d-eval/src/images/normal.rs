@@ -17,19 +17,20 @@ use s3d_io::dataset::Domain;
 use s3d_io::image::read_rgb8;
 
 const DSINE: [&str; 3] = [
-    "Images are evaluated at their own size, at pixels that show something; the angle between truth and \
-     prediction is that of their unit vectors, 90° to a prediction of no length.",
-    "Pixels of all images are pooled: mean, median (of two middle values their mean) and root mean square of \
-     their angles in degrees, and the percentage of angles below (<) 5, 7.5, 11.25, 22.5 and 30°.",
-    "As DSINE's utils.py (commit ef0c2afa), which computes in 32 bits: here in 64.",
+    "Images are evaluated at their own size, at pixels that show a surface. The angle is between the unit \
+     vectors of truth and prediction, or 90° if the prediction has no length.",
+    "The pixels of all images are pooled. Scores are the mean, the median (of two middle values their mean) \
+     and the root mean square of the angles in degrees, and the percentage of angles below (<) 5, 7.5, \
+     11.25, 22.5 and 30°.",
+    "As in DSINE's utils.py (commit ef0c2afa), which computes in 32 bits; here it is 64.",
 ];
 
 const OMNIDATA: [&str; 3] = [
-    "Images are evaluated at their own size, at pixels that show something.",
-    "Scores are those of an image: mean and median (of two middle values their mean) of its angles in \
-     degrees, and the share (0 to 1) of angles of at most (≤) 11.25, 22.5 and 30°; the table has their \
-     mean over images.",
-    "As Omnidata's evaluation_metrics.py (commit f69ff3ae).",
+    "Images are evaluated at their own size, at pixels that show a surface.",
+    "Scores are computed for each image: the mean and the median (of two middle values their mean) of its \
+     angles in degrees, and the share (0 to 1) of angles of at most (≤) 11.25, 22.5 and 30°. The table has \
+     their mean over images.",
+    "As in Omnidata's evaluation_metrics.py (commit f69ff3ae).",
 ];
 
 pub(crate) fn normal(task: &Task<'_>) -> Result<Evaluation> {
@@ -144,7 +145,7 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
 
     let mut definition = DSINE.to_vec();
     if with_intervals {
-        definition.push("Intervals of medians are of angles in steps of 0.2°.");
+        definition.push("Intervals of medians are computed from angles in steps of 0.2°.");
     }
     Ok((definition, units.iter().map(|unit| unit.1.0.pixels).sum(), made))
 }

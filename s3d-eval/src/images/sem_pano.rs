@@ -21,16 +21,17 @@ use std::fs;
 use std::path::Path;
 
 const DEFINITION: [&str; 6] = [
-    "Panoramas are evaluated at 1024 × 512 pixels, label indices by Pillow's nearest pixel; a prediction \
-     of the panorama's own size is sampled at the same pixels.",
-    "Not evaluated are pixels without a label, those where the panorama shows nothing, and those that are \
-     black in the RGB image after Pillow's Lanczos filter to 1024 × 512.",
-    "One confusion matrix a fold, of the pixels of all its panoramas; areas 5a and 5b are both area 5.",
-    "Classes without true pixels are taken out of the matrix first, rows and columns: a pixel predicted to \
-     be of such a class counts nowhere.",
-    "IoU is intersection over union, accuracy the share of a class's true pixels that were found, each of \
-     the matrix of the fold; the row `mean` is over the classes that have true pixels.",
-    "As HoHoNet's test_sem.py of RGB (commit 2bbc0866).",
+    "Panoramas are evaluated at 1024 × 512 pixels. Label indices are resized by Pillow's nearest filter. A \
+     prediction of the panorama's own size is sampled at the same pixels.",
+    "Pixels are not evaluated if they have no label, if the panorama shows nothing there, or if its RGB \
+     image is black there after Pillow's Lanczos filter to 1024 × 512.",
+    "Each fold has one confusion matrix, of the pixels of all its panoramas. Areas 5a and 5b are both area \
+     5.",
+    "Classes without true pixels are removed from the matrix first, rows and columns: a pixel predicted as \
+     such a class counts nowhere.",
+    "IoU is intersection over union; accuracy is the share of a class's true pixels that were found. Both \
+     are of the fold's matrix. The row `mean` is over the classes with true pixels.",
+    "As in HoHoNet's test_sem.py for RGB (commit 2bbc0866).",
 ];
 
 /// The file with the class of each number of predictions.

@@ -22,13 +22,13 @@ const COLUMNS: [&str; 3] = ["PQ", "SQ", "RQ"];
 const MISSING: [u8; 3] = [13; 3];
 
 const DEFINITION: [&str; 5] = [
-    "A true and a predicted segment of a class match if their IoU is more than 1/2; pixels of the predicted \
-     one that are void in the truth are taken out of the union.",
-    "A true segment without match is missed. A predicted one is invented, unless more than half of its \
-     pixels are void in the truth.",
-    "SQ is the mean IoU of matched segments, RQ = matched / (matched + invented / 2 + missed / 2), PQ = SQ \
-     · RQ, each a share of 1, of the segments of all images.",
-    "A class without segments on both sides has no scores and is left out of means.",
+    "A true and a predicted segment of a class match if their IoU is more than 1/2. Pixels of the predicted \
+     segment that are void in the truth do not count in the union.",
+    "A true segment without a match is missed. A predicted segment without a match is invented, unless more \
+     than half of its pixels are void in the truth.",
+    "SQ is the mean IoU of matched segments; RQ = matched / (matched + invented / 2 + missed / 2); PQ = SQ · \
+     RQ. Each is a share of 1, over the segments of all images.",
+    "A class without segments on either side has no scores and is left out of means.",
     "As in panopticapi 7bb4655 (panopticapi/evaluation.py), which prints 0 for such classes.",
 ];
 
@@ -67,11 +67,11 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     let names = |of: &[Class]| of.iter().map(|class| class.name()).collect::<Vec<_>>().join(", ");
     let but = match &*names(&truth.stuff) {
         "" => String::new(),
-        stuff => format!(", but of {stuff} all of an image is one"),
+        stuff => format!("; each stuff class ({stuff}) has one segment in an image"),
     };
     let source = format!(
-        "Truth: the labels of semantic images; each instance is a segment{but}. Void is what has no label, or \
-         lies outside of the photograph."
+        "Truth: the labels of semantic images. Each instance is a segment{but}. Pixels without a label, or \
+         outside of the photograph, are void."
     );
     let mut definition: Vec<&str> = vec![&source];
     definition.extend(DEFINITION);

@@ -16,11 +16,10 @@ use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::s3d_label::Class;
 use std::path::Path;
 
-const TRUTH: &str = "The points of a room are those of its files \
-                     s3dis/Area_k/ROOM/Annotations/CLASS_N.txt, the files in the order of their names as \
-                     strings, as `s3d profile` gives them to trainers.";
-const OF_CLASSES: &str =
-    "Classes are the 13 of S3DIS; a class of another taxonomy is the one that it counts as.";
+const TRUTH: &str = "The points of a room come from its files s3dis/Area_k/ROOM/Annotations/CLASS_N.txt, \
+                     sorted by name as strings, as `s3d profile` gives them to trainers.";
+const OF_CLASSES: &str = "Classes are the 13 of S3DIS. A class of another taxonomy is replaced by the S3DIS \
+                          class that it counts as.";
 
 /// The results of all rooms, and notes.
 struct Counted<T> {
@@ -92,13 +91,13 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
     let (absent, of_absent) = match task.variant {
         "nanmean" => (
             AbsentClass::LeftOut,
-            "A class that neither side has is left out of mIoU, one that the truth has not of mAcc, as in \
-             mmdetection3d fe25f7a (seg_eval.py) and Open3D-ML 5e81f52 (semseg_metric.py).",
+            "A class on neither side is left out of mIoU, and a class that the truth lacks is left out of \
+             mAcc, as in mmdetection3d fe25f7a (seg_eval.py) and Open3D-ML 5e81f52 (semseg_metric.py).",
         ),
         _ => (
             AbsentClass::Zero,
-            "1e-10 is added to every denominator, so that a class that neither side has counts as 0 in \
-             mIoU and mAcc, as in Pointcept d74c646 (engines/test.py, tools/test_s3dis_6fold.py).",
+            "1e-10 is added to every denominator, so a class on neither side counts as 0 in mIoU and mAcc, \
+             as in Pointcept d74c646 (engines/test.py, tools/test_s3dis_6fold.py).",
         ),
     };
 
@@ -114,12 +113,13 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
     });
 
     let definition = [
-        "Points are counted by class and summed over rooms: those of the truth, those predicted, those both.",
+        "Points are counted by class and summed over rooms: true points, predicted points, and points that \
+         are both.",
         "IoU = both / (truth + predicted - both); accuracy = both / truth; overall accuracy = right points \
          / all.",
         "mIoU and mAcc (the row mean) are means over classes.",
         of_absent,
-        "A point predicted as -1 is wrong, and of no class.",
+        "A point predicted as -1 is wrong and belongs to no class.",
     ];
     Ok(counted.evaluation(task, &definition, tables))
 }
@@ -139,18 +139,19 @@ pub(crate) fn inst_ap(task: &Task<'_>) -> Result<Evaluation> {
     });
 
     let definition = [
-        "Instances of fewer than 100 points do not count, on both sides.",
-        "In their order, true instances take the first prediction of their class that is free and whose \
-         IoU is greater than the threshold; each further one is wrong, the one with the lower score.",
-        "A prediction without a true instance of greater IoU is wrong, unless the share of its points that \
-         are void or of true instances of its class that are too small is greater than the threshold. \
-         S3DIS's points are never void.",
-        "Predictions of all rooms are sorted by score, equal scores together; the area below precision \
-         over recall is that of trapezes, from precision 1 at recall 0.",
-        "AP is the mean over IoU .50 to .90 in steps of .05 (nine thresholds: .95 is not among them); AP50 \
-         and AP25 are those of .50 and .25.",
-        "A class without a true instance that counts is not defined and left out of the mean; one without \
-         predictions is 0.",
+        "Instances of fewer than 100 points do not count on either side.",
+        "True instances are matched in their order. Each takes the first free prediction of its class with \
+         an IoU greater than the threshold. For each further such prediction, the one of the two with the \
+         lower score is wrong.",
+        "A prediction without a true instance above the threshold is wrong, unless the share of its points \
+         that are void, or belong to true instances of its class that are too small, is greater than the \
+         threshold. S3DIS's points are never void.",
+        "Predictions of all rooms are sorted by score, equal scores together. The area below precision over \
+         recall is a sum of trapezoids, from precision 1 at recall 0.",
+        "AP is the mean over IoU .50 to .90 in steps of .05 (nine thresholds: .95 is not among them). AP50 \
+         and AP25 are the areas at .50 and .25.",
+        "A class without a true instance that counts is not defined and left out of the mean. A class \
+         without predictions has 0.",
         "Source: Pointcept d74c646, engines/hooks/evaluator.py (InsSegEvaluator), after ScanNet's script.",
     ];
     Ok(counted.evaluation(task, &definition, tables))
@@ -175,16 +176,16 @@ pub(crate) fn inst_cov(task: &Task<'_>) -> Result<Evaluation> {
     });
 
     let definition = [
-        "The class of a predicted instance is that of most of its points, the lowest number of equals; \
-         points of instance -1 are in none.",
-        "A prediction is right if its largest IoU with a true instance of its class is 0.5 or more; \
-         several may be right by the same one. Precision = right / predicted, recall = right / true, over \
-         all rooms.",
-        "The coverage of a room is the mean over its true instances of the largest IoU with a prediction \
-         of their class, weighted by points for weighted coverage; of these the mean over rooms with such \
-         instances is taken.",
-        "mPrec, mRec, mCov and mWCov (the row mean) are means over the 13 classes, not defined if one of \
-         them is not; the row below leaves these out.",
+        "The class of a predicted instance is the class of most of its points, in a tie the lowest number. \
+         Points of instance -1 are in no instance.",
+        "A prediction is right if its largest IoU with a true instance of its class is 0.5 or more; several \
+         predictions may be right by the same instance. Precision = right / predicted, recall = right / \
+         true, over all rooms.",
+        "The coverage of a room is the mean, over its true instances, of the largest IoU with a prediction \
+         of their class; for weighted coverage, instances are weighted by their points. The score is the \
+         mean over rooms with such instances.",
+        "mPrec, mRec, mCov and mWCov (the row mean) are means over the 13 classes. They are not defined if a \
+         class is not; the row below leaves such classes out.",
         "Source: ASIS d71c3d6, models/ASIS/eval_iou_accuracy.py, on all points of a room, each once.",
     ];
     Ok(counted.evaluation(task, &definition, tables))

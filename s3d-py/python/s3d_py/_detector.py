@@ -30,8 +30,9 @@ class FoundBox:
 
 
 class Detector:
-    """A linear classifier for each class on the voxels of proposed boxes, with context (docs/detector.md). To
-    detect, it reads only the points of a data set, not the labels.
+    """A linear classifier for each class on the voxels of proposed boxes, with context. To detect, it reads
+    only the points of a data set, not the labels. The page "The baseline detector" of the documentation
+    explains it.
     """
 
     def __init__(self, native: _native.Detector) -> None:
@@ -73,12 +74,12 @@ class Detector:
 
     @property
     def areas(self) -> list[int]:
-        """The areas of its training."""
+        """The areas it was trained on."""
         return self._native.areas
 
     @property
     def seed(self) -> int:
-        """The seed of its training."""
+        """The seed it was trained with."""
         return self._native.seed
 
     def run(

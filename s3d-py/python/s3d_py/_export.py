@@ -1,4 +1,4 @@
-"""Scenes to data sets."""
+"""Makes data sets from scenes."""
 
 from __future__ import annotations
 
@@ -21,87 +21,86 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 Labels = Union[Sequence[str], npt.NDArray[np.str_], tuple[Sequence[str], npt.ArrayLike]]
-"""Labels of the F faces of a mesh: their names, one a face, "" for none; or a tuple of the different names
-and of the place of each face's among them, (F,), −1 for none. A name is CLASS_INSTANCE_ROOM_NUMBER:
-"chair_1_office_2".
+"""The labels of the F faces of a mesh. Either one name for each face, "" for none; or a tuple of the
+different names and, (F,), the index of each face's name among them, −1 for none. A name is
+CLASS_INSTANCE_ROOM_NUMBER: "chair_1_office_2".
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Area:
-    """One area of a data set, whose mesh is at hand."""
+    """One area of a data set, with a mesh in memory."""
 
     mesh: MeshLike
     area: int = 1
-    """Its number, from 1."""
+    """The number of the area, from 1."""
     locations: Sequence[PoseLike] = ()
-    """Where panoramas and views are made. If there are none, some are placed: the options `see` and
-    `place_cameras`.
+    """The poses at which panoramas and views are made. If there are none, the options `see` and
+    `place_cameras` say how locations are placed.
     """
     labels: Labels | None = None
-    """What its faces are; None makes a data set without labels."""
+    """The labels of the faces; None makes a data set without labels."""
     taxonomy: str = "s3dis"
-    """Whose classes these are: "s3dis", "nyu40", "scannet20", "scannet200" or "matterport40"."""
+    """The taxonomy of the labels: "s3dis", "nyu40", "scannet20", "scannet200" or "matterport40"."""
 
 
 class ExportOptions(TypedDict, total=False):
-    """Options of `export`; what is left out has the default of `s3d export --help`, which is the paper's
-    where it names one.
+    """The options of `export`. A missing option has the default of `s3d export --help`, which is the paper's
+    value where the paper names one.
     """
 
     seed: int
-    """Everything random comes from it: the same input and seed give the same bytes."""
+    """Determines everything random: the same input and seed give the same bytes."""
     place_cameras: float
-    """Put scan locations on the floor of every room, no two nearer than this, metres, instead of reading
-    some.
+    """Places scan locations on the floor of every room, at least this far apart in metres, instead of reading
+    them.
     """
     see: float
-    """Put as few scan locations as see this share of the visible surface, instead of reading some."""
+    """Places as few scan locations as see this share of the visible surface, instead of reading them."""
     views: int
-    """Candidate views a scan location; 72."""
+    """The number of candidate views at each scan location; default 72."""
     size: int
-    """Width and height of a view, pixels; 1080."""
+    """Width and height of a view in pixels; default 1080."""
     pano_width: int
-    """Width of a panorama, pixels, even; 4096."""
+    """Width of a panorama in pixels, even; default 4096."""
     pool: str
-    """Among which candidates views are selected: "dataset", "area" or "location"."""
+    """The pool of candidates from which views are selected: "dataset", "area" or "location"."""
     points_per_m2: float
-    """Density of the point cloud; 10,000."""
+    """Density of the point cloud in points per m²; default 10,000."""
     lenient: bool
-    """Skip and count what is not as it should be in the annotations."""
+    """Skips faulty annotations, and counts them."""
     fill: float
-    """Give faces without a vote the label of the surface next to them, if it is no farther than this,
-    metres.
-    """
+    """Gives faces without a vote the label of the surface next to them, up to this distance in metres."""
     entropy_stride: int
-    """The classes of a candidate view are counted on every which pixel of both axes; 4."""
+    """The score of a candidate view counts the classes of every n-th pixel along both axes; default 4."""
     modalities: list[str]
-    """Which images: rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose."""
+    """The images to write: rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose.
+    """
     keep_all: bool
-    """Write every candidate view."""
+    """Writes every candidate view."""
     only: list[str]
-    """Write the images of these scan locations only, by uuid."""
+    """Writes only the images of these scan locations, by uuid."""
     normals: str
     """ "flat" or "smooth"."""
     rgb_samples: int
-    """How many places of a pixel tell its colour where surfaces end or turn; 1."""
+    """The number of samples for the colour of a pixel where surfaces end or bend; default 1."""
     compression: str
     """ "fast", "balanced" or "small"; the pixels are the same."""
     xyz: str
-    """World coordinates as "half" floats, as "float", or "none"."""
+    """Images of world coordinates as "half" or "float" numbers, or "none"."""
     normal_axes: str
-    """Axes of normals in views: "paper" or "opencv"."""
+    """The axes of normals in views: "paper" or "opencv"."""
     depth_units: str
-    """ "512" a metre, or "mm"."""
+    """The unit of depth: "512" steps a metre, or "mm"."""
     pad_labels: str
-    """How many entries the table of labels is filled up to, or "off"."""
+    """The number of entries to which the table of labels is padded, or "off"."""
     profiles: list[str]
-    """What is written for loaders besides: pointcept, open3d-ml, mmdet3d, pointnet."""
+    """Loaders for which profiles are written as well: pointcept, open3d-ml, mmdet3d, pointnet."""
 
 
 SceneLike = Union[str, PathLike[str], Area, MeshLike]
-"""What is exported: the path of a scene file (scene.toml), of a published area's folder, or of a mesh; an
-`Area`; a mesh.
+"""The input of `export`: the path of a scene file (scene.toml), of a published area's folder, or of a mesh;
+an `Area`; or a mesh.
 """
 
 
@@ -117,22 +116,23 @@ def export(
     progress: Progress = None,
     **options: Unpack[ExportOptions],
 ) -> dict[str, Any] | None:
-    """Makes a data set in the folder `output`; docs/formats.md says what is in it.
+    """Makes a data set in the folder `output`. The page "Files and formats" of the documentation describes
+    its files.
 
-    - `scene`: scene files, areas in memory, or a mesh; several make a data set of several areas, and several
-      files of meshes one area. `locations` and `labels` belong to a single mesh in memory: they are those of
-      an `Area`.
-    - `allow`: conditions of usefulness that need not be met; an error that stops an export names its
+    - `scene`: scene files, areas in memory, or a mesh. Several scenes make a data set of several areas;
+      several files of meshes make one area.
+    - `locations`, `labels`: for a single mesh in memory, as in `Area`.
+    - `allow`: conditions of usefulness that need not be met. An error that stops an export names its
       condition.
-    - `overwrite`: replace an earlier data set, or an unfinished one of another call. Other files stay.
+    - `overwrite`: replace an earlier data set, or the unfinished one of another call. Other files stay.
     - `options`: see `ExportOptions`.
 
-    An export that was stopped, by Ctrl-C, a full disk or a kill, goes on where it was when the same call is
-    made again, and ends with the same bytes. Returns a summary: areas, locations, images by kind, seconds by
-    stage; None if all was there already.
+    If an export is stopped by Ctrl-C, a full disk or a kill, the same call resumes it and ends with the same
+    bytes. Returns a summary (areas, locations, images by kind, seconds by stage), or None if the data set was
+    complete already.
 
-    Raises `UsageError` for options out of range or a folder that holds something else, `InputError`,
-    `FileError`, `TemporaryError`, `CancelledError`.
+    Raises `UsageError` for options out of range or a folder with other content, and `InputError`,
+    `FileError`, `TemporaryError` or `CancelledError`.
     """
     scenes = list(scene) if isinstance(scene, (list, tuple)) else [scene]
     paths = [fspath(one) for one in scenes if isinstance(one, (str, PathLike))]
@@ -157,7 +157,7 @@ def export(
 
 
 class _Area:
-    """An `Area` as the compiled part takes it."""
+    """An `Area` in the form for the compiled part."""
 
     def __init__(self, area: Area) -> None:
         self.area = area.area
@@ -168,7 +168,7 @@ class _Area:
 
 
 def _places(labels: Labels) -> tuple[list[str], npt.NDArray[np.int32]]:
-    """The different names, and which of them each face has."""
+    """Returns the different names, and the index of each face's name among them."""
     if isinstance(labels, tuple) and len(labels) == 2 and not isinstance(labels[1], str):
         return [str(name) for name in labels[0]], np.asarray(labels[1]).astype(np.int32)
     names, places = np.unique(np.asarray(labels, np.str_), return_inverse=True)

@@ -1,4 +1,4 @@
-"""Meshes: from files, arrays, and the objects of other packages."""
+"""Meshes from files, arrays, and the objects of other packages."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from ._progress import Sink
 log = logging.getLogger("s3d_py")
 
 FAR_M = 10_000.0
-"""Farther from the origin than this, metres, positions of 32 bits step by a millimetre."""
+"""Beyond this distance from the origin, in metres, 32-bit positions have steps of a millimetre."""
 
 
 class Mesh:
-    """A triangle mesh: world metres, Z up. Nothing of it changes; scenes and threads share it without copies.
+    """A triangle mesh in world metres, Z up. It never changes; scenes and threads share it without copies.
 
-    Every face has an area, every index is in range, every number finite. Faces without area and those with
-    the corners of an earlier face are left out where it is made: `face` images, votes and all other columns
-    count what is left.
+    Every face has an area, every index is in range, every number finite. Faces without area, and faces with
+    the corners of an earlier face, are left out when the mesh is made. `face` images, votes and all other
+    columns refer to the remaining faces.
     """
 
     _native: NativeMesh
@@ -42,18 +42,19 @@ class Mesh:
         texture_of_face: npt.ArrayLike | None = None,
         vertex_normals: npt.ArrayLike | None = None,
     ) -> None:
-        """A mesh of arrays, which are copied.
+        """Makes a mesh from arrays, which are copied.
 
         - `vertices`: (V, 3), world metres, Z up; stored in 32 bits.
         - `faces`: (F, 3), indices into `vertices`, counter-clockwise seen from the front.
         - `vertex_colors`: (V, 3) or (V, 4), sRGB, uint8, or floats from 0 to 1.
-        - `uv`: texture coordinates, (V, 2), or (F, 3, 2) where corners have their own; (0, 0) is the bottom
-          left of the image. `texture` is that image, (H, W, 3) of uint8, or a list of some; then
-          `texture_of_face`, (F,), names the one of each face, −1 for none.
+        - `uv`: texture coordinates, (V, 2) for vertices or (F, 3, 2) for corners; (0, 0) is the bottom left
+          of the image.
+        - `texture`: the image, (H, W, 3) of uint8, or a list of images.
+        - `texture_of_face`: (F,), the index of each face's image in a list, −1 for none.
         - `vertex_normals`: (V, 3), unit vectors, for smooth normals.
 
-        Raises `MeshError` for an index out of range, a corner that is not finite, or no face with an area;
-        `UsageError` for an array of another shape.
+        Raises `MeshError` for an index out of range, a corner that is not finite, or a mesh without any face
+        that has an area; `UsageError` for an array of another shape.
         """
         positions = rows("vertices", vertices, 3, np.float32)
         if positions.size and np.abs(positions).max() > FAR_M:
@@ -91,8 +92,8 @@ class Mesh:
 
     @property
     def vertices(self) -> npt.NDArray[np.float32]:
-        """(V, 3), world metres. This and the other arrays show the mesh's own memory where they can,
-        read-only.
+        """(V, 3), world metres. This and the other arrays are read-only, and share the memory of the mesh
+        where possible.
         """
         return self._native.vertices
 
@@ -103,17 +104,18 @@ class Mesh:
 
     @property
     def vertex_colors(self) -> npt.NDArray[np.uint8] | None:
-        """(V, 3), sRGB; None if there are none."""
+        """(V, 3), sRGB; None without colours."""
         return self._native.vertex_colors
 
     @property
     def uv(self) -> npt.NDArray[np.float32] | None:
-        """(N, 2), texture coordinates, (0, 0) at the image's bottom left; None if there are none."""
+        """(N, 2), texture coordinates, (0, 0) at the image's bottom left; None without texture coordinates.
+        """
         return self._native.uv
 
     @property
     def face_uv(self) -> npt.NDArray[np.uint32] | None:
-        """(F, 3), indices into `uv`, 2³² − 1 where a face has none; None if there are none."""
+        """(F, 3), indices into `uv`, 2³² − 1 for a face without; None without texture coordinates."""
         return self._native.face_uv
 
     @property
@@ -123,22 +125,22 @@ class Mesh:
 
     @property
     def texture_of_face(self) -> npt.NDArray[np.int32]:
-        """(F,), which of `textures` a face shows, −1 for none."""
+        """(F,), index into `textures`, −1 for none."""
         return self._native.texture_of_face.view(np.int32)
 
     @property
     def face_normals(self) -> npt.NDArray[np.float32]:
-        """(F, 3), unit vectors in the world, by the winding of the faces. Computed anew."""
+        """(F, 3), unit vectors in the world, by the winding of the faces. Computed at every access."""
         return self._native.face_normals()
 
     @property
     def face_areas(self) -> npt.NDArray[np.float64]:
-        """(F,), m². Computed anew."""
+        """(F,), m². Computed at every access."""
         return self._native.face_areas()
 
     @property
     def area(self) -> float:
-        """Of all faces, m²."""
+        """The area of all faces, m²."""
         return self._native.area
 
     @property
@@ -148,24 +150,24 @@ class Mesh:
 
     @property
     def offset(self) -> npt.NDArray[np.float64]:
-        """(3,), metres: what was subtracted from the positions of a file far from its origin. Cameras and
-        points are to be in the same frame: subtract it from theirs.
+        """(3,), metres: the offset that was subtracted from the positions of a file far from its origin.
+        Subtract it from cameras and points as well, so that they are in the same frame.
         """
         return np.array(self._native.offset)
 
     @property
     def has_labels(self) -> bool:
-        """Whether its file labels its faces or vertices."""
+        """Whether the file has labels for faces or vertices."""
         return self._native.has_labels
 
     @property
     def warnings(self) -> list[str]:
-        """What was mended, left out or replaced when its file was read, a sentence each."""
+        """Repairs, omissions and replacements made when the file was read, a sentence each."""
         return self._native.warnings
 
     @property
     def path(self) -> Path | None:
-        """Its file; None for one of arrays."""
+        """The path of the file; None for a mesh from arrays."""
         return self._native.path
 
     def __repr__(self) -> str:
@@ -183,28 +185,30 @@ class Mesh:
 
 
 MeshLike = Union[Mesh, str, PathLike[str], Any]
-"""A `Mesh`; the path of a file; a mesh of trimesh or Open3D."""
+"""A `Mesh`, the path of a file, or a mesh of trimesh or Open3D."""
 
 
 def read_mesh(
     path: str | PathLike[str], *, up: str = "y", units: str | None = None, near: bool = True
 ) -> Mesh:
-    """Reads a mesh with its textures: OBJ, glTF, GLB or PLY, told by the ending.
+    """Reads a mesh with its textures. The ending of the path tells OBJ, glTF, GLB or PLY.
 
-    `up` is the axis of the file that points up, "y" or "z"; `units` "m", "cm", "mm", "ft" or "in", by default
-    what the file says, else metres. With `near`, a mesh more than 1,024 m from the origin is moved to it, and
-    `Mesh.offset` tells by how much. What is mended is in `Mesh.warnings` and the log.
+    - `up`: the axis of the file that points up, "y" or "z".
+    - `units`: "m", "cm", "mm", "ft" or "in"; by default the unit that the file states, otherwise metres.
+    - `near`: moves a mesh more than 1,024 m from the origin to it. `Mesh.offset` is the subtracted vector.
 
-    Raises `MissingFileError`, `FormatError` with file and line, `MeshError` if no face is left,
+    Repairs are listed in `Mesh.warnings` and logged.
+
+    Raises `MissingFileError`, `FormatError` with file and line, `MeshError` if no face is left, or
     `UnsupportedError`.
     """
     return Mesh._of(NativeMesh.read(fspath(path), up, units, near, Sink()))
 
 
 def as_mesh(mesh: MeshLike, *, up: str = "z") -> Mesh:
-    """The mesh that something is: a `Mesh`, or one of trimesh or Open3D, whose positions, faces, colours and
-    textures are copied. They are taken as metres; `up` says which axis of theirs points up: both packages
-    leave a glTF file's "y" as it is. A path is read by `read_mesh` with its defaults.
+    """Returns a `Mesh` for any `MeshLike`. The positions, faces, colours and textures of a mesh of trimesh or
+    Open3D are copied, and count as metres. `up` is the axis that points up in such a mesh: both packages keep
+    the "y" of a glTF file. A path is read by `read_mesh` with its defaults.
     """
     if isinstance(mesh, Mesh):
         return mesh
@@ -212,7 +216,7 @@ def as_mesh(mesh: MeshLike, *, up: str = "z") -> Mesh:
         return read_mesh(mesh)
     if up not in ("y", "z"):
         raise UsageError(f"up={up!r}: must be y or z")
-    # A scene of trimesh; a mesh of Open3D's tensors.
+    # A scene of trimesh, or a tensor mesh of Open3D.
     other: Any = mesh
     for joined in ("to_mesh", "to_legacy"):
         if hasattr(other, joined):
@@ -244,7 +248,7 @@ def _of_open3d(mesh: Any) -> dict[str, Any]:
     columns: dict[str, Any] = {"faces": np.asarray(mesh.triangles)}
     if mesh.has_vertex_colors():
         columns["vertex_colors"] = np.asarray(mesh.vertex_colors)
-    # One a material, empty where that has none; bottom row first.
+    # One image for each material, empty if the material has none; bottom row first.
     images = {k: np.asarray(image)[::-1] for k, image in enumerate(mesh.textures) if not image.is_empty()}
     if images and mesh.has_triangle_uvs():
         place = {k: number for number, k in enumerate(images)}
@@ -257,7 +261,7 @@ def _of_open3d(mesh: Any) -> dict[str, Any]:
 
 
 def rows(what: str, values: npt.ArrayLike, columns: int, kind: Any) -> npt.NDArray[Any]:
-    """The values as an array (n, columns) of this type, in C order."""
+    """Returns the values as an array (n, columns) of this type, in C order."""
     try:
         array = np.ascontiguousarray(values, kind)
     except (TypeError, ValueError) as error:
@@ -268,7 +272,7 @@ def rows(what: str, values: npt.ArrayLike, columns: int, kind: Any) -> npt.NDArr
 
 
 def indices(what: str, values: npt.ArrayLike, columns: int) -> npt.NDArray[np.uint32]:
-    """The values as indices."""
+    """Returns the values as indices."""
     array = np.asarray(values)
     if array.dtype.kind not in "iu" and array.size:
         raise UsageError(f"{what}: whole numbers, not {array.dtype}")
@@ -278,7 +282,7 @@ def indices(what: str, values: npt.ArrayLike, columns: int) -> npt.NDArray[np.ui
 
 
 def colors_of(values: npt.ArrayLike, what: str = "vertex_colors") -> npt.NDArray[np.uint8]:
-    """Colours of uint8, or of floats from 0 to 1, without their opacity."""
+    """Returns colours, given as uint8 or as floats from 0 to 1, without their opacity."""
     array = np.asarray(values)
     if array.dtype.kind == "f":
         array = np.rint(np.clip(array, 0.0, 1.0) * 255.0)
@@ -290,7 +294,7 @@ def colors_of(values: npt.ArrayLike, what: str = "vertex_colors") -> npt.NDArray
 def _corner_uv(
     uv: npt.ArrayLike, positions: npt.NDArray[np.float32], faces: npt.NDArray[np.uint32]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
-    """Texture coordinates, and the indices of those of each face."""
+    """Returns texture coordinates, and the indices into them for the corners of each face."""
     array = np.ascontiguousarray(uv, np.float32)
     if array.shape == (len(positions), 2):
         return array, faces

@@ -1,4 +1,4 @@
-"""What the compiled part has: for the modules of this package, and nobody else."""
+"""The compiled part, for the modules of this package alone."""
 
 from collections.abc import Sequence
 from os import PathLike

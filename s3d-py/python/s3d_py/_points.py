@@ -1,4 +1,4 @@
-"""Points of a mesh: sampled from it, and voting for the labels of its faces."""
+"""Samples points from a mesh, and lets points vote for the labels of its faces."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from ._progress import Progress, sink
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PointCloud:
-    """N coloured points of a mesh's surface."""
+    """N coloured points on the surface of a mesh."""
 
     xyz: npt.NDArray[np.float32]
     """(N, 3), world metres."""
     rgb: npt.NDArray[np.uint8]
     """(N, 3), sRGB."""
     face: npt.NDArray[np.int32]
-    """(N,), the face that each lies on."""
+    """(N,), index of the face under each point."""
 
     def __len__(self) -> int:
         return len(self.xyz)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes a binary PLY file of positions and colours, whole or not at all; one that is there is
+        """Writes positions and colours as a binary PLY file, completely or not at all. An existing file is
         replaced.
         """
         save_points(path, self.xyz, self.rgb)
@@ -50,10 +50,10 @@ class AnnotatedPoints:
     rgb: npt.NDArray[np.uint8]
     """(N, 3), sRGB; black where the files have no colours."""
     label: npt.NDArray[np.int32]
-    """(N,), of each point the place in `names`."""
+    """(N,), index into `names` for each point."""
     names: list[str]
-    """The instances, as `export` takes them: class, number among those of the room, room, its number:
-    "chair_1_office_2".
+    """The instances, in the form that `export` takes: class, number of the instance in the room, type and
+    number of the room: "chair_1_office_2".
     """
 
     def __len__(self) -> int:
@@ -65,39 +65,39 @@ class AnnotatedPoints:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Votes:
-    """How points voted for the label of each of F faces. A face without a vote has the label −1 and counts of
-    0.
+    """The votes of points for the label of each of F faces. A face without votes has the label −1 and counts
+    of 0.
     """
 
     mesh: Mesh
     label: npt.NDArray[np.int32]
-    """(F,), the label of most votes, the smallest of several; −1 where no point voted."""
+    """(F,), the label with the most votes, the smallest label in a tie; −1 without votes."""
     votes: npt.NDArray[np.uint32]
-    """(F,), its votes."""
+    """(F,), number of votes for `label`."""
     runner_up: npt.NDArray[np.int32]
-    """(F,), the label of the second most votes; −1 if there is none."""
+    """(F,), the label with the second most votes; −1 if there is none."""
     runner_up_votes: npt.NDArray[np.uint32]
-    """(F,), its votes."""
+    """(F,), number of votes for `runner_up`."""
     total: npt.NDArray[np.uint32]
-    """(F,), all votes."""
+    """(F,), number of all votes."""
     mean_distance: npt.NDArray[np.float32]
-    """(F,), metres from the voters to the face, NaN without a vote."""
+    """(F,), mean distance of the voters from the face in metres; NaN without votes."""
     max_distance: npt.NDArray[np.float32]
-    """(F,), metres from the farthest voter to the face, NaN without a vote."""
+    """(F,), distance of the farthest voter from the face in metres; NaN without votes."""
 
     @property
     def margin(self) -> npt.NDArray[np.uint32]:
-        """(F,), by how many votes the label won; 0 in a tie."""
+        """(F,), `votes` minus `runner_up_votes`; 0 in a tie."""
         return self.votes - self.runner_up_votes
 
     @property
     def share(self) -> npt.NDArray[np.float64]:
-        """(F,), the winner's share of all votes; NaN without a vote."""
+        """(F,), the share of the votes that were for `label`; NaN without votes."""
         with np.errstate(invalid="ignore"):
             return np.true_divide(self.votes, self.total, dtype=np.float64)
 
     def filled(self, within: float) -> npt.NDArray[np.int32]:
-        """(F,), the labels, where faces without a vote have that of the labelled surface next to them: see
+        """Returns the labels, (F,). Faces without votes get the label of the surface next to them: see
         `fill`.
         """
         return fill(self.mesh, self.label, within)
@@ -109,8 +109,8 @@ class Votes:
 
 
 PointsLike = Union[npt.ArrayLike, PointCloud, AnnotatedPoints, Any]
-"""Positions (N, 3), world metres; a `PointCloud` or `AnnotatedPoints`; points of laspy; a data frame of
-pandas with columns x, y, z.
+"""Positions (N, 3) in world metres; a `PointCloud` or `AnnotatedPoints`; points of laspy; or a pandas data
+frame with columns x, y, z.
 """
 
 
@@ -129,17 +129,17 @@ def read_points(
     progress: Progress = None,
 ) -> AnnotatedPoints:
     """Reads the annotated points of an area: the folder of an S3DIS area, `pointcloud.mat`, a scan of
-    ScanNet, PLY, NPY, NPZ, LAS, LAZ or E57; several files together.
+    ScanNet, PLY, NPY, NPZ, LAS, LAZ or E57. Several files make one area.
 
     - `taxonomy`: "s3dis", "nyu40", "scannet20", "scannet200" or "matterport40".
-    - `classes`: which class a name or number of the files means; None leaves its points out.
-    - `class_column`, `instance_column`, `room_column`: where they are, if not where the format has them;
-      `columns` names those of a plain NPY array.
-    - `room`: that of points whose file names none: "office_1".
-    - `offset`: metres, subtracted in 64 bits from points far from the origin, as `Mesh.offset` was.
-    - `lenient`: skip and count what is not as it should be; unknown classes are clutter.
+    - `classes`: the class for each name or number in the files; None leaves its points out.
+    - `class_column`, `instance_column`, `room_column`: names of columns that differ from the format's.
+    - `columns`: the names of the columns of a plain NPY array.
+    - `room`: the room of points whose file names none: "office_1".
+    - `offset`: metres, subtracted in 64 bits from points far from the origin, like `Mesh.offset`.
+    - `lenient`: skip faulty annotations and count them; unknown classes become clutter.
 
-    Raises `FileError` with file and line, `UsageError` for a class or room that is none.
+    Raises `FileError` with file and line, and `UsageError` for an invalid class or room.
     """
     how = SimpleNamespace(
         taxonomy=taxonomy,
@@ -157,8 +157,8 @@ def read_points(
 
 
 def save_points(path: str | PathLike[str], xyz: npt.ArrayLike, rgb: npt.ArrayLike) -> None:
-    """Writes N points as a binary PLY file, whole or not at all; one that is there is replaced. `xyz` is
-    (N, 3), metres; `rgb` (N, 3), sRGB, uint8, or floats from 0 to 1.
+    """Writes N points as a binary PLY file, completely or not at all. An existing file is replaced. `xyz` is
+    (N, 3), metres; `rgb` is (N, 3), sRGB, uint8, or floats from 0 to 1.
     """
     _native.write_points(fspath(path), rows("xyz", xyz, 3, np.float32), colors_of(rgb, "rgb"))
 
@@ -172,9 +172,9 @@ def sample(
     threads: int | None = None,
     progress: Progress = None,
 ) -> PointCloud:
-    """Points spread evenly over a mesh, in the order of its faces, with the mesh's colours there: so many a
-    square metre, or `points` in all. The same mesh, density and seed give the same bits. They take 19 bytes
-    each of memory.
+    """Samples points evenly over a mesh, in the order of its faces, with the mesh's colours. Their number
+    follows from the density `points_per_m2`, or is `points`. The same mesh, density and seed give the same
+    bits. Each point takes 19 bytes of memory.
     """
     native = as_mesh(mesh)._native
     if points is not None and points < 0:
@@ -191,13 +191,13 @@ def vote(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Votes:
-    """Labels of faces from labelled points: each votes for the face that is nearest to it, however far.
+    """Labels faces from labelled points. Each point votes for the face nearest to it, at any distance.
 
-    `xyz` are N points in the frame of the mesh (of a mesh far from its origin, less `Mesh.offset`); `labels`
-    (N,) are numbers from 0 to 855,307, or the name of a column of `xyz`, such as "classification" of laspy's
-    points.
+    - `xyz`: N points in the frame of the mesh. For a mesh far from its origin, subtract `Mesh.offset`.
+    - `labels`: (N,), numbers from 0 to 855,307; or the name of a column of `xyz`, such as "classification"
+      for laspy's points.
 
-    Raises `InputError` for a point that is not finite, `UsageError` for other labels or lengths.
+    Raises `InputError` for a point that is not finite, and `UsageError` for other labels or lengths.
     """
     table: Any = xyz
     column = np.asarray(table[labels] if isinstance(labels, str) else labels)
@@ -210,8 +210,8 @@ def vote(
 
 
 def fill(mesh: MeshLike, labels: npt.ArrayLike, within: float) -> npt.NDArray[np.int32]:
-    """Labels (F,) of faces, where each of −1 has become that of the labelled surface next to it, if that is
-    no farther than `within` metres along the surface and not around an edge of more than 45°.
+    """Returns the labels (F,) of faces. A face with −1 gets the label of the labelled surface next to it,
+    within `within` metres along the surface and not around an edge of more than 45°.
     """
     return _native.fill(as_mesh(mesh)._native, np.ascontiguousarray(labels, np.int64), within)
 

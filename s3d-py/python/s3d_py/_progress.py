@@ -17,31 +17,31 @@ LINE_EVERY_S = 5.0
 
 @dataclass(frozen=True)
 class Task:
-    """How far a piece of long work is. Several may be under way at the same time."""
+    """The progress of a piece of long work. Several pieces may be under way at the same time."""
 
     id: int
-    """Tells them apart."""
+    """Identifies the piece."""
     what: str
-    """What is done: "rendering"."""
+    """The work: "rendering"."""
     unit: str
-    """To what: "images"."""
+    """The unit that is counted: "images"."""
     total: int
-    """How many units there are."""
+    """The number of all units."""
     done: int
-    """How many of them are done."""
+    """The number of finished units."""
 
 
 Progress = Union[bool, Callable[[Task], object], None]
-"""What calls take as `progress`.
+"""The argument `progress` of calls.
 
-True: bars of tqdm if it is installed, else a line in the log of `s3d_py` every five seconds. A function: it
-is called with a `Task` about ten times a second, and cancels the call by returning False. False or None:
-nothing. Warnings and what was done are logged to `s3d_py` in any case.
+True: bars of tqdm if it is installed, otherwise a line in the log of `s3d_py` every five seconds. A function:
+it is called with a `Task` about ten times a second, and cancels the call by returning False. False or None:
+nothing. Warnings and finished work are logged to `s3d_py` in any case.
 """
 
 
 class Sink:
-    """Is told by the compiled part what happens."""
+    """Receives events from the compiled part."""
 
     def message(self, level: str, text: str) -> None:
         number = {"warning": logging.WARNING, "info": logging.INFO}.get(level, logging.DEBUG)
@@ -74,7 +74,7 @@ class _Calls(Sink):
 
 
 class _Bars(Sink):
-    """A bar of tqdm a task."""
+    """Shows a bar of tqdm for each task."""
 
     def __init__(self, tqdm: Any) -> None:
         self.tqdm = tqdm
@@ -91,7 +91,7 @@ class _Bars(Sink):
 
 
 class _Lines:
-    """A function that logs how far a task is every few seconds."""
+    """A function that logs the progress of a task every few seconds."""
 
     def __init__(self) -> None:
         self.last: dict[int, float] = {}
@@ -104,7 +104,7 @@ class _Lines:
 
 
 def sink(progress: Progress) -> Sink:
-    """Who is told, for an argument `progress`."""
+    """Returns the receiver of events for an argument `progress`."""
     if callable(progress):
         return _Calls(progress)
     if not progress:

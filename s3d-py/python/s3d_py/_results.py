@@ -23,39 +23,41 @@ class FaultGroup:
     """Faults of one kind."""
 
     topic: str
-    """What they are about: "images against the mesh"."""
+    """The subject: "images against the mesh"."""
     kind: str
-    """What they have in common, such as a modality."""
+    """What the faults have in common, such as a modality."""
     count: int
-    """How many there are."""
+    """The number of faults."""
     first: list[tuple[str, str]]
-    """The first twenty: the file, from the data set's folder, and what is wrong with it."""
+    """The first twenty: the file, relative to the data set's folder, and its fault."""
 
 
 @dataclass(frozen=True)
 class VerifyReport:
-    """What was found wrong in a data set."""
+    """The faults found in a data set."""
 
     faults: list[FaultGroup]
     notes: list[str]
-    """What was left out, and why."""
+    """Omitted checks, and why."""
     files: int
-    """Files that were looked at."""
+    """The number of files read."""
     checks: int
-    """Checks that were made."""
+    """The number of checks."""
     unread: str | None
-    """What kept a file from being read that may be read the next time: the report is not complete."""
+    """The reason why a file could not be read that may be readable the next time; the report is incomplete
+    then.
+    """
     text: str
-    """What `s3d verify` prints."""
+    """The output of `s3d verify`."""
 
     @property
     def fault_count(self) -> int:
-        """How many faults there are."""
+        """The number of faults."""
         return sum(group.count for group in self.faults)
 
     @property
     def ok(self) -> bool:
-        """Whether all was read, and nothing is wrong."""
+        """Whether all was read and no fault was found."""
         return not self.faults and self.unread is None
 
     def __str__(self) -> str:
@@ -66,36 +68,38 @@ class VerifyReport:
 
 
 class _Answer:
-    """Data, and the same as text."""
+    """A result as data and as text."""
 
     def __init__(self, data: Any, text: str) -> None:
         self.data, self.text = data, text
 
     data: Any
-    """What the command writes as JSON."""
+    """The data that the command writes as JSON."""
     text: str
-    """What the command prints."""
+    """The text that the command prints."""
 
     def __str__(self) -> str:
         return self.text
 
 
 class Evaluation(_Answer):
-    """Scores, with the definition that they follow. `data` is what `s3d eval --json` writes."""
+    """Scores, with their definition. `data` is what `s3d eval --json` writes."""
 
     @property
     def definition(self) -> list[str]:
-        """How it is counted, a sentence each."""
+        """The definition of the scores, a sentence each."""
         return self.data["definition"]  # type: ignore[no-any-return]
 
     @property
     def tables(self) -> list[str]:
-        """The titles of its tables: one a fold; with several folds, of all pooled and of the mean too."""
+        """The titles of the tables: one for each fold, and with several folds one for all pooled and one for
+        the mean.
+        """
         return [table["title"] for table in self.data["tables"]]
 
     def score(self, row: str, column: str, table: str | None = None) -> float:
-        """A score by the names of its row (a class, "mean", …), column ("IoU", …) and table, the last of
-        `tables` by default; NaN where it is not defined.
+        """Returns the score with these names: its row (a class, "mean", …), its column ("IoU", …) and its
+        table, by default the last of `tables`. NaN if it is not defined.
         """
         title = self.tables[-1] if table is None else table
         for found in self.data["tables"]:
@@ -113,21 +117,21 @@ class Evaluation(_Answer):
 
 
 class Comparison(_Answer):
-    """What differs between two data sets. `data` is what `s3d compare --json` writes."""
+    """The differences between two data sets. `data` is what `s3d compare --json` writes."""
 
     def __init__(self, equal: bool, data: Any, text: str) -> None:
         super().__init__(data, text)
         self.equal = equal
 
     equal: bool
-    """Whether nothing differs, and all could be compared."""
+    """Whether all could be compared and nothing differs."""
 
     def __repr__(self) -> str:
         return f"Comparison({'equal' if self.equal else 'different'})"
 
 
 class Statistics(_Answer):
-    """The paper's tables. `data` is what `statistics.json` holds, `text` is Markdown."""
+    """The paper's tables. `data` is the content of `statistics.json`, `text` is Markdown."""
 
     def __repr__(self) -> str:
         return f"Statistics({len(self.data['areas'])} areas)"
@@ -137,7 +141,7 @@ class Statistics(_Answer):
 
 
 def root_of(dataset: Any) -> Path:
-    """The folder of a `DataSet`, or a path itself."""
+    """Returns the folder of a `DataSet`, or a path itself."""
     return Path(dataset if isinstance(dataset, (str, os.PathLike)) else dataset.root)
 
 
@@ -150,9 +154,9 @@ def info(
     threads: int | None = None,
     progress: Progress = None,
 ) -> str:
-    """What a scene file, a mesh, or the folder of an area or a data set holds, how large a data set of it
-    would be, and what looks wrong: what `s3d info` prints. `see` and `place_cameras` place scan locations, as
-    `export` would.
+    """Describes a scene file, a mesh, or the folder of an area or data set: its content, the size of a data
+    set made from it, and what looks wrong. Returns the output of `s3d info`. `see` and `place_cameras` place
+    scan locations, as in `export`.
     """
     return _native.info(Path(scene), see, place_cameras, lenient, threads, sink(progress))
 
@@ -160,8 +164,8 @@ def info(
 def verify(
     dataset: Any, *, full: bool = False, threads: int | None = None, progress: Progress = None
 ) -> VerifyReport:
-    """Reads every file of a data set (a `DataSet` or its folder) back, and renders every pixel of every image
-    again. With `full` the candidate views are scored again as well, and the trees of points are compared.
+    """Reads back every file of a data set (a `DataSet` or its folder), and renders every pixel of every image
+    again. With `full`, candidate views are scored again too, and the trees of points are compared.
     """
     faults, notes, files, checks, unread, text = _native.verify(
         root_of(dataset), full, threads, sink(progress)
@@ -191,14 +195,16 @@ def evaluate(
     or "panoptic".
 
     - `truth`: a `DataSet`, or its folder.
-    - `pred`: the folder or file of predictions, in the forms that docs/evaluation.md describes.
-    - `variant`: whose definition; the first of the protocol by default.
-    - `folds`: "all" areas together, "each" for itself, or the three of the "paper"; or `areas`, together.
-    - `bootstrap`: so many draws for 95 % intervals, by `seed`.
-    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` (det), `stuff`
-      (panoptic): see the protocols.
+    - `pred`: the folder or file of predictions. The page "Evaluation" of the documentation describes its
+      forms.
+    - `variant`: the definition to follow; by default the first of the protocol.
+    - `folds`: "all" areas together, "each" area by itself, or the three folds of the "paper".
+    - `areas`: score these areas together instead.
+    - `bootstrap`: the number of draws for 95 % intervals, drawn by `seed`.
+    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` (det), `stuff` (panoptic):
+      see the protocols.
 
-    Raises `FileError` for a prediction that is missing, double, or of the wrong size.
+    Raises `FileError` for a prediction that is missing, duplicate, or of the wrong size.
     """
     how = SimpleNamespace(
         variant=variant,
@@ -218,8 +224,8 @@ def evaluate(
 def compare(
     a: Any, b: Any, *, full: bool = False, threads: int | None = None, progress: Progress = None
 ) -> Comparison:
-    """What differs between two data sets, each a `DataSet` or its folder: options, files, labels by face,
-    views, images, poses. With `full`, files whose listed checksums agree are read as well.
+    """Compares two data sets, each a `DataSet` or its folder: options, files, labels by face, views, images,
+    poses. With `full`, files whose listed checksums agree are read as well.
     """
     equal, data, text = _native.compare(root_of(a), root_of(b), full, threads, sink(progress))
     return Comparison(equal, json.loads(data), text)

@@ -1,4 +1,4 @@
-"""What cameras and rays see of a mesh."""
+"""Renders images of a mesh, and casts rays at it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ._mesh import Mesh, MeshLike, as_mesh
 from ._progress import Progress, sink
 
 MODALITIES = ("rgb", "depth", "normal", "xyz", "face")
-"""What a view can be asked for; `Images` says what each is."""
+"""The modalities of a view; `Images` describes each."""
 
 
 class Images:
-    """The images of one view or panorama, H × W, all of the same hit a pixel. Those that were not asked for
-    are not there.
+    """The images of one view or panorama, H × W. Each pixel shows the same hit in all of them. Only the
+    requested modalities exist.
     """
 
     K: Matrix | None
@@ -43,7 +43,7 @@ class Images:
 
     @property
     def modalities(self) -> tuple[str, ...]:
-        """The names of the images that are there."""
+        """The names of the images."""
         return tuple(self._arrays)
 
     @property
@@ -88,13 +88,13 @@ class Images:
         return f"Images({kind}, {width} × {height}: {', '.join(self._arrays)})"
 
     def _repr_png_(self) -> bytes:
-        """The first image as a picture, for notebooks."""
+        """Returns the first image as PNG, for notebooks."""
         name, array = next(iter(self._arrays.items()))
         return _native.encode_png(picture(name, array))
 
 
 def picture(name: str, array: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
-    """Colours, (H, W, 3), that show a modality."""
+    """Returns colours, (H, W, 3), that show a modality."""
     if name == "rgb":
         return array
     if name == "face":
@@ -116,20 +116,20 @@ def picture(name: str, array: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rays:
-    """What N rays hit first."""
+    """The first hits of N rays."""
 
     t: npt.NDArray[np.float64]
-    """(N,), how far along: the multiple of the direction, metres if that has length 1. NaN where nothing is
-    hit.
+    """(N,), the position along the ray as a multiple of the direction; metres if the direction has length 1.
+    NaN without a hit.
     """
     face: npt.NDArray[np.int32]
-    """(N,), index of the mesh's face. −1 where nothing is hit."""
+    """(N,), index of the mesh's face. −1 without a hit."""
     origins: npt.NDArray[np.float64]
     directions: npt.NDArray[np.float64]
 
     @property
     def xyz(self) -> npt.NDArray[np.float64]:
-        """(N, 3), world metres. NaN where nothing is hit."""
+        """(N, 3), world metres. NaN without a hit."""
         return self.origins + self.t[:, None] * self.directions
 
     def __len__(self) -> int:
@@ -140,15 +140,16 @@ class Rays:
 
 
 class Scene:
-    """A mesh with a tree over its faces: built once, shared by any number of threads. The mesh is not copied.
+    """A mesh with a tree over its faces, built once and shared by any number of threads. The mesh is not
+    copied.
 
-    Visibility is exact: no pinholes, no leaks at shared edges, the same bits for any number of threads, and
-    the same as in the files of `s3d render` and `s3d export`. One image is made on the calling thread,
-    without Python's lock.
+    Visibility is exact: no pinholes, no leaks at shared edges. The bits are the same for any number of
+    threads, and the same as in the files of `s3d render` and `s3d export`. One image is made on the calling
+    thread, without Python's lock.
     """
 
     def __init__(self, mesh: MeshLike) -> None:
-        """`mesh` is what `as_mesh` takes."""
+        """`mesh` is anything that `as_mesh` takes."""
         self.mesh: Mesh = as_mesh(mesh)
         self._native = _native.Scene(self.mesh._native)
 
@@ -165,16 +166,17 @@ class Scene:
         rgb_samples: int = 1,
         smooth_normals: bool = False,
     ) -> Images:
-        """What a pinhole camera sees.
+        """Renders the images of a pinhole camera.
 
         - `K`: 3 × 3, pixels, without skew; the centre of the first pixel is at (0.5, 0.5).
         - `T_world_cam`: camera → world, 4 × 4, OpenCV's axes (x right, y down, z forward), metres.
         - `size`: (width, height), pixels.
         - `modalities`: some of "rgb", "depth", "normal", "xyz", "face".
-        - `rgb_samples`: from 1 to 64; how many places of a pixel tell its colour where surfaces end or turn.
-        - `smooth_normals`: those interpolated from the mesh's own, where it has some.
+        - `rgb_samples`: from 1 to 64, the number of samples for the colour of a pixel where surfaces end or
+          bend.
+        - `smooth_normals`: interpolate the normals of the mesh's vertices, if it has any.
 
-        Raises `UsageError` for a matrix that is no camera, with what is wrong with it.
+        Raises `UsageError` for an invalid matrix, and says what is wrong with it.
         """
         return self._images(
             matrix("K", K, (3, 3)), T_world_cam, size, modalities, rgb_samples, smooth_normals
@@ -189,9 +191,9 @@ class Scene:
         rgb_samples: int = 1,
         smooth_normals: bool = False,
     ) -> Images:
-        """All around a place: equirectangular, `width` × `width` / 2 pixels. The middle column looks along
-        the pose's forward axis, projected to the horizon; rows go from +90° down to −90° in the world,
-        whatever the pose's tilt. `pose` is a `Location`, a matrix 4 × 4, or a place (3,) from which the
+        """Renders an equirectangular panorama of `width` × `width` / 2 pixels. The middle column looks along
+        the pose's forward axis, projected to the horizon. Rows go from +90° down to −90° in the world,
+        whatever the pose's tilt. `pose` is a `Location`, a 4 × 4 matrix, or a position (3,) from which the
         middle looks along +Y. `depth` is along the ray.
         """
         return self._images(None, pose, (width, width // 2), modalities, rgb_samples, smooth_normals)
@@ -207,8 +209,8 @@ class Scene:
         smooth_normals: bool = False,
         threads: int | None = None,
     ) -> Iterator[Images]:
-        """A generator of `render` for each pose, in order, made on `threads` threads (one a core if None). No
-        more than three images a thread are there at a time: `poses` may be endless.
+        """Returns a generator of `render` for each pose, in order, made on `threads` threads (one a core if
+        None). At most three images a thread exist at a time, so `poses` may be endless.
         """
         intrinsics = matrix("K", K, (3, 3))
         count = os.cpu_count() or 1 if threads is None else threads
@@ -245,10 +247,10 @@ class Scene:
         rgb_samples: int = 1,
         smooth_normals: bool = False,
     ) -> dict[str, npt.NDArray[Any]]:
-        """As `render` (as `panorama` if `K` is None), but with pixels as the files of a data set store them:
-        `depth` uint16, 512 a metre, 65,535 where nothing is seen or beyond 128 m; `normal` uint8, 127.5 +
-        127.5 n in the paper's axes (right, down, towards the camera), 128 where nothing is seen; `xyz`
-        float16, 0 where nothing is seen; `rgb` and `face` as ever.
+        """Renders like `render` (like `panorama` if `K` is None), with pixels as stored in the files of a
+        data set: `depth` uint16, 512 a metre, 65,535 where nothing is seen or beyond 128 m; `normal` uint8,
+        127.5 + 127.5 n in the paper's axes (right, down, towards the camera), 128 where nothing is seen;
+        `xyz` float16, 0 where nothing is seen; `rgb` and `face` as in `render`.
         """
         intrinsics = None if K is None else matrix("K", K, (3, 3))
         return self._arrays(
@@ -256,11 +258,13 @@ class Scene:
         )
 
     def cast(self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, threads: int | None = None) -> Rays:
-        """What rays hit first, from either side of the faces; exact, as in images.
+        """Returns the first hits of rays, from either side of the faces; exact, as in images.
 
-        `origins`: (N, 3), or (3,) for all; `directions`: (N, 3), of any length; both in the world, metres.
-        Nothing at t ≤ 0 is hit. Rays of an endless or zero direction hit nothing. On `threads` threads, one a
-        core if None.
+        - `origins`: (N, 3), or (3,) for all rays, world metres.
+        - `directions`: (N, 3), of any length, world metres.
+
+        Only hits at t > 0 count. Rays with an infinite or zero direction hit nothing. Uses `threads` threads,
+        one a core if None.
         """
         ways = np.ascontiguousarray(np.atleast_2d(np.asarray(directions, np.float64)))
         starts = np.ascontiguousarray(np.atleast_2d(np.asarray(origins, np.float64)))
@@ -276,15 +280,16 @@ class Scene:
         threads: int | None = None,
         progress: Progress = None,
     ) -> list[Location]:
-        """Scan locations where a tripod could stand: 1.5 m above surfaces that face up, inside, clear of
-        things.
+        """Returns scan locations where a tripod could stand: 1.5 m above surfaces that face up, indoors,
+        clear of objects.
 
-        As few as see the share `see` (0.95 if nothing is given) of the surface that can be seen from
-        anywhere, the most useful first; or, with `apart`, a pattern of which no two that see each other are
-        nearer than that, metres. They are those of `s3d export` on the same mesh and seed.
+        By default these are as few locations as see the share `see` (0.95 if neither is given) of the surface
+        that can be seen from anywhere, the most useful first. With `apart` they are a pattern in which
+        locations that see each other are at least `apart` metres apart. `s3d export` places the same
+        locations on the same mesh and seed.
 
-        Raises `InputError` if there is no such place, with what was found: the mesh may be upside down, or in
-        other units.
+        Raises `InputError` if there is no such place, and says what was found: the mesh may be upside down or
+        in other units.
         """
         placed = self._native.place_cameras(see, apart, seed, threads, sink(progress))
         return [Location(uuid, np.array(pose)) for uuid, pose in placed]

@@ -1,4 +1,4 @@
-//! Data sets that are made for tests, and reports that are read back.
+//! Makes data sets for tests, and reads reports back.
 
 // Not every test file uses all of it.
 #![allow(dead_code)]
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// An export that takes little time, of the built-in scene.
+/// A quick export of the built-in scene.
 pub(crate) fn data_set(folder: &Path, labelled: bool) -> PathBuf {
     let out = folder.join("data set");
     export(folder, labelled)
@@ -24,7 +24,7 @@ pub(crate) fn data_set(folder: &Path, labelled: bool) -> PathBuf {
     out
 }
 
-/// That export, not yet made.
+/// That export, before it runs.
 pub(crate) fn export(folder: &Path, labelled: bool) -> Export {
     let scan = ScanOptions { points_per_m2: 60.0, ..ScanOptions::default() };
     let scene = Building::demo()

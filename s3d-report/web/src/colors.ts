@@ -1,22 +1,19 @@
-// Colours of what is no colour: distances, classes, instances.
+// Colours for values without a colour of their own: distances, classes, instances.
 
 import type { Index, Rgb } from "./data.js";
 
 /** Where nothing was seen. */
 export const MISSING: Rgb = [0, 0, 0];
-/** Surface without a label, in pictures of classes and instances. */
+/** Surface without a label, in images of classes and instances. */
 export const NULL_LABEL: Rgb = [128, 128, 128];
-/**
- * What has a label of another class in another data set, and what is another instance of the class
- * there.
- */
+/** A label of another class in the other data set, and another instance of the same class there. */
 export const OTHER_CLASS: Rgb = [255, 0, 255];
 export const OTHER_INSTANCE: Rgb = [255, 190, 40];
 
-/** A colour in the words of shaders. */
+/** A colour as a GLSL expression. */
 export const shader = (color: Rgb): string => `vec3(${color.map((c) => (c / 255).toFixed(6)).join(", ")})`;
 
-/** A colour of OKLCH (B. Ottosson, 2020), cut to what a screen shows. */
+/** A colour of OKLCH (B. Ottosson, 2020), clipped to sRGB. */
 function oklch(lightness: number, chroma: number, hueDeg: number): Rgb {
   const hue = (hueDeg * Math.PI) / 180;
   const [a, b] = [chroma * Math.cos(hue), chroma * Math.sin(hue)];
@@ -63,12 +60,12 @@ export function gradient(ramp: (n: number) => Uint8Array): string {
   return `linear-gradient(to right, ${stops.join(", ")})`;
 }
 
-/** Columns of the tables of colours by label. */
+/** The number of columns in tables of colours by label. */
 export const TABLE_WIDTH = 256;
 
 /**
- * A table of colours by label, rows of `TABLE_WIDTH`. The opacity is a number of the class, 0 without
- * one: its lower byte in the table by class, the upper one in that by instance.
+ * A table of colours by label, in rows of `TABLE_WIDTH`. The opacity is a number for the class, 0 without a
+ * class: its lower byte in the table by class, its upper byte in the table by instance.
  */
 export function labelTable(index: Index, by: "class" | "instance"): { pixels: Uint8Array; rows: number } {
   const rows = Math.max(1, Math.ceil(index.labels.length / TABLE_WIDTH));

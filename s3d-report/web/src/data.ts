@@ -1,4 +1,5 @@
-// What a report holds (docs/report.md), and how its files come in: as scripts, when they are looked at.
+// The content of a report (`s3d_report::files`), and its files, which are loaded as scripts when they are
+// needed.
 
 export type Rgb = [number, number, number];
 
@@ -6,7 +7,7 @@ export interface Seen {
   coverage: number | null;
   unlabelled: number | null;
   instances: number | null;
-  /** Places of classes, and their shares of the pixels. */
+  /** Indices of classes, and their shares of the pixels. */
   classes: [number, number][];
 }
 
@@ -39,7 +40,7 @@ export interface View {
   fov_deg: number | null;
   entropy: number | null;
   place: Place | null;
-  /** Of photographs; like `forward` and `up`, the directions of its camera in the world. */
+  /** For a photograph. Like `forward` and `up`, the directions of its camera, it is in world coordinates. */
   position: Rgb | null;
   forward?: Rgb | null;
   up?: Rgb | null;
@@ -121,11 +122,11 @@ export interface VoteSpread {
 
 export interface Mesh {
   area: number;
-  /** Of the data set's mesh. */
+  /** The number in the data set's mesh. */
   faces: number;
-  /** In the report's files. */
+  /** The number in the report's files. */
   shown: number;
-  /** The edge of the cubes whose vertices became one; null if none did. */
+  /** The edge of the cubes in which vertices were merged, in metres; null if none were. */
   cell_m: number | null;
   min: Rgb;
   max: Rgb;
@@ -172,7 +173,7 @@ export interface Index {
   /** The name of the data set that the report was made against. */
   against?: string | null;
   pixels_by_class: number[];
-  /** Faces and m² of each class, filled ones too. */
+  /** Faces and m² of each class, including filled faces. */
   surface_by_class: Surface[];
   pixels_unlabelled: number;
   faults: { path: string; message: string }[];
@@ -180,7 +181,7 @@ export interface Index {
 }
 
 export interface Pinhole {
-  /** Focal lengths and principal point, pixels of the data set's image. */
+  /** Focal lengths and principal point, in pixels of the data set's image. */
   k: [number, number, number, number];
   /** World → camera, OpenCV's axes. */
   rt: number[][];
@@ -204,10 +205,10 @@ declare global {
   }
 }
 
-/** The form of files that this page reads. */
+/** The version of the files that this page reads. */
 export const FORM = 2;
 
-/** So many files of a kind are kept; those that were not looked at for longest go. */
+/** The number of files of a kind that are kept. The least recently used file goes first. */
 const KEPT: Record<string, number> = {
   index: 1,
   pano: 4,
@@ -224,7 +225,7 @@ const arriving = new Map<string, (text: string, packed: boolean) => void>();
 
 window.s3dReport = (key, text, packed = false) => arriving.get(key)?.(text, packed);
 
-/** What is packed: Base64 of a zlib stream. */
+/** Decodes Base64 of a zlib stream. */
 export function unpacked(text: string): Response {
   const characters = atob(text);
   const bytes = new Uint8Array(characters.length);
@@ -232,7 +233,7 @@ export function unpacked(text: string): Response {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate")));
 }
 
-/** The value that the file `data/KEY.js` hands over. */
+/** The value in the file `data/KEY.js`. */
 export function load<T>(key: string): Promise<T> {
   const there = files.get(key);
   files.delete(key);

@@ -1,4 +1,4 @@
-// Elements. All text goes in as text nodes: a name cannot be markup.
+// Elements. All text becomes text nodes, so a name cannot be markup.
 
 type Child = Node | string | number | null | undefined | false;
 type Properties = Record<string, string | number | boolean | null | undefined | ((event: never) => void)>;
@@ -21,7 +21,7 @@ export function append(element: Element, children: Child[]): void {
   }
 }
 
-/** An HTML element. Functions become listeners, all else attributes. */
+/** Makes an HTML element. Functions become listeners, all else attributes. */
 export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   properties: Properties = {},
@@ -32,7 +32,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-/** An SVG element. */
+/** Makes an SVG element. */
 export function s<K extends keyof SVGElementTagNameMap>(
   tag: K,
   properties: Properties = {},
@@ -43,11 +43,11 @@ export function s<K extends keyof SVGElementTagNameMap>(
   return element;
 }
 
-/** Lists that are longer are searched by typing. */
+/** Longer lists have a search field. */
 const LONG = 100;
 let lists = 0;
 
-/** A list to choose from: value and text of each entry. */
+/** A list to choose from, with the value and text of each entry. */
 export function choice(
   label: string,
   entries: [string, string][],
@@ -78,7 +78,7 @@ function search(
     value: now,
     class: "search",
   });
-  // The browser offers what fits to the text, so there is none while one chooses.
+  // The browser offers only entries that match the text, so the text is empty while one chooses.
   field.addEventListener("focus", () => {
     field.placeholder = now;
     field.value = "";
@@ -95,7 +95,7 @@ function search(
   return h("span", {}, field, options);
 }
 
-/** A column of which the first cell is a `.number` is one of numbers. */
+/** A table. A column whose first cell is a `.number` has numbers. */
 export function table(head: string[], rows: Child[][]): HTMLTableElement {
   const isNumber = (column: number): boolean => {
     const cell = rows[0]?.[column];
@@ -129,7 +129,7 @@ export function percent(share: number): string {
 /** `1 room`, `2 rooms`. */
 export const several = (n: number, noun: string): string => `${count(n)} ${noun}${n === 1 ? "" : "s"}`;
 
-/** `conferenceRoom_1` as people write it. */
+/** `conferenceRoom_1` in words. */
 export function roomName(room: string): string {
   if (room === "" || room === "unknown_1") return "unknown room";
   const words = room.replace(/([a-z])([A-Z])/g, "$1 $2").replaceAll("_", " ");

@@ -1,18 +1,18 @@
-// What the faces of a mesh voted: `faces_A.js`.
+// The votes for the faces of a mesh: `faces_A.js`.
 
 import { load, unpacked } from "./data.js";
 
 /** The margin of a face without votes. */
 export const NO_VOTES = 255;
-/** The margin of a face that nobody disputes. */
+/** The margin of a face that all votes agree on. */
 export const SURE = 254;
 
 export interface FaceVotes {
-  /** Places of labels. */
+  /** Indices of labels. */
   label: Uint32Array;
-  /** Likewise; 0 if nobody voted otherwise. */
+  /** Indices of labels; 0 if all votes agree. */
   runnerUp: Uint32Array;
-  /** 254 times the lead of the first over the second, as a share of all votes. */
+  /** 254 times the lead of the first label over the second, as a share of all votes. */
   margin: Uint8Array;
 }
 
@@ -23,7 +23,7 @@ interface Packed {
   margin: string;
 }
 
-/** The bytes of a packed row of numbers: Base64 of a zlib stream. */
+/** The bytes of packed numbers: Base64 of a zlib stream. */
 export const unpack = (text: string): Promise<ArrayBuffer> => unpacked(text).arrayBuffer();
 
 async function read(area: number): Promise<FaceVotes> {
@@ -47,7 +47,7 @@ async function read(area: number): Promise<FaceVotes> {
 
 let last: { area: number; votes: Promise<FaceVotes> } | null = null;
 
-/** The votes of an area's faces. Those of one area are kept. */
+/** The votes of an area's faces. Only the last area is kept. */
 export function loadFaceVotes(area: number): Promise<FaceVotes> {
   if (last?.area === area) return last.votes;
   const votes = read(area);

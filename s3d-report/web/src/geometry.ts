@@ -1,4 +1,4 @@
-// Pixels, rays and places: the conventions of the data set (conventions.json).
+// Pixels, rays and points, by the conventions of the data set (conventions.json).
 
 import type { Location, Picture, Rgb } from "./data.js";
 
@@ -6,7 +6,7 @@ export type Vec3 = Rgb;
 
 const TURN = 2 * Math.PI;
 
-/** Where the middle of the screen looks in a panorama: right of its centre column, above the horizon. */
+/** The direction in a panorama at the middle of the screen: right of its centre column, above the horizon. */
 export interface Gaze {
   lon: number;
   lat: number;
@@ -14,7 +14,7 @@ export interface Gaze {
   fov: number;
 }
 
-/** The pixel of an axis of `from` pixels that pixel `i` of a reduced axis of `to` shows. */
+/** The pixel of the full-size axis (`from` pixels) that pixel `i` of the reduced axis (`to` pixels) shows. */
 export function sourcePixel(i: number, from: number, to: number): number {
   return Math.floor(((2 * i + 1) * from) / (2 * to));
 }
@@ -29,12 +29,12 @@ export function clampGaze(gaze: Gaze): Gaze {
   };
 }
 
-/** Pixels of the screen from the middle at which a ray is 45° off. */
+/** The focal length in pixels of the screen: a ray this far from the middle is 45° off. */
 export function focal(gaze: Gaze, width: number, height: number): number {
   return Math.max(width, height) / 2 / Math.tan(gaze.fov / 2);
 }
 
-/** The place of a panorama, in shares of its width and height, that a point of the screen shows. */
+/** The point of a panorama, in shares of its width and height, that a point of the screen shows. */
 export function panoramaAt(
   gaze: Gaze,
   width: number,
@@ -52,7 +52,7 @@ export function panoramaAt(
   return [u - Math.floor(u), 0.5 - lat / Math.PI];
 }
 
-/** Where on the screen a direction of a panorama is; nothing for what is behind. */
+/** The point of the screen that shows a direction of a panorama; nothing for directions behind. */
 export function screenAt(
   gaze: Gaze,
   width: number,
@@ -70,8 +70,8 @@ export function screenAt(
 }
 
 /**
- * A world point on the screen of a panorama, as x·w, y·w and w: straight lines stay straight, and w is
- * not positive for what is behind.
+ * A world point on the screen of a panorama, as x·w, y·w and w: straight lines stay straight, and w is not
+ * positive for points behind.
  */
 export function panoramaScreen(
   location: Location,
@@ -93,7 +93,7 @@ export function panoramaScreen(
   return [(width / 2) * forward + f * right, (height / 2) * forward - f * up, forward];
 }
 
-/** A world point in the image of a view, in shares of its size, likewise. */
+/** A world point in the image of a view, as x·w, y·w and w, in shares of its size. */
 export function viewScreen(picture: Picture, point: Vec3): Vec3 | null {
   if (!picture.camera) return null;
   const { k, rt } = picture.camera;

@@ -1,5 +1,5 @@
-// A picture on a WebGL2 canvas: two of its modalities, left and right of a line, on a sphere or flat;
-// or another picture of the same camera right of the line.
+// A picture on a WebGL2 canvas, on a sphere or flat. Left and right of a line it shows two modalities, or
+// another picture of the same camera on the right.
 
 import {
   MISSING,
@@ -27,7 +27,7 @@ export const MODALITIES = [
 ] as const;
 export type Modality = (typeof MODALITIES)[number];
 
-/** Columns of the table of margins by face. */
+/** The number of columns in the table of margins by face. */
 const MARGINS_WIDTH = 4096;
 
 const VERTICES = `#version 300 es
@@ -117,7 +117,7 @@ void main() {
   color = vec4(show(at.x < line ? left : right, uv, two && at.x >= line), 1.0);
 }`;
 
-/** Numbers of a picture's pixels, as far as it has them. */
+/** The numbers of a picture's pixels; null for modalities that it does not have. */
 export interface Numbers {
   width: number;
   height: number;
@@ -133,25 +133,25 @@ export const NO_DEPTH = 65_535;
 export const NO_LABEL = 0x0d0d0d;
 export const NO_FACE = 0xffffff;
 
-/** A picture of the same camera, to be shown right of the line. */
+/** A picture of the same camera, shown right of the line. */
 export interface Other {
   picture: Picture;
-  /** The places of its labels in the index that the renderer was made with. */
+  /** The indices of its labels in the renderer's index. */
   labels: Uint32Array;
-  /** What its depths are multiplied by. */
+  /** The factor for its depths. */
   depth: number;
 }
 
 export interface Scene {
   left: Modality;
   right: Modality;
-  /** Where the line is, a share of the width. */
+  /** The position of the line as a share of the width. */
   split: number;
-  /** Where a panorama is looked at; a view is flat. */
+  /** The direction of view in a panorama; null for a view, which is flat. */
   gaze: Gaze | null;
 }
 
-/** Where a flat picture of this shape lies on a canvas: left, top, width, height. */
+/** The rectangle of a flat picture with this shape on a canvas: left, top, width, height. */
 export function placeOf(
   of: [number, number],
   width: number,
@@ -169,13 +169,13 @@ async function image(url: string): Promise<HTMLImageElement> {
   return element;
 }
 
-/** The pixels of an image as numbers of 24 bits. */
+/** The pixels of an image as 24-bit numbers. */
 function numbers(element: HTMLImageElement): { width: number; height: number; values: Uint32Array } {
   const { naturalWidth: width, naturalHeight: height } = element;
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [width, height];
   const context = canvas.getContext("2d", { willReadFrequently: true, colorSpace: "srgb" });
-  if (!context) throw new Error("this browser draws on no canvas");
+  if (!context) throw new Error("this browser cannot draw on a canvas");
   context.drawImage(element, 0, 0);
   const bytes = context.getImageData(0, 0, width, height).data;
   const values = new Uint32Array(width * height);
@@ -233,7 +233,7 @@ export class Renderer {
         throw new Error(`WebGL 2: ${log ?? "no shader"}`);
     }
     gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error("WebGL 2 links no program");
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error("WebGL 2 cannot link the program");
     return program;
   }
 
@@ -266,7 +266,7 @@ export class Renderer {
     this.picture = null;
   }
 
-  /** Takes a picture, and returns the numbers of its pixels. */
+  /** Uploads a picture, and returns the numbers of its pixels. */
   async take(picture: Picture): Promise<Numbers> {
     const [rgb, normal, depth, label, face] = await Promise.all(
       [picture.rgb, picture.normal, picture.depth, picture.label, picture.face].map((url) =>
@@ -300,7 +300,7 @@ export class Renderer {
     };
   }
 
-  /** Takes the picture that is shown right of the line, and returns the numbers of its pixels. */
+  /** Uploads the picture for the right of the line, and returns the numbers of its pixels. */
   async takeOther({ picture, labels, depth: factor }: Other): Promise<Numbers> {
     const { LINEAR, NEAREST } = this.gl;
     const [rgb, normal, depth, label] = await Promise.all(
@@ -338,7 +338,7 @@ export class Renderer {
     };
   }
 
-  /** Takes the margins of the mesh's faces. */
+  /** Uploads the margins of the mesh's faces. */
   takeMargins(margin: Uint8Array): void {
     const { gl } = this;
     const rows = Math.max(1, Math.ceil(margin.length / MARGINS_WIDTH));
@@ -350,7 +350,7 @@ export class Renderer {
     this.faces = margin.length;
   }
 
-  /** The ends of the ramp of depths, units. */
+  /** The ends of the ramp of depths, in units of depth. */
   get range(): [number, number] {
     return this.ends;
   }
@@ -398,20 +398,20 @@ export class Renderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /** Gives the graphics card back what it holds. */
+  /** Frees the memory of the graphics card. */
   close(): void {
     this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
 }
 
-/** Numbers of 24 bits as pixels. */
+/** 24-bit numbers as pixels. */
 function pixelsOf(values: Uint32Array): Uint8Array {
   const pixels = new Uint8Array(4 * values.length);
   values.forEach((value, i) => pixels.set([value >> 16, (value >> 8) & 255, value & 255, 255], 4 * i));
   return pixels;
 }
 
-/** The depths that 1 and 98 of 100 pixels do not reach. */
+/** The 1st and the 98th percentile of the depths. */
 function endsOf(values: Uint32Array): [number, number] {
   const bins = new Uint32Array(1024);
   let all = 0;

@@ -1,4 +1,4 @@
-// The page as a whole: its tabs, and which of them is open.
+// The whole page: its tabs, and the open one.
 
 import { comparePage } from "./compare/page.js";
 import { FORM, type Index, load } from "./data.js";
@@ -65,7 +65,7 @@ async function start(): Promise<void> {
     throw new Error(
       `data/index.js has form ${index.form}, and this page reads ${FORM}: make the report again`,
     );
-  // Photographs are numbered by their names.
+  // Photographs are numbered in the natural order of their names.
   const numbered = new Intl.Collator("en", { numeric: true });
   if (index.views.some((view) => view.photograph !== null))
     index.views.sort((a, b) => numbered.compare(a.photograph ?? "", b.photograph ?? ""));

@@ -1,13 +1,13 @@
-// What is marked in a picture: the place that was clicked last, and a line to measure with. Both lie in
-// the world, so they stay where they are while one turns.
+// Marks in a picture: the point that was clicked last, and a measuring line. Both are in world coordinates,
+// so they stay in place while the view turns.
 
 import type { Rgb } from "./data.js";
 import { h, s } from "./dom.js";
 
-/** A point of the screen as x·w, y·w and w; w is not positive for what is behind. */
+/** A point of the screen as x·w, y·w and w; w is not positive for points behind. */
 export type Projected = [number, number, number];
 
-/** What is nearer to the camera is not drawn, metres. */
+/** Lines nearer to the camera than this are not drawn, metres. */
 const NEAR = 1e-3;
 
 function clipped(a: Projected, b: Projected): [Projected, Projected] | null {
@@ -20,7 +20,7 @@ function clipped(a: Projected, b: Projected): [Projected, Projected] | null {
   return [toward(a, b), toward(b, a)];
 }
 
-/** The part of a segment inside of a box from (0, 0), or nothing (Liang and Barsky). */
+/** The part of a segment inside a box that starts at (0, 0), or nothing (Liang and Barsky). */
 function inside(
   [x0, y0]: [number, number],
   [x1, y1]: [number, number],
@@ -46,7 +46,7 @@ function inside(
 const screen = ([x, y, w]: Projected): [number, number] => [x / w, y / w];
 
 export class Marks {
-  /** Two ends at most. */
+  /** At most two ends. */
   private ends: Rgb[] = [];
   private pin: Rgb | null = null;
   private readonly halo = s("line", { class: "measure-halo" });
@@ -64,13 +64,13 @@ export class Marks {
   private readonly link = h("a", { class: "chip corner", hidden: true }, "Show in 3D");
   readonly elements: Element[] = [this.picture, this.distance, this.place, this.link];
 
-  /** How far the two ends are from one another, metres. */
+  /** The distance between the two ends, metres. */
   get length(): number | null {
     const [a, b] = this.ends;
     return a && b ? Math.hypot(...a.map((c, axis) => c - (b[axis] ?? 0))) : null;
   }
 
-  /** A click while measuring: the first end, the second, or the first of the next line. */
+  /** Handles a click while measuring: the first end, the second, or the first of the next line. */
   measure(point: Rgb): void {
     this.ends = this.ends.length === 1 ? [...this.ends, point] : [point];
     const { length } = this;
@@ -82,7 +82,7 @@ export class Marks {
     this.distance.textContent = "";
   }
 
-  /** The place that was clicked, and the link to it in 3D. */
+  /** Marks the point that was clicked, with a link to it in 3D. */
   pinAt(point: Rgb | null, href: string): void {
     this.pin = point;
     this.link.setAttribute("href", href);

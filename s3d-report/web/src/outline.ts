@@ -1,6 +1,6 @@
 // Outlines from above: boxes, centres, sizes.
 
-/** With a margin around what it is of. */
+/** A box with a margin around its content. */
 export interface Box {
   x: number;
   y: number;
@@ -18,7 +18,7 @@ export function boxOf(points: number[][]): Box {
   return { x: x0 - margin, y: y0 - margin, w: x1 - x0 + 2 * margin, h: y1 - y0 + 2 * margin };
 }
 
-/** The centre of a ring's surface. */
+/** The centroid of a ring. */
 export function middleOf(ring: [number, number][]): [number, number] {
   let [area, x, y] = [0, 0, 0];
   ring.forEach(([ax, ay], i) => {
@@ -31,7 +31,7 @@ export function middleOf(ring: [number, number][]): [number, number] {
   return area === 0 ? (ring[0] ?? [0, 0]) : [x / (3 * area), y / (3 * area)];
 }
 
-/** Twice a ring's surface. */
+/** Twice the area of a ring. */
 export const sizeOf = (ring: [number, number][]): number =>
   Math.abs(
     ring.reduce((sum, [ax, ay], i) => {

@@ -1,4 +1,4 @@
-// Where a point of the world is seen: in the panorama nearest to it, and in 3D.
+// Links that show a world point: in the nearest panorama, and in 3D.
 
 import type { Index, Rgb } from "./data.js";
 import { directionIn } from "./geometry.js";
@@ -6,7 +6,7 @@ import { link, spaceLink } from "./route.js";
 
 const DEGREES = 180 / Math.PI;
 
-/** The panorama nearest to a point, turned to it; `look` says more of how. */
+/** The link to the panorama nearest to a point, turned to it; `look` adds to the address. */
 export function panoramaOf(
   index: Index,
   area: number,
@@ -26,13 +26,13 @@ export function panoramaOf(
   return best?.href ?? null;
 }
 
-/** A patch that labels dispute, in the panorama nearest to it. */
+/** The link to a disputed patch in the nearest panorama. */
 export function disputeInPanorama(index: Index, area: number, center: Rgb): string | null {
   const hasVotes = index.meshes.some((m) => m.area === area && m.has_votes);
   return panoramaOf(index, area, center, hasVotes ? { left: "rgb", right: "contested" } : {});
 }
 
-/** Where such a patch is looked at: in a panorama, or else in 3D. */
+/** The link to such a patch: in a panorama, or else in 3D. */
 export function patchLink(index: Index, area: number, center: Rgb): string | null {
   const hasMesh = index.meshes.some((m) => m.area === area);
   return disputeInPanorama(index, area, center) ?? (hasMesh ? spaceLink(area, center) : null);

@@ -1,4 +1,4 @@
-// What is under the pointer, in words, and what the colours mean.
+// The values under the pointer in words, and the legend of the colours.
 
 import { OTHER_CLASS, OTHER_INSTANCE, css, depthRamp, gradient, marginRamp } from "./colors.js";
 import type { Index, Rgb } from "./data.js";
@@ -6,11 +6,11 @@ import { h, percent, roomName } from "./dom.js";
 import { type FaceVotes, NO_VOTES, SURE } from "./faces.js";
 import type { Modality } from "./gl.js";
 
-/** A pixel of a picture; what is not known, or was not seen there, is null. */
+/** A pixel of a picture. Values that are unknown or were not seen are null. */
 export interface Spot {
   label: number | null;
   face: number | null;
-  /** Of the camera, metres. */
+  /** The distance from the camera, metres. */
   distance: number | null;
   point: Rgb | null;
 }
@@ -24,7 +24,7 @@ export function key(color: Rgb): HTMLElement {
   return element;
 }
 
-/** How the votes for a face went. */
+/** Words for the votes for a face. */
 function tellVotes(index: Index, votes: FaceVotes, face: number): HTMLElement[] {
   const margin = votes.margin[face] ?? NO_VOTES;
   if (margin === NO_VOTES) return [entry("margin", "no votes")];
@@ -35,7 +35,7 @@ function tellVotes(index: Index, votes: FaceVotes, face: number): HTMLElement[] 
   return told;
 }
 
-/** What is told of a pixel. `room` is that of the picture, and `votes` may not be there yet. */
+/** Words for a pixel. `room` is the picture's room, and `votes` may still be loading. */
 export function tell(
   index: Index,
   spot: Spot,
@@ -70,7 +70,7 @@ function ramp(from: string, colors: (n: number) => Uint8Array, to: string): HTML
   return [h("span", {}, from), element, h("span", {}, to)];
 }
 
-/** The legend of what is shown; `range` is that of depths in metres. */
+/** The legend of the shown modalities; `range` is the range of depths in metres. */
 export function legendOf(index: Index, shown: Modality[], range: [number, number]): HTMLElement[] {
   const legend: HTMLElement[] = [];
   if (shown.includes("depth")) {

@@ -1,4 +1,4 @@
-// The part of the address behind `#`: a page, what it shows, and how.
+// The part of the address after `#`: a page, its content, and its look.
 
 export interface Route {
   page: string;
@@ -6,11 +6,11 @@ export interface Route {
   query: URLSearchParams;
 }
 
-/** What a route opens. */
+/** The page that a route opens. */
 export interface Page {
   element: HTMLElement;
   close: () => void;
-  /** What of it comes into sight first, and has the focus. */
+  /** The element that is scrolled into view at first, and gets the focus. */
   start?: HTMLElement;
 }
 
@@ -43,12 +43,12 @@ export function link(
   return `#/${parts}${words === "" ? "" : `?${words}`}`;
 }
 
-/** Changes the address without a step back to the former one, and without a call of the page. */
+/** Changes the address without a new entry in the history, and without opening the page again. */
 export function replaceRoute(page: string, path: (string | number)[], query: Record<string, string>): void {
   history.replaceState(null, "", link(page, path, query));
 }
 
-/** A number of the address within bounds; else the one given. */
+/** A number in the address, if it is within bounds; otherwise the given one. */
 export function numberOf(
   query: URLSearchParams,
   name: string,
@@ -61,7 +61,7 @@ export function numberOf(
   return Number.isFinite(value) ? Math.min(max, Math.max(min, value)) : otherwise;
 }
 
-/** A place in 3D, from where it is looked at, and in which colours. */
+/** The link to a place in 3D, with its viewpoint and colours. */
 export function spaceLink(
   area: number,
   at: number[],

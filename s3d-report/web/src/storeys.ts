@@ -1,20 +1,20 @@
-// Which storey of an area something is on.
+// Assigns points and rooms to the storeys of an area.
 
 import type { Index } from "./data.js";
 
-/** Floors that are no farther apart belong to one storey, metres. */
+/** Floors closer together than this belong to one storey, metres. */
 const GAP = 1.5;
-/** How high a camera stands where no floor is known, metres. */
+/** The assumed height of a camera above an unknown floor, metres. */
 const CAMERA = 1.5;
-/** Something that lies on a floor may be so much below it, metres: less than a ceiling below is. */
+/** An object on a floor may be this much below it, metres: less than the ceiling below. */
 const SLACK = 0.15;
 
 export interface Storeys {
-  /** How many; one at least. */
+  /** The number of storeys, at least one. */
   count: number;
-  /** The storey of a point that is anywhere between a floor and its ceiling. */
+  /** The storey of a point between a floor and its ceiling. */
   ofHeight: (z: number) => number;
-  /** That of a room; the lowest, if neither the room's heights are known nor a location in it. */
+  /** The storey of a room; the lowest, if neither the room's heights nor a location in it is known. */
   ofRoom: (room: string) => number;
 }
 

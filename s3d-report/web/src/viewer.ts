@@ -1,4 +1,4 @@
-// A picture to look at: two modalities with a line between them that moves, and what is under the pointer.
+// A picture with two modalities, a movable line between them, and a readout for the pointer.
 
 import type { Index, Picture, Rgb } from "./data.js";
 import { append, choice, h } from "./dom.js";
@@ -30,12 +30,12 @@ const NAMES: Record<Modality, string> = {
   changed: "Changed",
 };
 
-/** The pointer rests if it has not moved for so long, ms. */
+/** The time after which an unmoved pointer counts as resting, ms. */
 const REST = 250;
-/** A press that moves no farther is a click, CSS pixels. */
+/** A press that moves no farther counts as a click, CSS pixels. */
 const STILL = 5;
 
-/** How a picture is looked at: what the address keeps of it. */
+/** How a picture is shown, as kept in the address. */
 export interface Look {
   left: Modality;
   right: Modality;
@@ -45,24 +45,24 @@ export interface Look {
 
 /** Another picture, B, beside A. */
 export interface OtherSide extends Other {
-  /** What both can be shown in. */
+  /** The modalities in which both can be shown. */
   modalities: Modality[];
-  /** What is told of the labels of a pixel in both. */
+  /** Words for the labels of a pixel in both. */
   tell: (a: number | null, b: number | null) => HTMLElement[];
 }
 
 export interface ViewerOptions {
-  /** What the picture shows, for screen readers. */
+  /** A description of the picture for screen readers. */
   title: string;
   area: number;
-  /** The room, where there is no label to tell it. */
+  /** The room, for pixels without a label. */
   room: string;
   /** The world point of a pixel at a depth, and its distance from the camera. */
   point: (i: number, j: number, depth: number) => Rgb | null;
   position: Rgb | null;
-  /** Where a world point is on a canvas of this size, as x·w, y·w and w. */
+  /** The place of a world point on a canvas of this size, as x·w, y·w and w. */
   screen: (point: Rgb, gaze: Gaze | null, width: number, height: number) => Projected | null;
-  /** Right of the line another picture of the same camera is shown, in the same modality. */
+  /** Another picture of the same camera, shown right of the line in the same modality. */
   other?: OtherSide;
   /** Called when the look has changed. */
   changed: (look: Look) => void;
@@ -70,7 +70,7 @@ export interface ViewerOptions {
   drawn?: (width: number, height: number) => void;
 }
 
-/** Which modalities a picture can be shown in. */
+/** The modalities in which a picture can be shown. */
 export function modalitiesOf(index: Index, area: number, picture: Picture): Modality[] {
   const voted = index.meshes.some((mesh) => mesh.area === area && mesh.has_votes);
   const has: Record<Modality, boolean> = {
@@ -86,7 +86,7 @@ export function modalitiesOf(index: Index, area: number, picture: Picture): Moda
   return MODALITIES.filter((modality) => has[modality]);
 }
 
-/** The look that an address asks for, as far as the picture can be shown so. */
+/** The look in an address, as far as the picture has the modalities. */
 export function lookFrom(query: URLSearchParams, there: Modality[], gaze: Gaze | null): Look {
   const of = (name: string, otherwise: Modality[]): Modality => {
     const word = query.get(name) as Modality;
@@ -114,7 +114,7 @@ export function queryOf(look: Look): Record<string, string> {
 
 export class Viewer {
   readonly element: HTMLElement;
-  /** Lies over the canvas, for what is drawn in it. */
+  /** Lies over the canvas, for drawings in it. */
   readonly overlay = h("div", { class: "overlay" });
   private readonly canvas = h("canvas", { tabindex: 0 });
   private readonly line: HTMLElement;
@@ -132,7 +132,7 @@ export class Viewer {
   private numbers: Numbers = { width: 0, height: 0, depth: null, label: null, face: null };
   private others: Numbers | null = null;
   private votes: FaceVotes | null = null;
-  /** Why there are no votes to show. */
+  /** The reason why there are no votes. */
   private trouble = "";
   private rest = 0;
   private pending = false;
@@ -202,7 +202,7 @@ export class Viewer {
     return this.look.gaze;
   }
 
-  /** The depth in units at a place of the picture, in shares of its size. */
+  /** The depth, in units, at a point of the picture, which is given in shares of its size. */
   depthAt(u: number, v: number): number | null {
     const { width, height, depth } = this.numbers;
     const [i, j] = [Math.min(width - 1, Math.floor(u * width)), Math.min(height - 1, Math.floor(v * height))];
@@ -210,7 +210,7 @@ export class Viewer {
     return value === undefined || value === NO_DEPTH ? null : value;
   }
 
-  /** The labels of both pictures, if they are of one size. */
+  /** The labels of both pictures, if they have the same size. */
   get labels(): { width: number; height: number; a: Uint32Array | null; b: Uint32Array | null } {
     const { width, height, label: a } = this.numbers;
     const fits = this.others?.width === width && this.others.height === height;
@@ -238,7 +238,7 @@ export class Viewer {
     append(this.bar, [...(this.others ? one : two), this.numbers.depth && this.measuring]);
   }
 
-  /** The votes of the area's faces, once; whoever looks at the picture meanwhile sees none. */
+  /** Loads the votes of the area's faces once; until then the readout has none. */
   private async loadVotes(): Promise<void> {
     if (this.votes) return;
     try {
@@ -261,7 +261,7 @@ export class Viewer {
     this.draw();
   }
 
-  /** A click at a point of the canvas: an end of the line, or the place to see in 3D. */
+  /** Handles a click at a point of the canvas: an end of the line, or the place for the link to 3D. */
   private mark(x: number, y: number): void {
     const { area, position } = this.options;
     const point = this.spotAt(x, y, this.canvas.getBoundingClientRect())?.spot.point;
@@ -325,7 +325,7 @@ export class Viewer {
       { passive: false },
     );
     canvas.addEventListener("keydown", (event) => this.key(event));
-    // Focus by the keyboard; a touch gives it too, and has told its own place.
+    // Only focus by the keyboard counts; a touch gives the focus too, but has a place of its own.
     canvas.addEventListener("focus", () => {
       if (canvas.matches(":focus-visible")) this.readMiddle();
     });
@@ -398,7 +398,7 @@ export class Viewer {
     this.line.setAttribute("aria-valuetext", `${names[0]} on ${percent} %, ${names[1]} on the rest`);
     this.fillLegend();
     if (this.look.left === "contested" || this.look.right === "contested") void this.loadVotes();
-    // Until it is on the page, the address is not its own.
+    // The address belongs to the viewer only while it is on the page.
     if (this.element.isConnected) this.options.changed(this.look);
     this.draw();
   }
@@ -449,7 +449,7 @@ export class Viewer {
     this.readAt(box.width / 2, box.height / 2, box);
   }
 
-  /** What a point of the canvas shows, whose size is that of `box`: not of whole pixels. */
+  /** The values at a point of the canvas with the size of `box`, not limited to whole pixels. */
   private spotAt(
     x: number,
     y: number,
@@ -486,7 +486,7 @@ export class Viewer {
     return { pixel: `${i},${j}`, spot, other };
   }
 
-  /** Tells what a point of the canvas shows. */
+  /** Shows the values at a point of the canvas. */
   private readAt(x: number, y: number, box: DOMRect): void {
     window.clearTimeout(this.rest);
     this.readout.replaceChildren();
@@ -505,7 +505,7 @@ export class Viewer {
     const gaze = this.look.gaze;
     this.rest = window.setTimeout(async () => {
       await this.loadVotes();
-      // What is told is still of this point, unless something else was read or turned meanwhile.
+      // The votes belong to this point, unless the readout or the direction changed meanwhile.
       if (this.votes && this.readout.dataset["pixel"] === found.pixel && this.look.gaze === gaze)
         this.readAt(x, y, box);
     }, REST);

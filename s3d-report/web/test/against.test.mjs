@@ -1,6 +1,6 @@
-// A report against another data set: the scan with a chair that became a table. What differs is counted here
-// from both data sets' own files.
-// Each test fails on any error of the console, and on any request that leaves the report's folder.
+// A report against another data set: the scan with a chair that became a table. The differences are counted
+// here from the files of both data sets. Each test fails on any error of the console, and on any request
+// that leaves the report's folder.
 
 import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
@@ -86,7 +86,7 @@ test("the matrix has what both data sets' meshes and images have", async () => {
   await close();
 });
 
-/** The folder and the name of the image that a changed picture shows, and its location. */
+/** The folder and the name of the image in a changed picture, and its location. */
 function stemOfPicture({ picture, pano }) {
   const view = index.views.find((v) => v.picture === picture && picture !== null);
   const at = pano ?? view.location;
@@ -95,7 +95,7 @@ function stemOfPicture({ picture, pano }) {
   return [folder, stemOf(`area_1/${folder}/pose`, index.locations[at].uuid, frame), at];
 }
 
-/** The image that has most pixels of another class: its place among the pictures, and both images. */
+/** The image with the most pixels of another class: its index among the pictures, and both images. */
 function mostChanged(kind) {
   const stems = compare.pictures.map(stemOfPicture);
   const places = stems.map((_, k) => k).filter((k) => stems[k][0] === kind);
@@ -118,7 +118,7 @@ const sourceOf = (own, [i, j], [width, height]) => [
   Math.floor(((2 * j + 1) * own.height) / (2 * height)),
 ];
 
-/** Pixels of a reduced picture whose neighbours have the same labels in both, by how they changed. */
+/** Pixels of a reduced picture whose neighbours have the same labels in both, grouped by their change. */
 function samples(own, size, count) {
   const found = { none: [], instance: [], class: [] };
   const labels = (i, j) => own.map((image) => image.label(...sourceOf(image, [i, j], size)) ?? "<nothing>");
@@ -197,7 +197,7 @@ test("a changed panorama turns, and tells both", async () => {
   const { size } = pictureOf(k);
   const { page, faults, close } = await open(browser, report, `#/compare/${k}`);
   const box = await page.locator(".viewer canvas").boundingBox();
-  // It is turned to what is of another class. The address follows the first key.
+  // The panorama is turned to pixels of another class. The address follows the first key.
   await page.locator(".viewer canvas").focus();
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("ArrowLeft");
@@ -271,7 +271,7 @@ test("the line moves, its place is in the link, and one goes from image to image
   await page.getByLabel("Image that differs more").click();
   await page.waitForFunction((was) => document.querySelector("h1").textContent === was, name);
   await go(page, "#/compare/9999");
-  assert.match(await page.locator("[role=alert]").textContent(), /no such image/);
+  assert.match(await page.locator("[role=alert]").textContent(), /not among those that differ/);
   assert.deepEqual(faults, []);
   await close();
 });
@@ -289,7 +289,8 @@ test("a cell of the matrix leads to the images that show the change, and back", 
   const box = await list.boundingBox();
   assert.ok(box.y >= -1 && box.y < 450, `the list is at ${box.y}`);
   assert.ok(await list.evaluate((section) => document.activeElement === section));
-  // The images that show it, and how much: counted from both data sets' labels.
+  // The images that show the change, and their numbers of pixels, counted from the labels of both data
+  // sets.
   const wanted = [...ofImage.values()].filter((pixels) => pixels.chair_table > 0).length;
   const more = list.getByRole("button", { name: /Show more/ });
   while (await more.isVisible()) await more.click();
@@ -310,8 +311,8 @@ test("a cell of the matrix leads to the images that show the change, and back", 
   );
   const sum = pixels.reduce((a, b) => a + b, 0);
   assert.equal(sum, pixelPairs.get("chair table"));
-  assert.ok((await list.textContent()).includes(`${grouped(sum)} pixels that changed so`));
-  // From image to image of these alone, and back.
+  assert.ok((await list.textContent()).includes(`${grouped(sum)} pixels with this change`));
+  // From one of these images to the next, and back.
   await list.locator(".card a").first().click();
   await page.waitForSelector(".viewer canvas");
   await ready(page);
@@ -356,7 +357,7 @@ test("in 3D and on the plan, what changed is where it changed", async () => {
   const [a, b] = ofFaces.map((labels) => labels[face]);
   assert.deepEqual([classOf(a), classOf(b)], ["chair", "table"]);
   assert.deepEqual([told.A, told.B], [words(a), words(b)]);
-  // Beside the mark of the place the face has its colour.
+  // Beside the mark of the place, the face has its colour.
   const png = PNG.sync.read(await page.screenshot());
   const [r, g, blue] = colorsAt(png, [at[0] + 12, at[1]]);
   assert.ok(r > 150 && g < 20 && near(r, blue, 3, "magenta") === undefined, `${r} ${g} ${blue}`);
@@ -475,7 +476,7 @@ test("views, poses, settings and faults are told, with links to their places", a
       assert.equal(await hrefs("Scan locations in A alone"), `#/pano/1/${index.locations[2].uuid}`);
       const moved = page.locator("tr", { hasText: "0.0123 m" });
       assert.equal(await moved.locator("a").getAttribute("href"), `#/view/${kept.picture}`);
-      // An image that differs in colours is shown in them.
+      // An image that differs in colours is shown in colours.
       await go(page, "#/compare/0");
       assert.equal(await page.getByLabel("What of both is shown").inputValue(), "rgb");
       assert.deepEqual(faults, []);

@@ -1,5 +1,6 @@
-// Faces of the mesh in panoramas and views: which one is seen, how its votes went, and how far places
-// are apart. Each test fails on any error of the console, and on any request that leaves the report's folder.
+// Faces of the mesh in panoramas and views: which face a pixel sees, how its votes went, and how far places
+// are apart. Each test fails on any error of the console, and on any request that leaves the report's
+// folder.
 
 import assert from "node:assert/strict";
 import { rmSync } from "node:fs";
@@ -25,7 +26,7 @@ const NO_FACE = 0xffffff;
 const votes = readNpz(join(dataset, "area_1/3d/votes.npz"));
 const mesh = readObj(join(dataset, "area_1/3d/rgb.obj"));
 const names = json("assets/semantic_labels.json");
-/** By how much a face was won, as a share of its votes; null without votes. */
+/** The margin of a face as a share of its votes; null without votes. */
 const margin = (face) =>
   votes.total[face] === 0 ? null : (votes.votes[face] - votes.runner_up_votes[face]) / votes.total[face];
 
@@ -45,7 +46,7 @@ function facesOf(at) {
   return { width: png.width, height: png.height, of };
 }
 
-/** Pixels in the middle of three by three that show one face, far from the poles, of faces as wanted. */
+/** Pixels in the middle of three by three that show one wanted face, far from the poles. */
 function pixelsOf(faces, wanted, count) {
   const found = [];
   const seen = new Set();
@@ -65,7 +66,7 @@ function pixelsOf(faces, wanted, count) {
 const gazeAt = (faces, { x, y }) =>
   `lon=${(360 * ((x + 0.5) / faces.width - 0.5)).toFixed(1)}&lat=${(180 * (0.5 - (y + 0.5) / faces.height)).toFixed(1)}&fov=20`;
 
-/** The panorama that shows most contested faces. */
+/** The panorama that shows the most contested faces. */
 const [at, faces] = index.locations
   .flatMap((location, i) => (location.pano ? [[i, facesOf(i)]] : []))
   .sort(([, a], [, b]) => contestedIn(b) - contestedIn(a))[0];
@@ -83,7 +84,7 @@ test("the read-out names the face, and where votes differ the margin and the run
   for (const pixel of [...contested, ...sure]) {
     await go(page, `#/pano/${area}/${uuid}?${gazeAt(faces, pixel)}&left=contested&right=rgb&split=0.2`);
     const box = await page.locator(".viewer canvas").boundingBox();
-    // The pointer is there already, and tells nothing until it moves.
+    // The pointer may be there already, and the readout stays empty until it moves.
     await page.mouse.move(box.x + box.width / 2 + 3, box.y + box.height / 2);
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     await page.waitForFunction(() => document.querySelector(".legend .ramp"));
@@ -191,7 +192,7 @@ test("votes that are missing or damaged are told, and the rest is shown", async 
   }
 });
 
-/** Where the ends of the measuring line are, in pixels of the canvas; null if they are not shown. */
+/** The positions of the measuring line's ends, in pixels of the canvas; null if they are not shown. */
 const endsOf = async (page) => {
   await drawn(page);
   return page.evaluate(() =>
@@ -208,7 +209,7 @@ const endsOf = async (page) => {
 
 const worldOf = async (page) => (await readout(page))["X Y Z"].trim().split(/\s+/).map(Number);
 
-/** Two places of the canvas, apart, that show something, with nothing before them. */
+/** Two places of the canvas, apart, that show something, without an obstacle. */
 async function twoPlaces(page, box) {
   const found = [];
   for (const [x, y] of spread(40, box)) {
@@ -239,17 +240,17 @@ test("a line measures what lies between two clicks, and stays there", async () =
     await page.mouse.click(box.x + x, box.y + y);
     points.push(await worldOf(page));
   }
-  // The points are those of the data set's images: other tests hold that.
+  // Other tests compare the points with the data set's images.
   const length = Math.hypot(...points[0].map((c, k) => c - points[1][k]));
   assert.ok(length > 0.1);
   near(Number.parseFloat(await page.locator(".chip[role=status]").textContent()), length, 0.002, "length");
   const f = box.width / 2 / Math.tan(40 * degrees);
-  // A pixel of the reduced panorama is so wide on the screen, at most: points are those of the middles
-  // of pixels.
+  // The largest width of a pixel of the reduced panorama on the screen: points belong to the middles of
+  // pixels.
   const coarse = ((2 * Math.PI) / faces.width) * f * 2.2;
   let ends = await endsOf(page);
   ends.forEach((end, i) => end.forEach((c, k) => near(c, places[i][k], coarse, "an end")));
-  // Turned by a drag the line is where its points are.
+  // After a drag the line is still at its points.
   const mid = [box.x + box.width * 0.5, box.y + box.height * 0.3];
   await page.mouse.move(...mid);
   await page.mouse.down();

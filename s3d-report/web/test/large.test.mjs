@@ -1,6 +1,5 @@
-// A report as large as that of the published data set: it opens within 3 s, takes less than 1 GB, and
-// stays quick. Each test fails on any error of the console, and on any request that leaves the report's
-// folder.
+// A report as large as for the published data set: it opens within 3 s, takes less than 1 GB, and stays
+// quick. Each test fails on any error of the console, and on any request that leaves the report's folder.
 
 import assert from "node:assert/strict";
 import { mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
@@ -22,7 +21,7 @@ after(async () => {
   rmSync(folder, { recursive: true });
 });
 
-/** The memory of all processes that this one started, bytes; what they share counts once. */
+/** The memory of all processes that this one started, in bytes; shared memory counts once. */
 function memory() {
   const parents = new Map();
   for (const pid of readdirSync("/proc").filter((name) => /^\d+$/.test(name))) {
@@ -47,14 +46,14 @@ function memory() {
 }
 
 const GB = 1e9;
-/** Firefox draws here without a graphics card, which takes it as long again. */
+/** Firefox draws here without a graphics card, and takes twice as long. */
 const PATIENCE_MS = isFirefox ? 6000 : 3000;
 
 test("a report of 1,413 locations opens within 3 s, and in less than 1 GB", async (t) => {
   const empty = memory();
   assert.equal(index.locations.length, 1413);
   let [page, faults, close, opened] = [];
-  // Whatever else the machine does, one of five is undisturbed.
+  // Other programs may run meanwhile; one of five attempts is undisturbed.
   for (let i = 0; i < 5 && !(opened < PATIENCE_MS); i++) {
     await close?.();
     ({ page, faults, close } = await open(browser, folder, "#/pano"));
@@ -74,7 +73,7 @@ test("a report of 1,413 locations opens within 3 s, and in less than 1 GB", asyn
   t.diagnostic(
     `${Math.round(most / 1e6)} MB at most, of which the empty browser has ${Math.round(empty / 1e6)} MB`,
   );
-  // Without anything open Firefox takes half of that where it draws without a graphics card.
+  // An empty Firefox takes half of that where it draws without a graphics card.
   assert.ok(most - (isFirefox ? empty : 0) < GB, `${most} bytes`);
   assert.deepEqual(faults, []);
   await close();

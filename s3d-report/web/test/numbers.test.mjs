@@ -1,5 +1,5 @@
-// Numbers, held against the data set's tables, and what they lead to.
-// Each test fails on any error of the console, and on any request that leaves the report's folder.
+// Numbers and their links, compared with the data set's tables. Each test fails on any error of the
+// console, and on any request that leaves the report's folder.
 
 import assert from "node:assert/strict";
 import { join } from "node:path";
@@ -27,7 +27,7 @@ const areas = mesh.faces.map((corners) => {
   return Math.hypot(...cross) / 2;
 });
 
-/** How many faces are of a kind, and their surface, m²: recounted. */
+/** The number of faces of a kind, and their surface in m², counted again. */
 function surfaceOf(is) {
   const faces = areas.flatMap((_, face) => (is(face) ? [face] : []));
   return { faces: faces.length, m2: faces.reduce((sum, face) => sum + areas[face], 0) };
@@ -35,7 +35,7 @@ function surfaceOf(is) {
 
 const grouped = (n) => n.toLocaleString("en");
 
-/** The texts of a table's rows, cell by cell; the table after a heading. */
+/** The cells of a table's rows, for the table after a heading. */
 const rowsAfter = (page, heading, nth = 0) =>
   page
     .locator("section", { has: page.getByRole("heading", { name: heading, exact: true }) })
@@ -112,7 +112,7 @@ test("the spread of votes and of margins is that of votes.npz", async () => {
   const percent = (text) => (text === "< 0.1" ? 0 : Number(text));
   const within = {
     votes: (face, low, high) => total[face] >= low && total[face] <= high,
-    // The last part has its upper end, too.
+    // The last bin includes its upper end.
     margin: (face, low, high) => {
       const margin = (first[face] - second[face]) / total[face];
       return total[face] > 0 && margin >= low / 100 && (margin < high / 100 || high === 100);
@@ -167,7 +167,7 @@ test("the spread of votes and of margins is that of votes.npz", async () => {
   }
   assert.equal(surfaceOf((face) => total[face] > 0).faces, votes.total.faces_voted);
   await close();
-  // Without labels there is nothing of it.
+  // Without labels none of it is shown.
   const none = await open(browser, bare, "#/numbers");
   assert.equal(await none.page.locator(".column").count(), 0);
   assert.ok(!(await none.page.locator("main").textContent()).includes("Votes"));

@@ -81,7 +81,7 @@ test("names are text, whatever they are, and files that are missing are told", a
     assert.equal(await page.locator("header .title").textContent(), hostile);
     assert.equal(await page.locator(".badge").textContent(), "3");
     assert.equal(await page.locator("code").first().textContent(), hostile);
-    // A warning leads to the place that it is about.
+    // A warning links to its place.
     const warnings = page.locator("section", { hasText: "Warnings of the export" }).locator("li");
     assert.equal(await warnings.nth(1).textContent(), hostile);
     assert.equal(await warnings.nth(0).locator("a").getAttribute("href"), `#/pano/1/${uuid}`);

@@ -1,5 +1,5 @@
-// Panoramas in a browser, opened from the disk, held against the data set that they show.
-// Each test fails on any error of the console, and on any request that leaves the report's folder.
+// Panoramas in a browser, opened from the disk and compared with the data set. Each test fails on any error
+// of the console, and on any request that leaves the report's folder.
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
@@ -24,7 +24,7 @@ test("the panorama tells what is under the pointer, and is dragged and zoomed", 
   const canvas = page.locator(".viewer canvas");
   const box = await canvas.boundingBox();
   const middle = [box.x + box.width * 0.3, box.y + box.height * 0.6];
-  // The page takes the address as its own at the first change.
+  // The page writes the address from the first change on.
   await page.mouse.move(...middle);
   await page.mouse.down();
   await page.mouse.move(middle[0] + 120, middle[1] + 40, { steps: 4 });
@@ -36,7 +36,7 @@ test("the panorama tells what is under the pointer, and is dragged and zoomed", 
   await page.mouse.wheel(0, 300);
   query = await queryOf(page);
   near(Number(query.fov), 80 * Math.exp(1 / 3), 0.11, "angle of view after the wheel");
-  // Whole degrees, so that the address says exactly what is shown.
+  // Whole degrees, so that the address is exact.
   await go(page, `#/pano/${area}/${uuid}?lon=75&lat=-10&fov=80&left=rgb&right=class&split=0.5`);
   await holdPanorama(page, at, async ([x, y]) => {
     await page.mouse.move(x, y);
@@ -68,7 +68,7 @@ test("the line between two modalities moves, and each side shows its own", async
     Array.from(png.data.subarray(4 * (y * png.width + x), 4 * (y * png.width + x) + 3));
   const drag = async (share) => {
     const handle = await line.boundingBox();
-    // At an end half of the handle is hidden.
+    // At an end, half of the handle is hidden.
     const x = Math.min(Math.max(handle.x + handle.width / 2, box.x + 4), box.x + box.width - 4);
     await page.mouse.move(x, handle.y + handle.height / 2);
     await page.mouse.down();
@@ -90,7 +90,7 @@ test("the line between two modalities moves, and each side shows its own", async
     const flat = index.classes.find((c) => c.name === told.class)?.color;
     if (!flat) continue;
     const [seen, shown] = [colorAt(colors, [x, y]), colorAt(classes, [x, y])];
-    // The picture of classes has a little of the colours in it, so that shapes can be made out.
+    // The picture of classes mixes in a little of the colours, so that shapes can be made out.
     shown.forEach((c, k) => near(c, 0.7 * flat[k] + 0.3 * seen[k], 3, `${told.class} at ${x}, ${y}`));
     held += 1;
   }

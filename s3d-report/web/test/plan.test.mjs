@@ -1,5 +1,5 @@
-// The plan, held against the data set: rooms, coverage, cones of views, disputed patches, storeys.
-// Each test fails on any error of the console, and on any request that leaves the report's folder.
+// The plan, compared with the data set: rooms, coverage, cones of views, disputed patches, storeys. Each
+// test fails on any error of the console, and on any request that leaves the report's folder.
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
@@ -27,7 +27,7 @@ test("the plan has the rooms, and the locations in the colour of what they see",
       texts.some((text) => text.endsWith(`${room.floor_m2.toFixed(1)} m²`)),
       room.room,
     );
-  // A room leads to the panorama in it that sees most.
+  // A room links to the panorama in it that sees the most.
   for (const room of rooms) {
     const to = await page
       .locator(".plan a:has(.room)", { hasText: `, ${room.floor_m2.toFixed(1)} m²` })
@@ -68,7 +68,7 @@ test("the plan has the rooms, and the locations in the colour of what they see",
   await close();
 });
 
-/** The cones that are shown: the heading of their right side, and their angle, radians. */
+/** The shown cones: the heading of their right side, and their angle, in radians. */
 const conesOf = (page) =>
   page.locator(".cone").evaluateAll((paths) =>
     paths.map((path) => {
@@ -146,7 +146,7 @@ test("photographs are on the plan, and show where they look", async () => {
       for (const [i, [fx, fy]] of forwards.entries()) {
         await photographs.nth(i).focus();
         const cones = await conesOf(page);
-        // One that looks straight down has no heading.
+        // A view straight down has no heading.
         assert.equal(cones.length, Math.hypot(fx, fy) > 0 ? 1 : 0);
         for (const { from, fov } of cones) {
           near(fov, 50 * degrees, 0.01, "angle of view");
@@ -192,7 +192,8 @@ test("storeys of an area are apart, also rooms that nobody stands in", async () 
   const changed = structuredClone(index);
   const up = 3.2;
   const [above, empty] = ["office_1", "lounge_1"];
-  // The lounge is told by its heights, the office by who stands in it, and the floors below by both.
+  // The lounge's storey follows from its heights, the office's from its location, and the floors below from
+  // both.
   for (const room of changed.rooms) {
     if (room.name === empty) room.heights = room.heights.map((z) => z + up);
     if (room.name === above) room.heights = null;
@@ -200,7 +201,7 @@ test("storeys of an area are apart, also rooms that nobody stands in", async () 
   changed.locations = changed.locations.filter((l) => l.room !== empty);
   for (const l of changed.locations) if (l.room === above) l.position[2] += up;
   changed.views = [];
-  // A patch on the ceiling below is not of the storey above.
+  // A patch on the ceiling below does not belong to the storey above.
   const { disputed_patches: patches } = changed.votes[0].votes;
   patches.forEach((patch, i) => (patch.center[2] = [2.9, up, up + 0.01, up + 2.9][i % 4]));
   await withCopy(

@@ -1,4 +1,4 @@
-// The mesh in 3D, held against the data set's own mesh, labels and votes.
+// The mesh in 3D, compared with the data set's own mesh, labels and votes.
 
 import assert from "node:assert/strict";
 import { cpSync, mkdtempSync, readdirSync, rmSync, writeFileSync } from "node:fs";
@@ -37,7 +37,7 @@ const canvasOf = (page) => page.locator(".viewer canvas").boundingBox();
 const numbers = (text) => text.split(",").map(Number);
 const words = (point) => point.map((c) => c.toFixed(3)).join(",");
 const distance = (a, b) => Math.hypot(...a.map((c, k) => c - b[k]));
-/** Waits until the address, which follows what is shown a little later, says the same for a while. */
+/** Waits until the address stays the same for a while; it follows the display a little later. */
 const settle = (page) =>
   page.evaluate(async () => {
     for (let was = null; was !== window.location.hash;) {
@@ -46,7 +46,7 @@ const settle = (page) =>
     }
   });
 
-/** Where to look from: each location, level, into a direction of its own. */
+/** The viewpoints: each location, level, in a direction of its own. */
 const stands = index.locations
   .filter((location) => location.area === area && location.position)
   .map(({ position }, k) => ({
@@ -58,7 +58,7 @@ const stands = index.locations
 
 const linkTo = ({ at, from }, more = "") => `#/space/${area}?at=${words(at)}&from=${words(from)}${more}`;
 
-/** Holds what is told of a face against the data set. */
+/** Compares the readout of a face with the data set. */
 function hold(told, hit) {
   const where = `face ${hit.face} at ${hit.point}`;
   assert.equal(told.face, String(hit.face), where);
@@ -83,7 +83,7 @@ test("in 3D, what is under the pointer is what the data set's mesh has there", a
   const { page, faults, close } = await open(browser, report, "#/notes");
   let [held, contested] = [0, 0];
   for (const [k, stand] of stands.entries()) {
-    // The second half of the stands looks under a section.
+    // The second half of the viewpoints has a section.
     const section = k % 2 === 0 ? Infinity : 1.2;
     if (k % 2 === 1) stand.from[2] = 4;
     const more = `&marks=&section=${section === Infinity ? "none" : "1.20"}`;
@@ -110,7 +110,7 @@ test("in 3D, what is under the pointer is what the data set's mesh has there", a
   await close();
 });
 
-/** A colour is another one, darker by the light of the face. */
+/** A colour is the other one, darkened by the light of the face. */
 const isLit = (shown, flat, what) => {
   const light = shown.reduce((sum, c, k) => sum + c * flat[k], 0) / flat.reduce((sum, c) => sum + c * c, 0);
   assert.ok(light > 0.6 && light < 1.01, `${what}: ${shown} of ${flat}`);
@@ -150,7 +150,7 @@ test("each colouring has the colours of the data set", async () => {
   for (const place of spread(60)) {
     const { x, y, ray } = aim(box, stand, place);
     const hit = firstFront(mesh, stand.from, ray);
-    // A pixel is shown by its middle; where it is not clear which face that is, nothing is held.
+    // A pixel shows its middle; where the face is not clear, nothing is compared.
     if (!hit?.clear || hit.edge < 0.08 || !(await onCanvas(page, x, y))) continue;
     const label = index.labels[labels[hit.face]];
     const what = `face ${hit.face}, ${label.name}, at ${x}, ${y}`;
@@ -168,7 +168,7 @@ test("each colouring has the colours of the data set", async () => {
     colorAt("margin", x, y).forEach((c, k) =>
       assert.ok(Math.abs(c - 0.75 * led(k) - 0.25 * grey) < 7, `${what}: margin ${lead}`),
     );
-    // The panorama of that place shows the same colours, at other sharpness and without light.
+    // The panorama there shows the same colours, but not as sharp, and without light.
     const azimuth = Math.atan2(ray[1], ray[0]);
     const u = (((location.azimuth_rad - azimuth) / (2 * Math.PI) + 2.5) % 1) * pano.width;
     const v = (0.5 - Math.asin(ray[2]) / Math.PI) * pano.height;
@@ -192,7 +192,7 @@ test("a link says what is shown, and follows it", async () => {
   await loaded(page);
   await settle(page);
   const query = await queryOf(page);
-  // Without a section in the address it is just below the ceilings, and they are cut away.
+  // Without a section in the address, it is just below the ceilings, and they are cut away.
   const ceilings = index.labels.flatMap((label, i) =>
     label.class !== null && index.classes[label.class].name === "ceiling" ? [i] : [],
   );
@@ -225,7 +225,7 @@ test("a link says what is shown, and follows it", async () => {
     ["class", "locations,kept", String(chair), (Number(query.section) - 0.01).toFixed(2)],
   );
   assert.equal(await page.locator(".room-name:visible").count(), 0);
-  // Arrows turn, plus and minus zoom.
+  // Arrows turn; plus and minus zoom.
   await page.locator(".viewer canvas").focus();
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("+");
@@ -238,7 +238,7 @@ test("a link says what is shown, and follows it", async () => {
   const angle =
     Math.atan2(turned[1] - at[1], turned[0] - at[0]) - Math.atan2(from[1] - at[1], from[0] - at[0]);
   assert.ok(Math.abs(angle - Math.PI / 24) < 0.001, `an arrow turns by ${angle}`);
-  // Drag turns, too, and what the address says is shown again.
+  // A drag turns as well, and the address shows the same again.
   const box = await canvasOf(page);
   await page.mouse.move(box.x + box.width * 0.6, box.y + 30);
   await page.mouse.down();
@@ -319,7 +319,7 @@ test("a contested patch is flown to, and at rest nothing is drawn", async () => 
     assert.ok(distance(numbers(at), patch.center) < 0.001, `${at} and ${patch.center}`);
     assert.ok(section === "none" || Number(section) > patch.center[2], section);
     const box = await canvasOf(page);
-    // The pointer is there already, and tells nothing until it moves.
+    // The pointer may be there already, and the readout stays empty until it moves.
     await page.mouse.move(box.x + box.width / 2 + 9, box.y + box.height / 2);
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2 + 1);
     const told = await readout(page);
@@ -420,7 +420,7 @@ test("a place is gone to: from a panorama, from Notes, and by the wheel", async 
   await page.mouse.move(...middle);
   assert.ok(distance(await xyzOf(), there) < 0.05, `${await xyzOf()} and ${there}`);
   assert.ok(await page.locator(".pin").isVisible());
-  // The wheel goes to what is under the pointer, and not through it.
+  // The wheel goes to the point under the pointer, and not through it.
   const aside = [box.x + box.width * 0.7, box.y + box.height * 0.75];
   await page.mouse.move(...aside);
   const [target, before_] = [await xyzOf(), Number.parseFloat((await readout(page)).distance)];
@@ -484,7 +484,7 @@ test("files of the mesh that are missing or damaged are told, and the rest is sh
       assert.match(alert, words_);
       assert.match(alert, new RegExp(`data/mesh_${area}_0.js is damaged`));
     }
-    // What the browsers say of such files themselves.
+    // The browsers' own messages about such files.
     const own = /ERR_FILE_NOT_FOUND|Failed to read data from the ReadableStream/;
     assert.deepEqual(
       faults.filter((fault) => !own.test(fault)),

@@ -1,5 +1,5 @@
-// The grid of views, and a view, held against the data set.
-// Each test fails on any error of the console, and on any request that leaves the report's folder.
+// The grid of views, and a view, compared with the data set. Each test fails on any error of the console,
+// and on any request that leaves the report's folder.
 
 import assert from "node:assert/strict";
 import { readdirSync } from "node:fs";
@@ -52,7 +52,7 @@ test("the grid is sorted and filtered, and a view opens large", async () => {
   await page.getByLabel("Which views").selectOption("dropped");
   assert.equal(await total(), json("area_1/views.json").length - kept.length);
   await page.getByLabel("Which views").selectOption("pictures");
-  // What was filtered is in the address.
+  // The filter is in the address.
   await page.getByLabel("Class", { exact: true }).selectOption({ label: "chair" });
   const chairs = await total();
   await page.getByLabel("Sort by").selectOption("share");

@@ -1,4 +1,4 @@
-//! Looking at a scene without a renderer: every face in turn.
+//! Looks at a scene without a renderer, face by face.
 
 #![allow(dead_code, unreachable_pub, reason = "each test takes what it needs")]
 
@@ -53,7 +53,8 @@ impl Seen {
         self.triangles.iter().map(|t| distance(p, t)).fold(f64::MAX, f64::min)
     }
 
-    /// Every instance has faces, counts from 1 in its room, and there are floor, ceiling and four walls.
+    /// Every instance must have faces and be numbered from 1 in its room. Every room must have floor, ceiling
+    /// and four walls.
     pub fn check_instances(&self) {
         let s = &self.scene;
         let mut counts = vec![0; s.instances.len()];
@@ -74,7 +75,7 @@ impl Seen {
         }
     }
 
-    /// Nothing leaves its room but windows and doors, which reach into the walls.
+    /// All things must stay in their rooms; only windows and doors reach into the walls.
     pub fn check_things_stay_in_their_rooms(&self) {
         let rooms = self.rooms();
         for f in self.faces() {
@@ -92,7 +93,8 @@ impl Seen {
         }
     }
 
-    /// Every face has a texture, with coordinates in range, or a colour. Returns how many have which.
+    /// Every face must have a texture with coordinates in range, or a colour. Returns the number of faces
+    /// with each.
     pub fn check_colors(&self) -> [usize; 2] {
         let mut textured = 0;
         let mut plain = 0;
@@ -121,9 +123,10 @@ impl Seen {
         [textured, plain]
     }
 
-    /// No face lies on another.
+    /// No face may lie on another.
     pub fn check_no_overlaps(&self) {
-        // Faces by their plane, either side up; corners in the two axes in which the plane is widest.
+        // Faces grouped by their plane, whichever side is up. Corners are given along the two axes in which
+        // the plane is widest.
         let mut planes: BTreeMap<[i64; 4], Vec<(u32, [DVec2; 3])>> = BTreeMap::new();
         for f in self.faces() {
             let n = self.scene.mesh.normal(f).as_dvec3();
@@ -138,8 +141,8 @@ impl Seen {
                 .push((f, flat));
         }
 
-        // Two triangles are apart if a line along an edge of one of them divides them, but for the step of
-        // the builder's lattice.
+        // Two triangles are apart if a line along an edge of one separates them, up to a step of the
+        // builder's lattice.
         let apart = |a: &[DVec2; 3], b: &[DVec2; 3]| {
             (0..3).any(|i| {
                 let edge = (a[(i + 1) % 3] - a[i]).normalize();
@@ -157,14 +160,14 @@ impl Seen {
             for (i, (f, a)) in list.iter().enumerate() {
                 let right = a.iter().map(|p| p.x).fold(f64::MIN, f64::max);
                 for (g, b) in list[i + 1..].iter().take_while(|(_, b)| left(b) < right) {
-                    // Far from the origin, the place of a plane in the key is rough.
+                    // Far from the origin, the plane's distance in the key is rough.
                     let n = self.scene.mesh.normal(*f).as_dvec3();
                     let first = self.triangles[*f as usize][0];
                     let level = self.triangles[*g as usize]
                         .iter()
                         .all(|p| n.dot(p - first).abs() < 2e-3);
 
-                    // Parts of one thing may touch: nobody sees the faces between them.
+                    // Parts of one thing may touch: the faces between them are hidden.
                     let opposite = n.dot(self.scene.mesh.normal(*g).as_dvec3()) < 0.0;
                     let of = &self.scene.instance_of_face;
                     let touches = opposite && of[*f as usize] == of[*g as usize];
@@ -184,7 +187,7 @@ impl Seen {
     }
 }
 
-/// Distance along the unit vector `d` at which the ray from `o` meets a triangle.
+/// The distance along the unit vector `d` at which the ray from `o` meets a triangle.
 fn meets(o: DVec3, d: DVec3, &[a, b, c]: &[DVec3; 3]) -> Option<f64> {
     let e = b - a;
     let f = c - a;
@@ -215,7 +218,7 @@ fn distance(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> f64 {
     edge(a, b).min(edge(b, c)).min(edge(c, a))
 }
 
-/// `n` directions all around, evenly.
+/// `n` directions, spread evenly over the sphere.
 pub fn directions(n: u32) -> impl Iterator<Item = DVec3> {
     (0..n).map(move |i| {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(n);

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct EvalArgs {
-    /// The definition of the scores (docs/evaluation.md).
+    /// The definition of the scores.
     #[arg(value_parser = parsed::<Protocol>,
         value_name = "det|sem3d|inst-ap|inst-cov|sem-pano|depth|normal|panoptic")]
     pub(crate) protocol: Protocol,
@@ -22,8 +22,8 @@ pub(crate) struct EvalArgs {
     /// The predictions: a folder, or a file.
     #[arg(long, value_name = "DIR")]
     pub(crate) pred: PathBuf,
-    /// A variant of the protocol, named after the script that it follows [default: the first in
-    /// docs/evaluation.md]
+    /// A variant of the protocol, named after the script that it follows [default: the first in its
+    /// description]
     #[arg(long, value_name = "NAME")]
     pub(crate) variant: Option<String>,
     /// The areas to test together: all of them, each by itself (six-fold), or the paper's three folds.

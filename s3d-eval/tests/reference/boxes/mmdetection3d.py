@@ -74,11 +74,11 @@ module("mmengine")
 module("mmengine.logging", print_log=lambda *_, **__: None)
 load("boxes.base_box3d", "base_box3d.py")
 Boxes = load("boxes.depth_box3d", "depth_box3d.py").DepthInstance3DBoxes
-# The mode of all boxes is the one that is asked for.
+# Every box is already in the requested mode.
 Boxes.convert_to = lambda self, mode: self
 indoor = load("indoor_eval", "indoor_eval.py")
 
-# numpy's default order of equal scores differs by processor: here it is theirs that came first.
+# numpy's default order of equal scores depends on the processor; here the first of equal scores stays first.
 argsort = np.argsort
 np.argsort = lambda values: argsort(values, kind="stable")
 

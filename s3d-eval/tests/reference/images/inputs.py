@@ -6,13 +6,13 @@ MASK = np.uint64(0xFFFFFFFF)
 # HoHoNet's classes, in its order.
 CLASSES = ["beam", "board", "bookcase", "ceiling", "chair", "clutter", "column", "door", "floor", "sofa", "table",
            "wall", "window"]
-# Labels of eleven of them: no pixel is truly beam or column.
+# Labels of eleven of the classes: no true pixel is beam or column.
 LABELS = ["<UNK>_0_<UNK>_0_0"] + [c + "_1_office_1_1" for c in CLASSES if c not in ("beam", "column")]
 
-# Name, width, height, seed; all of the last one is void.
+# Name, width, height, seed. Every pixel of the last panorama is void.
 PANORAMAS = [("a", 2048, 1024, 1), ("b", 1024, 512, 2), ("c", 1000, 500, 3), ("d", 4096, 2048, 4),
              ("f", 1360, 680, 6), ("void", 1024, 512, 5)]
-# The areas that hold them, and the fold of HoHoNet that tests these.
+# The areas that hold the panoramas, and HoHoNet's fold that tests them.
 FOLDS = {"1_valid": {"area_5a": ["a"], "area_5b": ["b", "void"]}, "2_valid": {"area_2": ["c"], "area_4": ["d"]},
          "3_valid": {"area_1": ["f"], "area_3": [], "area_6": []}}
 AXES = [(4096, 1024), (2048, 512), (1000, 1024), (1360, 1024), (1234, 1024), (777, 512), (160, 1024), (2047, 1024)]
@@ -91,7 +91,7 @@ def predicted_depth(truth, seed):
     return out
 
 
-# Name, and the truth as an image of one row.
+# Name, and the true depth as an image of one row.
 DEPTHS = [("mixed", depth(4096, 1, 11)), ("one", np.array([[2048]], np.uint16)),
           ("beyond", np.full((1, 64), 6000, np.uint16)), ("even", depth(1000, 1, 12)), ("odd", depth(999, 1, 13))]
 

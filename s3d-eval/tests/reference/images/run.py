@@ -25,7 +25,7 @@ def stub(name, **members):
     return module
 
 
-# What the scripts import and these calls do not use.
+# The scripts import these modules, but the calls here do not use them.
 stub("pandas")
 transforms = stub("torchvision.transforms", ToTensor=lambda: lambda a: a, Normalize=lambda **_: lambda a: a)
 stub("torchvision", transforms=transforms)
@@ -59,7 +59,7 @@ def sem_pano():
     sys.path.insert(0, f"{sources}/HoHoNet")
     raw, data = f"{work}/raw", f"{work}/sem"
     os.makedirs(raw, exist_ok=True)
-    # The script looks what is missing up, too, at place 3341.
+    # The script also looks up missing pixels, at index 3341.
     padded = inputs.LABELS + inputs.LABELS[:1] * (3342 - len(inputs.LABELS))
     json.dump(padded, open(f"{raw}/semantic_labels.json", "w"))
     json.dump({"<UNK>": 0, **{c: i + 1 for i, c in enumerate(inputs.CLASSES)}}, open(f"{raw}/name2label.json", "w"))
@@ -99,7 +99,7 @@ def sem_pano():
     torch.save({}, f"{work}/net.pth")
     out["sem-pano"] = {}
     for fold, areas in inputs.FOLDS.items():
-        # A panorama that is void is not shown to the network.
+        # The network never sees a panorama that is void.
         Net.queue = [panoramas[n][2] for names in areas.values() for n in names if n != "void"]
         with open(f"{work}/sem.yaml", "w") as f:
             f.write(f"cuda: False\nnum_workers: 0\ndataset:\n  name: S2d3dSemDataset\n  common_kwargs:\n"
@@ -140,7 +140,7 @@ def depths():
             found["unifuse, median"] = of_unifuse(far, prediction, True)
         out["depth"][name] = found
 
-    # From files of the full size to scores.
+    # From full-size files to scores.
     for folder in ("rgb", "depth"):
         os.makedirs(f"{work}/depth_raw/area_1/pano/{folder}", exist_ok=True)
     units = inputs.depth(4096, 2048, 21)

@@ -98,7 +98,7 @@ def inst_ap():
     many = [random_truth(60, (60, 300), everything, 0.05) for _ in range(3)]
     at_thresholds, start = [], 0
     truth = []
-    # IoU of n / 1000, as exactly as floats can say.
+    # IoU of n / 1000, as exactly as floats allow.
     for i, n in enumerate([500, 550, 600, 650, 700, 750, 800, 850, 900, 250, 501, 251]):
         truth.append([8, i, 1000])
         at_thresholds.append(mask(8, 0.05 * (i + 1), (start, start + n)))

@@ -111,7 +111,7 @@ def sem3d(rooms):
     scores = locals_at_return(six_fold.evaluation, *sums)
     keys = ["iou_class", "accuracy_class", "mIoU", "mAcc", "allAcc"]
     pointcept = [np.asarray(scores[k]).tolist() for k in keys]
-    # 13 is its number for void.
+    # The program's number for void is 13.
     of_mmdet3d = [np.where(t < 0, 13, t) for t in truth]
     r = seg_eval.seg_eval(of_mmdet3d, [p.copy() for p in predicted], dict(enumerate(NAMES)), 13)
     hist = sum(seg_eval.fast_hist(p, t, 13) for p, t in zip(predicted, truth))
@@ -161,7 +161,7 @@ def inst_cov(rooms):
                 np.savetxt(f"room{i}_gt.txt", truth, fmt="%d")
                 np.savetxt(f"room{i}_pred.txt", predicted, fmt="%d")
                 names.write(f"room{i}_pred.txt\n")
-        # The script is of Python 2 and of the numpy of then.
+        # The script needs Python 2 and the numpy of its time.
         builtins.xrange, np.int, np.float = range, int, float
         found = runpy.run_path(script)
         os.chdir(here)

@@ -1,5 +1,5 @@
-// Another data set beside the one shown: what a report that was made against it holds of it (docs/report.md,
-// docs/compare.md). A is the one shown, B the other.
+// The comparison with another data set, in a report that was made against one (`s3d_report::files`,
+// docs/compare.md). A is the data set of the report, B the other.
 
 import { type Index, type Picture, type Rgb, load, loadPicture } from "../data.js";
 import { unpack } from "../faces.js";
@@ -107,7 +107,7 @@ export interface ChangedPicture {
   pano: number | null;
   is_there: boolean;
   pixels: Record<string, Pixels>;
-  /** Places in the comparison's matrix of classes, and how many pixels changed so. */
+  /** Indices into the comparison's matrix of classes, and the number of pixels that changed so. */
   classes: [number, number][];
 }
 
@@ -121,17 +121,17 @@ interface Compared {
   faults: { path: string; message: string }[];
 }
 
-/** What differs between A and B, with labels and classes that count for both. */
+/** The differences between A and B, with labels and classes of both. */
 export interface Against extends Compared {
-  /** The index of A, with B's labels and classes behind its own. */
+  /** The index of A, with B's labels and classes after its own. */
   both: Index;
-  /** The place in `both.labels` of each of B's labels. */
+  /** The index in `both.labels` of each of B's labels. */
   labelOfB: Uint32Array;
-  /** What B's depths are multiplied by to be A's. */
+  /** The factor that turns B's depths into A's units. */
   depthOfB: number;
 }
 
-/** A's and B's labels are the same if they have the same name; so are classes. */
+/** Labels of A and B are the same if their names are; so are classes. */
 function merged(index: Index, compared: Compared): Against {
   const { classes, labels } = { classes: [...index.classes], labels: [...index.labels] };
   const placeOf = <T extends { name: string }>(all: T[], of: T[], made: (entry: T) => T): number[] => {
@@ -155,7 +155,7 @@ function merged(index: Index, compared: Compared): Against {
 
 let made: Promise<Against> | null = null;
 
-/** What differs; null if the report was not made against another data set. */
+/** The differences; null if the report was not made against another data set. */
 export function loadAgainst(index: Index): Promise<Against> | null {
   if (index.against === null || index.against === undefined) return null;
   made ??= load<Compared>("compare").then((compared) => merged(index, compared));
@@ -163,7 +163,7 @@ export function loadAgainst(index: Index): Promise<Against> | null {
   return made;
 }
 
-/** A's picture and B's of an image that differs; null for one of which nothing is left. */
+/** The pictures of A and B for an image that differs; null if neither could be read. */
 export async function loadPair(
   index: Index,
   { picture, pano, is_there }: ChangedPicture,
@@ -175,36 +175,39 @@ export async function loadPair(
   return { a, b };
 }
 
-/** How a face or pixel changed: to another instance of the class, or to another class. */
+/** How a face or pixel changed: to another instance of the same class, or to another class. */
 export const INSTANCE = 1;
 export const CLASS = 2;
 
-/** What changed from one label to another: places in `both.labels`. */
+/** How one label changed to another, both as indices into `both.labels`. */
 export function kindOf({ both }: Against, a: number, b: number): 0 | typeof INSTANCE | typeof CLASS {
   if (a === b) return 0;
   return both.labels[a]?.class === both.labels[b]?.class ? INSTANCE : CLASS;
 }
 
-/** Changed faces that hang together: places in `both.labels`, and the centre of a face in their middle. */
+/**
+ * A connected patch of changed faces: labels as indices into `both.labels`, and the centre of a face in the
+ * middle.
+ */
 export interface Patch extends Omit<Counts, "pixels"> {
   a: number;
   b: number;
   center: Rgb;
 }
 
-/** What is known of the faces with other labels. */
+/** The faces whose labels differ. */
 export interface FaceChanges {
-  /** The largest, those of another class first. */
+  /** The largest patches, changes of class first. */
   patches: Patch[];
   /** How a face changed; 0 if it did not. */
   kind: (face: number) => number;
   /** Its labels in A and B, if it changed. */
   labelsOf: (face: number) => [number, number] | null;
-  /** By both labels: those of another class first, then those with more faces. */
+  /** Groups by both labels: changes of class first, then those with more faces. */
   groups: Group[];
 }
 
-/** Faces that had one label, and have another: places in `both.labels`. */
+/** Faces that changed from one label to another, as indices into `both.labels`. */
 export interface Group {
   a: number;
   b: number;
@@ -212,7 +215,7 @@ export interface Group {
   faces: number[];
 }
 
-/** The faces of an area with other labels; null where there are none, or meshes differ. */
+/** The faces of an area whose labels differ; null if there are none, or if the meshes differ. */
 export async function loadChanges(against: Against, area: number): Promise<FaceChanges | null> {
   if (!against.changed_faces.includes(area)) return null;
   const key = `changed_${area}`;
@@ -248,14 +251,14 @@ export async function loadChanges(against: Against, area: number): Promise<FaceC
   };
 }
 
-/** Whether a label is meant by the name of its class or instance; the comparison calls no label `<UNK>`. */
+/** Whether the name of a class or instance means this label. The comparison calls no label `<UNK>`. */
 function isNamed({ both }: Against, label: number, name: string | null): boolean {
   if (name === null) return true;
   const { class: of, name: its } = both.labels[label] ?? { class: null, name: "" };
   return of === null ? name === "<UNK>" : its === name || both.classes[of]?.name === name;
 }
 
-/** The first group that was `was` in A and is `is` in B; null of both stands for any. */
+/** The first group that was `was` in A and is `is` in B. If both are null, any group. */
 export const groupOf = (
   against: Against,
   { groups }: FaceChanges,
@@ -263,7 +266,7 @@ export const groupOf = (
   is: string | null,
 ): Group | undefined => groups.find(({ a, b }) => isNamed(against, a, was) && isNamed(against, b, is));
 
-/** The name of a label, as the comparison has it of a class or an instance. */
+/** The name of a label's class or instance, as the comparison writes it. */
 export function nameOf({ both }: Against, label: number, of: "class" | "instance"): string {
   const found = both.labels[label];
   const its = found?.class === null || !found ? undefined : both.classes[found.class];
@@ -271,6 +274,6 @@ export function nameOf({ both }: Against, label: number, of: "class" | "instance
   return of === "class" ? its.name : found.name;
 }
 
-/** `<UNK>` and `<nothing>` of the comparison, as people say it. */
+/** The comparison's `<UNK>` and `<nothing>` in words. */
 export const classWords = (name: string): string =>
   name === "<UNK>" ? "no label" : name === "<nothing>" ? "nothing seen" : name;

@@ -1,4 +1,4 @@
-// Where on the plan labels changed: in the middles of the patches of changed faces.
+// Marks changed labels on the plan, in the middle of each patch of changed faces.
 
 import type { Index, Rgb } from "../data.js";
 import { count } from "../dom.js";
@@ -6,16 +6,16 @@ import { spaceLink } from "../route.js";
 import { CLASS, kindOf, loadAgainst, loadChanges, nameOf } from "./data.js";
 import { surface } from "./matrix.js";
 
-/** A change of labels at a place of an area. */
+/** A change of labels at a point of an area. */
 export interface ChangeMark {
   at: Rgb;
-  /** Whether the class is another, too. */
+  /** Whether the class changed, too. */
   isClass: boolean;
   words: string;
   href: string | null;
 }
 
-/** By area; of an area without changed faces, none. */
+/** The marks by area; areas without changed faces are left out. */
 export async function changeMarks(index: Index): Promise<Map<number, ChangeMark[]>> {
   const marks = new Map<number, ChangeMark[]>();
   const against = await loadAgainst(index);

@@ -1,11 +1,11 @@
-// What has another label, by its class in A and in B.
+// Changed labels by class in A and class in B.
 
 import { append, count, h, metres2, several, table } from "../dom.js";
 import { link } from "../route.js";
 import { type Against, type Counts, classWords } from "./data.js";
 import { changeWords, imagesByChange, imagesOf } from "./order.js";
 
-/** So many classes fit into a matrix; more are a list. */
+/** The largest number of classes in a matrix; more are shown as a list. */
 const MATRIX = 16;
 
 export const number = (words: string | number): HTMLElement => h("span", { class: "number" }, words);
@@ -16,7 +16,7 @@ export const surface = (m2: number): string =>
 export const countsWords = ({ faces, m2, pixels }: Counts): string =>
   `${count(faces)} faces, ${surface(m2)}, ${count(pixels)} pixels`;
 
-/** Where changed faces are seen: those of a class or instance in A (`was`) and in B (`is`). */
+/** The link to changed faces of a class or instance in A (`was`) and in B (`is`). */
 export function changedLink(
   against: Against,
   { faces }: Counts,
@@ -30,7 +30,7 @@ export function matrix(against: Against): HTMLElement | null {
   const pairs = against.comparison.labels?.matrix ?? [];
   if (pairs.length === 0) return null;
   const order = against.both.classes.map((c) => c.name);
-  // What is no class comes last.
+  // Entries that are no class come last.
   const places = (names: string[]): string[] => {
     const place = (name: string): number => (order.indexOf(name) + order.length + 1) % (order.length + 1);
     return [...new Set(names)].sort((x, y) => place(x) - place(y));
@@ -41,7 +41,7 @@ export function matrix(against: Against): HTMLElement | null {
     const change = { was: pair.a, is: pair.b };
     const words = `${changeWords(change)}: ${countsWords(pair)}`;
     const pictures = images.get(pairs.indexOf(pair)) ?? 0;
-    // What no image shows is shown in 3D.
+    // Changes that no image shows are shown in 3D.
     const href = pictures > 0 ? imagesOf(change) : changedLink(against, pair, change);
     const where = pictures > 0 ? several(pictures, "image") : "in 3D";
     return href
@@ -61,7 +61,7 @@ export function matrix(against: Against): HTMLElement | null {
     );
   const bySurface = pairs.some((pair) => pair.faces > 0);
   const size = (pair: Counts): number => (bySurface ? pair.m2 : pair.pixels);
-  // Renumbered instances would hide what is of another class.
+  // Renumbered instances would hide changes of class.
   const all = (same: boolean): number =>
     pairs.reduce((sum, pair) => sum + ((pair.a === pair.b) === same ? size(pair) : 0), 0);
   const head = h("tr", {}, h("th", { scope: "col" }, "in A \\ in B"));
@@ -87,8 +87,8 @@ export function matrix(against: Against): HTMLElement | null {
     return h("tr", {}, h("th", { scope: "row" }, classWords(row)), ...cells);
   });
   const caption =
-    "Class in A by row, class in B by column. Shaded by the share of what is of another class; " +
-    `in the diagonal, of what is another instance of its class (${bySurface ? "surface" : "pixels"}). ` +
+    "Class in A by row, class in B by column. The shade is a cell's share of all changes of class, " +
+    `or on the diagonal of all changes of instance, by ${bySurface ? "surface" : "pixels"}. ` +
     "A cell leads to the images that show it.";
   const grid = h(
     "table",

@@ -1,9 +1,9 @@
-// In which order changed images are listed, and which of them show one change of labels.
+// The order of changed images in a list, and the images that show one change of labels.
 
 import { type Route, link } from "../route.js";
 import { type Against, type ChangedPicture, type Pixels, classWords } from "./data.js";
 
-/** A change of labels, by its classes in A and in B: what of all the list of images is about. */
+/** A change of labels, by class in A and in B; the list of images may be limited to it. */
 export interface Change {
   was: string;
   is: string;
@@ -23,7 +23,10 @@ export const imagesOf = (change: Change): string => link("compare", [], { ...cha
 const share = (pixels: Pixels | undefined): number =>
   pixels ? pixels.pixels_changed / Math.max(1, pixels.pixels) : 0;
 
-/** In which modality an image is said to differ, and how. Colours of labels follow from labels. */
+/**
+ * The modality that says most about a difference: labels, otherwise the one with the largest share of
+ * pixels. Colours of labels follow from labels, so they count only if nothing else differs.
+ */
 export function mostChanged({ pixels }: ChangedPicture): [string, Pixels] | null {
   const told = Object.entries(pixels).filter(([modality]) => modality !== "semantic_pretty");
   const of = told.length > 0 ? told : Object.entries(pixels);
@@ -38,7 +41,7 @@ function shareOf(changed: ChangedPicture): number {
   return most[0] === "semantic_pretty" ? share(most[1]) - 1.5 : share(most[1]);
 }
 
-/** How many pixels of each picture show a change; one that shows none is left out. */
+/** The number of pixels of each picture that show a change; pictures without any are left out. */
 function pixelsOf({ comparison, pictures }: Against, { was, is }: Change): Map<number, number> {
   const place = comparison.labels?.matrix.findIndex(({ a, b }) => a === was && b === is) ?? -1;
   const found = pictures.map(({ classes }, k): [number, number] => {
@@ -47,7 +50,7 @@ function pixelsOf({ comparison, pictures }: Against, { was, is }: Change): Map<n
   return new Map(found.filter(([, pixels]) => pixels > 0));
 }
 
-/** How many pictures show each change, by its place in the comparison's matrix. */
+/** The number of pictures that show each change, by index in the comparison's matrix. */
 export function imagesByChange({ pictures }: Against): Map<number, number> {
   const images = new Map<number, number>();
   for (const { classes } of pictures)
@@ -56,15 +59,15 @@ export function imagesByChange({ pictures }: Against): Map<number, number> {
 }
 
 export interface Order {
-  /** Places in `pictures`. */
+  /** Indices into `pictures`. */
   numbers: number[];
-  /** How many pixels of one show the change that is asked for; null if none is. */
+  /** The number of pixels that show the requested change, by picture; null if no change is requested. */
   pixels: Map<number, number> | null;
 }
 
 /**
- * The pictures that show a change, those with most pixels of it first; without one all, by the share of
- * their pixels that differ: of labels, or else of what they have.
+ * The pictures that show a change, those with most of its pixels first. Without a change all pictures, by
+ * the share of pixels whose labels differ, or, without labels, of pixels that differ.
  */
 export function orderOf(against: Against, change: Change | null): Order {
   const pixels = change && pixelsOf(against, change);

@@ -1,4 +1,4 @@
-// What differs between the data set that is shown, A, and another, B.
+// The differences between the shown data set, A, and another, B.
 
 import { type Index, type Picture, load, loadThumb } from "../data.js";
 import { append, count, h, percent, several } from "../dom.js";
@@ -18,7 +18,7 @@ import {
   viewsSection,
 } from "./tables.js";
 
-/** So many images are shown at first, and so many more each time. */
+/** The number of images that are shown at first, and added each time. */
 const BATCH = 24;
 
 const still = (element: HTMLElement): Page => ({ element, close: () => {} });
@@ -67,10 +67,10 @@ function overview(index: Index, against: Against, change: Change | null): Page {
   return { element, close, ...(change && grid && { start: grid }) };
 }
 
-/** What the list of images is about: all that differ, or those that show a change. */
+/** The heading of the list of images: all that differ, or those that show a change. */
 function heading(against: Against, change: Change | null, images: number): HTMLElement[] {
   if (!change) {
-    const words = `${several(images, "image")} with other pixels, those that differ most first.`;
+    const words = `${several(images, "image")} with different pixels, the most different first.`;
     return [h("h2", {}, "Images that differ"), h("p", { class: "quiet" }, words)];
   }
   const counts = against.comparison.labels?.matrix.find(({ a, b }) => a === change.was && b === change.is);
@@ -78,8 +78,8 @@ function heading(against: Against, change: Change | null, images: number): HTMLE
   const words =
     images === 0
       ? "No image shows this change."
-      : `${several(images, "image")} with ${count(counts?.pixels ?? 0)} pixels that changed so, ` +
-        "those with most first.";
+      : `${several(images, "image")} with ${count(counts?.pixels ?? 0)} pixels with this change, ` +
+        "the image with the most first.";
   const places = h("p", { class: "places" });
   append(places, [
     h("a", { href: link("compare") }, "All images that differ"),
@@ -89,7 +89,7 @@ function heading(against: Against, change: Change | null, images: number): HTMLE
   return [h("h2", {}, title), h("p", { class: "quiet" }, words), places];
 }
 
-/** The images that differ, or those of them that show a change. */
+/** The images that differ, or those that show a change. */
 function images(
   index: Index,
   against: Against,

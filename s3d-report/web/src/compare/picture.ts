@@ -13,7 +13,7 @@ import { tellBoth } from "./words.js";
 
 const RADIANS = Math.PI / 180;
 
-/** What the comparison calls a modality, in the words of the page. */
+/** The page's words for the comparison's modalities. */
 export const MODALITY_NAMES: Record<string, string> = {
   rgb: "Colour",
   depth: "Depth",
@@ -32,7 +32,7 @@ export interface Shown {
   location: Location | null;
 }
 
-/** Which image of the report it is; null if it is in none. */
+/** The image of the report that this picture shows; null if there is none. */
 export function shownBy(index: Index, { picture, pano }: ChangedPicture): Shown | null {
   if (pano !== null) {
     const location = index.locations[pano];
@@ -55,7 +55,7 @@ export function pixelsWords(modality: string, pixels: Pixels): string {
   return words.join(", ");
 }
 
-/** What both can be shown in, and what says most of how they differ. */
+/** The modalities in which both can be shown, and the one that shows best how they differ. */
 function modalitiesOfPair(against: Against, area: number, a: Picture, b: Picture): Modality[] {
   const ofB = modalitiesOf(against.both, area, b);
   const there = modalitiesOf(against.both, area, a).filter((m) => m !== "contested" && ofB.includes(m));
@@ -75,10 +75,10 @@ function firstModality({ pixels }: ChangedPicture, there: Modality[]): Modality 
   return of ?? there[0] ?? "rgb";
 }
 
-/** Cells of a panorama in which changed pixels are counted: across, and down. */
+/** The grid in which changed pixels of a panorama are counted: columns and rows. */
 const CELLS = [36, 18] as const;
 
-/** Where most pixels of a panorama have another class, or else another label. */
+/** The cell of a panorama where most pixels have another class, or else another label. */
 function mostOfPanorama(against: Against, viewer: Viewer): Pick<Gaze, "lon" | "lat"> | null {
   const { width, height, a, b } = viewer.labels;
   if (!a || !b || a.length !== b.length) return null;
@@ -99,7 +99,7 @@ function mostOfPanorama(against: Against, viewer: Viewer): Pick<Gaze, "lon" | "l
   return { lon: 2 * Math.PI * ((x + 0.5) / across - 0.5), lat: Math.PI * (0.5 - (y + 0.5) / down) };
 }
 
-/** How points of the image and of the world belong together. */
+/** The mapping between pixels of the image and world points. */
 function cameraOf(
   { view, location }: Shown,
   picture: Picture,
@@ -122,7 +122,7 @@ function cameraOf(
   };
 }
 
-/** Where the image is looked at in 3D, in the colours of what changed. */
+/** The link to the image's view in 3D, in the colours of the changes. */
 function inSpace(index: Index, { area, view, location }: Shown, picture: Picture, gaze: Gaze): string | null {
   const position = view?.position ?? location?.position;
   if (!position || !index.meshes.some((mesh) => mesh.area === area)) return null;
@@ -145,7 +145,7 @@ export async function pairPage(index: Index, against: Against, route: Route): Pr
   const number = /^\d+$/.test(place) ? Number(place) : -1;
   const changed = against.pictures[number];
   const shown = changed ? shownBy(index, changed) : null;
-  if (!changed || !shown) return sentence("There is no such image among those that differ.");
+  if (!changed || !shown) return sentence("This image is not among those that differ.");
   const change = changeOf(route);
   const order = orderOf(against, change).numbers;
   const at = order.indexOf(number);
@@ -170,7 +170,9 @@ export async function pairPage(index: Index, against: Against, route: Route): Pr
   const { a, b } = await loadPair(index, changed, number);
   if (!a || !b) {
     const side = a ? against.comparison.b.folder : index.data_set.name;
-    append(element, [h("p", {}, `Its images of ${side} are missing or damaged; see Notes and Compared.`)]);
+    append(element, [
+      h("p", {}, `Its image files in ${side} are missing or damaged; see Notes and Compared.`),
+    ]);
     return { element, close: () => {} };
   }
   const gaze: Gaze = {

@@ -1,4 +1,4 @@
-// What differs between two data sets, in tables.
+// Tables of the differences between two data sets.
 
 import type { Index } from "../data.js";
 import { count, h, percent, several, table } from "../dom.js";
@@ -8,12 +8,12 @@ import type { Against, Comparison, InstanceChange, ModalityChanges, ViewName } f
 import { changedLink, countsWords, matrix, number, surface } from "./matrix.js";
 import { MODALITY_NAMES } from "./picture.js";
 
-/** So many entries of a list are shown. */
+/** The number of entries shown of a list. */
 const MOST = 50;
 
 type Cells = (string | Node | null)[];
 
-/** A table of the first rows, and how many there are more. */
+/** A table of the first rows, and the number of further rows. */
 function some(head: string[], rows: Cells[], most = MOST): (HTMLElement | null)[] {
   if (rows.length === 0) return [];
   const more = rows.length - most;
@@ -31,7 +31,7 @@ function section(title: string, ...children: (Node | null)[]): HTMLElement | nul
 const value = (of: unknown): string =>
   of === null || of === undefined ? "–" : typeof of === "string" ? of : JSON.stringify(of);
 
-/** How A and B were made: what both are, and the settings and inputs that differ. */
+/** How A and B were made: both data sets, and the settings and inputs that differ. */
 export function madeWith({ a, b, labels, settings, inputs }: Comparison): HTMLElement {
   const rows: [string, string, string][] = [
     ["Data set", a.folder, b.folder],
@@ -63,7 +63,7 @@ export function labelsSection(against: Against): HTMLElement | null {
       const words = {
         other: "its meshes differ, so labels are compared by pixels alone",
         unread: "a mesh could not be read, so labels are compared by pixels alone",
-        one_sided: "only one of both has it",
+        one_sided: "only one of the data sets has it",
       }[geometry as "other"];
       return h("p", {}, `Area ${area}: ${words}.`);
     });
@@ -72,11 +72,10 @@ export function labelsSection(against: Against): HTMLElement | null {
   const words = none
     ? "No face and no pixel has another label."
     : `Another class: ${countsWords(other)}. ` +
-      `Another label, instances of the same class too: ${countsWords(changed)}.`;
+      `Another label, including other instances of the same class: ${countsWords(changed)}.`;
   const solid = against.changed_faces.flatMap((area) => {
     if (!against.both.meshes.some((mesh) => mesh.area === area)) return [];
-    const words =
-      against.both.meshes.length > 1 ? `What changed of area ${area} in 3D` : "What changed, in 3D";
+    const words = against.both.meshes.length > 1 ? `Changes of area ${area} in 3D` : "Changes in 3D";
     return [h("a", { href: link("space", [area], { show: "changed" }) }, words)];
   });
   const places = solid.length > 0 ? h("p", { class: "places" }, ...solid) : null;
@@ -126,7 +125,7 @@ export function instancesSection(against: Against): HTMLElement | null {
   );
 }
 
-/** Where a candidate view or scan location of A is seen, and its name. */
+/** The link to a candidate view or scan location of A, and its name. */
 function placeOf(index: Index, { area, uuid, candidate }: ViewName): { name: string; href: string | null } {
   const at = index.locations.findIndex((l) => l.area === area && l.uuid === uuid);
   const location = index.locations[at];
@@ -202,7 +201,7 @@ export function modalitiesSection({ modalities }: Comparison): HTMLElement | nul
   return section("Images by modality", table(head, rows), hint);
 }
 
-/** The place in the report that a file of A is an image of. */
+/** The link to the image of a file of A in the report. */
 function placeOfFile(index: Index, path: string): string | null {
   const [, area, uuid, frame] = /^area_(\d+)\/.*camera_([^_]+)_.*_frame_([^_]+)_domain_/.exec(path) ?? [];
   const at = index.locations.findIndex((l) => String(l.area) === area && l.uuid === uuid);

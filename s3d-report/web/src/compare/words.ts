@@ -1,9 +1,9 @@
-// What a place is in A and in B, in words.
+// The labels of a pixel in A and in B, in words.
 
 import { entry, key } from "../readout.js";
 import { type Against, nameOf } from "./data.js";
 
-/** What is under the pointer in A and in B. */
+/** Words for the label under the pointer in A and in B. */
 export function tellBoth(against: Against, a: number | null, b: number | null): HTMLElement[] {
   const sides = [
     ["A", a],

@@ -4,8 +4,8 @@ import type { Surface } from "../data.js";
 import { count, h, metres2, percent, s } from "../dom.js";
 
 /**
- * Values in bins of the same width; the last has those at the upper end and beyond, the first those
- * below.
+ * Counts values in bins of equal width. The first bin includes lower values, the last one the upper end and
+ * higher values.
  */
 export function bins(values: number[], from: number, to: number, count: number): number[] {
   const found = new Array<number>(count).fill(0);
@@ -28,13 +28,13 @@ export interface Histogram {
   bins: number;
   kept: number[];
   dropped: number[];
-  /** The density that values were drawn from, if there is one; its scale does not matter. */
+  /** The density that values were drawn from, if any; its scale does not matter. */
   density?: (value: number) => number;
-  /** Where a bar leads; a bound is null at the ends, which have what is beyond them, too. */
+  /** The link of a bar. A bound is null for the first and last bar, which include values beyond. */
   href: (kept: boolean, min: number | null, max: number | null) => string;
 }
 
-/** Arrow keys move the focus from bar to bar; the tab key goes on to what follows. */
+/** Arrow keys move the focus from bar to bar; the tab key leaves the chart. */
 function roving(bars: SVGElement[]): void {
   bars.forEach((bar, i) => {
     bar.setAttribute("tabindex", i === 0 ? "0" : "-1");
@@ -50,7 +50,7 @@ function roving(bars: SVGElement[]): void {
   });
 }
 
-/** Kept values with dropped ones on top of them, and the curve that they were drawn from. */
+/** A histogram of kept values with dropped values stacked on top, and the curve that they were drawn from. */
 export function histogram({
   title,
   unit,
@@ -101,7 +101,7 @@ export function histogram({
   return h("figure", {}, h("figcaption", {}, title), svg);
 }
 
-/** The axis, and words at its start, its middle and its end. */
+/** The axis, with words at its start, middle and end. */
 function axis(words: string[]): SVGElement[] {
   const at = (text: string, i: number): SVGElement => {
     const anchor = ["start", "middle", "end"][i];
@@ -113,13 +113,16 @@ function axis(words: string[]): SVGElement[] {
 export interface Spread {
   title: string;
   bins: Surface[];
-  /** What the faces of a bin have in common. */
+  /** Describes the faces of a bin. */
   nameOf: (bin: number) => string;
-  /** Below the bars one by one, or at the start, the middle and the end of the axis. */
+  /** Words below each bar, or at the start, middle and end of the axis. */
   ticks: { of: "bars" | "axis"; words: string[] };
 }
 
-/** Shares of faces, and beside each that of their surface. What a bar has is told while it is pointed at. */
+/**
+ * Shares of faces, each with the share of their surface beside it. A bar's values are shown while the
+ * pointer is on it.
+ */
 export function spread({ title, bins, nameOf, ticks }: Spread): HTMLElement {
   const sum = (of: (bin: Surface) => number): number => bins.reduce((all, bin) => all + of(bin), 0);
   const [faces, m2] = [
@@ -148,14 +151,14 @@ export function spread({ title, bins, nameOf, ticks }: Spread): HTMLElement {
       const size = { x: (i + 0.12 + 0.4 * k) * step, y: floor - tall, width: 0.36 * step, height: tall };
       return s("rect", { class: k === 0 ? "bar" : "bar surface", ...size });
     };
-    // All of the column is pointed at, also where its bars are low.
+    // The whole column reacts to the pointer, even where its bars are low.
     const target = s("rect", { class: "target", x: i * step, y: 0, width: step, height: floor });
     const parts = [target, ...(shares[i] ?? []).map(column)];
     return s("g", { class: "column", role: "img", "aria-label": words, ...listeners }, ...parts);
   });
   svg.append(...bars, ...axis(ticks.of === "axis" ? ticks.words : []));
   if (ticks.of === "bars") {
-    // As many as there is room for.
+    // As many labels as there is room for.
     const every = Math.ceil(bins.length / 12);
     ticks.words.forEach((text, i) => {
       const place = { x: (i + 0.5) * step, y: height - 5, "text-anchor": "middle" };
@@ -166,7 +169,7 @@ export function spread({ title, bins, nameOf, ticks }: Spread): HTMLElement {
   return h("figure", {}, h("figcaption", {}, title), told, svg);
 }
 
-/** A bar for a cell of a table: a share of the longest. */
+/** A bar in a cell of a table: a share of the longest. */
 export function bar(share: number, color: string): HTMLElement {
   const inner = h("span", { class: "bar" });
   inner.style.width = `${Math.max(0, 100 * share)}%`;

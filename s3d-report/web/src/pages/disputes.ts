@@ -1,5 +1,5 @@
-// How the votes of annotated points went: how many a face has, by how much they are won, and which
-// classes dispute.
+// Statistics of the votes of annotated points: how many votes faces have, by how much they are won, and
+// between which classes.
 
 import { bar, spread } from "./charts.js";
 import { css } from "../colors.js";
@@ -9,10 +9,10 @@ import { patchLink } from "../places.js";
 
 const number = (words: string): HTMLElement => h("span", { class: "number" }, words);
 
-/** So many classes fit into a matrix; more are a list. */
+/** The largest number of classes in a matrix; more are shown as a list. */
 const MATRIX = 16;
 
-/** Faces by how clearly their label won. */
+/** Faces by the margin of their label. */
 function margins(votes: Votes): HTMLElement {
   const { faces_voted, faces_contested } = votes.total;
   const close = votes.total.faces_won_with_less_than_three_quarters;
@@ -57,7 +57,7 @@ function byName(index: Index, kind: "Class" | "Room", votes: Votes): HTMLElement
   );
 }
 
-/** The largest patch that two classes dispute. */
+/** The largest patch that is disputed between two classes. */
 function largest(index: Index, area: number, votes: Votes, pair: [string, string]): string | null {
   const of_class = (label: string): string => label.split("_")[0] ?? "";
   const wanted = [...pair].sort().join();
@@ -108,17 +108,17 @@ function matrix(index: Index, area: number, votes: Votes): HTMLElement {
   return h("table", { class: "matrix" }, h("thead", {}, head), h("tbody", {}, ...rows));
 }
 
-/** How the faces of an area are spread by votes and by margin. */
+/** How the faces of an area are distributed over numbers of votes and margins. */
 function spreads({ votes, margin }: VoteSpread): HTMLElement[] {
-  // Of bin k the most votes of a face, and the fewest.
+  // The largest and the smallest number of votes of a face in bin k.
   const most = (k: number): number => (k === 0 ? 0 : 2 ** (k - 1));
   const fewest = (k: number): number => (k < 2 ? k : most(k - 1) + 1);
   const range = (k: number): string =>
     fewest(k) === most(k) ? count(most(k)) : `${count(fewest(k))} to ${count(most(k))}`;
   const words =
-    "Shares of the faces, and beside them in grey of their surface. The margin is how many more votes the " +
-    "first label has than the second, as a share of all votes of the face. Point at a bar, or go from bar to " +
-    "bar with arrow keys, to read it.";
+    "Shares of the faces, and in grey beside them the shares of their surface. The margin is the lead of the " +
+    "first label over the second, as a share of all votes of the face. Point at a bar, or go from bar to bar " +
+    "with arrow keys, to read it.";
   const charts = [
     spread({
       title: "Votes of a face, up to",
@@ -170,8 +170,8 @@ export function votesSection(index: Index): HTMLElement | null {
       h(
         "p",
         { class: "quiet" },
-        "Faces that were won with less than three quarters of the votes, by the classes of the first label and of " +
-          "the second. A number leads to the largest patch.",
+        "Faces that were won with less than three quarters of the votes, by the classes of the first and the " +
+          "second label. A number leads to the largest patch.",
       ),
       matrix(index, area, votes),
     ]);

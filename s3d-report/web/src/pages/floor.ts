@@ -1,4 +1,4 @@
-// One storey of an area from above: rooms, and where panoramas and photographs were taken.
+// One storey of an area from above, with its rooms, panoramas and photographs.
 
 import { css, depthRamp } from "../colors.js";
 import type { ChangeMark } from "../compare/marks.js";
@@ -9,27 +9,27 @@ import { patchLink } from "../places.js";
 import { link } from "../route.js";
 
 export interface FloorOptions {
-  /** In a corner of a panorama: without words. */
+  /** For the corner of a panorama: without words. */
   small?: boolean;
-  /** The place of a location in the index. */
+  /** The current location, as an index. */
   current?: number;
-  /** What of the area is shown; else all. */
+  /** The rooms to show; all by default. */
   hasRoom?: (room: string) => boolean;
   hasHeight?: (z: number) => boolean;
-  /** Where labels changed, against another data set. */
+  /** Changes of labels against another data set. */
   changes?: ChangeMark[];
-  /** Called when a location is pointed at or has the focus, with words on it; null when no longer. */
+  /** Called with words for the location under the pointer or with the focus; with null when there is none. */
   told?: (words: string | null) => void;
 }
 
-/** A plan that shows where one looks. */
+/** A plan that shows the direction of view. */
 export interface Plan {
   element: SVGSVGElement;
   /** Turns the wedge of the current location: heading from +X towards +Y, and angle of view. */
   look: (azimuth_rad: number, fov_rad: number) => void;
 }
 
-/** Other places of a room's name, in hundredths of the plan's size. */
+/** Alternative positions for a room's name, in hundredths of the plan's size. */
 const BESIDE: [number, number][] = [
   [13, -0.5],
   [-13, -0.5],
@@ -42,14 +42,16 @@ const ABOVE_BELOW: [number, number][] = [
 
 const RADIANS = Math.PI / 180;
 
-/** The colour of a share of the sphere that sees the mesh; the same ramp as that of depths. */
+/** The colour of the share of the sphere that sees the mesh, on the same ramp as depths. */
 const COVERAGE = depthRamp(101);
 export function coverageColor(share: number): Rgb {
   const at = 4 * Math.round(100 * Math.min(1, Math.max(0, share)));
   return [COVERAGE[at] ?? 0, COVERAGE[at + 1] ?? 0, COVERAGE[at + 2] ?? 0];
 }
 
-/** How far a cone is drawn, in hundredths of the plan: all cover as much, so that narrow ones stand out. */
+/**
+ * The length of a cone in hundredths of the plan: all cones have equal area, so that narrow ones stand out.
+ */
 const reachOf = (fov: number): number => Math.min(16, 9 * Math.sqrt(1 / fov));
 
 /** The headings of kept views at a location: from +X towards +Y, and angle of view, radians. */
@@ -63,7 +65,7 @@ function conesAt(index: Index, at: number): [number, number][] {
   );
 }
 
-/** The panorama of a room that sees most. */
+/** The panorama of a room that sees the most. */
 function bestIn(stands: [Location, number][], room: string): Location | null {
   const seen = (l: Location | null): number => l?.seen?.coverage ?? -1;
   return stands.reduce<Location | null>(
@@ -111,7 +113,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
     });
     const best = small ? null : bestIn(stands, room.name);
     if (!small) outline.append(s("title", {}, `${roomName(room.name)}, ${metres2(room.floor_m2)}`));
-    // The keyboard gets there by the scan location itself.
+    // Keyboard users get there by the scan location itself.
     const to = best && { href: link("pano", [area, best.uuid]), tabindex: -1, "aria-hidden": "true" };
     element.append(to ? s("a", to, outline) : outline);
   }
@@ -123,7 +125,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
     const tip = (angle: number): string => `${x + reach * Math.cos(angle)},${y - reach * Math.sin(angle)}`;
     return `M${x},${y}L${tip(a)}A${reach},${reach} 0 ${fov > Math.PI ? 1 : 0} 1 ${tip(b)}Z`;
   };
-  /** Shows cones and words while something is pointed at or has the focus. */
+  /** Shows cones and words for the element under the pointer or with the focus. */
   const reveal = (
     target: Element,
     place: [number, number],
@@ -200,7 +202,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
   if (!small) {
     append(element, [patches(index, area, hasHeight, at, unit)]);
     append(element, changed(options.changes ?? [], hasHeight, at, unit));
-    // The last is on top of all, and is not in the way of pointers.
+    // The last elements are on top, but do not block the pointer.
     append(element, [...names(rooms, stands, at, unit), scale(box, unit)].flat());
   }
   const current = options.current === undefined ? undefined : index.locations[options.current];
@@ -212,7 +214,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
   return { element, look };
 }
 
-/** Patches that labels dispute, each a link to where it is seen. */
+/** Disputed patches, each a link to a place that shows it. */
 function patches(
   index: Index,
   area: number,
@@ -236,7 +238,7 @@ function patches(
   return group;
 }
 
-/** Where labels changed, each a link to it in 3D; those of another class lie above. */
+/** Changes of labels, each a link to it in 3D; changes of class lie on top. */
 function changed(
   marks: ChangeMark[],
   hasHeight: (z: number) => boolean,
@@ -255,7 +257,7 @@ function changed(
   });
 }
 
-/** Names of rooms where they fit, beside whoever stands in the middle. */
+/** Names of rooms where they fit, beside any location in the middle. */
 function names(
   rooms: Index["rooms"],
   stands: [Location, number][],
@@ -268,10 +270,10 @@ function names(
     if (!largest) continue;
     const box = boxOf(largest);
     const name = roomName(room.name);
-    // A letter is about as wide as one hundredth of the plan; who points at the room is told its name anyway.
+    // A letter is about one hundredth of the plan wide; pointing at a room shows its name in any case.
     if (Math.min(name.length, 24) * unit > 1.6 * box.w || box.h < 2 * unit) continue;
     const [x, y] = at(...middleOf(largest));
-    // Beside the middle, or above or below it, if somebody stands there.
+    // Beside the middle, or above or below it, if a location is there.
     const taken = ([right, down]: [number, number]): boolean =>
       stands.some(([location]) => {
         const [sx, sy] = at(location.position?.[0] ?? 0, location.position?.[1] ?? 0);

@@ -1,23 +1,23 @@
-// What should be looked at: files that are missing or damaged, surface without labels, classes in dispute.
+// What users should check: missing or damaged files, unlabelled surface, disputed classes.
 
 import type { Index } from "../data.js";
 import { append, count, h, metres2, percent, several, table } from "../dom.js";
 import { disputeInPanorama } from "../places.js";
 import { link, spaceLink } from "../route.js";
 
-/** What the page has of others: put in by bundle.mjs. */
+/** The licences of bundled packages, inserted by bundle.mjs. */
 declare const LICENCES: { name: string; version: string; text: string }[];
 
 const warningsOf = (index: Index): string[] => index.areas.flatMap((area) => area.warnings ?? []);
 
-/** How many notes the tab counts: what is wrong with files, and what the export warned of. */
+/** The number of notes on the tab: faults of files, and warnings of the export. */
 export const faultCount = (index: Index): number =>
   index.faults.length +
   warningsOf(index).length +
   (index.data_set.missing_yet?.length ?? 0) +
   (index.verified?.faults ?? []).reduce((sum, group) => sum + group.count, 0);
 
-/** Where a page shows what a warning is about: the location that it names, or what has no label. */
+/** The link for a warning: the location that it names, or the unlabelled surface. */
 function placeOfWarning(index: Index, warning: string): [string, string] | null {
   const location = index.locations.find((l) => l.pano && warning.includes(l.uuid));
   if (location) return [link("pano", [location.area, location.uuid]), "its panorama"];
@@ -67,7 +67,7 @@ function faults(index: Index): HTMLElement {
   return section;
 }
 
-/** The name of a file, which leads to the picture that it is of. */
+/** The name of a file, with a link to its picture. */
 function fileName(index: Index, path: string): HTMLElement {
   const name = h("code", {}, path);
   const [, uuid, frame] = /\/camera_([0-9A-Za-z-]+)_.*_frame_(\d+|equirectangular)_/.exec(path) ?? [];
@@ -105,7 +105,7 @@ function surface(index: Index): HTMLElement | null {
           "li",
           {},
           `${of}${count(area.faces_left_out)} faces of the input were left out: ` +
-            "without area, or with the corners of an earlier one.",
+            "they have no area, or the corners of an earlier face.",
         ),
       );
     }
@@ -131,10 +131,16 @@ function surface(index: Index): HTMLElement | null {
     const filled = (area.unlabelled?.without_votes.faces ?? 0) - (bare?.faces ?? 0);
     if (filled > 0)
       items.push(
-        h("li", {}, `${of}${count(filled)} faces have no votes, and the label of the surface beside them.`),
+        h(
+          "li",
+          {},
+          `${of}${count(filled)} faces have no votes, and took the label of the surface beside them.`,
+        ),
       );
     if (area.offset_m)
-      items.push(h("li", {}, `${of}coordinates are those of the scan less ${area.offset_m.join(", ")} m.`));
+      items.push(
+        h("li", {}, `${of}${area.offset_m.join(", ")} m were subtracted from the coordinates of the scan.`),
+      );
   }
   return items.length === 0 ? null : h("section", {}, h("h2", {}, "Surface"), h("ul", {}, ...items));
 }

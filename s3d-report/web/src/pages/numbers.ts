@@ -1,4 +1,4 @@
-// The paper's tables, classes by pixels, and what the views are like.
+// The paper's tables, pixels by class, and the distributions of views.
 
 import { bar, histogram } from "./charts.js";
 import { css } from "../colors.js";
@@ -8,7 +8,7 @@ import { link } from "../route.js";
 import { votesSection } from "./disputes.js";
 import { yawOf } from "./views.js";
 
-/** Rows of a table with a column an area and, of several, their sum. */
+/** The rows of a table with a column for each area, and for several areas one for their sum. */
 function byArea(
   rows: [string, (area: number) => number][],
   areas: number,
@@ -86,7 +86,7 @@ function tables(index: Index): HTMLElement {
   return section;
 }
 
-/** Each class by what shows it: pixels, faces, m², instances. */
+/** Each class with its pixels, faces, m² and instances. */
 function classes(index: Index): HTMLElement | null {
   const labelled = index.pixels_by_class.reduce((a, b) => a + b, 0);
   const all = labelled + index.pixels_unlabelled;
@@ -137,7 +137,7 @@ function distributions(index: Index): HTMLElement | null {
   const entropy = split((v) => v.entropy);
   const highest = [...entropy.kept, ...entropy.dropped].reduce((a, b) => Math.max(a, b), 0.1);
   const photographs = index.views.some((v) => v.photograph !== null);
-  // The next number below a bound, as the index rounds them: a bar ends where the next one begins.
+  // The next number below a bound, with the index's rounding: a bar ends where the next one begins.
   const below = (key: string, bound: number): string =>
     key === "entropy" ? (bound - 1e-4).toFixed(4) : (bound - 0.01).toFixed(2);
   const href =
@@ -191,7 +191,7 @@ function distributions(index: Index): HTMLElement | null {
     }),
   ];
   const words =
-    "Kept views, dropped candidates on top of them in grey, and the curve that candidates are drawn from. " +
+    "Kept views, with dropped candidates on top in grey, and the distribution that candidates are drawn from. " +
     "A bar leads to its views; arrow keys go from bar to bar.";
   return h(
     "section",

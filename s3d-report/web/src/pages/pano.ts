@@ -1,4 +1,4 @@
-// A scan location: its panorama, its neighbours, and where it is on the plan.
+// A scan location: its panorama, its neighbours, and its position on the plan.
 
 import { type Index, type Location, type Picture, load } from "../data.js";
 import { append, choice, h, percent, roomName } from "../dom.js";
@@ -10,17 +10,17 @@ import { Viewer, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
 
 const RADIANS = Math.PI / 180;
 
-/** How much farther than what is seen a neighbour may be, metres: pixels are coarse. */
+/** A neighbour may be this much farther than the seen surface, in metres, since pixels are coarse. */
 const SLACK = 0.3;
 
-/** The location that sees most: some stand outside of what was scanned. */
+/** The location that sees the most, since some stand outside the scanned space. */
 function best(index: Index): number {
   const seen = (l: Location): number => (l.pano ? (l.seen?.coverage ?? 0) : -1);
   const most = index.locations.reduce((max, l) => Math.max(max, seen(l)), -1);
   return most < 0 ? -1 : index.locations.findIndex((l) => seen(l) === most);
 }
 
-/** Where a panorama that nobody has turned yet looks: straight ahead, unless little was seen there. */
+/** The first direction of view in a panorama: straight ahead, unless little is seen there. */
 function firstLook(depthAt: (u: number, v: number) => number | null): number {
   const shareAt = (lon: number): number => {
     const turns = Array.from({ length: 15 }, (_, i) => (lon + (i - 7) * 6) / 360 + 0.5);
@@ -40,7 +40,7 @@ export function locationAt(index: Index, route: Route): number {
   return route.path.length === 0 ? best(index) : named;
 }
 
-/** The other locations of the area that nothing hides, with direction and distance, the farthest first. */
+/** The visible other locations of the area, with direction and distance, the farthest first. */
 function neighbours(
   index: Index,
   from: Location,
@@ -142,7 +142,7 @@ export async function panoPage(
     opened.depthAt(u, v),
   )) {
     const words = `${roomName(other.room)}, ${distance.toFixed(1)} m`;
-    // Whoever walks keeps looking where he looked.
+    // Walking keeps the direction of view.
     const walk = (): void => {
       const now = opened.gaze ?? gaze;
       const turned = now.lon + (other.azimuth_rad ?? 0) - (location.azimuth_rad ?? 0);

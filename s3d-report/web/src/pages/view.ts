@@ -1,4 +1,4 @@
-// One view, large: the slider, what is under the pointer, and why it was kept.
+// One view, large: the slider, the readout, and why the view was kept.
 
 import { type Index, type View, loadPicture } from "../data.js";
 import { append, h, percent, roomName } from "../dom.js";
@@ -7,10 +7,10 @@ import { placeOf } from "../gl.js";
 import { type Route, link, replaceRoute } from "../route.js";
 import { Viewer, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
 
-/** Why a view is in the data set, or is not: a sentence. */
+/** A sentence that says why a view was kept or dropped. */
 export function reasonOf(view: View): string {
-  if (view.photograph !== null) return "A photograph: every one is a view.";
-  if (!view.place) return "views.json does not tell of it.";
+  if (view.photograph !== null) return "A photograph: each photograph is a view.";
+  if (!view.place) return "views.json does not list it.";
   const { reason, rank, pool } = view.place;
   const place = `its entropy is number ${rank} of ${pool} candidates`;
   switch (reason) {
@@ -19,15 +19,15 @@ export function reasonOf(view: View): string {
     case "highest":
       return `Kept: ${place}, among the highest 60 %.`;
     case "drawn":
-      return `Kept: ${place}, between the highest and the lowest, and it was drawn.`;
+      return `Kept: ${place}, between the highest and the lowest, and drawn at random.`;
     case "not_drawn":
-      return `Dropped: ${place}, between the highest and the lowest, and it was not drawn.`;
+      return `Dropped: ${place}, between the highest and the lowest, and not drawn at random.`;
     case "lowest":
       return `Dropped: ${place}, among the lowest 15 %.`;
   }
 }
 
-/** What a view is called. */
+/** The name of a view. */
 export function nameOf(index: Index, view: View): string {
   if (view.photograph !== null) return view.photograph;
   const uuid = view.location === null ? "" : (index.locations[view.location]?.uuid.slice(0, 8) ?? "");
@@ -35,7 +35,7 @@ export function nameOf(index: Index, view: View): string {
   return `${roomName(view.room)} · ${uuid} · ${number}`;
 }
 
-/** The panorama of a view's location, turned to where the view looks. */
+/** The link to the panorama of a view's location, turned in the direction of the view. */
 export function inPanorama(index: Index, view: View): string | null {
   const location = view.location === null ? undefined : index.locations[view.location];
   if (!location?.pano || view.yaw_deg === null || view.pitch_deg === null || view.fov_deg === null)

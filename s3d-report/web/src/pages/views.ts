@@ -1,4 +1,4 @@
-// The grid of views: sorted, filtered, loaded as it is scrolled.
+// The grid of views: sorted, filtered, and loaded while scrolling.
 
 import { css } from "../colors.js";
 import { type Index, type View, loadThumb } from "../data.js";
@@ -6,7 +6,7 @@ import { append, choice, h, percent, roomName } from "../dom.js";
 import { type Route, link, replaceRoute } from "../route.js";
 import { inPanorama, nameOf, reasonOf } from "./view.js";
 
-/** What can be sorted by and filtered: a number, or nothing where a view has none. */
+/** A property to sort and filter by: a number, or nothing where a view has none. */
 interface Property {
   key: string;
   name: string;
@@ -24,7 +24,7 @@ const PROPERTIES: Property[] = [
   { key: "fov", name: "Angle of view °", of: (v) => v.fov_deg, step: 5 },
 ];
 
-/** Of half a turn at most, to the left. */
+/** The yaw to the left, half a turn at most. */
 export function yawOf(view: View): number | null {
   const yaw = view.yaw_deg;
   return yaw === null ? null : yaw - 360 * Math.round(yaw / 360);
@@ -32,7 +32,7 @@ export function yawOf(view: View): number | null {
 
 const hundred = (share: number | null | undefined): number | null => (share == null ? null : 100 * share);
 
-/** So many cards are added at a time. */
+/** The number of cards that are added at a time. */
 const BATCH = 60;
 
 export function viewsPage(index: Index, route: Route): { element: HTMLElement; close: () => void } {
@@ -104,7 +104,7 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
     const sign = named || query["order"] === "up" ? 1 : -1;
     const value = query["sort"] === "share" ? shareOf : named ? roomPlace(index) : by?.of;
     if (value) {
-      // Those without a number come last, either way.
+      // Views without a number come last in both orders.
       const number = (view: View): number => value(view) ?? -sign * Infinity;
       shown.sort((a, b) => sign * (number(a) - number(b)) || 0);
     }
@@ -133,7 +133,7 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
   };
 }
 
-/** The place of a view's room among all, by area and name. */
+/** The rank of a view's room among all, by area and name. */
 function roomPlace(index: Index): (view: View) => number {
   const rooms = roomsOf(index);
   const places = new Map(rooms.map((room, i) => [room, i]));
@@ -251,7 +251,7 @@ function controls(
   return h("div", {}, bar, h("details", { open }, h("summary", {}, "Filter by numbers"), ranges));
 }
 
-/** What stands in place of a picture. */
+/** The text in place of a picture. */
 function placeholder(view: View): string {
   if (view.frame !== null) return "missing";
   return view.place?.reason === "lowest" ? "dropped: lowest entropy" : "dropped: not drawn";

@@ -1,4 +1,4 @@
-// From where one looks at a mesh: orbit, keys, and flights.
+// The viewpoint in 3D: orbit, keys, and flights.
 
 import { PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
@@ -7,7 +7,7 @@ import type { Projected } from "../marks.js";
 
 /** The vertical angle of view, degrees. */
 export const FOV = 50;
-/** How long a flight takes, ms. */
+/** The duration of a flight, ms. */
 const FLIGHT = 700;
 const NEAREST = 0.05;
 
@@ -24,7 +24,7 @@ export class Eye {
   private readonly size: number;
   private flight = 0;
 
-  /** `moved` is called whenever one looks from elsewhere. */
+  /** `moved` is called whenever the viewpoint changes. */
   constructor(
     canvas: HTMLCanvasElement,
     mesh: Mesh,
@@ -51,13 +51,13 @@ export class Eye {
     this.update();
   }
 
-  /** Looks at once from there. */
+  /** Moves to a viewpoint at once. */
   set({ at, from }: Stand): void {
     this.land();
     this.put(new Vector3(...at), new Vector3(...from));
   }
 
-  /** Goes there; at once for those who want no motion. */
+  /** Flies to a viewpoint; moves at once for users who want no motion. */
   fly(to: Stand): void {
     this.land();
     if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
@@ -80,13 +80,14 @@ export class Eye {
     this.flight = requestAnimationFrame(step);
   }
 
-  /** From where all of some points are seen, obliquely from above. */
+  /** A viewpoint obliquely from above that sees all of the points. */
   overview(points: Rgb[]): Stand {
     const back = new Vector3(0.3, -0.62, 0.9).normalize();
     const right = new Vector3(0, 0, 1).cross(back).normalize();
     const up = back.clone().cross(right);
     const tan = Math.tan((FOV * Math.PI) / 360);
-    // By axis of the canvas: a point z nearer to the camera needs tan * z more room on both of its sides.
+    // By axis of the canvas: a point that is z nearer to the camera needs tan * z more room on both of its
+    // sides.
     const [most, least] = [
       [-Infinity, -Infinity],
       [-Infinity, -Infinity],
@@ -115,18 +116,18 @@ export class Eye {
     return { at: rgb(at), from: rgb(from) };
   }
 
-  /** How far before the camera a place is. */
+  /** The depth of a point in front of the camera. */
   depth(point: Rgb): number {
     return this.screen(point, 1, 1)[2];
   }
 
-  /** Turns and zooms about what is so far away from now on; what is seen stays the same. */
+  /** Sets the distance of the point to turn and zoom about; the image stays the same. */
   reach(depth: number): void {
     const ahead = this.camera.getWorldDirection(new Vector3());
     this.controls.target.copy(this.camera.position).addScaledVector(ahead, Math.max(NEAREST, depth));
   }
 
-  /** The direction in which a point of the canvas lies, in shares of its size. */
+  /** The direction to a point of the canvas, which is given in shares of its size. */
   ray(u: number, v: number): Vector3 {
     return new Vector3(2 * u - 1, 1 - 2 * v, 0.5)
       .unproject(this.camera)

@@ -1,31 +1,31 @@
-// The files of a mesh: unpacked, and held against what they and the index say of them.
+// The files of a mesh: unpacked, and checked against their own numbers and the index.
 
 import { type Mesh, type Rgb, load } from "../data.js";
 import { unpack } from "../faces.js";
 
-/** A part of a mesh, its faces by material. */
+/** A part of a mesh, its faces sorted by material. */
 export interface Part {
   origin: Rgb;
   step: Rgb;
   /** In steps from the origin, 3 a vertex. */
   position: Uint16Array;
-  /** Of faces without a texture, 3 a vertex; null if those of the materials count. */
+  /** Colours for faces without a texture, 3 a vertex; null if the materials have the colours. */
   color: Uint8Array | null;
-  /** Vertices, 3 a face. */
+  /** Indices of vertices, 3 a face. */
   index: Uint32Array;
-  /** In steps from their origin, 2 a corner. */
+  /** In steps from the coordinates' origin, 2 a corner. */
   uv: Uint16Array | null;
   uvOrigin: [number, number];
   uvStep: [number, number];
-  /** Numbers of the faces in the data set's mesh. */
+  /** Indices of the faces in the data set's mesh. */
   face: Uint32Array;
-  /** Places in the mesh's materials. */
+  /** Indices into the mesh's materials. */
   material: Uint16Array;
 }
 
 export interface Box {
   label: number;
-  /** Lowest and highest x, y, z. */
+  /** The smallest and the largest x, y, z. */
   box: number[];
 }
 
@@ -92,8 +92,8 @@ export async function loadPart(mesh: Mesh, part: number): Promise<Part> {
     face: new Uint32Array(face),
     material: new Uint16Array(material),
   };
-  if (!all(made.index, vertices)) throw damaged(key, "a face has a vertex that is not there");
-  if (!all(made.face, mesh.faces)) throw damaged(key, "a face has a number that the mesh has not");
+  if (!all(made.index, vertices)) throw damaged(key, "a face has a vertex that does not exist");
+  if (!all(made.face, mesh.faces)) throw damaged(key, "a face has a number that the mesh does not have");
   if (!all(made.material, mesh.materials.length)) throw damaged(key, "a face has no material");
   return made;
 }
@@ -119,6 +119,6 @@ export async function loadBoxes(area: number): Promise<Box[]> {
   const key = `boxes_${area}`;
   const boxes = await load<Box[]>(key);
   if (!Array.isArray(boxes) || !boxes.every((b) => are([b.label], 1) && are(b.box, 6)))
-    throw damaged(key, "a box is not one");
+    throw damaged(key, "a box is invalid");
   return boxes;
 }

@@ -1,4 +1,4 @@
-// What lies over the canvas: names of rooms, and scan locations to enter.
+// The layer over the canvas: names of rooms, and scan locations to enter.
 
 import { Vector3 } from "three";
 import type { Index, Mesh, Rgb } from "../data.js";
@@ -10,9 +10,9 @@ import { floorOf, middleOf } from "./lines.js";
 import type { Look } from "./look.js";
 import type { Surface } from "./surface.js";
 
-/** So many locations are marked at once: those nearest to what is looked at. */
+/** The largest number of locations that are marked at once: those nearest to the point of interest. */
 const MOST = 200;
-/** What hides a location is nearer than it by so much, metres. */
+/** A surface hides a location only if it is nearer by this much, metres. */
 const SLACK = 0.05;
 
 interface Label {
@@ -45,7 +45,7 @@ export class Labels {
     }
   }
 
-  /** Names the rooms; boxes tell where their floors are. */
+  /** Shows the names of the rooms, at the height of the floors in `boxes`. */
   nameRooms(boxes: Box[]): void {
     const rooms = this.index.rooms.filter((room) => room.area === this.mesh.area);
     this.rooms = rooms.map((room) => {
@@ -55,7 +55,7 @@ export class Labels {
     this.overlay.prepend(...this.rooms.map(({ element }) => element));
   }
 
-  /** Puts all in its places on a canvas of this size. What the section cuts away is not shown. */
+  /** Moves all labels to their places on a canvas of this size. Labels above the section are hidden. */
   place(eye: Eye, surface: Surface, look: Look, width: number, height: number): void {
     const section = look.section ?? Infinity;
     const { at: target, from } = eye.stand;
@@ -77,7 +77,7 @@ export class Labels {
       for (const { element } of this.locations) element.hidden = true;
     }
     for (const label of near) put(label, look.marks.has("locations"), true);
-    // From inside, names of other rooms would stand in the walls.
+    // Seen from inside, names of other rooms would appear in the walls.
     const above = from[2] > Math.min(section, this.mesh.max[2]);
     for (const label of this.rooms) put(label, look.marks.has("rooms") && above, false);
   }

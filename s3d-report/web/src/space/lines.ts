@@ -1,4 +1,4 @@
-// Lines in the mesh: outlines of rooms, boxes of instances, and what views see.
+// Lines in the mesh: outlines of rooms, boxes of instances, and frustums of views.
 
 import {
   BufferAttribute,
@@ -14,7 +14,7 @@ import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js
 import type { Index, Mesh, Rgb, Room, View } from "../data.js";
 import type { Box } from "./files.js";
 
-/** How far above a floor an outline lies, and how long a frustum is, metres. */
+/** The height of an outline above its floor, and the length of a frustum, metres. */
 const ABOVE_FLOOR = 0.03;
 const REACH = 0.45;
 
@@ -24,7 +24,7 @@ const DROPPED: Rgb = [118, 118, 124];
 
 const share = (color: Rgb): [number, number, number] => color.map((c) => c / 255) as Rgb;
 
-/** Lines of a width in CSS pixels; `colors` has one for each segment. */
+/** Lines with a width in CSS pixels; `colors` has one for each segment. */
 function wide(points: number[], colors: Rgb[], width: number): LineSegments2 {
   const geometry = new LineSegmentsGeometry();
   geometry.setPositions(points);
@@ -34,7 +34,7 @@ function wide(points: number[], colors: Rgb[], width: number): LineSegments2 {
   return lines;
 }
 
-/** The floor of a room: the top of its boxes of the class floor, else the lowest of its instances. */
+/** The height of a room's floor: the top of its floor's boxes, or else the lowest point of its instances. */
 export function floorOf(index: Index, mesh: Mesh, boxes: Box[], room: Room): number {
   let floor: number | null = null;
   for (const { label, box } of boxes) {
@@ -46,7 +46,7 @@ export function floorOf(index: Index, mesh: Mesh, boxes: Box[], room: Room): num
   return floor ?? room.heights?.[0] ?? mesh.min[2];
 }
 
-/** Where the name of a room stands: the middle of its largest ring's box. */
+/** The place for a room's name: the middle of the box of its largest ring. */
 export function middleOf(room: Room, floor: number): Rgb {
   let best: [number, Rgb] = [-1, [0, 0, floor]];
   for (const ring of room.outline) {
@@ -69,12 +69,12 @@ export function roomLines(rooms: { room: Room; floor: number }[]): Object3D {
   return wide(points, Array<Rgb>(points.length / 6).fill(ROOM), 2.5);
 }
 
-/** Pairs of a cube's corners; bit k of a corner is its end of axis k. */
+/** Pairs of a cube's corners; bit k of a corner says its end of axis k. */
 const EDGES = [0, 1, 2].flatMap((axis) =>
   [0, 1, 2, 3, 4, 5, 6, 7].filter((c) => !(c & (1 << axis))).map((c) => [c, c | (1 << axis)] as const),
 );
 
-/** The boxes of the instances of a class, or of all. */
+/** The boxes of the instances of a class, or of all classes. */
 export function boxLines(index: Index, boxes: Box[], of_class: number | null): Object3D {
   const points: number[] = [];
   const colors: Rgb[] = [];
@@ -93,7 +93,7 @@ export function boxLines(index: Index, boxes: Box[], of_class: number | null): O
 
 type Axes = { at: Rgb; forward: Rgb; up: Rgb };
 
-/** Where the camera of a view is, and how it is turned. */
+/** The position and the axes of a view's camera. */
 function axesOf(index: Index, view: View): Axes | null {
   const { position, forward, up, yaw_deg: yaw, pitch_deg: pitch } = view;
   if (position && forward && up) return { at: position, forward, up };
@@ -106,8 +106,8 @@ function axesOf(index: Index, view: View): Axes | null {
 }
 
 /**
- * What kept views, or dropped ones, see. Views are square; the shape of a photograph is not in the index, so
- * that its frustum is drawn as high as it is wide.
+ * The frustums of kept or of dropped views. Views are square. The index does not have the shape of a
+ * photograph, so its frustum is drawn as high as it is wide.
  */
 export function frustums(index: Index, area: number, kept: boolean): Object3D {
   const points: number[] = [];
@@ -123,7 +123,7 @@ export function frustums(index: Index, area: number, kept: boolean): Object3D {
     const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
     corners.forEach((here, i) => points.push(...at, ...here, ...here, ...(corners[(i + 1) % 4] ?? here)));
   }
-  // There can be 100,000 of them: lines of one pixel.
+  // There can be 100,000 of them, so they are lines of one pixel.
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(new Float32Array(points), 3));
   const material = new LineBasicMaterial();
@@ -133,7 +133,7 @@ export function frustums(index: Index, area: number, kept: boolean): Object3D {
   return lines;
 }
 
-/** Gives the graphics card back what lines hold. */
+/** Frees the graphics card's memory for lines. */
 export function drop(group: Group): void {
   for (const child of [...group.children] as (LineSegments | LineSegments2)[]) {
     child.geometry.dispose();

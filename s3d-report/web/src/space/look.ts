@@ -1,4 +1,4 @@
-// How a mesh is looked at, and what the address keeps of it.
+// How a mesh is shown, as kept in the address.
 
 import type { Index, Mesh, Rgb } from "../data.js";
 import { SHOWS, type Show } from "./paint.js";
@@ -10,23 +10,23 @@ export type Mark = (typeof MARKS)[number];
 export interface Look {
   show: Show;
   marks: Set<Mark>;
-  /** Whose boxes are shown: a class, all, or nobody's. */
+  /** The instances whose boxes are shown: a class, all, or none. */
   boxes: number | "all" | null;
-  /** What is above is cut away; null asks for just below the ceilings. */
+  /** The height above which all is cut away; null means just below the ceilings. */
   section: number | null;
   at: Rgb | null;
   from: Rgb | null;
-  /** Whether the address is that of a place, which is to be marked. */
+  /** Whether the address names a point to mark. */
   place: boolean;
-  /** The class or instance in A and in B of changed faces to look at; null if no such are meant. */
+  /** The class or instance in A and in B of changed faces to find; null if there is nothing to find. */
   find: { was: string | null; is: string | null } | null;
 }
 
-/** In what colours the faces of a mesh can be shown. */
+/** The colours in which the faces of a mesh can be shown. */
 export const showsOf = (mesh: Mesh, changed: boolean): Show[] =>
   SHOWS.filter((show) => (show === "changed" ? changed : show === "texture" || mesh.has_votes));
 
-/** What there is to be drawn in a mesh. */
+/** The lines that can be drawn in a mesh. */
 export function marksOf(index: Index, mesh: Mesh): Mark[] {
   const views = index.views.filter((view) => view.area === mesh.area && view.fov_deg !== null);
   const kept = views.filter((view) => view.frame !== null || view.photograph !== null).length;

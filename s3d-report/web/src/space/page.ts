@@ -1,4 +1,4 @@
-// The page of a mesh in 3D: what can be chosen, and the list of what is contested.
+// The page of a mesh in 3D: its controls, and the list of disputed patches.
 
 import type { Index, Mesh } from "../data.js";
 import { append, choice, count, h, several } from "../dom.js";
@@ -10,7 +10,7 @@ import { type Look, type Mark, lookFrom, marksOf, queryOf, showsOf } from "./loo
 import type { Show } from "./paint.js";
 import { SpaceView } from "./view.js";
 
-/** Browsers take no more than so many changes of the address a minute, ms between two. */
+/** Browsers limit the changes of the address in a minute; this is the time between two, ms. */
 const PAUSE = 250;
 
 const SHOW_NAMES: Record<Show, string> = {
@@ -67,11 +67,11 @@ export async function spacePage(index: Index, route: Route): Promise<Page> {
   }
 }
 
-/** The first area in which the faces changed that an address is about. */
+/** The first area with the changed faces that an address names. */
 async function areaOfChange(against: Against, query: URLSearchParams): Promise<string | undefined> {
   if (!query.has("was") && !query.has("is")) return undefined;
   for (const area of against.changed_faces) {
-    // A file that cannot be read is told of when its area is shown.
+    // A file that cannot be read is reported when its area is shown.
     const changes = await loadChanges(against, area).catch(() => null);
     if (changes && groupOf(against, changes, query.get("was"), query.get("is"))) return String(area);
   }
@@ -197,7 +197,7 @@ function boxChoice(index: Index, view: SpaceView): HTMLElement | null {
   });
 }
 
-/** The patches that most surface is contested of; each leads to its place. */
+/** The disputed patches with the largest surface; each is a link to its place. */
 function patchList(index: Index, view: SpaceView): HTMLElement | null {
   const patches = index.votes.find(({ area }) => area === view.mesh.area)?.votes.disputed_patches ?? [];
   if (patches.length === 0) return null;
@@ -213,10 +213,10 @@ function patchList(index: Index, view: SpaceView): HTMLElement | null {
   return list;
 }
 
-/** So many changes are listed. */
+/** The number of changes in the list. */
 const CHANGES = 50;
 
-/** What changed, those of another class first; each leads to its place. */
+/** The changes, those of class first; each is a link to its place. */
 function changeList(against: Against, view: SpaceView): HTMLElement | null {
   const groups = view.changes?.groups.slice(0, CHANGES) ?? [];
   if (groups.length === 0) return null;
@@ -238,6 +238,6 @@ function simplified(mesh: Mesh): HTMLElement {
     mesh.cell_m === null
       ? `All ${count(mesh.faces)} faces of the mesh.`
       : `Simplified: ${count(mesh.shown)} of ${count(mesh.faces)} faces. The vertices in each cube of ` +
-        `${(100 * mesh.cell_m).toFixed(1)} cm were made one, and what collapsed was left out.`;
+        `${(100 * mesh.cell_m).toFixed(1)} cm were merged, and collapsed faces were left out.`;
   return h("p", { class: "quiet" }, words);
 }

@@ -1,4 +1,4 @@
-// The colours of the faces: one shader, which takes them from textures or by a number of each face.
+// The colours of the faces: one shader, which reads them from textures or from a table by face.
 
 import {
   DataTexture,
@@ -107,7 +107,7 @@ function table(pixels: Uint8Array, width: number, rows: number): DataTexture {
   return texture;
 }
 
-/** The materials of a mesh. What is changed here is changed in all of them. */
+/** The materials of a mesh. A change here applies to all of them. */
 export class Paint {
   private readonly show = { value: 0 };
   private readonly section = { value: 0 };
@@ -134,7 +134,7 @@ export class Paint {
     this.section.value = section;
   }
 
-  /** The material of the faces of a part that have one. */
+  /** The material for the faces of a part that have the material at this index. */
   of(part: Part, place: number): RawShaderMaterial {
     const { color, texture } = this.mesh.materials[place] ?? { color: NULL_LABEL, texture: null };
     const image = part.uv && texture !== null ? this.images.get(texture) : undefined;
@@ -159,7 +159,7 @@ export class Paint {
     return material;
   }
 
-  /** Takes the image of a texture, for the materials that are there and those to come. */
+  /** Uploads the image of a texture, for existing and later materials. */
   take(texture: number, image: HTMLImageElement, anisotropy: number): void {
     const made = new Texture(image);
     made.wrapS = made.wrapT = RepeatWrapping;

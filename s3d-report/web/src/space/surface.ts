@@ -1,4 +1,4 @@
-// The faces of a mesh: what is drawn, what a ray meets, and how high ceilings are.
+// The faces of a mesh: for drawing, for rays, and for the height of ceilings.
 
 import {
   BufferAttribute,
@@ -18,25 +18,28 @@ import { type FaceVotes, NO_VOTES } from "../faces.js";
 import type { Part } from "./files.js";
 import type { Paint } from "./paint.js";
 
-/** Where a ray meets the mesh: the face's number in the data set's mesh. */
+/** The hit of a ray: the face's index in the data set's mesh. */
 export interface Hit {
   face: number;
   point: Rgb;
   distance: number;
 }
 
-/** Faces are lit from above and from one side, and the darkest by no less than this. */
+/** Faces are lit from above and from one side; this is the least light. */
 const SHADE = 0.66;
 const LAMP = new Vector3(0.35, -0.45, 0.82).normalize();
 
-/** How far below the ceilings the section is, and how high above a floor a ceiling is at least, metres. */
+/**
+ * The distance of the section below the ceilings, and the least height of a ceiling above its floor,
+ * metres.
+ */
 const BELOW_CEILING = 0.1;
 const ROOM = 1.9;
 
-/** Of so many vertices a sample is taken. */
+/** The number of vertices in a sample. */
 const SAMPLE = 4000;
 
-/** A height and the surface that is there, m². */
+/** A height and the surface at it, m². */
 type Level = [z: number, m2: number];
 
 /** The height below which lies this share of the surface. */
@@ -127,12 +130,12 @@ export class Surface {
     return mesh;
   }
 
-  /** Whether the materials count; if not, each part is drawn at once, as if it were of its first. */
+  /** Whether to use the materials; otherwise each part is drawn at once with its first material. */
   useMaterials(all: boolean): void {
     for (const { mesh, materials } of this.drawings) mesh.material = all ? materials : (materials[0] ?? []);
   }
 
-  /** How much light a face has; and what is level is noted. */
+  /** The light of a face. Also records the surface of level faces. */
   private light([a, b, c]: readonly [Vector3, Vector3, Vector3]): number {
     const z = (a.z + b.z + c.z) / 3;
     const normal = b.sub(a).cross(c.sub(a));
@@ -153,7 +156,7 @@ export class Surface {
     return lowest === null ? null : lowest - BELOW_CEILING;
   }
 
-  /** Some of the vertices that are not above the section. */
+  /** A sample of the vertices below the section. */
   sample(section: number): Rgb[] {
     const points: Rgb[] = [];
     const all = this.parts.reduce((sum, { vertices }) => sum + vertices.length / 3, 0);
@@ -166,7 +169,7 @@ export class Surface {
     return points;
   }
 
-  /** A place on faces, as near as can be to their middle, and their surface; null if none is shown. */
+  /** The point on some faces that is nearest to their middle, and their surface; null if none is shown. */
   placeOf(faces: Set<number>): { at: Rgb; m2: number } | null {
     const found: { at: Vector3; m2: number }[] = [];
     const corner = (vertices: Float32Array, vertex: number): Vector3 =>
@@ -191,7 +194,7 @@ export class Surface {
     return { at: [x, y, z], m2 };
   }
 
-  /** The first front of a face that a ray meets, of what is not above the section. */
+  /** The first front of a face that a ray hits, below the section. */
   pick(origin: Vector3, direction: Vector3, section: number): Hit | null {
     // The part of the ray below the section.
     let [near, far] = [0, Infinity];

@@ -1,4 +1,4 @@
-// A mesh on a canvas: drawn when something has changed, and asked what is under the pointer.
+// A mesh on a canvas, drawn when something changes, with a readout for the pointer.
 
 import { ColorManagement, Group, LinearSRGBColorSpace, Plane, Scene, Vector3, WebGLRenderer } from "three";
 import type { Index, Mesh, Rgb } from "../data.js";
@@ -16,19 +16,19 @@ import type { Look, Mark } from "./look.js";
 import { Paint } from "./paint.js";
 import { type Hit, Surface } from "./surface.js";
 
-/** A press that moves no farther is a click, CSS pixels. */
+/** A press that moves no farther counts as a click, CSS pixels. */
 const STILL = 5;
-/** A place so little below the section is cut away with what is above, metres. */
+/** A point this close below the section is cut away as well, metres. */
 const SLACK = 0.05;
 /** Higher than everything, metres. */
 const SKY = 1e6;
 
 export interface ViewOptions {
-  /** The data set that this one is compared with. */
+  /** The comparison with another data set. */
   against: Against | null;
-  /** Called when one looks otherwise, or from elsewhere. */
+  /** Called when the look or the viewpoint changes. */
   changed: () => void;
-  /** Called as files come in, and with what is wrong with one. */
+  /** Called as files arrive, and with the fault of a file. */
   progress: (words: string) => void;
   fault: (words: string) => void;
 }
@@ -69,13 +69,14 @@ export class SpaceView {
   ) {
     const gl = this.canvas.getContext("webgl2", { antialias: true, alpha: true });
     if (!gl) throw new Error("This browser has no WebGL 2, which the 3D view needs.");
-    // Colours are shown as they are in the files.
+    // Colours are shown with the values in the files.
     ColorManagement.enabled = false;
     this.renderer = new WebGLRenderer({ canvas: this.canvas, context: gl });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.setClearColor(0, 0);
     this.renderer.clippingPlanes = [this.cut];
-    // All corners of a face are alike, and where the first one is asked no work is made of it.
+    // All corners of a face have the same values. With the first corner as the provoking one, WebGL needs
+    // no extra work.
     const corners = gl.getExtension("WEBGL_provoking_vertex") as ProvokingVertex | null;
     corners?.provokingVertexWEBGL(corners.FIRST_VERTEX_CONVENTION_WEBGL);
     this.paint = new Paint(index, mesh);
@@ -84,7 +85,7 @@ export class SpaceView {
     this.eye = new Eye(this.canvas, mesh, () => this.changed());
     this.canvas.setAttribute("aria-label", `Area ${mesh.area} in 3D; arrow keys turn, plus and minus zoom`);
     this.labels = new Labels(index, mesh, this.overlay);
-    // The pin of a place has a link to it in 3D, where one is here.
+    // The pin has a link to 3D, which is left out here.
     append(
       this.overlay,
       this.marks.elements.filter((element) => !(element instanceof HTMLAnchorElement)),
@@ -93,11 +94,11 @@ export class SpaceView {
     this.resized.observe(this.canvas);
   }
 
-  /** Fetches the mesh, and shows what there is of it. */
+  /** Loads the mesh, and shows its parts as they arrive. */
   async load(): Promise<void> {
     const { mesh, options } = this;
     if (mesh.has_votes) {
-      options.progress("Loading what the faces voted.");
+      options.progress("Loading the votes of the faces.");
       this.votes = await this.tried(loadFaceVotes(mesh.area));
     }
     if (mesh.has_boxes) this.boxes = (await this.tried(loadBoxes(mesh.area))) ?? [];
@@ -115,7 +116,7 @@ export class SpaceView {
     this.start();
   }
 
-  /** Fetches the textures, and shows each file of them when it is there. */
+  /** Loads the textures, and shows each file as it arrives. */
   async loadTextures(): Promise<void> {
     const { mesh, options } = this;
     const anisotropy = Math.min(4, this.renderer.capabilities.getMaxAnisotropy());
@@ -129,7 +130,7 @@ export class SpaceView {
     options.progress("");
   }
 
-  /** What a file holds; if it cannot be had, that is told, and the rest goes on. */
+  /** The content of a file. If it cannot be read, that is reported, and the rest goes on. */
   private async tried<T>(file: Promise<T>): Promise<T | null> {
     try {
       return await file;
@@ -139,20 +140,20 @@ export class SpaceView {
     }
   }
 
-  /** Shows all as the look has it now; `lines` if other lines are wanted. */
+  /** Draws everything with the current look; `lines` if other lines are needed. */
   refresh(lines = false): void {
     if (lines) this.fillLines();
     this.changed();
   }
 
-  /** Takes up or lays down the measuring line. */
+  /** Starts or ends measuring. */
   measure(on: boolean): void {
     this.measuring = on;
     if (!on) this.marks.endMeasure();
     this.draw();
   }
 
-  /** Goes to where a place is seen; what hides it by the section is shown again. */
+  /** Goes to a viewpoint of a place. If the section cuts the place away, the section is lifted. */
   visit(at: Rgb, size: number, flying: boolean): void {
     if (at[2] > (this.look.section ?? Infinity) - SLACK) this.look.section = Infinity;
     this.marks.pinAt(at, "");
@@ -162,14 +163,14 @@ export class SpaceView {
     this.changed();
   }
 
-  /** Goes to the middle of faces; nowhere, if none of them is shown. */
+  /** Goes to the middle of some faces. Stays if none of them is shown. */
   visitFaces(faces: number[], flying: boolean): boolean {
     const place = this.surface.placeOf(new Set(faces));
     if (place) this.visit(place.at, Math.sqrt(place.m2), flying);
     return place !== null;
   }
 
-  /** Goes to the changed faces that the address is about. */
+  /** Goes to the changed faces that the address names. */
   private findChange(): boolean {
     const { changes, look, options } = this;
     if (!look.find || !changes || !options.against) return false;
@@ -190,7 +191,7 @@ export class SpaceView {
   }
 
   /**
-   * The section if nobody has chosen one: just below the ceilings, unless one stands below or looks
+   * The section by default: just below the ceilings, unless the viewpoint is below them, or the target
    * above.
    */
   private firstSection(): number {
@@ -210,7 +211,7 @@ export class SpaceView {
     if (at && place) this.marks.pinAt(at, "");
   }
 
-  /** From where nothing hides a place, as near as possible to the direction one looks from. */
+  /** A viewpoint with a free view of a place, as near as possible to the current direction. */
   private vantage(at: Rgb, size: number): Rgb {
     const { from, at: was } = this.eye.stand;
     const ahead = Math.atan2(from[1] - was[1], from[0] - was[0]);
@@ -250,7 +251,7 @@ export class SpaceView {
       down = null;
       if (still) this.click(this.read(event));
     });
-    // Before the zoom: what is under the pointer is what one goes to.
+    // Before the zoom, so that it goes to the point under the pointer.
     const aim = (event: WheelEvent): void => {
       const hit = this.read(event);
       if (hit) this.eye.reach(this.eye.depth(hit.point));
@@ -284,7 +285,7 @@ export class SpaceView {
     return this.readAt((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
   }
 
-  /** Tells what a point of the canvas shows, in shares of its size. */
+  /** Shows the values at a point of the canvas, which is given in shares of its size. */
   private readAt(u: number, v: number): Hit | null {
     if (!this.loaded) return null;
     const hit = this.surface.pick(
@@ -299,7 +300,7 @@ export class SpaceView {
     const told = tell(this.index, spot, { room: "", hasDepth: true }, this.votes);
     const labels = this.changes?.labelsOf(hit.face);
     const hidden = labels ? ["class", "instance"] : [];
-    // Only a label tells the room.
+    // Only a label says which room it is.
     if (!label) hidden.push("room");
     append(this.readout, labels && this.options.against ? tellBoth(this.options.against, ...labels) : []);
     append(

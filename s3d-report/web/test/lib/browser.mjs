@@ -1,4 +1,4 @@
-// A browser without a window, and a page in it that tells of everything that must not happen.
+// A headless browser, and a page in it that reports every forbidden event.
 
 import { existsSync } from "node:fs";
 import { chromium, firefox } from "playwright-core";
@@ -21,13 +21,10 @@ const PATIENCE_MS = 60_000;
 const CHROMIUM = ["/usr/bin/chromium", "/usr/bin/chromium-browser"];
 const FIREFOX = ["/usr/bin/firefox-esr", "/usr/bin/firefox"];
 
-/** Without a graphics card, too. */
+/** WebGL even without a graphics card. */
 const DRAWN = { "webgl.force-enabled": true };
 
-/**
- * Firefox as it is installed, by WebDriver BiDi, or else Chromium. Firefox has WebGL with a display
- * alone.
- */
+/** The installed Firefox, by WebDriver BiDi, or else Chromium. Firefox has WebGL only with a display. */
 export const isFirefox = process.env["S3D_BROWSER"] === "firefox";
 
 export function launch() {
@@ -43,8 +40,8 @@ export function launch() {
 }
 
 /**
- * Opens a report, a folder or one file, from the disk. `faults` fills with errors, and with requests
- * that leave the folder.
+ * Opens a report (a folder or one file) from the disk. `faults` collects errors, and requests that leave
+ * the folder.
  */
 export async function open(browser, folder, hash, { width = 1440, height = 900, touch = false } = {}) {
   const context = await browser.newContext({ viewport: { width, height }, hasTouch: touch });
@@ -76,7 +73,7 @@ export async function ready(page) {
   await page.waitForTimeout(100);
 }
 
-/** Changes the part behind `#`, and waits for the page of it. */
+/** Changes the part after `#`, and waits for its page. */
 export async function go(page, hash) {
   const before = await page.getAttribute("body", "data-ready");
   await page.evaluate((to) => {
@@ -86,7 +83,7 @@ export async function go(page, hash) {
   await page.waitForTimeout(100);
 }
 
-/** What the line under a picture tells, by name. */
+/** The entries of the line under a picture, by name. */
 export async function readout(page) {
   return page.evaluate(() => {
     const line = document.querySelector(".readout");
@@ -99,20 +96,20 @@ export async function readout(page) {
   });
 }
 
-/** Waits until what was asked for is drawn. */
+/** Waits until the request is drawn. */
 export async function drawn(page) {
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 }
 
-/** Taps with a finger; where the browser's driver has none, clicks. */
+/** Taps with a finger, or clicks if the browser's driver has no touch. */
 export async function tap(page, x, y) {
   if (!isFirefox) return page.touchscreen.tap(x, y);
-  // It may be there already, and is told of only if it moves.
+  // The pointer may be there already, and only a move counts.
   await page.mouse.move(x + 3, y);
   return page.mouse.click(x, y);
 }
 
-/** Draws a finger from one x to another at the height y; the pointer, likewise. */
+/** Drags a finger, or else the pointer, from one x to another at the height y. */
 export async function drag(page, from, to, y) {
   const steps = [0.2, 0.6, 1].map((t) => from + t * (to - from));
   if (isFirefox) {

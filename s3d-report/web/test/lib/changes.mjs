@@ -1,4 +1,4 @@
-// What changed between the data set and the one it is compared with, counted from the files of both.
+// The changes between the data set and the one it is compared with, counted from the files of both.
 
 import { readFileSync, readdirSync } from "node:fs";
 import { join } from "node:path";
@@ -24,7 +24,7 @@ function labelsOfFaces(folder) {
 }
 
 const mesh = readObj(join(dataset, "area_1/3d/rgb.obj"));
-/** The label of each face in both, and the faces with another. */
+/** The label of each face in both, and the faces whose labels differ. */
 export const ofFaces = [dataset, other].map(labelsOfFaces);
 export const changedFaces = ofFaces[0].flatMap((label, face) => (label === ofFaces[1][face] ? [] : [face]));
 /** The surface of a face, m². */
@@ -34,7 +34,10 @@ export const surfaceOf = (face) => {
   return Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
 };
 
-/** How many pixels changed, by class in both; and of each image those of another class, and of one pair. */
+/**
+ * The numbers of changed pixels by class in both; and for each image the pixels of another class, and of
+ * one pair.
+ */
 function changedPixels() {
   const [pairs, ofImage] = [new Map(), new Map()];
   for (const kind of ["data", "pano"])
@@ -59,7 +62,7 @@ function changedPixels() {
 }
 export const { pairs: pixelPairs, ofImage } = changedPixels();
 
-/** Changed faces of the same two labels that have corners in one place: from face to face. */
+/** Patches of changed faces with the same two labels, connected at shared corners. */
 function patchesOf(faces) {
   const at = new Map();
   const keys = (face) =>

@@ -1,6 +1,5 @@
-// What tests of the page share: the report and its data set, and what is held against what.
-//
-// S3D_REPORT and S3D_DATASET name the folders; `run` makes them.
+// Shared by the tests of the page: the report and its data set, and comparisons of the two. S3D_REPORT and
+// S3D_DATASET name the folders; `run` makes them.
 
 import assert from "node:assert/strict";
 import { cpSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
@@ -50,7 +49,7 @@ export const transposed = (m) => m[0].map((_, c) => m.map((row) => row[c]));
 /** The camera's axes right, down and forward, from a pose file's matrix. */
 export const rotationOf = (pose) => pose.camera_rt_matrix.map((row) => row.slice(0, 3));
 
-/** Holds what the page tells under the pointer against the data set's files. */
+/** Compares the readout under the pointer with the data set's files. */
 export function hold(told, own, [i, j], [width, height]) {
   const [x, y] = [
     Math.floor(((2 * i + 1) * own.width) / (2 * width)),
@@ -70,7 +69,7 @@ export function hold(told, own, [i, j], [width, height]) {
 export const near = (a, b, tolerance, words) =>
   assert.ok(Math.abs(a - b) <= tolerance, `${words}: ${a} and ${b}`);
 
-/** Points of a box in no line. */
+/** Points of a box that lie on no line. */
 export function spread(count, box) {
   return Array.from({ length: count }, (_, k) => [
     Math.round(box.x + box.width * (0.06 + 0.88 * ((k * 0.618034) % 1))),
@@ -83,7 +82,7 @@ export const queryOf = (page) =>
   page.evaluate(() => Object.fromEntries(new URLSearchParams(location.hash.split("?")[1] ?? "")));
 
 /**
- * Which pixel of a reduced panorama a point of the screen shows: by vectors, not by the page's
+ * The pixel of a reduced panorama that a point of the screen shows, by vectors instead of the page's
  * formulas.
  */
 export function panoramaPixel(own, gaze, box, [px, py], [width, height]) {
@@ -117,7 +116,7 @@ export async function holdPanorama(page, at, hover) {
   for (const point of spread(40, box)) {
     const [u, v] = panoramaPixel(own, gaze, box, point, picture.size);
     const edge = (c) => Math.min(c - Math.floor(c), Math.ceil(c) - c);
-    // On an edge between two pixels both would be right.
+    // On an edge between two pixels both are right.
     if (edge(u) < 0.02 || edge(v) < 0.02) continue;
     if (!(await hover(point))) continue;
     const pixel = [Math.floor(u), Math.floor(v)];

@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 import { inflateSync } from "node:zlib";
 import { PNG } from "pngjs";
 
-/** A PNG file: width, height, and the samples of a pixel as they are in the file, by place. */
+/** A PNG file: width, height, and a function that gives the samples of a pixel as stored. */
 export function readPng(path) {
   const png = PNG.sync.read(readFileSync(path), { skipRescale: true });
   return {
@@ -14,7 +14,7 @@ export function readPng(path) {
   };
 }
 
-/** The number of a half float's bits. */
+/** The value of a half float with these bits. */
 function half(bits) {
   const [sign, exponent, fraction] = [bits & 0x8000 ? -1 : 1, (bits >> 10) & 31, bits & 1023];
   if (exponent === 0) return sign * fraction * 2 ** -24;
@@ -58,7 +58,7 @@ export function readXyz(path) {
   return { width, height, at: (x, y) => rows[y](x) };
 }
 
-/** Undoes OpenEXR's ZIP: inflate, sum the differences, and put the two halves in turns. */
+/** Undoes OpenEXR's ZIP: inflates, sums the differences, and interleaves the two halves. */
 function unzip(bytes) {
   const mixed = inflateSync(bytes);
   for (let i = 1; i < mixed.length; i++) mixed[i] = (mixed[i - 1] + mixed[i] - 128) & 255;

@@ -1,6 +1,6 @@
-// The report of a data set that nobody made: as large as the published one. `node large.mjs REPORT OUT`
-// writes OUT/, with the page and the pictures of REPORT, a small one. The numbers follow from a
-// counter, so that every run is alike.
+// The report of an imaginary data set, as large as the published one. `node large.mjs REPORT OUT` writes
+// OUT/, with the page and the pictures of REPORT, a small one. The numbers follow from a counter, so every
+// run is the same.
 
 import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -12,7 +12,7 @@ const LOCATIONS = [190, 299, 85, 258, 374, 207];
 const CANDIDATES = 72;
 const ROOM_M = 6;
 
-/** Numbers between 0 and 1, always the same (Park and Miller). */
+/** Numbers between 0 and 1, the same in every run (Park and Miller). */
 function numbers(seed) {
   let state = seed;
   return () => (state = (state * 48271) % 2147483647) / 2147483647;
@@ -23,7 +23,7 @@ const read = (folder, key) => {
   return JSON.parse(JSON.parse(text.slice(`s3dReport("${key}",`.length, text.lastIndexOf(");"))));
 };
 
-/** The index of such a report, in the form of a small one. */
+/** The index of such a report, in the form of the small one's. */
 export function largeIndex(small) {
   const next = numbers(17);
   const round = (value, places) => Math.round(value * 10 ** places) / 10 ** places;

@@ -18,7 +18,7 @@ export function readObj(path) {
 const less = (a, b) => a.map((c, k) => c - b[k]);
 const dot = (a, b) => a.reduce((sum, c, k) => sum + c * b[k], 0);
 
-/** How far a point is from a triangle: from its plane, or from what of its edges is nearest. */
+/** The distance of a point from a triangle: from its plane, or from its nearest edge. */
 export function distanceTo(point, [a, b, c]) {
   const alongEdge = (from, to) => {
     const edge = less(to, from);
@@ -38,7 +38,7 @@ export function distanceTo(point, [a, b, c]) {
   return Math.min(alongEdge(a, b), alongEdge(b, c), alongEdge(c, a));
 }
 
-/** The arrays of an NPZ file, of `<u4` alone. */
+/** The arrays of an NPZ file; only `<u4` is read. */
 export function readNpz(path) {
   const file = readFileSync(path);
   const end = file.lastIndexOf(Buffer.from([0x50, 0x4b, 5, 6]));

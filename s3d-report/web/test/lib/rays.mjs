@@ -1,4 +1,4 @@
-// Rays through the canvas, cast at every face of the data set's own mesh; which of its faces have a texture.
+// Rays through the canvas, cast at every face of the data set's own mesh; and its faces with a texture.
 
 import { readFileSync } from "node:fs";
 
@@ -7,7 +7,7 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const unit = (a) => a.map((c) => c / Math.hypot(...a));
 
-/** Of each face of `rgb.obj`, whether its material has a texture. */
+/** For each face of `rgb.obj`, whether its material has a texture. */
 export function texturedFaces(folder) {
   const words = (name) =>
     readFileSync(`${folder}/${name}`, "utf8")
@@ -28,8 +28,8 @@ export function texturedFaces(folder) {
 }
 
 /**
- * The first front that a ray meets, no higher than the section (Möller and Trumbore). It is `clear` which
- * face that is unless it is near an edge, or another one is just behind.
+ * The first front that a ray meets, no higher than the section (Möller and Trumbore). The hit is `clear`
+ * unless it is near an edge, or another face is just behind.
  */
 export function firstFront({ vertices, faces }, from, ray, section = Infinity) {
   let [best, second] = [null, Infinity];
@@ -44,7 +44,7 @@ export function firstFront({ vertices, faces }, from, ray, section = Infinity) {
     const turned = cross(to, ab);
     const v = dot(ray, turned) / det;
     const t = dot(ac, turned) / det;
-    // A ray that only just misses a face could hit it on the screen.
+    // A ray that only just misses a face may hit it on the screen.
     if (u < -0.02 || v < -0.02 || u + v > 1.02 || t <= 0) return;
     const point = from.map((f, k) => f + t * ray[k]);
     if (point[2] > section) return;
@@ -58,7 +58,10 @@ export function firstFront({ vertices, faces }, from, ray, section = Infinity) {
   return { ...best, clear: best.edge > 0.02 && second - best.t > 0.02 };
 }
 
-/** The ray of a point of the canvas, in shares of its size: `at` in the middle, 50° from top to bottom. */
+/**
+ * The ray of a point of the canvas, in shares of its size, with `at` in the middle and 50° from top to
+ * bottom.
+ */
 function rayOf(from, at, [u, v], aspect) {
   const ahead = unit(less(at, from));
   const right = unit(cross(ahead, [0, 0, 1]));
@@ -68,7 +71,7 @@ function rayOf(from, at, [u, v], aspect) {
   return unit(ahead.map((c, k) => c + x * right[k] + y * up[k]));
 }
 
-/** Places on the canvas in no line, in shares of its size. */
+/** Places on the canvas that lie on no line, in shares of its size. */
 export const spread = (count) =>
   Array.from({ length: count }, (_, k) => [
     0.04 + 0.92 * ((k * 0.618034) % 1),
