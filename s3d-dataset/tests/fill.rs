@@ -1,6 +1,6 @@
 //! Faces without votes take the label of the surface next to them, on demand.
 
-mod common;
+use crate::common;
 
 use common::{memory_scene, options};
 use s3d_dataset::export::MemoryScene;

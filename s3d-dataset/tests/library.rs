@@ -1,6 +1,6 @@
 //! A program that depends on this crate alone exports, cancels, resumes, verifies and packs.
 
-mod common;
+use crate::common;
 
 use common::{memory_scene, options};
 use s3d_dataset::event::{Level, Stage, UnitKind};

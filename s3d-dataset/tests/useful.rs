@@ -1,6 +1,6 @@
 //! Useless data sets are not made, unless the caller insists; `info` agrees.
 
-mod common;
+use crate::common;
 
 use common::{memory_scene, options, scene_of};
 use s3d_dataset::event::Level;

@@ -1,6 +1,6 @@
 //! Evaluates files of detections on a data set.
 
-mod scene;
+use crate::scene;
 
 use s3d_dataset::DataSet;
 use s3d_eval::{Context, EvalOptions, Evaluation, Folds, Protocol, Result, evaluate};

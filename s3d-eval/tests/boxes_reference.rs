@@ -1,7 +1,7 @@
 //! Compares the average precision of boxes with the numbers of mmdetection3d and Open3D-ML:
 //! `reference/boxes/README.md`.
 
-mod scene;
+use crate::scene;
 
 use s3d_dataset::s3d_label::Class;
 use s3d_eval::boxes::{ClassScore, Detection, GroundTruth, Rule, average_precision, mean};

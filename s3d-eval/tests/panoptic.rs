@@ -1,6 +1,6 @@
 //! Evaluates COCO's panoptic files on a data set.
 
-mod scene;
+use crate::scene;
 
 use s3d_dataset::pack::{ClassList, CocoOptions, PackOptions, Package, PackedImages};
 use s3d_dataset::{DataSet, Export, ExportOptions, pack};

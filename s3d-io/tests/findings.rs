@@ -1,7 +1,7 @@
 //! Feeds the findings of fuzzing to the readers again. Each file in `fixtures/fuzz/TARGET` once ended the
 //! program, kept it busy, or made it take memory without bound. See `../fuzz/README.md`.
 
-mod feed;
+use crate::feed;
 
 use feed::FEEDS;
 use std::fs;

@@ -1,6 +1,6 @@
 //! The report of a data set against another, read back by `s3d_report::files`.
 
-mod common;
+use crate::common;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;

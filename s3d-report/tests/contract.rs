@@ -1,6 +1,6 @@
 //! A report is read back as `s3d_report::files` says, and compared with the files of the data set.
 
-mod common;
+use crate::common;
 
 use common::{data_set, export, files, numbers, pair, url_bytes, value};
 use s3d_dataset::event::UnitKind;

@@ -1,7 +1,7 @@
 //! The meshes of a report and the faces of its pictures are read back by `s3d_report::files` and compared
 //! with the files of the data set.
 
-mod common;
+use crate::common;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;

@@ -1,0 +1,8 @@
+//! The integration tests of the crate in one program: each program is compiled and linked with all crates.
+//! `cargo test -p s3d-dataset --test all fill::` runs the tests of one file.
+
+mod common;
+
+mod fill;
+mod library;
+mod useful;

@@ -1,0 +1,15 @@
+//! The integration tests of the crate in one program: each program is compiled and linked with all crates.
+//! `cargo test -p s3d-io --test all clouds::` runs the tests of one file.
+
+mod feed;
+
+mod clouds;
+mod copyroom;
+mod findings;
+mod gltf;
+mod hard_inputs;
+mod limits;
+mod mesh_dialects;
+mod pointcloud_mat;
+mod published;
+mod readers;
