@@ -280,9 +280,12 @@ mod tests {
         assert_eq!((o.views, o.size, o.pano_width, o.seed, o.entropy_stride), (72, 1080, 4096, 0, 4));
     }
 
+    fn canonical(args: &[&str]) -> ExportOptions {
+        options(args).canonical().unwrap()
+    }
+
     #[test]
     fn options_written_in_two_ways_are_the_same() {
-        let canonical = |args: &[&str]| options(args).canonical().unwrap();
         let (x, y) = ("00112233445566778899aabbccddeeff", "508160ba5d80a2e365609578a09bab8b");
         let a = canonical(&[
             "--modalities",

@@ -168,6 +168,10 @@ impl Default for ExportOptions {
     }
 }
 
+fn is_positive(value: f64) -> bool {
+    value > 0.0 && value.is_finite()
+}
+
 fn is_one(samples: &u32) -> bool {
     *samples == 1
 }
@@ -207,9 +211,11 @@ impl ExportOptions {
     pub fn canonical(&self) -> Result<Self> {
         let mut options = self.clone();
         options.check_ranges()?;
-        let left_out = |d: &Domain| self.xyz == XyzType::None && *d == Domain::GlobalXyz;
-        let asked = |d: &Domain| self.modalities.contains(d) && !left_out(d);
-        options.modalities = Domain::ALL.into_iter().filter(asked).collect();
+        options.modalities = Domain::ALL.to_vec();
+        options.modalities.retain(|domain| {
+            let is_left_out = self.xyz == XyzType::None && *domain == Domain::GlobalXyz;
+            self.modalities.contains(domain) && !is_left_out
+        });
         options.profiles.sort();
         options.profiles.dedup();
         options.only = self
@@ -251,7 +257,6 @@ impl ExportOptions {
     }
 
     fn check_ranges(&self) -> Result<()> {
-        let positive = |value: f64| value > 0.0 && value.is_finite();
         let fits = [
             ("views", self.views <= 100_000, "at most 100000"),
             ("size", (8..=16_384).contains(&self.size), "from 8 to 16384"),
@@ -260,11 +265,15 @@ impl ExportOptions {
                 (8..=32_768).contains(&self.pano_width) && self.pano_width.is_multiple_of(2),
                 "an even number from 8 to 32768",
             ),
-            ("points_per_m2", positive(self.points_per_m2), "above 0"),
-            ("place_cameras", self.place_cameras.is_none_or(positive), "above 0"),
-            ("see", self.see.is_none_or(|share| positive(share) && share <= 1.0), "above 0, and at most 1"),
+            ("points_per_m2", is_positive(self.points_per_m2), "above 0"),
+            ("place_cameras", self.place_cameras.is_none_or(is_positive), "above 0"),
+            (
+                "see",
+                self.see.is_none_or(|share| is_positive(share) && share <= 1.0),
+                "above 0, and at most 1",
+            ),
             ("see", self.see.is_none() || self.place_cameras.is_none(), "left out beside place_cameras"),
-            ("fill", self.fill.is_none_or(positive), "above 0"),
+            ("fill", self.fill.is_none_or(is_positive), "above 0"),
             ("entropy_stride", (1..=64).contains(&self.entropy_stride), "from 1 to 64"),
             ("rgb_samples", (1..=64).contains(&self.rgb_samples), "from 1 to 64"),
             ("pad_labels", self.pad_labels.0 <= 65_536, "at most 65536"),

@@ -45,8 +45,9 @@ pub(super) fn pack(
         }
 
         let below = format!("area_{area}");
-        let is_masked = |image: &&DatasetImage| source.photograph(image).is_some_and(|p| p.masked > 0.0);
-        let masks = images.iter().any(is_masked);
+        let masks = images
+            .iter()
+            .any(|image| source.photograph(image).is_some_and(|p| p.masked > 0.0));
         let job = Job { masks, ..Job::new(source, destination, &below, depth, options)? };
         if masks {
             create_dir(&job.folder.join(MASKS))?;
@@ -218,15 +219,16 @@ fn absolute(path: &Path) -> Result<PathBuf, FileError> {
 
 /// Depth in millimetres, rounded; 0 if missing or beyond 65.535 m.
 fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
-    let convert = |v: &u16| {
-        let mm = (f64::from(*v) * (1000.0 / units_per_m)).round();
-        if *v == MISSING_DEPTH || mm > f64::from(u16::MAX) {
+    let mut converted = depth.clone();
+    for depth in converted.pixels_mut() {
+        let mm = (f64::from(*depth) * (1000.0 / units_per_m)).round();
+        *depth = if *depth == MISSING_DEPTH || mm > f64::from(u16::MAX) {
             0
         } else {
             mm as u16
-        }
-    };
-    Raster::from_vec(depth.width(), depth.height(), depth.pixels().iter().map(convert).collect())
+        };
+    }
+    converted
 }
 
 #[cfg(test)]

@@ -156,9 +156,9 @@ fn depth_row(depth: &Raster<u16>, units_per_m: f64) -> (f64, Option<[f64; 3]>) {
         count += 1;
     }
 
-    let metres = |units: f64| units / units_per_m;
-    let depth_m =
-        (count > 0).then(|| [f64::from(min), sum as f64 / count as f64, f64::from(max)].map(metres));
+    let depth_m = (count > 0).then(|| {
+        [f64::from(min), sum as f64 / count as f64, f64::from(max)].map(|units| units / units_per_m)
+    });
     (count as f64 / depth.len() as f64, depth_m)
 }
 

@@ -276,10 +276,9 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
             .map(|(_, fault)| fault)
             .collect()
     } else {
-        let wrong = |r: &&s3d_io::dataset::FileRecord| r.check_size(layout.root()).is_err();
         records
             .iter()
-            .filter(wrong)
+            .filter(|record| record.check_size(layout.root()).is_err())
             .map(|r| r.path.clone())
             .collect::<Vec<String>>()
     };

@@ -45,9 +45,8 @@ pub(crate) fn read_and_check(
         // The mesh names these files, and they are read with it.
         let with_it = path.with_extension("mtl");
         let textures = layout.mesh_dir(area).join("rgb_textures");
-        let fits = |other: &Path| *other == *with_it || other.starts_with(&textures);
         let file = report.read(Topic::Mesh, path, |path| {
-            report.check_sizes(fits)?;
+            report.check_sizes(|other| *other == *with_it || other.starts_with(&textures))?;
             read_mesh(path, UpAxis::Y)
         })?;
         for warning in &file.warnings {
@@ -145,8 +144,9 @@ fn label_names(mesh: &TriMesh, labels: &Labels, path: &Path, report: &Report) ->
             index.unwrap_or(NOT_IN_TABLE)
         })
         .collect();
-    let of = |face| mesh.material_of(face).map_or(NOT_IN_TABLE, |m| indices[m as usize]);
-    (0..mesh.faces().len() as u32).map(of).collect()
+    (0..mesh.faces().len() as u32)
+        .map(|face| mesh.material_of(face).map_or(NOT_IN_TABLE, |m| indices[m as usize]))
+        .collect()
 }
 
 #[derive(Deserialize)]
@@ -258,8 +258,8 @@ fn check_votes(
         .chain(manifest.keys())
         .collect::<std::collections::BTreeSet<_>>()
     {
-        let of = |map: &BTreeMap<String, u64>| map.get(room).copied().unwrap_or(0);
-        is(&format!("of {room}"), of(&manifest), of(&rooms));
+        let [told, found] = [&manifest, &rooms].map(|counts| counts.get(room).copied().unwrap_or(0));
+        is(&format!("of {room}"), told, found);
     }
 
     for class in &votes.classes {

@@ -9,7 +9,7 @@ use crate::export::modality::{Channels, Drawn, Image, ImageBuffers, NO_CLASS, nu
 use crate::record::manifest::Manifest;
 use crate::verify::files::Files;
 use crate::verify::images::pixels::{Difference, Opened, Pixels};
-use crate::verify::images::rays::{difference, points_of_depth};
+use crate::verify::images::rays::{difference, index_of, points_of_depth};
 use crate::verify::labels::Labels;
 use crate::verify::mesh::LabelledMesh;
 use crate::verify::photographs::{Photographs, check_share};
@@ -139,8 +139,11 @@ impl ImageCheck<'_> {
             );
         }
 
-        let read = || pose::read_and_check(self.layout, image, size, photograph.is_some(), report);
-        let pose = image.has(Domain::Pose).then(read).flatten();
+        let pose = if image.has(Domain::Pose) {
+            pose::read_and_check(self.layout, image, size, photograph.is_some(), report)
+        } else {
+            None
+        };
         if let Some(pose) = &pose {
             let path = image.path(self.layout, Domain::Pose);
             let offset_m = self.manifest.area(image.area).and_then(|area| area.offset_m);
@@ -347,9 +350,11 @@ impl ImageFiles<'_> {
             return;
         };
 
-        let of_hits = || hits.face.pixels().iter().map(|face| *face == NO_FACE).collect();
         let missing = pixels.missing(domain);
-        let expected = expected.clone().unwrap_or_else(of_hits);
+        let expected = match expected {
+            Some(expected) => expected.clone(),
+            None => hits.face.pixels().iter().map(|face| *face == NO_FACE).collect(),
+        };
         // A missing depth may also be one that is too far.
         let wrong = |(m, e): (&bool, &bool)| if domain == Domain::Depth { *e && !*m } else { m != e };
 
@@ -387,8 +392,10 @@ impl ImageFiles<'_> {
         let (Some(reference), Some(indices)) = (reference, indices) else { return };
         let UnlabelledPixels { images, without_votes, without_label } = self.check.unlabelled;
         let is_voted = &reference.mesh.is_voted;
-        let unvoted = |face: &&u32| **face != NO_FACE && !is_voted[**face as usize];
-        let faces = memory.hits.face.pixels().iter().filter(unvoted).count();
+        let faces = memory.hits.face.pixels().iter();
+        let faces = faces
+            .filter(|face| **face != NO_FACE && !is_voted[**face as usize])
+            .count();
         without_votes.fetch_add(faces as u64, Ordering::Relaxed);
         without_label.fetch_add(null_pixels(indices.pixels()), Ordering::Relaxed);
         images.fetch_add(1, Ordering::Relaxed);
@@ -397,8 +404,7 @@ impl ImageFiles<'_> {
     /// Checks that every label index is in the table.
     fn indices(&self, indices: &Raster<[u8; 3]>, path: &Path) {
         let Some(labels) = self.check.labels else { return };
-        let of = |[r, g, b]: [u8; 3]| u32::from_be_bytes([0, r, g, b]);
-        let wrong = |p: &[u8; 3]| of(*p) as usize >= labels.len() && *p != MISSING_INDEX;
+        let wrong = |p: &[u8; 3]| index_of(*p) as usize >= labels.len() && *p != MISSING_INDEX;
         let first = indices.pixels().iter().position(wrong);
         self.check.report.check(first.is_none(), INDICES, path, || {
             let at = first.unwrap_or_default();
@@ -411,7 +417,7 @@ impl ImageFiles<'_> {
                 labels.len(),
                 at % width,
                 at / width,
-                of(value)
+                index_of(value)
             )
         });
     }
@@ -419,16 +425,14 @@ impl ImageFiles<'_> {
     /// Checks that the colours belong to the label indices.
     fn pretty(&self, colors: &Raster<[u8; 3]>, path: &Path, memory: &Scratch<'_>) {
         let (Some(labels), Some(indices)) = (self.check.labels, self.semantic(memory)) else { return };
-        let expected = |[r, g, b]: [u8; 3]| {
-            labels
-                .pretty
-                .get(u32::from_be_bytes([0, r, g, b]) as usize)
-                .copied()
-                .unwrap_or([0; 3])
-        };
-        let same = |c: [u8; 3], i: [u8; 3]| c == expected(i);
-        let text = |c| format!("{c:?}");
-        let difference = Difference::of(colors, indices, same, text, |i| text(expected(i)));
+        let expected = |pixel| labels.pretty.get(index_of(pixel) as usize).copied().unwrap_or([0; 3]);
+        let difference = Difference::of(
+            colors,
+            indices,
+            |color, index| color == expected(index),
+            |color| format!("{color:?}"),
+            |index| format!("{:?}", expected(index)),
+        );
         self.check.report.check(difference.is_none(), PRETTY, path, || {
             difference
                 .map_or(String::new(), |d| d.sentence("the colours of the labels in the semantic image"))
@@ -444,16 +448,20 @@ impl ImageFiles<'_> {
                 format!("its palette has not the colours of {}", labels.taxonomy.name())
             });
         let Some(indices) = self.semantic(memory) else { return };
-        let expected = |[r, g, b]: [u8; 3]| {
+        let expected = |pixel| {
             labels
                 .classes
-                .get(u32::from_be_bytes([0, r, g, b]) as usize)
+                .get(index_of(pixel) as usize)
                 .copied()
                 .unwrap_or(NO_CLASS)
         };
-        let same = |c: u8, i: [u8; 3]| c == expected(i);
-        let text = |c: u8| labels.class_name(c);
-        let difference = Difference::of(places, indices, same, text, |i| text(expected(i)));
+        let difference = Difference::of(
+            places,
+            indices,
+            |class, index| class == expected(index),
+            |class| labels.class_name(class),
+            |index| labels.class_name(expected(index)),
+        );
         self.check.report.check(difference.is_none(), CLASSES, path, || {
             difference
                 .map_or(String::new(), |d| d.sentence("the classes of the labels in the semantic image"))
