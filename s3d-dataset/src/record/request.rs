@@ -151,7 +151,34 @@ impl Request {
 
     /// Returns the same request with labels and scores alone, for a plan.
     pub(crate) fn of_plan(&self) -> Self {
-        let ExportOptions { views, size, lenient, fill, entropy_stride, .. } = self.options;
+        // Every option is named, so that a new one is weighed here too.
+        let ExportOptions {
+            views,
+            size,
+            lenient,
+            fill,
+            entropy_stride,
+            // The request has these elsewhere.
+            seed: _,
+            place_cameras: _,
+            see: _,
+            // Labels and scores do not depend on these.
+            pano_width: _,
+            pool: _,
+            points_per_m2: _,
+            modalities: _,
+            keep_all: _,
+            only: _,
+            normals: _,
+            rgb_samples: _,
+            compression: _,
+            xyz: _,
+            normal_axes: _,
+            depth_units: _,
+            pad_labels: _,
+            profiles: _,
+            allow: _,
+        } = self.options;
         let options = ExportOptions {
             views,
             size,
