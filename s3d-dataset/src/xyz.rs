@@ -68,8 +68,8 @@ pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Res
     })
 }
 
-/// The files of one image.
-struct ImageFiles {
+/// The files of an image with depth and pose.
+struct DepthImage {
     pose: PathBuf,
     depth: PathBuf,
     xyz: PathBuf,
@@ -78,7 +78,7 @@ struct ImageFiles {
 }
 
 /// Returns the images with depth and pose, by area.
-fn images(data: &DataSet) -> Result<Vec<ImageFiles>> {
+fn images(data: &DataSet) -> Result<Vec<DepthImage>> {
     let mut images = Vec::new();
     for area in &data.manifest.area_numbers {
         let photographs = data.photographs(*area)?;
@@ -87,7 +87,7 @@ fn images(data: &DataSet) -> Result<Vec<ImageFiles>> {
                 let [pose, depth, xyz] = [Domain::Pose, Domain::Depth, Domain::GlobalXyz]
                     .map(|domain| image.path(&data.layout, domain));
                 let is_photograph = photographs.iter().any(|p| p.camera_uuid == image.uuid);
-                images.push(ImageFiles { pose, depth, xyz, frame: image.frame, is_photograph });
+                images.push(DepthImage { pose, depth, xyz, frame: image.frame, is_photograph });
             }
         }
     }
@@ -97,7 +97,7 @@ fn images(data: &DataSet) -> Result<Vec<ImageFiles>> {
 fn make(
     ctx: &Context,
     data: &DataSet,
-    images: &[ImageFiles],
+    images: &[DepthImage],
     args: &XyzOptions,
     call: &str,
 ) -> Result<usize> {
@@ -163,7 +163,7 @@ fn make(
 /// Returns the file of an image's world coordinates.
 fn make_one(
     files: &Listed,
-    image: &ImageFiles,
+    image: &DepthImage,
     units: DepthUnits,
     kind: XyzType,
     compression: Compression,

@@ -58,9 +58,8 @@ fn row(
 ) -> Result<ImageRow> {
     let path = |domain| image.path(&source.layout, domain);
 
-    // Reading the data set accepts any word for a room's type. Only those of the taxonomy are valid here, and
-    // the one for unknown rooms.
-
+    // Reading the data set accepts any word for a room's type. Only the words of the taxonomy and the one for
+    // unknown rooms are valid here.
     let (room_type, room_number) = match source.taxonomy.room(&image.room) {
         Ok(room) => (room.room_type.name(), room.number),
         Err(_) if table.is_none() && image.room == UNKNOWN_ROOM => ("unknown", 1),

@@ -35,19 +35,7 @@ impl AreaInput {
             return Self::published(&folder, Some(scene), asked, opened);
         }
 
-        let options = &scene.annotation_options;
-        let mut source = MeshSource::Files {
-            paths: scene.mesh.clone(),
-            up: scene.up,
-            // Named columns are columns of the annotations, if there are any.
-            options: MeshOptions {
-                class_column: options.class_column.clone().filter(|_| scene.annotations.is_empty()),
-                instance_column: options.instance_column.clone().filter(|_| scene.annotations.is_empty()),
-                origin: scene.mesh_offset_m.map_or(MeshOrigin::Near, MeshOrigin::At),
-                units: scene.units,
-            },
-            colors: Vec::new(),
-        };
+        let mut source = mesh_source(&scene);
 
         // The mesh is read first: annotations that lie far from it need not be read.
         let mut file = source.read()?;
@@ -166,6 +154,24 @@ impl AreaInput {
 
         area.records.push(InputRecord::of_text("scene", &text));
         Ok(area)
+    }
+}
+
+/// Returns where the mesh of a scene file is.
+fn mesh_source(scene: &SceneFile) -> MeshSource {
+    let options = &scene.annotation_options;
+    // Named columns are columns of the annotations, if there are any.
+    let are_of_mesh = scene.annotations.is_empty();
+    MeshSource::Files {
+        paths: scene.mesh.clone(),
+        up: scene.up,
+        options: MeshOptions {
+            class_column: options.class_column.clone().filter(|_| are_of_mesh),
+            instance_column: options.instance_column.clone().filter(|_| are_of_mesh),
+            origin: scene.mesh_offset_m.map_or(MeshOrigin::Near, MeshOrigin::At),
+            units: scene.units,
+        },
+        colors: Vec::new(),
     }
 }
 

@@ -23,8 +23,8 @@ use s3d_io::fs::read_file;
 use s3d_io::image::PngReader;
 use s3d_render::{Caster, Hits, MISSING_INDEX, NO_FACE};
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 const SIZES: (Topic, &str) = (Topic::Images, "sizes");
 const CLASSES: (Topic, &str) = (Topic::Images, "classes");
@@ -120,44 +120,8 @@ impl ImageCheck<'_> {
             }
         };
 
-        // Every modality of the manifest must be there, and no other.
-        for &domain in self.domains {
-            let path = image.path(self.layout, domain);
-            report.check(image.has(domain), MISSING, &path, || {
-                format!("missing: {} is there", image.relative_path(image.domains[0]))
-            });
-            if image.has(domain) && domain == Domain::Pose {
-                self.files.check(&path, report);
-            }
-        }
-        for &domain in image.domains.iter().filter(|d| !self.domains.contains(d)) {
-            report.fault(
-                MISSING.0,
-                "modalities that were not asked for",
-                &image.path(self.layout, domain),
-                "the manifest does not tell of this modality",
-            );
-        }
-
-        let pose = if image.has(Domain::Pose) {
-            pose::read_and_check(self.layout, image, size, photograph.is_some(), report)
-        } else {
-            None
-        };
-        if let Some(pose) = &pose {
-            let path = image.path(self.layout, Domain::Pose);
-            let offset_m = self.manifest.area(image.area).and_then(|area| area.offset_m);
-            pose::check_frame(pose, offset_m, &path, report);
-            let draw = self.views.draw_of(image);
-            if draw.is_some() || image.frame == Frame::Panorama {
-                pose::check_draw(pose, draw, &path, report);
-            }
-            self.cameras
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
-                .push((index, pose.camera));
-        }
-
+        self.check_modalities(image);
+        let pose = self.pose(index, image, size, photograph.is_some());
         let cast = match (&pose, &mut memory.caster) {
             (Some(pose), Some(caster)) => {
                 caster.cast_into(&pose.camera, 1, &mut memory.hits);
@@ -200,6 +164,57 @@ impl ImageCheck<'_> {
         }
 
         memory.reader = reader;
+    }
+
+    /// Checks that an image has every modality of the manifest and no other.
+    fn check_modalities(&self, image: &DatasetImage) {
+        let report = self.report;
+        for &domain in self.domains {
+            let path = image.path(self.layout, domain);
+            report.check(image.has(domain), MISSING, &path, || {
+                format!("missing: {} is there", image.relative_path(image.domains[0]))
+            });
+            if image.has(domain) && domain == Domain::Pose {
+                self.files.check(&path, report);
+            }
+        }
+        for &domain in image.domains.iter().filter(|d| !self.domains.contains(d)) {
+            report.fault(
+                MISSING.0,
+                "modalities that were not asked for",
+                &image.path(self.layout, domain),
+                "the manifest does not tell of this modality",
+            );
+        }
+    }
+
+    /// Reads and checks the pose of an image, and keeps its camera.
+    fn pose(
+        &self,
+        index: usize,
+        image: &DatasetImage,
+        size: (u32, u32),
+        is_photograph: bool,
+    ) -> Option<CheckedPose> {
+        let report = self.report;
+        if !image.has(Domain::Pose) {
+            return None;
+        }
+        let pose = pose::read_and_check(self.layout, image, size, is_photograph, report)?;
+
+        let path = image.path(self.layout, Domain::Pose);
+        let offset_m = self.manifest.area(image.area).and_then(|area| area.offset_m);
+        pose::check_frame(&pose, offset_m, &path, report);
+        let draw = self.views.draw_of(image);
+        if draw.is_some() || image.frame == Frame::Panorama {
+            pose::check_draw(&pose, draw, &path, report);
+        }
+
+        self.cameras
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push((index, pose.camera));
+        Some(pose)
     }
 
     /// Whether the mesh shows the contents of a file of this domain.
@@ -574,7 +589,7 @@ impl ImageFiles<'_> {
             self.check
                 .mismatches
                 .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .unwrap_or_else(PoisonError::into_inner)
                 .push(mismatch);
         }
         Some(pixels)
