@@ -2,7 +2,8 @@
 
 use crate::failure::Outcome;
 use clap::Args;
-use s3d_dataset::{Context, Error, NewFile, Result};
+use s3d_dataset::store::NewFile;
+use s3d_dataset::{Context, Error, Result};
 use s3d_io::Error as FileError;
 use s3d_io::fs::write_json;
 use serde::Serialize;

@@ -2,7 +2,7 @@
 
 use crate::values::parsed;
 use clap::{Args, value_parser};
-use s3d_dataset::SceneSource;
+use s3d_dataset::export::SceneSource;
 use s3d_io::mesh::{LengthUnit, UpAxis};
 use std::path::PathBuf;
 

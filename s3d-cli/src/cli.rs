@@ -259,7 +259,8 @@ impl Command {
 mod tests {
     use super::*;
     use clap::CommandFactory;
-    use s3d_dataset::{ExportOptions, Profile};
+    use s3d_dataset::ExportOptions;
+    use s3d_dataset::options::Profile;
     use s3d_io::dataset::Domain;
 
     #[test]

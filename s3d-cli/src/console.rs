@@ -5,7 +5,9 @@ use clap::ValueEnum;
 use indicatif::{
     HumanFloatCount, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle,
 };
-use s3d_dataset::{Event, Level, Task, UnitTally};
+use s3d_dataset::Event;
+use s3d_dataset::event::{Level, Task};
+use s3d_dataset::summary::UnitTally;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;

@@ -59,7 +59,7 @@ impl fmt::Display for Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_dataset::{InputError, UsageError};
+    use s3d_dataset::error::{InputError, UsageError};
 
     #[test]
     fn options_are_named_as_flags() {

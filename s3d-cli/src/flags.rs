@@ -1,6 +1,6 @@
 //! The options of calls as flags of the command line.
 
-use s3d_dataset::OptionNames;
+use s3d_dataset::error::OptionNames;
 
 /// Names options in messages as their flags: `--points-per-m2`, `--only UUID`.
 pub(crate) struct Flags;

@@ -1,7 +1,7 @@
 //! The parsers of the values of options.
 
 use glam::DVec3;
-pub(crate) use s3d_dataset::words::{even_width, finite, parsed, positive};
+pub(crate) use s3d_dataset::options::words::{even_width, finite, parsed, positive};
 use s3d_io::dataset::XyzType;
 
 pub(crate) fn stored_xyz(word: &str) -> Result<XyzType, String> {

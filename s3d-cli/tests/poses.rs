@@ -3,7 +3,8 @@
 use crate::common;
 use common::scan::Scan;
 use common::{files, s3d_fails, s3d_ok, text};
-use s3d_dataset::{Cancel, Context, Error, Event, PosesOptions, render_poses};
+use s3d_dataset::render::PosesOptions;
+use s3d_dataset::{Cancel, Context, Error, Event, render_poses};
 use s3d_geom::glam::{DAffine3, DQuat, dvec2, dvec3};
 use s3d_geom::{Camera, Pose};
 use s3d_io::camera::{GivenIntrinsics, PosedCamera, read_posed_cameras};

@@ -3,7 +3,8 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
-use s3d_dataset::{Context, Export, ExportOptions, MemoryScene};
+use s3d_dataset::export::MemoryScene;
+use s3d_dataset::{Context, Export, ExportOptions};
 use s3d_geom::glam::{Vec3, dvec3, vec3};
 use s3d_geom::{MeshParts, Pose, TriMesh};
 use s3d_io::camera::ScanLocation;

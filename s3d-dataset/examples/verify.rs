@@ -2,7 +2,8 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
-use s3d_dataset::{Context, VerifyOptions, verify};
+use s3d_dataset::verify::VerifyOptions;
+use s3d_dataset::{Context, verify};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let root = std::env::args().nth(1).ok_or("give the folder of a data set")?;

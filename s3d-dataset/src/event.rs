@@ -1,6 +1,7 @@
 //! The events that an observer receives while a call runs.
 
-use crate::stage::Stage;
+pub use crate::stage::Stage;
+
 use crate::summary::{Summary, UnitTally};
 use serde::Serialize;
 use std::fmt;

@@ -1,23 +1,32 @@
 //! 2D-3D-Semantic data sets as a whole.
 //!
-//! - [`Export`] turns scenes, from files or [in memory](MemoryScene), into a data set under the published
-//!   names, with [`ExportOptions`]. An export that was stopped, cancelled or killed goes on when the same
-//!   call is made again, and ends with the same bytes. [`plan`], [`Shard`] and [`merge`] share one among many
-//!   machines.
-//! - [`verify`] reads a data set back, every pixel of it, and returns a [`VerifyReport`]; [`statistics`]
-//!   counts it; [`compare`] tells what differs between two, as a [`Comparison`]; [`info`] what a scene holds
-//!   before it is exported.
-//! - [`pack`] makes packages for trainers of it, [`profile`] what loaders of point clouds want; [`xyz`] makes
-//!   its world coordinates again; [`DataSet`] reads it for other crates, and [`NewFolder`] is what they make
-//!   of it, whole or not at all. [`render`], [`render_poses`], [`sample`] and [`place_cameras`] need a mesh alone.
+//! A scene goes in: a mesh, annotated points, and the places where a scanner stood. A data set comes out, under
+//! the published names. The crate composes the stages of [`s3d_geom`], [`s3d_label`], `s3d-render` and
+//! `s3d-sample`, and writes files by [`s3d_io`].
 //!
-//! Every call is handed a [`Context`]: a [`Cancel`] that ends it early, from any thread, and an [`Observer`]
-//! that is told [what happens](Event). Nothing here prints, reads the command line, handles signals or exits;
-//! several calls may run in one process at the same time. Work is done on the current rayon pool. World frame
-//! everywhere: metres, Z-up, right-handed.
+//! | module | does |
+//! |---|---|
+//! | [`export`](mod@export), [`options`] | turn scenes into a data set, on one machine or many |
+//! | [`info`](mod@info) | tells what a scene holds and what looks wrong, before it is exported |
+//! | [`verify`](mod@verify) | reads a data set back, every pixel of it |
+//! | [`compare`](mod@compare), [`statistics`](mod@statistics) | tell what differs between two data sets; count one |
+//! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz) | write what trainers and loaders read |
+//! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: scan locations, pictures, points |
+//! | [`store`], [`parallel`] | for crates that write results of their own beside a data set |
+//! | [`error`], [`event`], [`summary`] | what a call answers, and what it tells on its way |
+//!
+//! World frame everywhere: metres, Z-up, right-handed. Work is done on the current rayon pool. Nothing here
+//! prints, reads the command line, handles signals or exits, and several calls may run in one process at the
+//! same time.
+//!
+//! # A data set from a scene
+//!
+//! [`Export`] takes scenes, one an area, as paths of scene files or as values [in memory](export::MemoryScene).
+//! An export that was stopped, cancelled or killed goes on when the same call is made again, and ends with the
+//! same bytes.
 //!
 //! ```
-//! use s3d_dataset::{Context, Export, ExportOptions, VerifyOptions};
+//! use s3d_dataset::{Context, Export, ExportOptions};
 //! use s3d_synth::{Building, ScanOptions};
 //!
 //! # let folder = tempfile::tempdir()?;
@@ -34,88 +43,134 @@
 //!
 //! // Called again, there is nothing left to do.
 //! assert!(export.run(&out, &Context::default())?.is_none());
-//! let report = s3d_dataset::verify(&out, &VerifyOptions::default(), &Context::default())?;
+//!
+//! // Every pixel is what the exported mesh shows.
+//! let report = s3d_dataset::verify(&out, &Default::default(), &Context::default())?;
 //! assert_eq!(report.fault_count(), 0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Watching and ending a call
+//!
+//! Every long call is handed a [`Context`]. Its [`Observer`] is told of every [`Event`]: stages, progress,
+//! warnings. Its [`Cancel`] ends the call from any thread; the call then returns [`Error::Cancelled`] and keeps
+//! the work so far for the same call later.
+//!
+//! ```
+//! use s3d_dataset::{Cancel, Context, Event, Export};
+//!
+//! let cancel = Cancel::default();
+//! let context = Context::default().cancelled_by(cancel.clone()).observed_by(|event: &Event<'_>| {
+//!     if let Event::Message { text, .. } = event {
+//!         println!("{text}");
+//!     }
+//! });
+//!
+//! // An error has data: what is wrong, and where.
+//! let missing = Export::new(["no/such/scene.toml"]).run(std::env::temp_dir().join("never"), &context);
+//! assert!(missing.unwrap_err().to_string().contains("scene.toml"));
+//! ```
+//!
+//! # One export on many machines
+//!
+//! [`plan()`] labels and scores the scenes once. Each machine then does an [`export::Shard`] of the work, and
+//! [`merge()`] makes one data set of their folders, with the bytes of an export on one machine.
+//!
+//! ```no_run
+//! use s3d_dataset::{Context, Export, ExportOptions};
+//! use std::path::Path;
+//!
+//! let (options, context) = (ExportOptions::default(), Context::default());
+//! s3d_dataset::plan(&["scene.toml"], Path::new("plan"), &options, None, &context)?;
+//!
+//! // Each of these on a machine of its own.
+//! for part in ["1/2", "2/2"] {
+//!     let export = Export::new(["scene.toml"]).options(options.clone()).plan(Some("plan".into()));
+//!     export.shard(Some(part.parse()?)).run("parts", &context)?;
+//! }
+//!
+//! s3d_dataset::merge(&["parts".into()], "dataset", false, &context)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Using a data set
+//!
+//! [`DataSet`] reads a data set for other crates: its mesh, labels, images and poses. [`pack()`] writes it for
+//! a trainer, and [`compare()`] tells what differs from an earlier one.
+//!
+//! ```no_run
+//! use s3d_dataset::pack::{Package, PackOptions, WebdatasetOptions};
+//! use s3d_dataset::{Context, DataSet};
+//! use std::path::Path;
+//!
+//! let context = Context::default();
+//! let data = DataSet::open(Path::new("dataset"))?;
+//! for &area in data.areas() {
+//!     println!("area {area}: {} images", data.images(area).len());
+//! }
+//!
+//! let shards = Package::Webdataset(WebdatasetOptions::default());
+//! s3d_dataset::pack(Path::new("dataset"), &shards, &PackOptions::default(), &context)?;
+//! let comparison = s3d_dataset::compare(
+//!     Path::new("dataset"),
+//!     Path::new("dataset_before"),
+//!     &Default::default(),
+//!     &context,
+//! )?;
+//! println!("{comparison}");
+//! # Ok::<(), s3d_dataset::Error>(())
 //! ```
 
 // What a file holds must not make it panic; loops index by what was checked.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 mod account;
-mod compare;
+pub mod compare;
 mod condition;
 mod context;
-mod error;
-mod event;
-mod export;
-mod info;
-mod options;
-mod pack;
-mod parallel;
-mod place;
-mod profile;
+pub mod error;
+pub mod event;
+pub mod export;
+pub mod info;
+pub mod options;
+pub mod pack;
+pub mod parallel;
+pub mod place;
+pub mod profile;
 mod reader;
 mod record;
-mod render;
-mod sample;
+pub mod render;
+pub mod sample;
 mod stage;
-mod store;
-mod summary;
+pub mod statistics;
+pub mod store;
+pub mod summary;
 mod survey;
 mod useful;
-mod verify;
-mod xyz;
+pub mod verify;
+pub mod xyz;
 
-pub use compare::comparison::{
-    AreaChanges, ChangedPatch, ClassPair, ClassPixels, ComparedSet, Comparison, FaceChange, FileKindChanges,
-    Geometry, ImageChange, InputChange, InstanceChange, LabelChanges, LabelCounts, LocationName,
-    ModalityChanges, PixelChanges, PoseChange, PoseChanges, SettingChange, Side, UnreadFile, ViewChanges,
-    ViewName,
-};
-pub use compare::{CompareOptions, compare};
-pub use condition::Condition;
+pub use compare::compare;
 pub use context::{Cancel, Context, Observer, Progress};
-pub use error::{
-    Difference, Error, FieldNames, Held, InputError, OptionNames, Overwriting, Result, TemporaryError,
-    UsageError, Work,
-};
-pub use event::{Event, Level, Task, UnitKind};
+pub use error::{Error, Result};
+pub use event::Event;
 pub use export::Export;
-pub use export::input::memory::{MemoryScene, SceneSource, SharedScene};
-pub use export::shard::assignment::Shard;
 pub use export::shard::make_plan::plan;
 pub use export::shard::merge::merge;
-pub use info::{
-    DataSetInfo, InfoOptions, LocationInfo, MeshInfo, RoomInfo, SceneInfo, data_set_info, info, is_data_set,
-};
-pub use options::profile::Profile;
-#[cfg(feature = "clap")]
-pub use options::words;
-pub use options::{ExportOptions, PadLabels, canonical_uuid};
-pub use pack::{
-    ClassList, CocoOptions, ColmapOptions, DepthFiles, NerfstudioOptions, PackOptions, Package,
-    PackageArguments, PackageKind, PackedImages, ParquetOptions, ShardPrefix, WebdatasetOptions, pack,
-};
-pub use parallel::map_in_order;
-pub use place::{PlaceOptions, place_cameras};
-pub use profile::room::{TreeInstance, TreeRoom};
-pub use profile::{ProfileOptions, profile};
+pub use info::info;
+pub use options::ExportOptions;
+pub use pack::pack;
+pub use place::place_cameras;
+pub use profile::profile;
 pub use record::data_set::DataSet;
-pub use record::statistics::{
-    AreaStatistics, LabelStatistics, LabelTally, RoomTypeStatistics, Statistics, statistics,
-};
-pub use render::{PosesOptions, RenderOptions, RenderedPoses, render, render_poses};
-pub use sample::{SampleOptions, sample};
-pub use stage::Stage;
-pub use store::new_file::NewFile;
-pub use store::new_folder::{FolderKind, NewFolder, beside, check_apart};
-pub use summary::{ImageTally, Summary, Surface, UnitTally, Unlabelled, ViewTally};
-pub use useful::{Estimate, Storey};
-pub use verify::{FaultGroup, VerifyOptions, VerifyReport, verify};
-pub use xyz::{XyzOptions, xyz};
+pub use render::{render, render_poses};
+pub use sample::sample;
+pub use statistics::statistics;
+pub use summary::Summary;
+pub use verify::verify;
+pub use xyz::xyz;
 
-/// The crates whose types [`MemoryScene`] is made of.
+/// The crates whose types a scene [in memory](export::MemoryScene) is made of.
 pub use {s3d_geom, s3d_io, s3d_label};
 
 /// The README's example, compiled and run.

@@ -1,4 +1,4 @@
-//! The stages of an export, for reports of time.
+//! The stages of an export.
 
 use serde::Serialize;
 

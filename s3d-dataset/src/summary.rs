@@ -1,4 +1,5 @@
-//! The summary of an export: files, bytes, images, missing pixels, dropped views, and the time of each stage.
+//! The summary of an export, as [`Export::run`](crate::Export::run) returns it: files, bytes, images,
+//! missing pixels, dropped views, and the time of each stage.
 
 use crate::stage::Stage;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! `s3d xyz`: makes the world coordinates of a data set's images from depth and pose.
+//! Makes the world coordinates of a data set's images from depth and pose.
 
 use crate::context::Context;
 use crate::error::{Result, UsageError};

@@ -3,7 +3,9 @@
 mod common;
 
 use common::{memory_scene, options};
-use s3d_dataset::{Context, Error, Export, ExportOptions, MemoryScene, VerifyOptions, verify};
+use s3d_dataset::export::MemoryScene;
+use s3d_dataset::verify::VerifyOptions;
+use s3d_dataset::{Context, Error, Export, ExportOptions, verify};
 use s3d_geom::TriMesh;
 use s3d_geom::glam::Vec3;
 use s3d_label::{LabelId, fill_labels};

@@ -3,10 +3,14 @@
 mod common;
 
 use common::{memory_scene, options};
-use s3d_dataset::{
-    Cancel, Context, Error, Event, Export, ExportOptions, InfoOptions, Level, PackOptions, Package, Profile,
-    ProfileOptions, Stage, UnitKind, VerifyOptions, WebdatasetOptions, XyzOptions,
-};
+use s3d_dataset::event::{Level, Stage, UnitKind};
+use s3d_dataset::info::InfoOptions;
+use s3d_dataset::options::Profile;
+use s3d_dataset::pack::{PackOptions, Package, WebdatasetOptions};
+use s3d_dataset::profile::ProfileOptions;
+use s3d_dataset::verify::VerifyOptions;
+use s3d_dataset::xyz::XyzOptions;
+use s3d_dataset::{Cancel, Context, Error, Event, Export, ExportOptions};
 use s3d_geom::glam::dvec3;
 use s3d_geom::{Pose, TriMesh};
 use s3d_synth::{Building, ScanOptions};

@@ -3,7 +3,11 @@
 mod common;
 
 use common::{memory_scene, options, scene_of};
-use s3d_dataset::{Condition, Context, Error, Event, Export, ExportOptions, InfoOptions, Level, MemoryScene};
+use s3d_dataset::event::Level;
+use s3d_dataset::export::MemoryScene;
+use s3d_dataset::info::InfoOptions;
+use s3d_dataset::options::Condition;
+use s3d_dataset::{Context, Error, Event, Export, ExportOptions};
 use s3d_geom::glam::{Vec3, dvec3, vec3};
 use s3d_geom::{Pose, TriMesh};
 use s3d_synth::{Building, ScanOptions};
@@ -223,8 +227,8 @@ fn a_data_set_is_told_of_as_a_whole_and_by_area() {
         .options(options(5))
         .run(&out, &Context::default())
         .unwrap();
-    assert!(s3d_dataset::is_data_set(&out) && !s3d_dataset::is_data_set(dir.path()));
-    let info = s3d_dataset::data_set_info(&out, &Context::default()).unwrap();
+    assert!(s3d_dataset::info::is_data_set(&out) && !s3d_dataset::info::is_data_set(dir.path()));
+    let info = s3d_dataset::info::data_set_info(&out, &Context::default()).unwrap();
     assert_eq!((info.seed, info.panoramas, info.areas.len(), &*info.taxonomy), (5, 1, 1, "s3dis"));
     assert_eq!((info.areas[0].area, info.areas[0].storeys.len()), (2, 1));
     let text = info.to_string();
@@ -232,7 +236,7 @@ fn a_data_set_is_told_of_as_a_whole_and_by_area() {
         assert!(text.contains(part), "{part}: {text}");
     }
     std::fs::write(out.join("files.csv"), "").unwrap();
-    let refused = s3d_dataset::data_set_info(&out, &Context::default()).unwrap_err();
+    let refused = s3d_dataset::info::data_set_info(&out, &Context::default()).unwrap_err();
     assert!(refused.to_string().contains("files.csv"), "{refused}");
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::{Folds, Protocol};
-use s3d_dataset::ClassList;
+use s3d_dataset::pack::ClassList;
 use s3d_io::dataset::Frame;
 use std::fmt;
 use std::str::FromStr;

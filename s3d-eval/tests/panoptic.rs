@@ -2,9 +2,8 @@
 
 mod scene;
 
-use s3d_dataset::{
-    ClassList, CocoOptions, DataSet, Export, ExportOptions, PackOptions, Package, PackedImages, pack,
-};
+use s3d_dataset::pack::{ClassList, CocoOptions, PackOptions, Package, PackedImages};
+use s3d_dataset::{DataSet, Export, ExportOptions, pack};
 use s3d_eval::{Context, EvalOptions, Evaluation, Folds, Protocol, Result, evaluate};
 use s3d_geom::Raster;
 use s3d_io::fs::{read_json, write_json};

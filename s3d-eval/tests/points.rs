@@ -1,7 +1,9 @@
 //! Evaluates predictions of points on an export: files, orders, folds, faults.
 
+use s3d_dataset::options::Profile;
+use s3d_dataset::profile::ProfileOptions;
 use s3d_dataset::s3d_io::cloud::NpyWriter;
-use s3d_dataset::{Export, ExportOptions, Profile, ProfileOptions, profile};
+use s3d_dataset::{Export, ExportOptions, profile};
 use s3d_eval::{Context, EvalOptions, Evaluation, Folds, Protocol, Result, evaluate};
 use s3d_synth::{Building, ScanOptions};
 use std::collections::BTreeMap;

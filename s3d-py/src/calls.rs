@@ -4,10 +4,14 @@ use crate::error::{exception, fault, input, usage};
 use crate::mesh::parsed;
 use crate::work::watched;
 use pyo3::prelude::*;
-use s3d_dataset::{
-    ClassList, CompareOptions, InfoOptions, PackOptions, PackageArguments, Profile, ProfileOptions,
-    SceneSource, VerifyOptions, XyzOptions,
-};
+use s3d_dataset::compare::CompareOptions;
+use s3d_dataset::export::SceneSource;
+use s3d_dataset::info::InfoOptions;
+use s3d_dataset::options::Profile;
+use s3d_dataset::pack::{ClassList, PackOptions, PackageArguments};
+use s3d_dataset::profile::ProfileOptions;
+use s3d_dataset::verify::VerifyOptions;
+use s3d_dataset::xyz::XyzOptions;
 use s3d_eval::{EvalOptions, Folds, Protocol};
 use s3d_report::ReportOptions;
 use std::path::PathBuf;
@@ -38,8 +42,8 @@ pub(crate) fn info(
     sink: Py<PyAny>,
 ) -> PyResult<String> {
     watched(py, threads, &sink, |ctx| {
-        if s3d_dataset::is_data_set(&path) {
-            return Ok(s3d_dataset::data_set_info(&path, ctx)?.to_string());
+        if s3d_dataset::info::is_data_set(&path) {
+            return Ok(s3d_dataset::info::data_set_info(&path, ctx)?.to_string());
         }
         let options = InfoOptions { place_cameras, see, seed: 0, lenient };
         let scene = SceneSource::list([path], None, None).remove(0);
@@ -178,7 +182,7 @@ pub(crate) fn report(
     let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
     let made = watched(py, threads, &sink, |ctx| {
         let ending = if single { "_report.html" } else { "_report" };
-        let to = to.map_or_else(|| s3d_dataset::beside(&root, ending), Ok)?;
+        let to = to.map_or_else(|| s3d_dataset::store::beside(&root, ending), Ok)?;
         let made = match against {
             Some(other) => s3d_report::report_against(&root, &other, &to, &options, ctx),
             None => s3d_report::report(&root, &to, &options, ctx),

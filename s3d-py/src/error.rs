@@ -3,7 +3,8 @@
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use s3d_dataset::{Error, OptionNames};
+use s3d_dataset::Error;
+use s3d_dataset::error::OptionNames;
 use s3d_io::{Error as FileError, Place};
 use std::io::ErrorKind;
 

@@ -6,7 +6,7 @@ use crate::mesh::Mesh;
 use crate::work::watched;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use s3d_dataset::InputError;
+use s3d_dataset::error::InputError;
 use s3d_geom::{Density, NearestFaces, PointCloud, SurfaceSampler};
 use s3d_label::{FaceVotes, LabelId, Labeler, MAX_LABELS, VoteError, VoteOptions, fill_labels};
 

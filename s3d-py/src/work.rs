@@ -3,7 +3,8 @@
 use crate::error::{exception, fault};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
-use s3d_dataset::{Cancel, Context, Event, Level, Result, Task};
+use s3d_dataset::event::{Level, Task};
+use s3d_dataset::{Cancel, Context, Event, Result};
 use std::collections::BTreeMap;
 use std::panic::resume_unwind;
 use std::process;

@@ -8,10 +8,11 @@ use crate::packed::packed;
 use crate::pixels::Images;
 use crate::script::Scripts;
 use crate::write::ReportOptions;
-use s3d_dataset::{
-    ChangedPatch, ClassPixels, CompareOptions, Comparison, Context, DataSet, ImageChange, PixelChanges,
-    Result, compare, map_in_order,
+use s3d_dataset::compare::{
+    ChangedPatch, ClassPixels, CompareOptions, Comparison, ImageChange, PixelChanges,
 };
+use s3d_dataset::parallel::map_in_order;
+use s3d_dataset::{Context, DataSet, Result, compare};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, ImageName};
 use s3d_io::image::PngReader;
@@ -119,8 +120,9 @@ pub(crate) fn write(
 
     let mut changed_faces = Vec::new();
     for area in comparison.areas.iter().filter(|area| !area.faces.is_empty()) {
-        let number =
-            |of: fn(&s3d_dataset::FaceChange) -> u32| packed(area.faces.iter().map(of), u32::to_le_bytes);
+        let number = |of: fn(&s3d_dataset::compare::FaceChange) -> u32| {
+            packed(area.faces.iter().map(of), u32::to_le_bytes)
+        };
         let faces = ChangedFaces {
             faces: area.faces.len(),
             face: number(|change| change.face),

@@ -4,7 +4,7 @@
 use crate::faults::Fault;
 use crate::pixels::Shares;
 use crate::selection::Place;
-use s3d_dataset::{FaultGroup, VerifyReport};
+use s3d_dataset::verify::{FaultGroup, VerifyReport};
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;

@@ -4,7 +4,8 @@
 mod common;
 
 use common::{data_set, export, files, numbers, pair, url_bytes, value};
-use s3d_dataset::{Cancel, Context, DataSet, Event, UnitKind};
+use s3d_dataset::event::UnitKind;
+use s3d_dataset::{Cancel, Context, DataSet, Event};
 use s3d_geom::Raster;
 use s3d_geom::glam::{DMat3, DVec3, dvec3};
 use s3d_io::dataset::{DatasetImage, Domain, Frame};

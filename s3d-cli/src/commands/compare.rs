@@ -5,7 +5,7 @@ use crate::answer::JsonArgs;
 use crate::args::Threads;
 use crate::failure::{Failure, Outcome};
 use clap::Args;
-use s3d_dataset::CompareOptions;
+use s3d_dataset::compare::CompareOptions;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

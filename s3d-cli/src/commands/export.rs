@@ -5,7 +5,8 @@ use crate::args::{Scenes, Threads};
 use crate::failure::Outcome;
 use crate::values::parsed;
 use clap::Args;
-use s3d_dataset::{Export, ExportOptions, Shard};
+use s3d_dataset::export::Shard;
+use s3d_dataset::{Export, ExportOptions};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -53,7 +54,7 @@ fn default_output(scene: &Path) -> PathBuf {
 mod tests {
     use super::*;
     use clap::CommandFactory;
-    use s3d_dataset::{Condition, Profile};
+    use s3d_dataset::options::{Condition, Profile};
     use s3d_io::dataset::Domain;
 
     #[test]

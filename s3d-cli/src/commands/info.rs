@@ -6,7 +6,8 @@ use crate::args::Threads;
 use crate::failure::Outcome;
 use crate::values::{parsed, positive};
 use clap::Args;
-use s3d_dataset::{InfoOptions, SceneSource};
+use s3d_dataset::export::SceneSource;
+use s3d_dataset::info::InfoOptions;
 use s3d_io::mesh::{LengthUnit, UpAxis};
 use std::path::PathBuf;
 
@@ -47,8 +48,9 @@ pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
         seed: args.seed,
         lenient: args.lenient,
     };
-    if s3d_dataset::is_data_set(&args.scene) {
-        let info = on_threads(args.threads, |context| s3d_dataset::data_set_info(&args.scene, context))?;
+    if s3d_dataset::info::is_data_set(&args.scene) {
+        let info =
+            on_threads(args.threads, |context| s3d_dataset::info::data_set_info(&args.scene, context))?;
         return print(&info.to_string());
     }
     let scene = SceneSource::list([args.scene], args.up, args.units).remove(0);

@@ -5,7 +5,7 @@ use crate::args::Threads;
 use crate::failure::Outcome;
 use crate::values::parsed;
 use clap::{Args, value_parser};
-use s3d_dataset::{
+use s3d_dataset::pack::{
     ClassList, DepthFiles, PackOptions, PackageArguments, PackageKind, PackedImages, ShardPrefix,
 };
 use s3d_io::dataset::Domain;

@@ -5,7 +5,8 @@ use crate::args::Threads;
 use crate::failure::Outcome;
 use crate::values::parsed;
 use clap::Args;
-use s3d_dataset::{Profile, ProfileOptions};
+use s3d_dataset::options::Profile;
+use s3d_dataset::profile::ProfileOptions;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

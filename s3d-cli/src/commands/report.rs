@@ -59,7 +59,7 @@ pub(crate) fn run(args: ReportArgs) -> Outcome<()> {
     let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
     let made = on_threads(threads, |context| {
         let to = output.map_or_else(
-            || s3d_dataset::beside(&dataset, if single { "_report.html" } else { "_report" }),
+            || s3d_dataset::store::beside(&dataset, if single { "_report.html" } else { "_report" }),
             Ok,
         )?;
         Ok(match against {

@@ -5,7 +5,7 @@ use crate::args::{MeshArgs, Threads};
 use crate::failure::Outcome;
 use crate::values::positive;
 use clap::Args;
-use s3d_dataset::SampleOptions;
+use s3d_dataset::sample::SampleOptions;
 use s3d_geom::Density;
 use std::path::PathBuf;
 

@@ -5,7 +5,9 @@ use crate::answer::print;
 use crate::args::Threads;
 use crate::failure::{Failure, Outcome};
 use clap::Args;
-use s3d_dataset::{Error, TemporaryError, VerifyOptions};
+use s3d_dataset::Error;
+use s3d_dataset::error::TemporaryError;
+use s3d_dataset::verify::VerifyOptions;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

@@ -5,7 +5,7 @@ use crate::args::Threads;
 use crate::failure::Outcome;
 use crate::values::{parsed, stored_xyz};
 use clap::Args;
-use s3d_dataset::XyzOptions;
+use s3d_dataset::xyz::XyzOptions;
 use s3d_io::dataset::XyzType;
 use s3d_io::image::Compression;
 use std::path::PathBuf;

@@ -3,7 +3,8 @@
 use super::common::{s3d, s3d_fails, s3d_ok, text};
 use super::exports::{altered, copy, copy_to, file, whole};
 use super::{compare, compare_with, count, entry};
-use s3d_dataset::{Cancel, CompareOptions, Context, Error};
+use s3d_dataset::compare::CompareOptions;
+use s3d_dataset::{Cancel, Context, Error};
 use s3d_io::dataset::Domain;
 use s3d_io::fs::write_bytes;
 use std::fs;

@@ -3,7 +3,8 @@
 //! `S3D_DAMAGES=2000 cargo test -p s3d-cli damage::structured` tries more; `S3D_SEED` others.
 
 use super::{copy, export, files};
-use s3d_dataset::{Context, VerifyOptions, verify};
+use s3d_dataset::verify::VerifyOptions;
+use s3d_dataset::{Context, verify};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -16,9 +16,16 @@ mod sides;
 mod text;
 mod views;
 
+pub use comparison::{
+    AreaChanges, ChangedPatch, ClassPair, ClassPixels, ComparedSet, Comparison, FaceChange, FileKindChanges,
+    Geometry, ImageChange, InputChange, InstanceChange, LabelChanges, LabelCounts, LocationName,
+    ModalityChanges, PixelChanges, PoseChange, PoseChanges, SettingChange, Side, UnreadFile, ViewChanges,
+    ViewName,
+};
+
 use crate::context::Context;
 use crate::error::Result;
-use comparison::{Comparison, Geometry, LabelPairs};
+use comparison::LabelPairs;
 use images::Images;
 use names::Names;
 use s3d_io::dataset::Domain;

@@ -6,7 +6,7 @@
 /// `points_per_m2`. A command line writes it as a flag, a Python module as an argument.
 ///
 /// ```
-/// use s3d_dataset::{OptionNames, UsageError};
+/// use s3d_dataset::error::{OptionNames, UsageError};
 ///
 /// struct Flags;
 ///

@@ -1,8 +1,10 @@
-//! The export: load → label → sample → score → select → render → tables. The one place that composes the
-//! stages.
+//! The export: load → label → sample → score → select → render → tables.
 //!
-//! An export is begun or continued in a folder (`store/output.rs`). Its units of work are done ([`job`]) and
-//! written down in the journal; then it is finished ([`finish`]).
+//! [`Export`] begins in a folder or goes on there, does the units of work that are left, writes each down in a
+//! journal, and finishes the data set. A [`Shard`] does a part of the units.
+
+// The one place that composes the stages: `run.rs` begins and ends in the folder, `job.rs` does the units, and
+// `finish.rs` writes what belongs to the whole.
 
 pub(crate) mod area;
 pub(crate) mod common;
@@ -22,14 +24,15 @@ pub(crate) mod shard;
 pub(crate) mod transfer;
 pub(crate) mod views;
 
+pub use input::memory::{MemoryScene, SceneSource, SharedScene};
+pub use shard::assignment::Shard;
+
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::plan::Plan;
-use crate::export::shard::assignment::Shard;
 use crate::export::shard::export_shard;
 use crate::options::ExportOptions;
 use crate::summary::Summary;
-use input::memory::SceneSource;
 use job::export;
 use run::{Run, Target};
 use s3d_io::dataset::Layout;
@@ -48,7 +51,7 @@ pub struct Export {
 
 impl Export {
     /// Makes an export of these scenes, one an area: paths of scene files (`scene.toml`) or of folders of
-    /// published areas (`area_3`), or [values in memory](crate::MemoryScene).
+    /// published areas (`area_3`), or [values in memory](crate::export::MemoryScene).
     pub fn new<S: Into<SceneSource>>(scenes: impl IntoIterator<Item = S>) -> Self {
         Self {
             scenes: scenes.into_iter().map(Into::into).collect(),

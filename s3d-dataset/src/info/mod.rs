@@ -2,6 +2,7 @@
 
 mod data_set;
 
+pub use crate::useful::{Estimate, Storey};
 pub use data_set::{DataSetInfo, data_set_info, is_data_set};
 
 use crate::context::Context;
@@ -17,7 +18,7 @@ use crate::export::location::{Located, room_name};
 use crate::options::ExportOptions;
 use crate::survey::annotated::Annotated;
 use crate::survey::outlook::unlabelled_share;
-use crate::useful::{Estimate, Finding, Headroom, Storey, mesh_findings, size_findings, stops_any};
+use crate::useful::{Finding, Headroom, mesh_findings, size_findings, stops_any};
 use s3d_geom::{Aabb, NearestFaces};
 use s3d_io::camera::ScanLocation;
 use s3d_io::mesh::MeshFile;
@@ -133,8 +134,8 @@ pub struct LocationInfo {
 /// export.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be
-/// exported; [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Error::Input`] or [`Error::File`] if the scene cannot be
+/// exported; [`Error::Cancelled`].
 pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context) -> Result<SceneInfo> {
     let InfoOptions { place_cameras, see, seed, lenient } = *options;
     let placing = ExportOptions { place_cameras, see, ..ExportOptions::default() }

@@ -5,10 +5,11 @@ pub(crate) mod profile;
 #[cfg(feature = "clap")]
 pub mod words;
 
-use crate::condition::Condition;
+pub use crate::condition::Condition;
+pub use profile::Profile;
+
 use crate::error::{Result, UsageError};
 use placing::Placing;
-use profile::Profile;
 use s3d_geom::NormalAxes;
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, PADDED_LABELS, XyzType};
 use s3d_io::image::Compression;

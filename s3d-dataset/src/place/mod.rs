@@ -1,5 +1,5 @@
 //! Places scan locations for a scan without any. With labels they stand on the floor of every room, spread
-//! evenly, away from walls and things. Without labels they stand in the free space ([`free_space`]).
+//! evenly, away from walls and things. Without labels they stand in the free space.
 
 pub(crate) mod free_space;
 

@@ -1,14 +1,15 @@
 //! Profiles: files for single point-cloud loaders, made from the S3DIS tree of a data set, in
 //! `profiles/NAME`.
 //!
-//! The head of each file below says what its loader reads, and where it would stop. A profile reads the
-//! tree's text files piece by piece, so its memory does not grow with a room.
+//! A profile reads the tree's text files piece by piece, so its memory does not grow with a room.
 
 mod arrays;
 mod open3d_ml;
 mod pickle;
 mod pointcept;
 pub(crate) mod room;
+
+pub use room::{TreeInstance, TreeRoom};
 
 use crate::context::Context;
 use crate::error::{InputError, Result, UsageError};
@@ -19,7 +20,7 @@ use crate::record::listing;
 use crate::record::manifest::Manifest;
 use crate::store::change::Change;
 use crate::store::lock::Lock;
-use room::{TreeRoom, rooms_of};
+use room::rooms_of;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::{create_dir, write_whole};

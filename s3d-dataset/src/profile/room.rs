@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// The number of points that are read at a time.
 const CHUNK: usize = 1 << 16;
 
-/// A room of a data set's S3DIS tree, as its [profiles](crate::Profile) give it to loaders. Loaders
+/// A room of a data set's S3DIS tree, as its [profiles](crate::options::Profile) give it to loaders. Loaders
 /// concatenate the points of the instances, each in the order of its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TreeRoom {

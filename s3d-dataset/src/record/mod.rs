@@ -11,7 +11,6 @@ pub(crate) mod listing;
 pub(crate) mod manifest;
 pub(crate) mod pending_change;
 pub(crate) mod request;
-pub(crate) mod statistics;
 pub(crate) mod tables;
 pub(crate) mod unfinished;
 

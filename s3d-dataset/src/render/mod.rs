@@ -1,4 +1,4 @@
-//! Renders views of a mesh without annotations: one view, or those of a list of cameras.
+//! Renders views of a mesh without annotations: one view, or a view of each camera of a list.
 
 mod frame_names;
 mod poses;

@@ -1,4 +1,9 @@
-//! The folder of a data set: its state, the finished part of an export, and who may write to it.
+//! How a folder or a file is written whole or not at all.
+//!
+//! Crates that write results of their own beside a data set use [`NewFolder`] and [`NewFile`], as the exports and
+//! packages of this crate do.
+
+// The folder of a data set has more: its state, the finished part of an export, and who may write to it.
 
 pub(crate) mod backup;
 pub(crate) mod change;
@@ -8,6 +13,9 @@ pub(crate) mod new_folder;
 pub(crate) mod output;
 pub(crate) mod staging;
 pub(crate) mod state;
+
+pub use new_file::NewFile;
+pub use new_folder::{FolderKind, NewFolder, beside, check_apart};
 
 use crate::error::{Result, UsageError};
 use s3d_io::Error as FileError;

@@ -1,7 +1,7 @@
 //! Reads a data set back: does it match its manifest, is it free of contradictions, and do its images show
 //! its mesh?
 //!
-//! No fault stops a check: all go to a [`Report`]. Only a fault that prevents every other check, such as a
+//! No fault stops a check: all go to the [report](VerifyReport). Only a fault that prevents every other check, such as a
 //! manifest that cannot be read, ends it early.
 //!
 //! Images are rendered again from the exported mesh. Its files hold every coordinate to the bit and every

@@ -5,7 +5,7 @@ use super::report::{Report, Topic};
 use crate::options::profile::Profile;
 use crate::record::assets;
 use crate::record::manifest::Manifest;
-use crate::record::statistics::Statistics;
+use crate::statistics::Statistics;
 use s3d_io::dataset::{
     DatasetImage, Domain, Frame, Layout, read_conventions, read_splits, read_world_offsets,
 };

@@ -1,6 +1,7 @@
 //! A scene that is made in memory.
 
-use s3d_dataset::{ExportOptions, MemoryScene};
+use s3d_dataset::ExportOptions;
+use s3d_dataset::export::MemoryScene;
 use s3d_geom::glam::{Vec3, dvec3, vec3};
 use s3d_geom::{PointCloud, Pose, TriMesh};
 use s3d_io::camera::ScanLocation;

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::tables::{Rows, tables};
 use crate::task::Task;
 use crate::{Evaluation, Fold};
-use s3d_dataset::map_in_order;
+use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::s3d_label::Class;
 
 /// The thresholds of the IoU.

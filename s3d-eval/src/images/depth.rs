@@ -9,7 +9,7 @@ use crate::images::resample::{opencv_nearest, pillow_nearest};
 use crate::options::ImageKind;
 use crate::tables::tables;
 use crate::task::Task;
-use s3d_dataset::map_in_order;
+use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
 use s3d_io::image::read_gray16;

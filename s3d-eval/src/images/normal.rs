@@ -11,7 +11,7 @@ use crate::images::read;
 use crate::options::ImageKind;
 use crate::tables::{mean_of_defined, tables};
 use crate::task::Task;
-use s3d_dataset::map_in_order;
+use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
 use s3d_io::image::read_rgb8;

@@ -6,12 +6,13 @@ use crate::Evaluation;
 use crate::error::{ClassOption, Error, Result};
 use crate::tables::{Rows, tables};
 use crate::task::Task;
+use s3d_dataset::pack::ClassList;
+use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::s3d_io::Error as FileError;
 use s3d_dataset::s3d_io::dataset::{DatasetImage, Domain, Frame};
 use s3d_dataset::s3d_io::image::{decode_rgb8, read_rgb8};
 use s3d_dataset::s3d_io::package::coco_panoptic;
 use s3d_dataset::s3d_label::{Class, LabelTable, Taxonomy, UnknownClass};
-use s3d_dataset::{ClassList, map_in_order};
 use s3d_geom::Raster;
 use std::collections::BTreeSet;
 

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::tables::{Rows, tables};
 use crate::task::Task;
 use crate::{Evaluation, Table};
-use s3d_dataset::map_in_order;
+use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::s3d_label::Class;
 use std::path::Path;
 

@@ -4,7 +4,7 @@ use super::CLASSES;
 use super::matching::TrueInstance;
 use crate::error::Result;
 use crate::task::Task;
-use s3d_dataset::TreeRoom;
+use s3d_dataset::profile::TreeRoom;
 
 /// A room that is tested.
 pub(super) struct Room {

@@ -5,7 +5,8 @@
 mod feed;
 
 use feed::{FEEDS, Feed};
-use s3d_dataset::{Context, VerifyOptions, statistics, verify};
+use s3d_dataset::{Context, statistics, verify};
+use s3d_dataset::verify::VerifyOptions;
 use s3d_io::fs::Checksum;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs;

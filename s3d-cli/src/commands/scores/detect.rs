@@ -6,7 +6,8 @@ use crate::commands::scores::on_threads_or;
 use crate::failure::{Failure, Outcome};
 use crate::values::parsed;
 use clap::{Args, Subcommand, value_parser};
-use s3d_dataset::{Context, DataSet, NewFile};
+use s3d_dataset::store::NewFile;
+use s3d_dataset::{Context, DataSet};
 use s3d_detect::{
     Error, Model, ParsedArea, Result, Space, SpaceSource, TrainOptions, cross_validate, detect_area,
     read_areas, table,

@@ -6,7 +6,7 @@ use crate::commands::scores::on_threads_or;
 use crate::failure::{Failure, Outcome};
 use crate::values::parsed;
 use clap::{Args, ValueEnum, value_parser};
-use s3d_dataset::ClassList;
+use s3d_dataset::pack::ClassList;
 use s3d_eval::{Error, EvalOptions, Folds, ImageKind, Protocol};
 use std::path::PathBuf;
 

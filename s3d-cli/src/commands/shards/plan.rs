@@ -6,7 +6,8 @@ use crate::failure::Outcome;
 use crate::values::parsed;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
-use s3d_dataset::{ExportOptions, Shard};
+use s3d_dataset::ExportOptions;
+use s3d_dataset::export::Shard;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -97,7 +98,7 @@ pub(crate) fn run(args: PlanArgs) -> Outcome<()> {
 mod tests {
     use super::*;
     use clap::Parser;
-    use s3d_dataset::Condition;
+    use s3d_dataset::options::Condition;
 
     #[derive(Parser)]
     struct Plan {
