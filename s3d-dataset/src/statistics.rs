@@ -195,7 +195,8 @@ impl Statistics {
         }
         self.table(text, instances, &rows_of(&class_rows));
 
-        let values: [(&str, fn(&RoomTypeStatistics) -> f64); 2] =
+        type Value = fn(&RoomTypeStatistics) -> f64;
+        let values: [(&str, Value); 2] =
             [(rooms, |of_type| of_type.rooms as f64), (floor, |of_type| of_type.floor_m2)];
         for (title, value) in values {
             let mut type_rows = Vec::new();
