@@ -1,9 +1,8 @@
 //! Arguments that several commands share.
 
-use crate::values::{parsed, positive};
+use crate::values::parsed;
 use clap::{Args, value_parser};
 use s3d_dataset::export::SceneSource;
-use s3d_dataset::options::Condition;
 use s3d_io::mesh::{LengthUnit, UpAxis};
 use std::path::PathBuf;
 
@@ -12,15 +11,6 @@ pub(crate) struct Threads {
     /// The number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=4096))]
     pub(crate) threads: Option<u16>,
-}
-
-/// The conditions of a useful data set that a call waives.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct Allow {
-    /// Go on although the data set would be of no use. The error that stops an export names its condition.
-    #[arg(long, value_delimiter = ',', value_parser = parsed::<Condition>,
-        value_name = "colour|coverage|frame|inside-out|labels|locations|scale|size|up")]
-    pub(crate) allow: Vec<Condition>,
 }
 
 #[derive(Debug, Args)]
@@ -56,17 +46,4 @@ impl Scenes {
     pub(crate) fn sources(&self) -> Vec<SceneSource> {
         SceneSource::list(self.scenes.iter().cloned(), self.up, self.units)
     }
-}
-
-/// How scan locations are placed, if they are not read.
-#[derive(Clone, Copy, Debug, Args)]
-pub(crate) struct Placing {
-    /// Place scan locations on the floor of every room instead of reading them: at least this far apart
-    /// within a room, 1.5 m high, clear of walls and objects.
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    pub(crate) place_cameras: Option<f64>,
-    /// Place as few scan locations as see this share of the visible surface, instead of reading them
-    /// [default if there are none to read: 0.95]
-    #[arg(long, value_name = "SHARE", value_parser = positive, conflicts_with = "place_cameras")]
-    pub(crate) see: Option<f64>,
 }

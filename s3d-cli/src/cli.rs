@@ -59,8 +59,8 @@ pub(crate) enum Command {
             "  s3d export s3d-demo/scan/scene.toml -o dataset\n",
             "Six generated areas to train a detector of objects on, without images:\n",
             "  s3d demo --areas 6 --seed 1 --no-images -o areas\n",
-            "Results on generated areas test programs; they are not comparable with results on the six licensed \
-             areas of 2D-3D-S.",
+            "Results on generated areas test programs; they are not comparable with results on the six \
+             licensed areas of 2D-3D-S.",
         )
     )]
     Demo(demo::DemoArgs),
@@ -72,7 +72,8 @@ pub(crate) enum Command {
             "  s3d export scan.glb -o dataset\n",
             "  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n",
             "  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\n",
-            "Call an export that was stopped or killed again with the same arguments: it goes on where it was.",
+            "Call an export that was stopped or killed again with the same arguments: ",
+            "it goes on where it was.",
         )
     )]
     Export(export::ExportArgs),
@@ -93,8 +94,8 @@ pub(crate) enum Command {
             "Examples:\n",
             "  s3d merge dataset -o dataset\n",
             "  s3d merge shard_1 shard_2 shard_3 -o dataset\n",
-            "The result equals the data set of a single run, byte for byte. If something is missing, the message \
-             names the shard to run again.",
+            "The result equals the data set of a single run, byte for byte. If something is missing, the \
+             message names the shard to run again.",
         )
     )]
     Merge(merge::MergeArgs),
@@ -133,10 +134,10 @@ pub(crate) enum Command {
         after_help = concat!(
             "Example:\n",
             "  s3d xyz dataset --type float --overwrite\n",
-            "Depth is stored in steps of 2 mm (or 1 mm), so the coordinates are off by up to half a step along \
-             the ray.\n",
-            "A pixel beyond the range of the depth is missing. `s3d export` writes the coordinates of the hits \
-             themselves.",
+            "Depth is stored in steps of 2 mm (or 1 mm), so the coordinates are off by up to half a step \
+             along the ray.\n",
+            "A pixel beyond the range of the depth is missing. `s3d export` writes the coordinates of the \
+             hits themselves.",
         )
     )]
     Xyz(xyz::XyzArgs),
@@ -181,8 +182,8 @@ pub(crate) enum Command {
             "  s3d compare dataset other --json - | jq .labels.matrix\n",
             "Exit code 0 if both hold the same data, 1 if they differ or could not be compared, 2 for a \
              wrong call.\n",
-            "Data sets hold the same data if their files have the same bytes. The manifests tell how they were \
-             made:\n",
+            "Data sets hold the same data if their files have the same bytes. The manifests tell how they \
+             were made:\n",
             "differences between them are listed but do not count.",
         )
     )]
@@ -282,9 +283,12 @@ mod tests {
         assert_eq!((o.views, o.size, o.pano_width, o.seed, o.entropy_stride), (72, 1080, 4096, 0, 4));
     }
 
+    fn canonical(args: &[&str]) -> ExportOptions {
+        options(args).canonical().unwrap()
+    }
+
     #[test]
     fn options_written_in_two_ways_are_the_same() {
-        let canonical = |args: &[&str]| options(args).canonical().unwrap();
         let (x, y) = ("00112233445566778899aabbccddeeff", "508160ba5d80a2e365609578a09bab8b");
         let a = canonical(&[
             "--modalities",

@@ -6,7 +6,7 @@ use indicatif::{
     HumanFloatCount, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle,
 };
 use s3d_dataset::Event;
-use s3d_dataset::event::{Level, Task};
+use s3d_dataset::event::{MessageLevel, Task};
 use s3d_dataset::summary::UnitTally;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -142,8 +142,8 @@ pub(crate) fn finished(exit_code: u8) {
 /// wants to know it.
 pub(crate) fn observe(event: &Event<'_>) {
     match event {
-        Event::Message { level: Level::Warning, text } => warn!("{text}"),
-        Event::Message { level: Level::Info, text } => info!("{text}"),
+        Event::Message { level: MessageLevel::Warning, text } => warn!("{text}"),
+        Event::Message { level: MessageLevel::Info, text } => info!("{text}"),
         Event::Message { text, .. } => debug!("{text}"),
 
         Event::TaskStarted { task } => {

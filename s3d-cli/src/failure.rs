@@ -77,9 +77,12 @@ mod tests {
         assert_eq!(failure.exit_code(), 75);
     }
 
+    fn code(error: Error) -> u8 {
+        Failure::from(error).exit_code()
+    }
+
     #[test]
     fn exit_codes_tell_whose_fault_it_is() {
-        let code = |error: Error| Failure::from(error).exit_code();
         let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
         assert_eq!(code(UsageError::NoShards.into()), 2);
         assert_eq!(code(InputError::Labels { why: "b".into() }.into()), 1);

@@ -1,7 +1,7 @@
 //! The context of a long call: a way to end it early, and an observer of what happens.
 
 use crate::error::{Error, Result};
-use crate::event::{Event, Level, Task};
+use crate::event::{Event, MessageLevel, Task};
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -117,7 +117,7 @@ impl Context {
         }
     }
 
-    fn message(&self, level: Level, text: impl fmt::Display) {
+    fn message(&self, level: MessageLevel, text: impl fmt::Display) {
         if self.observer.is_some() {
             self.tell(&Event::Message { level, text: &text.to_string() });
         }
@@ -137,7 +137,7 @@ impl Context {
                 .unwrap_or_else(PoisonError::into_inner)
                 .push(text.to_string());
         }
-        self.message(Level::Warning, text);
+        self.message(MessageLevel::Warning, text);
     }
 
     /// Returns the same context, which also keeps its warnings.
@@ -156,11 +156,11 @@ impl Context {
 
     /// Reports what was done.
     pub fn info(&self, text: impl fmt::Display) {
-        self.message(Level::Info, text);
+        self.message(MessageLevel::Info, text);
     }
 
     pub(crate) fn debug(&self, text: impl fmt::Display) {
-        self.message(Level::Debug, text);
+        self.message(MessageLevel::Debug, text);
     }
 
     /// Gives a warning for each sentence.

@@ -15,7 +15,7 @@ pub enum Event<'a> {
     #[serde(skip)]
     Message {
         /// The level of importance.
-        level: Level,
+        level: MessageLevel,
         /// The sentence, in English.
         text: &'a str,
     },
@@ -100,7 +100,7 @@ pub struct Task {
 
 /// How important a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Level {
+pub enum MessageLevel {
     /// Something may be wrong with the input or the result.
     Warning,
     /// Something a person wants to know.

@@ -186,23 +186,28 @@ impl Statistics {
             a.labels.as_ref().and_then(tally).map_or(0.0, value)
         };
 
-        let class_row = |c: &Class| {
-            let name = c.name();
-            (name, move |a: &AreaStatistics| of(a, &|tally| tally.instances_per_class[name] as f64))
-        };
-        let class_rows: Vec<_> = classes.iter().map(class_row).collect();
+        let mut class_rows = Vec::new();
+        for class in classes {
+            let name = class.name();
+            class_rows.push((name, move |a: &AreaStatistics| {
+                of(a, &|tally| tally.instances_per_class[name] as f64)
+            }));
+        }
         self.table(text, instances, &rows_of(&class_rows));
 
-        let type_rows = |value: fn(&RoomTypeStatistics) -> f64| -> Vec<_> {
-            let row = |t: &RoomType| {
-                let name = t.name();
-                (name, move |a: &AreaStatistics| of(a, &|tally| value(&tally.rooms_per_type[name])))
-            };
-            types.iter().map(row).collect()
-        };
-
-        self.table(text, rooms, &rows_of(&type_rows(|of_type| of_type.rooms as f64)));
-        self.table(text, floor, &rows_of(&type_rows(|of_type| of_type.floor_m2)));
+        type Value = fn(&RoomTypeStatistics) -> f64;
+        let values: [(&str, Value); 2] =
+            [(rooms, |of_type| of_type.rooms as f64), (floor, |of_type| of_type.floor_m2)];
+        for (title, value) in values {
+            let mut type_rows = Vec::new();
+            for room_type in types {
+                let name = room_type.name();
+                type_rows.push((name, move |a: &AreaStatistics| {
+                    of(a, &|tally| value(&tally.rooms_per_type[name]))
+                }));
+            }
+            self.table(text, title, &rows_of(&type_rows));
+        }
     }
 
     fn table(&self, text: &mut String, title: &str, rows: &[Row<'_>]) {
@@ -212,14 +217,10 @@ impl Statistics {
         });
         let _ = writeln!(text, " total |\n|---|{}", "---:|".repeat(self.areas.len() + 1));
 
-        let with_total = |value: &dyn Fn(&AreaStatistics) -> f64| -> Vec<f64> {
+        for (name, value) in rows {
             let mut cells: Vec<f64> = self.areas.iter().map(value).collect();
             cells.push(cells.iter().sum());
-            cells
-        };
 
-        for (name, value) in rows {
-            let cells = with_total(value);
             let digits =
                 if cells.iter().copied().all(is_count) && !title.contains("m²") && !name.contains("m²") {
                     0

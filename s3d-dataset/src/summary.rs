@@ -313,9 +313,10 @@ mod tests {
             pixels_unlabelled: 120,
             pixels_filled: 30,
         };
-        let surface = |faces, m2, pixels| Surface { faces, m2, pixels: Some(pixels) };
-        summary.unlabelled =
-            Some(Unlabelled { without_votes: surface(9, 2.5, 150), without_label: surface(4, 0.5, 120) });
+        summary.unlabelled = Some(Unlabelled {
+            without_votes: Surface { faces: 9, m2: 2.5, pixels: Some(150) },
+            without_label: Surface { faces: 4, m2: 0.5, pixels: Some(120) },
+        });
 
         summary.candidate_views =
             ViewTally { candidates: 20, kept: 15, dropped_lowest: 3, dropped_not_drawn: 2, not_asked: 8 };

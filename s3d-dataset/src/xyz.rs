@@ -56,20 +56,20 @@ pub fn xyz(root: impl Into<PathBuf>, options: &XyzOptions, ctx: &Context) -> Res
     // The lock keeps others from replacing the data set.
     Lock::during(ctx, layout, |completed| {
         let data = DataSet::open_in(layout)?;
-        let works = works(&data)?;
+        let images = images(&data)?;
         if completed.as_ref() == Some(&call) {
             ctx.info(format_args!(
                 "{}: what a killed process had begun is complete",
                 layout.root().display()
             ));
-            return Ok(works.len());
+            return Ok(images.len());
         }
-        make(ctx, &data, &works, options, &call)
+        make(ctx, &data, &images, options, &call)
     })
 }
 
-/// The files of one image.
-struct Work {
+/// The files of an image with depth and pose.
+struct DepthImage {
     pose: PathBuf,
     depth: PathBuf,
     xyz: PathBuf,
@@ -78,28 +78,34 @@ struct Work {
 }
 
 /// Returns the images with depth and pose, by area.
-fn works(data: &DataSet) -> Result<Vec<Work>> {
-    let mut works = Vec::new();
+fn images(data: &DataSet) -> Result<Vec<DepthImage>> {
+    let mut images = Vec::new();
     for area in &data.manifest.area_numbers {
         let photographs = data.photographs(*area)?;
         for image in data.files.images(&data.layout, *area) {
             if image.has(Domain::Pose) && image.has(Domain::Depth) {
-                let path = |domain| image.path(&data.layout, domain);
-                let [pose, depth, xyz] = [Domain::Pose, Domain::Depth, Domain::GlobalXyz].map(path);
+                let [pose, depth, xyz] = [Domain::Pose, Domain::Depth, Domain::GlobalXyz]
+                    .map(|domain| image.path(&data.layout, domain));
                 let is_photograph = photographs.iter().any(|p| p.camera_uuid == image.uuid);
-                works.push(Work { pose, depth, xyz, frame: image.frame, is_photograph });
+                images.push(DepthImage { pose, depth, xyz, frame: image.frame, is_photograph });
             }
         }
     }
-    Ok(works)
+    Ok(images)
 }
 
-fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: &str) -> Result<usize> {
+fn make(
+    ctx: &Context,
+    data: &DataSet,
+    images: &[DepthImage],
+    args: &XyzOptions,
+    call: &str,
+) -> Result<usize> {
     let layout = &data.layout;
-    if works.is_empty() {
+    if images.is_empty() {
         return Err(FileError::format(layout.root(), "no image with both depth and pose: export them").into());
     }
-    if let Some(there) = works.iter().find(|w| w.xyz.exists() && !args.overwrite) {
+    if let Some(there) = images.iter().find(|image| image.xyz.exists() && !args.overwrite) {
         return Err(UsageError::Exists {
             path: there.xyz.clone(),
             note: Some("what export writes is more exact"),
@@ -107,7 +113,7 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
         .into());
     }
 
-    let needed: BTreeSet<&Path> = works.iter().flat_map(|w| [&*w.pose, &*w.depth]).collect();
+    let needed: BTreeSet<&Path> = images.iter().flat_map(|image| [&*image.pose, &*image.depth]).collect();
     data.files.require(ctx, |path| needed.contains(path))?;
 
     let change = Change::begin(layout)?;
@@ -119,15 +125,15 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
     }
 
     let conventions = data.manifest.conventions();
-    let progress = ctx.progress("coordinates", "images", works.len() as u64);
-    let changed = Mutex::new(Vec::with_capacity(works.len() + 1));
+    let progress = ctx.progress("coordinates", "images", images.len() as u64);
+    let changed = Mutex::new(Vec::with_capacity(images.len() + 1));
     for_each_in_order(
         ctx,
-        works,
+        images,
         || (),
-        |(), work| {
-            let file = make_one(&data.files, work, conventions.depth_units, args.xyz, args.compression)?;
-            let record = FileRecord::of_bytes(layout.root(), &work.xyz, &file)?;
+        |(), image| {
+            let file = make_one(&data.files, image, conventions.depth_units, args.xyz, args.compression)?;
+            let record = FileRecord::of_bytes(layout.root(), &image.xyz, &file)?;
             write_bytes(&record.path_in(staged.root()), &file)?;
             changed.lock().unwrap_or_else(PoisonError::into_inner).push(record);
             progress.add(1);
@@ -149,41 +155,41 @@ fn make(ctx: &Context, data: &DataSet, works: &[Work], args: &XyzOptions, call: 
     ctx.info(format_args!(
         "{}: world coordinates of {} images from depth and pose",
         layout.root().display(),
-        works.len()
+        images.len()
     ));
-    Ok(works.len())
+    Ok(images.len())
 }
 
 /// Returns the file of an image's world coordinates.
 fn make_one(
     files: &Listed,
-    work: &Work,
+    image: &DepthImage,
     units: DepthUnits,
     kind: XyzType,
     compression: Compression,
 ) -> Result<Vec<u8>> {
-    let pose = read_pose(files.checked(&work.pose)?)?;
-    let depth = decode_gray16(&files.read_bytes(&work.depth)?, &work.depth)?;
+    let pose = read_pose(files.checked(&image.pose)?)?;
+    let depth = decode_gray16(&files.read_bytes(&image.depth)?, &image.depth)?;
 
-    let camera = if work.frame == Frame::Panorama {
+    let camera = if image.frame == Frame::Panorama {
         if depth.width() != 2 * depth.height() {
             let size =
                 format!("{} × {} pixels: a panorama is twice as wide as high", depth.width(), depth.height());
-            return Err(FileError::format(&work.depth, size).into());
+            return Err(FileError::format(&image.depth, size).into());
         }
         Camera::equirectangular(pose.pose(), depth.width())
     } else {
         let fov = pose.field_of_view_rads;
         if !(fov > 0.0 && fov < std::f64::consts::PI) {
             let message = format!("field_of_view_rads {fov} is no angle of view");
-            return Err(FileError::format(&work.pose, message).into());
+            return Err(FileError::format(&image.pose, message).into());
         }
         let camera = Camera::perspective(pose.pose(), fov, depth.width(), depth.height());
         // A photograph has focal lengths and a principal point of its own.
-        if work.is_photograph {
+        if image.is_photograph {
             Camera::from_k_rt(pose.camera_k_matrix, camera.pose.rt_matrix(), depth.width(), depth.height())
                 .map(|of_k| Camera { pose: camera.pose, ..of_k })
-                .map_err(|e| FileError::format(&work.pose, e.to_string()))?
+                .map_err(|e| FileError::format(&image.pose, e.to_string()))?
         } else {
             camera
         }

@@ -3,7 +3,7 @@
 use crate::common;
 
 use common::{memory_scene, options};
-use s3d_dataset::event::{Level, Stage, UnitKind};
+use s3d_dataset::event::{MessageLevel, Stage, UnitKind};
 use s3d_dataset::info::InfoOptions;
 use s3d_dataset::options::Profile;
 use s3d_dataset::pack::{PackOptions, Package, WebdatasetOptions};
@@ -106,7 +106,7 @@ fn two_exports_at_the_same_time_do_not_meet() {
         let warnings = Arc::new(Mutex::new(0u64));
         let counted = Arc::clone(&warnings);
         let context = Context::default().observed_by(move |event: &Event<'_>| {
-            if let Event::Message { level: Level::Warning, .. } = event {
+            if let Event::Message { level: MessageLevel::Warning, .. } = event {
                 *counted.lock().unwrap() += 1;
             }
         });

@@ -3,7 +3,7 @@
 use crate::common;
 
 use common::{memory_scene, options, scene_of};
-use s3d_dataset::event::Level;
+use s3d_dataset::event::MessageLevel;
 use s3d_dataset::export::MemoryScene;
 use s3d_dataset::info::InfoOptions;
 use s3d_dataset::options::Condition;
@@ -43,7 +43,7 @@ fn stops(scene: impl Fn() -> MemoryScene, options: &ExportOptions, condition: Co
     let warnings = Arc::new(Mutex::new(Vec::new()));
     let seen = Arc::clone(&warnings);
     let context = Context::default().observed_by(move |event: &Event<'_>| {
-        if let Event::Message { level: Level::Warning, text } = event {
+        if let Event::Message { level: MessageLevel::Warning, text } = event {
             seen.lock().unwrap().push((*text).to_owned());
         }
     });

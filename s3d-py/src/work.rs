@@ -3,7 +3,7 @@
 use crate::error::{exception, fault};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
-use s3d_dataset::event::{Level, Task};
+use s3d_dataset::event::{MessageLevel, Task};
 use s3d_dataset::{Cancel, Context, Event, Result};
 use std::collections::BTreeMap;
 use std::panic::resume_unwind;
@@ -86,7 +86,7 @@ pub(crate) fn watched<T: Send>(
 
 /// An event that outlives its call.
 enum News {
-    Message(Level, String),
+    Message(MessageLevel, String),
     Started(Task),
     Advanced(u64, u64),
     Ended(u64),
@@ -179,9 +179,9 @@ fn tell(py: Python<'_>, sink: &Py<PyAny>, batch: Vec<News>, cancel: &Cancel) -> 
         match news {
             News::Message(level, text) => {
                 let level = match level {
-                    Level::Warning => "warning",
-                    Level::Info => "info",
-                    Level::Debug => "debug",
+                    MessageLevel::Warning => "warning",
+                    MessageLevel::Info => "info",
+                    MessageLevel::Debug => "debug",
                 };
                 sink.call_method1(py, "message", (level, text))?;
             }

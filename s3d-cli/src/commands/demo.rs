@@ -281,3 +281,50 @@ fn remove(folder: &Path) -> Result<()> {
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Command;
+
+    #[test]
+    fn every_option_of_an_export_is_offered_or_left_at_its_default() {
+        let left_out = [
+            "place_cameras",
+            "see",
+            "pool",
+            "lenient",
+            "fill",
+            "entropy_stride",
+            "modalities",
+            "keep_all",
+            "only",
+            "normals",
+            "rgb_samples",
+            "xyz",
+            "normal_axes",
+            "depth_units",
+            "pad_labels",
+            "profiles",
+            "allow",
+        ];
+        let demo = SizeArgs::augment_args(Command::new("demo"));
+        let export = ExportOptions::augment_args(Command::new("export"));
+
+        for offered in demo.get_arguments() {
+            let of_export = export
+                .get_arguments()
+                .find(|argument| argument.get_id() == offered.get_id());
+            let of_export = of_export.unwrap();
+            assert_eq!(offered.get_long(), of_export.get_long());
+            assert_eq!(offered.get_value_names(), of_export.get_value_names());
+        }
+
+        let offered = demo.get_arguments().map(|argument| argument.get_id().as_str());
+        let mut known: Vec<&str> = left_out.into_iter().chain(offered).collect();
+        known.sort_unstable();
+        let mut options: Vec<&str> = export.get_arguments().map(|a| a.get_id().as_str()).collect();
+        options.sort_unstable();
+        assert_eq!(known, options);
+    }
+}

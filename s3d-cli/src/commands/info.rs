@@ -2,9 +2,9 @@
 
 use super::on_threads;
 use crate::answer::print;
-use crate::args::{Placing, Threads};
+use crate::args::Threads;
 use crate::failure::Outcome;
-use crate::values::parsed;
+use crate::values::{parsed, positive};
 use clap::Args;
 use s3d_dataset::export::SceneSource;
 use s3d_dataset::info::InfoOptions;
@@ -23,8 +23,14 @@ pub(crate) struct InfoArgs {
     /// height of rooms]
     #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
     pub(crate) units: Option<LengthUnit>,
-    #[command(flatten)]
-    pub(crate) placing: Placing,
+    /// Place scan locations on the floor of every room instead of reading them: at least this far apart
+    /// within a room, 1.5 m high, clear of walls and objects.
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub(crate) place_cameras: Option<f64>,
+    /// Place as few scan locations as see this share of the visible surface, instead of reading them
+    /// [default if there are none to read: 0.95]
+    #[arg(long, value_name = "SHARE", value_parser = positive, conflicts_with = "place_cameras")]
+    pub(crate) see: Option<f64>,
     /// The seed of the placing of scan locations.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
@@ -36,8 +42,12 @@ pub(crate) struct InfoArgs {
 }
 
 pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
-    let Placing { place_cameras, see } = args.placing;
-    let options = InfoOptions { place_cameras, see, seed: args.seed, lenient: args.lenient };
+    let options = InfoOptions {
+        place_cameras: args.place_cameras,
+        see: args.see,
+        seed: args.seed,
+        lenient: args.lenient,
+    };
     if s3d_dataset::info::is_data_set(&args.scene) {
         let info =
             on_threads(args.threads, |context| s3d_dataset::info::data_set_info(&args.scene, context))?;

@@ -32,11 +32,12 @@ pub(crate) fn compare(
 
     for area in areas {
         ctx.check()?;
-        let faces = |side| sides.of(side).manifest.area(area).map(|entry| entry.faces as u64);
+        let [faces_a, faces_b] =
+            [Side::A, Side::B].map(|side| sides.of(side).manifest.area(area).map(|entry| entry.faces as u64));
         let mut changes = AreaChanges {
             area,
-            faces_a: faces(Side::A),
-            faces_b: faces(Side::B),
+            faces_a,
+            faces_b,
             geometry: Geometry::OneSided,
             faces_changed: 0,
             m2_changed: 0.0,
@@ -84,8 +85,9 @@ fn of_area(
     let (Some(a), Some(b)) = (a?, b?) else { return Ok(Geometry::Unread) };
 
     let faces = a.mesh.faces().len();
-    let is_same = |face: u32| a.mesh.triangle(face) == b.mesh.triangle(face);
-    if faces != b.mesh.faces().len() || !(0..faces as u32).all(is_same) {
+    if faces != b.mesh.faces().len()
+        || (0..faces as u32).any(|face| a.mesh.triangle(face) != b.mesh.triangle(face))
+    {
         return Ok(Geometry::Other);
     }
 
@@ -109,34 +111,37 @@ fn of_area(
 fn patches(mesh: &TriMesh, names: &Names, changes: &[FaceChange]) -> Vec<ChangedPatch> {
     let faces: Vec<(u32, (u32, u32))> = changes.iter().map(|of| (of.face, (of.a, of.b))).collect();
 
-    let patch = |places: Vec<usize>| {
-        let of_patch: Vec<FaceChange> = places
-            .into_iter()
-            .filter_map(|place| changes.get(place))
-            .copied()
-            .collect();
-        let m2: f64 = of_patch.iter().map(|of| mesh.area(of.face)).sum();
-        let middle = of_patch
-            .iter()
-            .map(|of| mesh.area(of.face) * center(mesh, of.face))
-            .sum::<DVec3>()
-            / m2;
-
-        let away = |of: &&FaceChange| center(mesh, of.face).distance_squared(middle);
-        let nearest = of_patch.iter().min_by(|x, y| away(x).total_cmp(&away(y)))?;
-        let FaceChange { face, a, b } = *nearest;
-        let faces = of_patch.len() as u64;
-        Some(ChangedPatch { a, b, faces, m2, center: center(mesh, face).to_array() })
-    };
-
-    let mut patches: Vec<ChangedPatch> = face_patches(mesh, &faces).into_iter().filter_map(patch).collect();
+    let mut patches: Vec<ChangedPatch> = face_patches(mesh, &faces)
+        .into_iter()
+        .filter_map(|places| patch(mesh, changes, &places))
+        .collect();
     patches.sort_by(|x, y| {
-        let same_class = |of: &ChangedPatch| names.have_same_class(of.a, of.b);
-        same_class(x).cmp(&same_class(y)).then(y.m2.total_cmp(&x.m2))
+        let [x_same, y_same] = [x, y].map(|of| names.have_same_class(of.a, of.b));
+        x_same.cmp(&y_same).then(y.m2.total_cmp(&x.m2))
     });
 
     patches.truncate(MAX_PATCHES);
     patches
+}
+
+/// Joins the changes at some places of the list to a patch. The label of the face nearest to the middle of the
+/// area speaks for all of it.
+fn patch(mesh: &TriMesh, changes: &[FaceChange], places: &[usize]) -> Option<ChangedPatch> {
+    let of_patch: Vec<FaceChange> = places.iter().filter_map(|place| changes.get(*place)).copied().collect();
+    let m2: f64 = of_patch.iter().map(|of| mesh.area(of.face)).sum();
+    let middle = of_patch
+        .iter()
+        .map(|of| mesh.area(of.face) * center(mesh, of.face))
+        .sum::<DVec3>()
+        / m2;
+
+    let nearest = of_patch.iter().min_by(|x, y| {
+        let [x, y] = [x, y].map(|of| center(mesh, of.face).distance_squared(middle));
+        x.total_cmp(&y)
+    });
+    let FaceChange { face, a, b } = *nearest?;
+    let faces = of_patch.len() as u64;
+    Some(ChangedPatch { a, b, faces, m2, center: center(mesh, face).to_array() })
 }
 
 /// The centre of a face's corners.
@@ -151,21 +156,20 @@ fn labelled_mesh(sides: &Sides, side: Side, names: &Names, area: u32) -> Result<
     let path = data.layout.semantic_obj(area);
     data.files.checked(&path.with_extension("mtl"))?;
     let mesh = read_mesh(data.files.checked(&path)?, UpAxis::Y)?.mesh;
-    let number = |name: &str| {
-        names.number(side, name).ok_or_else(|| {
-            let message = format!("the material {name:?} is no label of semantic_labels.json");
-            FileError::format(&path, message)
+    let mut numbers = Vec::new();
+    for material in mesh.materials() {
+        let Some(number) = names.number(side, &material.name) else {
+            let message = format!("the material {:?} is no label of semantic_labels.json", material.name);
+            return Err(FileError::format(&path, message).into());
+        };
+        numbers.push(number);
+    }
+
+    let label_of_face = (0..mesh.faces().len() as u32)
+        .map(|face| {
+            mesh.material_of(face)
+                .map_or(NULL, |material| numbers[material as usize])
         })
-    };
-    let numbers: Vec<u32> = mesh
-        .materials()
-        .iter()
-        .map(|m| number(&m.name))
-        .collect::<Result<_, FileError>>()?;
-    let of = |face| {
-        mesh.material_of(face)
-            .map_or(NULL, |material| numbers[material as usize])
-    };
-    let label_of_face = (0..mesh.faces().len() as u32).map(of).collect();
+        .collect();
     Ok(Labelled { mesh, label_of_face })
 }

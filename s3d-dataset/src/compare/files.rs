@@ -16,10 +16,11 @@ const MAX_NAMES: usize = 20;
 
 /// Checks that every file of both data sets is there with its size, and with its checksum if `full`.
 pub(crate) fn check(sides: &Sides, full: bool, ctx: &Context) -> Result<()> {
-    let of = |(side, data): (Side, &'_ DataSet)| -> Vec<(Side, FileRecord)> {
-        data.files.records().map(|record| (side, record.clone())).collect()
-    };
-    let all: Vec<(Side, FileRecord)> = sides.both().into_iter().flat_map(of).collect();
+    let mut all: Vec<(Side, FileRecord)> = Vec::new();
+    for (side, data) in sides.both() {
+        all.extend(data.files.records().map(|record| (side, record.clone())));
+    }
+
     let progress = ctx.progress("checking", "files", all.len() as u64);
     for_each_in_order(
         ctx,
@@ -119,9 +120,9 @@ fn settings(data: &DataSet) -> Result<BTreeMap<String, Value>> {
     all.insert("taxonomy".to_owned(), Value::from(data.taxonomy().map(|taxonomy| taxonomy.name())));
     all.insert("world coordinates from depth".to_owned(), Value::from(manifest.is_xyz_from_depth()));
 
-    let options = serde_json::to_value(data.options());
-    let failed = |e: serde_json::Error| FileError::format(&data.layout().manifest(), e.to_string());
-    if let Value::Object(options) = options.map_err(failed)? {
+    let options = serde_json::to_value(data.options())
+        .map_err(|e| FileError::format(&data.layout().manifest(), e.to_string()))?;
+    if let Value::Object(options) = options {
         all.extend(
             options
                 .into_iter()

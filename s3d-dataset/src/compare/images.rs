@@ -11,8 +11,8 @@ use crate::error::{Error, Result};
 use crate::parallel::map_in_order;
 use crate::verify::images::pixels::Pixels;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Domain, PoseFile};
-use std::path::PathBuf;
+use s3d_io::dataset::Domain;
+use std::path::Path;
 
 /// The differences between the images.
 pub(crate) struct Images {
@@ -25,7 +25,7 @@ pub(crate) struct Images {
 
 /// The result for the files of a modality of one image.
 #[derive(Clone, Copy)]
-enum Found {
+enum FileVerdict {
     Same,
     Compared(Sums),
     OtherPose,
@@ -37,14 +37,14 @@ enum Found {
 
 /// The result for an image.
 struct Outcome {
-    found: Vec<(Domain, Found)>,
-    pose: PoseFound,
+    found: Vec<(Domain, FileVerdict)>,
+    pose: PoseVerdict,
     pairs: LabelPairs,
 }
 
 /// The result for the pose of an image.
 #[derive(Clone, Copy)]
-enum PoseFound {
+enum PoseVerdict {
     /// It is not in both, or could not be read.
     None,
     /// The view has other angles. The views report this already.
@@ -72,13 +72,13 @@ pub(crate) fn compare_all(
     let jobs: Vec<(&ImageKey, &[Option<FoundImage>; 2])> = views.images.iter().collect();
     let progress = ctx.progress("comparing", "images", jobs.len() as u64);
 
-    let work = Work { sides, views, names };
+    let comparer = ImageComparer { sides, views, names };
     let outcomes = map_in_order(
         ctx,
         &jobs,
         || (),
         |(), (key, pair)| {
-            let outcome = work.image(key, pair);
+            let outcome = comparer.image(key, pair);
             progress.add(1);
             outcome
         },
@@ -128,16 +128,16 @@ fn empty(modality: &'static str) -> ModalityChanges {
 
 impl Images {
     /// Adds the result for the pose of an image.
-    fn add_pose(&mut self, pair: &[Option<FoundImage>; 2], pose: PoseFound) {
+    fn add_pose(&mut self, pair: &[Option<FoundImage>; 2], pose: PoseVerdict) {
         let [Some(a), Some(b)] = pair else { return };
         match pose {
-            PoseFound::None => {
+            PoseVerdict::None => {
                 let without = !a.image.has(Domain::Pose) || !b.image.has(Domain::Pose);
                 self.without_poses += u64::from(without);
             }
-            PoseFound::Redrawn => {}
-            PoseFound::Same => self.poses.same += 1,
-            PoseFound::Moved(moved) => {
+            PoseVerdict::Redrawn => {}
+            PoseVerdict::Same => self.poses.same += 1,
+            PoseVerdict::Moved(moved) => {
                 let path_a = a.image.relative_path(Domain::Pose);
                 let path_b = b.image.relative_path(Domain::Pose);
                 self.poses.add((path_a, path_b), moved, a.size == b.size);
@@ -150,21 +150,21 @@ impl Images {
         &mut self,
         (key, pair): (&ImageKey, &[Option<FoundImage>; 2]),
         domain: Domain,
-        (found, classes): (Found, &[ClassPixels]),
+        (found, classes): (FileVerdict, &[ClassPixels]),
         sums: &mut [Sums],
     ) {
         let place = Domain::ALL.iter().position(|d| *d == domain).unwrap_or_default();
         let modality = &mut self.modalities[place];
 
         match found {
-            Found::Same => modality.same += 1,
-            Found::OtherPose => modality.other_pose += 1,
-            Found::OtherForm => modality.other_form += 1,
-            Found::Unread => modality.unread += 1,
-            Found::OnlyA => modality.only_a += 1,
-            Found::OnlyB => modality.only_b += 1,
-            Found::Compared(of_image) if of_image.changed == 0 => modality.same_pixels += 1,
-            Found::Compared(of_image) => {
+            FileVerdict::Same => modality.same += 1,
+            FileVerdict::OtherPose => modality.other_pose += 1,
+            FileVerdict::OtherForm => modality.other_form += 1,
+            FileVerdict::Unread => modality.unread += 1,
+            FileVerdict::OnlyA => modality.only_a += 1,
+            FileVerdict::OnlyB => modality.only_b += 1,
+            FileVerdict::Compared(of_image) if of_image.changed == 0 => modality.same_pixels += 1,
+            FileVerdict::Compared(of_image) => {
                 modality.changed += 1;
                 sums[place].add(&of_image);
                 if let [Some(a), Some(b)] = pair {
@@ -183,25 +183,28 @@ impl Images {
 
     /// Sorts images by modality, then by the share of pixels that differ, the largest first.
     fn sort(&mut self) {
-        let order = |of: &ImageChange| Domain::ALL.iter().position(|d| d.folder() == of.modality);
-        let share = |of: &ImageChange| of.pixels.pixels_changed as f64 / of.pixels.pixels as f64;
-        self.changed
-            .sort_by(|a, b| order(a).cmp(&order(b)).then(share(b).total_cmp(&share(a))));
+        self.changed.sort_by(|a, b| {
+            let [modality_a, modality_b] =
+                [a, b].map(|of| Domain::ALL.iter().position(|d| d.folder() == of.modality));
+            let [share_a, share_b] =
+                [a, b].map(|of| of.pixels.pixels_changed as f64 / of.pixels.pixels as f64);
+            modality_a.cmp(&modality_b).then(share_b.total_cmp(&share_a))
+        });
     }
 }
 
 /// The inputs of all comparisons.
-struct Work<'a> {
+struct ImageComparer<'a> {
     sides: &'a Sides,
     views: &'a Views,
     names: Option<&'a Names>,
 }
 
-impl Work<'_> {
+impl ImageComparer<'_> {
     /// Compares all files of an image. The cameras are compared once, when the first pair of files needs
     /// them.
     fn image(&self, key: &ImageKey, pair: &[Option<FoundImage>; 2]) -> Result<Outcome> {
-        let mut outcome = Outcome { found: Vec::new(), pose: PoseFound::None, pairs: LabelPairs::new() };
+        let mut outcome = Outcome { found: Vec::new(), pose: PoseVerdict::None, pairs: LabelPairs::new() };
 
         let mut camera = None;
         for domain in Domain::ALL {
@@ -221,8 +224,8 @@ impl Work<'_> {
                     }
                     self.domain(domain, camera, a, b, &mut outcome.pairs)?
                 }
-                (true, ..) => Found::OnlyA,
-                (_, true, _) => Found::OnlyB,
+                (true, ..) => FileVerdict::OnlyA,
+                (_, true, _) => FileVerdict::OnlyB,
                 _ => continue,
             };
 
@@ -232,26 +235,25 @@ impl Work<'_> {
     }
 
     /// Compares both cameras: how they differ, and whether they are the same.
-    fn camera(&self, key: &ImageKey, a: &FoundImage, b: &FoundImage) -> Result<(PoseFound, SameCamera)> {
+    fn camera(&self, key: &ImageKey, a: &FoundImage, b: &FoundImage) -> Result<(PoseVerdict, SameCamera)> {
         if self.views.redrawn.contains(key) {
-            return Ok((PoseFound::Redrawn, SameCamera::No));
+            return Ok((PoseVerdict::Redrawn, SameCamera::No));
         }
         if !a.image.has(Domain::Pose) || !b.image.has(Domain::Pose) {
             // Without poses, views are drawn at the same angles and panoramas stand at their location.
-            return Ok((PoseFound::None, SameCamera::Yes));
+            return Ok((PoseVerdict::None, SameCamera::Yes));
         }
 
         let path_a = a.image.path(self.sides.a.layout(), Domain::Pose);
         let path_b = b.image.path(self.sides.b.layout(), Domain::Pose);
         if self.sides.are_same(&path_a, &path_b) {
-            return Ok((PoseFound::Same, SameCamera::Yes));
+            return Ok((PoseVerdict::Same, SameCamera::Yes));
         }
 
-        let read = |side: Side, of: &FoundImage| -> Result<Option<PoseFile>> {
-            self.sides.keep(side, self.sides.of(side).pose(&of.image))
-        };
-        let (Some(pose_a), Some(pose_b)) = (read(Side::A, a)?, read(Side::B, b)?) else {
-            return Ok((PoseFound::None, SameCamera::Unread));
+        let pose_a = self.sides.keep(Side::A, self.sides.a.pose(&a.image))?;
+        let pose_b = self.sides.keep(Side::B, self.sides.b.pose(&b.image))?;
+        let (Some(pose_a), Some(pose_b)) = (pose_a, pose_b) else {
+            return Ok((PoseVerdict::None, SameCamera::Unread));
         };
 
         let moved = Moved::between(&pose_a, &pose_b);
@@ -260,7 +262,7 @@ impl Work<'_> {
         } else {
             SameCamera::No
         };
-        Ok((PoseFound::Moved(moved), camera))
+        Ok((PoseVerdict::Moved(moved), camera))
     }
 
     /// Compares the files of one modality.
@@ -271,36 +273,32 @@ impl Work<'_> {
         a: &FoundImage,
         b: &FoundImage,
         pairs: &mut LabelPairs,
-    ) -> Result<Found> {
-        let path = |side: Side, of: &FoundImage| of.image.path(self.sides.of(side).layout(), domain);
-        let path_a = path(Side::A, a);
-        let path_b = path(Side::B, b);
+    ) -> Result<FileVerdict> {
+        let path_a = a.image.path(self.sides.a.layout(), domain);
+        let path_b = b.image.path(self.sides.b.layout(), domain);
 
         // Equal bytes are the same unless their numbers mean something else.
         let has_other_labels = domain.is_semantic() && !self.means_same(domain);
         if self.sides.are_same(&path_a, &path_b) && !has_other_labels {
-            return Ok(Found::Same);
+            return Ok(FileVerdict::Same);
         }
         if a.size != b.size || !self.has_same_form(domain) {
-            return Ok(Found::OtherForm);
+            return Ok(FileVerdict::OtherForm);
         }
         match camera {
             SameCamera::Yes => {}
-            SameCamera::No => return Ok(Found::OtherPose),
-            SameCamera::Unread => return Ok(Found::Unread),
+            SameCamera::No => return Ok(FileVerdict::OtherPose),
+            SameCamera::Unread => return Ok(FileVerdict::Unread),
         }
 
-        let read = |side: Side, path: &PathBuf| {
-            let files = &self.sides.of(side).files;
-            let read = files.checked(path).and_then(|path| Pixels::read(domain, path));
-            self.sides.keep(side, read.map_err(Error::from))
-        };
-        let (Some(pixels_a), Some(pixels_b)) = (read(Side::A, &path_a)?, read(Side::B, &path_b)?) else {
-            return Ok(Found::Unread);
+        let pixels_a = self.pixels(Side::A, domain, &path_a)?;
+        let pixels_b = self.pixels(Side::B, domain, &path_b)?;
+        let (Some(pixels_a), Some(pixels_b)) = (pixels_a, pixels_b) else {
+            return Ok(FileVerdict::Unread);
         };
         if domain == Domain::Semantic && self.names.is_none() {
             // The table that could not be read is reported elsewhere.
-            return Ok(Found::Unread);
+            return Ok(FileVerdict::Unread);
         }
 
         let meaning = Meaning {
@@ -309,15 +307,22 @@ impl Work<'_> {
             taxonomies: [&self.sides.a, &self.sides.b].map(|data| &data.taxonomy),
         };
         match compare((&pixels_a, &pixels_b), domain, &meaning, pairs) {
-            Ok(Some(sums)) => Ok(Found::Compared(sums)),
-            Ok(None) => Ok(Found::OtherForm),
+            Ok(Some(sums)) => Ok(FileVerdict::Compared(sums)),
+            Ok(None) => Ok(FileVerdict::OtherForm),
             Err((side, message)) => {
                 let path = if side == Side::A { &path_a } else { &path_b };
                 self.sides
                     .keep::<()>(side, Err(FileError::format(path, message).into()))?;
-                Ok(Found::Unread)
+                Ok(FileVerdict::Unread)
             }
         }
+    }
+
+    /// Reads an image. Returns `None` if it cannot be read, which is kept as a fault of its side.
+    fn pixels(&self, side: Side, domain: Domain, path: &Path) -> Result<Option<Pixels>> {
+        let files = &self.sides.of(side).files;
+        let read = files.checked(path).and_then(|path| Pixels::read(domain, path));
+        self.sides.keep(side, read.map_err(Error::from))
     }
 
     /// Whether label or class numbers of this modality mean the same in both.

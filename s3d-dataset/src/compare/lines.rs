@@ -122,8 +122,8 @@ mod tests {
     #[test]
     fn columns_are_aligned_and_empty_tables_left_out() {
         let mut lines = Lines::default();
-        let row = |a: &str, b: &str| [a.to_owned(), b.to_owned()];
-        lines.table(["images", "same"], &[row("rgb", "1,000"), row("normal", "2")], 1);
+        let rows = [["rgb", "1,000"], ["normal", "2"]].map(|row| row.map(str::to_owned));
+        lines.table(["images", "same"], &rows, 1);
         assert_eq!(lines.text(), "images     same\n  rgb     1,000\n  normal      2\n");
         lines.table(["a", "b"], &[], 1);
         lines.more(0);

@@ -94,8 +94,7 @@ pub fn compare(a: &Path, b: &Path, options: &CompareOptions, ctx: &Context) -> R
 /// Notes on what was not compared, or only together with something else.
 fn notes(sides: &Sides, images: &Images) -> Vec<String> {
     let mut notes = Vec::new();
-    for (side, other) in [(&sides.a, &sides.b), (&sides.b, &sides.a)] {
-        let name = |data: &_| if std::ptr::eq(data, &sides.a) { "A" } else { "B" };
+    for (name, side, other) in [("A", &sides.a, &sides.b), ("B", &sides.b, &sides.a)] {
         let alone: Vec<String> = side
             .areas()
             .iter()
@@ -103,10 +102,10 @@ fn notes(sides: &Sides, images: &Images) -> Vec<String> {
             .map(u32::to_string)
             .collect();
         if !alone.is_empty() {
-            notes.push(format!("only {} has area {}", name(side), alone.join(", ")));
+            notes.push(format!("only {name} has area {}", alone.join(", ")));
         }
         if side.taxonomy().is_some() && other.taxonomy().is_none() {
-            notes.push(format!("only {} has labels", name(side)));
+            notes.push(format!("only {name} has labels"));
         }
     }
 
@@ -119,17 +118,14 @@ fn notes(sides: &Sides, images: &Images) -> Vec<String> {
     }
 
     let forms = [sides.a.options().conventions(), sides.b.options().conventions()];
-    let has = |domain| {
-        images
-            .modalities
-            .iter()
-            .any(|of| of.modality == domain && of.other_form > 0)
-    };
-    if has(Domain::Depth.folder()) && forms[0].depth_units != forms[1].depth_units {
+    let other_forms = images.modalities.iter().filter(|of| of.other_form > 0);
+    let [has_other_depth, has_other_normals] = [Domain::Depth, Domain::Normal]
+        .map(|domain| other_forms.clone().any(|of| of.modality == domain.folder()));
+    if has_other_depth && forms[0].depth_units != forms[1].depth_units {
         let [a, b] = forms.map(|form| form.depth_units);
         notes.push(format!("depth is in units of {a} in A and {b} in B; its pixels were not compared"));
     }
-    if has(Domain::Normal.folder()) && forms[0].normal_axes != forms[1].normal_axes {
+    if has_other_normals && forms[0].normal_axes != forms[1].normal_axes {
         let [a, b] = forms.map(|form| form.normal_axes.name());
         notes.push(format!("normals have the axes {a} in A and {b} in B; their pixels were not compared"));
     }

@@ -124,8 +124,9 @@ impl Names {
 
     /// Whether the label at index `a` of A's table and the label at index `b` of B's have the same class.
     pub(crate) fn have_same_class(&self, a: u32, b: u32) -> bool {
-        let class = |side, index| self.at(side, index).map(|number| self.class(side, number));
-        class(Side::A, a) == class(Side::B, b)
+        let [a, b] = [(Side::A, a), (Side::B, b)]
+            .map(|(side, index)| self.at(side, index).map(|number| self.class(side, number)));
+        a == b
     }
 
     /// Counts an image's pixels with other labels, by class in A and in B. The most frequent pair comes
@@ -149,18 +150,20 @@ impl Names {
         all
     }
 
+    /// The names of the labels that one side has and the other has not.
+    fn alone(&self, side: Side, other: Side) -> Vec<String> {
+        let numbers = (1..self.names.len() as u32).filter(|n| self.has(side, *n) && !self.has(other, *n));
+        numbers.map(|n| self.names[n as usize].clone()).collect()
+    }
+
     /// The differences between the labels. `pairs` counts the surface and pixels with another label.
     pub(crate) fn changes(&self, pairs: &LabelPairs) -> LabelChanges {
-        let alone = |side: Side, other: Side| -> Vec<String> {
-            let numbers = (1..self.names.len() as u32).filter(|n| self.has(side, *n) && !self.has(other, *n));
-            numbers.map(|n| self.names[n as usize].clone()).collect()
-        };
-        let instances = |side: Side| self.count(side).saturating_sub(1) as u64;
+        let [a, b] = [Side::A, Side::B].map(|side| self.count(side).saturating_sub(1) as u64);
         let mut changes = LabelChanges {
-            a: instances(Side::A),
-            b: instances(Side::B),
-            added: alone(Side::B, Side::A),
-            gone: alone(Side::A, Side::B),
+            a,
+            b,
+            added: self.alone(Side::B, Side::A),
+            gone: self.alone(Side::A, Side::B),
             ..LabelChanges::default()
         };
 
@@ -258,6 +261,10 @@ mod tests {
         LabelCounts { faces, m2, pixels }
     }
 
+    fn index(table: &LabelTable, name: &str) -> u32 {
+        table.id_of(&name.parse().unwrap()).unwrap().0
+    }
+
     #[test]
     fn labels_are_compared_by_name_whatever_their_index() {
         let a = table(&["chair_1_office_1_1", "chair_2_office_1_1", "wall_1_office_1_1"]);
@@ -265,7 +272,6 @@ mod tests {
         let names = Names::of_tables(Some(&a), Some(&b));
         let wall = |side| names.number(side, "wall_1_office_1_1").unwrap();
         assert_eq!(wall(Side::A), wall(Side::B));
-        let index = |table: &LabelTable, name: &str| table.id_of(&name.parse().unwrap()).unwrap().0;
         assert_ne!(index(&a, "wall_1_office_1_1"), index(&b, "chair_1_office_1_1"));
         assert_eq!(names.at(Side::A, index(&a, "wall_1_office_1_1")), Some(wall(Side::B)));
         assert_eq!((names.at(Side::A, 4), names.number(Side::B, "chair_2_office_1_1")), (None, None));

@@ -43,12 +43,14 @@ impl Sums {
     }
 
     pub(crate) fn changes(&self) -> PixelChanges {
-        let mean_square = self.squares as f64 / self.samples as f64;
-        let psnr = || 10.0 * libm::log10(255.0 * 255.0 / mean_square);
+        let psnr_db = (self.squares > 0).then(|| {
+            let mean_square = self.squares as f64 / self.samples as f64;
+            10.0 * libm::log10(255.0 * 255.0 / mean_square)
+        });
         PixelChanges {
             pixels: self.pixels,
             pixels_changed: self.changed,
-            psnr_db: (self.squares > 0).then(psnr),
+            psnr_db,
             mean: (self.seen > 0).then(|| self.total / self.seen as f64),
             largest: (self.seen > 0).then_some(self.largest),
         }
@@ -101,14 +103,20 @@ pub(crate) fn compare(
             Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => return Ok(None),
         },
         (Pixels::Depth(a), Pixels::Depth(b)) => {
-            let metres = |a: u16, b: u16| f64::from(a.abs_diff(b)) / meaning.depth_units.per_m();
-            let seen = |a: u16, b: u16| (a != MISSING_DEPTH && b != MISSING_DEPTH).then(|| metres(a, b));
-            Sums::of(a, b, |a, b| a == b, seen)
+            let units_per_m = meaning.depth_units.per_m();
+            Sums::of(
+                a,
+                b,
+                |a, b| a == b,
+                |a, b| {
+                    let both_seen = a != MISSING_DEPTH && b != MISSING_DEPTH;
+                    both_seen.then(|| f64::from(a.abs_diff(b)) / units_per_m)
+                },
+            )
         }
         (Pixels::Class(a, _), Pixels::Class(b, _)) => classes(a, b, meaning)?,
         (Pixels::Xyz(a), Pixels::Xyz(b)) => {
-            let is_same = |a: [f32; 3], b: [f32; 3]| a.map(f32::to_bits) == b.map(f32::to_bits);
-            Sums::of(a, b, is_same, distance)
+            Sums::of(a, b, |a, b| a.map(f32::to_bits) == b.map(f32::to_bits), distance)
         }
         // All images of a modality have the same kind of pixels.
         _ => return Ok(None),
@@ -117,10 +125,9 @@ pub(crate) fn compare(
 
 fn colors(a: &Raster<[u8; 3]>, b: &Raster<[u8; 3]>) -> Sums {
     let mut sums = Sums::of(a, b, |a, b| a == b, |_, _| None);
-    let square = |(a, b): (&u8, &u8)| u64::from(a.abs_diff(*b)).pow(2);
     let a = a.pixels().as_flattened();
     let b = b.pixels().as_flattened();
-    sums.squares = a.iter().zip(b).map(square).sum();
+    sums.squares = a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2)).sum();
     sums.samples = a.len() as u64;
     sums
 }
@@ -186,21 +193,26 @@ fn labels(
 
 /// Compares class images by the names of classes.
 fn classes(a: &Raster<u8>, b: &Raster<u8>, meaning: &Meaning<'_>) -> Result<Sums, (Side, String)> {
-    let names = |side, taxonomy: &Taxonomy, image: &Raster<u8>| {
-        let all: Vec<&str> = taxonomy.classes().iter().map(|class| class.name()).collect();
-        let is_known = |place: u8| place == NO_CLASS || usize::from(place) < all.len();
-        match image.pixels().iter().find(|place| !is_known(**place)) {
-            None => Ok(all),
-            Some(place) => {
-                Err((side, format!("a pixel has class {place}, and the taxonomy has {}", all.len())))
-            }
-        }
-    };
-
-    let names_a = names(Side::A, meaning.taxonomies[0], a)?;
-    let names_b = names(Side::B, meaning.taxonomies[1], b)?;
+    let names_a = class_names(Side::A, meaning.taxonomies[0], a)?;
+    let names_b = class_names(Side::B, meaning.taxonomies[1], b)?;
     let is_same = |a: u8, b: u8| names_a.get(usize::from(a)) == names_b.get(usize::from(b));
     Ok(Sums::of(a, b, is_same, |_, _| None))
+}
+
+/// The names of a taxonomy's classes, if it has every class of an image.
+fn class_names<'t>(
+    side: Side,
+    taxonomy: &'t Taxonomy,
+    image: &Raster<u8>,
+) -> Result<Vec<&'t str>, (Side, String)> {
+    let names: Vec<&str> = taxonomy.classes().iter().map(|class| class.name()).collect();
+    let mut places = image.pixels().iter();
+    match places.find(|place| **place != NO_CLASS && usize::from(**place) >= names.len()) {
+        None => Ok(names),
+        Some(place) => {
+            Err((side, format!("a pixel has class {place}, and the taxonomy has {}", names.len())))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -222,6 +234,22 @@ mod tests {
         Pixels::Color(Raster::from_vec(pixels.len() as u32, 1, pixels.to_vec()))
     }
 
+    fn depth(values: &[u16]) -> Pixels {
+        Pixels::Depth(Raster::from_vec(values.len() as u32, 1, values.to_vec()))
+    }
+
+    fn xyz(points: &[[f32; 3]]) -> Pixels {
+        Pixels::Xyz(Raster::from_vec(points.len() as u32, 1, points.to_vec()))
+    }
+
+    fn image(classes: &[u8]) -> Pixels {
+        Pixels::Class(Raster::from_vec(classes.len() as u32, 1, classes.to_vec()), Vec::new())
+    }
+
+    fn place(taxonomy: &Taxonomy, class: &str) -> u8 {
+        taxonomy.class(class).unwrap().index() as u8
+    }
+
     #[test]
     fn colours_have_a_ratio_of_signal_to_noise() {
         let same = sums(color(&[[1, 2, 3]; 2]), color(&[[1, 2, 3]; 2]), Domain::Rgb);
@@ -241,12 +269,9 @@ mod tests {
         let (mean, largest) = (found.mean.unwrap(), found.largest.unwrap());
         assert!((largest - 90.0).abs() < 0.7 && (mean - largest / 2.0).abs() < 1e-12, "{found:?}");
 
-        let depth = |values: &[u16]| Pixels::Depth(Raster::from_vec(values.len() as u32, 1, values.to_vec()));
         let found = sums(depth(&[512, 512, 9, 65_535]), depth(&[512, 256, 65_535, 65_535]), Domain::Depth);
         assert_eq!((found.pixels_changed, found.mean, found.largest), (2, Some(0.25), Some(0.5)));
 
-        let xyz =
-            |points: &[[f32; 3]]| Pixels::Xyz(Raster::from_vec(points.len() as u32, 1, points.to_vec()));
         let (a, b) = ([[1.0, 1.0, 1.0], [0.0; 3]], [[1.0, 4.0, 5.0], [2.0; 3]]);
         let found = sums(xyz(&a), xyz(&b), Domain::GlobalXyz);
         assert_eq!((found.pixels_changed, found.mean, found.largest), (2, Some(5.0), Some(5.0)));
@@ -255,8 +280,6 @@ mod tests {
     #[test]
     fn classes_are_compared_by_name_and_must_be_known() {
         let (s3dis, nyu40) = (Taxonomy::s3dis(), Taxonomy::built_in("nyu40").unwrap());
-        let place = |of: &Taxonomy, name: &str| of.class(name).unwrap().index() as u8;
-        let image = |pixels: &[u8]| Pixels::Class(Raster::from_vec(3, 1, pixels.to_vec()), Vec::new());
         let a = image(&[place(&s3dis, "chair"), NO_CLASS, place(&s3dis, "beam")]);
         let b = [place(&nyu40, "chair"), NO_CLASS, place(&nyu40, "wall")];
         assert_ne!(place(&s3dis, "chair"), place(&nyu40, "chair"));

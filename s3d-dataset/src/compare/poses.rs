@@ -80,11 +80,10 @@ impl PoseChanges {
 
     /// Sorts the farthest to the front. Ties keep their order.
     pub(crate) fn sort(&mut self) {
-        let k = |of: &PoseChange| of.k_px.unwrap_or(0.0);
         self.moved.sort_by(|a, b| {
             b.m.total_cmp(&a.m)
                 .then(b.degrees.total_cmp(&a.degrees))
-                .then(k(b).total_cmp(&k(a)))
+                .then(b.k_px.unwrap_or(0.0).total_cmp(&a.k_px.unwrap_or(0.0)))
         });
     }
 }

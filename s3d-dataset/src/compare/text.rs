@@ -112,8 +112,10 @@ impl Comparison {
         text.more(matrix.len().saturating_sub(MAX_ROWS));
 
         // Instances with only another number come last, and are shown if no class changed.
-        let is_of_another = |of: &&InstanceChange| of.class_changed != LabelCounts::default();
-        let of_another = instances.iter().filter(is_of_another).count();
+        let of_another = instances
+            .iter()
+            .filter(|of| of.class_changed != LabelCounts::default())
+            .count();
         let told = if of_another == 0 { instances.len() } else { of_another };
         let rows: Vec<_> = instances.iter().take(told.min(MAX_ROWS)).map(instance_row).collect();
         text.table(["instance", "lost m²", "pixels", "gained m²", "pixels"], &rows, 1);
@@ -130,10 +132,9 @@ impl Comparison {
         ];
 
         let changed = rows.into_iter().filter(|(_, lost, gained)| lost + gained > 0);
-        let row = |(what, lost, gained): (&str, usize, usize)| {
-            [what.to_owned(), grouped(lost as u64), grouped(gained as u64)]
-        };
-        let rows: Vec<_> = changed.map(row).collect();
+        let rows: Vec<_> = changed
+            .map(|(what, lost, gained)| [what.to_owned(), grouped(lost as u64), grouped(gained as u64)])
+            .collect();
         text.table(["there", "only A", "only B"], &rows, 1);
 
         if !of.redrawn.is_empty() {

@@ -82,12 +82,12 @@ pub(crate) fn compare(sides: &Sides) -> Result<Views> {
             let data = sides.of(side);
             for image in data.images(area) {
                 let photograph = listed.photographs.get(&image.uuid);
-                let candidate = |frame| numbers[place].get(&(image.uuid.as_str(), frame)).copied();
                 let kind = match (image.frame, photograph) {
                     (Frame::Panorama, _) => ImageKind::Panorama,
                     (Frame::View(_), Some(_)) => ImageKind::Photograph,
                     (Frame::View(frame), None) => {
-                        candidate(frame).map_or(ImageKind::Frame(frame), ImageKind::Candidate)
+                        let candidate = numbers[place].get(&(image.uuid.as_str(), frame)).copied();
+                        candidate.map_or(ImageKind::Frame(frame), ImageKind::Candidate)
                     }
                 };
 
@@ -104,19 +104,14 @@ pub(crate) fn compare(sides: &Sides) -> Result<Views> {
         }
 
         let [locations_a, locations_b] = both.map(|(side, listed)| locations(sides, side, listed, area));
-        let named = |uuids: &BTreeSet<String>, others: &BTreeSet<String>| -> Vec<LocationName> {
-            uuids
-                .difference(others)
-                .map(|uuid| LocationName { area, uuid: uuid.clone() })
-                .collect()
-        };
-
         let [photos_a, photos_b] = [&a, &b].map(|of| of.photographs.keys().cloned().collect());
         let changes = &mut views.changes;
-        changes.locations_lost.extend(named(&locations_a, &locations_b));
-        changes.locations_gained.extend(named(&locations_b, &locations_a));
-        changes.photographs_lost.extend(named(&photos_a, &photos_b));
-        changes.photographs_gained.extend(named(&photos_b, &photos_a));
+        changes.locations_lost.extend(only_in(area, &locations_a, &locations_b));
+        changes
+            .locations_gained
+            .extend(only_in(area, &locations_b, &locations_a));
+        changes.photographs_lost.extend(only_in(area, &photos_a, &photos_b));
+        changes.photographs_gained.extend(only_in(area, &photos_b, &photos_a));
     }
 
     Ok(views)
@@ -144,7 +139,6 @@ impl Views {
     /// Compares the kept views of an area.
     fn drawn(&mut self, area: u32, a: &[ViewRecord], b: &[ViewRecord]) {
         type Kept<'v> = BTreeMap<(&'v str, u32), &'v ViewRecord>;
-        let kept = |views: &'_ [ViewRecord]| views.iter().filter(|v| v.frame_num.is_some()).count() as u64;
         fn by_name(views: &[ViewRecord]) -> Kept<'_> {
             let kept = views.iter().filter(|view| view.frame_num.is_some());
             kept.map(|view| ((view.camera_uuid.as_str(), view.candidate), view))
@@ -166,9 +160,8 @@ impl Views {
             .gained
             .extend(b.keys().filter(|key| !a.contains_key(*key)).map(|key| name(*key)));
 
-        let angles = |view: &ViewRecord| [view.yaw_rad, view.pitch_rad, view.fov_rad];
         for (key, view) in a {
-            if b.get(&key).is_some_and(|other| angles(view) != angles(other)) {
+            if b.get(&key).is_some_and(|other| angles_of(view) != angles_of(other)) {
                 changes.redrawn.push(name(key));
                 let uuid = key.0.to_owned();
                 let kind = ImageKind::Candidate(key.1);
@@ -178,13 +171,29 @@ impl Views {
     }
 }
 
+/// The places whose uuids are in the first list alone.
+fn only_in(area: u32, uuids: &BTreeSet<String>, others: &BTreeSet<String>) -> Vec<LocationName> {
+    uuids
+        .difference(others)
+        .map(|uuid| LocationName { area, uuid: uuid.clone() })
+        .collect()
+}
+
+/// The number of kept views.
+fn kept(views: &[ViewRecord]) -> u64 {
+    views.iter().filter(|view| view.frame_num.is_some()).count() as u64
+}
+
+fn angles_of(view: &ViewRecord) -> [f64; 3] {
+    [view.yaw_rad, view.pitch_rad, view.fov_rad]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn views_are_named_by_location_and_candidate() {
-        let view = |candidate, yaw_rad, frame_num| ViewRecord {
+    fn view(candidate: u32, yaw_rad: f64, frame_num: Option<u32>) -> ViewRecord {
+        ViewRecord {
             camera_uuid: "a".into(),
             candidate,
             yaw_rad,
@@ -192,7 +201,15 @@ mod tests {
             fov_rad: 1.0,
             entropy: 0.0,
             frame_num,
-        };
+        }
+    }
+
+    fn name(candidate: u32) -> ViewName {
+        ViewName { area: 7, uuid: "a".into(), candidate }
+    }
+
+    #[test]
+    fn views_are_named_by_location_and_candidate() {
         let a = [view(0, 0.0, Some(0)), view(1, 0.5, Some(1)), view(2, 1.0, None), view(3, 1.5, Some(2))];
         let b = [view(0, 0.0, None), view(1, 0.5, Some(0)), view(2, 1.0, Some(1)), view(3, 1.6, Some(2))];
 
@@ -201,7 +218,6 @@ mod tests {
         views.drawn(7, &a, &b);
 
         let ViewChanges { kept_a, kept_b, lost, gained, redrawn, .. } = views.changes;
-        let name = |candidate| ViewName { area: 7, uuid: "a".into(), candidate };
         assert_eq!((kept_a, kept_b), (3, 3));
         assert_eq!((lost, gained, redrawn), (vec![name(0)], vec![name(2)], vec![name(3)]));
         assert_eq!(candidates(&b)[&("a", 0)], 1);

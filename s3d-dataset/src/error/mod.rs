@@ -7,7 +7,7 @@ mod usage;
 
 pub use input::InputError;
 pub use names::{FieldNames, OptionNames};
-pub use temporary::{TemporaryError, Work};
+pub use temporary::{Activity, TemporaryError};
 pub use usage::{Difference, Held, Overwriting, UsageError};
 
 use std::error::Error as StdError;

@@ -17,7 +17,7 @@ pub enum TemporaryError {
         /// The file or folder.
         path: PathBuf,
         /// What that process does.
-        by: Work,
+        by: Activity,
     },
     /// Something was changed while it was read.
     #[error("{what}")]
@@ -29,7 +29,7 @@ pub enum TemporaryError {
 
 /// What another process does with a file or folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Work {
+pub enum Activity {
     /// It exports into it.
     Exporting,
     /// Shards of another call export into it.
@@ -38,7 +38,7 @@ pub enum Work {
     Writing,
 }
 
-impl Work {
+impl Activity {
     fn sentence(self) -> &'static str {
         match self {
             Self::Exporting => "another process exports into it",

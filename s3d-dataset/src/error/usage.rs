@@ -220,13 +220,13 @@ impl UsageError {
                 format!("{modalities}: only images of labels, and the scene has none")
             }
             Self::Missing { what, groups } => {
-                let group = |options: &Vec<(&'static str, Option<&'static str>)>| {
+                let mut ways = Vec::new();
+                for options in groups {
                     let options: Vec<String> =
                         options.iter().map(|(name, value)| names.option(name, *value)).collect();
-                    options.join(" and ")
-                };
-                let groups: Vec<String> = groups.iter().map(group).collect();
-                format!("{what}: give {}", groups.join(", or "))
+                    ways.push(options.join(" and "));
+                }
+                format!("{what}: give {}", ways.join(", or "))
             }
             Self::ForeignOption { option, packages } => {
                 format!("{} belongs to {} only", names.option(option, None), packages.join(" and "))

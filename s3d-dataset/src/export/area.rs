@@ -5,7 +5,7 @@ use crate::event::UnitKind;
 use crate::export::common::{Common, PreparedMesh};
 use crate::export::images::photographs::{self, WrittenPhotograph};
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
-use crate::export::input::AreaInput;
+use crate::export::input::area::AreaInput;
 use crate::export::input::pictures::Pictures;
 use crate::export::labels::label_area::label_files;
 use crate::export::location::room_of;

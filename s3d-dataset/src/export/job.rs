@@ -7,11 +7,12 @@ use crate::error::{InputError, Result, UsageError};
 use crate::export::area;
 use crate::export::common::{Common, PreparedMesh};
 use crate::export::finish::finish;
+use crate::export::input::Inputs;
+use crate::export::input::area::AreaInput;
 use crate::export::input::cameras::Cameras;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::requested::requested_areas;
-use crate::export::input::{AreaInput, Inputs};
 use crate::export::labels::label_area::{self, mesh_doubts};
 use crate::export::plan::Plan;
 use crate::export::run::{Run, Target};
@@ -21,8 +22,8 @@ use crate::options::ExportOptions;
 use crate::record::assets;
 use crate::record::journal::{Journal, Unit};
 use crate::record::manifest::Manifest;
-use crate::record::missing::missing_units;
 use crate::record::request::Request;
+use crate::record::unfinished::missing_units;
 use crate::stage::Stage;
 use crate::store::lock::Sharing;
 use crate::store::state::OutputState;
@@ -221,12 +222,11 @@ impl<'a> Job<'a> {
     /// written if that unit is ours. Otherwise the journal knows the unit, but does not write it down.
     pub(crate) fn label(&self, common: Common<'_>, scope: Scope) -> Result<Labelled<'_>> {
         let missing = missing_units(&self.request, &common.journal.finished());
-        let is_needed = |area: u32| scope == Scope::All || missing.iter().any(|unit| unit.area() == area);
-
         let mut labelled = Labelled { single: None, areas: Vec::new() };
         for area in &self.inputs.areas {
+            let is_needed = scope == Scope::All || missing.iter().any(|unit| unit.area() == area.number);
             let plan = match self.plan {
-                _ if !is_needed(area.number) => None,
+                _ if !is_needed => None,
                 Some(plan) => Some(label_area::take_from_plan(area, plan, &common)?),
                 None => Some(self.label_area(area, common, &mut labelled.single)?),
             };

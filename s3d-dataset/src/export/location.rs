@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::input::AreaInput;
+use crate::export::input::area::AreaInput;
 use crate::export::input::cameras::Cameras;
 use crate::options::placing::{Placing, SHARE};
 use crate::place::free_space::{FreeSpaceOptions, place_in_free_space};
@@ -34,16 +34,14 @@ pub(crate) fn locate(
     table: &LabelTable,
     seed: u64,
 ) -> Result<Located> {
-    let room = |l: &ScanLocation| room_of(&annotated.rooms, l.pose.location);
-
     match &area.cameras {
         Cameras::Listed(locations, told) => {
-            let is_known = |room: &Room| annotated.rooms.iter().any(|r| r.room == *room);
-            let rooms = locations
-                .iter()
-                .zip(told)
-                .map(|(l, told)| told.filter(is_known).or_else(|| room(l)));
-            Ok(Located { locations: locations.clone(), rooms: rooms.collect(), surface_seen: None })
+            let mut rooms = Vec::with_capacity(locations.len());
+            for (location, told) in locations.iter().zip(told) {
+                let known = told.filter(|told| annotated.rooms.iter().any(|r| r.room == *told));
+                rooms.push(known.or_else(|| room_of(&annotated.rooms, location.pose.location)));
+            }
+            Ok(Located { locations: locations.clone(), rooms, surface_seen: None })
         }
         Cameras::Placed(Placing::Apart(distance_m)) if area.is_labelled => {
             let ground = Ground {
@@ -77,7 +75,11 @@ pub(crate) fn locate(
                 "area {number}: {count} scan locations placed on {floor_m2:.0} m² of floor: {seen}"
             ));
 
-            let rooms = placed.locations.iter().map(room).collect();
+            let rooms = placed
+                .locations
+                .iter()
+                .map(|location| room_of(&annotated.rooms, location.pose.location))
+                .collect();
             Ok(Located { locations: placed.locations, rooms, surface_seen: Some(seen) })
         }
     }

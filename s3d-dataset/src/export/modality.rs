@@ -21,12 +21,14 @@ pub(crate) const NO_CLASS: u8 = MAX_CLASSES as u8;
 
 /// The index of each label's class in the taxonomy, or [`NO_CLASS`].
 pub(crate) fn classes_of_labels(table: &LabelTable) -> Vec<u8> {
-    let class = |index| {
-        table
-            .class_of(LabelId(index))
-            .map_or(NO_CLASS, |class| class.index() as u8)
-    };
-    (0..table.len() as u32).map(class).collect()
+    (0..table.len() as u32)
+        .map(|index| class_index(table, LabelId(index)))
+        .collect()
+}
+
+/// The index of a label's class in the taxonomy, or [`NO_CLASS`].
+pub(crate) fn class_index(table: &LabelTable, label: LabelId) -> u8 {
+    table.class_of(label).map_or(NO_CLASS, |class| class.index() as u8)
 }
 
 /// The palette of `semantic_class` images: a colour for each byte, black for bytes without a class.

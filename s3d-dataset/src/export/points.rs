@@ -33,12 +33,11 @@ pub(crate) fn write_points(
     let annotated = &plan.annotated;
     let place = places(plan, table);
 
-    let key = |face: &u32| {
+    let mut faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
+    faces.sort_by_cached_key(|face| {
         let label = annotated.label_of_face[*face as usize];
         (place.get(&label).map_or((true, None), |(room, _)| (false, Some(*room))), label)
-    };
-    let mut faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
-    faces.sort_by_cached_key(key);
+    });
     let rooms: Vec<(Option<Room>, Vec<Run>)> = runs(&faces, &annotated.label_of_face, &place);
 
     let number = plan.area;

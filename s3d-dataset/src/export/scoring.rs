@@ -10,14 +10,19 @@ use s3d_io::camera::ScanLocation;
 
 /// The locations of an area whose candidates are ours to score and are not scored yet.
 fn unscored<'p>(plan: &'p LabelledArea, common: &Common<'_>) -> Vec<&'p ScanLocation> {
-    let unit = |l: &ScanLocation| Unit::Scores(plan.area, l.uuid.clone());
-    let mut todo: Vec<&ScanLocation> = {
-        let finished = common.journal.finished();
-        plan.locations.iter().filter(|l| !finished.has(&unit(l))).collect()
-    };
+    let mut todo: Vec<(Unit, &ScanLocation)> = plan
+        .locations
+        .iter()
+        .map(|location| (Unit::Scores(plan.area, location.uuid.clone()), location))
+        .collect();
+
+    let finished = common.journal.finished();
+    todo.retain(|(unit, _)| !finished.has(unit));
+    drop(finished);
+
     // `is_ours` may lock the journal, so it is called after the lock is released.
-    todo.retain(|l| (common.is_ours)(&unit(l)));
-    todo
+    todo.retain(|(unit, _)| (common.is_ours)(unit));
+    todo.into_iter().map(|(_, location)| location).collect()
 }
 
 /// Whether any location of an area is still to be scored.

@@ -2,6 +2,7 @@
 
 use crate::context::Context;
 use crate::error::{InputError, Result};
+use crate::export::modality::class_index;
 use crate::parallel::for_each_in_order;
 use crate::record::journal::Finished;
 use crate::record::request::Request;
@@ -19,14 +20,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// What a view shows in a pixel, by the face seen there. Views are scored by its entropy.
 pub(crate) enum Kinds {
-    /// The index of each face's class or [`NO_CLASS`], and the number of classes.
+    /// The index of each face's class or [`NO_CLASS`](crate::export::modality::NO_CLASS), and the number of classes.
     Classes(Vec<u8>, usize),
     /// Without labels: which of the [`DIRECTIONS`] each face's normal is nearest to.
     Directions(Vec<u8>),
 }
-
-/// The index of a face without a class.
-const NO_CLASS: u8 = MAX_CLASSES as u8;
 
 /// The directions to the faces, edges and corners of a cube.
 const DIRECTIONS: usize = 26;
@@ -35,9 +33,7 @@ impl Kinds {
     /// Returns the kinds of a mesh's faces: their classes, or their directions if the table has no labels.
     pub(crate) fn of(table: &LabelTable, label_of_face: &[LabelId], mesh: &TriMesh) -> Self {
         if table.len() > 1 {
-            let class =
-                |label: &LabelId| table.class_of(*label).map_or(NO_CLASS, |class| class.index() as u8);
-            let class_of_face = label_of_face.iter().map(class).collect();
+            let class_of_face = label_of_face.iter().map(|label| class_index(table, *label)).collect();
             return Self::Classes(class_of_face, table.taxonomy().classes().len());
         }
 
@@ -47,15 +43,8 @@ impl Kinds {
             .flat_map(|x| steps.iter().flat_map(move |y| steps.map(|z| vec3(*x, *y, z))));
         let directions: Vec<Vec3> = all.filter_map(Vec3::try_normalize).collect();
 
-        let nearest = |face: u32| {
-            let normal = mesh.normal(face);
-            let cosines = directions.iter().map(|d| d.dot(normal));
-            let best = cosines
-                .enumerate()
-                .max_by(|(i, a), (j, b)| a.total_cmp(b).then(j.cmp(i)));
-            best.map_or(0, |(index, _)| index as u8)
-        };
-        Self::Directions((0..mesh.faces().len() as u32).into_par_iter().map(nearest).collect())
+        let faces = (0..mesh.faces().len() as u32).into_par_iter();
+        Self::Directions(faces.map(|face| nearest(&directions, mesh.normal(face))).collect())
     }
 
     /// The entropy of what a view's hits show, in nats.
@@ -74,6 +63,15 @@ impl Kinds {
             }
         }
     }
+}
+
+/// The index of the direction nearest to a normal. The first wins a tie.
+fn nearest(directions: &[Vec3], normal: Vec3) -> u8 {
+    let cosines = directions.iter().map(|d| d.dot(normal));
+    let best = cosines
+        .enumerate()
+        .max_by(|(i, a), (j, b)| a.total_cmp(b).then(j.cmp(i)));
+    best.map_or(0, |(index, _)| index as u8)
 }
 
 /// How candidates are drawn and scored.
@@ -101,9 +99,11 @@ fn draw(
 ) -> Vec<Candidate> {
     let distribution = ViewDistribution::default();
 
-    let candidate = |candidate| {
+    let mut candidates = Vec::with_capacity(views as usize);
+    for candidate in 0..views {
         let View { yaw_rad, pitch_rad, fov_rad } = draw_view(&distribution, seed, uuid, candidate);
-        Candidate {
+        let entropy = entropies.and_then(|e| e.get(candidate as usize)).copied();
+        candidates.push(Candidate {
             area,
             location,
             camera_uuid: uuid.to_owned(),
@@ -111,15 +111,11 @@ fn draw(
             yaw_rad,
             pitch_rad,
             fov_rad,
-            entropy: entropies
-                .and_then(|e| e.get(candidate as usize))
-                .copied()
-                .unwrap_or(0.0),
+            entropy: entropy.unwrap_or(0.0),
             frame_num: None,
-        }
-    };
-
-    (0..views).map(candidate).collect()
+        });
+    }
+    candidates
 }
 
 /// Draws the candidates of some locations of an area, and scores each by the entropy of what it sees. The
@@ -148,24 +144,28 @@ pub(crate) fn score_area(
     let scores: Vec<OnceLock<f64>> = candidates.iter().map(|_| OnceLock::new()).collect();
     let items: Vec<usize> = (0..candidates.len()).collect();
 
-    let memory = || (Caster::new(scene), Hits::default());
-    for_each_in_order(ctx, &items, memory, |(caster, hits), &i| {
-        let c = &candidates[i];
-        let camera = c.camera(locations[c.location], scoring.size);
-        caster.cast_into(&camera, scoring.stride, hits);
-        let _ = scores[i].set(kinds.entropy_of(hits));
-        progress.add(1);
+    for_each_in_order(
+        ctx,
+        &items,
+        || (Caster::new(scene), Hits::default()),
+        |(caster, hits), &i| {
+            let c = &candidates[i];
+            let camera = c.camera(locations[c.location], scoring.size);
+            caster.cast_into(&camera, scoring.stride, hits);
+            let _ = scores[i].set(kinds.entropy_of(hits));
+            progress.add(1);
 
-        // The thread that scores the last candidate of a location hands the location on.
-        if left[c.location].fetch_sub(1, Ordering::AcqRel) == 1 {
-            let views = scoring.views as usize;
-            let of_location = scores.iter().skip(c.location * views).take(views);
-            let entropies = of_location.map(|score| score.get().copied().unwrap_or(0.0)).collect();
-            each(&c.camera_uuid, entropies)?;
-        }
+            // The thread that scores the last candidate of a location hands the location on.
+            if left[c.location].fetch_sub(1, Ordering::AcqRel) == 1 {
+                let views = scoring.views as usize;
+                let of_location = scores.iter().skip(c.location * views).take(views);
+                let entropies = of_location.map(|score| score.get().copied().unwrap_or(0.0)).collect();
+                each(&c.camera_uuid, entropies)?;
+            }
 
-        Ok(())
-    })
+            Ok(())
+        },
+    )
 }
 
 /// Returns all candidates of a request after the selection, and what became of them. The areas must be
@@ -216,27 +216,28 @@ pub(crate) fn select_requested(
 pub(crate) fn tally(candidates: &[Candidate], pool: Pool, keep_all: bool, only: &[String]) -> ViewTally {
     let kept: Vec<&Candidate> = candidates.iter().filter(|c| c.frame_num.is_some()).collect();
 
-    let same_pool = |a: &Candidate, b: &Candidate| match pool {
+    let selection = Selection::default();
+    let pools = candidates.chunk_by(|a, b| match pool {
         Pool::Dataset => true,
         Pool::Area => a.area == b.area,
         Pool::Location => (a.area, a.location) == (b.area, b.location),
-    };
-    let selection = Selection::default();
-    let pools = candidates.chunk_by(same_pool);
+    });
     let dropped_lowest = if keep_all {
         0
     } else {
         pools.map(|pool| selection.discarded(pool.len()) as u64).sum()
     };
 
-    let asked = |c: &&&Candidate| only.is_empty() || only.contains(&c.camera_uuid);
-
+    let asked = kept
+        .iter()
+        .filter(|c| only.is_empty() || only.contains(&c.camera_uuid))
+        .count();
     ViewTally {
         candidates: candidates.len() as u64,
         kept: kept.len() as u64,
         dropped_lowest,
         dropped_not_drawn: (candidates.len() - kept.len()) as u64 - dropped_lowest,
-        not_asked: (kept.len() - kept.iter().filter(asked).count()) as u64,
+        not_asked: (kept.len() - asked) as u64,
     }
 }
 

@@ -22,8 +22,8 @@ use std::str::FromStr;
 /// What decides the bytes of a data set besides its input. The defaults are the paper's where it names a
 /// number. The manifest stores them, with the seed and the distance of placed locations elsewhere in it.
 ///
-/// This is the one place that says an option. With the feature `clap` it is a group of arguments of a command line:
-/// comments of fields are help texts. The names of fields are the names in JSON and in Python.
+/// This is the one place that says an option. With the feature `clap` it is a group of arguments of a command
+/// line: comments of fields are help texts. The names of fields are the names in JSON and in Python.
 ///
 /// ```
 /// use s3d_dataset::ExportOptions;
@@ -38,104 +38,126 @@ use std::str::FromStr;
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[serde(default, deny_unknown_fields)]
 pub struct ExportOptions {
-    /// Everything random comes from it: the same input and seed give the same bytes.
+    /// The source of everything random. The same input and seed give the same bytes.
     #[serde(skip_serializing_if = "is_zero")]
     #[cfg_attr(feature = "clap", arg(display_order = 10, long, default_value_t = 0))]
     pub seed: u64,
-    /// Put scan locations on the floor of every room instead of reading some: no two of a room nearer than
-    /// this, 1.5 m high, clear of walls and things.
+    /// Place scan locations on the floor of every room instead of reading them: at least this far apart
+    /// within a room, 1.5 m high, clear of walls and objects.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "clap", arg(display_order = 11, long, value_name = "METRES", value_parser = words::positive))]
+    #[cfg_attr(feature = "clap", arg(display_order = 11, long, value_name = "METRES",
+        value_parser = words::positive))]
     pub place_cameras: Option<f64>,
-    /// Put as few scan locations as see this share of the surface that can be seen, instead of reading some
-    /// [default where there are none to read: 0.95]
+    /// Place as few scan locations as see this share of the visible surface, instead of reading them
+    /// [default if there are none to read: 0.95]
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "clap", arg(display_order = 12, long, value_name = "SHARE", value_parser = words::positive, conflicts_with = "place_cameras"))]
+    #[cfg_attr(feature = "clap", arg(display_order = 12, long, value_name = "SHARE",
+        value_parser = words::positive, conflicts_with = "place_cameras"))]
     pub see: Option<f64>,
-    /// Candidate views a scan location; the paper's are 3 × 24.
-    #[cfg_attr(feature = "clap", arg(display_order = 7, long, value_name = "N", default_value_t = 72, value_parser = clap::value_parser!(u32).range(0..=100_000)))]
+    /// The number of candidate views at each scan location. The paper has 3 × 24.
+    #[cfg_attr(feature = "clap", arg(display_order = 7, long, value_name = "N", default_value_t = 72,
+        value_parser = clap::value_parser!(u32).range(0..=100_000)))]
     pub views: u32,
     /// Width and height of a view in pixels.
-    #[cfg_attr(feature = "clap", arg(display_order = 8, long, value_name = "PX", default_value_t = 1080, value_parser = clap::value_parser!(u32).range(8..=16_384)))]
+    #[cfg_attr(feature = "clap", arg(display_order = 8, long, value_name = "PX", default_value_t = 1080,
+        value_parser = clap::value_parser!(u32).range(8..=16_384)))]
     pub size: u32,
-    /// Width of a panorama in pixels, even; it is half as high.
-    #[cfg_attr(feature = "clap", arg(display_order = 9, long, value_name = "PX", default_value_t = 4096, value_parser = words::even_width))]
+    /// Width of a panorama in pixels, an even number. Its height is half of that.
+    #[cfg_attr(feature = "clap", arg(display_order = 9, long, value_name = "PX", default_value_t = 4096,
+        value_parser = words::even_width))]
     pub pano_width: u32,
-    /// Among which candidates views are selected: of the whole data set, of an area, or of a location.
+    /// Select views among the candidates of the whole data set, of each area, or of each scan location.
     #[serde(with = "by_name")]
-    #[cfg_attr(feature = "clap", arg(display_order = 13, long, value_name = "dataset|area|location", default_value = "dataset", value_parser = words::parsed::<Pool>))]
+    #[cfg_attr(feature = "clap", arg(display_order = 13, long, value_name = "dataset|area|location",
+        default_value = "dataset", value_parser = words::parsed::<Pool>))]
     pub pool: Pool,
-    /// Density of the point cloud.
-    #[cfg_attr(feature = "clap", arg(display_order = 14, long, value_name = "N", default_value_t = 10_000.0, value_parser = words::positive))]
+    /// Points per m² of the point cloud.
+    #[cfg_attr(feature = "clap", arg(display_order = 14, long, value_name = "N", default_value_t = 10_000.0,
+        value_parser = words::positive))]
     pub points_per_m2: f64,
-    /// Skip and count what is not as it should be in the annotations — odd names, lines that are no points,
-    /// unknown classes — instead of stopping at it.
+    /// Skip and count faults in the annotations (odd names, lines that are no points, unknown classes)
+    /// instead of stopping at them.
     #[cfg_attr(feature = "clap", arg(display_order = 21, long))]
     pub lenient: bool,
-    /// Give faces that no annotated point voted for the label of the surface next to them, along the surface
-    /// and not around sharp edges, if it is no farther than this. Left out, nothing is filled, as published.
+    /// Give each face without a vote of an annotated point the label of the surface next to it, along the
+    /// surface and not around sharp edges, if that surface is no farther than this [default: fill none, as in
+    /// the published data]
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "clap", arg(display_order = 22, long, value_name = "METRES", value_parser = words::positive))]
+    #[cfg_attr(feature = "clap", arg(display_order = 22, long, value_name = "METRES",
+        value_parser = words::positive))]
     pub fill: Option<f64>,
-    /// Count the classes of a candidate view on every Nth pixel of both axes; 1 counts all, exactly. With 4
-    /// the entropies of two scenes were off by 0.003 nats at most, 0.0006 on average, and the same views were
+    /// Count the classes of a candidate view on every Nth pixel of both axes; 1 counts all. With 4, the
+    /// entropies of two scenes were off by at most 0.003 nats, 0.0006 on average, and the same views were
     /// kept.
-    #[cfg_attr(feature = "clap", arg(display_order = 15, long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64)))]
+    #[cfg_attr(feature = "clap", arg(display_order = 15, long, value_name = "N", default_value_t = 4,
+        value_parser = clap::value_parser!(u32).range(1..=64)))]
     pub entropy_stride: u32,
-    /// Which images to write, such as rgb,depth,pose [default: rgb, depth, normal, semantic,
-    /// semantic_pretty, global_xyz, pose; besides there is semantic_class: PNG with a palette, a colour a
-    /// class]
+    /// The images to write, such as rgb,depth,pose. There is also semantic_class, a PNG whose palette has a
+    /// colour for each class [default: rgb, depth, normal, semantic, semantic_pretty, global_xyz, pose]
     #[serde(with = "by_names")]
-    #[cfg_attr(feature = "clap", arg(display_order = 16, long, value_name = "LIST", value_delimiter = ',', default_values_t = Domain::PUBLISHED, hide_default_value = true, value_parser = words::parsed::<Domain>))]
+    #[cfg_attr(feature = "clap", arg(display_order = 16, long, value_name = "LIST", value_delimiter = ',',
+        default_values_t = Domain::PUBLISHED, hide_default_value = true,
+        value_parser = words::parsed::<Domain>))]
     pub modalities: Vec<Domain>,
     /// Write every candidate view, whatever its entropy.
     #[cfg_attr(feature = "clap", arg(display_order = 17, long))]
     pub keep_all: bool,
     /// Write the images of these scan locations only. Views are still selected among all locations.
-    #[cfg_attr(feature = "clap", arg(display_order = 18, long, value_name = "UUID", num_args = 1.., value_delimiter = ',', value_parser = words::uuid))]
+    #[cfg_attr(feature = "clap", arg(display_order = 18, long, value_name = "UUID", num_args = 1..,
+        value_delimiter = ',', value_parser = words::uuid))]
     pub only: Vec<String>,
-    /// Normals interpolated from the mesh's own where it has some, instead of the faces'.
+    /// Interpolate normals from the mesh's own where it has some, instead of taking the normals of faces.
     #[serde(with = "normals")]
-    #[cfg_attr(feature = "clap", arg(display_order = 19, long = "smooth-normals", action = clap::ArgAction::SetTrue, value_parser = words::smooth_normals()))]
+    #[cfg_attr(feature = "clap", arg(display_order = 19, long = "smooth-normals",
+        action = clap::ArgAction::SetTrue, value_parser = words::smooth_normals()))]
     pub normals: Normals,
-    /// Take N samples of the colour of a pixel where surfaces end or turn, so that there are no stair-steps;
-    /// all other images keep one.
+    /// Take N samples of a pixel's colour where surfaces end or turn, so that edges have no stair-steps. All
+    /// other images keep one sample.
     #[serde(skip_serializing_if = "is_one")]
-    #[cfg_attr(feature = "clap", arg(display_order = 20, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64)))]
+    #[cfg_attr(feature = "clap", arg(display_order = 20, long, value_name = "N", default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=64)))]
     pub rgb_samples: u32,
-    /// How much time the images' files may take: fast, balanced (about the size that libpng and OpenEXR make
-    /// them) or small (slowest). The pixels are the same.
+    /// Compression of the image files: fast, balanced (about as small as files by libpng and OpenEXR) or
+    /// small (slowest). The pixels are the same.
     #[serde(with = "by_name")]
-    #[cfg_attr(feature = "clap", arg(display_order = 23, long, value_name = "fast|balanced|small", default_value_t, value_parser = words::parsed::<Compression>))]
+    #[cfg_attr(feature = "clap", arg(display_order = 23, long, value_name = "fast|balanced|small",
+        default_value_t, value_parser = words::parsed::<Compression>))]
     pub compression: Compression,
-    /// World coordinates as half floats (1.6 cm steps at 20 m from the origin), as 32-bit floats, or not at
-    /// all, whatever modalities there are: `s3d xyz` makes them later from depth and pose.
+    /// Write world coordinates as half floats (steps of 1.6 cm at 20 m from the origin), as 32-bit floats, or
+    /// not at all, whatever the modalities are. `s3d xyz` can make them later, from depth and pose.
     #[serde(with = "by_name")]
-    #[cfg_attr(feature = "clap", arg(display_order = 25, long, value_name = "half|float|none", default_value_t, value_parser = words::parsed::<XyzType>))]
+    #[cfg_attr(feature = "clap", arg(display_order = 25, long, value_name = "half|float|none",
+        default_value_t, value_parser = words::parsed::<XyzType>))]
     pub xyz: XyzType,
-    /// Axes of normals in views: the paper's (B towards the camera) or OpenCV's (B forward, as omnidata has
-    /// them). Panoramas have X, −Z, Y of the world in either.
+    /// Axes of normals in views: the paper's (B towards the camera) or OpenCV's (B forward, as in omnidata).
+    /// Panoramas always have X, −Z, Y of the world.
     #[serde(with = "normal_axes")]
-    #[cfg_attr(feature = "clap", arg(display_order = 26, long, value_name = "paper|opencv", default_value = "paper", value_parser = words::normal_axes))]
+    #[cfg_attr(feature = "clap", arg(display_order = 26, long, value_name = "paper|opencv",
+        default_value = "paper", value_parser = words::normal_axes))]
     pub normal_axes: NormalAxes,
-    /// Depth in 512ths of a metre (up to 128 m), or in millimetres (up to 65.534 m; loaders of the published
-    /// data divide by 512).
+    /// Write depth in 512ths of a metre (up to 128 m) or in millimetres (up to 65.534 m). Loaders of the
+    /// published data divide by 512.
     #[serde(with = "by_name")]
-    #[cfg_attr(feature = "clap", arg(display_order = 27, long, value_name = "512|mm", default_value_t, value_parser = words::parsed::<DepthUnits>))]
+    #[cfg_attr(feature = "clap", arg(display_order = 27, long, value_name = "512|mm", default_value_t,
+        value_parser = words::parsed::<DepthUnits>))]
     pub depth_units: DepthUnits,
-    /// Fill semantic_labels.json with null labels up to N entries: loaders look missing pixels up at index
+    /// Fill semantic_labels.json with null labels up to N entries. Loaders look up missing pixels at index
     /// 3341.
     #[serde(with = "by_name")]
-    #[cfg_attr(feature = "clap", arg(display_order = 28, long, value_name = "N|off", default_value_t, value_parser = words::parsed::<PadLabels>))]
+    #[cfg_attr(feature = "clap", arg(display_order = 28, long, value_name = "N|off", default_value_t,
+        value_parser = words::parsed::<PadLabels>))]
     pub pad_labels: PadLabels,
-    /// Write what a point cloud loader wants to OUT/profiles/NAME besides; may be repeated.
+    /// Write the files that a point cloud loader reads to OUT/profiles/NAME as well; may be repeated.
     #[serde(with = "by_names")]
-    #[cfg_attr(feature = "clap", arg(display_order = 29, long = "profile", value_delimiter = ',', value_parser = words::parsed::<Profile>, value_name = "pointcept|open3d-ml|mmdet3d|pointnet"))]
+    #[cfg_attr(feature = "clap", arg(display_order = 29, long = "profile", value_delimiter = ',',
+        value_parser = words::parsed::<Profile>, value_name = "pointcept|open3d-ml|mmdet3d|pointnet"))]
     pub profiles: Vec<Profile>,
-    /// Go on although the data set would be of no use: the error that stops an export names its condition.
+    /// Go on although the data set would be of no use. The error that stops an export names its condition.
     /// Conditions decide no byte, and are not stored.
     #[serde(skip)]
-    #[cfg_attr(feature = "clap", arg(display_order = 24, long, value_delimiter = ',', value_parser = words::parsed::<Condition>, value_name = "colour|coverage|frame|inside-out|labels|locations|scale|size|up"))]
+    #[cfg_attr(feature = "clap", arg(display_order = 24, long, value_delimiter = ',',
+        value_parser = words::parsed::<Condition>,
+        value_name = "colour|coverage|frame|inside-out|labels|locations|scale|size|up"))]
     pub allow: Vec<Condition>,
 }
 
@@ -169,6 +191,10 @@ impl Default for ExportOptions {
     }
 }
 
+fn is_positive(value: f64) -> bool {
+    value > 0.0 && value.is_finite()
+}
+
 fn is_one(samples: &u32) -> bool {
     *samples == 1
 }
@@ -178,8 +204,8 @@ fn is_zero(seed: &u64) -> bool {
 }
 
 impl ExportOptions {
-    /// Returns the names of the options that a data set stores: the fields of this struct but `allow`, in their
-    /// order.
+    /// Returns the names of the options that a data set stores: the fields of this struct but `allow`, in
+    /// their order.
     ///
     /// ```
     /// let names = s3d_dataset::ExportOptions::names();
@@ -208,9 +234,11 @@ impl ExportOptions {
     pub fn canonical(&self) -> Result<Self> {
         let mut options = self.clone();
         options.check_ranges()?;
-        let left_out = |d: &Domain| self.xyz == XyzType::None && *d == Domain::GlobalXyz;
-        let asked = |d: &Domain| self.modalities.contains(d) && !left_out(d);
-        options.modalities = Domain::ALL.into_iter().filter(asked).collect();
+        options.modalities = Domain::ALL.to_vec();
+        options.modalities.retain(|domain| {
+            let is_left_out = self.xyz == XyzType::None && *domain == Domain::GlobalXyz;
+            self.modalities.contains(domain) && !is_left_out
+        });
         options.profiles.sort();
         options.profiles.dedup();
         options.only = self
@@ -231,10 +259,11 @@ impl ExportOptions {
             || self.pad_labels.0 > 0
     }
 
-    /// The same for scenes without labels: what is made of them is left out.
+    /// Returns the same options for scenes without labels, without anything made of labels.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) if nothing else is asked for, and for what only makes sense with labels.
+    /// [`Error::Usage`](crate::Error::Usage) if nothing else is asked for, or an option only makes sense with
+    /// labels.
     pub(crate) fn without_labels(&self) -> Result<Self> {
         if let Some(profile) = self.profiles.first() {
             let value = Some(profile.name().to_owned());
@@ -252,7 +281,6 @@ impl ExportOptions {
     }
 
     fn check_ranges(&self) -> Result<()> {
-        let positive = |value: f64| value > 0.0 && value.is_finite();
         let fits = [
             ("views", self.views <= 100_000, "at most 100000"),
             ("size", (8..=16_384).contains(&self.size), "from 8 to 16384"),
@@ -261,11 +289,15 @@ impl ExportOptions {
                 (8..=32_768).contains(&self.pano_width) && self.pano_width.is_multiple_of(2),
                 "an even number from 8 to 32768",
             ),
-            ("points_per_m2", positive(self.points_per_m2), "above 0"),
-            ("place_cameras", self.place_cameras.is_none_or(positive), "above 0"),
-            ("see", self.see.is_none_or(|share| positive(share) && share <= 1.0), "above 0, and at most 1"),
+            ("points_per_m2", is_positive(self.points_per_m2), "above 0"),
+            ("place_cameras", self.place_cameras.is_none_or(is_positive), "above 0"),
+            (
+                "see",
+                self.see.is_none_or(|share| is_positive(share) && share <= 1.0),
+                "above 0, and at most 1",
+            ),
             ("see", self.see.is_none() || self.place_cameras.is_none(), "left out beside place_cameras"),
-            ("fill", self.fill.is_none_or(positive), "above 0"),
+            ("fill", self.fill.is_none_or(is_positive), "above 0"),
             ("entropy_stride", (1..=64).contains(&self.entropy_stride), "from 1 to 64"),
             ("rgb_samples", (1..=64).contains(&self.rgb_samples), "from 1 to 64"),
             ("pad_labels", self.pad_labels.0 <= 65_536, "at most 65536"),

@@ -1,5 +1,5 @@
-//! The words that stand for values of options on a command line. Each parser returns what is wrong with a word in a
-//! phrase that goes on after the word.
+//! The words that stand for values of options on a command line. Each parser returns what is wrong with a
+//! word, in a phrase that goes on after the word.
 
 use crate::options::canonical_uuid;
 use clap::builder::{BoolValueParser, MapValueParser, TypedValueParser};

@@ -111,6 +111,12 @@ mod tests {
         names
     }
 
+    /// Returns why a package of `dataset` cannot be written to `place`.
+    fn refusal(place: &Path, dataset: &Path) -> String {
+        let begun = Destination::begin(&Context::default(), place, dataset, true);
+        begun.err().unwrap().to_string()
+    }
+
     #[test]
     fn a_package_is_there_whole_or_not_at_all() {
         let dir = tempfile::tempdir().unwrap();
@@ -143,25 +149,20 @@ mod tests {
         let (root, place) = (dir.path().join("data"), dir.path().join("thesis"));
         fs::create_dir_all(&place).unwrap();
         fs::write(place.join("chapter_1.tex"), "").unwrap();
-        let fails = |place: &Path| {
-            Destination::begin(&Context::default(), place, &root, true)
-                .err()
-                .unwrap()
-                .to_string()
-        };
-        assert!(fails(&place).contains("holds chapter_1.tex, and was not written by s3d pack"));
-        assert!(fails(&place.join("chapter_1.tex")).contains("cannot use as the package's folder"));
+        assert!(refusal(&place, &root).contains("holds chapter_1.tex, and was not written by s3d pack"));
+        assert!(refusal(&place.join("chapter_1.tex"), &root).contains("cannot use as the package's folder"));
         fs::create_dir(&root).unwrap();
         for apart in [&root, &root.join("a/b"), dir.path(), &root.join("../data/x")] {
-            assert!(fails(apart).contains("in one another"), "{}", apart.display());
+            assert!(refusal(apart, &root).contains("in one another"), "{}", apart.display());
         }
     }
 
     #[test]
     fn relative_paths_lead_there() {
-        let path = |from: &str, to: &str| relative_path(Path::new(from), Path::new(to));
-        assert_eq!(path("/a/b/c", "/a/x/y.png"), "../../x/y.png");
-        assert_eq!(path("/a/b", "/a/b/c"), "c");
-        assert_eq!(path("/a", "/b"), "../b");
+        for (from, to, expected) in
+            [("/a/b/c", "/a/x/y.png", "../../x/y.png"), ("/a/b", "/a/b/c", "c"), ("/a", "/b", "../b")]
+        {
+            assert_eq!(relative_path(Path::new(from), Path::new(to)), expected);
+        }
     }
 }

@@ -109,9 +109,12 @@ fn area_points(source: &Source, area: u32, max: Option<u32>) -> Result<PointClou
 mod tests {
     use super::*;
 
+    fn place(path: &str, kind: PackageKind) -> PathBuf {
+        default_place(Path::new(path), kind).unwrap()
+    }
+
     #[test]
     fn the_default_lies_beside_the_data_set() {
-        let place = |path: &str, kind| default_place(Path::new(path), kind).unwrap();
         assert_eq!(place("a/data", PackageKind::Colmap), Path::new("a/data_colmap"));
         assert_eq!(place("data/", PackageKind::Parquet), Path::new("data_images.parquet"));
         let here = std::env::current_dir().unwrap();

@@ -5,7 +5,7 @@ use super::area_points;
 use super::destination::{Destination, relative_path};
 use super::options::{DepthFiles, NerfstudioOptions};
 use super::source::Source;
-use crate::context::Context;
+use crate::context::{Context, Progress};
 use crate::error::Result;
 use crate::parallel::map_in_order;
 use crate::store::new_folder::resolved;
@@ -44,45 +44,7 @@ pub(super) fn pack(
             continue;
         }
 
-        let below = format!("area_{area}");
-        let is_masked = |image: &&DatasetImage| source.photograph(image).is_some_and(|p| p.masked > 0.0);
-        let masks = images.iter().any(is_masked);
-        let job = Job { masks, ..Job::new(source, destination, &below, depth, options)? };
-        if masks {
-            create_dir(&job.folder.join(MASKS))?;
-            notes.push(format!(
-                "{below}: {MASKS} are 0 where a view lies outside of its photograph; all its views have one"
-            ));
-        }
-
-        let points = area_points(source, area, options.points)?;
-        let ply = (!points.is_empty()).then_some(PLY);
-        if ply.is_some() {
-            write_colored_points(&job.folder.join(PLY), &points)?;
-        }
-
-        let (panoramas, views): (Vec<_>, Vec<_>) =
-            images.into_iter().partition(|image| image.frame == Frame::Panorama);
-        for (images, camera, name) in [
-            (views, NerfstudioCamera::Perspective, "transforms.json"),
-            (panoramas, NerfstudioCamera::Equirectangular, "transforms_panoramas.json"),
-        ] {
-            if images.is_empty() {
-                continue;
-            }
-            let frames = map_in_order(
-                ctx,
-                &images,
-                || (),
-                |(), image| {
-                    let frame = job.frame(image, camera)?;
-                    progress.add(1);
-                    Ok(frame)
-                },
-            )?;
-            write_nerfstudio(&job.folder.join(name), camera, ply, &frames)?;
-            notes.push(format!("ns-train … --data {below}/{name}"));
-        }
+        notes.extend(pack_area(ctx, source, destination, (area, images), depth, options, &progress)?);
     }
 
     match depth {
@@ -95,6 +57,60 @@ pub(super) fn pack(
             f64::from(MISSING_DEPTH) / source.depth_units_per_m
         )),
         DepthFiles::None => {}
+    }
+    Ok(notes)
+}
+
+/// Writes the folder of an area. Returns notes on how to use it.
+fn pack_area(
+    ctx: &Context,
+    source: &Source,
+    destination: &Destination,
+    (area, images): (u32, Vec<&DatasetImage>),
+    depth: DepthFiles,
+    options: &NerfstudioOptions,
+    progress: &Progress<'_>,
+) -> Result<Vec<String>> {
+    let mut notes = Vec::new();
+    let below = format!("area_{area}");
+    let masks = images
+        .iter()
+        .any(|image| source.photograph(image).is_some_and(|p| p.masked > 0.0));
+    let job = Job { masks, ..Job::new(source, destination, &below, depth, options)? };
+    if masks {
+        create_dir(&job.folder.join(MASKS))?;
+        notes.push(format!(
+            "{below}: {MASKS} are 0 where a view lies outside of its photograph; all its views have one"
+        ));
+    }
+
+    let points = area_points(source, area, options.points)?;
+    let ply = (!points.is_empty()).then_some(PLY);
+    if ply.is_some() {
+        write_colored_points(&job.folder.join(PLY), &points)?;
+    }
+
+    let (panoramas, views): (Vec<_>, Vec<_>) =
+        images.into_iter().partition(|image| image.frame == Frame::Panorama);
+    for (images, camera, name) in [
+        (views, NerfstudioCamera::Perspective, "transforms.json"),
+        (panoramas, NerfstudioCamera::Equirectangular, "transforms_panoramas.json"),
+    ] {
+        if images.is_empty() {
+            continue;
+        }
+        let frames = map_in_order(
+            ctx,
+            &images,
+            || (),
+            |(), image| {
+                let frame = job.frame(image, camera)?;
+                progress.add(1);
+                Ok(frame)
+            },
+        )?;
+        write_nerfstudio(&job.folder.join(name), camera, ply, &frames)?;
+        notes.push(format!("ns-train … --data {below}/{name}"));
     }
     Ok(notes)
 }
@@ -218,15 +234,16 @@ fn absolute(path: &Path) -> Result<PathBuf, FileError> {
 
 /// Depth in millimetres, rounded; 0 if missing or beyond 65.535 m.
 fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
-    let convert = |v: &u16| {
-        let mm = (f64::from(*v) * (1000.0 / units_per_m)).round();
-        if *v == MISSING_DEPTH || mm > f64::from(u16::MAX) {
+    let mut converted = depth.clone();
+    for depth in converted.pixels_mut() {
+        let mm = (f64::from(*depth) * (1000.0 / units_per_m)).round();
+        *depth = if *depth == MISSING_DEPTH || mm > f64::from(u16::MAX) {
             0
         } else {
             mm as u16
-        }
-    };
-    Raster::from_vec(depth.width(), depth.height(), depth.pixels().iter().map(convert).collect())
+        };
+    }
+    converted
 }
 
 #[cfg(test)]

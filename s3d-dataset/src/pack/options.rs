@@ -389,8 +389,8 @@ impl FromStr for ShardPrefix {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let fits = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-        if text.is_empty() || text.starts_with('.') || !text.chars().all(fits) {
+        let has_other = text.contains(|c: char| !c.is_ascii_alphanumeric() && !"_-.".contains(c));
+        if text.is_empty() || text.starts_with('.') || has_other {
             return Err("must be letters, digits, _, - and ., and not begin with a .".to_owned());
         }
         Ok(Self(text.to_owned()))

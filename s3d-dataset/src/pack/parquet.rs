@@ -58,9 +58,8 @@ fn row(
 ) -> Result<ImageRow> {
     let path = |domain| image.path(&source.layout, domain);
 
-    // Reading the data set accepts any word for a room's type. Here only the taxonomy's words are valid, and
-    // the word for unknown rooms.
-
+    // Reading the data set accepts any word for a room's type. Only the words of the taxonomy and the one for
+    // unknown rooms are valid here.
     let (room_type, room_number) = match source.taxonomy.room(&image.room) {
         Ok(room) => (room.room_type.name(), room.number),
         Err(_) if table.is_none() && image.room == UNKNOWN_ROOM => ("unknown", 1),
@@ -156,9 +155,9 @@ fn depth_row(depth: &Raster<u16>, units_per_m: f64) -> (f64, Option<[f64; 3]>) {
         count += 1;
     }
 
-    let metres = |units: f64| units / units_per_m;
-    let depth_m =
-        (count > 0).then(|| [f64::from(min), sum as f64 / count as f64, f64::from(max)].map(metres));
+    let depth_m = (count > 0).then(|| {
+        [f64::from(min), sum as f64 / count as f64, f64::from(max)].map(|units| units / units_per_m)
+    });
     (count as f64 / depth.len() as f64, depth_m)
 }
 

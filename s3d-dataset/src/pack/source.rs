@@ -62,8 +62,11 @@ impl Source {
             .into());
         }
 
-        let chosen = |a: &u32| areas.is_empty() || areas.contains(a);
-        let mut areas: Vec<u32> = there.iter().copied().filter(chosen).collect();
+        let mut areas: Vec<u32> = there
+            .iter()
+            .copied()
+            .filter(|area| areas.is_empty() || areas.contains(area))
+            .collect();
         areas.sort_unstable();
 
         let mut images: Vec<DatasetImage> =
@@ -110,10 +113,11 @@ impl Source {
     /// A sentence on the coordinates of each area whose scan has another frame.
     pub(crate) fn frame_notes(&self) -> Vec<String> {
         let packed = self.offsets.iter().filter(|(area, _)| self.areas.contains(area));
-        let note = |(area, offset_m): (&u32, &[f64; 3])| {
-            format!("area {area}: coordinates are those of its scan less offset_m = {offset_m:?}")
-        };
-        packed.map(note).collect()
+        packed
+            .map(|(area, offset_m)| {
+                format!("area {area}: coordinates are those of its scan less offset_m = {offset_m:?}")
+            })
+            .collect()
     }
 
     /// The record of the photograph that an image is the view of.

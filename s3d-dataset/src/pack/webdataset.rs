@@ -52,36 +52,9 @@ pub(super) fn pack(
         .map(|(name, bytes)| TarWriter::entry_bytes(name, bytes.len() as u64))
         .sum();
 
-    let most = ShardLimits::default();
-    let max_bytes = options.max_size.map_or(most.max_bytes, |mb| u64::from(mb) * 1_000_000);
-    let mut shards = Vec::new();
-    let mut names = Vec::new();
-    for (name, mut images) in series(source, options) {
-        if let Some(seed) = options.shuffle {
-            shuffle(&mut images, seed);
-        }
-
-        let sizes = map_in_order(ctx, &images, || (), |(), image| sample_bytes(source, image, &domains))?;
-        let max_samples = match (options.max_count, options.max_size) {
-            (Some(count), _) => count as usize,
-            (None, Some(_)) => most.max_samples,
-            (None, None) => (images.len() / SHARDS).clamp(1, most.max_samples),
-        };
-        let limits = ShardLimits { max_bytes: max_bytes.saturating_sub(meta_bytes), max_samples };
-
-        let plan = plan_shards(&sizes, limits);
-        names.push(match plan.len() {
-            1 => format!("{name}-000000.tar"),
-            n => format!("{name}-{{000000..{:06}}}.tar", n - 1),
-        });
-
-        shards.extend(
-            plan.into_iter().enumerate().map(|(i, range)| Shard {
-                url: format!("{name}-{i:06}.tar"),
-                images: images[range].to_vec(),
-            }),
-        );
-    }
+    let plans = shards(ctx, source, options, &domains, meta_bytes)?;
+    let (names, shards): (Vec<String>, Vec<Vec<Shard<'_>>>) = plans.into_iter().unzip();
+    let shards: Vec<Shard<'_>> = shards.into_iter().flatten().collect();
 
     let progress = ctx.progress("packing", "images", source.images.len() as u64);
     let entries = map_in_order(
@@ -105,6 +78,51 @@ pub(super) fn pack(
 
     write_shard_index(&destination.path().join("shards.json"), "s3d", &entries)?;
 
+    Ok(notes(&names))
+}
+
+/// Plans the shards of each series. `meta_bytes` is the size of the tables that each shard begins with. Returns
+/// the name of each series, as webdataset takes it, with its shards.
+fn shards<'a>(
+    ctx: &Context,
+    source: &'a Source,
+    options: &WebdatasetOptions,
+    domains: &[Domain],
+    meta_bytes: u64,
+) -> Result<Vec<(String, Vec<Shard<'a>>)>> {
+    let most = ShardLimits::default();
+    let max_bytes = options.max_size.map_or(most.max_bytes, |mb| u64::from(mb) * 1_000_000);
+
+    let mut all = Vec::new();
+    for (name, mut images) in series(source, options) {
+        if let Some(seed) = options.shuffle {
+            shuffle(&mut images, seed);
+        }
+
+        let sizes = map_in_order(ctx, &images, || (), |(), image| sample_bytes(source, image, domains))?;
+        let max_samples = match (options.max_count, options.max_size) {
+            (Some(count), _) => count as usize,
+            (None, Some(_)) => most.max_samples,
+            (None, None) => (images.len() / SHARDS).clamp(1, most.max_samples),
+        };
+        let limits = ShardLimits { max_bytes: max_bytes.saturating_sub(meta_bytes), max_samples };
+
+        let plan = plan_shards(&sizes, limits);
+        let urls = match plan.len() {
+            1 => format!("{name}-000000.tar"),
+            n => format!("{name}-{{000000..{:06}}}.tar", n - 1),
+        };
+        let shards = plan
+            .into_iter()
+            .enumerate()
+            .map(|(i, range)| Shard { url: format!("{name}-{i:06}.tar"), images: images[range].to_vec() });
+        all.push((urls, shards.collect()));
+    }
+    Ok(all)
+}
+
+/// Returns notes on how to use the shards of these names.
+fn notes(names: &[String]) -> Vec<String> {
     let mut notes: Vec<String> = names
         .iter()
         .map(|n| format!("webdataset.WebDataset(\"{n}\")"))
@@ -123,7 +141,7 @@ pub(super) fn pack(
          decoders of their own, before it, with webdataset.autodecode.handle_extension"
             .into(),
     );
-    Ok(notes)
+    notes
 }
 
 /// The series of shards: the views and the panoramas of each area, or one series of all images if the user

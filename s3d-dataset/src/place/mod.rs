@@ -177,10 +177,10 @@ fn on_outline(room: &SurveyedRoom, per_m2: f64) -> Vec<DVec3> {
     let step = 1.0 / per_m2.sqrt();
     let min = room.bbox.min.as_dvec3();
     let size = room.bbox.size().as_dvec3();
-    let along = |length: f64| (length / step).ceil().min(1e4) as u32;
+    let [columns, rows] = [size.x, size.y].map(|length| (length / step).ceil().min(1e4) as u32);
 
-    (0..along(size.x))
-        .flat_map(|i| (0..along(size.y)).map(move |j| (f64::from(i) + 0.5, f64::from(j) + 0.5)))
+    (0..columns)
+        .flat_map(|i| (0..rows).map(move |j| (f64::from(i) + 0.5, f64::from(j) + 0.5)))
         .map(|(i, j)| dvec3(min.x + i * step, min.y + j * step, min.z))
         .filter(|p| room.footprint.contains(p.x, p.y))
         .collect()
@@ -192,17 +192,12 @@ fn free_places(scene: &Scene<'_>, nearest: &NearestFaces<'_>, feet: &[DVec3]) ->
     let mut around = Vec::new();
     nearest.nearest_many(&eyes, &mut around);
 
-    let is_open = |foot: DVec3| {
-        let up = (HEIGHT_M - FOOT_M) * DVec3::Z;
-        cast_ray(scene, foot + FOOT_M * DVec3::Z, up).is_none_or(|hit| hit.t > 1.0)
-    };
-
     for clearance in CLEARANCES_M {
         let free: Vec<[f64; 3]> = feet
             .iter()
             .zip(&eyes)
             .zip(&around)
-            .filter(|((foot, _), n)| n.distance_m >= clearance && is_open(**foot))
+            .filter(|((foot, _), n)| n.distance_m >= clearance && has_headroom(scene, **foot))
             .map(|((_, eye), _)| eye.as_dvec3().to_array())
             .collect();
         if !free.is_empty() {
@@ -212,29 +207,35 @@ fn free_places(scene: &Scene<'_>, nearest: &NearestFaces<'_>, feet: &[DVec3]) ->
     Vec::new()
 }
 
+/// Returns whether nothing is above a foot up to the height of a location.
+fn has_headroom(scene: &Scene<'_>, foot: DVec3) -> bool {
+    let up = (HEIGHT_M - FOOT_M) * DVec3::Z;
+    cast_ray(scene, foot + FOOT_M * DVec3::Z, up).is_none_or(|hit| hit.t > 1.0)
+}
+
 /// Spreads locations over free places so that each sees the front of a surface in at least half of all
 /// directions. The floor of a room may continue through a door, to where the scan ends. If no place fulfils
 /// the condition, as in a scan without walls, it is dropped.
 fn choose(scene: &Scene<'_>, free: Vec<[f64; 3]>, placement: Placement, name: &str) -> Vec<[f64; 3]> {
-    let spread = |places: &[[f64; 3]]| -> Vec<[f64; 3]> {
-        let chosen = poisson_disk(places, placement.distance_m, placement.seed, name);
-        chosen.into_iter().map(|i| places[i]).collect()
-    };
-
     let mut places = free.clone();
     // Each turn removes places.
     while !places.is_empty() {
-        let chosen = spread(&places);
-        let is_blind = |place: &[f64; 3]| front_coverage(scene, *place) < LOW_COVERAGE;
-        let blind: Vec<[f64; 3]> = chosen.iter().copied().filter(is_blind).collect();
-
+        let chosen = spread(&places, placement, name);
+        let mut blind = chosen.clone();
+        blind.retain(|place| front_coverage(scene, *place) < LOW_COVERAGE);
         if blind.is_empty() {
             return chosen;
         }
 
         places.retain(|place| !blind.iter().any(|b| is_near(*place, *b)));
     }
-    spread(&free)
+    spread(&free, placement, name)
+}
+
+/// Returns the places of a Poisson-disk pattern.
+fn spread(places: &[[f64; 3]], placement: Placement, name: &str) -> Vec<[f64; 3]> {
+    let chosen = poisson_disk(places, placement.distance_m, placement.seed, name);
+    chosen.into_iter().map(|i| places[i]).collect()
 }
 
 /// Returns the share of directions in which a camera at a place sees the front of a surface.

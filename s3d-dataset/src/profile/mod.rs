@@ -104,12 +104,11 @@ fn add(ctx: &Context, data: &DataSet, wanted: &[Profile], overwrite: bool, call:
 
     let mut manifest = Manifest::read(layout)?;
     manifest.add_profiles(wanted);
-    let is_gone = |path: &str| {
-        wanted
-            .iter()
-            .any(|profile| path.starts_with(&format!("profiles/{}/", profile.name())))
-    };
-
+    let folders: Vec<String> = wanted
+        .iter()
+        .map(|profile| format!("profiles/{}/", profile.name()))
+        .collect();
+    let is_gone = |path: &str| folders.iter().any(|folder| path.starts_with(folder));
     listing::write_changed(data, &mut manifest, changed, is_gone, staged)?;
     change.commit(call, &dirs)
 }

@@ -155,10 +155,22 @@ mod tests {
     use s3d_io::dataset::{FileRecord, Layout};
     use s3d_label::Class;
 
-    #[test]
-    fn a_turned_table_has_its_own_axes() {
+    /// Returns the box of a table with these points.
+    fn box_of(points: &str) -> OrientedBox {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("table_1.txt");
+        std::fs::write(&path, points).unwrap();
+
+        let files = Listed::of(dir.path(), [FileRecord::of_file(dir.path(), &path).unwrap()]);
+        let ctx = &Context::default();
+        let layout = &Layout::new(dir.path());
+        let table = TreeInstance { class: Class::TABLE, name: "table_1.txt".to_owned(), path };
+        OrientedBox::of(&Source { ctx, layout, files: &files, taxonomy: &Default::default() }, &table)
+            .unwrap()
+    }
+
+    #[test]
+    fn a_turned_table_has_its_own_axes() {
         let (sin, cos) = libm::sincos(0.5);
         let mut text = String::new();
         for i in -50..=50 {
@@ -171,25 +183,14 @@ mod tests {
             }
         }
 
-        let of = |text: String| {
-            std::fs::write(&path, text).unwrap();
-            let files = Listed::of(dir.path(), [FileRecord::of_file(dir.path(), &path).unwrap()]);
-            let ctx = &Context::default();
-            let layout = &Layout::new(dir.path());
-            let table =
-                TreeInstance { class: Class::TABLE, name: "table_1.txt".to_owned(), path: path.clone() };
-            OrientedBox::of(&Source { ctx, layout, files: &files, taxonomy: &Default::default() }, &table)
-                .unwrap()
-        };
-
-        let b = of(text);
+        let b = box_of(&text);
         assert_eq!(b.points, 2 * 101 * 41);
         let expected = [4.0, -3.0, 0.725, 2.0, 0.05, 0.8, 0.5];
         for (got, expected) in b.numbers().into_iter().zip(expected) {
             assert!((got - expected).abs() < 0.002, "{:?}", b.numbers());
         }
 
-        let b = of("1 2 3 4 5 6\n".to_owned());
+        let b = box_of("1 2 3 4 5 6\n");
         assert_eq!(b.numbers(), [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
     }
 }

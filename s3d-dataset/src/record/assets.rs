@@ -63,15 +63,14 @@ mod tests {
     /// Options that the manifest stores beside `options`.
     const STORED_ELSEWHERE: [&str; 3] = ["seed", "place_cameras", "see"];
 
+    /// Returns the words that the schema of an option allows in its list.
+    fn words_of(option: &serde_json::Value) -> Vec<serde_json::Value> {
+        option["items"]["enum"].as_array().unwrap().clone()
+    }
+
     #[test]
     fn the_schema_of_manifests_knows_all_options_modalities_and_profiles() {
         let schema: serde_json::Value = serde_json::from_str(MANIFEST_SCHEMA).unwrap();
-        let words = |option: &str| {
-            schema["properties"]["options"]["properties"][option]["items"]["enum"]
-                .as_array()
-                .unwrap()
-                .clone()
-        };
         let options = &schema["properties"]["options"]["properties"];
         let stored: Vec<&str> = ExportOptions::names()
             .iter()
@@ -81,7 +80,7 @@ mod tests {
         let mut known: Vec<&str> = options.as_object().unwrap().keys().map(String::as_str).collect();
         known.sort_unstable_by_key(|name| stored.iter().position(|other| other == name));
         assert_eq!(known, stored);
-        assert_eq!(words("modalities"), Domain::ALL.map(Domain::folder));
-        assert_eq!(words("profiles"), Profile::ALL.map(Profile::name));
+        assert_eq!(words_of(&options["modalities"]), Domain::ALL.map(Domain::folder));
+        assert_eq!(words_of(&options["profiles"]), Profile::ALL.map(Profile::name));
     }
 }

@@ -17,14 +17,18 @@ struct Seal {
 /// Writes `value` as a line of JSON and its checksum as another, whole or not at all. Numbers come back bit
 /// by bit.
 pub(crate) fn write_checked<T: Serialize>(path: &Path, value: &T) -> Result<()> {
-    let json = |e: serde_json::Error| FileError::format(path, e.to_string());
-    let mut lines = serde_json::to_vec(value).map_err(json)?;
-    lines.push(b'\n');
-    let seal = serde_json::to_vec(&Seal { xxh3_128: Checksum::of(&lines) }).map_err(json)?;
-    lines.extend(seal);
-    lines.push(b'\n');
+    let mut lines = json_line(path, value)?;
+    let seal = Seal { xxh3_128: Checksum::of(&lines) };
+    lines.extend(json_line(path, &seal)?);
     write_bytes(path, &lines)?;
     Ok(())
+}
+
+/// Returns `value` as a line of JSON for the file at `path`.
+fn json_line<T: Serialize>(path: &Path, value: &T) -> Result<Vec<u8>> {
+    let mut line = serde_json::to_vec(value).map_err(|e| FileError::format(path, e.to_string()))?;
+    line.push(b'\n');
+    Ok(line)
 }
 
 /// Reads a file that [`write_checked`] wrote.

@@ -228,8 +228,10 @@ impl Listed {
         ctx: &Context,
         needed: impl Fn(&Path) -> bool,
     ) -> Result<BTreeMap<String, FileError>> {
-        let is_needed = |record: &&FileRecord| needed(&record.path_in(&self.root));
-        let records: Vec<&FileRecord> = self.records().filter(is_needed).collect();
+        let records: Vec<&FileRecord> = self
+            .records()
+            .filter(|record| needed(&record.path_in(&self.root)))
+            .collect();
 
         let faults = Mutex::new(BTreeMap::new());
         for_each_in_order(

@@ -147,9 +147,20 @@ mod tests {
         any::<f64>().prop_filter("JSON has no other", |v| v.is_finite())
     }
 
+    fn any_corner() -> impl Strategy<Value = [f32; 3]> {
+        any::<[f32; 3]>().prop_filter("finite", |v| v.iter().all(|v| v.is_finite()))
+    }
+
+    /// Returns why an area is refused, or nothing.
+    fn refusal(folder: &Path, area: u32) -> String {
+        LabelledArea::read(folder, area)
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default()
+    }
+
     fn any_box() -> impl Strategy<Value = Aabb> {
-        let corner = || any::<[f32; 3]>().prop_filter("finite", |v| v.iter().all(|v| v.is_finite()));
-        (any::<bool>(), corner(), corner()).prop_map(|(empty, a, b)| {
+        (any::<bool>(), any_corner(), any_corner()).prop_map(|(empty, a, b)| {
             if empty {
                 Aabb::EMPTY
             } else {
@@ -257,13 +268,7 @@ mod tests {
         plan.write(dir.path()).unwrap();
         assert!(LabelledArea::is_in(dir.path()) && LabelledArea::read(dir.path(), 3).is_ok());
 
-        let refusal = |area| {
-            LabelledArea::read(dir.path(), area)
-                .err()
-                .map(|e| e.to_string())
-                .unwrap_or_default()
-        };
-        assert!(refusal(4).contains("is area 3, not area 4"), "{}", refusal(4));
+        assert!(refusal(dir.path(), 4).contains("is area 3, not area 4"), "{}", refusal(dir.path(), 4));
 
         let labels = labels_file(dir.path());
         let whole = std::fs::read(&labels).unwrap();
@@ -271,11 +276,15 @@ mod tests {
         *other.last_mut().unwrap() ^= 1;
         for bytes in [&whole[..whole.len() - 4], &[], &other] {
             std::fs::write(&labels, bytes).unwrap();
-            assert!(refusal(3).contains("label_of_face.npy: is damaged"), "{}", refusal(3));
+            assert!(
+                refusal(dir.path(), 3).contains("label_of_face.npy: is damaged"),
+                "{}",
+                refusal(dir.path(), 3)
+            );
         }
 
         std::fs::remove_file(&labels).unwrap();
-        assert!(refusal(3).contains("label_of_face.npy"), "{}", refusal(3));
+        assert!(refusal(dir.path(), 3).contains("label_of_face.npy"), "{}", refusal(dir.path(), 3));
     }
 
     #[test]
@@ -342,20 +351,22 @@ mod tests {
         plan.write(dir.path()).unwrap();
         let text = std::fs::read_to_string(area_file(dir.path())).unwrap();
         let mut file: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
-        let refusal = || {
-            LabelledArea::read(dir.path(), 3)
-                .err()
-                .map(|e| e.to_string())
-                .unwrap_or_default()
-        };
-        assert_eq!(refusal(), "");
+        assert_eq!(refusal(dir.path(), 3), "");
 
         file["plan"]["names"][0]["room"] = "kitchen_1".into();
         write_checked(&area_file(dir.path()), &file).unwrap();
-        assert!(refusal().contains("kitchen_1") && refusal().contains("area.jsonl"), "{}", refusal());
+        assert!(
+            refusal(dir.path(), 3).contains("kitchen_1") && refusal(dir.path(), 3).contains("area.jsonl"),
+            "{}",
+            refusal(dir.path(), 3)
+        );
 
         plan.location_rooms.clear();
         plan.write(dir.path()).unwrap();
-        assert!(refusal().contains("1 scan locations, and rooms of 0"), "{}", refusal());
+        assert!(
+            refusal(dir.path(), 3).contains("1 scan locations, and rooms of 0"),
+            "{}",
+            refusal(dir.path(), 3)
+        );
     }
 }

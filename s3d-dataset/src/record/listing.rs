@@ -24,48 +24,52 @@ pub(crate) fn is_part(path: &Path) -> bool {
 /// does not exist.
 pub(crate) fn walk(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(folder) = folders.pop() {
-        let failed = |e| FileError::io(&folder, "read the folder", e);
-        let entries = match fs::read_dir(&folder) {
-            Err(e) if e.kind() == ErrorKind::NotFound => continue,
-            entries => entries.map_err(failed)?,
-        };
-        for entry in entries {
-            let path = entry.map_err(failed)?.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if !is_part(&path) {
-                files.push(path);
-            }
+    visit_below(folder, |path| {
+        let is_folder = path.is_dir();
+        if !is_folder && !is_part(path) {
+            files.push(path.to_owned());
         }
-    }
+        Ok(is_folder)
+    })?;
     files.sort();
     Ok(files)
 }
 
-/// Removes half-written files of a killed process in a folder, and if `below`, in the folders below it.
+/// Removes half-written files of a killed process in a folder, and if `below`, in the folders below it. Does
+/// not follow links.
 pub(crate) fn remove_parts(folder: &Path, below: bool) -> Result<()> {
+    visit_below(folder, |path| {
+        let is_folder = path.is_dir() && !path.is_symlink();
+        if !is_folder && is_part(path) {
+            fs::remove_file(path).map_err(|e| FileError::io(path, "remove", e))?;
+        }
+        Ok(is_folder && below)
+    })
+}
+
+/// Calls `visit` with each path in a folder, and with the paths in each folder for which it returns true.
+pub(crate) fn visit_below(folder: &Path, mut visit: impl FnMut(&Path) -> Result<bool>) -> Result<()> {
     let mut folders = vec![folder.to_owned()];
     while let Some(folder) = folders.pop() {
-        let failed = |e| FileError::io(&folder, "read the folder", e);
-        let entries = match fs::read_dir(&folder) {
-            Err(e) if e.kind() == ErrorKind::NotFound => continue,
-            entries => entries.map_err(failed)?,
-        };
-        for entry in entries {
-            let entry = entry.map_err(failed)?;
-            let path = entry.path();
-            if entry.file_type().map_err(failed)?.is_dir() {
-                if below {
-                    folders.push(path);
-                }
-            } else if is_part(&path) {
-                fs::remove_file(&path).map_err(|e| FileError::io(&path, "remove", e))?;
+        for path in children(&folder)? {
+            if visit(&path)? {
+                folders.push(path);
             }
         }
     }
     Ok(())
+}
+
+/// Returns the paths in a folder, in any order. Returns none if the folder does not exist.
+pub(crate) fn children(folder: &Path) -> Result<Vec<PathBuf>> {
+    let failed = |e| FileError::io(folder, "read the folder", e);
+    match fs::read_dir(folder) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
+        entries => {
+            let paths = entries.map_err(failed)?.map(|entry| entry.map(|entry| entry.path()));
+            Ok(paths.collect::<Result<_, _>>().map_err(failed)?)
+        }
+    }
 }
 
 /// Returns the records of existing files, sorted. Reads the files on all threads.

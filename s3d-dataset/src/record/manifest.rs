@@ -271,17 +271,17 @@ impl Manifest {
     pub(crate) fn require(layout: &Layout) -> Result<(), FileError> {
         let path = layout.manifest();
         let head: Head = read_manifest(&path)?;
-        let fault = |message: String| Err(FileError::format(&path, message));
-
         if head.generator != GENERATOR {
-            return fault(format!("written by {:?}, not by s3d", head.generator));
+            let message = format!("written by {:?}, not by s3d", head.generator);
+            return Err(FileError::format(&path, message));
         }
         if !head.is_complete() {
-            return fault(format!(
+            let message = format!(
                 "status {:?}: the export into this folder did not finish, call it again, with the same \
                  arguments, and it goes on",
                 head.status
-            ));
+            );
+            return Err(FileError::format(&path, message));
         }
         Ok(())
     }
@@ -294,17 +294,15 @@ impl Manifest {
     pub(crate) fn read(layout: &Layout) -> Result<Self, FileError> {
         Self::require(layout)?;
         let path = layout.manifest();
-        let fault = |message: String| Err(FileError::format(&path, message));
-
         if let Some(what) = pending(layout)? {
-            return fault(format!(
-                "the data set is half changed: make the call {what:?} again, and it goes on"
-            ));
+            let message =
+                format!("the data set is half changed: make the call {what:?} again, and it goes on");
+            return Err(FileError::format(&path, message));
         }
 
         let manifest: Self = read_manifest(&path)?;
         match manifest.contradiction() {
-            Some(message) => fault(message),
+            Some(message) => Err(FileError::format(&path, message)),
             None => Ok(manifest),
         }
     }
@@ -389,11 +387,12 @@ impl Manifest {
 
     /// Returns the domains that every image has, in their order.
     pub(crate) fn domains(&self) -> Vec<Domain> {
-        let made_later = |d: &Domain| *d == Domain::GlobalXyz && self.is_xyz_from_depth();
-        Domain::ALL
-            .into_iter()
-            .filter(|d| self.options.modalities.contains(d) || made_later(d))
-            .collect()
+        let mut domains = Domain::ALL.to_vec();
+        domains.retain(|domain| {
+            let is_made_later = *domain == Domain::GlobalXyz && self.is_xyz_from_depth();
+            self.options.modalities.contains(domain) || is_made_later
+        });
+        domains
     }
 
     /// Returns whether `s3d xyz` made the world coordinates.

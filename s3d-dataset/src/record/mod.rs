@@ -9,7 +9,6 @@ pub(crate) mod labelled_area;
 pub(crate) mod legend;
 pub(crate) mod listing;
 pub(crate) mod manifest;
-pub(crate) mod missing;
 pub(crate) mod pending_change;
 pub(crate) mod request;
 pub(crate) mod tables;

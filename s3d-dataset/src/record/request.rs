@@ -93,13 +93,13 @@ fn stored_value(fields: &serde_json::Map<String, Value>, name: &str) -> Value {
 
 /// Returns how an option differs. A switch is set or not; any other option has a value.
 fn difference(name: &str, there: &Value, now: &Value) -> Difference {
-    let switch = |value: Option<String>, now: bool| Difference::Switch { name: name.to_owned(), value, now };
+    let name = name.to_owned();
     match (there, now) {
-        (Value::Bool(there), _) => switch(None, !there),
+        (Value::Bool(there), _) => Difference::Switch { name, value: None, now: !there },
         (a, b) if name == "normals" && is_smooth(a) != is_smooth(b) => {
-            switch(Some("smooth".to_owned()), is_smooth(b))
+            Difference::Switch { name, value: Some("smooth".to_owned()), now: is_smooth(b) }
         }
-        _ => Difference::Option { name: name.to_owned(), there: words(there), now: words(now) },
+        _ => Difference::Option { name, there: words(there), now: words(now) },
     }
 }
 
@@ -151,7 +151,34 @@ impl Request {
 
     /// Returns the same request with labels and scores alone, for a plan.
     pub(crate) fn of_plan(&self) -> Self {
-        let ExportOptions { views, size, lenient, fill, entropy_stride, .. } = self.options;
+        // Every option is named, so that a new one is weighed here too.
+        let ExportOptions {
+            views,
+            size,
+            lenient,
+            fill,
+            entropy_stride,
+            // The request has these elsewhere.
+            seed: _,
+            place_cameras: _,
+            see: _,
+            // Labels and scores do not depend on these.
+            pano_width: _,
+            pool: _,
+            points_per_m2: _,
+            modalities: _,
+            keep_all: _,
+            only: _,
+            normals: _,
+            rgb_samples: _,
+            compression: _,
+            xyz: _,
+            normal_axes: _,
+            depth_units: _,
+            pad_labels: _,
+            profiles: _,
+            allow: _,
+        } = self.options;
         let options = ExportOptions {
             views,
             size,
@@ -310,8 +337,11 @@ pub(crate) mod tests {
         }
     }
 
+    fn input(path: &str) -> InputRecord {
+        InputRecord { path: path.into(), bytes: 7, xxh3_128: Checksum(7) }
+    }
+
     fn area(area: u32) -> RequestedArea {
-        let input = |path: &str| InputRecord { path: path.into(), bytes: 7, xxh3_128: Checksum(7) };
         RequestedArea {
             area,
             place_cameras: None,
@@ -329,69 +359,72 @@ pub(crate) mod tests {
         assert!(request().differences(&back).is_empty());
     }
 
+    /// Returns the differences after a change of the request.
+    fn changed(change: impl Fn(&mut Request)) -> Vec<String> {
+        let mut now = request();
+        change(&mut now);
+        assert_ne!(now, request());
+        texts(&request().differences(&now))
+    }
+
+    /// Returns the differences for a plan after a change of the request.
+    fn changed_plan(change: impl Fn(&mut Request)) -> Vec<String> {
+        let mut now = request();
+        change(&mut now);
+        texts(&request().of_plan().differences(&now.of_plan()))
+    }
+
     #[test]
     fn each_difference_is_told_in_words() {
-        let changed = |change: &dyn Fn(&mut Request)| {
-            let mut now = request();
-            change(&mut now);
-            assert_ne!(now, request());
-            texts(&request().differences(&now))
-        };
-        assert_eq!(changed(&|r| r.seed = 7), ["`seed` 0 there, 7 now"]);
-        assert_eq!(changed(&|r| r.version = "2.0.0".into()), ["version 1.2.3 of s3d there, 2.0.0 now"]);
-        assert_eq!(changed(&|r| r.options.pano_width = 64), ["`pano_width` 4096 there, 64 now"]);
-        assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
-        assert_eq!(changed(&|r| r.options.keep_all = true), ["`keep_all` now, not there"]);
-        assert_eq!(changed(&|r| r.options.normals = Normals::Smooth), ["`normals = smooth` now, not there"]);
+        assert_eq!(changed(|r| r.seed = 7), ["`seed` 0 there, 7 now"]);
+        assert_eq!(changed(|r| r.version = "2.0.0".into()), ["version 1.2.3 of s3d there, 2.0.0 now"]);
+        assert_eq!(changed(|r| r.options.pano_width = 64), ["`pano_width` 4096 there, 64 now"]);
+        assert_eq!(changed(|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
+        assert_eq!(changed(|r| r.options.keep_all = true), ["`keep_all` now, not there"]);
+        assert_eq!(changed(|r| r.options.normals = Normals::Smooth), ["`normals = smooth` now, not there"]);
 
         assert_eq!(
-            changed(&|r| r.options.only = vec!["a".into(), "b".into()]),
+            changed(|r| r.options.only = vec!["a".into(), "b".into()]),
             ["`only` none there, a,b now"]
         );
         assert_eq!(
-            changed(&|r| r.options.profiles = vec![Profile::PointNet]),
+            changed(|r| r.options.profiles = vec![Profile::PointNet]),
             ["`profiles` none there, pointnet now"]
         );
 
-        assert_eq!(changed(&|r| r.areas[1].inputs[1].xxh3_128 = Checksum(8)), ["rgb.obj: other bytes"]);
-        assert_eq!(changed(&|r| drop(r.areas[0].inputs.remove(2))), ["Area_1/: input there, not now"]);
-        assert_eq!(changed(&|r| r.areas[0].inputs.swap(0, 1)), ["area 1: its input in another order"]);
+        assert_eq!(changed(|r| r.areas[1].inputs[1].xxh3_128 = Checksum(8)), ["rgb.obj: other bytes"]);
+        assert_eq!(changed(|r| drop(r.areas[0].inputs.remove(2))), ["Area_1/: input there, not now"]);
+        assert_eq!(changed(|r| r.areas[0].inputs.swap(0, 1)), ["area 1: its input in another order"]);
         assert_eq!(
-            changed(&|r| r.areas[0].place_cameras = Some(2.5)),
+            changed(|r| r.areas[0].place_cameras = Some(2.5)),
             ["placed scan locations of area 1: none there, 2.5 m apart now"]
         );
         assert_eq!(
-            changed(&|r| r.areas[0].see = Some(0.9)),
+            changed(|r| r.areas[0].see = Some(0.9)),
             ["placed scan locations of area 1: none there, to see 0.9 of the surface now"]
         );
         assert_eq!(
-            changed(&|r| r.areas[0].offset_m = Some([5e5, 0.0, 1.5])),
+            changed(|r| r.areas[0].offset_m = Some([5e5, 0.0, 1.5])),
             ["offset_m of area 1: none there, [500000.0, 0.0, 1.5] now"]
         );
 
-        assert_eq!(changed(&|r| drop(r.areas.remove(1))), ["area 3 there, not now"]);
-        assert_eq!(changed(&|r| r.areas[1].area = 4), ["area 3 there, not now", "area 4 now, not there"]);
+        assert_eq!(changed(|r| drop(r.areas.remove(1))), ["area 3 there, not now"]);
+        assert_eq!(changed(|r| r.areas[1].area = 4), ["area 3 there, not now", "area 4 now, not there"]);
     }
 
     #[test]
     fn a_plan_is_for_any_images_of_the_same_scores() {
-        let changed = |change: &dyn Fn(&mut Request)| {
-            let mut now = request();
-            change(&mut now);
-            texts(&request().of_plan().differences(&now.of_plan()))
-        };
-
-        let other_images = |r: &mut Request| {
+        let other_images = changed_plan(|r| {
             r.options.pano_width = 64;
             r.options.pool = Pool::Area;
             r.options.only = vec!["a".into()];
             r.options.xyz = XyzType::None;
-        };
-        assert!(changed(&other_images).is_empty());
-        assert_eq!(changed(&|r| r.options.size = 64), ["`size` 1080 there, 64 now"]);
-        assert_eq!(changed(&|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
-        assert_eq!(changed(&|r| r.options.lenient = true), ["`lenient` now, not there"]);
-        assert_eq!(changed(&|r| r.seed = 7), ["`seed` 0 there, 7 now"]);
+        });
+        assert!(other_images.is_empty());
+        assert_eq!(changed_plan(|r| r.options.size = 64), ["`size` 1080 there, 64 now"]);
+        assert_eq!(changed_plan(|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
+        assert_eq!(changed_plan(|r| r.options.lenient = true), ["`lenient` now, not there"]);
+        assert_eq!(changed_plan(|r| r.seed = 7), ["`seed` 0 there, 7 now"]);
 
         let known = request();
         assert_eq!(known.input(3, "Area_1").map(|i| i.path.as_str()), Some("Area_1/"));

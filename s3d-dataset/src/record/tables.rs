@@ -9,7 +9,7 @@ use crate::survey::room_names::RoomNames;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FaceVoteColumns, Frame, ImageName, Layout, Split};
 use s3d_io::fs::{create_dir, write_json};
-use s3d_label::{Class, ClassDispute, DisputedPatch, Disputes, FaceLabels, LabelId, LabelTable, VoteRow};
+use s3d_label::{Class, Disputes, FaceLabels, LabelId, LabelTable, VoteRow};
 use s3d_sample::Fold;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -137,15 +137,23 @@ pub(crate) fn write_votes(
         disputed_patches: Vec<Patch>,
     }
 
-    let dispute =
-        |d: &ClassDispute| Dispute { classes: d.classes.map(Class::name), faces: d.faces, m2: d.area_m2 };
-    let patch = |p: &DisputedPatch| Patch {
-        labels: p.labels.map(|label| table.name_of(label)),
-        faces: p.faces,
-        m2: p.area_m2,
-        center: p.center.to_array(),
-        bbox: p.bbox.to_array(),
-    };
+    let disputing_classes = disputes
+        .classes
+        .iter()
+        .map(|d| Dispute { classes: d.classes.map(Class::name), faces: d.faces, m2: d.area_m2 })
+        .collect();
+    let disputed_patches = disputes
+        .patches
+        .iter()
+        .take(MOST_PATCHES)
+        .map(|p| Patch {
+            labels: p.labels.map(|label| table.name_of(label)),
+            faces: p.faces,
+            m2: p.area_m2,
+            center: p.center.to_array(),
+            bbox: p.bbox.to_array(),
+        })
+        .collect();
 
     let report = &annotated.report;
     let unlabelled = &annotated.unlabelled;
@@ -168,8 +176,8 @@ pub(crate) fn write_votes(
             .iter()
             .map(|(c, row)| Named { name: c.to_string(), row: row.into() })
             .collect(),
-        disputing_classes: disputes.classes.iter().map(dispute).collect(),
-        disputed_patches: disputes.patches.iter().take(MOST_PATCHES).map(patch).collect(),
+        disputing_classes,
+        disputed_patches,
     };
 
     write_json(&layout.votes_json(area), &votes)?;
@@ -266,19 +274,13 @@ pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: 
 
     create_dir(&layout.lists_dir())?;
 
-    let listed = |areas: &[u32]| -> Vec<(String, String)> {
-        pairs
-            .iter()
-            .filter(|(area, _)| areas.contains(area))
-            .map(|(area, name)| {
-                (path_in_list(*area, name, Domain::Rgb), path_in_list(*area, name, Domain::Depth))
-            })
-            .collect()
-    };
-    s3d_io::dataset::write_image_list(&layout.list_of_all(), &listed(areas))?;
+    s3d_io::dataset::write_image_list(&layout.list_of_all(), &listed(&pairs, areas))?;
     for fold in folds {
         for (train, areas) in [(true, &fold.train), (false, &fold.test)] {
-            s3d_io::dataset::write_image_list(&layout.list_of_fold(fold.number, train), &listed(areas))?;
+            s3d_io::dataset::write_image_list(
+                &layout.list_of_fold(fold.number, train),
+                &listed(&pairs, areas),
+            )?;
         }
     }
 
@@ -289,6 +291,17 @@ pub(crate) fn write_lists(ctx: &Context, layout: &Layout, areas: &[u32], folds: 
         ));
     }
     Ok(())
+}
+
+/// Returns the paths of the colour and depth images of these areas.
+fn listed(pairs: &[(u32, ImageName)], areas: &[u32]) -> Vec<(String, String)> {
+    pairs
+        .iter()
+        .filter(|(area, _)| areas.contains(area))
+        .map(|(area, name)| {
+            (path_in_list(*area, name, Domain::Rgb), path_in_list(*area, name, Domain::Depth))
+        })
+        .collect()
 }
 
 /// Returns the path of a panorama in a domain, as lists give it: below the data set's folder.

@@ -1,4 +1,4 @@
-//! The finished part of a data set whose export did not finish.
+//! A data set whose export did not finish: its finished part, and the units of work that it still lacks.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -6,9 +6,7 @@ use crate::record::data_set::{DataSet, Listed, Unfinished};
 use crate::record::journal::{Finished, Unit};
 use crate::record::listing;
 use crate::record::manifest::{AreaEntry, Manifest};
-use crate::record::missing::missing_units;
-use crate::record::request::Request;
-use crate::record::request::read_request;
+use crate::record::request::{Request, read_request};
 use crate::summary::UnitTally;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
@@ -53,6 +51,36 @@ impl DataSet {
     }
 }
 
+/// Returns the known units that a request still lacks. The units of an area's locations are known once its
+/// labels are done.
+pub(crate) fn missing_units(request: &Request, finished: &Finished) -> Vec<Unit> {
+    let mut missing = Vec::new();
+    for area in request.numbers() {
+        let Some(labels) = finished.labels(area) else {
+            missing.push(Unit::Labels(area));
+            continue;
+        };
+        for uuid in &labels.locations {
+            missing.push(Unit::Scores(area, uuid.clone()));
+            if is_chosen(request, uuid) {
+                missing.push(Unit::Location(area, uuid.clone()));
+            }
+        }
+        let photographs = labels.photographs.iter().filter(|uuid| is_chosen(request, uuid));
+        missing.extend(photographs.map(|uuid| Unit::Photograph(area, uuid.clone())));
+        missing.push(Unit::Assets(area));
+    }
+
+    missing.retain(|unit| !finished.has(unit));
+    missing
+}
+
+/// Returns whether a location's images were asked for.
+pub(crate) fn is_chosen(request: &Request, uuid: &str) -> bool {
+    let only = &request.options.only;
+    only.is_empty() || only.iter().any(|o| o == uuid)
+}
+
 /// Returns the manifest's entry for a labelled area, so far.
 fn entry(finished: &Finished, area: u32) -> Option<AreaEntry> {
     let of_photographs = finished.photographs(area).map(|done| done.tally);
@@ -67,32 +95,41 @@ fn entry(finished: &Finished, area: u32) -> Option<AreaEntry> {
     })
 }
 
+/// Returns what is missing, a sentence each.
 fn sentences(request: &Request, finished: &Finished) -> Vec<String> {
     let missing = missing_units(request, finished);
     let mut sentences = Vec::new();
     for area in request.numbers() {
-        let count =
-            |is: fn(&Unit) -> bool| missing.iter().filter(|unit| unit.area() == area && is(unit)).count();
-
-        if count(|unit| matches!(unit, Unit::Labels(_))) > 0 {
+        if count(&missing, area, |unit| matches!(unit, Unit::Labels(_))) > 0 {
             sentences.push(format!("area {area} has neither labels nor images yet"));
             continue;
         }
 
         for (n, what) in [
-            (count(|unit| matches!(unit, Unit::Location(..))), "scan locations have no images yet"),
-            (count(|unit| matches!(unit, Unit::Photograph(..))), "photographs are no views yet"),
+            (
+                count(&missing, area, |unit| matches!(unit, Unit::Location(..))),
+                "scan locations have no images yet",
+            ),
+            (
+                count(&missing, area, |unit| matches!(unit, Unit::Photograph(..))),
+                "photographs are no views yet",
+            ),
         ] {
             if n > 0 {
                 sentences.push(format!("area {area}: {n} {what}"));
             }
         }
 
-        if count(|unit| matches!(unit, Unit::Assets(_))) > 0 {
+        if count(&missing, area, |unit| matches!(unit, Unit::Assets(_))) > 0 {
             sentences.push(format!("area {area} has neither meshes nor points yet"));
         }
     }
 
     sentences.push("lists of views, statistics and folds are made at the end".to_owned());
     sentences
+}
+
+/// Returns the number of an area's units of one kind.
+fn count(units: &[Unit], area: u32, is: fn(&Unit) -> bool) -> usize {
+    units.iter().filter(|unit| unit.area() == area && is(unit)).count()
 }

@@ -44,11 +44,12 @@ mod tests {
 
     fn names(list: &[&str]) -> Vec<String> {
         let pose = Pose::level(DVec3::ZERO, 0.0);
-        let camera = |name: &&str| {
+        let mut cameras = Vec::new();
+        for name in list {
             let name = (*name).to_owned();
-            PosedCamera { name, pose, size: None, optics: None, picture: None, line: 0 }
-        };
-        frame_names(&list.iter().map(camera).collect::<Vec<_>>())
+            cameras.push(PosedCamera { name, pose, size: None, optics: None, picture: None, line: 0 });
+        }
+        frame_names(&cameras)
     }
 
     #[test]

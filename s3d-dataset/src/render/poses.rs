@@ -5,6 +5,7 @@ use super::view::{IMAGES, RenderOptions, channels, face_image, faces_fit};
 use crate::condition::Condition;
 use crate::context::Context;
 use crate::error::{Error, Overwriting, Result, UsageError};
+use crate::export::input::photographs::camera_error;
 use crate::export::modality::{Image, ImageBuffers};
 use crate::parallel::for_each_in_order;
 use crate::store::parent_of;
@@ -150,14 +151,16 @@ pub fn render_poses(
     judge_of(("the views", "write them"), ctx, &findings, &options.allow)?;
 
     let is_panorama = frames.first().is_some_and(|frame| frame.camera.is_panorama());
-    let listed = |frame: &Frame<'_>| NerfstudioFrame::new(format!("rgb/{}.png", frame.stem), &frame.camera);
     let transforms = Transforms {
         generator: GENERATOR,
         camera_model: if is_panorama { "EQUIRECTANGULAR" } else { "OPENCV" },
         world_offset_m,
         frames: frames
             .iter()
-            .map(|f| ListedFrame { name: f.name, frame: listed(f) })
+            .map(|frame| {
+                let file = format!("rgb/{}.png", frame.stem);
+                ListedFrame { name: frame.name, frame: NerfstudioFrame::new(file, &frame.camera) }
+            })
             .collect(),
     };
 
@@ -171,33 +174,27 @@ pub fn render_poses(
 fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics) -> Result<Vec<Frame<'a>>> {
     let mut frames = Vec::with_capacity(cameras.len());
     for (posed, stem) in cameras.iter().zip(frame_names(cameras)) {
-        let at = |message: String| {
-            let message = format!("{:?}: {message}", posed.name);
-            match posed.line {
-                0 => FileError::format(poses, message),
-                line => FileError::line(poses, line, message),
-            }
-        };
         let camera = posed.camera(given).map_err(|e| -> Error {
+            let refused = camera_error(poses, posed, e.to_string());
             match e {
                 IntrinsicsError::NoSize => UsageError::Missing {
-                    what: at(e.to_string()).to_string(),
+                    what: refused.to_string(),
                     groups: vec![vec![("width", None), ("height", None)]],
                 }
                 .into(),
                 IntrinsicsError::NoOptics => UsageError::Missing {
-                    what: at(e.to_string()).to_string(),
+                    what: refused.to_string(),
                     groups: vec![vec![("fov", Some("DEGREES"))], vec![("k", Some("FX,FY,CX,CY"))]],
                 }
                 .into(),
-                _ => at(e.to_string()).into(),
+                _ => refused,
             }
         })?;
 
         let w = camera.width;
         let h = camera.height;
         if w > MAX_SIDE || h > MAX_SIDE {
-            let what = at(format!("images of {w} × {h} pixels")).to_string();
+            let what = camera_error(poses, posed, format!("images of {w} × {h} pixels"));
             let range = format!("at most {MAX_SIDE} ({what})");
             return Err(UsageError::OutOfRange { option: "width", range }.into());
         }
@@ -256,7 +253,6 @@ fn write_images(
     let progress = ctx.progress("rendering", "views", frames.len() as u64);
     let blind = AtomicU64::new(0);
     let memory = || (Caster::new(&scene), Hits::default(), ImageBuffers::default());
-
     for_each_in_order(ctx, frames, memory, |(caster, hits, buffers), frame| {
         let Frame { stem, camera, name } = frame;
         caster.cast_into(camera, 1, hits);

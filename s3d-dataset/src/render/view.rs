@@ -113,16 +113,10 @@ pub fn render(
     options: &RenderOptions,
     ctx: &Context,
 ) -> Result<()> {
-    let names = IMAGES.into_iter().map(name_of).chain(["faces.png", "camera.json"]);
-    let refuse = |overwrite| {
-        names
-            .clone()
-            .try_for_each(|name| refuse_existing(&output.join(name), overwrite))
-    };
     // Several files make one result: all of them appear or none.
     let whole = Path::new("render");
     if !Staging::is_left(output, whole) {
-        refuse(options.overwrite)?;
+        refuse_files(output, options.overwrite)?;
     }
 
     let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
@@ -157,7 +151,7 @@ pub fn render(
     let channels = channels(&scene, &textures, options);
     create_dir(output)?;
     let staging = Staging::begin(ctx, output, whole)?;
-    refuse(options.overwrite || staging.was_placing())?;
+    refuse_files(output, options.overwrite || staging.was_placing())?;
     let folder = staging.path();
     channels.encode(&IMAGES, &hits, camera, &mut ImageBuffers::default(), |image, file| {
         write_bytes(&folder.join(name_of(image)), &file).map(drop)
@@ -208,4 +202,13 @@ pub(super) fn face_image(hits: &Hits, compression: Compression) -> Vec<u8> {
         [r, g, b]
     });
     encode_rgb8(&image, Content::Labels, compression)
+}
+
+/// Refuses a folder that holds a file of a view, unless it may be replaced.
+fn refuse_files(output: &Path, overwrite: bool) -> Result<()> {
+    IMAGES
+        .into_iter()
+        .map(name_of)
+        .chain(["faces.png", "camera.json"])
+        .try_for_each(|name| refuse_existing(&output.join(name), overwrite))
 }

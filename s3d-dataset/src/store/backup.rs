@@ -2,6 +2,7 @@
 //! a state with one meaning. [`output`](super::output) lists the states.
 
 use crate::error::{Error, Result};
+use crate::record::listing::children;
 use crate::record::manifest::Head;
 use crate::record::request::read_request;
 use crate::store::change;
@@ -11,7 +12,7 @@ use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;
 use std::fs;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Folders in OUT for an earlier data set: while it is set aside, once it is aside, and while it is removed.
 pub(super) const MOVING: &str = ".s3d-previous.part";
@@ -20,11 +21,11 @@ pub(super) const TRASH: &str = ".s3d-trash";
 
 /// Brings the folder of a killed export to a state with one meaning. Returns what the folder holds then.
 pub(super) fn recover(layout: &Layout) -> Result<OutputState> {
-    let inside = |name: &str| layout.root().join(name);
+    let root = layout.root();
     change::settle(layout)?;
-    remove(&inside(TRASH))?;
+    remove(&root.join(TRASH))?;
 
-    let moving = Layout::new(inside(MOVING));
+    let moving = Layout::new(root.join(MOVING));
     if moving.root().exists() {
         // The manifest moves last, so it is in one of the two folders.
         let mut head = Head::read(&moving.manifest())?;
@@ -37,13 +38,13 @@ pub(super) fn recover(layout: &Layout) -> Result<OutputState> {
     let state = OutputState::read(layout)?;
     if state.is_complete() {
         clear(layout)?;
-        if inside(BACKUP).exists() {
+        if root.join(BACKUP).exists() {
             discard(layout)?;
         }
         return Ok(state.without_request());
     }
 
-    if inside(BACKUP).exists() && !state.has_request() {
+    if root.join(BACKUP).exists() && !state.has_request() {
         restore(layout)?;
         return OutputState::read(layout);
     }
@@ -61,20 +62,6 @@ pub(super) fn clear(layout: &Layout) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn children(folder: &Path) -> Result<Vec<PathBuf>> {
-    let failed = |e| FileError::io(folder, "read the folder", e);
-    match fs::read_dir(folder) {
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
-        entries => {
-            let entries = entries.map_err(failed)?;
-            Ok(entries
-                .map(|e| e.map(|e| e.path()))
-                .collect::<Result<_, _>>()
-                .map_err(failed)?)
-        }
-    }
 }
 
 /// Removes the earlier data set. One rename takes it away, so half of it is never mistaken for all of it.

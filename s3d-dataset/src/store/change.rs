@@ -7,13 +7,11 @@
 //! next process with the lock completes it.
 
 use crate::error::Result;
+use crate::record::listing::visit_below;
 use crate::record::pending_change::{Ready, folder, pending, ready_file};
 use crate::store::backup::{remove, rename};
-use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::{create_dir, read_json, sync_data_set, sync_file, write_json};
-use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// A change that is being written.
@@ -54,8 +52,11 @@ impl Change {
     /// Moves the new files into place. Nothing stays of `replaced`, folders of the data set, unless it was
     /// written anew. The list of files and the manifest must have been written.
     pub(crate) fn commit(self, call: &str, replaced: &[PathBuf]) -> Result<()> {
-        let below = |path: &PathBuf| path.strip_prefix(self.layout.root()).map(Path::to_owned).ok();
-        let ready = Ready { call: call.to_owned(), replaced: replaced.iter().filter_map(below).collect() };
+        let replaced = replaced
+            .iter()
+            .filter_map(|path| path.strip_prefix(self.layout.root()).map(Path::to_owned).ok())
+            .collect();
+        let ready = Ready { call: call.to_owned(), replaced };
 
         // A change that is called ready must be whole on the disk, or it could never be completed.
         sync_data_set(self.layout.root(), &entries(self.staged.root())?.1)?;
@@ -120,23 +121,12 @@ fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let mut folders = Vec::new();
     let mut files = Vec::new();
 
-    let mut left = vec![folder.to_owned()];
-    while let Some(folder) = left.pop() {
-        let failed = |e| FileError::io(&folder, "read the folder", e);
-        let there = match fs::read_dir(&folder) {
-            Err(e) if e.kind() == ErrorKind::NotFound => continue,
-            there => there.map_err(failed)?,
-        };
-        for entry in there {
-            let path = entry.map_err(failed)?.path();
-            if path.is_dir() {
-                folders.push(path.clone());
-                left.push(path);
-            } else {
-                files.push(path);
-            }
-        }
-    }
+    visit_below(folder, |path| {
+        let is_folder = path.is_dir();
+        let list = if is_folder { &mut folders } else { &mut files };
+        list.push(path.to_owned());
+        Ok(is_folder)
+    })?;
 
     folders.sort();
     files.sort();
@@ -147,6 +137,7 @@ fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
 mod tests {
     use super::*;
     use s3d_io::fs::write_bytes;
+    use std::fs;
 
     const CALL: &str = "profile pointnet";
 
@@ -157,11 +148,12 @@ mod tests {
     }
 
     fn state(layout: &Layout) -> Vec<(PathBuf, String)> {
-        let below = |path: PathBuf| {
+        let mut state = Vec::new();
+        for path in entries(layout.root()).unwrap().1 {
             let text = fs::read_to_string(&path).unwrap();
-            (path.strip_prefix(layout.root()).unwrap().to_owned(), text)
-        };
-        entries(layout.root()).unwrap().1.into_iter().map(below).collect()
+            state.push((path.strip_prefix(layout.root()).unwrap().to_owned(), text));
+        }
+        state
     }
 
     /// Begins a change of a data set that replaces a folder and adds a file.

@@ -1,7 +1,7 @@
 //! The lock of an output folder: one process at a time exports into it.
 
 use crate::context::Context;
-use crate::error::{Result, TemporaryError, Work};
+use crate::error::{Activity, Result, TemporaryError};
 use crate::store::change;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
@@ -58,7 +58,7 @@ impl Lock {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
                     let path = layout.root().to_owned();
-                    return Err(TemporaryError::InUse { path, by: Work::Exporting }.into());
+                    return Err(TemporaryError::InUse { path, by: Activity::Exporting }.into());
                 }
                 Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => {
                     ctx.warn(format_args!(
@@ -128,7 +128,7 @@ mod tests {
         for sharing in [Sharing::Alone, Sharing::Shards] {
             let refused = Lock::take(&Context::default(), &layout, sharing).unwrap_err();
             assert!(
-                matches!(&refused, Error::Temporary(TemporaryError::InUse { by: Work::Exporting, .. })),
+                matches!(&refused, Error::Temporary(TemporaryError::InUse { by: Activity::Exporting, .. })),
                 "{refused}"
             );
         }

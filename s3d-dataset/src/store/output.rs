@@ -16,7 +16,7 @@
 
 use crate::account::Account;
 use crate::context::Context;
-use crate::error::{Error, InputError, Result, TemporaryError, UsageError, Work, passes};
+use crate::error::{Activity, Error, InputError, Result, TemporaryError, UsageError, passes};
 use crate::record::journal::{Done, Finished, Journal};
 use crate::record::listing::remove_parts;
 use crate::record::manifest::Manifest;
@@ -147,7 +147,7 @@ pub(crate) fn begin_shard(
                 lock.abandon();
                 if started.elapsed() > BEGIN_WITHIN {
                     let path = layout.root().to_owned();
-                    return Err(TemporaryError::InUse { path, by: Work::OtherShards }.into());
+                    return Err(TemporaryError::InUse { path, by: Activity::OtherShards }.into());
                 }
             }
             Err(e @ Error::Temporary(_)) if started.elapsed() > BEGIN_WITHIN => return Err(e),
@@ -276,10 +276,9 @@ fn is_intact(ctx: &Context, layout: &Layout, exactly: bool) -> Result<bool> {
             .map(|(_, fault)| fault)
             .collect()
     } else {
-        let wrong = |r: &&s3d_io::dataset::FileRecord| r.check_size(layout.root()).is_err();
         records
             .iter()
-            .filter(wrong)
+            .filter(|record| record.check_size(layout.root()).is_err())
             .map(|r| r.path.clone())
             .collect::<Vec<String>>()
     };

@@ -6,7 +6,7 @@
 //! and the same call may replace them. It says so until a call comes to its end, however many are killed.
 
 use crate::context::Context;
-use crate::error::{Error, Result, TemporaryError, Work};
+use crate::error::{Activity, Error, Result, TemporaryError};
 use crate::store::backup::{remove, rename};
 use crate::store::lock::{Lock, Sharing};
 use s3d_io::Error as FileError;
@@ -65,7 +65,9 @@ impl Staging {
 
         let folder = folder_of(parent, name);
         let lock = Lock::take(ctx, &Layout::new(&folder), Sharing::Alone).map_err(|e| match e {
-            Error::Temporary(_) => TemporaryError::InUse { path: place.clone(), by: Work::Writing }.into(),
+            Error::Temporary(_) => {
+                TemporaryError::InUse { path: place.clone(), by: Activity::Writing }.into()
+            }
             Error::File(FileError::Io { source, .. }) => FileError::io(&place, "write", source).into(),
             other => other,
         })?;

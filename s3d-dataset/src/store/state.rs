@@ -9,7 +9,7 @@ use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use std::ffi::OsStr;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The state of an output folder when it was read.
 #[derive(Debug)]
@@ -167,11 +167,11 @@ impl OutputState {
 
         // An unfinished export without a request left these, and they cannot be continued.
         let leftover = layout.entries(&self.areas_of_manifest());
-        let is_leftover = |path: &Path| self.head.is_some() && leftover.iter().any(|b| b.starts_with(path));
         for entry in entries {
             let path = entry.map_err(|e| FileError::io(root, "read", e))?.path();
             let name = path.file_name().unwrap_or_default();
-            if is_leftover(&path) || is_working_name(name) || allowed.iter().any(|a| name == *a) {
+            let is_leftover = self.head.is_some() && leftover.iter().any(|b| b.starts_with(&path));
+            if is_leftover || is_working_name(name) || allowed.iter().any(|a| name == *a) {
                 continue;
             }
             return Err(UsageError::Holds {

@@ -127,31 +127,34 @@ pub(crate) fn unlabelled_share(
     locations: &[ScanLocation],
     label_of_face: &[LabelId],
 ) -> Option<f64> {
-    let seen_and_unlabelled = |location: &ScanLocation| {
-        let camera = Camera::equirectangular(location.pose, PROBE_WIDTH);
-        let faces = cast(scene, &camera).face;
-
-        let mut seen = 0.0;
-        let mut unlabelled = 0.0;
-        for y in 0..camera.height {
-            let latitude = (0.5 - (f64::from(y) + 0.5) / f64::from(camera.height)) * std::f64::consts::PI;
-            for x in 0..camera.width {
-                let face = faces.at(x, y);
-                if face != NO_FACE {
-                    seen += latitude.cos();
-                    unlabelled += if label_of_face[face as usize].is_null() {
-                        latitude.cos()
-                    } else {
-                        0.0
-                    };
-                }
-            }
-        }
-
-        (seen, unlabelled)
-    };
-
-    let each: Vec<(f64, f64)> = locations.par_iter().map(seen_and_unlabelled).collect();
+    let each: Vec<(f64, f64)> = locations
+        .par_iter()
+        .map(|location| seen_and_unlabelled(scene, location, label_of_face))
+        .collect();
     let (seen, unlabelled) = each.iter().fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
     (seen > 0.0).then(|| unlabelled / seen)
+}
+
+/// Returns what a scan location sees, and the unlabelled part of it, both in the same unit of solid angle.
+fn seen_and_unlabelled(scene: &Scene<'_>, location: &ScanLocation, label_of_face: &[LabelId]) -> (f64, f64) {
+    let camera = Camera::equirectangular(location.pose, PROBE_WIDTH);
+    let faces = cast(scene, &camera).face;
+
+    let mut seen = 0.0;
+    let mut unlabelled = 0.0;
+    for y in 0..camera.height {
+        let latitude = (0.5 - (f64::from(y) + 0.5) / f64::from(camera.height)) * std::f64::consts::PI;
+        for x in 0..camera.width {
+            let face = faces.at(x, y);
+            if face != NO_FACE {
+                seen += latitude.cos();
+                unlabelled += if label_of_face[face as usize].is_null() {
+                    latitude.cos()
+                } else {
+                    0.0
+                };
+            }
+        }
+    }
+    (seen, unlabelled)
 }

@@ -35,8 +35,8 @@ impl Headroom {
     /// Samples a mesh in any unit. `up` points up.
     pub(crate) fn of(scene: &Scene<'_>, up: DVec3) -> Self {
         let mesh = scene.mesh();
-        let is_level = |face: &u32| mesh.normal(*face).dot(up.as_vec3()) > LEVEL;
-        let faces: Vec<u32> = (0..mesh.faces().len() as u32).filter(is_level).collect();
+        let mut faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
+        faces.retain(|face| mesh.normal(*face).dot(up.as_vec3()) > LEVEL);
         let area: f64 = faces.iter().map(|face| mesh.area(*face)).sum();
         if faces.is_empty() {
             return Self { samples: Vec::new(), m2: 0.0 };
@@ -46,14 +46,16 @@ impl Headroom {
         SurfaceSampler::over_faces(mesh, faces, Density::Total(POINTS), 0).sample(0..POINTS, &mut cloud);
 
         let above = 1e-5 * f64::from(mesh.aabb().size().max_element());
-        let look_up = |point: &glam::Vec3| {
-            let from = point.as_dvec3() + up * above;
-            let hit = cast_ray(scene, from, up);
-            let ends_below = hit.is_some_and(|hit| mesh.normal(hit.face).dot(up.as_vec3()) < -LEVEL);
-            (from.dot(up), hit.map_or(f64::INFINITY, |hit| hit.t), ends_below)
-        };
-
-        let samples: Vec<_> = cloud.positions.par_iter().map(look_up).collect();
+        let samples: Vec<_> = cloud
+            .positions
+            .par_iter()
+            .map(|point| {
+                let from = point.as_dvec3() + up * above;
+                let hit = cast_ray(scene, from, up);
+                let ends_below = hit.is_some_and(|hit| mesh.normal(hit.face).dot(up.as_vec3()) < -LEVEL);
+                (from.dot(up), hit.map_or(f64::INFINITY, |hit| hit.t), ends_below)
+            })
+            .collect();
         Self { m2: area / samples.len().max(1) as f64, samples }
     }
 
@@ -135,12 +137,13 @@ mod tests {
     use super::*;
     use s3d_synth::Building;
 
+    fn storeys(building: Building) -> Vec<Storey> {
+        let mesh = building.build().unwrap().mesh;
+        Headroom::of(&Scene::new(&mesh), DVec3::Z).storeys()
+    }
+
     #[test]
     fn storeys_are_floors_and_neither_tables_nor_shelves() {
-        let storeys = |building: Building| {
-            let mesh = building.build().unwrap().mesh;
-            Headroom::of(&Scene::new(&mesh), DVec3::Z).storeys()
-        };
         let demo = storeys(Building::demo());
         assert!(demo.len() == 1 && demo[0].z_m.abs() < 0.05, "{demo:?}");
         assert!((80.0..140.0).contains(&demo[0].floor_m2), "{demo:?}");

@@ -66,9 +66,10 @@ pub(crate) fn judge_of(
     findings: &[Finding],
     allowed: &[Condition],
 ) -> Result<()> {
-    let stops = |f: &&Finding| f.stops && !allowed.contains(&f.condition);
-    let stopping: Vec<&Finding> = findings.iter().filter(stops).collect();
-    findings.iter().filter(|f| !stops(f)).for_each(|f| ctx.warn(&f.text));
+    let (stopping, others): (Vec<&Finding>, Vec<&Finding>) = findings
+        .iter()
+        .partition(|f| f.stops && !allowed.contains(&f.condition));
+    others.iter().for_each(|f| ctx.warn(&f.text));
 
     if stopping.is_empty() {
         return Ok(());
@@ -217,19 +218,14 @@ fn level_finding(mesh: &TriMesh, label_of_face: &[LabelId], table: &LabelTable) 
 }
 
 fn room_findings(rooms: &[SurveyedRoom]) -> Vec<Finding> {
-    let median = |of: &dyn Fn(&SurveyedRoom) -> f64| {
-        let mut values: Vec<f64> = rooms.iter().filter(|r| r.points > 0).map(of).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied()
-    };
     let mut findings = Vec::new();
-    if let Some(height_m) = median(&|room| f64::from(room.bbox.size().z))
+    if let Some(height_m) = median(rooms, |room| f64::from(room.bbox.size().z))
         && height_m > 5.0
     {
         let text = format!("rooms are {height_m:.1} m high: are points and mesh in metres, not in feet?");
         findings.push(Finding::new(Condition::Scale, height_m > 8.0, text));
     }
-    if let Some(floor_m2) = median(&|room| room.footprint.area_m2)
+    if let Some(floor_m2) = median(rooms, |room| room.footprint.area_m2)
         && floor_m2 > 2000.0
     {
         let text = format!("rooms have {floor_m2:.0} m² of floor: are points and mesh in metres?");
@@ -298,4 +294,11 @@ pub(crate) fn outlook_findings(outlooks: &[Outlook]) -> Vec<Finding> {
         findings.push(Finding::new(Condition::InsideOut, back_sides > 0.75, text));
     }
     findings
+}
+
+/// The median of a value over the rooms that have points.
+fn median(rooms: &[SurveyedRoom], of: impl Fn(&SurveyedRoom) -> f64) -> Option<f64> {
+    let mut values: Vec<f64> = rooms.iter().filter(|room| room.points > 0).map(of).collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }

@@ -54,8 +54,13 @@ impl Files {
             });
         }
 
-        let listed = |r: FileRecord| (r.path.clone(), (r, AtomicBool::new(false)));
-        Self { listed: records.map(|records| records.into_iter().map(listed).collect()) }
+        let listed = records.map(|records| {
+            records
+                .into_iter()
+                .map(|record| (record.path.clone(), (record, AtomicBool::new(false))))
+                .collect()
+        });
+        Self { listed }
     }
 
     /// Checks the size and checksum of a file that is there.

@@ -68,11 +68,13 @@ impl Labels {
             .map(|(i, name)| (name.clone(), i as u32))
             .collect();
         let pretty = (0..names.len() as u32).map(pretty_color).collect();
-        let class = |name: &String| match taxonomy.parse_name(name) {
-            Ok(Some(label)) => label.class.index() as u8,
-            _ => NO_CLASS,
-        };
-        let classes = names.iter().map(class).collect();
+        let classes = names
+            .iter()
+            .map(|name| match taxonomy.parse_name(name) {
+                Ok(Some(label)) => label.class.index() as u8,
+                _ => NO_CLASS,
+            })
+            .collect();
 
         Some(Self { names, indices, taxonomy, pretty, classes })
     }

@@ -40,7 +40,7 @@ use s3d_io::image::{Compression, pretty_color};
 use s3d_render::{MipMaps, Scene};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 use views::Views;
 
@@ -140,16 +140,13 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
 
     let scene = Scene::new(&mesh.file.mesh);
     let textures = MipMaps::new(&mesh.file.mesh);
-    let pretty = |label: &u32| {
-        if *label == NOT_IN_TABLE {
-            [0; 3]
-        } else {
-            pretty_color(*label)
-        }
-    };
-    let pretty_of_face: Vec<[u8; 3]> = mesh.label_of_face.iter().map(pretty).collect();
-    let class = |label: &u32| labels.classes.get(*label as usize).copied().unwrap_or(NO_CLASS);
-    let class_of_face: Vec<u8> = mesh.label_of_face.iter().map(class).collect();
+    let mut pretty_of_face: Vec<[u8; 3]> = Vec::with_capacity(mesh.label_of_face.len());
+    let mut class_of_face: Vec<u8> = Vec::with_capacity(mesh.label_of_face.len());
+    for label in &mesh.label_of_face {
+        let is_known = *label != NOT_IN_TABLE;
+        pretty_of_face.push(if is_known { pretty_color(*label) } else { [0; 3] });
+        class_of_face.push(labels.classes.get(*label as usize).copied().unwrap_or(NO_CLASS));
+    }
 
     // Colours that were not drawn from the mesh cannot be compared.
     let source = manifest.area(area).map_or("texture", |a| a.rgb.as_str());
@@ -199,9 +196,9 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     check_images(common, area, images, Some((&reference, mesh, labels)))
 }
 
-/// One piece of an area's work.
+/// One piece of the work of checking an area.
 #[derive(Clone, Copy)]
-enum Work {
+enum CheckItem {
     Points,
     Image(usize),
 }
@@ -209,13 +206,15 @@ enum Work {
 /// Compares the manifest's counts of pixels without votes and without a label with the images, if all of them
 /// could be read.
 fn check_unlabelled(common: &Common<'_>, area: u32, images: &[DatasetImage], found: &UnlabelledPixels) {
-    let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
+    let UnlabelledPixels { images: read, without_votes, without_label } = found;
+    let [read, without_votes, without_label] =
+        [read, without_votes, without_label].map(|count| count.load(Ordering::Relaxed));
     let with_labels = images.iter().filter(|image| image.has(Domain::Semantic)).count() as u64;
     let told = common.manifest.area(area).and_then(|entry| entry.unlabelled);
-    let Some(told) = told.filter(|_| count(&found.images) == with_labels) else { return };
+    let Some(told) = told.filter(|_| read == with_labels) else { return };
     for (what, told, found) in [
-        ("votes", told.without_votes.pixels, count(&found.without_votes)),
-        ("a label", told.without_label.pixels, count(&found.without_label)),
+        ("votes", told.without_votes.pixels, without_votes),
+        ("a label", told.without_label.pixels, without_label),
     ] {
         let Some(told) = told else { continue };
         common.report.check(
@@ -255,23 +254,23 @@ fn check_images(
     };
 
     let progress = ctx.progress("verifying", "images", images.len() as u64);
-    let works: Vec<Work> = std::iter::once(Work::Points)
-        .chain((0..images.len()).map(Work::Image))
+    let items: Vec<CheckItem> = std::iter::once(CheckItem::Points)
+        .chain((0..images.len()).map(CheckItem::Image))
         .collect();
 
     for_each_in_order(
         ctx,
-        &works,
+        &items,
         || Scratch::new(check.reference),
-        |memory, work| {
-            match *work {
-                Work::Points => {
+        |memory, item| {
+            match *item {
+                CheckItem::Points => {
                     if let Some((_, mesh, labels)) = reference {
                         let in_all_forms = full && manifest.is_labelled();
                         points::check(layout, area, manifest, mesh, labels, in_all_forms, report);
                     }
                 }
-                Work::Image(index) => {
+                CheckItem::Image(index) => {
                     check.check(index, &images[index], memory);
                     progress.add(1);
                 }
@@ -282,8 +281,7 @@ fn check_images(
 
     drop(progress);
     check_unlabelled(common, area, images, &unlabelled);
-    let unlocked = |e: PoisonError<_>| e.into_inner();
-    let mut cameras = cameras.into_inner().unwrap_or_else(unlocked);
+    let mut cameras = cameras.into_inner().unwrap_or_else(PoisonError::into_inner);
     cameras.sort_by_key(|(index, _)| *index);
 
     let Some((reference, ..)) = reference else { return Ok(()) };

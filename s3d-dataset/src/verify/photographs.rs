@@ -33,10 +33,9 @@ impl Photographs {
                     format!("{name:?} has the camera {camera_uuid}, and its name gives {expected}")
                 });
 
-                let is_share = |share: &f64| (0.0..=1.0).contains(share);
-                checks.check(is_share(masked) && is_share(seen), || {
-                    format!("{name:?}: masked {masked} and seen {seen} are no shares")
-                });
+                let are_shares = [masked, seen].iter().all(|share| (0.0..=1.0).contains(*share));
+                checks
+                    .check(are_shares, || format!("{name:?}: masked {masked} and seen {seen} are no shares"));
 
                 let uuid = camera_uuid.clone();
                 let text = name.clone();

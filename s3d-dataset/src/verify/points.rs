@@ -145,10 +145,12 @@ impl<'a> Forms<'a> {
         let numbers: Vec<Number> = report
             .read(Topic::Points, &layout.instance_numbers_json(area), read_json)
             .unwrap_or_default();
-        let file = |n: &Number| format!("{}_{}.txt", n.class, n.number_in_room);
         let places = numbers
             .iter()
-            .map(|n| (n.label.clone(), (n.room.clone(), file(n))))
+            .map(|n| {
+                let file = format!("{}_{}.txt", n.class, n.number_in_room);
+                (n.label.clone(), (n.room.clone(), file))
+            })
             .collect();
 
         let mat = report.read(Topic::Points, &layout.point_cloud_mat(area), MatArea::open);

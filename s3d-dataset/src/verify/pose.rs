@@ -95,8 +95,8 @@ fn misspelt_key(raw: &Value, checks: &OfFile<'_>) {
 /// The rotation part of `camera_rt_matrix`, and its last column.
 fn parts_of_matrix(file: &PoseFile) -> (DMat3, DVec3) {
     let rows = file.camera_rt_matrix;
-    let row = |i: usize| DVec3::new(rows[i][0], rows[i][1], rows[i][2]);
-    let rotation = DMat3::from_cols(row(0), row(1), row(2)).transpose();
+    let [x, y, z] = [0, 1, 2].map(|i| DVec3::new(rows[i][0], rows[i][1], rows[i][2]));
+    let rotation = DMat3::from_cols(x, y, z).transpose();
     (rotation, DVec3::new(rows[0][3], rows[1][3], rows[2][3]))
 }
 
@@ -162,10 +162,9 @@ fn looks_like(rotation: DMat3, expected: DMat3) -> &'static str {
 
 /// Checks that the three rotations in the file fit together.
 fn angles(file: &PoseFile, checks: &OfFile<'_>) {
-    let rotation = |angles| rotation_from_euler(DVec3::from_array(angles));
-    let between = rotation(file.rotation_from_original_to_point);
-    let original = rotation(file.camera_original_rotation);
-    let last = rotation(file.final_camera_rotation);
+    let [between, original, last] =
+        [file.rotation_from_original_to_point, file.camera_original_rotation, file.final_camera_rotation]
+            .map(|angles| rotation_from_euler(DVec3::from_array(angles)));
     checks.check(close(between * original, last), || {
         let why = if close(original * between, last) {
             ": the product is in the other order"
@@ -349,8 +348,9 @@ mod tests {
             ("in Blender's axes (y up", &|f| rows(f, |r, t| (flip * r, flip * t))),
             ("is no rotation", &|f| rows(f, |r, t| (r * 1.01, t))),
             ("the product is in the other order", &|f| {
-                let of = |a| rotation_from_euler(DVec3::from_array(a));
-                let between = of(f.camera_original_rotation).transpose() * of(f.final_camera_rotation);
+                let [original, last] = [f.camera_original_rotation, f.final_camera_rotation]
+                    .map(|angles| rotation_from_euler(DVec3::from_array(angles)));
+                let between = original.transpose() * last;
                 f.rotation_from_original_to_point = euler_from_rotation(between).to_array();
             }),
             ("room is \"WC_1_3\"", &|f| f.room = "WC_1_3".into()),

@@ -122,13 +122,6 @@ pub(crate) fn rooms(
             format!("{}: wall_direction_deg {}", r.room, r.wall_direction_deg)
         });
 
-        let area_of = |ring: &[[f64; 2]]| {
-            // Relative to the first corner, so that numbers are small.
-            let Some(&[x, y]) = ring.first() else { return 0.0 };
-            let twice = |p: [f64; 2], q: [f64; 2]| (p[0] - x) * (q[1] - y) - (q[0] - x) * (p[1] - y);
-            ring.windows(2).map(|w| 0.5 * twice(w[0], w[1])).sum::<f64>()
-        };
-
         let inside = r
             .outline
             .iter()
@@ -226,8 +219,9 @@ pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) 
     // An unreadable taxonomy is reported with the labels.
     let Ok(taxonomy) = manifest.read_taxonomy(layout, |_| Ok(())) else { return };
     let taxonomy = Some(&taxonomy).filter(|_| manifest.is_labelled());
-    let check = |path: &Path, _| report.check_size(path);
-    let counted = match Statistics::count(layout, &manifest.area_numbers, taxonomy, check) {
+    let counted =
+        Statistics::count(layout, &manifest.area_numbers, taxonomy, |path, _| report.check_size(path));
+    let counted = match counted {
         Ok(counted) => counted,
         Err(e) => {
             report.fault(
@@ -282,4 +276,16 @@ fn differ(found: &Value, expected: &Value, place: &str, out: &mut Vec<String>) {
         _ if found == expected => {}
         _ => out.push(format!("{place} is {found}, counted are {expected}")),
     }
+}
+
+/// The signed area within a closed ring.
+fn area_of(ring: &[[f64; 2]]) -> f64 {
+    // Relative to the first corner, so that numbers are small.
+    let Some(&[x, y]) = ring.first() else { return 0.0 };
+    ring.windows(2)
+        .map(|side| {
+            let [p, q] = [side[0], side[1]];
+            0.5 * ((p[0] - x) * (q[1] - y) - (q[0] - x) * (p[1] - y))
+        })
+        .sum()
 }

@@ -207,6 +207,20 @@ impl Views {
             return;
         }
 
+        self.check_missing(layout, manifest, &locations, &there, photographs, report);
+        check_counts(layout, manifest, [&panoramas, &views], &locations, report);
+    }
+
+    /// Checks that there is an image of each kept view, each location and each photograph.
+    fn check_missing(
+        &self,
+        layout: &Layout,
+        manifest: &Manifest,
+        locations: &BTreeMap<u32, BTreeSet<&str>>,
+        there: &BTreeSet<(u32, &str, Frame)>,
+        photographs: &Photographs,
+        report: &Report,
+    ) {
         let missing = |area: u32, uuid: &str, frame: Frame| {
             let name = format!("camera_{uuid}_…_frame_{frame}_…");
             let folder = layout.area_dir(area).join(frame.folder());
@@ -214,7 +228,7 @@ impl Views {
                 format!("{name}: missing, in every modality")
             });
         };
-        for (area, known) in &locations {
+        for (area, known) in locations {
             known
                 .iter()
                 .filter(|u| manifest.is_chosen(u))
@@ -226,21 +240,29 @@ impl Views {
         photographs
             .cameras()
             .for_each(|(area, uuid)| missing(area, uuid, Frame::View(0)));
+    }
+}
 
-        // The counts of the manifest.
-        for area in &manifest.areas {
-            let path = layout.manifest();
-            let checks = report.of((Topic::Manifest, "counts"), &path);
-            let is = |what: &str, manifest: u64, found: u64| {
-                checks.check(manifest == found, || {
-                    format!("area {}: {manifest} {what}, there are {found}", area.area)
-                });
-            };
-            is("panoramas", area.panoramas, panoramas.get(&area.area).copied().unwrap_or(0));
-            is("views", area.views, views.get(&area.area).copied().unwrap_or(0));
-            if let Some(known) = locations.get(&area.area).filter(|known| !known.is_empty()) {
-                is("locations", area.locations as u64, known.len() as u64);
-            }
+/// Checks the numbers of panoramas, views and locations that the manifest tells.
+fn check_counts(
+    layout: &Layout,
+    manifest: &Manifest,
+    [panoramas, views]: [&BTreeMap<u32, u64>; 2],
+    locations: &BTreeMap<u32, BTreeSet<&str>>,
+    report: &Report,
+) {
+    for area in &manifest.areas {
+        let path = layout.manifest();
+        let checks = report.of((Topic::Manifest, "counts"), &path);
+        let is = |what: &str, manifest: u64, found: u64| {
+            checks.check(manifest == found, || {
+                format!("area {}: {manifest} {what}, there are {found}", area.area)
+            });
+        };
+        is("panoramas", area.panoramas, panoramas.get(&area.area).copied().unwrap_or(0));
+        is("views", area.views, views.get(&area.area).copied().unwrap_or(0));
+        if let Some(known) = locations.get(&area.area).filter(|known| !known.is_empty()) {
+            is("locations", area.locations as u64, known.len() as u64);
         }
     }
 }

@@ -1,12 +1,14 @@
 //! `s3d plan`: labels and scores, for the shards of an export.
 
-use crate::args::{Allow, Placing, Scenes, Threads};
+use crate::args::{Scenes, Threads};
 use crate::commands::on_threads;
 use crate::failure::Outcome;
-use crate::values::{parsed, positive};
-use clap::{Args, value_parser};
+use crate::values::parsed;
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use s3d_dataset::ExportOptions;
 use s3d_dataset::export::Shard;
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -19,48 +21,141 @@ pub(crate) struct PlanArgs {
     /// Make one of N parts of the plan, such as 2/4. The parts may be made anywhere, in any order.
     #[arg(long, value_name = "i/N", value_parser = parsed::<Shard>)]
     pub(crate) shard: Option<Shard>,
-    /// The number of candidate views at each scan location.
-    #[arg(long, value_name = "N", default_value_t = 72, value_parser = value_parser!(u32).range(0..=100_000))]
-    views: u32,
-    /// Width and height of a view in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 1080,
-        value_parser = value_parser!(u32).range(8..=16_384))]
-    size: u32,
-    /// The source of everything random.
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
     #[command(flatten)]
-    placing: Placing,
-    /// Count the classes of a candidate view on every Nth pixel of both axes.
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = value_parser!(u32).range(1..=64))]
-    entropy_stride: u32,
-    /// Skip and count faults in the annotations.
-    #[arg(long)]
-    lenient: bool,
-    /// Give each face without a vote of an annotated point the label of the surface next to it, if that
-    /// surface is no farther than this.
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    fill: Option<f64>,
-    #[command(flatten)]
-    allow: Allow,
+    options: PlanOptions,
     #[command(flatten)]
     pub(crate) threads: Threads,
 }
 
+/// The options of an export on which labels and scores depend, in the order of the help.
+const PLANNED: [&str; 9] =
+    ["views", "size", "seed", "place_cameras", "see", "entropy_stride", "lenient", "fill", "allow"];
+
+/// The options of an export for a plan. It takes the ones in [`PLANNED`] as `s3d export` does; all others have
+/// their defaults.
+#[derive(Clone, Debug)]
+struct PlanOptions(ExportOptions);
+
+impl PlanOptions {
+    fn arguments() -> Vec<Arg> {
+        let export = ExportOptions::augment_args(Command::new("export"));
+        PLANNED
+            .iter()
+            .filter_map(|name| export.get_arguments().find(|argument| argument.get_id() == name))
+            .map(|argument| argument.clone().display_order(None))
+            .collect()
+    }
+}
+
+impl Args for PlanOptions {
+    fn augment_args(command: Command) -> Command {
+        command.args(Self::arguments())
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for PlanOptions {
+    /// Lets the arguments of an export read the given words again, since these make all of its options.
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut words: Vec<OsString> = Vec::new();
+        for argument in Self::arguments() {
+            let id = argument.get_id().as_str();
+            if matches.value_source(id) != Some(ValueSource::CommandLine) {
+                continue;
+            }
+
+            let flag = format!("--{}", argument.get_long().unwrap_or(id));
+            if argument.get_action().takes_values() {
+                for value in matches.get_raw(id).into_iter().flatten() {
+                    words.extend([flag.clone().into(), value.to_owned()]);
+                }
+            } else {
+                words.push(flag.into());
+            }
+        }
+
+        let export = ExportOptions::augment_args(Command::new("export").no_binary_name(true));
+        ExportOptions::from_arg_matches(&export.try_get_matches_from(words)?).map(Self)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
 pub(crate) fn run(args: PlanArgs) -> Outcome<()> {
-    let options = ExportOptions {
-        views: args.views,
-        size: args.size,
-        seed: args.seed,
-        place_cameras: args.placing.place_cameras,
-        see: args.placing.see,
-        entropy_stride: args.entropy_stride,
-        lenient: args.lenient,
-        fill: args.fill,
-        allow: args.allow.allow,
-        ..ExportOptions::default()
-    };
+    let PlanOptions(options) = args.options;
     on_threads(args.threads, |context| {
         s3d_dataset::plan(&args.scenes.sources(), &args.output, &options, args.shard, context)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use s3d_dataset::options::Condition;
+
+    #[derive(Parser)]
+    struct Plan {
+        #[command(flatten)]
+        args: PlanArgs,
+    }
+
+    fn options(words: &[&str]) -> Result<ExportOptions, clap::Error> {
+        let call = ["plan", "a.toml", "-o", "plan"].iter().chain(words);
+        Plan::try_parse_from(call).map(|plan| plan.args.options.0)
+    }
+
+    #[test]
+    fn its_options_are_those_of_an_export() {
+        assert_eq!(options(&[]).unwrap(), ExportOptions::default());
+        let given = ["--views", "3", "--seed=7", "--fill", "0.5", "--lenient", "--allow", "up,size"];
+        let expected = ExportOptions {
+            views: 3,
+            seed: 7,
+            fill: Some(0.5),
+            lenient: true,
+            allow: vec![Condition::Up, Condition::Size],
+            ..ExportOptions::default()
+        };
+        assert_eq!(options(&given).unwrap(), expected);
+
+        for bad in
+            [&["--xyz", "half"] as &[&str], &["--size", "7"], &["--see", "0.9", "--place-cameras", "2"]]
+        {
+            assert!(options(bad).is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn every_option_of_an_export_is_planned_or_makes_no_difference_to_a_plan() {
+        let others = [
+            "pano_width",
+            "pool",
+            "points_per_m2",
+            "modalities",
+            "keep_all",
+            "only",
+            "normals",
+            "rgb_samples",
+            "compression",
+            "xyz",
+            "normal_axes",
+            "depth_units",
+            "pad_labels",
+            "profiles",
+        ];
+        let mut known: Vec<&str> = PLANNED.into_iter().chain(others).collect();
+        known.sort_unstable();
+
+        let export = ExportOptions::augment_args(Command::new("export"));
+        let mut options: Vec<&str> = export.get_arguments().map(|a| a.get_id().as_str()).collect();
+        options.sort_unstable();
+        assert_eq!(known, options);
+    }
 }

@@ -12,12 +12,12 @@ use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::parallel::for_each_in_order;
 use crate::summary::{ImageTally, UnitTally};
 use crate::survey::candidate::Candidate;
-use s3d_geom::Camera;
+use s3d_geom::{Camera, Pose};
 use s3d_io::camera::ScanLocation;
 use s3d_io::dataset::{Domain, FileRecord, Frame, Layout, PoseFile};
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_label::Room;
-use s3d_render::{Caster, Hits, NO_FACE};
+use s3d_render::{Caster, Hits, NO_FACE, Scene};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -81,7 +81,7 @@ struct Shot {
 type AssetsWriter<'a> = &'a (dyn Fn() -> Result<()> + Sync);
 
 /// One piece of an area's work.
-enum Work<'a> {
+enum WorkItem<'a> {
     Assets(AssetsWriter<'a>),
     Shot(&'a Shot),
     Photograph(&'a photographs::Shot<'a>),
@@ -133,46 +133,45 @@ fn write_shots(
     assets: Option<AssetsWriter<'_>>,
     progress: &Progress<'_>,
 ) -> Result<()> {
-    let memory = || Memory {
-        caster: Caster::new(job.channels.scene),
-        hits: Hits::default(),
-        buffers: ImageBuffers::default(),
-    };
-
-    let photographs = job.photographs.iter().map(Work::Photograph);
-    let works: Vec<Work<'_>> = assets
-        .map(Work::Assets)
+    let photographs = job.photographs.iter().map(WorkItem::Photograph);
+    let items: Vec<WorkItem<'_>> = assets
+        .map(WorkItem::Assets)
         .into_iter()
-        .chain(shots.iter().map(Work::Shot))
+        .chain(shots.iter().map(WorkItem::Shot))
         .chain(photographs)
         .collect();
 
-    for_each_in_order(ctx, &works, memory, |memory, work| match work {
-        Work::Assets(assets) => assets(),
-        Work::Photograph(shot) => {
-            let written = write_photograph(job, shot, memory)?;
-            progress.add(1);
-            (job.each_photograph)(written)
-        }
-        Work::Shot(shot) => {
-            let started = Instant::now();
-            let written = write_shot(job, shot, memory)?;
-            progress.add(1);
-
-            let mut location = open[shot.location].lock().unwrap_or_else(PoisonError::into_inner);
-            location.add(shot.frame, written, started);
-            if location.left > 0 {
-                return Ok(());
+    for_each_in_order(
+        ctx,
+        &items,
+        || Memory::new(job.channels.scene),
+        |memory, item| match item {
+            WorkItem::Assets(assets) => assets(),
+            WorkItem::Photograph(shot) => {
+                let written = write_photograph(job, shot, memory)?;
+                progress.add(1);
+                (job.each_photograph)(written)
             }
+            WorkItem::Shot(shot) => {
+                let started = Instant::now();
+                let written = write_shot(job, shot, memory)?;
+                progress.add(1);
 
-            // The last image of the location is written.
-            let OpenLocation { tally, mut files, started, .. } = std::mem::take(&mut *location);
-            drop(location);
-            files.sort();
-            let started = started.unwrap_or_else(Instant::now);
-            (job.each)(WrittenLocation { location: shot.location, tally, files, started })
-        }
-    })
+                let mut location = open[shot.location].lock().unwrap_or_else(PoisonError::into_inner);
+                location.add(shot.frame, written, started);
+                if location.left > 0 {
+                    return Ok(());
+                }
+
+                // The last image of the location is written.
+                let OpenLocation { tally, mut files, started, .. } = std::mem::take(&mut *location);
+                drop(location);
+                files.sort();
+                let started = started.unwrap_or_else(Instant::now);
+                (job.each)(WrittenLocation { location: shot.location, tally, files, started })
+            }
+        },
+    )
 }
 
 /// The images to take: for each location its panorama, which takes longest, then its views.
@@ -203,6 +202,12 @@ pub(crate) struct Memory<'s> {
     pub(crate) buffers: ImageBuffers,
 }
 
+impl<'s> Memory<'s> {
+    fn new(scene: &'s Scene<'s>) -> Self {
+        Self { caster: Caster::new(scene), hits: Hits::default(), buffers: ImageBuffers::default() }
+    }
+}
+
 /// What was written for a shot.
 #[derive(Default)]
 struct WrittenShot {
@@ -226,31 +231,50 @@ impl OpenLocation {
     }
 }
 
+/// Writes the files of one image.
+pub(crate) struct ImageWriter<'a> {
+    pub(crate) job: &'a ImageJob<'a>,
+    pub(crate) uuid: &'a str,
+    pub(crate) room: &'a str,
+    pub(crate) frame: Frame,
+}
+
+impl ImageWriter<'_> {
+    pub(crate) fn write(&self, domain: Domain, bytes: &[u8]) -> Result<FileRecord> {
+        let layout = self.job.layout;
+        let path = layout.image_path(self.job.area, self.uuid, self.room, self.frame, domain);
+        write_bytes(&path, bytes)?;
+        Ok(FileRecord::of_bytes(layout.root(), &path, bytes)?)
+    }
+
+    pub(crate) fn write_pose(&self, camera: &Camera, scan: &Pose) -> Result<FileRecord> {
+        let room = format!("{}_{}", self.room, self.job.area);
+        let mut pose = PoseFile::new(camera, scan, self.uuid, &room, self.frame);
+        pose.world_offset_m = self.job.offset_m;
+        self.write(Domain::Pose, &pose.to_json())
+    }
+}
+
 fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Result<WrittenShot> {
     let Memory { caster, hits, buffers } = memory;
     let scan = &job.locations[shot.location];
     let room = room_name(job.rooms[shot.location]);
+    let writer = ImageWriter { job, uuid: &scan.uuid, room: &room, frame: shot.frame };
     let mut written = WrittenShot::default();
-
-    let write = |domain: Domain, bytes: &[u8]| -> Result<FileRecord> {
-        let path = job.layout.image_path(job.area, &scan.uuid, &room, shot.frame, domain);
-        write_bytes(&path, bytes)?;
-        Ok(FileRecord::of_bytes(job.layout.root(), &path, bytes)?)
-    };
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
 
     // Poses alone need no rays.
     if !images.is_empty() {
         caster.cast_into(&shot.camera, 1, hits);
-        let each = |image: Image, file: Vec<u8>| write(image.domain(), &file);
-        written.files = job.channels.encode(&images, hits, &shot.camera, buffers, each)?;
+        written.files = job
+            .channels
+            .encode(&images, hits, &shot.camera, buffers, |image, file| {
+                writer.write(image.domain(), &file)
+            })?;
     }
 
     if job.modalities.contains(&Domain::Pose) {
-        let room = format!("{room}_{}", job.area);
-        let mut pose = PoseFile::new(&shot.camera, &scan.pose, &scan.uuid, &room, shot.frame);
-        pose.world_offset_m = job.offset_m;
-        written.files.push(write(Domain::Pose, &pose.to_json())?);
+        written.files.push(writer.write_pose(&shot.camera, &scan.pose)?);
     }
 
     if !images.is_empty() {
@@ -262,7 +286,6 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
 /// Counts the pixels of an image that was cast and encoded. The tally counts no image itself.
 pub(crate) fn count(job: &ImageJob<'_>, images: &[Image], hits: &Hits, buffers: &ImageBuffers) -> ImageTally {
     let faces = hits.face.pixels();
-    let is_filled = |face: &&u32| **face != NO_FACE && job.is_filled[**face as usize];
     let counts_filled = images.contains(&Image::Semantic) && !job.is_filled.is_empty();
     ImageTally {
         images: 0,
@@ -270,7 +293,10 @@ pub(crate) fn count(job: &ImageJob<'_>, images: &[Image], hits: &Hits, buffers: 
         pixels_missing: faces.iter().filter(|face| **face == NO_FACE).count() as u64,
         pixels_unlabelled: buffers.unlabelled,
         pixels_filled: if counts_filled {
-            faces.iter().filter(is_filled).count() as u64
+            let filled = faces
+                .iter()
+                .filter(|face| **face != NO_FACE && job.is_filled[**face as usize]);
+            filled.count() as u64
         } else {
             0
         },

@@ -24,9 +24,11 @@ pub(super) struct PointColors {
 impl PointColors {
     /// Colours the mesh from all points of `annotations`, as the scene file `scene` asks for.
     pub(super) fn of(scene: &Path, mesh: &TriMesh, annotations: &Annotations) -> Result<Self> {
-        let fault = |message: &str| Error::unfit(scene, format!("mesh.colors = \"points\": {message}"));
         if !mesh.textures().is_empty() {
-            return Err(fault("the mesh has textures, which would cover these colours: leave the key out"));
+            return Err(fault(
+                scene,
+                "the mesh has textures, which would cover these colours: leave the key out",
+            ));
         }
 
         let nearest_faces = NearestFaces::new(mesh);
@@ -43,12 +45,15 @@ impl PointColors {
         }
 
         if is_black {
-            return Err(fault("the annotated points have no colours"));
+            return Err(fault(scene, "the annotated points have no colours"));
         }
 
         let vertices = colors.finish();
         if vertices.far_points == vertices.points {
-            return Err(fault("no annotated point is within 10 cm of the mesh: do they share a frame?"));
+            return Err(fault(
+                scene,
+                "no annotated point is within 10 cm of the mesh: do they share a frame?",
+            ));
         }
         Ok(Self { vertices, area_m2: mesh.total_area() })
     }
@@ -86,4 +91,9 @@ impl PointColors {
         }
         doubts
     }
+}
+
+/// An error about the key `colors` of a scene file.
+fn fault(scene: &Path, message: &str) -> Error {
+    Error::unfit(scene, format!("mesh.colors = \"points\": {message}"))
 }

@@ -1,6 +1,13 @@
 //! An area that is not read from files.
 
 use crate::error::{Error, Result};
+use crate::export::input::area::AreaInput;
+use crate::export::input::cameras::Cameras;
+use crate::export::input::mesh::{MeshFrame, MeshSource};
+use crate::export::input::numbering::number;
+use crate::export::input::photographs::Photographs;
+use crate::export::input::scene::Opened;
+use crate::options::placing::Placing;
 use crate::record::request::InputRecord;
 use s3d_geom::{MeshParts, PointCloud, TriMesh, Wrap};
 use s3d_io::camera::ScanLocation;
@@ -154,22 +161,23 @@ impl SharedScene {
     /// The records of its parts, with the checksums of their values. They tell whether a later call is the
     /// same, and continues this one.
     pub(crate) fn records(&self) -> Result<Vec<InputRecord>> {
-        let mut record = Vec::new();
-        let mut push = |name: &str, sum: ChecksumOfParts| {
-            let (bytes, xxh3_128) = sum.finish();
-            record.push(InputRecord { path: format!("memory:{name}"), bytes, xxh3_128 });
-        };
-        push("mesh", sum_of_mesh(self.mesh.mesh.parts()));
+        let mut sums = vec![("mesh", sum_of_mesh(self.mesh.mesh.parts()))];
         if let Some(annotations) = &self.annotations {
-            push("annotations", sum_of_annotations(annotations)?);
+            sums.push(("annotations", sum_of_annotations(annotations)?));
             if !annotations.taxonomy.is_s3dis() {
                 let mut sum = ChecksumOfParts::default();
                 sum.add(format!("{:?}", annotations.taxonomy.definition()).as_bytes());
-                push("taxonomy", sum);
+                sums.push(("taxonomy", sum));
             }
         }
-        push("locations", self.sum_of_locations());
-        Ok(record)
+        sums.push(("locations", self.sum_of_locations()));
+
+        let mut records = Vec::with_capacity(sums.len());
+        for (name, sum) in sums {
+            let (bytes, xxh3_128) = sum.finish();
+            records.push(InputRecord { path: format!("memory:{name}"), bytes, xxh3_128 });
+        }
+        Ok(records)
     }
 
     fn sum_of_locations(&self) -> ChecksumOfParts {
@@ -182,6 +190,58 @@ impl SharedScene {
             numbers.for_each(|number| sum.add(&number.to_le_bytes()));
         }
         sum
+    }
+}
+
+impl AreaInput {
+    /// Opens an area that is in memory.
+    pub(super) fn in_memory(scene: &SharedScene, asked: Option<Placing>, opened: Opened) -> Result<Self> {
+        scene.check()?;
+        let name = scene.name();
+
+        let frame = MeshFrame::of(&scene.mesh);
+        let mut rooms = Vec::new();
+        let mut warnings = Vec::new();
+        if opened.annotations
+            && let Some(annotations) = &scene.annotations
+        {
+            frame.refuse_far_points(&name, annotations)?;
+            let mut annotations = annotations.clone();
+            warnings = std::mem::take(&mut annotations.warnings);
+            rooms = number(scene.area, annotations).map_err(|e| Error::unfit(&name, e.to_string()))?;
+        }
+
+        let cameras = match asked {
+            Some(placing) => Cameras::Placed(placing),
+            None => Cameras::listed_or_placed(scene.locations.clone(), vec![None; scene.locations.len()]),
+        };
+        frame.refuse_far_locations(&name, cameras.listed())?;
+
+        Ok(Self {
+            number: scene.area,
+            source: MeshSource::Memory(Arc::clone(&scene.mesh)),
+            frame,
+            mesh_file: Some(Arc::clone(&scene.mesh)),
+            pictures: None,
+            is_labelled: scene.annotations.is_some(),
+            taxonomy: scene
+                .annotations
+                .as_ref()
+                .map(|a| a.taxonomy.clone())
+                .unwrap_or_default(),
+            rooms,
+            cameras,
+            cameras_path: name.clone(),
+            photographs: Photographs::default(),
+            path: name,
+            notes: Vec::new(),
+            warnings,
+            lenient: false,
+            files: Vec::new(),
+            sources: Vec::new(),
+            annotations: Vec::new(),
+            records: scene.records()?,
+        })
     }
 }
 

@@ -105,8 +105,8 @@ impl MeshFrame {
 
     /// Refuses scan locations that all lie far from the mesh.
     pub(crate) fn refuse_far_locations(&self, list: &Path, locations: &[ScanLocation]) -> Result<()> {
-        let at = || locations.iter().map(|l| l.pose.location);
-        let (min, max) = at().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+        let at = locations.iter().map(|l| l.pose.location);
+        let (min, max) = at.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
         let Some(gap) = FrameGap::between([min, max], DVec3::ZERO, self.bounds) else { return Ok(()) };
         let [x, y, z] = (-gap.offset_m + DVec3::ZERO).to_array();
         Err(Error::unfit(

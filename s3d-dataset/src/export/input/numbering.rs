@@ -1,7 +1,7 @@
 //! The names of labels: instances numbered by area, and the table of all labels.
 
 use crate::error::{InputError, Result};
-use crate::export::input::{AreaInput, InstanceInput, RoomInput};
+use crate::export::input::area::{AreaInput, InstanceInput, RoomInput};
 use s3d_io::cloud::Annotations;
 use s3d_label::{Class, Label, LabelTable, NumberingError, Room, number_area};
 use std::collections::BTreeMap;

@@ -75,7 +75,11 @@ impl Photographs {
 
         let mut names = HashSet::new();
         if let Some(twice) = chosen.iter().find(|camera| !names.insert(camera.name.as_str())) {
-            return Err(at(list, twice, "is listed twice: each photograph needs a name of its own".into()));
+            return Err(camera_error(
+                list,
+                twice,
+                "is listed twice: each photograph needs a name of its own".into(),
+            ));
         }
 
         let pictures = find(source, &chosen)?;
@@ -145,8 +149,8 @@ fn choose(cameras: Vec<PosedCamera>, source: &FrameSource) -> Vec<PosedCamera> {
     chosen
 }
 
-/// An error about a camera of the list.
-fn at(list: &Path, camera: &PosedCamera, message: String) -> Error {
+/// An error about a camera of a list.
+pub(crate) fn camera_error(list: &Path, camera: &PosedCamera, message: String) -> Error {
     let message = format!("{:?}: {message}", camera.name);
     match camera.line {
         0 => FileError::format(list, message),
@@ -175,7 +179,7 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
         if candidates.is_empty() && source.images.is_none() {
             let message =
                 "no photograph was found for it: say which folder they are in, images = \"…\" under [frames]";
-            return Err(at(&source.path, camera, message.into()));
+            return Err(camera_error(&source.path, camera, message.into()));
         }
 
         match candidates.iter().find_map(|path| with_ending(path)) {
@@ -210,15 +214,14 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
 
 /// Finds the file of this name, which may lack its ending.
 fn with_ending(path: &Path) -> Option<PathBuf> {
-    let longer = |ending: &str| {
+    let mut names = vec![path.to_owned()];
+    for ending in ENDINGS {
         let mut name = path.as_os_str().to_owned();
         name.push(".");
         name.push(ending);
-        PathBuf::from(name)
-    };
-    std::iter::once(path.to_owned())
-        .chain(ENDINGS.map(longer))
-        .find(|path| path.is_file())
+        names.push(PathBuf::from(name));
+    }
+    names.into_iter().find(|path| path.is_file())
 }
 
 /// Opens a photograph with its lens and the camera of its view. Returns its EXIF orientation too.
@@ -233,7 +236,7 @@ fn open_one(
     let turn = read_picture_turn(&picture)?;
 
     let lens = posed.photo_lens([width, height]).map_err(|e| match e {
-        IntrinsicsError::NoOptics => at(
+        IntrinsicsError::NoOptics => camera_error(
             &source.path,
             posed,
             format!(
@@ -253,14 +256,14 @@ fn open_one(
             FileError::format(&picture, message).into()
         }
         IntrinsicsError::OtherSize { .. } => FileError::format(&picture, e.to_string()).into(),
-        _ => at(&source.path, posed, e.to_string()),
+        _ => camera_error(&source.path, posed, e.to_string()),
     })?;
 
     let mut pose = posed.pose;
     pose.location -= offset_m;
     let camera = lens
         .pinhole(pose, source.width.unwrap_or(width))
-        .map_err(|e| at(&source.path, posed, e.to_string()))?;
+        .map_err(|e| camera_error(&source.path, posed, e.to_string()))?;
 
     let name = posed.name.clone();
     let uuid = uuid_from_name(&format!("area_{area}/{name}"));
@@ -285,23 +288,25 @@ mod tests {
         }
     }
 
-    #[test]
-    fn photographs_are_chosen_evenly() {
+    /// Returns the chosen ones of ten cameras, which are named 0 to 9.
+    fn chosen(every: u32, max: Option<u32>) -> Vec<String> {
         let pose = Pose::level(DVec3::ZERO, 0.0);
-        let camera = |i: u32| PosedCamera {
+        let cameras = (0..10).map(|i| PosedCamera {
             name: i.to_string(),
             pose,
             size: None,
             optics: None,
             picture: None,
             line: 0,
-        };
-        let chosen = |every, max| -> Vec<String> {
-            choose((0..10).map(camera).collect(), &source(every, max))
-                .into_iter()
-                .map(|c| c.name)
-                .collect()
-        };
+        });
+        choose(cameras.collect(), &source(every, max))
+            .into_iter()
+            .map(|c| c.name)
+            .collect()
+    }
+
+    #[test]
+    fn photographs_are_chosen_evenly() {
         assert_eq!(chosen(1, None).len(), 10);
         assert_eq!(chosen(4, None), ["0", "4", "8"]);
         assert_eq!(chosen(1, Some(3)), ["0", "3", "6"]);

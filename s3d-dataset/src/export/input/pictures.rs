@@ -3,7 +3,7 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::input::AreaInput;
+use crate::export::input::area::AreaInput;
 use crate::export::input::cameras::Cameras;
 use crate::export::picture_colors::PictureColors;
 use glam::DVec3;
@@ -24,13 +24,13 @@ const MAX_NAMED: usize = 20;
 pub(crate) struct Pictures {
     source: PictureSource,
     /// The pictures of each location; `None` where no image is asked for.
-    found: Vec<Option<Found>>,
+    found: Vec<Option<LocationPictures>>,
     /// What was odd about them, as a sentence each.
     pub(crate) warnings: Vec<String>,
 }
 
 /// The pictures of a location.
-enum Found {
+enum LocationPictures {
     SkyBox([PathBuf; 6]),
     Captures(Vec<CaptureFile>),
     Panorama(PathBuf),
@@ -73,7 +73,7 @@ impl Pictures {
                 Some(Ok(mut pictures)) => {
                     pictures.check()?;
                     pictures.subtract(area.frame.offset_m);
-                    if let Found::Captures(captures) = &pictures
+                    if let LocationPictures::Captures(captures) = &pictures
                         && captures.len() < CAPTURES_A_LOCATION
                     {
                         warnings.push(format!(
@@ -133,7 +133,7 @@ impl Pictures {
         let pose = &location.pose;
 
         let cube = match found {
-            Found::SkyBox(paths) => {
+            LocationPictures::SkyBox(paths) => {
                 let pictures = read_all(paths)?;
                 let turn = match options.caps {
                     SkyBoxCaps::Detect => SkyBoxTurn::Detect,
@@ -146,11 +146,11 @@ impl Pictures {
                 check_sky_box(&paths[0], pictures.map(|p| (p.width(), p.height())))?;
                 CubeMap::from_sky_box(pictures, turn, pose, options.size)
             }
-            Found::Panorama(path) => {
+            LocationPictures::Panorama(path) => {
                 let photo = read_picture(path)?;
                 CubeMap::from_equirectangular(&photo, options.yaw_deg.to_radians(), pose, options.size)
             }
-            Found::Captures(files) => {
+            LocationPictures::Captures(files) => {
                 let mut captures = Vec::new();
                 for read in in_parallel(files, CaptureFile::read) {
                     let file = &files[captures.len()];
@@ -191,18 +191,22 @@ fn read_all(paths: &[PathBuf]) -> Result<Vec<Raster<[u8; 3]>>> {
 }
 
 /// Finds the pictures of a location, or returns the names of the missing ones.
-fn find(folder: &PictureFolder, kind: PictureKind, uuid: &str) -> s3d_io::Result<Result<Found, String>> {
+fn find(
+    folder: &PictureFolder,
+    kind: PictureKind,
+    uuid: &str,
+) -> s3d_io::Result<Result<LocationPictures, String>> {
     Ok(match kind {
-        PictureKind::SkyBox => folder.sky_box(uuid).map(Found::SkyBox),
-        PictureKind::Panorama => folder.panorama(uuid).map(Found::Panorama),
+        PictureKind::SkyBox => folder.sky_box(uuid).map(LocationPictures::SkyBox),
+        PictureKind::Panorama => folder.panorama(uuid).map(LocationPictures::Panorama),
         PictureKind::Captures => match folder.captures(uuid)? {
             captures if captures.is_empty() => Err(format!("{uuid}_i0_0.jpg to {uuid}_i2_5.jpg")),
-            captures => Ok(Found::Captures(captures)),
+            captures => Ok(LocationPictures::Captures(captures)),
         },
     })
 }
 
-impl Found {
+impl LocationPictures {
     /// Moves the poses of captures from the frame of the mesh's file to where the mesh lies.
     fn subtract(&mut self, offset_m: DVec3) {
         if let Self::Captures(captures) = self {

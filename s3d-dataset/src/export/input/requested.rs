@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::input::AreaInput;
+use crate::export::input::area::AreaInput;
 use crate::parallel::for_each_in_order;
 use crate::record::listing::walk;
 use crate::record::request::{InputRecord, Request, RequestedArea};
@@ -68,15 +68,13 @@ pub(crate) fn requested_areas(
 
     let mut requested = Vec::new();
     for ((area, paths), files) in areas.iter().zip(&paths).zip(&files) {
-        let record = |path: &PathBuf, files: &[PathBuf]| match taken.get(&(area.number, path.as_path())) {
-            Some(record) => record.clone(),
-            None => record_of(&area.path, path, files, &sums),
-        };
-        let mut inputs: Vec<InputRecord> = paths
-            .iter()
-            .zip(files)
-            .map(|(path, files)| record(path, files))
-            .collect();
+        let mut inputs = Vec::new();
+        for (path, files) in paths.iter().zip(files) {
+            inputs.push(match taken.get(&(area.number, path.as_path())) {
+                Some(record) => record.clone(),
+                None => record_of(&area.path, path, files, &sums),
+            });
+        }
         inputs.extend(area.records.iter().cloned());
 
         requested.push(RequestedArea {
@@ -90,19 +88,23 @@ pub(crate) fn requested_areas(
     Ok(requested)
 }
 
+/// The size of a file in bytes, and its checksum.
+fn sum_of(sums: &Sums<'_>, file: &Path) -> (u64, Checksum) {
+    sums.get(file).copied().unwrap_or((0, Checksum::of(b"")))
+}
+
 /// The record of an input: a file, or a folder with `files` in it.
 fn record_of(scene: &Path, path: &Path, files: &[PathBuf], sums: &Sums<'_>) -> InputRecord {
-    let sum_of = |file: &Path| sums.get(file).copied().unwrap_or((0, Checksum::of(b"")));
     let name = name_of(scene, path);
     if !path.is_dir() {
-        let (bytes, xxh3_128) = sum_of(path);
+        let (bytes, xxh3_128) = sum_of(sums, path);
         return InputRecord { path: name, bytes, xxh3_128 };
     }
 
     let mut total = 0;
     let mut listed: Vec<(String, u64, Checksum)> = Vec::new();
     for file in files {
-        let (bytes, sum) = sum_of(file);
+        let (bytes, sum) = sum_of(sums, file);
         listed.push((below(path, file), bytes, sum));
         total += bytes;
     }
@@ -176,9 +178,12 @@ fn slashed(path: &Path) -> String {
 mod tests {
     use super::*;
 
+    fn name(scene: &str, path: &str) -> String {
+        name_of(Path::new(scene), Path::new(path))
+    }
+
     #[test]
     fn inputs_are_named_from_the_scenes_folder() {
-        let name = |scene: &str, path: &str| name_of(Path::new(scene), Path::new(path));
         assert_eq!(name("scan/scene.toml", "scan/Area_1"), "Area_1");
         assert_eq!(name("scan/scene.toml", "scan/../shared/a.obj"), "../shared/a.obj");
         assert_eq!(name("scan/scene.toml", "/data/a.obj"), "a.obj");

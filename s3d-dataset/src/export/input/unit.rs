@@ -26,14 +26,11 @@ impl UnitGuess {
     /// The unit that gives rooms a usual height, if that is clear; otherwise the metre. Feet are never clear:
     /// a height of 8 may be 8 feet, or a hall of 8 metres.
     pub(super) fn unit(self) -> LengthUnit {
-        let fits = |unit: &LengthUnit| {
-            self.height
-                .is_some_and(|height| HEIGHTS_M.contains(&(height * unit.metres())))
-        };
+        let Some(height) = self.height else { return LengthUnit::default() };
         // If a height fits both centimetres and inches, the lower room is the likelier.
         [LengthUnit::Millimetre, LengthUnit::Centimetre, LengthUnit::Inch]
             .into_iter()
-            .find(fits)
+            .find(|unit| HEIGHTS_M.contains(&(height * unit.metres())))
             .unwrap_or_default()
     }
 

@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::error::{Error, InputError, Result};
-use crate::export::input::AreaInput;
+use crate::export::input::area::AreaInput;
 use crate::summary::Unlabelled;
 use crate::survey::annotated::{Annotated, SkippedLines, SurveyedRoom};
 use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
@@ -60,9 +60,6 @@ pub(crate) fn annotate(
             let take = |block: &PointCloud, is_whole: bool| -> Result<()> {
                 ctx.check()?;
                 bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
-                let vote = || vote(&mut labeler, &instance.points, block, id);
-                // One thread counts votes; the others draw the floor's outline, and write.
-                let outline = || block.positions.iter().for_each(|p| builder.add(*p));
                 let hand_out = || {
                     if !is_whole {
                         return Ok(());
@@ -71,7 +68,12 @@ pub(crate) fn annotate(
                     let points = &mut &block.positions[..];
                     each(AnnotatedInstance { label: instance.label, id, bbox, points })
                 };
-                let (voted, ((), handed_out)) = rayon::join(vote, || rayon::join(outline, hand_out));
+
+                // One thread counts votes; the others draw the floor's outline, and write.
+                let (voted, ((), handed_out)) = rayon::join(
+                    || vote(&mut labeler, &instance.points, block, id),
+                    || rayon::join(|| block.positions.iter().for_each(|p| builder.add(*p)), hand_out),
+                );
                 voted?;
                 handed_out
             };
@@ -113,8 +115,8 @@ pub(crate) fn annotate(
 
     let (labels, directions_deg, report) = rooms.draw_beside(|| {
         let labels = labeler.finish();
-        let directions = || wall_directions_deg(mesh, table, labels.label_of_face());
-        let (directions_deg, report) = rayon::join(directions, || labels.report(table));
+        let (directions_deg, report) =
+            rayon::join(|| wall_directions_deg(mesh, table, labels.label_of_face()), || labels.report(table));
         (labels, directions_deg, report)
     });
 

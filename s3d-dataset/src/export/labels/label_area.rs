@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::event::UnitKind;
 use crate::export::common::{Common, PreparedMesh};
 use crate::export::images::photographs::judge_sight;
-use crate::export::input::AreaInput;
+use crate::export::input::area::AreaInput;
 use crate::export::labels::annotate::{AnnotatedInstance, hidden_instances};
 use crate::export::labels::overlap::overlap_doubts;
 use crate::export::labels::survey::{Locating, Survey, SurveyOptions, Surveyor, survey};

@@ -96,11 +96,13 @@ mod tests {
         SurveyedRoom { room, points: 3721, footprint, bbox, wall_direction_deg: 0 }
     }
 
+    /// Returns the doubts about an office of 6 × 4 m and another room.
+    fn doubts(other: SurveyedRoom) -> Vec<String> {
+        overlap_doubts(&[room("office_1", Vec3::ZERO, 6.0, 4.0), other])
+    }
+
     #[test]
     fn rooms_in_one_another_are_told_and_neighbours_are_not() {
-        let office = || room("office_1", Vec3::ZERO, 6.0, 4.0);
-        let doubts = |other: SurveyedRoom| overlap_doubts(&[office(), other]);
-
         // A wall in common, the floor above, far away.
         assert!(doubts(room("office_2", vec3(5.9, 0.0, 0.0), 3.0, 3.0)).is_empty());
         assert!(doubts(room("office_2", vec3(0.0, 0.0, 2.6), 6.0, 4.0)).is_empty());

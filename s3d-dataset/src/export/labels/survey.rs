@@ -4,7 +4,7 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::export::input::AreaInput;
+use crate::export::input::area::AreaInput;
 use crate::export::labels::annotate::{AnnotatedInstance, annotate, unannotated};
 use crate::export::location::{Located, locate};
 use crate::survey::annotated::Annotated;
@@ -78,8 +78,8 @@ pub(crate) fn survey(
 
     // What is wrong with the labels is weighed before locations are placed, which may take long.
     let (annotated, locating) = if area.is_labelled {
-        let each = |instance: AnnotatedInstance<'_>| surveyor.instance(instance);
-        let (annotated, votes) = annotate(ctx, area, &nearest, table, fill_m, each)?;
+        let (annotated, votes) =
+            annotate(ctx, area, &nearest, table, fill_m, |instance| surveyor.instance(instance))?;
         surveyor.labels(&annotated, &votes)?;
         drop(votes);
         let labels = label_findings(scene.mesh(), &annotated, table);

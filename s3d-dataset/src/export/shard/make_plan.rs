@@ -79,17 +79,10 @@ pub fn plan<S: Clone + Into<SceneSource>>(
             .checked_where(ctx, &layout, |unit| *unit == Unit::Labels(number))?;
         there.iter().for_each(|done| journal.know(done.clone()));
 
-        let position_of = |uuid: &str| -> Option<usize> {
-            let finished = journal.finished();
-            finished
-                .labels(number)?
-                .locations
-                .iter()
-                .position(|other| other == uuid)
-        };
-
         let is_ours = |unit: &Unit| match unit {
-            Unit::Scores(_, uuid) => position_of(uuid).is_some_and(|position| part.takes(position)),
+            Unit::Scores(_, uuid) => {
+                position_of(&journal, number, uuid).is_some_and(|position| part.takes(position))
+            }
             Unit::Labels(_) => true,
             Unit::Location(..) | Unit::Photograph(..) | Unit::Assets(_) => false,
         };
@@ -123,4 +116,10 @@ fn refuse_foreign(folder: &Path) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The position of a location in its area, if the area's labels are done.
+fn position_of(journal: &Journal, area: u32, uuid: &str) -> Option<usize> {
+    let finished = journal.finished();
+    finished.labels(area)?.locations.iter().position(|other| other == uuid)
 }

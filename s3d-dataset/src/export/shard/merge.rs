@@ -13,9 +13,9 @@ use crate::record::assets;
 use crate::record::journal::{Done, Finished, Unit};
 use crate::record::label_list::LabelList;
 use crate::record::manifest::Manifest;
-use crate::record::missing::missing_units;
 use crate::record::request::Request;
 use crate::record::request::{begun_by_other_version, read_request};
+use crate::record::unfinished::missing_units;
 use crate::stage::Stage;
 use crate::store::lock::{Lock, Sharing};
 use crate::store::output::Session;
@@ -109,18 +109,19 @@ pub fn merge(
 fn read_parts(ctx: &Context, folders: &[PathBuf], layout: &Layout) -> Result<(Vec<Lock>, Vec<Part>)> {
     let (inside, apart): (Vec<&PathBuf>, Vec<&PathBuf>) =
         folders.iter().partition(|folder| is_same(folder, layout.root()));
-    let lock_all = |folders: Vec<&PathBuf>| -> Result<Vec<Lock>> {
-        folders
-            .into_iter()
-            .filter_map(|folder| lock(ctx, folder).transpose())
-            .collect()
-    };
-    let locks = lock_all(apart)?;
-    let own_lock = lock_all(inside)?;
+    let locks = lock_all(ctx, &apart)?;
+    let own_lock = lock_all(ctx, &inside)?;
 
     let parts: Result<Vec<Part>> = folders.iter().map(|folder| Part::read(ctx, folder)).collect();
     drop(own_lock);
     Ok((locks, parts?))
+}
+
+fn lock_all(ctx: &Context, folders: &[&PathBuf]) -> Result<Vec<Lock>> {
+    folders
+        .iter()
+        .filter_map(|folder| lock(ctx, folder).transpose())
+        .collect()
 }
 
 /// A merge whose shards are all there.

@@ -17,7 +17,7 @@ use crate::export::views::select_requested;
 use crate::options::ExportOptions;
 use crate::record::journal::{Done, Journal, Unit};
 use crate::record::label_list::LabelList;
-use crate::record::missing::is_chosen;
+use crate::record::unfinished::is_chosen;
 use crate::store::lock::Sharing;
 use crate::summary::{Summary, UnitTally, ViewTally};
 use crate::survey::candidate::Candidate;
@@ -80,16 +80,10 @@ impl Job<'_> {
         let cache = layout.work_dir();
         LabelList::of(&self.inputs.table).write(&LabelList::path(layout))?;
         let positions: BTreeMap<u32, usize> = self.request.numbers().into_iter().zip(0..).collect();
-        let labels_are_ours = |unit: &Unit| {
-            positions
-                .get(&unit.area())
-                .is_some_and(|position| shard.takes(*position))
-        };
-
         // With a plan, every shard writes down its share of the scores, for the merge. Without one, every
         // shard has made all scores.
         let is_ours = |unit: &Unit| match unit {
-            Unit::Labels(_) => labels_are_ours(unit),
+            Unit::Labels(area) => positions.get(area).is_some_and(|position| shard.takes(*position)),
             Unit::Scores(_, uuid) => self.plan.is_none() || keeper(uuid, shard.of) == shard.number,
             Unit::Location(..) | Unit::Photograph(..) | Unit::Assets(_) => false,
         };

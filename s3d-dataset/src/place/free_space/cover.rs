@@ -73,8 +73,10 @@ pub(super) fn greedy(lists: &[Vec<u32>], weights: &[u64], samples: usize, share:
             let seen = list.len() - unseen(&times, list);
             (seen as f64) < SHARE_OF_EVERY_VIEW * list.len() as f64
         });
-        let gain = |i: usize| (unseen(&times, &lists[i]) as u64 * weights[i], Reverse(i));
-        let Some(&place) = asking.iter().max_by_key(|&&i| gain(i)) else { break };
+        let best = asking
+            .iter()
+            .max_by_key(|&&i| (unseen(&times, &lists[i]) as u64 * weights[i], Reverse(i)));
+        let Some(&place) = best else { break };
         see(&mut times, &lists[place]);
         chosen.push(place);
     }

@@ -4,6 +4,7 @@ use crate::error::{InputError, Result};
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 use s3d_geom::TriMesh;
+use std::ops::RangeInclusive;
 
 /// The distance between the grid's lines, metres. It is larger if there is very much floor.
 pub(super) const STEP_M: f64 = 0.1;
@@ -43,8 +44,9 @@ pub(super) struct Foot {
 pub(super) fn sides_within(lines: f64) -> Vec<Side> {
     let most = lines.floor().max(1.0) as i32;
     let all = (-most..=most).flat_map(|i| (-most..=most).map(move |j| (i, j)));
-    let is_near = |&(i, j): &Side| f64::from(i * i + j * j) <= (lines * lines).max(2.0);
-    all.filter(|side| *side != (0, 0) && is_near(side)).collect()
+    all.filter(|side| *side != (0, 0))
+        .filter(|(i, j)| f64::from(i * i + j * j) <= (lines * lines).max(2.0))
+        .collect()
 }
 
 /// Vertical lines at equal distances. They are shifted off the round numbers on which modellers put edges.
@@ -136,34 +138,13 @@ impl Grid {
     fn meetings(&self, corners: [Vec3; 3]) -> impl Iterator<Item = (u64, f64)> {
         let grid = *self;
         let [a, b, c] = corners.map(|p| (p.as_dvec3() - grid.origin) / dvec3(grid.step, grid.step, 1.0));
-        let low = a.min(b).min(c);
-        let high = a.max(b).max(c);
         let area = cross(a, b, c.x, c.y);
 
         // Go row by row, since a long and narrow triangle meets few of the lines around it.
-        let row = move |i: u64| {
-            let x = i as f64;
-            let mut from = f64::INFINITY;
-            let mut to = f64::NEG_INFINITY;
-            for (p, q) in [(a, b), (b, c), (c, a)] {
-                if (p.x - x) * (q.x - x) <= 0.0 {
-                    let t = if p.x == q.x {
-                        [0.0, 1.0]
-                    } else {
-                        [(x - p.x) / (q.x - p.x); 2]
-                    };
-                    for y in t.map(|t| p.y + (q.y - p.y) * t) {
-                        from = from.min(y);
-                        to = to.max(y);
-                    }
-                }
-            }
-            // The margin is for rounding; the weights below decide.
-            (from.max(low.y) - 1e-6).ceil().max(0.0) as u64..=(to.min(high.y) + 1e-6).floor().max(0.0) as u64
-        };
-
-        let rows = low.x.ceil().max(0.0) as u64..=high.x.floor().max(0.0) as u64;
-        rows.flat_map(move |i| row(i).map(move |j| (i, j)))
+        let low = a.x.min(b.x).min(c.x);
+        let high = a.x.max(b.x).max(c.x);
+        let rows = low.ceil().max(0.0) as u64..=high.floor().max(0.0) as u64;
+        rows.flat_map(move |i| lines_in_row([a, b, c], i).map(move |j| (i, j)))
             .filter_map(move |(i, j)| {
                 let x = i as f64;
                 let y = j as f64;
@@ -173,6 +154,32 @@ impl Grid {
                 is_in.then(|| (grid.column(i, j), grid.origin.z + wa * a.z + wb * b.z + wc * c.z))
             })
     }
+}
+
+/// Returns the lines of a row, at x = `i`, that may meet a triangle.
+fn lines_in_row([a, b, c]: [DVec3; 3], i: u64) -> RangeInclusive<u64> {
+    let x = i as f64;
+    let low = a.y.min(b.y).min(c.y);
+    let high = a.y.max(b.y).max(c.y);
+
+    let mut from = f64::INFINITY;
+    let mut to = f64::NEG_INFINITY;
+    for (p, q) in [(a, b), (b, c), (c, a)] {
+        if (p.x - x) * (q.x - x) <= 0.0 {
+            let t = if p.x == q.x {
+                [0.0, 1.0]
+            } else {
+                [(x - p.x) / (q.x - p.x); 2]
+            };
+            for y in t.map(|t| p.y + (q.y - p.y) * t) {
+                from = from.min(y);
+                to = to.max(y);
+            }
+        }
+    }
+
+    // The margin is for rounding; the weights of the corners decide.
+    (from.max(low) - 1e-6).ceil().max(0.0) as u64..=(to.min(high) + 1e-6).floor().max(0.0) as u64
 }
 
 /// Returns twice the signed area of the triangle `p`, `q`, (x, y), seen from above.

@@ -22,7 +22,7 @@ use s3d_geom::{NearestFaces, Pose, TriMesh};
 use s3d_io::camera::{ScanLocation, uuid_from_name};
 use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk_where;
-use standing::{Facing, Ground, Place};
+use standing::{Facing, Ground, Standpoint};
 use visibility::{Enclosure, Surface};
 
 /// The edge of the squares with one candidate each, metres. Squares grow if there would be more than
@@ -99,13 +99,13 @@ pub(crate) fn place_in_free_space(
 
     // Find the places, and what can be seen from them.
     let search = Search { ctx, scene, nearest, cell_m, most };
-    let found = search.run(Facing::Fronts)?;
-    if found.places.is_empty() {
-        return Err(InputError::UnfitArea { area, why: search.explain(&found)? }.into());
+    let interior = search.run(Facing::Fronts)?;
+    if interior.standpoints.is_empty() {
+        return Err(InputError::UnfitArea { area, why: search.explain(&interior)? }.into());
     }
 
     let surface = Surface::sample(mesh, options.seed);
-    let eyes: Vec<DVec3> = found.places.iter().map(Place::eye).collect();
+    let eyes: Vec<DVec3> = interior.standpoints.iter().map(Standpoint::eye).collect();
     let lists = if eyes.len() <= MOST_CANDIDATES {
         surface.seen_from(ctx, scene, &eyes)?
     } else {
@@ -117,11 +117,11 @@ pub(crate) fn place_in_free_space(
 
     let (chosen, cover) = match options.distance_m {
         None => {
-            let weights: Vec<u64> = found.places.iter().map(Place::weight).collect();
+            let weights: Vec<u64> = interior.standpoints.iter().map(Standpoint::weight).collect();
             cover::greedy(&lists, &weights, surface.len(), options.share)
         }
         Some(distance_m) => {
-            let chosen = pattern(scene, &found.places, &eyes, distance_m, options.seed, area);
+            let chosen = pattern(scene, &interior.standpoints, &eyes, distance_m, options.seed, area);
             let at: Vec<DVec3> = chosen.iter().map(|&i| eyes[i]).collect();
             let seen = surface.seen_from(ctx, scene, &at)?;
             let cover = Cover::of(&seen, lists.iter().chain(&seen), surface.len());
@@ -129,11 +129,10 @@ pub(crate) fn place_in_free_space(
         }
     };
 
-    let m2 = |samples: usize| samples as f64 * surface.m2_per_sample;
     let seen = SurfaceSeen {
-        surface_m2: m2(surface.len()),
-        visible_m2: m2(cover.visible),
-        seen_m2: cover.seen_by.map(m2),
+        surface_m2: surface.m2(surface.len()),
+        visible_m2: surface.m2(cover.visible),
+        seen_m2: cover.seen_by.map(|samples| surface.m2(samples)),
     };
 
     let mut warnings = Vec::new();
@@ -160,26 +159,27 @@ pub(crate) fn place_in_free_space(
         ));
     }
 
-    let locate = |(number, &index): (usize, &usize)| {
-        let [x, y, z] = eyes[index].to_array();
-        let name = format!("s3d free space {area} {number} {} {x} {y} {z}", options.seed);
-        ScanLocation { uuid: uuid_from_name(&name), pose: Pose::level(eyes[index], 0.0), line: 0 }
-    };
-    let locations = chosen.iter().enumerate().map(locate).collect();
-    Ok(FreeSpace { locations, seen, floor: found.floor, warnings })
+    let mut locations = Vec::with_capacity(chosen.len());
+    for (number, &index) in chosen.iter().enumerate() {
+        let eye = eyes[index];
+        let name = format!("s3d free space {area} {number} {} {} {} {}", options.seed, eye.x, eye.y, eye.z);
+        locations.push(ScanLocation { uuid: uuid_from_name(&name), pose: Pose::level(eye, 0.0), line: 0 });
+    }
+    Ok(FreeSpace { locations, seen, floor: interior.floor, warnings })
 }
 
 /// Chooses places on a Poisson-disk pattern: wide ones, and narrow ones where no wide one is near. Rooms on
 /// both sides of a wall get places.
 fn pattern(
     scene: &Scene<'_>,
-    places: &[Place],
+    standpoints: &[Standpoint],
     eyes: &[DVec3],
     distance_m: f64,
     seed: u64,
     area: u32,
 ) -> Vec<usize> {
-    let (wide, narrow): (Vec<usize>, Vec<usize>) = (0..places.len()).partition(|&i| places[i].is_wide());
+    let (wide, narrow): (Vec<usize>, Vec<usize>) =
+        (0..standpoints.len()).partition(|&i| standpoints[i].is_wide());
     let is_near =
         |a: usize, b: usize| eyes[a].distance(eyes[b]) < distance_m && sees(scene, eyes[a], eyes[b]);
 
@@ -205,7 +205,7 @@ fn sees(scene: &Scene<'_>, from: DVec3, to: DVec3) -> bool {
     cast_ray(scene, from, to - from).is_none_or(|hit| hit.t >= 1.0)
 }
 
-/// A search for places inside.
+/// A search for standpoints inside.
 struct Search<'a> {
     ctx: &'a Context,
     scene: &'a Scene<'a>,
@@ -214,43 +214,43 @@ struct Search<'a> {
     most: usize,
 }
 
-/// Places inside, and the floor on the way to them.
-struct Found {
-    places: Vec<Place>,
+/// The standpoints inside, and the floor on the way to them.
+struct Interior {
+    standpoints: Vec<Standpoint>,
     floor: FloorFound,
-    /// The mean enclosure of the places that are not inside.
+    /// The mean enclosure of the standpoints that are not inside.
     around: Enclosure,
 }
 
 impl Search<'_> {
-    fn run(&self, facing: Facing) -> Result<Found> {
+    fn run(&self, facing: Facing) -> Result<Interior> {
         let ground = Ground::find(self.ctx, self.scene, self.nearest, facing)?;
         let candidates = ground.candidates(self.cell_m, self.most);
         let around = candidates
             .par_iter()
-            .map(|place| {
+            .map(|standpoint| {
                 self.ctx.check()?;
-                Ok(Enclosure::of(self.scene, place.eye(), facing))
+                Ok(Enclosure::of(self.scene, standpoint.eye(), facing))
             })
             .collect::<Result<Vec<_>>>()?;
         let mut floor = ground.floor;
 
-        let mut places = Vec::new();
+        let mut standpoints = Vec::new();
         let mut outside = Vec::new();
-        for (place, around) in candidates.into_iter().zip(around) {
+        for (standpoint, around) in candidates.into_iter().zip(around) {
             if around.is_inside() {
-                floor.inside_m2 += place.stands_for_m2;
-                places.push(place);
+                floor.inside_m2 += standpoint.stands_for_m2;
+                standpoints.push(standpoint);
             } else {
                 outside.push(around);
             }
         }
-        Ok(Found { places, floor, around: Enclosure::mean(&outside) })
+        Ok(Interior { standpoints, floor, around: Enclosure::mean(&outside) })
     }
 
     /// Returns why no place was found.
-    fn explain(&self, found: &Found) -> Result<String> {
-        let floor = found.floor;
+    fn explain(&self, interior: &Interior) -> Result<String> {
+        let floor = interior.floor;
         let size = size_of(self.scene.mesh());
 
         // Each number is told only if the one before it is not 0.
@@ -263,7 +263,7 @@ impl Search<'_> {
             text += &format!(", {:.2} m² of these are floor to walk on", floor.walkable_m2);
         }
         if floor.walkable_m2 > 0.0 {
-            let [front, back, none] = found.around.percent();
+            let [front, back, none] = interior.around.percent();
             text += &format!(
                 ", and none of these is inside: rays from there end on a front side in {front:.0} % of all \
                  directions, on a back side in {back:.0} %, on nothing in {none:.0} %"

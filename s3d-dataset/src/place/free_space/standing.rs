@@ -13,7 +13,7 @@ use crate::place::{FOOT_M, HEIGHT_M, LEVEL};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use s3d_geom::{NearestFaces, TriMesh};
-use s3d_render::{Scene, cast_ray};
+use s3d_render::{Hit, Scene, cast_ray};
 use std::collections::BTreeMap;
 
 /// Half the width of a person, metres. This much must be free around at 1 m and at 1.5 m.
@@ -71,9 +71,9 @@ impl Facing {
     }
 }
 
-/// A place where a location could be.
+/// A place where a tripod with the scanner can stand.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct Standpoint {
     pub(super) foot: DVec3,
     /// The free space around, metres, at most [`CLEARANCE_M`].
     clearance_m: f32,
@@ -81,7 +81,7 @@ pub(super) struct Place {
     pub(super) stands_for_m2: f64,
 }
 
-impl Place {
+impl Standpoint {
     pub(super) fn eye(&self) -> DVec3 {
         // The position is rounded to `f32` as it is written, since the mesh has no more digits.
         (self.foot + HEIGHT_M * DVec3::Z).as_vec3().as_dvec3()
@@ -143,9 +143,8 @@ impl Ground {
         ctx.check()?;
 
         let square = grid.step * grid.step;
-        let count = |has: &dyn Fn(&Foot) -> bool| feet.iter().filter(|f| has(f)).count() as f64 * square;
-        let floor =
-            FloorFound { up_facing_m2: m2, headroom_m2: count(&|f| f.has_headroom), ..FloorFound::default() };
+        let headroom_m2 = feet.iter().filter(|foot| foot.has_headroom).count() as f64 * square;
+        let floor = FloorFound { up_facing_m2: m2, headroom_m2, ..FloorFound::default() };
         let mut ground = Self { component: Vec::new(), is_place: vec![false; feet.len()], grid, feet, floor };
 
         ground.join(scene);
@@ -178,13 +177,6 @@ impl Ground {
 
     /// Decides which components are floors, and which of their feet are places.
     fn judge(&mut self) {
-        #[derive(Default)]
-        struct Tally {
-            feet: u64,
-            rim: u64,
-            drops: u64,
-        }
-
         let mut tallies: BTreeMap<u32, Tally> = BTreeMap::new();
         // Count each component's feet, and the sides on which it ends or drops.
         for a in (0..self.feet.len()).filter(|&a| self.feet[a].walkable) {
@@ -203,14 +195,9 @@ impl Ground {
         }
 
         let square = self.grid.step * self.grid.step;
-        let is_floor = |tally: &Tally| {
-            let m2 = tally.feet as f64 * square;
-            let is_furniture = tally.drops as f64 > DROP_SHARE * tally.rim as f64 && m2 < LARGEST_TABLE_M2;
-            m2 >= SMALLEST_M2 && !is_furniture
-        };
         let floors: Vec<u32> = tallies
             .iter()
-            .filter(|(_, t)| is_floor(t))
+            .filter(|(_, tally)| tally.is_floor(square))
             .map(|(&first, _)| first)
             .collect();
 
@@ -221,8 +208,10 @@ impl Ground {
         }
 
         let around = sides_within(LEGS_M / self.grid.step);
-        let is_place = |a| is_free(&self.feet[a]) && self.is_level(a, &around);
-        self.is_place = (0..self.feet.len()).into_par_iter().map(is_place).collect();
+        self.is_place = (0..self.feet.len())
+            .into_par_iter()
+            .map(|a| is_free(&self.feet[a]) && self.is_level(a, &around))
+            .collect();
         self.floor.walkable_m2 = walkable as f64 * square;
 
         if !self.is_place.contains(&true) {
@@ -246,7 +235,7 @@ impl Ground {
 
     /// Returns the places with most room around, one for each square of `cell_m` or larger, in the order of
     /// the grid. There are at most `most` places, or one for each component if that is more.
-    pub(super) fn candidates(&self, cell_m: f64, most: usize) -> Vec<Place> {
+    pub(super) fn candidates(&self, cell_m: f64, most: usize) -> Vec<Standpoint> {
         let square = self.grid.step * self.grid.step;
         let mut cell_m = cell_m.max(self.grid.step);
         loop {
@@ -262,18 +251,13 @@ impl Ground {
                     continue;
                 }
 
-                let off = |b: usize| {
-                    let at = self.grid.at(&self.feet[b]) - self.grid.origin;
-                    let off = |c: f64, i: i64| (c / cell_m - i as f64 - 0.5).powi(2);
-                    off(at.x, cell[0]) + off(at.y, cell[1])
-                };
-                let is_better = |old: usize| {
-                    let this = self.feet[a].clearance_m;
+                let is_better = best.0.is_none_or(|old| {
+                    let this_m = self.feet[a].clearance_m;
                     let old_m = self.feet[old].clearance_m;
-                    this > old_m || this == old_m && off(a) < off(old)
-                };
-
-                if best.0.is_none_or(is_better) {
+                    this_m > old_m
+                        || this_m == old_m && self.off(a, cell, cell_m) < self.off(old, cell, cell_m)
+                });
+                if is_better {
                     best.0 = Some(a);
                 }
             }
@@ -284,16 +268,24 @@ impl Ground {
             // Stop also if squares are larger than the building, since they do not become fewer.
             if found.len() <= most || cell_m > self.grid.extent_m() {
                 found.sort_by_key(|(a, _)| *a);
-                let place = |(a, stands_for_m2): (usize, f64)| Place {
-                    foot: self.grid.at(&self.feet[a]),
-                    clearance_m: self.feet[a].clearance_m,
-                    stands_for_m2,
-                };
-                return found.into_iter().map(place).collect();
+                return found
+                    .into_iter()
+                    .map(|(a, stands_for_m2)| Standpoint {
+                        foot: self.grid.at(&self.feet[a]),
+                        clearance_m: self.feet[a].clearance_m,
+                        stands_for_m2,
+                    })
+                    .collect();
             }
 
             cell_m *= (found.len() as f64 / most as f64).sqrt().max(1.1);
         }
+    }
+
+    /// Returns the squared distance of a foot from the middle of its square, in squares.
+    fn off(&self, foot: usize, [i, j, _]: [i64; 3], cell_m: f64) -> f64 {
+        let at = self.grid.at(&self.feet[foot]) - self.grid.origin;
+        (at.x / cell_m - i as f64 - 0.5).powi(2) + (at.y / cell_m - j as f64 - 0.5).powi(2)
     }
 
     /// Returns whether the floor continues evenly at all of these sides, as far as anything is known there.
@@ -307,8 +299,10 @@ impl Ground {
     /// Returns whether one side has nothing to step on, but something below that is not the next storey.
     fn is_drop(&self, a: usize, side: Side) -> bool {
         let mut next = self.beside(a, side);
-        let below = |b: usize| self.feet[a].z - self.feet[b].z;
-        !next.clone().any(|b| self.is_step(a, b, side)) && next.any(|b| (0.0..DROP_M).contains(&below(b)))
+        if next.clone().any(|b| self.is_step(a, b, side)) {
+            return false;
+        }
+        next.any(|b| (0.0..DROP_M).contains(&(self.feet[a].z - self.feet[b].z)))
     }
 
     /// Returns whether a person can step from `a` to `b` on the line at `side`.
@@ -343,6 +337,25 @@ impl Ground {
 
 const SIDES: [Side; 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
+/// What is counted of a component's feet.
+#[derive(Default)]
+struct Tally {
+    feet: u64,
+    /// Sides on which the component ends.
+    rim: u64,
+    /// Sides on which it drops.
+    drops: u64,
+}
+
+impl Tally {
+    /// Returns whether the component is a floor, and no furniture. `square` is the area of a foot in m².
+    fn is_floor(&self, square: f64) -> bool {
+        let m2 = self.feet as f64 * square;
+        let is_furniture = self.drops as f64 > DROP_SHARE * self.rim as f64 && m2 < LARGEST_TABLE_M2;
+        m2 >= SMALLEST_M2 && !is_furniture
+    }
+}
+
 /// Half of the sides, so that every pair of neighbours comes once.
 const HALF: [Side; 4] = [(1, 0), (1, 1), (0, 1), (-1, 1)];
 
@@ -364,21 +377,32 @@ fn root(parents: &mut [u32], mut foot: u32) -> u32 {
 /// Returns whether nothing is above a foot up to the height of a location. A surface right above it that does
 /// not face down like a ceiling is the floor's own unevenness.
 fn has_headroom(scene: &Scene<'_>, foot: DVec3, facing: Facing) -> bool {
-    let hit_above = |from: f64| {
-        let way = (HEIGHT_M - from) * DVec3::Z;
-        let hit = cast_ray(scene, foot + from * DVec3::Z, way).filter(|hit| hit.t <= 1.0)?;
-        Some((from + hit.t * way.z, facing.normal(scene.mesh(), hit.face)))
-    };
-    match hit_above(SKIN_M) {
-        Some((height, normal)) if height < FOOT_M && normal.z > -LEVEL => hit_above(FOOT_M).is_none(),
+    match hit_above(scene, foot, SKIN_M) {
+        Some((height, hit)) if height < FOOT_M && facing.normal(scene.mesh(), hit.face).z > -LEVEL => {
+            hit_above(scene, foot, FOOT_M).is_none()
+        }
         hit => hit.is_none(),
     }
 }
 
+/// Returns the first hit above a foot between the height `from` and the height of a location, with its height
+/// above the foot.
+fn hit_above(scene: &Scene<'_>, foot: DVec3, from: f64) -> Option<(f64, Hit)> {
+    let way = (HEIGHT_M - from) * DVec3::Z;
+    let hit = cast_ray(scene, foot + from * DVec3::Z, way).filter(|hit| hit.t <= 1.0)?;
+    Some((from + hit.t * way.z, hit))
+}
+
 /// Measures the free space around feet with headroom.
 fn room_around(grid: &Grid, nearest: &NearestFaces<'_>, feet: &mut [Foot]) {
+    for foot in feet.iter_mut() {
+        foot.walkable = foot.has_headroom;
+        foot.clearance_m = CLEARANCE_M;
+    }
+
+    // Each height narrows what the one before left.
     let mut found = Vec::new();
-    let mut measure = |feet: &mut [Foot], height: f64, least: f32| {
+    for (height, least) in [(HEIGHT_M, BODY_M), (HIP_M, BODY_M), (KNEE_M, 0.0)] {
         let asked: Vec<usize> = (0..feet.len()).filter(|&i| feet[i].walkable).collect();
         let points: Vec<Vec3> = asked
             .iter()
@@ -389,15 +413,5 @@ fn room_around(grid: &Grid, nearest: &NearestFaces<'_>, feet: &mut [Foot]) {
             feet[i].clearance_m = feet[i].clearance_m.min(n.distance_m);
             feet[i].walkable = n.distance_m >= least;
         }
-    };
-
-    for foot in feet.iter_mut() {
-        foot.walkable = foot.has_headroom;
-        foot.clearance_m = CLEARANCE_M;
     }
-
-    // Each height narrows what the one before left.
-    measure(feet, HEIGHT_M, BODY_M);
-    measure(feet, HIP_M, BODY_M);
-    measure(feet, KNEE_M, 0.0);
 }

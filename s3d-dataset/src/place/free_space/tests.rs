@@ -34,14 +34,10 @@ impl Quads {
 
     /// Adds sides of a box: down, up, −y, +x, +y, −x, with fronts outside, or inside for a room.
     fn sides(&mut self, low: [f32; 3], high: [f32; 3], sides: &[usize], is_room: bool) {
-        let corner = |i: usize| {
-            let [x, y, z] = [i & 1, i >> 1 & 1, i >> 2].map(|b| b == 1);
-            let pick = |k: usize, high_end: bool| if high_end { high[k] } else { low[k] };
-            [pick(0, x), pick(1, y), pick(2, z)]
-        };
+        let ends = [low, high];
         let all = [[2, 3, 1, 0], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
         for &side in sides {
-            let mut corners = all[side].map(corner);
+            let mut corners = all[side].map(|i| [ends[i & 1][0], ends[i >> 1 & 1][1], ends[i >> 2][2]]);
             if is_room {
                 corners.reverse();
             }
@@ -130,15 +126,17 @@ fn both_storeys_and_every_room_get_a_location() {
     }
 }
 
+/// Returns the heights of the lowest and the highest foot of the largest floor.
+fn heights(building: &Building) -> [f64; 2] {
+    let scene = built(building);
+    let rays = Scene::new(&scene.mesh);
+    let nearest = NearestFaces::new(&scene.mesh);
+    let ground = Ground::find(&Context::default(), &rays, &nearest, Facing::Fronts).unwrap();
+    ground.heights_of_largest()
+}
+
 #[test]
 fn stairs_join_storeys() {
-    let heights = |building: &Building| {
-        let scene = built(building);
-        let rays = Scene::new(&scene.mesh);
-        let nearest = NearestFaces::new(&scene.mesh);
-        let ground = Ground::find(&Context::default(), &rays, &nearest, Facing::Fronts).unwrap();
-        ground.heights_of_largest()
-    };
     let mut building = Building::two_storeys();
     let [low, high] = heights(&building);
     assert!(low < 0.01 && high > 2.84, "{low} {high}");
@@ -267,8 +265,10 @@ fn nobody_stands_under_eaves() {
     house.block([-2.0, -2.0, 2.65], [10.0, 12.0, 2.9]);
     let found = place(&house.mesh(), FreeSpaceOptions { share: 1.0, ..SHARE }).unwrap();
     let places = positions(&found);
-    let is_in = |at: &DVec3| at.x > 0. && at.y > 0. && (at.x < 8. && at.y < 5. || at.x < 4. && at.y < 10.);
-    assert!(places.iter().all(is_in), "{places:?}");
+    for at in &places {
+        let is_in = at.x > 0. && at.y > 0. && (at.x < 8. && at.y < 5. || at.x < 4. && at.y < 10.);
+        assert!(is_in, "{places:?}");
+    }
     for room in [0.0..5.0, 5.4..10.0] {
         assert!(places.iter().any(|at| room.contains(&at.y)), "{places:?}");
     }

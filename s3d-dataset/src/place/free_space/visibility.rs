@@ -40,7 +40,7 @@ const AROUND_SHARE: f64 = 0.85;
 pub(super) struct Surface {
     points: Vec<DVec3>,
     normals: Vec<DVec3>,
-    pub(super) m2_per_sample: f64,
+    m2_per_sample: f64,
 }
 
 impl Surface {
@@ -55,6 +55,11 @@ impl Surface {
             normals: cloud.faces.iter().map(|&f| mesh.normal(f).as_dvec3()).collect(),
             m2_per_sample: m2 / total as f64,
         }
+    }
+
+    /// Returns the area of a number of samples, in m².
+    pub(super) fn m2(&self, samples: usize) -> f64 {
+        samples as f64 * self.m2_per_sample
     }
 
     pub(super) fn len(&self) -> usize {
@@ -107,8 +112,11 @@ impl Enclosure {
         let mut around = [0.0; 2];
         for direction in directions() {
             let hit = cast_ray(scene, eye, direction);
-            let is_front = |face| facing.normal(scene.mesh(), face).as_dvec3().dot(direction) < 0.0;
-            let kind = hit.map_or(2, |hit| usize::from(!is_front(hit.face)));
+            let kind = hit.map_or(2, |hit| {
+                let normal = facing.normal(scene.mesh(), hit.face).as_dvec3();
+                let is_front = normal.dot(direction) < 0.0;
+                usize::from(!is_front)
+            });
             all[kind] += 1.0;
             if (0.0..0.26).contains(&direction.z) {
                 around[usize::from(kind != 0)] += 1.0;

@@ -186,39 +186,45 @@ fn explained(
         }
     }
 
-    let share = |k: usize| {
+    let [first, second] = [0, 1].map(|k| {
         if counts[k] == 0 {
             1.0
         } else {
             right[k] as f64 / counts[k] as f64
         }
-    };
-    share(0).min(share(1))
+    });
+    first.min(second)
 }
 
 /// Whether two values are equal within rounding and the effect of resampling.
 fn near(domain: Domain, found: [f64; 3], expected: [f64; 3]) -> bool {
-    let within = |k: usize| match domain {
-        Domain::Depth => 1.5 + 5e-4 * expected[k],
-        Domain::Normal => 2.0,
-        Domain::Rgb => 14.0,
-        Domain::GlobalXyz => 2e-4 + 1e-3 * expected[k].abs(),
-        Domain::Semantic | Domain::SemanticPretty | Domain::SemanticClass | Domain::Pose => 0.0,
-    };
-    (0..3).all(|k| (found[k] - expected[k]).abs() <= within(k))
+    found.into_iter().zip(expected).all(|(found, expected)| {
+        let within = match domain {
+            Domain::Depth => 1.5 + 5e-4 * expected,
+            Domain::Normal => 2.0,
+            Domain::Rgb => 14.0,
+            Domain::GlobalXyz => 2e-4 + 1e-3 * expected.abs(),
+            Domain::Semantic | Domain::SemanticPretty | Domain::SemanticClass | Domain::Pose => 0.0,
+        };
+        (found - expected).abs() <= within
+    })
+}
+
+/// The index that a colour stands for.
+fn index_of_color([r, g, b]: [f64; 3]) -> u32 {
+    r as u32 * 65_536 + g as u32 * 256 + b as u32
 }
 
 /// Checks whether the indices come from another label table, in which each stands for one label but not for
 /// its own.
 fn other_table(reference: &Reference<'_>, sample: &[Probe]) -> Option<String> {
-    let index = |c: [f64; 3]| c[0] as u32 * 65_536 + c[1] as u32 * 256 + c[2] as u32;
     let mut meanings: std::collections::BTreeMap<u32, std::collections::BTreeMap<u32, u32>> =
         Default::default();
     for probe in sample {
         *meanings
-            .entry(index(probe.found))
+            .entry(index_of_color(probe.found))
             .or_default()
-            .entry(index(probe.expected))
+            .entry(index_of_color(probe.expected))
             .or_default() += 1;
     }
 
@@ -394,17 +400,15 @@ fn of_others(
     found.sort_by_key(|(elsewhere, i, _)| (*elsewhere, *i));
     found.truncate(MOST_OTHERS);
 
-    let name = |i: usize, elsewhere: bool| match (images[i].frame, elsewhere) {
-        (Frame::View(n), false) => {
-            format!("it is what frame {n} of this location shows ({}): swapped?", images[i].stem())
-        }
-        _ => format!("it is what {} shows: swapped?", images[i].stem()),
-    };
-
     found
         .into_iter()
         .map(|(elsewhere, i, camera)| Suspect {
-            words: name(i, elsewhere),
+            words: match (images[i].frame, elsewhere) {
+                (Frame::View(n), false) => {
+                    format!("it is what frame {n} of this location shows ({}): swapped?", images[i].stem())
+                }
+                _ => format!("it is what {} shows: swapped?", images[i].stem()),
+            },
             ray: Ray::Of(camera),
             change: as_is,
         })

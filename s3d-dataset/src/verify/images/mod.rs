@@ -9,7 +9,7 @@ use crate::export::modality::{Channels, Drawn, Image, ImageBuffers, NO_CLASS, nu
 use crate::record::manifest::Manifest;
 use crate::verify::files::Files;
 use crate::verify::images::pixels::{Difference, Opened, Pixels};
-use crate::verify::images::rays::{difference, points_of_depth};
+use crate::verify::images::rays::{difference, index_of, points_of_depth};
 use crate::verify::labels::Labels;
 use crate::verify::mesh::LabelledMesh;
 use crate::verify::photographs::{Photographs, check_share};
@@ -23,8 +23,8 @@ use s3d_io::fs::read_file;
 use s3d_io::image::PngReader;
 use s3d_render::{Caster, Hits, MISSING_INDEX, NO_FACE};
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 const SIZES: (Topic, &str) = (Topic::Images, "sizes");
 const CLASSES: (Topic, &str) = (Topic::Images, "classes");
@@ -120,41 +120,8 @@ impl ImageCheck<'_> {
             }
         };
 
-        // Every modality of the manifest must be there, and no other.
-        for &domain in self.domains {
-            let path = image.path(self.layout, domain);
-            report.check(image.has(domain), MISSING, &path, || {
-                format!("missing: {} is there", image.relative_path(image.domains[0]))
-            });
-            if image.has(domain) && domain == Domain::Pose {
-                self.files.check(&path, report);
-            }
-        }
-        for &domain in image.domains.iter().filter(|d| !self.domains.contains(d)) {
-            report.fault(
-                MISSING.0,
-                "modalities that were not asked for",
-                &image.path(self.layout, domain),
-                "the manifest does not tell of this modality",
-            );
-        }
-
-        let read = || pose::read_and_check(self.layout, image, size, photograph.is_some(), report);
-        let pose = image.has(Domain::Pose).then(read).flatten();
-        if let Some(pose) = &pose {
-            let path = image.path(self.layout, Domain::Pose);
-            let offset_m = self.manifest.area(image.area).and_then(|area| area.offset_m);
-            pose::check_frame(pose, offset_m, &path, report);
-            let draw = self.views.draw_of(image);
-            if draw.is_some() || image.frame == Frame::Panorama {
-                pose::check_draw(pose, draw, &path, report);
-            }
-            self.cameras
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
-                .push((index, pose.camera));
-        }
-
+        self.check_modalities(image);
+        let pose = self.pose(index, image, size, photograph.is_some());
         let cast = match (&pose, &mut memory.caster) {
             (Some(pose), Some(caster)) => {
                 caster.cast_into(&pose.camera, 1, &mut memory.hits);
@@ -197,6 +164,57 @@ impl ImageCheck<'_> {
         }
 
         memory.reader = reader;
+    }
+
+    /// Checks that an image has every modality of the manifest and no other.
+    fn check_modalities(&self, image: &DatasetImage) {
+        let report = self.report;
+        for &domain in self.domains {
+            let path = image.path(self.layout, domain);
+            report.check(image.has(domain), MISSING, &path, || {
+                format!("missing: {} is there", image.relative_path(image.domains[0]))
+            });
+            if image.has(domain) && domain == Domain::Pose {
+                self.files.check(&path, report);
+            }
+        }
+        for &domain in image.domains.iter().filter(|d| !self.domains.contains(d)) {
+            report.fault(
+                MISSING.0,
+                "modalities that were not asked for",
+                &image.path(self.layout, domain),
+                "the manifest does not tell of this modality",
+            );
+        }
+    }
+
+    /// Reads and checks the pose of an image, and keeps its camera.
+    fn pose(
+        &self,
+        index: usize,
+        image: &DatasetImage,
+        size: (u32, u32),
+        is_photograph: bool,
+    ) -> Option<CheckedPose> {
+        let report = self.report;
+        if !image.has(Domain::Pose) {
+            return None;
+        }
+        let pose = pose::read_and_check(self.layout, image, size, is_photograph, report)?;
+
+        let path = image.path(self.layout, Domain::Pose);
+        let offset_m = self.manifest.area(image.area).and_then(|area| area.offset_m);
+        pose::check_frame(&pose, offset_m, &path, report);
+        let draw = self.views.draw_of(image);
+        if draw.is_some() || image.frame == Frame::Panorama {
+            pose::check_draw(&pose, draw, &path, report);
+        }
+
+        self.cameras
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push((index, pose.camera));
+        Some(pose)
     }
 
     /// Whether the mesh shows the contents of a file of this domain.
@@ -347,9 +365,11 @@ impl ImageFiles<'_> {
             return;
         };
 
-        let of_hits = || hits.face.pixels().iter().map(|face| *face == NO_FACE).collect();
         let missing = pixels.missing(domain);
-        let expected = expected.clone().unwrap_or_else(of_hits);
+        let expected = match expected {
+            Some(expected) => expected.clone(),
+            None => hits.face.pixels().iter().map(|face| *face == NO_FACE).collect(),
+        };
         // A missing depth may also be one that is too far.
         let wrong = |(m, e): (&bool, &bool)| if domain == Domain::Depth { *e && !*m } else { m != e };
 
@@ -387,8 +407,10 @@ impl ImageFiles<'_> {
         let (Some(reference), Some(indices)) = (reference, indices) else { return };
         let UnlabelledPixels { images, without_votes, without_label } = self.check.unlabelled;
         let is_voted = &reference.mesh.is_voted;
-        let unvoted = |face: &&u32| **face != NO_FACE && !is_voted[**face as usize];
-        let faces = memory.hits.face.pixels().iter().filter(unvoted).count();
+        let faces = memory.hits.face.pixels().iter();
+        let faces = faces
+            .filter(|face| **face != NO_FACE && !is_voted[**face as usize])
+            .count();
         without_votes.fetch_add(faces as u64, Ordering::Relaxed);
         without_label.fetch_add(null_pixels(indices.pixels()), Ordering::Relaxed);
         images.fetch_add(1, Ordering::Relaxed);
@@ -397,8 +419,7 @@ impl ImageFiles<'_> {
     /// Checks that every label index is in the table.
     fn indices(&self, indices: &Raster<[u8; 3]>, path: &Path) {
         let Some(labels) = self.check.labels else { return };
-        let of = |[r, g, b]: [u8; 3]| u32::from_be_bytes([0, r, g, b]);
-        let wrong = |p: &[u8; 3]| of(*p) as usize >= labels.len() && *p != MISSING_INDEX;
+        let wrong = |p: &[u8; 3]| index_of(*p) as usize >= labels.len() && *p != MISSING_INDEX;
         let first = indices.pixels().iter().position(wrong);
         self.check.report.check(first.is_none(), INDICES, path, || {
             let at = first.unwrap_or_default();
@@ -411,7 +432,7 @@ impl ImageFiles<'_> {
                 labels.len(),
                 at % width,
                 at / width,
-                of(value)
+                index_of(value)
             )
         });
     }
@@ -419,16 +440,14 @@ impl ImageFiles<'_> {
     /// Checks that the colours belong to the label indices.
     fn pretty(&self, colors: &Raster<[u8; 3]>, path: &Path, memory: &Scratch<'_>) {
         let (Some(labels), Some(indices)) = (self.check.labels, self.semantic(memory)) else { return };
-        let expected = |[r, g, b]: [u8; 3]| {
-            labels
-                .pretty
-                .get(u32::from_be_bytes([0, r, g, b]) as usize)
-                .copied()
-                .unwrap_or([0; 3])
-        };
-        let same = |c: [u8; 3], i: [u8; 3]| c == expected(i);
-        let text = |c| format!("{c:?}");
-        let difference = Difference::of(colors, indices, same, text, |i| text(expected(i)));
+        let expected = |pixel| labels.pretty.get(index_of(pixel) as usize).copied().unwrap_or([0; 3]);
+        let difference = Difference::of(
+            colors,
+            indices,
+            |color, index| color == expected(index),
+            |color| format!("{color:?}"),
+            |index| format!("{:?}", expected(index)),
+        );
         self.check.report.check(difference.is_none(), PRETTY, path, || {
             difference
                 .map_or(String::new(), |d| d.sentence("the colours of the labels in the semantic image"))
@@ -444,16 +463,20 @@ impl ImageFiles<'_> {
                 format!("its palette has not the colours of {}", labels.taxonomy.name())
             });
         let Some(indices) = self.semantic(memory) else { return };
-        let expected = |[r, g, b]: [u8; 3]| {
+        let expected = |pixel| {
             labels
                 .classes
-                .get(u32::from_be_bytes([0, r, g, b]) as usize)
+                .get(index_of(pixel) as usize)
                 .copied()
                 .unwrap_or(NO_CLASS)
         };
-        let same = |c: u8, i: [u8; 3]| c == expected(i);
-        let text = |c: u8| labels.class_name(c);
-        let difference = Difference::of(places, indices, same, text, |i| text(expected(i)));
+        let difference = Difference::of(
+            places,
+            indices,
+            |class, index| class == expected(index),
+            |class| labels.class_name(class),
+            |index| labels.class_name(expected(index)),
+        );
         self.check.report.check(difference.is_none(), CLASSES, path, || {
             difference
                 .map_or(String::new(), |d| d.sentence("the classes of the labels in the semantic image"))
@@ -566,7 +589,7 @@ impl ImageFiles<'_> {
             self.check
                 .mismatches
                 .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .unwrap_or_else(PoisonError::into_inner)
                 .push(mismatch);
         }
         Some(pixels)

@@ -30,22 +30,17 @@ pub(super) fn difference(
     expected: Drawn<'_>,
 ) -> Option<Difference> {
     let labels = reference.labels;
-    let point = |p: [f32; 3]| format!("{p:?}");
-    let to_f32 = |p: [f16; 3]| p.map(f16::to_f32);
-
     match (pixels, expected) {
         (Pixels::Color(found), Drawn::Color(expected)) => {
-            let index = |c: [u8; 3]| u32::from_be_bytes([0, c[0], c[1], c[2]]);
             let text = |c: [u8; 3]| match (image, c) {
                 (Image::Semantic, MISSING_INDEX) => "nothing".to_owned(),
-                (Image::Semantic, c) => format!("{} ({})", index(c), labels.name_of(index(c))),
+                (Image::Semantic, c) => format!("{} ({})", index_of(c), labels.name_of(index_of(c))),
                 (_, c) => format!("{c:?}"),
             };
             Difference::of(found, expected, |a, b| a == b, text, text)
         }
         (Pixels::Class(found, _), Drawn::Class(expected)) => {
-            let text = |place: u8| labels.class_name(place);
-            Difference::of(found, expected, |a, b| a == b, text, text)
+            Difference::of(found, expected, |a, b| a == b, |c| labels.class_name(c), |c| labels.class_name(c))
         }
         (Pixels::Depth(found), Drawn::Depth(expected)) => {
             Difference::of(found, expected, |a, b| a == b, |d| d.to_string(), |d| d.to_string())
@@ -60,9 +55,22 @@ pub(super) fn difference(
             Difference::of(found, expected, |a, b| to_f32(a) == b, |p| point(to_f32(p)), point)
         }
         (Pixels::XyzHalf(found), Drawn::XyzHalf(expected)) => {
-            let text = |p| point(to_f32(p));
-            Difference::of(found, expected, |a, b| a == b, text, text)
+            Difference::of(found, expected, |a, b| a == b, |p| point(to_f32(p)), |p| point(to_f32(p)))
         }
         _ => unreachable!("{} is read as what is drawn of it", image.domain()),
     }
+}
+
+/// The label index of a pixel of a semantic image.
+pub(super) fn index_of([r, g, b]: [u8; 3]) -> u32 {
+    u32::from_be_bytes([0, r, g, b])
+}
+
+/// A point in words.
+fn point(p: [f32; 3]) -> String {
+    format!("{p:?}")
+}
+
+fn to_f32(p: [f16; 3]) -> [f32; 3] {
+    p.map(f16::to_f32)
 }

@@ -126,8 +126,6 @@ fn shape_edges(scene: &Scene<'_>, hits: &Hits, camera: &Camera, valid: &[bool]) 
     let size = [camera.width as usize, camera.height as usize];
     let depth = hits.depth.pixels();
     let faces = hits.face.pixels();
-    let normal = |i: usize| scene.mesh().normal(faces[i]).as_dvec3();
-
     let found = at_inner(size, |i| {
         let [left, right, up, down] = around(i, size[0]);
         if ![i, left, right, up, down].iter().all(|k| valid[*k]) {
@@ -135,9 +133,10 @@ fn shape_edges(scene: &Scene<'_>, hits: &Hits, camera: &Camera, valid: &[bool]) 
         }
         let across = |a: usize, b: usize| {
             // On a plane, the depth of a pixel is the harmonic mean of its two neighbours.
-            let inverse = |k: usize| 1.0 / f64::from(depth[k]).max(1e-6);
-            let bend = (inverse(a) + inverse(b) - 2.0 * inverse(i)).abs() / inverse(i);
-            let turn = 1.0 - normal(a).dot(normal(b)).clamp(-1.0, 1.0);
+            let [before, here, after] = [a, i, b].map(|k| 1.0 / f64::from(depth[k]).max(1e-6));
+            let bend = (before + after - 2.0 * here).abs() / here;
+            let [left, right] = [a, b].map(|k| scene.mesh().normal(faces[k]).as_dvec3());
+            let turn = 1.0 - left.dot(right).clamp(-1.0, 1.0);
             (bend / STEP).min(1.0) + turn.min(1.0)
         };
         across(left, right) + across(up, down)
@@ -176,8 +175,9 @@ fn softened(values: &[f64], size: [usize; 2]) -> Vec<f64> {
         let before = blurred.clone();
         for y in 1..height.saturating_sub(1) {
             for x in 1..width.saturating_sub(1) {
-                let row = |y: usize| before[y * width + x - 1..=y * width + x + 1].iter().sum::<f64>();
-                blurred[y * width + x] = (row(y - 1) + row(y) + row(y + 1)) / 9.0;
+                let [above, here, below] = [y - 1, y, y + 1]
+                    .map(|y| before[y * width + x - 1..=y * width + x + 1].iter().sum::<f64>());
+                blurred[y * width + x] = (above + here + below) / 9.0;
             }
         }
     }

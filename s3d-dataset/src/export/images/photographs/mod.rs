@@ -5,7 +5,7 @@ pub(crate) mod agreement;
 use crate::condition::Condition;
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::images::{ImageJob, Memory, count};
+use crate::export::images::{ImageJob, ImageWriter, Memory, count};
 use crate::export::input::photographs::{Photograph, Photographs};
 use crate::export::location::room_name;
 use crate::export::modality::{Channels, Image};
@@ -18,8 +18,7 @@ use rayon::prelude::*;
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
 use s3d_io::camera::read_picture;
-use s3d_io::dataset::{Domain, FileRecord, Frame, PhotographRecord, PoseFile};
-use s3d_io::fs::write_bytes;
+use s3d_io::dataset::{Domain, Frame, PhotographRecord};
 use s3d_label::Room;
 use s3d_render::{Caster, Hits, NO_FACE, Scene, undistort};
 use std::time::Instant;
@@ -78,11 +77,7 @@ pub(crate) fn write_photograph(
     let Shot { photograph, room } = shot;
     let Photograph { name, uuid, picture, lens, camera } = photograph;
     let room = room_name(*room);
-    let write = |domain: Domain, bytes: &[u8]| -> Result<FileRecord> {
-        let path = job.layout.image_path(job.area, uuid, &room, VIEW, domain);
-        write_bytes(&path, bytes)?;
-        Ok(FileRecord::of_bytes(job.layout.root(), &path, bytes)?)
-    };
+    let writer = ImageWriter { job, uuid, room: &room, frame: VIEW };
 
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
     let mut tally =
@@ -105,21 +100,18 @@ pub(crate) fn write_photograph(
         caster.cast_into(camera, 1, hits);
 
         let channels = Channels { pictures: Some(PictureColors::Photograph(&colors)), ..job.channels };
-        let each = |image: Image, file: Vec<u8>| write(image.domain(), &file);
-        files = channels.encode(&images, hits, camera, buffers, each)?;
+        files = channels
+            .encode(&images, hits, camera, buffers, |image, file| writer.write(image.domain(), &file))?;
 
         let pixels = count(job, &images, hits, buffers);
-        let share = |count: u64| count as f64 / colors.len() as f64;
-        masked = share(colors.pixels().iter().filter(|color| **color == [0; 3]).count() as u64);
-        seen = 1.0 - share(pixels.pixels_missing);
+        let black = colors.pixels().iter().filter(|color| **color == [0; 3]).count();
+        masked = black as f64 / colors.len() as f64;
+        seen = 1.0 - pixels.pixels_missing as f64 / colors.len() as f64;
         tally.views += pixels;
     }
 
     if job.modalities.contains(&Domain::Pose) {
-        let room = format!("{room}_{}", job.area);
-        let mut pose = PoseFile::new(camera, &camera.pose, uuid, &room, VIEW);
-        pose.world_offset_m = job.offset_m;
-        files.push(write(Domain::Pose, &pose.to_json())?);
+        files.push(writer.write_pose(camera, &camera.pose)?);
     }
 
     files.sort();
@@ -211,9 +203,8 @@ fn agreement_doubt(area: u32, records: &[&PhotographRecord]) -> Option<String> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_few_bad_poses_are_named_and_many_are_told_as_one() {
-        let record = |name: &str, agreement: Option<f64>| PhotographRecord {
+    fn record(name: &str, agreement: Option<f64>) -> PhotographRecord {
+        PhotographRecord {
             camera_uuid: "a".into(),
             name: name.into(),
             room: "unknown_1".into(),
@@ -223,19 +214,27 @@ mod tests {
             seen: 1.0,
             agreement,
             chance: Some(0.1),
-        };
+        }
+    }
 
-        let of = |scores: &[Option<f64>]| {
-            let records: Vec<_> = scores
-                .iter()
-                .zip(1..)
-                .map(|(s, i)| record(&format!("{i}.jpg"), *s))
-                .collect();
-            doubts(3, &records.iter().collect::<Vec<_>>())
-        };
+    /// Returns the doubts about photographs that agree with the mesh as well as `scores` say.
+    fn doubts_of(scores: &[Option<f64>]) -> Vec<String> {
+        let records: Vec<_> = scores
+            .iter()
+            .zip(1..)
+            .map(|(s, i)| record(&format!("{i}.jpg"), *s))
+            .collect();
+        doubts(3, &records.iter().collect::<Vec<_>>())
+    }
 
-        assert!(of(&[]).is_empty() && of(&[None]).is_empty() && of(&[Some(0.5), Some(0.4), None]).is_empty());
-        let some = of(&[Some(0.5), Some(0.12), Some(0.4), Some(0.6)]);
+    #[test]
+    fn a_few_bad_poses_are_named_and_many_are_told_as_one() {
+        assert!(
+            doubts_of(&[]).is_empty()
+                && doubts_of(&[None]).is_empty()
+                && doubts_of(&[Some(0.5), Some(0.4), None]).is_empty()
+        );
+        let some = doubts_of(&[Some(0.5), Some(0.12), Some(0.4), Some(0.6)]);
         assert!(
             some[0].contains("1 of 4 photographs") && some[0].contains("the worst 2.jpg (0.12)"),
             "{some:?}"
@@ -245,7 +244,7 @@ mod tests {
         let of_mask = doubts(3, &[&record("a.jpg", Some(0.5)), &masked]);
         assert!(of_mask[0].contains("1 of 2 photographs fill less than half of their views, m.jpg 25 %"));
 
-        let most = of(&[Some(0.5), Some(0.12), Some(0.0)]);
+        let most = doubts_of(&[Some(0.5), Some(0.12), Some(0.0)]);
         assert!(
             most[0].contains("no more than by chance: the median") && most[0].contains("0.12"),
             "{most:?}"

@@ -1,0 +1,228 @@
+//! Opens an area of files: a scene file, or meshes alone.
+
+use crate::error::{Error, Result};
+use crate::export::input::area::AreaInput;
+use crate::export::input::cameras::Cameras;
+use crate::export::input::colors::PointColors;
+use crate::export::input::mesh::{MeshFrame, MeshSource};
+use crate::export::input::numbering::number;
+use crate::export::input::photographs::Photographs;
+use crate::export::input::unit::UnitGuess;
+use crate::export::input::up_axis::UpGuess;
+use crate::options::placing::Placing;
+use crate::record::request::InputRecord;
+use s3d_io::cloud::{AnnotationOptions, Annotations, OnFault};
+use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::scene::{CameraSource, MeshColors, SceneFile};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Which parts of an area are opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Opened {
+    /// Whether the annotations are opened. If not, a plan replaces them, and the area has no rooms.
+    pub(super) annotations: bool,
+    /// Whether the mesh stays in memory. Several meshes are read again where they are needed, so that they
+    /// never share the memory.
+    pub(super) keep_mesh: bool,
+}
+
+impl AreaInput {
+    /// Opens the area of a scene file.
+    pub(super) fn open(scene: SceneFile, asked: Option<Placing>, opened: Opened) -> Result<Self> {
+        if let Some(folder) = &scene.published {
+            let folder = folder.clone();
+            return Self::published(&folder, Some(scene), asked, opened);
+        }
+
+        let mut source = mesh_source(&scene);
+
+        // The mesh is read first: annotations that lie far from it need not be read.
+        let mut file = source.read()?;
+        let frame = MeshFrame::of(&file);
+        let takes_colors = scene.mesh_colors == MeshColors::Points;
+
+        let mut rooms = Vec::new();
+        let mut notes = Vec::new();
+        let mut warnings = Vec::new();
+
+        if (opened.annotations || takes_colors) && scene.is_labelled {
+            let mut annotations = open_annotations(&scene, &file, &frame)?;
+            warnings = std::mem::take(&mut annotations.warnings);
+
+            if takes_colors && let MeshSource::Files { colors, .. } = &mut source {
+                let found = PointColors::of(&scene.path, &file.mesh, &annotations)?;
+                notes.push(found.sentence());
+                warnings.extend(found.doubts());
+                *colors = found.vertices.colors;
+                let mut colored = Arc::unwrap_or_clone(file);
+                colored.mesh = colored.mesh.with_vertex_colors(colors.clone());
+                file = Arc::new(colored);
+            }
+
+            let of = scene.annotations.first().unwrap_or(&scene.mesh[0]);
+            if opened.annotations {
+                rooms = number(scene.area, annotations).map_err(|e| Error::unfit(of, e.to_string()))?;
+            }
+        }
+
+        let mesh_file = opened.keep_mesh.then_some(file);
+        let photographs = photographs_of(&scene, &frame)?;
+
+        let (cameras, cameras_path) =
+            Cameras::of_scene(&scene, asked, frame.offset_m)?.unwrap_or_else(|| {
+                // An area with photographs needs no other locations.
+                let cameras = if photographs.all.is_empty() {
+                    Cameras::listed_or_placed(Vec::new(), Vec::new())
+                } else {
+                    Cameras::Listed(Vec::new(), Vec::new())
+                };
+                (cameras, scene.path.clone())
+            });
+        frame.refuse_far_locations(&cameras_path, cameras.listed())?;
+
+        Ok(Self {
+            number: scene.area,
+            source,
+            frame,
+            mesh_file,
+            is_labelled: scene.is_labelled,
+            taxonomy: scene.taxonomy.clone(),
+            rooms,
+            cameras,
+            notes,
+            warnings,
+            lenient: scene.annotation_options.on_fault == OnFault::Skip,
+            files: files_of(&scene)
+                .into_iter()
+                .chain(photographs.files().cloned())
+                .collect(),
+            sources: files_of(&scene)
+                .into_iter()
+                .chain(photographs.by_folder().into_keys())
+                .collect(),
+            annotations: scene.annotations,
+            records: Vec::new(),
+            photographs,
+            cameras_path,
+            pictures: scene.pictures,
+            path: scene.path,
+        })
+    }
+
+    /// Opens an area of meshes alone. Their up axis and their unit are guessed if nobody says them.
+    pub(super) fn of_meshes(
+        paths: &[PathBuf],
+        (up, units): (Option<UpAxis>, Option<LengthUnit>),
+        asked: Option<Placing>,
+        opened: Opened,
+    ) -> Result<Self> {
+        // By glTF's definition +Y points up, and the unit is the metre.
+        let first = paths.first().filter(|path| !is_gltf(path));
+        let first = match first.filter(|_| up.is_none() || units.is_none()) {
+            Some(path) => {
+                let options = MeshOptions { origin: MeshOrigin::Near, units, ..MeshOptions::default() };
+                Some(s3d_io::mesh::read_mesh_with(path, UpAxis::Z, &options)?)
+            }
+            None => None,
+        };
+
+        let guess = first
+            .as_ref()
+            .filter(|_| up.is_none())
+            .map(|file| UpGuess::of(&file.mesh));
+        let up = up.or(guess.map(|guess| guess.up())).unwrap_or(UpAxis::Y);
+
+        let unsaid = first
+            .as_ref()
+            .filter(|file| units.is_none() && file.unit_said.is_none());
+        let unit_guess = unsaid.map(|file| UnitGuess::of(&file.mesh, up));
+        let units = units.or(unit_guess
+            .map(|guess| guess.unit())
+            .filter(|unit| *unit != LengthUnit::Metre));
+        drop(first);
+
+        let scene = SceneFile { units, ..SceneFile::of_meshes(paths.to_vec(), up) };
+        let mut text = format!("area = {}\n[mesh]\nup = {:?}\n", scene.area, up.name());
+        text.extend(units.map(|unit| format!("units = {:?}\n", unit.name())));
+
+        let mut area = Self::open(scene, asked, opened)?;
+        area.notes.extend(guess.map(|guess| guess.sentence()));
+        area.notes.extend(unit_guess.and_then(|guess| guess.sentence()));
+        area.warnings.extend(guess.and_then(|guess| guess.doubt()));
+        area.warnings.extend(unit_guess.and_then(|guess| guess.doubt()));
+
+        area.records.push(InputRecord::of_text("scene", &text));
+        Ok(area)
+    }
+}
+
+/// Returns where the mesh of a scene file is.
+fn mesh_source(scene: &SceneFile) -> MeshSource {
+    let options = &scene.annotation_options;
+    // Named columns are columns of the annotations, if there are any.
+    let are_of_mesh = scene.annotations.is_empty();
+    MeshSource::Files {
+        paths: scene.mesh.clone(),
+        up: scene.up,
+        options: MeshOptions {
+            class_column: options.class_column.clone().filter(|_| are_of_mesh),
+            instance_column: options.instance_column.clone().filter(|_| are_of_mesh),
+            origin: scene.mesh_offset_m.map_or(MeshOrigin::Near, MeshOrigin::At),
+            units: scene.units,
+        },
+        colors: Vec::new(),
+    }
+}
+
+/// Opens the annotations of a scene file: its own, or the labels of its mesh.
+fn open_annotations(scene: &SceneFile, file: &MeshFile, frame: &MeshFrame) -> Result<Annotations> {
+    let options = &scene.annotation_options;
+    if scene.annotations.is_empty() {
+        return Ok(Annotations::of_mesh(file, options)?);
+    }
+    let given = Some(options.offset_m).filter(|_| scene.annotations_have_offset);
+    let options = AnnotationOptions {
+        offset_m: given.unwrap_or(frame.offset_m),
+        mesh_bounds: Some(frame.bounds),
+        ..options.clone()
+    };
+    Ok(Annotations::open(&scene.annotations, &options)?)
+}
+
+/// Whether a path names a glTF file, by its ending.
+fn is_gltf(path: &Path) -> bool {
+    let ending = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
+    ["gltf", "glb"].contains(&ending.as_str())
+}
+
+/// Opens the photographs that a scene file names.
+pub(super) fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Photographs> {
+    let Some(source) = &scene.frames else { return Ok(Photographs::default()) };
+    let photographs = Photographs::open(source, scene.area, frame.offset_m)?;
+    frame.refuse_far_locations(&source.path, &photographs.locations())?;
+    Ok(photographs)
+}
+
+/// The scene file, and the files and folders that it names.
+pub(super) fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
+    let mut files = vec![scene.path.clone()];
+    files.extend(
+        scene
+            .mesh
+            .iter()
+            .chain(&scene.annotations)
+            .chain(&scene.published)
+            .cloned(),
+    );
+    if let Some(CameraSource::Listed { path, .. }) = &scene.cameras {
+        files.push(path.clone());
+    }
+    files.extend(scene.pictures.iter().map(|p| p.path.clone()));
+    files.extend(scene.taxonomy_file.clone());
+    files
+}
