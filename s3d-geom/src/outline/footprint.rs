@@ -4,7 +4,8 @@
 //! the plane", 1983): the triangles of a Delaunay triangulation whose circumscribed circle is small. It
 //! follows corners and pillars but closes the gaps under furniture.
 
-use super::polygon::{Polygon, edges, signed_area};
+use super::polygon::Polygon;
+use super::triangulation::{edges, signed_area};
 use glam::{DVec2, Vec2, Vec3, dvec2};
 use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
