@@ -67,8 +67,8 @@ impl Pose {
         Self::from_scanner(location, DQuat::from_rotation_z(yaw_rad))
     }
 
-    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix world → camera, 3 ×
-    /// 4, row by row. [`Pose::rt_matrix`] returns the same matrix.
+    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix world → camera,
+    /// 3 × 4, row by row. [`Pose::rt_matrix`] returns the same matrix.
     ///
     /// # Errors
     /// The errors of [`Pose::from_opengl`].
@@ -85,8 +85,8 @@ impl Pose {
         }
     }
 
-    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix camera → world, 4 ×
-    /// 4, row by row.
+    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix camera → world,
+    /// 4 × 4, row by row.
     ///
     /// # Errors
     /// The errors of [`Pose::from_opengl`].
@@ -95,8 +95,8 @@ impl Pose {
         Self::from_axes(location, right, -down, -forward)
     }
 
-    /// Returns the pose of an OpenGL camera (x right, y up, z backwards) from its matrix camera → world, 4 ×
-    /// 4, row by row. Blender and nerfstudio have the same axes.
+    /// Returns the pose of an OpenGL camera (x right, y up, z backwards) from its matrix camera → world,
+    /// 4 × 4, row by row. Blender and nerfstudio have the same axes.
     ///
     /// Axes from rounded files, which are off by less than a thousandth, are made perpendicular. The viewing
     /// direction is kept.
@@ -186,8 +186,8 @@ impl Pose {
     /// `view` has a roll, it is ignored.
     pub fn yaw_pitch_to(&self, view: &Pose) -> (f64, f64) {
         let turn = self.world_from_camera.transpose() * view.world_from_camera;
-        // The first column of Ry(yaw)·Rx(pitch) is (cos y, 0, −sin y), and the middle row is (0, cos p, −sin
-        // p).
+        // The first column of Ry(yaw)·Rx(pitch) is (cos y, 0, −sin y).
+        // The middle row is (0, cos p, −sin p).
         (libm::atan2(-turn.x_axis.z, turn.x_axis.x), libm::atan2(-turn.z_axis.y, turn.y_axis.y))
     }
 
