@@ -36,7 +36,6 @@
 //! ```
 
 mod colmap;
-mod colmap_cameras;
 mod located;
 mod locations;
 mod matterport;

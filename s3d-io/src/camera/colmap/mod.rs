@@ -1,4 +1,4 @@
-//! The pictures of a COLMAP model, `images.txt` or `images.bin`. Their cameras are in `colmap_cameras`.
+//! The pictures of a COLMAP model, `images.txt` or `images.bin`. Their cameras are in `cameras`.
 //! Source: COLMAP's documentation, "Output Format".
 //!
 //! Own code: lines of ten words, and the same in binary, take eighty lines to read.
@@ -6,13 +6,15 @@
 //! A picture's pose is the transform from the world to the camera in OpenCV's axes (x right, y down, z
 //! forward): a quaternion w x y z and a translation.
 
-use crate::camera::colmap_cameras::read_beside;
+mod cameras;
+
 use crate::camera::located::{fault, pose_from_opencv, rotation};
 use crate::camera::posed::PosedCamera;
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use crate::fs::quote::quote;
+use cameras::read_beside;
 use s3d_geom::Pose;
 use s3d_geom::glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
