@@ -96,11 +96,12 @@ mod tests {
     use super::*;
     use glam::dvec2;
 
+    fn square(x: f64, y: f64, side: f64) -> Vec<DVec2> {
+        vec![dvec2(x, y), dvec2(x + side, y), dvec2(x + side, y + side), dvec2(x, y + side)]
+    }
+
     #[test]
     fn a_polygon_with_holes() {
-        let square = |x: f64, y: f64, side: f64| {
-            vec![dvec2(x, y), dvec2(x + side, y), dvec2(x + side, y + side), dvec2(x, y + side)]
-        };
         let reversed = square(4.0, 4.0, 2.0).into_iter().rev().collect();
         let p = Polygon { outer: square(0.0, 0.0, 10.0), holes: vec![square(1.0, 1.0, 2.0), reversed] };
         assert_eq!(p.area(), 92.0);
@@ -132,14 +133,11 @@ mod tests {
 
     #[test]
     fn holes_that_are_not_inside() {
-        let square = |x: f64, side: f64| {
-            vec![dvec2(x, x), dvec2(x + side, x), dvec2(x + side, x + side), dvec2(x, x + side)]
-        };
-        let with = |holes| Polygon { outer: square(0.0, 4.0), holes }.triangulate();
-        assert_eq!(with(vec![square(5.0, 1.0)]), Err(PolygonError::Overlap));
-        assert_eq!(with(vec![square(1.0, 2.0), square(1.5, 0.5)]), Err(PolygonError::Overlap));
-        assert!(matches!(with(vec![square(3.0, 2.0)]), Err(PolygonError::SelfIntersection { .. })));
-        assert_eq!(with(vec![square(0.0, 4.0)]), Err(PolygonError::ZeroArea));
+        let with = |holes| Polygon { outer: square(0.0, 0.0, 4.0), holes }.triangulate();
+        assert_eq!(with(vec![square(5.0, 5.0, 1.0)]), Err(PolygonError::Overlap));
+        assert_eq!(with(vec![square(1.0, 1.0, 2.0), square(1.5, 1.5, 0.5)]), Err(PolygonError::Overlap));
+        assert!(matches!(with(vec![square(3.0, 3.0, 2.0)]), Err(PolygonError::SelfIntersection { .. })));
+        assert_eq!(with(vec![square(0.0, 0.0, 4.0)]), Err(PolygonError::ZeroArea));
         assert_eq!(with(vec![vec![]]), Err(PolygonError::TooFewCorners { corners: 0 }));
         let outer = vec![dvec2(0.0, 0.0), dvec2(1e100, 0.0), dvec2(0.0, 1.0)];
         let far = Polygon { outer, holes: vec![] }.triangulate();

@@ -14,7 +14,8 @@ const MOST_CORNERS: usize = 1 << 14;
 
 /// The reason why an outline cannot be cut into triangles.
 ///
-/// Corners count from 0. In a [`Polygon`](crate::Polygon), the corners of the holes follow the corners of the outer ring.
+/// Corners count from 0. In a [`Polygon`](crate::Polygon), the corners of the holes follow the corners of the
+/// outer ring.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum PolygonError {
@@ -288,14 +289,15 @@ mod tests {
         ]));
     }
 
+    fn circle(n: usize) -> Vec<Vec3> {
+        let angle = |i: usize| i as f32 / n as f32 * std::f32::consts::TAU;
+        (0..n)
+            .map(|i| vec3(9.0 * angle(i).cos(), 9.0 * angle(i).sin(), 1.0))
+            .collect()
+    }
+
     #[test]
     fn a_face_has_so_many_corners_at_most() {
-        let circle = |n: usize| -> Vec<Vec3> {
-            let angle = |i: usize| i as f32 / n as f32 * std::f32::consts::TAU;
-            (0..n)
-                .map(|i| vec3(9.0 * angle(i).cos(), 9.0 * angle(i).sin(), 1.0))
-                .collect()
-        };
         assert_eq!(triangulate_face(&circle(MOST_CORNERS)).unwrap().len(), MOST_CORNERS - 2);
         let corners = MOST_CORNERS + 1;
         assert_eq!(triangulate_face(&circle(corners)), Err(PolygonError::TooManyCorners { corners }));
@@ -363,29 +365,32 @@ mod tests {
         assert!(triangles.iter().all(|&t| triangle_area(&corners, t).z > 0.0));
     }
 
+    fn flat_face(corners: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, PolygonError> {
+        triangulate_face(&lifted(&ring(corners), DMat3::IDENTITY))
+    }
+
     #[test]
     fn outlines_without_triangles() {
-        let of = |corners: &[[f64; 2]]| triangulate_face(&lifted(&ring(corners), DMat3::IDENTITY));
-        assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0]]), Err(PolygonError::TooFewCorners { corners: 2 }));
-        assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), Err(PolygonError::ZeroArea));
-        assert_eq!(of(&[[1.0, 1.0]; 5]), Err(PolygonError::ZeroArea));
-        assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0]]), Err(PolygonError::ZeroArea));
+        assert_eq!(flat_face(&[[0.0, 0.0], [1.0, 0.0]]), Err(PolygonError::TooFewCorners { corners: 2 }));
+        assert_eq!(flat_face(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), Err(PolygonError::ZeroArea));
+        assert_eq!(flat_face(&[[1.0, 1.0]; 5]), Err(PolygonError::ZeroArea));
+        assert_eq!(flat_face(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0]]), Err(PolygonError::ZeroArea));
 
         // There and back, with a bend.
-        assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 0.0]]), Err(PolygonError::ZeroArea));
+        assert_eq!(flat_face(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 0.0]]), Err(PolygonError::ZeroArea));
         assert_eq!(
-            of(&[[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0]]),
+            flat_face(&[[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0]]),
             Err(PolygonError::OutOfRange { corner: 1 })
         );
 
         // A bow tie whose halves differ, so that their areas do not cancel.
         assert!(matches!(
-            of(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]]),
+            flat_face(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]]),
             Err(PolygonError::SelfIntersection { .. })
         ));
         // A bow tie that touches itself in a corner.
         assert_eq!(
-            of(&[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.0, 0.0], [1.0, 1.0], [0.0, 2.0]]),
+            flat_face(&[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.0, 0.0], [1.0, 1.0], [0.0, 2.0]]),
             Err(PolygonError::Overlap)
         );
 
@@ -396,18 +401,21 @@ mod tests {
                 [c, s]
             })
             .collect();
-        assert!(matches!(of(&star), Err(PolygonError::SelfIntersection { .. })));
+        assert!(matches!(flat_face(&star), Err(PolygonError::SelfIntersection { .. })));
     }
 
     /// Makes corners at ascending angles: a simple outline, usually concave.
     fn star() -> impl Strategy<Value = Vec<DVec2>> {
         prop::collection::vec(0.2..3.0f64, 3..40).prop_map(|radii| {
             let n = radii.len() as f64;
-            let at = |(i, r): (usize, f64)| {
-                let (s, c) = libm::sincos(i as f64 / n * std::f64::consts::TAU);
-                dvec2(r * c, r * s)
-            };
-            radii.into_iter().enumerate().map(at).collect()
+            radii
+                .into_iter()
+                .enumerate()
+                .map(|(i, r)| {
+                    let (s, c) = libm::sincos(i as f64 / n * std::f64::consts::TAU);
+                    dvec2(r * c, r * s)
+                })
+                .collect()
         })
     }
 
