@@ -45,9 +45,8 @@ pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Contex
     let mut table = Table::new(options.seed);
     table.agreement = areas.iter().map(|a| (a.number, a.agreement)).collect();
     for fold in folds {
-        let of = |wanted: &[u32]| areas.iter().filter(|a| wanted.contains(&a.number)).collect::<Vec<_>>();
-        let training = of(&fold.train);
-        let testing = of(&fold.test);
+        let training = areas_of(&fold.train, areas);
+        let testing = areas_of(&fold.test, areas);
         let spaces: Vec<&Space> = training.iter().flat_map(|a| &a.spaces).collect();
         ctx.info(format_args!(
             "fold {}: train on areas {:?}, test on {:?}",
@@ -63,6 +62,10 @@ pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Contex
         table.rows_of_fold(rows);
     }
     Ok(table)
+}
+
+fn areas_of<'a>(wanted: &[u32], areas: &'a [ParsedArea]) -> Vec<&'a ParsedArea> {
+    areas.iter().filter(|a| wanted.contains(&a.number)).collect()
 }
 
 /// Tests a model on areas. Returns a row for each of its machines and each comparison.
@@ -100,26 +103,31 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
         .iter()
         .map(|m| m.variant.name())
         .chain([NO_CONTEXT, TRUE_BOXES, RANDOM]);
-    let rows = names.filter(|name| found.keys().any(|(n, _)| n == name)).map(|name| {
-        let of = |threshold: f64| {
-            let classes = (0..CLASSES.len()).map(|class| {
-                let elements = areas.iter().flat_map(|a| a.elements.iter().map(|e| (a.number, e)));
-                let truth = elements
-                    .filter(|(_, e)| e.class == class)
-                    .map(|(a, e)| ((a, e.room), e.bbox));
-                let boxes = found.get(&(name.to_owned(), class)).map_or(&[][..], |f| f);
-                average_precision(boxes, &truth.collect::<Vec<_>>(), threshold)
-            });
-            classes.collect()
-        };
-        Row { name: name.to_owned(), ap: THRESHOLDS.map(of) }
-    });
+    let rows = names
+        .filter(|name| found.keys().any(|(n, _)| n == name))
+        .map(|name| Row {
+            name: name.to_owned(),
+            ap: THRESHOLDS.map(|threshold| {
+                let classes = (0..CLASSES.len()).map(|class| {
+                    let elements = areas.iter().flat_map(|a| a.elements.iter().map(|e| (a.number, e)));
+                    let truth = elements
+                        .filter(|(_, e)| e.class == class)
+                        .map(|(a, e)| ((a, e.room), e.bbox));
+                    let boxes = found.get(&(name.to_owned(), class)).map_or(&[][..], |f| f);
+                    average_precision(boxes, &truth.collect::<Vec<_>>(), threshold)
+                });
+                classes.collect()
+            }),
+        });
     let mut rows: Vec<Row> = rows.collect();
 
-    let share = |[found, all]: [usize; 2]| (all > 0).then(|| found as f64 / all as f64);
     let of = |t: usize| recalls.iter().map(|r| share(r[t])).collect();
     rows.push(Row { name: RECALL.to_owned(), ap: [of(0), of(1)] });
     Ok(rows)
+}
+
+fn share([found, all]: [usize; 2]) -> Option<f64> {
+    (all > 0).then(|| found as f64 / all as f64)
 }
 
 /// Returns the detections in a space by row and class, and the number of elements that its proposals overlap,
@@ -159,6 +167,7 @@ fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
         }
     }
 
-    let recall = |class| THRESHOLDS.map(|threshold| recalled(&prepared, &proposals, class, threshold));
-    (found, (0..CLASSES.len()).map(recall).collect())
+    let recalls = (0..CLASSES.len())
+        .map(|class| THRESHOLDS.map(|threshold| recalled(&prepared, &proposals, class, threshold)));
+    (found, recalls.collect())
 }
