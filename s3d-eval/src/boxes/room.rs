@@ -43,8 +43,10 @@ fn greedy(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdic
 }
 
 fn best_of_boxes(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdict>> {
-    let with_all = |bbox| found.iter().map(|(_, of)| iou(of, bbox, Rule::Open3dMl)).collect();
-    let ious: Vec<Vec<f64>> = truth.iter().map(with_all).collect();
+    let ious: Vec<Vec<f64>> = truth
+        .iter()
+        .map(|bbox| found.iter().map(|(_, of)| iou(of, bbox, Rule::Open3dMl)).collect())
+        .collect();
 
     // The best detection of each box has the largest IoU, or the first IoU that is NaN, like numpy's argmax.
     let mut is_best = vec![false; found.len()];
