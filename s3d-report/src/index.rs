@@ -76,8 +76,20 @@ impl From<VerifyReport> for Verified {
     fn from(found: VerifyReport) -> Self {
         let VerifyReport { faults, mut notes, files, checks, unread, .. } = found;
         notes.extend(unread);
-        let group = |FaultGroup { topic, kind, first, count, .. }| VerifyFaults { topic, kind, count, first };
-        Self { files, checks, notes, faults: faults.into_iter().map(group).collect() }
+        Self {
+            files,
+            checks,
+            notes,
+            faults: faults
+                .into_iter()
+                .map(|FaultGroup { topic, kind, first, count, .. }| VerifyFaults {
+                    topic,
+                    kind,
+                    count,
+                    first,
+                })
+                .collect(),
+        }
     }
 }
 

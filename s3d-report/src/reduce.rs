@@ -201,7 +201,6 @@ impl Mean {
     pub(crate) fn new(from: [u32; 2], size: [u32; 2], missing: Option<[u8; 3]>) -> Self {
         let [[width, height], [w, h]] = [from, size];
         let most = u64::from(width.div_ceil(w.max(1))) * u64::from(height.div_ceil(h.max(1)));
-        let even = |side: u32| (width == side * w && height == side * h).then_some(side.trailing_zeros());
         Self {
             from,
             size,
@@ -214,7 +213,9 @@ impl Mean {
             some_missing: false,
             sums: vec![[0; 4]; w as usize],
             divisor: Divisor::new(most),
-            halvings: [2, 4, 8].into_iter().find_map(even),
+            halvings: [2, 4, 8]
+                .into_iter()
+                .find_map(|side| (width == side * w && height == side * h).then_some(side.trailing_zeros())),
             halved: vec![0; 3 * width as usize],
             halved_missing: vec![0; 3 * width as usize],
             means: vec![0; 3 * width as usize],
@@ -228,8 +229,7 @@ impl Mean {
         self.y += 1;
         if self.size == self.from {
             self.pixels.extend_from_slice(line);
-            let is_missing = |pixel: &&[u8; 3]| Some(**pixel) == self.missing;
-            self.all_missing += line.iter().filter(is_missing).count() as u64;
+            self.all_missing += line.iter().filter(|pixel| Some(**pixel) == self.missing).count() as u64;
             return;
         }
 
@@ -255,8 +255,11 @@ impl Mean {
             self.add_columns();
         }
         if is_last {
-            let mean = |sums: &[u32; 4]| self.divisor.mean(*sums).or(self.missing).unwrap_or_default();
-            self.pixels.extend(self.sums.iter().map(mean));
+            self.pixels.extend(
+                self.sums
+                    .iter()
+                    .map(|sums| self.divisor.mean(*sums).or(self.missing).unwrap_or_default()),
+            );
             self.sums.fill([0; 4]);
         }
     }
@@ -272,8 +275,11 @@ impl Mean {
 
         let begin = self.pixels.len();
         let step = 3 << halvings;
-        let first = |bytes: &[u8]| bytes.first_chunk().copied().unwrap_or_default();
-        self.pixels.extend(self.means.chunks_exact(step).map(first));
+        self.pixels.extend(
+            self.means
+                .chunks_exact(step)
+                .map(|bytes| bytes.first_chunk().copied().unwrap_or_default()),
+        );
 
         // Pixels that cover missing ones are made again, without these.
         if let Some(missing) = self.missing
@@ -387,12 +393,15 @@ mod tests {
         assert_eq!(reduced_size([4000, 1], 256), [256, 1]);
     }
 
+    fn source_pixels(from: u32, to: u32) -> Vec<u32> {
+        (0..to).map(|i| source_pixel(i, from, to)).collect::<Vec<_>>()
+    }
+
     #[test]
     fn nearest_pixels_hold_the_centres() {
-        let of = |from, to| (0..to).map(|i| source_pixel(i, from, to)).collect::<Vec<_>>();
-        assert_eq!(of(4, 2), [1, 3]);
-        assert_eq!(of(3, 3), [0, 1, 2]);
-        assert_eq!(of(5, 3), [0, 2, 4]);
+        assert_eq!(source_pixels(4, 2), [1, 3]);
+        assert_eq!(source_pixels(3, 3), [0, 1, 2]);
+        assert_eq!(source_pixels(5, 3), [0, 2, 4]);
         assert_eq!(source_pixel(2047, u32::MAX, 2048), 4_293_918_719);
         let image = Raster::from_vec(4, 2, vec![1, 2, 3, 4, 5, 6, 7, 8]);
         assert_eq!(nearest(&image, [2, 1]).into_vec(), [6, 8]);

@@ -51,8 +51,7 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
             .filter_map(|i| views.get(i).map(|(area, view)| (i, *area, *view)))
             .collect();
         // The first name wins a tie, like in the selection.
-        let name = |(_, area, v): &(usize, u32, &ViewRecord)| (*area, v.camera_uuid.clone(), v.candidate);
-        members.sort_by_cached_key(name);
+        members.sort_by_cached_key(|(_, area, v)| (*area, v.camera_uuid.clone(), v.candidate));
         members.sort_by(|a, b| b.2.entropy.total_cmp(&a.2.entropy));
 
         let n = members.len();
@@ -97,10 +96,10 @@ mod tests {
             }
         }
         for pool in [Pool::Dataset, Pool::Area, Pool::Location] {
-            let item = |(area, view): &(u32, ViewRecord)| {
-                (*area, view.camera_uuid.clone(), view.candidate, view.entropy)
-            };
-            let items: Vec<_> = views.iter().map(item).collect();
+            let items: Vec<_> = views
+                .iter()
+                .map(|(area, view)| (*area, view.camera_uuid.clone(), view.candidate, view.entropy))
+                .collect();
             let items: Vec<PoolItem<'_>> = items
                 .iter()
                 .map(|(area, location, view, score)| PoolItem {

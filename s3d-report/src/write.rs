@@ -221,8 +221,11 @@ fn write_data(
     }
     bytes += scripts.write_list("index", &index)?;
 
-    let shown = |made: &[ReadImage]| made.iter().filter(|made| made.seen.is_some()).count();
-    Ok(Data { index, panoramas: shown(&made.panoramas), views: shown(&made.views), bytes })
+    Ok(Data { index, panoramas: shown_count(&made.panoramas), views: shown_count(&made.views), bytes })
+}
+
+fn shown_count(made: &[ReadImage]) -> usize {
+    made.iter().filter(|made| made.seen.is_some()).count()
 }
 
 /// The place where a report is made.
