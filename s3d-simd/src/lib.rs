@@ -227,8 +227,10 @@ impl Level {
 
 /// Returns the highest level that a value of [`VARIABLE`] allows.
 fn allowed(value: Option<&str>) -> SimdLevel {
-    let named = |level: &SimdLevel| value == Some(level.name());
-    SimdLevel::ALL.into_iter().find(named).unwrap_or(SimdLevel::Avx512)
+    SimdLevel::ALL
+        .into_iter()
+        .find(|level| value == Some(level.name()))
+        .unwrap_or(SimdLevel::Avx512)
 }
 
 /// Returns the level in use, with its proof.
