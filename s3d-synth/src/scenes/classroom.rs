@@ -147,8 +147,12 @@ mod tests {
         for (asked, faces) in [(500, 1_700), (20_000, 27_056), (100_000, 116_644)] {
             let room = classroom(asked);
             assert_eq!(room.faces().len(), faces, "{asked}");
-            let near = |p: &Vec3| p.as_dvec3().distance(CLASSROOM_LOCATION) < 0.3;
-            assert!(!room.positions().iter().any(near));
+            assert!(
+                !room
+                    .positions()
+                    .iter()
+                    .any(|p| p.as_dvec3().distance(CLASSROOM_LOCATION) < 0.3)
+            );
         }
     }
 }
