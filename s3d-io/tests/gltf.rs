@@ -34,7 +34,8 @@ fn gltf(accessors: &[(Vec<u8>, u32, &str, usize, &str)], rest: &str) -> String {
         data.extend(bytes);
         views.push(format!(r#"{{"buffer": 0, "byteOffset": {at}, "byteLength": {length}}}"#));
         json.push(format!(
-            r#"{{"bufferView": {view}, "componentType": {component}, "type": "{kind}", "count": {count}{more}}}"#
+            r#"{{"bufferView": {view}, "componentType": {component},
+            "type": "{kind}", "count": {count}{more}}}"#
         ));
     }
 

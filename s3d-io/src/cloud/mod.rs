@@ -8,7 +8,7 @@
 //!
 //! | format | its labels |
 //! |---|---|
-//! | S3DIS tree | rooms, classes and instances are folders and text files: [`AnnotationTree`], [`PointReader`] |
+//! | S3DIS tree | names of folders and text files: [`AnnotationTree`], [`PointReader`] |
 //! | `pointcloud.mat` | MATLAB v7.3, as published: [`MatArea`] |
 //! | PLY, NPY, NPZ, LAS, LAZ, E57 | columns or attributes of points |
 //! | ScanNet | objects as lists of segments of a mesh |

@@ -205,13 +205,16 @@ mod tests {
     }
 
     fn names(annotations: &Annotations) -> Vec<String> {
-        let of = |r: &AnnotatedRoom| -> Vec<String> {
-            r.instances
-                .iter()
-                .map(|i| format!("{} {}_{}", r.room, i.class, i.number))
-                .collect()
-        };
-        annotations.rooms.iter().flat_map(of).collect()
+        annotations
+            .rooms
+            .iter()
+            .flat_map(|r: &AnnotatedRoom| -> Vec<String> {
+                r.instances
+                    .iter()
+                    .map(|i| format!("{} {}_{}", r.room, i.class, i.number))
+                    .collect()
+            })
+            .collect()
     }
 
     #[test]

@@ -169,6 +169,10 @@ impl Place {
 mod tests {
     use super::*;
 
+    fn expected(k: usize) -> usize {
+        3 * k + 2
+    }
+
     #[test]
     fn buffers_that_overflow_are_written_where_they_belong() {
         // More points than the 16,384 that wait, of two instances in turn.
@@ -184,7 +188,6 @@ mod tests {
         let store = writer.finish().unwrap().unwrap();
         let mut cloud = PointCloud::default();
         store.read(40_000, 20_000, &mut cloud).unwrap();
-        let expected = |k: usize| 3 * k + 2;
         assert!(
             cloud
                 .positions
