@@ -102,8 +102,9 @@ impl Photograph {
 
     fn in_lanes(&self, levels: &MipLevels<'_>, level: Level) -> CubeMap {
         let width = stored_width(self.face_size);
-        let place = |i: u32| place_of(self.face_size, i) as f32;
-        let places: Vec<f32> = (0..width + LANES as u32).map(place).collect();
+        let places: Vec<f32> = (0..width + LANES as u32)
+            .map(|i| place_of(self.face_size, i) as f32)
+            .collect();
         CubeMap::build_bands(self.pose, self.face_size, |band| {
             dispatch_on(level, PhotographKernel { photo: self, levels, places: &places, band });
         })
@@ -224,13 +225,13 @@ mod tests {
 
     /// Returns noise, turned, as two photographs; in the second case pixels of the cube see several rows.
     fn photographs() -> [Photograph; 2] {
-        let pixel = |k: u32| {
+        let pixels = (0..700 * 350).map(|k: u32| {
             let mut h = k.wrapping_mul(0x9E37_79B1);
             h ^= h >> 15;
             let [r, g, b, _] = h.wrapping_mul(0x85EB_CA77).to_le_bytes();
             [r, g / 4, b / 2 + 100]
-        };
-        let photo = Raster::from_vec(700, 350, (0..700 * 350).map(pixel).collect());
+        });
+        let photo = Raster::from_vec(700, 350, pixels.collect());
         [288, 96].map(|size| Photograph::new(&photo, 0.7, &pose(), size))
     }
 
@@ -262,7 +263,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn arc_tangents_are_right(x in -2.0..2.0f32, y in -2.0..2.0f32, small in prop::array::uniform2(0..30)) {
+        fn arc_tangents_are_right(
+            x in -2.0..2.0f32, y in -2.0..2.0f32, small in prop::array::uniform2(0..30),
+        ) {
             let x = x * 0.5f32.powi(small[0]);
             let y = y * 0.5f32.powi(small[1]);
             for (x, y) in [(x, y), (x, x), (x, 0.0), (0.0, y)] {

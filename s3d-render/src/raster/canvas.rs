@@ -231,10 +231,9 @@ impl Canvas {
     /// Notes that the tiles of the cover were drawn on.
     #[inline(always)]
     pub(crate) fn touch(&mut self, cover: &Cover) {
-        let tile = |pixel: u16| usize::from(pixel) / TILE;
-        for row in tile(cover.rows.0)..=tile(cover.rows.1) {
+        for row in tile_of(cover.rows.0)..=tile_of(cover.rows.1) {
             let first = row * self.tile_columns;
-            self.stale[first + tile(cover.columns.0)..=first + tile(cover.columns.1)].fill(true);
+            self.stale[first + tile_of(cover.columns.0)..=first + tile_of(cover.columns.1)].fill(true);
         }
     }
 
@@ -409,18 +408,25 @@ impl Canvas {
     }
 }
 
+fn tile_of(pixel: u16) -> usize {
+    usize::from(pixel) / TILE
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn pixels_of(columns: (f32, f32), rows: (f32, f32)) -> Option<((u16, u16), (u16, u16))> {
+        Cover::new(columns, rows, (10, 6), 1.0).map(|c| (c.columns, c.rows))
+    }
+
     #[test]
     fn a_cover_holds_the_centres_of_pixels_between_its_bounds() {
-        let pixels = |columns, rows| Cover::new(columns, rows, (10, 6), 1.0).map(|c| (c.columns, c.rows));
-        assert_eq!(pixels((0.2, 3.9), (1.0, 2.0)), Some(((1, 3), (1, 2))));
-        assert_eq!(pixels((-7.5, 99.0), (-0.3, f32::INFINITY)), Some(((0, 9), (0, 5))));
+        assert_eq!(pixels_of((0.2, 3.9), (1.0, 2.0)), Some(((1, 3), (1, 2))));
+        assert_eq!(pixels_of((-7.5, 99.0), (-0.3, f32::INFINITY)), Some(((0, 9), (0, 5))));
         for between in [(0.2, 0.8), (-3.0, -0.1), (9.1, 20.0)] {
-            assert_eq!(pixels(between, (0.0, 5.0)), None);
-            assert_eq!(pixels((0.0, 9.0), (between.0 - 4.0, between.1 - 4.0)), None);
+            assert_eq!(pixels_of(between, (0.0, 5.0)), None);
+            assert_eq!(pixels_of((0.0, 9.0), (between.0 - 4.0, between.1 - 4.0)), None);
         }
     }
 }

@@ -99,11 +99,8 @@ impl<'a> Panorama<'a> {
             ((0.0, (grid.width - 1) as f32), 0.0)
         };
 
-        // Arcs bend towards the poles. Along an arc, the latitude's tangent is a cosine of the azimuth. Its
-        // greatest value is at most half of the width away from the nearer end.
-        let towards_pole = |latitude: f64| libm::atan2(libm::sin(latitude), libm::cos(latitude) * bend);
-        let north = if north > 0.0 { towards_pole(north) } else { north };
-        let south = if south < 0.0 { towards_pole(south) } else { south };
+        let north = if north > 0.0 { towards_pole(north, bend) } else { north };
+        let south = if south < 0.0 { towards_pole(south, bend) } else { south };
 
         let rows = grid.rows_between(south as f32 - ANGLE_ERROR, north as f32 + ANGLE_ERROR);
         let top = (rows.0 - 1.0).max(0.0);
@@ -150,6 +147,13 @@ impl<'a> Panorama<'a> {
             poor: !known,
         });
     }
+}
+
+/// Returns the latitude nearest to the pole of an arc that ends at `latitude`. Arcs bend towards the poles:
+/// along an arc, the latitude's tangent is a cosine of the azimuth. Its greatest value is at most half of the
+/// width away from the nearer end, and `bend` is the cosine of this half.
+fn towards_pole(latitude: f64, bend: f64) -> f64 {
+    libm::atan2(libm::sin(latitude), libm::cos(latitude) * bend)
 }
 
 /// A face on all tiles that it may cover.
@@ -346,8 +350,14 @@ impl ProjectionRaster for Panorama<'_> {
         out_pitch: usize,
         single: impl Fn(u32, usize, usize) -> f64,
     ) {
-        let line = |row: usize| (self.grid.row_cos[row], self.grid.row_sin[row]);
-        canvas.finish::<L, true>(l, out, out_pitch, (&self.grid.cos, &self.grid.sin), line, single);
+        canvas.finish::<L, true>(
+            l,
+            out,
+            out_pitch,
+            (&self.grid.cos, &self.grid.sin),
+            |row| (self.grid.row_cos[row], self.grid.row_sin[row]),
+            single,
+        );
     }
 
     fn inverse_t(&self, drawn: &DrawnFace, column: usize, row: usize) -> f64 {

@@ -99,9 +99,13 @@ impl PanoramaGrid {
         let Rays::Equirectangular { columns, rows } = window.rays else {
             unreachable!("a panorama has a panorama's rays")
         };
-        let pixel = |sample: usize| (window.stride / 2 + window.stride * sample as u32) as usize;
-        let columns: Vec<_> = (0..window.width).map(|i| columns[pixel(window.column + i)]).collect();
-        let rows: Vec<_> = (0..window.height).map(|j| rows[pixel(window.row + j)]).collect();
+
+        let columns: Vec<_> = (0..window.width)
+            .map(|i| columns[window.pixel_of(window.column + i) as usize])
+            .collect();
+        let rows: Vec<_> = (0..window.height)
+            .map(|j| rows[window.pixel_of(window.row + j) as usize])
+            .collect();
 
         let step = TAU / f64::from(window.camera.width) * f64::from(window.stride);
         let middle_column = 0.5 * (window.width - 1) as f64;
@@ -158,11 +162,12 @@ impl PanoramaGrid {
         if max(first, tan(row + most - 1)) <= STEEP_TAN {
             return most;
         }
-        let steady = |&rows: &usize| {
-            let last = tan(row + rows);
-            max(first, last) <= 3.0 * min(first, last)
-        };
-        1 + (1..most).take_while(steady).count()
+        1 + (1..most)
+            .take_while(|&rows| {
+                let last = tan(row + rows);
+                max(first, last) <= 3.0 * min(first, last)
+            })
+            .count()
     }
 
     /// Returns the reach of a chunk of `rows` rows from `row` on.

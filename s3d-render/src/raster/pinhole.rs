@@ -236,7 +236,6 @@ impl<'a> Pinhole<'a> {
         let mut x = (infinite, -infinite);
         let mut y = (infinite, -infinite);
         let mut q = (infinite, 0.0f64);
-        let widen = |range: &mut (f64, f64), v: f64| *range = (range.0.min(v), range.1.max(v));
 
         for (k, &p) in cone.corners.iter().enumerate() {
             let z = self.ahead.dot(p);
@@ -255,8 +254,7 @@ impl<'a> Pinhole<'a> {
             // An edge that crosses the camera's plane goes off to infinity, on the side of the crossing.
             let next = cone.corners[(k + 1) % 3];
             let z_next = self.ahead.dot(next);
-            let near = |z: f64, p: DVec3| z.abs() <= 1e-12 * p.abs().element_sum();
-            if (z > 0.0) != (z_next > 0.0) || near(z, p) || near(z_next, next) {
+            if (z > 0.0) != (z_next > 0.0) || is_near_zero(z, p) || is_near_zero(z_next, next) {
                 let s = if z == z_next {
                     0.5
                 } else {
@@ -267,10 +265,10 @@ impl<'a> Pinhole<'a> {
                 for (range, axis) in [(&mut x, self.across), (&mut y, self.down)] {
                     let v = axis.dot(at);
                     let slack = slack * axis.abs().element_sum();
-                    if v > -slack || near(z, p) || near(z_next, next) {
+                    if v > -slack || is_near_zero(z, p) || is_near_zero(z_next, next) {
                         range.1 = infinite;
                     }
-                    if v < slack || near(z, p) || near(z_next, next) {
+                    if v < slack || is_near_zero(z, p) || is_near_zero(z_next, next) {
                         range.0 = -infinite;
                     }
                 }
@@ -289,6 +287,14 @@ impl<'a> Pinhole<'a> {
             inverse_t: q,
         })
     }
+}
+
+fn widen(range: &mut (f64, f64), v: f64) {
+    *range = (range.0.min(v), range.1.max(v))
+}
+
+fn is_near_zero(z: f64, p: DVec3) -> bool {
+    z.abs() <= 1e-12 * p.abs().element_sum()
 }
 
 /// The pixels that a face may cover, and the least and greatest 1/t of the face there.
@@ -500,8 +506,14 @@ impl ProjectionRaster for Pinhole<'_> {
         out_pitch: usize,
         single: impl Fn(u32, usize, usize) -> f64,
     ) {
-        let line = |row: usize| (0.0, row as f64);
-        canvas.finish::<L, false>(l, out, out_pitch, (&self.columns, &self.columns), line, single);
+        canvas.finish::<L, false>(
+            l,
+            out,
+            out_pitch,
+            (&self.columns, &self.columns),
+            |row| (0.0, row as f64),
+            single,
+        );
     }
 
     fn inverse_t(&self, drawn: &DrawnFace, column: usize, row: usize) -> f64 {

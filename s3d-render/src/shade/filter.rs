@@ -24,8 +24,7 @@ pub(crate) struct Footprints {
 
 impl Footprints {
     pub(crate) fn new(len: usize) -> Self {
-        let two = || [vec![0.0; len], vec![0.0; len]];
-        Self { at: two(), x: two(), y: two() }
+        Self { at: two_lines(len), x: two_lines(len), y: two_lines(len) }
     }
 
     /// Stores the eight pixels from column `i` on. The sides are stored only if not all footprints are
@@ -48,6 +47,10 @@ impl Footprints {
             }
         }
     }
+}
+
+fn two_lines(len: usize) -> [Vec<f32>; 2] {
+    [vec![0.0; len], vec![0.0; len]]
 }
 
 /// How eight footprints are sampled.
@@ -128,18 +131,20 @@ pub(crate) struct MipLevels<'a> {
 
 impl<'a> MipLevels<'a> {
     pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
-        let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)) as f32;
-        // Larger levels are not used: see `is_usable`.
-        let last = |size: u32| (size.clamp(1, 1 << 15) - 1) << 15;
-        let level = |image: &'a Raster<[u8; 3]>| MipLevel {
-            image,
-            texels: Texels::new(image.pixels().as_flattened(), image.width() as i32 * 3),
-            right: last(image.width()),
-            bottom: last(image.height()),
-            x: ratio(image.width(), full.image.width()),
-            y: ratio(image.height(), full.image.height()),
-        };
-        Self { wrap: full.wrap, levels: std::iter::once(&full.image).chain(reductions).map(level).collect() }
+        Self {
+            wrap: full.wrap,
+            levels: std::iter::once(&full.image)
+                .chain(reductions)
+                .map(|image| MipLevel {
+                    image,
+                    texels: Texels::new(image.pixels().as_flattened(), image.width() as i32 * 3),
+                    right: last_place(image.width()),
+                    bottom: last_place(image.height()),
+                    x: ratio(image.width(), full.image.width()),
+                    y: ratio(image.height(), full.image.height()),
+                })
+                .collect(),
+        }
     }
 
     /// Tells whether positions in the texture fit in the numbers used here.
@@ -153,11 +158,6 @@ impl<'a> MipLevels<'a> {
     /// Returns how coordinates in pixels of the full size repeat.
     pub(crate) fn wraps(&self) -> [TexelWrap; 3] {
         let image = self.levels[0].image;
-        let texel_wrap = |wrap, size: u32| match wrap {
-            Wrap::Repeat => TexelWrap::repeat(f64::from(size)),
-            Wrap::Mirror => TexelWrap::mirror(f64::from(size)),
-            Wrap::Clamp => TexelWrap::NONE,
-        };
         [texel_wrap(self.wrap[0], image.width()), texel_wrap(self.wrap[1], image.height()), TexelWrap::NONE]
     }
 
@@ -427,10 +427,6 @@ impl<'a> MipLevels<'a> {
     /// fractions of the position.
     fn at_the_edge(&self, level: &MipLevel<'a>, x: f32, y: f32) -> ((u64, u64), (i16, i16)) {
         let image = level.image;
-        let split = |v: f32| {
-            let v = if v.is_finite() { f64::from(v) } else { 0.0 };
-            (v.floor() as i64, ((v - v.floor()) * 32768.0) as i16)
-        };
         let ((column, x), (row, y)) = (split(x), split(y));
         let columns = [column, column + 1].map(|i| self.wrap[0].index(i, image.width()));
         // v grows upwards and rows downwards, but mirroring and repeating look the same from both sides.
@@ -441,6 +437,29 @@ impl<'a> MipLevels<'a> {
         };
         ((pair(rows[0]), pair(rows[1])), (x, y))
     }
+}
+
+fn ratio(a: u32, b: u32) -> f32 {
+    (f64::from(a) / f64::from(b)) as f32
+}
+
+/// Returns the place of the last texel, in the units of fixed places. Larger levels are not used: see
+/// `is_usable`.
+fn last_place(size: u32) -> u32 {
+    (size.clamp(1, 1 << 15) - 1) << 15
+}
+
+fn texel_wrap(wrap: Wrap, size: u32) -> TexelWrap {
+    match wrap {
+        Wrap::Repeat => TexelWrap::repeat(f64::from(size)),
+        Wrap::Mirror => TexelWrap::mirror(f64::from(size)),
+        Wrap::Clamp => TexelWrap::NONE,
+    }
+}
+
+fn split(v: f32) -> (i64, i16) {
+    let v = if v.is_finite() { f64::from(v) } else { 0.0 };
+    (v.floor() as i64, ((v - v.floor()) * 32768.0) as i16)
 }
 
 /// Returns the eight bytes at `at`, if there are so many.

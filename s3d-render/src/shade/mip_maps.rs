@@ -363,8 +363,9 @@ mod tests {
         fn mip_maps_keep_the_mean_and_take_a_third_more(
             w in 1u32..70, h in 1u32..70, seed in any::<u32>(),
         ) {
-            let noise = |x: u32, y: u32| (x * 7919 + y * 104_729).wrapping_mul(seed | 1).rotate_left(9) as u8;
-            let full = image(w, h, noise);
+            let full = image(w, h, |x, y| {
+                (x * 7919 + y * 104_729).wrapping_mul(seed | 1).rotate_left(9) as u8
+            });
             let levels: Vec<_> = std::iter::successors(halved(&full), halved).collect();
             let bytes: usize = levels.iter().map(Raster::len).sum();
             // Along a strip of one pixel, the levels add up to as much again.

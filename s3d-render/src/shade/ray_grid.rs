@@ -23,7 +23,6 @@ pub(crate) struct RayGrid {
 impl RayGrid {
     pub(crate) fn new(camera: &Camera) -> Self {
         let rays = camera.rays();
-        let offset = |at: usize| at as f64 - f64::from(REACH);
         let (column_step, rows) = match &rays {
             Rays::Perspective { .. } => (None, vec![]),
             Rays::Equirectangular { rows, .. } => (
@@ -31,8 +30,6 @@ impl RayGrid {
                 rows.iter().map(|row| [row.x, row.y]).collect(),
             ),
         };
-        // 1 − cos a = 2 sin² a/2, without cancellation.
-        let versine = |a: f64| 2.0 * libm_sin(0.5 * a) * libm_sin(0.5 * a);
         Self {
             rays,
             column_step: column_step.unwrap_or(1.0) as f32,
@@ -60,6 +57,15 @@ impl RayGrid {
             Rays::Equirectangular { columns, .. } => [columns[i].extend(0.0), DVec3::ZERO],
         }
     }
+}
+
+fn offset(at: usize) -> f64 {
+    at as f64 - f64::from(REACH)
+}
+
+/// Returns 1 − cos a = 2 sin² a/2, without cancellation.
+fn versine(a: f64) -> f64 {
+    2.0 * libm_sin(0.5 * a) * libm_sin(0.5 * a)
 }
 
 /// Returns the sine from glam, which is the same on every platform.

@@ -145,8 +145,9 @@ impl BlendKernel<'_> {
         let corners = [at(0, 0), at(last_x, 0), at(0, last_y), at(last_x, last_y)];
         let least = corners.map(|corner| middle.dot(corner)).into_iter().fold(1.0, f64::min);
         let angle = libm::acos(least);
-        let may_see = |k: &usize| self.captures[*k].may_see(middle, angle, f64::from(nearest));
-        near.extend((0..self.captures.len()).filter(may_see));
+        near.extend(
+            (0..self.captures.len()).filter(|k| self.captures[*k].may_see(middle, angle, f64::from(nearest))),
+        );
     }
 
     /// Blends the captures `near` into a row of a tile.

@@ -158,15 +158,11 @@ mod tests {
                 let yaw = -((k % 6) as f64) * std::f64::consts::FRAC_PI_3 + 0.2;
                 let own = pose().turned(yaw, [0.95, 0.02, -0.95][k / 6]);
                 let world = own.opencv_from_world().transpose();
-                let pixel = |i: u32| {
+                let pixels = (0..160 * 128).map(|i| {
                     let at = dvec2(f64::from(i % 160) + 0.5, f64::from(i / 160) + 0.5);
                     seen(k, world * lens.direction(at).unwrap()).map(|c| (c + 0.5).clamp(0.0, 255.0) as u8)
-                };
-                Capture {
-                    image: Raster::from_vec(160, 128, (0..160 * 128).map(pixel).collect()),
-                    lens,
-                    pose: own,
-                }
+                });
+                Capture { image: Raster::from_vec(160, 128, pixels.collect()), lens, pose: own }
             })
             .collect()
     }
@@ -205,20 +201,27 @@ mod tests {
         assert!(directions().any(|d| !close(sample(&wrong, d).0, color_of(d), 8.0)));
     }
 
+    fn spread(gains: bool) -> f32 {
+        let cube = stitch(captures(gray), &pose(), None, &StitchOptions { gains, size: Some(64) });
+        let seen = directions()
+            .map(|d| sample(&cube, d))
+            .filter(|s| s.1 == 255)
+            .map(|s| s.0[0]);
+        let (low, high) = seen.fold((255.0f32, 0.0f32), |(l, h), c| (l.min(c), h.max(c)));
+        high - low
+    }
+
+    fn gray(k: usize, _: DVec3) -> [f32; 3] {
+        [120.0 * exposure(k), 100.0, 90.0 * exposure(k + 3)]
+    }
+
+    /// Returns the exposure of a capture: each has its own.
+    fn exposure(k: usize) -> f32 {
+        1.0 + 0.15 * (((k * 7) % 5) as f32 - 2.0) / 2.0
+    }
+
     #[test]
     fn exposures_are_brought_together() {
-        // Every capture has an exposure of its own.
-        let exposure = |k: usize| 1.0 + 0.15 * (((k * 7) % 5) as f32 - 2.0) / 2.0;
-        let gray = |k: usize, _: DVec3| [120.0 * exposure(k), 100.0, 90.0 * exposure(k + 3)];
-        let spread = |gains: bool| {
-            let cube = stitch(captures(gray), &pose(), None, &StitchOptions { gains, size: Some(64) });
-            let seen = directions()
-                .map(|d| sample(&cube, d))
-                .filter(|s| s.1 == 255)
-                .map(|s| s.0[0]);
-            let (low, high) = seen.fold((255.0f32, 0.0f32), |(l, h), c| (l.min(c), h.max(c)));
-            high - low
-        };
         let before = spread(false);
         let after = spread(true);
         assert!(before > 30.0 && after < 4.0, "{before} {after}");
