@@ -150,7 +150,8 @@ impl Palette {
         let all = [sum(&self.sides)];
         for (contrast, around) in out.iter_mut().zip(self.sides.iter().chain(&all)) {
             if total(&inside) > 0.0 && total(around) > 0.0 {
-                let (p, q) = (share(&inside), share(around));
+                let p = share(&inside);
+                let q = share(around);
                 *contrast = Some(0.5 * p.iter().zip(q).map(|(p, q)| (p - q).abs()).sum::<f32>());
             }
         }
@@ -220,7 +221,8 @@ mod tests {
     #[test]
     fn contrasts_are_high_where_a_box_differs_from_its_surroundings() {
         let b = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
-        let (red, white) = (Shade::new(vec3(0.8, 0.1, 0.1), MEAN), Shade::new(Vec3::splat(0.9), MEAN));
+        let red = Shade::new(vec3(0.8, 0.1, 0.1), MEAN);
+        let white = Shade::new(Vec3::splat(0.9), MEAN);
         let places = [vec3(0.5, 0.5, 0.1), vec3(0.5, 0.5, 0.9), vec3(-0.2, 0.5, 1.1), vec3(0.5, 0.5, 1.2)];
         let palette = Palette::new(&b, places.into_iter().zip([&red, &red, &white, &red]));
         assert_eq!([0, 1, 2].map(|k| total(&palette.layers[k]) > 0.0), [true, false, true]);

@@ -135,7 +135,8 @@ fn add_line(sums: &mut [u16], line: &[u8]) {
 /// Whether the three bytes of a pixel follow each other in a line, even across pixels.
 #[inline(always)]
 fn is_in(line: &[u8], [r, g, b]: [u8; 3]) -> bool {
-    let (second, third) = (line.get(1..).unwrap_or_default(), line.get(2..).unwrap_or_default());
+    let second = line.get(1..).unwrap_or_default();
+    let third = line.get(2..).unwrap_or_default();
     let mut any = 0;
     for ((x, y), z) in line.iter().zip(second).zip(third) {
         any |= u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
@@ -146,7 +147,8 @@ fn is_in(line: &[u8], [r, g, b]: [u8; 3]) -> bool {
 /// Adds one to the counts of the bytes where [`is_in`] finds a pixel.
 #[inline(always)]
 fn count_at(counts: &mut [u8], line: &[u8], [r, g, b]: [u8; 3]) {
-    let (second, third) = (line.get(1..).unwrap_or_default(), line.get(2..).unwrap_or_default());
+    let second = line.get(1..).unwrap_or_default();
+    let third = line.get(2..).unwrap_or_default();
     for (((count, x), y), z) in counts.iter_mut().zip(line).zip(second).zip(third) {
         *count += u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
     }
@@ -420,7 +422,8 @@ mod tests {
 
     /// Computes the same means pixel by pixel.
     fn plain_mean(image: &Raster<[u8; 3]>, [w, h]: [u32; 2], missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
-        let (width, height) = (image.width(), image.height());
+        let width = image.width();
+        let height = image.height();
         let pixel = |i, j| {
             let columns = edge(i, width, w)..edge(i + 1, width, w);
             let rows = edge(j, height, h)..edge(j + 1, height, h);

@@ -171,7 +171,8 @@ impl Groups {
     }
 
     fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.of(a), self.of(b));
+        let a = self.of(a);
+        let b = self.of(b);
         self.0[a.max(b)] = a.min(b);
     }
 }

@@ -348,11 +348,16 @@ impl CubeMap {
 
         let last = mask.width() as i32 - 1;
         // `x` and `y` are at least −½, or NaN, which a cast brings to 0.
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (xf, yf) = (x.floor(), y.floor());
-        let (px, py) = (((x - xf) * 256.0) as u32, ((y - yf) * 256.0) as u32);
-        let (x0, x1) = (column_of(xf as i32, last), column_of((xf as i32).saturating_add(1), last));
-        let (y0, y1) = (column_of(yf as i32, last), column_of((yf as i32).saturating_add(1), last));
+        let x = x - 0.5;
+        let y = y - 0.5;
+        let xf = x.floor();
+        let yf = y.floor();
+        let px = ((x - xf) * 256.0) as u32;
+        let py = ((y - yf) * 256.0) as u32;
+        let x0 = column_of(xf as i32, last);
+        let x1 = column_of((xf as i32).saturating_add(1), last);
+        let y0 = column_of(yf as i32, last);
+        let y1 = column_of((yf as i32).saturating_add(1), last);
         let at = |x, y| u32::from(mask.at(x, y));
         let upper = at(x0, y0) * (256 - px) + at(x1, y0) * px;
         let lower = at(x0, y1) * (256 - px) + at(x1, y1) * px;

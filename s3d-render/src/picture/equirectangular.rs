@@ -126,7 +126,9 @@ impl Kernel for PhotographKernel<'_> {
     fn run<S: Simd>(self, simd: S) {
         let l = simd.shade();
         let Self { photo, levels, places, mut band } = self;
-        let (face, first_row, size) = (band.face, band.first_row, photo.face_size);
+        let face = band.face;
+        let first_row = band.first_row;
+        let size = photo.face_size;
 
         let [right, down, forward] = axes_of(face);
         let three = |v: DVec3| [l.splat(v.x as f32), l.splat(v.y as f32), l.splat(v.z as f32)];

@@ -21,7 +21,8 @@ const LITTLE_MORE: f64 = 0.2;
 /// use s3d_render::undistort;
 ///
 /// // k₁ > 0 pushes the corners outwards: the pinhole's corners lie outside the photograph.
-/// let (f, c) = (dvec2(30.0, 30.0), dvec2(32.0, 24.0));
+/// let f = dvec2(30.0, 30.0);
+/// let c = dvec2(32.0, 24.0);
 /// let lens = PhotoLens::Straight(Lens::new([64, 48], f, c, [0.2, 0.0, 0.0, 0.0, 0.0]).unwrap());
 /// let camera = Camera::pinhole(Pose::level(DVec3::ZERO, 0.0), f, c, 64, 48)?;
 /// let image = undistort(&Raster::filled(64, 48, [9, 8, 0]), &lens, &camera);

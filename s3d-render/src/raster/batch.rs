@@ -64,7 +64,8 @@ impl FacesByKind {
     pub(crate) fn sort(&mut self, kinds: &[u32]) {
         self.counts = [0; KINDS];
         for (i, &kind) in kinds.iter().enumerate() {
-            let (list, count) = (&mut self.lists[kind as usize], &mut self.counts[kind as usize]);
+            let list = &mut self.lists[kind as usize];
+            let count = &mut self.counts[kind as usize];
             list[*count % MAX_FACES] = i as u8;
             *count += 1;
         }
@@ -180,7 +181,10 @@ impl FaceBatch {
             let x = [xs[0][i], xs[1][i], xs[2][i]];
             let y = [ys[0][i], ys[1][i], ys[2][i]];
             let q = [qs[0][i], qs[1][i], qs[2][i]];
-            let (left, right, top, bottom) = (lefts[i], rights[i], tops[i], bottoms[i]);
+            let left = lefts[i];
+            let right = rights[i];
+            let top = tops[i];
+            let bottom = bottoms[i];
 
             // Edge k is opposite to corner k: it runs from corner k + 1 to corner k + 2.
             let across = [y[1] - y[2], y[2] - y[0], y[0] - y[1]];
@@ -300,7 +304,8 @@ impl FaceBatch {
             bend: 0.0,
             down: self.down[k][i] as f32,
         };
-        let (column, row) = (self.left[i] as usize, self.top[i] as usize);
+        let column = self.left[i] as usize;
+        let row = self.top[i] as usize;
         let chunk = Chunk {
             column,
             row,
@@ -317,7 +322,8 @@ impl FaceBatch {
     /// Returns the second chunk of a face that has two, and the number of the face's columns in it.
     #[inline(always)]
     pub(crate) fn second_chunk(&self, i: usize, first: &Chunk) -> (Chunk, usize) {
-        let (left, top) = (f64::from(self.left[i]) + LANES as f64, f64::from(self.top[i]));
+        let left = f64::from(self.left[i]) + LANES as f64;
+        let top = f64::from(self.top[i]);
         let at = |k: usize| (self.at[k][i] + self.across[k][i] * left + self.down[k][i] * top) as f32;
         let mut chunk = *first;
         chunk.column += LANES;

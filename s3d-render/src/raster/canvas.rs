@@ -65,7 +65,8 @@ pub(crate) fn part_of_tile(tile_row: usize, top: usize, bottom: usize) -> (usize
 /// and `right`.
 #[inline(always)]
 pub(crate) fn half_of_tile(tile_column: usize, left: usize, right: usize) -> (usize, bool) {
-    let (first, middle) = (tile_column * TILE, tile_column * TILE + TILE / 2);
+    let first = tile_column * TILE;
+    let middle = tile_column * TILE + TILE / 2;
     if left >= middle {
         (middle, true)
     } else {
@@ -102,8 +103,10 @@ impl Cover {
         (width, height): (usize, usize),
         inverse_t: f32,
     ) -> Option<Self> {
-        let (left, right) = (left.ceil().max(0.0), right.floor().min((width - 1) as f32));
-        let (top, bottom) = (top.ceil().max(0.0), bottom.floor().min((height - 1) as f32));
+        let left = left.ceil().max(0.0);
+        let right = right.floor().min((width - 1) as f32);
+        let top = top.ceil().max(0.0);
+        let bottom = bottom.floor().min((height - 1) as f32);
         (left <= right && top <= bottom).then_some(Self {
             columns: (left as u16, right as u16),
             rows: (top as u16, bottom as u16),
@@ -186,7 +189,8 @@ impl Canvas {
                 }
 
                 // Some pixel of the tile sees farther; it counts only if it is in the cover.
-                let (x, y) = (column * TILE, row * TILE);
+                let x = column * TILE;
+                let y = row * TILE;
                 let lanes = left.saturating_sub(x)..=(right - x).min(TILE - 1);
                 for row in y.max(top)..=(y + TILE - 1).min(bottom) {
                     let at = row * self.pitch + x;
@@ -214,7 +218,8 @@ impl Canvas {
     #[inline(always)]
     fn look_again(&mut self, tile: usize) -> f32 {
         self.stale[tile] = false;
-        let (x, y) = (tile % self.tile_columns * TILE, tile / self.tile_columns * TILE);
+        let x = tile % self.tile_columns * TILE;
+        let y = tile / self.tile_columns * TILE;
         let mut lanes = [f32::INFINITY; LANES];
         for row in y..y + TILE {
             let at = row * self.pitch + x;
@@ -318,7 +323,8 @@ impl Canvas {
     ) {
         let mut doubts = std::mem::take(&mut self.doubts);
         doubts.sort_unstable_by_key(|d| (d.pixel, d.slot));
-        let (mut slots, mut candidates) = (Vec::new(), Vec::new());
+        let mut slots = Vec::new();
+        let mut candidates = Vec::new();
 
         for group in doubts.chunk_by(|a, b| a.pixel == b.pixel) {
             let pixel = group[0].pixel as usize;
@@ -401,7 +407,8 @@ impl Canvas {
 
         // Exact depths where a function is too poor.
         for &pixel in &self.poor {
-            let (column, row) = (pixel as usize % self.pitch, pixel as usize / self.pitch);
+            let column = pixel as usize % self.pitch;
+            let row = pixel as usize / self.pitch;
             let at = row * out_pitch + column;
             out.1[at] = single(out.0[at], column, row) as f32;
         }

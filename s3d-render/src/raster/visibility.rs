@@ -21,7 +21,8 @@ use std::f64::consts::TAU;
 /// let corners = vec![vec3(-9.0, -9.0, 0.0), vec3(9.0, -9.0, 0.0), vec3(0.0, 9.0, 0.0)];
 /// let floor = TriMesh::from_faces(corners, vec![[0, 1, 2]])?;
 /// let scene = Scene::new(&floor);
-/// let (mut caster, mut hits) = (Caster::new(&scene), Hits::default());
+/// let mut caster = Caster::new(&scene);
+/// let mut hits = Hits::default();
 /// let panorama = Camera::equirectangular(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 256);
 /// caster.cast_into(&panorama, 4, &mut hits); // every fourth pixel of every fourth row, to score it
 /// assert_eq!((hits.face.width(), hits.face.height()), (64, 32));

@@ -65,7 +65,8 @@ impl Slopes {
             let (sign, shift) = wrap.sign_and_shift(value);
             slopes.set::<PANORAMA>(k, m * sign, steps);
             slopes.base[k] = (value * sign + shift) as f32;
-            let (low, high) = ((low * sign + shift) as f32, (high * sign + shift) as f32);
+            let low = (low * sign + shift) as f32;
+            let high = (high * sign + shift) as f32;
             (slopes.min[k], slopes.max[k]) = if sign < 0.0 { (high, low) } else { (low, high) };
         }
         slopes
@@ -109,7 +110,8 @@ impl Anchor {
         i: usize,
         j: usize,
     ) -> bool {
-        let (e, steps) = (grid.rays.at(i as u32, j as u32), grid.steps(i));
+        let e = grid.rays.at(i as u32, j as u32);
+        let steps = grid.steps(i);
         self.put(Slopes::new::<PANORAMA>(attributes, wraps, e, steps), i, j)
     }
 
@@ -190,7 +192,8 @@ impl AnchorBatch {
         for n in 0..3 {
             let TexelWrap { divisor, period, half } = wraps[n];
             let wrap = [divisor, period, half];
-            let (corner, ray) = (corners[n].to_array(), rays[n].to_array());
+            let corner = corners[n].to_array();
+            let ray = rays[n].to_array();
             for m in 0..3 {
                 self.corners[n][m][k] = f64::from(corner[m]);
                 self.values[n][m][k] = values[n][m];
@@ -306,7 +309,8 @@ impl AnchoredRow<'_> {
             if PANORAMA {
                 let change = l.sub(l.mul(l.splat(along[n] * cos), s), l.mul(l.splat(down[n] * cos), v));
                 values[n] = l.add(l.splat(start[n]), change);
-                let (level, rise) = (cos * grid.column_step, sin * grid.column_step);
+                let level = cos * grid.column_step;
+                let rise = sin * grid.column_step;
                 let (a, b) = (l.mul(l.splat(along[n] * level), cosine), l.mul(l.splat(down[n] * level), s));
                 by_column[n] = l.sub(a, b);
                 let (a, b) = (l.mul(l.splat(down[n] * rise), cosine), l.mul(l.splat(along[n] * rise), s));

@@ -48,7 +48,8 @@ impl Attributes {
             let (low, high) = self.bounds[k];
             let value = min(max(self.numerator[k].dot(e) * scale, low), high);
             for step in steps {
-                let (a, w) = (self.numerator[k].dot(step) * scale, self.denominator.dot(step) * scale);
+                let a = self.numerator[k].dot(step) * scale;
+                let w = self.denominator.dot(step) * scale;
                 let most = (a - w * value).abs() + (high - low) * w.abs();
                 sum += most * most;
             }

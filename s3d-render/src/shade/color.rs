@@ -250,7 +250,8 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
             while let Some(&[piece, next]) =
                 pieces.next_if(|pieces| (pieces[0].start as usize) < from + width)
             {
-                let (start, end) = (piece.start as usize, next.start as usize);
+                let start = piece.start as usize;
+                let end = next.start as usize;
                 let columns = start - from..end - from;
                 self.lay_out::<PANORAMA>(grid, faces[start], piece.number, first_row + j, columns, row);
             }

@@ -103,7 +103,8 @@ struct TapWalk<L: ShadeLanes> {
 impl<L: ShadeLanes> TapWalk<L> {
     #[inline(always)]
     fn at(l: L, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
-        let (place, fixed_step) = ((l.fixed(first.0), l.fixed(first.1)), (l.fixed(step.0), l.fixed(step.1)));
+        let place = (l.fixed(first.0), l.fixed(first.1));
+        let fixed_step = (l.fixed(step.0), l.fixed(step.1));
         Self { first, step, place, fixed_step }
     }
 
@@ -118,7 +119,8 @@ impl<L: ShadeLanes> TapWalk<L> {
     /// Takes a step.
     #[inline(always)]
     fn go_on(&mut self, l: L) {
-        let (place, step) = (self.place, self.fixed_step);
+        let place = self.place;
+        let step = self.fixed_step;
         self.place = (l.add_fixed(place.0, step.0), l.add_fixed(place.1, step.1));
     }
 }
@@ -295,7 +297,9 @@ impl<'a> MipLevels<'a> {
 
     #[inline(always)]
     fn magnified<L: ShadeLanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> L::ColorSum {
-        let (level, half, zero) = (&self.levels[0], l.splat(0.5), l.splat(0.0));
+        let level = &self.levels[0];
+        let half = l.splat(0.5);
+        let zero = l.splat(0.0);
         let walk = TapWalk::at(l, (l.sub(x, half), l.sub(y, half)), (zero, zero));
         self.add(l, l.zero_sum(), level, &walk, zero, l.full_weights(), these)
     }

@@ -149,7 +149,9 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
         let x = -half + 0.66 * seat as f32;
         b.cuboid([x + 0.015, -0.43, 0.305], [x + 0.645, 0.22, 0.44], fabric, &[Bottom]);
         let back: [Vec3; 8] = std::array::from_fn(|i| {
-            let (left, front, low) = ([0, 3].contains(&(i % 4)), i % 4 < 2, i < 4);
+            let left = [0, 3].contains(&(i % 4));
+            let front = i % 4 < 2;
+            let low = i < 4;
             let lean = if low { 0.0 } else { 0.09 };
             vec3(
                 if left { x + 0.03 } else { x + 0.63 },

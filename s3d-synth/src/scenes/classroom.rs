@@ -51,10 +51,8 @@ struct Builder {
 
 impl Builder {
     fn grid(&mut self, origin: Vec3, u: Vec3, v: Vec3) {
-        let (nu, nv) = (
-            (u.length() / self.cell).ceil().max(1.0) as u32,
-            (v.length() / self.cell).ceil().max(1.0) as u32,
-        );
+        let nu = (u.length() / self.cell).ceil().max(1.0) as u32;
+        let nv = (v.length() / self.cell).ceil().max(1.0) as u32;
         let normal = u.cross(v).normalize();
         let first = self.parts.positions.len() as u32;
 

@@ -48,7 +48,8 @@ pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
 /// use s3d_io::image::{Compression, encode_palette8, read_palette8};
 ///
 /// let file = tempfile::NamedTempFile::new()?;
-/// let (image, palette) = (Raster::from_vec(2, 1, vec![1, 0]), [[0, 0, 0], [255, 128, 0]]);
+/// let image = Raster::from_vec(2, 1, vec![1, 0]);
+/// let palette = [[0, 0, 0], [255, 128, 0]];
 /// std::fs::write(file.path(), encode_palette8(&image, &palette, Compression::Balanced))?;
 /// assert_eq!(read_palette8(file.path())?, (image, palette.to_vec()));
 /// # Ok::<(), Box<dyn std::error::Error>>(())

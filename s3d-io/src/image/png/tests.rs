@@ -121,7 +121,8 @@ struct View {
 }
 
 fn view() -> View {
-    let (width, height) = (320, 240);
+    let width = 320;
+    let height = 240;
     let mut byte = noise();
     // The horizontal position, the depth, and whether the pixel shows the floor.
     type Seen = (f32, f32, bool);
@@ -145,7 +146,8 @@ fn view() -> View {
         depth: Raster::from_vec(width, height, pixels.iter().map(|p| (512.0 * p.1) as u16).collect()),
         // Triangles of noisy vertices, each with its own normal.
         normals: raster(&mut |&(x, depth, floor)| {
-            let (u, v) = (9.0 * (x + 1.0), 11.0 * depth + 3.0 * x);
+            let u = 9.0 * (x + 1.0);
+            let v = 11.0 * depth + 3.0 * x;
             let upper = u32::from(u.fract() > v.fract());
             let face = (u as u32 * 7919 + v as u32 * 104_729 + upper).wrapping_mul(0x9e37_79b1);
             let tilt = [face >> 28, face >> 20 & 15, face >> 12 & 3].map(|t| t as u8);
@@ -297,7 +299,8 @@ fn file_of(chunks: &[([u8; 4], &[u8])]) -> Vec<u8> {
 
 #[test]
 fn files_of_other_programs_are_read() {
-    let (w, h) = (21, 40);
+    let w = 21;
+    let h = 40;
     let mut byte = noise();
     let image = Raster::from_vec(w, h, (0..w * h).map(|i| [(i / 3) as u8, byte() % 9, 250]).collect());
     let header = [&w.to_be_bytes()[..], &h.to_be_bytes(), &[8, 2, 0, 0, 0]].concat();
