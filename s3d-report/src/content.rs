@@ -9,7 +9,7 @@ use crate::mesh;
 use crate::pixels::{Images, Picture, Shares, Widths, nothing_left};
 use crate::reduce::nearest;
 use crate::script::Scripts;
-use crate::selection::{Place, places};
+use crate::selection::{PoolPlace, places};
 use crate::write::ReportOptions;
 use s3d_dataset::{Context, DataSet, Progress, Result, map_in_order};
 use s3d_geom::{Camera, Raster, TriMesh};
@@ -539,7 +539,7 @@ fn key_of(image: &DatasetImage) -> (u32, String, String, Frame) {
 }
 
 /// Adds the record of a candidate to the entry of its view.
-fn of_record(entry: ViewEntry, view: &ViewRecord, place: Place) -> ViewEntry {
+fn of_record(entry: ViewEntry, view: &ViewRecord, place: PoolPlace) -> ViewEntry {
     ViewEntry {
         candidate: Some(view.candidate),
         yaw_deg: Some(degrees(view.yaw_rad)),

@@ -23,7 +23,7 @@ pub(crate) enum Reason {
 
 /// The place of a view in its pool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub(crate) struct Place {
+pub(crate) struct PoolPlace {
     pub(crate) reason: Reason,
     /// Its rank, from 1 for the highest entropy.
     pub(crate) rank: usize,
@@ -32,7 +32,7 @@ pub(crate) struct Place {
 }
 
 /// Returns the places of candidates, in their order. `views` has the area of each.
-pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -> Vec<Place> {
+pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -> Vec<PoolPlace> {
     let mut pools: BTreeMap<(u32, &str), Vec<usize>> = BTreeMap::new();
     for (i, (area, view)) in views.iter().enumerate() {
         let key = match pool {
@@ -44,7 +44,7 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
     }
 
     let selection = Selection::default();
-    let mut ranked: Vec<(usize, Place)> = Vec::with_capacity(views.len());
+    let mut ranked: Vec<(usize, PoolPlace)> = Vec::with_capacity(views.len());
     for members in pools.into_values() {
         let mut members: Vec<(usize, u32, &ViewRecord)> = members
             .into_iter()
@@ -65,7 +65,7 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
                 None if at + dropped >= n => Reason::Lowest,
                 None => Reason::NotDrawn,
             };
-            ranked.push((i, Place { reason, rank: at + 1, pool: n }));
+            ranked.push((i, PoolPlace { reason, rank: at + 1, pool: n }));
         }
     }
     ranked.sort_by_key(|(i, _)| *i);

@@ -26,7 +26,7 @@ const RECALL: &str = "Proposals: recall";
 pub const THRESHOLDS: [f64; 2] = [0.5, 0.25];
 
 /// Detections in the world frame, by row and class.
-type Found = BTreeMap<(String, usize), Vec<Scored>>;
+type BoxesByRow = BTreeMap<(String, usize), Vec<Scored>>;
 
 /// Returns the average precision over the folds of the paper, as far as their areas exist. Each number is the
 /// mean over folds; a fold whose areas lack a class is left out. All variants are trained, whatever
@@ -82,7 +82,7 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
         Ok(tested)
     });
 
-    let mut found = Found::new();
+    let mut found = BoxesByRow::new();
     let mut recalls = vec![[[0usize; 2]; 2]; CLASSES.len()];
     for (of_space, recall) in tested.collect::<Result<Vec<_>>>()? {
         for (key, boxes) in of_space {
@@ -132,10 +132,10 @@ fn share([found, all]: [usize; 2]) -> Option<f64> {
 
 /// Returns the detections in a space by row and class, and the number of elements that its proposals overlap,
 /// by class and threshold.
-fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
+fn test_space(model: &Model, space: &Space) -> (BoxesByRow, Vec<[[usize; 2]; 2]>) {
     let prepared = Prepared::new(space);
     let proposals = model.proposer.propose(&prepared);
-    let mut found = Found::new();
+    let mut found = BoxesByRow::new();
     let mut put = |name: &str, class: usize, bbox: &Aabb, score: f64| {
         let scored = Scored { scene: (space.area, space.room_of(bbox)), bbox: space.to_world(bbox), score };
         found.entry((name.to_owned(), class)).or_default().push(scored);

@@ -32,7 +32,7 @@ use std::collections::BTreeMap;
 /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, in metres.
 type Bbox = [f64; 6];
 /// The score and the box of a detection, of one class in one room.
-type Found = (f64, Bbox);
+type ScoredBox = (f64, Bbox);
 
 /// The program whose definition is followed: it says which detections are true, and what average precision
 /// is.
@@ -99,7 +99,7 @@ pub fn average_precision(
         .iter()
         .copied()
         .map(|class| {
-            let mut rooms: BTreeMap<u32, (Vec<Bbox>, Vec<Found>)> = BTreeMap::new();
+            let mut rooms: BTreeMap<u32, (Vec<Bbox>, Vec<ScoredBox>)> = BTreeMap::new();
             for t in truth.iter().filter(|t| t.class == class) {
                 rooms.entry(t.room).or_default().0.push(t.bbox);
             }

@@ -4,7 +4,7 @@ use super::precision::{ClassScore, mean};
 use super::predictions::Predictions;
 use super::room::{Verdict, verdicts};
 use super::truth::{Classes, Room, rooms};
-use super::{Bbox, Found, Rule};
+use super::{Bbox, Rule, ScoredBox};
 use crate::error::Result;
 use crate::tables::{Rows, tables};
 use crate::task::Task;
@@ -130,7 +130,7 @@ impl OfClass {
             .filter(|(c, _)| *c == class)
             .map(|(_, bbox)| *bbox)
             .collect();
-        let found: Vec<Found> = found
+        let found: Vec<ScoredBox> = found
             .iter()
             .filter(|(_, c, _)| *c == class)
             .map(|(score, _, bbox)| (*score, *bbox))

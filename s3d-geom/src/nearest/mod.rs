@@ -15,7 +15,7 @@ mod surroundings;
 mod triangle;
 mod triangle8;
 
-use crate::wide::{self, Work};
+use crate::wide::{self, Kernel};
 use crate::{Aabb, NO_INDEX, TriMesh};
 use curve::{MOST_POINTS, along_a_curve};
 use face_tree::{FaceTree, Search, Starts};
@@ -143,7 +143,7 @@ struct Lookup<'a> {
     out: &'a mut [Nearest],
 }
 
-impl Work for Lookup<'_> {
+impl Kernel for Lookup<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -4,7 +4,7 @@
 
 mod patch;
 
-use crate::wide::{self, Work};
+use crate::wide::{self, Kernel};
 use crate::{PointCloud, TriMesh};
 use glam::Vec3;
 use patch::{Patch, PointColor};
@@ -183,7 +183,7 @@ struct Draw<'a> {
     faces: &'a mut [u32],
 }
 
-impl Work for Draw<'_> {
+impl Kernel for Draw<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -426,7 +426,7 @@ mod tests {
     use crate::simd::dispatch_on;
     use glam::dvec3;
     use s3d_geom::{Pose, TriMesh};
-    use s3d_simd::Level;
+    use s3d_simd::ProvenLevel;
     use s3d_synth::scenes::furnished_room;
 
     fn pose() -> Pose {
@@ -546,7 +546,7 @@ mod tests {
         let filter = TextureFilter::default();
         for camera in cameras() {
             let hits = cast(&scene, &camera);
-            let images = Level::all().into_iter().map(|level| {
+            let images = ProvenLevel::all().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 let mut shown = Raster::filled(camera.width, camera.height, 0);
                 let cube = &cube;

@@ -26,7 +26,7 @@ use crate::simd::dispatch_on;
 use crate::simd::shade_lanes::{LANES, ShadeLanes};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, NormalAxes, Raster};
-use s3d_simd::{Level, level};
+use s3d_simd::{ProvenLevel, level};
 use std::ops::Range;
 
 /// Returns the colours that the pixels see. Textures are filtered over each pixel's footprint, colours of
@@ -75,7 +75,7 @@ pub fn rgb_image_into(
 
 /// Writes the image of [`rgb_image_into`] from the faces of hits, with the instructions of `level`.
 pub(crate) fn rgb_of_faces_into(
-    level: Level,
+    level: ProvenLevel,
     scene: &Scene<'_>,
     mip_maps: &MipMaps,
     faces: &Raster<u32>,
@@ -446,7 +446,7 @@ mod tests {
         ] {
             let hits = crate::raster::visibility::cast(&scene, &camera);
             let filter = TextureFilter::default();
-            let images = Level::all().into_iter().map(|level| {
+            let images = ProvenLevel::all().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 rgb_of_faces_into(level, &scene, &mip_maps, &hits.face, &camera, &filter, &mut out);
                 out
