@@ -219,7 +219,7 @@ mod tests {
                     prop_assert_eq!(start, next);
                     prop_assert!((1..=LANES).contains(&(end - start)) && start / width == (end - 1) / width);
                     prop_assert!(faces[start..end].iter().all(|&face| face == things[piece.number as usize]));
-                    let cut = end - start < LANES && end % width != 0;
+                    let cut = end - start < LANES && !end.is_multiple_of(width);
                     prop_assert!(!cut || faces[end - 1] != faces[end]);
                     next = end;
                 }
