@@ -3,8 +3,8 @@
 use crate::area::CLASSES;
 use crate::error::{Error, Result};
 use crate::model::Model;
-use crate::parsed_area::ParsedArea;
 use crate::proposals::Prepared;
+use crate::spaces::parsed_area::ParsedArea;
 use rayon::prelude::*;
 use s3d_dataset::Context;
 use serde::{Deserialize, Serialize};

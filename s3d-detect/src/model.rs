@@ -8,7 +8,7 @@ use crate::features::{FEATURES, Variant};
 use crate::learn::{Machines, elements, learn, overlap, score};
 use crate::proposals::windows::WINDOW_FEATURES;
 use crate::proposals::{Prepared, Proposal, Proposer};
-use crate::space::{Space, SpaceSource};
+use crate::spaces::space::{Space, SpaceSource};
 use crate::svm::Linear;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;

@@ -9,8 +9,9 @@
 
 use crate::hits::Hits;
 use crate::scene::Scene;
+use crate::shade::anchor::attributes::Attributes;
+use crate::shade::anchor::ray_grid::RayGrid;
 use crate::shade::anchor::{Anchor, AnchorBatch};
-use crate::shade::attributes::Attributes;
 use crate::shade::channels::{assert_size, fit, paint};
 use crate::shade::face_table::NewFace;
 use crate::shade::filter::{Footprints, MipLevels};
@@ -18,7 +19,6 @@ use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::shade::patch::{FaceCache, Patch};
 use crate::shade::pixel_color::PixelByPixel;
 use crate::shade::prefetch::Prefetch;
-use crate::shade::ray_grid::RayGrid;
 use crate::shade::spans::Spans;
 use crate::shade::texel_wrap::TexelWrap;
 use crate::shade::view::{Modalities, Shading, ViewImages, ViewKernel};

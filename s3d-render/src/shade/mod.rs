@@ -1,7 +1,6 @@
 //! Makes images from hits: colours, depths, normals, indices and points.
 
 pub(crate) mod anchor;
-pub(crate) mod attributes;
 pub(crate) mod channels;
 pub(crate) mod color;
 pub(crate) mod face_table;
@@ -12,7 +11,6 @@ pub(crate) mod patch;
 pub(crate) mod pixel_color;
 pub(crate) mod points;
 pub(crate) mod prefetch;
-pub(crate) mod ray_grid;
 pub(crate) mod spans;
 pub(crate) mod texel_wrap;
 pub(crate) mod view;

@@ -5,6 +5,7 @@
 
 use crate::hits::Hits;
 use crate::scene::Scene;
+use crate::shade::anchor::ray_grid::RayGrid;
 use crate::shade::channels::{
     MISSING_INDEX, MISSING_NORMAL, assert_size, depths, fit, flat_normals_of, index_color,
 };
@@ -13,7 +14,6 @@ use crate::shade::flat_painter::FlatPainter;
 use crate::shade::mip_maps::{MipMaps, TextureFilter};
 use crate::shade::points::RayTable;
 use crate::shade::prefetch::Prefetch;
-use crate::shade::ray_grid::RayGrid;
 use crate::shade::spans::{Spans, band_rows};
 use crate::simd::shade_lanes::{LANES, ShadeLanes};
 use crate::simd::{Kernel, Simd, dispatch};

@@ -21,12 +21,15 @@
 //! varies, as is usual in 64 pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel
 //! in a texture of 4096.
 
-use crate::shade::attributes::{Attributes, max, min};
+pub(crate) mod attributes;
+pub(crate) mod ray_grid;
+
 use crate::shade::patch::Patch;
-use crate::shade::ray_grid::{REACH, RayGrid};
 use crate::shade::texel_wrap::TexelWrap;
 use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
+use attributes::{Attributes, max, min};
 use glam::DVec3;
+use ray_grid::{REACH, RayGrid};
 
 /// The largest factor by which a pixel may be nearer or farther than its anchor.
 pub(crate) const DEEP: f32 = 16.0;
