@@ -283,10 +283,8 @@ mod tests {
     }
 
     fn document(matrix: &str) -> String {
-        format!(
-            r#"{{"fl_x": 500, "camera_model": "OPENCV",
-            "frames": [{{"file_path": "images/a.png", "transform_matrix": {matrix}}}]}}"#
-        )
+        let frame = format!(r#"{{"file_path": "images/a.png", "transform_matrix": {matrix}}}"#);
+        format!(r#"{{"fl_x": 500, "camera_model": "OPENCV", "frames": [{frame}]}}"#)
     }
 
     #[test]
