@@ -35,16 +35,15 @@ impl Costs {
 
     /// Returns the costs by the codes of a block.
     pub(crate) fn of(lengths: &CodeLengths, tokens: &Tokens) -> Self {
-        let cost = |length: u8| if length == 0 { RARE } else { length };
         let distances: [u8; 16] = from_fn(|log| {
             // Two symbols have this logarithm, except at the ends.
             let shorter = lengths.distance[2 * log].min(lengths.distance[(2 * log + 1).min(DISTANCES - 1)]);
-            cost(shorter).min(FAR) + (log as u8).saturating_sub(1)
+            cost_of(shorter).min(FAR) + (log as u8).saturating_sub(1)
         });
         Self {
-            literals: from_fn(|byte| cost(lengths.litlen[byte])),
+            literals: from_fn(|byte| cost_of(lengths.litlen[byte])),
             lengths: LENGTH_SYMBOLS
-                .map(|(symbol, extra)| cost(lengths.litlen[257 + usize::from(symbol)]) + extra),
+                .map(|(symbol, extra)| cost_of(lengths.litlen[257 + usize::from(symbol)]) + extra),
             fixed_distances: tokens
                 .fixed_distances
                 .map(|distance| distances[distance.ilog2() as usize & 15]),
@@ -71,4 +70,8 @@ impl Costs {
         let here: &[u8; PRICED] = data[at..].first_chunk().unwrap_or(&[0; PRICED]);
         here.map(|byte| self.literal(byte)).iter().sum::<u32>() * found.length as u32 / PRICED as u32 > cost
     }
+}
+
+fn cost_of(length: u8) -> u8 {
+    if length == 0 { RARE } else { length }
 }

@@ -184,12 +184,15 @@ mod tests {
         }
     }
 
+    fn reversed(code: u16, bits: u32) -> u16 {
+        code.reverse_bits() >> (16 - bits)
+    }
+
     #[test]
     fn codes_are_those_of_the_standards_example() {
         // RFC 1951, 3.2.2: A to H have the lengths 3 3 3 3 3 2 4 4.
         let mut codes = [0; 8];
         canonical_codes(&[3, 3, 3, 3, 3, 2, 4, 4], &mut codes);
-        let reversed = |code: u16, bits: u32| code.reverse_bits() >> (16 - bits);
         let expected = [(2, 3), (3, 3), (4, 3), (5, 3), (6, 3), (0, 2), (14, 4), (15, 4)];
         assert_eq!(codes, expected.map(|(code, bits)| reversed(code, bits)));
     }

@@ -229,24 +229,27 @@ mod tests {
         patience: 6,
     };
 
+    fn search_with(candidates: Candidates, hash_bytes: u32) -> Search {
+        Search { candidates, hash_bytes, ..SEARCH }
+    }
+
     /// Returns one search of each kind, from the quickest to the most thorough.
     fn searches() -> Vec<Search> {
         use Candidates::{
             FixedDistances, HalfOfFixedDistances, Hash1, Hash2, Hash4, Hash16, LongFixedDistances,
             SplitFixedDistances,
         };
-        let with = |candidates, hash_bytes| Search { candidates, hash_bytes, ..SEARCH };
         let short = Search { lazy: 0, nice: 8, remember: 0, patience: 0, ..SEARCH };
         vec![
-            with(Hash1, 8),
-            with(Hash2, 6),
+            search_with(Hash1, 8),
+            search_with(Hash2, 6),
             short,
-            with(Hash4, 4),
-            with(Hash16, 4),
-            with(FixedDistances, 4),
-            with(HalfOfFixedDistances, 4),
-            with(LongFixedDistances, 4),
-            with(SplitFixedDistances, 4),
+            search_with(Hash4, 4),
+            search_with(Hash16, 4),
+            search_with(FixedDistances, 4),
+            search_with(HalfOfFixedDistances, 4),
+            search_with(LongFixedDistances, 4),
+            search_with(SplitFixedDistances, 4),
         ]
     }
 
@@ -315,20 +318,21 @@ mod tests {
         }
     }
 
+    /// Compresses noise that repeats after `distance` bytes, and returns the size.
+    fn size_with_repeat_at(distance: usize) -> usize {
+        let once = noise(distance, 256);
+        let data = [&once[..], &once[..10_000]].concat();
+        let mut out = Vec::new();
+        let search = Search { candidates: Candidates::Hash16, patience: 20, ..SEARCH };
+        Deflater::new(search).unwrap().zlib(&data, None, &mut out);
+        assert_eq!(inflated(&out, data.len()), data);
+        out.len()
+    }
+
     #[test]
     fn matches_as_far_back_as_they_may_be_are_found() {
-        // Noise repeats after the longest distance, and after one byte more.
-        let find = |distance: usize| {
-            let once = noise(distance, 256);
-            let data = [&once[..], &once[..10_000]].concat();
-            let mut out = Vec::new();
-            let search = Search { candidates: Candidates::Hash16, patience: 20, ..SEARCH };
-            Deflater::new(search).unwrap().zlib(&data, None, &mut out);
-            assert_eq!(inflated(&out, data.len()), data);
-            out.len()
-        };
-        assert!(find(1 << 15) < (1 << 15) + 500, "{}", find(1 << 15));
-        assert!(find((1 << 15) + 1) > (1 << 15) + 9_000);
+        assert!(size_with_repeat_at(1 << 15) < (1 << 15) + 500, "{}", size_with_repeat_at(1 << 15));
+        assert!(size_with_repeat_at((1 << 15) + 1) > (1 << 15) + 9_000);
     }
 
     #[test]

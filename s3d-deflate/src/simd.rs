@@ -4,7 +4,7 @@
 //! (the book's page on encoding). Every form gives the same bytes; tests compare each with the portable
 //! form.
 
-use s3d_simd::{Level, Scalar, level};
+use s3d_simd::{ProvenLevel, Scalar, level};
 
 /// The number of bytes in a register, and of places that one comparison covers.
 pub(crate) const WIDTH: usize = 32;
@@ -95,17 +95,17 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     )
 }
 
-fn dispatch_on<K: Kernel>(level: Level, kernel: K) -> K::Output {
+fn dispatch_on<K: Kernel>(level: ProvenLevel, kernel: K) -> K::Output {
     match level {
-        Level::Scalar(scalar) => kernel.run(scalar),
+        ProvenLevel::Scalar(scalar) => kernel.run(scalar),
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2(avx2) => avx2.vectorize(
+        ProvenLevel::Avx2(avx2) => avx2.vectorize(
             #[inline(always)]
             || kernel.run(avx2),
         ),
         // Comparisons use AVX2, since mask registers are no faster. The code around them gains from AVX-512.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512(avx512) => avx512.vectorize(
+        ProvenLevel::Avx512(avx512) => avx512.vectorize(
             #[inline(always)]
             || kernel.run(avx512.avx2()),
         ),
@@ -279,7 +279,7 @@ mod tests {
             });
 
             let windows = Windows { upper, lower, upper_half, lower_half, bytes };
-            for level in Level::all() {
+            for level in ProvenLevel::all() {
                 prop_assert_eq!(dispatch_on(level, windows), (expected, expected_in_halves));
             }
         }

@@ -253,7 +253,8 @@ mod tests {
             .iter_mut()
             .for_each(|w| *w = rng.random_range(-0.6..0.3));
         let nodes = (0..9).map(|_| {
-            let (class, score) = (rng.random_range(0..COUNT), rng.random_range(-1.0..1.5));
+            let class = rng.random_range(0..COUNT);
+            let score = rng.random_range(-1.0..1.5);
             node(class, score, rng.random_range(0.0..4.0), rng.random_range(0.0..1.5))
         });
         (context, nodes.collect())

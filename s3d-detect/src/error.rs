@@ -38,6 +38,17 @@ pub enum Error {
         /// The areas.
         areas: Vec<u32>,
     },
+    /// Most points of a found element have a room that the area's list of rooms lacks. Areas that are read
+    /// never do.
+    #[error("area {area} has a point in room {room}, and names for {rooms} rooms: give each room a name")]
+    UnnamedRoom {
+        /// The area.
+        area: u32,
+        /// The room, from 0.
+        room: u32,
+        /// The number of rooms that have names.
+        rooms: usize,
+    },
     /// A file is wrong, the disk refuses, or the call was cancelled.
     #[error(transparent)]
     Dataset(#[from] s3d_dataset::Error),

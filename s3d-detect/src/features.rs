@@ -171,8 +171,7 @@ fn describe_palette(out: &mut [f32], palette: &Palette) {
 
 /// Fills the features of the place and the size of a box.
 fn describe_place(out: &mut [f32], extent: Vec3, b: &Aabb) {
-    let unit = |p: Vec3| p / extent.max(Vec3::splat(0.1));
-    let [center, low, high] = [b.center(), b.min, b.max].map(unit);
+    let [center, low, high] = [b.center(), b.min, b.max].map(|p| of_extent(p, extent));
     let size = b.size();
     let (position, sizes) = out[POSITION.start..].split_at_mut(SIZE.start - POSITION.start);
 
@@ -192,8 +191,12 @@ fn describe_place(out: &mut [f32], extent: Vec3, b: &Aabb) {
     }
     let mut bins = sizes[3 * SIZE_BINS..].chunks_exact_mut(SHARE_BINS);
     for axis in 0..3 {
-        put(bins.next(), unit(size)[axis]);
+        put(bins.next(), of_extent(size, extent)[axis]);
     }
+}
+
+fn of_extent(p: Vec3, extent: Vec3) -> Vec3 {
+    p / extent.max(Vec3::splat(0.1))
 }
 
 /// Spreads a number between 0 and 1 over the two bins next to it.
@@ -260,10 +263,13 @@ mod tests {
         assert!((row[POSITION.start + 4] - 0.75 * BIN_WEIGHT).abs() < 1e-5);
     }
 
+    fn features_left(v: Variant) -> usize {
+        FEATURES - v.without().iter().map(Range::len).sum::<usize>()
+    }
+
     #[test]
     fn variants_leave_out_the_features_of_the_paper() {
-        let left = |v: Variant| FEATURES - v.without().iter().map(Range::len).sum::<usize>();
-        assert_eq!(Variant::ALL.map(left), [FEATURES, 2312, FEATURES - 6 * CELLS, FEATURES - 1016]);
+        assert_eq!(Variant::ALL.map(features_left), [FEATURES, 2312, FEATURES - 6 * CELLS, FEATURES - 1016]);
         assert_eq!(SIZE.end, 2312 + 55 + 26 + 75);
     }
 }

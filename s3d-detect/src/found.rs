@@ -1,10 +1,10 @@
 //! The elements that a trained model finds in an area.
 
 use crate::area::CLASSES;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::Model;
-use crate::parsed_area::ParsedArea;
 use crate::proposals::Prepared;
+use crate::spaces::parsed_area::ParsedArea;
 use rayon::prelude::*;
 use s3d_dataset::Context;
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,8 @@ pub struct FoundBox {
 /// first.
 ///
 /// # Errors
-/// [`Error::Dataset`](crate::Error::Dataset) if the call is cancelled.
+/// [`Error::Dataset`] if the call is cancelled; [`Error::UnnamedRoom`] if an area made by hand lacks the name
+/// of a room with an element.
 pub fn detect_area(model: &Model, area: &ParsedArea, ctx: &Context) -> Result<Vec<FoundBox>> {
     let progress = ctx.progress("detecting", "spaces", area.spaces.len() as u64);
     let found = area.spaces.par_iter().map(|space| {
@@ -42,17 +43,21 @@ pub fn detect_area(model: &Model, area: &ParsedArea, ctx: &Context) -> Result<Ve
 
         let found = detections.iter().map(|d| {
             let room = space.room_of(&d.bbox);
+            let Some(name) = area.rooms.get(room as usize) else {
+                return Err(Error::UnnamedRoom { area: area.number, room, rooms: area.rooms.len() });
+            };
+
             let bbox = space.to_world(&d.bbox);
-            FoundBox {
+            Ok(FoundBox {
                 area: area.number,
-                room: area.rooms[room as usize].clone(),
+                room: name.clone(),
                 class: CLASSES[d.class].name().to_owned(),
                 score: d.in_context,
                 min: bbox.min.to_array(),
                 max: bbox.max.to_array(),
-            }
+            })
         });
-        Ok(found.collect::<Vec<_>>())
+        found.collect::<Result<Vec<_>>>()
     });
     Ok(found.collect::<Result<Vec<_>>>()?.concat())
 }

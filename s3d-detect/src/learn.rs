@@ -129,12 +129,14 @@ pub fn learn(
 impl<'a> Source<'a> {
     /// Describes the true boxes and the proposals of all spaces.
     fn new(spaces: &'a [Prepared<'a>], proposals: &'a [Vec<(Proposal, f64)>], seed: u64) -> Self {
-        let of_space = |(s, proposals): (&Prepared<'_>, &Vec<(Proposal, f64)>)| {
-            let truth = describe_all(s, s.space.elements.iter().map(|e| &e.bbox));
-            (truth, describe_all(s, proposals.iter().map(|(p, _)| &p.bbox)))
-        };
-        let (truths, described): (Vec<SparseRows>, Vec<SparseRows>) =
-            spaces.par_iter().zip(proposals).map(of_space).unzip();
+        let (truths, described): (Vec<SparseRows>, Vec<SparseRows>) = spaces
+            .par_iter()
+            .zip(proposals)
+            .map(|(s, proposals)| {
+                let truth = describe_all(s, s.space.elements.iter().map(|e| &e.bbox));
+                (truth, describe_all(s, proposals.iter().map(|(p, _)| &p.bbox)))
+            })
+            .unzip();
         let mut truth = SparseRows::new(FEATURES);
         truths.iter().for_each(|rows| truth.append(rows));
 
@@ -251,8 +253,11 @@ impl<'a> Source<'a> {
     fn nodes(&self, space: usize, machines: &[Option<Linear>]) -> (Vec<Node>, Vec<bool>) {
         let prepared = &self.spaces[space];
         let proposals: Vec<Proposal> = self.proposals[space].iter().map(|(p, _)| *p).collect();
-        let score = |(i, p): (usize, &Proposal)| score_of(machines, p, self.described[space].row(i));
-        let scores: Vec<f64> = proposals.iter().enumerate().map(score).collect();
+        let scores: Vec<f64> = proposals
+            .iter()
+            .enumerate()
+            .map(|(i, p)| score_of(machines, p, self.described[space].row(i)))
+            .collect();
         let nodes = elements(&proposals, &scores);
 
         let mut taken = vec![false; prepared.space.elements.len()];
@@ -282,14 +287,16 @@ pub fn score(
     machines: &[&[Option<Linear>]],
 ) -> Vec<Vec<f64>> {
     let rows = describe_all(prepared, proposals.iter().map(|p| &p.bbox));
-    let of = |machines: &&[Option<Linear>]| {
-        proposals
-            .iter()
-            .enumerate()
-            .map(|(i, p)| score_of(machines, p, rows.row(i)))
-            .collect()
-    };
-    machines.iter().map(of).collect()
+    machines
+        .iter()
+        .map(|machines| {
+            proposals
+                .iter()
+                .enumerate()
+                .map(|(i, p)| score_of(machines, p, rows.row(i)))
+                .collect()
+        })
+        .collect()
 }
 
 fn score_of(machines: &[Option<Linear>], p: &Proposal, row: SparseRow<'_>) -> f64 {

@@ -91,16 +91,14 @@ mod area;
 mod error;
 mod found;
 mod model;
-mod parsed_area;
-mod space;
 
 pub use area::{Area, CLASSES, Element, STRUCTURAL};
 pub use error::{Error, Result};
 pub use found::{FoundBox, detect_area};
 pub use model::{Detection, Model, TrainOptions, recalled};
-pub use parsed_area::{ParsedArea, read_areas};
 pub use s3d_dataset::Context;
-pub use space::{Space, SpaceSource, UnknownSpaceSource, spaces_of};
+pub use spaces::parsed_area::{ParsedArea, read_areas};
+pub use spaces::space::{Space, SpaceSource, UnknownSpaceSource, spaces_of};
 pub use table::cross_validation::cross_validate;
 
 /// The README's example, compiled.

@@ -2,13 +2,13 @@
 
 use crate::area::CLASSES;
 use crate::boxes::iou;
-use crate::context::{ContextWeights, Node};
+use crate::context::ContextWeights;
 use crate::error::{Error, Result};
 use crate::features::{FEATURES, Variant};
 use crate::learn::{Machines, elements, learn, overlap, score};
 use crate::proposals::windows::WINDOW_FEATURES;
 use crate::proposals::{Prepared, Proposal, Proposer};
-use crate::space::{Space, SpaceSource};
+use crate::spaces::space::{Space, SpaceSource};
 use crate::svm::Linear;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -179,13 +179,11 @@ impl Model {
         let found = self.machines.iter().zip(&scores).map(|(machines, scores)| {
             let nodes = elements(proposals, scores);
             let (_, gains) = machines.context.infer(&nodes);
-            let detection = |(n, in_context): (&Node, f64)| Detection {
-                class: n.class,
-                bbox: n.bbox,
-                score: n.score,
-                in_context,
-            };
-            nodes.iter().zip(gains).map(detection).collect()
+            nodes
+                .iter()
+                .zip(gains)
+                .map(|(n, in_context)| Detection { class: n.class, bbox: n.bbox, score: n.score, in_context })
+                .collect()
         });
         found.collect()
     }

@@ -150,7 +150,8 @@ impl Palette {
         let all = [sum(&self.sides)];
         for (contrast, around) in out.iter_mut().zip(self.sides.iter().chain(&all)) {
             if total(&inside) > 0.0 && total(around) > 0.0 {
-                let (p, q) = (share(&inside), share(around));
+                let p = share(&inside);
+                let q = share(around);
                 *contrast = Some(0.5 * p.iter().zip(q).map(|(p, q)| (p - q).abs()).sum::<f32>());
             }
         }
@@ -194,6 +195,12 @@ mod tests {
 
     const MEAN: Vec3 = Vec3::splat(0.7);
 
+    fn strongest_entry(color: Vec3) -> usize {
+        let mut shares = [0.0; ENTRIES];
+        Shade::new(color, MEAN).add_to(&mut shares);
+        (0..ENTRIES).fold(0, |best, i| if shares[i] > shares[best] { i } else { best })
+    }
+
     #[test]
     fn shares_of_a_colour_sum_to_one_and_move_with_it() {
         for i in 0..2000u32 {
@@ -203,23 +210,19 @@ mod tests {
             shade.add_to(&mut shares);
             assert!((total(&shares) - 255.0).abs() <= 3.0, "{shares:?}");
         }
-        let most = |color| {
-            let mut shares = [0.0; ENTRIES];
-            Shade::new(color, MEAN).add_to(&mut shares);
-            (0..ENTRIES).fold(0, |best, i| if shares[i] > shares[best] { i } else { best })
-        };
         // Dark red, dark green and light blue; black to white.
-        assert_eq!(most(vec3(0.9, 0.1, 0.1)), 0);
-        assert_eq!([most(vec3(0.1, 0.8, 0.1)), most(vec3(0.3, 0.3, 1.0))], [8, 15]);
-        assert_eq!([0.1, 0.4, 0.6, 0.9].map(|l| most(Vec3::splat(l))), [18, 19, 20, 21]);
-        assert_eq!(most(vec3(0.9, 0.1, 0.2)), most(vec3(0.9, 0.2, 0.1)));
+        assert_eq!(strongest_entry(vec3(0.9, 0.1, 0.1)), 0);
+        assert_eq!([strongest_entry(vec3(0.1, 0.8, 0.1)), strongest_entry(vec3(0.3, 0.3, 1.0))], [8, 15]);
+        assert_eq!([0.1, 0.4, 0.6, 0.9].map(|l| strongest_entry(Vec3::splat(l))), [18, 19, 20, 21]);
+        assert_eq!(strongest_entry(vec3(0.9, 0.1, 0.2)), strongest_entry(vec3(0.9, 0.2, 0.1)));
         let _ = (Shade::new(Vec3::ZERO, Vec3::ZERO), Shade::new(Vec3::ONE, Vec3::ZERO));
     }
 
     #[test]
     fn contrasts_are_high_where_a_box_differs_from_its_surroundings() {
         let b = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
-        let (red, white) = (Shade::new(vec3(0.8, 0.1, 0.1), MEAN), Shade::new(Vec3::splat(0.9), MEAN));
+        let red = Shade::new(vec3(0.8, 0.1, 0.1), MEAN);
+        let white = Shade::new(Vec3::splat(0.9), MEAN);
         let places = [vec3(0.5, 0.5, 0.1), vec3(0.5, 0.5, 0.9), vec3(-0.2, 0.5, 1.1), vec3(0.5, 0.5, 1.2)];
         let palette = Palette::new(&b, places.into_iter().zip([&red, &red, &white, &red]));
         assert_eq!([0, 1, 2].map(|k| total(&palette.layers[k]) > 0.0), [true, false, true]);

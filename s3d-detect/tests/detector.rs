@@ -5,7 +5,7 @@ use s3d_detect::boxes::iou;
 use s3d_detect::features::Variant;
 use s3d_detect::table::markdown;
 use s3d_detect::{
-    CLASSES, Element, Error, Model, ParsedArea, Space, SpaceSource, TrainOptions, cross_validate,
+    Area, CLASSES, Element, Error, Model, ParsedArea, Space, SpaceSource, TrainOptions, cross_validate,
     detect_area, read_areas,
 };
 use s3d_geom::Aabb;
@@ -100,6 +100,26 @@ fn models_beat_chance_and_find_what_they_learnt_from() {
     assert!(2 * again > all, "{again} of {all}");
     // Each box has a room of the area.
     assert!(found.iter().all(|f| f.area == 1 && areas[0].rooms.contains(&f.room)));
+}
+
+/// A list of rooms that is too short, as of an area made by hand.
+#[test]
+fn rooms_without_a_name_are_an_error_or_no_space() {
+    let mut areas = areas();
+    let model = train(&areas, 1);
+    let rooms = areas[0].rooms.len();
+    areas[0].rooms.clear();
+    let told = detect_area(&model, &areas[0], &Context::default()).unwrap_err();
+    assert!(
+        matches!(told, Error::UnnamedRoom { area: 1, room, rooms: 0 } if (room as usize) < rooms),
+        "{told}"
+    );
+
+    let mut area = Area::read(&data(), 1, &Context::default()).unwrap();
+    area.rooms.clear();
+    let parsed = ParsedArea::new(area, SpaceSource::Rooms);
+    assert!(parsed.spaces.is_empty());
+    assert_eq!(detect_area(&model, &parsed, &Context::default()).unwrap(), []);
 }
 
 #[test]

@@ -54,10 +54,10 @@ impl Folds {
                 vec![present.iter().copied().filter(|area| areas.contains(area)).collect()]
             }
             Self::EachArea => present.iter().map(|&area| vec![area]).collect(),
-            Self::Paper => {
-                let of = |fold: &[u32]| present.iter().copied().filter(|a| fold.contains(a)).collect();
-                PAPER.into_iter().map(of).collect()
-            }
+            Self::Paper => PAPER
+                .into_iter()
+                .map(|fold| present.iter().copied().filter(|a| fold.contains(a)).collect())
+                .collect(),
         };
 
         let folds: Vec<Fold> = sets

@@ -50,17 +50,18 @@ fn of_units<T>(
     if let [fold] = task.folds {
         return vec![table(&fold.name, pooled)];
     }
-    let of_fold = |fold: usize| {
-        let units: Vec<&T> = units.iter().filter(|(f, _)| *f == fold).map(|(_, unit)| unit).collect();
-        let mut rows = score(&units);
-        // A fold without drawn units has no scores.
-        if units.is_empty() {
-            rows.iter_mut().for_each(|(_, values)| values.fill(f64::NAN));
-        }
-        rows
-    };
 
-    let folds: Vec<Rows> = (0..task.folds.len()).map(of_fold).collect();
+    let folds: Vec<Rows> = (0..task.folds.len())
+        .map(|fold| {
+            let units: Vec<&T> = units.iter().filter(|(f, _)| *f == fold).map(|(_, unit)| unit).collect();
+            let mut rows = score(&units);
+            // A fold without drawn units has no scores.
+            if units.is_empty() {
+                rows.iter_mut().for_each(|(_, values)| values.fill(f64::NAN));
+            }
+            rows
+        })
+        .collect();
     let mean = |row: usize, column: usize| {
         mean_of_defined(folds.iter().filter_map(|rows| rows.get(row)?.1.get(column).copied()))
     };

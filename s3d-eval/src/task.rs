@@ -5,8 +5,8 @@ use s3d_dataset::{Context, DataSet};
 use std::path::Path;
 
 /// The definition of the tables over several folds.
-const OF_FOLDS: &str = "All folds, pooled: the counts of all folds together. Mean over folds: the mean of each \
-                        score over the folds in which it is defined.";
+const OF_FOLDS: &str = "All folds, pooled: the counts of all folds together. Mean over folds: the mean of \
+                        each score over the folds in which it is defined.";
 
 /// An evaluation to do.
 #[derive(Clone, Copy)]

@@ -106,11 +106,13 @@ impl Cells {
         numbers.par_sort_unstable();
         numbers.dedup();
 
-        let place = |number: &Option<u64>| {
-            let found = number.and_then(|number| numbers.binary_search(&number).ok());
-            found.map_or(crate::NO_INDEX, |place| place as u32)
-        };
-        let of_vertex = of_vertex.par_iter().map(place).collect();
+        let of_vertex = of_vertex
+            .par_iter()
+            .map(|number| {
+                let found = number.and_then(|number| numbers.binary_search(&number).ok());
+                found.map_or(crate::NO_INDEX, |place| place as u32)
+            })
+            .collect();
         Self { cell_m, origin, numbers, of_vertex }
     }
 
@@ -120,11 +122,13 @@ impl Cells {
 
     /// Returns the number of faces whose corners are in three different cells.
     fn count(&self, mesh: &TriMesh) -> usize {
-        let is_left = |corners: &&[u32; 3]| {
-            let [a, b, c] = self.of_face(**corners);
-            a != b && b != c && c != a
-        };
-        mesh.faces().par_iter().filter(is_left).count()
+        mesh.faces()
+            .par_iter()
+            .filter(|corners| {
+                let [a, b, c] = self.of_face(**corners);
+                a != b && b != c && c != a
+            })
+            .count()
     }
 
     /// Returns the faces whose corners are in three different cells. If several have the same cells and the
@@ -276,8 +280,11 @@ mod tests {
         // Quadrics put vertices into the corner. Means would round it off.
         assert!((kept.total_area() / mesh.total_area() - 1.0).abs() < 0.01, "{}", kept.total_area());
         for corner in [Vec3::ZERO, vec3(4.0, 3.0, 2.5), vec3(4.0, 0.0, 2.5)] {
-            let nearest = |p: &Vec3| p.distance(corner);
-            let least = small.positions.iter().map(nearest).fold(f32::MAX, f32::min);
+            let least = small
+                .positions
+                .iter()
+                .map(|p| p.distance(corner))
+                .fold(f32::MAX, f32::min);
             assert!(least < 0.005, "{corner}: {least} m");
         }
 

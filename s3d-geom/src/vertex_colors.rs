@@ -135,10 +135,13 @@ impl<'m> VertexColors<'m> {
     /// Returns the area of the faces with a corner that has no colour, in m².
     fn area_without_color(&self, colors: &[Option<[u8; 3]>]) -> f64 {
         let mesh = self.nearest_faces.mesh();
-        let is_without = |group: &u32| colors[*group as usize].is_none();
         (0u32..)
             .zip(mesh.faces())
-            .filter(|(_, face)| self.groups_of(face).iter().any(is_without))
+            .filter(|(_, face)| {
+                self.groups_of(face)
+                    .iter()
+                    .any(|group| colors[*group as usize].is_none())
+            })
             .map(|(f, _)| mesh.area(f))
             .sum()
     }
@@ -160,9 +163,12 @@ impl<'m> VertexColors<'m> {
         }
         let bare_m2 = self.area_without_color(&colors);
 
-        let color_of = |group: &u32| colors[*group as usize].unwrap_or(DEFAULT_COLOR);
         ColoredVertices {
-            colors: self.group_of_vertex.iter().map(color_of).collect(),
+            colors: self
+                .group_of_vertex
+                .iter()
+                .map(|group| colors[*group as usize].unwrap_or(DEFAULT_COLOR))
+                .collect(),
             points: self.points,
             far_points: self.far_points,
             spread_m2: unseen_m2 - bare_m2,
@@ -186,18 +192,12 @@ fn groups(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
             .for_each(|vertex| normals[*vertex as usize] += (b - a).cross(c - a));
     }
 
-    // Adding 0 turns −0 into 0, so that equal positions have equal bits.
-    let key = |vertex: u32| {
-        (mesh.positions()[vertex as usize] + Vec3::ZERO)
-            .to_array()
-            .map(f32::to_bits)
-    };
     let mut order: Vec<u32> = (0..normals.len() as u32).collect();
-    order.sort_unstable_by_key(|&vertex| (key(vertex), vertex));
+    order.sort_unstable_by_key(|&vertex| (place_key(vertex, mesh), vertex));
 
     let mut group_of_vertex = vec![0; normals.len()];
     let mut place_of_group = Vec::new();
-    for (place, vertices) in (0u32..).zip(order.chunk_by(|&a, &b| key(a) == key(b))) {
+    for (place, vertices) in (0u32..).zip(order.chunk_by(|&a, &b| place_key(a, mesh) == place_key(b, mesh))) {
         // The normal of the first vertex of each group at this place.
         let first_group = place_of_group.len();
         let mut firsts: Vec<Vec3> = Vec::new();
@@ -215,6 +215,13 @@ fn groups(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
     (group_of_vertex, place_of_group)
 }
 
+/// Returns the place of a vertex as bits. Adding 0 turns −0 into 0, so that equal positions have equal bits.
+fn place_key(vertex: u32, mesh: &TriMesh) -> [u32; 3] {
+    (mesh.positions()[vertex as usize] + Vec3::ZERO)
+        .to_array()
+        .map(f32::to_bits)
+}
+
 /// Returns the mean of weighted colours, rounded. Returns `None` if the weight is 0.
 fn mean([r, g, b, weight]: &[u64; 4]) -> Option<[u8; 3]> {
     (*weight > 0).then(|| [r, g, b].map(|sum| ((2 * sum + weight) / (2 * weight)) as u8))
@@ -222,10 +229,11 @@ fn mean([r, g, b, weight]: &[u64; 4]) -> Option<[u8; 3]> {
 
 /// Returns the unweighted mean of colours.
 fn plain_mean(colors: impl Iterator<Item = [u8; 3]>) -> Option<[u8; 3]> {
-    let add = |sums: [u64; 4], [r, g, b]: [u8; 3]| {
-        [sums[0] + u64::from(r), sums[1] + u64::from(g), sums[2] + u64::from(b), sums[3] + 1]
-    };
     mean(&colors.fold([0; 4], add))
+}
+
+fn add(sums: [u64; 4], [r, g, b]: [u8; 3]) -> [u64; 4] {
+    [sums[0] + u64::from(r), sums[1] + u64::from(g), sums[2] + u64::from(b), sums[3] + 1]
 }
 
 /// The faces around each group of vertices.
@@ -265,7 +273,6 @@ impl<'f> FacesAround<'f> {
 /// Gives each group without a colour the mean colour of its neighbours. It proceeds ring by ring, starting
 /// with the groups next to a colour.
 fn spread(colors: &mut [Option<[u8; 3]>], around: &FacesAround<'_>) {
-    let is_without = |colors: &[Option<[u8; 3]>], group: u32| colors[group as usize].is_none();
     let mut ring: Vec<u32> = (0..colors.len() as u32)
         .filter(|group| is_without(colors, *group))
         .filter(|group| around.corners(*group).any(|other| !is_without(colors, other)))
@@ -286,6 +293,10 @@ fn spread(colors: &mut [Option<[u8; 3]>], around: &FacesAround<'_>) {
         next.dedup();
         ring = next;
     }
+}
+
+fn is_without(colors: &[Option<[u8; 3]>], group: u32) -> bool {
+    colors[group as usize].is_none()
 }
 
 /// Gives each group without a colour the mean of the groups at the same place. Returns true if a group got a
@@ -392,17 +403,28 @@ mod tests {
         assert_eq!((found.colors, found.blurred_m2), (vec![[90, 80, 70]; 6], 0.0));
     }
 
+    fn color_of_wall(p: Vec3) -> [u8; 3] {
+        if p.z > 0.0 { [10, 20, 30] } else { [200, 100, 0] }
+    }
+
     #[test]
     fn colours_of_two_walls_do_not_mix_in_their_corner() {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ZERO, Vec3::Y, Vec3::Z];
         let mesh = TriMesh::from_faces(corners.to_vec(), vec![[0, 1, 2], [3, 4, 5]]).unwrap();
-        let at = |p: Vec3| if p.z > 0.0 { [10, 20, 30] } else { [200, 100, 0] };
-        let both = cloud(vec![vec3(0.3, 0.3, 0.0), vec3(0.0, 0.3, 0.3)], at);
+        let both = cloud(vec![vec3(0.3, 0.3, 0.0), vec3(0.0, 0.3, 0.3)], color_of_wall);
         let [floor, wall] = [[200, 100, 0], [10, 20, 30]];
         assert_eq!(colored(&mesh, &[both]).colors, [floor, floor, floor, wall, wall, wall]);
         // A wall without points takes the colours of the corner.
-        let one = colored(&mesh, &[cloud(vec![vec3(0.3, 0.3, 0.0)], at)]);
+        let one = colored(&mesh, &[cloud(vec![vec3(0.3, 0.3, 0.0)], color_of_wall)]);
         assert_eq!((one.colors, one.spread_m2, one.bare_m2), (vec![floor; 6], 0.5, 0.0));
+    }
+
+    fn cloud_of(points: &[(f32, f32, f32, [u8; 3])]) -> PointCloud {
+        PointCloud {
+            positions: points.iter().map(|(x, y, z, _)| vec3(*x, *y, *z)).collect(),
+            colors: points.iter().map(|(.., color)| *color).collect(),
+            faces: Vec::new(),
+        }
     }
 
     proptest! {
@@ -415,13 +437,9 @@ mod tests {
             at in 0usize..200,
         ) {
             let mesh = floor();
-            let make = |points: &[(f32, f32, f32, [u8; 3])]| PointCloud {
-                positions: points.iter().map(|(x, y, z, _)| vec3(*x, *y, *z)).collect(),
-                colors: points.iter().map(|(.., color)| *color).collect(),
-                faces: Vec::new(),
-            };
             let (a, b) = points.split_at(at.min(points.len()));
-            prop_assert_eq!(colored(&mesh, &[make(&points)]), colored(&mesh, &[make(b), make(a)]));
+            let parts = [cloud_of(b), cloud_of(a)];
+            prop_assert_eq!(colored(&mesh, &[cloud_of(&points)]), colored(&mesh, &parts));
         }
     }
 }

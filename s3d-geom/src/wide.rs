@@ -2,17 +2,17 @@
 
 use s3d_simd::{dispatch, level};
 
-/// Work whose loops the compiler may vectorise. `run` and the functions that it calls in loops are
+/// A calculation whose loops the compiler may vectorise. `run` and the functions that it calls in loops are
 /// `#[inline(always)]`, so they are compiled twice: for any processor of the target, and for AVX2.
-pub(crate) trait Work {
+pub(crate) trait Kernel {
     type Output;
     fn run(self) -> Self::Output;
 }
 
-/// Runs `work`, compiled for AVX2 if that is in use. The result is the same at every width, because products
+/// Runs `kernel`, compiled for AVX2 if that is in use. The result is the same at every width, because products
 /// and sums are not fused.
-pub(crate) fn run<W: Work>(work: W) -> W::Output {
-    dispatch!(level().without_avx512(), _simd => work.run())
+pub(crate) fn run<K: Kernel>(kernel: K) -> K::Output {
+    dispatch!(level().without_avx512(), _simd => kernel.run())
 }
 
 /// Returns the larger number, or `b` if one is NaN. Unlike [`f32::max`], this is a single instruction.

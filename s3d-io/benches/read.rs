@@ -84,10 +84,12 @@ fn write_glb(dir: &Path, n: usize) -> PathBuf {
     let indices = bin.len() - positions;
     let mut json = format!(
         r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}}}], "bufferViews": [
-        {{"buffer": 0, "byteLength": {positions}}}, {{"buffer": 0, "byteOffset": {positions}, "byteLength": {indices}}}],
+        {{"buffer": 0, "byteLength": {positions}}},
+        {{"buffer": 0, "byteOffset": {positions}, "byteLength": {indices}}}],
         "accessors": [{{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": {vertices}}},
         {{"bufferView": 1, "componentType": 5125, "type": "SCALAR", "count": {count}}}],
-        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": 1}}]}}], "nodes": [{{"mesh": 0}}]}}"#,
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": 1}}]}}],
+        "nodes": [{{"mesh": 0}}]}}"#,
         bin.len()
     );
     while json.len() % 4 != 0 {

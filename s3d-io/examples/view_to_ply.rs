@@ -2,7 +2,8 @@
 //! that two views of a location lie over one another.
 //!
 //! ```text
-//! cargo run --release -p s3d-io --example view_to_ply -- out/area_1/data/rgb/camera_…_domain_rgb.png view.ply
+//! cargo run --release -p s3d-io --example view_to_ply -- \
+//!     out/area_1/data/rgb/camera_…_domain_rgb.png view.ply
 //! ```
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 

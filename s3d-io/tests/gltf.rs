@@ -33,9 +33,8 @@ fn gltf(accessors: &[(Vec<u8>, u32, &str, usize, &str)], rest: &str) -> String {
         let length = bytes.len();
         data.extend(bytes);
         views.push(format!(r#"{{"buffer": 0, "byteOffset": {at}, "byteLength": {length}}}"#));
-        json.push(format!(
-            r#"{{"bufferView": {view}, "componentType": {component}, "type": "{kind}", "count": {count}{more}}}"#
-        ));
+        let elements = format!(r#""type": "{kind}", "count": {count}{more}"#);
+        json.push(format!(r#"{{"bufferView": {view}, "componentType": {component}, {elements}}}"#));
     }
 
     format!(

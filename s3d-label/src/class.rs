@@ -108,11 +108,10 @@ impl FromStr for Class {
 
     /// Finds the class of S3DIS with exactly the name `word`.
     fn from_str(word: &str) -> Result<Self, UnknownClass> {
-        let unknown = || UnknownClass { word: word.to_owned(), classes: names(&Self::S3DIS) };
         Self::S3DIS
             .into_iter()
             .find(|class| *class.name == word)
-            .ok_or_else(unknown)
+            .ok_or_else(|| UnknownClass { word: word.to_owned(), classes: names(&Self::S3DIS) })
     }
 }
 

@@ -58,9 +58,12 @@ mod tests {
         assert_eq!(pretty_color(0), [128; 3]);
     }
 
+    fn distance(a: [u8; 3], b: [u8; 3]) -> u8 {
+        (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap()
+    }
+
     #[test]
     fn neighbours_differ_clearly() {
-        let distance = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap();
         for i in 0..10_000 {
             for step in 1..8 {
                 let a = pretty_color(i);

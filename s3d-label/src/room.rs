@@ -132,12 +132,18 @@ impl RoomType {
 
 impl Ord for RoomType {
     fn cmp(&self, other: &Self) -> Ordering {
-        let letters = |t: &Self| t.name.bytes().map(|b| b.to_ascii_lowercase());
-        let rest = |t: &Self| (t.name, t.index, t.s3dis);
         letters(self)
             .cmp(letters(other))
             .then_with(|| rest(self).cmp(&rest(other)))
     }
+}
+
+fn letters(t: &RoomType) -> impl Iterator<Item = u8> {
+    t.name.bytes().map(|b| b.to_ascii_lowercase())
+}
+
+fn rest(t: &RoomType) -> (&'static &'static str, u8, u8) {
+    (t.name, t.index, t.s3dis)
 }
 
 impl PartialOrd for RoomType {

@@ -349,16 +349,19 @@ mod tests {
         assert_eq!(LabelTable::from_names(&names), Err(TableError::Null { index: 16 }));
     }
 
+    fn refused(names: &[&str]) -> String {
+        LabelTable::from_names(&owned(names)).unwrap_err().to_string()
+    }
+
     #[test]
     fn faults_are_named_with_their_index() {
-        let read = |names: &[&str]| LabelTable::from_names(&owned(names)).unwrap_err().to_string();
-        assert_eq!(read(&[]), format!("index 0 of a label table is {NULL_NAME:?}, not \"\""));
-        assert!(read(&["wall_1_office_1_1"]).ends_with("not \"wall_1_office_1_1\""));
-        let text = read(&[NULL_NAME, "wall_1_office_1_1", "wall_x_office_1_1"]);
+        assert_eq!(refused(&[]), format!("index 0 of a label table is {NULL_NAME:?}, not \"\""));
+        assert!(refused(&["wall_1_office_1_1"]).ends_with("not \"wall_1_office_1_1\""));
+        let text = refused(&[NULL_NAME, "wall_1_office_1_1", "wall_x_office_1_1"]);
         assert!(text.starts_with("index 2: ") && text.contains("\"x\""), "{text}");
-        let text = read(&[NULL_NAME, "beam_1_office_1_1", "beam_10_office_1_1"]);
+        let text = refused(&[NULL_NAME, "beam_1_office_1_1", "beam_10_office_1_1"]);
         assert!(text.starts_with("index 2: beam_10_office_1_1 stands behind beam_1_office_1_1"), "{text}");
-        let text = read(&[NULL_NAME, "beam_1_office_1_1", "beam_2_office_1_1", "beam_1_office_2_1"]);
+        let text = refused(&[NULL_NAME, "beam_1_office_1_1", "beam_2_office_1_1", "beam_1_office_2_1"]);
         assert_eq!(text, "index 3: beam_1_office_2_1 is the same instance as beam_1_office_1_1 at index 1");
     }
 

@@ -59,9 +59,8 @@ struct Faces {
 
 impl Faces {
     fn direction_deg(self) -> u32 {
-        let of = |faces: Vec<(Vec3, f64)>| dominant_wall_direction_deg(faces.into_iter());
-        of(self.walls)
-            .or_else(|| of(self.others))
+        dominant_wall_direction_deg(self.walls.into_iter())
+            .or_else(|| dominant_wall_direction_deg(self.others.into_iter()))
             .map_or(0, |deg| deg.round() as u32 % 90)
     }
 }

@@ -84,17 +84,22 @@ pub fn sample_edges(
 /// Returns places in a pixel, 0 to 1. Each has a row and a column of its own; the columns follow the golden
 /// ratio.
 fn places(samples: u32) -> Vec<DVec2> {
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    let turn = |k: u32| (f64::from(k) * GOLDEN).fract();
     let mut columns: Vec<u32> = (0..samples).collect();
-    columns.sort_by(|a, b| turn(*a).total_cmp(&turn(*b)));
-
-    let middle = |k: u32| (f64::from(k) + 0.5) / f64::from(samples);
+    columns.sort_by(|a, b| golden_turn(*a).total_cmp(&golden_turn(*b)));
 
     (0..samples)
         .zip(columns)
-        .map(|(row, column)| dvec2(middle(column), middle(row)))
+        .map(|(row, column)| dvec2(middle_of(column, samples), middle_of(row, samples)))
         .collect()
+}
+
+fn golden_turn(k: u32) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    (f64::from(k) * GOLDEN).fract()
+}
+
+fn middle_of(k: u32, samples: u32) -> f64 {
+    (f64::from(k) + 0.5) / f64::from(samples)
 }
 
 /// The number of pairs of faces that are remembered, a power of two: neighbours meet in many pixels.
@@ -320,8 +325,9 @@ impl Sampler<'_, '_> {
             let row = self.hits.face.row(v);
             for &face in &row[x.saturating_sub(1) as usize..=(x + 1).min(width - 1) as usize] {
                 if face != NO_FACE && self.near.iter().all(|near| near.0 != face) {
-                    let front = || Front::new(self.mesh, face, self.camera.pose.location);
-                    self.near.push((face, *self.fronts.get(face, front)));
+                    let location = self.camera.pose.location;
+                    let front = *self.fronts.get(face, || Front::new(self.mesh, face, location));
+                    self.near.push((face, front));
                 }
             }
         }
@@ -344,13 +350,19 @@ mod tests {
     use glam::vec3;
     use s3d_geom::{Material, MeshParts, Pose, TriMesh};
 
+    fn material(color: [u8; 3]) -> Material {
+        Material { name: format!("{color:?}"), color, texture: None }
+    }
+
+    fn upright(y: f32, [a, b, c, d]: [(f32, f32); 4]) -> [glam::Vec3; 4] {
+        [a, b, c, d].map(|(x, z)| vec3(x, y, z))
+    }
+
     /// A white wall at y = 4. A metre in front of it is a black board whose lower edge rises by one in ten.
     /// There is nothing beside the wall.
     fn board() -> TriMesh {
-        let quad = |y: f32, [a, b, c, d]: [(f32, f32); 4]| [a, b, c, d].map(|(x, z)| vec3(x, y, z));
-        let wall = quad(4.0, [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)]);
-        let front = quad(3.0, [(-1.0, -0.1), (1.0, 0.1), (1.0, 1.0), (-1.0, 1.0)]);
-        let material = |color| Material { name: format!("{color:?}"), color, texture: None };
+        let wall = upright(4.0, [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)]);
+        let front = upright(3.0, [(-1.0, -0.1), (1.0, 0.1), (1.0, 1.0), (-1.0, 1.0)]);
         let parts = MeshParts {
             positions: wall.into_iter().chain(front).collect(),
             faces: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],

@@ -91,7 +91,7 @@ pub use hits::{Hits, NO_FACE};
 pub use picture::cube_map::CubeMap;
 pub use picture::cube_sources::SkyBoxTurn;
 pub use picture::picture_color::{Unseen, picture_image, picture_image_into};
-pub use picture::stitch::{Capture, StitchOptions, stitch};
+pub use picture::stitch::{StitchOptions, capture::Capture, stitch};
 pub use picture::undistort::undistort;
 pub use raster::visibility::{Caster, cast, cast_ray_by_ray, cast_strided};
 pub use ray::caster::{Hit, Sight, cast_ray, cast_ray_brute_force};

@@ -14,7 +14,7 @@ use s3d_dataset::compare::{
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::{Context, DataSet, Result, compare};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{DatasetImage, Domain, ImageName};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, ImageName};
 use s3d_io::image::PngReader;
 use s3d_label::LabelTable;
 use serde::Serialize;
@@ -112,8 +112,11 @@ pub(crate) fn write(
             Shown::Picture(number) => (Some(number), None),
             Shown::Panorama(location) => (None, Some(location)),
         };
-        let place = |of: &ClassPixels| Some((*place_of.get(&(of.a, of.b))?, of.pixels));
-        let classes = pair.classes.iter().filter_map(place).collect();
+        let classes = pair
+            .classes
+            .iter()
+            .filter_map(|of| Some((*place_of.get(&(of.a, of.b))?, of.pixels)))
+            .collect();
         let is_there = written.is_some();
         pictures.push(PictureEntry { picture, pano, is_there, pixels: pair.pixels, classes });
     }
@@ -148,12 +151,7 @@ pub(crate) fn write(
 
 /// Returns the images that differ in a shown modality, in the order of the pictures.
 fn pairs(other: &DataSet, content: &Content<'_>, changes: &[ImageChange]) -> Vec<Pair> {
-    let named = |area: u32, path: &str| {
-        let name = path.rsplit('/').next().and_then(ImageName::parse)?;
-        Some((area, name.uuid, name.room, name.frame))
-    };
-    let of_other = |area: &u32| other.images(*area).into_iter();
-    let images = other.areas().iter().flat_map(of_other);
+    let images = other.areas().iter().flat_map(|area| other.images(*area).into_iter());
     let images: BTreeMap<_, DatasetImage> = images
         .map(|image| ((image.area, image.uuid.clone(), image.room.clone(), image.frame), image))
         .collect();
@@ -161,8 +159,8 @@ fn pairs(other: &DataSet, content: &Content<'_>, changes: &[ImageChange]) -> Vec
     let shown = content.shown();
     let mut pairs: BTreeMap<Shown, Pair> = BTreeMap::new();
     for change in changes {
-        let place = named(change.area, &change.a).and_then(|key| shown.get(&key));
-        let image = named(change.area, &change.b).and_then(|key| images.get(&key));
+        let place = image_key(change.area, &change.a).and_then(|key| shown.get(&key));
+        let image = image_key(change.area, &change.b).and_then(|key| images.get(&key));
         let (Some(place), Some(image)) = (place, image) else { continue };
         let pair = pairs.entry(*place).or_insert_with(|| Pair {
             shown: *place,
@@ -175,8 +173,15 @@ fn pairs(other: &DataSet, content: &Content<'_>, changes: &[ImageChange]) -> Vec
     }
 
     // The page does not show other modalities.
-    let is_shown = |pair: &Pair| SHOWN.iter().any(|domain| pair.pixels.contains_key(domain.folder()));
-    pairs.into_values().filter(is_shown).collect()
+    pairs
+        .into_values()
+        .filter(|pair| SHOWN.iter().any(|domain| pair.pixels.contains_key(domain.folder())))
+        .collect()
+}
+
+fn image_key(area: u32, path: &str) -> Option<(u32, String, String, Frame)> {
+    let name = path.rsplit('/').next().and_then(ImageName::parse)?;
+    Some((area, name.uuid, name.room, name.frame))
 }
 
 /// Writes the picture of the other data set. Returns the bytes written; `None` if the image has no file left.

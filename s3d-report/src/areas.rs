@@ -58,9 +58,16 @@ pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomEntry
             let rings = outline
                 .into_iter()
                 .flat_map(|p| std::iter::once(p.outer).chain(p.holes));
-            let millimetres = |ring: Vec<[f64; 2]>| ring.iter().map(|p| p.map(|c| rounded(c, 3))).collect();
             let heights = heights.get(&name).map(|range| range.map(|z| rounded(z.into(), 3)));
-            RoomEntry { area, name, floor_m2, heights, outline: rings.map(millimetres).collect() }
+            RoomEntry {
+                area,
+                name,
+                floor_m2,
+                heights,
+                outline: rings
+                    .map(|ring| ring.iter().map(|p| p.map(|c| rounded(c, 3))).collect())
+                    .collect(),
+            }
         }));
     }
     Ok(rooms)
@@ -82,36 +89,39 @@ pub(crate) fn statistics(data: &DataSet, faults: &mut Faults) -> Result<Option<V
 
 /// Returns the entry of each area in the manifest, without the list of its input.
 pub(crate) fn areas(data: &DataSet) -> Result<Vec<Value>> {
-    let entry = |area| {
-        let failed = |e: serde_json::Error| FileError::format(&data.layout().manifest(), e.to_string());
-        let mut value = serde_json::to_value(area).map_err(failed)?;
-        if let Some(members) = value.as_object_mut() {
-            members.remove("inputs");
-        }
-        Ok(value)
-    };
-    data.area_entries().map(entry).collect()
+    data.area_entries()
+        .map(|area| {
+            let failed = |e: serde_json::Error| FileError::format(&data.layout().manifest(), e.to_string());
+            let mut value = serde_json::to_value(area).map_err(failed)?;
+            if let Some(members) = value.as_object_mut() {
+                members.remove("inputs");
+            }
+            Ok(value)
+        })
+        .collect()
 }
 
 pub(crate) fn classes(data: &DataSet) -> Vec<ClassEntry> {
-    let of = |t: &s3d_label::Taxonomy| {
-        t.classes()
-            .iter()
-            .map(|c| ClassEntry { name: c.name(), color: t.color(*c) })
-            .collect()
-    };
-    data.taxonomy().map(of).unwrap_or_default()
+    data.taxonomy()
+        .map(|t| {
+            t.classes()
+                .iter()
+                .map(|c| ClassEntry { name: c.name(), color: t.color(*c) })
+                .collect()
+        })
+        .unwrap_or_default()
 }
 
 pub(crate) fn labels(table: &LabelTable) -> Vec<LabelEntry> {
     let names = table.names().into_iter().enumerate();
-    let label = |(i, name)| {
-        let index = u32::try_from(i).unwrap_or(u32::MAX);
-        LabelEntry {
-            name,
-            class: table.class_of(LabelId(index)).map(|c| c.index()),
-            color: pretty_color(index),
-        }
-    };
-    names.map(label).collect()
+    names
+        .map(|(i, name)| {
+            let index = u32::try_from(i).unwrap_or(u32::MAX);
+            LabelEntry {
+                name,
+                class: table.class_of(LabelId(index)).map(|c| c.index()),
+                color: pretty_color(index),
+            }
+        })
+        .collect()
 }

@@ -9,7 +9,7 @@ use crate::mesh;
 use crate::pixels::{Images, Picture, Shares, Widths, nothing_left};
 use crate::reduce::nearest;
 use crate::script::Scripts;
-use crate::selection::{Place, places};
+use crate::selection::{PoolPlace, places};
 use crate::write::ReportOptions;
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::{Context, DataSet, Progress, Result};
@@ -223,10 +223,9 @@ impl<'a> Content<'a> {
             .iter()
             .zip(&self.pictures)
             .map(|(image, i)| (image, Shown::Picture(*i)));
-        let key = |image: &DatasetImage| (image.area, image.uuid.clone(), image.room.clone(), image.frame);
         panoramas
             .chain(views)
-            .map(|(image, shown)| (key(image), shown))
+            .map(|(image, shown)| (key_of(image), shown))
             .collect()
     }
 
@@ -361,9 +360,8 @@ impl<'a> Content<'a> {
         let located = pose.as_ref().map(|pose| Located::new(pose, size));
 
         let Some(images) = images else { return Ok((ReadImage { located, seen: None }, None, None)) };
-        let faces = |size| Some(faces(caster.as_mut()?, camera.as_ref()?, size));
         let (picture, thumb) = images
-            .picture(faces)
+            .picture(|size| Some(faces(caster.as_mut()?, camera.as_ref()?, size)))
             .map_err(|e| FileError::format(&image.path(self.data.layout(), Domain::Rgb), e.to_string()))?;
         let pinhole = camera.filter(|_| image.frame != Frame::Panorama).map(|camera| {
             let [[fx, _, cx], [_, fy, cy], _] = camera.k_matrix();
@@ -537,8 +535,12 @@ impl<'a> Content<'a> {
     }
 }
 
+fn key_of(image: &DatasetImage) -> (u32, String, String, Frame) {
+    (image.area, image.uuid.clone(), image.room.clone(), image.frame)
+}
+
 /// Adds the record of a candidate to the entry of its view.
-fn of_record(entry: ViewEntry, view: &ViewRecord, place: Place) -> ViewEntry {
+fn of_record(entry: ViewEntry, view: &ViewRecord, place: PoolPlace) -> ViewEntry {
     ViewEntry {
         candidate: Some(view.candidate),
         yaw_deg: Some(degrees(view.yaw_rad)),

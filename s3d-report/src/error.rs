@@ -13,8 +13,8 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 pub enum Error {
     /// A number of the options is out of range.
     #[error(
-        "panoramas of {} and views of {} pixels across, meshes of {} faces: {} to {}, {} to {}, and {} to {} are \
-         possible",
+        "panoramas of {} and views of {} pixels across, meshes of {} faces: {} to {}, {} to {}, and {} to {} \
+         are possible",
         .0.pano_width, .0.thumbs, .0.mesh_faces, PANO_WIDTHS.start(), PANO_WIDTHS.end(), THUMB_WIDTHS.start(),
         THUMB_WIDTHS.end(), MESH_FACES.start(), MESH_FACES.end()
     )]

@@ -3,7 +3,7 @@
 
 use crate::faults::Fault;
 use crate::pixels::Shares;
-use crate::selection::Place;
+use crate::selection::PoolPlace;
 use s3d_dataset::verify::{FaultGroup, VerifyReport};
 use serde::Serialize;
 use serde_json::Value;
@@ -76,8 +76,20 @@ impl From<VerifyReport> for Verified {
     fn from(found: VerifyReport) -> Self {
         let VerifyReport { faults, mut notes, files, checks, unread, .. } = found;
         notes.extend(unread);
-        let group = |FaultGroup { topic, kind, first, count, .. }| VerifyFaults { topic, kind, count, first };
-        Self { files, checks, notes, faults: faults.into_iter().map(group).collect() }
+        Self {
+            files,
+            checks,
+            notes,
+            faults: faults
+                .into_iter()
+                .map(|FaultGroup { topic, kind, first, count, .. }| VerifyFaults {
+                    topic,
+                    kind,
+                    count,
+                    first,
+                })
+                .collect(),
+        }
     }
 }
 
@@ -160,7 +172,7 @@ pub(crate) struct ViewEntry {
     pub(crate) fov_deg: Option<f64>,
     /// The entropy that decided about its selection, in nats.
     pub(crate) entropy: Option<f64>,
-    pub(crate) place: Option<Place>,
+    pub(crate) place: Option<PoolPlace>,
     /// The place of its camera; only for photographs, since other views stand at their location.
     pub(crate) position: Option<[f64; 3]>,
     /// Its directions in the world; only for photographs.

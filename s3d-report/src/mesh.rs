@@ -170,8 +170,10 @@ fn surface_by_class(mesh: &TriMesh, labels: &[u32], table: &LabelTable) -> Vec<(
         let sum = by_label.entry(*label).or_default();
         sum.add(mesh.area(face));
     }
-    let class = |(label, sum)| Some((table.class_of(LabelId(label))?.index(), sum));
-    by_label.into_iter().filter_map(class).collect()
+    by_label
+        .into_iter()
+        .filter_map(|(label, sum)| Some((table.class_of(LabelId(label))?.index(), sum)))
+        .collect()
 }
 
 /// Counts faces by votes and by margin.
@@ -246,16 +248,18 @@ impl<const N: usize> Steps<N> {
     }
 
     fn pack(&self, values: &[[f64; N]]) -> String {
-        let axis = |((value, origin), step): ((&f64, &f64), &f64)| {
-            if *step > 0.0 {
-                ((value - origin) / step).round() as u16
-            } else {
-                0
-            }
-        };
-        let steps = values
-            .iter()
-            .flat_map(|v| v.iter().zip(&self.origin).zip(&self.step).map(axis));
+        let steps = values.iter().flat_map(|v| {
+            v.iter()
+                .zip(&self.origin)
+                .zip(&self.step)
+                .map(|((value, origin), step)| {
+                    if *step > 0.0 {
+                        ((value - origin) / step).round() as u16
+                    } else {
+                        0
+                    }
+                })
+        });
         packed(steps, u16::to_le_bytes)
     }
 }
@@ -333,18 +337,20 @@ impl Shown<'_> {
 /// ones.
 fn near_zero(uvs: [Vec2; 3], [along_u, along_v]: [Wrap; 2]) -> [Vec2; 3] {
     let least = uvs.into_iter().fold(Vec2::INFINITY, Vec2::min).floor();
-    let axis = |uv: f32, least: f32, wrap| match wrap {
+    uvs.map(|uv| vec2(near_zero_along(uv.x, least.x, along_u), near_zero_along(uv.y, least.y, along_v)))
+}
+
+fn near_zero_along(uv: f32, least: f32, wrap: Wrap) -> f32 {
+    match wrap {
         Wrap::Repeat => uv - least,
         Wrap::Clamp => uv.clamp(0.0, 1.0),
         Wrap::Mirror => uv,
-    };
-    uvs.map(|uv| vec2(axis(uv.x, least.x, along_u), axis(uv.y, least.y, along_v)))
+    }
 }
 
 /// Writes the textures, reduced if they are many or large. Returns the number and the bytes of their files.
 fn write_textures(ctx: &Context, area: u32, mesh: &TriMesh, scripts: &Scripts) -> Result<(usize, u64)> {
-    let pixels = |image: &Raster<[u8; 3]>| f64::from(image.width()) * f64::from(image.height());
-    let all: f64 = mesh.textures().iter().map(|texture| pixels(&texture.image)).sum();
+    let all: f64 = mesh.textures().iter().map(|texture| pixel_count(&texture.image)).sum();
     let scale = (TEXTURE_PIXELS / all).sqrt().min(1.0);
     let files: Vec<_> = mesh.textures().chunks(TEXTURES_PER_FILE).enumerate().collect();
     let bytes = map_in_order(
@@ -357,15 +363,19 @@ fn write_textures(ctx: &Context, area: u32, mesh: &TriMesh, scripts: &Scripts) -
                 let size = [texture.image.width(), texture.image.height()];
                 let width = ((f64::from(size[0]) * scale).ceil() as u32).clamp(1, TEXTURE_WIDTH);
                 let small = mean(&texture.image, reduced_size(size, width), None);
-                let failed = |e: jpeg_encoder::EncodingError| {
-                    FileError::format(Path::new(&texture.name), e.to_string())
-                };
-                urls.push(jpeg_url(&small).map_err(failed)?);
+                urls.push(
+                    jpeg_url(&small)
+                        .map_err(|e| FileError::format(Path::new(&texture.name), e.to_string()))?,
+                );
             }
             scripts.write(&format!("textures_{area}_{k}"), &urls)
         },
     )?;
     Ok((files.len(), bytes.into_iter().sum()))
+}
+
+fn pixel_count(image: &Raster<[u8; 3]>) -> f64 {
+    f64::from(image.width()) * f64::from(image.height())
 }
 
 fn face_votes(votes: &FaceVoteColumns) -> FaceVotes {

@@ -39,14 +39,15 @@ pub(crate) fn png_url(image: &Raster<[u8; 3]>, content: Content) -> String {
 /// The encoder of the `image` crate takes twice as long. The AVX2 instructions of this encoder save a fifth,
 /// but round differently, so that the bytes would depend on the processor.
 pub(crate) fn jpeg_url(image: &Raster<[u8; 3]>) -> Result<String, EncodingError> {
-    let side = |pixels: u32| {
-        let longer = |_| EncodingError::Write(format!("{pixels} pixels are more than JPEG has"));
-        u16::try_from(pixels).map_err(longer)
-    };
-    let (width, height) = (side(image.width())?, side(image.height())?);
+    let width = jpeg_side(image.width())?;
+    let height = jpeg_side(image.height())?;
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, QUALITY);
     encoder.set_sampling_factor(SamplingFactor::F_2_2);
     encoder.encode(image.pixels().as_flattened(), width, height, ColorType::Rgb)?;
     Ok(format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(bytes)))
+}
+
+fn jpeg_side(pixels: u32) -> Result<u16, EncodingError> {
+    u16::try_from(pixels).map_err(|_| EncodingError::Write(format!("{pixels} pixels are more than JPEG has")))
 }

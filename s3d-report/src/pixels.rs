@@ -226,10 +226,12 @@ impl Files<'_> {
             let mut missing = counts.then_some(0);
             lines.for_each(|line| {
                 nearest.line(line, u16::from_be_bytes);
-                let is_missing = |sample: &&[u8; 2]| u16::from_be_bytes(**sample) == MISSING_DEPTH;
-                missing
-                    .iter_mut()
-                    .for_each(|n| *n += line.iter().filter(is_missing).count() as u64);
+                missing.iter_mut().for_each(|n| {
+                    *n += line
+                        .iter()
+                        .filter(|sample| u16::from_be_bytes(**sample) == MISSING_DEPTH)
+                        .count() as u64
+                });
             });
             (nearest.finish(), missing)
         })?;
@@ -259,8 +261,12 @@ const RUN: usize = 16;
 fn are(pixels: &[[u8; 3]; RUN], expected: &[[u8; 3]; RUN]) -> bool {
     let words = pixels.as_flattened().as_chunks().0;
     let expected = expected.as_flattened().as_chunks().0;
-    let differ = |(a, b): (&[u8; 8], &[u8; 8])| u64::from_ne_bytes(*a) ^ u64::from_ne_bytes(*b);
-    words.iter().zip(expected).map(differ).fold(0, |all, bits| all | bits) == 0
+    words
+        .iter()
+        .zip(expected)
+        .map(|(a, b)| u64::from_ne_bytes(*a) ^ u64::from_ne_bytes(*b))
+        .fold(0, |all, bits| all | bits)
+        == 0
 }
 
 impl LabelCounts {

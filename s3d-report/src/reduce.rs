@@ -135,7 +135,8 @@ fn add_line(sums: &mut [u16], line: &[u8]) {
 /// Whether the three bytes of a pixel follow each other in a line, even across pixels.
 #[inline(always)]
 fn is_in(line: &[u8], [r, g, b]: [u8; 3]) -> bool {
-    let (second, third) = (line.get(1..).unwrap_or_default(), line.get(2..).unwrap_or_default());
+    let second = line.get(1..).unwrap_or_default();
+    let third = line.get(2..).unwrap_or_default();
     let mut any = 0;
     for ((x, y), z) in line.iter().zip(second).zip(third) {
         any |= u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
@@ -146,7 +147,8 @@ fn is_in(line: &[u8], [r, g, b]: [u8; 3]) -> bool {
 /// Adds one to the counts of the bytes where [`is_in`] finds a pixel.
 #[inline(always)]
 fn count_at(counts: &mut [u8], line: &[u8], [r, g, b]: [u8; 3]) {
-    let (second, third) = (line.get(1..).unwrap_or_default(), line.get(2..).unwrap_or_default());
+    let second = line.get(1..).unwrap_or_default();
+    let third = line.get(2..).unwrap_or_default();
     for (((count, x), y), z) in counts.iter_mut().zip(line).zip(second).zip(third) {
         *count += u8::from(*x == r) & u8::from(*y == g) & u8::from(*z == b);
     }
@@ -201,7 +203,6 @@ impl Mean {
     pub(crate) fn new(from: [u32; 2], size: [u32; 2], missing: Option<[u8; 3]>) -> Self {
         let [[width, height], [w, h]] = [from, size];
         let most = u64::from(width.div_ceil(w.max(1))) * u64::from(height.div_ceil(h.max(1)));
-        let even = |side: u32| (width == side * w && height == side * h).then_some(side.trailing_zeros());
         Self {
             from,
             size,
@@ -214,7 +215,9 @@ impl Mean {
             some_missing: false,
             sums: vec![[0; 4]; w as usize],
             divisor: Divisor::new(most),
-            halvings: [2, 4, 8].into_iter().find_map(even),
+            halvings: [2, 4, 8]
+                .into_iter()
+                .find_map(|side| (width == side * w && height == side * h).then_some(side.trailing_zeros())),
             halved: vec![0; 3 * width as usize],
             halved_missing: vec![0; 3 * width as usize],
             means: vec![0; 3 * width as usize],
@@ -228,8 +231,7 @@ impl Mean {
         self.y += 1;
         if self.size == self.from {
             self.pixels.extend_from_slice(line);
-            let is_missing = |pixel: &&[u8; 3]| Some(**pixel) == self.missing;
-            self.all_missing += line.iter().filter(is_missing).count() as u64;
+            self.all_missing += line.iter().filter(|pixel| Some(**pixel) == self.missing).count() as u64;
             return;
         }
 
@@ -255,8 +257,11 @@ impl Mean {
             self.add_columns();
         }
         if is_last {
-            let mean = |sums: &[u32; 4]| self.divisor.mean(*sums).or(self.missing).unwrap_or_default();
-            self.pixels.extend(self.sums.iter().map(mean));
+            self.pixels.extend(
+                self.sums
+                    .iter()
+                    .map(|sums| self.divisor.mean(*sums).or(self.missing).unwrap_or_default()),
+            );
             self.sums.fill([0; 4]);
         }
     }
@@ -272,8 +277,11 @@ impl Mean {
 
         let begin = self.pixels.len();
         let step = 3 << halvings;
-        let first = |bytes: &[u8]| bytes.first_chunk().copied().unwrap_or_default();
-        self.pixels.extend(self.means.chunks_exact(step).map(first));
+        self.pixels.extend(
+            self.means
+                .chunks_exact(step)
+                .map(|bytes| bytes.first_chunk().copied().unwrap_or_default()),
+        );
 
         // Pixels that cover missing ones are made again, without these.
         if let Some(missing) = self.missing
@@ -387,12 +395,15 @@ mod tests {
         assert_eq!(reduced_size([4000, 1], 256), [256, 1]);
     }
 
+    fn source_pixels(from: u32, to: u32) -> Vec<u32> {
+        (0..to).map(|i| source_pixel(i, from, to)).collect::<Vec<_>>()
+    }
+
     #[test]
     fn nearest_pixels_hold_the_centres() {
-        let of = |from, to| (0..to).map(|i| source_pixel(i, from, to)).collect::<Vec<_>>();
-        assert_eq!(of(4, 2), [1, 3]);
-        assert_eq!(of(3, 3), [0, 1, 2]);
-        assert_eq!(of(5, 3), [0, 2, 4]);
+        assert_eq!(source_pixels(4, 2), [1, 3]);
+        assert_eq!(source_pixels(3, 3), [0, 1, 2]);
+        assert_eq!(source_pixels(5, 3), [0, 2, 4]);
         assert_eq!(source_pixel(2047, u32::MAX, 2048), 4_293_918_719);
         let image = Raster::from_vec(4, 2, vec![1, 2, 3, 4, 5, 6, 7, 8]);
         assert_eq!(nearest(&image, [2, 1]).into_vec(), [6, 8]);
@@ -411,7 +422,8 @@ mod tests {
 
     /// Computes the same means pixel by pixel.
     fn plain_mean(image: &Raster<[u8; 3]>, [w, h]: [u32; 2], missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
-        let (width, height) = (image.width(), image.height());
+        let width = image.width();
+        let height = image.height();
         let pixel = |i, j| {
             let columns = edge(i, width, w)..edge(i + 1, width, w);
             let rows = edge(j, height, h)..edge(j + 1, height, h);

@@ -23,7 +23,7 @@ pub(crate) enum Reason {
 
 /// The place of a view in its pool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub(crate) struct Place {
+pub(crate) struct PoolPlace {
     pub(crate) reason: Reason,
     /// Its rank, from 1 for the highest entropy.
     pub(crate) rank: usize,
@@ -32,7 +32,7 @@ pub(crate) struct Place {
 }
 
 /// Returns the places of candidates, in their order. `views` has the area of each.
-pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -> Vec<Place> {
+pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -> Vec<PoolPlace> {
     let mut pools: BTreeMap<(u32, &str), Vec<usize>> = BTreeMap::new();
     for (i, (area, view)) in views.iter().enumerate() {
         let key = match pool {
@@ -44,15 +44,14 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
     }
 
     let selection = Selection::default();
-    let mut ranked: Vec<(usize, Place)> = Vec::with_capacity(views.len());
+    let mut ranked: Vec<(usize, PoolPlace)> = Vec::with_capacity(views.len());
     for members in pools.into_values() {
         let mut members: Vec<(usize, u32, &ViewRecord)> = members
             .into_iter()
             .filter_map(|i| views.get(i).map(|(area, view)| (i, *area, *view)))
             .collect();
         // The first name wins a tie, like in the selection.
-        let name = |(_, area, v): &(usize, u32, &ViewRecord)| (*area, v.camera_uuid.clone(), v.candidate);
-        members.sort_by_cached_key(name);
+        members.sort_by_cached_key(|(_, area, v)| (*area, v.camera_uuid.clone(), v.candidate));
         members.sort_by(|a, b| b.2.entropy.total_cmp(&a.2.entropy));
 
         let n = members.len();
@@ -66,7 +65,7 @@ pub(crate) fn places(views: &[(u32, &ViewRecord)], pool: Pool, keep_all: bool) -
                 None if at + dropped >= n => Reason::Lowest,
                 None => Reason::NotDrawn,
             };
-            ranked.push((i, Place { reason, rank: at + 1, pool: n }));
+            ranked.push((i, PoolPlace { reason, rank: at + 1, pool: n }));
         }
     }
     ranked.sort_by_key(|(i, _)| *i);
@@ -97,10 +96,10 @@ mod tests {
             }
         }
         for pool in [Pool::Dataset, Pool::Area, Pool::Location] {
-            let item = |(area, view): &(u32, ViewRecord)| {
-                (*area, view.camera_uuid.clone(), view.candidate, view.entropy)
-            };
-            let items: Vec<_> = views.iter().map(item).collect();
+            let items: Vec<_> = views
+                .iter()
+                .map(|(area, view)| (*area, view.camera_uuid.clone(), view.candidate, view.entropy))
+                .collect();
             let items: Vec<PoolItem<'_>> = items
                 .iter()
                 .map(|(area, location, view, score)| PoolItem {

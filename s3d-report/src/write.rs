@@ -156,13 +156,13 @@ fn write(
         DataSet::open(against)?;
     }
     let data = DataSet::open_as_far_as_it_is(out, ctx)?;
-    let place = Place::begin(ctx, to, out, options)?;
-    let scripts = match &place {
-        Place::Folder(folder) => {
+    let destination = Destination::begin(ctx, to, out, options)?;
+    let scripts = match &destination {
+        Destination::Folder(folder) => {
             create_dir(&folder.path().join("data"))?;
             Scripts::Files(folder.path().to_owned())
         }
-        Place::File { .. } => Scripts::Page(Mutex::default()),
+        Destination::File { .. } => Scripts::Page(Mutex::default()),
     };
 
     let written = match write_data(ctx, (out, &data), against, options, &scripts) {
@@ -170,8 +170,8 @@ fn write(
         written => written?,
     };
     let Data { index, panoramas, views, mut bytes } = written;
-    let page = place.page();
-    bytes += place.finish(scripts)?;
+    let page = destination.page();
+    bytes += destination.finish(scripts)?;
 
     for sentence in data.missing_yet().into_iter().flatten() {
         ctx.warn(format_args!("{}: not finished: {sentence}", out.display()));
@@ -223,17 +223,20 @@ fn write_data(
     }
     bytes += scripts.write_list("index", &index)?;
 
-    let shown = |made: &[ReadImage]| made.iter().filter(|made| made.seen.is_some()).count();
-    Ok(Data { index, panoramas: shown(&made.panoramas), views: shown(&made.views), bytes })
+    Ok(Data { index, panoramas: shown_count(&made.panoramas), views: shown_count(&made.views), bytes })
+}
+
+fn shown_count(made: &[ReadImage]) -> usize {
+    made.iter().filter(|made| made.seen.is_some()).count()
 }
 
 /// The place where a report is made.
-enum Place {
+enum Destination {
     Folder(NewFolder),
     File { place: PathBuf, file: NewFile },
 }
 
-impl Place {
+impl Destination {
     fn begin(ctx: &Context, to: &Path, out: &Path, options: &ReportOptions) -> Result<Self> {
         if !options.single {
             return Ok(Self::Folder(NewFolder::begin(ctx, to, out, KIND, options.overwrite)?));

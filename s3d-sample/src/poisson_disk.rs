@@ -61,16 +61,17 @@ pub fn poisson_disk_where(
         let point = &points[index];
         let at = point.map(|c| (c / distance_m).floor() as i64);
 
-        let is_too_near = |other: &usize| {
-            let d2: f64 = (0..3).map(|k| (points[*other][k] - point[k]).powi(2)).sum();
-            d2 < distance_m * distance_m && is_near(*other, index)
-        };
         let near = (-1..=1).any(|x| {
             (-1..=1).any(|y| {
                 (-1..=1).any(|z| {
                     let neighbour =
                         [at[0].saturating_add(x), at[1].saturating_add(y), at[2].saturating_add(z)];
-                    cells.get(&neighbour).is_some_and(|c| c.iter().any(is_too_near))
+                    cells.get(&neighbour).is_some_and(|c| {
+                        c.iter().any(|other| {
+                            let d2: f64 = (0..3).map(|k| (points[*other][k] - point[k]).powi(2)).sum();
+                            d2 < distance_m * distance_m && is_near(*other, index)
+                        })
+                    })
                 })
             })
         });

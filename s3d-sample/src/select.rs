@@ -25,7 +25,8 @@ pub struct Selection {
 
 impl Default for Selection {
     /// The shares of the paper: 15 % go, 60 % stay, and half of the remaining 25 % stay too, which makes
-    /// 72.5 %. In the published data 69.3 % of the views stayed (the book's page on the paper, "Which views").
+    /// 72.5 %. In the published data 69.3 % of the views stayed (the book's page on the paper, "Which
+    /// views").
     fn default() -> Self {
         Self { discard: 0.15, keep: 0.60, half_of_rest: 0.5 }
     }
@@ -183,18 +184,19 @@ mod tests {
         stays.iter().filter(|&&s| s).count()
     }
 
+    fn counts_of(n: usize) -> (usize, usize, usize) {
+        let c = Selection::default().counts(n);
+        (c.discard, c.keep, c.draw)
+    }
+
     #[test]
     fn counts_of_small_and_usual_pools() {
-        let of = |n| {
-            let c = Selection::default().counts(n);
-            (c.discard, c.keep, c.draw)
-        };
         let small = [(0, 0, 0), (0, 1, 0), (0, 1, 0), (0, 2, 0), (0, 2, 1), (0, 3, 1), (0, 4, 0), (1, 4, 1)];
-        assert_eq!((0..8).map(of).collect::<Vec<_>>(), small);
-        assert_eq!(of(20), (3, 12, 3));
-        assert_eq!(of(72), (10, 43, 9));
-        assert_eq!(of(100), (15, 60, 13));
-        assert_eq!(of(1413 * 72), (15_260, 61_042, 12_717));
+        assert_eq!((0..8).map(counts_of).collect::<Vec<_>>(), small);
+        assert_eq!(counts_of(20), (3, 12, 3));
+        assert_eq!(counts_of(72), (10, 43, 9));
+        assert_eq!(counts_of(100), (15, 60, 13));
+        assert_eq!(counts_of(1413 * 72), (15_260, 61_042, 12_717));
     }
 
     #[test]

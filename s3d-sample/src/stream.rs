@@ -63,20 +63,23 @@ mod tests {
         assert_eq!(fnv1a_128(b"foobar"), 0x343e1662793c64bf6f0d3597ba446f18);
     }
 
+    fn first_of(purpose: [u8; 4], seed: u64, name: &str, number: u32) -> u64 {
+        stream(purpose, seed, name, number).next_u64()
+    }
+
     #[test]
     fn every_part_of_the_name_counts() {
-        let first = |purpose, seed, name, number| stream(purpose, seed, name, number).next_u64();
         let mut all = vec![
-            first(*b"view", 1, "a", 1),
-            first(*b"pick", 1, "a", 1),
-            first(*b"view", 2, "a", 1),
-            first(*b"view", 1 << 63, "a", 1),
-            first(*b"view", 1, "b", 1),
-            first(*b"view", 1, "", 1),
-            first(*b"view", 1, "a", 2),
-            first(*b"view", 1, "a", 1 << 31),
+            first_of(*b"view", 1, "a", 1),
+            first_of(*b"pick", 1, "a", 1),
+            first_of(*b"view", 2, "a", 1),
+            first_of(*b"view", 1 << 63, "a", 1),
+            first_of(*b"view", 1, "b", 1),
+            first_of(*b"view", 1, "", 1),
+            first_of(*b"view", 1, "a", 2),
+            first_of(*b"view", 1, "a", 1 << 31),
         ];
-        assert_eq!(all[0], first(*b"view", 1, "a", 1));
+        assert_eq!(all[0], first_of(*b"view", 1, "a", 1));
         all.sort_unstable();
         all.dedup();
         assert_eq!(all.len(), 8);

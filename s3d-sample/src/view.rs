@@ -246,6 +246,10 @@ mod tests {
         assert!(kolmogorov(fov, |x| fov_cdf(&untruncated, x)) > CRITICAL);
     }
 
+    fn sum_of(cells: &mut dyn Iterator<Item = u32>) -> f64 {
+        f64::from(cells.sum::<u32>())
+    }
+
     /// Returns the χ² statistic of independence of two columns, over 8 × 8 cells of equal probability. With
     /// 49 degrees of freedom it exceeds 85.35 with probability 0.001.
     fn chi_square(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
@@ -255,9 +259,8 @@ mod tests {
             cells[(a * 8.0) as usize % 8 * 8 + (b * 8.0) as usize % 8] += 1;
             n += 1.0;
         }
-        let sum = |cells: &mut dyn Iterator<Item = u32>| f64::from(cells.sum::<u32>());
-        let rows: Vec<f64> = (0..8).map(|r| sum(&mut (0..8).map(|c| cells[r * 8 + c]))).collect();
-        let columns: Vec<f64> = (0..8).map(|c| sum(&mut (0..8).map(|r| cells[r * 8 + c]))).collect();
+        let rows: Vec<f64> = (0..8).map(|r| sum_of(&mut (0..8).map(|c| cells[r * 8 + c]))).collect();
+        let columns: Vec<f64> = (0..8).map(|c| sum_of(&mut (0..8).map(|r| cells[r * 8 + c]))).collect();
         (0..64)
             .map(|i| {
                 let expected = rows[i / 8] * columns[i % 8] / n;
@@ -266,18 +269,19 @@ mod tests {
             .sum()
     }
 
+    fn ranks_of(v: &View, dist: &ViewDistribution) -> [f64; 3] {
+        let pitch = normal_cdf(v.pitch_rad.to_degrees() / dist.pitch_sigma_deg);
+        [(v.yaw_rad + PI) / (2.0 * PI), pitch, fov_cdf(dist, v.fov_rad.to_degrees())]
+    }
+
     #[test]
     fn neighbours_are_independent() {
         let dist = ViewDistribution::default();
-        let ranks = |v: &View| {
-            let pitch = normal_cdf(v.pitch_rad.to_degrees() / dist.pitch_sigma_deg);
-            [(v.yaw_rad + PI) / (2.0 * PI), pitch, fov_cdf(&dist, v.fov_rad.to_degrees())]
-        };
 
-        let here: Vec<[f64; 3]> = draws(&dist, 1).iter().map(ranks).collect();
-        let next_seed: Vec<[f64; 3]> = draws(&dist, 2).iter().map(ranks).collect();
+        let here: Vec<[f64; 3]> = draws(&dist, 1).iter().map(|v| ranks_of(v, &dist)).collect();
+        let next_seed: Vec<[f64; 3]> = draws(&dist, 2).iter().map(|v| ranks_of(v, &dist)).collect();
         let next_place: Vec<[f64; 3]> = (0..DRAWS)
-            .map(|i| ranks(&draw_view(&dist, 1, "8eb9955b866b4b5f74abb1071416c629", i)))
+            .map(|i| ranks_of(&draw_view(&dist, 1, "8eb9955b866b4b5f74abb1071416c629", i), &dist))
             .collect();
 
         for a in 0..3 {

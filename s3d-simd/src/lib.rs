@@ -2,7 +2,7 @@
 //!
 //! # Levels
 //!
-//! [`level`] returns the highest [`Level`] that the processor has. The environment variable `S3D_SIMD` can
+//! [`level`] returns the highest [`ProvenLevel`] that the processor has. The environment variable `S3D_SIMD` can
 //! hold it down: see [`SimdLevel`]. All levels give the same bytes.
 //!
 //! # Dispatch
@@ -14,7 +14,7 @@
 //! compile it for any processor and call it.
 //!
 //! ```
-//! use s3d_simd::{Level, dispatch, level};
+//! use s3d_simd::{ProvenLevel, dispatch, level};
 //!
 //! #[inline(always)]
 //! fn sum(values: &[u32]) -> u32 {
@@ -25,7 +25,7 @@
 //! assert_eq!(dispatch!(level(), _simd => sum(&values)), 499_500);
 //!
 //! // A test holds every level against the plain one.
-//! for level in Level::all() {
+//! for level in ProvenLevel::all() {
 //!     assert_eq!(dispatch!(level, _simd => sum(&values)), 499_500);
 //! }
 //! ```
@@ -164,7 +164,7 @@ impl Avx512 {
 
 /// A level and the proof that the processor has it.
 #[derive(Clone, Copy, Debug)]
-pub enum Level {
+pub enum ProvenLevel {
     /// The plain form, which defines the results.
     Scalar(Scalar),
     /// See [`Avx2`].
@@ -175,7 +175,7 @@ pub enum Level {
     Avx512(Avx512),
 }
 
-impl Level {
+impl ProvenLevel {
     /// Returns the level without its proof.
     pub fn name(self) -> SimdLevel {
         match self {
@@ -227,15 +227,17 @@ impl Level {
 
 /// Returns the highest level that a value of [`VARIABLE`] allows.
 fn allowed(value: Option<&str>) -> SimdLevel {
-    let named = |level: &SimdLevel| value == Some(level.name());
-    SimdLevel::ALL.into_iter().find(named).unwrap_or(SimdLevel::Avx512)
+    SimdLevel::ALL
+        .into_iter()
+        .find(|level| value == Some(level.name()))
+        .unwrap_or(SimdLevel::Avx512)
 }
 
 /// Returns the level in use, with its proof.
 #[inline]
-pub fn level() -> Level {
-    static LEVEL: OnceLock<Level> = OnceLock::new();
-    *LEVEL.get_or_init(|| Level::best(allowed(std::env::var(VARIABLE).ok().as_deref())))
+pub fn level() -> ProvenLevel {
+    static LEVEL: OnceLock<ProvenLevel> = OnceLock::new();
+    *LEVEL.get_or_init(|| ProvenLevel::best(allowed(std::env::var(VARIABLE).ok().as_deref())))
 }
 
 /// Prefetches the cache line in which `thing` begins, so that it arrives from memory while the program does
@@ -253,7 +255,7 @@ pub fn prefetch<T>(thing: &T) {
     let _ = thing;
 }
 
-/// Runs an expression at a [`Level`]: `dispatch!(level, simd => work)` is the value of `work`.
+/// Runs an expression at a [`ProvenLevel`]: `dispatch!(level, simd => work)` is the value of `work`.
 ///
 /// The expression is compiled once for each level. In it, `simd` is the proof of the level. Every function
 /// that `work` calls in its loops must be `#[inline(always)]`.
@@ -261,14 +263,14 @@ pub fn prefetch<T>(thing: &T) {
 macro_rules! dispatch {
     ($level:expr, $simd:ident => $work:expr) => {
         match $level {
-            $crate::Level::Scalar($simd) => $work,
+            $crate::ProvenLevel::Scalar($simd) => $work,
             #[cfg(target_arch = "x86_64")]
-            $crate::Level::Avx2($simd) => $simd.vectorize(
+            $crate::ProvenLevel::Avx2($simd) => $simd.vectorize(
                 #[inline(always)]
                 || $work,
             ),
             #[cfg(target_arch = "x86_64")]
-            $crate::Level::Avx512($simd) => $simd.vectorize(
+            $crate::ProvenLevel::Avx512($simd) => $simd.vectorize(
                 #[inline(always)]
                 || $work,
             ),
@@ -282,23 +284,23 @@ mod tests {
 
     #[test]
     fn the_variable_holds_the_level_down_and_never_up() {
-        let best = Level::best(SimdLevel::Avx512).name();
+        let best = ProvenLevel::best(SimdLevel::Avx512).name();
         for level in SimdLevel::ALL {
             assert_eq!(allowed(Some(level.name())), level);
-            assert_eq!(Level::best(level).name(), level.min(best));
+            assert_eq!(ProvenLevel::best(level).name(), level.min(best));
         }
         for other in [None, Some(""), Some("AVX2"), Some("neon")] {
-            assert_eq!(Level::best(allowed(other)).name(), best);
+            assert_eq!(ProvenLevel::best(allowed(other)).name(), best);
         }
     }
 
     #[test]
     fn all_levels_run_and_the_plain_one_is_first() {
-        let sums = Level::all().into_iter().map(|level| {
+        let sums = ProvenLevel::all().into_iter().map(|level| {
             assert!(level.without_avx512().name() <= SimdLevel::Avx2.min(level.name()));
             dispatch!(level, _simd => [1u32, 2, 3].iter().sum::<u32>())
         });
-        assert!(sums.eq(Level::all().iter().map(|_| 6)));
-        assert_eq!(Level::all()[0].name(), SimdLevel::Scalar);
+        assert!(sums.eq(ProvenLevel::all().iter().map(|_| 6)));
+        assert_eq!(ProvenLevel::all()[0].name(), SimdLevel::Scalar);
     }
 }

@@ -34,14 +34,17 @@ impl RangeError {
         what: impl FnOnce() -> String,
     ) -> Result<(), Self> {
         let value = value.into();
-        // A bound of 1.8 may come as an `f32` a little below it.
-        let single = |bound: f64| f64::from(bound as f32);
         if (min.min(single(min))..=max.max(single(max))).contains(&value) {
             Ok(())
         } else {
             Err(Self { what: what(), value, min, max })
         }
     }
+}
+
+/// Rounds a bound to `f32`: a value of 1.8 may come as an `f32` a little below it.
+fn single(bound: f64) -> f64 {
+    f64::from(bound as f32)
 }
 
 /// Why a scan was not written.

@@ -35,13 +35,16 @@ impl Default for SightOptions {
 
 impl SightOptions {
     pub(crate) fn check(&self) -> Result<(), RangeError> {
-        let range = |value: f32, range, what: &str| RangeError::check(value, range, || what.to_owned());
-        range(self.range_m, [0.5, 200.0], "how far a scanner sees")?;
-        range(self.full_m, [0.1, 200.0], "how far surfaces have all their points")?;
-        range(self.grazing_deg, [0.0, 89.0], "the angle at which rays give no points")?;
-        range(self.glass, [0.0, 1.0], "the share of points on panes")?;
-        range(self.holes, [0.0, 1.0], "the share of holes")
+        check_range(self.range_m, [0.5, 200.0], "how far a scanner sees")?;
+        check_range(self.full_m, [0.1, 200.0], "how far surfaces have all their points")?;
+        check_range(self.grazing_deg, [0.0, 89.0], "the angle at which rays give no points")?;
+        check_range(self.glass, [0.0, 1.0], "the share of points on panes")?;
+        check_range(self.holes, [0.0, 1.0], "the share of holes")
     }
+}
+
+fn check_range(value: f32, range: [f64; 2], what: &str) -> Result<(), RangeError> {
+    RangeError::check(value, range, || what.to_owned())
 }
 
 /// Edge of the patches that have no points.
@@ -230,8 +233,11 @@ impl AnnotatedScene {
             .par_chunks(256)
             .map(|chunk| {
                 let mut memory = sight.memory();
-                let seen = |&face: &u32| sight.seen_place(&self.mesh, face, &mut memory).is_some();
-                chunk.iter().copied().filter(seen).collect()
+                chunk
+                    .iter()
+                    .copied()
+                    .filter(|&face| sight.seen_place(&self.mesh, face, &mut memory).is_some())
+                    .collect()
             })
             .collect();
         self.with_faces(&kept.concat())

@@ -1,24 +1,13 @@
 //! Options from the whole of their ranges, with furniture of several models and with wings. The generator
 //! refuses them for a reason that no seed changes, or it makes a building that can be built.
 
+mod common;
+
+use common::TYPES;
 use proptest::prelude::*;
 use s3d_label::RoomType;
 use s3d_synth::building::{LeafModel, SeatBase, ShelfFront, TableBase};
 use s3d_synth::{Building, BuildingError, BuildingOptions, FloorPlan, Models, RoomOptions};
-
-const TYPES: [RoomType; 10] = [
-    RoomType::OFFICE,
-    RoomType::CONFERENCE_ROOM,
-    RoomType::LOUNGE,
-    RoomType::LOBBY,
-    RoomType::OPENSPACE,
-    RoomType::PANTRY,
-    RoomType::COPY_ROOM,
-    RoomType::STORAGE,
-    // These room types need models.
-    RoomType::AUDITORIUM,
-    RoomType::WC,
-];
 
 /// Lengths from `low` to `high`, often exactly at one of the ends.
 fn length(low: f32, high: f32) -> BoxedStrategy<f32> {

@@ -110,11 +110,11 @@ mod tests {
     use super::*;
     use crate::{Candidates, Deflater, Search};
     use proptest::prelude::*;
-    use s3d_simd::{Level, dispatch};
+    use s3d_simd::{ProvenLevel, dispatch};
 
     /// Inflates at every level of instructions. All results must agree.
     fn inflate(stream: &[u8], len: usize) -> Result<Vec<u8>, Error> {
-        let made = Level::all().into_iter().map(|level| {
+        let made = ProvenLevel::all().into_iter().map(|level| {
             let mut inflater = Inflater::default();
             let mut out = vec![0; len];
             let done = dispatch!(level, _simd => inflater.run(stream, &mut out));

@@ -203,20 +203,21 @@ mod tests {
         assert_eq!(filter(&plane, 3, 1, Filter::Paeth).unwrap(), [4, 5, 3, 3, 4, 10, 3, 3]);
     }
 
+    fn plain_paeth(left: u8, above: u8, corner: u8) -> u8 {
+        let plane = i16::from(left) + i16::from(above) - i16::from(corner);
+        let far = |byte: u8| (plane - i16::from(byte)).abs();
+        let nearer = if far(above) <= far(corner) { above } else { corner };
+        if far(left) <= far(above) && far(left) <= far(corner) {
+            left
+        } else {
+            nearer
+        }
+    }
+
     #[test]
     fn bytes_are_expected_as_the_specification_has_it() {
-        let plain = |left: u8, above: u8, corner: u8| {
-            let plane = i16::from(left) + i16::from(above) - i16::from(corner);
-            let far = |byte: u8| (plane - i16::from(byte)).abs();
-            let nearer = if far(above) <= far(corner) { above } else { corner };
-            if far(left) <= far(above) && far(left) <= far(corner) {
-                left
-            } else {
-                nearer
-            }
-        };
         for [left, above] in (0..=u16::MAX).map(u16::to_le_bytes) {
-            let other = (0..=u8::MAX).find(|&c| expected(left, above, c) != plain(left, above, c));
+            let other = (0..=u8::MAX).find(|&c| expected(left, above, c) != plain_paeth(left, above, c));
             assert_eq!(other, None, "{left}, {above}");
         }
     }
@@ -266,13 +267,16 @@ mod tests {
         }
     }
 
+    fn filter_error(len: usize, line: usize, pixel: usize) -> Error {
+        filter(&[0; 12][..len], line, pixel, Filter::Paeth).unwrap_err()
+    }
+
     #[test]
     fn parts_of_lines_and_of_pixels_are_errors() {
-        let error = |len, line, pixel| filter(&[0; 12][..len], line, pixel, Filter::Paeth).unwrap_err();
-        assert_eq!(error(12, 5, 1), Error::PartialLine { len: 12, line: 5 });
-        assert_eq!(error(12, 0, 1), Error::PartialLine { len: 12, line: 0 });
-        assert_eq!(error(12, 4, 3), Error::PartialLine { len: 4, line: 3 });
-        assert_eq!(error(12, 4, 0), Error::PartialLine { len: 4, line: 0 });
+        assert_eq!(filter_error(12, 5, 1), Error::PartialLine { len: 12, line: 5 });
+        assert_eq!(filter_error(12, 0, 1), Error::PartialLine { len: 12, line: 0 });
+        assert_eq!(filter_error(12, 4, 3), Error::PartialLine { len: 4, line: 3 });
+        assert_eq!(filter_error(12, 4, 0), Error::PartialLine { len: 4, line: 0 });
         assert_eq!(filter(&[], 4, 2, Filter::Paeth), Ok(vec![]));
     }
 }

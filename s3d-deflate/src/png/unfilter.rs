@@ -260,16 +260,17 @@ mod tests {
         }
     }
 
+    fn unfilter_error(len: usize, above: Option<&[u8]>, line: usize, pixel: usize) -> Error {
+        let mut lines = vec![0; len];
+        unfilter(&mut lines, above, line, pixel).unwrap_err()
+    }
+
     #[test]
     fn what_is_no_line_is_refused() {
-        let fails = |len, above: Option<&[u8]>, line, pixel| {
-            let mut lines = vec![0; len];
-            unfilter(&mut lines, above, line, pixel).unwrap_err()
-        };
-        assert_eq!(fails(12, None, 4, 1), Error::PartialLine { len: 12, line: 5 });
-        assert_eq!(fails(12, None, 0, 1), Error::PartialLine { len: 12, line: 1 });
-        assert_eq!(fails(15, None, 4, 3), Error::PartialLine { len: 4, line: 3 });
-        assert_eq!(fails(15, Some(&[0; 3]), 4, 2), Error::PartialLine { len: 3, line: 4 });
+        assert_eq!(unfilter_error(12, None, 4, 1), Error::PartialLine { len: 12, line: 5 });
+        assert_eq!(unfilter_error(12, None, 0, 1), Error::PartialLine { len: 12, line: 1 });
+        assert_eq!(unfilter_error(15, None, 4, 3), Error::PartialLine { len: 4, line: 3 });
+        assert_eq!(unfilter_error(15, Some(&[0; 3]), 4, 2), Error::PartialLine { len: 3, line: 4 });
         let mut lines = [4, 1, 1, 5, 1, 1];
         assert_eq!(unfilter(&mut lines, None, 2, 2), Err(Error::UnknownFilter { number: 5 }));
         assert_eq!(lines, [4, 1, 1, 5, 1, 1]);

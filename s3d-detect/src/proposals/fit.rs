@@ -90,10 +90,15 @@ pub fn fit(index: &Index, window: &Aabb, size: Vec3, fits: [Fit; 3]) -> Option<A
 
 /// Counts the surfels along an axis.
 fn histogram(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Vec<u32> {
-    let bin = |x: f32| ((x - grown.min[axis]) / BIN_M).max(0.0) as usize;
-    let mut counts = vec![0; bin(grown.max[axis]) + 1];
-    surfels.iter().for_each(|s| counts[bin(s.position[axis])] += 1);
+    let mut counts = vec![0; bin_of(grown.max[axis], grown.min[axis]) + 1];
+    surfels
+        .iter()
+        .for_each(|s| counts[bin_of(s.position[axis], grown.min[axis])] += 1);
     counts
+}
+
+fn bin_of(x: f32, origin: f32) -> usize {
+    ((x - origin) / BIN_M).max(0.0) as usize
 }
 
 /// Returns the ends of the surfels whose positions are in an interval along an axis; `None` if there are
@@ -168,11 +173,11 @@ fn shortest(surfels: &[&Surfel], grown: &Aabb, axis: usize, share: f32) -> Optio
 /// Returns the longest run of bins that surfels reach into, up to the ends of their extents. The first run
 /// wins a tie.
 fn run(surfels: &[&Surfel], grown: &Aabb, axis: usize) -> Option<[f32; 2]> {
-    let bin = |x: f32| ((x - grown.min[axis]) / BIN_M).max(0.0) as usize;
-    let mut covered = vec![false; bin(grown.max[axis]) + 1];
+    let origin = grown.min[axis];
+    let mut covered = vec![false; bin_of(grown.max[axis], origin) + 1];
     for s in surfels {
-        let last = bin(s.extent.max[axis]).min(covered.len() - 1);
-        covered[bin(s.extent.min[axis]).min(last)..=last].fill(true);
+        let last = bin_of(s.extent.max[axis], origin).min(covered.len() - 1);
+        covered[bin_of(s.extent.min[axis], origin).min(last)..=last].fill(true);
     }
 
     let mut best: Option<[usize; 2]> = None;
@@ -238,12 +243,14 @@ pub fn learn(examples: &[(&Index, Aabb, Aabb)], size: Vec3) -> [Fit; 3] {
             for candidate in FITS {
                 let mut tried = before;
                 tried[axis] = candidate;
-                let overlap = |(index, window, truth): &(&Index, Aabb, Aabb)| {
-                    fit(index, window, size, tried).map_or(0.0, |b| {
-                        iou_1d([b.min[axis], b.max[axis]], [truth.min[axis], truth.max[axis]])
+                let total: f32 = examples
+                    .iter()
+                    .map(|(index, window, truth)| {
+                        fit(index, window, size, tried).map_or(0.0, |b| {
+                            iou_1d([b.min[axis], b.max[axis]], [truth.min[axis], truth.max[axis]])
+                        })
                     })
-                };
-                let total: f32 = examples.iter().map(overlap).sum();
+                    .sum();
                 if total > best {
                     best = total;
                     fits[axis] = candidate;
@@ -259,29 +266,27 @@ mod tests {
     use super::*;
     use glam::vec3;
 
+    fn surfel_at(position: Vec3) -> Surfel {
+        let extent = Aabb { min: position - 0.02, max: position + 0.02 };
+        Surfel { position, extent, normal: Vec3::Z, curvature: 0.0, color: Vec3::ZERO, room: 0 }
+    }
+
     /// Makes a wall at y = 1 with a floor before it.
     fn room() -> Index {
         let mut surfels = Vec::new();
-        let mut add = |position: Vec3| {
-            let extent = Aabb { min: position - 0.02, max: position + 0.02 };
-            surfels.push(Surfel {
-                position,
-                extent,
-                normal: Vec3::Z,
-                curvature: 0.0,
-                color: Vec3::ZERO,
-                room: 0,
-            });
-        };
         for i in 0..80 {
             for j in 0..50 {
-                add(vec3(0.025 + 0.05 * i as f32, 1.0, 0.025 + 0.05 * j as f32));
+                surfels.push(surfel_at(vec3(0.025 + 0.05 * i as f32, 1.0, 0.025 + 0.05 * j as f32)));
             }
             for j in 0..20 {
-                add(vec3(0.025 + 0.05 * i as f32, 0.025 + 0.05 * j as f32, 0.0));
+                surfels.push(surfel_at(vec3(0.025 + 0.05 * i as f32, 0.025 + 0.05 * j as f32, 0.0)));
             }
         }
         Index::new(surfels)
+    }
+
+    fn is_hidden(p: Vec3) -> bool {
+        p.y > 0.99 && (1.0..3.0).contains(&p.x) && (1.0..2.0).contains(&p.z)
     }
 
     #[test]
@@ -297,7 +302,6 @@ mod tests {
 
         // A board of 2.5 cm, 1 cm off the wall, whose edges are not seen: the wall tells where its back is.
         let mut surfels = index.surfels().to_vec();
-        let is_hidden = |p: Vec3| p.y > 0.99 && (1.0..3.0).contains(&p.x) && (1.0..2.0).contains(&p.z);
         let hidden: Vec<Surfel> = surfels.iter().filter(|s| is_hidden(s.position)).copied().collect();
         surfels.retain(|s| !is_hidden(s.position));
         surfels.extend(hidden.iter().map(|s| {
@@ -314,13 +318,15 @@ mod tests {
         assert!(crate::boxes::iou(&found, &truth) > 0.85, "{found:?} {fits:?}");
 
         // A run ends at a gap.
-        let line = |x: f32| {
-            index
-                .surfels()
-                .iter()
-                .find(|s| s.position.z == 0.0 && (s.position.x - x).abs() < 0.03)
-        };
-        let some: Vec<&Surfel> = [0.1, 0.15, 0.2, 0.4, 0.45].into_iter().filter_map(line).collect();
+        let some: Vec<&Surfel> = [0.1, 0.15, 0.2, 0.4, 0.45]
+            .into_iter()
+            .filter_map(|x| {
+                index
+                    .surfels()
+                    .iter()
+                    .find(|s| s.position.z == 0.0 && (s.position.x - x).abs() < 0.03)
+            })
+            .collect();
         let found = run(&some, &Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 0).unwrap();
         assert!((found[1] - found[0] - 0.14).abs() < 0.02 && found[1] < 0.3, "{found:?}");
 

@@ -13,7 +13,7 @@ pub mod windows;
 use crate::area::CLASSES;
 use crate::boxes::{iou, suppress};
 use crate::error::Result;
-use crate::space::Space;
+use crate::spaces::space::Space;
 use crate::surfel::volume::Volumes;
 use crate::svm::sparse::SparseRows;
 use crate::svm::{Linear, SvmOptions, train};

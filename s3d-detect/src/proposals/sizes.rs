@@ -74,13 +74,15 @@ fn first_centers(points: &[Vec3], k: usize, seed: u64) -> Vec<Vec3> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut centers: Vec<Vec3> = Vec::new();
     while centers.len() < k.min(points.len()) {
-        let far = |p: &Vec3| {
-            centers
-                .iter()
-                .map(|c| f64::from(c.distance_squared(*p)))
-                .fold(1e9, f64::min)
-        };
-        let weights: Vec<f64> = points.iter().map(far).collect();
+        let weights: Vec<f64> = points
+            .iter()
+            .map(|p| {
+                centers
+                    .iter()
+                    .map(|c| f64::from(c.distance_squared(*p)))
+                    .fold(1e9, f64::min)
+            })
+            .collect();
         let total: f64 = weights.iter().sum();
         if total <= 0.0 {
             break;

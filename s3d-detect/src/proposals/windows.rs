@@ -76,8 +76,11 @@ fn scale(from: IVec3, to: IVec3) -> f32 {
 
 /// Returns the bins of the heights above the floor and below the ceiling.
 fn heights(w: &Window, volumes: &Volumes) -> [usize; 2] {
-    let bin = |cells: i32| (cells.max(0) / CELLS_A_HEIGHT).min(HEIGHTS as i32 - 1) as usize;
-    [bin(w.corner.z), HEIGHTS + bin(volumes.cells.z - w.corner.z - w.cells.z)]
+    [height_bin(w.corner.z), HEIGHTS + height_bin(volumes.cells.z - w.corner.z - w.cells.z)]
+}
+
+fn height_bin(cells: i32) -> usize {
+    (cells.max(0) / CELLS_A_HEIGHT).min(HEIGHTS as i32 - 1) as usize
 }
 
 /// Returns the features of a window: its parts by direction, then z, y, x; then its heights.
@@ -164,7 +167,6 @@ pub fn best_windows(
 fn is_beaten(scores: &[f32], [nx, ny, nz]: [usize; 3], place: [usize; 3]) -> bool {
     let [x, y, z] = place;
     let score = scores[(z * ny + y) * nx + x];
-    let around = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
     for k in around(z, nz) {
         for j in around(y, ny) {
             for i in around(x, nx) {
@@ -176,6 +178,10 @@ fn is_beaten(scores: &[f32], [nx, ny, nz]: [usize; 3], place: [usize; 3]) -> boo
         }
     }
     false
+}
+
+fn around(i: usize, n: usize) -> std::ops::Range<usize> {
+    i.saturating_sub(1)..(i + 2).min(n)
 }
 
 /// Returns the scores of `count` windows along each axis, from corner `least` on, with x fastest.

@@ -78,21 +78,23 @@ pub fn canonical_frames(bounds: &[Aabb]) -> Vec<Frame> {
         })
         .collect();
 
-    let frame = |(bounds, near): (&Aabb, &Vec<(usize, u8, f32)>)| {
-        let entrance = near.iter().reduce(|best, other| {
-            let rank = |n: &(usize, u8, f32)| (sides[n.0].len(), n.2);
-            if rank(other) > rank(best) { other } else { best }
-        });
-        let size = bounds.size();
-        Frame::new(bounds, entrance.map_or(u8::from(size.y > size.x), |(_, turns, _)| *turns))
-    };
-    bounds.iter().zip(&sides).map(frame).collect()
+    bounds
+        .iter()
+        .zip(&sides)
+        .map(|(bounds, near)| {
+            let entrance = near.iter().reduce(|best, other| {
+                let rank = |n: &(usize, u8, f32)| (sides[n.0].len(), n.2);
+                if rank(other) > rank(best) { other } else { best }
+            });
+            let size = bounds.size();
+            Frame::new(bounds, entrance.map_or(u8::from(size.y > size.x), |(_, turns, _)| *turns))
+        })
+        .collect()
 }
 
 /// Returns the turns that bring `b` before `a` along y, and the length over which they face each other, in
 /// metres; `None` if the two boxes are no neighbours.
 fn side(a: &Aabb, b: &Aabb) -> Option<(u8, f32)> {
-    let flat = |v: Vec3| vec2(v.x, v.y);
     let gaps: Vec2 = flat(b.min - a.max).max(flat(a.min - b.max));
     if a.max.z.min(b.max.z) <= a.min.z.max(b.min.z) {
         return None;
@@ -105,6 +107,10 @@ fn side(a: &Aabb, b: &Aabb) -> Option<(u8, f32)> {
     } else {
         None
     }
+}
+
+fn flat(v: Vec3) -> Vec2 {
+    vec2(v.x, v.y)
 }
 
 #[cfg(test)]

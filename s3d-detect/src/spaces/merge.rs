@@ -91,12 +91,8 @@ fn number_spaces(groups: &[(usize, Aabb)]) -> (Vec<u32>, u32) {
     }
 
     for (i, (_, b)) in groups.iter().enumerate().filter(|(_, g)| g.0 > 0 && !is_space(g)) {
-        let gap = |other: &Aabb| {
-            let apart = (b.min - other.max).max(other.min - b.max).truncate();
-            apart.max_element().max(0.0)
-        };
         let spaces = (0..groups.len()).filter(|&j| is_space(&groups[j]));
-        let nearest = spaces.map(|j| (gap(&groups[j].1), j)).reduce(|best, next| {
+        let nearest = spaces.map(|j| (gap(b, &groups[j].1), j)).reduce(|best, next| {
             let is_nearer = (next.0, groups[best.1].0) < (best.0, groups[next.1].0);
             if is_nearer { next } else { best }
         });
@@ -107,6 +103,11 @@ fn number_spaces(groups: &[(usize, Aabb)]) -> (Vec<u32>, u32) {
         }
     }
     (numbers, count)
+}
+
+fn gap(b: &Aabb, other: &Aabb) -> f32 {
+    let apart = (b.min - other.max).max(other.min - b.max).truncate();
+    apart.max_element().max(0.0)
 }
 
 /// Returns the columns of each face in the plane of a divider, in the order of the cuts across it.
@@ -145,8 +146,10 @@ fn faces(axis: usize, divider: &Divider, surfels: &[Surfel], dividers: &Dividers
 
 /// Whether the ceiling goes through in enough columns. It does above bookcases, and does not above doors.
 fn is_open(columns: &[Column]) -> bool {
-    let is_wall = |c: &&Column| !c.passes && c.walls.into_iter().max() >= Some(WALL_SURFELS);
-    let walls = columns.iter().filter(is_wall).count();
+    let walls = columns
+        .iter()
+        .filter(|c| !c.passes && c.walls.into_iter().max() >= Some(WALL_SURFELS))
+        .count();
     let open = columns.iter().filter(|c| c.passes).count();
     open >= OPEN_COLUMNS && open as f64 >= OPEN_SHARE * (open + walls) as f64
 }
@@ -168,7 +171,8 @@ impl Groups {
     }
 
     fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.of(a), self.of(b));
+        let a = self.of(a);
+        let b = self.of(b);
         self.0[a.max(b)] = a.min(b);
     }
 }
@@ -188,9 +192,12 @@ mod tests {
         assert_eq!((0..6).map(|i| groups.of(i)).collect::<Vec<_>>(), [0, 0, 2, 3, 2, 2]);
     }
 
+    fn group(size: usize, x: [f32; 2]) -> (usize, Aabb) {
+        (size, Aabb { min: vec3(x[0], 0.0, 0.0), max: vec3(x[1], 3.0, 2.0) })
+    }
+
     #[test]
     fn slivers_belong_to_the_space_beside_them() {
-        let group = |size, x: [f32; 2]| (size, Aabb { min: vec3(x[0], 0.0, 0.0), max: vec3(x[1], 3.0, 2.0) });
         let none = (0, Aabb::EMPTY);
         let groups = [
             none,
@@ -204,6 +211,10 @@ mod tests {
         assert_eq!((numbers, count), (vec![NO_SPACE, 0, 1, 1, NO_SPACE], 2));
     }
 
+    fn middle_of(i: usize) -> f32 {
+        0.025 + 0.05 * i as f32
+    }
+
     /// Makes two rooms with floors and ceilings. A wall of 15 cm is between them, with a door of 0.9 m.
     fn two_rooms(wall: bool) -> Vec<Surfel> {
         let mut surfels = Vec::new();
@@ -211,10 +222,9 @@ mod tests {
             let extent = Aabb { min: position, max: position };
             surfels.push(Surfel { position, extent, normal, curvature: 0.0, color: Vec3::ZERO, room: 0 });
         };
-        let at = |i: usize| 0.025 + 0.05 * i as f32;
         for (i, j) in (0..160).flat_map(|i| (0..80).map(move |j| (i, j))) {
             // The wall is x = 4 to 4.15; the door is y = 1 to 1.9.
-            let [x, y] = [i, j].map(at);
+            let [x, y] = [i, j].map(middle_of);
             let in_wall = wall && (4.0..4.15).contains(&x);
             let in_door = (1.0..1.9).contains(&y);
             if !in_wall || in_door {
@@ -225,7 +235,7 @@ mod tests {
             }
         }
         for (j, k) in (0..80).flat_map(|j| (0..52).map(move |k| (j, k))) {
-            let [y, z] = [j, k].map(at);
+            let [y, z] = [j, k].map(middle_of);
             if wall && (!(1.0..1.9).contains(&y) || z > 2.1) {
                 add(vec3(3.995, y, z), Vec3::X);
                 add(vec3(4.155, y, z), Vec3::X);

@@ -13,6 +13,9 @@ pub mod frame;
 pub mod merge;
 pub mod rand_index;
 
+pub(crate) mod parsed_area;
+pub(crate) mod space;
+
 use crate::surfel::Surfel;
 use dividers::{Dividers, find_dividers};
 use merge::{NO_SPACE, merge_cells};

@@ -72,12 +72,15 @@ impl Index {
         rows.flat_map(move |c| {
             let row = (c.z * self.cells.y + c.y) as usize;
             let [from, to] = [self.rows[row] as usize, self.rows[row + 1] as usize];
-            let x = |s: &Surfel| (s.position.x * CELLS_A_M).floor() as i32;
-            let start = from + self.surfels[from..to].partition_point(|s| x(s) < low.x);
-            (start..to).take_while(move |&i| x(&self.surfels[i]) <= high.x)
+            let start = from + self.surfels[from..to].partition_point(|s| column_of(s) < low.x);
+            (start..to).take_while(move |&i| column_of(&self.surfels[i]) <= high.x)
         })
         .filter(|&i| b.contains(self.surfels[i].position))
     }
+}
+
+fn column_of(s: &Surfel) -> i32 {
+    (s.position.x * CELLS_A_M).floor() as i32
 }
 
 fn cell(s: &Surfel) -> IVec3 {
@@ -89,14 +92,15 @@ mod tests {
     use super::*;
     use glam::vec3;
 
+    fn surfel(i: u32) -> Surfel {
+        let r = |k: u32| (i.wrapping_mul(k) % 997) as f32 / 997.0;
+        let position = vec3(3.0 * r(7919), 2.0 * r(104_729), r(1_299_709));
+        let extent = Aabb { min: position, max: position };
+        Surfel { position, extent, normal: Vec3::Z, curvature: 0.0, color: Vec3::ZERO, room: 0 }
+    }
+
     #[test]
     fn a_box_has_the_surfels_that_a_search_finds() {
-        let surfel = |i: u32| {
-            let r = |k: u32| (i.wrapping_mul(k) % 997) as f32 / 997.0;
-            let position = vec3(3.0 * r(7919), 2.0 * r(104_729), r(1_299_709));
-            let extent = Aabb { min: position, max: position };
-            Surfel { position, extent, normal: Vec3::Z, curvature: 0.0, color: Vec3::ZERO, room: 0 }
-        };
         let index = Index::new((0..2000).map(surfel).collect());
         for i in 0..50 {
             let min = surfel(i).position - 0.2;

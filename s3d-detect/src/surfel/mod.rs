@@ -93,7 +93,6 @@ const COMPONENTS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2),
 /// Returns the surfels of cells, which are in order. The 27 cells around a cell are 9 runs of neighbours
 /// along x. From one cell to the next, the start of each run only moves on.
 fn with_normals(cells: &[Sums], room: u32) -> Vec<Surfel> {
-    let order = |k: [i32; 3]| [k[2], k[1], k[0]];
     let mut starts = [0usize; 9];
     let mut surfels = Vec::with_capacity(cells.len());
     for cell in cells {
@@ -137,6 +136,10 @@ fn with_normals(cells: &[Sums], room: u32) -> Vec<Surfel> {
         });
     }
     surfels
+}
+
+fn order(k: [i32; 3]) -> [i32; 3] {
+    [k[2], k[1], k[0]]
 }
 
 /// Returns the eigenvector of the least eigenvalue of a covariance (xx, xy, xz, yy, yz, zz), and the share of
@@ -210,8 +213,12 @@ mod tests {
             [vec3(u, v, 0.0), vec3(0.0, v, u)]
         });
         let surfels = surfels_of(&cloud(edge.collect()), 0);
-        let at_edge = |s: &&Surfel| s.position.x + s.position.z < 0.06;
-        assert!(surfels.iter().filter(at_edge).all(|s| s.curvature > 0.05));
+        assert!(
+            surfels
+                .iter()
+                .filter(|s| s.position.x + s.position.z < 0.06)
+                .all(|s| s.curvature > 0.05)
+        );
         assert!(
             surfels
                 .iter()

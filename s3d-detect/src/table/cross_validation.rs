@@ -5,9 +5,9 @@ use crate::error::{Error, Result};
 use crate::features::{FEATURES, Variant, describe};
 use crate::learn::{elements, random_scores};
 use crate::model::{Detection, Model, TrainOptions, recalled};
-use crate::parsed_area::ParsedArea;
 use crate::proposals::Prepared;
-use crate::space::Space;
+use crate::spaces::parsed_area::ParsedArea;
+use crate::spaces::space::Space;
 use crate::svm::sparse::SparseRows;
 use crate::table::precision::{Scored, average_precision};
 use crate::table::{Row, Table};
@@ -26,7 +26,7 @@ const RECALL: &str = "Proposals: recall";
 pub const THRESHOLDS: [f64; 2] = [0.5, 0.25];
 
 /// Detections in the world frame, by row and class.
-type Found = BTreeMap<(String, usize), Vec<Scored>>;
+type BoxesByRow = BTreeMap<(String, usize), Vec<Scored>>;
 
 /// Returns the average precision over the folds of the paper, as far as their areas exist. Each number is the
 /// mean over folds; a fold whose areas lack a class is left out. All variants are trained, whatever
@@ -45,9 +45,8 @@ pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Contex
     let mut table = Table::new(options.seed);
     table.agreement = areas.iter().map(|a| (a.number, a.agreement)).collect();
     for fold in folds {
-        let of = |wanted: &[u32]| areas.iter().filter(|a| wanted.contains(&a.number)).collect::<Vec<_>>();
-        let training = of(&fold.train);
-        let testing = of(&fold.test);
+        let training = areas_of(&fold.train, areas);
+        let testing = areas_of(&fold.test, areas);
         let spaces: Vec<&Space> = training.iter().flat_map(|a| &a.spaces).collect();
         ctx.info(format_args!(
             "fold {}: train on areas {:?}, test on {:?}",
@@ -65,6 +64,10 @@ pub fn cross_validate(areas: &[ParsedArea], options: &TrainOptions, ctx: &Contex
     Ok(table)
 }
 
+fn areas_of<'a>(wanted: &[u32], areas: &'a [ParsedArea]) -> Vec<&'a ParsedArea> {
+    areas.iter().filter(|a| wanted.contains(&a.number)).collect()
+}
+
 /// Tests a model on areas. Returns a row for each of its machines and each comparison.
 ///
 /// # Errors
@@ -79,7 +82,7 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
         Ok(tested)
     });
 
-    let mut found = Found::new();
+    let mut found = BoxesByRow::new();
     let mut recalls = vec![[[0usize; 2]; 2]; CLASSES.len()];
     for (of_space, recall) in tested.collect::<Result<Vec<_>>>()? {
         for (key, boxes) in of_space {
@@ -100,34 +103,39 @@ pub fn test(model: &Model, areas: &[&ParsedArea], ctx: &Context) -> Result<Vec<R
         .iter()
         .map(|m| m.variant.name())
         .chain([NO_CONTEXT, TRUE_BOXES, RANDOM]);
-    let rows = names.filter(|name| found.keys().any(|(n, _)| n == name)).map(|name| {
-        let of = |threshold: f64| {
-            let classes = (0..CLASSES.len()).map(|class| {
-                let elements = areas.iter().flat_map(|a| a.elements.iter().map(|e| (a.number, e)));
-                let truth = elements
-                    .filter(|(_, e)| e.class == class)
-                    .map(|(a, e)| ((a, e.room), e.bbox));
-                let boxes = found.get(&(name.to_owned(), class)).map_or(&[][..], |f| f);
-                average_precision(boxes, &truth.collect::<Vec<_>>(), threshold)
-            });
-            classes.collect()
-        };
-        Row { name: name.to_owned(), ap: THRESHOLDS.map(of) }
-    });
+    let rows = names
+        .filter(|name| found.keys().any(|(n, _)| n == name))
+        .map(|name| Row {
+            name: name.to_owned(),
+            ap: THRESHOLDS.map(|threshold| {
+                let classes = (0..CLASSES.len()).map(|class| {
+                    let elements = areas.iter().flat_map(|a| a.elements.iter().map(|e| (a.number, e)));
+                    let truth = elements
+                        .filter(|(_, e)| e.class == class)
+                        .map(|(a, e)| ((a, e.room), e.bbox));
+                    let boxes = found.get(&(name.to_owned(), class)).map_or(&[][..], |f| f);
+                    average_precision(boxes, &truth.collect::<Vec<_>>(), threshold)
+                });
+                classes.collect()
+            }),
+        });
     let mut rows: Vec<Row> = rows.collect();
 
-    let share = |[found, all]: [usize; 2]| (all > 0).then(|| found as f64 / all as f64);
     let of = |t: usize| recalls.iter().map(|r| share(r[t])).collect();
     rows.push(Row { name: RECALL.to_owned(), ap: [of(0), of(1)] });
     Ok(rows)
 }
 
+fn share([found, all]: [usize; 2]) -> Option<f64> {
+    (all > 0).then(|| found as f64 / all as f64)
+}
+
 /// Returns the detections in a space by row and class, and the number of elements that its proposals overlap,
 /// by class and threshold.
-fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
+fn test_space(model: &Model, space: &Space) -> (BoxesByRow, Vec<[[usize; 2]; 2]>) {
     let prepared = Prepared::new(space);
     let proposals = model.proposer.propose(&prepared);
-    let mut found = Found::new();
+    let mut found = BoxesByRow::new();
     let mut put = |name: &str, class: usize, bbox: &Aabb, score: f64| {
         let scored = Scored { scene: (space.area, space.room_of(bbox)), bbox: space.to_world(bbox), score };
         found.entry((name.to_owned(), class)).or_default().push(scored);
@@ -159,6 +167,7 @@ fn test_space(model: &Model, space: &Space) -> (Found, Vec<[[usize; 2]; 2]>) {
         }
     }
 
-    let recall = |class| THRESHOLDS.map(|threshold| recalled(&prepared, &proposals, class, threshold));
-    (found, (0..CLASSES.len()).map(recall).collect())
+    let recalls = (0..CLASSES.len())
+        .map(|class| THRESHOLDS.map(|threshold| recalled(&prepared, &proposals, class, threshold)));
+    (found, recalls.collect())
 }

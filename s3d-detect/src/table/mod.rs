@@ -121,35 +121,37 @@ pub fn markdown(tables: &[Table]) -> String {
 /// Returns the cells of a row at a threshold, in the order of the columns.
 fn cells_of_row(tables: &[Table], name: &str, threshold: usize) -> Vec<String> {
     let of_seeds: Vec<_> = tables.iter().filter_map(|t| t.numbers(name, threshold)).collect();
-    let cell = |column: usize| {
-        let values: Vec<f64> = of_seeds.iter().filter_map(|n| n[column]).collect();
-        match spread(&values) {
-            Some([mean, deviation]) if column >= CLASSES.len() && tables.len() > 1 => {
-                format!("{mean:.2} ± {deviation:.2}")
-            }
-            Some([mean, _]) => format!("{mean:.2}"),
-            None => "–".to_owned(),
-        }
-    };
 
     // The mean over structural classes stands behind them, the other two means at the end.
     let n = CLASSES.len();
     let columns = (0..STRUCTURAL).chain(n..n + 1).chain(STRUCTURAL..n).chain(n + 1..n + 3);
-    columns.map(cell).collect()
+    columns
+        .map(|column| {
+            let values: Vec<f64> = of_seeds.iter().filter_map(|n| n[column]).collect();
+            match spread(&values) {
+                Some([mean, deviation]) if column >= CLASSES.len() && tables.len() > 1 => {
+                    format!("{mean:.2} ± {deviation:.2}")
+                }
+                Some([mean, _]) => format!("{mean:.2}"),
+                None => "–".to_owned(),
+            }
+        })
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn row(first: Option<f64>, last: Option<f64>) -> Row {
+        let mut ap = vec![Some(0.5); CLASSES.len()];
+        (ap[0], ap[11]) = (first, last);
+        Row { name: "Full model".to_owned(), ap: [ap.clone(), ap] }
+    }
+
     #[test]
     fn means_leave_out_classes_that_do_not_exist() {
         let mut table = Table::new(1);
-        let row = |first: Option<f64>, last: Option<f64>| {
-            let mut ap = vec![Some(0.5); CLASSES.len()];
-            (ap[0], ap[11]) = (first, last);
-            Row { name: "Full model".to_owned(), ap: [ap.clone(), ap] }
-        };
         table.rows_of_fold(vec![row(Some(0.2), None)]);
         table.rows_of_fold(vec![row(Some(0.4), None)]);
         let numbers = table.numbers("Full model", 0).unwrap();
@@ -162,15 +164,16 @@ mod tests {
         assert_eq!(table.numbers("No global", 0), None);
     }
 
+    fn table_of(ap: f64) -> Table {
+        let mut table = Table::new(0);
+        let ap = vec![Some(ap); CLASSES.len()];
+        table.rows_of_fold(vec![Row { name: "No color".to_owned(), ap: [ap.clone(), ap] }]);
+        table
+    }
+
     #[test]
     fn several_seeds_have_a_spread() {
-        let table = |ap: f64| {
-            let mut table = Table::new(0);
-            let ap = vec![Some(ap); CLASSES.len()];
-            table.rows_of_fold(vec![Row { name: "No color".to_owned(), ap: [ap.clone(), ap] }]);
-            table
-        };
-        let text = markdown(&[table(0.1), table(0.3)]);
+        let text = markdown(&[table_of(0.1), table_of(0.3)]);
         assert!(
             text.contains("| **mean** | table |")
                 && text.contains("| bookcase | board | **mean** | **overall** |")

@@ -24,7 +24,6 @@ pub fn average_precision(detections: &[Scored], truth: &[((u32, u32), Aabb)], th
         let next = rooms.len() as u32;
         *rooms.entry(scene).or_insert(next)
     };
-    let corners = |b: &Aabb| [b.min.x, b.min.y, b.min.z, b.max.x, b.max.y, b.max.z].map(f64::from);
 
     // Any class will do, since truth and detections have the same.
     let class = Class::CHAIR;
@@ -42,6 +41,10 @@ pub fn average_precision(detections: &[Scored], truth: &[((u32, u32), Aabb)], th
     scores.first().map(|score| score.ap).filter(|ap| !ap.is_nan())
 }
 
+fn corners(b: &Aabb) -> [f64; 6] {
+    [b.min.x, b.min.y, b.min.z, b.max.x, b.max.y, b.max.z].map(f64::from)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -51,16 +54,19 @@ mod tests {
         Aabb { min: vec3(x, 0.0, 0.0), max: vec3(x + 1.0, 1.0, 1.0) }
     }
 
+    fn scored(room: u32, x: f32, score: f64) -> Scored {
+        Scored { scene: (1, room), bbox: cube(x), score }
+    }
+
     #[test]
     fn hand_made_curves() {
         let truth = [(1, 0.0), (1, 5.0), (2, 0.0), (2, 9.0)].map(|(room, x)| ((1, room), cube(x)));
-        let at = |room, x, score| Scored { scene: (1, room), bbox: cube(x), score };
         // True, false (found before), false (another scene), true: precision 1 at recall ¼, ½ at ½.
-        let found = [at(1, 0.0, 4.0), at(1, 0.1, 3.0), at(3, 0.0, 2.0), at(2, 9.2, 1.0)];
+        let found = [scored(1, 0.0, 4.0), scored(1, 0.1, 3.0), scored(3, 0.0, 2.0), scored(2, 9.2, 1.0)];
         assert_eq!(average_precision(&found, &truth, 0.5), Some(0.25 + 0.25 * 0.5));
         assert_eq!(average_precision(&[], &truth, 0.5), Some(0.0));
         assert_eq!(average_precision(&found, &[], 0.5), None);
         // An overlap of exactly the threshold is too small.
-        assert_eq!(average_precision(&[at(1, 0.0, 1.0)], &truth[..1], 1.0), Some(0.0));
+        assert_eq!(average_precision(&[scored(1, 0.0, 1.0)], &truth[..1], 1.0), Some(0.0));
     }
 }

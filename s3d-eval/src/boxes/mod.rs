@@ -32,7 +32,7 @@ use std::collections::BTreeMap;
 /// `[xmin, ymin, zmin, xmax, ymax, zmax]`, in metres.
 type Bbox = [f64; 6];
 /// The score and the box of a detection, of one class in one room.
-type Found = (f64, Bbox);
+type ScoredBox = (f64, Bbox);
 
 /// The program whose definition is followed: it says which detections are true, and what average precision
 /// is.
@@ -95,24 +95,27 @@ pub fn average_precision(
     threshold: f64,
     rule: Rule,
 ) -> Vec<ClassScore> {
-    let of_class = |class: Class| {
-        let mut rooms: BTreeMap<u32, (Vec<Bbox>, Vec<Found>)> = BTreeMap::new();
-        for t in truth.iter().filter(|t| t.class == class) {
-            rooms.entry(t.room).or_default().0.push(t.bbox);
-        }
-        for d in detections.iter().filter(|d| d.class == class) {
-            rooms.entry(d.room).or_default().1.push((d.score, d.bbox));
-        }
+    classes
+        .iter()
+        .copied()
+        .map(|class| {
+            let mut rooms: BTreeMap<u32, (Vec<Bbox>, Vec<ScoredBox>)> = BTreeMap::new();
+            for t in truth.iter().filter(|t| t.class == class) {
+                rooms.entry(t.room).or_default().0.push(t.bbox);
+            }
+            for d in detections.iter().filter(|d| d.class == class) {
+                rooms.entry(d.room).or_default().1.push((d.score, d.bbox));
+            }
 
-        let mut judged: Vec<(f64, Verdict)> = Vec::new();
-        for (boxes, found) in rooms.values() {
-            let verdicts = room::verdicts(boxes, found, &[threshold], rule);
-            judged.extend(found.iter().map(|f| f.0).zip(verdicts.into_iter().flatten()));
-        }
-        let boxes = rooms.values().map(|(boxes, _)| boxes.len() as u64).sum();
-        ClassScore::new(boxes, &mut judged, rule)
-    };
-    classes.iter().copied().map(of_class).collect()
+            let mut judged: Vec<(f64, Verdict)> = Vec::new();
+            for (boxes, found) in rooms.values() {
+                let verdicts = room::verdicts(boxes, found, &[threshold], rule);
+                judged.extend(found.iter().map(|f| f.0).zip(verdicts.into_iter().flatten()));
+            }
+            let boxes = rooms.values().map(|(boxes, _)| boxes.len() as u64).sum();
+            ClassScore::new(boxes, &mut judged, rule)
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -130,8 +130,8 @@ fn thresholds(scores: &[f64], truth: u64) -> Vec<f64> {
 /// Returns the share of hits among the detections with this score or more.
 fn precision_from(judged: &[(f64, Verdict)], threshold: f64) -> f64 {
     let above = &judged[..judged.partition_point(|(score, _)| *score >= threshold)];
-    let count = |wanted| above.iter().filter(|(_, verdict)| *verdict == wanted).count();
-    let [hits, misses] = [Verdict::True, Verdict::False].map(count);
+    let [hits, misses] = [Verdict::True, Verdict::False]
+        .map(|wanted| above.iter().filter(|(_, verdict)| *verdict == wanted).count());
     // There is a hit, since the threshold is the score of one.
     hits as f64 / (hits + misses) as f64
 }
@@ -140,12 +140,15 @@ fn precision_from(judged: &[(f64, Verdict)], threshold: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn judged(pattern: &str) -> Vec<(f64, Verdict)> {
-        let verdict = |c| match c {
+    fn verdict(c: char) -> Verdict {
+        match c {
             't' => Verdict::True,
             'f' => Verdict::False,
             _ => Verdict::Void,
-        };
+        }
+    }
+
+    fn judged(pattern: &str) -> Vec<(f64, Verdict)> {
         pattern
             .chars()
             .enumerate()

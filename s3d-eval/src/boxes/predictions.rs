@@ -133,8 +133,9 @@ fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>)> {
 
 /// Returns the JSON files in a folder, and its other entries.
 fn json_and_others(dir: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-    let is_json = |p: &PathBuf| p.extension().is_some_and(|e| e == "json") && p.is_file();
-    Ok(entries(dir)?.into_iter().partition(is_json))
+    Ok(entries(dir)?
+        .into_iter()
+        .partition(|p| p.extension().is_some_and(|e| e == "json") && p.is_file()))
 }
 
 fn read_content(path: &Path) -> Result<Content> {

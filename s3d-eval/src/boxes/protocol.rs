@@ -4,7 +4,7 @@ use super::precision::{ClassScore, mean};
 use super::predictions::Predictions;
 use super::room::{Verdict, verdicts};
 use super::truth::{Classes, Room, rooms};
-use super::{Bbox, Found, Rule};
+use super::{Bbox, Rule, ScoredBox};
 use crate::error::Result;
 use crate::tables::{Rows, tables};
 use crate::task::Task;
@@ -70,8 +70,11 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
         &jobs,
         || (),
         |(), (room, found)| {
-            let of_class = |class: &Class| OfClass::judge(room, found, *class, rule);
-            let of_classes: Vec<OfClass> = classes.list.iter().map(of_class).collect();
+            let of_classes: Vec<OfClass> = classes
+                .list
+                .iter()
+                .map(|class| OfClass::judge(room, found, *class, rule))
+                .collect();
             progress.add(1);
             Ok((room.fold, of_classes))
         },
@@ -126,7 +129,7 @@ impl OfClass {
             .filter(|(c, _)| *c == class)
             .map(|(_, bbox)| *bbox)
             .collect();
-        let found: Vec<Found> = found
+        let found: Vec<ScoredBox> = found
             .iter()
             .filter(|(_, c, _)| *c == class)
             .map(|(score, _, bbox)| (*score, *bbox))
@@ -139,18 +142,21 @@ impl OfClass {
 
 /// Returns a note on the classes that are detected in a fold without true boxes of them.
 fn invented(folds: &[Fold], rooms: &[(usize, Vec<OfClass>)], classes: &[Class]) -> Option<String> {
-    let in_fold = |(i, fold): (usize, &Fold)| {
-        let of_fold = rooms.iter().filter(move |(at, _)| *at == i).map(|(_, of)| of);
-        let is_invented = |class: &usize| {
-            let of_class = of_fold.clone().map(|of| &of[*class]);
-            of_class.clone().all(|of| of.truth == 0) && of_class.clone().any(|of| !of.judged.is_empty())
-        };
-        let names = (0..classes.len())
-            .filter(is_invented)
-            .map(|class| classes[class].name());
-        names.map(|name| format!("{name} in {}", fold.name)).collect::<Vec<_>>()
-    };
-    let names: Vec<String> = folds.iter().enumerate().flat_map(in_fold).collect();
+    let names: Vec<String> = folds
+        .iter()
+        .enumerate()
+        .flat_map(|(i, fold)| {
+            let of_fold = rooms.iter().filter(move |(at, _)| *at == i).map(|(_, of)| of);
+            let names = (0..classes.len())
+                .filter(|class| {
+                    let of_class = of_fold.clone().map(|of| &of[*class]);
+                    of_class.clone().all(|of| of.truth == 0)
+                        && of_class.clone().any(|of| !of.judged.is_empty())
+                })
+                .map(|class| classes[class].name());
+            names.map(|name| format!("{name} in {}", fold.name)).collect::<Vec<_>>()
+        })
+        .collect();
     let told = "Detected, but not in the truth, so that means are not defined there";
     (!names.is_empty()).then(|| format!("{told}: {}.", names.join(", ")))
 }
@@ -169,11 +175,7 @@ fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
         .map(|class| [0, 1].map(|threshold| of_class(class, threshold)))
         .collect();
 
-    let columns = |pairs: [(f64, f64); 2]| match rule {
-        Rule::Mmdetection3d => pairs.into_iter().flat_map(|(ap, recall)| [ap, recall]).collect(),
-        Rule::Open3dMl => pairs.into_iter().map(|(ap, _)| ap).collect::<Vec<f64>>(),
-    };
-    let of_row = |of: &[ClassScore; 2]| columns(of.map(|score| (score.ap, score.recall)));
+    let of_row = |of: &[ClassScore; 2]| columns(of.map(|score| (score.ap, score.recall)), rule);
     let mut rows: Rows = classes
         .iter()
         .zip(&scores)
@@ -189,7 +191,7 @@ fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
                 .map(|(_, of)| of[threshold])
                 .collect()
         };
-        columns([0, 1].map(|threshold| mean(&chosen(threshold), rule)))
+        columns([0, 1].map(|threshold| mean(&chosen(threshold), rule)), rule)
     };
     let has_both_kinds =
         classes.iter().any(|c| is_structural(*c)) && !classes.iter().all(|c| is_structural(*c));
@@ -201,6 +203,13 @@ fn rows(rooms: &[&Vec<OfClass>], classes: &[Class], rule: Rule) -> Rows {
     rows
 }
 
+fn columns(pairs: [(f64, f64); 2], rule: Rule) -> Vec<f64> {
+    match rule {
+        Rule::Mmdetection3d => pairs.into_iter().flat_map(|(ap, recall)| [ap, recall]).collect(),
+        Rule::Open3dMl => pairs.into_iter().map(|(ap, _)| ap).collect::<Vec<f64>>(),
+    }
+}
+
 /// Whether a building is made of things of a class, rather than furnished with them.
 fn is_structural(class: Class) -> bool {
     class.s3dis() <= Class::DOOR
@@ -210,17 +219,17 @@ fn is_structural(class: Class) -> bool {
 mod tests {
     use super::*;
 
+    fn of_class(truth: u64, found: bool) -> OfClass {
+        OfClass { truth, judged: vec![(0.5, vec![Verdict::False; 2]); found.into()] }
+    }
+
     #[test]
     fn classes_without_true_boxes_are_noted() {
         let folds = [5, 2].map(|area| Fold { name: format!("area {area}"), areas: vec![area] });
-        let of = |truth, found: bool| OfClass {
-            truth,
-            judged: vec![(0.5, vec![Verdict::False; 2]); found.into()],
-        };
         let rooms = vec![
-            (0, vec![of(1, true), of(0, true)]),
-            (0, vec![of(0, true), of(0, false)]),
-            (1, vec![of(0, false), of(1, true)]),
+            (0, vec![of_class(1, true), of_class(0, true)]),
+            (0, vec![of_class(0, true), of_class(0, false)]),
+            (1, vec![of_class(0, false), of_class(1, true)]),
         ];
         let told = invented(&folds, &rooms, &[Class::BEAM, Class::SOFA]).unwrap();
         assert!(told.ends_with("not defined there: sofa in area 5."), "{told}");

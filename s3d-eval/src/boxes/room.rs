@@ -1,6 +1,6 @@
 //! Decides which detections of a room are true.
 
-use super::{Bbox, Found, Rule, iou};
+use super::{Bbox, Rule, ScoredBox, iou};
 
 /// The verdict on a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,14 +12,19 @@ pub(super) enum Verdict {
 }
 
 /// Returns the verdicts on each detection of one class in one room, by threshold.
-pub(super) fn verdicts(truth: &[Bbox], found: &[Found], thresholds: &[f64], rule: Rule) -> Vec<Vec<Verdict>> {
+pub(super) fn verdicts(
+    truth: &[Bbox],
+    found: &[ScoredBox],
+    thresholds: &[f64],
+    rule: Rule,
+) -> Vec<Vec<Verdict>> {
     match rule {
         Rule::Mmdetection3d => greedy(truth, found, thresholds),
         Rule::Open3dMl => best_of_boxes(truth, found, thresholds),
     }
 }
 
-fn greedy(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdict>> {
+fn greedy(truth: &[Bbox], found: &[ScoredBox], thresholds: &[f64]) -> Vec<Vec<Verdict>> {
     let mut verdicts = vec![vec![Verdict::False; thresholds.len()]; found.len()];
     let mut taken = vec![vec![false; truth.len()]; thresholds.len()];
     let mut order: Vec<usize> = (0..found.len()).collect();
@@ -42,9 +47,11 @@ fn greedy(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdic
     verdicts
 }
 
-fn best_of_boxes(truth: &[Bbox], found: &[Found], thresholds: &[f64]) -> Vec<Vec<Verdict>> {
-    let with_all = |bbox| found.iter().map(|(_, of)| iou(of, bbox, Rule::Open3dMl)).collect();
-    let ious: Vec<Vec<f64>> = truth.iter().map(with_all).collect();
+fn best_of_boxes(truth: &[Bbox], found: &[ScoredBox], thresholds: &[f64]) -> Vec<Vec<Verdict>> {
+    let ious: Vec<Vec<f64>> = truth
+        .iter()
+        .map(|bbox| found.iter().map(|(_, of)| iou(of, bbox, Rule::Open3dMl)).collect())
+        .collect();
 
     // The best detection of each box has the largest IoU, or the first IoU that is NaN, like numpy's argmax.
     let mut is_best = vec![false; found.len()];

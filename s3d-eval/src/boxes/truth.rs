@@ -27,7 +27,6 @@ impl Classes {
             return Ok(Self { taxonomy, list, as_s3dis: true });
         };
 
-        let refused = |fault| Error::Classes { option: ClassOption::Classes, fault };
         let mut list = Vec::new();
         for name in names {
             let class = taxonomy.class(name).map_err(|e| refused(e.into()))?;
@@ -59,6 +58,10 @@ impl Classes {
             .collect::<Vec<_>>()
             .join(", ")
     }
+}
+
+fn refused(fault: ClassFault) -> Error {
+    Error::Classes { option: ClassOption::Classes, fault }
 }
 
 /// A room that is tested.

@@ -90,9 +90,12 @@ impl Confusion {
             scores.accuracy[class] = found / truth;
         }
 
-        let mean = |values: &[f64]| there.iter().map(|&c| values[c]).sum::<f64>() / there.len() as f64;
-        scores.mean_iou = mean(&scores.iou);
-        scores.mean_accuracy = mean(&scores.accuracy);
+        scores.mean_iou = mean_over(&scores.iou, &there);
+        scores.mean_accuracy = mean_over(&scores.accuracy, &there);
         scores
     }
+}
+
+fn mean_over(values: &[f64], there: &[usize]) -> f64 {
+    there.iter().map(|&c| values[c]).sum::<f64>() / there.len() as f64
 }

@@ -125,11 +125,11 @@ fn both(
     let units = task.data.options().depth_units;
     let image = read::gray16(task.data, &predicted.image, Domain::Depth)?;
     let places = Places::new([image.width(), image.height()], nearest);
-    let metres = |value: u16, missing: f64| units.metres(value).unwrap_or(missing);
+
     let truth: Vec<f64> = places
         .sample(image.pixels())
         .into_iter()
-        .map(|value| metres(value, 0.0))
+        .map(|value| units.metres(value).unwrap_or(0.0))
         .collect();
 
     let file = &predicted.file;
@@ -138,7 +138,8 @@ fn both(
         let size = [image.width(), image.height()];
         read::check_size(file, size, &places.sizes())?;
         let values = places.sample_prediction(size, image.into_vec());
-        (size, values.into_iter().map(|value| metres(value, f64::NAN)).collect())
+        let metres = values.into_iter().map(|value| units.metres(value).unwrap_or(f64::NAN));
+        (size, metres.collect())
     } else {
         let (size, values) = read::floats(file, &places.sizes(), 1)?;
         (size, places.sample_prediction(size, values))

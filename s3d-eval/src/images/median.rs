@@ -83,11 +83,14 @@ impl Group {
     }
 
     fn new(steps: RangeInclusive<usize>, middle: Option<[u64; 2]>) -> Self {
-        let cosine = |step: usize| libm::cos(step as f64 * (PI / STEPS as f64));
         // Wider, since rounding moves cosines, even beyond 1.
-        let cosines = cosine(steps.end() + 1) - 1e-12..=cosine(*steps.start()) + 1e-12;
+        let cosines = cosine_of(steps.end() + 1) - 1e-12..=cosine_of(*steps.start()) + 1e-12;
         Self { steps, cosines, middle, angles: Mutex::default() }
     }
+}
+
+fn cosine_of(step: usize) -> f64 {
+    libm::cos(step as f64 * (PI / STEPS as f64))
 }
 
 impl Search {
@@ -110,20 +113,22 @@ impl Search {
     /// Returns the median of each fold, then the median of all: the mean of both middle angles, NaN without
     /// angles.
     pub(super) fn found(self) -> Vec<f64> {
-        let median = |group: Group| {
-            let counts = group.angles.into_inner().unwrap_or_else(PoisonError::into_inner);
-            let at = |place: u64| {
-                let ends = counts.iter().scan(0, |end, (bits, count)| {
-                    *end += count;
-                    Some((*end, *bits))
-                });
-                ends.into_iter()
-                    .find(|(end, _)| *end > place)
-                    .map_or(f64::NAN, |(_, bits)| f64::from_bits(bits))
-            };
-            group.middle.map_or(f64::NAN, |[low, high]| (at(low) + at(high)) / 2.0)
-        };
-        self.0.into_iter().map(median).collect()
+        self.0
+            .into_iter()
+            .map(|group| {
+                let counts = group.angles.into_inner().unwrap_or_else(PoisonError::into_inner);
+                let at = |place: u64| {
+                    let ends = counts.iter().scan(0, |end, (bits, count)| {
+                        *end += count;
+                        Some((*end, *bits))
+                    });
+                    ends.into_iter()
+                        .find(|(end, _)| *end > place)
+                        .map_or(f64::NAN, |(_, bits)| f64::from_bits(bits))
+                };
+                group.middle.map_or(f64::NAN, |[low, high]| (at(low) + at(high)) / 2.0)
+            })
+            .collect()
     }
 }
 
@@ -131,6 +136,10 @@ impl Search {
 mod tests {
     use super::*;
     use crate::images::median_of_angles;
+
+    fn angles(cosines: &[f64]) -> Vec<f64> {
+        cosines.iter().copied().map(degrees).collect()
+    }
 
     #[test]
     fn medians_agree_with_sorted_angles() {
@@ -140,7 +149,6 @@ mod tests {
             &[],
             &[&[1.0], &[], &[1.0, -0.3, 1.0]],
         ];
-        let angles = |cosines: &[f64]| -> Vec<f64> { cosines.iter().copied().map(degrees).collect() };
         let medians = Medians::new(cosines.len());
         let each = |f: &dyn Fn(usize, &[f64])| {
             for (fold, images) in cosines.iter().enumerate() {

@@ -9,7 +9,7 @@ use crate::images::normal_metrics::{
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
 use crate::images::read;
 use crate::options::ImageKind;
-use crate::tables::{mean_of_defined, tables};
+use crate::tables::{Rows, mean_of_defined, tables};
 use crate::task::Task;
 use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
@@ -72,18 +72,19 @@ fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         Ok((predicted.fold, (angles.len() as u64, omnidata_scores(angles))))
     })?;
 
-    let score = |units: &[&(u64, Option<[f64; 5]>)]| {
-        let there = units.iter().filter_map(|unit| unit.1);
-        let mut sums = [0.0; 5];
-        there
-            .clone()
-            .for_each(|scores| sums.iter_mut().zip(scores).for_each(|(sum, v)| *sum += v));
-        let count = there.count() as f64;
-        vec![("mean".to_owned(), sums.map(|sum| sum / count).to_vec())]
-    };
     let columns = ["mean (°)", "median (°)", "≤ 11.25°", "≤ 22.5°", "≤ 30°"];
-    let made = tables(task, &columns, &units, score);
+    let made = tables(task, &columns, &units, mean_scores);
     Ok((OMNIDATA.to_vec(), units.iter().map(|unit| unit.1.0).sum(), made))
+}
+
+fn mean_scores(units: &[&(u64, Option<[f64; 5]>)]) -> Rows {
+    let there = units.iter().filter_map(|unit| unit.1);
+    let mut sums = [0.0; 5];
+    there
+        .clone()
+        .for_each(|scores| sums.iter_mut().zip(scores).for_each(|(sum, v)| *sum += v));
+    let count = there.count() as f64;
+    vec![("mean".to_owned(), sums.map(|sum| sum / count).to_vec())]
 }
 
 /// An image: its sums, and with intervals the number of its angles in each of [`STEPS`] steps.
@@ -122,22 +123,11 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     drop(progress);
     let medians = search.found();
 
-    let score = |units: &[&Unit]| {
-        let mut sums = AngleSums::default();
-        let mut steps = vec![0u64; STEPS];
-        for (of_image, counts) in units {
-            sums.add(of_image);
-            steps.iter_mut().zip(counts).for_each(|(sum, n)| *sum += u64::from(*n));
-        }
-        let ([mean, rmse], below) = sums.mean_rmse_below();
-        let scores = [mean, median_of_steps(&steps), rmse].into_iter().chain(below);
-        vec![("all pixels".to_owned(), scores.collect())]
-    };
     let below = DSINE_LIMITS.map(|limit| format!("< {limit}° (%)"));
     let columns = ["mean (°)", "median (°)", "RMSE (°)"]
         .into_iter()
         .chain(below.iter().map(String::as_str));
-    let mut made = tables(task, &columns.collect::<Vec<_>>(), &units, score);
+    let mut made = tables(task, &columns.collect::<Vec<_>>(), &units, pooled_scores);
     // Medians of steps are for intervals only.
     for (table, median) in made.iter_mut().zip(of_tables(&medians)) {
         table.rows[0].scores[1].value = median;
@@ -148,6 +138,18 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         definition.push("Intervals of medians are computed from angles in steps of 0.2°.");
     }
     Ok((definition, units.iter().map(|unit| unit.1.0.pixels).sum(), made))
+}
+
+fn pooled_scores(units: &[&Unit]) -> Rows {
+    let mut sums = AngleSums::default();
+    let mut steps = vec![0u64; STEPS];
+    for (of_image, counts) in units {
+        sums.add(of_image);
+        steps.iter_mut().zip(counts).for_each(|(sum, n)| *sum += u64::from(*n));
+    }
+    let ([mean, rmse], below) = sums.mean_rmse_below();
+    let scores = [mean, median_of_steps(&steps), rmse].into_iter().chain(below);
+    vec![("all pixels".to_owned(), scores.collect())]
 }
 
 /// Returns medians in the order of tables: of folds, of all, and the mean over folds. `medians` has the first

@@ -31,20 +31,19 @@ impl PanoramaClasses {
         let columns = pillow_nearest(size[0], PANORAMA[0]);
         let rows = pillow_nearest(size[1], PANORAMA[1]);
 
-        let of_index = |[r, g, b]: [u8; 3]| {
-            if r == 0 {
-                class(u16::from_be_bytes([g, b]))
-            } else {
-                None
-            }
-        };
         let mut classes: Vec<Option<u8>> = rows
             .iter()
             .flat_map(|&row| {
                 let row = semantic.row(row);
                 columns.iter().map(move |&column| row[column as usize])
             })
-            .map(of_index)
+            .map(|[r, g, b]| {
+                if r == 0 {
+                    class(u16::from_be_bytes([g, b]))
+                } else {
+                    None
+                }
+            })
             .collect();
 
         // Few pixels have no green: only these need the other channels.

@@ -78,7 +78,6 @@ fn floats_of<R: Read>(
         Some((&[height, width], rest)) if rest == of_pixel => [height, width],
         _ => return wrong(format!("is an array of the shape {:?}: save one of {form}", array.shape())),
     };
-    let side = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
     let size = [side(width), side(height)];
     check_size(file, size, sizes)?;
 
@@ -92,6 +91,10 @@ fn floats_of<R: Read>(
     let mut values = Vec::with_capacity(size[0] as usize * size[1] as usize * channels as usize);
     while array.read_floats(&mut values)? > 0 {}
     Ok((size, values))
+}
+
+fn side(n: u64) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
 }
 
 /// The pixels of a panorama that are evaluated at 1024 × 512.

@@ -127,18 +127,19 @@ fn compare(truth: &Truth, file: &Path, meaning: &[u8], count: usize) -> s3d_data
     let size = [image.width(), image.height()];
     read::check_size(file, size, &places.sizes())?;
     let numbers = places.sample_prediction(size, image.into_vec());
-    let class = |number: &u8| meaning.get(usize::from(*number)).copied().unwrap_or(u8::MAX);
-    classes
-        .compare(&numbers.iter().map(class).collect::<Vec<_>>(), count)
-        .map_err(|at| {
-            let [x, y] = places.place(size, at);
-            let message = format!(
-                "has {} in column {x}, row {y}, which is evaluated: numbers of classes are below {}",
-                numbers[at],
-                meaning.len(),
-            );
-            FileError::format(file, message).into()
-        })
+    let predicted: Vec<u8> = numbers
+        .iter()
+        .map(|number| meaning.get(usize::from(*number)).copied().unwrap_or(u8::MAX))
+        .collect();
+    classes.compare(&predicted, count).map_err(|at| {
+        let [x, y] = places.place(size, at);
+        let message = format!(
+            "has {} in column {x}, row {y}, which is evaluated: numbers of classes are below {}",
+            numbers[at],
+            meaning.len(),
+        );
+        FileError::format(file, message).into()
+    })
 }
 
 /// Returns the class of each number of predictions. A file may list them, one on each line; otherwise they

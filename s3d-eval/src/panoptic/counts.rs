@@ -310,20 +310,24 @@ mod tests {
         assert_eq!((twice.classes()[0].matched, twice.classes()[0].score()), (2, scores[0]));
     }
 
+    fn fault_of(truth: &[u32], predicted: &[u32], found: &[(u32, usize)]) -> SegmentFault {
+        let mut counts = PanopticCounts::new(2);
+        let fault = counts.add(truth, &of(&[(1, 0)]), predicted, &of(found)).unwrap_err();
+        assert_eq!(counts, PanopticCounts::new(2));
+        fault
+    }
+
     #[test]
     fn faults_are_found() {
-        let fault = |truth: &[u32], predicted: &[u32], found: &[(u32, usize)]| {
-            let mut counts = PanopticCounts::new(2);
-            let fault = counts.add(truth, &of(&[(1, 0)]), predicted, &of(found)).unwrap_err();
-            assert_eq!(counts, PanopticCounts::new(2));
-            fault
-        };
-        assert_eq!(fault(&[1, 1], &[4, 4], &[]), SegmentFault::Unlisted { id: 4, pixels: 2 });
-        assert_eq!(fault(&[1, 1], &[4, 4], &[(4, 0), (5, 0)]), SegmentFault::Empty(5));
-        assert_eq!(fault(&[1, 1], &[4, 4], &[(4, 0), (4, 1)]), SegmentFault::Double(4));
-        assert_eq!(fault(&[1, 1], &[4, 4], &[(0, 0)]), SegmentFault::Void);
-        assert_eq!(fault(&[1, 1], &[4, 4], &[(4, 2)]), SegmentFault::Class { id: 4, class: 2, classes: 2 });
-        assert_eq!(fault(&[1], &[4, 4], &[(4, 0)]), SegmentFault::Size { truth: 1, predicted: 2 });
-        assert_eq!(fault(&[0], &[0], &[]), SegmentFault::Empty(1));
+        assert_eq!(fault_of(&[1, 1], &[4, 4], &[]), SegmentFault::Unlisted { id: 4, pixels: 2 });
+        assert_eq!(fault_of(&[1, 1], &[4, 4], &[(4, 0), (5, 0)]), SegmentFault::Empty(5));
+        assert_eq!(fault_of(&[1, 1], &[4, 4], &[(4, 0), (4, 1)]), SegmentFault::Double(4));
+        assert_eq!(fault_of(&[1, 1], &[4, 4], &[(0, 0)]), SegmentFault::Void);
+        assert_eq!(
+            fault_of(&[1, 1], &[4, 4], &[(4, 2)]),
+            SegmentFault::Class { id: 4, class: 2, classes: 2 }
+        );
+        assert_eq!(fault_of(&[1], &[4, 4], &[(4, 0)]), SegmentFault::Size { truth: 1, predicted: 2 });
+        assert_eq!(fault_of(&[0], &[0], &[]), SegmentFault::Empty(1));
     }
 }

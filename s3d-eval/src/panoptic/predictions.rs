@@ -155,8 +155,8 @@ fn check_categories(categories: &[Category], taxonomy: &Taxonomy, stuff: &[Class
                 ["stuff", "a thing"]
             };
             return Err(format!(
-                "{name} is {here}, and by the taxonomy of the data set {there}, unless the option `stuff` says \
-                 otherwise"
+                "{name} is {here}, and by the taxonomy of the data set {there}, unless the option `stuff` \
+                 says otherwise"
             ));
         }
     }

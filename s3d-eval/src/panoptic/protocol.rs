@@ -12,7 +12,7 @@ use s3d_dataset::s3d_io::Error as FileError;
 use s3d_dataset::s3d_io::dataset::{DatasetImage, Domain, Frame};
 use s3d_dataset::s3d_io::image::{decode_rgb8, read_rgb8};
 use s3d_dataset::s3d_io::package::coco_panoptic;
-use s3d_dataset::s3d_label::{Class, LabelTable, Taxonomy, UnknownClass};
+use s3d_dataset::s3d_label::{Class, LabelTable, Taxonomy};
 use s3d_geom::Raster;
 use std::collections::BTreeSet;
 
@@ -64,8 +64,7 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     let classes = taxonomy.classes();
     let tables = tables(task, &COLUMNS, &counts, |images| rows(images, classes, &truth.stuff));
 
-    let names = |of: &[Class]| of.iter().map(|class| class.name()).collect::<Vec<_>>().join(", ");
-    let but = match &*names(&truth.stuff) {
+    let but = match &*names_of(&truth.stuff) {
         "" => String::new(),
         stuff => format!("; each stuff class ({stuff}) has one segment in an image"),
     };
@@ -89,6 +88,10 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     Ok(evaluation)
 }
 
+fn names_of(of: &[Class]) -> String {
+    of.iter().map(|class| class.name()).collect::<Vec<_>>().join(", ")
+}
+
 /// The fold, the image and the prediction of an image that is evaluated.
 type Job = (usize, DatasetImage, Predicted);
 
@@ -103,7 +106,6 @@ fn images(task: &Task<'_>, predictions: &mut Predictions) -> Result<(Vec<Job>, V
                 .map(|image| (fold, image)),
         );
     }
-    let is_panorama = |image: &DatasetImage| image.frame == Frame::Panorama;
 
     let mut jobs = Vec::new();
     let mut missing = Vec::new();
@@ -142,6 +144,10 @@ fn images(task: &Task<'_>, predictions: &mut Predictions) -> Result<(Vec<Job>, V
     let count = predictions.of_images.len();
     let notes = (count > 0).then(|| format!("{count} predictions are of areas that are not tested."));
     Ok((jobs, notes.into_iter().collect()))
+}
+
+fn is_panorama(image: &DatasetImage) -> bool {
+    image.frame == Frame::Panorama
 }
 
 impl<'a> Truth<'a> {
@@ -191,17 +197,16 @@ impl<'a> Truth<'a> {
         predictions: &Predictions,
     ) -> s3d_dataset::Result<PanopticCounts> {
         let taxonomy = self.table.taxonomy();
-        let class_of = |id: u32| taxonomy.classes().iter().position(|class| taxonomy.id(*class) == id);
         let path = image.path(self.task.data.layout(), Domain::Semantic);
         let (panoptic, segments) = coco_panoptic(&self.semantic(image)?, &self.table, &self.stuff)
             .map_err(|e| FileError::format(&path, e.to_string()))?;
         let segments: Vec<Segment> = segments
             .iter()
-            .filter_map(|s| Some(Segment { id: s.id, class: class_of(s.category_id)? }))
+            .filter_map(|s| Some(Segment { id: s.id, class: class_of(s.category_id, taxonomy)? }))
             .collect();
 
         let found = predicted.segments.iter().map(|s| {
-            let class = class_of(s.category_id).ok_or_else(|| {
+            let class = class_of(s.category_id, taxonomy).ok_or_else(|| {
                 let png = predicted.png.display();
                 let message = format!(
                     "segment {} of {png} is of category {}, which the data set has not",
@@ -231,6 +236,10 @@ impl<'a> Truth<'a> {
     }
 }
 
+fn class_of(id: u32, taxonomy: &Taxonomy) -> Option<usize> {
+    taxonomy.classes().iter().position(|class| taxonomy.id(*class) == id)
+}
+
 /// Returns the number of the segment of each pixel.
 fn ids(image: &Raster<[u8; 3]>) -> Vec<u32> {
     image
@@ -242,11 +251,15 @@ fn ids(image: &Raster<[u8; 3]>) -> Vec<u32> {
 
 /// Returns the classes that the option `stuff` names, in their order and once each.
 fn classes_of(list: &ClassList, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
-    let class = |name: &String| {
-        let refused = |e: UnknownClass| Error::Classes { option: ClassOption::Stuff, fault: e.into() };
-        taxonomy.class(name).map_err(refused)
-    };
-    let mut classes = list.0.iter().map(class).collect::<Result<Vec<_>>>()?;
+    let mut classes = list
+        .0
+        .iter()
+        .map(|name| {
+            taxonomy
+                .class(name)
+                .map_err(|e| Error::Classes { option: ClassOption::Stuff, fault: e.into() })
+        })
+        .collect::<Result<Vec<_>>>()?;
     classes.sort_unstable();
     classes.dedup();
     Ok(classes)
@@ -256,7 +269,6 @@ fn classes_of(list: &ClassList, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
 fn rows(images: &[&PanopticCounts], classes: &[Class], stuff: &[Class]) -> Rows {
     let mut sum = PanopticCounts::new(classes.len());
     images.iter().for_each(|counts| sum.add_counts(counts));
-    let row = |name: &str, score: PanopticScore| (name.to_owned(), vec![score.pq, score.sq, score.rq]);
     let counts = classes.iter().zip(sum.classes());
     let mut rows: Rows = counts
         .clone()
@@ -271,4 +283,8 @@ fn rows(images: &[&PanopticCounts], classes: &[Class], stuff: &[Class]) -> Rows 
     rows.push(row("mean of stuff", of_kind(true)));
     rows.push(row("mean", mean(sum.classes())));
     rows
+}
+
+fn row(name: &str, score: PanopticScore) -> (String, Vec<f64>) {
+    (name.to_owned(), vec![score.pq, score.sq, score.rq])
 }

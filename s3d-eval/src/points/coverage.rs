@@ -72,27 +72,29 @@ pub struct CoverageScores {
 /// Returns the scores of each class over rooms, which have the same number of classes.
 pub fn coverage(rooms: &[&RoomCoverage]) -> Vec<CoverageScores> {
     let classes = rooms.iter().map(|room| room.0.len()).max().unwrap_or(0);
-    let of_class = |class: usize| {
-        let rooms: Vec<&ClassCoverage> = rooms.iter().filter_map(|room| room.0.get(class)).collect();
-        let sum = |count: fn(&ClassCoverage) -> u64| rooms.iter().map(|room| count(room)).sum::<u64>() as f64;
-        let mean = |score: fn(&ClassCoverage) -> f64| {
-            let scores: Vec<f64> = rooms
-                .iter()
-                .filter(|room| room.truth > 0)
-                .map(|room| score(room))
-                .collect();
-            scores.iter().sum::<f64>() / scores.len() as f64
-        };
+    (0..classes)
+        .map(|class| {
+            let rooms: Vec<&ClassCoverage> = rooms.iter().filter_map(|room| room.0.get(class)).collect();
+            let sum =
+                |count: fn(&ClassCoverage) -> u64| rooms.iter().map(|room| count(room)).sum::<u64>() as f64;
+            let mean = |score: fn(&ClassCoverage) -> f64| {
+                let scores: Vec<f64> = rooms
+                    .iter()
+                    .filter(|room| room.truth > 0)
+                    .map(|room| score(room))
+                    .collect();
+                scores.iter().sum::<f64>() / scores.len() as f64
+            };
 
-        let right = sum(|room| room.right);
-        CoverageScores {
-            precision: right / sum(|room| room.predicted),
-            recall: right / sum(|room| room.truth),
-            coverage: mean(|room| room.covered / room.truth as f64),
-            weighted_coverage: mean(|room| room.covered_points / room.points as f64),
-        }
-    };
-    (0..classes).map(of_class).collect()
+            let right = sum(|room| room.right);
+            CoverageScores {
+                precision: right / sum(|room| room.predicted),
+                recall: right / sum(|room| room.truth),
+                coverage: mean(|room| room.covered / room.truth as f64),
+                weighted_coverage: mean(|room| room.covered_points / room.points as f64),
+            }
+        })
+        .collect()
 }
 
 impl CoverageScores {
@@ -106,22 +108,19 @@ impl CoverageScores {
 mod tests {
     use super::*;
 
+    fn predicted(points: u64, common: u64) -> PredictedInstance {
+        PredictedInstance { class: 0, score: 0.0, points, void: 0, overlaps: vec![(0, common)] }
+    }
+
     #[test]
     fn an_iou_at_the_threshold_is_right() {
         let truth = [TrueInstance { class: 0, points: 200 }, TrueInstance { class: 0, points: 50 }];
-        let of = |points, common| PredictedInstance {
-            class: 0,
-            score: 0.0,
-            points,
-            void: 0,
-            overlaps: vec![(0, common)],
-        };
-        let room = RoomCoverage::new(&truth, &[of(250, 150), of(30, 10)], 2);
+        let room = RoomCoverage::new(&truth, &[predicted(250, 150), predicted(30, 10)], 2);
         let scores = coverage(&[&room]);
         let expected = [0.5, 0.5, 0.25, 0.5 * 200.0 / 250.0];
         assert_eq!(scores[0].to_array(), expected);
         assert!(scores[1].to_array().iter().all(|score| score.is_nan()));
-        assert_eq!(coverage(&[&RoomCoverage::new(&truth, &[of(251, 150)], 1)])[0].precision, 0.0);
+        assert_eq!(coverage(&[&RoomCoverage::new(&truth, &[predicted(251, 150)], 1)])[0].precision, 0.0);
         assert!(coverage(&[]).is_empty());
     }
 }

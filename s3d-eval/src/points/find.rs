@@ -41,8 +41,7 @@ pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<
         }
     }
 
-    let key = |room: &Room| (room.tree.area, room.tree.name.clone());
-    let paths: Vec<Option<PathBuf>> = rooms.iter().map(|room| found.remove(&key(room))).collect();
+    let paths: Vec<Option<PathBuf>> = rooms.iter().map(|room| found.remove(&key_of(room))).collect();
     let missing: Vec<&Room> = rooms
         .iter()
         .zip(&paths)
@@ -77,6 +76,10 @@ pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<
         notes.push(format!("Beside the predictions lie {} others, left out: {names}.", others.len()));
     }
     Ok((paths.into_iter().flatten().collect(), notes))
+}
+
+fn key_of(room: &Room) -> (u32, String) {
+    (room.tree.area, room.tree.name.clone())
 }
 
 /// Returns the entries of the folder and of folders of areas, by name, without hidden ones.
@@ -137,9 +140,12 @@ pub(super) fn wrong(path: &Path, message: impl Into<String>) -> s3d_dataset::Err
 mod tests {
     use super::*;
 
+    fn room_named(path: &str) -> Option<(u32, String)> {
+        room_of(Path::new(path), &["npy", "npz"])
+    }
+
     #[test]
     fn rooms_are_found_by_the_names_of_trainers() {
-        let room = |path: &str| room_of(Path::new(path), &["npy", "npz"]);
         for path in [
             "result/Area_5-office_1_pred.npy",
             "Area_5_office_1.npz",
@@ -147,10 +153,10 @@ mod tests {
             "x/Area_5/office_1_pred.NPY",
             "Area_5/Area_5-office_1.npy",
         ] {
-            assert_eq!(room(path), Some((5, "office_1".to_owned())), "{path}");
+            assert_eq!(room_named(path), Some((5, "office_1".to_owned())), "{path}");
         }
         for path in ["office_1.npy", "Area_5/office_1.txt", "Area_5.pth", "Area_x-office_1.npy"] {
-            assert_eq!(room(path), None, "{path}");
+            assert_eq!(room_named(path), None, "{path}");
         }
         assert_eq!(listed(&(0..7).map(|i| i.to_string()).collect::<Vec<_>>()), "0, 1, 2, 3, 4 and 2 more");
     }

@@ -47,12 +47,16 @@ pub(super) fn scored(path: &Path, room: &Room, points: &Points, ctx: &Context) -
         (None, _) => file.of_ids(&named(path, &file.names, &[IDS, MASKS].concat())?, classes.len())?,
     };
 
-    let of = |((class, score), overlaps): ((i64, f64), Overlaps)| {
-        let points = overlaps.iter().map(|(_, common)| common).sum();
-        let class = usize::try_from(class).ok()?;
-        Some(PredictedInstance { class, score, points, void: 0, overlaps })
-    };
-    let predicted = classes.into_iter().zip(scores).zip(shared).filter_map(of).collect();
+    let predicted = classes
+        .into_iter()
+        .zip(scores)
+        .zip(shared)
+        .filter_map(|((class, score), overlaps)| {
+            let points = overlaps.iter().map(|(_, common)| common).sum();
+            let class = usize::try_from(class).ok()?;
+            Some(PredictedInstance { class, score, points, void: 0, overlaps })
+        })
+        .collect();
     Ok((truth, predicted))
 }
 
@@ -69,12 +73,12 @@ pub(super) fn segments(path: &Path, room: &Room, points: &Points, ctx: &Context)
     if maybe_named(path, &file.names, &SEMANTIC)?.is_none() {
         let classes = file.classes()?;
         let (truth, shared) = file.of_ids(&name, classes.len())?;
-        let of = |(class, overlaps): (i64, Overlaps)| {
+        let predicted = classes.into_iter().zip(shared).filter_map(|(class, overlaps)| {
             let points = overlaps.iter().map(|(_, common)| common).sum();
             let class = usize::try_from(class).ok().filter(|_| points > 0)?;
             Some(PredictedInstance { class, score: 0.0, points, void: 0, overlaps })
-        };
-        return Ok((truth, classes.into_iter().zip(shared).filter_map(of).collect()));
+        });
+        return Ok((truth, predicted.collect()));
     }
     file.of_ids_and_classes(&name)
 }

@@ -155,16 +155,18 @@ impl Segments {
 
     /// Returns the predicted instances.
     pub(super) fn finish(self) -> Vec<PredictedInstance> {
-        let segment = |(classes, overlaps): (BTreeMap<usize, u64>, _)| {
-            let most = classes.values().max().copied();
-            let class = classes
-                .iter()
-                .find(|(_, points)| Some(**points) == most)
-                .map_or(0, |(class, _)| *class);
-            let points = classes.values().sum();
-            PredictedInstance { class, score: 0.0, points, void: 0, overlaps: merged(overlaps) }
-        };
-        self.segments.into_iter().map(segment).collect()
+        self.segments
+            .into_iter()
+            .map(|(classes, overlaps)| {
+                let most = classes.values().max().copied();
+                let class = classes
+                    .iter()
+                    .find(|(_, points)| Some(**points) == most)
+                    .map_or(0, |(class, _)| *class);
+                let points = classes.values().sum();
+                PredictedInstance { class, score: 0.0, points, void: 0, overlaps: merged(overlaps) }
+            })
+            .collect()
     }
 }
 

@@ -104,15 +104,20 @@ pub fn instance_ap(rooms: &[&InstanceMatches]) -> InstanceAp {
         .map(|class| thresholds().map(|threshold| class_ap(rooms, class, threshold)))
         .collect();
 
-    let strict = |ap: &[f64; THRESHOLDS]| ap.iter().take(THRESHOLDS - 1).copied().collect::<Vec<f64>>();
-    let three = |ap: &[f64; THRESHOLDS]| [nan_mean(strict(ap)), ap[0], ap[THRESHOLDS - 1]];
-    let by_class: Vec<[f64; 3]> = at.iter().map(three).collect();
+    let by_class: Vec<[f64; 3]> = at
+        .iter()
+        .map(|ap| [nan_mean(all_but_last(ap)), ap[0], ap[THRESHOLDS - 1]])
+        .collect();
     let mean = [
-        nan_mean(at.iter().flat_map(strict)),
+        nan_mean(at.iter().flat_map(all_but_last)),
         nan_mean(by_class.iter().map(|ap| ap[1])),
         nan_mean(by_class.iter().map(|ap| ap[2])),
     ];
     InstanceAp { by_class, mean }
+}
+
+fn all_but_last(ap: &[f64; THRESHOLDS]) -> Vec<f64> {
+    ap.iter().take(THRESHOLDS - 1).copied().collect::<Vec<f64>>()
 }
 
 /// Returns the average precision of a class at a threshold of the IoU.
@@ -169,11 +174,10 @@ impl ClassMatches {
             }
         }
 
-        let is_wrong = |c: &&Candidate| c.best_iou <= threshold && c.ignored <= threshold;
         found.extend(
             self.predicted
                 .iter()
-                .filter(is_wrong)
+                .filter(|c| c.best_iou <= threshold && c.ignored <= threshold)
                 .map(|candidate| (candidate.score, false)),
         );
         missed

@@ -86,27 +86,30 @@ impl SemanticCounts {
 
     /// Returns the scores of these counts.
     pub fn scores(&self, absent: AbsentClass) -> SemanticScores {
-        let share = |part: u64, whole: u64| match absent {
-            AbsentClass::Zero => part as f64 / (whole as f64 + 1e-10),
-            AbsentClass::LeftOut => part as f64 / whole as f64,
-        };
         let both = || self.intersection.iter().copied();
         let sides = self.truth.iter().zip(&self.predicted);
         let iou: Vec<f64> = both()
             .zip(sides)
-            .map(|(both, (t, p))| share(both, t + p - both))
+            .map(|(both, (t, p))| share(both, t + p - both, absent))
             .collect();
         let accuracy: Vec<f64> = both()
             .zip(&self.truth)
-            .map(|(both, truth)| share(both, *truth))
+            .map(|(both, truth)| share(both, *truth, absent))
             .collect();
         SemanticScores {
             mean_iou: nan_mean(iou.iter().copied()),
             mean_accuracy: nan_mean(accuracy.iter().copied()),
-            overall_accuracy: share(both().sum(), self.truth.iter().sum()),
+            overall_accuracy: share(both().sum(), self.truth.iter().sum(), absent),
             iou,
             accuracy,
         }
+    }
+}
+
+fn share(part: u64, whole: u64, absent: AbsentClass) -> f64 {
+    match absent {
+        AbsentClass::Zero => part as f64 / (whole as f64 + 1e-10),
+        AbsentClass::LeftOut => part as f64 / whole as f64,
     }
 }
 

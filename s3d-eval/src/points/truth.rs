@@ -41,12 +41,10 @@ impl Room {
 
     /// Counts its points.
     pub(super) fn points(&self, task: &Task<'_>) -> s3d_dataset::Result<Points> {
-        let count = |instance| task.data.point_count(instance, task.ctx);
-        let instances = self
-            .tree
-            .instances
-            .iter()
-            .map(|instance| Ok(TrueInstance { class: instance.class.index(), points: count(instance)? }));
+        let instances = self.tree.instances.iter().map(|instance| {
+            let points = task.data.point_count(instance, task.ctx)?;
+            Ok(TrueInstance { class: instance.class.index(), points })
+        });
         Ok(Points(instances.collect::<s3d_dataset::Result<_>>()?))
     }
 }
@@ -87,13 +85,16 @@ pub(super) fn rows_expected(room: &Room, points: &Points) -> String {
 mod tests {
     use super::*;
 
+    fn instances(points: &[u64]) -> Vec<TrueInstance> {
+        points.iter().map(|&points| TrueInstance { class: 2, points }).collect()
+    }
+
     #[test]
     fn the_only_point_of_an_instance_may_count_twice() {
-        let of = |points: &[u64]| points.iter().map(|&points| TrueInstance { class: 2, points }).collect();
-        let points = Points(of(&[5, 1, 0, 1]));
-        assert_eq!(points.of_rows(7), Some(of(&[5, 1, 0, 1])));
-        assert_eq!(points.of_rows(9), Some(of(&[5, 2, 0, 2])));
+        let points = Points(instances(&[5, 1, 0, 1]));
+        assert_eq!(points.of_rows(7), Some(instances(&[5, 1, 0, 1])));
+        assert_eq!(points.of_rows(9), Some(instances(&[5, 2, 0, 2])));
         assert_eq!(points.of_rows(8), None);
-        assert_eq!(Points(of(&[5])).of_rows(6), None);
+        assert_eq!(Points(instances(&[5])).of_rows(6), None);
     }
 }

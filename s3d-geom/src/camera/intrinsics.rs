@@ -215,17 +215,20 @@ mod tests {
         assert!((off.fov_rad() - PI / 4.0).abs() < 1e-12);
     }
 
+    fn refused(f: DVec2, c: DVec2, w: u32, h: u32) -> CameraError {
+        Camera::pinhole(pose(), f, c, w, h).unwrap_err()
+    }
+
     #[test]
     fn what_is_no_camera_is_refused() {
-        let camera = |f, c, w, h| Camera::pinhole(pose(), f, c, w, h).unwrap_err();
         let f = dvec2(100.0, 100.0);
         let c = dvec2(5.0, 5.0);
-        assert_eq!(camera(f, c, 0, 3), CameraError::NoPixels { width: 0, height: 3 });
+        assert_eq!(refused(f, c, 0, 3), CameraError::NoPixels { width: 0, height: 3 });
         for focal in [dvec2(0.0, 1.0), dvec2(1.0, -1.0), dvec2(1.0, f64::INFINITY), dvec2(1e-320, 1.0)] {
-            assert_eq!(camera(focal, c, 9, 9), CameraError::FocalLength(focal));
+            assert_eq!(refused(focal, c, 9, 9), CameraError::FocalLength(focal));
         }
         let far = dvec2(f64::INFINITY, 0.0);
-        assert_eq!(camera(f, far, 9, 9), CameraError::PrincipalPoint(far));
+        assert_eq!(refused(f, far, 9, 9), CameraError::PrincipalPoint(far));
         let nowhere = Pose { location: DVec3::NAN, ..pose() };
         assert_eq!(Camera::pinhole(nowhere, f, c, 9, 9), Err(CameraError::NotFinite));
         let skewed = [[100.0, 0.1, 5.0], [0.0, 100.0, 5.0], [0.0, 0.0, 1.0]];

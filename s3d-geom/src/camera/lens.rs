@@ -159,8 +159,10 @@ impl Lens {
 
     /// Returns the tangent of the largest angle off the axis that the picture shows.
     pub fn reach(&self) -> f64 {
-        let radius = |pixel| self.direction(pixel).map_or(self.last_r2, |d| d.x * d.x + d.y * d.y);
-        self.border(16).map(radius).fold(0.0, f64::max).sqrt()
+        self.border(16)
+            .map(|pixel| self.direction(pixel).map_or(self.last_r2, |d| d.x * d.x + d.y * d.y))
+            .fold(0.0, f64::max)
+            .sqrt()
     }
 
     /// Returns places along the border of the picture, `steps` per side.

@@ -18,13 +18,13 @@ pub fn rotation_from_euler(angles_rad: DVec3) -> DMat3 {
 /// Returns the three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in
 /// [−π/2, π/2]. If the two outer axes coincide (y = ±π/2), z is 0.
 pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
-    let m = |row: usize, col: usize| rotation.col(col)[row];
-    let cos_y = libm::hypot(m(0, 0), m(1, 0));
-    let y = libm::atan2(-m(2, 0), cos_y);
+    let DMat3 { x_axis, y_axis, z_axis } = rotation;
+    let cos_y = libm::hypot(x_axis.x, x_axis.y);
+    let y = libm::atan2(-x_axis.z, cos_y);
     if cos_y > 1e-9 {
-        dvec3(libm::atan2(m(2, 1), m(2, 2)), y, libm::atan2(m(1, 0), m(0, 0)))
+        dvec3(libm::atan2(y_axis.z, z_axis.z), y, libm::atan2(x_axis.y, x_axis.x))
     } else {
-        dvec3(libm::atan2(-m(1, 2), m(1, 1)), y, 0.0)
+        dvec3(libm::atan2(-z_axis.y, y_axis.y), y, 0.0)
     }
 }
 
@@ -67,8 +67,8 @@ impl Pose {
         Self::from_scanner(location, DQuat::from_rotation_z(yaw_rad))
     }
 
-    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix world → camera, 3 ×
-    /// 4, row by row. [`Pose::rt_matrix`] returns the same matrix.
+    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix world → camera,
+    /// 3 × 4, row by row. [`Pose::rt_matrix`] returns the same matrix.
     ///
     /// # Errors
     /// The errors of [`Pose::from_opengl`].
@@ -85,8 +85,8 @@ impl Pose {
         }
     }
 
-    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix camera → world, 4 ×
-    /// 4, row by row.
+    /// Returns the pose of an OpenCV camera (x right, y down, z forward) from its matrix camera → world,
+    /// 4 × 4, row by row.
     ///
     /// # Errors
     /// The errors of [`Pose::from_opengl`].
@@ -95,8 +95,8 @@ impl Pose {
         Self::from_axes(location, right, -down, -forward)
     }
 
-    /// Returns the pose of an OpenGL camera (x right, y up, z backwards) from its matrix camera → world, 4 ×
-    /// 4, row by row. Blender and nerfstudio have the same axes.
+    /// Returns the pose of an OpenGL camera (x right, y up, z backwards) from its matrix camera → world,
+    /// 4 × 4, row by row. Blender and nerfstudio have the same axes.
     ///
     /// Axes from rounded files, which are off by less than a thousandth, are made perpendicular. The viewing
     /// direction is kept.
@@ -186,8 +186,8 @@ impl Pose {
     /// `view` has a roll, it is ignored.
     pub fn yaw_pitch_to(&self, view: &Pose) -> (f64, f64) {
         let turn = self.world_from_camera.transpose() * view.world_from_camera;
-        // The first column of Ry(yaw)·Rx(pitch) is (cos y, 0, −sin y), and the middle row is (0, cos p, −sin
-        // p).
+        // The first column of Ry(yaw)·Rx(pitch) is (cos y, 0, −sin y).
+        // The middle row is (0, cos p, −sin p).
         (libm::atan2(-turn.x_axis.z, turn.x_axis.x), libm::atan2(-turn.z_axis.y, turn.y_axis.y))
     }
 
@@ -286,6 +286,11 @@ mod tests {
         [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
     }
 
+    fn are_close(other: Pose, tolerance: f64, pose: &Pose) -> bool {
+        other.location.abs_diff_eq(pose.location, tolerance)
+            && other.world_from_camera.abs_diff_eq(pose.world_from_camera, tolerance)
+    }
+
     proptest! {
         #[test]
         fn matrices_come_back(
@@ -294,22 +299,18 @@ mod tests {
         ) {
             let Some(q) = glam::DVec4::from_array(q).try_normalize() else { return Ok(()) };
             let pose = Pose::from_scanner(DVec3::from_array(at), DQuat::from_vec4(q));
-            let close_to = |other: Pose, tolerance| {
-                other.location.abs_diff_eq(pose.location, tolerance)
-                    && other.world_from_camera.abs_diff_eq(pose.world_from_camera, tolerance)
-            };
 
             let opengl = rows(&pose, [1.0, 1.0, 1.0]);
-            prop_assert!(close_to(Pose::from_opengl(opengl).unwrap(), 1e-12));
-            prop_assert!(close_to(Pose::from_opencv(rows(&pose, [1.0, -1.0, -1.0])).unwrap(), 1e-12));
-            prop_assert!(close_to(Pose::from_rt(pose.rt_matrix()).unwrap(), 1e-12));
+            prop_assert!(are_close(Pose::from_opengl(opengl).unwrap(), 1e-12, &pose));
+            prop_assert!(are_close(Pose::from_opencv(rows(&pose, [1.0, -1.0, -1.0])).unwrap(), 1e-12, &pose));
+            prop_assert!(are_close(Pose::from_rt(pose.rt_matrix()).unwrap(), 1e-12, &pose));
             // The axes of one convention are a rotation in the other too, so only a picture shows a mix-up.
-            prop_assert!(!close_to(Pose::from_opencv(opengl).unwrap(), 0.1));
+            prop_assert!(!are_close(Pose::from_opencv(opengl).unwrap(), 0.1, &pose));
 
             let mut rounded = opengl;
             (0..9).for_each(|k| rounded[k / 3][k % 3] += off[k]);
             let back = Pose::from_opengl(rounded).unwrap();
-            prop_assert!(close_to(back, 1e-3));
+            prop_assert!(are_close(back, 1e-3, &pose));
             let m = back.world_from_camera;
             prop_assert!(close(m * m.transpose(), DMat3::IDENTITY) && m.determinant() > 0.0);
         }
@@ -327,33 +328,44 @@ mod tests {
         }
     }
 
+    fn look_from_one(target: DVec3, up: DVec3) -> CameraError {
+        Pose::look_at(DVec3::ONE, target, up).unwrap_err()
+    }
+
+    fn scale(rows: &mut [[f64; 4]; 4], by: [f64; 3]) {
+        rows[..3]
+            .iter_mut()
+            .for_each(|row| (0..3).for_each(|k| row[k] *= by[k]));
+    }
+
+    fn transpose(rows: &mut [[f64; 4]; 4]) {
+        *rows = std::array::from_fn(|i| std::array::from_fn(|j| rows[j][i]));
+    }
+
+    /// Changes a good matrix, and returns why it is refused.
+    fn refused_with(change: fn(&mut [[f64; 4]; 4]), good: [[f64; 4]; 4]) -> CameraError {
+        let mut rows = good;
+        change(&mut rows);
+        Pose::from_opengl(rows).unwrap_err()
+    }
+
     #[test]
     fn what_is_no_rotation_is_refused_by_its_fault() {
         let pose = Pose::level(dvec3(1.0, 2.0, 3.0), 0.4).turned(0.2, 0.3);
         let good = rows(&pose, [1.0; 3]);
-        let with = |change: fn(&mut [[f64; 4]; 4])| {
-            let mut rows = good;
-            change(&mut rows);
-            Pose::from_opengl(rows).unwrap_err()
-        };
-        let transposed = |rows: &mut [[f64; 4]; 4]| {
-            *rows = std::array::from_fn(|i| std::array::from_fn(|j| rows[j][i]));
-        };
-        assert_eq!(with(transposed), CameraError::Transposed);
-        assert_eq!(with(|rows| rows[3][3] = 2.0), CameraError::LastRow);
-        assert_eq!(with(|rows| rows[1][3] = f64::NEG_INFINITY), CameraError::NotFinite);
-        assert_eq!(with(|rows| rows[1][1] += 0.1), CameraError::Sheared);
-        assert_eq!(with(|rows| *rows = [[0.0; 4], [0.0; 4], [0.0; 4], rows[3]]), CameraError::Sheared);
+        assert_eq!(refused_with(transpose, good), CameraError::Transposed);
+        assert_eq!(refused_with(|rows| rows[3][3] = 2.0, good), CameraError::LastRow);
+        assert_eq!(refused_with(|rows| rows[1][3] = f64::NEG_INFINITY, good), CameraError::NotFinite);
+        assert_eq!(refused_with(|rows| rows[1][1] += 0.1, good), CameraError::Sheared);
+        assert_eq!(
+            refused_with(|rows| *rows = [[0.0; 4], [0.0; 4], [0.0; 4], rows[3]], good),
+            CameraError::Sheared
+        );
 
-        let times = |rows: &mut [[f64; 4]; 4], by: [f64; 3]| {
-            rows[..3]
-                .iter_mut()
-                .for_each(|row| (0..3).for_each(|k| row[k] *= by[k]));
-        };
         let mut rows = good;
-        times(&mut rows, [1.0, 1.0, -1.0]);
+        scale(&mut rows, [1.0, 1.0, -1.0]);
         assert_eq!(Pose::from_opengl(rows), Err(CameraError::Mirrored));
-        times(&mut rows, [2.0, 2.0, -2.0]);
+        scale(&mut rows, [2.0, 2.0, -2.0]);
         assert!(matches!(Pose::from_opengl(rows), Err(CameraError::Scaled(s)) if (s - 2.0).abs() < 1e-9));
 
         let mut rt = pose.rt_matrix();
@@ -363,11 +375,10 @@ mod tests {
         rt[1] = rt[1].map(|v| -v);
         assert_eq!(Pose::from_rt(rt), Err(CameraError::NotFinite));
 
-        let look = |target, up| Pose::look_at(DVec3::ONE, target, up).unwrap_err();
-        assert_eq!(look(DVec3::ONE, DVec3::Z), CameraError::TargetAtEye);
-        assert_eq!(look(DVec3::ZERO, DVec3::ONE), CameraError::UpAlongView);
-        assert_eq!(look(DVec3::ZERO, DVec3::ZERO), CameraError::UpAlongView);
-        assert_eq!(look(DVec3::ZERO, DVec3::NAN), CameraError::NotFinite);
+        assert_eq!(look_from_one(DVec3::ONE, DVec3::Z), CameraError::TargetAtEye);
+        assert_eq!(look_from_one(DVec3::ZERO, DVec3::ONE), CameraError::UpAlongView);
+        assert_eq!(look_from_one(DVec3::ZERO, DVec3::ZERO), CameraError::UpAlongView);
+        assert_eq!(look_from_one(DVec3::ZERO, DVec3::NAN), CameraError::NotFinite);
     }
 
     #[test]

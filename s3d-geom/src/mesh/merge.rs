@@ -129,16 +129,17 @@ mod tests {
     use crate::primitives::{cuboid, quad};
     use glam::Vec3;
 
+    fn quad_with_sliver(x: f32) -> TriMesh {
+        let mut parts = quad([Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y].map(|p| p + Vec3::X * x));
+        parts.faces.push([0, 0, 1]);
+        parts.face_uvs.push([NO_INDEX; 3]);
+        TriMesh::new(parts).unwrap()
+    }
+
     #[test]
     fn joined_meshes_keep_what_was_mended() {
-        let with_sliver = |x: f32| {
-            let mut parts = quad([Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y].map(|p| p + Vec3::X * x));
-            parts.faces.push([0, 0, 1]);
-            parts.face_uvs.push([NO_INDEX; 3]);
-            TriMesh::new(parts).unwrap()
-        };
-        let a = with_sliver(0.0);
-        let b = with_sliver(5.0);
+        let a = quad_with_sliver(0.0);
+        let b = quad_with_sliver(5.0);
         let all = a.clone().join(b.clone());
         assert_eq!((all.faces().len(), all.report().zero_area_faces), (4, 2));
         assert_eq!([all.triangle(1), all.triangle(2)], [a.triangle(1), b.triangle(0)]);

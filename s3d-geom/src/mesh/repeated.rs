@@ -48,12 +48,13 @@ fn corners(mesh: &TriMesh, face: u32) -> [[u32; 3]; 3] {
 }
 
 fn hash(corners: [[u32; 3]; 3]) -> u64 {
-    let mix = |hash: u64, part: &u32| {
-        (hash ^ u64::from(*part))
-            .wrapping_mul(0x9e37_79b9_7f4a_7c15)
-            .rotate_left(29)
-    };
     corners.as_flattened().iter().fold(0, mix)
+}
+
+fn mix(hash: u64, part: &u32) -> u64 {
+    (hash ^ u64::from(*part))
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        .rotate_left(29)
 }
 
 #[cfg(test)]

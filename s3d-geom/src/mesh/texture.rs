@@ -192,6 +192,10 @@ mod tests {
         }
     }
 
+    fn columns(wrap: Wrap) -> [u32; 7] {
+        [-7, -1, 0, 2, 3, 5, 6].map(|i| wrap.index(i, 3))
+    }
+
     #[test]
     fn neighbours_are_those_of_the_endless_texture() {
         let far = 1i64 << 40;
@@ -206,7 +210,6 @@ mod tests {
                 }
             }
         }
-        let columns = |wrap: Wrap| [-7, -1, 0, 2, 3, 5, 6].map(|i| wrap.index(i, 3));
         assert_eq!(columns(Wrap::Repeat), [2, 2, 0, 2, 0, 2, 0]);
         assert_eq!(columns(Wrap::Mirror), [0, 0, 0, 2, 2, 0, 0]);
         assert_eq!(columns(Wrap::Clamp), [0, 0, 0, 2, 2, 2, 2]);

@@ -15,7 +15,7 @@ mod surroundings;
 mod triangle;
 mod triangle8;
 
-use crate::wide::{self, Work};
+use crate::wide::{self, Kernel};
 use crate::{Aabb, NO_INDEX, TriMesh};
 use curve::{MOST_POINTS, along_a_curve};
 use face_tree::{FaceTree, Search, Starts};
@@ -143,7 +143,7 @@ struct Lookup<'a> {
     out: &'a mut [Nearest],
 }
 
-impl Work for Lookup<'_> {
+impl Kernel for Lookup<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -251,8 +251,11 @@ mod tests {
         prop::collection::vec([point(2.0), point(2.0), point(2.0)], 1..n).prop_filter_map(
             "no area",
             move |t| {
-                let snap = |p: Vec3| lattice.map_or(p, |step| (p / step).round() * step);
-                let positions: Vec<Vec3> = t.into_iter().flatten().map(snap).collect();
+                let positions: Vec<Vec3> = t
+                    .into_iter()
+                    .flatten()
+                    .map(|p| lattice.map_or(p, |step| (p / step).round() * step))
+                    .collect();
                 let faces = (0..positions.len() as u32 / 3)
                     .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
                     .collect();
@@ -319,11 +322,14 @@ mod tests {
         }
     }
 
+    fn fraction_from(i: u32, k: u32) -> f32 {
+        ((i * k) % 101) as f32 / 50.0 - 1.0
+    }
+
     /// Returns points around `from`, up to `spread` away on each axis.
     fn points_at(from: Vec3, spread: f32, n: u32) -> Vec<Vec3> {
-        let off = |i: u32, k: u32| ((i * k) % 101) as f32 / 50.0 - 1.0;
         (0..n)
-            .map(|i| from + spread * vec3(off(i, 7), off(i, 31), off(i, 57)))
+            .map(|i| from + spread * vec3(fraction_from(i, 7), fraction_from(i, 31), fraction_from(i, 57)))
             .collect()
     }
 
@@ -359,22 +365,23 @@ mod tests {
         check(&mesh, &points_at(mesh.aabb().center(), 30.0, 40));
     }
 
+    fn boxes_measured(distance: f32, tree: &FaceTree) -> usize {
+        let mut search = Search::new(tree);
+        let points = points_at(Vec3::ZERO, 6.0, 200);
+        for (i, p) in points.into_iter().enumerate() {
+            let to = [Vec3::X, Vec3::Y, Vec3::Z, vec3(0.1, 0.99, 0.0), Vec3::ONE][i % 5].normalize();
+            search.nearest_far(tree.surroundings.looked_up_from(p + to * distance), 0);
+        }
+        search.measured
+    }
+
     #[test]
     fn a_lookup_costs_the_same_at_any_distance() {
         let mesh = grid(120, 0.1, |x, y| 0.3 * libm::sinf(9.0 * x) * libm::cosf(7.0 * y));
         let tree = FaceTree::new(&mesh);
-        let measured = |distance: f32| {
-            let mut search = Search::new(&tree);
-            let points = points_at(Vec3::ZERO, 6.0, 200);
-            for (i, p) in points.into_iter().enumerate() {
-                let to = [Vec3::X, Vec3::Y, Vec3::Z, vec3(0.1, 0.99, 0.0), Vec3::ONE][i % 5].normalize();
-                search.nearest_far(tree.surroundings.looked_up_from(p + to * distance), 0);
-            }
-            search.measured
-        };
-        let near = measured(300.0);
+        let near = boxes_measured(300.0, &tree);
         for distance in [1e4, 1e5, 5.4e6, 1e9, 1e20, 1e38] {
-            let far = measured(distance);
+            let far = boxes_measured(distance, &tree);
             assert!(far < 2 * near + 200, "{far} triangles at {distance} m, {near} at 300 m");
         }
     }
@@ -478,6 +485,13 @@ mod tests {
         assert_eq!(many[2], nearest_brute_force(&m, points[2]));
     }
 
+    fn on_threads(threads: usize, faces: &NearestFaces<'_>, points: &[Vec3]) -> Vec<Nearest> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut out = Vec::new();
+        pool.install(|| faces.nearest_many(points, &mut out));
+        out
+    }
+
     #[test]
     fn the_number_of_threads_changes_nothing() {
         let m = grid(30, 0.1, |x, y| x * y);
@@ -485,13 +499,7 @@ mod tests {
         let points: Vec<Vec3> = (0..5000)
             .map(|i| vec3((i % 71) as f32, (i % 97) as f32, 2.0) * 0.04)
             .collect();
-        let with = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let mut out = Vec::new();
-            pool.install(|| faces.nearest_many(&points, &mut out));
-            out
-        };
-        assert_eq!(with(1), with(2));
+        assert_eq!(on_threads(1, &faces, &points), on_threads(2, &faces, &points));
     }
 
     /// Returns points on the faces of a mesh, moved off by up to twice `off` metres. Every 37th is far off,

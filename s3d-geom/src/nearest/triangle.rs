@@ -190,6 +190,10 @@ mod tests {
         (-4.0..4.0f32, -4.0..4.0f32, -4.0..4.0f32).prop_map(|(x, y, z)| vec3(x, y, z))
     }
 
+    fn away_from(p: DVec3, ad: DVec3, bd: DVec3) -> DVec3 {
+        (p - ad).reject_from(bd - ad).normalize()
+    }
+
     proptest! {
         #[test]
         fn nothing_on_the_triangle_is_nearer(corners in [corner(), corner(), corner()], point in corner()) {
@@ -220,12 +224,12 @@ mod tests {
             // The point is opposite to the inner bisector of the two triangles, so the edge or one of its
             // ends is nearest in both.
             let [ad, bd, cd, dd] = [a, b, c, d].map(|p| p.as_dvec3());
-            let away = |p: DVec3| (p - ad).reject_from(bd - ad).normalize();
-            prop_assume!(away(cd).is_finite() && away(dd).is_finite());
-            let point = (ad + (bd - ad) * t - (away(cd) + away(dd))).as_vec3().as_dvec3();
+            prop_assume!(away_from(cd, ad, bd).is_finite() && away_from(dd, ad, bd).is_finite());
+            let away = away_from(cd, ad, bd) + away_from(dd, ad, bd);
+            let point = (ad + (bd - ad) * t - away).as_vec3().as_dvec3();
             let on = SortedTriangle::new([a, b, c]).closest(point);
             let edge = SortedTriangle::new([b, a, d]).closest(point);
-            prop_assume!(away(cd).dot(away(dd)) > -0.99);
+            prop_assume!(away_from(cd, ad, bd).dot(away_from(dd, ad, bd)) > -0.99);
             prop_assert_eq!(on, edge);
         }
     }

@@ -224,10 +224,13 @@ mod tests {
         }
     }
 
+    fn triangle_at(x: f32) -> SortedTriangle {
+        SortedTriangle::new([vec3(x, 0.0, 0.0), vec3(x, 1.0, 0.0), vec3(x, 0.0, 1.0)])
+    }
+
     #[test]
     fn lanes_hold_their_own_triangles() {
-        let at = |x: f32| SortedTriangle::new([vec3(x, 0.0, 0.0), vec3(x, 1.0, 0.0), vec3(x, 0.0, 1.0)]);
-        let three = Triangles8::new(&[(7, at(1.0)), (5, at(2.0)), (9, at(4.0))]);
+        let three = Triangles8::new(&[(7, triangle_at(1.0)), (5, triangle_at(2.0)), (9, triangle_at(4.0))]);
         assert_eq!((three.lanes(), three.face(0), three.face(1), three.face(2)), (0b111, 7, 5, 9));
         let bounds = three.bounds([0.0, 0.2, 0.2]);
         for (lane, square) in [(0, 1.0), (1, 4.0), (2, 16.0)] {

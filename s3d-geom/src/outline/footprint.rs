@@ -4,7 +4,8 @@
 //! the plane", 1983): the triangles of a Delaunay triangulation whose circumscribed circle is small. It
 //! follows corners and pillars but closes the gaps under furniture.
 
-use super::polygon::{Polygon, edges, signed_area};
+use super::polygon::Polygon;
+use super::triangulation::{edges, signed_area};
 use glam::{DVec2, Vec2, Vec3, dvec2};
 use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -287,17 +288,16 @@ fn simple_rings(walk: Vec<DVec2>) -> Vec<Vec<DVec2>> {
     let mut rings = Vec::new();
     let mut open: Vec<DVec2> = Vec::with_capacity(walk.len());
     let mut place_of: HashMap<[u64; 2], usize> = HashMap::with_capacity(walk.len());
-    let key = |p: DVec2| [p.x.to_bits(), p.y.to_bits()];
 
     for p in walk {
-        if let Some(&place) = place_of.get(&key(p)) {
+        if let Some(&place) = place_of.get(&bits(p)) {
             let ring = open.split_off(place);
             for &q in &ring {
-                place_of.remove(&key(q));
+                place_of.remove(&bits(q));
             }
             rings.push(ring);
         }
-        place_of.insert(key(p), open.len());
+        place_of.insert(bits(p), open.len());
         open.push(p);
     }
     rings.push(open);
@@ -307,6 +307,10 @@ fn simple_rings(walk: Vec<DVec2>) -> Vec<Vec<DVec2>> {
         ring.rotate_left(smallest);
     }
     rings
+}
+
+fn bits(p: DVec2) -> [u64; 2] {
+    [p.x.to_bits(), p.y.to_bits()]
 }
 
 fn by_place(a: DVec2, b: DVec2) -> std::cmp::Ordering {
@@ -451,16 +455,20 @@ mod tests {
         assert!((footprint(&tiny).area_m2 - 0.02).abs() < 1e-6);
     }
 
+    fn places(points: &[[f64; 2]]) -> Vec<DVec2> {
+        points.iter().map(|&[x, y]| dvec2(x, y)).collect::<Vec<_>>()
+    }
+
     #[test]
     fn rings_that_touch_are_parted() {
-        let at = |points: &[[f64; 2]]| points.iter().map(|&[x, y]| dvec2(x, y)).collect::<Vec<_>>();
         // One walk around a square and around a hole that touches its corner (1, 1).
-        let walk = at(&[[1.0, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.6, 0.2], [0.2, 0.6]]);
+        let walk =
+            places(&[[1.0, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.6, 0.2], [0.2, 0.6]]);
         assert_eq!(
             simple_rings(walk),
             [
-                at(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
-                at(&[[0.2, 0.6], [1.0, 1.0], [0.6, 0.2]]),
+                places(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
+                places(&[[0.2, 0.6], [1.0, 1.0], [0.6, 0.2]]),
             ]
         );
     }

@@ -2,8 +2,10 @@
 
 mod footprint;
 mod polygon;
+mod triangulation;
 mod wall_direction;
 
 pub use footprint::{Footprint, FootprintBuilder, FootprintOptions};
-pub use polygon::{Polygon, PolygonError, triangulate_face};
+pub use polygon::Polygon;
+pub use triangulation::{PolygonError, triangulate_face};
 pub use wall_direction::dominant_wall_direction_deg;

@@ -4,7 +4,7 @@
 
 mod patch;
 
-use crate::wide::{self, Work};
+use crate::wide::{self, Kernel};
 use crate::{PointCloud, TriMesh};
 use glam::Vec3;
 use patch::{Patch, PointColor};
@@ -183,7 +183,7 @@ struct Draw<'a> {
     faces: &'a mut [u32],
 }
 
-impl Work for Draw<'_> {
+impl Kernel for Draw<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -385,18 +385,21 @@ mod tests {
         assert_ne!(of(4).positions, of(5).positions);
     }
 
+    fn points_of(density: Density, mesh: &TriMesh) -> u64 {
+        SurfaceSampler::new(mesh, density, 0).len()
+    }
+
     #[test]
     fn number_of_points() {
         let mesh = fan(9);
-        let len = |density| SurfaceSampler::new(&mesh, density, 0).len();
         let area = mesh.total_area();
-        assert_eq!(len(Density::Total(0)), 0);
-        assert_eq!(len(Density::Total(123)), 123);
-        assert_eq!(len(Density::PerM2(0.0)), 0);
-        assert_eq!(len(Density::PerM2(7.4 / area)), 7);
-        assert_eq!(len(Density::PerM2(7.6 / area)), 8);
-        assert_eq!(len(Density::PerM2(0.4 / area)), 0);
-        assert_eq!(len(Density::PerM2(1e300)), MAX_POINTS);
+        assert_eq!(points_of(Density::Total(0), &mesh), 0);
+        assert_eq!(points_of(Density::Total(123), &mesh), 123);
+        assert_eq!(points_of(Density::PerM2(0.0), &mesh), 0);
+        assert_eq!(points_of(Density::PerM2(7.4 / area), &mesh), 7);
+        assert_eq!(points_of(Density::PerM2(7.6 / area), &mesh), 8);
+        assert_eq!(points_of(Density::PerM2(0.4 / area), &mesh), 0);
+        assert_eq!(points_of(Density::PerM2(1e300), &mesh), MAX_POINTS);
         assert!(draw(&SurfaceSampler::new(&mesh, Density::Total(0), 0)).is_empty());
     }
 

@@ -144,12 +144,15 @@ mod tests {
         );
     }
 
+    fn refused(p: Vec<PosedCamera>) -> String {
+        locations_of(Path::new("p"), p).unwrap_err().to_string()
+    }
+
     #[test]
     fn places_that_cannot_be_are_refused() {
         let hex = "8eb9955b866b4b5f74abb1071416c628";
-        let message = |p: Vec<PosedCamera>| locations_of(Path::new("p"), p).unwrap_err().to_string();
-        assert!(message(vec![picture(hex, 0.0, 0.0), picture(hex, 1.0, 0.0)]).contains("1.000 m away"));
-        assert!(message(vec![picture("a", f64::NAN, 0.0)]).contains("from the origin"));
-        assert!(message(vec![]).contains("no picture"));
+        assert!(refused(vec![picture(hex, 0.0, 0.0), picture(hex, 1.0, 0.0)]).contains("1.000 m away"));
+        assert!(refused(vec![picture("a", f64::NAN, 0.0)]).contains("from the origin"));
+        assert!(refused(vec![]).contains("no picture"));
     }
 }

@@ -122,6 +122,12 @@ mod tests {
 
     const IMAGES: &str = "1 1 0 0 0 0 0 0 1 a.jpg\n\n";
 
+    fn pose_file(uuid: &str) -> Vec<u8> {
+        let pose = Pose::level(dvec3(1.0, -2.0, 1.5), 0.3);
+        let camera = s3d_geom::Camera::equirectangular(pose, 64);
+        PoseFile::new(&camera, &pose, uuid, "office_5_3", Frame::Panorama).to_json()
+    }
+
     #[test]
     fn the_form_is_found_by_name() {
         let dir = tempfile::tempdir().unwrap();
@@ -144,15 +150,10 @@ mod tests {
         }
         assert_eq!(read("cameras.csv").unwrap()[0].pose.location, dvec3(1.0, 2.0, 3.0));
 
-        let pose = |uuid: &str| {
-            let pose = Pose::level(dvec3(1.0, -2.0, 1.5), 0.3);
-            let camera = s3d_geom::Camera::equirectangular(pose, 64);
-            PoseFile::new(&camera, &pose, uuid, "office_5_3", Frame::Panorama).to_json()
-        };
         fs::create_dir(at("poses")).unwrap();
         let uuids = ["8eb9955b866b4b5f74abb1071416c628", "508160ba5d80a2e365609578a09bab8b"];
         for uuid in uuids {
-            fs::write(at(&format!("poses/{uuid}.json")), pose(uuid)).unwrap();
+            fs::write(at(&format!("poses/{uuid}.json")), pose_file(uuid)).unwrap();
         }
         let poses = read("poses").unwrap();
         assert_eq!((poses.len(), poses[0].uuid.as_str()), (2, uuids[1]));

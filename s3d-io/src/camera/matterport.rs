@@ -524,15 +524,18 @@ mod tests {
         fails("_i0_5.png");
     }
 
+    fn refused(f: &Folder) -> String {
+        read_matterport_locations(f.0.path()).unwrap_err().to_string()
+    }
+
     #[test]
     fn locations_stand_at_the_level_cameras_mean() {
         let folder = Folder::new();
 
-        let message = |f: &Folder| read_matterport_locations(f.0.path()).unwrap_err().to_string();
-        assert!(message(&folder).contains("has no captures"));
+        assert!(refused(&folder).contains("has no captures"));
         let other = "ffffffffffffffffffffffffffffffff";
         folder.text(&format!("{other}_pose_1_1.txt"), ALONG_X);
-        assert!(message(&folder).contains(&format!("{other}_pose_1_0.txt")));
+        assert!(refused(&folder).contains(&format!("{other}_pose_1_0.txt")));
         folder.text(&format!("{other}_pose_1_0.txt"), "1 0 0 7\n0 0 1 8\n0 -1 0 9\n0 0 0 1");
         folder.text(&format!("{UUID}_pose_1_0.txt"), ALONG_X);
         for (yaw, x) in [(1, 4.6), (2, 4.7)] {

@@ -6,7 +6,7 @@
 //!
 //! | path | what it is |
 //! |---|---|
-//! | `.csv` | a table `uuid,x,y,z,qx,qy,qz,qw`, or with a target or a heading: [`read_cameras`], [`parse_cameras`] |
+//! | `.csv` | a table `uuid,x,y,z,qx,qy,qz,qw`, or a target or heading: [`read_cameras`], [`parse_cameras`] |
 //! | `images.txt`, `images.bin` | a COLMAP model |
 //! | `transforms.json` | frames of nerfstudio, Polycam, Record3D, instant-ngp |
 //! | a folder of `*.json` | pose files of a published area |
@@ -36,7 +36,6 @@
 //! ```
 
 mod colmap;
-mod colmap_cameras;
 mod located;
 mod locations;
 mod matterport;

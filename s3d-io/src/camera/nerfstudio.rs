@@ -283,9 +283,8 @@ mod tests {
     }
 
     fn document(matrix: &str) -> String {
-        format!(
-            r#"{{"fl_x": 500, "camera_model": "OPENCV", "frames": [{{"file_path": "images/a.png", "transform_matrix": {matrix}}}]}}"#
-        )
+        let frame = format!(r#"{{"file_path": "images/a.png", "transform_matrix": {matrix}}}"#);
+        format!(r#"{{"fl_x": 500, "camera_model": "OPENCV", "frames": [{frame}]}}"#)
     }
 
     #[test]
@@ -334,17 +333,19 @@ mod tests {
     const FRAME: &str =
         r#""file_path": "images/a.png", "transform_matrix": [[1,0,0,4],[0,0,-1,5],[0,1,0,6],[0,0,0,1]]"#;
 
+    fn pinhole(focal: [f64; 2], distortion: Distortion) -> Option<Optics> {
+        Some(Optics::Pinhole { focal_px: focal.into(), center_px: Some(dvec2(320.0, 241.0)), distortion })
+    }
+
     #[test]
     fn intrinsics_are_shared_or_the_frames_own() {
         let text = format!(
-            r#"{{"camera_model": "OPENCV", "w": 640.0, "h": 480, "fl_x": 500, "fl_y": 510, "cx": 320, "cy": 241, "k1": 0.1, "p2": 0.2,
+            r#"{{"camera_model": "OPENCV", "w": 640.0, "h": 480,
+            "fl_x": 500, "fl_y": 510, "cx": 320, "cy": 241, "k1": 0.1, "p2": 0.2,
             "frames": [{{{FRAME}}}, {{{FRAME}, "fl_x": 400, "w": 320, "k1": 0, "p2": 0}},
             {{{FRAME}, "camera_model": "OPENCV_FISHEYE", "k4": 0.4}}]}}"#
         );
         let cameras = posed(&text).unwrap();
-        let pinhole = |focal: [f64; 2], distortion| {
-            Some(Optics::Pinhole { focal_px: focal.into(), center_px: Some(dvec2(320.0, 241.0)), distortion })
-        };
         assert_eq!(cameras[0].optics, pinhole([500.0, 510.0], Distortion::OpenCv([0.1, 0.0, 0.0, 0.2, 0.0])));
         assert_eq!(cameras[1].optics, pinhole([400.0, 510.0], Distortion::None));
         assert_eq!(cameras[2].optics, pinhole([500.0, 510.0], Distortion::Fisheye([0.1, 0.0, 0.0, 0.4])));

@@ -323,18 +323,21 @@ mod tests {
         assert!(posed(Some([0, 8]), Some(PHONE)).camera(&none).is_err());
     }
 
+    fn phone_lens(found: [u32; 2]) -> Result<PhotoLens, IntrinsicsError> {
+        posed(Some([1920, 1080]), Some(PHONE)).photo_lens(found)
+    }
+
     #[test]
     fn photographs_have_the_shape_that_their_camera_tells() {
         let camera = posed(Some([1920, 1080]), Some(PHONE));
-        let lens = |found| posed(Some([1920, 1080]), Some(PHONE)).photo_lens(found);
-        let full = lens([1920, 1080]).unwrap();
+        let full = phone_lens([1920, 1080]).unwrap();
         // A third of the size, rounded: the corner stays the corner.
-        let small = lens([641, 360]).unwrap();
+        let small = phone_lens([641, 360]).unwrap();
         let a = full.direction(dvec2(1800.0, 90.0)).unwrap();
         let b = small.direction(dvec2(1800.0 * 641.0 / 1920.0, 30.0)).unwrap();
         assert!(a.abs_diff_eq(b, 1e-9));
         for found in [[1080, 1920], [1920, 1088], [640, 480]] {
-            assert_eq!(lens(found), Err(IntrinsicsError::OtherSize { found, told: [1920, 1080] }));
+            assert_eq!(phone_lens(found), Err(IntrinsicsError::OtherSize { found, told: [1920, 1080] }));
         }
 
         // Intrinsics without a size are for the photograph. A principal point outside says that they are not.

@@ -458,26 +458,30 @@ mod tests {
         }
     }
 
+    fn pinhole(fx: f64, fy: f64, center_px: Option<s3d_geom::glam::DVec2>) -> Option<Optics> {
+        Some(Optics::Pinhole { focal_px: dvec2(fx, fy), center_px, distortion: Distortion::None })
+    }
+
+    fn rows_of(text: &str) -> Result<Vec<PosedCamera>> {
+        read_rows(Path::new("c.csv"), text.as_bytes())
+    }
+
     #[test]
     fn rows_may_have_intrinsics() {
-        let rows = |text: &str| read_rows(Path::new("c.csv"), text.as_bytes());
         let head = "name,x,y,z,yaw,width,height,fov,fx,fy,cx,cy\n";
         let text = format!(
             "{head}a,0,0,1,0,640,480,90,,,,\nb,0,0,1,0,,,,500,510,320,240\nc,0,0,1,0,64,48,,500,,,\n"
         );
-        let cameras = rows(&text).unwrap();
+        let cameras = rows_of(&text).unwrap();
         assert_eq!(cameras[0].size, Some([640, 480]));
         assert_eq!(cameras[0].optics, Some(Optics::AngleOfView { fov_rad: 90f64.to_radians() }));
-        let pinhole = |fx, fy, center_px| {
-            Some(Optics::Pinhole { focal_px: dvec2(fx, fy), center_px, distortion: Distortion::None })
-        };
         assert_eq!(
             (cameras[1].size, cameras[1].optics),
             (None, pinhole(500.0, 510.0, Some(dvec2(320.0, 240.0))))
         );
         assert_eq!(cameras[2].optics, pinhole(500.0, 500.0, None));
         // Names may occur twice: a caller that makes files of them must check.
-        assert_eq!(rows("name,x,y,z,yaw\na,0,0,1,0\na,0,0,1,0\n").unwrap().len(), 2);
+        assert_eq!(rows_of("name,x,y,z,yaw\na,0,0,1,0\na,0,0,1,0\n").unwrap().len(), 2);
         for (row, words) in [
             ("a,0,0,1,0,640,,,,,,", "line 2: width and height go together"),
             ("a,0,0,1,0,640.5,480,,,,,", "an image of 640.5 × 480"),
@@ -487,7 +491,7 @@ mod tests {
             ("a,0,0,1,0,,,,500,-1,,", "fx, fy are 500, -1"),
             ("a,0,0,1,0,,,wide,,,,", "fov is \"wide\""),
         ] {
-            let message = rows(&format!("{head}{row}\n")).unwrap_err().to_string();
+            let message = rows_of(&format!("{head}{row}\n")).unwrap_err().to_string();
             assert!(message.contains(words), "{message}");
         }
     }

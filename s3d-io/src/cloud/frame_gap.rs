@@ -230,13 +230,16 @@ mod tests {
         }
     }
 
+    fn gap_of_box(low: DVec3, high: DVec3) -> Option<FrameGap> {
+        FrameGap::between([low, high], DVec3::ZERO, room())
+    }
+
     #[test]
     fn neighbours_and_parts_of_the_scan_are_no_gap() {
-        let between = |low: DVec3, high: DVec3| FrameGap::between([low, high], DVec3::ZERO, room());
-        assert!(between(dvec3(100.0, 0.0, 0.0), dvec3(120.0, 9.0, 3.0)).is_none());
-        assert!(between(dvec3(1.0, 1.0, 1.0), UTM).is_none());
-        assert!(between(dvec3(110.0, 0.0, 0.0), dvec3(120.0, 9.0, 3.0)).is_some());
-        assert!(between(DVec3::INFINITY, DVec3::NEG_INFINITY).is_none());
+        assert!(gap_of_box(dvec3(100.0, 0.0, 0.0), dvec3(120.0, 9.0, 3.0)).is_none());
+        assert!(gap_of_box(dvec3(1.0, 1.0, 1.0), UTM).is_none());
+        assert!(gap_of_box(dvec3(110.0, 0.0, 0.0), dvec3(120.0, 9.0, 3.0)).is_some());
+        assert!(gap_of_box(DVec3::INFINITY, DVec3::NEG_INFINITY).is_none());
         assert!(FrameGap::between([UTM, UTM], DVec3::ZERO, Aabb::EMPTY).is_none());
         let large = Aabb { min: Vec3::ZERO, max: Vec3::splat(2000.0) };
         assert!(FrameGap::between([dvec3(4000.0, 0.0, 0.0); 2], DVec3::ZERO, large).is_none());

@@ -8,7 +8,7 @@
 //!
 //! | format | its labels |
 //! |---|---|
-//! | S3DIS tree | rooms, classes and instances are folders and text files: [`AnnotationTree`], [`PointReader`] |
+//! | S3DIS tree | names of folders and text files: [`AnnotationTree`], [`PointReader`] |
 //! | `pointcloud.mat` | MATLAB v7.3, as published: [`MatArea`] |
 //! | PLY, NPY, NPZ, LAS, LAZ, E57 | columns or attributes of points |
 //! | ScanNet | objects as lists of segments of a mesh |
@@ -49,8 +49,6 @@ mod las;
 mod mat;
 #[cfg(feature = "npy")]
 pub(crate) mod npy;
-mod of_faces;
-mod of_memory;
 #[cfg(feature = "mesh")]
 mod of_mesh;
 pub(crate) mod on_fault;
@@ -63,13 +61,14 @@ mod s3dis;
 mod scannet;
 mod table;
 
-pub use annotations::{AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, Skipped};
+pub use annotations::{
+    AnnotatedInstance, AnnotatedPoints, AnnotatedRoom, AnnotationOptions, Annotations, Skipped,
+};
 pub use frame_gap::FrameGap;
 #[cfg(feature = "mat")]
 pub use mat::{MatArea, MatObject, MatRoom, MatWriter};
 #[cfg(feature = "npy")]
 pub use npy::{NpyArray, NpyWriter, NpzArchive};
-pub use of_memory::AnnotatedPoints;
 pub use passes::{InstancePasses, InstanceReader, PointPasses};
 #[cfg(feature = "ply")]
 pub use ply::{

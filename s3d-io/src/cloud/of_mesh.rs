@@ -115,11 +115,11 @@ fn of_numbers(
         .map(|i| Label { class: i.class, instance: i.number, room: i.room, area: 1 })
         .collect();
 
-    let label_of = |group: u32| match group {
+    let label_of_face = group_of.into_iter().map(|group| match group {
         NO_INDEX => NO_INDEX,
         group => meaning.instance_of[group as usize].map_or(NO_INDEX, |i| i as u32),
-    };
-    Ok((labels, group_of.into_iter().map(label_of).collect()))
+    });
+    Ok((labels, label_of_face.collect()))
 }
 
 /// A mesh's file, which may name its room and is named in messages.

@@ -7,7 +7,7 @@ use crate::cloud::annotations::{
 use crate::cloud::frame_gap::{FrameGap, refusal};
 use crate::cloud::on_fault::OnFault;
 use crate::cloud::s3dis::points::PointReader;
-use crate::cloud::s3dis::tree::{AnnotationTree, InstanceFile, TreeOptions};
+use crate::cloud::s3dis::tree::{AnnotationTree, TreeOptions};
 use crate::cloud::table::cloud::Cloud;
 use crate::cloud::table::read::read_tables;
 use crate::error::{Error, Result};
@@ -200,13 +200,17 @@ impl Annotations {
             refuse_far_tree(dir, &files, offset_m, mesh)?;
         }
 
-        let instance_of = |file: InstanceFile| {
-            let points = TextPoints { path: file.path, on_fault, offset_m, spool_dir: spool_dir.clone() };
-            AnnotatedInstance::new(file.class, file.number, Arc::new(points))
-        };
         let rooms = tree.rooms.into_iter().map(|room| AnnotatedRoom {
             room: room.room,
-            instances: room.instances.into_iter().map(instance_of).collect(),
+            instances: room
+                .instances
+                .into_iter()
+                .map(|file| {
+                    let points =
+                        TextPoints { path: file.path, on_fault, offset_m, spool_dir: spool_dir.clone() };
+                    AnnotatedInstance::new(file.class, file.number, Arc::new(points))
+                })
+                .collect(),
         });
         let rooms = rooms.collect();
         Ok(Self { taxonomy: options.taxonomy.clone(), rooms, warnings: tree.warnings })
@@ -458,9 +462,12 @@ mod tests {
         assert!(found.rooms[0].instances[1].source().ends_with("stairs_1.txt"));
     }
 
+    fn line(x: f64) -> String {
+        format!("{} 5400002.75 301.5 4 5 6\n", 500_000.0 + x)
+    }
+
     #[test]
     fn a_tree_in_another_frame_is_refused_with_the_offset_that_fits() {
-        let line = |x: f64| format!("{} 5400002.75 301.5 4 5 6\n", 500_000.0 + x);
         let a = tree(&[
             ("WC_1/Annotations/wall_1.txt", &(line(0.0) + &line(4.0))),
             ("WC_1/Annotations/wall_2.txt", "no point\n"),

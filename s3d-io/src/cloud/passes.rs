@@ -410,11 +410,14 @@ mod tests {
         assert_eq!((skipped.count, blocks), (1, 0));
     }
 
+    fn failure() -> Error {
+        Error::format(std::path::Path::new("x"), "enough")
+    }
+
     #[test]
     fn the_first_failure_ends_a_pass() {
         let dir = tempfile::tempdir().unwrap();
         let [tree, _] = instances(dir.path(), 20);
-        let failure = || Error::format(std::path::Path::new("x"), "enough");
         let mut reader = InstanceReader::new(6);
         let mut blocks = 0;
         let read = reader.read(&tree, None, |_, _| {

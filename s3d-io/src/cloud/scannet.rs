@@ -325,9 +325,10 @@ impl Cloud for ScannetCloud {
                     }
                 };
 
-                let number = |p: usize| batch.scalars(p).get(row).copied().unwrap_or(f64::NAN);
                 let point = Row {
-                    position: DVec3::from_array([x, y, z].map(number)),
+                    position: DVec3::from_array(
+                        [x, y, z].map(|p| batch.scalars(p).get(row).copied().unwrap_or(f64::NAN)),
+                    ),
                     color,
                     class: Value::Name(group.label.trim()),
                     instance: group.object().map_or(Value::None, Value::Whole),

@@ -165,7 +165,8 @@ impl Conventions {
             "conventions": 1,
             "world": { "unit": "m", "up": "+Z", "handedness": "right" },
             "files": {
-                "pattern": "area_{area}/{kind}/{folder}/camera_{uuid}_{roomType}_{roomNum}_frame_{frame}_domain_{suffix}.{ext}",
+                "pattern": "area_{area}/{kind}/{folder}/camera_{uuid}_{roomType}_{roomNum}_frame_{frame}_\
+                    domain_{suffix}.{ext}",
                 "kinds": { "data": "perspective views, frame counts from 0", "pano": "panoramas, frame is \
                     \"equirectangular\"" },
                 "folder_suffix_ext": Domain::ALL.map(|d| [d.folder(), d.suffix(), d.extension()]),
@@ -357,20 +358,22 @@ mod tests {
         assert_eq!(DepthUnits::Millimetres.metres(65_535), None);
     }
 
+    fn conventions(per_m: &str, axes: &str, kind: &str) -> String {
+        format!(
+            r#"{{"depth":{{"units_per_m":{per_m}}},
+            "normal":{{"axes":{axes}}},"global_xyz":{{"type":{kind}}}}}"#
+        )
+    }
+
     #[test]
     fn what_is_not_known_is_named() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("conventions.json");
-        let text = |per_m: &str, axes: &str, kind: &str| {
-            format!(
-                r#"{{"depth":{{"units_per_m":{per_m}}},"normal":{{"axes":{axes}}},"global_xyz":{{"type":{kind}}}}}"#
-            )
-        };
         for (file, part) in [
-            (text("4000", "\"paper\"", "\"half\""), "4000 units a metre"),
-            (text("512", "\"left\"", "\"half\""), "\"left\" axes"),
-            (text("512", "\"paper\"", "\"double\""), "\"double\" is none of half, float and none"),
-            (text("512", "3", "\"half\""), "invalid type"),
+            (conventions("4000", "\"paper\"", "\"half\""), "4000 units a metre"),
+            (conventions("512", "\"left\"", "\"half\""), "\"left\" axes"),
+            (conventions("512", "\"paper\"", "\"double\""), "\"double\" is none of half, float and none"),
+            (conventions("512", "3", "\"half\""), "invalid type"),
             ("{}".into(), "missing field"),
             ("".into(), "EOF"),
         ] {

@@ -127,19 +127,22 @@ pub fn read_face_votes_from(reader: impl Read + Seek, name: &Path) -> Result<Fac
 mod tests {
     use super::*;
 
+    fn multiples(n: u32) -> Vec<u32> {
+        (0..5).map(|i| i * n).collect::<Vec<_>>()
+    }
+
     #[test]
     fn columns_come_back_and_damage_is_told() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("votes.npz");
         write_face_votes(&path, &FaceVoteColumns::default()).unwrap();
         assert_eq!(read_face_votes(&path).unwrap(), FaceVoteColumns::default());
-        let numbers = |n: u32| (0..5).map(|i| i * n).collect::<Vec<_>>();
         let columns = FaceVoteColumns {
-            label: numbers(3),
-            votes: numbers(7),
-            total: numbers(1 << 20),
-            runner_up: numbers(1),
-            runner_up_votes: numbers(2),
+            label: multiples(3),
+            votes: multiples(7),
+            total: multiples(1 << 20),
+            runner_up: multiples(1),
+            runner_up_votes: multiples(2),
             farthest_m: vec![0.0, 0.5, f32::MAX, 1e-9, 3.0],
         };
         assert_eq!(write_face_votes(&path, &columns).unwrap(), std::fs::metadata(&path).unwrap().len());

@@ -177,7 +177,8 @@ mod tests {
 
     /// A pose file of the published data set (Area 3). Only the order of its keys is changed.
     const GENUINE: &str = r#"{
-        "camera_k_matrix": [[877.7806396484375, 0.0, 540.0], [0.0, 877.7806396484375, 540.0], [0.0, 0.0, 1.0]],
+        "camera_k_matrix":
+            [[877.7806396484375, 0.0, 540.0], [0.0, 877.7806396484375, 540.0], [0.0, 0.0, 1.0]],
         "field_of_view_rads": 1.1030245194845198,
         "camera_rt_matrix": [
             [-0.7075634002685547, -0.7066466212272644, 0.0021539656445384026, 13.17724323272705],
@@ -193,24 +194,25 @@ mod tests {
         "room": "office_5_3"
     }"#;
 
+    fn assert_close(a: &[f64], b: &[f64], tolerance: f64) {
+        assert_eq!(a.len(), b.len());
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance), "{a:?}\n{b:?}");
+    }
+
     /// Checks that location, original rotation, yaw, pitch and angle of view give everything else.
     fn assert_reproduced(genuine: &PoseFile) {
         let original = genuine.original();
         let (yaw, pitch) = original.yaw_pitch_to(&genuine.pose());
         let camera = Camera::perspective(original.turned(yaw, pitch), genuine.field_of_view_rads, 1080, 1080);
         let ours = PoseFile::new(&camera, &original, &genuine.camera_uuid, &genuine.room, genuine.frame_num);
-        let close = |a: &[f64], b: &[f64], tolerance: f64| {
-            assert_eq!(a.len(), b.len());
-            assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance), "{a:?}\n{b:?}");
-        };
-        close(ours.camera_k_matrix.as_flattened(), genuine.camera_k_matrix.as_flattened(), 3e-5);
+        assert_close(ours.camera_k_matrix.as_flattened(), genuine.camera_k_matrix.as_flattened(), 3e-5);
         // The translation is a sum of products with single-precision rotations and 22 m.
-        close(ours.camera_rt_matrix.as_flattened(), genuine.camera_rt_matrix.as_flattened(), 2e-6);
-        close(&ours.final_camera_rotation, &genuine.final_camera_rotation, 1e-6);
-        close(&ours.camera_rotation_final, &genuine.final_camera_rotation, 1e-6);
-        close(&ours.camera_original_rotation, &genuine.camera_original_rotation, 1e-6);
-        close(&ours.rotation_from_original_to_point, &genuine.rotation_from_original_to_point, 1e-6);
-        close(&ours.camera_location, &genuine.camera_location, 1e-6);
+        assert_close(ours.camera_rt_matrix.as_flattened(), genuine.camera_rt_matrix.as_flattened(), 2e-6);
+        assert_close(&ours.final_camera_rotation, &genuine.final_camera_rotation, 1e-6);
+        assert_close(&ours.camera_rotation_final, &genuine.final_camera_rotation, 1e-6);
+        assert_close(&ours.camera_original_rotation, &genuine.camera_original_rotation, 1e-6);
+        assert_close(&ours.rotation_from_original_to_point, &genuine.rotation_from_original_to_point, 1e-6);
+        assert_close(&ours.camera_location, &genuine.camera_location, 1e-6);
         assert_eq!(ours.field_of_view_rads, genuine.field_of_view_rads);
         assert_eq!(
             (&ours.camera_uuid, &ours.point_uuid, &ours.room, ours.frame_num),

@@ -60,11 +60,14 @@ mod tests {
     use super::*;
     use crate::fs::atomic::write_bytes;
 
+    fn pair(i: u32) -> (String, String) {
+        (format!("area_1/pano/rgb/{i}.png"), format!("area_1/pano/depth/{i}.png"))
+    }
+
     #[test]
     fn a_list_is_two_paths_a_line() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("fold_1_train.txt");
-        let pair = |i: u32| (format!("area_1/pano/rgb/{i}.png"), format!("area_1/pano/depth/{i}.png"));
         write_image_list(&path, &[pair(1), pair(2)]).unwrap();
         assert_eq!(
             std::fs::read_to_string(&path).unwrap(),

@@ -44,9 +44,11 @@ impl SyncAhead {
     pub fn start(root: &Path) -> Self {
         let (open, is_open) = mpsc::channel();
         let folder = root.to_owned();
-        let work = move || sync_until_closed(&folder, &is_open);
         // Without a thread, everything is left for the final sync.
-        let thread = Builder::new().name("sync".to_owned()).spawn(work).ok();
+        let thread = Builder::new()
+            .name("sync".to_owned())
+            .spawn(move || sync_until_closed(&folder, &is_open))
+            .ok();
         Self { root: root.to_owned(), open, thread }
     }
 

@@ -194,7 +194,8 @@ fn unreadable(path: &Path, error: &exr::error::Error) -> Error {
 /// Decodes any file that the exr crate reads. Its header was checked.
 fn decode_any(bytes: &[u8], path: &Path) -> Result<Raster<[f32; 3]>> {
     use exr::prelude::{ReadChannels, ReadLayers, Vec2};
-    let read = || {
+
+    let image = guarded(|| {
         exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()
@@ -216,10 +217,9 @@ fn decode_any(bytes: &[u8], path: &Path) -> Result<Raster<[f32; 3]>> {
             .all_attributes()
             .non_parallel()
             .from_buffered(Cursor::new(bytes))
-    };
-
-    let damaged = || Error::format(path, "no readable OpenEXR file of R G B: its blocks are damaged");
-    let image = guarded(read).ok_or_else(damaged)?.map_err(|e| unreadable(path, &e))?;
+    })
+    .ok_or_else(|| Error::format(path, "no readable OpenEXR file of R G B: its blocks are damaged"))?
+    .map_err(|e| unreadable(path, &e))?;
     Ok(image.layer_data.channel_data.pixels)
 }
 
@@ -321,17 +321,21 @@ mod tests {
     /// Encodes with the exr crate's own writer.
     fn reference_half(image: &Raster<[f16; 3]>) -> Vec<u8> {
         use exr::prelude::*;
-        let at = |p: Vec2<usize>| {
-            let [r, g, b] = image.at(p.x() as u32, p.y() as u32);
-            (r, g, b)
-        };
         let encoding = Encoding {
             compression: Method::ZIP16,
             blocks: Blocks::ScanLines,
             line_order: LineOrder::Increasing,
         };
         let size = (image.width() as usize, image.height() as usize);
-        let layer = Layer::new(size, LayerAttributes::default(), encoding, SpecificChannels::rgb(at));
+        let layer = Layer::new(
+            size,
+            LayerAttributes::default(),
+            encoding,
+            SpecificChannels::rgb(|p: Vec2<usize>| {
+                let [r, g, b] = image.at(p.x() as u32, p.y() as u32);
+                (r, g, b)
+            }),
+        );
         let mut file = Cursor::new(Vec::new());
         Image::from_layer(layer)
             .write()
@@ -343,7 +347,7 @@ mod tests {
 
     /// Makes a floor and a wall, in metres.
     fn room(width: u32, height: u32) -> Raster<[f32; 3]> {
-        let pixel = |i: u32| {
+        let pixels = (0..width * height).map(|i| {
             let x = (i % width) as f32 / width as f32;
             let y = (i / width) as f32 / height as f32;
             if y < 0.5 {
@@ -351,8 +355,8 @@ mod tests {
             } else {
                 [x / y, 1.5 / y, 0.0]
             }
-        };
-        Raster::from_vec(width, height, (0..width * height).map(pixel).collect())
+        });
+        Raster::from_vec(width, height, pixels.collect())
     }
 
     #[test]
@@ -380,8 +384,9 @@ mod tests {
         fn any_values_come_back((w, h, data) in (1u32..40, 1u32..40).prop_flat_map(|(w, h)| {
             (Just(w), Just(h), proptest::collection::vec(any::<[u16; 3]>(), (w * h) as usize))
         })) {
-            let number = |bits| Some(f16::from_bits(bits)).filter(|v| !v.is_nan()).unwrap_or(f16::ONE);
-            let image = Raster::from_vec(w, h, data.into_iter().map(|p| p.map(number)).collect());
+            let numbers = data.into_iter().map(|p| p.map(f16::from_bits));
+            let numbers = numbers.map(|p| p.map(|v| if v.is_nan() { f16::ONE } else { v }));
+            let image = Raster::from_vec(w, h, numbers.collect());
             for compression in Compression::ALL {
                 let bytes = encode_xyz_half(&image, compression);
                 let expected = image.map(|p| p.map(f16::to_f32));
@@ -392,16 +397,17 @@ mod tests {
         }
     }
 
+    fn header(bytes: &[u8]) -> exr::meta::header::Header {
+        let meta = exr::meta::MetaData::read_from_buffered(bytes, true).unwrap();
+        let [header] = meta.headers.as_slice() else { panic!("one layer") };
+        header.clone()
+    }
+
     #[test]
     fn the_header_is_what_the_plain_writer_makes() {
         let image = room(100, 50).map(|p| p.map(f16::from_f32));
         let ours = encode_xyz_half(&image, Compression::Balanced);
         let plain = reference_half(&image);
-        let header = |bytes: &[u8]| {
-            let meta = exr::meta::MetaData::read_from_buffered(bytes, true).unwrap();
-            let [header] = meta.headers.as_slice() else { panic!("one layer") };
-            header.clone()
-        };
         let a = header(&ours);
         let b = header(&plain);
         assert_eq!(a.channels, b.channels);

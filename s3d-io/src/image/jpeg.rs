@@ -208,7 +208,9 @@ mod tests {
         let with = [&whole[..2], &thumbnail].concat();
         assert_eq!(end(&with).at, Some(with.len() - 2));
         assert_eq!(end(&with[..with.len() - 2]).at, None);
-        let progressive = |bytes: &[u8]| end(bytes).is_progressive;
-        assert_eq!([&b""[..], b"\xff\xd8\xff", b"\xff\xd8\xff\xc2\0"].map(progressive), [false, false, true]);
+        assert_eq!(
+            [&b""[..], b"\xff\xd8\xff", b"\xff\xd8\xff\xc2\0"].map(|bytes| end(bytes).is_progressive),
+            [false, false, true]
+        );
     }
 }

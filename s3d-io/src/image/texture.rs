@@ -244,19 +244,27 @@ pub(crate) mod tests {
         image.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Jpeg).unwrap();
         let loaded = decode_texture(bytes.clone()).unwrap();
         assert_eq!(loaded.file, TextureFile { extension: "jpg", bytes });
-        let close = |p: &[u8; 3]| p.iter().zip([200, 100, 50]).all(|(a, b): (&u8, u8)| a.abs_diff(b) <= 3);
-        assert!(loaded.image.pixels().iter().all(close));
+        assert!(
+            loaded
+                .image
+                .pixels()
+                .iter()
+                .all(|p| p.iter().zip([200, 100, 50]).all(|(a, b): (&u8, u8)| a.abs_diff(b) <= 3))
+        );
+    }
+
+    fn fault_of(bytes: Vec<u8>) -> String {
+        decode_texture(bytes).unwrap_err().to_string()
     }
 
     #[test]
     fn what_is_no_image_is_refused() {
-        let fault = |bytes: Vec<u8>| decode_texture(bytes).unwrap_err().to_string();
-        assert!(fault(b"v 0 0 0".to_vec()).contains("no PNG or JPEG"));
-        assert!(fault(b"GIF89a\x01\0\x01\0".to_vec()).contains("gif"));
+        assert!(fault_of(b"v 0 0 0".to_vec()).contains("no PNG or JPEG"));
+        assert!(fault_of(b"GIF89a\x01\0\x01\0".to_vec()).contains("gif"));
         let mut cut = two_pixels([1; 3], [2; 3]);
         cut.truncate(cut.len() - 20);
-        assert!(fault(cut).contains("cannot be decoded"));
-        assert!(fault(claim(20_000)).contains("claims 20000 × 20000"));
+        assert!(fault_of(cut).contains("cannot be decoded"));
+        assert!(fault_of(claim(20_000)).contains("claims 20000 × 20000"));
     }
 
     /// Makes a header that claims this number of pixels on each side (with its checksum), and next to no

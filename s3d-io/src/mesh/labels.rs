@@ -173,11 +173,11 @@ impl MeshLabels {
     reason = "labels of another mesh are a caller's mistake: see Panics of `into_faces`"
 )]
 fn majority_of_corners(column: LabelColumn, mesh: &TriMesh) -> LabelColumn {
-    let of_face = |corners: &[u32; 3]| {
+    let values = mesh.faces().iter().map(|corners| {
         let [a, b, c] = corners.map(|vertex| column.values[vertex as usize]);
         if b == c { b } else { a }
-    };
-    LabelColumn { values: mesh.faces().iter().map(of_face).collect(), name: column.name }
+    });
+    LabelColumn { values: values.collect(), name: column.name }
 }
 
 fn picked<T: Copy>(values: &[T], tags: &[u32], missing: T) -> Vec<T> {

@@ -163,8 +163,9 @@ mod tests {
 
     /// Makes a flight of steps, each a millimetre wide, at some place, Z-up. The first vertex is in no face.
     fn steps(at: DVec3) -> Vec<DVec3> {
-        let step = |i: u32| at + dvec3(f64::from(i / 2) / 1024.0, f64::from(i % 2), f64::from(i / 4) / 512.0);
-        std::iter::once(DVec3::ZERO).chain((0..40).map(step)).collect()
+        let steps = (0..40)
+            .map(|i| at + dvec3(f64::from(i / 2) / 1024.0, f64::from(i % 2), f64::from(i / 4) / 512.0));
+        std::iter::once(DVec3::ZERO).chain(steps).collect()
     }
 
     fn faces() -> impl Iterator<Item = [usize; 3]> {
@@ -282,24 +283,25 @@ mod tests {
         assert_eq!(positions, [[0.25, 0.5, 0.0], [1.25, 0.5, 0.125], [0.0, 1.0, 0.5]]);
     }
 
+    fn read_named(name: &str, bytes: &[u8], units: Option<LengthUnit>, origin: MeshOrigin) -> MeshFile {
+        let options = MeshOptions { origin, units, ..MeshOptions::default() };
+        read_mesh_from(bytes, Path::new(name), UpAxis::Z, &options).unwrap()
+    }
+
     #[test]
     fn units_are_taken_to_metres_near_the_origin_and_far() {
         let inches = LengthUnit::Inch;
-        let read = |name: &str, bytes: &[u8], units, origin| {
-            let options = MeshOptions { origin, units, ..MeshOptions::default() };
-            read_mesh_from(bytes, Path::new(name), UpAxis::Z, &options).unwrap()
-        };
         for (name, file) in
             [("a.obj", (|at| obj(at, UpAxis::Z)) as fn(DVec3) -> Vec<u8>), ("a.ply", ply), ("a.gltf", gltf)]
         {
-            let near = read(name, &file(DVec3::ZERO), None, MeshOrigin::Near);
-            let scaled = read(name, &file(DVec3::ZERO), Some(inches), MeshOrigin::Near);
+            let near = read_named(name, &file(DVec3::ZERO), None, MeshOrigin::Near);
+            let scaled = read_named(name, &file(DVec3::ZERO), Some(inches), MeshOrigin::Near);
             for (a, b) in near.mesh.positions().iter().zip(scaled.mesh.positions()) {
                 assert_eq!((a.as_dvec3() * 0.0254).as_vec3(), *b, "{name}");
             }
             assert_eq!((scaled.offset_m, scaled.mesh.faces().len()), (DVec3::ZERO, 38), "{name}");
             // The mesh is 12.7 km away, in steps of a millionth of an inch, and as exact as near the origin.
-            let far = read(name, &file(UTM), Some(inches), MeshOrigin::Near);
+            let far = read_named(name, &file(UTM), Some(inches), MeshOrigin::Near);
             assert_eq!(far.offset_m, dvec3(12_700.0, 137_200.0, 0.0), "{name}");
             let at = UTM * 0.0254 - far.offset_m;
             for (a, b) in near.mesh.positions().iter().zip(far.mesh.positions()).skip(1) {
@@ -309,23 +311,30 @@ mod tests {
         }
     }
 
+    fn depth_of(file: &MeshFile) -> f32 {
+        file.mesh.aabb().size().y
+    }
+
+    fn read_obj(bytes: &[u8], units: Option<LengthUnit>) -> MeshFile {
+        let options = MeshOptions { units, ..MeshOptions::default() };
+        read_mesh_from(bytes, Path::new("a.obj"), UpAxis::Z, &options).unwrap()
+    }
+
+    fn obj_with(head: &str) -> Vec<u8> {
+        [head.as_bytes(), &obj(DVec3::ZERO, UpAxis::Z)].concat()
+    }
+
     #[test]
     fn a_comment_in_the_head_of_an_obj_tells_the_unit() {
-        let with = |head: &str| [head.as_bytes(), &obj(DVec3::ZERO, UpAxis::Z)].concat();
-        let read = |bytes: &[u8], units| {
-            let options = MeshOptions { units, ..MeshOptions::default() };
-            read_mesh_from(bytes, Path::new("a.obj"), UpAxis::Z, &options).unwrap()
-        };
-        let size = |file: &MeshFile| file.mesh.aabb().size().y;
-        let said = read(&with("# made by hand\n\n# File units = inches\n"), None);
-        assert_eq!((said.unit_said, size(&said)), (Some(LengthUnit::Inch), 0.0254));
+        let said = read_obj(&obj_with("# made by hand\n\n# File units = inches\n"), None);
+        assert_eq!((said.unit_said, depth_of(&said)), (Some(LengthUnit::Inch), 0.0254));
         assert!(said.warnings.iter().any(|w| w.contains("its unit is in:")), "{:?}", said.warnings);
-        let other = read(&with("# File units = inches\n"), Some(LengthUnit::Metre));
-        assert_eq!((size(&other), other.warnings.len()), (1.0, 0));
+        let other = read_obj(&obj_with("# File units = inches\n"), Some(LengthUnit::Metre));
+        assert_eq!((depth_of(&other), other.warnings.len()), (1.0, 0));
         for head in ["# File units = meters\n", "# File units: parsecs\n", "v 0 0 0\n# file units = mm\n", ""]
         {
-            let file = read(&with(head), None);
-            assert_eq!(size(&file), 1.0, "{head}");
+            let file = read_obj(&obj_with(head), None);
+            assert_eq!(depth_of(&file), 1.0, "{head}");
             assert!(!file.warnings.iter().any(|w| w.contains("unit")), "{:?}", file.warnings);
         }
     }

@@ -40,14 +40,17 @@ pub struct CocoCategory {
 
 /// Returns the categories, one for each class. The instances of the classes in `stuff` are not told apart.
 pub fn coco_categories(taxonomy: &Taxonomy, stuff: &[Class]) -> Vec<CocoCategory> {
-    let category = |&class: &Class| CocoCategory {
-        id: taxonomy.id(class),
-        name: class.name(),
-        supercategory: supercategory(class),
-        isthing: u8::from(!stuff.contains(&class)),
-        color: taxonomy.color(class),
-    };
-    taxonomy.classes().iter().map(category).collect()
+    taxonomy
+        .classes()
+        .iter()
+        .map(|&class| CocoCategory {
+            id: taxonomy.id(class),
+            name: class.name(),
+            supercategory: supercategory(class),
+            isthing: u8::from(!stuff.contains(&class)),
+            color: taxonomy.color(class),
+        })
+        .collect()
 }
 
 fn supercategory(class: Class) -> &'static str {
@@ -285,6 +288,10 @@ mod tests {
         u32::from(r) + 256 * u32::from(g) + 65_536 * u32::from(b)
     }
 
+    fn segment(id: u32, category_id: u32, area: u64, bbox: [u32; 4]) -> CocoSegment {
+        CocoSegment { id, category_id, area, bbox, iscrowd: 0 }
+    }
+
     #[test]
     fn segments_cover_their_pixels() {
         let [m, w, v, c] = [MISSING, pixel(4), pixel(5), pixel(2)];
@@ -293,7 +300,6 @@ mod tests {
         let wall = FIRST_STUFF_ID + 3;
         let ids: Vec<u32> = image.pixels().iter().map(|p| id_of(*p)).collect();
         assert_eq!(ids, [0, wall, wall, wall, 2, 0, wall, 2, 0, 0, 2, 2]);
-        let segment = |id, category_id, area, bbox| CocoSegment { id, category_id, area, bbox, iscrowd: 0 };
         assert_eq!(segments, [segment(2, 9, 4, [0, 1, 4, 2]), segment(wall, 3, 4, [1, 0, 3, 2])]);
         // Each wall is a segment of its own.
         let (_, segments) = coco_panoptic(&semantic, &table(), &[]).unwrap();

@@ -51,13 +51,14 @@ pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> B
     }
     add(current, start, at);
 
-    let mask = |(id, (mut counts, end)): (u32, (Vec<u32>, u32))| {
-        if end < at {
-            counts.push(at - end);
-        }
-        (id, CocoMask { size: [height, width], counts: text_of(&counts) })
-    };
-    runs.into_iter().map(mask).collect()
+    runs.into_iter()
+        .map(|(id, (mut counts, end))| {
+            if end < at {
+                counts.push(at - end);
+            }
+            (id, CocoMask { size: [height, width], counts: text_of(&counts) })
+        })
+        .collect()
 }
 
 /// Encodes run lengths as text. Each length from the fourth on is replaced by its difference from the length
@@ -130,10 +131,6 @@ pub fn write_coco_instances(
             .iter()
             .filter_map(move |segment| Some((image.id, segment, image.masks.get(&segment.id)?)))
     });
-    let annotation = |(id, (image_id, segment, segmentation)): (u64, (u32, &CocoSegment, _))| {
-        let CocoSegment { category_id, bbox, area, iscrowd, .. } = *segment;
-        Annotation { id, image_id, category_id, bbox, area, iscrowd, segmentation }
-    };
 
     let file = File {
         info: Info { description },
@@ -141,7 +138,13 @@ pub fn write_coco_instances(
             .iter()
             .map(|i| Image { id: i.id, file_name: &i.file_name, width: i.width, height: i.height })
             .collect(),
-        annotations: (1..).zip(pairs).map(annotation).collect(),
+        annotations: (1..)
+            .zip(pairs)
+            .map(|(id, (image_id, segment, segmentation))| {
+                let CocoSegment { category_id, bbox, area, iscrowd, .. } = *segment;
+                Annotation { id, image_id, category_id, bbox, area, iscrowd, segmentation }
+            })
+            .collect(),
         categories: categories.iter().filter(|category| category.isthing == 1).collect(),
     };
 

@@ -272,6 +272,14 @@ mod tests {
         }
     }
 
+    fn u32_at(b: &[u8], at: usize) -> u32 {
+        u32::from_le_bytes(b[at..at + 4].try_into().unwrap())
+    }
+
+    fn f64_at(b: &[u8], at: usize) -> f64 {
+        f64::from_le_bytes(b[at..at + 8].try_into().unwrap())
+    }
+
     #[test]
     fn text_and_binary_hold_the_same() {
         let dir = tempfile::tempdir().unwrap();
@@ -293,21 +301,19 @@ mod tests {
                 .collect()
         };
         let bytes = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
-        let f = |b: &[u8], at: usize| f64::from_le_bytes(b[at..at + 8].try_into().unwrap());
-        let int = |b: &[u8], at: usize| u32::from_le_bytes(b[at..at + 4].try_into().unwrap());
 
         let text = lines("cameras.txt");
         let binary = bytes("cameras.bin");
-        assert_eq!((text.len(), int(&binary, 0), binary.len()), (40, 40, 8 + 40 * 56));
+        assert_eq!((text.len(), u32_at(&binary, 0), binary.len()), (40, 40, 8 + 40 * 56));
         for (i, line) in text.iter().enumerate() {
             let at = 8 + i * 56;
             assert_eq!(&line[..4], &[(i + 1).to_string(), "PINHOLE".into(), "108".into(), "96".into()]);
             assert_eq!(
-                (int(&binary, at), int(&binary, at + 4), int(&binary, at + 8)),
+                (u32_at(&binary, at), u32_at(&binary, at + 4), u32_at(&binary, at + 8)),
                 (i as u32 + 1, 1, 108)
             );
             for k in 0..4 {
-                assert_eq!(line[4 + k].parse(), Ok(f(&binary, at + 24 + 8 * k)));
+                assert_eq!(line[4 + k].parse(), Ok(f64_at(&binary, at + 24 + 8 * k)));
             }
         }
 
@@ -320,7 +326,7 @@ mod tests {
             assert!(empty.is_empty());
             assert_eq!((line[0].parse(), line[8].parse()), (Ok(i + 1), Ok(i + 1)));
             for k in 0..7 {
-                assert_eq!(line[1 + k].parse(), Ok(f(&binary, at + 4 + 8 * k)));
+                assert_eq!(line[1 + k].parse(), Ok(f64_at(&binary, at + 4 + 8 * k)));
             }
             at += 4 + 7 * 8 + 4;
             let end = at + images[i].name.len();
@@ -335,7 +341,7 @@ mod tests {
         assert_eq!(text[0], ["1", "1.5", "-2.25", "0.1", "1", "2", "3", "0"]);
         assert_eq!(text[1][1..4], ["0", "0.0000001", "12"]);
         assert_eq!((text.len(), binary.len()), (2, 8 + 2 * (8 + 24 + 3 + 8 + 8)));
-        assert_eq!((f(&binary, 16), binary[40..43].to_vec()), (1.5, vec![1, 2, 3]));
+        assert_eq!((f64_at(&binary, 16), binary[40..43].to_vec()), (1.5, vec![1, 2, 3]));
     }
 
     #[test]

@@ -351,6 +351,14 @@ mod tests {
         rows[i].get_column_iter().nth(at).unwrap().1
     }
 
+    fn float(v: Option<f64>) -> Field {
+        v.map_or(Field::Null, Field::Double)
+    }
+
+    fn text(t: &str) -> Field {
+        Field::Str(t.to_owned())
+    }
+
     #[test]
     fn rows_come_back() {
         let dir = tempfile::tempdir().unwrap();
@@ -361,7 +369,6 @@ mod tests {
         let table = read(&path);
         assert_eq!((table.0.len(), table.1.len()), (7 + 8 + 2 + 1 + 2 + 3 + 2 + 3 + 13 + 2 + 3 + 1, 3));
 
-        let text = |t: &str| Field::Str(t.to_owned());
         for (i, row) in rows.iter().enumerate() {
             assert_eq!(*field(&table, i, "area"), Field::Int(row.area as i32));
             assert_eq!(*field(&table, i, "camera_uuid"), text(&row.camera_uuid));
@@ -374,7 +381,6 @@ mod tests {
             for (file, domain) in row.files.iter().zip(Domain::ALL) {
                 assert_eq!(*field(&table, i, domain.folder()), file.as_deref().map_or(Field::Null, text));
             }
-            let float = |v: Option<f64>| v.map_or(Field::Null, Field::Double);
             assert_eq!(*field(&table, i, "z"), float(row.location.map(|l| l[2])));
             assert_eq!(*field(&table, i, "pitch_rad"), float(row.yaw_pitch_rad.map(|v| v[1])));
             assert_eq!(*field(&table, i, "coverage"), float(row.coverage));

@@ -59,7 +59,8 @@ struct MeshTable {
 /// path = "rgb.obj"    # or paths = ["floor_1.ply", "floor_2.ply"]
 /// up   = "y"          # or "z"; left out: "y"
 /// units = "cm"        # or "m", "mm", "ft", "in"; left out: what the mesh's file says, or metres
-/// offset_m = [500000.0, 5400000.0, 300.0]  # subtracted from positions; left out: chosen if the mesh is far from 0
+/// # Subtracted from positions; left out: chosen if the mesh is far from 0.
+/// offset_m = [500000.0, 5400000.0, 300.0]
 /// colors = "points"   # a mesh without textures takes the colours of the annotated points
 /// [annotations]       # left out: there are no labels
 /// path = "Area_1"     # or mesh = true: the labels that came with the mesh
@@ -122,8 +123,11 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
         return Err(Error::unsupported(path, format!("is {what}; {SCENE}")));
     }
     let bytes = read_file(path)?;
-    let no_text = |_| Error::format(path, format!("is no text in UTF-8; {SCENE}"));
-    parse_scene(std::str::from_utf8(&text_of(&bytes, path)?).map_err(no_text)?, path)
+    parse_scene(
+        std::str::from_utf8(&text_of(&bytes, path)?)
+            .map_err(|_| Error::format(path, format!("is no text in UTF-8; {SCENE}")))?,
+        path,
+    )
 }
 
 /// Reads like [`read_scene`], from the text of a scene file. Errors call the file `path`, and the files that

@@ -149,7 +149,8 @@ impl<'de> Deserialize<'de> for RgbEntry {
             type Value = RgbEntry;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(
-                    "\"texture\", \"skybox\", \"captures\", \"panorama\", or a table with `source` and `path`",
+                    "\"texture\", \"skybox\", \"captures\", \"panorama\", or a table with `source` and \
+                     `path`",
                 )
             }
             fn visit_str<E: de::Error>(self, word: &str) -> Result<RgbEntry, E> {

@@ -99,8 +99,11 @@ pub fn read_taxonomy(path: &Path) -> Result<Taxonomy> {
         return read_taxonomy_json(path);
     }
     let bytes = read_file(path)?;
-    let no_text = |_| Error::format(path, "is no text in UTF-8; a taxonomy is a text file in TOML");
-    parse_taxonomy(std::str::from_utf8(&text_of(&bytes, path)?).map_err(no_text)?, path)
+    parse_taxonomy(
+        std::str::from_utf8(&text_of(&bytes, path)?)
+            .map_err(|_| Error::format(path, "is no text in UTF-8; a taxonomy is a text file in TOML"))?,
+        path,
+    )
 }
 
 /// Reads like [`read_taxonomy`], from the text of a TOML file. Errors call the file `path`.

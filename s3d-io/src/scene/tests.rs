@@ -54,23 +54,28 @@ fn paths_are_resolved_and_up_is_y_unless_said() {
     assert_eq!(moved.mesh_offset_m, Some(DVec3::new(5e5, 0.0, 7.0)));
 }
 
-#[test]
-fn cameras_are_listed_placed_or_not_said() {
-    let cameras =
-        |table: &str| read(&GOOD.replace("[cameras]\npath = \"c.csv\"\n", table)).map(|scene| scene.cameras);
-    let frame = |table: &str| match cameras(&format!("[cameras]\npath = \"c.csv\"\n{table}")).unwrap() {
+fn cameras(table: &str) -> Result<Option<CameraSource>> {
+    read(&GOOD.replace("[cameras]\npath = \"c.csv\"\n", table)).map(|scene| scene.cameras)
+}
+
+fn frame_of(table: &str) -> DAffine3 {
+    match cameras(&format!("[cameras]\npath = \"c.csv\"\n{table}")).unwrap() {
         Some(CameraSource::Listed { world_from_file, .. }) => world_from_file,
         other => panic!("{other:?}"),
-    };
+    }
+}
+
+#[test]
+fn cameras_are_listed_placed_or_not_said() {
     assert_eq!(cameras("").unwrap(), None);
     assert_eq!(cameras("[cameras]\nplace = 2\n").unwrap(), Some(CameraSource::Placed { distance_m: 2.0 }));
-    assert_eq!(frame(""), DAffine3::IDENTITY);
+    assert_eq!(frame_of(""), DAffine3::IDENTITY);
     let p = DVec3::new(1.0, 2.0, 3.0);
-    assert_eq!(frame("up = \"y\"\n").transform_point3(p), DVec3::new(1.0, -3.0, 2.0));
+    assert_eq!(frame_of("up = \"y\"\n").transform_point3(p), DVec3::new(1.0, -3.0, 2.0));
     let transform = "transform = [[2, 0, 0, 5], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]]\n";
-    assert_eq!(frame(transform).transform_point3(p), DVec3::new(7.0, 4.0, 6.0));
+    assert_eq!(frame_of(transform).transform_point3(p), DVec3::new(7.0, 4.0, 6.0));
     let both = format!("up = \"y\"\n{transform}");
-    assert_eq!(frame(&both).transform_point3(p), DVec3::new(7.0, -6.0, 4.0));
+    assert_eq!(frame_of(&both).transform_point3(p), DVec3::new(7.0, -6.0, 4.0));
     for (table, words) in [
         ("[cameras]\n", "needs a path, or place"),
         ("[cameras]\nplace = 0\n", "is no distance"),
@@ -100,32 +105,33 @@ fn cameras_are_listed_placed_or_not_said() {
     }
 }
 
+fn pictures_of(rgb: &str) -> Option<PictureSource> {
+    let plain = rgb.starts_with("rgb");
+    let text = if plain {
+        format!("{rgb}\n{GOOD}")
+    } else {
+        format!("{GOOD}{rgb}\n")
+    };
+    let mut pictures = read(&text).unwrap().pictures;
+    if let Some(source) = &mut pictures {
+        source.path = source.path.file_name().unwrap().into();
+    }
+    pictures
+}
+
 #[test]
 fn colours_come_from_the_texture_or_from_pictures() {
-    let pictures = |rgb: &str| {
-        let plain = rgb.starts_with("rgb");
-        let text = if plain {
-            format!("{rgb}\n{GOOD}")
-        } else {
-            format!("{GOOD}{rgb}\n")
-        };
-        let mut pictures = read(&text).unwrap().pictures;
-        if let Some(source) = &mut pictures {
-            source.path = source.path.file_name().unwrap().into();
-        }
-        pictures
-    };
     let source = |kind, path: &str, options| Some(PictureSource { kind, path: path.into(), options });
     let options = PictureOptions::default();
     for texture in ["", "rgb = \"texture\"", "[rgb]\nsource = \"texture\""] {
-        assert_eq!(pictures(texture), None);
+        assert_eq!(pictures_of(texture), None);
     }
-    assert_eq!(pictures("rgb = \"skybox\""), source(PictureKind::SkyBox, "skybox", options.clone()));
-    let captures = pictures("[rgb]\nsource = \"captures\"\npath = \"raw\"\nparallax = false\nsize = 512");
+    assert_eq!(pictures_of("rgb = \"skybox\""), source(PictureKind::SkyBox, "skybox", options.clone()));
+    let captures = pictures_of("[rgb]\nsource = \"captures\"\npath = \"raw\"\nparallax = false\nsize = 512");
     let small = PictureOptions { parallax: false, size: Some(512), ..options.clone() };
     assert_eq!(captures, source(PictureKind::Captures, "raw", small));
     let panorama =
-        pictures("[rgb]\nsource = \"panorama\"\npath = \"raw\"\nyaw_deg = 90\nunseen = \"nearby\"");
+        pictures_of("[rgb]\nsource = \"panorama\"\npath = \"raw\"\nyaw_deg = 90\nunseen = \"nearby\"");
     let turned = PictureOptions { yaw_deg: 90.0, unseen: UnseenColor::Nearby, ..options };
     assert_eq!(panorama, source(PictureKind::Panorama, "raw", turned));
     for (rgb, words) in [

@@ -154,11 +154,10 @@ impl Taxonomy {
         if self.is_s3dis() {
             return None;
         }
-        let by_id = || {
+        self.meaning(&number.to_string()).or_else(|| {
             let place = self.0.details.iter().position(|d| i64::from(d.id) == number)?;
             self.classes().get(place).copied().map(Some)
-        };
-        self.meaning(&number.to_string()).or_else(by_id)
+        })
     }
 
     /// Finds the room type with exactly this name.
@@ -182,12 +181,14 @@ impl Taxonomy {
     /// # Errors
     /// [`RoomError`] if the word is not a room.
     pub fn room_of_word(&self, word: &str) -> Result<Room, RoomError> {
-        let by_alias = |(alias, number): (&str, &str)| {
-            let room_type = *self.0.room_words.get(alias)?;
-            self.room(&format!("{room_type}_{number}")).ok()
-        };
-        self.room(word)
-            .or_else(|e| word.rsplit_once('_').and_then(by_alias).ok_or(e))
+        self.room(word).or_else(|e| {
+            word.rsplit_once('_')
+                .and_then(|(alias, number)| {
+                    let room_type = *self.0.room_words.get(alias)?;
+                    self.room(&format!("{room_type}_{number}")).ok()
+                })
+                .ok_or(e)
+        })
     }
 
     /// Parses a label like [`Taxonomy::parse_name`], but the null label is an error.

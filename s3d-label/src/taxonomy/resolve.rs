@@ -37,8 +37,9 @@ impl Taxonomy {
             return Err(TaxonomyError::Empty);
         }
         if definition.rooms.is_empty() {
-            let room = |t: RoomType| RoomTypeDefinition { name: t.name().to_owned(), ..Default::default() };
-            definition.rooms = RoomType::S3DIS.map(room).into();
+            definition.rooms = RoomType::S3DIS
+                .map(|t| RoomTypeDefinition { name: t.name().to_owned(), ..Default::default() })
+                .into();
         }
         let classes = resolve_classes(&mut definition.classes)?;
         let room_types = resolve_room_types(&mut definition.rooms)?;
@@ -203,10 +204,10 @@ fn resolve_room_types(entries: &mut [RoomTypeDefinition]) -> Result<Vec<RoomType
     check_names(ROOM_TYPE, &names)?;
     let counts_as: Vec<Option<String>> = entries.iter().map(|entry| entry.counts_as.clone()).collect();
     let s3dis = counts_as_s3dis(ROOM_TYPE, &names, &counts_as, &RoomType::S3DIS.map(RoomType::name))?;
-    let room_type = |(index, (name, s3dis)): (u8, (&String, Option<u8>))| {
-        RoomType::new(index, s3dis.unwrap_or(NOTHING), intern(name))
-    };
-    Ok((0u8..).zip(names.iter().zip(s3dis)).map(room_type).collect())
+    Ok((0u8..)
+        .zip(names.iter().zip(s3dis))
+        .map(|(index, (name, s3dis))| RoomType::new(index, s3dis.unwrap_or(NOTHING), intern(name)))
+        .collect())
 }
 
 fn check_name(what: &'static str, place: usize, name: &str) -> Result<(), TaxonomyError> {

@@ -63,26 +63,30 @@ fn all_that_are_built_in_can_be_made_and_made_again() {
     );
 }
 
+fn meaning(taxonomy: &str, word: &str) -> Option<(u32, &'static str, [u8; 3], &'static str)> {
+    let taxonomy = Taxonomy::built_in(taxonomy).unwrap();
+    let meant = taxonomy.meaning(word).expect(word);
+    meant.map(|c| (taxonomy.id(c), c.name(), taxonomy.color(c), c.s3dis().name()))
+}
+
 #[test]
 fn facts_of_the_data_sets() {
-    let find = |taxonomy: &str, word: &str| {
-        let taxonomy = Taxonomy::built_in(taxonomy).unwrap();
-        let meant = taxonomy.meaning(word).expect(word);
-        meant.map(|c| (taxonomy.id(c), c.name(), taxonomy.color(c), c.s3dis().name()))
-    };
-    assert_eq!(find("nyu40", "refridgerator"), Some((24, "refrigerator", [255, 127, 14], "clutter")));
-    assert_eq!(find("nyu40", "office chair"), Some((5, "chair", [188, 189, 34], "chair")));
-    assert_eq!(find("scannet20", "otherfurniture"), Some((39, "otherFurniture", [82, 84, 163], "clutter")));
-    // The benchmark of ScanNet leaves out this class of NYU.
-    assert_eq!(find("scannet20", "ceiling"), None);
-    assert_eq!(Taxonomy::built_in("scannet20").unwrap().meaning_of_number(22), Some(None));
-    assert_eq!(find("scannet200", "toilet paper dispenser").unwrap().0, 163);
-    assert_eq!(find("scannet200", "mattress").unwrap().0, 1191);
+    assert_eq!(meaning("nyu40", "refridgerator"), Some((24, "refrigerator", [255, 127, 14], "clutter")));
+    assert_eq!(meaning("nyu40", "office chair"), Some((5, "chair", [188, 189, 34], "chair")));
     assert_eq!(
-        find("matterport40", "chest_of_drawers"),
+        meaning("scannet20", "otherfurniture"),
+        Some((39, "otherFurniture", [82, 84, 163], "clutter"))
+    );
+    // The benchmark of ScanNet leaves out this class of NYU.
+    assert_eq!(meaning("scannet20", "ceiling"), None);
+    assert_eq!(Taxonomy::built_in("scannet20").unwrap().meaning_of_number(22), Some(None));
+    assert_eq!(meaning("scannet200", "toilet paper dispenser").unwrap().0, 163);
+    assert_eq!(meaning("scannet200", "mattress").unwrap().0, 1191);
+    assert_eq!(
+        meaning("matterport40", "chest_of_drawers"),
         Some((13, "chestOfDrawers", [0x94, 0x67, 0xbd], "clutter"))
     );
-    assert_eq!(find("matterport40", "shelving").unwrap().3, "bookcase");
+    assert_eq!(meaning("matterport40", "shelving").unwrap().3, "bookcase");
     let matterport = Taxonomy::built_in("matterport40").unwrap();
     assert_eq!((matterport.meaning_of_number(0), matterport.meaning_of_number(42)), (Some(None), None));
     assert_eq!(matterport.room_of_word("b_2").unwrap().to_string(), "bedroom_2");
@@ -168,64 +172,72 @@ fn labels_of_another_taxonomy_make_no_table() {
     }
 }
 
+fn room_type(name: &str) -> RoomTypeDefinition {
+    RoomTypeDefinition { name: name.into(), aliases: vec!["z".into()], counts_as: None }
+}
+
+fn pairs(list: &[(&str, &str)]) -> BTreeMap<String, String> {
+    list.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect()
+}
+
+fn refused_with(change: fn(&mut TaxonomyDefinition)) -> String {
+    let mut definition = of(vec![class("bed"), class("lamp")]);
+    change(&mut definition);
+    refused(definition)
+}
+
 #[test]
 fn every_fault_has_a_clear_word() {
-    let with = |change: fn(&mut TaxonomyDefinition)| {
-        let mut definition = of(vec![class("bed"), class("lamp")]);
-        change(&mut definition);
-        refused(definition)
-    };
-    let pairs = |list: &[(&str, &str)]| -> BTreeMap<String, String> {
-        list.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect()
-    };
-
     for (message, part) in [
-        (with(|t| t.name = "s3dis".into()), "give it another name"),
-        (with(|t| t.name = "my list".into()), "class 0: \"my list\" is no name"),
-        (with(|t| t.classes.clear()), "[[classes]]"),
+        (refused_with(|t| t.name = "s3dis".into()), "give it another name"),
+        (refused_with(|t| t.name = "my list".into()), "class 0: \"my list\" is no name"),
+        (refused_with(|t| t.classes.clear()), "[[classes]]"),
         (
-            with(|t| t.classes = (0..256).map(|i| class(&format!("c{i}"))).collect()),
+            refused_with(|t| t.classes = (0..256).map(|i| class(&format!("c{i}"))).collect()),
             "has 256 of the kind \"class\"",
         ),
-        (with(|t| t.classes[1].name = "shower_curtain".into()), "class 2: \"shower_curtain\" is no name"),
-        (with(|t| t.classes[1].name = "shower curtain".into()), "Write \"showerCurtain\""),
-        (with(|t| t.classes[1].name = "2x".into()), "behind a letter"),
-        (with(|t| t.classes[1].name = "x".repeat(41)), "40 characters at most"),
-        (with(|t| t.classes[1].name = "bed".into()), "class 2: \"bed\" has the name of class 1"),
-        (with(|t| t.classes[1].name = "Bed".into()), "more than upper and lower case"),
-        (with(|t| t.classes[1].aliases = vec!["bed".into()]), "\"bed\" is a word for bed and for lamp"),
-        (with(|t| t.aliases = [("bed".into(), String::new())].into()), "for bed and for none"),
         (
-            with(|t| t.aliases = [("2".into(), "bed".into())].into()),
+            refused_with(|t| t.classes[1].name = "shower_curtain".into()),
+            "class 2: \"shower_curtain\" is no name",
+        ),
+        (refused_with(|t| t.classes[1].name = "shower curtain".into()), "Write \"showerCurtain\""),
+        (refused_with(|t| t.classes[1].name = "2x".into()), "behind a letter"),
+        (refused_with(|t| t.classes[1].name = "x".repeat(41)), "40 characters at most"),
+        (refused_with(|t| t.classes[1].name = "bed".into()), "class 2: \"bed\" has the name of class 1"),
+        (refused_with(|t| t.classes[1].name = "Bed".into()), "more than upper and lower case"),
+        (
+            refused_with(|t| t.classes[1].aliases = vec!["bed".into()]),
+            "\"bed\" is a word for bed and for lamp",
+        ),
+        (refused_with(|t| t.aliases = [("bed".into(), String::new())].into()), "for bed and for none"),
+        (
+            refused_with(|t| t.aliases = [("2".into(), "bed".into())].into()),
             "\"2\" is a word for lamp (its id) and for bed",
         ),
         (
-            with(|t| t.clutter = Some("stuff".into())),
+            refused_with(|t| t.clutter = Some("stuff".into())),
             "clutter means \"stuff\", which is no class: there are bed lamp",
         ),
-        (with(|t| t.classes[0].id = Some(2)), "class \"lamp\" has the id 2 of class \"bed\""),
-        (with(|t| t.classes[0].id = Some(65_536)), "ids go from 0 to 65,535"),
+        (refused_with(|t| t.classes[0].id = Some(2)), "class \"lamp\" has the id 2 of class \"bed\""),
+        (refused_with(|t| t.classes[0].id = Some(65_536)), "ids go from 0 to 65,535"),
         (
-            with(|t| t.classes.iter_mut().for_each(|c| c.color = Some([1, 2, 3]))),
+            refused_with(|t| t.classes.iter_mut().for_each(|c| c.color = Some([1, 2, 3]))),
             "has the colour [1, 2, 3] of class \"bed\"",
         ),
         (
-            with(|t| t.classes[0].counts_as = Some("sofaa".into())),
+            refused_with(|t| t.classes[0].counts_as = Some("sofaa".into())),
             "counts_as of \"bed\" means \"sofaa\", which is no class",
         ),
-        (with(|t| t.classes[0].counts_as = Some("bed".into())), "bed counts as bed; let one"),
+        (refused_with(|t| t.classes[0].counts_as = Some("bed".into())), "bed counts as bed; let one"),
         (
-            with(|t| t.rooms = vec![RoomTypeDefinition { name: "unknown".into(), ..Default::default() }]),
+            refused_with(|t| {
+                t.rooms = vec![RoomTypeDefinition { name: "unknown".into(), ..Default::default() }]
+            }),
             "type of room 1: \"unknown\"",
         ),
         (
-            with(|t| {
-                let room = |name: &str| RoomTypeDefinition {
-                    name: name.into(),
-                    aliases: vec!["z".into()],
-                    counts_as: None,
-                };
-                t.rooms = vec![room("den"), room("nook")];
+            refused_with(|t| {
+                t.rooms = vec![room_type("den"), room_type("nook")];
             }),
             "which type of room is meant",
         ),

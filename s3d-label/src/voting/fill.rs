@@ -85,15 +85,18 @@ type Edge = [[u32; 3]; 2];
 
 /// Returns the edges of a face, whether the face runs from the smaller end to the larger, and the middles.
 fn edges(mesh: &TriMesh, face: u32) -> [(Edge, bool, DVec3); 3] {
-    // Adding 0 turns −0 into 0.
-    let key = |p: Vec3| (p + 0.0).to_array().map(f32::to_bits);
     let [a, b, c] = mesh.triangle(face);
     [[a, b], [b, c], [c, a]].map(|[from, to]| {
-        let start = key(from);
-        let end = key(to);
+        let start = place_key(from);
+        let end = place_key(to);
         let edge = if start < end { [start, end] } else { [end, start] };
         (edge, start < end, (from.as_dvec3() + to.as_dvec3()) / 2.0)
     })
+}
+
+/// Returns the place as bits. Adding 0 turns −0 into 0.
+fn place_key(p: Vec3) -> [u32; 3] {
+    (p + 0.0).to_array().map(f32::to_bits)
 }
 
 /// A way to a face. The shortest way is the smallest.
@@ -108,8 +111,9 @@ impl Eq for Way {}
 
 impl Ord for Way {
     fn cmp(&self, other: &Self) -> Ordering {
-        let others = || (self.label, self.face).cmp(&(other.label, other.face));
-        self.length_m.total_cmp(&other.length_m).then_with(others)
+        self.length_m
+            .total_cmp(&other.length_m)
+            .then_with(|| (self.label, self.face).cmp(&(other.label, other.face)))
     }
 }
 
@@ -179,12 +183,11 @@ fn across_gaps(
 
     // A hierarchy of all labelled faces would be large. Only those near a face that is left are needed.
     let cell_m = within_m.max(0.01);
-    let cell = |p: DVec3| (p / cell_m).floor().as_i64vec3();
-    let cells: HashSet<_> = left.iter().map(|(_, at)| cell(*at)).collect();
+    let cells: HashSet<_> = left.iter().map(|(_, at)| cell_of(*at, cell_m)).collect();
     let is_near = |face: u32| {
         let corners = mesh.triangle(face).map(|c| c.as_dvec3());
-        let min = cell(corners.iter().copied().reduce(DVec3::min).unwrap_or_default() - within_m);
-        let max = cell(corners.iter().copied().reduce(DVec3::max).unwrap_or_default() + within_m);
+        let min = cell_of(corners.iter().copied().reduce(DVec3::min).unwrap_or_default() - within_m, cell_m);
+        let max = cell_of(corners.iter().copied().reduce(DVec3::max).unwrap_or_default() + within_m, cell_m);
         let count = (max - min).as_dvec3() + 1.0;
         count.element_product() > MOST_CELLS.max(cells.len() as f64)
             || (min.x..=max.x)
@@ -204,14 +207,20 @@ fn across_gaps(
     let mut nearest = Vec::new();
     let middles: Vec<Vec3> = left.iter().map(|(_, at)| at.as_vec3()).collect();
     NearestFaces::new(&part).nearest_many(&middles, &mut nearest);
-    let flush = |((face, at), nearest): (&(u32, DVec3), &s3d_geom::Nearest)| {
-        let (other, label) = *labelled.get(nearest.face as usize)?;
-        let up = normal(mesh, other);
-        let is_flush =
-            up.dot(normal(mesh, *face)) >= SMOOTH && up.dot(*at - nearest.point.as_dvec3()).abs() <= FLUSH_M;
-        (f64::from(nearest.distance_m) <= within_m && is_flush).then_some((*face, label))
-    };
-    left.iter().zip(&nearest).filter_map(flush).collect()
+    left.iter()
+        .zip(&nearest)
+        .filter_map(|((face, at), nearest)| {
+            let (other, label) = *labelled.get(nearest.face as usize)?;
+            let up = normal(mesh, other);
+            let is_flush = up.dot(normal(mesh, *face)) >= SMOOTH
+                && up.dot(*at - nearest.point.as_dvec3()).abs() <= FLUSH_M;
+            (f64::from(nearest.distance_m) <= within_m && is_flush).then_some((*face, label))
+        })
+        .collect()
+}
+
+fn cell_of(p: DVec3, cell_m: f64) -> s3d_geom::glam::I64Vec3 {
+    (p / cell_m).floor().as_i64vec3()
 }
 
 #[cfg(test)]
@@ -273,29 +282,36 @@ mod tests {
         }
     }
 
+    fn is_filled_beside(gap_m: f32, step_m: f32, within_m: f64) -> bool {
+        let faces = [strip(1, 0.0, 0.0), strip(1, 0.1 + gap_m, step_m)].concat();
+        filled(&faces, &[5, 5, 0, 0], within_m)[2..] == [5, 5]
+    }
+
     #[test]
     fn gaps_are_crossed_where_pieces_are_flush() {
-        let beside = |gap_m: f32, step_m: f32, within_m: f64| {
-            let faces = [strip(1, 0.0, 0.0), strip(1, 0.1 + gap_m, step_m)].concat();
-            filled(&faces, &[5, 5, 0, 0], within_m)[2..] == [5, 5]
-        };
-        assert!(beside(0.01, 0.004, 0.1) && beside(0.01, -0.004, 0.1));
-        assert!(!beside(0.01, 0.006, 0.1), "a step");
-        assert!(!beside(0.01, 0.0, 0.05), "the farther of the two is 7.7 cm away");
+        assert!(is_filled_beside(0.01, 0.004, 0.1) && is_filled_beside(0.01, -0.004, 0.1));
+        assert!(!is_filled_beside(0.01, 0.006, 0.1), "a step");
+        assert!(!is_filled_beside(0.01, 0.0, 0.05), "the farther of the two is 7.7 cm away");
         // The other side of a thin board is another thing.
         let mut board = [strip(1, 0.0, 0.0), strip(1, 0.0, 0.003)].concat();
         board[2..].iter_mut().for_each(|face| face.swap(0, 1));
         assert_eq!(filled(&board, &[5, 5, 0, 0], 1.0), [5, 5, 0, 0]);
     }
 
+    fn place((x, y, z): (i8, i8, i8)) -> Vec3 {
+        vec3(x.into(), y.into(), f32::from(z) * 0.5)
+    }
+
+    fn any_corner() -> impl Strategy<Value = (i8, i8, i8)> {
+        (0..5i8, 0..5i8, 0..2i8)
+    }
+
     /// Makes triangles on a coarse lattice, each with a label or none.
     fn any_labelled() -> impl Strategy<Value = (TriMesh, Vec<LabelId>)> {
-        let corner = || (0..5i8, 0..5i8, 0..2i8);
-        prop::collection::vec(([corner(), corner(), corner()], 0..6u32), 1..40).prop_filter_map(
+        prop::collection::vec(([any_corner(), any_corner(), any_corner()], 0..6u32), 1..40).prop_filter_map(
             "no area",
             |faces| {
-                let at = |(x, y, z): (i8, i8, i8)| vec3(x.into(), y.into(), f32::from(z) * 0.5);
-                let triangles: Vec<[Vec3; 3]> = faces.iter().map(|(corners, _)| corners.map(at)).collect();
+                let triangles: Vec<[Vec3; 3]> = faces.iter().map(|(corners, _)| corners.map(place)).collect();
                 let parts = (0..faces.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
                 let mesh = TriMesh::from_faces(triangles.concat(), parts).ok()?;
                 let labels = faces.iter().map(|(_, l)| LabelId(l.saturating_sub(3)));
@@ -308,8 +324,10 @@ mod tests {
     /// until none can be shortened.
     fn shortest_ways(mesh: &TriMesh, labels: &[LabelId]) -> Vec<(f64, LabelId)> {
         let count = labels.len() as u32;
-        let start = |l: &LabelId| (if l.is_null() { f64::INFINITY } else { 0.0 }, *l);
-        let mut ways: Vec<(f64, LabelId)> = labels.iter().map(start).collect();
+        let mut ways: Vec<(f64, LabelId)> = labels
+            .iter()
+            .map(|l| (if l.is_null() { f64::INFINITY } else { 0.0 }, *l))
+            .collect();
         let mut pairs = Vec::new();
         for (a, b) in (0..count)
             .flat_map(|a| (0..count).map(move |b| (a, b)))

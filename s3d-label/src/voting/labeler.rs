@@ -258,18 +258,27 @@ mod tests {
     use s3d_geom::nearest_brute_force;
     use std::collections::BTreeMap;
 
+    fn place((x, y, z): (i8, i8, i8)) -> Vec3 {
+        vec3(f32::from(x), f32::from(y), f32::from(z))
+    }
+
+    fn any_corner() -> impl Strategy<Value = (i8, i8, i8)> {
+        (0..4i8, 0..4i8, 0..3i8)
+    }
+
     /// Makes triangles on a coarse lattice, so that they share corners and edges, and points are equally near
     /// to several faces.
     fn any_mesh() -> impl Strategy<Value = TriMesh> {
-        let corner = || (0..4i8, 0..4i8, 0..3i8);
-        prop::collection::vec([corner(), corner(), corner()], 1..25).prop_filter_map("no area", |triangles| {
-            let at = |(x, y, z): (i8, i8, i8)| vec3(f32::from(x), f32::from(y), f32::from(z));
-            let positions: Vec<Vec3> = triangles.into_iter().flatten().map(at).collect();
-            let faces = (0..positions.len() as u32 / 3)
-                .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
-                .collect();
-            TriMesh::from_faces(positions, faces).ok()
-        })
+        prop::collection::vec([any_corner(), any_corner(), any_corner()], 1..25).prop_filter_map(
+            "no area",
+            |triangles| {
+                let positions: Vec<Vec3> = triangles.into_iter().flatten().map(place).collect();
+                let faces = (0..positions.len() as u32 / 3)
+                    .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
+                    .collect();
+                TriMesh::from_faces(positions, faces).ok()
+            },
+        )
     }
 
     /// Makes points, some of them on the lattice, with a label each.
@@ -325,19 +334,25 @@ mod tests {
             .install(work)
     }
 
+    fn mean_m(of_face: &Option<FaceVotes>) -> f32 {
+        of_face.map_or(0.0, |f| f.mean_m)
+    }
+
+    fn rounded(of_face: &Option<FaceVotes>) -> Option<FaceVotes> {
+        of_face.map(|f| FaceVotes { mean_m: 0.0, ..f })
+    }
+
     proptest! {
         #[test]
         fn labels_are_those_of_a_recount(mesh in any_mesh(), points in any_points()) {
             let (positions, labels): (Vec<Vec3>, Vec<LabelId>) = points.iter().copied().unzip();
             let found = vote(&mesh, &positions, &labels).unwrap();
             let expected = recount(&mesh, &points);
-            let rounded = |of_face: &Option<FaceVotes>| of_face.map(|f| FaceVotes { mean_m: 0.0, ..f });
             prop_assert_eq!(
                 votes_of_faces(&found).iter().map(rounded).collect::<Vec<_>>(),
                 expected.iter().map(rounded).collect::<Vec<_>>()
             );
             for (found, expected) in votes_of_faces(&found).iter().zip(&expected) {
-                let mean_m = |of_face: &Option<FaceVotes>| of_face.map_or(0.0, |f| f.mean_m);
                 prop_assert!((mean_m(found) - mean_m(expected)).abs() < 1e-6);
             }
             let of_face = expected.iter().map(|f| f.map_or(LabelId::NULL, |f| f.label));
@@ -394,8 +409,8 @@ mod tests {
             }
             let mut expected = Votes::new(mesh.faces().len());
             for (point, label) in &points {
-                let here = |face: &u32| mesh.triangle(*face).contains(point);
-                let around: Vec<u32> = (0..mesh.faces().len() as u32).filter(here).collect();
+                let faces = 0..mesh.faces().len() as u32;
+                let around: Vec<u32> = faces.filter(|face| mesh.triangle(*face).contains(point)).collect();
                 around.iter().for_each(|face| expected.add(*face, *label, 0.0));
                 if around.is_empty() {
                     let nearest = nearest_brute_force(&mesh, *point);

@@ -245,6 +245,18 @@ mod tests {
         assert_eq!(refused.to_string(), "label 5 of a table of 5");
     }
 
+    fn columns(r: &VoteRow) -> [u64; 7] {
+        [
+            r.points,
+            r.far_points,
+            r.faces,
+            r.face_votes,
+            r.contested,
+            r.contested_below_three_quarters,
+            r.contested_below_half,
+        ]
+    }
+
     proptest! {
         #[test]
         fn rooms_and_classes_sum_to_the_total(
@@ -255,10 +267,6 @@ mod tests {
                 votes.add(face, LabelId(label), distance_m);
             }
             let report = VoteReport::new(&votes, &table()).unwrap();
-            let columns = |r: &VoteRow| {
-                [r.points, r.far_points, r.faces, r.face_votes, r.contested,
-                 r.contested_below_three_quarters, r.contested_below_half]
-            };
             let sum = |rows: Vec<VoteRow>| {
                 rows.iter().map(columns).fold([0; 7], |a, b| std::array::from_fn(|i| a[i] + b[i]))
             };

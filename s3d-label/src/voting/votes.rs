@@ -278,7 +278,6 @@ impl Votes {
     /// # Panics
     /// If there is no face `face`.
     pub fn of_face(&self, face: u32) -> Option<FaceVotes> {
-        let is_before = |a: (u64, LabelId), b: (u64, LabelId)| a.0 > b.0 || (a.0 == b.0 && a.1 < b.1);
         let mut first = (0, LabelId::NULL);
         let mut second = (0, LabelId::NULL);
         let mut total = 0;
@@ -320,6 +319,10 @@ impl Votes {
     }
 }
 
+fn is_before(a: (u64, LabelId), b: (u64, LabelId)) -> bool {
+    a.0 > b.0 || (a.0 == b.0 && a.1 < b.1)
+}
+
 #[cfg(feature = "serde")]
 mod as_data {
     use serde::{Deserialize, Deserializer, de::Error};
@@ -341,20 +344,24 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
+    fn most_frequent(labels: &BTreeMap<u32, u64>) -> Option<u32> {
+        let most = labels.values().copied().max()?;
+        labels
+            .iter()
+            .find(|(_, count)| **count == most)
+            .map(|(label, _)| *label)
+    }
+
     /// The plain reference: a map of all votes for each face.
     fn reference(face_count: usize, points: &[(u32, u32)]) -> Vec<LabelId> {
         let mut counts: Vec<BTreeMap<u32, u64>> = vec![BTreeMap::new(); face_count];
         for &(face, label) in points.iter().filter(|(_, label)| *label != 0) {
             *counts[face as usize].entry(label).or_default() += 1;
         }
-        let most = |labels: &BTreeMap<u32, u64>| {
-            let most = labels.values().copied().max()?;
-            labels
-                .iter()
-                .find(|(_, count)| **count == most)
-                .map(|(label, _)| *label)
-        };
-        counts.iter().map(|labels| LabelId(most(labels).unwrap_or(0))).collect()
+        counts
+            .iter()
+            .map(|labels| LabelId(most_frequent(labels).unwrap_or(0)))
+            .collect()
     }
 
     fn votes(face_count: usize, points: &[(u32, u32)]) -> Votes {

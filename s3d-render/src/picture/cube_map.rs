@@ -128,8 +128,10 @@ impl Seen {
         let mut whole = Vec::with_capacity((blocks * blocks) as usize);
         for rows in (0..blocks).map(around) {
             for columns in (0..blocks).map(around) {
-                let is_shown = |y| mask.row(y as u32)[columns.clone()].iter().all(|&seen| seen == 255);
-                whole.push(rows.clone().all(is_shown));
+                whole.push(
+                    rows.clone()
+                        .all(|y| mask.row(y as u32)[columns.clone()].iter().all(|&seen| seen == 255)),
+                );
             }
         }
         let whole = Raster::from_vec(blocks, blocks, whole);
@@ -244,8 +246,7 @@ impl CubeMap {
     /// direction in the cube's frame.
     pub(crate) fn directions(size: u32) -> impl Iterator<Item = (usize, u32, u32, DVec3)> {
         let width = stored_width(size);
-        let at = move |face: usize, k: u32| (face, k % width, k / width);
-        let all = (0..6).flat_map(move |face| (0..width * width).map(move |k| at(face, k)));
+        let all = (0..6).flat_map(move |face| (0..width * width).map(move |k| (face, k % width, k / width)));
         all.map(move |(face, x, y)| (face, x, y, direction_of(face, size, x, y)))
     }
 
@@ -341,19 +342,22 @@ impl CubeMap {
     pub(crate) fn seen_at(&self, face: usize, x: f32, y: f32) -> u8 {
         let Some(Seen { mask, whole }) = &self.seen[face] else { return 255 };
         // A place in or beside a block without holes.
-        let block = |place: f32| (place as u32 / BLOCK).min(whole.width() - 1);
-        if whole.at(block(x), block(y)) {
+        if whole.at(block_of(x, whole.width()), block_of(y, whole.width())) {
             return 255;
         }
 
         let last = mask.width() as i32 - 1;
         // `x` and `y` are at least −½, or NaN, which a cast brings to 0.
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (xf, yf) = (x.floor(), y.floor());
-        let (px, py) = (((x - xf) * 256.0) as u32, ((y - yf) * 256.0) as u32);
-        let column = |i: i32| i.clamp(0, last) as u32;
-        let (x0, x1) = (column(xf as i32), column((xf as i32).saturating_add(1)));
-        let (y0, y1) = (column(yf as i32), column((yf as i32).saturating_add(1)));
+        let x = x - 0.5;
+        let y = y - 0.5;
+        let xf = x.floor();
+        let yf = y.floor();
+        let px = ((x - xf) * 256.0) as u32;
+        let py = ((y - yf) * 256.0) as u32;
+        let x0 = column_of(xf as i32, last);
+        let x1 = column_of((xf as i32).saturating_add(1), last);
+        let y0 = column_of(yf as i32, last);
+        let y1 = column_of((yf as i32).saturating_add(1), last);
         let at = |x, y| u32::from(mask.at(x, y));
         let upper = at(x0, y0) * (256 - px) + at(x1, y0) * px;
         let lower = at(x0, y1) * (256 - px) + at(x1, y1) * px;
@@ -389,6 +393,15 @@ impl CubeMap {
         let color = mip_map.sample(uv, slope(x) * per_pixel, slope(y) * per_pixel, filter);
         (color, self.seen_at(face, pixel.x as f32, pixel.y as f32))
     }
+}
+
+/// Returns the row or column of the block at a place.
+fn block_of(place: f32, blocks: u32) -> u32 {
+    (place as u32 / BLOCK).min(blocks - 1)
+}
+
+fn column_of(i: i32, last: i32) -> u32 {
+    i.clamp(0, last) as u32
 }
 
 /// Returns the position of the centre of column or row `i` of a face with its border on the face's plane:
@@ -473,29 +486,35 @@ pub(crate) mod tests {
         }
     }
 
+    fn seen_value(x: f64, y: f64) -> f64 {
+        let [x, y] = [x, y].map(|v| v.clamp(0.0, 101.0) as u32);
+        if is_hole(x, y) { 0.0 } else { 255.0 }
+    }
+
+    fn plain_seen(x: f64, y: f64) -> f64 {
+        let x = x - 0.5;
+        let y = y - 0.5;
+        let fx = x - x.floor();
+        let fy = y - y.floor();
+        let row = |y| seen_value(x.floor(), y) * (1.0 - fx) + seen_value(x.floor() + 1.0, y) * fx;
+        row(y.floor()) * (1.0 - fy) + row(y.floor() + 1.0) * fy
+    }
+
+    /// There are few holes, one of them at a corner.
+    fn is_hole(x: u32, y: u32) -> bool {
+        (x / 3, y / 5) == (30, 7) || (x, y) == (0, 0) || (x, y) == (48, 63)
+    }
+
     #[test]
     fn whole_blocks_change_nothing_that_is_seen() {
-        // There are few holes, one of them at a corner.
-        let hole = |x: u32, y: u32| (x / 3, y / 5) == (30, 7) || (x, y) == (0, 0) || (x, y) == (48, 63);
-        let cube = CubeMap::build(pose(), 96, |face, x, y, _| (face != 2 || !hole(x, y)).then_some([9.0; 3]));
-        let plain = |x: f64, y: f64| {
-            let at = |x: f64, y: f64| {
-                let [x, y] = [x, y].map(|v| v.clamp(0.0, 101.0) as u32);
-                if hole(x, y) { 0.0 } else { 255.0 }
-            };
-            let x = x - 0.5;
-            let y = y - 0.5;
-            let fx = x - x.floor();
-            let fy = y - y.floor();
-            let row = |y| at(x.floor(), y) * (1.0 - fx) + at(x.floor() + 1.0, y) * fx;
-            row(y.floor()) * (1.0 - fy) + row(y.floor() + 1.0) * fy
-        };
+        let cube =
+            CubeMap::build(pose(), 96, |face, x, y, _| (face != 2 || !is_hole(x, y)).then_some([9.0; 3]));
         let mut part = 0;
         for k in 0..400 * 400 {
             let x = f64::from(k % 400) * 0.255;
             let y = f64::from(k / 400) * 0.255;
             let seen = cube.seen_at(2, x as f32, y as f32);
-            let expected = plain(x, y);
+            let expected = plain_seen(x, y);
             assert!((f64::from(seen) - expected).abs() <= 3.0, "({x}, {y}): {seen}, {expected}");
             part += u32::from(seen < 255);
             assert_eq!(cube.seen_at(1, x as f32, y as f32), 255);

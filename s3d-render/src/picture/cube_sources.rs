@@ -102,28 +102,32 @@ impl CubeMap {
 /// edges of the side pictures.
 fn agreeing_turn(pictures: &[&Raster<[u8; 3]>; 6], face: usize) -> u32 {
     let n = pictures[0].width();
-    let cost = |quarters: u32| -> u64 {
-        let quarters = if face == 0 { quarters } else { (4 - quarters) % 4 };
-        let cap = |x, y| turned_at(pictures[face], quarters, x, y);
-        (0..n)
-            .map(|i| {
-                let last = n - 1;
-                // The edge that meets the front picture from left to right, then the edges that meet the
-                // right, back and left pictures, each in its picture's order.
-                let (edge, row) = if face == 0 {
-                    ([cap(i, last), cap(last, last - i), cap(last - i, 0), cap(0, i)], 0)
-                } else {
-                    ([cap(i, 0), cap(last, i), cap(last - i, last), cap(0, last - i)], last)
-                };
-                let sides = [4, 1, 2, 3].map(|side| pictures[side].at(i, row));
-                edge.into_iter()
-                    .zip(sides)
-                    .map(|(a, b)| color_distance(a, b))
-                    .sum::<u64>()
-            })
-            .sum()
-    };
-    (0..4).min_by_key(|&quarters| cost(quarters)).unwrap_or(0)
+    (0..4)
+        .min_by_key(|&quarters| turn_cost(quarters, pictures, face, n))
+        .unwrap_or(0)
+}
+
+/// Returns how much the edges of a cap that is turned differ from the sides.
+fn turn_cost(quarters: u32, pictures: &[&Raster<[u8; 3]>; 6], face: usize, n: u32) -> u64 {
+    let quarters = if face == 0 { quarters } else { (4 - quarters) % 4 };
+    let cap = |x, y| turned_at(pictures[face], quarters, x, y);
+    (0..n)
+        .map(|i| {
+            let last = n - 1;
+            // The edge that meets the front picture from left to right, then the edges that meet the
+            // right, back and left pictures, each in its picture's order.
+            let (edge, row) = if face == 0 {
+                ([cap(i, last), cap(last, last - i), cap(last - i, 0), cap(0, i)], 0)
+            } else {
+                ([cap(i, 0), cap(last, i), cap(last - i, last), cap(0, last - i)], last)
+            };
+            let sides = [4, 1, 2, 3].map(|side| pictures[side].at(i, row));
+            edge.into_iter()
+                .zip(sides)
+                .map(|(a, b)| color_distance(a, b))
+                .sum::<u64>()
+        })
+        .sum()
 }
 
 /// Returns the sum of the differences of two colours.
@@ -192,8 +196,9 @@ mod tests {
 
     fn taken(camera: &Camera) -> Raster<[u8; 3]> {
         let rays = camera.rays();
-        let pixel = |k: u32| color_of(rays.at(k % camera.width, k / camera.width)).map(|c| (c + 0.5) as u8);
-        Raster::from_vec(camera.width, camera.height, (0..camera.width * camera.height).map(pixel).collect())
+        let pixels = (0..camera.width * camera.height)
+            .map(|k| color_of(rays.at(k % camera.width, k / camera.width)).map(|c| (c + 0.5) as u8));
+        Raster::from_vec(camera.width, camera.height, pixels.collect())
     }
 
     /// Returns a sky box whose upper and lower pictures are turned to the right by `quarters`.

@@ -122,13 +122,16 @@ mod tests {
         assert!(row[4] < 45 && row[11] > 75, "{row:?}");
     }
 
+    fn is_seen(k: u32, seed: u64) -> bool {
+        seed.rotate_left(k * 7) & 3 == 0
+    }
+
     proptest! {
         #[test]
         fn what_is_seen_stays_and_what_is_not_is_between(w in 1u32..20, h in 1u32..20, seed in any::<u64>()) {
-            let bit = |k: u32| seed.rotate_left(k * 7) & 3 == 0;
-            let seen = Raster::from_vec(w, h, (0..w * h).map(|k| u8::from(bit(k))).collect());
-            let color = |k: u32| [if bit(k) { 100 + (k % 50) as u8 } else { 0 }; 3];
-            let before = Raster::from_vec(w, h, (0..w * h).map(color).collect());
+            let seen = Raster::from_vec(w, h, (0..w * h).map(|k| u8::from(is_seen(k, seed))).collect());
+            let colors = (0..w * h).map(|k| [if is_seen(k, seed) { 100 + (k % 50) as u8 } else { 0 }; 3]);
+            let before = Raster::from_vec(w, h, colors.collect());
             let mut after = before.clone();
             fill_unseen(&mut after, &seen);
             for ((a, b), s) in after.pixels().iter().zip(before.pixels()).zip(seen.pixels()) {

@@ -6,5 +6,4 @@ pub(crate) mod equirectangular;
 pub(crate) mod fill;
 pub(crate) mod picture_color;
 pub(crate) mod stitch;
-pub(crate) mod stitch_lanes;
 pub(crate) mod undistort;

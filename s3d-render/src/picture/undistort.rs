@@ -21,7 +21,8 @@ const LITTLE_MORE: f64 = 0.2;
 /// use s3d_render::undistort;
 ///
 /// // k₁ > 0 pushes the corners outwards: the pinhole's corners lie outside the photograph.
-/// let (f, c) = (dvec2(30.0, 30.0), dvec2(32.0, 24.0));
+/// let f = dvec2(30.0, 30.0);
+/// let c = dvec2(32.0, 24.0);
 /// let lens = PhotoLens::Straight(Lens::new([64, 48], f, c, [0.2, 0.0, 0.0, 0.0, 0.0]).unwrap());
 /// let camera = Camera::pinhole(Pose::level(DVec3::ZERO, 0.0), f, c, 64, 48)?;
 /// let image = undistort(&Raster::filled(64, 48, [9, 8, 0]), &lens, &camera);
@@ -48,8 +49,7 @@ pub fn undistort(photo: &Raster<[u8; 3]>, lens: &PhotoLens, camera: &Camera) -> 
     let places_of = |y: u32, places: &mut Vec<Option<DVec2>>| {
         places.clear();
         let down = (f64::from(y) + 0.5 - c.y) / f.y;
-        let place = |x: u32| lens.project(dvec3((f64::from(x) + 0.5 - c.x) / f.x, down, 1.0));
-        places.extend((0..=width).map(place));
+        places.extend((0..=width).map(|x| lens.project(dvec3((f64::from(x) + 0.5 - c.x) / f.x, down, 1.0))));
     };
 
     let size = DVec2::new(f64::from(photo.width()), f64::from(photo.height()));
@@ -131,16 +131,19 @@ mod tests {
         Camera::pinhole(Pose::level(DVec3::ZERO, 0.7), f, c, width, height).unwrap()
     }
 
+    fn wave(v: f64) -> u8 {
+        (128.0 + 100.0 * (v / 9.0).sin()).round() as u8
+    }
+
     /// Two waves that are too long to be blurred: their phases tell where a pixel comes from.
     fn pattern(place: DVec2) -> [u8; 3] {
-        let wave = |v: f64| (128.0 + 100.0 * (v / 9.0).sin()).round() as u8;
         [wave(place.x), wave(place.y), wave(place.x + place.y)]
     }
 
     fn photo(size: [u32; 2], of: impl Fn(DVec2) -> [u8; 3]) -> Raster<[u8; 3]> {
         let [w, h] = size;
-        let at = |i: u32| of(dvec2(f64::from(i % w) + 0.5, f64::from(i / w) + 0.5));
-        Raster::from_vec(w, h, (0..w * h).map(at).collect())
+        let pixels = (0..w * h).map(|i| of(dvec2(f64::from(i % w) + 0.5, f64::from(i / w) + 0.5)));
+        Raster::from_vec(w, h, pixels.collect())
     }
 
     #[test]

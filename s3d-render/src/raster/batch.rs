@@ -64,7 +64,8 @@ impl FacesByKind {
     pub(crate) fn sort(&mut self, kinds: &[u32]) {
         self.counts = [0; KINDS];
         for (i, &kind) in kinds.iter().enumerate() {
-            let (list, count) = (&mut self.lists[kind as usize], &mut self.counts[kind as usize]);
+            let list = &mut self.lists[kind as usize];
+            let count = &mut self.counts[kind as usize];
             list[*count % MAX_FACES] = i as u8;
             *count += 1;
         }
@@ -180,7 +181,10 @@ impl FaceBatch {
             let x = [xs[0][i], xs[1][i], xs[2][i]];
             let y = [ys[0][i], ys[1][i], ys[2][i]];
             let q = [qs[0][i], qs[1][i], qs[2][i]];
-            let (left, right, top, bottom) = (lefts[i], rights[i], tops[i], bottoms[i]);
+            let left = lefts[i];
+            let right = rights[i];
+            let top = tops[i];
+            let bottom = bottoms[i];
 
             // Edge k is opposite to corner k: it runs from corner k + 1 to corner k + 2.
             let across = [y[1] - y[2], y[2] - y[0], y[0] - y[1]];
@@ -300,7 +304,8 @@ impl FaceBatch {
             bend: 0.0,
             down: self.down[k][i] as f32,
         };
-        let (column, row) = (self.left[i] as usize, self.top[i] as usize);
+        let column = self.left[i] as usize;
+        let row = self.top[i] as usize;
         let chunk = Chunk {
             column,
             row,
@@ -317,7 +322,8 @@ impl FaceBatch {
     /// Returns the second chunk of a face that has two, and the number of the face's columns in it.
     #[inline(always)]
     pub(crate) fn second_chunk(&self, i: usize, first: &Chunk) -> (Chunk, usize) {
-        let (left, top) = (f64::from(self.left[i]) + LANES as f64, f64::from(self.top[i]));
+        let left = f64::from(self.left[i]) + LANES as f64;
+        let top = f64::from(self.top[i]);
         let at = |k: usize| (self.at[k][i] + self.across[k][i] * left + self.down[k][i] * top) as f32;
         let mut chunk = *first;
         chunk.column += LANES;
@@ -376,13 +382,14 @@ mod tests {
     const WIDTH: f64 = 90.0;
     const HEIGHT: f64 = 70.0;
 
+    fn place_near(size: f64) -> impl Strategy<Value = f64> {
+        prop_oneof![-0.2 * size..1.2 * size, (0.0..1.0f64).prop_map(move |s| (s * size).round())]
+    }
+
     /// Returns a corner in or near the window with its 1/z, or a corner that the view cannot show.
     fn corner() -> impl Strategy<Value = [f64; 3]> {
-        let at = |size: f64| {
-            prop_oneof![-0.2 * size..1.2 * size, (0.0..1.0f64).prop_map(move |s| (s * size).round())]
-        };
         prop_oneof![
-            12 => (at(WIDTH), at(HEIGHT), 0.1..10.0f64).prop_map(|(x, y, q)| [x, y, q]),
+            12 => (place_near(WIDTH), place_near(HEIGHT), 0.1..10.0f64).prop_map(|(x, y, q)| [x, y, q]),
             1 => Just([f64::NAN, f64::INFINITY, 0.0]),
         ]
     }
@@ -394,6 +401,10 @@ mod tests {
                 c.map(|p| [c[0][0] + (p[0] - c[0][0]) * spread, c[0][1] + (p[1] - c[0][1]) * spread, p[2]])
             },
         )
+    }
+
+    fn doubled_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     }
 
     proptest! {
@@ -427,11 +438,8 @@ mod tests {
                     continue;
                 }
 
-                let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
-                    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-                };
                 let [p, q, r] = c.map(|p| [p[0], p[1]]);
-                let whole = area(p, q, r);
+                let whole = doubled_area(p, q, r);
                 let bounds = batch.bounds(i);
                 let columns = bounds.left..=bounds.right;
                 let rows = bounds.top..=bounds.bottom;
@@ -444,7 +452,8 @@ mod tests {
 
                 for (x, y) in (0..WIDTH as usize).flat_map(|x| (0..HEIGHT as usize).map(move |y| (x, y))) {
                     let at = [x as f64, y as f64];
-                    let weights = [area(at, q, r), area(p, at, r), area(p, q, at)].map(|w| w / whole);
+                    let weights = [[at, q, r], [p, at, r], [p, q, at]]
+                        .map(|[a, b, c]| doubled_area(a, b, c) / whole);
                     if !(weights.iter().all(|&w| w > 1e-6) && whole.abs() > 1e-3) {
                         continue;
                     }

@@ -65,7 +65,8 @@ pub(crate) fn part_of_tile(tile_row: usize, top: usize, bottom: usize) -> (usize
 /// and `right`.
 #[inline(always)]
 pub(crate) fn half_of_tile(tile_column: usize, left: usize, right: usize) -> (usize, bool) {
-    let (first, middle) = (tile_column * TILE, tile_column * TILE + TILE / 2);
+    let first = tile_column * TILE;
+    let middle = tile_column * TILE + TILE / 2;
     if left >= middle {
         (middle, true)
     } else {
@@ -102,8 +103,10 @@ impl Cover {
         (width, height): (usize, usize),
         inverse_t: f32,
     ) -> Option<Self> {
-        let (left, right) = (left.ceil().max(0.0), right.floor().min((width - 1) as f32));
-        let (top, bottom) = (top.ceil().max(0.0), bottom.floor().min((height - 1) as f32));
+        let left = left.ceil().max(0.0);
+        let right = right.floor().min((width - 1) as f32);
+        let top = top.ceil().max(0.0);
+        let bottom = bottom.floor().min((height - 1) as f32);
         (left <= right && top <= bottom).then_some(Self {
             columns: (left as u16, right as u16),
             rows: (top as u16, bottom as u16),
@@ -186,7 +189,8 @@ impl Canvas {
                 }
 
                 // Some pixel of the tile sees farther; it counts only if it is in the cover.
-                let (x, y) = (column * TILE, row * TILE);
+                let x = column * TILE;
+                let y = row * TILE;
                 let lanes = left.saturating_sub(x)..=(right - x).min(TILE - 1);
                 for row in y.max(top)..=(y + TILE - 1).min(bottom) {
                     let at = row * self.pitch + x;
@@ -214,7 +218,8 @@ impl Canvas {
     #[inline(always)]
     fn look_again(&mut self, tile: usize) -> f32 {
         self.stale[tile] = false;
-        let (x, y) = (tile % self.tile_columns * TILE, tile / self.tile_columns * TILE);
+        let x = tile % self.tile_columns * TILE;
+        let y = tile / self.tile_columns * TILE;
         let mut lanes = [f32::INFINITY; LANES];
         for row in y..y + TILE {
             let at = row * self.pitch + x;
@@ -231,10 +236,9 @@ impl Canvas {
     /// Notes that the tiles of the cover were drawn on.
     #[inline(always)]
     pub(crate) fn touch(&mut self, cover: &Cover) {
-        let tile = |pixel: u16| usize::from(pixel) / TILE;
-        for row in tile(cover.rows.0)..=tile(cover.rows.1) {
+        for row in tile_of(cover.rows.0)..=tile_of(cover.rows.1) {
             let first = row * self.tile_columns;
-            self.stale[first + tile(cover.columns.0)..=first + tile(cover.columns.1)].fill(true);
+            self.stale[first + tile_of(cover.columns.0)..=first + tile_of(cover.columns.1)].fill(true);
         }
     }
 
@@ -319,7 +323,8 @@ impl Canvas {
     ) {
         let mut doubts = std::mem::take(&mut self.doubts);
         doubts.sort_unstable_by_key(|d| (d.pixel, d.slot));
-        let (mut slots, mut candidates) = (Vec::new(), Vec::new());
+        let mut slots = Vec::new();
+        let mut candidates = Vec::new();
 
         for group in doubts.chunk_by(|a, b| a.pixel == b.pixel) {
             let pixel = group[0].pixel as usize;
@@ -402,25 +407,33 @@ impl Canvas {
 
         // Exact depths where a function is too poor.
         for &pixel in &self.poor {
-            let (column, row) = (pixel as usize % self.pitch, pixel as usize / self.pitch);
+            let column = pixel as usize % self.pitch;
+            let row = pixel as usize / self.pitch;
             let at = row * out_pitch + column;
             out.1[at] = single(out.0[at], column, row) as f32;
         }
     }
 }
 
+fn tile_of(pixel: u16) -> usize {
+    usize::from(pixel) / TILE
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn pixels_of(columns: (f32, f32), rows: (f32, f32)) -> Option<((u16, u16), (u16, u16))> {
+        Cover::new(columns, rows, (10, 6), 1.0).map(|c| (c.columns, c.rows))
+    }
+
     #[test]
     fn a_cover_holds_the_centres_of_pixels_between_its_bounds() {
-        let pixels = |columns, rows| Cover::new(columns, rows, (10, 6), 1.0).map(|c| (c.columns, c.rows));
-        assert_eq!(pixels((0.2, 3.9), (1.0, 2.0)), Some(((1, 3), (1, 2))));
-        assert_eq!(pixels((-7.5, 99.0), (-0.3, f32::INFINITY)), Some(((0, 9), (0, 5))));
+        assert_eq!(pixels_of((0.2, 3.9), (1.0, 2.0)), Some(((1, 3), (1, 2))));
+        assert_eq!(pixels_of((-7.5, 99.0), (-0.3, f32::INFINITY)), Some(((0, 9), (0, 5))));
         for between in [(0.2, 0.8), (-3.0, -0.1), (9.1, 20.0)] {
-            assert_eq!(pixels(between, (0.0, 5.0)), None);
-            assert_eq!(pixels((0.0, 9.0), (between.0 - 4.0, between.1 - 4.0)), None);
+            assert_eq!(pixels_of(between, (0.0, 5.0)), None);
+            assert_eq!(pixels_of((0.0, 9.0), (between.0 - 4.0, between.1 - 4.0)), None);
         }
     }
 }

@@ -61,9 +61,13 @@ impl<'a> Panorama<'a> {
             let (mut xs, mut ys, mut zs) = ([0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
             let (mut azimuths, mut latitudes) = ([0.0; PACKET], [0.0; PACKET]);
             for i in 0..PACKET {
-                let (x, y, z) = (f64::from(x[i]) - o.x, f64::from(y[i]) - o.y, f64::from(z[i]) - o.z);
+                let x = f64::from(x[i]) - o.x;
+                let y = f64::from(y[i]) - o.y;
+                let z = f64::from(z[i]) - o.z;
                 (xs[i], ys[i], zs[i]) = (x, y, z);
-                let (x, y, z) = (x as f32, y as f32, z as f32);
+                let x = x as f32;
+                let y = y as f32;
+                let z = z as f32;
                 // Turned so that the window's middle is straight ahead, and azimuths grow to the right.
                 azimuths[i] = angle_of(x * sin - y * cos, x * cos + y * sin);
                 latitudes[i] = angle_of(z, (x * x + y * y).sqrt());
@@ -99,11 +103,8 @@ impl<'a> Panorama<'a> {
             ((0.0, (grid.width - 1) as f32), 0.0)
         };
 
-        // Arcs bend towards the poles. Along an arc, the latitude's tangent is a cosine of the azimuth. Its
-        // greatest value is at most half of the width away from the nearer end.
-        let towards_pole = |latitude: f64| libm::atan2(libm::sin(latitude), libm::cos(latitude) * bend);
-        let north = if north > 0.0 { towards_pole(north) } else { north };
-        let south = if south < 0.0 { towards_pole(south) } else { south };
+        let north = if north > 0.0 { towards_pole(north, bend) } else { north };
+        let south = if south < 0.0 { towards_pole(south, bend) } else { south };
 
         let rows = grid.rows_between(south as f32 - ANGLE_ERROR, north as f32 + ANGLE_ERROR);
         let top = (rows.0 - 1.0).max(0.0);
@@ -152,6 +153,13 @@ impl<'a> Panorama<'a> {
     }
 }
 
+/// Returns the latitude nearest to the pole of an arc that ends at `latitude`. Arcs bend towards the poles:
+/// along an arc, the latitude's tangent is a cosine of the azimuth. Its greatest value is at most half of the
+/// width away from the nearer end, and `bend` is the cosine of this half.
+fn towards_pole(latitude: f64, bend: f64) -> f64 {
+    libm::atan2(libm::sin(latitude), libm::cos(latitude) * bend)
+}
+
 /// A face on all tiles that it may cover.
 struct PanoramaTiles<'a> {
     grid: &'a PanoramaGrid,
@@ -181,7 +189,8 @@ impl PanoramaTiles<'_> {
             let mut row = first;
             while row < first + count {
                 let rows = grid.steady_rows(row, first + count - row);
-                let (reach, lines) = (grid.reach(row, rows), grid.chunk_grid(row, rows, &mut tangents));
+                let reach = grid.reach(row, rows);
+                let lines = grid.chunk_grid(row, rows, &mut tangents);
                 for tile_column in bounds.left / TILE..=bounds.right / TILE {
                     let (column, narrow) = half_of_tile(tile_column, bounds.left, bounds.right);
                     let mut chunk = grid.chunk(planes, (column, row), &reach, slot);
@@ -233,7 +242,8 @@ impl ProjectionRaster for Panorama<'_> {
         let hi = (Vec3::from(node.max).as_dvec3() - self.origin).as_vec3();
         // A bound on the rounding error.
         let off = 1e-6 * lo.abs().max(hi.abs()) + 1e-30;
-        let (lo, hi) = (lo - off, hi + off);
+        let lo = lo - off;
+        let hi = hi + off;
 
         let near = lo.max(-hi).max(Vec3::ZERO);
         let far = lo.abs().max(hi.abs());
@@ -244,10 +254,13 @@ impl ProjectionRaster for Panorama<'_> {
         // All angles are computed at once: both latitudes, the azimuth of the middle, and the azimuths of the
         // corners relative to it, which are less than half a turn apart.
         let (sin, cos) = self.grid.middle_sin_cos;
-        let (x, y) = (0.5 * (lo.x + hi.x), 0.5 * (lo.y + hi.y));
+        let x = 0.5 * (lo.x + hi.x);
+        let y = 0.5 * (lo.y + hi.y);
         let from_middle = |cx: f32, cy: f32| (cx * y - cy * x, cx * x + cy * y);
-        let (a, b) = (from_middle(lo.x, lo.y), from_middle(hi.x, lo.y));
-        let (c, d) = (from_middle(lo.x, hi.y), from_middle(hi.x, hi.y));
+        let a = from_middle(lo.x, lo.y);
+        let b = from_middle(hi.x, lo.y);
+        let c = from_middle(lo.x, hi.y);
+        let d = from_middle(hi.x, hi.y);
         let (low_flat, high_flat) =
             (if lo.z < 0.0 { flat } else { flat_far }, if hi.z > 0.0 { flat } else { flat_far });
         let ys = [lo.z, hi.z, x * sin - y * cos, a.0, b.0, c.0, d.0, 0.0];
@@ -256,13 +269,15 @@ impl ProjectionRaster for Panorama<'_> {
 
         let (top, bottom) = self.grid.rows_between(low - ANGLE_ERROR, high + ANGLE_ERROR);
         let rows = (top - 0.01, bottom + 0.01);
-        let (mut left, mut right) = (0.0, self.grid.width as f32 - 1.0);
+        let mut left = 0.0;
+        let mut right = self.grid.width as f32 - 1.0;
         if flat > 0.0 {
             let mut range = (0.0f32, 0.0f32);
             for azimuth in corners {
                 range = (min(range.0, azimuth), max(range.1, azimuth));
             }
-            let (middle_column, per_rad) = (self.grid.middle_column as f32, 1.0 / self.grid.step as f32);
+            let middle_column = self.grid.middle_column as f32;
+            let per_rad = 1.0 / self.grid.step as f32;
             let pad = 0.01 + 2.0 * ANGLE_ERROR * per_rad;
             let around = TAU as f32 * per_rad;
             let mut first = middle_column + (middle + range.0) * per_rad - pad;
@@ -287,7 +302,8 @@ impl ProjectionRaster for Panorama<'_> {
     #[inline(always)]
     fn draw<L: RasterLanes>(&mut self, l: L, canvas: &mut Canvas, cluster: &Cluster<'_>) {
         self.project(cluster.corners);
-        let (batch, grid) = (&mut *self.batch, &self.grid);
+        let batch = &mut *self.batch;
+        let grid = &self.grid;
         batch.set_up(cluster.faces, &self.projected, grid);
         let batch = &*self.batch;
         let enter = |canvas: &mut Canvas, j: usize| {
@@ -297,7 +313,8 @@ impl ProjectionRaster for Panorama<'_> {
 
         for j in batch.faces(DrawKind::Large) {
             let slot = enter(canvas, j);
-            let (planes, bounds) = (&batch.planes(j), &batch.bounds(j));
+            let planes = &batch.planes(j);
+            let bounds = &batch.bounds(j);
             PanoramaTiles { grid, canvas, planes, bounds, slot, poor: false }.draw(l);
         }
 
@@ -316,7 +333,8 @@ impl ProjectionRaster for Panorama<'_> {
             let (first, rows) = batch.chunk(j, enter(canvas, j));
             let lines = grid.chunk_grid(first.row, rows, &mut tangents);
             canvas.draw::<L, true, false>(l, &lines, &first);
-            let (reach, column) = (grid.reach(first.row, rows), first.column + LANES);
+            let reach = grid.reach(first.row, rows);
+            let column = first.column + LANES;
             let mut chunk = grid.chunk(&batch.planes(j), (column, first.row), &reach, first.slot);
             let (low, error) = reach.trust(&chunk.inverse_t);
             (chunk.inverse_t_error, chunk.trusted) = (error, error / TRUSTED);
@@ -329,7 +347,8 @@ impl ProjectionRaster for Panorama<'_> {
             canvas.draw::<L, true, true>(l, &lines, &chunk);
         }
         for j in batch.faces(DrawKind::InSpace) {
-            let (face, bounds) = (cluster.ids[batch.place_in_cluster(j)], batch.bounds(j));
+            let face = cluster.ids[batch.place_in_cluster(j)];
+            let bounds = batch.bounds(j);
             match batch.wide_azimuths(j) {
                 Some(azimuths) => self.draw_wide(canvas, face, azimuths),
                 None => self.draw_in_space(canvas, face, bounds),
@@ -346,8 +365,14 @@ impl ProjectionRaster for Panorama<'_> {
         out_pitch: usize,
         single: impl Fn(u32, usize, usize) -> f64,
     ) {
-        let line = |row: usize| (self.grid.row_cos[row], self.grid.row_sin[row]);
-        canvas.finish::<L, true>(l, out, out_pitch, (&self.grid.cos, &self.grid.sin), line, single);
+        canvas.finish::<L, true>(
+            l,
+            out,
+            out_pitch,
+            (&self.grid.cos, &self.grid.sin),
+            |row| (self.grid.row_cos[row], self.grid.row_sin[row]),
+            single,
+        );
     }
 
     fn inverse_t(&self, drawn: &DrawnFace, column: usize, row: usize) -> f64 {

@@ -163,7 +163,8 @@ impl PanoramaBatch {
             group(&self.latitude[1], first),
             group(&self.latitude[2], first),
         ];
-        let (last_column, last_row) = (grid.width as f32 - 1.0, grid.height as f32 - 1.0);
+        let last_column = grid.width as f32 - 1.0;
+        let last_row = grid.height as f32 - 1.0;
 
         // Each result has an array of its own, so that the compiler bounds all faces of the group at once.
         let (mut lefts, mut rights) = ([0.0; GROUP], [0.0; GROUP]);
@@ -172,13 +173,15 @@ impl PanoramaBatch {
         for i in 0..GROUP {
             let azimuth = [azimuths[0][i], azimuths[1][i], azimuths[2][i]];
             let latitude = [latitudes[0][i], latitudes[1][i], latitudes[2][i]];
-            let (first, last) = (low(azimuth), high(azimuth));
+            let first = low(azimuth);
+            let last = high(azimuth);
             let wide = last - first;
             // An arc bends towards the pole by at most the square of its width over 16; 15 leaves a margin.
             let bend = wide * wide * (1.0 / 15.0) + ANGLE_ERROR;
             let rows = grid.rows_between(low(latitude) - bend, high(latitude) + bend);
             let columns = grid.columns_between(first, last);
-            let (left, right) = (max(columns.0, 0.0), min(columns.1, last_column));
+            let left = max(columns.0, 0.0);
+            let right = min(columns.1, last_column);
             let top = max((rows.0 - 0.01).ceil(), 0.0);
             let bottom = min((rows.1 + 0.01).floor(), last_row);
 
@@ -212,7 +215,8 @@ impl PanoramaBatch {
 
         let bounds = self.bounds_in_cluster(i);
         // The bounds of a wide face mean nothing and may be anywhere.
-        let (column, row) = (bounds.left.min(grid.width - 1), bounds.top.min(grid.height - 1));
+        let column = bounds.left.min(grid.width - 1);
+        let row = bounds.top.min(grid.height - 1);
         let anchor = grid.anchor(column, row);
         let reach = grid.reach(row, (bounds.bottom.max(row) - row).min(grid.height - row - 1) + 1);
         self.anchor_cos[j] = anchor.cos;
@@ -238,7 +242,8 @@ impl PanoramaBatch {
         let reaches = group(&self.reach_tan, first);
         let first_coses = group(&self.first_cos, first);
         let last_coses = group(&self.last_cos, first);
-        let (columns, rows) = (group(&self.columns, first), group(&self.rows, first));
+        let columns = group(&self.columns, first);
+        let rows = group(&self.rows, first);
         let wides = group(&self.wide, first);
         let columns_reach = grid.reach(0, 1);
 

@@ -99,9 +99,13 @@ impl PanoramaGrid {
         let Rays::Equirectangular { columns, rows } = window.rays else {
             unreachable!("a panorama has a panorama's rays")
         };
-        let pixel = |sample: usize| (window.stride / 2 + window.stride * sample as u32) as usize;
-        let columns: Vec<_> = (0..window.width).map(|i| columns[pixel(window.column + i)]).collect();
-        let rows: Vec<_> = (0..window.height).map(|j| rows[pixel(window.row + j)]).collect();
+
+        let columns: Vec<_> = (0..window.width)
+            .map(|i| columns[window.pixel_of(window.column + i) as usize])
+            .collect();
+        let rows: Vec<_> = (0..window.height)
+            .map(|j| rows[window.pixel_of(window.row + j) as usize])
+            .collect();
 
         let step = TAU / f64::from(window.camera.width) * f64::from(window.stride);
         let middle_column = 0.5 * (window.width - 1) as f64;
@@ -128,7 +132,8 @@ impl PanoramaGrid {
     /// Returns the range of rows between two latitudes.
     #[inline(always)]
     pub(crate) fn rows_between(&self, low: f32, high: f32) -> (f32, f32) {
-        let (top, per_rad) = (self.top as f32, 1.0 / self.step as f32);
+        let top = self.top as f32;
+        let per_rad = 1.0 / self.step as f32;
         ((top - high) * per_rad, (top - low) * per_rad)
     }
 
@@ -136,7 +141,8 @@ impl PanoramaGrid {
     /// the error of [`angle_of`].
     #[inline(always)]
     pub(crate) fn columns_between(&self, first: f32, last: f32) -> (f32, f32) {
-        let (middle, per_rad) = (self.middle_column as f32, 1.0 / self.step as f32);
+        let middle = self.middle_column as f32;
+        let per_rad = 1.0 / self.step as f32;
         let pad = 0.01 + ANGLE_ERROR * per_rad;
         ((middle + first * per_rad - pad).ceil(), (middle + last * per_rad + pad).floor())
     }
@@ -144,7 +150,8 @@ impl PanoramaGrid {
     /// Returns the anchor at a column and a row.
     #[inline(always)]
     pub(crate) fn anchor(&self, column: usize, row: usize) -> ChunkAnchor {
-        let (cos, sin) = (self.cos.as_flattened()[column], self.sin.as_flattened()[column]);
+        let cos = self.cos.as_flattened()[column];
+        let sin = self.sin.as_flattened()[column];
         ChunkAnchor { cos, sin, tan: self.tan[row] }
     }
 
@@ -158,11 +165,12 @@ impl PanoramaGrid {
         if max(first, tan(row + most - 1)) <= STEEP_TAN {
             return most;
         }
-        let steady = |&rows: &usize| {
-            let last = tan(row + rows);
-            max(first, last) <= 3.0 * min(first, last)
-        };
-        1 + (1..most).take_while(steady).count()
+        1 + (1..most)
+            .take_while(|&rows| {
+                let last = tan(row + rows);
+                max(first, last) <= 3.0 * min(first, last)
+            })
+            .count()
     }
 
     /// Returns the reach of a chunk of `rows` rows from `row` on.
@@ -227,7 +235,8 @@ impl ChunkAnchor {
     /// Returns a bound on the error of edge functions in a chunk, for planes with the error `edge_off`.
     #[inline(always)]
     pub(crate) fn edge_error(&self, edges: &[Linear; 3], reach: &Reach, edge_off: f64) -> f32 {
-        let (reach_u, reach_v) = (f64::from(-reach.u), f64::from(reach.v));
+        let reach_u = f64::from(-reach.u);
+        let reach_v = f64::from(reach.v);
         let reach_t = f64::from(-reach.tan);
         // Planes are evaluated for directions of the length 1 / cos φ ≤ 1 + |tan φ|.
         let away = 1.0 + self.tan.abs() + reach_t.abs();
@@ -247,7 +256,8 @@ impl Reach {
     #[inline(always)]
     pub(crate) fn range(&self, f: &Linear) -> (f32, f32, f32) {
         let down = f.down * self.tan;
-        let (u, v) = (f.across * self.u, f.bend * self.v);
+        let u = f.across * self.u;
+        let v = f.bend * self.v;
         let along = u + v;
         // Between its ends, the function along a row bulges by the square of the angle over 8.
         let bulge = (f.across.abs() + f.bend.abs()) * (self.v * self.v - 2.0 * self.u) * 0.125;
@@ -261,7 +271,8 @@ impl Reach {
     pub(crate) fn trust(&self, inverse_t: &Linear) -> (f32, f32) {
         let (low, _, size) = self.range(inverse_t);
         // cos φ is least at one of the ends; between them it may be greater than at both.
-        let (min_cos, max_cos) = (min(self.cos[0], self.cos[1]), max(self.cos[0], self.cos[1]));
+        let min_cos = min(self.cos[0], self.cos[1]);
+        let max_cos = max(self.cos[0], self.cos[1]);
         let max_cos = min(1.0, max_cos * 1.5);
         let low = if low > 0.0 { low * min_cos } else { low };
         (low, INVERSE_T_ROUNDING * size * max_cos)
@@ -271,7 +282,8 @@ impl Reach {
 /// Returns the angle of (x, y) from the x axis, with an error below 1.2e-5.
 #[inline(always)]
 pub(crate) fn angle_of(y: f32, x: f32) -> f32 {
-    let (wide, high) = (x.abs(), y.abs());
+    let wide = x.abs();
+    let high = y.abs();
     let (small, large) = if wide < high { (wide, high) } else { (high, wide) };
     let t = small / if large > 0.0 { large } else { 1.0 };
     let s = t * t;

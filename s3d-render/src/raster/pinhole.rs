@@ -158,13 +158,18 @@ impl<'a> Pinhole<'a> {
     /// Projects the corners of a cluster.
     #[inline(always)]
     fn project(&mut self, corners: &[[[f32; PACKET]; 3]]) {
-        let (o, r, d, f) = (self.origin, self.across, self.down, self.ahead);
+        let o = self.origin;
+        let r = self.across;
+        let d = self.down;
+        let f = self.ahead;
         let guard = self.guard;
         for (k, [x, y, z]) in corners.iter().enumerate() {
             // Each result has an array of its own, so that the compiler projects all eight corners at once.
             let (mut xs, mut ys, mut qs) = ([0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
             for i in 0..PACKET {
-                let (x, y, z) = (f64::from(x[i]) - o.x, f64::from(y[i]) - o.y, f64::from(z[i]) - o.z);
+                let x = f64::from(x[i]) - o.x;
+                let y = f64::from(y[i]) - o.y;
+                let z = f64::from(z[i]) - o.z;
                 let depth = f.x * x + f.y * y + f.z * z;
                 let q = 1.0 / depth;
                 let px = (r.x * x + r.y * y + r.z * z) * q;
@@ -200,7 +205,8 @@ impl<'a> Pinhole<'a> {
         for (k, (p, q)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
             let n = p.cross(q);
             let length = n.length();
-            let (x, y) = (n.dot(self.step_x), n.dot(self.step_y));
+            let x = n.dot(self.step_x);
+            let y = n.dot(self.step_y);
             let slope = x.abs() + y.abs();
             if !(length > 0.0 && slope > 0.0) {
                 // The edge has no plane, or its function is the same everywhere: it never decides.
@@ -226,7 +232,8 @@ impl<'a> Pinhole<'a> {
         let inverse_t = [at[3], across[3], down[3]];
         let slot = canvas.enter(DrawnFace::new(inverse_t, face, !known));
         let edge_error = EDGE_ERROR + edge_error as f32;
-        let (planes, bounds) = (&planes, &bounds);
+        let planes = &planes;
+        let bounds = &bounds;
         dispatch(PinholeTiles { canvas, planes, bounds, edge_error, slot, poor: !known });
     }
 
@@ -236,7 +243,6 @@ impl<'a> Pinhole<'a> {
         let mut x = (infinite, -infinite);
         let mut y = (infinite, -infinite);
         let mut q = (infinite, 0.0f64);
-        let widen = |range: &mut (f64, f64), v: f64| *range = (range.0.min(v), range.1.max(v));
 
         for (k, &p) in cone.corners.iter().enumerate() {
             let z = self.ahead.dot(p);
@@ -255,8 +261,7 @@ impl<'a> Pinhole<'a> {
             // An edge that crosses the camera's plane goes off to infinity, on the side of the crossing.
             let next = cone.corners[(k + 1) % 3];
             let z_next = self.ahead.dot(next);
-            let near = |z: f64, p: DVec3| z.abs() <= 1e-12 * p.abs().element_sum();
-            if (z > 0.0) != (z_next > 0.0) || near(z, p) || near(z_next, next) {
+            if (z > 0.0) != (z_next > 0.0) || is_near_zero(z, p) || is_near_zero(z_next, next) {
                 let s = if z == z_next {
                     0.5
                 } else {
@@ -267,10 +272,10 @@ impl<'a> Pinhole<'a> {
                 for (range, axis) in [(&mut x, self.across), (&mut y, self.down)] {
                     let v = axis.dot(at);
                     let slack = slack * axis.abs().element_sum();
-                    if v > -slack || near(z, p) || near(z_next, next) {
+                    if v > -slack || is_near_zero(z, p) || is_near_zero(z_next, next) {
                         range.1 = infinite;
                     }
-                    if v < slack || near(z, p) || near(z_next, next) {
+                    if v < slack || is_near_zero(z, p) || is_near_zero(z_next, next) {
                         range.0 = -infinite;
                     }
                 }
@@ -291,6 +296,14 @@ impl<'a> Pinhole<'a> {
     }
 }
 
+fn widen(range: &mut (f64, f64), v: f64) {
+    *range = (range.0.min(v), range.1.max(v))
+}
+
+fn is_near_zero(z: f64, p: DVec3) -> bool {
+    z.abs() <= 1e-12 * p.abs().element_sum()
+}
+
 /// The pixels that a face may cover, and the least and greatest 1/t of the face there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PinholeBounds {
@@ -304,7 +317,8 @@ pub(crate) struct PinholeBounds {
 impl PinholePlanes {
     #[inline(always)]
     fn chunk(&self, column: usize, row: usize, slot: u32, edge_error: f32) -> Chunk {
-        let (i, j) = (column as f64, row as f64);
+        let i = column as f64;
+        let j = row as f64;
         let mut f = [Linear::default(); 4];
         for (k, f) in f.iter_mut().enumerate() {
             f.at = (self.at[k] + self.across[k] * i + self.down[k] * j) as f32;
@@ -350,7 +364,8 @@ impl PinholeTiles<'_> {
 
                 // Returns the least and the greatest value of a function on the tile.
                 let range = |f: &Linear| {
-                    let (x, y) = (f.across * last, f.down * last_row);
+                    let x = f.across * last;
+                    let y = f.down * last_row;
                     (f.at + x.min(0.0) + y.min(0.0), f.at + x.max(0.0) + y.max(0.0))
                 };
 
@@ -394,7 +409,9 @@ impl ProjectionRaster for Pinhole<'_> {
 
     #[inline(always)]
     fn cover(&self, node: &Node) -> Option<Cover> {
-        let (right, down, ahead) = (self.across.as_vec3(), self.down.as_vec3(), self.ahead.as_vec3());
+        let right = self.across.as_vec3();
+        let down = self.down.as_vec3();
+        let ahead = self.ahead.as_vec3();
         let lo = (Vec3::from(node.min).as_dvec3() - self.origin).as_vec3();
         let hi = (Vec3::from(node.max).as_dvec3() - self.origin).as_vec3();
 
@@ -419,7 +436,8 @@ impl ProjectionRaster for Pinhole<'_> {
             return None;
         }
         let off = 1e-6 * (right.abs() + down.abs()).dot(far) + off * (self.width + self.height) as f32;
-        let (width, height) = (self.width as f32, self.height as f32);
+        let width = self.width as f32;
+        let height = self.height as f32;
 
         // A box around the camera's plane has no bounds in the image: only its sides can tell.
         if nearest <= 1e-4 * farthest {
@@ -437,13 +455,15 @@ impl ProjectionRaster for Pinhole<'_> {
         let mut y = x;
         for k in 0..8 {
             let q = 1.0 / zs[k];
-            let (px, py) = (xs[k] * q, ys[k] * q);
+            let px = xs[k] * q;
+            let py = ys[k] * q;
             x = (if px < x.0 { px } else { x.0 }, if px > x.1 { px } else { x.1 });
             y = (if py < y.0 { py } else { y.0 }, if py > y.1 { py } else { y.1 });
         }
 
         let pad = 0.01 + off / nearest;
-        let (columns, rows) = ((x.0 - pad, x.1 + pad), (y.0 - pad, y.1 + pad));
+        let columns = (x.0 - pad, x.1 + pad);
+        let rows = (y.0 - pad, y.1 + pad);
         Cover::new(columns, rows, (self.width, self.height), 1.0 / nearest)
     }
 
@@ -460,7 +480,8 @@ impl ProjectionRaster for Pinhole<'_> {
 
         for i in batch.faces(DrawKind::Large) {
             let slot = enter(canvas, i);
-            let (planes, bounds) = (&batch.planes(i), &batch.bounds(i));
+            let planes = &batch.planes(i);
+            let bounds = &batch.bounds(i);
             PinholeTiles { canvas, planes, bounds, edge_error: EDGE_ERROR, slot, poor: false }.draw(l);
         }
         for i in batch.faces(DrawKind::Narrow) {
@@ -500,8 +521,14 @@ impl ProjectionRaster for Pinhole<'_> {
         out_pitch: usize,
         single: impl Fn(u32, usize, usize) -> f64,
     ) {
-        let line = |row: usize| (0.0, row as f64);
-        canvas.finish::<L, false>(l, out, out_pitch, (&self.columns, &self.columns), line, single);
+        canvas.finish::<L, false>(
+            l,
+            out,
+            out_pitch,
+            (&self.columns, &self.columns),
+            |row| (0.0, row as f64),
+            single,
+        );
     }
 
     fn inverse_t(&self, drawn: &DrawnFace, column: usize, row: usize) -> f64 {

@@ -8,7 +8,7 @@ use crate::ray::caster::RayCaster;
 use crate::scene::Scene;
 use crate::simd::dispatch_on;
 use s3d_geom::{Camera, Projection, Raster};
-use s3d_simd::{Level, level};
+use s3d_simd::{ProvenLevel, level};
 use std::f64::consts::TAU;
 
 /// Casts image after image of a scene and keeps its memory between them. Each thread that renders should hold
@@ -21,7 +21,8 @@ use std::f64::consts::TAU;
 /// let corners = vec![vec3(-9.0, -9.0, 0.0), vec3(9.0, -9.0, 0.0), vec3(0.0, 9.0, 0.0)];
 /// let floor = TriMesh::from_faces(corners, vec![[0, 1, 2]])?;
 /// let scene = Scene::new(&floor);
-/// let (mut caster, mut hits) = (Caster::new(&scene), Hits::default());
+/// let mut caster = Caster::new(&scene);
+/// let mut hits = Hits::default();
 /// let panorama = Camera::equirectangular(Pose::level(dvec3(0.0, 0.0, 1.5), 0.0), 256);
 /// caster.cast_into(&panorama, 4, &mut hits); // every fourth pixel of every fourth row, to score it
 /// assert_eq!((hits.face.width(), hits.face.height()), (64, 32));
@@ -125,7 +126,7 @@ impl<'s, 'm> Caster<'s, 'm> {
 /// Casts a window with the instructions of `level`. `out` begins at the first pixel of the window; its rows
 /// are `pitch` apart.
 fn cast_window(
-    level: Level,
+    level: ProvenLevel,
     scene: &Scene<'_>,
     window: &Window<'_>,
     scratch: &mut Scratch,
@@ -226,7 +227,7 @@ mod tests {
             let height = camera.height as usize - 5;
             let window =
                 Window { camera, rays: &camera.rays(), stride: 1, column: 60, row: 3, width, height };
-            let images: Vec<_> = Level::all()
+            let images: Vec<_> = ProvenLevel::all()
                 .into_iter()
                 .map(|level| {
                     let mut faces = vec![7; width * height];

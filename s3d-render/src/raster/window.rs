@@ -28,6 +28,13 @@ pub(crate) struct Window<'a> {
     pub(crate) height: usize,
 }
 
+impl Window<'_> {
+    /// Returns the column or row of a sample's pixel in the image.
+    pub(crate) fn pixel_of(&self, sample: usize) -> u32 {
+        self.stride / 2 + self.stride * sample as u32
+    }
+}
+
 /// Maps the samples of a window to pixels of the image.
 pub(crate) struct Pixels<'a> {
     pub(crate) rays: &'a Rays,
@@ -38,9 +45,8 @@ pub(crate) struct Pixels<'a> {
 
 impl<'a> Pixels<'a> {
     pub(crate) fn new(window: &Window<'a>) -> Self {
-        let first = |sample: usize| window.stride / 2 + window.stride * sample as u32;
-        let column = first(window.column);
-        let row = first(window.row);
+        let column = window.pixel_of(window.column);
+        let row = window.pixel_of(window.row);
         Self { rays: window.rays, stride: window.stride, column, row }
     }
 
@@ -53,8 +59,10 @@ impl<'a> Pixels<'a> {
 
 /// Splits values by column into groups of a register. The last group is filled up with zeros.
 pub(crate) fn groups(values: &[f64]) -> Vec<[f64; LANES]> {
-    let group = |chunk: &[f64]| std::array::from_fn(|k| chunk.get(k).copied().unwrap_or(0.0));
-    values.chunks(LANES).map(group).collect()
+    values
+        .chunks(LANES)
+        .map(|chunk| std::array::from_fn(|k| chunk.get(k).copied().unwrap_or(0.0)))
+        .collect()
 }
 
 /// Projects faces onto a window.

@@ -277,12 +277,14 @@ mod tests {
 
     fn check(mesh: &TriMesh, origin: DVec3, directions: impl IntoIterator<Item = DVec3>) -> Vec<Option<Hit>> {
         let scene = Scene::new(mesh);
-        let cast = |d| {
-            let hit = cast_ray(&scene, origin, d);
-            assert_eq!(hit, cast_ray_brute_force(mesh, origin, d), "from {origin} along {d}");
-            hit
-        };
-        directions.into_iter().map(cast).collect()
+        directions
+            .into_iter()
+            .map(|d| {
+                let hit = cast_ray(&scene, origin, d);
+                assert_eq!(hit, cast_ray_brute_force(mesh, origin, d), "from {origin} along {d}");
+                hit
+            })
+            .collect()
     }
 
     /// A box of 12 faces, seen from inside or outside.
@@ -452,6 +454,10 @@ mod tests {
         prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from)
     }
 
+    fn are_above(w: [f64; 3], by: f64) -> bool {
+        w.iter().all(|&w| w > by)
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(128))]
 
@@ -477,13 +483,13 @@ mod tests {
                 }
 
                 let all = (0..soup.faces().len() as u32).map(|f| textbook(&soup, f, origin, d));
-                let inside = |w: [f64; 3], by: f64| w.iter().all(|&w| w > by);
-                let hits = all.filter(|(t, w)| *t > 0.0 && inside(*w, 1e-9));
+                let hits = all.filter(|(t, w)| *t > 0.0 && are_above(*w, 1e-9));
                 let nearest = hits.map(|(t, _)| t).fold(f64::MAX, f64::min);
                 match hit {
                     Some(hit) => {
                         let (t, w) = textbook(&soup, hit.face, origin, d);
-                        prop_assert!((hit.t - t).abs() <= 1e-6 * t && inside(w, -1e-9), "{hit:?} {t} {w:?}");
+                        let is_near = (hit.t - t).abs() <= 1e-6 * t;
+                        prop_assert!(is_near && are_above(w, -1e-9), "{hit:?} {t} {w:?}");
                         prop_assert!(hit.t <= nearest * (1.0 + 2e-6));
                     }
                     None => prop_assert_eq!(nearest, f64::MAX),

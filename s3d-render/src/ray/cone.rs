@@ -118,14 +118,17 @@ mod tests {
         prop::array::uniform3(-20i64..=20)
     }
 
+    fn scaled(q: [i64; 3], s: f64) -> DVec3 {
+        dvec3(q[0] as f64, q[1] as f64, q[2] as f64) * s
+    }
+
     proptest! {
         #[test]
         fn signs_are_exact(a in point(), b in point(), c in point(), scale in -1e-3..1e-3f64) {
             // Scaling by a factor that rounds would keep a zero only by chance, so powers of two are used.
             let s = if scale > 0.0 { 1.0 / 1024.0 } else { 4096.0 };
-            let p = |q: [i64; 3]| dvec3(q[0] as f64, q[1] as f64, q[2] as f64) * s;
             let expected = integer_side(a, b, c).signum() as f64;
-            let got = side(p(a), p(b), p(c));
+            let got = side(scaled(a, s), scaled(b, s), scaled(c, s));
             prop_assert_eq!(if got == 0.0 { 0.0 } else { got.signum() }, expected);
         }
 

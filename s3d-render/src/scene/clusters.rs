@@ -176,7 +176,8 @@ impl Clusters {
 
     #[inline(always)]
     pub(crate) fn cluster(&self, index: u32) -> Cluster<'_> {
-        let (at, end) = (self.starts[index as usize], self.starts[index as usize + 1]);
+        let at = self.starts[index as usize];
+        let end = self.starts[index as usize + 1];
         let faces = at.first_face as usize..end.first_face as usize;
         Cluster {
             corners: &self.corners[at.first_packet as usize..end.first_packet as usize],

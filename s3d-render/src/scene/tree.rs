@@ -66,19 +66,22 @@ impl FaceTree {
 
         // Leaves are small, since testing a face costs more than testing a box.
         let bvh = build(&boxes, 4);
-        let node = |node: &obvhs::bvh2::node::Bvh2Node| {
-            let first = node.first_index;
-            let count = node.prim_count as u8;
-            let content = if count > 0 {
-                Content::Leaf { first, count }
-            } else {
-                Content::Children(first)
-            };
-            Node::new(node.aabb(), content)
-        };
 
         Self {
-            nodes: bvh.nodes.iter().map(node).collect(),
+            nodes: bvh
+                .nodes
+                .iter()
+                .map(|node| {
+                    let first = node.first_index;
+                    let count = node.prim_count as u8;
+                    let content = if count > 0 {
+                        Content::Leaf { first, count }
+                    } else {
+                        Content::Children(first)
+                    };
+                    Node::new(node.aabb(), content)
+                })
+                .collect(),
             faces: bvh.primitive_indices.iter().map(|&k| faces[k as usize]).collect(),
         }
     }

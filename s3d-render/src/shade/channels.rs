@@ -321,17 +321,17 @@ pub fn byte_per_face_image(hits: &Hits, byte_of_face: &[u8], missing: u8) -> Ras
 /// As for [`byte_per_face_image`].
 pub fn byte_per_face_image_into(hits: &Hits, byte_of_face: &[u8], missing: u8, out: &mut Raster<u8>) {
     fit(out, &hits.face, 0);
-    let byte = |face: u32| {
-        if face == NO_FACE {
-            missing
-        } else {
-            byte_of_face[face as usize]
-        }
-    };
+
     out.pixels_mut()
         .iter_mut()
         .zip(hits.face.pixels())
-        .for_each(|(out, face)| *out = byte(*face));
+        .for_each(|(out, face)| {
+            *out = if *face == NO_FACE {
+                missing
+            } else {
+                byte_of_face[*face as usize]
+            }
+        });
 }
 
 /// Returns the share of pixels that see anything, 0 to 1; 0 for an image without pixels.
@@ -349,11 +349,10 @@ fn by_face(
     values: impl Fn(&[u32; LANES]) -> [[u8; 3]; LANES],
 ) {
     fit(out, &hits.face, [0; 3]);
-    let values = |faces: &[u32; LANES]| values(faces).map(|value| [value]);
     dispatch(ByFaceKernel {
         mesh: scene.map(Scene::mesh),
         hits,
-        flat: FlatPainter::new([missing], values),
+        flat: FlatPainter::new([missing], |faces: &[u32; LANES]| values(faces).map(|value| [value])),
         out,
     });
 }

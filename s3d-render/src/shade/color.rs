@@ -9,7 +9,9 @@
 
 use crate::hits::Hits;
 use crate::scene::Scene;
-use crate::shade::anchor::{Anchor, AnchorBatch, Attributes, RayGrid};
+use crate::shade::anchor::attributes::Attributes;
+use crate::shade::anchor::ray_grid::RayGrid;
+use crate::shade::anchor::{Anchor, AnchorBatch};
 use crate::shade::channels::{assert_size, fit, paint};
 use crate::shade::face_table::NewFace;
 use crate::shade::filter::{Footprints, MipLevels};
@@ -24,7 +26,7 @@ use crate::simd::dispatch_on;
 use crate::simd::shade_lanes::{LANES, ShadeLanes};
 use glam::DVec3;
 use s3d_geom::{Camera, FaceColor, NormalAxes, Raster};
-use s3d_simd::{Level, level};
+use s3d_simd::{ProvenLevel, level};
 use std::ops::Range;
 
 /// Returns the colours that the pixels see. Textures are filtered over each pixel's footprint, colours of
@@ -73,7 +75,7 @@ pub fn rgb_image_into(
 
 /// Writes the image of [`rgb_image_into`] from the faces of hits, with the instructions of `level`.
 pub(crate) fn rgb_of_faces_into(
-    level: Level,
+    level: ProvenLevel,
     scene: &Scene<'_>,
     mip_maps: &MipMaps,
     faces: &Raster<u32>,
@@ -248,7 +250,8 @@ impl<'a, L: ShadeLanes> RgbPainter<'a, L> {
             while let Some(&[piece, next]) =
                 pieces.next_if(|pieces| (pieces[0].start as usize) < from + width)
             {
-                let (start, end) = (piece.start as usize, next.start as usize);
+                let start = piece.start as usize;
+                let end = next.start as usize;
                 let columns = start - from..end - from;
                 self.lay_out::<PANORAMA>(grid, faces[start], piece.number, first_row + j, columns, row);
             }
@@ -443,7 +446,7 @@ mod tests {
         ] {
             let hits = crate::raster::visibility::cast(&scene, &camera);
             let filter = TextureFilter::default();
-            let images = Level::all().into_iter().map(|level| {
+            let images = ProvenLevel::all().into_iter().map(|level| {
                 let mut out = Raster::filled(camera.width, camera.height, [0; 3]);
                 rgb_of_faces_into(level, &scene, &mip_maps, &hits.face, &camera, &filter, &mut out);
                 out

@@ -24,8 +24,7 @@ pub(crate) struct Footprints {
 
 impl Footprints {
     pub(crate) fn new(len: usize) -> Self {
-        let two = || [vec![0.0; len], vec![0.0; len]];
-        Self { at: two(), x: two(), y: two() }
+        Self { at: two_lines(len), x: two_lines(len), y: two_lines(len) }
     }
 
     /// Stores the eight pixels from column `i` on. The sides are stored only if not all footprints are
@@ -48,6 +47,10 @@ impl Footprints {
             }
         }
     }
+}
+
+fn two_lines(len: usize) -> [Vec<f32>; 2] {
+    [vec![0.0; len], vec![0.0; len]]
 }
 
 /// How eight footprints are sampled.
@@ -100,7 +103,8 @@ struct TapWalk<L: ShadeLanes> {
 impl<L: ShadeLanes> TapWalk<L> {
     #[inline(always)]
     fn at(l: L, first: (L::F, L::F), step: (L::F, L::F)) -> Self {
-        let (place, fixed_step) = ((l.fixed(first.0), l.fixed(first.1)), (l.fixed(step.0), l.fixed(step.1)));
+        let place = (l.fixed(first.0), l.fixed(first.1));
+        let fixed_step = (l.fixed(step.0), l.fixed(step.1));
         Self { first, step, place, fixed_step }
     }
 
@@ -115,7 +119,8 @@ impl<L: ShadeLanes> TapWalk<L> {
     /// Takes a step.
     #[inline(always)]
     fn go_on(&mut self, l: L) {
-        let (place, step) = (self.place, self.fixed_step);
+        let place = self.place;
+        let step = self.fixed_step;
         self.place = (l.add_fixed(place.0, step.0), l.add_fixed(place.1, step.1));
     }
 }
@@ -128,18 +133,20 @@ pub(crate) struct MipLevels<'a> {
 
 impl<'a> MipLevels<'a> {
     pub(crate) fn new(full: &'a Texture, reductions: &'a [Raster<[u8; 3]>]) -> Self {
-        let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)) as f32;
-        // Larger levels are not used: see `is_usable`.
-        let last = |size: u32| (size.clamp(1, 1 << 15) - 1) << 15;
-        let level = |image: &'a Raster<[u8; 3]>| MipLevel {
-            image,
-            texels: Texels::new(image.pixels().as_flattened(), image.width() as i32 * 3),
-            right: last(image.width()),
-            bottom: last(image.height()),
-            x: ratio(image.width(), full.image.width()),
-            y: ratio(image.height(), full.image.height()),
-        };
-        Self { wrap: full.wrap, levels: std::iter::once(&full.image).chain(reductions).map(level).collect() }
+        Self {
+            wrap: full.wrap,
+            levels: std::iter::once(&full.image)
+                .chain(reductions)
+                .map(|image| MipLevel {
+                    image,
+                    texels: Texels::new(image.pixels().as_flattened(), image.width() as i32 * 3),
+                    right: last_place(image.width()),
+                    bottom: last_place(image.height()),
+                    x: ratio(image.width(), full.image.width()),
+                    y: ratio(image.height(), full.image.height()),
+                })
+                .collect(),
+        }
     }
 
     /// Tells whether positions in the texture fit in the numbers used here.
@@ -153,11 +160,6 @@ impl<'a> MipLevels<'a> {
     /// Returns how coordinates in pixels of the full size repeat.
     pub(crate) fn wraps(&self) -> [TexelWrap; 3] {
         let image = self.levels[0].image;
-        let texel_wrap = |wrap, size: u32| match wrap {
-            Wrap::Repeat => TexelWrap::repeat(f64::from(size)),
-            Wrap::Mirror => TexelWrap::mirror(f64::from(size)),
-            Wrap::Clamp => TexelWrap::NONE,
-        };
         [texel_wrap(self.wrap[0], image.width()), texel_wrap(self.wrap[1], image.height()), TexelWrap::NONE]
     }
 
@@ -295,7 +297,9 @@ impl<'a> MipLevels<'a> {
 
     #[inline(always)]
     fn magnified<L: ShadeLanes>(&self, l: L, x: L::F, y: L::F, these: u32) -> L::ColorSum {
-        let (level, half, zero) = (&self.levels[0], l.splat(0.5), l.splat(0.0));
+        let level = &self.levels[0];
+        let half = l.splat(0.5);
+        let zero = l.splat(0.0);
         let walk = TapWalk::at(l, (l.sub(x, half), l.sub(y, half)), (zero, zero));
         self.add(l, l.zero_sum(), level, &walk, zero, l.full_weights(), these)
     }
@@ -427,10 +431,6 @@ impl<'a> MipLevels<'a> {
     /// fractions of the position.
     fn at_the_edge(&self, level: &MipLevel<'a>, x: f32, y: f32) -> ((u64, u64), (i16, i16)) {
         let image = level.image;
-        let split = |v: f32| {
-            let v = if v.is_finite() { f64::from(v) } else { 0.0 };
-            (v.floor() as i64, ((v - v.floor()) * 32768.0) as i16)
-        };
         let ((column, x), (row, y)) = (split(x), split(y));
         let columns = [column, column + 1].map(|i| self.wrap[0].index(i, image.width()));
         // v grows upwards and rows downwards, but mirroring and repeating look the same from both sides.
@@ -441,6 +441,29 @@ impl<'a> MipLevels<'a> {
         };
         ((pair(rows[0]), pair(rows[1])), (x, y))
     }
+}
+
+fn ratio(a: u32, b: u32) -> f32 {
+    (f64::from(a) / f64::from(b)) as f32
+}
+
+/// Returns the place of the last texel, in the units of fixed places. Larger levels are not used: see
+/// `is_usable`.
+fn last_place(size: u32) -> u32 {
+    (size.clamp(1, 1 << 15) - 1) << 15
+}
+
+fn texel_wrap(wrap: Wrap, size: u32) -> TexelWrap {
+    match wrap {
+        Wrap::Repeat => TexelWrap::repeat(f64::from(size)),
+        Wrap::Mirror => TexelWrap::mirror(f64::from(size)),
+        Wrap::Clamp => TexelWrap::NONE,
+    }
+}
+
+fn split(v: f32) -> (i64, i16) {
+    let v = if v.is_finite() { f64::from(v) } else { 0.0 };
+    (v.floor() as i64, ((v - v.floor()) * 32768.0) as i16)
 }
 
 /// Returns the eight bytes at `at`, if there are so many.

@@ -44,7 +44,8 @@ impl<V: Fn(&[u32; LANES]) -> [[[u8; 3]; N]; LANES], const N: usize> FlatPainter<
             }
         }
         for pieces in spans.pieces().windows(2) {
-            let (start, end) = (pieces[0].start as usize, pieces[1].start as usize);
+            let start = pieces[0].start as usize;
+            let end = pieces[1].start as usize;
             fill(lanes, &mut out, start, end, &self.colors[pieces[0].number as usize]);
         }
     }

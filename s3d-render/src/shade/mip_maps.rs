@@ -44,7 +44,8 @@ impl Default for TextureFilter {
 /// assert_eq!(mip_maps.bytes(), 3 * (4 * 4 + 2 * 2 + 1));
 ///
 /// // In a few pixels, the chequers are seen as their mean.
-/// let (scene, camera) = (Scene::new(&mesh), Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 1.2, 5, 5));
+/// let scene = Scene::new(&mesh);
+/// let camera = Camera::perspective(Pose::level(DVec3::ZERO, 0.0), 1.2, 5, 5);
 /// let rgb = rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
 /// assert_eq!(rgb.at(2, 2), [100; 3]);
 /// # Ok::<(), s3d_geom::MeshError>(())
@@ -283,11 +284,13 @@ struct ColorSum([f32; 8]);
 impl ColorSum {
     #[inline(always)]
     fn add_bilinear(&mut self, image: &Raster<[u8; 3]>, wrap: [Wrap; 2], uv: DVec2, weight: f32) {
-        let (w, h) = (image.width(), image.height());
+        let w = image.width();
+        let h = image.height();
         let uv = DVec2::new(wrapped(uv.x, wrap[0]), wrapped(uv.y, wrap[1]));
         let x = uv.x * f64::from(w) - 0.5;
         let y = (1.0 - uv.y) * f64::from(h) - 0.5;
-        let (xi, yi) = (x as u32, y as u32);
+        let xi = x as u32;
+        let yi = y as u32;
         let at = 3 * (yi as usize * w as usize + xi as usize);
         let bytes = image.pixels().as_flattened();
         let below = at + 3 * w as usize;
@@ -298,11 +301,14 @@ impl ColorSum {
             return self.add_at_the_edge(image, wrap, uv, weight);
         };
 
-        let (fx, fy) = ((x - f64::from(xi)) as f32, (y - f64::from(yi)) as f32);
-        let (left, right) = ((1.0 - fx) * weight, fx * weight);
+        let fx = (x - f64::from(xi)) as f32;
+        let fy = (y - f64::from(yi)) as f32;
+        let left = (1.0 - fx) * weight;
+        let right = fx * weight;
         let columns = [left, left, left, right, right, right, 0.0, 0.0];
         for k in 0..8 {
-            let (a, b) = (f32::from(upper[k]), f32::from(lower[k]));
+            let a = f32::from(upper[k]);
+            let b = f32::from(lower[k]);
             self.0[k] += columns[k] * (a + (b - a) * fy);
         }
     }
@@ -363,8 +369,9 @@ mod tests {
         fn mip_maps_keep_the_mean_and_take_a_third_more(
             w in 1u32..70, h in 1u32..70, seed in any::<u32>(),
         ) {
-            let noise = |x: u32, y: u32| (x * 7919 + y * 104_729).wrapping_mul(seed | 1).rotate_left(9) as u8;
-            let full = image(w, h, noise);
+            let full = image(w, h, |x, y| {
+                (x * 7919 + y * 104_729).wrapping_mul(seed | 1).rotate_left(9) as u8
+            });
             let levels: Vec<_> = std::iter::successors(halved(&full), halved).collect();
             let bytes: usize = levels.iter().map(Raster::len).sum();
             // Along a strip of one pixel, the levels add up to as much again.

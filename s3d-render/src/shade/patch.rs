@@ -93,7 +93,8 @@ impl UvPatch {
         let uv = DVec2::new(self.u.dot(d), self.v.dot(d)) * scale;
         let step =
             |s: DVec3| (DVec2::new(self.u.dot(s), self.v.dot(s)) - uv * self.denominator.dot(s)) * scale;
-        let (x, y) = (step(dx), step(dy));
+        let x = step(dx);
+        let y = step(dy);
         // `max` and `min` also bring NaN, from a face seen exactly edge-on, into the box.
         (uv.max(self.min).min(self.max), x, y)
     }

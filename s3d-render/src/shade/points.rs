@@ -148,7 +148,8 @@ impl RayTable {
         out: &mut [[T; 3]],
     ) {
         let repeated = |v: DVec3| std::array::from_fn(|k| v.to_array()[k % 3]);
-        let (place, width) = (repeated(self.place), self.width.max(1));
+        let place = repeated(self.place);
+        let width = self.width.max(1);
         let rows = &self.rows[first_row..];
         for ((depths, out), row) in depths.chunks_exact(width).zip(out.chunks_exact_mut(width)).zip(rows) {
             let row = repeated(*row);

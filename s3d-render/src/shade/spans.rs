@@ -86,7 +86,8 @@ impl Spans {
         pieces.clear();
 
         for (span, &number) in starts.windows(2).zip(numbers.iter()) {
-            let (start, end) = (span[0], span[1]);
+            let start = span[0];
+            let end = span[1];
             let at = pieces.len();
             pieces.extend([start, start + PIECE].map(|start| Piece { start, number }));
             if end - start > 2 * PIECE {
@@ -150,7 +151,8 @@ fn add_starts(lanes: impl ShadeLanes, values: &[u32], from: usize, starts: &mut 
     let first = starts.len();
     starts.resize(first + values.len() + 4 * LANES, from as u32);
 
-    let (mut at, mut count) = (1, first + 1);
+    let mut at = 1;
+    let mut count = first + 1;
     while let Some(window) = values.get(at - 1..).and_then(<[u32]>::first_chunk::<{ 4 * LANES + 1 }>)
         && let Some(to) = starts
             .get_mut(count..)
@@ -212,11 +214,12 @@ mod tests {
 
                 let mut next = 0;
                 for (piece, after) in spans.pieces().iter().zip(&spans.pieces()[1..]) {
-                    let (start, end) = (piece.start as usize, after.start as usize);
+                    let start = piece.start as usize;
+                    let end = after.start as usize;
                     prop_assert_eq!(start, next);
                     prop_assert!((1..=LANES).contains(&(end - start)) && start / width == (end - 1) / width);
                     prop_assert!(faces[start..end].iter().all(|&face| face == things[piece.number as usize]));
-                    let cut = end - start < LANES && end % width != 0;
+                    let cut = end - start < LANES && !end.is_multiple_of(width);
                     prop_assert!(!cut || faces[end - 1] != faces[end]);
                     next = end;
                 }

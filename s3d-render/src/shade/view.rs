@@ -5,7 +5,7 @@
 
 use crate::hits::Hits;
 use crate::scene::Scene;
-use crate::shade::anchor::RayGrid;
+use crate::shade::anchor::ray_grid::RayGrid;
 use crate::shade::channels::{
     MISSING_INDEX, MISSING_NORMAL, assert_size, depths, fit, flat_normals_of, index_color,
 };
@@ -97,9 +97,12 @@ impl Default for ViewImages {
 impl Default for FaceImages {
     /// Returns images without pixels.
     fn default() -> Self {
-        let empty = || Raster::filled(0, 0, [0; 3]);
         Self { normal: empty(), index: empty(), color: empty() }
     }
+}
+
+fn empty() -> Raster<[u8; 3]> {
+    Raster::filled(0, 0, [0; 3])
 }
 
 /// Makes the wanted images of a view, in less time than one after another. Other images in `out` stay as they
@@ -208,7 +211,6 @@ impl ViewKernel<'_> {
             if wanted.rgb {
                 let next = pixels.end..all_faces.len().min(pixels.end + band);
                 let (done, rest) = rgb.pixels_mut().split_at_mut(next.start);
-                let part = |of: &Range<usize>, wanted| if wanted { of.clone() } else { 0..0 };
                 let painted = part(&pixels, wanted.faces);
                 let prefetch = Prefetch {
                     faces: &all_faces.pixels()[next.clone()],
@@ -230,4 +232,8 @@ impl ViewKernel<'_> {
             }
         }
     }
+}
+
+fn part(of: &Range<usize>, wanted: bool) -> Range<usize> {
+    if wanted { of.clone() } else { 0..0 }
 }

@@ -1,7 +1,7 @@
 //! Wide registers: one choice of vector instructions for all kernels.
 //!
 //! A kernel is written once, over [`Simd`], and compiled for every level of instructions. [`dispatch`] runs
-//! it at the level that s3d-simd has chosen. A [`Level`] carries the proof that the processor has its
+//! it at the level that s3d-simd has chosen. A [`ProvenLevel`] carries the proof that the processor has its
 //! instructions; the public [`SimdLevel`](s3d_simd::SimdLevel) is its name. A level has registers for sixteen
 //! pixels of the visibility pass ([`RasterLanes`]) and for eight pixels to be shaded ([`ShadeLanes`]). All
 //! levels give the same bits: every operation is on integers or rounds once, as IEEE 754 demands, and
@@ -28,7 +28,7 @@ pub(crate) mod shade_width;
 use raster_lanes::{Pair, Portable, RasterLanes};
 #[cfg(target_arch = "x86_64")]
 use s3d_simd::{Avx2, Avx512};
-use s3d_simd::{Level, Scalar, level};
+use s3d_simd::{ProvenLevel, Scalar, level};
 use shade_lanes::{Plain, ShadeLanes};
 
 /// A level of instructions, as the proof that the processor has them.
@@ -100,6 +100,6 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 }
 
 /// Runs a kernel at a given level.
-pub(crate) fn dispatch_on<K: Kernel>(level: Level, kernel: K) -> K::Output {
+pub(crate) fn dispatch_on<K: Kernel>(level: ProvenLevel, kernel: K) -> K::Output {
     s3d_simd::dispatch!(level, simd => kernel.run(simd))
 }

@@ -348,6 +348,10 @@ mod tests {
         Ok(())
     }
 
+    fn repeated(a: [f64; 3]) -> [f64; 12] {
+        std::array::from_fn(|k| a[k % 3])
+    }
+
     proptest! {
         #[test]
         fn numbers_are_those_of_plain_rust(a in eight(), b in eight(), c in eight()) {
@@ -479,8 +483,8 @@ mod tests {
             place in prop::array::uniform3(-100.0..100.0f64), depths in eight(),
         ) {
             let Some(avx2) = Avx2::detect().map(Eight) else { return Ok(()) };
-            let four = |a: [f64; 3]| std::array::from_fn(|k| a[k % 3]);
-            let (row, place): ([f64; 12], [f64; 12]) = (four(row), four(place));
+            let row = repeated(row);
+            let place = repeated(place);
             let rays = EightRays { column: &column, row: &row, depths: &depths, place: &place };
             same_points(avx2, &rays)?;
             if let Some(full) = Avx512::detect().map(Eight) {

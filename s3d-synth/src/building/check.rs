@@ -18,9 +18,8 @@ const HIGHEST_CEILING_M: f64 = 30.0;
 impl Building {
     /// Checks everything that can be checked without building.
     pub(crate) fn check(&self) -> Result<(), BuildingError> {
-        let far = |axis: &str| format!("the origin's {axis}");
         for (value, axis) in self.origin.to_array().into_iter().zip(["x", "y", "z"]) {
-            RangeError::check(value, [-1e6, 1e6], || far(axis))?;
+            RangeError::check(value, [-1e6, 1e6], || format!("the origin's {axis}"))?;
         }
 
         check_texture_scale(self.texture_scale)?;
@@ -172,9 +171,8 @@ impl RoomPlan {
             Filling::Glazing { panes, depth_m } => {
                 let [columns, rows] = panes.map(|n| n as f32);
                 RangeError::check(depth_m, [0.06, 5.0], || what("the depth of a window"))?;
-                let most = |m: f32| [1.0, f64::from(most_panes(m))];
-                RangeError::check(columns, most(to - from), || what("the panes beside one another"))?;
-                RangeError::check(rows, most(high - low), || what("the panes above one another"))?;
+                RangeError::check(columns, pane_range(to - from), || what("the panes beside one another"))?;
+                RangeError::check(rows, pane_range(high - low), || what("the panes above one another"))?;
             }
             Filling::Window | Filling::ShutDoor | Filling::Nothing => {}
         }
@@ -182,19 +180,31 @@ impl RoomPlan {
     }
 
     fn overlaps(&self, other: &Self) -> bool {
-        let apart = |a: [f32; 2], b: [f32; 2]| a[1] <= b[0] + SLACK_M || b[1] <= a[0] + SLACK_M;
-        let x = |r: &Self| [r.low.x, r.high.x];
-        let y = |r: &Self| [r.low.y, r.high.y];
-        let z = |r: &Self| [r.floor_m, r.floor_m + r.top()];
-        !(apart(x(self), x(other)) || apart(y(self), y(other)) || apart(z(self), z(other)))
+        let mut axes = self.spans().into_iter().zip(other.spans());
+        !axes.any(|(a, b)| are_apart(a, b, SLACK_M))
     }
+
+    /// Returns the interval that the room takes along each axis.
+    fn spans(&self) -> [[f32; 2]; 3] {
+        [[self.low.x, self.high.x], [self.low.y, self.high.y], [self.floor_m, self.floor_m + self.top()]]
+    }
+}
+
+fn pane_range(m: f32) -> [f64; 2] {
+    [1.0, f64::from(most_panes(m))]
 }
 
 impl Opening {
     fn overlaps(&self, other: &Self) -> bool {
-        let apart = |a: [f32; 2], b: [f32; 2]| a[1] <= b[0] || b[1] <= a[0];
-        self.wall == other.wall && !apart(self.span, other.span) && !apart(self.heights, other.heights)
+        self.wall == other.wall
+            && !are_apart(self.span, other.span, 0.0)
+            && !are_apart(self.heights, other.heights, 0.0)
     }
+}
+
+/// Tells whether two intervals share no more than `slack_m`.
+fn are_apart(a: [f32; 2], b: [f32; 2], slack_m: f32) -> bool {
+    a[1] <= b[0] + slack_m || b[1] <= a[0] + slack_m
 }
 
 type Range<'a> = &'a dyn Fn(f32, [f64; 2], &str) -> Result<(), RangeError>;
@@ -230,18 +240,6 @@ impl Item {
 impl Thing {
     /// Checks that every part of the thing has a size.
     fn check(&self, range: Range<'_>) -> Result<(), RangeError> {
-        let hanging = |width: f32, [low, high]: [f32; 2], what: &str| {
-            range(width, [0.1, LARGE_M], &format!("the width of {what}"))?;
-            range(low, [0.0, LARGE_M], &format!("the lower edge of {what}"))?;
-            range(high - low, [0.1, LARGE_M], &format!("the height of {what}"))
-        };
-
-        let measures = |size: [f32; 3], least: [(&str, f64); 3], what: &str| {
-            size.into_iter().zip(least).try_for_each(|(m, (word, least))| {
-                range(m, [least, LARGE_M], &format!("the {word} of {what}"))
-            })
-        };
-
         match *self {
             Self::Table { width_m, depth_m, height_m, .. } => {
                 range(width_m.min(depth_m), [0.2, LARGE_M], "the width or depth of a table")?;
@@ -250,21 +248,29 @@ impl Thing {
             }
             Self::ModelTable { size_m, base, .. } => {
                 let least = if base == TableBase::Trestles { 0.9 } else { 0.5 };
-                measures(size_m, [("width", least), ("depth", 0.4), ("height", 0.3)], "a table")
+                check_measures(size_m, [("width", least), ("depth", 0.4), ("height", 0.3)], "a table", range)
             }
-            Self::Seat { size_m: [width, seat, back], .. } => measures(
+            Self::Seat { size_m: [width, seat, back], .. } => check_measures(
                 [width, seat, back - seat],
                 [("width", 0.35), ("seat", 0.35), ("back", 0.25)],
                 "a chair",
+                range,
             ),
             Self::Couch { seats, size_m, .. } => {
                 range(seats as f32, [1.0, 20.0], "the seats of a sofa")?;
-                measures(size_m, [("width of a seat", 0.45), ("depth", 0.6), ("height", 0.55)], "a sofa")
+                check_measures(
+                    size_m,
+                    [("width of a seat", 0.45), ("depth", 0.6), ("height", 0.55)],
+                    "a sofa",
+                    range,
+                )
             }
             Self::Shelves { size_m, .. } => {
-                measures(size_m, [("width", 0.4), ("depth", 0.2), ("height", 0.5)], "a bookcase")
+                check_measures(size_m, [("width", 0.4), ("depth", 0.2), ("height", 0.5)], "a bookcase", range)
             }
-            Self::PlainBoard { width_m, heights_m, .. } => hanging(width_m, heights_m, "a board"),
+            Self::PlainBoard { width_m, heights_m, .. } => {
+                check_hanging(width_m, heights_m, "a board", range)
+            }
             Self::Partition { depth_m, height_m } => {
                 range(depth_m, [0.2, LARGE_M], "the depth of a partition")?;
                 range(height_m, [0.5, LARGE_M], "the height of a partition")
@@ -283,11 +289,11 @@ impl Thing {
                 range(shelves as f32, [1.0, 20.0], "the shelves of a bookcase")
             }
             Self::Board { width_m, heights_m, tray_m, .. } => {
-                hanging(width_m, heights_m, "a board")?;
+                check_hanging(width_m, heights_m, "a board", range)?;
                 tray_m.map_or(Ok(()), |tray| range(tray, [0.6, LARGE_M], "the width of a tray of pens"))
             }
-            Self::Picture { width_m, heights_m, .. } => hanging(width_m, heights_m, "a picture"),
-            Self::WallScreen { width_m, heights_m } => hanging(width_m, heights_m, "a screen"),
+            Self::Picture { width_m, heights_m, .. } => check_hanging(width_m, heights_m, "a picture", range),
+            Self::WallScreen { width_m, heights_m } => check_hanging(width_m, heights_m, "a screen", range),
             Self::Plant { height_m, .. } => range(height_m, [0.3, 5.0], "the height of a plant"),
             Self::Carton { size_m } => size_m
                 .into_iter()
@@ -320,4 +326,21 @@ impl Thing {
             | Self::Rug => Ok(()),
         }
     }
+}
+
+fn check_hanging(width: f32, [low, high]: [f32; 2], what: &str, range: Range<'_>) -> Result<(), RangeError> {
+    range(width, [0.1, LARGE_M], &format!("the width of {what}"))?;
+    range(low, [0.0, LARGE_M], &format!("the lower edge of {what}"))?;
+    range(high - low, [0.1, LARGE_M], &format!("the height of {what}"))
+}
+
+fn check_measures(
+    size: [f32; 3],
+    least: [(&str, f64); 3],
+    what: &str,
+    range: Range<'_>,
+) -> Result<(), RangeError> {
+    size.into_iter()
+        .zip(least)
+        .try_for_each(|(m, (word, least))| range(m, [least, LARGE_M], &format!("the {word} of {what}")))
 }

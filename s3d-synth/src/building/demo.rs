@@ -18,16 +18,17 @@ impl Building {
     /// scan: textures with light and shade in them, windows as opaque surfaces, open doors, a slanted
     /// ceiling, all 13 classes, and a place that was not captured (a tile of the conference room's ceiling).
     pub fn demo() -> Self {
-        let location = |(uuid, position, yaw_deg): (&str, [f64; 3], f64)| ScanLocation {
-            uuid: uuid.to_owned(),
-            position: DVec3::from_array(position),
-            yaw_rad: yaw_deg.to_radians(),
-        };
         Self {
             title: "The built-in scene of s3d: three rooms and a hallway".to_owned(),
             origin: Vec3::new(10.0, 5.0, 0.0),
             rooms: vec![office(), conference_room(), lounge(), hallway()],
-            locations: LOCATIONS.map(location).to_vec(),
+            locations: LOCATIONS
+                .map(|(uuid, position, yaw_deg)| ScanLocation {
+                    uuid: uuid.to_owned(),
+                    position: DVec3::from_array(position),
+                    yaw_rad: yaw_deg.to_radians(),
+                })
+                .to_vec(),
             texture_scale: 1.0,
         }
     }

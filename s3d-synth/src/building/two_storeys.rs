@@ -28,16 +28,17 @@ impl Building {
     /// # Ok::<(), s3d_synth::BuildingError>(())
     /// ```
     pub fn two_storeys() -> Self {
-        let location = |(uuid, position): (&str, [f64; 3])| ScanLocation {
-            uuid: uuid.to_owned(),
-            position: DVec3::from_array(position),
-            yaw_rad: 0.0,
-        };
         Self {
             title: "A house of two storeys".to_owned(),
             origin: Vec3::ZERO,
             rooms: vec![lounge(), storage(), pantry(), hallway(), office(1), office(2)],
-            locations: LOCATIONS.map(location).to_vec(),
+            locations: LOCATIONS
+                .map(|(uuid, position)| ScanLocation {
+                    uuid: uuid.to_owned(),
+                    position: DVec3::from_array(position),
+                    yaw_rad: 0.0,
+                })
+                .to_vec(),
             texture_scale: 1.0,
         }
     }

@@ -134,8 +134,11 @@ impl Builder {
     pub(crate) fn cuboid(&mut self, low: [f32; 3], high: [f32; 3], look: Look, omit: &[Side]) {
         let ([x0, y0, z0], [x1, y1, z1]) = (low, high);
         let plan = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
-        let corner = |i: usize| Vec3::new(plan[i % 4][0], plan[i % 4][1], if i < 4 { z0 } else { z1 });
-        self.hexahedron(std::array::from_fn(corner), look, omit);
+        self.hexahedron(
+            std::array::from_fn(|i| Vec3::new(plan[i % 4][0], plan[i % 4][1], if i < 4 { z0 } else { z1 })),
+            look,
+            omit,
+        );
     }
 
     /// Adds a body of six sides. The corners of its bottom come first, counter-clockwise seen from above,

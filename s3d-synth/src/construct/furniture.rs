@@ -83,13 +83,15 @@ pub(super) fn office_chair(b: &mut Builder, fabric: Look) {
 /// The back of a seat, `half_width` to either side, from z `span[0]` to `span[1]`, leaning backwards.
 fn tilted_back(b: &mut Builder, half_width: f32, y: f32, span: [f32; 2], lean: f32, look: Look) {
     let [z0, z1] = span;
-    let ring = |y: f32, z: f32| {
-        let x = half_width;
-        let t = 0.06;
-        [vec3(-x, y, z), vec3(x, y, z), vec3(x, y + t, z), vec3(-x, y + t, z)]
-    };
-    let ([a, c, d, e], [f, g, h, i]) = (ring(y, z0), ring(y + lean, z1));
+    let [a, c, d, e] = back_ring(y, z0, half_width);
+    let [f, g, h, i] = back_ring(y + lean, z1, half_width);
     b.hexahedron([a, c, d, e, f, g, h, i], look, &[]);
+}
+
+fn back_ring(y: f32, z: f32, half_width: f32) -> [Vec3; 4] {
+    let x = half_width;
+    let t = 0.06;
+    [vec3(-x, y, z), vec3(x, y, z), vec3(x, y + t, z), vec3(-x, y + t, z)]
 }
 
 /// A chair with four wooden legs.
@@ -147,7 +149,9 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
         let x = -half + 0.66 * seat as f32;
         b.cuboid([x + 0.015, -0.43, 0.305], [x + 0.645, 0.22, 0.44], fabric, &[Bottom]);
         let back: [Vec3; 8] = std::array::from_fn(|i| {
-            let (left, front, low) = ([0, 3].contains(&(i % 4)), i % 4 < 2, i < 4);
+            let left = [0, 3].contains(&(i % 4));
+            let front = i % 4 < 2;
+            let low = i < 4;
             let lean = if low { 0.0 } else { 0.09 };
             vec3(
                 if left { x + 0.03 } else { x + 0.63 },
@@ -160,24 +164,27 @@ pub(super) fn sofa(b: &mut Builder, seats: u32, fabric: Look, cushion: Look) {
 
     // A cushion thrown into the corner.
     b.place(vec3(half - 0.28, -0.1, 0.445), 24.0, |b| {
-        let corner = |x: f32, y: f32, z: f32| vec3(x, y + 0.4 * z, z);
         let x = 0.21;
         let y = 0.05;
         b.hexahedron(
             [
-                corner(-x, -y, 0.0),
-                corner(x, -y, 0.0),
-                corner(x, y, 0.0),
-                corner(-x, y, 0.0),
-                corner(-x, -y, 0.36),
-                corner(x, -y, 0.36),
-                corner(x, y, 0.36),
-                corner(-x, y, 0.36),
+                sloped_corner(-x, -y, 0.0),
+                sloped_corner(x, -y, 0.0),
+                sloped_corner(x, y, 0.0),
+                sloped_corner(-x, y, 0.0),
+                sloped_corner(-x, -y, 0.36),
+                sloped_corner(x, -y, 0.36),
+                sloped_corner(x, y, 0.36),
+                sloped_corner(-x, y, 0.36),
             ],
             cushion,
             &[Bottom],
         );
     });
+}
+
+fn sloped_corner(x: f32, y: f32, z: f32) -> Vec3 {
+    vec3(x, y + 0.4 * z, z)
 }
 
 /// A bookcase with `shelves` rows of books, which `seed` chooses.

@@ -55,13 +55,9 @@ pub(super) fn table(b: &mut Builder, base: TableBase, [width, depth, height]: [f
                     for end in [-1.0, 1.0] {
                         let y0 = end * (y - 0.1) - 0.02;
                         let foot = middle + lean * 0.16;
-                        let ring = |x0: f32, z: f32| {
-                            let (x0, x1) = (x0 - 0.02, x0 + 0.02);
-                            [vec3(x0, y0, z), vec3(x1, y0, z), vec3(x1, y0 + 0.04, z), vec3(x0, y0 + 0.04, z)]
-                        };
                         // The heads of the two legs of a side stand beside one another.
-                        let ([a, c, d, e], [f, g, h, i]) =
-                            (ring(foot, 0.0), ring(middle + lean * 0.021, under - 0.05));
+                        let [a, c, d, e] = foot_ring(foot, 0.0, y0);
+                        let [f, g, h, i] = foot_ring(middle + lean * 0.021, under - 0.05, y0);
                         b.hexahedron([a, c, d, e, f, g, h, i], top, &[Top, Bottom]);
                     }
                 }
@@ -84,6 +80,12 @@ pub(super) fn table(b: &mut Builder, base: TableBase, [width, depth, height]: [f
             }
         }
     }
+}
+
+fn foot_ring(x: f32, z: f32, y0: f32) -> [Vec3; 4] {
+    let x0 = x - 0.02;
+    let x1 = x + 0.02;
+    [vec3(x0, y0, z), vec3(x1, y0, z), vec3(x1, y0 + 0.04, z), vec3(x0, y0 + 0.04, z)]
 }
 
 /// A chair of a model: width and height of the seat, and height of the back.

@@ -200,9 +200,6 @@ impl RoomPlan {
         );
 
         let floor = b.texture(format!("{name}_floor"), floor, Wrap::Clamp);
-        let is_in = |hole: Option<[Vec2; 2]>, p: Vec2| {
-            hole.is_some_and(|[a, c]| p.cmpgt(a).all() && p.cmplt(c).all())
-        };
         let place = |x, y| (vec3(x, y, 0.0), inside(vec2(x, y)));
         b.baked(lattice(&xs, &ys, place, |p| !is_in(well, p)), floor);
         if let Some(well) = self.stairwell {
@@ -212,11 +209,14 @@ impl RoomPlan {
         b.begin(Class::CEILING);
         let slope = (self.heights_m[1] - self.heights_m[0]) / (self.high.y - self.low.y);
         let normal = vec3(0.0, slope, -1.0).normalize();
-        let height = |p: Vec2| p.extend(self.ceiling_at(p.y));
 
-        let ceiling = self.bake_level(b.light(), height, normal, CEILING_PER_M * scale, |p| {
-            self.ceiling.at(p.x - self.low.x, p.y - self.low.y)
-        });
+        let ceiling = self.bake_level(
+            b.light(),
+            |p| p.extend(self.ceiling_at(p.y)),
+            normal,
+            CEILING_PER_M * scale,
+            |p| self.ceiling.at(p.x - self.low.x, p.y - self.low.y),
+        );
         let ceiling = b.texture(format!("{name}_ceiling"), ceiling, Wrap::Clamp);
 
         // Rows from large to small y, so that the front is below.
@@ -282,14 +282,12 @@ impl RoomPlan {
                 let u = offsets[k] as f32 + (s - start).abs() / self.length(wall) * columns[k] as f32;
                 (foot.extend(z), vec2(u / all as f32, z / top))
             };
-            let open = |o: &Opening, p: Vec2| {
-                let s = o.span;
-                let z = o.heights;
-                o.wall == wall && p.x > s[0] && p.x < s[1] && p.y > z[0] && p.y < z[1]
-            };
 
             b.begin(Class::WALL);
-            b.baked(lattice(&along, zs, place, |p| !self.openings.iter().any(|o| open(o, p))), texture);
+            b.baked(
+                lattice(&along, zs, place, |p| !self.openings.iter().any(|o| covers(o, p, wall))),
+                texture,
+            );
         }
     }
 
@@ -319,13 +317,22 @@ impl RoomPlan {
     }
 }
 
+fn is_in(hole: Option<[Vec2; 2]>, p: Vec2) -> bool {
+    hole.is_some_and(|[a, c]| p.cmpgt(a).all() && p.cmplt(c).all())
+}
+
+fn covers(o: &Opening, p: Vec2, wall: Wall) -> bool {
+    let s = o.span;
+    let z = o.heights;
+    o.wall == wall && p.x > s[0] && p.x < s[1] && p.y > z[0] && p.y < z[1]
+}
+
 /// The sides of a stairwell, seen from within.
 fn rim(b: &mut Builder, Stairwell { low, high, depth_m }: Stairwell) {
     let ring = [low, vec2(low.x, high.y), high, vec2(high.x, low.y)];
     for (k, from) in ring.into_iter().enumerate() {
         let to = ring[(k + 1) % ring.len()];
-        let (top, down) = (|p: Vec2| p.extend(0.0), |p: Vec2| p.extend(-depth_m));
-        b.panel([down(from), down(to), top(to), top(from)], WHITE);
+        b.panel([from.extend(-depth_m), to.extend(-depth_m), to.extend(0.0), from.extend(0.0)], WHITE);
     }
 }
 

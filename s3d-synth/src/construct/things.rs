@@ -103,15 +103,16 @@ fn monitor(b: &mut Builder, picture: Pattern) {
 /// The front of a screen: its picture within a rim.
 fn screen(b: &mut Builder, half: f32, y: f32, z: [f32; 2], picture: Pattern) {
     const RIM: f32 = 0.012;
-    let rect = |x0: f32, x1: f32, z0: f32, z1: f32| {
-        [[x0, z0], [x1, z0], [x1, z1], [x0, z1]].map(|[x, z]| vec3(x, y, z))
-    };
     let [z0, z1] = z;
-    b.panel(rect(-half + RIM, half - RIM, z0 + RIM, z1 - RIM), Look::Fitted(picture));
-    b.panel(rect(-half, half, z0, z0 + RIM), BLACK);
-    b.panel(rect(-half, half, z1 - RIM, z1), BLACK);
-    b.panel(rect(-half, -half + RIM, z0 + RIM, z1 - RIM), BLACK);
-    b.panel(rect(half - RIM, half, z0 + RIM, z1 - RIM), BLACK);
+    b.panel(rect_at(-half + RIM, half - RIM, z0 + RIM, z1 - RIM, y), Look::Fitted(picture));
+    b.panel(rect_at(-half, half, z0, z0 + RIM, y), BLACK);
+    b.panel(rect_at(-half, half, z1 - RIM, z1, y), BLACK);
+    b.panel(rect_at(-half, -half + RIM, z0 + RIM, z1 - RIM, y), BLACK);
+    b.panel(rect_at(half - RIM, half, z0 + RIM, z1 - RIM, y), BLACK);
+}
+
+fn rect_at(x0: f32, x1: f32, z0: f32, z1: f32, y: f32) -> [Vec3; 4] {
+    [[x0, z0], [x1, z0], [x1, z1], [x0, z1]].map(|[x, z]| vec3(x, y, z))
 }
 
 /// A large screen on a wall, 3 cm off it.
@@ -134,24 +135,27 @@ fn laptop(b: &mut Builder) {
     b.cuboid([-0.17, -0.12, 0.0], [0.17, 0.12, 0.018], STEEL, &[Bottom, Top]);
     let keys = [[-0.17, -0.12], [0.17, -0.12], [0.17, 0.12], [-0.17, 0.12]];
     b.panel(keys.map(|[x, y]| vec3(x, y, 0.018)), Look::Fitted(Pattern::Keyboard));
-    let at = |x: f32, y: f32, z: f32| vec3(x, y + 0.28 * z, z);
     let x = 0.17;
     let y0 = 0.118;
     let y1 = 0.128;
     let z0 = 0.022;
     let z1 = 0.23;
     let corners = [
-        at(-x, y0, z0),
-        at(x, y0, z0),
-        at(x, y1, z0),
-        at(-x, y1, z0),
-        at(-x, y0, z1),
-        at(x, y0, z1),
-        at(x, y1, z1),
-        at(-x, y1, z1),
+        leaning(-x, y0, z0),
+        leaning(x, y0, z0),
+        leaning(x, y1, z0),
+        leaning(-x, y1, z0),
+        leaning(-x, y0, z1),
+        leaning(x, y0, z1),
+        leaning(x, y1, z1),
+        leaning(-x, y1, z1),
     ];
     b.hexahedron(corners, STEEL, &[Front]);
     b.panel([corners[0], corners[1], corners[5], corners[4]], Look::Fitted(Pattern::Editor));
+}
+
+fn leaning(x: f32, y: f32, z: f32) -> Vec3 {
+    vec3(x, y + 0.28 * z, z)
 }
 
 fn mug(b: &mut Builder, look: Look) {

@@ -196,35 +196,6 @@ fn proportions(building: usize) -> Proportions {
 }
 
 fn models(building: usize) -> Models {
-    let common = |tables, seats, couches, shelves, leaves, panes| Models {
-        tables,
-        table_m: [[1.4, 1.7], [0.68, 0.8], [0.72, 0.75]],
-        seats,
-        seat_m: [[0.44, 0.48], [0.44, 0.48], [0.86, 1.02]],
-        couches,
-        couch_m: [[0.6, 0.68], [0.82, 0.9], [0.78, 0.86]],
-        shelves,
-        shelf_m: [[0.8, 1.0], [0.28, 0.34], [1.9, 2.15]],
-        plain_boards: 0.1,
-        board_m: [[1.2, 2.4], [1.0, 1.2]],
-        table_looks: vec![WHITE, Look::Plain("maple", [226, 202, 164])],
-        seat_looks: vec![Look::Plain("black_mesh", [46, 48, 52]), Look::Plain("navy_fabric", [44, 58, 92])],
-        couch_looks: vec![RUST_FABRIC, Look::Plain("burgundy_fabric", [136, 44, 52])],
-        shelf_looks: vec![
-            Look::Plain("blue_steel", [92, 112, 138]),
-            Look::Plain("graphite_steel", [88, 92, 98]),
-        ],
-        leaves,
-        leaf_looks: vec![OAK, Look::Plain("beech_veneer", [206, 160, 112])],
-        door_m: [0.9, 2.05],
-        shut: 0.3,
-        panes,
-        window_m: [0.85, 2.1],
-        beams: 0.0,
-        columns: 0.0,
-        end_windows: 0.3,
-    };
-
     match building {
         0 => common(
             vec![TableBase::Legs, TableBase::Legs, TableBase::Pedestal],
@@ -303,6 +274,45 @@ fn models(building: usize) -> Models {
                 vec![[1, 1]],
             )
         },
+    }
+}
+
+/// Returns models of the given kinds, with the sizes and looks of the first building.
+fn common(
+    tables: Vec<TableBase>,
+    seats: Vec<(SeatBase, bool)>,
+    couches: Vec<bool>,
+    shelves: Vec<ShelfFront>,
+    leaves: Vec<LeafModel>,
+    panes: Vec<[u32; 2]>,
+) -> Models {
+    Models {
+        tables,
+        table_m: [[1.4, 1.7], [0.68, 0.8], [0.72, 0.75]],
+        seats,
+        seat_m: [[0.44, 0.48], [0.44, 0.48], [0.86, 1.02]],
+        couches,
+        couch_m: [[0.6, 0.68], [0.82, 0.9], [0.78, 0.86]],
+        shelves,
+        shelf_m: [[0.8, 1.0], [0.28, 0.34], [1.9, 2.15]],
+        plain_boards: 0.1,
+        board_m: [[1.2, 2.4], [1.0, 1.2]],
+        table_looks: vec![WHITE, Look::Plain("maple", [226, 202, 164])],
+        seat_looks: vec![Look::Plain("black_mesh", [46, 48, 52]), Look::Plain("navy_fabric", [44, 58, 92])],
+        couch_looks: vec![RUST_FABRIC, Look::Plain("burgundy_fabric", [136, 44, 52])],
+        shelf_looks: vec![
+            Look::Plain("blue_steel", [92, 112, 138]),
+            Look::Plain("graphite_steel", [88, 92, 98]),
+        ],
+        leaves,
+        leaf_looks: vec![OAK, Look::Plain("beech_veneer", [206, 160, 112])],
+        door_m: [0.9, 2.05],
+        shut: 0.3,
+        panes,
+        window_m: [0.85, 2.1],
+        beams: 0.0,
+        columns: 0.0,
+        end_windows: 0.3,
     }
 }
 

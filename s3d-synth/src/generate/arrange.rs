@@ -140,12 +140,13 @@ fn windows(room: &RoomOptions, wall: Wall, [from, to]: [f32; 2], rng: &mut ChaCh
     let sill = pick(rng, &[0.8, 0.9]);
     let slot = (to - from - 0.8) / room.windows.max(1) as f32;
     let half = 0.5 * (slot - 0.5).min(1.8);
-    let window = |k: u32| {
-        let middle = from + 0.4 + slot * (k as f32 + 0.5);
-        let span = [middle - half, middle + half];
-        Opening { wall, span, heights: [sill, WINDOW_TOP_M], filling: Filling::Window }
-    };
-    (0..room.windows).map(window).collect()
+    (0..room.windows)
+        .map(|k| {
+            let middle = from + 0.4 + slot * (k as f32 + 0.5);
+            let span = [middle - half, middle + half];
+            Opening { wall, span, heights: [sill, WINDOW_TOP_M], filling: Filling::Window }
+        })
+        .collect()
 }
 
 /// A room with finishes and lamps.

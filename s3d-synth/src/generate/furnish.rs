@@ -169,12 +169,13 @@ pub(super) fn furnish(
 
 /// Makes scan locations at places in the plan.
 fn stand_at(plan: &[Vec2], floor_m: f32, rng: &mut ChaCha8Rng) -> Vec<ScanLocation> {
-    let location = |p: &Vec2| ScanLocation {
-        uuid: format!("{:016x}{:016x}", rng.random::<u64>(), rng.random::<u64>()),
-        position: p.extend(floor_m + between(rng, 1.4, 1.6)).as_dvec3(),
-        yaw_rad: f64::from(between(rng, -180.0, 180.0)).to_radians(),
-    };
-    plan.iter().map(location).collect()
+    plan.iter()
+        .map(|p| ScanLocation {
+            uuid: format!("{:016x}{:016x}", rng.random::<u64>(), rng.random::<u64>()),
+            position: p.extend(floor_m + between(rng, 1.4, 1.6)).as_dvec3(),
+            yaw_rad: f64::from(between(rng, -180.0, 180.0)).to_radians(),
+        })
+        .collect()
 }
 
 /// Adds beams between the lamps, columns under them at outer walls, and radiators under windows.

@@ -52,10 +52,13 @@ mod tests {
         room
     }
 
+    fn lamp(x: f32) -> Item {
+        Item::standing([x, 2.0, 0.74], 90.0, Thing::DeskLamp)
+    }
+
     #[test]
     fn a_thing_is_moved_off_a_wall_and_no_farther() {
         let end = Building::demo().rooms[0].high.x;
-        let lamp = |x: f32| Item::standing([x, 2.0, 0.74], 90.0, Thing::DeskLamp);
         // Turned so, its arm reaches 28 cm along x.
         let room = office(vec![lamp(2.0), lamp(end - 0.2)]);
 
@@ -76,6 +79,10 @@ mod tests {
         assert_eq!(room.items, []);
     }
 
+    fn are_near(a: Aabb, b: Aabb) -> bool {
+        a.min.distance(b.min) < 1e-3 && a.max.distance(b.max) < 1e-3
+    }
+
     #[test]
     fn a_thing_reaches_as_far_as_the_surfaces_that_are_built_of_it() {
         let building = Building { texture_scale: 0.02, ..Building::demo() };
@@ -86,11 +93,10 @@ mod tests {
             boxes[instance as usize] = corners.into_iter().fold(boxes[instance as usize], Aabb::with);
         }
 
-        let near = |a: Aabb, b: Aabb| a.min.distance(b.min) < 1e-3 && a.max.distance(b.max) < 1e-3;
         for room in &building.rooms {
             for item in &room.items {
                 let bounds = room.bounds_of(item);
-                assert!(boxes.iter().any(|&built| near(built, bounds)), "{item:?}: {bounds:?}");
+                assert!(boxes.iter().any(|&built| are_near(built, bounds)), "{item:?}: {bounds:?}");
             }
         }
     }

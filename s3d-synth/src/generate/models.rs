@@ -78,10 +78,6 @@ impl Models {
             return Err(BuildingError::EmptyStyle { what });
         }
 
-        let check = |value: f32, range: [f64; 2], what: &str| {
-            RangeError::check(value, range, || format!("the models: {what}"))
-        };
-
         let sizes = [
             (&self.table_m, [[1.4, 3.0], [0.6, 1.5], [0.6, 1.1]], "the size of tables"),
             (&self.seat_m, [[0.35, 0.65], [0.38, 0.55], [0.65, 1.3]], "the size of chairs"),
@@ -91,7 +87,7 @@ impl Models {
 
         for (ranges, allowed, what) in sizes {
             for (range, allowed) in ranges.iter().zip(allowed) {
-                range.iter().try_for_each(|&m| check(m, allowed, what))?;
+                range.iter().try_for_each(|&m| check_range(m, allowed, what))?;
             }
         }
 
@@ -106,13 +102,13 @@ impl Models {
         for (range, allowed) in self.board_m.iter().zip([[0.4, 5.0], [0.4, board]]) {
             range
                 .iter()
-                .try_for_each(|&m| check(m, allowed, "the size of boards"))?;
+                .try_for_each(|&m| check_range(m, allowed, "the size of boards"))?;
         }
 
         let most = options.hallway_width_m - 0.2;
-        check(self.door_m[0], [0.7, f64::from(most.min(1.1))], "the width of doorways")?;
-        check(self.door_m[1], [1.9, 2.1], "the height of doorways")?;
-        check(self.window_m[0], [0.3, 1.2], "the lower edge of windows")?;
+        check_range(self.door_m[0], [0.7, f64::from(most.min(1.1))], "the width of doorways")?;
+        check_range(self.door_m[1], [1.9, 2.1], "the height of doorways")?;
+        check_range(self.window_m[0], [0.3, 1.2], "the lower edge of windows")?;
 
         // Under a slanted ceiling, openings end below the slant.
         let top = if options.rooms.iter().all(|r| r.heights_m[0] == r.heights_m[1]) {
@@ -120,14 +116,14 @@ impl Models {
         } else {
             2.1
         };
-        check(self.window_m[1], [1.9, f64::from(top)], "the upper edge of windows")?;
+        check_range(self.window_m[1], [1.9, f64::from(top)], "the upper edge of windows")?;
 
         for panes in self.panes.iter().flatten() {
-            check(*panes as f32, [1.0, 3.0], "the panes of a window")?;
+            check_range(*panes as f32, [1.0, 3.0], "the panes of a window")?;
         }
 
-        check(self.beams, [0.0, 20.0], "the number of beams")?;
-        check(self.columns, [0.0, 20.0], "the number of columns")?;
+        check_range(self.beams, [0.0, 20.0], "the number of beams")?;
+        check_range(self.columns, [0.0, 20.0], "the number of columns")?;
 
         for (share, what) in [
             (self.plain_boards, "the share of boards without a frame"),
@@ -136,7 +132,7 @@ impl Models {
         ] {
             RangeError::check(share, [0.0, 1.0], || format!("the models: {what}"))?;
         }
-        check(options.wall_m, [0.15, 1.0], "the thickness of walls that doors divide")?;
+        check_range(options.wall_m, [0.15, 1.0], "the thickness of walls that doors divide")?;
         Ok(())
     }
 
@@ -165,6 +161,10 @@ impl Models {
         };
         (thing, width_m)
     }
+}
+
+fn check_range(value: f32, range: [f64; 2], what: &str) -> Result<(), RangeError> {
+    RangeError::check(value, range, || format!("the models: {what}"))
 }
 
 /// Draws one size from each range.

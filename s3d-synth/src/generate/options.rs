@@ -115,19 +115,20 @@ impl BuildingOptions {
     /// gives the same options.
     pub fn drawn(rooms: u32, seed: u64) -> Self {
         let mut rng = rng(seed, u64::MAX);
-        let room = |_| {
-            let (room_type, [[x0, x1], [y0, y1]]) = pick(&mut rng, &DRAWN);
-            let mut room =
-                RoomOptions::sized(room_type, [between(&mut rng, x0, x1), between(&mut rng, y0, y1)]);
-            room.heights_m = [between(&mut rng, 2.5, 3.1); 2];
-            if pick(&mut rng, &[true, false, false, false]) {
-                room.heights_m[1] = between(&mut rng, 2.4, 3.4);
-            }
-            room
-        };
         Self {
             title: format!("A building of {rooms} rooms, seed {seed}"),
-            rooms: (0..rooms).map(room).collect(),
+            rooms: (0..rooms)
+                .map(|_| {
+                    let (room_type, [[x0, x1], [y0, y1]]) = pick(&mut rng, &DRAWN);
+                    let mut room =
+                        RoomOptions::sized(room_type, [between(&mut rng, x0, x1), between(&mut rng, y0, y1)]);
+                    room.heights_m = [between(&mut rng, 2.5, 3.1); 2];
+                    if pick(&mut rng, &[true, false, false, false]) {
+                        room.heights_m[1] = between(&mut rng, 2.4, 3.4);
+                    }
+                    room
+                })
+                .collect(),
             storeys: 1,
             hallway_width_m: 1.8,
             hallway_height_m: 2.6,
@@ -145,14 +146,13 @@ impl BuildingOptions {
             return Err(BuildingError::NoRoom);
         }
 
-        let words = |what: &str| what.to_owned();
         let count = self.rooms.len() as f64;
-        RangeError::check(count, [1.0, 1000.0], || words("the number of rooms"))?;
-        RangeError::check(self.storeys, [1.0, count], || words("the number of storeys"))?;
+        RangeError::check(count, [1.0, 1000.0], || "the number of rooms".to_owned())?;
+        RangeError::check(self.storeys, [1.0, count], || "the number of storeys".to_owned())?;
 
-        RangeError::check(self.hallway_width_m, [1.2, 10.0], || words("the width of hallways"))?;
-        RangeError::check(self.hallway_height_m, HEIGHTS, || words("the height of hallways"))?;
-        RangeError::check(self.wall_m, [0.1, 1.0], || words("the thickness of walls"))?;
+        RangeError::check(self.hallway_width_m, [1.2, 10.0], || "the width of hallways".to_owned())?;
+        RangeError::check(self.hallway_height_m, HEIGHTS, || "the height of hallways".to_owned())?;
+        RangeError::check(self.wall_m, [0.1, 1.0], || "the thickness of walls".to_owned())?;
 
         let with_models = self.models.is_some();
         self.rooms
@@ -164,10 +164,10 @@ impl BuildingOptions {
             if !with_models {
                 return Err(BuildingError::EmptyStyle { what: "models, which wings need" });
             }
-            RangeError::check(wings, [1.0, 20.0], || words("the number of wings"))?;
+            RangeError::check(wings, [1.0, 20.0], || "the number of wings".to_owned())?;
             let least = if wings > 1 { 2 * wings } else { 1 };
-            RangeError::check(hallways, [f64::from(least), 200.0], || words("the number of hallways"))?;
-            RangeError::check(courtyard_m, [0.5, 100.0], || words("what is between wings"))?;
+            RangeError::check(hallways, [f64::from(least), 200.0], || "the number of hallways".to_owned())?;
+            RangeError::check(courtyard_m, [0.5, 100.0], || "what is between wings".to_owned())?;
         }
 
         check_texture_scale(self.texture_scale)?;

@@ -352,20 +352,22 @@ impl Outfitter<'_> {
                 let found = space.find_at_wall(rng, [toilets as f32 + 0.06, 1.5], true);
                 let at = |k: f32| k - 0.5 * toilets as f32;
                 let partition = Thing::Partition { depth_m: 1.4, height_m: 1.9 };
-                let stalls = |f: Frame| {
-                    let screens = (0..=toilets).map(|k| f.put([at(k as f32), 0.0, 0.0], 0.0, partition));
-                    let bowls =
-                        (0..toilets).map(|k| f.put([at(k as f32 + 0.5), 0.0, 0.0], 0.0, Thing::Toilet));
-                    screens.chain(bowls).collect()
-                };
-                found.map(stalls).unwrap_or_default()
+                found
+                    .map(|f| {
+                        let screens = (0..=toilets).map(|k| f.put([at(k as f32), 0.0, 0.0], 0.0, partition));
+                        let bowls =
+                            (0..toilets).map(|k| f.put([at(k as f32 + 0.5), 0.0, 0.0], 0.0, Thing::Toilet));
+                        screens.chain(bowls).collect()
+                    })
+                    .unwrap_or_default()
             }
             Basins => {
                 let basins = rng.random_range(1..=3u32);
                 let found = space.find_at_wall(rng, [0.75 * basins as f32, 0.52], true);
                 let at = |k: u32| [0.75 * (k as f32 + 0.5 - 0.5 * basins as f32), 0.0, 0.0];
-                let row = |f: Frame| (0..basins).map(|k| f.put(at(k), 0.0, Thing::Basin)).collect();
-                found.map(row).unwrap_or_default()
+                found
+                    .map(|f| (0..basins).map(|k| f.put(at(k), 0.0, Thing::Basin)).collect())
+                    .unwrap_or_default()
             }
             Usual(_) => Vec::new(),
         }

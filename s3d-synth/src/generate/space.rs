@@ -105,16 +105,16 @@ impl Space {
 
     fn is_free(&self, [low, high]: Rect) -> bool {
         let inside = low.cmpge(self.low + 0.5 * GAP_M).all() && high.cmple(self.high - 0.5 * GAP_M).all();
-        let apart = |[l, h]: Rect| low.cmpge(h + GAP_M).any() || l.cmpge(high + GAP_M).any();
-        inside && self.taken.iter().all(|&rect| apart(rect))
+        let mut taken = self.taken.iter();
+        inside && taken.all(|&[l, h]| low.cmpge(h + GAP_M).any() || l.cmpge(high + GAP_M).any())
     }
 
     fn wall_is_free(&self, wall: Wall, [from, to]: [f32; 2]) -> bool {
         let [start, end] = self.ends(wall);
-        let apart = |[l, h]: [f32; 2]| from >= h + GAP_M || l >= to + GAP_M;
+        let mut taken = self.walls[wall as usize].iter();
         from >= start + GAP_M
             && to <= end - GAP_M
-            && self.walls[wall as usize].iter().all(|&span| apart(span))
+            && taken.all(|&[l, h]| from >= h + GAP_M || l >= to + GAP_M)
     }
 
     /// Takes the rectangle along a wall up to `depth` if it is free, and the wall behind it if it is `tall`.

@@ -66,7 +66,6 @@ pub(super) fn arrange_wings(
     let wings = planner.deal(wings, start);
     // The hallways left for the wings, dealt evenly.
     let left = hallways as usize - if has_cross { wings.len() } else { 0 };
-    let pieces = |wing: usize| left / wings.len() + usize::from(wing < left % wings.len());
 
     let first = sites.len();
     let mut hallway_sites = Vec::new();
@@ -83,14 +82,9 @@ pub(super) fn arrange_wings(
         let north = south + options.hallway_width_m;
         let top = north + deepest(1);
 
-        let entry = planner.wing(
-            wing,
-            [start, south, north],
-            pieces(index),
-            has_cross,
-            (sites, &mut hallway_sites),
-            rng,
-        );
+        let pieces = left / wings.len() + usize::from(index < left % wings.len());
+        let entry =
+            planner.wing(wing, [start, south, north], pieces, has_cross, (sites, &mut hallway_sites), rng);
         cross.push(([y, top], entry));
         y = top + courtyard_m;
     }
@@ -212,9 +206,12 @@ impl Planner<'_> {
         let ends: Vec<f32> = cuts.iter().copied().chain([end + 0.5 * wall_m]).collect();
         for (k, cut) in ends.iter().enumerate() {
             let to = cut - 0.5 * wall_m;
-            let inside = |o: &&Opening| o.span[0] >= from && o.span[1] <= to;
 
-            let mut openings: Vec<Opening> = doors.iter().filter(inside).copied().collect();
+            let mut openings: Vec<Opening> = doors
+                .iter()
+                .filter(|o| o.span[0] >= from && o.span[1] <= to)
+                .copied()
+                .collect();
             openings.extend(west.take());
             if k + 1 < ends.len() {
                 let door = self.doorway(across, rng);
@@ -321,15 +318,13 @@ impl Planner<'_> {
             let wanted = start + (end - start) * k as f32 / pieces as f32;
             let least = cuts.last().map_or(start, |cut| *cut) + SHORTEST_M + self.options.wall_m;
 
-            let fits = |cut: &&f32| {
-                **cut >= least
-                    && **cut <= end - SHORTEST_M - self.options.wall_m
-                    && have_place(&[cuts.as_slice(), &[**cut]].concat())
-            };
-
             let nearest = places
                 .iter()
-                .filter(fits)
+                .filter(|cut| {
+                    **cut >= least
+                        && **cut <= end - SHORTEST_M - self.options.wall_m
+                        && have_place(&[cuts.as_slice(), &[**cut]].concat())
+                })
                 .min_by(|a, b| (**a - wanted).abs().total_cmp(&(**b - wanted).abs()));
             cuts.extend(nearest.copied());
         }

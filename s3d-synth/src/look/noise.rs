@@ -13,24 +13,29 @@ pub(crate) fn hash(x: u32, y: u32, seed: u32) -> f32 {
 pub(crate) fn value(x: f32, y: f32, period: u32, seed: u32) -> f32 {
     let xf = x.floor();
     let yf = y.floor();
-    let wrap = |v: f32| (v as i64).rem_euclid(i64::from(period)) as u32;
-    let x0 = wrap(xf);
-    let x1 = wrap(xf + 1.0);
-    let y0 = wrap(yf);
-    let y1 = wrap(yf + 1.0);
+    let x0 = wrapped(xf, period);
+    let x1 = wrapped(xf + 1.0, period);
+    let y0 = wrapped(yf, period);
+    let y1 = wrapped(yf + 1.0, period);
     let fx = smooth(x - xf);
     let fy = smooth(y - yf);
     let row = |y| hash(x0, y, seed) * (1.0 - fx) + hash(x1, y, seed) * fx;
     row(y0) * (1.0 - fy) + row(y1) * fy
 }
 
+fn wrapped(v: f32, period: u32) -> u32 {
+    (v as i64).rem_euclid(i64::from(period)) as u32
+}
+
 /// Four octaves of [`value`], in [0, 1); repeats every `period` units.
 pub(crate) fn fractal(x: f32, y: f32, period: u32, seed: u32) -> f32 {
-    let octave = |k: u32| {
-        let n = 1 << k;
-        value(x * n as f32, y * n as f32, period * n, seed + k) / (2 * n) as f32
-    };
-    (0..4).map(octave).sum::<f32>() / 0.9375
+    (0..4)
+        .map(|k| {
+            let n = 1 << k;
+            value(x * n as f32, y * n as f32, period * n, seed + k) / (2 * n) as f32
+        })
+        .sum::<f32>()
+        / 0.9375
 }
 
 /// 0 below 0, 1 above 1, smooth in between.

@@ -18,8 +18,12 @@ struct Canvas {
 
 impl Canvas {
     fn new(width: u32, height: u32, color: impl Fn(f32, f32) -> Color) -> Self {
-        let at = |i: u32| color((i % width) as f32, (i / width) as f32);
-        Self { width, pixels: (0..width * height).map(at).collect() }
+        Self {
+            width,
+            pixels: (0..width * height)
+                .map(|i| color((i % width) as f32, (i / width) as f32))
+                .collect(),
+        }
     }
 
     /// Blends `color` over each pixel, by the share that `cover` gives.
@@ -31,8 +35,10 @@ impl Canvas {
     }
 
     fn rect(&mut self, low: [f32; 2], high: [f32; 2], color: Color) {
-        let inside = |p: Vec2| p.x >= low[0] && p.x < high[0] && p.y >= low[1] && p.y < high[1];
-        self.cover(color, |p| if inside(p) { 1.0 } else { 0.0 });
+        self.cover(color, |p| {
+            let is_inside = p.x >= low[0] && p.x < high[0] && p.y >= low[1] && p.y < high[1];
+            if is_inside { 1.0 } else { 0.0 }
+        });
     }
 
     fn disc(&mut self, center: [f32; 2], radius: f32, color: Color) {
@@ -41,8 +47,10 @@ impl Canvas {
 
     /// A pen's line through `points`, each scaled by `scale` and moved by `origin`.
     fn line(&mut self, points: &[[f32; 2]], origin: [f32; 2], scale: f32, width: f32, color: Color) {
-        let place = |p: [f32; 2]| Vec2::from_array(origin) + Vec2::from_array(p) * scale;
-        let points: Vec<Vec2> = points.iter().map(|&p| place(p)).collect();
+        let points: Vec<Vec2> = points
+            .iter()
+            .map(|&p| Vec2::from_array(origin) + Vec2::from_array(p) * scale)
+            .collect();
         self.cover(color, |p| {
             let distance = points.windows(2).map(|ab| {
                 let along = ab[1] - ab[0];
@@ -367,13 +375,15 @@ mod tests {
             let w = picture.width();
             let h = picture.height();
             let differs = |other: &dyn Fn(u32, u32) -> (u32, u32)| {
-                let changed = |&(x, y): &(u32, u32)| {
+                let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
+                all.filter(|&(x, y)| {
                     let a = other(x, y);
                     let b = picture.at(x, y);
                     picture.at(a.0, a.1).iter().zip(b).any(|(p, q)| p.abs_diff(q) > 24)
-                };
-                let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
-                all.filter(changed).count() * 50 > (w * h) as usize
+                })
+                .count()
+                    * 50
+                    > (w * h) as usize
             };
             assert!(differs(&|x, y| (w - 1 - x, y)), "mirrored");
             assert!(differs(&|x, y| (x, h - 1 - y)), "upside down");

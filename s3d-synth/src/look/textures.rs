@@ -301,13 +301,16 @@ fn rug() -> Raster<[u8; 3]> {
 mod tests {
     use super::*;
 
+    fn step(a: [u8; 3], b: [u8; 3]) -> i32 {
+        i32::from(a[0].abs_diff(b[0]))
+    }
+
     #[test]
     fn tiles_meet_at_their_edges() {
         for pattern in [Pattern::Oak, Pattern::Concrete, Pattern::BlueFabric] {
             let image = pattern.image();
             let w = image.width();
             let h = image.height();
-            let step = |a: [u8; 3], b: [u8; 3]| i32::from(a[0].abs_diff(b[0]));
             let inner: i32 = (0..h).map(|y| step(image.at(w / 2 - 1, y), image.at(w / 2, y))).sum();
             let seam: i32 = (0..h).map(|y| step(image.at(w - 1, y), image.at(0, y))).sum();
             assert!(seam < 2 * inner + 2 * h as i32, "{pattern:?}: {seam} across the seam, {inner} within");

@@ -51,10 +51,8 @@ struct Builder {
 
 impl Builder {
     fn grid(&mut self, origin: Vec3, u: Vec3, v: Vec3) {
-        let (nu, nv) = (
-            (u.length() / self.cell).ceil().max(1.0) as u32,
-            (v.length() / self.cell).ceil().max(1.0) as u32,
-        );
+        let nu = (u.length() / self.cell).ceil().max(1.0) as u32;
+        let nv = (v.length() / self.cell).ceil().max(1.0) as u32;
         let normal = u.cross(v).normalize();
         let first = self.parts.positions.len() as u32;
 
@@ -147,8 +145,12 @@ mod tests {
         for (asked, faces) in [(500, 1_700), (20_000, 27_056), (100_000, 116_644)] {
             let room = classroom(asked);
             assert_eq!(room.faces().len(), faces, "{asked}");
-            let near = |p: &Vec3| p.as_dvec3().distance(CLASSROOM_LOCATION) < 0.3;
-            assert!(!room.positions().iter().any(near));
+            assert!(
+                !room
+                    .positions()
+                    .iter()
+                    .any(|p| p.as_dvec3().distance(CLASSROOM_LOCATION) < 0.3)
+            );
         }
     }
 }

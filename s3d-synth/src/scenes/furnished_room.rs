@@ -68,8 +68,8 @@ mod tests {
             let m = furnished_room(seed);
             prop_assert_eq!(open_edges(m.parts()), 0);
             prop_assert_eq!(digest(&m), digest(&furnished_room(seed)));
-            let is_textured = |f: &u32| matches!(m.color_of(*f), FaceColor::Texture(..));
-            let textured = (0..m.faces().len() as u32).filter(is_textured).count();
+            let faces = 0..m.faces().len() as u32;
+            let textured = faces.filter(|f| matches!(m.color_of(*f), FaceColor::Texture(..))).count();
             prop_assert!(textured * 2 > m.faces().len());
             let middle = m.aabb().center();
             let height = m.aabb().max.z;

@@ -105,14 +105,11 @@ impl LargeScan {
     /// [`ScanError::Range`] for a number that is out of its range, [`ScanError::File`] if a file cannot be
     /// written.
     pub fn write(&self, folder: &Path) -> Result<LargeScanSummary, ScanError> {
-        let range = |value: f64, min: f64, max: f64, what: &str| {
-            RangeError::check(value, [min, max], || format!("the number of {what}"))
-        };
-        range(self.faces as f64, 1.0, 1e9, "faces")?;
-        range(self.materials as f64, 1.0, 1e6, "materials")?;
-        range(self.labels as f64, 6.0, 1e6, "labels")?;
-        range(self.points as f64, 0.0, 1e12, "points")?;
-        range(f64::from(self.texture_px), 8.0, 16_384.0, "pixels along a texture")?;
+        check_number(self.faces as f64, 1.0, 1e9, "faces")?;
+        check_number(self.materials as f64, 1.0, 1e6, "materials")?;
+        check_number(self.labels as f64, 6.0, 1e6, "labels")?;
+        check_number(self.points as f64, 0.0, 1e12, "points")?;
+        check_number(f64::from(self.texture_px), 8.0, 16_384.0, "pixels along a texture")?;
 
         create_dir(folder)?;
         let rooms = Rooms::new(self);
@@ -134,6 +131,10 @@ impl LargeScan {
             area_m2: rooms.area,
         })
     }
+}
+
+fn check_number(value: f64, min: f64, max: f64, what: &str) -> Result<(), RangeError> {
+    RangeError::check(value, [min, max], || format!("the number of {what}"))
 }
 
 /// Writes one file piece by piece.
@@ -273,13 +274,13 @@ impl Rooms {
         for m in 0..options.materials {
             let _ = writeln!(mtl, "newmtl m{m}\nKd 1 1 1\nmap_Kd m{m}.png");
             let px = options.texture_px;
-            let color = |at: u32| {
-                let [r, g, b, ..] =
-                    hash((m << 32) | u64::from(at % px / 8) << 16 | u64::from(at / px / 8)).to_le_bytes();
-                [r, g, b]
-            };
 
-            let image = Raster::from_vec(px, px, (0..px * px).map(color).collect());
+            let pixels = (0..px * px).map(|at| {
+                let place = (m << 32) | u64::from(at % px / 8) << 16 | u64::from(at / px / 8);
+                let [r, g, b, ..] = hash(place).to_le_bytes();
+                [r, g, b]
+            });
+            let image = Raster::from_vec(px, px, pixels.collect());
             write_bytes(
                 &folder.join(format!("m{m}.png")),
                 &encode_rgb8(&image, Content::Photo, Compression::Fast),

@@ -1,12 +1,30 @@
-//! Looks at a scene without a renderer, face by face.
+//! The types of rooms to generate, and a look at every face of a scene without a renderer.
 
 #![allow(dead_code, unreachable_pub, reason = "each test takes what it needs")]
 
 use s3d_geom::glam::{DVec2, DVec3, dvec2};
 use s3d_geom::{Aabb, FaceColor, Wrap};
-use s3d_label::{Class, Room};
+use s3d_label::{Class, Room, RoomType};
 use s3d_synth::{AnnotatedScene, Instance};
 use std::collections::BTreeMap;
+
+/// The types of generated rooms.
+pub const TYPES: [RoomType; 10] = [
+    RoomType::OFFICE,
+    RoomType::CONFERENCE_ROOM,
+    RoomType::LOUNGE,
+    RoomType::LOBBY,
+    RoomType::OPENSPACE,
+    RoomType::PANTRY,
+    RoomType::COPY_ROOM,
+    RoomType::STORAGE,
+    // These need models.
+    RoomType::AUDITORIUM,
+    RoomType::WC,
+];
+
+/// The first types need no models.
+pub const PLAIN_TYPES: usize = 8;
 
 /// A scene and its triangles.
 pub struct Seen {

@@ -205,13 +205,16 @@ mod tests {
     }
 
     fn names(annotations: &Annotations) -> Vec<String> {
-        let of = |r: &AnnotatedRoom| -> Vec<String> {
-            r.instances
-                .iter()
-                .map(|i| format!("{} {}_{}", r.room, i.class, i.number))
-                .collect()
-        };
-        annotations.rooms.iter().flat_map(of).collect()
+        annotations
+            .rooms
+            .iter()
+            .flat_map(|r: &AnnotatedRoom| -> Vec<String> {
+                r.instances
+                    .iter()
+                    .map(|i| format!("{} {}_{}", r.room, i.class, i.number))
+                    .collect()
+            })
+            .collect()
     }
 
     #[test]
@@ -221,13 +224,15 @@ mod tests {
         assert_eq!(names(&found), ["hallway_2 door_1", "office_1 wall_1", "office_1 chair_3"]);
         let chair = &found.rooms[1].instances[1];
         assert_eq!(chair.source(), format!("{}, office_1, chair_3", path.display()));
-        let (mut cloud, offset_m) = (PointCloud::default(), DVec3::new(100.0, 0.0, 0.0));
+        let mut cloud = PointCloud::default();
+        let offset_m = DVec3::new(100.0, 0.0, 0.0);
         chair.read(&mut cloud).unwrap();
         chair.read(&mut cloud).unwrap();
         assert_eq!((cloud.len(), cloud.colors[6]), (10, [1, 2, 254]));
         let moved = AnnotationOptions { offset_m, ..Default::default() };
         let found = Annotations::open(&[path], &moved).unwrap();
-        let (before, mut cloud) = (cloud, PointCloud::default());
+        let before = cloud;
+        let mut cloud = PointCloud::default();
         found.rooms[1].instances[1].read(&mut cloud).unwrap();
         assert_eq!(cloud.positions[4].x, before.positions[4].x - 100.0);
     }

@@ -43,14 +43,14 @@ fn user_block() -> [u8; 512] {
 /// | `….AlignmentAngle` | double, 1 × 1 | whole degrees, as in the S3DIS tree's file of angles |
 /// | `….color` | double, 1 × 3 | R G B from 0 to 1, another for each room |
 /// | `….object` | struct, 1 × objects | |
-/// | `….object.name` | char | "chair_3": numbered per class and room, as in the names of the S3DIS tree's files |
+/// | `….object.name` | char | "chair_3": numbered per class and room, as files of the S3DIS tree |
 /// | `….object.points` | single, N × 3 | x y z, metres |
 /// | `….object.RGB_color` | uint8, N × 3 | 0 to 255 |
 /// | `….object.global_name` | char | its label: "chair_17_office_1_1" |
 /// | `….object.Bbox` | single, 1 × 6 | smallest x y z, largest x y z of `points` |
-/// | `….object.Voxels` | single, 216 × 6 | the boxes of its voxels, in the order of `instances.json`: z fastest |
+/// | `….object.Voxels` | single, 216 × 6 | the boxes of its voxels, as in `instances.json`: z fastest |
 /// | `….object.Voxel_Occupancy` | uint8, 216 × 1 | 1 where a voxel holds a point |
-/// | `….object.Points_per_Voxel` | cell, 216 × 1 | for each voxel the rows of `points` in it: uint32, n × 1, from 1 |
+/// | `….object.Points_per_Voxel` | cell, 216 × 1 | rows of `points` in each voxel: uint32, n × 1, from 1 |
 ///
 /// Box and voxels are computed from `points`. A room without objects and an object without points are left
 /// out. As in MATLAB's own files, a struct array of one element holds the fields themselves, and a longer one

@@ -320,16 +320,17 @@ mod tests {
         assert!(integers(&beyond).unwrap_err().to_string().contains("beyond"));
     }
 
+    fn shape_and_order(shape: &str, order: &str) -> (Vec<u64>, bool) {
+        let bytes = npy("|u1", shape, order, &[0; 24]);
+        let array = NpyArray::new(&bytes[..], Path::new("a.npy")).unwrap();
+        (array.shape().to_vec(), array.is_column_major())
+    }
+
     #[test]
     fn shapes_and_orders_are_told() {
-        let array = |shape, order| {
-            let bytes = npy("|u1", shape, order, &[0; 24]);
-            let array = NpyArray::new(&bytes[..], Path::new("a.npy")).unwrap();
-            (array.shape().to_vec(), array.is_column_major())
-        };
-        assert_eq!(array("(2, 3, 4)", "True"), (vec![2, 3, 4], true));
-        assert_eq!(array("(24,)", "True"), (vec![24], false));
-        assert_eq!(array("()", "False"), (vec![], false));
+        assert_eq!(shape_and_order("(2, 3, 4)", "True"), (vec![2, 3, 4], true));
+        assert_eq!(shape_and_order("(24,)", "True"), (vec![24], false));
+        assert_eq!(shape_and_order("()", "False"), (vec![], false));
         assert_eq!(integers(&npy("|u1", "()", "False", &[7])).unwrap(), [7]);
         assert!(integers(&npy("|u1", "(0, 5)", "False", &[])).unwrap().is_empty());
     }

@@ -149,9 +149,12 @@ fn code_point(chars: &mut std::str::Chars<'_>, digits: usize) -> Result<char, &'
 mod tests {
     use super::*;
 
+    fn text(text: &str) -> Literal {
+        Literal::Text(text.into())
+    }
+
     #[test]
     fn values_as_python_writes_them() {
-        let text = |text: &str| Literal::Text(text.into());
         for (written, value) in [
             (" 'a' \n", text("a")),
             (r#""it's""#, text("it's")),

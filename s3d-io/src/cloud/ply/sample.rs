@@ -295,11 +295,14 @@ mod tests {
         assert_eq!((sample.positions[0], sample.colors[0]), (vec3(1.0, 2.0, 3.0), [0; 3]));
     }
 
+    fn head(format: &str, rest: &str) -> String {
+        format!("ply\nformat {format} 1.0\n{rest}end_header\n")
+    }
+
     #[test]
     fn every_fault_is_told() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("cloud.ply");
-        let head = |format: &str, rest: &str| format!("ply\nformat {format} 1.0\n{rest}end_header\n");
         let xyz = "property float x\nproperty float y\nproperty float z\n";
         let little = "binary_little_endian";
         for (text, words) in [

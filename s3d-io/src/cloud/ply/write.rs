@@ -174,8 +174,10 @@ pub fn read_ply_point_count(path: &Path) -> Result<u64> {
         let line = line.map_err(|e| Error::io(path, "read", e))?;
         let text = String::from_utf8_lossy(&line);
         if let Some(count) = text.trim().strip_prefix("element vertex ") {
-            let bad = |_| Error::format(path, format!("\"{count}\" is no number of points"));
-            return count.trim().parse().map_err(bad);
+            return count
+                .trim()
+                .parse()
+                .map_err(|_| Error::format(path, format!("\"{count}\" is no number of points")));
         }
         if text.trim() == "end_header" {
             break;
@@ -196,6 +198,14 @@ mod tests {
         let (points, rest) = bytes[end..].as_chunks();
         assert!(rest.is_empty());
         (String::from_utf8(bytes[..end].to_vec()).unwrap(), points.to_vec())
+    }
+
+    fn uint_at(p: &[u8; POINT_BYTES], at: usize) -> u32 {
+        u32::from_le_bytes(p[at..at + 4].try_into().unwrap())
+    }
+
+    fn float_at(p: &[u8; POINT_BYTES], at: usize) -> f32 {
+        f32::from_le_bytes(p[at..at + 4].try_into().unwrap())
     }
 
     #[test]
@@ -221,18 +231,16 @@ mod tests {
         let (header, points) = read(&path);
         assert!(header.contains(&format!("element vertex {}\n", n + 1)));
         assert!(header.lines().filter(|l| l.starts_with("property")).count() == 8);
-        let float = |p: &[u8; POINT_BYTES], at| f32::from_le_bytes(p[at..at + 4].try_into().unwrap());
-        let uint = |p: &[u8; POINT_BYTES], at| u32::from_le_bytes(p[at..at + 4].try_into().unwrap());
         for (i, p) in points[..n].iter().enumerate() {
-            assert_eq!(vec3(float(p, 0), float(p, 4), float(p, 8)), cloud.positions[i]);
+            assert_eq!(vec3(float_at(p, 0), float_at(p, 4), float_at(p, 8)), cloud.positions[i]);
             assert_eq!(
-                (&p[12..15], uint(p, 15), uint(p, 19)),
+                (&p[12..15], uint_at(p, 15), uint_at(p, 19)),
                 (&cloud.colors[i][..], labels[i], cloud.faces[i])
             );
         }
         let last = &points[n];
         assert_eq!(
-            (float(last, 0), &last[12..15], uint(last, 15), uint(last, 19)),
+            (float_at(last, 0), &last[12..15], uint_at(last, 15), uint_at(last, 19)),
             (7.0, &[0u8; 3][..], 9815, NO_INDEX)
         );
     }

@@ -269,13 +269,15 @@ mod tests {
     }
 
     fn names(tree: &AnnotationTree) -> Vec<String> {
-        let instances = |r: &RoomFiles| -> Vec<String> {
-            r.instances
-                .iter()
-                .map(|i| format!("{} {}_{}", r.room, i.class, i.number))
-                .collect()
-        };
-        tree.rooms.iter().flat_map(instances).collect()
+        tree.rooms
+            .iter()
+            .flat_map(|r: &RoomFiles| -> Vec<String> {
+                r.instances
+                    .iter()
+                    .map(|i| format!("{} {}_{}", r.room, i.class, i.number))
+                    .collect()
+            })
+            .collect()
     }
 
     #[test]

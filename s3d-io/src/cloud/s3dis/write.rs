@@ -305,6 +305,10 @@ mod tests {
         }
     }
 
+    fn read_text(path: PathBuf) -> String {
+        std::fs::read_to_string(path).unwrap()
+    }
+
     #[test]
     fn a_room_is_written_and_read_back() {
         let dir = tempfile::tempdir().unwrap();
@@ -328,18 +332,17 @@ mod tests {
         area.alignment(&[("office_1".into(), 90), ("hallway_2".into(), 0)])
             .unwrap();
 
-        let read = |path: PathBuf| std::fs::read_to_string(path).unwrap();
-        let chair = read(dir.path().join("Area_1/office_1/Annotations/chair_1.txt"));
+        let chair = read_text(dir.path().join("Area_1/office_1/Annotations/chair_1.txt"));
         for (i, line) in chair.lines().enumerate() {
             let numbers: Vec<f32> = line.split(' ').map(|n| n.parse().unwrap()).collect();
             assert!(Vec3::from_slice(&numbers[..3]).abs_diff_eq(many[i], 0.000_501), "{line}");
             assert_eq!(numbers[3..], if i < 6000 { [1.0, 20.0, 255.0] } else { [0.0; 3] });
         }
-        let wall = read(dir.path().join("Area_1/office_1/Annotations/wall_3.txt"));
+        let wall = read_text(dir.path().join("Area_1/office_1/Annotations/wall_3.txt"));
         assert_eq!(wall, "-24.048 3.997 0.000 7 8 9\n");
-        assert_eq!(read(room_file), format!("{chair}{wall}1.000 2.000 3.000 4 5 6\n"));
+        assert_eq!(read_text(room_file), format!("{chair}{wall}1.000 2.000 3.000 4 5 6\n"));
         assert_eq!(
-            read(dir.path().join("Area_1/Area_1_alignmentAngle.txt")),
+            read_text(dir.path().join("Area_1/Area_1_alignmentAngle.txt")),
             "## Global alignment angle per disjoint space in Area_1 ##\n\
              ## Disjoint Space Name Global Alignment Angle ##\noffice_1 90\nhallway_2 0\n"
         );

@@ -147,9 +147,12 @@ mod tests {
         Columns::choose(Path::new("a.ply"), &names, options)
     }
 
+    fn found(names: &str) -> Columns {
+        choose(names, &AnnotationOptions::default()).unwrap()
+    }
+
     #[test]
     fn usual_names_are_found() {
-        let found = |names| choose(names, &AnnotationOptions::default()).unwrap();
         let full = found("Z Y X label red green blue instance_id");
         assert_eq!((full.position, full.color), ([2, 1, 0], Some([4, 5, 6])));
         assert_eq!((full.class, full.instance, full.room), (3, Some(7), None));

@@ -371,22 +371,23 @@ mod tests {
         );
     }
 
+    fn refused(rows: &[TestRow], options: &AnnotationOptions) -> String {
+        read(&[TestCloud::new("a.las", rows)], options).unwrap_err().to_string()
+    }
+
     #[test]
     fn nothing_is_left_out_until_nothing_is_left() {
         let lenient = AnnotationOptions { on_fault: OnFault::Skip, ..options() };
-        let message = |rows: &[TestRow], options: &AnnotationOptions| {
-            read(&[TestCloud::new("a.las", rows)], options).unwrap_err().to_string()
-        };
 
         // A column of something else, such as intensities: no number in it is a class.
-        let said = message(&[(77, 1, 0), (78, 1, 0), (78, 1, 0)], &lenient);
+        let said = refused(&[(77, 1, 0), (78, 1, 0), (78, 1, 0)], &lenient);
         assert!(said.contains("\"77\" (1 points), \"78\" (2 points)"), "{said}");
         assert!(said.contains("class = \"label\""), "{said}");
         let some = read(&[TestCloud::new("a.las", &[(77, 1, 0), (1, 1, 0)])], &lenient).unwrap();
         assert!(some.warnings[0].contains("1 points of unknown classes left out"), "{:?}", some.warnings);
 
         // Room numbers without a type of room.
-        let said = message(&[(1, 1, 4)], &AnnotationOptions { room: None, ..lenient.clone() });
+        let said = refused(&[(1, 1, 4)], &AnnotationOptions { room: None, ..lenient.clone() });
         assert!(said.contains("unknown rooms: \"4\""), "{said}");
 
         // No record is a valid point.
@@ -412,7 +413,7 @@ mod tests {
         let expected = "a.las: holds no point that can be used: 1 records left out; record 1: class: 0.5 is \
                         no whole number";
         assert_eq!(said, expected);
-        assert!(message(&[], &lenient).contains("a.las: holds no point that can be used"));
+        assert!(refused(&[], &lenient).contains("a.las: holds no point that can be used"));
     }
 
     #[test]
@@ -460,12 +461,14 @@ mod tests {
         }
 
         let mut numbers: BTreeMap<(Room, Class), u32> = BTreeMap::new();
-        let name = |((room, class, ..), x): ((Room, Class, i64, i64), Vec<f32>)| {
-            let number = numbers.entry((room, class)).or_default();
-            *number += 1;
-            (format!("{room} {class}_{number}"), x)
-        };
-        lists.into_iter().map(name).collect()
+        lists
+            .into_iter()
+            .map(|((room, class, ..), x)| {
+                let number = numbers.entry((room, class)).or_default();
+                *number += 1;
+                (format!("{room} {class}_{number}"), x)
+            })
+            .collect()
     }
 
     proptest! {

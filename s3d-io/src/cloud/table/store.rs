@@ -95,13 +95,13 @@ impl Spool {
 pub(crate) struct SpoolWriter {
     file: File,
     dir: PathBuf,
-    places: Vec<Place>,
+    buffers: Vec<InstanceBuffer>,
     /// The most bytes of an instance that may wait.
     most: usize,
 }
 
-/// The place of an instance in the file.
-struct Place {
+/// The points of an instance that wait for their place in the file.
+struct InstanceBuffer {
     /// Bytes that wait to be written.
     waiting: Vec<u8>,
     /// Where the next bytes belong, in points.
@@ -116,26 +116,26 @@ impl SpoolWriter {
     pub(crate) fn create(dir: Option<&Path>, counts: &[u64]) -> Result<Self> {
         let dir = dir.map_or_else(std::env::temp_dir, Path::to_owned);
         let file = tempfile::tempfile_in(&dir).map_err(|e| Error::io(&dir, WRITE, e))?;
-        let places = counts.iter().scan(0u64, |end, n| {
+        let buffers = counts.iter().scan(0u64, |end, n| {
             let next = *end;
             *end = end.saturating_add(*n);
-            Some(Place { waiting: Vec::new(), next, left: *n })
+            Some(InstanceBuffer { waiting: Vec::new(), next, left: *n })
         });
         let share = BUFFER_BYTES.checked_div(counts.len()).unwrap_or(BUFFER_BYTES);
-        Ok(Self { file, dir, places: places.collect(), most: share.clamp(1, 16_384 * POINT_BYTES) })
+        Ok(Self { file, dir, buffers: buffers.collect(), most: share.clamp(1, 16_384 * POINT_BYTES) })
     }
 
     /// Adds a point of an instance. Returns `false` if the instance is complete already.
     pub(crate) fn push(&mut self, instance: usize, position: Vec3, color: [u8; 3]) -> Result<bool> {
-        let Some(place) = self.places.get_mut(instance) else { return Ok(false) };
-        let Some(left) = place.left.checked_sub(1) else { return Ok(false) };
-        place.left = left;
+        let Some(buffer) = self.buffers.get_mut(instance) else { return Ok(false) };
+        let Some(left) = buffer.left.checked_sub(1) else { return Ok(false) };
+        buffer.left = left;
         for coordinate in position.to_array() {
-            place.waiting.extend_from_slice(&coordinate.to_le_bytes());
+            buffer.waiting.extend_from_slice(&coordinate.to_le_bytes());
         }
-        place.waiting.extend_from_slice(&color);
-        if place.waiting.len() >= self.most {
-            place
+        buffer.waiting.extend_from_slice(&color);
+        if buffer.waiting.len() >= self.most {
+            buffer
                 .write(&mut self.file)
                 .map_err(|e| Error::io(&self.dir, WRITE, e))?;
         }
@@ -144,17 +144,17 @@ impl SpoolWriter {
 
     /// Returns the points, to be read. Returns `None` if fewer points came than were promised.
     pub(crate) fn finish(mut self) -> Result<Option<PointStore>> {
-        for place in &mut self.places {
-            place
+        for buffer in &mut self.buffers {
+            buffer
                 .write(&mut self.file)
                 .map_err(|e| Error::io(&self.dir, WRITE, e))?;
         }
-        let complete = self.places.iter().all(|place| place.left == 0);
+        let complete = self.buffers.iter().all(|buffer| buffer.left == 0);
         Ok(complete.then(|| PointStore::Spool(Spool { file: Mutex::new(self.file), dir: self.dir })))
     }
 }
 
-impl Place {
+impl InstanceBuffer {
     fn write(&mut self, file: &mut File) -> std::io::Result<()> {
         file.seek(SeekFrom::Start(byte_of(self.next)))?;
         file.write_all(&self.waiting)?;
@@ -168,6 +168,10 @@ impl Place {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn expected(k: usize) -> usize {
+        3 * k + 2
+    }
 
     #[test]
     fn buffers_that_overflow_are_written_where_they_belong() {
@@ -184,7 +188,6 @@ mod tests {
         let store = writer.finish().unwrap().unwrap();
         let mut cloud = PointCloud::default();
         store.read(40_000, 20_000, &mut cloud).unwrap();
-        let expected = |k: usize| 3 * k + 2;
         assert!(
             cloud
                 .positions

@@ -67,8 +67,8 @@ pub struct InstanceEntry {
 /// | `bbox` | f32, n × 6 | smallest x y z, largest x y z, metres |
 /// | `voxel_occupancy` | u8, n × 6 × 6 × 6 | 1 if the voxel \[ix, iy, iz\] holds a point |
 /// | `points_per_voxel` | u32, n × 6 × 6 × 6 | the number of points |
-/// | `point_start` | u64, n + 1 | the points of instance i are `point_index[point_start[i]:point_start[i+1]]` |
-/// | `point_index` | u32, N | points of an instance (from 0, in the order of its file in the S3DIS tree), voxel after voxel |
+/// | `point_start` | u64, n + 1 | instance i has the points `point_index[point_start[i]:point_start[i+1]]` |
+/// | `point_index` | u32, N | points by voxel, numbered from 0 as in the instance's file of the S3DIS tree |
 ///
 /// Memory: about 1.3 kilobytes for each instance, however many points it has. Point indices wait in a
 /// nameless temporary file.
@@ -159,11 +159,10 @@ impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
 
     /// Appends indices of points.
     fn put(&mut self, members: &[u32]) -> Result<()> {
-        let failed = |e| Error::io(&self.name, "write", e);
         members
             .iter()
             .try_for_each(|m| self.point_index.write_all(&m.to_le_bytes()))
-            .map_err(failed)
+            .map_err(|e| Error::io(&self.name, "write", e))
     }
 
     /// Appends the indices of points that are not in memory. Returns the number of points in each voxel.
@@ -335,6 +334,10 @@ mod tests {
         }
     }
 
+    fn size_of(path: &Path) -> u64 {
+        std::fs::metadata(path).unwrap().len()
+    }
+
     fn write(dir: &Path) -> Vec<InstanceEntry> {
         let json = dir.join("instances.json");
         let npz = dir.join("instances.npz");
@@ -345,8 +348,7 @@ mod tests {
         writer.push(&record("wall_1_WC_2_1"), &mut &[WALL.min][..]).unwrap();
         let bytes = writer.finish().unwrap();
 
-        let size = |path: &Path| std::fs::metadata(path).unwrap().len();
-        assert_eq!(bytes, size(&json) + size(&npz));
+        assert_eq!(bytes, size_of(&json) + size_of(&npz));
         assert_eq!(std::fs::read_dir(dir).unwrap().count(), 2);
         read_instances(&json).unwrap()
     }
@@ -497,9 +499,8 @@ mod tests {
         assert!(message.contains("i.npz") && message.ends_with("annotate it in parts"), "{message}");
     }
 
-    #[test]
-    fn totals_go_beyond_32_bits() {
-        let entry = |points| InstanceEntry {
+    fn entry(points: u64) -> InstanceEntry {
+        InstanceEntry {
             label: "wall_1_WC_2_1".to_owned(),
             label_index: 1,
             class: "wall".to_owned(),
@@ -508,7 +509,11 @@ mod tests {
             bbox: [0.0; 6],
             voxel_occupancy: vec![0; CELLS],
             points_per_voxel: vec![0; CELLS],
-        };
+        }
+    }
+
+    #[test]
+    fn totals_go_beyond_32_bits() {
         let entries = [entry(u64::from(u32::MAX)), entry(7)];
         assert_eq!(point_starts(&entries), [0, u64::from(u32::MAX), (1 << 32) + 6]);
     }

@@ -48,7 +48,8 @@ pub fn decode_rgb8(bytes: &[u8], name: &Path) -> Result<Raster<[u8; 3]>> {
 /// use s3d_io::image::{Compression, encode_palette8, read_palette8};
 ///
 /// let file = tempfile::NamedTempFile::new()?;
-/// let (image, palette) = (Raster::from_vec(2, 1, vec![1, 0]), [[0, 0, 0], [255, 128, 0]]);
+/// let image = Raster::from_vec(2, 1, vec![1, 0]);
+/// let palette = [[0, 0, 0], [255, 128, 0]];
 /// std::fs::write(file.path(), encode_palette8(&image, &palette, Compression::Balanced))?;
 /// assert_eq!(read_palette8(file.path())?, (image, palette.to_vec()));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -157,11 +158,7 @@ fn open_whole(path: &Path) -> Result<Opened> {
 /// Like [`read_rgb8`].
 pub fn read_numbers8(path: &Path) -> Result<Raster<u8>> {
     let (file, size) = open(path)?;
-    let is_one = |color, depth| match color {
-        ColorType::Grayscale => depth == BitDepth::Eight,
-        color => color == ColorType::Indexed,
-    };
-    let decoded = decode_one_of(file, size, path, is_one, "8-bit gray or with a palette")?;
+    let decoded = decode_one_of(file, size, path, has_numbers8, "8-bit gray or with a palette")?;
     let Decoded { width, height, bytes, depth, .. } = decoded;
     if depth == BitDepth::Eight {
         return Ok(Raster::from_vec(width, height, bytes));
@@ -171,13 +168,22 @@ pub fn read_numbers8(path: &Path) -> Result<Raster<u8>> {
     let bits = depth as usize;
     let line = (width as usize * bits).div_ceil(8);
     let numbers = bytes.chunks_exact(line.max(1)).flat_map(|row| {
-        let of_byte = move |byte: &u8| {
-            let byte = u16::from(*byte);
-            (0..8 / bits).map(move |i| (byte >> (8 - bits * (i + 1)) & ((1 << bits) - 1)) as u8)
-        };
-        row.iter().flat_map(of_byte).take(width as usize)
+        row.iter()
+            .flat_map(move |byte| {
+                let byte = u16::from(*byte);
+                (0..8 / bits).map(move |i| (byte >> (8 - bits * (i + 1)) & ((1 << bits) - 1)) as u8)
+            })
+            .take(width as usize)
     });
     Ok(Raster::from_vec(width, height, numbers.collect()))
+}
+
+/// Tells whether the pixels of a PNG file are numbers of 8 bits or less: gray, or into a palette.
+fn has_numbers8(color: ColorType, depth: BitDepth) -> bool {
+    match color {
+        ColorType::Grayscale => depth == BitDepth::Eight,
+        color => color == ColorType::Indexed,
+    }
 }
 
 /// Returns width, height, samples and palette of a file of `size` bytes.
@@ -188,9 +194,13 @@ pub(super) fn decode(
     color: ColorType,
     depth: BitDepth,
 ) -> Result<(u32, u32, Vec<u8>, Vec<u8>)> {
-    let is_one = |found, bits| (found, bits) == (color, depth);
-    let Decoded { width, height, bytes, palette, .. } =
-        decode_one_of(file, size, path, is_one, &describe(color, depth))?;
+    let Decoded { width, height, bytes, palette, .. } = decode_one_of(
+        file,
+        size,
+        path,
+        |found, bits| (found, bits) == (color, depth),
+        &describe(color, depth),
+    )?;
     Ok((width, height, bytes, palette))
 }
 

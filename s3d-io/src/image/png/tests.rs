@@ -121,7 +121,8 @@ struct View {
 }
 
 fn view() -> View {
-    let (width, height) = (320, 240);
+    let width = 320;
+    let height = 240;
     let mut byte = noise();
     // The horizontal position, the depth, and whether the pixel shows the floor.
     type Seen = (f32, f32, bool);
@@ -145,7 +146,8 @@ fn view() -> View {
         depth: Raster::from_vec(width, height, pixels.iter().map(|p| (512.0 * p.1) as u16).collect()),
         // Triangles of noisy vertices, each with its own normal.
         normals: raster(&mut |&(x, depth, floor)| {
-            let (u, v) = (9.0 * (x + 1.0), 11.0 * depth + 3.0 * x);
+            let u = 9.0 * (x + 1.0);
+            let v = 11.0 * depth + 3.0 * x;
             let upper = u32::from(u.fract() > v.fract());
             let face = (u as u32 * 7919 + v as u32 * 104_729 + upper).wrapping_mul(0x9e37_79b1);
             let tilt = [face >> 28, face >> 20 & 15, face >> 12 & 3].map(|t| t as u8);
@@ -170,6 +172,10 @@ fn peer(width: u32, height: u32, color: ColorType, depth: BitDepth, bytes: &[u8]
     file.len()
 }
 
+fn sizes_of(encode: &dyn Fn(Compression) -> Vec<u8>) -> [usize; 3] {
+    Compression::ALL.map(|c| encode(c).len())
+}
+
 #[test]
 fn more_time_makes_smaller_files_about_as_small_as_libpngs() {
     let view = view();
@@ -181,9 +187,8 @@ fn more_time_makes_smaller_files_about_as_small_as_libpngs() {
         (&view.labels, Content::Labels, 110),
     ];
 
-    let sizes = |encode: &dyn Fn(Compression) -> Vec<u8>| Compression::ALL.map(|c| encode(c).len());
     for (image, content, percent) in images {
-        let [fast, balanced, small] = sizes(&|c| encode_rgb8(image, content, c));
+        let [fast, balanced, small] = sizes_of(&|c| encode_rgb8(image, content, c));
         let peer = peer(w, h, ColorType::Rgb, BitDepth::Eight, image.pixels().as_flattened());
         let ordered = 102 * fast >= 100 * balanced && balanced >= small;
         assert!(ordered, "{content:?}: {fast}, {balanced}, {small}");
@@ -191,7 +196,7 @@ fn more_time_makes_smaller_files_about_as_small_as_libpngs() {
         assert!(100 * small <= 102 * peer, "{content:?}: {small}, the peer {peer}");
     }
 
-    let [fast, balanced, small] = sizes(&|c| encode_gray16(&view.depth, c));
+    let [fast, balanced, small] = sizes_of(&|c| encode_gray16(&view.depth, c));
     let bytes: Vec<u8> = view.depth.pixels().iter().flat_map(|v| v.to_be_bytes()).collect();
     let peer = peer(w, h, ColorType::Grayscale, BitDepth::Sixteen, &bytes);
     assert!(fast >= balanced && balanced >= small, "depth: {fast}, {balanced}, {small}");
@@ -255,11 +260,14 @@ fn plain(bytes: &[u8]) -> Result<Raster<[u8; 3]>, String> {
     Ok(Raster::from_vec(width, height, bytes.as_chunks().0.to_vec()))
 }
 
+fn ours(bytes: &[u8]) -> Result<Raster<[u8; 3]>, String> {
+    decode_rgb8(bytes, Path::new("a.png")).map_err(|e| e.to_string())
+}
+
 #[test]
 fn cut_and_damaged_files_are_read_as_the_png_crate_does() {
     let mut byte = noise();
     let image = Raster::from_vec(13, 11, (0..143).map(|i| [i as u8, byte() % 4, 7]).collect());
-    let ours = |bytes: &[u8]| decode_rgb8(bytes, Path::new("a.png")).map_err(|e| e.to_string());
 
     for content in CONTENTS {
         let whole = encode_rgb8(&image, content, Compression::Balanced);
@@ -291,7 +299,8 @@ fn file_of(chunks: &[([u8; 4], &[u8])]) -> Vec<u8> {
 
 #[test]
 fn files_of_other_programs_are_read() {
-    let (w, h) = (21, 40);
+    let w = 21;
+    let h = 40;
     let mut byte = noise();
     let image = Raster::from_vec(w, h, (0..w * h).map(|i| [(i / 3) as u8, byte() % 9, 250]).collect());
     let header = [&w.to_be_bytes()[..], &h.to_be_bytes(), &[8, 2, 0, 0, 0]].concat();
@@ -346,8 +355,10 @@ fn a_reader_forgets_what_it_read_before() {
         assert_eq!(lines, 50);
 
         let mut found = Vec::new();
-        let add = |line: &[[u8; 2]]| found.extend(line.iter().map(|v| u16::from_be_bytes(*v)));
-        reader.gray16(&small, name).unwrap().for_each(add);
+        reader
+            .gray16(&small, name)
+            .unwrap()
+            .for_each(|line| found.extend(line.iter().map(|v| u16::from_be_bytes(*v))));
         assert_eq!(found, gray.pixels());
         assert!(reader.rgb8(&small, name).is_err());
     }

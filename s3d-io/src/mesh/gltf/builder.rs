@@ -106,8 +106,11 @@ impl<'a> Builder<'a> {
 
     /// Returns the positions of all face corners so far.
     pub(crate) fn corners(&self) -> impl Iterator<Item = DVec3> {
-        let position = |&v: &u32| self.parts.positions.get(v as usize).map(|p| p.as_dvec3());
-        self.parts.faces.iter().flatten().filter_map(position)
+        self.parts
+            .faces
+            .iter()
+            .flatten()
+            .filter_map(|&v| self.parts.positions.get(v as usize).map(|p| p.as_dvec3()))
     }
 
     /// Adds the triangles of an instance.

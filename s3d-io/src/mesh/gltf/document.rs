@@ -479,9 +479,11 @@ mod tests {
 
     #[test]
     fn views_stay_inside_their_buffer() {
-        let json = r#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 3, "uri": "data:;base64,BQYH"}],
+        let json = r#"{"asset": {"version": "2.0"},
+            "buffers": [{"byteLength": 3, "uri": "data:;base64,BQYH"}],
             "bufferViews": [{"buffer": 0, "byteOffset": 1, "byteLength": 2}, {"buffer": 0, "byteLength": 4},
-            {"buffer": 0, "byteOffset": 18446744073709551615, "byteLength": 2}, {"buffer": 7, "byteLength": 1}]}"#;
+            {"buffer": 0, "byteOffset": 18446744073709551615, "byteLength": 2},
+            {"buffer": 7, "byteLength": 1}]}"#;
         let document = open("a.gltf", json.as_bytes()).unwrap();
         assert_eq!(document.view(json::Index::new(0), "x").unwrap(), [6, 7]);
         for (view, words) in [
@@ -511,6 +513,10 @@ mod tests {
         assert!(open("a.gltf", harmless.as_bytes()).is_ok());
     }
 
+    fn buffer_error(b: &str) -> String {
+        error(&format!(r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 9, {b}}}]}}"#))
+    }
+
     #[test]
     fn broken_containers_are_refused() {
         let whole = glb(2, r#"{"asset": {"version": "2.0"}}"#, &[1, 2, 3]);
@@ -524,14 +530,11 @@ mod tests {
                 .to_string()
                 .contains("glTF 1.0")
         );
-        let buffer = |b: &str| {
-            error(&format!(r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": 9, {b}}}]}}"#))
-        };
-        assert!(buffer(r#""uri": "gone.bin""#).contains("gone.bin cannot be read"));
-        assert!(buffer(r#""uri": "https://a.b/c.bin""#).contains("on the network"));
-        assert!(buffer(r#""uri": "data:;base64,!!""#).contains("no base64"));
-        assert!(buffer(r#""uri": "two%20words.bin""#).contains("should have 9 bytes and has 4"));
-        assert!(buffer(r#""name": "x""#).contains("neither"));
+        assert!(buffer_error(r#""uri": "gone.bin""#).contains("gone.bin cannot be read"));
+        assert!(buffer_error(r#""uri": "https://a.b/c.bin""#).contains("on the network"));
+        assert!(buffer_error(r#""uri": "data:;base64,!!""#).contains("no base64"));
+        assert!(buffer_error(r#""uri": "two%20words.bin""#).contains("should have 9 bytes and has 4"));
+        assert!(buffer_error(r#""name": "x""#).contains("neither"));
     }
 
     #[test]

@@ -250,17 +250,18 @@ mod tests {
         "textures": [{"source": 0, "sampler": 0}, {"source": 1},
         {"extensions": {"KHR_texture_basisu": {"source": 0}}}]"#;
 
+    fn textured(i: u32, more: &str) -> String {
+        format!(
+            r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": {i}{more}}},
+                    "baseColorFactor": [1, 1, 1, 1]}}}}"#
+        )
+    }
+
     #[test]
     fn textures_factors_and_fallbacks() {
         let mut f = Fixture::default();
         let p = f.triangle();
         let uv = f.floats(&[[0.0, 0.0], [1.0, 0.0], [0.0, 0.75]]);
-        let textured = |i: u32, more: &str| {
-            format!(
-                r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": {i}{more}}},
-                "baseColorFactor": [1, 1, 1, 1]}}}}"#
-            )
-        };
         let materials = [
             textured(0, ""),
             textured(0, "").replace("[1, 1, 1, 1]", "[0.5, 1, 0, 1]"),
@@ -343,6 +344,14 @@ mod tests {
         assert_eq!(file.mesh.parts().face_materials, [NO_INDEX, 0, 0, NO_INDEX]);
     }
 
+    fn mesh_of(primitive: &str) -> String {
+        format!(
+            r#"{IMAGES},
+                    "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
+                    "meshes": [{{"name": "box", "primitives": [{{{primitive}}}]}}], "nodes": [{{"mesh": 0}}]"#
+        )
+    }
+
     #[test]
     fn every_wrong_index_and_number_is_named() {
         let mut f = Fixture::default();
@@ -351,13 +360,6 @@ mod tests {
         let uv = f.floats(&[[0.0; 2]; 2]);
         let i = f.indices(&[0, 1, 2]);
         let beyond = f.indices(&[0, 1, 3]);
-        let mesh = |primitive: &str| {
-            format!(
-                r#"{IMAGES},
-                "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
-                "meshes": [{{"name": "box", "primitives": [{{{primitive}}}]}}], "nodes": [{{"mesh": 0}}]"#
-            )
-        };
         for (primitive, words) in [
             (
                 format!(r#""attributes": {{"POSITION": {p}}}, "indices": {beyond}"#),
@@ -383,13 +385,13 @@ mod tests {
             (format!(r#""attributes": {{"POSITION": {p}}}, "indices": {p}"#), "single unsigned integers"),
             (r#""attributes": {"NORMAL": 0}"#.into(), "no triangle in its scene"),
         ] {
-            let message = f.error(&mesh(&primitive));
+            let message = f.error(&mesh_of(&primitive));
             assert!(message.contains(words), "{words}: {message}");
         }
         // A vertex that no triangle uses may have any coordinates.
         let two = f.indices(&[0, 2, 2, 2, 0, 0]);
         assert!(
-            f.error(&mesh(&format!(r#""attributes": {{"POSITION": {bad}}}, "indices": {two}"#)))
+            f.error(&mesh_of(&format!(r#""attributes": {{"POSITION": {bad}}}, "indices": {two}"#)))
                 .contains("no face with an area")
         );
     }

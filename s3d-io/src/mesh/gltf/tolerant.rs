@@ -182,8 +182,11 @@ mod tests {
             "asset": {"version": "2.0", "extras": 7},
             "animations": [{"channels": [{"sampler": 0, "target": {"path": "pointer"}}]}],
             "cameras": "none", "extras": [1], "scene": 0.0, "scenes": [{"name": "empty", "extras": "x"}],
-            "nodes": [{"mesh": 1.0, "camera": "x", "name": 5, "translation": [-1.0, 0.5, 2.0], "children": null}, {}],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 2.0}, "targets": [{"POSITION": "x"}], "extras": 1}]}],
+            "nodes": [
+                {"mesh": 1.0, "camera": "x", "name": 5, "translation": [-1.0, 0.5, 2.0], "children": null},
+                {}],
+            "meshes": [{"primitives": [
+                {"attributes": {"POSITION": 2.0}, "targets": [{"POSITION": "x"}], "extras": 1}]}],
         });
         let expected = json!({
             "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}],

@@ -84,13 +84,16 @@ pub(crate) fn face_line(bytes: &[u8], face: usize) -> Option<u64> {
 mod tests {
     use super::*;
 
+    fn told(text: &[u8]) -> String {
+        fault(Path::new("a.obj"), text, "why").to_string()
+    }
+
     #[test]
     fn the_first_fault_is_found() {
-        let said = |text: &[u8]| fault(Path::new("a.obj"), text, "why").to_string();
         let text = b"v 0 0 0\nvt 0.5 # x\n# v 0 0 x\nvn 0 0 1\nv 1 3.1+e2 0\nv x 0 0\n";
-        assert_eq!(said(text), "a.obj, line 5: `3.1+e2` is no number: `v 1 3.1+e2 0`");
-        assert!(said(b"v 0 0 0 0\n").contains("line 1: the vertex has the weight 0"));
-        assert_eq!(said(b"v 0 0 0\n"), "a.obj: cannot be read: why");
+        assert_eq!(told(text), "a.obj, line 5: `3.1+e2` is no number: `v 1 3.1+e2 0`");
+        assert!(told(b"v 0 0 0 0\n").contains("line 1: the vertex has the weight 0"));
+        assert_eq!(told(b"v 0 0 0\n"), "a.obj: cannot be read: why");
     }
 
     #[test]

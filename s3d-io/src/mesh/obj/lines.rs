@@ -139,9 +139,12 @@ mod tests {
             .collect()
     }
 
+    fn line(n: u64, s: &str) -> (u64, String) {
+        (n, s.to_owned())
+    }
+
     #[test]
     fn lines_are_counted_as_editors_do() {
-        let line = |n, s: &str| (n, s.to_owned());
         assert_eq!(all(b"\xef\xbb\xbfa\r\n b \n"), [line(1, "a"), line(2, "b"), line(3, "")]);
         assert_eq!(all(b"a\rb"), [line(1, "a"), line(2, "b")]);
         assert_eq!(

@@ -24,7 +24,7 @@ pub(crate) struct ObjLooks {
 }
 
 /// A material, and the library that describes it.
-struct Found {
+struct LibraryMaterial {
     material: MtlMaterial,
     library: PathBuf,
 }
@@ -133,7 +133,7 @@ struct WantedImages {
 impl WantedImages {
     /// Adds the next material, whose image is searched beside its library and in `folder`. `None` is a
     /// material that no library describes.
-    fn add(&mut self, found: Option<&Found>, folder: &Path, warnings: &mut Vec<String>) {
+    fn add(&mut self, found: Option<&LibraryMaterial>, folder: &Path, warnings: &mut Vec<String>) {
         let image = found.and_then(|found| {
             let map = found.material.map.as_ref()?;
             let path = image_path(found, map, folder, warnings)?;
@@ -149,7 +149,12 @@ impl WantedImages {
 }
 
 /// Returns the path of the image that `map` names. Adds a warning if it lies elsewhere or is missing.
-fn image_path(found: &Found, map: &MtlMap, folder: &Path, warnings: &mut Vec<String>) -> Option<PathBuf> {
+fn image_path(
+    found: &LibraryMaterial,
+    map: &MtlMap,
+    folder: &Path,
+    warnings: &mut Vec<String>,
+) -> Option<PathBuf> {
     let library = found.library.display();
     let line = map.line;
     let written = quote(map.file.as_bytes());
@@ -178,7 +183,7 @@ fn load_libraries(
     libraries: &[(u64, String)],
     read: &mut Vec<PathBuf>,
     warnings: &mut Vec<String>,
-) -> HashMap<String, Found> {
+) -> HashMap<String, LibraryMaterial> {
     let mut found = HashMap::new();
 
     for (line, names) in libraries {
@@ -199,7 +204,10 @@ fn load_libraries(
                     let (materials, complaints) = parse_mtl(&bytes);
                     warnings.extend(complaints.iter().map(|c| format!("{}, {c}", library.display())));
                     for material in materials {
-                        found.insert(material.name.clone(), Found { material, library: library.clone() });
+                        found.insert(
+                            material.name.clone(),
+                            LibraryMaterial { material, library: library.clone() },
+                        );
                     }
                 }
                 Err(e) => warnings.push(format!("line {line}: the materials of {names:?} are missing: {e}")),

@@ -177,20 +177,24 @@ mod tests {
         assert_eq!((m[1].name.as_str(), m[1].color), ("", [255; 3]));
     }
 
+    fn found(file: &str, wrap: Wrap) -> Option<(String, Wrap)> {
+        Some((file.to_owned(), wrap))
+    }
+
+    fn map_of(line: &str) -> (Option<(String, Wrap)>, usize) {
+        let (m, warnings) = parse_mtl(format!("newmtl m\nmap_Kd {line}").as_bytes());
+        (m[0].map.as_ref().map(|m| (m.file.clone(), m.wrap[0])), warnings.len())
+    }
+
     #[test]
     fn options_are_taken_from_the_name() {
-        let map = |line: &str| {
-            let (m, warnings) = parse_mtl(format!("newmtl m\nmap_Kd {line}").as_bytes());
-            (m[0].map.as_ref().map(|m| (m.file.clone(), m.wrap[0])), warnings.len())
-        };
-        let found = |file: &str, wrap| Some((file.to_owned(), wrap));
-        assert_eq!(map("-s 1 1 1 -o 0 0 a.png"), (found("a.png", Wrap::Repeat), 0));
-        assert_eq!(map("-clamp on -mm 0 1 a b.png"), (found("a b.png", Wrap::Clamp), 0));
-        assert_eq!(map("-s 2 2 a.png"), (found("a.png", Wrap::Repeat), 1));
-        assert_eq!(map("-s 1 1.png"), (found("1.png", Wrap::Repeat), 0));
-        assert_eq!(map("-odd.png"), (found("-odd.png", Wrap::Repeat), 0));
-        assert_eq!(map("\"C:\\my scans\\a.png\""), (found("C:\\my scans\\a.png", Wrap::Repeat), 0));
-        assert_eq!(map("-clamp on"), (None, 1));
+        assert_eq!(map_of("-s 1 1 1 -o 0 0 a.png"), (found("a.png", Wrap::Repeat), 0));
+        assert_eq!(map_of("-clamp on -mm 0 1 a b.png"), (found("a b.png", Wrap::Clamp), 0));
+        assert_eq!(map_of("-s 2 2 a.png"), (found("a.png", Wrap::Repeat), 1));
+        assert_eq!(map_of("-s 1 1.png"), (found("1.png", Wrap::Repeat), 0));
+        assert_eq!(map_of("-odd.png"), (found("-odd.png", Wrap::Repeat), 0));
+        assert_eq!(map_of("\"C:\\my scans\\a.png\""), (found("C:\\my scans\\a.png", Wrap::Repeat), 0));
+        assert_eq!(map_of("-clamp on"), (None, 1));
     }
 
     #[test]
@@ -204,13 +208,16 @@ mod tests {
         assert_eq!(wraps, [[Wrap::Mirror, Wrap::Clamp], [Wrap::Repeat; 2]]);
     }
 
+    fn tobj_library(text: &str) -> tobj::MTLLoadResult {
+        tobj::load_mtl_buf(&mut text.as_bytes())
+    }
+
     #[test]
     fn tobj_gives_a_library_up() {
-        let library = |text: &str| tobj::load_mtl_buf(&mut text.as_bytes());
-        assert!(library("newmtl a\nKd 1 0 0\nillum x\n").is_err());
-        assert!(library("newmtl\nKd 1 0 0\n").is_err());
-        assert!(std::panic::catch_unwind(|| library("newmtl a\nKd 1\n")).is_err());
-        let (materials, _) = library("newmtl a\nmap_Kd -clamp on a.png\n").unwrap();
+        assert!(tobj_library("newmtl a\nKd 1 0 0\nillum x\n").is_err());
+        assert!(tobj_library("newmtl\nKd 1 0 0\n").is_err());
+        assert!(std::panic::catch_unwind(|| tobj_library("newmtl a\nKd 1\n")).is_err());
+        let (materials, _) = tobj_library("newmtl a\nmap_Kd -clamp on a.png\n").unwrap();
         assert_eq!(materials[0].diffuse_texture.as_deref(), Some("-clamp on a.png"));
     }
 

@@ -383,6 +383,10 @@ mod tests {
         assert_eq!((obj.counts, obj.colored), ([3, 2, 1], 0));
     }
 
+    fn kind(material: u32, has_uv: bool, has_normal: bool) -> FaceKind {
+        FaceKind { material, has_uv, has_normal }
+    }
+
     #[test]
     fn dialects_become_plain() {
         let text = format!(
@@ -395,7 +399,6 @@ mod tests {
                         f 1//1 2//1 3//1\nf 1/1/ 2// 3//\n";
         assert_eq!(rest, expected);
 
-        let kind = |material, has_uv, has_normal| FaceKind { material, has_uv, has_normal };
         assert_eq!(
             obj.kinds,
             [(0, kind(0, true, true)), (1, kind(1, false, true)), (2, kind(0, false, false))]

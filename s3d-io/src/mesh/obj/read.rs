@@ -155,8 +155,9 @@ struct Columns {
 
 impl Columns {
     fn read(obj: &NormalObj<'_>) -> std::result::Result<Self, tobj::LoadError> {
-        let no_library = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-        let (models, _) = tobj::load_obj_buf(&mut obj.reader(), &tobj::LoadOptions::default(), no_library)?;
+        let (models, _) = tobj::load_obj_buf(&mut obj.reader(), &tobj::LoadOptions::default(), |_| {
+            Err(tobj::LoadError::OpenFileFailed)
+        })?;
         let mesh = models.into_iter().next().ok_or(tobj::LoadError::GenericFailure)?.mesh;
 
         // The faces in front use each vertex once.
@@ -240,7 +241,8 @@ fn unit_in_comments(bytes: &[u8]) -> Option<LengthUnit> {
 fn told(unit: LengthUnit) -> Option<String> {
     (unit != LengthUnit::Metre).then(|| {
         format!(
-            "a comment says that its unit is {unit}: positions are converted to metres (set units for another unit)"
+            "a comment says that its unit is {unit}: positions are converted to metres (set units for \
+             another unit)"
         )
     })
 }
@@ -445,18 +447,19 @@ mod tests {
         }
     }
 
+    fn colors_and_warnings(obj: &str) -> (Vec<[u8; 3]>, usize) {
+        let file = read_obj(obj).unwrap();
+        (file.mesh.parts().colors.clone(), file.warnings.len())
+    }
+
     #[test]
     fn vertex_colours_of_both_scales_and_of_some_vertices() {
-        let colors = |obj: &str| {
-            let file = read_obj(obj).unwrap();
-            (file.mesh.parts().colors.clone(), file.warnings.len())
-        };
         let all = "v 0 0 0 1 0.5 0\nv 1 0 0 0 0 0\nv 0 1 0 0 0 1\nf 1 2 3\n";
-        assert_eq!(colors(all), (vec![[255, 128, 0], [0; 3], [0, 0, 255]], 0));
+        assert_eq!(colors_and_warnings(all), (vec![[255, 128, 0], [0; 3], [0, 0, 255]], 0));
         let bytes = "v 0 0 0 255 128 0\nv 1 0 0 0 0 1\nv 0 1 0 0 0 300\nf 1 2 3\n";
-        assert_eq!(colors(bytes), (vec![[255, 128, 0], [0, 0, 1], [0, 0, 255]], 0));
+        assert_eq!(colors_and_warnings(bytes), (vec![[255, 128, 0], [0, 0, 1], [0, 0, 255]], 0));
         let some = "v 0 0 0\nv 1 0 0 0 0 1\nv 0 1 0\nf 1 2 3\n";
-        assert_eq!(colors(some), (vec![DEFAULT_COLOR, [0, 0, 255], DEFAULT_COLOR], 1));
+        assert_eq!(colors_and_warnings(some), (vec![DEFAULT_COLOR, [0, 0, 255], DEFAULT_COLOR], 1));
     }
 
     #[test]

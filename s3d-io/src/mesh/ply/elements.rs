@@ -362,14 +362,15 @@ mod tests {
         );
     }
 
+    fn file_of(rows: &str) -> String {
+        format!(
+            "ply\nformat ascii 1.0\nelement v 2\nproperty float x\nproperty uchar c\n\
+                     property list char int l\nend_header\n{rows}"
+        )
+    }
+
     #[test]
     fn faults_of_rows_are_named() {
-        let file = |rows: &str| {
-            format!(
-                "ply\nformat ascii 1.0\nelement v 2\nproperty float x\nproperty uchar c\n\
-                 property list char int l\nend_header\n{rows}"
-            )
-        };
         for (rows, words) in [
             ("1 2 0\nx 2 0\n", "a.ply, line 9: v 1: `x` is no number, but x is"),
             ("1 2 0\n1 256 0\n", "line 9: v 1: `256` does not fit c, which is a uchar"),
@@ -383,15 +384,15 @@ mod tests {
             ("1 2 1 1.5\n", "`1.5` does not fit l, which is a int"),
             (&format!("1 2 0\n{}", "1".repeat(5000)), "line 9: v 1: a word of more than 4096 characters"),
         ] {
-            let message = all(file(rows).as_bytes(), |_| true).unwrap_err().to_string();
+            let message = all(file_of(rows).as_bytes(), |_| true).unwrap_err().to_string();
             assert!(message.contains(words), "{rows:?}: {message}");
         }
         assert!(
-            all(file("-NaN(ind) 255.0 0\ninf 2e1 0\n").as_bytes(), |_| true).unwrap()[0]
+            all(file_of("-NaN(ind) 255.0 0\ninf 2e1 0\n").as_bytes(), |_| true).unwrap()[0]
                 .starts_with("v 0: NaN")
         );
 
-        let text = file("1 2 0\n1 2 0\n 3");
+        let text = file_of("1 2 0\n1 2 0\n 3");
         let mut reader = open(text.as_bytes()).unwrap();
         while reader.next_element().unwrap().is_some() {}
         assert!(reader.has_more().unwrap());

@@ -165,11 +165,12 @@ impl PlyFaces {
         for (polygon, &size) in self.sizes.iter().enumerate() {
             let Some(corners) = self.corners.get(start..).and_then(|c| c.get(..size as usize)) else { break };
             let mut add = |triangle: [u32; 3]| {
-                let of = |c: u32| corners.get(c as usize).copied().unwrap_or(NO_INDEX);
                 // A corner beyond 32 bits has no coordinates on the texture.
-                let number = |c: u32| u32::try_from(start.saturating_add(c as usize)).unwrap_or(NO_INDEX);
-                out.faces.push(triangle.map(of));
-                out.corners.push(triangle.map(number));
+                out.faces
+                    .push(triangle.map(|c| corners.get(c as usize).copied().unwrap_or(NO_INDEX)));
+                out.corners.push(
+                    triangle.map(|c| u32::try_from(start.saturating_add(c as usize)).unwrap_or(NO_INDEX)),
+                );
                 out.polygons.push(u32::try_from(polygon).unwrap_or(NO_INDEX));
             };
 

@@ -51,8 +51,7 @@ pub(crate) fn read(
         let known = ["vertex", "face", "tristrips"]
             .iter()
             .position(|name| element.name.eq_ignore_ascii_case(name));
-        let is_first = |k: &usize| done.get_mut(*k).is_some_and(|done| !std::mem::replace(done, true));
-        match known.filter(is_first) {
+        match known.filter(|k| done.get_mut(*k).is_some_and(|done| !std::mem::replace(done, true))) {
             Some(0) => {
                 let labels = labels.as_mut().filter(|l| l.element == LabelElement::Vertex);
                 vertices = PlyVertices::read(path, &mut reader, &element, (up, frame), labels)?;
@@ -238,25 +237,26 @@ mod tests {
         assert!(file.warnings[0].contains("1 face left out: not finite"), "{:?}", file.warnings);
     }
 
+    fn two_colors(kind: &str, names: [&str; 3], values: [&str; 2]) -> [[u8; 3]; 2] {
+        let properties: String = names.map(|n| format!("property {kind} {n}\n")).concat();
+        let [a, b] = values;
+        let rows = format!("0 0 0 {a}\n1 0 0 {b}\n1 1 0 {b}\n0 1 0 {b}\n4 0 1 2 3\n");
+        let file = read_ply(&square(&properties, "", 1), &rows).unwrap();
+        assert!(file.warnings.is_empty());
+        [file.mesh.parts().colors[0], file.mesh.parts().colors[1]]
+    }
+
     #[test]
     fn colours_of_every_type() {
-        let colors = |kind: &str, names: [&str; 3], values: [&str; 2]| {
-            let properties: String = names.map(|n| format!("property {kind} {n}\n")).concat();
-            let [a, b] = values;
-            let rows = format!("0 0 0 {a}\n1 0 0 {b}\n1 1 0 {b}\n0 1 0 {b}\n4 0 1 2 3\n");
-            let file = read_ply(&square(&properties, "", 1), &rows).unwrap();
-            assert!(file.warnings.is_empty());
-            [file.mesh.parts().colors[0], file.mesh.parts().colors[1]]
-        };
         let red = ["red", "green", "blue"];
-        assert_eq!(colors("uchar", red, ["255 128 0", "1 2 3"]), [[255, 128, 0], [1, 2, 3]]);
-        assert_eq!(colors("float", red, ["1 0.5 0", "0 0 1.01"]), [[255, 128, 0], [0, 0, 255]]);
-        assert_eq!(colors("double", red, ["255 128 0", "1 2 nan"]), [[255, 128, 0], [1, 2, 0]]);
-        assert_eq!(colors("ushort", red, ["65535 257 0", "0 0 0"]), [[255, 1, 0], [0; 3]]);
-        assert_eq!(colors("int", red, ["255 128 -1", "0 0 0"]), [[255, 128, 0], [0; 3]]);
+        assert_eq!(two_colors("uchar", red, ["255 128 0", "1 2 3"]), [[255, 128, 0], [1, 2, 3]]);
+        assert_eq!(two_colors("float", red, ["1 0.5 0", "0 0 1.01"]), [[255, 128, 0], [0, 0, 255]]);
+        assert_eq!(two_colors("double", red, ["255 128 0", "1 2 nan"]), [[255, 128, 0], [1, 2, 0]]);
+        assert_eq!(two_colors("ushort", red, ["65535 257 0", "0 0 0"]), [[255, 1, 0], [0; 3]]);
+        assert_eq!(two_colors("int", red, ["255 128 -1", "0 0 0"]), [[255, 128, 0], [0; 3]]);
         let diffuse = ["diffuse_red", "diffuse_green", "diffuse_blue"];
-        assert_eq!(colors("uint8", diffuse, ["9 8 7", "1 2 3"]), [[9, 8, 7], [1, 2, 3]]);
-        assert_eq!(colors("uint8", ["R", "G", "B"], ["9 8 7", "1 2 3"]), [[9, 8, 7], [1, 2, 3]]);
+        assert_eq!(two_colors("uint8", diffuse, ["9 8 7", "1 2 3"]), [[9, 8, 7], [1, 2, 3]]);
+        assert_eq!(two_colors("uint8", ["R", "G", "B"], ["9 8 7", "1 2 3"]), [[9, 8, 7], [1, 2, 3]]);
 
         let elements = square("", "property uchar red\nproperty uchar green\nproperty uchar blue\n", 1);
         let file = read_ply(&elements, &format!("{SQUARE}4 0 1 2 3 9 9 9\n")).unwrap();
@@ -358,6 +358,14 @@ mod tests {
         assert!(file.mesh.parts().face_tags.is_empty());
     }
 
+    fn named_columns(class: Option<&str>, instance: Option<&str>) -> MeshOptions {
+        MeshOptions {
+            class_column: class.map(str::to_owned),
+            instance_column: instance.map(str::to_owned),
+            ..MeshOptions::default()
+        }
+    }
+
     #[test]
     fn labels_of_vertices_and_columns_by_name() {
         let elements = square(
@@ -373,20 +381,15 @@ mod tests {
             (LabelElement::Vertex, [column("label", &[3, 4, 5, 6]), instance.clone()])
         );
 
-        let ask = |class: Option<&str>, instance: Option<&str>| MeshOptions {
-            class_column: class.map(str::to_owned),
-            instance_column: instance.map(str::to_owned),
-            ..MeshOptions::default()
-        };
-        let file = read_with(&elements, rows, &ask(Some("nyu"), None)).unwrap();
+        let file = read_with(&elements, rows, &named_columns(Some("nyu"), None)).unwrap();
         assert_eq!(numbers(&file).1, [column("nyu", &[7, 7, 8, 9]), instance]);
 
         // The faces have that column, but no column of classes.
-        let file = read_with(&elements, rows, &ask(None, Some("part"))).unwrap();
+        let file = read_with(&elements, rows, &named_columns(None, Some("part"))).unwrap();
         assert_eq!(numbers(&file), (LabelElement::Face, [None, column("part", &[20, 21])]));
 
         // No element has both columns.
-        let message = read_with(&elements, rows, &ask(Some("label"), Some("part")))
+        let message = read_with(&elements, rows, &named_columns(Some("label"), Some("part")))
             .unwrap_err()
             .to_string();
         assert!(
@@ -433,15 +436,18 @@ mod tests {
         assert_eq!(numbers(&file).1, [column("label", &[9, NO_LABEL]), None]);
     }
 
+    fn read_face(row: &str) -> Result<MeshFile> {
+        read_ply(&square("", "", 1), &format!("{SQUARE}{row}\n"))
+    }
+
     #[test]
     fn faults_are_named_with_their_place() {
-        let face = |row: &str| read_ply(&square("", "", 1), &format!("{SQUARE}{row}\n"));
         for (outcome, words) in [
-            (face("3 0 1 4"), "line 14: face 0: vertex 4 is not there; there are 4"),
-            (face("3 0 1 -1"), "line 14: face 0: vertex -1 is not there"),
-            (face("2 0 1"), "has no face that can be used"),
-            (face("4 0 2 1 3"), "has no face that can be used, as face 0 (counted from 0): "),
-            (face("3 0 0 1"), "no face with an area (1 faces"),
+            (read_face("3 0 1 4"), "line 14: face 0: vertex 4 is not there; there are 4"),
+            (read_face("3 0 1 -1"), "line 14: face 0: vertex -1 is not there"),
+            (read_face("2 0 1"), "has no face that can be used"),
+            (read_face("4 0 2 1 3"), "has no face that can be used, as face 0 (counted from 0): "),
+            (read_face("3 0 0 1"), "no face with an area (1 faces"),
             (read_ply(&format!("element vertex 1\n{XYZ}"), "1 2 3\n"), "has no face, only 1 vertex; a mesh"),
             (
                 read_ply(

@@ -168,7 +168,9 @@ impl Colors {
         } else {
             1.0
         };
-        let byte = |v: f32| (v * scale).round().clamp(0.0, 255.0) as u8;
-        self.numbers.into_iter().map(|c| c.map(byte)).collect()
+        self.numbers
+            .into_iter()
+            .map(|c| c.map(|v| (v * scale).round().clamp(0.0, 255.0) as u8))
+            .collect()
     }
 }

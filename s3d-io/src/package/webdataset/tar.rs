@@ -182,23 +182,23 @@ mod tests {
         files.collect()
     }
 
+    fn theirs(name: &str) -> std::io::Result<[u8; 512]> {
+        let mut header = tar::Header::new_ustar();
+        header.set_path(name)?;
+        header.set_mode(0o644);
+        header.set_uid(0);
+        header.set_gid(0);
+        header.set_size(5);
+        header.set_mtime(0);
+        header.set_entry_type(tar::EntryType::Regular);
+        header.set_device_major(0)?;
+        header.set_device_minor(0)?;
+        header.set_cksum();
+        std::io::Result::Ok(*header.as_bytes())
+    }
+
     #[test]
     fn the_tar_crate_writes_other_bytes() {
-        let theirs = |name: &str| {
-            let mut header = tar::Header::new_ustar();
-            header.set_path(name)?;
-            header.set_mode(0o644);
-            header.set_uid(0);
-            header.set_gid(0);
-            header.set_size(5);
-            header.set_mtime(0);
-            header.set_entry_type(tar::EntryType::Regular);
-            header.set_device_major(0)?;
-            header.set_device_minor(0)?;
-            header.set_cksum();
-            std::io::Result::Ok(*header.as_bytes())
-        };
-
         let ours = header("a", 5, b'0');
         let other = theirs("a").unwrap();
         let differ: Vec<usize> = (0..512).filter(|&at| ours[at] != other[at]).collect();

@@ -167,10 +167,6 @@ fn corners_of(column: &[[u32; 3]], face: usize) -> Option<[u32; 3]> {
 /// beyond the edge of the texture.
 fn clamped_textures(mesh: &TriMesh) -> Vec<bool> {
     let parts = mesh.parts();
-    let is_inside = |&i: &u32| {
-        let uv = parts.uvs[i as usize];
-        uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all()
-    };
 
     let mut clamped = vec![false; parts.textures.len()];
     for (f, corners) in parts.face_uvs.iter().enumerate().filter(|(_, c)| **c != [NO_INDEX; 3]) {
@@ -178,7 +174,10 @@ fn clamped_textures(mesh: &TriMesh) -> Vec<bool> {
             .material_of(f as u32)
             .and_then(|m| mesh.materials()[m as usize].texture);
         if let Some(t) = texture.filter(|&t| parts.textures[t as usize].wrap == [Wrap::Clamp; 2]) {
-            clamped[t as usize] |= !corners.iter().all(is_inside);
+            clamped[t as usize] |= !corners.iter().all(|&i| {
+                let uv = parts.uvs[i as usize];
+                uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all()
+            });
         }
     }
     clamped

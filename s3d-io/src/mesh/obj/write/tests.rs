@@ -18,26 +18,31 @@ struct Face {
     material: Option<usize>,
 }
 
+fn byte(x: f32) -> u8 {
+    (x * 255.0).round() as u8
+}
+
+fn corners(column: &[u32], f: usize) -> Option<[u32; 3]> {
+    (!column.is_empty()).then(|| [column[3 * f], column[3 * f + 1], column[3 * f + 2]])
+}
+
+fn place(v: &[f32], i: u32) -> Vec3 {
+    let i = 3 * i as usize;
+    vec3(v[i], -v[i + 2], v[i + 1])
+}
+
 fn read(path: &Path) -> (Vec<Face>, Vec<tobj::Material>) {
     let (models, materials) = tobj::load_obj(path, &tobj::LoadOptions::default()).unwrap();
-    let world = |v: &[f32], i: u32| {
-        let i = 3 * i as usize;
-        vec3(v[i], -v[i + 2], v[i + 1])
-    };
     let mut faces = Vec::new();
     for m in models.iter().map(|m| &m.mesh) {
         assert!(m.face_arities.is_empty(), "triangles only");
-        let corners = |column: &[u32], f: usize| -> Option<[u32; 3]> {
-            (!column.is_empty()).then(|| [column[3 * f], column[3 * f + 1], column[3 * f + 2]])
-        };
         for f in 0..m.indices.len() / 3 {
             let v = corners(&m.indices, f).unwrap();
-            let byte = |x: f32| (x * 255.0).round() as u8;
             faces.push(Face {
-                positions: v.map(|i| world(&m.positions, i)),
+                positions: v.map(|i| place(&m.positions, i)),
                 uvs: corners(&m.texcoord_indices, f)
                     .map(|c| c.map(|i| vec2(m.texcoords[2 * i as usize], m.texcoords[2 * i as usize + 1]))),
-                normals: corners(&m.normal_indices, f).map(|c| c.map(|i| world(&m.normals, i))),
+                normals: corners(&m.normal_indices, f).map(|c| c.map(|i| place(&m.normals, i))),
                 colors: (!m.vertex_color.is_empty())
                     .then(|| v.map(|i| [0, 1, 2].map(|k| byte(m.vertex_color[3 * i as usize + k])))),
                 material: m.material_id,
@@ -60,13 +65,19 @@ fn square() -> MeshParts {
     }
 }
 
-fn textured() -> MeshParts {
-    let material = |name: &str, texture| Material { name: name.into(), color: [10, 200, 255], texture };
-    let texture = |name: &str, value| Texture {
+fn texture(name: &str, value: u8) -> Texture {
+    Texture {
         name: name.into(),
         image: Raster::from_vec(2, 1, vec![[value; 3], [1, 2, 3]]),
         wrap: [Wrap::Repeat; 2],
-    };
+    }
+}
+
+fn material(name: &str, texture: Option<u32>) -> Material {
+    Material { name: name.into(), color: [10, 200, 255], texture }
+}
+
+fn textured() -> MeshParts {
     MeshParts {
         uvs: vec![vec2(0.1, 0.9), vec2(1.25, -3.0), vec2(0.7, f32::NAN), vec2(0.5, 0.5)],
         face_uvs: vec![[0, 1, 3], [NO_INDEX; 3], [3, 0, 0]],
@@ -79,12 +90,15 @@ fn textured() -> MeshParts {
     }
 }
 
+/// Returns the bits, so that 0 and −0 differ.
+fn bits(t: [Vec3; 3]) -> [[u32; 3]; 3] {
+    t.map(|v| v.to_array().map(f32::to_bits))
+}
+
 fn check_faces(mesh: &TriMesh, faces: &[Face]) {
     let p = mesh.parts();
     assert_eq!(faces.len(), mesh.faces().len());
     for (f, face) in faces.iter().enumerate() {
-        // Bit by bit, so that a corner at −0 counts too.
-        let bits = |t: [Vec3; 3]| t.map(|v| v.to_array().map(f32::to_bits));
         assert_eq!(bits(face.positions), bits(mesh.triangle(f as u32)), "face {f}");
         // tobj takes the first entry of the file for a face that names none, so only entries of the mesh are
         // compared.

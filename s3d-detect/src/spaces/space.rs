@@ -104,7 +104,7 @@ fn grown(b: &Aabb) -> Aabb {
 
 /// Returns the spaces of an area that hold points, and how well they agree with its rooms: the adjusted Rand
 /// index over surfels. An element belongs to the space with most surfels in its box, or to no space if there
-/// are none.
+/// are none. With [`SpaceSource::Rooms`], surfels of a room that `area.rooms` lacks are in no space.
 pub fn spaces_of(area: &Area, source: SpaceSource) -> (Vec<Space>, f64) {
     let angle = building_angle_deg(&area.surfels);
     let angle = if angle.abs() < ALIGNED_DEG { 0.0 } else { angle };
@@ -125,7 +125,11 @@ pub fn spaces_of(area: &Area, source: SpaceSource) -> (Vec<Space>, f64) {
             let parsed = parse(&surfels);
             (parsed.of_surfel, parsed.count)
         }
-        SpaceSource::Rooms => (rooms.clone(), area.rooms.len() as u32),
+        SpaceSource::Rooms => {
+            let count = area.rooms.len() as u32;
+            let named = rooms.iter().map(|&room| if room < count { room } else { NO_SPACE });
+            (named.collect(), count)
+        }
     };
     let agreement = adjusted_rand_index(&of_surfel, &rooms);
 

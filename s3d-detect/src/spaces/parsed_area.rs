@@ -2,7 +2,7 @@
 
 use crate::area::{Area, Element};
 use crate::error::Result;
-use crate::space::{Space, SpaceSource, spaces_of};
+use crate::spaces::space::{Space, SpaceSource, spaces_of};
 use s3d_dataset::{Context, DataSet};
 
 /// An area with its spaces.

@@ -176,9 +176,12 @@ mod tests {
         assert_eq!(whole.colors, [[0; 3]; 5]);
     }
 
+    fn refused(given: Vec<AnnotatedPoints>) -> String {
+        Annotations::from_points(given).unwrap_err().to_string()
+    }
+
     #[test]
     fn what_is_no_annotation_is_refused() {
-        let refused = |given: Vec<AnnotatedPoints>| Annotations::from_points(given).unwrap_err().to_string();
         assert!(refused(vec![]).contains("no instance"));
         assert!(refused(vec![instance("WC_1", Class::WALL, 0, 1)]).contains("count from 1"));
         assert!(refused(vec![instance("WC_1", Class::WALL, 1, 0)]).contains("wall_1 of WC_1: has no points"));

@@ -1,5 +1,8 @@
 //! Annotated points of any source: rooms, their instances, and the points of each instance.
 
+mod of_faces;
+mod of_memory;
+
 use crate::cloud::on_fault::OnFault;
 use crate::error::{Error, Result};
 use s3d_geom::glam::DVec3;
@@ -9,6 +12,8 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+pub use of_memory::AnnotatedPoints;
 
 /// How annotated points are read, whatever the file.
 #[derive(Clone, Debug, PartialEq)]

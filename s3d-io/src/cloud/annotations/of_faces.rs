@@ -175,8 +175,12 @@ mod tests {
         // √2 m in parts of 5 cm: 29 rows.
         assert_eq!(cloud.len(), 4 + 3 + 29 * 29);
         assert!(cloud.faces[4..].iter().all(|f| *f == 0) && cloud.colors.len() == cloud.len());
-        let inside = |p: &Vec3| p.x >= 0.0 && p.y >= 0.0 && p.x + p.y <= 1.0 + 1e-6 && p.z == 0.0;
-        assert!(cloud.positions.iter().all(inside));
+        assert!(
+            cloud
+                .positions
+                .iter()
+                .all(|p| p.x >= 0.0 && p.y >= 0.0 && p.x + p.y <= 1.0 + 1e-6 && p.z == 0.0)
+        );
         let center = cloud.positions[7..].iter().sum::<Vec3>() / (29.0 * 29.0);
         assert!(center.abs_diff_eq(vec3(1.0 / 3.0, 1.0 / 3.0, 0.0), 1e-5), "{center}");
 

@@ -1,4 +1,4 @@
-//! The pictures of a COLMAP model, `images.txt` or `images.bin`. Their cameras are in `colmap_cameras`.
+//! The pictures of a COLMAP model, `images.txt` or `images.bin`. Their cameras are in `cameras`.
 //! Source: COLMAP's documentation, "Output Format".
 //!
 //! Own code: lines of ten words, and the same in binary, take eighty lines to read.
@@ -6,13 +6,15 @@
 //! A picture's pose is the transform from the world to the camera in OpenCV's axes (x right, y down, z
 //! forward): a quaternion w x y z and a translation.
 
-use crate::camera::colmap_cameras::read_beside;
+mod cameras;
+
 use crate::camera::located::{fault, pose_from_opencv, rotation};
 use crate::camera::posed::PosedCamera;
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use crate::fs::quote::quote;
+use cameras::read_beside;
 use s3d_geom::Pose;
 use s3d_geom::glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
@@ -258,19 +260,23 @@ mod tests {
         }
     }
 
+    fn picture_line(name: &str) -> String {
+        format!("1 1 0 0 0 0 0 0 1 {name}\n")
+    }
+
+    fn names_in(text: &str) -> Vec<String> {
+        let read = read_text(Path::new("images.txt"), text.as_bytes()).unwrap();
+        read.into_iter().map(|(_, picture)| picture.name).collect()
+    }
+
     #[test]
     fn pictures_without_lines_of_points_are_all_read() {
-        let names = |text: &str| -> Vec<String> {
-            let read = read_text(Path::new("images.txt"), text.as_bytes()).unwrap();
-            read.into_iter().map(|(_, picture)| picture.name).collect()
-        };
-        let picture = |name: &str| format!("1 1 0 0 0 0 0 0 1 {name}\n");
-        let [a, b, c] = ["a.jpg", "7", "c d.png"].map(picture);
-        assert_eq!(names(&format!("# no points\n{a}{b}{c}")), ["a.jpg", "7", "c d.png"]);
+        let [a, b, c] = ["a.jpg", "7", "c d.png"].map(picture_line);
+        assert_eq!(names_in(&format!("# no points\n{a}{b}{c}")), ["a.jpg", "7", "c d.png"]);
         // With and without, and with what people write between.
-        assert_eq!(names(&format!("{a}\n{b}1 2 -1 3.5 4e1 7\n{c}")), ["a.jpg", "7", "c d.png"]);
+        assert_eq!(names_in(&format!("{a}\n{b}1 2 -1 3.5 4e1 7\n{c}")), ["a.jpg", "7", "c d.png"]);
         assert_eq!(
-            names(&format!("{a}# a comment\n0 0 -1\n{c}{a}\n\n\n{b}")),
+            names_in(&format!("{a}# a comment\n0 0 -1\n{c}{a}\n\n\n{b}")),
             ["a.jpg", "c d.png", "a.jpg", "7"]
         );
         // Half a point is no picture either.

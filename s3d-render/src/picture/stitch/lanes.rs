@@ -111,7 +111,8 @@ impl Kernel for BlendKernel<'_> {
 impl BlendKernel<'_> {
     /// Returns the tile from column `first` on, and the largest of its inverse depths.
     fn tile(&self, first: usize) -> (Tile, f32) {
-        let (columns, rows) = (TILE.min(self.band.width - first), self.band.colors.len() / self.band.width);
+        let columns = TILE.min(self.band.width - first);
+        let rows = self.band.colors.len() / self.band.width;
         let mut tile = Tile {
             first,
             columns,
@@ -140,13 +141,15 @@ impl BlendKernel<'_> {
             let [x, y] = [x, y].map(|i| place_of(self.size, i as u32));
             (right * x + down * y + forward).normalize()
         };
-        let (last_x, last_y) = (tile.columns - 1, tile.rows - 1);
+        let last_x = tile.columns - 1;
+        let last_y = tile.rows - 1;
         let middle = at(last_x / 2, last_y / 2);
         let corners = [at(0, 0), at(last_x, 0), at(0, last_y), at(last_x, last_y)];
         let least = corners.map(|corner| middle.dot(corner)).into_iter().fold(1.0, f64::min);
         let angle = libm::acos(least);
-        let may_see = |k: &usize| self.captures[*k].may_see(middle, angle, f64::from(nearest));
-        near.extend((0..self.captures.len()).filter(may_see));
+        near.extend(
+            (0..self.captures.len()).filter(|k| self.captures[*k].may_see(middle, angle, f64::from(nearest))),
+        );
     }
 
     /// Blends the captures `near` into a row of a tile.
@@ -280,7 +283,8 @@ impl DepthLimits {
     /// Returns the limits around eight places of the plane at a depth of 1.
     #[inline(always)]
     fn at<L: ShadeLanes>(&self, l: L, x: L::F, y: L::F) -> L::F {
-        let (columns, rows) = (self.limits.width(), self.limits.height());
+        let columns = self.limits.width();
+        let rows = self.limits.height();
         let (focal, zero) = (l.splat(self.focal), l.splat(0.0));
         let index = |place: L::F, count: u32| {
             // The picture has one column more than `limits`: the axis goes through the middle of `limits`.

@@ -21,139 +21,18 @@
 //! varies, as is usual in 64 pixels. The sum with a₀ is rounded by 2⁻²⁴ of itself: a 4000th of a pixel
 //! in a texture of 4096.
 
+pub(crate) mod attributes;
+pub(crate) mod ray_grid;
+
 use crate::shade::patch::Patch;
 use crate::shade::texel_wrap::TexelWrap;
 use crate::simd::shade_lanes::{LANES, ShadeLanes, eight};
+use attributes::{Attributes, max, min};
 use glam::DVec3;
-use s3d_geom::{Camera, Rays};
+use ray_grid::{REACH, RayGrid};
 
-/// The largest distance of a pixel from its anchor, in columns and in rows.
-pub(crate) const REACH: i32 = 64;
 /// The largest factor by which a pixel may be nearer or farther than its anchor.
 pub(crate) const DEEP: f32 = 16.0;
-
-/// Up to three attributes of a face.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Attributes {
-    /// α of each attribute.
-    pub(crate) numerator: [DVec3; 3],
-    /// ω.
-    pub(crate) denominator: DVec3,
-    /// The bounds of each attribute: values that rounding throws outside are clamped.
-    pub(crate) bounds: [(f64, f64); 3],
-}
-
-impl Attributes {
-    /// Interpolates the values at the face's corners; `values[k]` belong to attribute k.
-    #[inline(always)]
-    pub(crate) fn new(patch: &Patch, values: [[f64; 3]; 3]) -> Self {
-        let [p, q, r] = patch.weights_of_corners();
-        let (mut numerator, mut bounds) = ([DVec3::ZERO; 3], [(0.0, 0.0); 3]);
-        for (k, [a, b, c]) in values.into_iter().enumerate() {
-            numerator[k] = p * a + q * b + r * c;
-            bounds[k] = (min(min(a, b), c), max(max(a, b), c));
-        }
-        Self { numerator, denominator: patch.denominator(), bounds }
-    }
-}
-
-impl Attributes {
-    /// Returns the bound that [`AnchorBatch::anchors`] describes. Let a₀ = a(e), and 1/w = z(d) / z(e),
-    /// where z is the distance of the face along a ray. An attribute changes by (m − (a − a₀) ω /
-    /// ω·e) · step / w, where m = (α − a₀ω) / ω·e; and z is greatest at a corner.
-    #[inline(always)]
-    fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
-        let scale = self.denominator.dot(e).recip();
-        let here = self.denominator.dot(world[0] - origin) * scale;
-
-        let mut far = 0.0;
-        for corner in world {
-            far = max(far, (corner - origin).length_squared());
-        }
-        // The length of a ray's direction is at least 1, so z of a corner is no more than its distance.
-
-        let mut sum = 0.0;
-        for k in 0..2 {
-            let (low, high) = self.bounds[k];
-            let value = min(max(self.numerator[k].dot(e) * scale, low), high);
-            for step in steps {
-                let (a, w) = (self.numerator[k].dot(step) * scale, self.denominator.dot(step) * scale);
-                let most = (a - w * value).abs() + (high - low) * w.abs();
-                sum += most * most;
-            }
-        }
-        sum * far / (here * here) * 1.001
-    }
-}
-
-#[inline(always)]
-fn min(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn max(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-/// The directions of an image's pixels, as anchors need them.
-pub(crate) struct RayGrid {
-    rays: Rays,
-    /// δ in a panorama, else 1.
-    column_step: f32,
-    /// The cosines and sines of the rows' latitudes; empty in a perspective view.
-    rows: Vec<[f64; 2]>,
-    /// sin kδ in a panorama, else k; by column offset k + [`REACH`].
-    sines: [f32; 2 * REACH as usize + LANES],
-    /// 1 − cos kδ in a panorama, else 0.
-    versines: [f32; 2 * REACH as usize + LANES],
-}
-
-impl RayGrid {
-    pub(crate) fn new(camera: &Camera) -> Self {
-        let rays = camera.rays();
-        let offset = |at: usize| at as f64 - f64::from(REACH);
-        let (column_step, rows) = match &rays {
-            Rays::Perspective { .. } => (None, vec![]),
-            Rays::Equirectangular { rows, .. } => (
-                Some(std::f64::consts::TAU / f64::from(camera.width)),
-                rows.iter().map(|row| [row.x, row.y]).collect(),
-            ),
-        };
-        // 1 − cos a = 2 sin² a/2, without cancellation.
-        let versine = |a: f64| 2.0 * libm_sin(0.5 * a) * libm_sin(0.5 * a);
-        Self {
-            rays,
-            column_step: column_step.unwrap_or(1.0) as f32,
-            rows,
-            sines: std::array::from_fn(|k| {
-                column_step.map_or(offset(k), |step| libm_sin(offset(k) * step)) as f32
-            }),
-            versines: std::array::from_fn(|k| {
-                column_step.map_or(0.0, |step| versine(offset(k) * step)) as f32
-            }),
-        }
-    }
-
-    /// Tells whether the image is a panorama.
-    pub(crate) fn is_panorama(&self) -> bool {
-        !self.rows.is_empty()
-    }
-
-    /// Returns the change of the directions at column `i`: from column to column and from row to row in a
-    /// perspective view. In a panorama the first is the column's unit vector, the second is unused.
-    fn steps(&self, i: usize) -> [DVec3; 2] {
-        match &self.rays {
-            Rays::Perspective { x_step, y_step, .. } => [*x_step, *y_step],
-            Rays::Equirectangular { columns, .. } => [columns[i].extend(0.0), DVec3::ZERO],
-        }
-    }
-}
-
-/// Returns the sine from glam, which is the same on every platform.
-fn libm_sin(a: f64) -> f64 {
-    glam::DVec2::from_angle(a).y
-}
 
 /// The linear functions of d − e: n of the three attributes, then w − 1. In a perspective view they are
 /// `along` · columns + `down` · rows. In a panorama, let c(k) be the unit vector of the azimuth of column
@@ -189,7 +68,8 @@ impl Slopes {
             let (sign, shift) = wrap.sign_and_shift(value);
             slopes.set::<PANORAMA>(k, m * sign, steps);
             slopes.base[k] = (value * sign + shift) as f32;
-            let (low, high) = ((low * sign + shift) as f32, (high * sign + shift) as f32);
+            let low = (low * sign + shift) as f32;
+            let high = (high * sign + shift) as f32;
             (slopes.min[k], slopes.max[k]) = if sign < 0.0 { (high, low) } else { (low, high) };
         }
         slopes
@@ -233,7 +113,8 @@ impl Anchor {
         i: usize,
         j: usize,
     ) -> bool {
-        let (e, steps) = (grid.rays.at(i as u32, j as u32), grid.steps(i));
+        let e = grid.rays.at(i as u32, j as u32);
+        let steps = grid.steps(i);
         self.put(Slopes::new::<PANORAMA>(attributes, wraps, e, steps), i, j)
     }
 
@@ -314,7 +195,8 @@ impl AnchorBatch {
         for n in 0..3 {
             let TexelWrap { divisor, period, half } = wraps[n];
             let wrap = [divisor, period, half];
-            let (corner, ray) = (corners[n].to_array(), rays[n].to_array());
+            let corner = corners[n].to_array();
+            let ray = rays[n].to_array();
             for m in 0..3 {
                 self.corners[n][m][k] = f64::from(corner[m]);
                 self.values[n][m][k] = values[n][m];
@@ -430,7 +312,8 @@ impl AnchoredRow<'_> {
             if PANORAMA {
                 let change = l.sub(l.mul(l.splat(along[n] * cos), s), l.mul(l.splat(down[n] * cos), v));
                 values[n] = l.add(l.splat(start[n]), change);
-                let (level, rise) = (cos * grid.column_step, sin * grid.column_step);
+                let level = cos * grid.column_step;
+                let rise = sin * grid.column_step;
                 let (a, b) = (l.mul(l.splat(along[n] * level), cosine), l.mul(l.splat(down[n] * level), s));
                 by_column[n] = l.sub(a, b);
                 let (a, b) = (l.mul(l.splat(down[n] * rise), cosine), l.mul(l.splat(along[n] * rise), s));
@@ -463,7 +346,7 @@ mod tests {
     use super::*;
     use crate::simd::shade_lanes::Plain;
     use proptest::prelude::*;
-    use s3d_geom::{Pose, TriMesh};
+    use s3d_geom::{Camera, Pose, TriMesh};
 
     /// Compares the values of eight pixels, and their changes by column and by row, with exact results in
     /// `f64`.
@@ -530,36 +413,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn no_point_of_a_face_changes_faster_than_its_bound(
-            corners in prop::array::uniform3((-3.0..3.0f64, -3.0..3.0f64, 0.05..9.0f64)),
-            values in prop::array::uniform3(prop::array::uniform3(-900.0..900.0f64)),
-            (p, q) in (0.0..1.0f64, 0.0..1.0f64), (r, t) in (0.0..1.0f64, 0.0..1.0f64),
-        ) {
-            // The rays are (x, y, 1) from a place. The anchor and the pixel are anywhere on the face.
-            let origin = DVec3::new(0.5, -0.25, 2.0);
-            let world = corners.map(|(x, y, z)| DVec3::new(x * z, y * z, z) + origin);
-            let attributes = Attributes::new(&Patch::of(world, origin), values);
-            let ray = |p: f64, q: f64| {
-                let at = world[0] * (1.0 - p) + world[1] * (p * (1.0 - q)) + world[2] * (p * q) - origin;
-                at / at.z
-            };
-            let steps = [DVec3::new(0.01, 0.0, 0.0), DVec3::new(0.0, 0.01, 0.0)];
-            let fastest = attributes.fastest(world, origin, ray(p, q), steps);
-
-            let d = ray(r, t);
-            let mut sum = 0.0;
-            let scale = attributes.denominator.dot(d).recip();
-            for numerator in &attributes.numerator[..2] {
-                for step in steps {
-                    let below = attributes.denominator.dot(step);
-                    let change = numerator.dot(step) - numerator.dot(d) * scale * below;
-                    sum += (change * scale) * (change * scale);
-                }
-            }
-            prop_assert!(sum <= fastest * (1.0 + 1e-6) || !fastest.is_finite(), "{sum} {fastest}");
-        }
-
         #[test]
         fn faces_together_are_anchored_as_they_are_alone(
             corners in prop::array::uniform8(prop::array::uniform3(prop::array::uniform3(-5.0..5.0f32))),
