@@ -333,6 +333,20 @@ pub(crate) fn null_pixels(pixels: &[[u8; 3]]) -> u64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
+
+    /// What is drawn where nothing is seen is what the format says.
+    #[test]
+    fn pixels_that_see_nothing_are_those_of_the_format() {
+        for domain in Domain::ALL {
+            assert_eq!(Image::of(domain).is_some(), domain.pixels().is_some());
+            assert!(Image::of(domain).is_none_or(|image| image.domain() == domain));
+        }
+        assert_eq!(Domain::Depth.missing(), [MISSING_DEPTH, 0, 0]);
+        assert_eq!(Domain::Normal.missing(), MISSING_NORMAL.map(u16::from));
+        assert_eq!(Domain::Semantic.missing(), MISSING_INDEX.map(u16::from));
+        assert_eq!(Domain::SemanticClass.missing(), [u16::from(NO_CLASS), 0, 0]);
+    }
 
     proptest! {
         #[test]

@@ -63,6 +63,11 @@ pub(super) fn difference(
             let text = |p| point(to_f32(p));
             Difference::of(found, expected, |a, b| a == b, text, text)
         }
-        _ => unreachable!("{} is read as what is drawn of it", image.domain()),
+        (
+            Pixels::Color(_) | Pixels::Depth(_) | Pixels::Class(..) | Pixels::Xyz(_) | Pixels::XyzHalf(_),
+            _,
+        ) => {
+            unreachable!("{} is read as what is drawn of it", image.domain())
+        }
     }
 }
