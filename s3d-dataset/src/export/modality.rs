@@ -228,15 +228,16 @@ impl Channels<'_> {
     /// Draws an image, unless it is made already.
     pub(crate) fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
-        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, made, .. } =
-            buffers;
+        let made = buffers.made;
+        let ViewImages { rgb, depth, faces, xyz } = &mut buffers.images;
 
+        // Images that no walk makes together with others are never made already.
         let is_made = match image {
             Image::Rgb => made.rgb,
             Image::Depth => made.depth,
             Image::Normal | Image::Semantic | Image::SemanticPretty => made.faces,
-            Image::SemanticClass => false,
             Image::GlobalXyz => made.xyz,
+            _ => false,
         };
 
         if is_made {
@@ -266,8 +267,12 @@ impl Channels<'_> {
             Image::SemanticPretty => {
                 color_per_face_image_into(hits, self.pretty_of_face, &mut faces.color);
             }
-            Image::SemanticClass => byte_per_face_image_into(hits, self.class_of_face, NO_CLASS, class),
-            Image::GlobalXyz if xyz_type == XyzType::Float => xyz_image_into(hits, camera, xyz_float),
+            Image::SemanticClass => {
+                byte_per_face_image_into(hits, self.class_of_face, NO_CLASS, &mut buffers.class);
+            }
+            Image::GlobalXyz if xyz_type == XyzType::Float => {
+                xyz_image_into(hits, camera, &mut buffers.xyz_float);
+            }
             Image::GlobalXyz => xyz_image_half_into(hits, camera, xyz),
         }
     }
@@ -280,15 +285,15 @@ impl Channels<'_> {
 
     /// Returns an image that was drawn.
     pub(crate) fn drawn<'a>(&self, image: Image, buffers: &'a ImageBuffers) -> Drawn<'a> {
-        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, .. } = buffers;
+        let ViewImages { rgb, depth, faces, xyz } = &buffers.images;
         match image {
             Image::Rgb => Drawn::Color(rgb),
             Image::Depth => Drawn::Depth(depth),
             Image::Normal => Drawn::Color(&faces.normal),
             Image::Semantic => Drawn::Color(&faces.index),
             Image::SemanticPretty => Drawn::Color(&faces.color),
-            Image::SemanticClass => Drawn::Class(class),
-            Image::GlobalXyz if self.conventions.xyz == XyzType::Float => Drawn::Xyz(xyz_float),
+            Image::SemanticClass => Drawn::Class(&buffers.class),
+            Image::GlobalXyz if self.conventions.xyz == XyzType::Float => Drawn::Xyz(&buffers.xyz_float),
             Image::GlobalXyz => Drawn::XyzHalf(xyz),
         }
     }

@@ -48,13 +48,12 @@ pub enum PixelKind {
     Xyz,
 }
 
-/// What there is to say about a domain.
+/// What there is to say about a domain. Methods of [`Domain`] with the names of these fields describe them.
 struct Row {
     domain: Domain,
     folder: &'static str,
     suffix: &'static str,
     is_semantic: bool,
-    /// `None` if it is not an image.
     pixels: Option<PixelKind>,
     missing: [u16; 3],
 }
@@ -72,7 +71,7 @@ impl Row {
 }
 
 /// The domains in the order of their variants, which is the order of [`Domain::ALL`].
-const TABLE: [Row; 8] = [
+const TABLE: &[Row] = &[
     Row::image(Domain::Rgb, "rgb", PixelKind::Rgb8, [0; 3]),
     Row::image(Domain::Depth, "depth", PixelKind::Gray16, [u16::MAX, 0, 0]),
     Row { suffix: "normals", ..Row::image(Domain::Normal, "normal", PixelKind::Rgb8, [128; 3]) },
