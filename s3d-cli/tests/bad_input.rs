@@ -4,6 +4,7 @@
 use crate::common;
 use common::scan::{SMALL, Scan, png_that_claims, run, wait};
 use common::{UUID_A, UUID_B, text};
+use s3d_io::mesh::MeshFormat;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -97,8 +98,8 @@ fn a_camera_inside_a_wall_is_told() {
     assert!(!log.contains(&format!("location {UUID_A} is")), "{log}");
 }
 
-/// Names of files of every kind that is read, by the part of the scan that they make up.
-const MESHES: [&str; 4] = ["m.obj", "m.ply", "m.gltf", "m.glb"];
+/// Names of files of every kind that is read, by the part of the scan that they make up. Meshes are in
+/// [`MeshFormat::ALL`].
 const ANNOTATIONS: [&str; 8] =
     ["a.ply", "a.npy", "a.npz", "a.las", "a.laz", "a.e57", "a.mat", "scene0000_00.aggregation.json"];
 const CAMERAS: [&str; 4] = ["c.csv", "images.txt", "images.bin", "transforms.json"];
@@ -107,8 +108,14 @@ const CAMERAS: [&str; 4] = ["c.csv", "images.txt", "images.bin", "transforms.jso
 /// file.
 fn every_kind_is_refused(make: impl Fn(&Path), parts: &[&str]) {
     type Choose = fn(&Scan, &str);
+    let meshes: Vec<String> = MeshFormat::ALL
+        .iter()
+        .flat_map(|format| format.endings)
+        .map(|ending| format!("m.{ending}"))
+        .collect();
+    let meshes: Vec<&str> = meshes.iter().map(String::as_str).collect();
     let kinds: [(&[&str], Choose); 3] =
-        [(&MESHES, Scan::use_mesh), (&ANNOTATIONS, Scan::use_annotations), (&CAMERAS, Scan::use_cameras)];
+        [(&meshes, Scan::use_mesh), (&ANNOTATIONS, Scan::use_annotations), (&CAMERAS, Scan::use_cameras)];
     for (names, choose) in kinds {
         for name in names {
             let scan = Scan::new();

@@ -15,7 +15,7 @@ fn main() -> ExitCode {
         [path] | [path, "y"] => (Path::new(*path), UpAxis::Y),
         [path, "z"] => (Path::new(*path), UpAxis::Z),
         _ => {
-            eprintln!("usage: inspect_mesh FILE.obj|.gltf|.glb [y|z]");
+            eprintln!("usage: inspect_mesh MESH [y|z]");
             return ExitCode::from(2);
         }
     };

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let path = std::env::args().nth(1).ok_or("usage: load_mesh FILE.obj|.gltf|.glb")?;
+    let path = std::env::args().nth(1).ok_or("usage: load_mesh MESH")?;
     let before = user_seconds().unwrap_or(0.0);
     let start = Instant::now();
     let file = read_mesh(Path::new(&path), UpAxis::Y)?;

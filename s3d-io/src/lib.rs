@@ -9,7 +9,7 @@
 //!
 //! | module | files |
 //! |---|---|
-//! | [`mesh`] | OBJ, glTF and PLY with textures and labels; the OBJ files of a data set |
+//! | [`mesh`] | meshes with textures and labels; the OBJ files of a data set |
 //! | [`cloud`] | annotated points in nine forms; writers of PLY, S3DIS, `pointcloud.mat`, NPY |
 //! | [`camera`] | lists of scan locations and of photographs; the scanner's own pictures |
 //! | [`image`] | the images of a data set, PNG and OpenEXR |

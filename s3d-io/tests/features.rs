@@ -2,7 +2,7 @@
 //! them. `.ci/features` runs it. If all features are built in, it tests nothing.
 #![cfg(all(feature = "obj", not(any(feature = "gltf", feature = "ply"))))]
 
-use s3d_io::{mesh::UpAxis, mesh::read_mesh};
+use s3d_io::mesh::{MeshFormat, UpAxis, read_mesh};
 use std::fs;
 
 /// A PNG with one pixel: 200, 100, 50.
@@ -31,11 +31,13 @@ fn a_textured_obj_is_read() {
 #[test]
 fn other_formats_name_their_feature() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, feature) in [("a.gltf", "gltf"), ("a.GLB", "gltf"), ("a.ply", "ply")] {
-        let path = folder.path().join(name);
-        fs::write(&path, "ply\n").unwrap();
-        let message = read_mesh(&path, UpAxis::Z).unwrap_err().to_string();
-        assert!(message.contains(&format!("cargo feature `{feature}`")), "{message}");
+    for format in MeshFormat::ALL.iter().filter(|format| format.feature != "obj") {
+        for ending in format.endings.iter().flat_map(|e| [e.to_string(), e.to_uppercase()]) {
+            let path = folder.path().join(format!("a.{ending}"));
+            fs::write(&path, "ply\n").unwrap();
+            let message = read_mesh(&path, UpAxis::Z).unwrap_err().to_string();
+            assert!(message.contains(&format!("cargo feature `{}`", format.feature)), "{message}");
+        }
     }
 }
 

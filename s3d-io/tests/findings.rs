@@ -4,6 +4,7 @@
 use crate::feed;
 
 use feed::FEEDS;
+use s3d_io::mesh::MeshFormat;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -50,4 +51,24 @@ fn cut_and_changed_fixtures_are_read_or_refused() {
         }
     }
     assert!(fed > 0, "{} holds no seed", seeds.display());
+}
+
+/// The reader that reads files of this name is fed by the fuzz target of this name.
+#[test]
+fn every_feed_is_a_fuzz_target_and_every_mesh_format_has_one() {
+    let fuzz = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz");
+    let text = |name: &str| fs::read_to_string(fuzz.join(name)).unwrap();
+    let manifest = text("Cargo.toml");
+    let readme = text("README.md");
+    for (name, _) in FEEDS {
+        assert!(text(&format!("fuzz_targets/{name}.rs")).contains(&format!("{name:?}")), "{name}");
+        assert!(manifest.contains(&format!("name = {name:?}\npath = \"fuzz_targets/{name}.rs\"")), "{name}");
+        assert!(readme.contains(&format!("`{name}`")), "the table of README.md has no {name}");
+    }
+    for format in MeshFormat::ALL {
+        let names = [format.feature.to_owned(), format!("{}_mesh", format.feature)];
+        let feed = FEEDS.iter().find(|(name, _)| names.contains(&(*name).to_owned()));
+        let (feed, _) = feed.unwrap_or_else(|| panic!("nothing feeds {}", format.name));
+        assert!(fuzz.join("seeds").join(feed).is_dir(), "{feed} starts from no seed");
+    }
 }

@@ -2,7 +2,7 @@
 //! `hard_inputs.txt` says, in a short time and without a panic.
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
-use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
+use s3d_io::mesh::{MeshFile, MeshFormat, UpAxis, read_mesh};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::thread;
@@ -53,10 +53,7 @@ fn meshes_below(dir: &Path, found: &mut Vec<PathBuf>) {
         }
         if path.is_dir() {
             meshes_below(&path, found);
-        } else if path
-            .extension()
-            .is_some_and(|e| ["obj", "gltf", "glb", "ply"].iter().any(|m| e == *m))
-        {
+        } else if MeshFormat::of(&path).is_some() {
             found.push(path);
         }
     }
@@ -115,9 +112,10 @@ fn files_of_other_formats_under_our_names_are_refused() {
         ["assimp/test/models/PLY/cube_binary.ply", "happly/platonic_shelf.ply", "pngsuite/png/basn2c16.png"]
     {
         let ply = name.ends_with("ply");
-        for ending in ["obj", "gltf", "glb", "ply"]
-            .into_iter()
-            .filter(|e| !(ply && *e == "ply"))
+        for ending in MeshFormat::ALL
+            .iter()
+            .flat_map(|format| format.endings)
+            .filter(|e| !(ply && **e == "ply"))
         {
             let path = dir.path().join(format!("x.{ending}"));
             std::fs::copy(folder.join(name), &path).unwrap();

@@ -1,10 +1,8 @@
 //! Colours of textures and corners: in closed form, and as single pixels give them.
 
-#[path = "../benches/common/mod.rs"]
-mod common;
-mod room;
+use crate::common;
 
-use room::{EYE, all_kinds, room_parts, view};
+use crate::room::{EYE, all_kinds, room_parts, view};
 use s3d_geom::glam::{dvec3, vec2};
 use s3d_geom::{Camera, Material, MeshParts, Pose, Raster, Texture, TriMesh, Wrap};
 use s3d_render::{MipMaps, NO_FACE, Scene};

@@ -1,7 +1,6 @@
 //! Whole images: casting them at once gives the same as single rays, pixel for pixel.
 
-#[path = "../benches/common/mod.rs"]
-mod common;
+use crate::common;
 
 use s3d_geom::glam::{DVec3, Vec3, dvec3, vec3};
 use s3d_geom::{Camera, Pose, TriMesh};

@@ -1,8 +1,6 @@
 //! Scenes whose images are known in closed form: depth, normals and coordinates of pixels.
 
-mod room;
-
-use room::{EYE, all_kinds, room_parts, view};
+use crate::room::{EYE, all_kinds, room_parts, view};
 use s3d_geom::glam::{DVec3, Vec3, dvec2, dvec3, vec3};
 use s3d_geom::{Camera, MeshParts, NO_INDEX, Pose, Raster, TriMesh};
 use s3d_render::{

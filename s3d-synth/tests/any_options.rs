@@ -1,7 +1,7 @@
 //! Options from the whole of their ranges, with furniture of several models and with wings. The generator
 //! refuses them for a reason that no seed changes, or it makes a building that can be built.
 
-mod common;
+use crate::common;
 
 use common::TYPES;
 use proptest::prelude::*;

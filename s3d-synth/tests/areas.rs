@@ -1,7 +1,7 @@
 //! The six generated areas: rooms and things are as frequent as published, buildings differ, and points lie
 //! where the scanner sees them.
 
-mod common;
+use crate::common;
 
 use common::{Seen, directions};
 use s3d_geom::Aabb;

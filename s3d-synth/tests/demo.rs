@@ -1,6 +1,6 @@
 //! The demo's building: complete, closed, and the same at every call.
 
-mod common;
+use crate::common;
 
 use common::{Seen, directions};
 use s3d_geom::glam::dvec3;

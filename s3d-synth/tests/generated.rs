@@ -1,6 +1,6 @@
 //! Generated buildings, of any rooms and seeds: closed, labelled, with a place for the scanner in every room.
 
-mod common;
+use crate::common;
 
 use common::{PLAIN_TYPES, Seen, TYPES, directions};
 use proptest::prelude::*;

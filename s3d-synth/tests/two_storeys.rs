@@ -1,6 +1,6 @@
 //! A house of two storeys is complete, and is one building.
 
-mod common;
+use crate::common;
 
 use common::{Seen, directions};
 use s3d_geom::glam::{DVec3, vec2};

@@ -56,6 +56,7 @@ mod tests {
     use clap::CommandFactory;
     use s3d_dataset::options::{Condition, Profile};
     use s3d_io::dataset::Domain;
+    use s3d_io::mesh::MeshFormat;
 
     #[test]
     fn the_help_names_all_that_can_be_chosen() {
@@ -69,7 +70,8 @@ mod tests {
             .map(|domain| domain.folder().to_owned())
             .into_iter()
             .chain(Profile::ALL.map(|profile| profile.to_string()))
-            .chain(Condition::ALL.map(|condition| condition.to_string()));
+            .chain(Condition::ALL.map(|condition| condition.to_string()))
+            .chain(MeshFormat::ALL.iter().map(|format| format.name.to_owned()));
         for name in names {
             assert!(help.contains(&name), "{name}");
         }

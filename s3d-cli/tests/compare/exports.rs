@@ -40,11 +40,9 @@ fn export(scene: &str, name: &str, more: &[&str]) -> PathBuf {
 /// The room with all candidate views.
 pub(crate) fn whole() -> &'static Path {
     static OUT: OnceLock<PathBuf> = OnceLock::new();
-    OUT.get_or_init(|| export("scene.toml", "whole", &["--keep-all", "--modalities", MODALITIES]))
+    let all = Domain::ALL.map(Domain::folder).join(",");
+    OUT.get_or_init(|| export("scene.toml", "whole", &["--keep-all", "--modalities", &all]))
 }
-
-/// All modalities.
-const MODALITIES: &str = "rgb,depth,normal,semantic,semantic_pretty,semantic_class,global_xyz,pose";
 
 /// The room with its views selected with this seed, without points.
 pub(crate) fn seeded(seed: u32) -> PathBuf {

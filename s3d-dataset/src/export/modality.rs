@@ -230,15 +230,16 @@ impl Channels<'_> {
     /// Draws an image, unless it is made already.
     pub(crate) fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
-        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, made, .. } =
-            buffers;
+        let made = buffers.made;
+        let ViewImages { rgb, depth, faces, xyz } = &mut buffers.images;
 
+        // Images that no walk makes together with others are never made already.
         let is_made = match image {
             Image::Rgb => made.rgb,
             Image::Depth => made.depth,
             Image::Normal | Image::Semantic | Image::SemanticPretty => made.faces,
-            Image::SemanticClass => false,
             Image::GlobalXyz => made.xyz,
+            _ => false,
         };
 
         if is_made {
@@ -268,8 +269,12 @@ impl Channels<'_> {
             Image::SemanticPretty => {
                 color_per_face_image_into(hits, self.pretty_of_face, &mut faces.color);
             }
-            Image::SemanticClass => byte_per_face_image_into(hits, self.class_of_face, NO_CLASS, class),
-            Image::GlobalXyz if xyz_type == XyzType::Float => xyz_image_into(hits, camera, xyz_float),
+            Image::SemanticClass => {
+                byte_per_face_image_into(hits, self.class_of_face, NO_CLASS, &mut buffers.class);
+            }
+            Image::GlobalXyz if xyz_type == XyzType::Float => {
+                xyz_image_into(hits, camera, &mut buffers.xyz_float);
+            }
             Image::GlobalXyz => xyz_image_half_into(hits, camera, xyz),
         }
     }
@@ -282,15 +287,15 @@ impl Channels<'_> {
 
     /// Returns an image that was drawn.
     pub(crate) fn drawn<'a>(&self, image: Image, buffers: &'a ImageBuffers) -> Drawn<'a> {
-        let ImageBuffers { images: ViewImages { rgb, depth, faces, xyz }, class, xyz_float, .. } = buffers;
+        let ViewImages { rgb, depth, faces, xyz } = &buffers.images;
         match image {
             Image::Rgb => Drawn::Color(rgb),
             Image::Depth => Drawn::Depth(depth),
             Image::Normal => Drawn::Color(&faces.normal),
             Image::Semantic => Drawn::Color(&faces.index),
             Image::SemanticPretty => Drawn::Color(&faces.color),
-            Image::SemanticClass => Drawn::Class(class),
-            Image::GlobalXyz if self.conventions.xyz == XyzType::Float => Drawn::Xyz(xyz_float),
+            Image::SemanticClass => Drawn::Class(&buffers.class),
+            Image::GlobalXyz if self.conventions.xyz == XyzType::Float => Drawn::Xyz(&buffers.xyz_float),
             Image::GlobalXyz => Drawn::XyzHalf(xyz),
         }
     }
@@ -335,6 +340,20 @@ pub(crate) fn null_pixels(pixels: &[[u8; 3]]) -> u64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
+
+    /// What is drawn where nothing is seen is what the format says.
+    #[test]
+    fn pixels_that_see_nothing_are_those_of_the_format() {
+        for domain in Domain::ALL {
+            assert_eq!(Image::of(domain).is_some(), domain.pixels().is_some());
+            assert!(Image::of(domain).is_none_or(|image| image.domain() == domain));
+        }
+        assert_eq!(Domain::Depth.missing(), [MISSING_DEPTH, 0, 0]);
+        assert_eq!(Domain::Normal.missing(), MISSING_NORMAL.map(u16::from));
+        assert_eq!(Domain::Semantic.missing(), MISSING_INDEX.map(u16::from));
+        assert_eq!(Domain::SemanticClass.missing(), [u16::from(NO_CLASS), 0, 0]);
+    }
 
     proptest! {
         #[test]

@@ -1,7 +1,7 @@
 //! Renders the views of a list of cameras. The mesh is loaded once, and all threads share the cameras.
 
 use super::frame_names::frame_names;
-use super::view::{IMAGES, RenderOptions, channels, face_image, faces_fit};
+use super::view::{RenderOptions, channels, face_image, faces_fit, images};
 use crate::condition::Condition;
 use crate::context::Context;
 use crate::error::{Error, Overwriting, Result, UsageError};
@@ -244,7 +244,8 @@ fn write_images(
     let path_of =
         |image: Image, stem: &str| folder_of(image).join(format!("{stem}.{}", image.domain().extension()));
     let faces = faces_fit(ctx, mesh.faces().len()).then(|| folder.join("faces"));
-    let folders: Vec<PathBuf> = IMAGES.into_iter().map(folder_of).chain(faces.clone()).collect();
+    let images = images();
+    let folders: Vec<PathBuf> = images.iter().copied().map(folder_of).chain(faces.clone()).collect();
     folders.iter().try_for_each(|folder| create_dir(folder))?;
 
     let scene = Scene::new(mesh);
@@ -256,7 +257,7 @@ fn write_images(
     for_each_in_order(ctx, frames, memory, |(caster, hits, buffers), frame| {
         let Frame { stem, camera, name } = frame;
         caster.cast_into(camera, 1, hits);
-        channels.encode(&IMAGES, hits, camera, buffers, |image, file| {
+        channels.encode(&images, hits, camera, buffers, |image, file| {
             write_bytes(&path_of(image, stem), &file).map(drop)
         })?;
         if let Some(faces) = &faces {

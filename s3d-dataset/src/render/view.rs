@@ -7,7 +7,7 @@ use crate::store::refuse_existing;
 use crate::store::staging::Staging;
 use glam::DVec3;
 use s3d_geom::Camera;
-use s3d_io::dataset::Conventions;
+use s3d_io::dataset::{Conventions, Domain};
 use s3d_io::fs::{create_dir, write_bytes, write_json};
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{LengthUnit, MeshOptions, MeshOrigin, UpAxis};
@@ -68,7 +68,10 @@ impl Default for RenderOptions {
 }
 
 /// The images of a view that need no annotation, without the image of faces.
-pub(super) const IMAGES: [Image; 4] = [Image::Rgb, Image::Depth, Image::Normal, Image::GlobalXyz];
+pub(super) fn images() -> Vec<Image> {
+    let domains = Domain::ALL.into_iter().filter(|domain| !domain.is_semantic());
+    domains.filter_map(Image::of).collect()
+}
 
 /// The inputs of these images.
 pub(super) fn channels<'a>(
@@ -153,7 +156,7 @@ pub fn render(
     let staging = Staging::begin(ctx, output, whole)?;
     refuse_files(output, options.overwrite || staging.was_placing())?;
     let folder = staging.path();
-    channels.encode(&IMAGES, &hits, camera, &mut ImageBuffers::default(), |image, file| {
+    channels.encode(&images(), &hits, camera, &mut ImageBuffers::default(), |image, file| {
         write_bytes(&folder.join(name_of(image)), &file).map(drop)
     })?;
     if faces_fit(ctx, file.mesh.faces().len()) {
@@ -186,13 +189,9 @@ pub fn render(
 }
 
 /// The file name of an image.
-fn name_of(image: Image) -> &'static str {
-    match image {
-        Image::Rgb => "rgb.png",
-        Image::Depth => "depth.png",
-        Image::Normal => "normals.png",
-        _ => "global_xyz.exr",
-    }
+fn name_of(image: Image) -> String {
+    let domain = image.domain();
+    format!("{}.{}", domain.suffix(), domain.extension())
 }
 
 /// Face indices as colours, R·65536 + G·256 + B; (255, 255, 255) where nothing is seen.
@@ -206,9 +205,9 @@ pub(super) fn face_image(hits: &Hits, compression: Compression) -> Vec<u8> {
 
 /// Refuses a folder that holds a file of a view, unless it may be replaced.
 fn refuse_files(output: &Path, overwrite: bool) -> Result<()> {
-    IMAGES
+    images()
         .into_iter()
         .map(name_of)
-        .chain(["faces.png", "camera.json"])
+        .chain(["faces.png", "camera.json"].map(str::to_owned))
         .try_for_each(|name| refuse_existing(&output.join(name), overwrite))
 }

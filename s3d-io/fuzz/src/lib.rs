@@ -72,7 +72,7 @@ static TARGET: OnceLock<Target> = OnceLock::new();
 
 /// Chooses the reader, and makes its folder.
 pub fn start(name: &str) {
-    let mut feeds = FEEDS.into_iter().chain([("manifest", manifest as Feed)]);
+    let mut feeds = FEEDS.iter().copied().chain([("manifest", manifest as Feed)]);
     let (_, feed) = feeds.find(|(n, _)| *n == name).expect("a feed has this name");
 
     // No threads: a run must depend on its input alone.

@@ -352,6 +352,16 @@ mod tests {
     }
 
     #[test]
+    fn each_image_says_what_sees_nothing() {
+        let conventions = Conventions::default().to_json();
+        for domain in Domain::ALL.into_iter().filter(|domain| domain.pixels().is_some()) {
+            let missing = &conventions[domain.folder()]["missing"];
+            let is_said = *missing == json!(domain.missing()) || *missing == json!(domain.missing()[0]);
+            assert!(is_said, "{domain}: {missing}");
+        }
+    }
+
+    #[test]
     fn depth_in_metres() {
         assert_eq!(DepthUnits::Per512.metres(1024), Some(2.0));
         assert_eq!(DepthUnits::Millimetres.metres(1024), Some(1.024));

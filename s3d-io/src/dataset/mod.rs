@@ -53,7 +53,7 @@ pub(crate) mod taxonomy;
 pub use conventions::{
     Conventions, DepthUnits, UnknownWord, WorldOffsets, XyzType, read_conventions, read_world_offsets,
 };
-pub use domain::{Domain, UnknownDomain};
+pub use domain::{Domain, PixelKind, UnknownDomain};
 #[cfg(feature = "dataset")]
 pub use face_votes::{FaceVoteColumns, read_face_votes, read_face_votes_from, write_face_votes};
 #[cfg(feature = "dataset")]

@@ -1,7 +1,7 @@
-//! Meshes with their textures and labels: OBJ, glTF and PLY.
+//! Meshes with their textures and labels.
 //!
-//! [`read_mesh`] reads one file and [`read_meshes`] joins several. The name's ending tells the format. The
-//! result is a [`MeshFile`]: the mesh in world metres, Z-up, its encoded textures as the file has them,
+//! [`read_mesh`] reads one file and [`read_meshes`] joins several. The name's ending tells the
+//! [format](MeshFormat). The result is a [`MeshFile`]: the mesh in world metres, Z-up, its encoded textures as the file has them,
 //! [`MeshLabels`] if the file labels its faces or vertices, and warnings of everything that was repaired.
 //! [`read_mesh_from`] takes any reader. A mesh far from its origin, as in UTM, can be moved near to it before
 //! its positions are rounded to `f32`: [`MeshOptions::origin`].
@@ -61,4 +61,4 @@ pub use obj::{RgbObj, SemanticObj, TextureOut, write_rgb_obj, write_semantic_obj
 #[cfg(feature = "mesh")]
 pub use origin::MeshOrigin;
 #[cfg(feature = "mesh")]
-pub use read::{read_mesh, read_mesh_from, read_mesh_with};
+pub use read::{MeshFormat, read_mesh, read_mesh_from, read_mesh_with};

@@ -6,55 +6,84 @@ use crate::mesh::file::{MeshFile, MeshOptions, UpAxis};
 use std::io::Read;
 use std::path::Path;
 
-/// A mesh format.
-struct MeshFormat {
+/// A format of meshes that are read.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshFormat {
+    /// Its usual name, "glTF".
+    pub name: &'static str,
     /// The endings of its files, in lower case, without the dot.
-    endings: &'static [&'static str],
+    pub endings: &'static [&'static str],
     /// The cargo feature that reads it.
-    feature: &'static str,
+    pub feature: &'static str,
+    /// Whether the format itself says that +Y points up and that the unit is the metre. If not, scenes of a
+    /// lone mesh guess both.
+    pub defines_frame: bool,
     /// Its reader. `None` if this build is without the feature.
     read: Option<Reader>,
 }
 
 type Reader = fn(OpenMesh<'_>, &Path, UpAxis, &MeshOptions) -> Result<MeshFile>;
 
-/// The formats that are read. The endings in messages, and the feature that a smaller build names, come from
-/// here.
-const FORMATS: [MeshFormat; 3] = [
-    MeshFormat {
-        endings: &["obj"],
-        feature: "obj",
-        #[cfg(feature = "obj")]
-        read: Some(|file, path, up, options| {
-            crate::mesh::obj::read::read_bytes(file.into_bytes(path)?, path, up, options)
-        }),
-        #[cfg(not(feature = "obj"))]
-        read: None,
-    },
-    MeshFormat {
-        endings: &["gltf", "glb"],
-        feature: "gltf",
-        #[cfg(feature = "gltf")]
-        read: Some(|file, path, up, options| {
-            crate::mesh::gltf::read::read_bytes(file.into_bytes(path)?, path, up, options)
-        }),
-        #[cfg(not(feature = "gltf"))]
-        read: None,
-    },
-    MeshFormat {
-        endings: &["ply"],
-        feature: "ply",
-        #[cfg(feature = "ply")]
-        read: Some(|file, path, up, options| {
-            crate::mesh::ply::read::read(file.reader, file.size, path, up, options)
-        }),
-        #[cfg(not(feature = "ply"))]
-        read: None,
-    },
-];
+impl MeshFormat {
+    /// All formats, whether this build reads them or not. Messages list their endings, and scenes take files
+    /// with these endings for meshes.
+    pub const ALL: &'static [Self] = &[
+        Self {
+            name: "OBJ",
+            endings: &["obj"],
+            feature: "obj",
+            defines_frame: false,
+            #[cfg(feature = "obj")]
+            read: Some(|file, path, up, options| {
+                crate::mesh::obj::read::read_bytes(file.into_bytes(path)?, path, up, options)
+            }),
+            #[cfg(not(feature = "obj"))]
+            read: None,
+        },
+        Self {
+            name: "glTF",
+            endings: &["gltf", "glb"],
+            feature: "gltf",
+            defines_frame: true,
+            #[cfg(feature = "gltf")]
+            read: Some(|file, path, up, options| {
+                crate::mesh::gltf::read::read_bytes(file.into_bytes(path)?, path, up, options)
+            }),
+            #[cfg(not(feature = "gltf"))]
+            read: None,
+        },
+        Self {
+            name: "PLY",
+            endings: &["ply"],
+            feature: "ply",
+            defines_frame: false,
+            #[cfg(feature = "ply")]
+            read: Some(|file, path, up, options| {
+                crate::mesh::ply::read::read(file.reader, file.size, path, up, options)
+            }),
+            #[cfg(not(feature = "ply"))]
+            read: None,
+        },
+    ];
 
-/// Reads a mesh and its textures. The name's ending tells the format: `.obj`, `.gltf`, `.glb` or `.ply`, in
-/// upper or lower case.
+    /// Finds the format of a file by the ending of its name, in upper or lower case. `None` if no format of
+    /// meshes has it.
+    pub fn of(path: &Path) -> Option<&'static Self> {
+        let ending = ending_of(path);
+        Self::ALL
+            .iter()
+            .find(|format| format.endings.contains(&ending.as_str()))
+    }
+}
+
+/// Returns the ending of a file's name in lower case, without the dot.
+fn ending_of(path: &Path) -> String {
+    let ending = path.extension().unwrap_or_default();
+    ending.to_string_lossy().to_ascii_lowercase()
+}
+
+/// Reads a mesh and its textures. The name's ending tells the format, which is one of
+/// [`MeshFormat::ALL`].
 ///
 /// A small fault does not stop the reader: it becomes one of [`MeshFile::warnings`]. Such faults are a
 /// texture that is missing or cannot be decoded, and a face that has no area, has fewer than three corners,
@@ -109,13 +138,8 @@ fn read<'r>(
     up: UpAxis,
     options: &MeshOptions,
 ) -> Result<MeshFile> {
-    let ending = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_ascii_lowercase();
-    let Some(format) = FORMATS.iter().find(|format| format.endings.contains(&ending.as_str())) else {
-        return Err(Error::unsupported(path, unknown_ending(&ending)));
+    let Some(format) = MeshFormat::of(path) else {
+        return Err(Error::unsupported(path, unknown_ending(&ending_of(path))));
     };
     let Some(reader) = format.read else {
         return Err(Error::not_built_in(path, format.feature));
@@ -145,7 +169,7 @@ impl OpenMesh<'_> {
 
 /// Says that no format has this ending, and which endings are known.
 fn unknown_ending(ending: &str) -> String {
-    let known: Vec<String> = FORMATS
+    let known: Vec<String> = MeshFormat::ALL
         .iter()
         .flat_map(|format| format.endings)
         .map(|ending| format!(".{ending}"))
@@ -166,11 +190,21 @@ mod tests {
 
     #[test]
     fn other_formats_are_refused_by_name() {
+        let endings: Vec<&str> = MeshFormat::ALL
+            .iter()
+            .flat_map(|format| format.endings)
+            .copied()
+            .collect();
+        let (last, others) = endings.split_last().unwrap();
+        let known = format!("meshes are .{} or .{last}", others.join(", ."));
+        assert!(known.starts_with("meshes are .obj, .gltf, .glb"));
+
         for (name, word) in [("scan.fbx", ".fbx"), ("scan", "no ending"), ("a.b/scan.PLYX", ".ply")] {
             let message = read_mesh(Path::new(name), UpAxis::Y).unwrap_err().to_string();
             assert!(message.contains(word), "{message}");
-            assert!(message.ends_with("meshes are .obj, .gltf, .glb or .ply"), "{message}");
+            assert!(message.ends_with(&known), "{message}");
         }
+        assert!(MeshFormat::of(Path::new("a/SCAN.Glb")).is_some_and(|format| format.name == "glTF"));
         assert!(matches!(read_mesh(Path::new("gone.OBJ"), UpAxis::Y), Err(Error::Io { .. })));
     }
 }

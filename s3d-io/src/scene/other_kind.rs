@@ -1,5 +1,6 @@
 //! Files that users give in place of a scene file.
 
+use crate::mesh::MeshFormat;
 use std::path::Path;
 
 /// The explanation of a scene, for users who give something else.
@@ -9,8 +10,9 @@ pub(crate) const SCENE: &str = "a scene is a text file, scene.toml, that names t
 
 /// Returns what a file is that is given in place of a scene, by its extension; `None` if it may be a scene.
 pub(crate) fn other_kind(path: &Path) -> Option<&'static str> {
+    let of_mesh = MeshFormat::of(path).map(|_| "a mesh, not a scene");
     Some(match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
-        "obj" | "gltf" | "glb" | "stl" | "fbx" | "dae" | "off" | "usd" | "usdz" => "a mesh, not a scene",
+        "stl" | "fbx" | "dae" | "off" | "usd" | "usdz" => "a mesh, not a scene",
         "ply" => "a mesh or a cloud, not a scene",
         "las" | "laz" | "e57" | "npy" | "npz" | "mat" | "pcd" | "pts" | "xyz" => {
             "a cloud of points, not a scene"
@@ -18,6 +20,6 @@ pub(crate) fn other_kind(path: &Path) -> Option<&'static str> {
         "mtl" | "png" | "jpg" | "jpeg" => "a part of a mesh, not a scene",
         "csv" => "a table, not a scene",
         "json" => "JSON, not a scene",
-        _ => return None,
+        _ => return of_mesh,
     })
 }

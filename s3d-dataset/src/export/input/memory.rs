@@ -13,8 +13,8 @@ use s3d_geom::{MeshParts, PointCloud, TriMesh, Wrap};
 use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::Annotations;
 use s3d_io::fs::ChecksumOfParts;
-use s3d_io::mesh::{LengthUnit, MeshFile, UpAxis};
-use std::path::{Path, PathBuf};
+use s3d_io::mesh::{LengthUnit, MeshFile, MeshFormat, UpAxis};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// The name of a [`MemoryScene`]'s mesh in messages and the manifest.
@@ -44,7 +44,7 @@ pub enum SceneSource {
     Path(PathBuf),
     /// The files of a mesh, which are joined: an area without labels. Its number is 1.
     Meshes {
-        /// OBJ, glTF, GLB or PLY.
+        /// Of formats that [`MeshFormat::ALL`] lists.
         paths: Vec<PathBuf>,
         /// Which axis points up; `None`: +Y in glTF, as it defines, and guessed in the others.
         up: Option<UpAxis>,
@@ -59,7 +59,7 @@ pub enum SceneSource {
 impl<P: Into<PathBuf>> From<P> for SceneSource {
     fn from(path: P) -> Self {
         let path = path.into();
-        if is_mesh(&path) {
+        if MeshFormat::of(&path).is_some() {
             Self::Meshes { paths: vec![path], up: None, units: None }
         } else {
             Self::Path(path)
@@ -75,23 +75,13 @@ impl SceneSource {
         units: Option<LengthUnit>,
     ) -> Vec<Self> {
         let (meshes, others): (Vec<PathBuf>, Vec<PathBuf>) =
-            paths.into_iter().partition(|path| is_mesh(path));
+            paths.into_iter().partition(|path| MeshFormat::of(path).is_some());
         let mut sources: Vec<Self> = others.into_iter().map(Self::Path).collect();
         if !meshes.is_empty() {
             sources.push(Self::Meshes { paths: meshes, up, units });
         }
         sources
     }
-}
-
-/// Whether a path names a mesh, by its ending.
-fn is_mesh(path: &Path) -> bool {
-    let ending = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_ascii_lowercase();
-    ["obj", "gltf", "glb", "ply"].contains(&ending.as_str())
 }
 
 impl From<MemoryScene> for SceneSource {

@@ -12,7 +12,7 @@ use crate::export::input::up_axis::UpGuess;
 use crate::options::placing::Placing;
 use crate::record::request::InputRecord;
 use s3d_io::cloud::{AnnotationOptions, Annotations, OnFault};
-use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::mesh::{LengthUnit, MeshFile, MeshFormat, MeshOptions, MeshOrigin, UpAxis};
 use s3d_io::scene::{CameraSource, MeshColors, SceneFile};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -117,8 +117,8 @@ impl AreaInput {
         asked: Option<Placing>,
         opened: Opened,
     ) -> Result<Self> {
-        // By glTF's definition +Y points up, and the unit is the metre.
-        let first = paths.first().filter(|path| !is_gltf(path));
+        // In glTF +Y points up, and the unit is the metre.
+        let first = paths.first().filter(|path| !has_own_frame(path));
         let first = match first.filter(|_| up.is_none() || units.is_none()) {
             Some(path) => {
                 let options = MeshOptions { origin: MeshOrigin::Near, units, ..MeshOptions::default() };
@@ -190,14 +190,9 @@ fn open_annotations(scene: &SceneFile, file: &MeshFile, frame: &MeshFrame) -> Re
     Ok(Annotations::open(&scene.annotations, &options)?)
 }
 
-/// Whether a path names a glTF file, by its ending.
-fn is_gltf(path: &Path) -> bool {
-    let ending = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_ascii_lowercase();
-    ["gltf", "glb"].contains(&ending.as_str())
+/// Whether the format of a mesh file says which axis points up and what its unit is.
+fn has_own_frame(path: &Path) -> bool {
+    MeshFormat::of(path).is_some_and(|format| format.defines_frame)
 }
 
 /// Opens the photographs that a scene file names.

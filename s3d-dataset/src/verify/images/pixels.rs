@@ -1,14 +1,13 @@
 //! Reads the pixels of image files, and describes their differences.
 
-use crate::export::modality::{Drawn, NO_CLASS};
+use crate::export::modality::Drawn;
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 use s3d_geom::Raster;
 use s3d_io::Result;
-use s3d_io::dataset::Domain;
+use s3d_io::dataset::{Domain, PixelKind};
 use s3d_io::fs::read_file;
 use s3d_io::image::{PngLines, PngReader, decode_palette8, decode_xyz, decode_xyz_half};
-use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
 use std::path::Path;
 
 /// The pixels of a file.
@@ -36,20 +35,18 @@ impl<'r> Opened<'r> {
     /// # Panics
     /// For poses, which have no pixels.
     pub(crate) fn new(domain: Domain, bytes: &[u8], path: &Path, reader: &'r mut PngReader) -> Result<Self> {
-        Ok(match domain {
-            Domain::Rgb | Domain::Normal | Domain::Semantic | Domain::SemanticPretty => {
-                Self::Color(reader.rgb8(bytes, path)?)
-            }
-            Domain::Depth => Self::Depth(reader.gray16(bytes, path)?),
-            Domain::SemanticClass => {
+        Ok(match domain.pixels() {
+            Some(PixelKind::Rgb8) => Self::Color(reader.rgb8(bytes, path)?),
+            Some(PixelKind::Gray16) => Self::Depth(reader.gray16(bytes, path)?),
+            Some(PixelKind::Palette8) => {
                 let (places, palette) = decode_palette8(bytes, path)?;
                 Self::Pixels(Pixels::Class(places, palette))
             }
-            Domain::GlobalXyz => Self::Pixels(match decode_xyz_half(bytes) {
+            Some(PixelKind::Xyz) => Self::Pixels(match decode_xyz_half(bytes) {
                 Some(points) => Pixels::XyzHalf(points),
                 None => Pixels::Xyz(decode_xyz(bytes, path)?),
             }),
-            Domain::Pose => unreachable!("a pose has no pixels"),
+            None => unreachable!("{domain} has no pixels"),
         })
     }
 
@@ -141,17 +138,11 @@ impl Pixels {
 
     /// Whether each pixel says that nothing is seen there.
     pub(crate) fn missing(&self, domain: Domain) -> Vec<bool> {
-        let color = match domain {
-            Domain::Normal => MISSING_NORMAL,
-            Domain::Semantic => MISSING_INDEX,
-            Domain::Rgb | Domain::SemanticPretty => [0; 3],
-            // These modalities have no colours.
-            Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => [0; 3],
-        };
+        let missing = domain.missing();
         match self {
-            Self::Color(r) => equal_to(r.pixels(), color),
-            Self::Depth(r) => r.pixels().iter().map(|p| *p == MISSING_DEPTH).collect(),
-            Self::Class(r, _) => r.pixels().iter().map(|p| *p == NO_CLASS).collect(),
+            Self::Color(r) => equal_to(r.pixels(), missing.map(|value| value as u8)),
+            Self::Depth(r) => r.pixels().iter().map(|p| *p == missing[0]).collect(),
+            Self::Class(r, _) => r.pixels().iter().map(|p| u16::from(*p) == missing[0]).collect(),
             Self::Xyz(r) => r.pixels().iter().map(|p| *p == [0.0; 3]).collect(),
             Self::XyzHalf(r) => r.pixels().iter().map(|p| *p == [f16::ZERO; 3]).collect(),
         }
@@ -245,6 +236,7 @@ impl Difference {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use s3d_render::MISSING_INDEX;
 
     #[test]
     fn pixels_of_a_color_are_found_at_any_place() {

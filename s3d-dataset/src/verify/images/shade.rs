@@ -6,7 +6,7 @@ use crate::verify::images::Reference;
 use glam::DVec3;
 use s3d_geom::Camera;
 use s3d_io::dataset::Domain;
-use s3d_render::{Hit, MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL, TextureFilter, rgb_of_ray};
+use s3d_render::{Hit, TextureFilter, rgb_of_ray};
 
 /// The values of a domain.
 pub(crate) struct Shade<'a> {
@@ -23,15 +23,7 @@ impl<'a> Shade<'a> {
     pub(crate) fn value(&self, camera: &Camera, direction: DVec3, hit: Option<Hit>) -> [f64; 3] {
         let reference = self.reference;
         let conventions = reference.channels.conventions;
-        let Some(hit) = hit else {
-            return match self.domain {
-                Domain::Depth => [f64::from(MISSING_DEPTH), 0.0, 0.0],
-                Domain::Normal => MISSING_NORMAL.map(f64::from),
-                Domain::Semantic => MISSING_INDEX.map(f64::from),
-                Domain::SemanticClass => [f64::from(NO_CLASS), 0.0, 0.0],
-                Domain::Rgb | Domain::SemanticPretty | Domain::GlobalXyz | Domain::Pose => [0.0; 3],
-            };
-        };
+        let Some(hit) = hit else { return self.domain.missing().map(f64::from) };
 
         match self.domain {
             Domain::Depth => {
