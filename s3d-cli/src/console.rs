@@ -37,8 +37,8 @@ pub(crate) enum LogFormat {
     /// For a person.
     #[default]
     Text,
-    /// For a program: one JSON object a line. The page "Messages and exit codes" of the documentation describes
-    /// the objects.
+    /// For a program: one JSON object a line. The page "Messages and exit codes" of the documentation
+    /// describes the objects.
     Json,
 }
 

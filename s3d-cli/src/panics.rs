@@ -4,7 +4,8 @@ use std::backtrace::{Backtrace, BacktraceStatus};
 use std::panic::{self, PanicHookInfo};
 use tracing::{debug, error};
 
-/// Reports panics in the log instead of beside it. A panic that becomes an error of the file is only a detail.
+/// Reports panics in the log instead of beside it. A panic that becomes an error of the file is only a
+/// detail.
 pub(crate) fn install() {
     panic::set_hook(Box::new(tell));
 }

@@ -1,7 +1,7 @@
 //! 2D-3D-Semantic data sets as a whole.
 //!
-//! A scene goes in: a mesh, annotated points, and the places where a scanner stood. A data set comes out, under
-//! the published names. The crate composes the stages of [`s3d_geom`], [`s3d_label`], `s3d-render` and
+//! A scene goes in: a mesh, annotated points, and the places where a scanner stood. A data set comes out,
+//! under the published names. The crate composes the stages of [`s3d_geom`], [`s3d_label`], `s3d-render` and
 //! `s3d-sample`, and writes files by [`s3d_io`].
 //!
 //! | module | does |
@@ -21,9 +21,9 @@
 //!
 //! # A data set from a scene
 //!
-//! [`Export`] takes scenes, one an area, as paths of scene files or as values [in memory](export::MemoryScene).
-//! An export that was stopped, cancelled or killed goes on when the same call is made again, and ends with the
-//! same bytes.
+//! [`Export`] takes scenes, one an area, as paths of scene files or as values [in
+//! memory](export::MemoryScene). An export that was stopped, cancelled or killed goes on when the same call
+//! is made again, and ends with the same bytes.
 //!
 //! ```
 //! use s3d_dataset::{Context, Export, ExportOptions};
@@ -53,8 +53,8 @@
 //! # Watching and ending a call
 //!
 //! Every long call is handed a [`Context`]. Its [`Observer`] is told of every [`Event`]: stages, progress,
-//! warnings. Its [`Cancel`] ends the call from any thread; the call then returns [`Error::Cancelled`] and keeps
-//! the work so far for the same call later.
+//! warnings. Its [`Cancel`] ends the call from any thread; the call then returns [`Error::Cancelled`] and
+//! keeps the work so far for the same call later.
 //!
 //! ```
 //! use s3d_dataset::{Cancel, Context, Event, Export};
@@ -95,8 +95,8 @@
 //!
 //! # Using a data set
 //!
-//! [`DataSet`] reads a data set for other crates: its mesh, labels, images and poses. [`pack()`] writes it for
-//! a trainer, and [`compare()`] tells what differs from an earlier one.
+//! [`DataSet`] reads a data set for other crates: its mesh, labels, images and poses. [`pack()`] writes it
+//! for a trainer, and [`compare()`] tells what differs from an earlier one.
 //!
 //! ```no_run
 //! use s3d_dataset::pack::{Package, PackOptions, WebdatasetOptions};

@@ -9,8 +9,8 @@ pub(crate) trait Kernel {
     fn run(self) -> Self::Output;
 }
 
-/// Runs `kernel`, compiled for AVX2 if that is in use. The result is the same at every width, because products
-/// and sums are not fused.
+/// Runs `kernel`, compiled for AVX2 if that is in use. The result is the same at every width, because
+/// products and sums are not fused.
 pub(crate) fn run<K: Kernel>(kernel: K) -> K::Output {
     dispatch!(level().without_avx512(), _simd => kernel.run())
 }

@@ -254,8 +254,8 @@ fn memory_that_was_used_changes_nothing() {
 
 #[test]
 fn an_image_may_be_as_thin_as_it_likes() {
-    // Two rows of faces, each in its own clusters. The nearer one appears around row 65,535 of the 70,000 rows
-    // of pixels, the farther one below it.
+    // Two rows of faces, each in its own clusters. The nearer one appears around row 65,535 of the 70,000
+    // rows of pixels, the farther one below it.
     let mut positions = Vec::new();
     let mut faces = Vec::new();
     for (y, top, bottom) in [(0.1, -3.0, -3.1), (0.2, -6.4, -6.8)] {

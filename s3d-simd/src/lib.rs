@@ -2,8 +2,8 @@
 //!
 //! # Levels
 //!
-//! [`level`] returns the highest [`ProvenLevel`] that the processor has. The environment variable `S3D_SIMD` can
-//! hold it down: see [`SimdLevel`]. All levels give the same bytes.
+//! [`level`] returns the highest [`ProvenLevel`] that the processor has. The environment variable `S3D_SIMD`
+//! can hold it down: see [`SimdLevel`]. All levels give the same bytes.
 //!
 //! # Dispatch
 //!

@@ -124,8 +124,8 @@ fn patches(mesh: &TriMesh, names: &Names, changes: &[FaceChange]) -> Vec<Changed
     patches
 }
 
-/// Joins the changes at some places of the list to a patch. The label of the face nearest to the middle of the
-/// area speaks for all of it.
+/// Joins the changes at some places of the list to a patch. The label of the face nearest to the middle of
+/// the area speaks for all of it.
 fn patch(mesh: &TriMesh, changes: &[FaceChange], places: &[usize]) -> Option<ChangedPatch> {
     let of_patch: Vec<FaceChange> = places.iter().filter_map(|place| changes.get(*place)).copied().collect();
     let m2: f64 = of_patch.iter().map(|of| mesh.area(of.face)).sum();

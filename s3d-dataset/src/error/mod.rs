@@ -30,11 +30,12 @@ pub enum Error {
     /// The input does not fit together.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Nothing is wrong with the call or the input, and everything that was done so far is kept: the same call
-    /// may go on later.
+    /// Nothing is wrong with the call or the input, and everything that was done so far is kept: the same
+    /// call may go on later.
     #[error(transparent)]
     Temporary(#[from] TemporaryError),
-    /// The call was [cancelled](crate::Cancel). Everything that was done so far is kept: the same call goes on.
+    /// The call was [cancelled](crate::Cancel). Everything that was done so far is kept: the same call goes
+    /// on.
     #[error("cancelled; the same call goes on where it stopped")]
     Cancelled,
 }

@@ -1,4 +1,5 @@
-//! Calls that cannot be: options that are out of range or exclude each other, folders that hold something else.
+//! Calls that cannot be: options that are out of range or exclude each other, folders that hold something
+//! else.
 
 use crate::error::names::{FieldNames, OptionNames};
 use std::fmt;
@@ -9,8 +10,8 @@ const MAX_NAMED: usize = 8;
 
 /// Why a call cannot be made. Nothing was changed.
 ///
-/// Options are named as fields of the options structs; [`message`](UsageError::message) names them as the users
-/// of a program write them.
+/// Options are named as fields of the options structs; [`message`](UsageError::message) names them as the
+/// users of a program write them.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum UsageError {

@@ -1,10 +1,10 @@
 //! The export: load → label → sample → score → select → render → tables.
 //!
-//! [`Export`] begins in a folder or goes on there, does the units of work that are left, writes each down in a
-//! journal, and finishes the data set. A [`Shard`] does a part of the units.
+//! [`Export`] begins in a folder or goes on there, does the units of work that are left, writes each down in
+//! a journal, and finishes the data set. A [`Shard`] does a part of the units.
 
-// The one place that composes the stages: `run.rs` begins and ends in the folder, `job.rs` does the units, and
-// `finish.rs` writes what belongs to the whole.
+// The one place that composes the stages: `run.rs` begins and ends in the folder, `job.rs` does the units,
+// and `finish.rs` writes what belongs to the whole.
 
 pub(crate) mod area;
 pub(crate) mod common;

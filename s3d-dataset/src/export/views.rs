@@ -20,7 +20,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// What a view shows in a pixel, by the face seen there. Views are scored by its entropy.
 pub(crate) enum Kinds {
-    /// The index of each face's class or [`NO_CLASS`](crate::export::modality::NO_CLASS), and the number of classes.
+    /// The index of each face's class or [`NO_CLASS`](crate::export::modality::NO_CLASS), and the number of
+    /// classes.
     Classes(Vec<u8>, usize),
     /// Without labels: which of the [`DIRECTIONS`] each face's normal is nearest to.
     Directions(Vec<u8>),

@@ -52,7 +52,7 @@ pub(super) fn pack(
             notes.push("depth is in millimetres, 0 where missing: nerfstudio's default".into());
         }
         DepthFiles::Original => notes.push(format!(
-            "depth needs --depth-unit-scale-factor {}; missing pixels seem to be {:.0} m away",
+            "depth needs a depth-unit-scale-factor of {} in nerfstudio; missing pixels seem to be {:.0} m away",
             1.0 / source.depth_units_per_m,
             f64::from(MISSING_DEPTH) / source.depth_units_per_m
         )),
@@ -110,7 +110,7 @@ fn pack_area(
             },
         )?;
         write_nerfstudio(&job.folder.join(name), camera, ply, &frames)?;
-        notes.push(format!("ns-train … --data {below}/{name}"));
+        notes.push(format!("the data of ns-train: {below}/{name}"));
     }
     Ok(notes)
 }

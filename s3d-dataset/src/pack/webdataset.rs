@@ -81,8 +81,8 @@ pub(super) fn pack(
     Ok(notes(&names))
 }
 
-/// Plans the shards of each series. `meta_bytes` is the size of the tables that each shard begins with. Returns
-/// the name of each series, as webdataset takes it, with its shards.
+/// Plans the shards of each series. `meta_bytes` is the size of the tables that each shard begins with.
+/// Returns the name of each series, as webdataset takes it, with its shards.
 fn shards<'a>(
     ctx: &Context,
     source: &'a Source,

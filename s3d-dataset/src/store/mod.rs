@@ -1,7 +1,7 @@
 //! How a folder or a file is written whole or not at all.
 //!
-//! Crates that write results of their own beside a data set use [`NewFolder`] and [`NewFile`], as the exports and
-//! packages of this crate do.
+//! Crates that write results of their own beside a data set use [`NewFolder`] and [`NewFile`], as the exports
+//! and packages of this crate do.
 
 // The folder of a data set has more: its state, the finished part of an export, and who may write to it.
 

@@ -175,8 +175,8 @@ struct VotesRecord {
     classes: Vec<VoteRecord>,
 }
 
-/// Checks the labels of `semantic.obj` against the votes, and against the report on them. Returns whether each
-/// face has votes.
+/// Checks the labels of `semantic.obj` against the votes, and against the report on them. Returns whether
+/// each face has votes.
 fn check_votes(
     layout: &Layout,
     area: u32,

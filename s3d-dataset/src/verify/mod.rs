@@ -1,8 +1,8 @@
 //! Reads a data set back: does it match its manifest, is it free of contradictions, and do its images show
 //! its mesh?
 //!
-//! No fault stops a check: all go to the [report](VerifyReport). Only a fault that prevents every other check, such as a
-//! manifest that cannot be read, ends it early.
+//! No fault stops a check: all go to the [report](VerifyReport). Only a fault that prevents every other
+//! check, such as a manifest that cannot be read, ends it early.
 //!
 //! Images are rendered again from the exported mesh. Its files hold every coordinate to the bit and every
 //! face in order, and pose files hold the rotation to the bit. So every pixel of every image must be equal to

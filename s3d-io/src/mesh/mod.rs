@@ -1,10 +1,10 @@
 //! Meshes with their textures and labels.
 //!
 //! [`read_mesh`] reads one file and [`read_meshes`] joins several. The name's ending tells the
-//! [format](MeshFormat). The result is a [`MeshFile`]: the mesh in world metres, Z-up, its encoded textures as the file has them,
-//! [`MeshLabels`] if the file labels its faces or vertices, and warnings of everything that was repaired.
-//! [`read_mesh_from`] takes any reader. A mesh far from its origin, as in UTM, can be moved near to it before
-//! its positions are rounded to `f32`: [`MeshOptions::origin`].
+//! [format](MeshFormat). The result is a [`MeshFile`]: the mesh in world metres, Z-up, its encoded textures
+//! as the file has them, [`MeshLabels`] if the file labels its faces or vertices, and warnings of everything
+//! that was repaired. [`read_mesh_from`] takes any reader. A mesh far from its origin, as in UTM, can be
+//! moved near to it before its positions are rounded to `f32`: [`MeshOptions::origin`].
 //!
 //! | ending | what is read |
 //! |---|---|

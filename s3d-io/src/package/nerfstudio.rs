@@ -25,7 +25,7 @@ pub enum NerfstudioCamera {
 pub struct NerfstudioFrame {
     /// The image, relative to the folder of the file.
     pub file_path: String,
-    /// Its depth, a 16-bit PNG file. nerfstudio's option `--depth-unit-scale-factor` converts the numbers to
+    /// Its depth, a 16-bit PNG file. nerfstudio's option `depth-unit-scale-factor` converts the numbers to
     /// metres. They are depths along the optical axis, and in panoramas distances.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth_file_path: Option<String>,

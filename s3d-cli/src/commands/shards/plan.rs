@@ -31,8 +31,8 @@ pub(crate) struct PlanArgs {
 const PLANNED: [&str; 9] =
     ["views", "size", "seed", "place_cameras", "see", "entropy_stride", "lenient", "fill", "allow"];
 
-/// The options of an export for a plan. It takes the ones in [`PLANNED`] as `s3d export` does; all others have
-/// their defaults.
+/// The options of an export for a plan. It takes the ones in [`PLANNED`] as `s3d export` does; all others
+/// have their defaults.
 #[derive(Clone, Debug)]
 struct PlanOptions(ExportOptions);
 

@@ -1,6 +1,7 @@
 //! The survey of an area: its annotations label the faces of its mesh, and its scan locations look around.
 //!
-//! An export and `info` survey alike. They differ in what they do with each result, which a [`Surveyor`] says.
+//! An export and `info` survey alike. They differ in what they do with each result, which a [`Surveyor`]
+//! says.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -64,8 +65,8 @@ pub(crate) trait Surveyor: Send {
     fn outlook_findings(&mut self, findings: Vec<Finding>) -> Result<()>;
 }
 
-/// Labels the faces of an area's mesh, finds its scan locations, and looks around from each. `nearest` are the
-/// nearest faces of the scene's mesh; they are dropped as soon as they are not needed.
+/// Labels the faces of an area's mesh, finds its scan locations, and looks around from each. `nearest` are
+/// the nearest faces of the scene's mesh; they are dropped as soon as they are not needed.
 pub(crate) fn survey(
     ctx: &Context,
     area: &AreaInput,
