@@ -21,9 +21,9 @@
 //!
 //! # A data set from a scene
 //!
-//! [`Export`] takes scenes, one an area, as paths of scene files or as values [in
-//! memory](export::MemoryScene). An export that was stopped, cancelled or killed goes on when the same call
-//! is made again, and ends with the same bytes.
+//! [`Export`] takes scenes, one an area: paths of scene files, or values in memory ([`export::MemoryScene`]).
+//! An export that was stopped, cancelled or killed goes on when the same call is made again, and ends with
+//! the same bytes.
 //!
 //! ```
 //! use s3d_dataset::{Context, Export, ExportOptions};
