@@ -376,7 +376,7 @@ fn a_density_without_end_is_refused() {
     s3d_fails(
         &["export", text(&scan.scene), "-o", text(&out), "--points-per-m2", "1e300"],
         1,
-        &["points are more than", "ask for fewer"],
+        &["points a m²", "lower --points-per-m2"],
     );
     assert!(!out.exists());
 }

@@ -62,6 +62,8 @@ pub enum InputError {
     TooManyPoints {
         /// How many points there would be.
         points: f64,
+        /// How many a square metre would have. `None` if their number itself was asked for.
+        points_per_m2: Option<f64>,
         /// How many there may be.
         most: f64,
     },
@@ -147,11 +149,17 @@ impl InputError {
                  of a pixel alone, and a pixel with an R for one without a label; export the areas in several \
                  data sets"
             ),
-            Self::TooManyPoints { points, most } => {
+            Self::TooManyPoints { points, points_per_m2: None, most } => {
                 format!(
                     "{points:.1e} points are more than {most:.0e}: ask for fewer, or is the mesh not in metres?"
                 )
             }
+            Self::TooManyPoints { points, points_per_m2: Some(density), most } => format!(
+                "{density} points a m² on {:.1} m² are {points:.1e} points, more than {most:.0e}: is the mesh in \
+                 metres? or lower {}",
+                points / density,
+                names.option("points_per_m2", None)
+            ),
             Self::Useless { what, action, reasons, conditions } => {
                 let allow: Vec<String> = conditions
                     .iter()

@@ -148,7 +148,7 @@ pub(crate) fn check_points(points: f64) -> Result<()> {
     if points <= MOST_POINTS {
         return Ok(());
     }
-    Err(InputError::TooManyPoints { points, most: MOST_POINTS }.into())
+    Err(InputError::TooManyPoints { points, points_per_m2: None, most: MOST_POINTS }.into())
 }
 
 /// Returns what looks wrong about the number of points sampled on a mesh.
@@ -158,13 +158,19 @@ pub(crate) fn check_points(points: f64) -> Result<()> {
 pub(crate) fn size_findings(mesh: &TriMesh, points_per_m2: f64) -> Result<Vec<Finding>> {
     let area_m2 = mesh.total_area();
     let points = area_m2 * points_per_m2;
+    if points > MOST_POINTS {
+        return Err(InputError::TooManyPoints {
+            points,
+            points_per_m2: Some(points_per_m2),
+            most: MOST_POINTS,
+        }
+        .into());
+    }
+
     let text = format!(
         "{points_per_m2} points a m² on {area_m2:.1} m² are {points:.1e} points: is the mesh in metres? or \
          ask for fewer points"
     );
-    if points > MOST_POINTS {
-        return Err(InputError::TooManyPoints { points, most: MOST_POINTS }.into());
-    }
     Ok((points > MANY_POINTS)
         .then(|| Finding::new(Condition::Size, true, text))
         .into_iter()
