@@ -194,8 +194,8 @@ pub(crate) enum Command {
             "Examples:\n",
             "  s3d eval sem3d --truth dataset --pred predictions --areas 5\n",
             "  s3d eval det --truth dataset --pred boxes.json --folds paper --json result.json\n",
-            "The page \"Evaluation\" of the documentation (the module `s3d_eval::protocols`) describes each protocol \
-             and the files of its predictions.",
+            "The page \"Evaluation\" of the documentation (the module `s3d_eval::protocols`) describes each \
+             protocol and the files of its predictions.",
         )
     )]
     Eval(eval::EvalArgs),
@@ -206,7 +206,8 @@ pub(crate) enum Command {
             "  s3d detect table dataset --seeds 5\n",
             "  s3d detect train dataset --areas 1,2,3,4,6 -o model.json\n",
             "  s3d detect run dataset model.json --areas 5 -o found.json\n",
-            "The page \"The baseline detector\" of the documentation explains how it works and what its numbers mean.",
+            "The page \"The baseline detector\" of the documentation explains how it works and what its \
+             numbers mean.",
         )
     )]
     Detect(detect::DetectArgs),

@@ -345,9 +345,9 @@ fn units_of_depth_are_those_of_the_manifest() {
     let args =
         ["pack", text(&out), "--to", "nerfstudio", "--depth", "original", "--overwrite", "-o", text(&place)];
     write("512", 512.0);
-    assert!(s3d_ok(&args).contains("depth-unit-scale-factor of 0.001953125 in"));
+    assert!(s3d_ok(&args).contains("depth-unit-scale-factor 0.001953125 here"));
     write("mm", 1000.0);
-    assert!(s3d_ok(&args).contains("depth-unit-scale-factor of 0.001 in"));
+    assert!(s3d_ok(&args).contains("depth-unit-scale-factor 0.001 here"));
     write("ell", 1000.0);
     s3d_fails(&args, 1, &["manifest.json", "\"ell\""]);
 }

@@ -202,8 +202,8 @@ fn make_one(
     })
 }
 
-/// Returns location + direction × depth for each pixel, along the ray through its middle. Missing depth gives
-/// 0.
+/// Returns location + direction × depth for each pixel, along the ray through its middle. Missing depth
+/// gives 0.
 pub(crate) fn points(camera: &Camera, depth: &Raster<u16>, units: DepthUnits) -> Raster<[f32; 3]> {
     let rays = camera.rays();
     let mut points = Raster::filled(depth.width(), depth.height(), [0.0; 3]);

@@ -18,8 +18,8 @@ const PLACES: usize = 4;
 /// The last places of each hash, newest first. All are compared without a branch, which noise would make
 /// unpredictable.
 pub(crate) struct HashMatcher {
-    /// A row of words per hash. A word holds four places modulo 2¹⁶. Words are fast because a run loads a row
-    /// again just after it was stored.
+    /// A row of words per hash. A word holds four places modulo 2¹⁶. Words are fast because a run loads a
+    /// row again just after it was stored.
     table: Vec<u64>,
     hash_bytes: u32,
     /// The length from which a match is taken without looking further.

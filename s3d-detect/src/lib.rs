@@ -47,7 +47,7 @@
 //!     }
 //! }
 //!
-//! // A room of 4 × 3 m with a floor and a sofa of 1.6 × 0.8 × 0.7 m; `Area::read` reads one of a data set.
+//! // A room of 4 × 3 m with a floor and a sofa of 1.6 × 0.8 × 0.7 m; `Area::read` reads a real one.
 //! let class = CLASSES.iter().position(|c| *c == Class::SOFA).unwrap();
 //! let room = |number: u32, corner: Vec3| {
 //!     let bbox = Aabb { min: corner, max: corner + vec3(1.6, 0.8, 0.7) };

@@ -211,8 +211,8 @@ impl Cells {
     }
 }
 
-/// The sum of the squared distances to planes, as a function of the place x: xᵀAx − 2bx + c. The constant c
-/// is left out.
+/// The sum of the squared distances to planes, as a function of the place x: xᵀAx − 2bx + c. The constant
+/// c is left out.
 #[derive(Clone, Copy)]
 struct Quadric {
     a: DMat3,

@@ -65,7 +65,8 @@ pub struct ColoredVertices {
     pub far_points: u64,
     /// The area of the faces with a corner that has no points and took its colour from neighbours, in m².
     pub spread_m2: f64,
-    /// The area of the faces with a corner that no colour reaches, in m². Such corners are [`DEFAULT_COLOR`].
+    /// The area of the faces with a corner that no colour reaches, in m². Such corners are
+    /// [`DEFAULT_COLOR`].
     pub bare_m2: f64,
     /// The area of the faces with more than 16 points, in m². Details finer than these faces are lost.
     pub blurred_m2: f64,
@@ -215,7 +216,8 @@ fn groups(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
     (group_of_vertex, place_of_group)
 }
 
-/// Returns the place of a vertex as bits. Adding 0 turns −0 into 0, so that equal positions have equal bits.
+/// Returns the place of a vertex as bits. Adding 0 turns −0 into 0, so that equal positions have equal
+/// bits.
 fn place_key(vertex: u32, mesh: &TriMesh) -> [u32; 3] {
     (mesh.positions()[vertex as usize] + Vec3::ZERO)
         .to_array()

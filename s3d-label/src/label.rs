@@ -14,7 +14,8 @@ pub const NULL_NAME: &str = "<UNK>_0_<UNK>_0_0";
 /// `board_3_hallway_4_6`. Source: `s3d_io::formats`, "What is written".
 ///
 /// `Ord` is the published order: by (`class_instanceNum_`, `areaNum`) as strings, with the underscore, so
-/// `beam_10_…` comes before `beam_1_…`. Then by room, which only matters for two labels of the same instance.
+/// `beam_10_…` comes before `beam_1_…`. Then by room, which only matters for two labels of the same
+/// instance.
 ///
 /// ```
 /// use s3d_label::{Class, Label, LabelError};

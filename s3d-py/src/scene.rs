@@ -102,8 +102,8 @@ impl Scene {
         Ok(dict)
     }
 
-    /// Returns the first hit of each ray: t, the multiple of the direction (NaN for no hit), and the face (−1
-    /// for no hit).
+    /// Returns the first hit of each ray: t, the multiple of the direction (NaN for no hit), and the face
+    /// (−1 for no hit).
     fn cast<'py>(
         &self,
         py: Python<'py>,

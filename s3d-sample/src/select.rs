@@ -112,18 +112,18 @@ const WEIGHT_SIGMA: f64 = 0.5;
 ///
 /// In a pool of n views, the `discard`·n views with the lowest scores go (rounded down), and the `keep`·n
 /// views with the highest scores stay (rounded to the nearest, halves up). A draw from the rest fills up to
-/// [`Selection::share`]·n views (rounded likewise), so 72.5 % of any pool stay, to half a view. If two scores
-/// are equal, the smaller index counts as the higher score.
+/// [`Selection::share`]·n views (rounded likewise), so 72.5 % of any pool stay, to half a view. If two
+/// scores are equal, the smaller index counts as the higher score.
 ///
 /// The draw is without replacement. The paper says "half-normal with mean 1 and deviation ½ on the entropy
 /// scaled to \[0, 1\]". We take the lower half of that normal distribution: a view of score e has the weight
-/// exp(−(s − 1)² / (2·½²)), where s is e divided by the highest score of the pool. The weight is 1 at s = 1
-/// and e⁻² = 0.135 at s = 0. If all scores are 0, all weights are equal.
+/// exp(−(s − 1)² / (2·½²)), where s is e divided by the highest score of the pool. The weight is 1 at
+/// s = 1 and e⁻² = 0.135 at s = 0. If all scores are 0, all weights are equal.
 ///
-/// By the method of Efraimidis and Spirakis (2006), view i gets the key ln(uᵢ) / weightᵢ, and the views with
-/// the largest keys stay. The number uᵢ, in (0, 1], comes from the i-th 64 bits of a ChaCha8 stream keyed by
-/// `seed`. The result therefore does not depend on the order in which keys are computed, but it depends on
-/// the index of a view. [`select_pooled`](crate::select_pooled) selects views by name instead.
+/// By the method of Efraimidis and Spirakis (2006), view i gets the key ln(uᵢ) / weightᵢ, and the views
+/// with the largest keys stay. The number uᵢ, in (0, 1], comes from the i-th 64 bits of a ChaCha8 stream
+/// keyed by `seed`. The result therefore does not depend on the order in which keys are computed, but it
+/// depends on the index of a view. [`select_pooled`](crate::select_pooled) selects views by name instead.
 ///
 /// # Panics
 /// If a score is negative or not finite, or [`Selection::check`] fails.

@@ -35,8 +35,8 @@ pub struct ViewDistribution {
 }
 
 impl Default for ViewDistribution {
-    /// The distribution of the paper: pitch N(0, 15°) and angle of view 75° − |N(0, 30°)|. The lower limit of
-    /// 10° is our addition.
+    /// The distribution of the paper: pitch N(0, 15°) and angle of view 75° − |N(0, 30°)|. The lower
+    /// limit of 10° is our addition.
     fn default() -> Self {
         Self { pitch_sigma_deg: 15.0, fov_max_deg: 75.0, fov_sigma_deg: 30.0, fov_min_deg: 10.0 }
     }
@@ -108,8 +108,8 @@ pub struct View {
 /// stream is ChaCha8, with the key `seed` in 8 bytes, `number` in 4, `view` in ASCII, and the 128-bit FNV-1a
 /// hash of `location`, all little-endian. It gives, in this order:
 /// - the yaw, uniform in [−180°, 180°);
-/// - the pitch, normal by the method of Box and Muller. It is drawn again (2 in 10⁹) if the camera would tip
-///   over, at 90° or more up or down;
+/// - the pitch, normal by the method of Box and Muller. It is drawn again (2 in 10⁹) if the camera would
+///   tip over, at 90° or more up or down;
 /// - the angle of view, `fov_max_deg − |normal|`. It is drawn again below `fov_min_deg`.
 ///
 /// # Panics
@@ -250,8 +250,8 @@ mod tests {
         f64::from(cells.sum::<u32>())
     }
 
-    /// Returns the χ² statistic of independence of two columns, over 8 × 8 cells of equal probability. With
-    /// 49 degrees of freedom it exceeds 85.35 with probability 0.001.
+    /// Returns the χ² statistic of independence of two columns, over 8 × 8 cells of equal probability.
+    /// With 49 degrees of freedom it exceeds 85.35 with probability 0.001.
     fn chi_square(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
         let mut cells = [0u32; 64];
         let mut n = 0.0;

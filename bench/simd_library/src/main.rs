@@ -5,9 +5,9 @@
 //! ```
 //!
 //! The kernel (`s3d-render/src/raster/chunk.rs`, as it is there) draws 4,000 chunks of 16 columns and 4 to 16
-//! rows on a window of 256 × 128, with our registers and with those of `fearless_simd`, taking turns. Printed
-//! are milliseconds of processor time; the pixels must be the same. Needs a processor with AVX-512 as of Ice
-//! Lake, which is what the library asks for.
+//! rows on a window of 256 × 128, with our registers and with those of `fearless_simd`, taking turns.
+//! Printed are milliseconds of processor time; the pixels must be the same. Needs a processor with AVX-512 as
+//! of Ice Lake, which is what the library asks for.
 
 #![allow(dead_code)]
 

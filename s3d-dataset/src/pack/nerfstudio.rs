@@ -52,7 +52,7 @@ pub(super) fn pack(
             notes.push("depth is in millimetres, 0 where missing: nerfstudio's default".into());
         }
         DepthFiles::Original => notes.push(format!(
-            "depth needs a depth-unit-scale-factor of {} in nerfstudio; missing pixels seem to be {:.0} m away",
+            "nerfstudio needs depth-unit-scale-factor {} here; missing pixels seem to be {:.0} m away",
             1.0 / source.depth_units_per_m,
             f64::from(MISSING_DEPTH) / source.depth_units_per_m
         )),

@@ -1,18 +1,18 @@
 //! PointNet and mmdetection3d: the points of a room in numpy arrays.
 //!
 //! **PointNet** (`sem_seg/indoor3d_util.py`, and the many projects that copied it) turns each room of the
-//! tree into `stanford_indoor3d/Area_1_office_3.npy`: float64, N × 7, with rows `x y z r g b label`. The room
-//! is moved so that its smallest coordinates are 0. The label is the class: ceiling 0, floor 1, wall 2, beam
-//! 3, column 4, window 5, door 6, table 7, chair 8, sofa 9, bookcase 10, board 11, clutter 12. The lists in
-//! `meta/` name the rooms. `anno_paths.txt` and `all_data_label.txt` replace the loader's own, which name the
-//! 272 published rooms.
+//! tree into `stanford_indoor3d/Area_1_office_3.npy`: float64, N × 7, with rows `x y z r g b label`. The
+//! room is moved so that its smallest coordinates are 0. The label is the class: ceiling 0, floor 1, wall 2,
+//! beam 3, column 4, window 5, door 6, table 7, chair 8, sofa 9, bookcase 10, board 11, clutter 12. The lists
+//! in `meta/` name the rooms. `anno_paths.txt` and `all_data_label.txt` replace the loader's own, which name
+//! the 272 published rooms.
 //!
 //! **mmdetection3d** (`data/s3dis/indoor3d_util.py`) turns each room, in `s3dis_data/`, into
-//! `Area_1_office_3_point.npy` (float32, N × 6, moved in the same way), `…_sem_label.npy` (int64, N, the same
-//! classes) and `…_ins_label.npy` (int64, N, instances from 1, 0 for none). Its `create_data.py s3dis` then
-//! lists the rooms by the folders of `Stanford3dDataset_v1.2_Aligned_Version/Area_{1..6}`, and all six must
-//! exist. They are made here, with an empty folder for each room, since the points are in the arrays. The
-//! loader numbers instances in the order in which the system lists files; here it is the order of their
+//! `Area_1_office_3_point.npy` (float32, N × 6, moved in the same way), `…_sem_label.npy` (int64, N, the
+//! same classes) and `…_ins_label.npy` (int64, N, instances from 1, 0 for none). Its `create_data.py s3dis`
+//! then lists the rooms by the folders of `Stanford3dDataset_v1.2_Aligned_Version/Area_{1..6}`, and all six
+//! must exist. They are made here, with an empty folder for each room, since the points are in the arrays.
+//! The loader numbers instances in the order in which the system lists files; here it is the order of their
 //! names.
 //!
 //! Colours are the tree's, from 0 to 255.

@@ -44,7 +44,8 @@ pub struct FisheyeLens {
 const STEPS: u32 = 2000;
 
 impl FisheyeLens {
-    /// Makes a lens from the focal lengths and the principal point in pixels, and OpenCV's k₁ k₂ k₃ k₄.
+    /// Makes a lens from the focal lengths and the principal point in pixels, and OpenCV's k₁ k₂ k₃
+    /// k₄.
     ///
     /// Returns `None` if a number is not finite, a size is 0, a focal length is not above 0, or no direction
     /// is projected to the middle of the picture.

@@ -47,7 +47,8 @@ pub struct Lens {
 const FARTHEST_R2: f64 = 100.0;
 
 impl Lens {
-    /// Makes a lens from the focal lengths and the principal point in pixels, and OpenCV's k₁ k₂ p₁ p₂ k₃.
+    /// Makes a lens from the focal lengths and the principal point in pixels, and OpenCV's k₁ k₂ p₁
+    /// p₂ k₃.
     ///
     /// Returns `None` if a number is not finite, a size is 0, a focal length is not above 0, or no direction
     /// is projected to the middle of the picture.

@@ -36,8 +36,8 @@ pub enum Projection {
         center_px: DVec2,
     },
     /// A panorama. Columns are longitudes, growing to the right. Rows are latitudes, from +90° at the top to
-    /// −90°. The centre column looks along the forward axis of the pose, projected to the horizon. Up is +Z
-    /// of the world, whatever the tilt of the pose.
+    /// −90°. The centre column looks along the forward axis of the pose, projected to the horizon. Up is
+    /// +Z of the world, whatever the tilt of the pose.
     Equirectangular,
 }
 
@@ -233,7 +233,8 @@ impl Camera {
 /// The ray directions of a camera, by pixel. [`Camera::rays`] makes them.
 #[derive(Clone, Debug)]
 pub enum Rays {
-    /// The direction is origin + x_step·(i + ½) + y_step·(j + ½). Its component along the optical axis is 1.
+    /// The direction is origin + x_step·(i + ½) + y_step·(j + ½). Its component along the optical axis is
+    /// 1.
     Perspective {
         /// The step from a pixel to the next on the right.
         x_step: DVec3,

@@ -15,8 +15,8 @@ pub fn rotation_from_euler(angles_rad: DVec3) -> DMat3 {
         * DMat3::from_rotation_x(angles_rad.x)
 }
 
-/// Returns the three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y in
-/// [−π/2, π/2]. If the two outer axes coincide (y = ±π/2), z is 0.
+/// Returns the three angles in radians whose [`rotation_from_euler`] is `rotation`: x and z in (−π, π], y
+/// in [−π/2, π/2]. If the two outer axes coincide (y = ±π/2), z is 0.
 pub fn euler_from_rotation(rotation: DMat3) -> DVec3 {
     let DMat3 { x_axis, y_axis, z_axis } = rotation;
     let cos_y = libm::hypot(x_axis.x, x_axis.y);
@@ -54,8 +54,8 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Returns the pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°). The
-    /// identity therefore looks along +Y with +Z up.
+    /// Returns the pose of a scan location from its entry in a camera table: E(original) = R(q)·Rx(90°).
+    /// The identity therefore looks along +Y with +Z up.
     pub fn from_scanner(location: DVec3, world_from_scanner: DQuat) -> Self {
         let turn = DMat3::from_quat(world_from_scanner.normalize());
         Self { location, world_from_camera: turn * DMat3::from_rotation_x(FRAC_PI_2) }
@@ -218,8 +218,8 @@ impl Pose {
         DMat3::from_cols(self.right(), -self.up(), self.forward()).transpose()
     }
 
-    /// Returns `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C], world →
-    /// camera, 3 × 4.
+    /// Returns `camera_rt_matrix` of the pose files, row by row: [D·E(final)ᵀ | −D·E(final)ᵀ·C],
+    /// world → camera, 3 × 4.
     pub fn rt_matrix(&self) -> [[f64; 4]; 3] {
         let r = self.opencv_from_world();
         let t = -(r * self.location);

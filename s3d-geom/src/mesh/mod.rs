@@ -423,7 +423,8 @@ fn drop_non_finite(column: &mut [[u32; 3]], is_finite: impl Fn(u32) -> bool) -> 
     dropped
 }
 
-/// Returns half the cross product of two edges. It points along the normal, and its length is the area in m².
+/// Returns half the cross product of two edges. It points along the normal, and its length is the area in
+/// m².
 pub(crate) fn area_vector([a, b, c]: [Vec3; 3]) -> DVec3 {
     let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
     (b - a).cross(c - a) * 0.5

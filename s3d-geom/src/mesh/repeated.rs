@@ -40,7 +40,8 @@ impl TriMesh {
     }
 }
 
-/// Returns the corners of a face as bits, sorted: equal for faces with the same corners. 0 and −0 are equal.
+/// Returns the corners of a face as bits, sorted: equal for faces with the same corners. 0 and −0 are
+/// equal.
 fn corners(mesh: &TriMesh, face: u32) -> [[u32; 3]; 3] {
     let mut corners = mesh.triangle(face).map(|p| p.to_array().map(|c| (c + 0.0).to_bits()));
     corners.sort_unstable();

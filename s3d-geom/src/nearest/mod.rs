@@ -227,8 +227,8 @@ mod tests {
         }
     }
 
-    /// Returns an n × n grid of squares, two triangles each, over z = `height(x, y)`. Its vertices are `step`
-    /// apart.
+    /// Returns an n × n grid of squares, two triangles each, over z = `height(x, y)`. Its vertices are
+    /// `step` apart.
     fn grid(n: u32, step: f32, height: impl Fn(f32, f32) -> f32) -> TriMesh {
         let at = |i: u32, j: u32| i * (n + 1) + j;
         let positions = (0..=n).flat_map(|i| (0..=n).map(move |j| (i as f32 * step, j as f32 * step)));

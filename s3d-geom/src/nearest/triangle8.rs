@@ -1,18 +1,18 @@
 //! Lower bounds of the distances of eight triangles at once, so that few exact distances are needed.
 //!
 //! **The bound.** Take the point as the origin, and let a, b and c be the corners of a triangle T. For every
-//! direction q, all of T lies at least min(q·a, q·b, q·c)/|q| along q, so T is no nearer than that. If q is
-//! the nearest point of T, the bound is the distance itself. A good q is found region by region in plain
+//! direction q, all of T lies at least min(q·a, q·b, q·c)/|q| along q, so T is no nearer than that. If q
+//! is the nearest point of T, the bound is the distance itself. A good q is found region by region in plain
 //! `f32` arithmetic. The bound holds for any q, so only the rounding of the bound itself counts:
-//! - Corners relative to the point are rounded by 2⁻²⁴ of their length, dot products of three terms by 3·2⁻²⁴
-//!   |q||v|. With R ≥ |v| for all corners v, this changes the distance by less than 3e-7 R. The code
-//!   subtracts 1e-6 R.
+//! - Corners relative to the point are rounded by 2⁻²⁴ of their length, dot products of three terms by
+//!   3·2⁻²⁴ |q||v|. With R ≥ |v| for all corners v, this changes the distance by less than 3e-7 R.
+//!   The code subtracts 1e-6 R.
 //! - The reference is not the distance but [`SortedTriangle::closest`], in `f64`. It may take a foot of the
 //!   perpendicular outside of a thin triangle for one inside. Its weights are the areas of three small
-//!   triangles times the area of the triangle. They are off by at most 32·2⁻⁵³ L²R², where L is the longest
-//!   edge, and their sum n² is small for a thin triangle. An error of η in barycentric coordinates moves the
-//!   foot by up to 4 η L, so the reference may be below the distance by 128·2⁻⁵³ L³R²/n². The code subtracts
-//!   that too: `thinness` is 2⁻⁴⁵ L³/n².
+//!   triangles times the area of the triangle. They are off by at most 32·2⁻⁵³ L²R², where L is the
+//!   longest edge, and their sum n² is small for a thin triangle. An error of η in barycentric coordinates
+//!   moves the foot by up to 4 η L, so the reference may be below the distance by 128·2⁻⁵³ L³R²/n².
+//!   The code subtracts that too: `thinness` is 2⁻⁴⁵ L³/n².
 //! - Other roundings of the reference are below 1e-7 R. (Triangles thinner than 1e-8 are measured by their
 //!   edges: see [`SortedTriangle`].)
 //!

@@ -40,10 +40,10 @@ const BLOCK: usize = 256;
 
 /// Draws points evenly from the surface of a mesh, in pieces of any size.
 ///
-/// Point i of N is at (i + uᵢ)/N of the cumulative area of the faces, where uᵢ is random in [0, 1). Its place
-/// in the triangle is uniform. The points are therefore in the order of the faces, every stretch of surface
-/// has its share of points to within two, and any range of points can be drawn alone. The random numbers of a
-/// point depend on the seed and its index only.
+/// Point i of N is at (i + uᵢ)/N of the cumulative area of the faces, where uᵢ is random in [0, 1). Its
+/// place in the triangle is uniform. The points are therefore in the order of the faces, every stretch of
+/// surface has its share of points to within two, and any range of points can be drawn alone. The random
+/// numbers of a point depend on the seed and its index only.
 ///
 /// ```
 /// use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh, glam::Vec3};

@@ -6,7 +6,8 @@ use s3d_geom::{NearestFaces, TriMesh};
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BinaryHeap, HashMap, HashSet};
 
-/// The cosine of 45°, the largest angle at which a surface continues. At a sharper edge another thing begins.
+/// The cosine of 45°, the largest angle at which a surface continues. At a sharper edge another thing
+/// begins.
 const SMOOTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// The largest step between two pieces of surface that are flush: 5 mm.
@@ -19,8 +20,8 @@ const MOST_CELLS: f64 = 1000.0;
 /// `within_m` metres away. Returns the indices of the faces that got a label, ascending.
 ///
 /// A label first spreads along the surface, from face to face across shared edges (edges are shared if the
-/// places of their corners are equal). It does not cross an edge at which normals differ by more than 45°, so
-/// it does not go around a sharp edge. The length of a way counts from the edge of the labelled surface
+/// places of their corners are equal). It does not cross an edge at which normals differ by more than 45°,
+/// so it does not go around a sharp edge. The length of a way counts from the edge of the labelled surface
 /// through the middles of edges and faces.
 ///
 /// The mesh may be in pieces. A face that no way reaches takes the label of the nearest labelled face by

@@ -31,9 +31,9 @@ const DIRECTIONS: u32 = 256;
 const FRONT_SHARE: f64 = 0.5;
 /// … on back sides in at most this share of the directions in which they end, …
 const BACK_SHARE: f64 = 0.25;
-/// … and on front sides in this share of directions a little above the horizon. The last condition is needed
-/// since a ceiling may not have been captured, and a ceiling that reaches over a wall, as eaves do, makes no
-/// room outside.
+/// … and on front sides in this share of directions a little above the horizon. The last condition is
+/// needed since a ceiling may not have been captured, and a ceiling that reaches over a wall, as eaves do,
+/// makes no room outside.
 const AROUND_SHARE: f64 = 0.85;
 
 /// Samples of the surface of a mesh, each of the same area.

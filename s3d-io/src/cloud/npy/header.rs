@@ -21,7 +21,8 @@ pub(crate) struct NpyHeader {
     pub(crate) rows: u64,
     /// The bytes of a row.
     pub(crate) stride: usize,
-    /// The fields of a row. In an array that is not structured they are `[0]`, `[1]`…, or one without a name.
+    /// The fields of a row. In an array that is not structured they are `[0]`, `[1]`…, or one without a
+    /// name.
     pub(crate) fields: Vec<Field>,
     /// Whether the fields have names of their own.
     pub(crate) is_structured: bool,

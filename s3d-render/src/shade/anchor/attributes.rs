@@ -30,8 +30,8 @@ impl Attributes {
     /// Returns the bound that [`AnchorBatch::anchors`](crate::shade::anchor::AnchorBatch::anchors) describes.
     ///
     /// Let a₀ = a(e), and 1/w = z(d) / z(e), where z is the distance of the face along a ray. An attribute
-    /// changes by (m − (a − a₀) ω / ω·e) · step / w, where m = (α − a₀ω) / ω·e; and z is greatest at a
-    /// corner.
+    /// changes by (m − (a − a₀) ω / ω·e) · step / w, where m = (α − a₀ω) / ω·e; and z is
+    /// greatest at a corner.
     #[inline(always)]
     pub(super) fn fastest(&self, world: [DVec3; 3], origin: DVec3, e: DVec3, steps: [DVec3; 2]) -> f64 {
         let scale = self.denominator.dot(e).recip();

@@ -167,7 +167,8 @@ fn around(i: usize, width: usize) -> [usize; 4] {
     [i - 1, i + 1, i - width, i + width]
 }
 
-/// The square roots of the values, so that a few strong edges do not decide, blurred twice over 3 × 3 pixels.
+/// The square roots of the values, so that a few strong edges do not decide, blurred twice over 3 × 3
+/// pixels.
 fn softened(values: &[f64], size: [usize; 2]) -> Vec<f64> {
     let [width, height] = size;
     let mut blurred: Vec<f64> = values.iter().map(|v| v.sqrt()).collect();
