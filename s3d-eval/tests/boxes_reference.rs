@@ -2,7 +2,6 @@
 //! `reference/boxes/README.md`.
 
 use crate::scene;
-
 use s3d_dataset::s3d_label::Class;
 use s3d_eval::boxes::{ClassScore, Detection, GroundTruth, Rule, average_precision, mean};
 use s3d_eval::{Context, EvalOptions, Folds, Protocol, evaluate};
@@ -109,9 +108,9 @@ struct Detected {
     detections: Vec<(usize, usize, f64, [f32; 6])>,
 }
 
-/// Makes a data set whose area 5 has only these instances.
-fn with_instances(detected: &Detected) -> &'static Path {
-    let root = scene::data_set();
+/// Makes a data set in a new folder, whose area 5 has only these instances.
+fn write_with_instances(root: &Path, detected: &Detected) {
+    scene::copy_to(root);
     let entries = detected
         .truth
         .iter()
@@ -141,7 +140,6 @@ fn with_instances(detected: &Detected) -> &'static Path {
     files["bytes"] = (files["bytes"].as_u64().unwrap() + new_bytes - bytes).into();
     files["xxh3_128"] = checksum_of_file(&list).unwrap().1.to_string().into();
     write_json(&manifest, &value).unwrap();
-    root
 }
 
 #[test]
@@ -159,8 +157,9 @@ fn mmdetection3d_gives_the_same_for_detections_of_our_detector() {
     write_json(&found, &list.collect::<Vec<_>>()).unwrap();
     let mut options = EvalOptions::default();
     options.folds = Folds::Areas(vec![5]);
-    let root = with_instances(&detected);
-    let ours = evaluate(Protocol::Det, root, &found, &options, &Context::default()).unwrap();
+    let root = folder.path().join("data set");
+    write_with_instances(&root, &detected);
+    let ours = evaluate(Protocol::Det, &root, &found, &options, &Context::default()).unwrap();
     assert_eq!(ours.counted["boxes"], detected.truth.len() as u64);
     assert_eq!(ours.counted["detections"], detected.detections.len() as u64);
 

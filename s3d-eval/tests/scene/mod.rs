@@ -1,4 +1,5 @@
-//! A data set of two areas, made once for all tests of a file.
+//! A data set of two areas, made once for all tests. They run at the same time, so a test that changes it takes
+//! a copy.
 
 use s3d_dataset::{Context, Export, ExportOptions};
 use s3d_synth::{Building, ScanOptions};
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 static OUT: LazyLock<PathBuf> = LazyLock::new(|| {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_CRATE_NAME"));
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_PKG_NAME"));
     let _ = fs::remove_dir_all(&folder);
     let building = Building::demo().build().unwrap();
     let scenes = [2, 5].map(|area: u32| {
@@ -32,6 +33,24 @@ static OUT: LazyLock<PathBuf> = LazyLock::new(|| {
         .unwrap();
     out
 });
+
+/// Copies the data set to a new folder.
+pub(crate) fn copy_to(folder: &Path) {
+    copy_files(data_set(), folder);
+}
+
+fn copy_files(from: &Path, to: &Path) {
+    fs::create_dir(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let copy = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            copy_files(&path, &copy);
+        } else {
+            fs::copy(&path, &copy).unwrap();
+        }
+    }
+}
 
 /// The folder of a labelled data set with areas 2 and 5.
 pub(crate) fn data_set() -> &'static Path {
