@@ -8,6 +8,7 @@ mod copyroom;
 mod findings;
 mod gltf;
 mod hard_inputs;
+mod label_files;
 mod limits;
 mod mesh_dialects;
 mod pointcloud_mat;

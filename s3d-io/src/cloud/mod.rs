@@ -43,6 +43,8 @@ pub(crate) mod annotations;
 #[cfg(feature = "e57")]
 mod e57;
 pub(crate) mod frame_gap;
+#[cfg(feature = "label-files")]
+mod label_files;
 #[cfg(feature = "las")]
 mod las;
 #[cfg(feature = "mat")]
@@ -60,11 +62,15 @@ mod s3dis;
 #[cfg(feature = "scannet")]
 mod scannet;
 mod table;
+#[cfg(any(feature = "mesh", feature = "scannet"))]
+mod words;
 
 pub use annotations::{
     AnnotatedInstance, AnnotatedPoints, AnnotatedRoom, AnnotationOptions, Annotations, Skipped,
 };
 pub use frame_gap::FrameGap;
+#[cfg(feature = "label-files")]
+pub use label_files::AnnotatedMesh;
 #[cfg(feature = "mat")]
 pub use mat::{MatArea, MatObject, MatRoom, MatWriter};
 #[cfg(feature = "npy")]

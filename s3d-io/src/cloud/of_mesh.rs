@@ -3,12 +3,13 @@
 use crate::cloud::annotations::{AnnotationOptions, Annotations};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::meaning::{Group, Meaning};
-use crate::cloud::table::rows::{CloudTags, NO_INSTANCE, NO_TAG, Reading};
+use crate::cloud::table::rows::{CloudTags, NO_INSTANCE, NO_TAG, Reading, Tag, Value};
+use crate::cloud::words::class_of_word;
 use crate::error::{Error, Result};
 use crate::mesh::file::MeshFile;
-use crate::mesh::labels::{MeshLabels, NO_LABEL};
-use s3d_geom::NO_INDEX;
-use s3d_label::Label;
+use crate::mesh::labels::{LabelledObject, MeshLabels, NO_LABEL};
+use s3d_geom::{NO_INDEX, TriMesh};
+use s3d_label::{Class, Label};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -30,43 +31,174 @@ impl Annotations {
     /// If [`MeshFile::sources`] is empty.
     #[expect(clippy::indexing_slicing, reason = "a mesh of no file is a caller's mistake: see Panics")]
     pub fn of_mesh(file: &MeshFile, options: &AnnotationOptions) -> Result<Self> {
+        FaceLabels::of_mesh(file, options)?.annotate(&file.sources[0].path, &file.mesh, options, true)
+    }
+}
+
+/// The labels of the faces of a mesh.
+pub(crate) struct FaceLabels {
+    pub(crate) labels: Vec<Label>,
+    /// For each face its index into the labels, or [`NO_INDEX`].
+    pub(crate) faces: Vec<u32>,
+    warnings: Vec<String>,
+    /// The other files that say them.
+    companions: Vec<PathBuf>,
+}
+
+impl FaceLabels {
+    /// Takes the labels that came with a mesh.
+    ///
+    /// # Errors
+    /// The errors of [`Annotations::of_mesh`].
+    #[expect(clippy::indexing_slicing, reason = "a mesh of no file is a caller's mistake: see `of_mesh`")]
+    pub(crate) fn of_mesh(file: &MeshFile, options: &AnnotationOptions) -> Result<Self> {
         let path = &file.sources[0].path;
-        let (labels, mut warnings) = match &file.labels {
-            Some(labels) => (labels.clone().into_faces(&file.mesh), Vec::new()),
-            None => MeshLabels::from_materials(&file.mesh, &options.taxonomy).ok_or_else(|| {
-                Error::format(
-                    path,
-                    "came without labels: it has no column of classes of faces or vertices (name it with \
-                     class = \"…\"), and its materials are not named as labels, as in chair_3_office_5_1",
-                )
-            })?,
+        let mut companions = Vec::new();
+        // Names of materials that are labels of the data set say more than words for classes.
+        let names = match &file.labels {
+            Some(MeshLabels::Numbers { .. } | MeshLabels::Names { .. }) => None,
+            Some(MeshLabels::Objects { .. }) | None => {
+                MeshLabels::from_materials(&file.mesh, &options.taxonomy)
+            }
+        };
+
+        let (labels, mut warnings) = if let Some(names) = names {
+            names
+        } else if let Some(named) = named_beside(file, options.class_column.as_deref())? {
+            companions.push(named.list);
+            (named.labels, named.warnings)
+        } else if let Some(labels) = &file.labels {
+            (labels.clone().into_faces(&file.mesh), Vec::new())
+        } else {
+            return Err(Error::format(
+                path,
+                "came without labels: it has no column of classes of faces or vertices (name it with \
+                 class = \"…\"), and its materials are not named as labels, as in chair_3_office_5_1",
+            ));
         };
 
         let (labels, faces) = match labels {
             MeshLabels::Names { labels, faces } => (labels, faces),
+            MeshLabels::Objects { objects, faces } => {
+                of_tags(file, &ObjectTags { objects: &objects, faces: &faces }, options, &mut warnings)?
+            }
             MeshLabels::Numbers { class, instance, .. } => {
                 let Some(class) = class else {
                     let message = "has a column of objects, but none of classes: name it with class = \"…\"";
                     return Err(Error::format(path, message));
                 };
                 let instance = instance.map(|column| column.values);
-                of_numbers(file, &class.values, instance.as_deref(), options, &mut warnings)?
+                let numbers = NumberTags { classes: &class.values, instances: instance.as_deref() };
+                of_tags(file, &numbers, options, &mut warnings)?
             }
         };
+        Ok(Self { labels, faces, warnings, companions })
+    }
 
-        let mut found = Self::from_face_labels(path, &file.mesh, &labels, &faces)?;
+    /// Makes annotations of them for the faces of `mesh`. The points know these faces if they are the faces
+    /// of the scene's mesh. Messages name the file `path`.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if no face has a label.
+    pub(crate) fn annotate(
+        self,
+        path: &Path,
+        mesh: &TriMesh,
+        options: &AnnotationOptions,
+        know_faces: bool,
+    ) -> Result<Annotations> {
+        let mut found = Annotations::from_labelled_faces(path, mesh, &self.labels, &self.faces, know_faces)?;
         found.taxonomy = options.taxonomy.clone();
-        found.warnings = warnings;
+        found.warnings = self.warnings;
+        found.companions = self.companions;
         Ok(found)
     }
 }
 
-/// The labels that columns of numbers stand for, and for each face an index into them.
+/// Labels that a list beside a mesh gives to its faces.
+pub(crate) struct NamedFaces {
+    pub(crate) labels: MeshLabels,
+    pub(crate) warnings: Vec<String>,
+    /// The list.
+    pub(crate) list: PathBuf,
+}
+
+#[cfg(feature = "label-files")]
+use crate::cloud::label_files::named_beside;
+
+/// Without the feature, no list is read.
+#[cfg(not(feature = "label-files"))]
+fn named_beside(_: &MeshFile, _: Option<&str>) -> Result<Option<NamedFaces>> {
+    Ok(None)
+}
+
+/// What a file says of each face of its mesh.
+trait FaceTags {
+    /// Returns the class of a face, or `None` if it has none.
+    fn class(&self, face: u32) -> Option<Value<'_>>;
+    /// Returns the number of its object, or [`NO_LABEL`].
+    fn instance(&self, face: u32) -> i64;
+    /// Returns the number of its room, if the file tells it.
+    fn room(&self, face: u32) -> Option<i64>;
+}
+
+/// Columns of numbers, one number a face.
+struct NumberTags<'a> {
+    classes: &'a [i64],
+    instances: Option<&'a [i64]>,
+}
+
+impl FaceTags for NumberTags<'_> {
+    fn class(&self, face: u32) -> Option<Value<'_>> {
+        let class = self
+            .classes
+            .get(face as usize)
+            .copied()
+            .filter(|class| *class != NO_LABEL)?;
+        Some(Value::Whole(class))
+    }
+
+    fn instance(&self, face: u32) -> i64 {
+        let instance = self.instances.and_then(|column| column.get(face as usize));
+        instance.copied().unwrap_or(NO_LABEL)
+    }
+
+    fn room(&self, _face: u32) -> Option<i64> {
+        None
+    }
+}
+
+/// Objects with words for classes, and the object of each face.
+struct ObjectTags<'a> {
+    objects: &'a [LabelledObject],
+    faces: &'a [u32],
+}
+
+impl ObjectTags<'_> {
+    fn object(&self, face: u32) -> Option<&LabelledObject> {
+        self.objects.get(*self.faces.get(face as usize)? as usize)
+    }
+}
+
+impl FaceTags for ObjectTags<'_> {
+    fn class(&self, face: u32) -> Option<Value<'_>> {
+        self.object(face).map(|object| Value::Name(&object.class))
+    }
+
+    fn instance(&self, face: u32) -> i64 {
+        self.object(face).map_or(NO_LABEL, |object| object.instance)
+    }
+
+    fn room(&self, face: u32) -> Option<i64> {
+        self.object(face)?.room
+    }
+}
+
+/// Returns the labels that the tags of faces stand for, and for each face an index into them.
 #[expect(clippy::indexing_slicing, reason = "columns have an entry a face; groups are counted here")]
-fn of_numbers(
+fn of_tags(
     file: &MeshFile,
-    classes: &[i64],
-    instances: Option<&[i64]>,
+    faces: &dyn FaceTags,
     options: &AnnotationOptions,
     warnings: &mut Vec<String>,
 ) -> Result<(Vec<Label>, Vec<u32>)> {
@@ -75,24 +207,28 @@ fn of_numbers(
     let mut tags = CloudTags::new();
     let mut groups: Vec<Group> = Vec::new();
     let mut index: HashMap<(u32, u32, i64), u32> = HashMap::new();
-    let mut group_of = vec![NO_INDEX; classes.len()];
+    let mut group_of = vec![NO_INDEX; file.mesh.faces().len()];
 
     for (source, cloud) in clouds.iter().enumerate() {
         let path = cloud.path();
         let too_many = || Error::format(path, "has too many different classes: is the column another one?");
-        let room = match options.room.or(cloud.room(&options.taxonomy)) {
+        let usual_room = match options.room.or(cloud.room(&options.taxonomy)) {
             Some(room) => tags.rooms.name(&room.to_string()).ok_or_else(too_many)?,
             None => NO_TAG,
         };
+
         for face in file.faces_of(source) {
-            let class = classes[face as usize];
-            if class == NO_LABEL {
-                continue;
-            }
-            let class = tags.classes.number(class).ok_or_else(too_many)?;
-            let instance = instances
-                .map_or(NO_LABEL, |column| column[face as usize])
-                .max(NO_INSTANCE);
+            let class = match faces.class(face) {
+                Some(Value::Name(name)) => tags.classes.name(name),
+                Some(Value::Whole(number)) => tags.classes.number(number),
+                _ => continue,
+            };
+            let class = class.ok_or_else(too_many)?;
+            let room = match faces.room(face) {
+                Some(number) => tags.rooms.number(number).ok_or_else(too_many)?,
+                None => usual_room,
+            };
+            let instance = faces.instance(face).max(NO_INSTANCE);
             let group = *index.entry((room, class, instance)).or_insert_with(|| {
                 groups.push(Group { room, class, instance, file: source, points: 0 });
                 groups.len() as u32 - 1
@@ -101,12 +237,12 @@ fn of_numbers(
             group_of[face as usize] = group;
         }
     }
+
     if groups.is_empty() {
-        return Err(Error::format(
-            &file.sources[0].path,
-            "has a column of classes, but no face with a class",
-        ));
+        let message = "has labels, but no face with a class";
+        return Err(Error::format(&file.sources[0].path, message));
     }
+
     let meaning = Meaning::new(&clouds, options, &groups, &tags, warnings)?;
     // The area does not matter here: instances are numbered by room.
     let labels = meaning
@@ -128,6 +264,13 @@ struct Source(PathBuf);
 impl Cloud for Source {
     fn path(&self) -> &Path {
         &self.0
+    }
+
+    fn class_of(&self, tag: &Tag) -> Option<Class> {
+        match tag {
+            Tag::Name(word) => class_of_word(word),
+            Tag::Number(_) => None,
+        }
     }
 
     fn read(&self, _colors: ColorRange, _reading: &mut Reading<'_>) -> Result<bool> {

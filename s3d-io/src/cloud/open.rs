@@ -5,6 +5,8 @@ use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
 use crate::cloud::frame_gap::{FrameGap, refusal};
+#[cfg(feature = "label-files")]
+use crate::cloud::label_files::{AnnotatedMesh, LabelFile};
 use crate::cloud::on_fault::OnFault;
 use crate::cloud::s3dis::points::PointReader;
 use crate::cloud::s3dis::tree::{AnnotationTree, TreeOptions};
@@ -59,12 +61,51 @@ impl Annotations {
     /// # Panics
     /// If `paths` is empty.
     pub fn open(paths: &[PathBuf], options: &AnnotationOptions) -> Result<Self> {
+        Self::open_each(
+            paths,
+            options,
+            #[cfg(feature = "label-files")]
+            None,
+        )
+    }
+
+    /// Reads like [`Annotations::open`], for a mesh. A file of labels of faces labels the faces of this mesh:
+    /// one to one if its own mesh has the same faces in the same order, and else by surface. A face takes the
+    /// label that most of its places, up to 5 cm apart, find on the nearest face within 10 cm.
+    ///
+    /// # Errors
+    /// The errors of [`Annotations::open`]; [`Error::Format`] for a mesh of labels that lies elsewhere.
+    ///
+    /// # Panics
+    /// If `paths` is empty.
+    #[cfg(feature = "label-files")]
+    pub fn open_for(
+        mesh: &AnnotatedMesh<'_>,
+        paths: &[PathBuf],
+        options: &AnnotationOptions,
+    ) -> Result<Self> {
+        Self::open_each(paths, options, Some(mesh))
+    }
+
+    fn open_each(
+        paths: &[PathBuf],
+        options: &AnnotationOptions,
+        #[cfg(feature = "label-files")] mesh: Option<&AnnotatedMesh<'_>>,
+    ) -> Result<Self> {
         assert!(!paths.is_empty(), "no path of annotations");
         let taxonomy = options.taxonomy.clone();
-        let mut all = Self { taxonomy, rooms: Vec::new(), warnings: Vec::new() };
+        let mut all = Self { taxonomy, rooms: Vec::new(), warnings: Vec::new(), companions: Vec::new() };
         let mut clouds: Vec<Box<dyn Cloud + '_>> = Vec::new();
 
         for path in paths {
+            #[cfg(feature = "label-files")]
+            // Columns of rooms are columns of points.
+            if options.room_column.is_none()
+                && let Some(file) = LabelFile::of(path)?
+            {
+                all.join(Self::of_label_file(&file, options, mesh)?)?;
+                continue;
+            }
             if path.is_dir() && !is_scannet(path) {
                 all.join(Self::from_tree(path, options)?)?;
             } else if is_mat(path) {
@@ -162,6 +203,7 @@ impl Annotations {
             }
         }
         self.warnings.extend(other.warnings);
+        self.companions.extend(other.companions);
         Ok(())
     }
 
@@ -213,7 +255,12 @@ impl Annotations {
                 .collect(),
         });
         let rooms = rooms.collect();
-        Ok(Self { taxonomy: options.taxonomy.clone(), rooms, warnings: tree.warnings })
+        Ok(Self {
+            taxonomy: options.taxonomy.clone(),
+            rooms,
+            warnings: tree.warnings,
+            companions: Vec::new(),
+        })
     }
 }
 

@@ -5,6 +5,7 @@ use crate::cloud::ply::read::{color_of, open_vertices};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::records::Color;
 use crate::cloud::table::rows::{Reading, Row, Tag, Value};
+use crate::cloud::words::class_of_word;
 use crate::error::{Error, Result};
 use crate::fs::json::read_json;
 use crate::fs::quote::quote;
@@ -16,95 +17,6 @@ use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// The classes of the annotators' words. Other words are in none of the 13 classes.
-const CATEGORIES: [(Class, &[&str]); 12] = [
-    (Class::CEILING, &["ceiling"]),
-    (Class::FLOOR, &["floor", "carpet", "rug", "mat", "doormat", "yoga mat"]),
-    (
-        Class::WALL,
-        &["wall", "closet wall", "closet walls", "shower wall", "shower walls", "divider", "room divider"],
-    ),
-    (Class::BEAM, &["beam"]),
-    (Class::COLUMN, &["column", "pillar", "structure column"]),
-    (Class::WINDOW, &["window", "windows", "windowframe"]),
-    (
-        Class::DOOR,
-        &[
-            "door",
-            "doors",
-            "doorframe",
-            "door frame",
-            "closet door",
-            "closet doors",
-            "sliding door",
-            "shower door",
-            "closet doorframe",
-            "sliding wood door",
-            "glass doors",
-        ],
-    ),
-    (
-        Class::TABLE,
-        &[
-            "table",
-            "desk",
-            "coffee table",
-            "end table",
-            "dining table",
-            "side table",
-            "folded table",
-            "round table",
-            "conference table",
-            "foosball table",
-            "ping pong table",
-            "dinner table",
-            "massage table",
-            "pool table",
-            "folding table",
-            "computer desk",
-        ],
-    ),
-    (
-        Class::CHAIR,
-        &[
-            "chair",
-            "chairs",
-            "office chair",
-            "armchair",
-            "stool",
-            "folded chair",
-            "folded chairs",
-            "stack of chairs",
-            "lounge chair",
-            "beach chair",
-            "dining chair",
-            "folding chair",
-            "desk chair",
-            "high chair",
-            "rocking chair",
-            "bar stool",
-            "step stool",
-            "seat",
-            "footstool",
-        ],
-    ),
-    (Class::SOFA, &["sofa", "couch", "loveseat", "futon", "sofa chair", "sofa bed", "beanbag chair"]),
-    (
-        Class::BOOKCASE,
-        &[
-            "bookshelf",
-            "bookshelves",
-            "bookcase",
-            "shelf",
-            "shelves",
-            "book shelf",
-            "book rack",
-            "storage shelf",
-        ],
-    ),
-    (Class::BOARD, &["whiteboard", "whiteboards", "blackboard", "bulletin board", "board", "poster board"]),
-];
-
 /// The three files of a scan.
 #[derive(Debug)]
 pub(crate) struct ScannetCloud {
@@ -113,34 +25,38 @@ pub(crate) struct ScannetCloud {
     mesh: PathBuf,
 }
 
+/// A list of objects, as ScanNet, ScanNet++ and 3RScan write it.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Aggregation {
+pub(crate) struct SegmentGroups {
     segments_file: Option<String>,
-    seg_groups: Vec<SegmentGroup>,
+    pub(crate) seg_groups: Vec<SegmentGroup>,
 }
 
+/// An object.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct SegmentGroup {
+pub(crate) struct SegmentGroup {
     object_id: Option<i64>,
     /// The same number. Some files have only one of the two.
     id: Option<i64>,
-    label: String,
-    segments: Vec<i64>,
+    /// The annotator's word for its class.
+    pub(crate) label: String,
+    pub(crate) segments: Vec<i64>,
 }
 
 impl SegmentGroup {
-    /// The number of the object, from 0.
-    fn object(&self) -> Option<i64> {
+    /// Returns the number of the object, from 0.
+    pub(crate) fn object(&self) -> Option<i64> {
         self.object_id.or(self.id).filter(|n| *n >= 0)
     }
 }
 
+/// The segment of each vertex.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Segments {
-    seg_indices: Vec<i64>,
+pub(crate) struct Segments {
+    pub(crate) seg_indices: Vec<i64>,
 }
 
 fn aggregations(dir: &Path) -> Option<Vec<PathBuf>> {
@@ -166,7 +82,7 @@ impl ScannetCloud {
             path.to_owned()
         };
         let dir = aggregation.parent().unwrap_or(Path::new("")).to_owned();
-        let document: Aggregation = read_json(&aggregation)?;
+        let document: SegmentGroups = read_json(&aggregation)?;
 
         // The file names its segments, as in "scannet.scene0000_00_vh_clean_2.0.010000.segs.json".
         let named = document.segments_file.as_deref().unwrap_or_default();
@@ -236,7 +152,7 @@ impl ScannetCloud {
     /// The index of the object that each segment belongs to.
     fn objects_of_segments(
         &self,
-        aggregation: &Aggregation,
+        aggregation: &SegmentGroups,
         reading: &mut Reading<'_>,
     ) -> Result<HashMap<i64, usize>> {
         let mut object_of: HashMap<i64, usize> = HashMap::new();
@@ -270,16 +186,17 @@ impl Cloud for ScannetCloud {
         true
     }
 
+    fn companions(&self) -> Vec<PathBuf> {
+        vec![self.segments.clone(), self.mesh.clone()]
+    }
+
     fn class_of(&self, tag: &Tag) -> Option<Class> {
         let Tag::Name(name) = tag else { return None };
-        CATEGORIES
-            .iter()
-            .find(|(_, names)| names.contains(&name.as_str()))
-            .map(|(class, _)| *class)
+        class_of_word(name)
     }
 
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-        let aggregation: Aggregation = read_json(&self.aggregation)?;
+        let aggregation: SegmentGroups = read_json(&self.aggregation)?;
         let segments = read_json::<Segments>(&self.segments)?.seg_indices;
         let object_of = self.objects_of_segments(&aggregation, reading)?;
 

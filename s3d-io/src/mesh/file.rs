@@ -67,6 +67,10 @@ pub struct MeshFile {
     /// The labels of its faces or vertices, if the file has any. They are aligned with the faces or vertices
     /// of `mesh`.
     pub labels: Option<MeshLabels>,
+    /// For each face its number in its file, from 0. Triangles that were cut from a polygon share the number
+    /// of the polygon. PLY and OBJ count their faces, those with fewer than three corners not in OBJ. glTF
+    /// counts triangles in the order of the nodes of the scene. Empty for a mesh that no file holds.
+    pub source_faces: Vec<u32>,
     /// The files that the mesh comes from, and where each begins in the mesh.
     pub sources: Vec<MeshSource>,
     /// The other files that were read: material libraries, textures, buffers. Missing files are not listed.
@@ -97,6 +101,7 @@ impl MeshFile {
             texture_files: Vec::new(),
             warnings: Vec::new(),
             labels: None,
+            source_faces: Vec::new(),
             sources: vec![source],
             companions: Vec::new(),
             offset_m: DVec3::ZERO,
@@ -125,7 +130,7 @@ impl MeshFile {
     pub(crate) fn tidy(mut self) -> (Self, Vec<u32>) {
         let (mut mesh, repeated) = self.mesh.without_repeated_faces();
         let tags = mesh.take_face_tags();
-        if let Some(labels) = self.labels.as_mut().filter(|_| !tags.is_empty()) {
+        if let Some(labels) = self.labels.as_mut() {
             labels.pick_faces(&tags);
         }
 

@@ -54,6 +54,8 @@ pub fn read_meshes_with(paths: &[PathBuf], up: UpAxis, options: &MeshOptions) ->
     let faces = joined.mesh.faces().len() as u32;
     joined.mesh = joined.mesh.with_face_tags((0..faces).collect());
     let (mut joined, kept) = joined.tidy();
+    let source_faces = kept.iter().filter_map(|&face| joined.source_faces.get(face as usize));
+    joined.source_faces = source_faces.copied().collect();
     for source in &mut joined.sources {
         source.first_face = kept.partition_point(|&face| face < source.first_face) as u32;
     }
@@ -77,6 +79,9 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
     let first_vertex = joined.mesh.positions().len() as u32;
     let labels = match (joined.labels, next.labels) {
         (None, None) => None,
+        (a, b) if has_objects(&a) || has_objects(&b) => {
+            Some(joined_objects((a, &joined.mesh), (b, &next.mesh)))
+        }
         (a, b) => Some(joined_labels((a, &joined.mesh), (b, &next.mesh))),
     };
     let mut sources = joined.sources;
@@ -92,6 +97,7 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
         texture_files: [joined.texture_files, next.texture_files].concat(),
         warnings: [joined.warnings, next.warnings].concat(),
         labels,
+        source_faces: [joined.source_faces, next.source_faces].concat(),
         sources,
         companions: [joined.companions, next.companions].concat(),
         offset_m: joined.offset_m,
@@ -107,6 +113,28 @@ fn sizes(mesh: &TriMesh) -> [usize; 4] {
 }
 
 type Labelled<'a> = (Option<MeshLabels>, &'a TriMesh);
+
+fn has_objects(labels: &Option<MeshLabels>) -> bool {
+    matches!(labels, Some(MeshLabels::Objects { .. }))
+}
+
+/// Joins the labels of two meshes, of which one at least has objects. Numbers of the other become objects
+/// whose classes are these numbers, as words.
+fn joined_objects(a: Labelled<'_>, b: Labelled<'_>) -> MeshLabels {
+    let mut objects = Vec::new();
+    let mut faces = Vec::new();
+    for (labels, mesh) in [a, b] {
+        let first = objects.len() as u32;
+        let end = faces.len() + mesh.faces().len();
+        if let Some((found, of_face)) = labels.map(|labels| labels.into_objects(mesh)) {
+            objects.extend(found);
+            faces.extend(of_face.into_iter().map(|o| if o == NO_INDEX { o } else { first + o }));
+        }
+        // A mesh without labels.
+        faces.resize(end, NO_INDEX);
+    }
+    MeshLabels::Objects { objects, faces }
+}
 
 /// Joins the labels of two meshes. They stay vertex labels if neither mesh labels its faces. Files have
 /// numbers, never names.

@@ -26,6 +26,17 @@ pub struct LabelColumn {
     pub values: Vec<i64>,
 }
 
+/// An object of a mesh, as its file names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LabelledObject {
+    /// The word for its class, such as `office chair`. A taxonomy, or the user, says what the word means.
+    pub class: String,
+    /// Its number. Objects of one class, room and number are one instance. [`NO_LABEL`] if it has none.
+    pub instance: i64,
+    /// The number of its room, from 1, if the file tells it.
+    pub room: Option<i64>,
+}
+
 /// Labels that come with a mesh, aligned with its faces or vertices after all checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MeshLabels {
@@ -37,6 +48,13 @@ pub enum MeshLabels {
         class: Option<LabelColumn>,
         /// The object that each face or vertex belongs to.
         instance: Option<LabelColumn>,
+    },
+    /// Objects with words for their classes: the nodes of glTF, HM3D, Replica, ScanNet++.
+    Objects {
+        /// The objects that the file names.
+        objects: Vec<LabelledObject>,
+        /// For each face its index into `objects`, or [`NO_INDEX`] if it belongs to none.
+        faces: Vec<u32>,
     },
     /// A label of the data set for each face, as the published `semantic.obj` has them. Made by
     /// [`MeshLabels::from_materials`].
@@ -131,7 +149,7 @@ impl MeshLabels {
     pub fn element(&self) -> LabelElement {
         match self {
             Self::Numbers { element, .. } => *element,
-            Self::Names { .. } => LabelElement::Face,
+            Self::Objects { .. } | Self::Names { .. } => LabelElement::Face,
         }
     }
 
@@ -152,6 +170,37 @@ impl MeshLabels {
         }
     }
 
+    /// Returns the labels as objects, and for each face its index into them, or [`NO_INDEX`]. The class of an
+    /// object with a number is this number, as a word. Names have no objects.
+    pub(crate) fn into_objects(self, mesh: &TriMesh) -> (Vec<LabelledObject>, Vec<u32>) {
+        let (class, instance) = match self.into_faces(mesh) {
+            Self::Objects { objects, faces } => return (objects, faces),
+            Self::Names { .. } => return (Vec::new(), vec![NO_INDEX; mesh.faces().len()]),
+            Self::Numbers { class, instance, .. } => (class, instance),
+        };
+
+        let mut objects = Vec::new();
+        let mut index: HashMap<(i64, i64), u32> = HashMap::new();
+        let number = |column: &Option<LabelColumn>, face: usize| {
+            column
+                .as_ref()
+                .and_then(|c| c.values.get(face).copied())
+                .unwrap_or(NO_LABEL)
+        };
+        let faces = (0..mesh.faces().len()).map(|face| {
+            let key = (number(&class, face), number(&instance, face));
+            if key.0 == NO_LABEL {
+                return NO_INDEX;
+            }
+            *index.entry(key).or_insert_with(|| {
+                objects.push(LabelledObject { class: key.0.to_string(), instance: key.1, room: None });
+                objects.len() as u32 - 1
+            })
+        });
+        let faces = faces.collect();
+        (objects, faces)
+    }
+
     /// Replaces columns of faces by columns of other faces: `tags` gives for each new face the index of its
     /// old one, such as a polygon of the file, or [`NO_INDEX`] for a face without a label.
     pub(crate) fn pick_faces(&mut self, tags: &[u32]) {
@@ -162,7 +211,7 @@ impl MeshLabels {
                 }
             }
             Self::Numbers { .. } => {}
-            Self::Names { faces, .. } => *faces = picked(faces, tags, NO_INDEX),
+            Self::Objects { faces, .. } | Self::Names { faces, .. } => *faces = picked(faces, tags, NO_INDEX),
         }
     }
 }
@@ -215,8 +264,7 @@ pub(crate) const CLASS_NAMES: [&str; 22] = [
 ];
 
 /// The names of properties that hold objects. Replica and Habitat use `object_id` of faces, 3RScan and
-/// MultiScan `objectId`. Matterport3D's `segment_id` and `material_id` are not among them, since an object
-/// has many segments.
+/// MultiScan `objectId`. `segment_id` is not among them: it is an object in [`MATTERPORT_NAMES`] alone.
 pub(crate) const INSTANCE_NAMES: [&str; 14] = [
     "instance",
     "instance_id",
@@ -233,6 +281,10 @@ pub(crate) const INSTANCE_NAMES: [&str; 14] = [
     "scalar_instance_id",
     "scalar_object_id",
 ];
+
+/// The properties of faces in Matterport3D's meshes of regions and houses: a part of the over-segmentation,
+/// the object, and its class. Source: niessner/Matterport, data_organization.md and gaps/apps/mpview.
+pub(crate) const MATTERPORT_NAMES: [&str; 3] = ["material_id", "segment_id", "category_id"];
 
 #[cfg(test)]
 mod tests {

@@ -145,8 +145,9 @@ fn read<'r>(
         return Err(Error::not_built_in(path, format.feature));
     };
 
-    let file = reader(open()?, path, up, options)?;
-    Ok(file.tidy().0)
+    let (mut file, source_faces) = reader(open()?, path, up, options)?.tidy();
+    file.source_faces = source_faces;
+    Ok(file)
 }
 
 /// A mesh file that is open.

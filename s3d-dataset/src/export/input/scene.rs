@@ -11,7 +11,7 @@ use crate::export::input::unit::UnitGuess;
 use crate::export::input::up_axis::UpGuess;
 use crate::options::placing::Placing;
 use crate::record::request::InputRecord;
-use s3d_io::cloud::{AnnotationOptions, Annotations, OnFault};
+use s3d_io::cloud::{AnnotatedMesh, AnnotationOptions, Annotations, OnFault};
 use s3d_io::mesh::{LengthUnit, MeshFile, MeshFormat, MeshOptions, MeshOrigin, UpAxis};
 use s3d_io::scene::{CameraSource, MeshColors, SceneFile};
 use std::path::{Path, PathBuf};
@@ -45,10 +45,15 @@ impl AreaInput {
         let mut rooms = Vec::new();
         let mut notes = Vec::new();
         let mut warnings = Vec::new();
+        let mut companions = Vec::new();
 
         if (opened.annotations || takes_colors) && scene.is_labelled {
             let mut annotations = open_annotations(&scene, &file, &frame)?;
             warnings = std::mem::take(&mut annotations.warnings);
+            companions = std::mem::take(&mut annotations.companions);
+            // A file that lies in a folder of annotations is read with the folder.
+            companions.retain(|path| !scene.annotations.iter().any(|named| path.starts_with(named)));
+            companions.retain(|path| !scene.mesh.contains(path));
 
             if takes_colors && let MeshSource::Files { colors, .. } = &mut source {
                 let found = PointColors::of(&scene.path, &file.mesh, &annotations)?;
@@ -95,10 +100,12 @@ impl AreaInput {
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
             files: files_of(&scene)
                 .into_iter()
+                .chain(companions.iter().cloned())
                 .chain(photographs.files().cloned())
                 .collect(),
             sources: files_of(&scene)
                 .into_iter()
+                .chain(companions)
                 .chain(photographs.by_folder().into_keys())
                 .collect(),
             annotations: scene.annotations,
@@ -187,7 +194,8 @@ fn open_annotations(scene: &SceneFile, file: &MeshFile, frame: &MeshFrame) -> Re
         mesh_bounds: Some(frame.bounds),
         ..options.clone()
     };
-    Ok(Annotations::open(&scene.annotations, &options)?)
+    let mesh = AnnotatedMesh { file, up: scene.up, units: scene.units };
+    Ok(Annotations::open_for(&mesh, &scene.annotations, &options)?)
 }
 
 /// Whether the format of a mesh file says which axis points up and what its unit is.

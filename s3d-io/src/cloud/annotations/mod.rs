@@ -82,6 +82,8 @@ pub struct Annotations {
     pub rooms: Vec<AnnotatedRoom>,
     /// What was left out or reinterpreted: a sentence each, for the user.
     pub warnings: Vec<String>,
+    /// The files that were read beside those that were named, such as the mesh of a list of objects.
+    pub companions: Vec<PathBuf>,
 }
 
 /// A room and its instances.

@@ -40,6 +40,18 @@ impl Annotations {
         labels: &[Label],
         label_of_face: &[u32],
     ) -> Result<Self> {
+        Self::from_labelled_faces(path, mesh, labels, label_of_face, true)
+    }
+
+    /// Makes annotations like [`Annotations::from_face_labels`]. If the points do not know their faces, since
+    /// another mesh is labelled, they are not at the corners, which neighbours share.
+    pub(crate) fn from_labelled_faces(
+        path: &Path,
+        mesh: &TriMesh,
+        labels: &[Label],
+        label_of_face: &[u32],
+        know_faces: bool,
+    ) -> Result<Self> {
         let count = mesh.faces().len();
         assert_eq!(label_of_face.len(), count, "{count} faces need as many labels");
 
@@ -59,14 +71,14 @@ impl Annotations {
             let Some(AnnotatedRoom { instances, .. }) = rooms.last_mut() else { continue };
             let number = instances.last().filter(|i| i.class == class).map_or(0, |i| i.number) + 1;
             let part = format!("{class}_{instance}_{room}");
-            let points = FacePoints { path: path.to_owned(), part, faces };
+            let points = FacePoints { path: path.to_owned(), part, faces, know_faces };
             instances.push(AnnotatedInstance::new(class, number, Arc::new(points)));
         }
 
         if rooms.is_empty() {
             return Err(Error::format(path, "labels no face"));
         }
-        Ok(Self { taxonomy: Taxonomy::s3dis(), rooms, warnings: Vec::new() })
+        Ok(Self { taxonomy: Taxonomy::s3dis(), rooms, warnings: Vec::new(), companions: Vec::new() })
     }
 }
 
@@ -76,6 +88,7 @@ struct FacePoints {
     path: PathBuf,
     part: String,
     faces: Vec<Face>,
+    know_faces: bool,
 }
 
 impl InstancePoints for FacePoints {
@@ -85,7 +98,7 @@ impl InstancePoints for FacePoints {
     }
 
     fn open(&self) -> Result<Box<dyn PointBlocks + '_>> {
-        Ok(Box::new(FaceBlocks { faces: &self.faces }))
+        Ok(Box::new(FaceBlocks { faces: &self.faces, know_faces: self.know_faces }))
     }
 
     fn path(&self) -> &Path {
@@ -102,16 +115,22 @@ impl InstancePoints for FacePoints {
 struct FaceBlocks<'a> {
     /// The faces that are left.
     faces: &'a [Face],
+    know_faces: bool,
 }
 
 impl PointBlocks for FaceBlocks<'_> {
     fn read_block(&mut self, points: usize, out: &mut PointCloud) -> Result<bool> {
-        assert!(out.faces.len() == out.len(), "points with faces beside points without");
+        let faces_before = if self.know_faces { out.len() } else { 0 };
+        assert!(out.faces.len() == faces_before, "points with faces beside points without");
         let end = out.len().saturating_add(points);
         while let Some((&(face, corners), rest)) = self.faces.split_first() {
-            out.positions.extend(corners);
+            if self.know_faces {
+                out.positions.extend(corners);
+            }
             push_inner(corners, &mut out.positions);
-            out.faces.resize(out.positions.len(), face);
+            if self.know_faces {
+                out.faces.resize(out.positions.len(), face);
+            }
             self.faces = rest;
             if out.positions.len() >= end {
                 break;

@@ -85,7 +85,12 @@ impl Annotations {
             });
             AnnotatedRoom { room, instances: instances.collect() }
         });
-        Ok(Self { taxonomy: Taxonomy::s3dis(), rooms: rooms.collect(), warnings: Vec::new() })
+        Ok(Self {
+            taxonomy: Taxonomy::s3dis(),
+            rooms: rooms.collect(),
+            warnings: Vec::new(),
+            companions: Vec::new(),
+        })
     }
 }
 

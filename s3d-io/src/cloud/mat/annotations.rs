@@ -39,7 +39,7 @@ impl Annotations {
         }
 
         let taxonomy = options.taxonomy.clone();
-        let mut all = Self { taxonomy, rooms: Vec::new(), warnings: Vec::new() };
+        let mut all = Self { taxonomy, rooms: Vec::new(), warnings: Vec::new(), companions: Vec::new() };
 
         for room in MatArea::read(&source)?.rooms {
             if let Some(room) = all.mat_room(path, room, options)? {

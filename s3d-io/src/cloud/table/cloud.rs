@@ -3,7 +3,7 @@
 use crate::cloud::table::rows::{Reading, Tag};
 use crate::error::Result;
 use s3d_label::{Class, Room, Taxonomy};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How a format's colours are scaled. If the format leaves it open, the narrow range is tried first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,6 +32,11 @@ pub(crate) trait Cloud {
     /// Whether its points are the vertices of a mesh. This is known once the file is read.
     fn are_vertices(&self) -> bool {
         false
+    }
+
+    /// The files that it reads beside its own.
+    fn companions(&self) -> Vec<PathBuf> {
+        Vec::new()
     }
 
     /// Reads all rows. Returns `false` if a colour is beyond the narrow range; the rows must then be read

@@ -49,7 +49,8 @@ pub(crate) fn read_tables(clouds: &[&dyn Cloud], options: &AnnotationOptions) ->
     };
 
     let rooms = rooms_of(clouds, meaning, &Arc::new(store));
-    Ok(Annotations { taxonomy: options.taxonomy.clone(), rooms, warnings })
+    let companions = clouds.iter().flat_map(|cloud| cloud.companions()).collect();
+    Ok(Annotations { taxonomy: options.taxonomy.clone(), rooms, warnings, companions })
 }
 
 /// The error for a cloud without a point. It repeats the first warning, which says what is wrong with the

@@ -30,6 +30,8 @@ pub(crate) struct Builder<'a> {
     parts: MeshParts,
     /// The first index of the texture coordinates of an accessor, after they are mapped for a material.
     uv_starts: HashMap<(usize, usize), u32>,
+    /// The node that is the object of each face.
+    node_of_face: Vec<u32>,
     notes: Notes,
 }
 
@@ -95,6 +97,7 @@ impl<'a> Builder<'a> {
             colored,
             parts: MeshParts::default(),
             uv_starts: HashMap::new(),
+            node_of_face: Vec::new(),
             notes: Notes::default(),
         })
     }
@@ -102,6 +105,11 @@ impl<'a> Builder<'a> {
     /// Returns the vertices so far, in the world's axes.
     pub(crate) fn positions(&self) -> &[Vec3] {
         &self.parts.positions
+    }
+
+    /// Returns for each face so far the node that is its object.
+    pub(crate) fn node_of_face(&self) -> &[u32] {
+        &self.node_of_face
     }
 
     /// Returns the positions of all face corners so far.
@@ -127,6 +135,7 @@ impl<'a> Builder<'a> {
             self.notes.morphed += usize::from(primitive.targets.as_ref().is_some_and(|t| !t.is_empty()));
             self.add_primitive(instance, primitive, &who, &mut shared)?;
         }
+        self.node_of_face.resize(self.parts.faces.len(), instance.object);
         Ok(())
     }
 

@@ -10,6 +10,7 @@ use crate::fs::encoding::into_utf8;
 use crate::fs::open::read_file;
 use crate::fs::quote::quote;
 use crate::mesh::gltf::extensions::{check_required, way_out};
+use crate::mesh::gltf::objects::NodeWords;
 use crate::mesh::gltf::tolerant::needed;
 use base64::Engine;
 use base64::alphabet::STANDARD;
@@ -31,6 +32,8 @@ pub(crate) struct GltfDocument {
     buffers: Vec<Vec<u8>>,
     /// The nodes in `f64`, if any is far from its parent's origin. Otherwise empty.
     exact_nodes: Vec<ExactNode>,
+    /// The names of the nodes, and what their authors added.
+    words: Vec<NodeWords>,
 }
 
 /// The part of the JSON that is read before all of it.
@@ -97,7 +100,8 @@ impl GltfDocument {
 
         let exact_nodes = exact_nodes(&root, text);
         let json = gltf::Document::from_json_without_validation(root);
-        let mut document = Self { path: path.to_owned(), json, buffers: Vec::new(), exact_nodes };
+        let words = NodeWords::of_document(text);
+        let mut document = Self { path: path.to_owned(), json, buffers: Vec::new(), exact_nodes, words };
         // The binary chunk stays in the memory of the file, since it is most of the file.
         let blob = blob.map(|blob| {
             bytes.truncate(blob.end);
@@ -124,6 +128,11 @@ impl GltfDocument {
         let node = self.exact_nodes.get(node)?;
         let of_matrix = node.matrix.map(|m| [m[12], m[13], m[14]]);
         of_matrix.or(node.translation).map(DVec3::from_array)
+    }
+
+    /// Returns what each node says of itself. There may be fewer of them than nodes.
+    pub(crate) fn words(&self) -> &[NodeWords] {
+        &self.words
     }
 
     /// Returns the bytes of a buffer.

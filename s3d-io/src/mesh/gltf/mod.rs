@@ -5,6 +5,7 @@ mod builder;
 mod document;
 mod extensions;
 mod material;
+mod objects;
 pub(crate) mod read;
 mod scene;
 mod tolerant;

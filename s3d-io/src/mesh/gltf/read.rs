@@ -10,6 +10,7 @@ use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
 use crate::mesh::gltf::builder::Builder;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::material::GltfLooks;
+use crate::mesh::gltf::objects::labels_of;
 use crate::mesh::gltf::scene::{Instance, Precision, instances};
 use crate::mesh::origin::{FileFrame, largest};
 use s3d_geom::MeshParts;
@@ -47,7 +48,9 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         }
     }
 
-    let parts = builder.finish(&mut warnings);
+    let labels = labels_of(&document, builder.node_of_face());
+    let mut parts = builder.finish(&mut warnings);
+    parts.face_tags = (0..parts.faces.len() as u32).collect();
     if parts.faces.is_empty() {
         return Err(document.fail(no_triangles(&instances, &warnings)));
     }
@@ -61,6 +64,7 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         warnings,
         companions: document.companions(),
         offset_m,
+        labels,
         ..MeshFile::new(path, mesh)
     })
 }

@@ -21,6 +21,9 @@ pub(crate) struct Instance {
     pub(crate) world_from_node: DMat4,
     /// Whether it has joints, which would move it.
     pub(crate) skinned: bool,
+    /// The node that says which object it is: the nearest one that is labelled, up to the root, or else the
+    /// node of the mesh.
+    pub(crate) object: u32,
 }
 
 /// How exactly the positions of nodes are read.
@@ -49,13 +52,13 @@ pub(crate) fn instances(
     // A tree has each node once. A node that comes twice would make a circle, or instances without end.
     let mut visited = vec![false; root.nodes.len()];
     let mut checked = vec![false; root.meshes.len()];
-    let mut stack: Vec<(Index<Node>, DMat4)> = roots(document)?
+    let mut stack: Vec<(Index<Node>, DMat4, Option<u32>)> = roots(document)?
         .into_iter()
         .rev()
-        .map(|n| (n, DMat4::IDENTITY))
+        .map(|n| (n, DMat4::IDENTITY, None))
         .collect();
 
-    while let Some((index, world_from_parent)) = stack.pop() {
+    while let Some((index, world_from_parent, object_above)) = stack.pop() {
         let node = document.get(index, "the scene", "node")?;
         if visited
             .get_mut(index.value())
@@ -85,6 +88,10 @@ pub(crate) fn instances(
                 ))
             })?;
 
+        let words = document.words().get(index.value());
+        let object = words
+            .filter(|words| words.is_labelled())
+            .map_or(object_above, |_| Some(index.value() as u32));
         if let Some(mesh) = node.mesh {
             check_mesh(document, mesh, &mut checked, &mut unknown)?;
             let many = extension(node, "EXT_mesh_gpu_instancing");
@@ -97,7 +104,9 @@ pub(crate) fn instances(
                      cut it in parts"
                 )));
             }
-            placed.push((Instance { mesh, world_from_node, skinned: node.skin.is_some() }, many));
+            let object = object.unwrap_or(index.value() as u32);
+            let instance = Instance { mesh, world_from_node, skinned: node.skin.is_some(), object };
+            placed.push((instance, many));
         }
 
         stack.extend(
@@ -105,7 +114,7 @@ pub(crate) fn instances(
                 .iter()
                 .flatten()
                 .rev()
-                .map(|&child| (child, world_from_node)),
+                .map(|&child| (child, world_from_node, object)),
         );
     }
 

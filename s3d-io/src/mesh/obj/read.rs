@@ -81,6 +81,7 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         face_normals: faces.normals,
         materials: looks.materials,
         face_materials: faces.materials,
+        face_tags: faces.polygon_of,
         textures: looks.textures,
         ..MeshParts::default()
     };
@@ -258,6 +259,8 @@ struct Triangles {
     uvs: Vec<[u32; 3]>,
     normals: Vec<[u32; 3]>,
     materials: Vec<u32>,
+    /// The polygon that each comes from.
+    polygon_of: Vec<u32>,
     /// How many polygons were cut.
     polygons: usize,
     /// The polygons that cannot be cut: number of the first, from 0, its reason, and how many there are.
@@ -314,6 +317,7 @@ impl Triangles {
                 out.uvs.push(uvs.map_or([NO_INDEX; 3], pick));
                 out.normals.push(normals.map_or([NO_INDEX; 3], pick));
                 out.materials.push(of_face.material);
+                out.polygon_of.push(face as u32);
             }
         }
 

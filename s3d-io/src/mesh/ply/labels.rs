@@ -2,7 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::file::MeshOptions;
-use crate::mesh::labels::{CLASS_NAMES, INSTANCE_NAMES, LabelColumn, LabelElement, MeshLabels, NO_LABEL};
+use crate::mesh::labels::{
+    CLASS_NAMES, INSTANCE_NAMES, LabelColumn, LabelElement, MATTERPORT_NAMES, MeshLabels, NO_LABEL,
+};
 use crate::mesh::ply::batch::{PlyBatch, integer};
 use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::header::{PlyElement, PlyHeader};
@@ -39,7 +41,7 @@ impl PlyLabels {
         for (name, kind) in [("face", LabelElement::Face), ("vertex", LabelElement::Vertex)] {
             let Some((_, element)) = header.element(name) else { continue };
             let class = column(element, options.class_column.as_deref(), &CLASS_NAMES);
-            let instance = column(element, options.instance_column.as_deref(), &INSTANCE_NAMES);
+            let instance = column(element, options.instance_column.as_deref(), instance_names(element));
             let (Some(class), Some(instance)) = (class, instance) else { continue };
             if class.is_some() || instance.is_some() {
                 return Ok(Some(Self { element: kind, class, instance }));
@@ -113,6 +115,20 @@ impl Column {
             return None;
         }
         Some(self.column)
+    }
+}
+
+/// Returns the names of columns of objects, the surest first. Matterport3D's `segment_id` is one where its
+/// three properties stand together.
+fn instance_names(element: &PlyElement) -> &'static [&'static str] {
+    let [_, object, _] = &MATTERPORT_NAMES;
+    let is_matterport = MATTERPORT_NAMES
+        .iter()
+        .all(|name| element.find_scalar(&[name]).is_some());
+    if is_matterport {
+        std::slice::from_ref(object)
+    } else {
+        &INSTANCE_NAMES
     }
 }
 

@@ -98,11 +98,8 @@ pub(crate) fn read(
 
     // Face labels belong to polygons until all checks are done.
     let labels = labels.and_then(|l| l.finish(&mut warnings));
-    if labels.as_ref().is_some_and(|l| l.element() == LabelElement::Face) {
-        parts.face_tags = polygons;
-    }
-
     let parts = MeshParts {
+        face_tags: polygons,
         positions: vertices.positions,
         faces: triangles,
         colors: vertices.colors,

@@ -1,0 +1,262 @@
+//! Files that label the faces of a mesh: meshes with labels of their own, and the lists of objects of HM3D,
+//! Replica, ScanNet++ and 3RScan.
+//!
+//! Each kind becomes a mesh with [`MeshLabels`](crate::mesh::MeshLabels). `transfer` hands its labels to the
+//! faces of the scene's mesh.
+
+mod hm3d;
+mod replica;
+mod segments;
+mod transfer;
+
+use crate::cloud::annotations::{AnnotationOptions, Annotations};
+use crate::cloud::frame_gap::{FrameGap, refusal};
+use crate::cloud::of_mesh::{FaceLabels, NamedFaces};
+use crate::error::{Error, Result};
+use crate::fs::open::open_file;
+use crate::mesh::file::{LengthUnit, MeshFile, MeshOptions, UpAxis};
+use crate::mesh::labels::MeshLabels;
+use crate::mesh::origin::MeshOrigin;
+use crate::mesh::ply::elements::PlyReader;
+use crate::mesh::read::{MeshFormat, read_mesh_with};
+use s3d_geom::TriMesh;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use transfer::{are_same_faces, overlap, transferred};
+
+/// The mesh that annotations label, and how its file was read.
+#[derive(Clone, Copy, Debug)]
+pub struct AnnotatedMesh<'a> {
+    /// The mesh.
+    pub file: &'a MeshFile,
+    /// The axis of its file that points up.
+    pub up: UpAxis,
+    /// The unit of its file. `None`: the unit that the file says, or metres.
+    pub units: Option<LengthUnit>,
+}
+
+/// A file of labels, by its kind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum LabelFile {
+    /// A mesh with labels of its faces or vertices, or with names of materials or nodes.
+    Mesh(PathBuf),
+    /// HM3D's `….semantic.txt`.
+    Hm3d(PathBuf),
+    /// Replica's `info_semantic.json`.
+    Replica(PathBuf),
+    /// Objects as groups of segments: ScanNet++'s `segments_anno.json`, 3RScan's `semseg.v2.json`.
+    Segments(PathBuf),
+}
+
+impl LabelFile {
+    /// Finds the kind of a file, or of the file of labels in a folder. Returns `None` if it is of another
+    /// kind.
+    ///
+    /// # Errors
+    /// [`Error::Io`], and [`Error::Format`] for a PLY file whose header is damaged.
+    pub(crate) fn of(path: &Path) -> Result<Option<Self>> {
+        if path.is_dir() {
+            return Ok(Self::in_folder(path));
+        }
+
+        let name = name_of(path);
+        if name.ends_with(".aggregation.json") {
+            return Ok(None);
+        }
+        let path = path.to_owned();
+        match name.rsplit_once('.').map_or("", |(_, ending)| ending) {
+            "ply" => Ok(has_faces(&path)?.then_some(Self::Mesh(path))),
+            "json" => Ok(Self::of_json(&path)),
+            "txt" => Ok(hm3d::is_list(&path).then_some(Self::Hm3d(path))),
+            _ => Ok(MeshFormat::of(&path).map(|_| Self::Mesh(path))),
+        }
+    }
+
+    /// Finds the file of labels in a folder of a data set.
+    fn in_folder(dir: &Path) -> Option<Self> {
+        let usual = ["segments_anno.json", "semseg.v2.json", "info_semantic.json"];
+        let by_name = usual.iter().map(|name| dir.join(name)).find(|path| path.is_file());
+        if let Some(path) = by_name {
+            return Self::of_json(&path);
+        }
+        let list = files_of(dir)
+            .into_iter()
+            .find(|path| name_of(path).ends_with(".semantic.txt"))?;
+        hm3d::is_list(&list).then_some(Self::Hm3d(list))
+    }
+
+    /// Finds the kind of a JSON file by its keys.
+    fn of_json(path: &Path) -> Option<Self> {
+        let head = String::from_utf8_lossy(&head_of(path)).into_owned();
+        let keys = ["segGroups", "id_to_label", "class_name", "\"classes\""];
+        let has = keys.map(|key| head.contains(key));
+        match has {
+            [true, ..] => Some(Self::Segments(path.to_owned())),
+            [_, false, false, false] => None,
+            _ => Some(Self::Replica(path.to_owned())),
+        }
+    }
+
+    /// Reads the mesh with its labels. Its companions are the other files that were read.
+    ///
+    /// # Errors
+    /// Like [`read_mesh_with`]; [`Error::Format`] for labels that are damaged or do not fit their mesh.
+    fn read(&self, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
+        match self {
+            Self::Mesh(path) => read_mesh_with(path, up, options),
+            Self::Hm3d(list) => hm3d::read(list, up, options),
+            Self::Replica(list) => replica::read(list, up, options),
+            Self::Segments(groups) => segments::read(groups, up, options),
+        }
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Self::Mesh(path) | Self::Hm3d(path) | Self::Replica(path) | Self::Segments(path) => path,
+        }
+    }
+}
+
+/// Reads the list of objects that the data set of a mesh puts beside it, if the mesh has objects without
+/// classes, or is HM3D's coloured one. A class column that the user named is meant: then there is no list.
+///
+/// # Errors
+/// [`Error::Io`], and [`Error::Format`] for a list that is damaged or does not fit.
+pub(crate) fn named_beside(file: &MeshFile, class_column: Option<&str>) -> Result<Option<NamedFaces>> {
+    let Some(path) = file.sources.first().map(|source| &source.path) else { return Ok(None) };
+    if class_column.is_some() || file.sources.len() > 1 {
+        return Ok(None);
+    }
+
+    let mut warnings = Vec::new();
+    let (labels, list) = match &file.labels {
+        Some(labels @ MeshLabels::Numbers { class, instance: Some(_), .. }) => {
+            if let Some(list) = segments::groups_of_objects_beside(path) {
+                (segments::named(labels, &file.mesh, &list)?, list)
+            } else if let Some(list) = replica::list_beside(path).filter(|_| class.is_none()) {
+                (replica::named(labels, &file.mesh, &list)?, list)
+            } else {
+                return Ok(None);
+            }
+        }
+        Some(MeshLabels::Numbers { .. } | MeshLabels::Names { .. }) => return Ok(None),
+        Some(MeshLabels::Objects { .. }) | None => match hm3d::list_beside(path) {
+            Some(list) => (hm3d::named(&file.mesh, &list, &mut warnings)?, list),
+            None => return Ok(None),
+        },
+    };
+    Ok(Some(NamedFaces { labels, warnings, list }))
+}
+
+impl Annotations {
+    /// Takes the labels of a file of labels for a scene's mesh. Without a mesh, the annotated points lie on
+    /// the faces of the file's own mesh, Z-up, and know no face.
+    ///
+    /// # Errors
+    /// The errors of [`LabelFile::read`] and [`Annotations::of_mesh`]; [`Error::Format`] if the two meshes
+    /// lie far apart.
+    pub(crate) fn of_label_file(
+        file: &LabelFile,
+        options: &AnnotationOptions,
+        scene: Option<&AnnotatedMesh<'_>>,
+    ) -> Result<Self> {
+        let mut mesh_options = MeshOptions {
+            class_column: options.class_column.clone(),
+            instance_column: options.instance_column.clone(),
+            origin: MeshOrigin::behind(options.offset_m),
+            units: None,
+        };
+        let Some(scene) = scene else {
+            let labelled = file.read(UpAxis::Z, &mesh_options)?;
+            let labels = FaceLabels::of_mesh(&labelled, options)?;
+            let mut found = labels.annotate(file.path(), &labelled.mesh, options, false)?;
+            found.add_companions(&labelled, file);
+            return Ok(found);
+        };
+
+        mesh_options.units = scene.units.or(scene.file.unit_said);
+        let labelled = in_frame_of(file, scene, &mesh_options)?;
+        let bounds = labelled.mesh.aabb();
+        let corners = [bounds.min, bounds.max].map(|p| p.as_dvec3() + options.offset_m);
+        if let Some(gap) = FrameGap::between(corners, options.offset_m, scene.file.mesh.aabb()) {
+            return Err(refusal(file.path(), &gap));
+        }
+
+        let mut found = if are_same_faces(&labelled.mesh, &scene.file.mesh) {
+            Self::of_mesh(&labelled, options)?
+        } else {
+            let mut labels = FaceLabels::of_mesh(&labelled, options)?;
+            labels.faces = transferred(&labelled.mesh, &labels.faces, &scene.file.mesh);
+            labels
+                .annotate(file.path(), &scene.file.mesh, options, true)
+                .map_err(|_| Error::format(file.path(), "labels no surface within 10 cm of the mesh"))?
+        };
+        found.add_companions(&labelled, file);
+        Ok(found)
+    }
+
+    /// Adds the files that were read beside the file of labels.
+    fn add_companions(&mut self, labelled: &MeshFile, file: &LabelFile) {
+        let sources = labelled.sources.iter().map(|source| &source.path);
+        self.companions.extend(sources.chain(&labelled.companions).cloned());
+        self.companions.retain(|path| path != file.path());
+    }
+}
+
+/// Reads the mesh of a file of labels in the frame of the scene's mesh. Its up axis is the one of the scene's
+/// mesh file or Z, whichever brings the two meshes together: programs that label a mesh may turn it.
+fn in_frame_of(file: &LabelFile, scene: &AnnotatedMesh<'_>, options: &MeshOptions) -> Result<MeshFile> {
+    let first = file.read(scene.up, options)?;
+    let other = match scene.up {
+        UpAxis::Y => UpAxis::Z,
+        UpAxis::Z => UpAxis::Y,
+    };
+    if are_same_faces(&first.mesh, &scene.file.mesh) {
+        return Ok(first);
+    }
+
+    let fit = |mesh: &TriMesh| overlap(mesh.aabb(), scene.file.mesh.aabb());
+    let turned = file.read(other, options)?;
+    Ok(if fit(&turned.mesh) > fit(&first.mesh) + 0.1 {
+        turned
+    } else {
+        first
+    })
+}
+
+/// Returns whether a PLY file is a mesh.
+fn has_faces(path: &Path) -> Result<bool> {
+    let file = open_file(path)?;
+    let bytes = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+    let reader = PlyReader::new(file, bytes, path)?;
+    Ok(reader.header().element("face").is_some_and(|(_, face)| face.count > 0))
+}
+
+/// Returns the first 64 KiB of a file, or nothing if it cannot be read.
+fn head_of(path: &Path) -> Vec<u8> {
+    let mut head = Vec::new();
+    // A file that cannot be read is of no known kind. Whoever reads it as another kind reports the fault.
+    let read = std::fs::File::open(path).map(|file| file.take(1 << 16).read_to_end(&mut head));
+    if read.is_err() {
+        head.clear();
+    }
+    head
+}
+
+/// Returns the name of a file in lower case.
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+/// Returns the files of a folder, by name.
+fn files_of(dir: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten();
+    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.sort();
+    files
+}
+
+/// Returns the folder of a file.
+fn folder_of(path: &Path) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).to_owned()
+}
