@@ -379,3 +379,28 @@ fn headers_that_miscount_their_records_do_not_hide_the_points() {
         }
     }
 }
+
+#[test]
+fn classes_that_five_bits_may_have_cut_are_told_of() {
+    for (name, words) in [("1_2_format_3.las", "2 points have the class 31"), ("1_4_format_7.las", "")] {
+        let mut bytes = std::fs::read(fixture(name)).unwrap();
+        let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize;
+        let record = usize::from(u16::from_le_bytes(*bytes[105..].first_chunk().unwrap()));
+        for i in 0..2 {
+            bytes[start + i * record + if words.is_empty() { 16 } else { 15 }] = 31;
+        }
+        let mut known = options();
+        let open = |options: &AnnotationOptions| {
+            let bytes = std::io::Cursor::new(bytes.clone());
+            Annotations::from_reader(bytes, Path::new(name), options)
+                .unwrap()
+                .warnings
+        };
+        let warnings = open(&AnnotationOptions { unknown_as_clutter: true, ..known.clone() });
+        let told = warnings.iter().any(|w| w.contains("class 31, the largest"));
+        assert_eq!(told, !words.is_empty(), "{name}: {warnings:?}");
+        assert!(!told || warnings.iter().any(|w| w.contains(words)), "{warnings:?}");
+        known.classes.insert("31".to_owned(), Some(Class::TABLE));
+        assert!(open(&known).is_empty());
+    }
+}
