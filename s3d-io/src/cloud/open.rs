@@ -349,7 +349,7 @@ impl InstancePoints for TextPoints {
     fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
         let mut reader = PointReader::open_with(&self.path, self.on_fault)?.with_offset(self.offset_m);
         while reader.read_chunk(usize::MAX, out)? > 0 {}
-        Ok(reader.into_skipped())
+        Ok(reader.take_skipped())
     }
 
     fn path(&self) -> &Path {
@@ -432,7 +432,7 @@ mod tests {
 
     #[test]
     fn lines_that_are_skipped_are_counted_with_the_first_place() {
-        let a = tree(&[("WC_1/Annotations/wall_1.txt", "1 2 3 4 5 6\n1 2 3\x10 4 5 6\nx\n1 1 1 1 1 1\n")]);
+        let a = tree(&[("WC_1/Annotations/wall_1.txt", "1 2 3 4 5 6\n1 2 3\x10 4 5\nx\n1 1\x10 1 1 1 1\n")]);
         let strict = open(&[&a], &AnnotationOptions::default()).unwrap();
         let message = strict.rooms[0].instances[0]
             .read(&mut PointCloud::default())
@@ -444,7 +444,8 @@ mod tests {
         let lenient = open(&[&a], &skip).unwrap();
         let mut cloud = PointCloud::default();
         let skipped = lenient.rooms[0].instances[0].read(&mut cloud).unwrap();
-        assert_eq!((cloud.len(), skipped.count), (2, 2));
+        assert_eq!((cloud.len(), skipped.count, skipped.mended), (2, 2, 1));
+        assert!(skipped.first_mended.unwrap().ends_with("wall_1.txt, line 4"));
         assert!(skipped.first.unwrap().to_string().contains("line 2"));
     }
 

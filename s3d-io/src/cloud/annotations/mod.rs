@@ -103,13 +103,17 @@ pub struct AnnotatedInstance {
     points: Arc<dyn InstancePoints>,
 }
 
-/// The lines or records left out while points were read with [`OnFault::Skip`].
+/// The lines or records left out while points were read with [`OnFault::Skip`], and those that were mended.
 #[derive(Debug, Default)]
 pub struct Skipped {
     /// The number of lines or records left out.
     pub count: u64,
     /// The fault of the first of them, and its place.
     pub first: Option<Error>,
+    /// The number of lines with control characters within numbers, which were read without them.
+    pub mended: u64,
+    /// The place of the first of these: its file and line.
+    pub first_mended: Option<String>,
 }
 
 /// The source of one instance's points.
