@@ -73,6 +73,29 @@ fn write_ply(dir: &Path, points: &[Point], ascii: bool) -> PathBuf {
     path
 }
 
+/// The points as text, behind a line of names.
+fn write_text(dir: &Path, points: &[Point], name: &str, head: &str) -> PathBuf {
+    let path = dir.join(name);
+    let mut text = head.to_owned();
+    for Point { position: [x, y, z], color: [r, g, b], class, instance } in points {
+        text += &format!("{x:.8} {y:.8} {z:.8} {r} {g} {b} {class}.000000 {instance}.000000\n");
+    }
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn write_pcd(dir: &Path, points: &[Point]) -> PathBuf {
+    let path = dir.join("binary.pcd");
+    let mut bytes = format!(
+        "VERSION 0.7\nFIELDS x y z r g b class instance\nSIZE 4 4 4 1 1 1 1 2\nTYPE F F F U U U U U\n\
+         COUNT 1 1 1 1 1 1 1 1\nWIDTH {POINTS}\nHEIGHT 1\nPOINTS {POINTS}\nDATA binary\n"
+    )
+    .into_bytes();
+    bytes.extend(rows(points));
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
 fn write_npy(dir: &Path, points: &[Point]) -> PathBuf {
     let path = dir.join("structured.npy");
     let mut header = format!(
@@ -208,6 +231,8 @@ fn clouds(c: &mut Criterion) {
         write_las(dir.path(), &points, "cloud.las"),
         write_las(dir.path(), &points, "cloud.laz"),
         write_e57(dir.path(), &points),
+        write_pcd(dir.path(), &points),
+        write_text(dir.path(), &points, "cloudcompare.asc", "//X Y Z R G B Classification Instance\n"),
     ];
 
     let classes = (0..72)

@@ -10,7 +10,7 @@
 //! | module | files |
 //! |---|---|
 //! | [`mesh`] | meshes with textures and labels; the OBJ files of a data set |
-//! | [`cloud`] | annotated points in nine forms; writers of PLY, S3DIS, `pointcloud.mat`, NPY |
+//! | [`cloud`] | annotated points in twelve forms; writers of PLY, S3DIS, `pointcloud.mat`, NPY |
 //! | [`camera`] | lists of scan locations and of photographs; the scanner's own pictures |
 //! | [`image`] | the images of a data set, PNG and OpenEXR |
 //! | [`dataset`] | the rest of a data set: names, poses, labels, instances, splits |
@@ -194,7 +194,7 @@
 //! |---|---|
 //! | `obj`, `gltf`, `ply` | meshes; OBJ is written too, with `png` |
 //! | `cloud` | annotated points: the S3DIS tree, and the labels of meshes |
-//! | `las`, `e57`, `npy`, `scannet`, `mat`, `ply` | annotated points of these formats |
+//! | `las`, `e57`, `npy`, `pcd`, `text`, `kitti`, `scannet`, `mat`, `ply` | annotated points of these formats |
 //! | `camera` | lists of cameras; the scanner's pictures |
 //! | `png`, `exr` | the images of a data set |
 //! | `dataset` | the rest of a data set: poses, labels, instances, splits, lists, conventions |

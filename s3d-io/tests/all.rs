@@ -3,6 +3,7 @@
 
 mod feed;
 
+mod cloud_forms;
 mod clouds;
 mod copyroom;
 mod findings;

@@ -17,7 +17,7 @@ fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
-fn options() -> AnnotationOptions {
+pub(crate) fn options() -> AnnotationOptions {
     let classes = [("2", Class::FLOOR), ("6", Class::WALL), ("19", Class::CHAIR)];
     AnnotationOptions {
         room: Some("office_1".parse().unwrap()),
@@ -34,7 +34,7 @@ fn open(name: &str, options: &AnnotationOptions) -> Result<Annotations> {
 }
 
 /// The points that the fixtures' script wrote, less `offset`, by class and number.
-fn expected(offset: DVec3) -> BTreeMap<(usize, u32), PointCloud> {
+pub(crate) fn expected(offset: DVec3) -> BTreeMap<(usize, u32), PointCloud> {
     let mut all: BTreeMap<(usize, u32), PointCloud> = BTreeMap::new();
     for i in 0..60u8 {
         let f = f32::from(i);
@@ -49,7 +49,7 @@ fn expected(offset: DVec3) -> BTreeMap<(usize, u32), PointCloud> {
 }
 
 /// The instances of the only room, with their points.
-fn contents(annotations: &Annotations, room: &str) -> BTreeMap<(usize, u32), PointCloud> {
+pub(crate) fn contents(annotations: &Annotations, room: &str) -> BTreeMap<(usize, u32), PointCloud> {
     assert_eq!(annotations.rooms.len(), 1, "{annotations:?}");
     assert_eq!(annotations.rooms[0].room.to_string(), room);
 
@@ -332,19 +332,36 @@ fn damaged_files_are_errors_or_other_points() {
 #[test]
 fn what_is_no_annotation_says_what_is_read() {
     let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("points.xyz");
-    std::fs::write(&path, "1 2 3").unwrap();
-    let message = Annotations::open(&[path], &AnnotationOptions::default())
-        .unwrap_err()
-        .to_string();
-    assert!(
-        message.contains("points.xyz: is no kind of annotations") && message.contains(".laz"),
-        "{message}"
-    );
+    for (name, bytes, words) in [
+        ("points.foo", &b"no point"[..], "points.foo: is no kind of annotations that is read: "),
+        ("points.bar", b"\x89HDF\r\n", "(it is HDF5: MATLAB's files are read if they end in .mat)"),
+        ("points.foo", b"1 2 3", "is an ASCII cloud without names of columns: it has 3, as in `1 2 3`"),
+    ] {
+        let path = dir.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let message = Annotations::open(&[path], &AnnotationOptions::default())
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains(words), "{message}");
+        assert!(message.contains(".laz") || message.contains("columns = [\"x\""), "{message}");
+    }
     let missing = Annotations::open(&[dir.path().join("a.laz")], &AnnotationOptions::default());
 
     assert!(matches!(missing, Err(Error::Io { .. })));
-    for name in ["a.las", "a.laz", "a.ply", "a.npy", "a.npz", "a.e57", "a.aggregation.json"] {
+    for name in [
+        "a.las",
+        "a.laz",
+        "a.ply",
+        "a.npy",
+        "a.npz",
+        "a.e57",
+        "a.pcd",
+        "a.csv",
+        "a.ptx",
+        "a.bin",
+        "a.label",
+        "a.aggregation.json",
+    ] {
         let path = dir.path().join(name);
         std::fs::write(&path, b"nonsense, and much of it, but no points").unwrap();
         let message = Annotations::open(&[path], &options()).unwrap_err().to_string();
@@ -377,5 +394,30 @@ fn headers_that_miscount_their_records_do_not_hide_the_points() {
             };
             assert!(found.warnings.len() == 1 && found.warnings[0].contains(&there), "{:?}", found.warnings);
         }
+    }
+}
+
+#[test]
+fn classes_that_five_bits_may_have_cut_are_told_of() {
+    for (name, words) in [("1_2_format_3.las", "2 points have the class 31"), ("1_4_format_7.las", "")] {
+        let mut bytes = std::fs::read(fixture(name)).unwrap();
+        let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize;
+        let record = usize::from(u16::from_le_bytes(*bytes[105..].first_chunk().unwrap()));
+        for i in 0..2 {
+            bytes[start + i * record + if words.is_empty() { 16 } else { 15 }] = 31;
+        }
+        let mut known = options();
+        let open = |options: &AnnotationOptions| {
+            let bytes = std::io::Cursor::new(bytes.clone());
+            Annotations::from_reader(bytes, Path::new(name), options)
+                .unwrap()
+                .warnings
+        };
+        let warnings = open(&AnnotationOptions { unknown_as_clutter: true, ..known.clone() });
+        let told = warnings.iter().any(|w| w.contains("class 31, the largest"));
+        assert_eq!(told, !words.is_empty(), "{name}: {warnings:?}");
+        assert!(!told || warnings.iter().any(|w| w.contains(words)), "{warnings:?}");
+        known.classes.insert("31".to_owned(), Some(Class::TABLE));
+        assert!(open(&known).is_empty());
     }
 }

@@ -41,14 +41,27 @@ fn other_formats_name_their_feature() {
     }
 }
 
-#[cfg(all(feature = "cloud", not(any(feature = "las", feature = "e57", feature = "npy", feature = "mat"))))]
+#[cfg(all(
+    feature = "cloud",
+    not(any(
+        feature = "las",
+        feature = "e57",
+        feature = "npy",
+        feature = "mat",
+        feature = "pcd",
+        feature = "text",
+        feature = "kitti"
+    ))
+))]
 #[test]
 fn annotations_of_other_formats_name_their_feature() {
     use s3d_io::cloud::Annotations;
     let folder = tempfile::tempdir().unwrap();
     let named = [("a.las", "las"), ("a.LAZ", "las"), ("a.e57", "e57"), ("a.npz", "npy"), ("a.mat", "mat")];
+    let texts = [("a.pcd", "pcd"), ("a.asc", "text"), ("a.label", "kitti")];
     for (name, feature) in named
         .into_iter()
+        .chain(texts)
         .chain([("a.ply", "ply"), ("b.aggregation.json", "scannet")])
     {
         let path = folder.path().join(name);

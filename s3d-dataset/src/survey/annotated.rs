@@ -47,23 +47,36 @@ fn unlabelled_surface(mesh: &TriMesh, labels: &[LabelId]) -> Surface {
     sum
 }
 
-/// What lenient reading left out of instance files.
+/// What lenient reading left out of instance files, and what was mended in them.
 #[derive(Debug, Default)]
 pub(crate) struct SkippedLines {
     pub(crate) lines: u64,
     pub(crate) empty_instances: u64,
     /// The first place where something was left out.
     pub(crate) first: Option<String>,
+    /// The number of lines with control characters within numbers.
+    pub(crate) mended: u64,
+    /// The place of the first of them.
+    pub(crate) first_mended: Option<String>,
 }
 
 impl SkippedLines {
-    /// Returns a sentence on it, if something was left out.
-    pub(crate) fn sentence(&self) -> Option<String> {
-        let first = self.first.as_ref()?;
-        Some(format!(
-            "{} lines of annotations and {} instances without points left out, the first: {first}",
-            self.lines, self.empty_instances
-        ))
+    /// Returns a sentence on what was left out, and one on what was mended.
+    pub(crate) fn sentences(&self) -> Vec<String> {
+        let left_out = self.first.as_ref().map(|first| {
+            format!(
+                "{} lines of annotations and {} instances without points left out, the first: {first}",
+                self.lines, self.empty_instances
+            )
+        });
+        let mended = self.first_mended.as_ref().map(|first| {
+            format!(
+                "{} lines of annotations have control characters within numbers, and are read without \
+                 them, the first: {first}",
+                self.mended
+            )
+        });
+        left_out.into_iter().chain(mended).collect()
     }
 }
 

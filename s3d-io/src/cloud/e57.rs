@@ -7,9 +7,10 @@ use crate::cloud::table::columns::Columns;
 use crate::cloud::table::records::{Color, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};
-use crate::fs::source::Source;
+use crate::fs::source::{Bytes, Source};
 use e57::{E57Reader, PointCloud, RawValues, Record, RecordDataType, RecordName, RecordValue};
 use s3d_geom::glam::{DQuat, DVec3, dvec3};
+use s3d_label::Room;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -26,6 +27,30 @@ impl<'a> E57Cloud<'a> {
 
     fn error(&self, error: &e57::Error) -> Error {
         Error::format(self.source.name(), format!("cannot be read: {error}"))
+    }
+
+    /// Opens the file, and returns its size too.
+    fn reader(&self) -> Result<(E57Reader<BufReader<Bytes>>, u64)> {
+        let (file, size) = self.source.open()?;
+        let file = BufReader::with_capacity(1 << 18, file);
+        let reader = guarded(self.source.name(), || E57Reader::new(file))?;
+        Ok((reader.map_err(|e| self.error(&e))?, size))
+    }
+
+    /// Whether several points of a scan are at the scanner itself. A single one may be a point like others.
+    fn has_several_empty(&self, cloud: &PointCloud, scan: &Scan<'_>) -> Result<bool> {
+        let path = self.source.name();
+        let (mut reader, _) = self.reader()?;
+        let mut points = guarded(path, || reader.pointcloud_raw(cloud))?.map_err(|e| self.error(&e))?;
+        let mut found = 0;
+        // What cannot be read is reported when it is its turn.
+        while let Some(Ok(values)) = guarded(path, || points.next())? {
+            found += u32::from(!scan.is_invalid(&values) && scan.is_scanner(&values));
+            if found == 2 {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 }
 
@@ -135,14 +160,25 @@ impl<'a> Scan<'a> {
         }
     }
 
+    /// Whether the point is the scanner itself. Cyclone writes it for a ray without a return.
+    fn is_scanner(&self, values: &RawValues) -> bool {
+        let [a, b, c] = self.columns.position.map(|i| self.float(values, i) == 0.0);
+        a && (self.is_spherical || b && c)
+    }
+
     /// Whether the point has no position.
     fn is_invalid(&self, values: &RawValues) -> bool {
         self.invalid.is_some_and(|i| self.float(values, i) != 0.0)
     }
 
+    /// The position in the world.
     fn position(&self, values: &RawValues) -> DVec3 {
-        let [a, b, c] = self.columns.position.map(|i| self.float(values, i));
-        let local = if self.is_spherical {
+        self.rotation * self.local(self.columns.position.map(|i| self.float(values, i))) + self.translation
+    }
+
+    /// The position in the scan's own frame. An azimuth may be of any turn, as near −2π.
+    fn local(&self, [a, b, c]: [f64; 3]) -> DVec3 {
+        if self.is_spherical {
             let azimuth_sin = libm::sin(b);
             let azimuth_cos = libm::cos(b);
             let elevation_sin = libm::sin(c);
@@ -150,8 +186,23 @@ impl<'a> Scan<'a> {
             a * dvec3(elevation_cos * azimuth_cos, elevation_cos * azimuth_sin, elevation_sin)
         } else {
             dvec3(a, b, c)
-        };
-        self.rotation * local + self.translation
+        }
+    }
+
+    /// The row of a point. `room` is the one that all points are in, if the user says so.
+    fn row(&self, values: &RawValues, room: Option<Room>) -> Row<'_> {
+        let columns = &self.columns;
+        Row {
+            position: self.position(values),
+            color: self.color(values),
+            class: self.value(values, columns.class),
+            instance: columns.instance.map_or(Value::None, |i| self.value(values, i)),
+            room: match (columns.room, &self.room, room) {
+                (Some(i), _, _) => self.value(values, i),
+                (None, Some(name), None) => Value::Name(name),
+                _ => Value::None,
+            },
+        }
     }
 
     fn color(&self, values: &RawValues) -> [u8; 3] {
@@ -257,9 +308,7 @@ impl Cloud for E57Cloud<'_> {
 
     fn read(&self, _: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
         let path = self.source.name();
-        let (file, size) = self.source.open()?;
-        let file = BufReader::with_capacity(1 << 18, file);
-        let mut reader = guarded(path, || E57Reader::new(file))?.map_err(|e| self.error(&e))?;
+        let (mut reader, size) = self.reader()?;
         let scans = guarded(path, || reader.pointclouds())?;
         if scans.is_empty() {
             return Err(Error::format(path, "holds no scan"));
@@ -270,6 +319,7 @@ impl Cloud for E57Cloud<'_> {
         }
         let mut number = 0;
         let mut invalid = 0u64;
+        let mut empty = 0u64;
         for cloud in &scans {
             let scan = Scan::new(path, self.options, cloud)?;
             let bits: u64 = cloud.prototype.iter().map(|r| bits_of(&r.data_type)).sum();
@@ -281,7 +331,7 @@ impl Cloud for E57Cloud<'_> {
             }
 
             let mut points = guarded(path, || reader.pointcloud_raw(cloud))?.map_err(|e| self.error(&e))?;
-            let columns = scan.columns;
+            let mut several_empty = None;
             while let Some(values) = guarded(path, || points.next())? {
                 let values = values
                     .map_err(|e| Error::format(path, format!("cannot be read after point {number}: {e}")))?;
@@ -291,24 +341,31 @@ impl Cloud for E57Cloud<'_> {
                     continue;
                 }
 
-                let row = Row {
-                    position: scan.position(&values),
-                    color: scan.color(&values),
-                    class: scan.value(&values, columns.class),
-                    instance: columns.instance.map_or(Value::None, |i| scan.value(&values, i)),
-                    room: match (columns.room, &scan.room, self.options.room) {
-                        (Some(i), _, _) => scan.value(&values, i),
-                        (None, Some(name), None) => Value::Name(name),
-                        _ => Value::None,
-                    },
-                };
-                reading.push(number, &row)?;
+                if scan.is_scanner(&values) {
+                    let several = match several_empty {
+                        Some(several) => several,
+                        None => self.has_several_empty(cloud, &scan)?,
+                    };
+                    several_empty = Some(several);
+                    if several {
+                        empty += 1;
+                        continue;
+                    }
+                }
+                reading.push(number, &scan.row(&values, self.options.room))?;
             }
         }
 
         if invalid > 0 {
             reading.notes.push(format!(
                 "{}: {invalid} of {number} points are marked invalid, left out",
+                path.display()
+            ));
+        }
+        if empty > 0 {
+            reading.notes.push(format!(
+                "{}: {empty} of {number} points are at the scanner itself (0 0 0), rays without a return; \
+                 left out",
                 path.display()
             ));
         }
@@ -352,5 +409,79 @@ fn bits_of(kind: &RecordDataType) -> u64 {
                 _ => 0,
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::annotations::Annotations;
+    use e57::{E57Writer, Quaternion, Transform, Translation};
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    /// Writes a scan at (1, 2, 3), turned by 90° about z. A point is three coordinates and a class.
+    fn scan(path: &Path, names: [RecordName; 3], points: &[([f64; 3], i64)]) {
+        let mut writer = E57Writer::from_file(path, "file").unwrap();
+        let extension = e57::Extension::new("ext", "http://example.org/ext");
+        writer.register_extension(extension).unwrap();
+        let mut prototype: Vec<Record> = names
+            .into_iter()
+            .map(|name| Record { name, data_type: RecordDataType::F64 })
+            .collect();
+        let class = RecordName::Unknown { namespace: "ext".to_owned(), name: "class".to_owned() };
+        prototype.push(Record { name: class, data_type: RecordDataType::Integer { min: 0, max: 255 } });
+
+        let mut scan = writer.add_pointcloud("scan", prototype).unwrap();
+        let half = libm::sqrt(0.5);
+        scan.set_transform(Some(Transform {
+            rotation: Quaternion { w: half, x: 0.0, y: 0.0, z: half },
+            translation: Translation { x: 1.0, y: 2.0, z: 3.0 },
+        }));
+        for (position, class) in points {
+            let mut values: RawValues = position.iter().map(|v| RecordValue::Double(*v)).collect();
+            values.push(RecordValue::Integer(*class));
+            scan.add_point(values).unwrap();
+        }
+        scan.finalize().unwrap();
+        writer.finalize().unwrap();
+    }
+
+    fn read(names: [RecordName; 3], points: &[([f64; 3], i64)]) -> (Vec<[f32; 3]>, Vec<String>) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("office_1.e57");
+        scan(&path, names, points);
+        let classes = [("7".to_owned(), Some(s3d_label::Class::CHAIR))].into();
+        let options = AnnotationOptions { classes, ..AnnotationOptions::default() };
+        let found = Annotations::open(&[path], &options).unwrap();
+        let mut cloud = s3d_geom::PointCloud::default();
+        found.rooms[0].instances[0].read(&mut cloud).unwrap();
+        // The turn is a product of rounded numbers.
+        let round = |v: f32| (v * 1e6).round() / 1e6;
+        (cloud.positions.iter().map(|p| p.to_array().map(round)).collect(), found.warnings)
+    }
+
+    #[test]
+    fn points_at_the_scanner_are_left_out_if_there_are_several() {
+        let names = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+        let point = ([1.0, 0.0, 0.5], 7);
+        let zero = ([0.0; 3], 7);
+        let (positions, warnings) = read(names.clone(), &[zero, point, zero, ([0.0, 0.0, 1.0], 7)]);
+        assert_eq!(positions, [[1.0, 3.0, 3.5], [1.0, 2.0, 4.0]]);
+        let note = "2 of 4 points are at the scanner itself (0 0 0)";
+        assert!(warnings.len() == 1 && warnings[0].contains(note), "{warnings:?}");
+
+        let (positions, warnings) = read(names, &[zero, point]);
+        assert_eq!(positions, [[1.0, 2.0, 3.0], [1.0, 3.0, 3.5]]);
+        assert!(warnings.is_empty(), "{warnings:?}");
+    }
+
+    #[test]
+    fn azimuths_of_any_turn_are_the_same_direction() {
+        let names =
+            [RecordName::SphericalRange, RecordName::SphericalAzimuth, RecordName::SphericalElevation];
+        let turns = [FRAC_PI_2 - TAU, FRAC_PI_2, FRAC_PI_2 + TAU, FRAC_PI_2 - 3.0 * TAU];
+        let points: Vec<([f64; 3], i64)> = turns.iter().map(|a| ([2.0, *a, 0.0], 7)).collect();
+        let (positions, _) = read(names, &points);
+        assert_eq!(positions, [[-1.0, 2.0, 3.0]; 4]);
     }
 }

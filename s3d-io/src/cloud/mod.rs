@@ -10,7 +10,8 @@
 //! |---|---|
 //! | S3DIS tree | names of folders and text files: [`AnnotationTree`], [`PointReader`] |
 //! | `pointcloud.mat` | MATLAB v7.3, as published: [`MatArea`] |
-//! | PLY, NPY, NPZ, LAS, LAZ, E57 | columns or attributes of points |
+//! | PLY, NPY, NPZ, LAS, LAZ, E57, PCD, text | columns or attributes of points |
+//! | SemanticKITTI, Pointcept | a file of labels, or arrays in a folder |
 //! | ScanNet | objects as lists of segments of a mesh |
 //! | a mesh | labels of its faces or vertices: [`Annotations::of_mesh`], [`Annotations::from_face_labels`] |
 //! | memory | [`AnnotatedPoints`] |
@@ -43,6 +44,9 @@ pub(crate) mod annotations;
 #[cfg(feature = "e57")]
 mod e57;
 pub(crate) mod frame_gap;
+mod kind;
+#[cfg(feature = "kitti")]
+mod kitti;
 #[cfg(feature = "label-files")]
 mod label_files;
 #[cfg(feature = "las")]
@@ -56,12 +60,16 @@ mod of_mesh;
 pub(crate) mod on_fault;
 mod open;
 pub(crate) mod passes;
+#[cfg(feature = "pcd")]
+mod pcd;
 #[cfg(feature = "ply")]
 mod ply;
 mod s3dis;
 #[cfg(feature = "scannet")]
 mod scannet;
 mod table;
+#[cfg(feature = "text")]
+mod text;
 #[cfg(any(feature = "mesh", feature = "scannet"))]
 mod words;
 

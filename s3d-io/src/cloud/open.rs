@@ -5,6 +5,7 @@ use crate::cloud::annotations::{
     AnnotatedInstance, AnnotatedRoom, AnnotationOptions, Annotations, InstancePoints, PointBlocks, Skipped,
 };
 use crate::cloud::frame_gap::{FrameGap, refusal};
+use crate::cloud::kind::{is_kitti, is_scannet, open_arrays, open_cloud, table};
 #[cfg(feature = "label-files")]
 use crate::cloud::label_files::{AnnotatedMesh, LabelFile};
 use crate::cloud::on_fault::OnFault;
@@ -33,6 +34,13 @@ impl Annotations {
     /// | `.npz` | one such array, or an array a column (`xyz`, `rgb`, `label`…), or a few |
     /// | `.las`, `.laz` | `classification`, and `point_source_id` as instance; extra dimensions by name |
     /// | `.e57` | several scans with their poses; attributes of extensions for classes and instances |
+    /// | `.pcd` | PCL's fields, ASCII, binary or compressed; `rgb` and `rgba` may be packed |
+    /// | `.asc`, `.xyz`, `.txt`, `.csv` | a point a line; the first line, or [`AnnotationOptions::columns`], names the columns |
+    /// | `.pts`, `.ptx` | the same with a scanner's counts and poses; [`AnnotationOptions::columns`] names the columns |
+    /// | `.label`, `.bin` | SemanticKITTI: one beside the other, or in `labels/` and `velodyne/` |
+    /// | a folder with `coord.npy`, or folders with it | Pointcept's arrays: `color.npy`, `segment.npy`, `instance.npy` |
+    ///
+    /// The first bytes of a file come before the ending of its name.
     ///
     /// The points of a tree are read when they are asked for, an instance at a time. All other files hold
     /// *clouds*: rows of points, each with its own class, instance and room. All clouds of an area are read
@@ -41,7 +49,7 @@ impl Annotations {
     /// - **class**: [`AnnotationOptions::classes`] gives the meaning of a number or a name. Names of the 13
     ///   classes mean themselves, and the usual words of ScanNet's annotators mean the nearest of the 13. The
     ///   numbers of a plain NPY array are S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes
-    ///   are named. Classes without a meaning are an error that lists them.
+    ///   are named, and so are those of SemanticKITTI's files and Pointcept's arrays without classes. Classes without a meaning are an error that lists them.
     /// - **instance**: points of one room and class with one number are one instance. Two classes of the file
     ///   that mean the same are kept apart, since many files number per class. Points without a number, or
     ///   with a negative one, are one instance a class and room. Instances are numbered per class and room
@@ -106,7 +114,12 @@ impl Annotations {
                 all.join(Self::of_label_file(&file, options, mesh)?)?;
                 continue;
             }
-            if path.is_dir() && !is_scannet(path) {
+            if path.is_dir() && !is_scannet(path) && !is_kitti(path) {
+                let arrays = open_arrays(path, options)?;
+                if !arrays.is_empty() {
+                    clouds.extend(arrays);
+                    continue;
+                }
                 all.join(Self::from_tree(path, options)?)?;
             } else if is_mat(path) {
                 let area = Self::mat(Source::file(path), options)?;
@@ -130,8 +143,8 @@ impl Annotations {
     }
 
     /// Reads annotations like [`Annotations::open`], from the bytes of one file, which are read as often as
-    /// necessary: a `.mat`, or a table of points (`.ply`, `.npy`, `.npz`, `.las`, `.laz`, `.e57`). The
-    /// extension of `name` tells the format; errors call the file `name`.
+    /// necessary: a `.mat`, or a table of points in one file (`.ply`, `.npy`, `.npz`, `.las`, `.laz`, `.e57`,
+    /// `.pcd`, text). The first bytes or the extension of `name` tell the format; errors call the file `name`.
     ///
     /// ```
     /// use s3d_io::cloud::{AnnotationOptions, Annotations};
@@ -311,75 +324,8 @@ fn bounds_of(cloud: &PointCloud, offset_m: DVec3) -> [DVec3; 2] {
     [bounds.min, bounds.max]
 }
 
-/// Chooses the reader of a cloud by the file's name.
-fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn Cloud + 'a>> {
-    let what = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_ascii_lowercase();
-    if what.is_dir() || name.ends_with(".aggregation.json") {
-        #[cfg(feature = "scannet")]
-        return Ok(Box::new(crate::cloud::scannet::ScannetCloud::open(path)?));
-        #[cfg(not(feature = "scannet"))]
-        return Err(Error::not_built_in(path, "scannet"));
-    }
-    table(Source::file(path), options)
-}
-
-/// Chooses the reader of a table of points by the file's extension.
-#[cfg_attr(
-    not(any(feature = "ply", feature = "npy", feature = "las", feature = "e57")),
-    allow(unused_variables)
-)]
-fn table(source: Source, options: &AnnotationOptions) -> Result<Box<dyn Cloud + '_>> {
-    let path = source.name().to_owned();
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_ascii_lowercase();
-    match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
-        #[cfg(feature = "ply")]
-        "ply" => Ok(Box::new(crate::cloud::ply::read::PlyCloud::new(source, options))),
-        #[cfg(feature = "npy")]
-        "npy" | "npz" => Ok(Box::new(crate::cloud::npy::read::NpyCloud::new(source, options))),
-        #[cfg(feature = "las")]
-        "las" | "laz" => Ok(Box::new(crate::cloud::las::read::LasCloud::new(source, options))),
-        #[cfg(feature = "e57")]
-        "e57" => Ok(Box::new(crate::cloud::e57::E57Cloud::new(source, options))),
-        extension if let Some(feature) = feature_of(extension) => Err(Error::not_built_in(&path, feature)),
-        _ => Err(Error::unsupported(
-            &path,
-            "is no kind of annotations that is read: an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, \
-             .e57, or ScanNet's .aggregation.json",
-        )),
-    }
-}
-
-/// The feature that reads clouds with this extension.
-fn feature_of(extension: &str) -> Option<&'static str> {
-    match extension {
-        "ply" => Some("ply"),
-        "npy" | "npz" => Some("npy"),
-        "las" | "laz" => Some("las"),
-        "e57" => Some("e57"),
-        _ => None,
-    }
-}
-
 fn is_mat(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat"))
-}
-
-/// Whether a folder is a scan of ScanNet rather than an S3DIS tree.
-fn is_scannet(dir: &Path) -> bool {
-    std::fs::read_dir(dir).is_ok_and(|entries| {
-        entries
-            .flatten()
-            .any(|e| e.file_name().to_string_lossy().ends_with(".aggregation.json"))
-    })
 }
 
 /// A file of the S3DIS tree.
@@ -396,7 +342,7 @@ impl InstancePoints for TextPoints {
     fn read(&self, out: &mut PointCloud) -> Result<Skipped> {
         let mut reader = PointReader::open_with(&self.path, self.on_fault)?.with_offset(self.offset_m);
         while reader.read_chunk(usize::MAX, out)? > 0 {}
-        Ok(reader.into_skipped())
+        Ok(reader.take_skipped())
     }
 
     fn path(&self) -> &Path {
@@ -479,7 +425,7 @@ mod tests {
 
     #[test]
     fn lines_that_are_skipped_are_counted_with_the_first_place() {
-        let a = tree(&[("WC_1/Annotations/wall_1.txt", "1 2 3 4 5 6\n1 2 3\x10 4 5 6\nx\n1 1 1 1 1 1\n")]);
+        let a = tree(&[("WC_1/Annotations/wall_1.txt", "1 2 3 4 5 6\n1 2 3\x10 4 5\nx\n1 1\x10 1 1 1 1\n")]);
         let strict = open(&[&a], &AnnotationOptions::default()).unwrap();
         let message = strict.rooms[0].instances[0]
             .read(&mut PointCloud::default())
@@ -491,7 +437,8 @@ mod tests {
         let lenient = open(&[&a], &skip).unwrap();
         let mut cloud = PointCloud::default();
         let skipped = lenient.rooms[0].instances[0].read(&mut cloud).unwrap();
-        assert_eq!((cloud.len(), skipped.count), (2, 2));
+        assert_eq!((cloud.len(), skipped.count, skipped.mended), (2, 2, 1));
+        assert!(skipped.first_mended.unwrap().ends_with("wall_1.txt, line 4"));
         assert!(skipped.first.unwrap().to_string().contains("line 2"));
     }
 

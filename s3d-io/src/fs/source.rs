@@ -42,6 +42,12 @@ impl Source {
         &self.name
     }
 
+    /// Returns whether it is the file of its name, so that others may lie beside it.
+    #[cfg(feature = "kitti")]
+    pub(crate) fn is_file(&self) -> bool {
+        self.reader.is_none()
+    }
+
     /// Returns a new reader that starts at the first byte, and the number of bytes. Every reader has its own
     /// position.
     pub(crate) fn open(&self) -> Result<(Bytes, u64)> {

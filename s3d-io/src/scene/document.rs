@@ -91,7 +91,7 @@ struct MeshTable {
 /// instance   = "point_source_id"      # the column of instance numbers
 /// room       = "office_1"             # the room of points that name none
 /// rooms      = "room"                 # the column of rooms
-/// columns    = ["x", "y", "z", "class"]         # of a plain NPY array
+/// columns    = ["x", "y", "z", "class"]         # of a file that does not name them
 /// offset_m   = [500000.0, 4000000.0, 0.0]       # subtracted from coordinates; left out: the mesh's
 /// unknown_as_clutter = true           # left out: unknown classes are errors
 /// [annotations.classes]

@@ -14,7 +14,7 @@ pub(crate) fn other_kind(path: &Path) -> Option<&'static str> {
     Some(match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
         "stl" | "fbx" | "dae" | "off" | "usd" | "usdz" => "a mesh, not a scene",
         "ply" => "a mesh or a cloud, not a scene",
-        "las" | "laz" | "e57" | "npy" | "npz" | "mat" | "pcd" | "pts" | "xyz" => {
+        "las" | "laz" | "e57" | "npy" | "npz" | "mat" | "pcd" | "pts" | "ptx" | "asc" | "xyz" | "label" => {
             "a cloud of points, not a scene"
         }
         "mtl" | "png" | "jpg" | "jpeg" => "a part of a mesh, not a scene",

@@ -41,6 +41,9 @@ pub(crate) const FEEDS: &[(&str, Feed)] = &[
     ("npy", npy),
     ("las", las),
     ("e57", e57),
+    ("pcd", pcd),
+    ("text_cloud", text_cloud),
+    ("kitti", kitti),
     ("scannet", scannet),
     ("mat", mat),
     ("png", png),
@@ -325,7 +328,7 @@ fn taxonomy(dir: &Path, data: &[u8]) {
     );
 }
 
-/// An array, or an archive of arrays, by the first bytes.
+/// An array, or an archive of arrays, by the first bytes; and a folder that has the array thrice.
 fn npy(dir: &Path, data: &[u8]) {
     let name = if data.starts_with(b"PK") {
         "cloud.npz"
@@ -334,6 +337,12 @@ fn npy(dir: &Path, data: &[u8]) {
     };
     let path = file(dir, name, data);
     annotations(dir, &path);
+    let folder = dir.join("office_1");
+    fs::create_dir_all(&folder).expect("the folder can be written");
+    for name in ["coord.npy", "segment.npy", "instance.npy"] {
+        file(&folder, name, data);
+    }
+    annotations(dir, &folder);
     if let Ok(array) = NpyArray::open(&path) {
         numbers(array);
     }
@@ -356,6 +365,28 @@ fn numbers(mut array: NpyArray<impl Read>) {
 /// LAS or LAZ: the header tells which it is, whatever the name.
 fn las(dir: &Path, data: &[u8]) {
     annotations(dir, &file(dir, "cloud.las", data));
+}
+
+fn pcd(dir: &Path, data: &[u8]) {
+    annotations(dir, &file(dir, "cloud.pcd", data));
+}
+
+/// A text with names of columns or a count, without them, and as scans with poses.
+fn text_cloud(dir: &Path, data: &[u8]) {
+    let columns = ["x", "y", "z", "class"].map(str::to_owned).to_vec();
+    for name in ["cloud.csv", "cloud.pts", "cloud.ptx"] {
+        let path = file(dir, name, data);
+        annotations(dir, &path);
+        let named = AnnotationOptions { columns: columns.clone(), ..numbered() };
+        check(dir, Annotations::open(&[path], &named));
+    }
+}
+
+/// Points of SemanticKITTI, each with a label made of its own bytes.
+fn kitti(dir: &Path, data: &[u8]) {
+    let labels: Vec<u8> = data.iter().step_by(4).copied().collect();
+    file(dir, "cloud.label", &labels);
+    annotations(dir, &file(dir, "cloud.bin", data));
 }
 
 /// An E57 file. The checksums of its pages are corrected, so that their contents are read.

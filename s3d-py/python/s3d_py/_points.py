@@ -129,12 +129,13 @@ def read_points(
     progress: Progress = None,
 ) -> AnnotatedPoints:
     """Reads the annotated points of an area: the folder of an S3DIS area, `pointcloud.mat`, a scan of
-    ScanNet, PLY, NPY, NPZ, LAS, LAZ or E57. Several files make one area.
+    ScanNet, PLY, NPY, NPZ, LAS, LAZ, E57, PCD, text, SemanticKITTI's `.label` or a folder of Pointcept's
+    arrays. Several files make one area.
 
     - `taxonomy`: "s3dis", "nyu40", "scannet20", "scannet200" or "matterport40".
     - `classes`: the class for each name or number in the files; None leaves its points out.
     - `class_column`, `instance_column`, `room_column`: names of columns that differ from the format's.
-    - `columns`: the names of the columns of a plain NPY array.
+    - `columns`: the names of the columns of a file that does not name them: a plain NPY array, a text.
     - `room`: the room of points whose file names none: "office_1".
     - `offset`: metres, subtracted in 64 bits from points far from the origin, like `Mesh.offset`.
     - `lenient`: skip faulty annotations and count them; unknown classes become clutter.

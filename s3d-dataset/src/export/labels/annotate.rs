@@ -83,6 +83,10 @@ pub(crate) fn annotate(
             if let Some(first) = left_out.first {
                 skipped.first.get_or_insert(first.to_string());
             }
+            skipped.mended += left_out.mended;
+            if let Some(first) = left_out.first_mended {
+                skipped.first_mended.get_or_insert(first);
+            }
             progress.add(1);
 
             if passes.is_empty() {

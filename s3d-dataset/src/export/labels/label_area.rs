@@ -132,7 +132,7 @@ pub(crate) fn mesh_doubts(area: &AreaInput, mesh: &TriMesh, options: &ExportOpti
 
 /// Returns a sentence for each oddity of the annotations.
 pub(crate) fn label_doubts(area: &AreaInput, annotated: &Annotated, table: &LabelTable) -> Vec<String> {
-    let mut doubts: Vec<String> = annotated.skipped.sentence().into_iter().collect();
+    let mut doubts = annotated.skipped.sentences();
     doubts.extend(hidden_instances(area, &annotated.label_of_face, table));
     doubts.extend(overlap_doubts(&annotated.rooms));
     doubts

@@ -36,8 +36,9 @@ pub struct AnnotationOptions {
     pub instance_column: Option<String>,
     /// The name of the column of rooms. `None`: there is no such column.
     pub room_column: Option<String>,
-    /// The names of the columns, in order, for a file that does not name them (a plain NPY array). Empty: `x
-    /// y z r g b class` and, if there is one more column, `instance`.
+    /// The names of the columns, in order, for a file that does not name them: a plain NPY array or a text. In
+    /// a text, they come before the file's own names. Empty: a plain array has `x y z r g b class` and, if
+    /// there is one more column, `instance`; a text must name its columns.
     pub columns: Vec<String>,
     /// The offset that is subtracted from coordinates in `f64`, before they are rounded to `f32`: metres.
     /// For georeferenced clouds.
@@ -105,13 +106,17 @@ pub struct AnnotatedInstance {
     points: Arc<dyn InstancePoints>,
 }
 
-/// The lines or records left out while points were read with [`OnFault::Skip`].
+/// The lines or records left out while points were read with [`OnFault::Skip`], and those that were mended.
 #[derive(Debug, Default)]
 pub struct Skipped {
     /// The number of lines or records left out.
     pub count: u64,
     /// The fault of the first of them, and its place.
     pub first: Option<Error>,
+    /// The number of lines with control characters within numbers, which were read without them.
+    pub mended: u64,
+    /// The place of the first of these: its file and line.
+    pub first_mended: Option<String>,
 }
 
 /// The source of one instance's points.

@@ -24,6 +24,11 @@ impl Dimension {
         Self::Classification { at, mask }
     }
 
+    /// Whether it is a class of five bits, and the largest of these: a larger class may have been cut to it.
+    pub(super) fn is_cut(&self, record: &[u8]) -> bool {
+        matches!(self, Self::Classification { mask: 0x1f, .. }) && self.value(record) == Value::Whole(0x1f)
+    }
+
     fn plain(name: &str, at: usize, kind: Kind) -> (String, Self) {
         let field = Field { name: name.to_owned(), at, kind, big_endian: false };
         (name.to_owned(), Self::Plain { field, scale: 1.0, offset: 0.0 })

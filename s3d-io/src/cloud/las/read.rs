@@ -164,6 +164,7 @@ impl Cloud for LasCloud<'_> {
             .clamp(1, BATCH);
         let mut done = 0u64;
         let mut withheld = 0u64;
+        let mut cut = 0u64;
         while let Some(left) = count.checked_sub(done).filter(|left| *left > 0) {
             let n = at_once.min(left);
             let read = guarded(|| reader.fill_points(n, &mut data)).ok_or_else(|| self.damaged())?;
@@ -178,6 +179,7 @@ impl Cloud for LasCloud<'_> {
                     withheld = withheld.saturating_add(1);
                     continue;
                 }
+                cut = cut.saturating_add(u64::from(fields.class.is_cut(record)));
                 let Some(color) = fields.color(record, colors) else { return Ok(false) };
                 let row = Row {
                     position: fields.position(record),
@@ -190,10 +192,19 @@ impl Cloud for LasCloud<'_> {
             }
         }
 
+        let shown = path.display();
         if withheld > 0 {
             reading
                 .notes
-                .push(format!("{}: {withheld} points are withheld (deleted), left out", path.display()));
+                .push(format!("{shown}: {withheld} points are withheld (deleted), left out"));
+        }
+        // Whoever gives 31 a meaning knows of it.
+        if cut > 0 && !self.options.classes.contains_key("31") {
+            reading.notes.push(format!(
+                "{shown}: {cut} points have the class 31, the largest in this point format: larger classes may \
+                 have been cut to it. Save as LAS 1.4 with a point format of 6 to 10, or classes as an extra \
+                 dimension"
+            ));
         }
         Ok(true)
     }

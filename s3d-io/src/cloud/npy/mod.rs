@@ -1,6 +1,7 @@
 //! numpy's arrays: NPY and NPZ.
 
 mod array;
+pub(crate) mod folder;
 mod header;
 mod literal;
 pub(crate) mod read;

@@ -6,7 +6,8 @@ use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::npy::array::zipped;
 use crate::cloud::npy::header::NpyHeader;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
-use crate::cloud::table::records::{Field, Table, fill, rows_of_block};
+use crate::cloud::table::meaning::{plain_numbers, s3dis_number};
+use crate::cloud::table::records::{Field, Part, Table};
 use crate::cloud::table::rows::{Reading, Tag};
 use crate::error::{Error, Result};
 use crate::fs::source::{Bytes, Source};
@@ -22,21 +23,15 @@ const PLAIN: [&str; 8] = ["x", "y", "z", "r", "g", "b", "class", "instance"];
 /// An `.npy` or `.npz` file.
 pub(crate) struct NpyCloud<'a> {
     source: Source,
+    is_npz: bool,
     options: &'a AnnotationOptions,
     /// Whether class numbers are S3DIS's: in a plain array whose columns and classes are not named.
     s3dis_numbers: Cell<bool>,
 }
 
 impl<'a> NpyCloud<'a> {
-    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
-        Self { source, options, s3dis_numbers: Cell::new(false) }
-    }
-
-    fn is_npz(&self) -> bool {
-        self.source
-            .name()
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+    pub(crate) fn new(source: Source, is_npz: bool, options: &'a AnnotationOptions) -> Self {
+        Self { source, is_npz, options, s3dis_numbers: Cell::new(false) }
     }
 
     fn file(&self) -> Result<BufReader<Bytes>> {
@@ -64,11 +59,7 @@ impl<'a> NpyCloud<'a> {
                 let taxonomy = &self.options.taxonomy;
                 self.s3dis_numbers.set(taxonomy.is_s3dis());
                 let path = self.source.name().display();
-                let numbers = if taxonomy.is_s3dis() {
-                    "S3DIS's, 0 ceiling to 12 clutter".to_owned()
-                } else {
-                    format!("the ids of {}", taxonomy.name())
-                };
+                let numbers = plain_numbers(taxonomy);
                 reading.notes.push(format!(
                     "{path}: a plain array: its columns are taken for {}, and class numbers for {numbers}",
                     fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(" ")
@@ -132,7 +123,7 @@ impl<'a> NpyCloud<'a> {
             let table = self.table(fields, header.stride, header.is_structured, reading)?;
             return table.read(self.source.name(), member, header.rows, colors, reading);
         }
-        self.read_columns(arrays, colors, reading)
+        read_columns(self.source.name(), arrays, self.options, colors, reading)
     }
 
     /// The names of an archive's arrays. Few archives have more than a dozen.
@@ -150,61 +141,38 @@ impl<'a> NpyCloud<'a> {
         }
         Ok(names)
     }
+}
 
-    /// Reads several arrays, each with its name and its header, as columns of one table. Shorter arrays than
-    /// the longest describe the cloud as a whole, and are left out.
-    fn read_columns<R: Read>(
-        &self,
-        mut arrays: Vec<(String, NpyHeader, R)>,
-        colors: ColorRange,
-        reading: &mut Reading<'_>,
-    ) -> Result<bool> {
-        let path = self.source.name();
-        let rows = arrays.iter().map(|(_, h, _)| h.rows).max().unwrap_or(0);
-        arrays.retain(|(_, h, _)| h.rows == rows && h.stride > 0);
-        let mut fields = Vec::new();
-        let mut stride = 0;
-        for (stem, header, _) in &arrays {
-            for field in &header.fields {
-                let name = if header.is_structured {
-                    field.name.clone()
-                } else {
-                    format!("{stem}{}", field.name)
-                };
-                fields.push(Field { name, at: field.at.saturating_add(stride), ..field.clone() });
-            }
-            stride = header.stride.saturating_add(stride);
+/// Reads several arrays, each with its name and its header, as columns of one table. Shorter arrays than the
+/// longest describe the cloud as a whole, and are left out.
+pub(super) fn read_columns<R: Read>(
+    path: &Path,
+    mut arrays: Vec<(String, NpyHeader, R)>,
+    options: &AnnotationOptions,
+    colors: ColorRange,
+    reading: &mut Reading<'_>,
+) -> Result<bool> {
+    let rows = arrays.iter().map(|(_, h, _)| h.rows).max().unwrap_or(0);
+    arrays.retain(|(_, h, _)| h.rows == rows && h.stride > 0);
+    let mut fields = Vec::new();
+    let mut parts = Vec::new();
+    let mut stride = 0usize;
+    for (stem, header, source) in arrays {
+        let is_one = header.fields.len() == 1;
+        for field in header.fields {
+            let name = match field.name.as_str() {
+                _ if header.is_structured => field.name,
+                // An array of one column is a column.
+                "[0]" if is_one => stem.clone(),
+                element => format!("{stem}{element}"),
+            };
+            fields.push(Field { name, at: field.at.saturating_add(stride), ..field });
         }
-        let table = Table::new(path, fields, stride, self.options)?;
-
-        // Rows have up to 64 KiB, so a block has a few MiB at most.
-        let mut done = 0;
-        let mut block = Vec::new();
-        let mut column = Vec::new();
-        let mut texts = Default::default();
-        while let Some(n) = rows_of_block(rows, done, stride) {
-            block.resize(n.saturating_mul(stride), 0);
-            let mut at = 0usize;
-            for (_, header, member) in &mut arrays {
-                column.resize(n.saturating_mul(header.stride), 0);
-                fill(path, member, &mut column, done, rows, header.stride)?;
-                for (record, piece) in block.chunks_exact_mut(stride).zip(column.chunks_exact(header.stride))
-                {
-                    let place = record.get_mut(at..).and_then(|r| r.get_mut(..piece.len()));
-                    place.into_iter().for_each(|place| place.copy_from_slice(piece));
-                }
-                at = at.saturating_add(header.stride);
-            }
-
-            for (record, number) in block.chunks_exact(stride).zip(done.saturating_add(1)..) {
-                if !table.push(number, record, colors, &mut texts, path, reading)? {
-                    return Ok(false);
-                }
-            }
-            done = done.saturating_add(n as u64);
-        }
-        Ok(true)
+        parts.push(Part { path: path.to_owned(), source, at: stride, stride: header.stride });
+        stride = header.stride.saturating_add(stride);
     }
+    let table = Table::new(path, fields, stride, options)?;
+    table.read_parts(path, &mut parts, rows, colors, reading)
 }
 
 impl Cloud for NpyCloud<'_> {
@@ -213,16 +181,11 @@ impl Cloud for NpyCloud<'_> {
     }
 
     fn class_of(&self, tag: &Tag) -> Option<Class> {
-        match tag {
-            Tag::Number(n) if self.s3dis_numbers.get() => {
-                usize::try_from(*n).ok().and_then(|n| Class::S3DIS.get(n)).copied()
-            }
-            _ => None,
-        }
+        s3dis_number(tag).filter(|_| self.s3dis_numbers.get())
     }
 
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-        if self.is_npz() {
+        if self.is_npz {
             self.read_npz(colors, reading)
         } else {
             self.read_npy(colors, reading)

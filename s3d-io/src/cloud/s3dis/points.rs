@@ -32,7 +32,8 @@ const PIECE: usize = 1 << 16;
 ///
 /// A line is `x y z r g b`, separated by any ASCII white space: metres in the Z-up world, as the nearest
 /// `f32`, and a colour of whole numbers from 0 to 255, which may be written `41.000000`. Empty lines do not
-/// count.
+/// count. The published Area_5/office_19 has a control character within a number: a line that is no point is
+/// read without its control characters, and counted ([`PointReader::mended`]).
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -62,6 +63,9 @@ pub struct PointReader<R = File> {
     line: u64,
     skipped: u64,
     first_skipped: Option<Error>,
+    mended: u64,
+    /// The line that was mended first.
+    first_mended: Option<u64>,
 }
 
 impl PointReader {
@@ -98,6 +102,8 @@ impl<R: Read> PointReader<R> {
             line: 0,
             skipped: 0,
             first_skipped: None,
+            mended: 0,
+            first_mended: None,
         }
     }
 
@@ -118,9 +124,20 @@ impl<R: Read> PointReader<R> {
         self.first_skipped.as_ref()
     }
 
-    /// The lines left out, once the file is read.
-    pub(crate) fn into_skipped(self) -> Skipped {
-        Skipped { count: self.skipped, first: self.first_skipped }
+    /// The number of lines so far that are points only without their control characters.
+    pub fn mended(&self) -> u64 {
+        self.mended
+    }
+
+    /// What was left out and mended so far. The fault of the first line left out is moved out.
+    pub(crate) fn take_skipped(&mut self) -> Skipped {
+        let line = |line| format!("{}, line {line}", self.path.display());
+        Skipped {
+            count: self.skipped,
+            first: self.first_skipped.take(),
+            mended: self.mended,
+            first_mended: self.first_mended.map(line),
+        }
     }
 
     /// Appends the next points to `out`, up to `max_points` of them, and returns their number: 0 at the end
@@ -152,7 +169,13 @@ impl<R: Read> PointReader<R> {
             };
 
             self.line += 1;
-            match parse_point(line, self.offset_m) {
+            let parsed = parse_point(line, self.offset_m).or_else(|why| {
+                let mended = without_controls(line).and_then(|line| parse_point(&line, self.offset_m).ok());
+                self.mended += u64::from(mended.is_some());
+                self.first_mended = self.first_mended.or(mended.map(|_| self.line));
+                mended.ok_or(why)
+            });
+            match parsed {
                 Ok(Some((position, color))) => {
                     out.positions.push(position);
                     out.colors.push(color);
@@ -225,7 +248,7 @@ impl PointBlocks for PointReader {
     }
 
     fn skipped(&mut self) -> Skipped {
-        Skipped { count: self.skipped, first: self.first_skipped.take() }
+        self.take_skipped()
     }
 }
 
@@ -268,6 +291,13 @@ fn points_of(mut lines: &[u8], offset_m: DVec3) -> Option<(PointCloud, u64)> {
         }
     }
     Some((points, n))
+}
+
+/// Returns a line without the control characters that do not separate words, if it has any.
+fn without_controls(line: &[u8]) -> Option<Vec<u8>> {
+    let is_control = |b: &u8| b.is_ascii_control() && !matches!(b, b'\t' | b'\n' | b'\r');
+    let kept: Vec<u8> = line.iter().copied().filter(|b| !is_control(b)).collect();
+    (kept.len() < line.len()).then_some(kept)
 }
 
 /// Parses a line, and subtracts an offset from its point. Returns `None` for an empty line.
@@ -380,7 +410,8 @@ mod tests {
         for (text, words) in [
             (&b"1 2 3 4 5"[..], "line 3: not a point `x y z r g b`: 5 fields: `1 2 3 4 5`"),
             (b"1 2 3 4 5 6 7", "more than 6 fields"),
-            (b"1 2 3\x10 4 5 6", "the coordinate `3\u{fffd}` is no number"),
+            (b"1 2 3\x10 4 5", "line 3: not a point `x y z r g b`: 5 fields"),
+            (b"1 2 \x10x 4 5 6", "the coordinate `\u{fffd}x` is no number"),
             (b"1 nan 3 4 5 6", "`nan` is not finite"),
             (b"1 2 1e39 4 5 6", "`1e39` is not finite"),
             (b"1 2 3 256 5 6", "the colour `256` is not from 0 to 255"),
@@ -407,6 +438,18 @@ mod tests {
         assert_eq!(reader.skipped(), 2);
         assert!(reader.first_skipped().unwrap().to_string().contains("line 2"));
         assert_eq!(reader.read_chunk(100, &mut cloud).unwrap(), 0);
+    }
+
+    #[test]
+    fn control_characters_within_numbers_are_taken_out_and_counted() {
+        let text = "0 0 0 0 0 0\n1 2 3 103.0\x10000 5 6\r\n1\x7f2 0 0 0 0 0\n\0\n7 8 9 1 2 3\n";
+        let mut reader = PointReader::new(text.as_bytes(), Path::new("a.txt"), OnFault::Stop);
+        let mut cloud = PointCloud::default();
+        while reader.read_chunk(100, &mut cloud).unwrap() > 0 {}
+        assert_eq!(cloud.positions[1..3], [vec3(1.0, 2.0, 3.0), vec3(12.0, 0.0, 0.0)]);
+        assert_eq!((cloud.colors[1], cloud.len()), ([103, 5, 6], 4));
+        assert_eq!((reader.mended(), reader.skipped()), (3, 0));
+        assert_eq!(reader.take_skipped().first_mended.unwrap(), "a.txt, line 2");
     }
 
     #[test]

@@ -29,6 +29,12 @@ pub(crate) trait Cloud {
         None
     }
 
+    /// What this kind of file means by a tag, whatever the taxonomy says: a class, or unlabelled points. The
+    /// user's table comes first.
+    fn own_meaning(&self, _tag: &Tag) -> Option<Option<Class>> {
+        None
+    }
+
     /// Whether its points are the vertices of a mesh. This is known once the file is read.
     fn are_vertices(&self) -> bool {
         false
@@ -44,10 +50,11 @@ pub(crate) trait Cloud {
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool>;
 }
 
-/// The room that a file is named after: `office_3.ply`, `Area_1_office_3.npy`.
+/// The room that a file or a folder is named after: `office_3.ply`, `Area_1_office_3.npy`,
+/// `Area_1-office_3`.
 fn room_of_name(path: &Path, taxonomy: &Taxonomy) -> Option<Room> {
     let stem = path.file_stem()?.to_str()?;
-    let name = match stem.strip_prefix("Area_").and_then(|rest| rest.split_once('_')) {
+    let name = match stem.strip_prefix("Area_").and_then(|rest| rest.split_once(['_', '-'])) {
         Some((area, name)) if area.bytes().all(|b| b.is_ascii_digit()) => name,
         _ => stem,
     };

@@ -9,11 +9,15 @@ const POSITIONS: [[&str; 3]; 1] = [["x", "y", "z"]];
 const POSITION_ARRAYS: [&str; 9] =
     ["xyz", "points", "point", "coord", "coords", "positions", "position", "pos", "vertices"];
 /// Names of the three colour columns, and of arrays of three colours.
-const COLORS: [[&str; 3]; 3] =
-    [["red", "green", "blue"], ["r", "g", "b"], ["diffuse_red", "diffuse_green", "diffuse_blue"]];
+const COLORS: [[&str; 3]; 4] = [
+    ["red", "green", "blue"],
+    ["r", "g", "b"],
+    ["rf", "gf", "bf"],
+    ["diffuse_red", "diffuse_green", "diffuse_blue"],
+];
 const COLOR_ARRAYS: [&str; 6] = ["rgb", "colors", "color", "colours", "colour", "rgbs"];
 /// Names of class columns, the surest first. `scalar_…` is CloudCompare's.
-pub(crate) const CLASSES: [&str; 19] = [
+pub(crate) const CLASSES: [&str; 21] = [
     "class",
     "semantic_class",
     "class_id",
@@ -23,6 +27,8 @@ pub(crate) const CLASSES: [&str; 19] = [
     "semantic_gt",
     "sem_label",
     "segment",
+    "segment20",
+    "segment200",
     "label",
     "labels",
     "category",

@@ -5,6 +5,8 @@ use crate::cloud::on_fault::OnFault;
 use crate::cloud::table::cloud::Cloud;
 use crate::cloud::table::rows::{CloudTags, NO_INSTANCE, NO_TAG, Tag};
 use crate::error::{Error, Result};
+#[cfg(any(feature = "npy", feature = "kitti"))]
+use s3d_label::Taxonomy;
 use s3d_label::{Class, Room};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -155,6 +157,9 @@ fn class_of(cloud: &dyn Cloud, options: &AnnotationOptions, tag: &Tag) -> Option
     if let Some(class) = options.classes.get(&tag.key()) {
         return Some(*class);
     }
+    if let Some(meant) = cloud.own_meaning(tag) {
+        return Some(meant);
+    }
     let meant = match tag {
         Tag::Name(name) => options.taxonomy.meaning(name),
         Tag::Number(number) => options.taxonomy.meaning_of_number(*number),
@@ -167,6 +172,25 @@ fn class_of(cloud: &dyn Cloud, options: &AnnotationOptions, tag: &Tag) -> Option
             None
         }
     })
+}
+
+/// The class of S3DIS with this number, as in the files of its loaders: 0 ceiling to 12 clutter.
+#[cfg(any(feature = "npy", feature = "kitti"))]
+pub(crate) fn s3dis_number(tag: &Tag) -> Option<Class> {
+    match tag {
+        Tag::Number(n) => usize::try_from(*n).ok().and_then(|n| Class::S3DIS.get(n)).copied(),
+        Tag::Name(_) => None,
+    }
+}
+
+/// What class numbers are taken for where nothing says what they mean, for messages.
+#[cfg(any(feature = "npy", feature = "kitti"))]
+pub(crate) fn plain_numbers(taxonomy: &Taxonomy) -> String {
+    if taxonomy.is_s3dis() {
+        "S3DIS's, 0 ceiling to 12 clutter".to_owned()
+    } else {
+        format!("the ids of {}", taxonomy.name())
+    }
 }
 
 /// The room that a tag means.

@@ -9,3 +9,5 @@ pub(crate) mod read;
 pub(crate) mod records;
 pub(crate) mod rows;
 mod store;
+#[cfg(any(feature = "pcd", feature = "text"))]
+pub(crate) mod words;

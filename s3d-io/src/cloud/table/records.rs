@@ -8,8 +8,9 @@ use crate::cloud::table::columns::Columns;
 use crate::cloud::table::rows::{Reading, Row, Value};
 use crate::error::{Error, Result};
 use s3d_geom::glam::dvec3;
+use std::cell::Cell;
 use std::io::{ErrorKind, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Bytes that are read at a time.
 const BLOCK: usize = 1 << 20;
@@ -195,6 +196,20 @@ pub(crate) struct Table {
     pub(crate) columns: Columns,
     /// Bytes of a record.
     pub(crate) stride: usize,
+    /// The number of points left out because a coordinate is NaN. `None`: such a point is a fault.
+    pub(crate) holes: Option<Cell<u64>>,
+    /// The number that stands for no instance, beside negative ones.
+    pub(crate) no_instance: Option<i64>,
+}
+
+/// A piece of every record, from a source of its own.
+pub(crate) struct Part<R> {
+    /// The source, for messages.
+    pub(crate) path: PathBuf,
+    pub(crate) source: R,
+    /// Where the piece starts in the record, and its bytes.
+    pub(crate) at: usize,
+    pub(crate) stride: usize,
 }
 
 impl Table {
@@ -224,7 +239,7 @@ impl Table {
             let message = format!("the column {} reaches beyond the {stride} bytes of a record", field.name);
             return Err(Error::format(path, message));
         }
-        Ok(Self { fields, columns, stride })
+        Ok(Self { fields, columns, stride, holes: None, no_instance: None })
     }
 
     /// Hands on the record with this `number` (from 1). Returns `false` if its colour is beyond the narrow
@@ -241,6 +256,12 @@ impl Table {
     ) -> Result<bool> {
         let columns = &self.columns;
         let [x, y, z] = columns.position.map(|i| self.fields[i].float(record));
+        if let Some(holes) = &self.holes
+            && dvec3(x, y, z).is_nan()
+        {
+            holes.set(holes.get().saturating_add(1));
+            return Ok(true);
+        }
 
         let mut rgb = [0; 3];
         if let Some(channels) = columns.color {
@@ -259,13 +280,15 @@ impl Table {
         }
 
         let [class, instance, room] = texts;
+        let instance = columns
+            .instance
+            .map_or(Value::None, |i| self.fields[i].value(record, instance));
+        let is_none = matches!((instance, self.no_instance), (Value::Whole(n), Some(none)) if n == none);
         let row = Row {
             position: dvec3(x, y, z),
             color: rgb,
             class: self.fields[columns.class].value(record, class),
-            instance: columns
-                .instance
-                .map_or(Value::None, |i| self.fields[i].value(record, instance)),
+            instance: if is_none { Value::None } else { instance },
             room: columns.room.map_or(Value::None, |i| self.fields[i].value(record, room)),
         };
         reading.push(number, &row)?;
@@ -290,6 +313,48 @@ impl Table {
         while let Some(n) = rows_of_block(count, done, self.stride) {
             block.resize(n.saturating_mul(self.stride), 0);
             fill(path, &mut source, &mut block, done, count, self.stride)?;
+            for (record, number) in block.chunks_exact(self.stride).zip(done.saturating_add(1)..) {
+                if !self.push(number, record, colors, &mut texts, path, reading)? {
+                    return Ok(false);
+                }
+            }
+            done = done.saturating_add(n as u64);
+        }
+        Ok(true)
+    }
+}
+
+impl Table {
+    /// Hands on `count` records that are put together from pieces. Bytes of a record that no piece fills are
+    /// zero. Returns `false` if a colour is beyond the narrow range.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if a source holds fewer pieces, and the errors of [`Table::push`].
+    pub(crate) fn read_parts<R: Read>(
+        &self,
+        path: &Path,
+        parts: &mut [Part<R>],
+        count: u64,
+        colors: ColorRange,
+        reading: &mut Reading<'_>,
+    ) -> Result<bool> {
+        // Records have up to 64 KiB, so a block has a few MiB at most.
+        let mut done = 0;
+        let mut block = Vec::new();
+        let mut column = Vec::new();
+        let mut texts = Default::default();
+        while let Some(n) = rows_of_block(count, done, self.stride) {
+            block.resize(n.saturating_mul(self.stride), 0);
+            for Part { path, source, at, stride } in &mut *parts {
+                column.resize(n.saturating_mul(*stride), 0);
+                fill(path, source, &mut column, done, count, *stride)?;
+                let pieces = column.chunks_exact((*stride).max(1));
+                for (record, piece) in block.chunks_exact_mut(self.stride).zip(pieces) {
+                    let place = record.get_mut(*at..).and_then(|r| r.get_mut(..piece.len()));
+                    place.into_iter().for_each(|place| place.copy_from_slice(piece));
+                }
+            }
+
             for (record, number) in block.chunks_exact(self.stride).zip(done.saturating_add(1)..) {
                 if !self.push(number, record, colors, &mut texts, path, reading)? {
                     return Ok(false);
