@@ -296,7 +296,7 @@ fn compression_is_refused_by_name_with_the_way_out() {
         ("EXT_meshopt_compression", "gltf-transform copy"),
         ("KHR_meshopt_compression", "gltf-transform copy"),
         ("KHR_texture_basisu", "gltf-transform ktxdecompress"),
-        ("EXT_texture_webp", "gltf-transform png"),
+        ("EXT_texture_avif", "gltf-transform png"),
         ("XYZ_new", "export without it"),
     ] {
         let message =
@@ -334,7 +334,7 @@ fn textures_of_extensions_are_replaced_with_a_warning() {
     let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
     let uv = f.floats(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
     for (extension, way_out) in
-        [("KHR_texture_basisu", "ktxdecompress"), ("EXT_texture_webp", "gltf-transform png")]
+        [("KHR_texture_basisu", "ktxdecompress"), ("EXT_texture_avif", "gltf-transform png")]
     {
         let file = f
             .read(&format!(
@@ -351,6 +351,33 @@ fn textures_of_extensions_are_replaced_with_a_warning() {
         let told = &file.warnings[0];
         assert!(told.contains("`wall`") && told.contains(extension) && told.contains(way_out), "{told}");
     }
+}
+
+#[test]
+fn textures_in_webp_are_read_and_written_as_png() {
+    let mut webp = std::io::Cursor::new(Vec::new());
+    let image = image::RgbImage::from_pixel(2, 2, image::Rgb([9, 80, 200]));
+    image.write_to(&mut webp, image::ImageFormat::WebP).unwrap();
+    let webp = STANDARD.encode(webp.into_inner());
+
+    let mut f = Gltf::default();
+    let p = f.corners();
+    let i = f.accessor(&[0, 1, 2, 0, 2, 3], "SCALAR", 5121, 6, "");
+    let uv = f.floats(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+    let file = f
+        .read(&format!(
+            r#""extensionsUsed": ["EXT_texture_webp"], "extensionsRequired": ["EXT_texture_webp"],
+            "images": [{{"uri": "data:image/webp;base64,{webp}"}}],
+            "textures": [{{"extensions": {{"EXT_texture_webp": {{"source": 0}}}}}}],
+            "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
+            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": {p}, "TEXCOORD_0": {uv}}},
+            "indices": {i}, "material": 0}}]}}],
+            "nodes": [{{"mesh": 0}}]"#
+        ))
+        .unwrap();
+    let FaceColor::Texture(_, texture, _) = file.mesh.color_of(0) else { panic!() };
+    assert_eq!(texture.image.pixels(), [[9, 80, 200]; 4]);
+    assert_eq!((file.texture_files, file.warnings), (vec![None], vec![]));
 }
 
 #[test]
@@ -488,7 +515,10 @@ fn ply_files_of_other_libraries_with_the_columns_of_data_sets() {
     let of_faces = LabelElement::Face;
     type Labels = Option<(LabelElement, [Option<(&'static str, Vec<i64>)>; 2])>;
     let expected: [(&str, Labels); 6] = [
-        ("matterport_region.ply", Some((of_faces, [Some(("category_id", halves(|i| i - 1))), None]))),
+        (
+            "matterport_region.ply",
+            Some((of_faces, [Some(("category_id", halves(|i| i - 1))), Some(("segment_id", faces.clone()))])),
+        ),
         ("replica_semantic.ply", Some((of_faces, [None, Some(("object_id", halves(|i| i * 10)))]))),
         (
             "scannet_labels.ply",
@@ -526,11 +556,11 @@ fn ply_files_of_other_libraries_with_the_columns_of_data_sets() {
         assert!(file.warnings.is_empty(), "{name}: {:?}", file.warnings);
     }
 
-    // The numbers of segments and materials can be asked for.
-    let options = MeshOptions { instance_column: Some("segment_id".into()), ..MeshOptions::default() };
+    // The parts of the over-segmentation can be asked for.
+    let options = MeshOptions { instance_column: Some("material_id".into()), ..MeshOptions::default() };
     let file = read_mesh_with(&folder.join("matterport_region.ply"), UpAxis::Z, &options).unwrap();
     let Some(MeshLabels::Numbers { instance: Some(instance), class: Some(_), .. }) = file.labels else {
         panic!()
     };
-    assert_eq!(instance.values, faces);
+    assert_eq!(instance.values, [0; 12]);
 }

@@ -61,7 +61,7 @@ fn annotations_of_any_format_come_from_a_reader() {
         let error = Annotations::from_reader(cut, Path::new(name), &options).unwrap_err();
         assert_eq!(error.path(), Path::new(name), "{error}");
     }
-    let error = Annotations::from_reader(Cursor::new([]), Path::new("a.xyz"), &options).unwrap_err();
+    let error = Annotations::from_reader(Cursor::new([]), Path::new("a.fbx"), &options).unwrap_err();
     assert!(matches!(error, Error::Unsupported { .. }), "{error}");
 }
 

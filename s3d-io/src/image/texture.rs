@@ -1,4 +1,5 @@
-//! Decodes texture images, PNG and JPEG, to 8-bit colour.
+//! Decodes texture images to 8-bit colour: PNG and JPEG, which an export copies unchanged, and WebP, BMP, TGA
+//! and TIFF, which it writes as PNG.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -36,7 +37,8 @@ pub struct TextureFile {
 #[derive(Clone, Debug)]
 pub(crate) struct LoadedTexture {
     pub(crate) image: Raster<[u8; 3]>,
-    pub(crate) file: TextureFile,
+    /// `None` for a format that an export does not copy.
+    pub(crate) file: Option<TextureFile>,
 }
 
 /// Why an image is not decoded: a sentence that follows its name.
@@ -55,7 +57,7 @@ impl std::fmt::Display for TextureFault {
     }
 }
 
-/// Decodes a PNG or JPEG of any kind (gray, palette, with alpha, 16 bits) to 8-bit RGB. Alpha is dropped.
+/// Decodes an image of any kind (gray, palette, with alpha, 16 bits) to 8-bit RGB. Alpha is dropped.
 pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTexture, TextureFault> {
     let (format, extension, size) = size_of_texture(&bytes)?;
     // The decoders belong to other crates, and some panic on damaged images.
@@ -67,7 +69,8 @@ pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTextur
     if is_jpeg && let Some(what) = missing(encoded, &image) {
         return Err(TextureFault::Unreadable(what));
     }
-    Ok(LoadedTexture { image, file: TextureFile { extension, bytes } })
+    let file = extension.map(|extension| TextureFile { extension, bytes });
+    Ok(LoadedTexture { image, file })
 }
 
 fn decode(
@@ -96,17 +99,27 @@ fn decode(
     Ok(Raster::from_vec(width, height, rgb))
 }
 
-/// Returns the format, its extension, and the width and height, from the first bytes. The file can hold an
-/// image of this size.
-fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static str, [u32; 2]), TextureFault> {
-    let (format, extension) = match image::guess_format(bytes) {
-        Ok(ImageFormat::Png) => (ImageFormat::Png, "png"),
-        Ok(ImageFormat::Jpeg) => (ImageFormat::Jpeg, "jpg"),
-        Ok(other) => {
-            let message = format!("is a {} image; only PNG and JPEG are read", name_of(other));
+/// The format of a texture, the extension of its file if an export copies it, and its width and height.
+type Header = (ImageFormat, Option<&'static str>, [u32; 2]);
+
+/// Reads the first bytes of a texture. The file can hold an image of the size that they tell.
+fn size_of_texture(bytes: &[u8]) -> std::result::Result<Header, TextureFault> {
+    let guessed = image::guess_format(bytes).ok();
+    let (format, extension) = match guessed.or(is_tga(bytes).then_some(ImageFormat::Tga)) {
+        Some(ImageFormat::Png) => (ImageFormat::Png, Some("png")),
+        Some(ImageFormat::Jpeg) => (ImageFormat::Jpeg, Some("jpg")),
+        Some(format @ (ImageFormat::WebP | ImageFormat::Bmp | ImageFormat::Tga | ImageFormat::Tiff)) => {
+            (format, None)
+        }
+        Some(other) => {
+            let message = format!("is a {} image; {READ} are read", name_of(other));
             return Err(TextureFault::Unreadable(message));
         }
-        Err(_) => return Err(TextureFault::Unreadable("is no PNG or JPEG image".into())),
+        None if bytes.starts_with(b"\xABKTX") => {
+            let message = format!("is a KTX2 image, of the memory of a graphics card; {READ} are read");
+            return Err(TextureFault::Unreadable(message));
+        }
+        None => return Err(TextureFault::Unreadable(format!("is no image; {READ} are read"))),
     };
 
     let size = guarded(|| ImageReader::with_format(Cursor::new(bytes), format).into_dimensions());
@@ -132,6 +145,25 @@ fn size_of_texture(bytes: &[u8]) -> std::result::Result<(ImageFormat, &'static s
         return Err(TextureFault::Unreadable(message));
     }
     Ok((format, extension, [width, height]))
+}
+
+/// The formats, for messages.
+const READ: &str = "PNG, JPEG, WebP, BMP, TGA and TIFF";
+
+/// Returns whether the first bytes are the header of a TGA image, which has no name of its own: a map of
+/// colours or none, one of six types, its depth in bits, a width and a height.
+fn is_tga(bytes: &[u8]) -> bool {
+    let Some(&[_, map, kind, _, _, _, _, map_bits, _, _, _, _, w0, w1, h0, h1, bits, _]) =
+        bytes.first_chunk()
+    else {
+        return false;
+    };
+    let has_map = map == 1 && matches!(map_bits, 15 | 16 | 24 | 32) && matches!(kind, 1 | 9);
+    let has_colors = map == 0 && matches!(kind, 2 | 3 | 10 | 11);
+    (has_map || has_colors)
+        && matches!(bits, 8 | 15 | 16 | 24 | 32)
+        && [w0, w1] != [0; 2]
+        && [h0, h1] != [0; 2]
 }
 
 fn name_of(format: ImageFormat) -> &'static str {
@@ -243,7 +275,7 @@ pub(crate) mod tests {
         let image = DynamicImage::from(ImageBuffer::from_pixel(16, 16, Rgb([200u8, 100, 50])));
         image.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Jpeg).unwrap();
         let loaded = decode_texture(bytes.clone()).unwrap();
-        assert_eq!(loaded.file, TextureFile { extension: "jpg", bytes });
+        assert_eq!(loaded.file, Some(TextureFile { extension: "jpg", bytes }));
         assert!(
             loaded
                 .image
@@ -253,13 +285,27 @@ pub(crate) mod tests {
         );
     }
 
+    #[test]
+    fn textures_of_modellers_are_decoded_and_not_copied() {
+        let colors = [[200, 100, 50], [1, 2, 3]];
+        let image: DynamicImage =
+            ImageBuffer::from_fn(2, 1, |x, _| Rgb(if x == 0 { colors[0] } else { colors[1] })).into();
+        for format in [ImageFormat::WebP, ImageFormat::Bmp, ImageFormat::Tga, ImageFormat::Tiff] {
+            let mut bytes = Vec::new();
+            image.write_to(&mut Cursor::new(&mut bytes), format).unwrap();
+            let loaded = decode_texture(bytes).unwrap_or_else(|e| panic!("{format:?}: {e}"));
+            assert_eq!((loaded.image.into_vec(), loaded.file), (colors.to_vec(), None), "{format:?}");
+        }
+        assert!(fault_of(b"\xABKTX 20\xBB\r\n".to_vec()).contains("is a KTX2 image"));
+    }
+
     fn fault_of(bytes: Vec<u8>) -> String {
         decode_texture(bytes).unwrap_err().to_string()
     }
 
     #[test]
     fn what_is_no_image_is_refused() {
-        assert!(fault_of(b"v 0 0 0".to_vec()).contains("no PNG or JPEG"));
+        assert!(fault_of(b"v 0 0 0".to_vec()).contains("is no image; PNG, JPEG"));
         assert!(fault_of(b"GIF89a\x01\0\x01\0".to_vec()).contains("gif"));
         let mut cut = two_pixels([1; 3], [2; 3]);
         cut.truncate(cut.len() - 20);

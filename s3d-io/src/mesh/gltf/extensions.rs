@@ -10,9 +10,10 @@ use serde_json::{Map, Value};
 use std::path::Path;
 
 /// The extensions that are read, or change nothing that is read. [`HARMLESS_FAMILIES`] has more.
-const HARMLESS: [&str; 24] = [
+const HARMLESS: [&str; 25] = [
     // Read.
     "EXT_mesh_gpu_instancing",
+    "EXT_texture_webp",
     "KHR_mesh_quantization",
     "KHR_node_visibility",
     "KHR_texture_transform",
@@ -60,7 +61,7 @@ const GEOMETRY: [&str; 6] = [
 ];
 
 /// What the user can do about an extension that is not read.
-const WAYS_OUT: [(&str, &str); 9] = [
+const WAYS_OUT: [(&str, &str); 8] = [
     (
         "KHR_draco_mesh_compression",
         "export without Draco compression, or run `gltf-transform copy in.glb out.glb`",
@@ -77,7 +78,6 @@ const WAYS_OUT: [(&str, &str); 9] = [
         "KHR_texture_basisu",
         "export PNG or JPEG textures instead of KTX2, or run `gltf-transform ktxdecompress in.glb out.glb`",
     ),
-    ("EXT_texture_webp", "export PNG or JPEG textures, or run `gltf-transform png in.glb out.glb`"),
     ("EXT_texture_avif", "export PNG or JPEG textures, or run `gltf-transform png in.glb out.glb`"),
     ("CESIUM_RTC", "add its centre to the translation of the outermost nodes"),
     ("EXT_mesh_primitive_restart", "export lists of triangles, not strips"),

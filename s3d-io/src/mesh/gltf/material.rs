@@ -4,6 +4,7 @@ use crate::fs::quote::quote;
 use crate::image::texture::{LoadedTexture, TextureFault, TextureFile, Together, decode_texture};
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::extensions::way_out;
+use crate::mesh::gltf::scene::index_of;
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index, texture};
 use rayon::prelude::*;
@@ -129,7 +130,7 @@ impl GltfLooks {
                     multiplied(&loaded.image, factor)
                 };
                 self.textures.push(Texture { name: name.clone(), image, wrap });
-                self.files.push(is_plain.then(|| loaded.file.clone()));
+                self.files.push(loaded.file.clone().filter(|_| is_plain));
                 (self.textures.len() - 1) as u32
             });
             material.texture = Some(index);
@@ -205,13 +206,21 @@ fn texture_key(
         .root()
         .get(index)
         .ok_or_else(|| format!("texture {index} is not there"))?;
-    if texture.source.value() == u32::MAX as usize {
+    let webp = texture
+        .extensions
+        .as_ref()
+        .and_then(|e| e.others.get("EXT_texture_webp"));
+    let webp = webp
+        .and_then(|e| index_of(e.get("source")?))
+        .map(|image| image as usize);
+    let plain = Some(texture.source.value()).filter(|image| *image != u32::MAX as usize);
+    let Some(image) = plain.or(webp) else {
         let only = texture.extensions.iter().flat_map(|e| e.others.keys()).next();
         let only = only.map_or_else(String::new, |name| {
             format!(", only one for the extension {name}; {}", way_out(name))
         });
-        return Err(format!("texture {index} has no PNG or JPEG image{only}"));
-    }
+        return Err(format!("texture {index} has no image that is read{only}"));
+    };
 
     let sampler = match texture.sampler {
         Some(s) => Some(
@@ -224,7 +233,7 @@ fn texture_key(
     };
 
     let wrap = sampler.map_or([0; 2], |s| [s.wrap_s, s.wrap_t].map(wrap_number));
-    Ok(TextureKey { image: texture.source.value(), wrap, factor_bits: factor.map(f32::to_bits) })
+    Ok(TextureKey { image, wrap, factor_bits: factor.map(f32::to_bits) })
 }
 
 /// Returns an index into [`WRAPS`]. Unknown modes repeat, as the format does by default.

@@ -205,7 +205,7 @@ fn extension<'a>(node: &'a Node, name: &str) -> Option<&'a Value> {
 }
 
 /// Reads an index, even if the JSON writes it as a decimal fraction.
-fn index_of(value: &Value) -> Option<u32> {
+pub(crate) fn index_of(value: &Value) -> Option<u32> {
     let number = value
         .as_u64()
         .or_else(|| value.as_f64().filter(|v| v.fract() == 0.0).map(|v| v as u64))?;

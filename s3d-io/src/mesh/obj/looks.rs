@@ -106,13 +106,12 @@ impl ObjLooks {
                 // The last texture takes the image without a copy: most images have one texture.
                 let (pixels, file) = if more.is_empty() {
                     let pixels = std::mem::replace(&mut texture.image, Raster::from_vec(0, 0, Vec::new()));
-                    (pixels, std::mem::take(&mut texture.file.bytes))
+                    (pixels, texture.file.take())
                 } else {
-                    (texture.image.clone(), texture.file.bytes.clone())
+                    (texture.image.clone(), texture.file.clone())
                 };
                 self.textures.push(Texture { name: name.clone(), image: pixels, wrap });
-                self.files
-                    .push(Some(TextureFile { extension: texture.file.extension, bytes: file }));
+                self.files.push(file);
                 wraps.remove(0);
             }
         }

@@ -67,7 +67,7 @@ impl PlyLooks {
                     looks
                         .textures
                         .push(Texture { name, image: loaded.image, wrap: [Wrap::Repeat; 2] });
-                    looks.files.push(Some(loaded.file));
+                    looks.files.push(loaded.file);
                 }
                 Err(why) => {
                     warnings.push(format!("texture {} {why}; its faces are drawn without it", path.display()))
