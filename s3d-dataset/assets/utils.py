@@ -179,6 +179,13 @@ def read_votes(path):
         return {name: arrays[name] for name in arrays.files}
 
 
+def read_source_faces(path):
+    """source_faces.npz: files, the names of the files of the scan's mesh; and by face of rgb.obj, (F,) each: file, a place in
+    files, and face, the number there, from 0. So labels of the scan's own faces are `labels[source["face"]]`."""
+    with np.load(path) as arrays:
+        return {name: arrays[name] for name in arrays.files}
+
+
 def read_s3dis_room(folder, classes=CLASSES):
     """A room of the S3DIS tree: xyz (N, 3) metres, rgb (N, 3) 0..255, class (N,) as a place in classes, -1 for a word that is
     none of them and no clutter, instance (N,) from 1."""
@@ -406,6 +413,10 @@ def main():
             failures.append(f"area {area}: {name} has faces without vertices")
         if data.is_labelled and not set(materials) <= set(data.label_names):
             failures.append(f"area {area}: {name} has materials that are no labels")
+        if (folder / "source_faces.npz").exists():
+            source = read_source_faces(folder / "source_faces.npz")
+            if len(source["face"]) != len(faces) or source["file"].max(initial=0) >= len(source["files"]):
+                failures.append(f"area {area}: source_faces.npz has other faces than {name}")
         points = read_points(folder / "pointcloud.ply")
         if len(points) and points["label"].max() >= len(data.labels):
             failures.append(f"area {area}: pointcloud.ply has labels beyond the table")

@@ -9,8 +9,8 @@ use memchr::memchr_iter;
 use s3d_geom::Camera;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, PoseFile, ViewRecord,
-    read_face_votes, read_instances, read_labels, read_pose, read_views,
+    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, PoseFile, SourceFaces, ViewRecord,
+    read_face_votes, read_instances, read_labels, read_pose, read_source_faces, read_views,
 };
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_label::{LabelTable, Taxonomy};
@@ -134,6 +134,21 @@ impl DataSet {
         let votes = read_face_votes(self.files.checked(&path)?)?;
         self.fits(area, &path, votes.label.len())?;
         Ok(Some(votes))
+    }
+
+    /// Returns the file of the scan that each face of [`DataSet::mesh`] comes from, and its number there.
+    /// Returns `None` if the mesh came from no file, or the data set is of an earlier version.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn source_faces(&self, area: u32) -> Result<Option<SourceFaces>> {
+        let path = self.layout().source_faces_npz(area);
+        if !self.names(&path) {
+            return Ok(None);
+        }
+        let source = read_source_faces(self.files.checked(&path)?)?;
+        self.fits(area, &path, source.face.len())?;
+        Ok(Some(source))
     }
 
     /// Refuses a file whose number of faces is not the manifest's.

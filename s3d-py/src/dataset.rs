@@ -57,6 +57,9 @@ type VoteColumns<'py> = (
     Bound<'py, PyArray1<f32>>,
 );
 
+/// The names of files, and by face the file and the number in it.
+type SourceColumns<'py> = (Vec<String>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
+
 #[pymethods]
 impl DataSet {
     #[staticmethod]
@@ -188,6 +191,14 @@ impl DataSet {
                 PyArray1::from_vec(py, v.farthest_m),
             )
         }))
+    }
+
+    /// The file of the scan and the number in it of each face of the mesh: files, file, face; `None` if no
+    /// file told.
+    fn source_faces<'py>(&self, py: Python<'py>, area: u32) -> PyResult<Option<SourceColumns<'py>>> {
+        self.check_area(area)?;
+        let source = py.detach(|| self.data.source_faces(area)).map_err(|e| exception(&e))?;
+        Ok(source.map(|s| (s.files, PyArray1::from_vec(py, s.file), PyArray1::from_vec(py, s.face))))
     }
 
     /// The path of a file of an image, whether it exists or not.

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use s3d_geom::glam::Vec2;
 use s3d_geom::{Material, MeshParts, NO_INDEX, Raster, Texture, TriMesh, Wrap};
 use s3d_io::Error as FileError;
-use s3d_io::mesh::{LengthUnit, MeshFile, MeshOptions, MeshOrigin, UpAxis, read_mesh_with};
+use s3d_io::mesh::{LengthUnit, MeshFile, MeshLabels, MeshOptions, MeshOrigin, UpAxis, read_mesh_with};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -182,6 +182,11 @@ impl Mesh {
     }
 
     #[getter]
+    fn source_faces<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        PyArray1::from_slice(py, &self.file.source_faces)
+    }
+
+    #[getter]
     fn area(&self) -> f64 {
         self.mesh().total_area()
     }
@@ -209,7 +214,7 @@ impl Mesh {
 
     #[getter]
     fn has_labels(&self) -> bool {
-        self.file.labels.is_some()
+        self.file.labels.as_ref().is_some_and(MeshLabels::are_certain)
     }
 
     #[getter]

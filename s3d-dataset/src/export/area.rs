@@ -7,6 +7,7 @@ use crate::export::images::photographs::{self, WrittenPhotograph};
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
 use crate::export::input::area::AreaInput;
 use crate::export::input::pictures::Pictures;
+use crate::export::input::requested::name_of;
 use crate::export::labels::label_area::label_files;
 use crate::export::location::room_of;
 use crate::export::modality::{Channels, classes_of_labels, palette};
@@ -19,7 +20,7 @@ use crate::survey::annotated::{Annotated, SurveyedRoom};
 use crate::survey::candidate::Candidate;
 use crate::survey::labelled_area::LabelledArea;
 use s3d_geom::Density;
-use s3d_io::dataset::Domain;
+use s3d_io::dataset::{Domain, SourceFaces};
 use s3d_io::fs::create_dir;
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{MeshFile, TextureOut};
@@ -48,6 +49,9 @@ fn write_area_assets(
     if area.is_labelled {
         s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &label_of_face, &table.names())?;
     }
+    if let Some(source) = source_faces(area, file) {
+        s3d_io::dataset::write_source_faces(&layout.source_faces_npz(number), &source)?;
+    }
     meshes.end();
     ctx.check()?;
 
@@ -67,6 +71,19 @@ fn write_area_assets(
     sampling.end();
     account.unit_finished(UnitKind::Assets, number, None, &tally, started);
     Ok(())
+}
+
+/// Returns where each face of an area's mesh comes from. `None` for a mesh that no file holds.
+fn source_faces(area: &AreaInput, file: &MeshFile) -> Option<SourceFaces> {
+    if file.source_faces.is_empty() {
+        return None;
+    }
+    let mut source = SourceFaces { face: file.source_faces.clone(), ..SourceFaces::default() };
+    for (index, found) in file.sources.iter().enumerate() {
+        source.files.push(name_of(&area.path, &found.path));
+        source.file.resize(file.faces_of(index).end as usize, index as u32);
+    }
+    Some(source)
 }
 
 /// Writes the mesh with its textures. A texture that was used unchanged keeps the bytes of its file; any

@@ -6,7 +6,7 @@ use super::report::{OfFile, Report, Topic};
 use crate::record::manifest::{Manifest, XyzLoss};
 use crate::summary::Surface;
 use s3d_geom::TriMesh;
-use s3d_io::dataset::{Layout, read_face_votes};
+use s3d_io::dataset::{Layout, read_face_votes, read_source_faces};
 use s3d_io::fs::read_json;
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_label::{LabelId, fill_labels};
@@ -51,6 +51,7 @@ pub(crate) fn read_and_check(
     let file = read(layout, area, &colored, report)?;
     let faces = file.mesh.faces().len();
     check_manifest(layout, area, manifest, &file, report);
+    check_source_faces(&layout.source_faces_npz(area), faces, report);
 
     if !manifest.is_labelled() {
         let label_of_face = vec![0; faces];
@@ -112,6 +113,19 @@ fn check_manifest(layout: &Layout, area: u32, manifest: &Manifest, file: &MeshFi
     report.check(entry.xyz == loss, topic, &layout.manifest(), || {
         format!("area {area}: the loss of coordinates is {:?}, and that of its mesh {loss:?}", entry.xyz)
     });
+}
+
+/// Checks that each face comes from a face of the scan, in the scan's order. Data sets of earlier versions and
+/// meshes that no file held have no such list.
+fn check_source_faces(path: &Path, faces: usize, report: &Report) {
+    if !path.exists() {
+        return;
+    }
+    let Some(source) = report.read(Topic::Mesh, path, read_source_faces) else { return };
+    let told = source.face.len();
+    report.check(told == faces, MESH, path, || format!("{told} faces, and rgb.obj has {faces}"));
+    let order = source.file.iter().zip(&source.face);
+    report.check(order.is_sorted(), MESH, path, || "faces are not in the order of their files".to_owned());
 }
 
 /// Checks the surface without votes and without a label that the manifest tells.

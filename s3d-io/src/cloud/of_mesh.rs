@@ -79,7 +79,7 @@ impl FaceLabels {
 
         let (labels, faces) = match labels {
             MeshLabels::Names { labels, faces } => (labels, faces),
-            MeshLabels::Objects { objects, faces } => {
+            MeshLabels::Objects { objects, faces, .. } => {
                 of_tags(file, &ObjectTags { objects: &objects, faces: &faces }, options, &mut warnings)?
             }
             MeshLabels::Numbers { class, instance, .. } => {

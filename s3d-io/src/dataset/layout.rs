@@ -274,6 +274,11 @@ impl Layout {
         self.mesh_dir(area).join("votes.npz")
     }
 
+    /// `area_1/3d/source_faces.npz`: the file and the number in it of each face, for numpy.
+    pub fn source_faces_npz(&self, area: u32) -> PathBuf {
+        self.mesh_dir(area).join("source_faces.npz")
+    }
+
     /// `area_1/3d/rooms.json`: floor outline, m² and wall direction of each room.
     pub fn rooms_json(&self, area: u32) -> PathBuf {
         self.mesh_dir(area).join("rooms.json")
@@ -534,6 +539,7 @@ mod tests {
             layout.instances_json(1),
             layout.instances_npz(1),
             layout.votes_npz(1),
+            layout.source_faces_npz(1),
             layout.s3dis_area_dir(1),
             layout.labels_json(),
             layout.splits(),

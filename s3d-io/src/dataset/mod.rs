@@ -45,6 +45,8 @@ mod npz;
 #[cfg(feature = "dataset")]
 pub(crate) mod pose;
 #[cfg(feature = "dataset")]
+mod source_faces;
+#[cfg(feature = "dataset")]
 mod splits;
 #[cfg(feature = "dataset")]
 pub(crate) mod taxonomy;
@@ -73,6 +75,8 @@ pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, 
 pub use layout::{Frame, ImageName, Layout, PROFILES, image_stem, is_valid_room, is_valid_uuid};
 #[cfg(feature = "dataset")]
 pub use pose::{PoseFile, read_pose};
+#[cfg(feature = "dataset")]
+pub use source_faces::{SourceFaces, read_source_faces, read_source_faces_from, write_source_faces};
 #[cfg(feature = "dataset")]
 pub use splits::{Split, read_splits, write_image_list, write_splits};
 #[cfg(feature = "dataset")]

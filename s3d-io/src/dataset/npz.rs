@@ -122,6 +122,35 @@ pub(super) fn damaged(path: &Path, name: &str, e: &std::io::Error) -> Error {
     Error::format(path, format!("the array {name:?} is damaged: {e}"))
 }
 
+impl<R: Read + Seek> NpzReader<'_, R> {
+    /// Returns the texts of an array of type `<U…`.
+    pub(super) fn texts(&mut self, name: &str) -> Result<Vec<String>> {
+        let path = self.path;
+        let (header, mut values) = self.array(name)?;
+        let mut bytes = Vec::new();
+        values.read_to_end(&mut bytes).map_err(|e| damaged(path, name, &e))?;
+
+        // The type tells how many characters a text has at most.
+        let head = String::from_utf8_lossy(&header).into_owned();
+        let written = head.split_once("'<U").and_then(|(_, rest)| rest.split_once('\''));
+        let length = written
+            .and_then(|(length, _)| length.parse::<usize>().ok())
+            .unwrap_or(0);
+        let size = length.saturating_mul(4).max(4);
+        let count = (bytes.len() / size) as u64;
+        check_header(path, name, &header, &format!("<U{length}"), &[count])?;
+
+        let texts = bytes.chunks_exact(size).map(|text| {
+            let codes = text.as_chunks().0.iter().map(|code| u32::from_le_bytes(*code));
+            let codes = codes.take_while(|code| *code != 0);
+            codes
+                .map(|code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER))
+                .collect()
+        });
+        Ok(texts.collect())
+    }
+}
+
 /// Refuses an array of another type or shape.
 pub(super) fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, shape: &[u64]) -> Result<()> {
     if header == npy_header(kind, shape) {

@@ -123,6 +123,9 @@ fn has_objects(labels: &Option<MeshLabels>) -> bool {
 fn joined_objects(a: Labelled<'_>, b: Labelled<'_>) -> MeshLabels {
     let mut objects = Vec::new();
     let mut faces = Vec::new();
+    let are_names = [&a, &b]
+        .into_iter()
+        .all(|(labels, _)| labels.as_ref().is_none_or(|labels| !labels.are_certain()));
     for (labels, mesh) in [a, b] {
         let first = objects.len() as u32;
         let end = faces.len() + mesh.faces().len();
@@ -133,7 +136,7 @@ fn joined_objects(a: Labelled<'_>, b: Labelled<'_>) -> MeshLabels {
         // A mesh without labels.
         faces.resize(end, NO_INDEX);
     }
-    MeshLabels::Objects { objects, faces }
+    MeshLabels::Objects { objects, faces, are_names }
 }
 
 /// Joins the labels of two meshes. They stay vertex labels if neither mesh labels its faces. Files have

@@ -55,6 +55,8 @@ pub enum MeshLabels {
         objects: Vec<LabelledObject>,
         /// For each face its index into `objects`, or [`NO_INDEX`] if it belongs to none.
         faces: Vec<u32>,
+        /// Whether the words are the plain names of the file's parts, which may be any words.
+        are_names: bool,
     },
     /// A label of the data set for each face, as the published `semantic.obj` has them. Made by
     /// [`MeshLabels::from_materials`].
@@ -145,6 +147,11 @@ impl MeshLabels {
         Some((Self::Names { labels, faces }, warnings))
     }
 
+    /// Returns whether the file says labels on purpose. Plain names of parts may be labels too.
+    pub fn are_certain(&self) -> bool {
+        !matches!(self, Self::Objects { are_names: true, .. })
+    }
+
     /// Returns the part of the mesh that has labels.
     pub fn element(&self) -> LabelElement {
         match self {
@@ -174,7 +181,7 @@ impl MeshLabels {
     /// object with a number is this number, as a word. Names have no objects.
     pub(crate) fn into_objects(self, mesh: &TriMesh) -> (Vec<LabelledObject>, Vec<u32>) {
         let (class, instance) = match self.into_faces(mesh) {
-            Self::Objects { objects, faces } => return (objects, faces),
+            Self::Objects { objects, faces, .. } => return (objects, faces),
             Self::Names { .. } => return (Vec::new(), vec![NO_INDEX; mesh.faces().len()]),
             Self::Numbers { class, instance, .. } => (class, instance),
         };

@@ -132,6 +132,22 @@ class FaceVotes:
         return f"FaceVotes({int((self.label > 0).sum()):,} of {len(self.label):,} faces labelled)"
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class SourceFaces:
+    """Where each of the F faces of `DataSet.mesh` comes from. With labels of the faces of the scan's own file,
+    `labels[source.face]` are labels of the data set's faces."""
+
+    files: list[str]
+    """The files of the scan's mesh, named as in the manifest."""
+    file: npt.NDArray[np.uint32]
+    """(F,), the file of each face, as a place in `files`."""
+    face: npt.NDArray[np.uint32]
+    """(F,), its number in this file, from 0."""
+
+    def __repr__(self) -> str:
+        return f"SourceFaces({len(self.face):,} faces of {', '.join(self.files)})"
+
+
 class View:
     """A perspective view or panorama of a data set. Its modalities are registered pixel to pixel.
 
@@ -588,6 +604,11 @@ class DataSet(Sequence[View]):
         """Returns the votes of points for each face of `mesh(area)`; None without labels."""
         found = self._native.votes(self._area(area))
         return None if found is None else FaceVotes(*found)
+
+    def source_faces(self, area: int | None = None) -> SourceFaces | None:
+        """Returns the file and the number in it of each face of `mesh(area)`; None if no file held the mesh."""
+        found = self._native.source_faces(self._area(area))
+        return None if found is None else SourceFaces(*found)
 
     def instances(self, area: int | None = None) -> list[Instance]:
         """Returns the instances of an area, or of all areas, with their boxes. Empty without labels."""

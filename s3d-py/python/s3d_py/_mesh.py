@@ -139,6 +139,13 @@ class Mesh:
         return self._native.face_areas()
 
     @property
+    def source_faces(self) -> npt.NDArray[np.uint32]:
+        """(F,), the number of each face in its file, from 0: faces are left out, and polygons cut, when a file is
+        read. So `labels[mesh.source_faces]` are labels of `faces`. (0,) for a mesh from arrays.
+        """
+        return self._native.source_faces
+
+    @property
     def area(self) -> float:
         """The area of all faces, m²."""
         return self._native.area

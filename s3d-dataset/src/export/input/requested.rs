@@ -151,7 +151,7 @@ fn checksums<'a>(ctx: &Context, files: &[&'a PathBuf]) -> Result<Sums<'a>> {
 }
 
 /// The name of an input: its path from the folder of the scene that the user named, or else its last part.
-pub(super) fn name_of(scene: &Path, path: &Path) -> String {
+pub(crate) fn name_of(scene: &Path, path: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     match path.strip_prefix(folder) {
         Ok(below) if below.is_relative() && below.components().next().is_some() => slashed(below),

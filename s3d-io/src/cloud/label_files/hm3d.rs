@@ -107,7 +107,7 @@ pub(super) fn named(mesh: &TriMesh, list: &Path, warnings: &mut Vec<String>) -> 
             room: entry.region.map(|region| region.saturating_add(1)),
         })
         .collect();
-    Ok(MeshLabels::Objects { objects, faces })
+    Ok(MeshLabels::Objects { objects, faces, are_names: false })
 }
 
 /// Returns the object whose colour most places of a face have, or [`NO_INDEX`].

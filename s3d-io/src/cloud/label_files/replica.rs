@@ -89,7 +89,7 @@ pub(super) fn named(labels: &MeshLabels, mesh: &TriMesh, list: &Path) -> Result<
         })
     });
     let faces = faces.collect();
-    Ok(MeshLabels::Objects { objects, faces })
+    Ok(MeshLabels::Objects { objects, faces, are_names: false })
 }
 
 fn no_objects(list: &Path) -> Error {

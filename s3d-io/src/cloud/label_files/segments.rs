@@ -146,7 +146,7 @@ fn named_by<'g>(
         })
     });
     let faces = faces.collect();
-    Ok(MeshLabels::Objects { objects, faces })
+    Ok(MeshLabels::Objects { objects, faces, are_names: false })
 }
 
 fn no_objects(groups: &Path) -> Error {

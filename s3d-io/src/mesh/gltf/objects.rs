@@ -110,5 +110,5 @@ pub(crate) fn labels_of(document: &GltfDocument, node_of_face: &[u32]) -> Option
             })
         })
         .collect();
-    (!objects.is_empty()).then_some(MeshLabels::Objects { objects, faces })
+    (!objects.is_empty()).then_some(MeshLabels::Objects { objects, faces, are_names: !some_are_labelled })
 }
