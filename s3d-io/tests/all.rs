@@ -3,6 +3,7 @@
 
 mod feed;
 
+mod camera_lists;
 mod clouds;
 mod copyroom;
 mod findings;

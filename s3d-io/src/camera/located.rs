@@ -100,6 +100,14 @@ pub(crate) fn pose_from_extrinsics(camera_from_world: DMat3, translation: DVec3)
     pose_from_opencv(location, right, down, forward)
 }
 
+/// Returns the rotation around an axis by its length, radians.
+pub(crate) fn rotation_of_axis_angle(axis: DVec3) -> DQuat {
+    let angle_rad = axis.length();
+    let (sin, cos) = libm::sincos(0.5 * angle_rad);
+    let v = axis.try_normalize().unwrap_or(DVec3::ZERO) * sin;
+    DQuat::from_xyzw(v.x, v.y, v.z, cos)
+}
+
 /// Returns the rotation of a quaternion x y z w of any length. The error is a sentence.
 pub(crate) fn rotation(xyzw: [f64; 4]) -> std::result::Result<DQuat, String> {
     let q = DVec4::from_array(xyzw)

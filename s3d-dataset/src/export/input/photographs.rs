@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use s3d_geom::{Camera, CameraError, PhotoLens, Pose, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::camera::{
-    IntrinsicsError, PosedCamera, PosedCameras, ScanLocation, check_picture, read_picture_turn,
-    read_posed_cameras, uuid_from_name,
+    IntrinsicsError, PosedCamera, PosedCameras, ScanLocation, check_picture, read_photograph_cameras,
+    read_picture_turn, uuid_from_name,
 };
 use s3d_io::dataset::Frame;
 use s3d_io::scene::FrameSource;
@@ -122,15 +122,14 @@ impl Photographs {
     /// be.
     pub(crate) fn open(source: &FrameSource, area: u32, offset_m: DVec3) -> Result<Self> {
         let PosedCameras { cameras, untracked, files } =
-            read_posed_cameras(&source.path, &source.world_from_file)?;
+            read_photograph_cameras(&source.path, source.images.as_deref(), &source.world_from_file)?;
         let listed = cameras.len();
         let list = &source.path;
 
         let mut notes = Vec::new();
         if untracked > 0 {
             notes.push(format!(
-                "{}: {untracked} of {} photographs are left out: their poses are not known (they hold an \
-                 infinity)",
+                "{}: {untracked} of {} photographs are left out: the list does not know their poses",
                 list.display(),
                 listed + untracked
             ));
