@@ -288,8 +288,10 @@ class Dataset:
         """What frames.json tells of the photographs of an area: a dict each, with the Image of its view as "image"."""
         path = self.root / f"area_{area}" / "frames.json"
         records = read_json(path) if path.exists() else []
-        stem = "camera_{camera_uuid}_{room}_frame_0"
-        return [{**r, "image": Image(area, "data", stem.format(**r))} for r in records]
+        stem = "camera_{camera_uuid}_{room}_frame_"
+        of_view, of_panorama = ("data", stem + "0"), ("pano", stem + "equirectangular")
+        kinds = [of_panorama if r.get("panorama") else of_view for r in records]
+        return [{**r, "image": Image(area, kind, stem.format(**r))} for r, (kind, stem) in zip(records, kinds)]
 
     def mask(self, image):
         """Where an image has colours, (H, W) of bool: of a photograph all but what lies outside of it."""

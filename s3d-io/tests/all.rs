@@ -4,6 +4,7 @@
 mod feed;
 
 mod cloud_forms;
+mod camera_lists;
 mod clouds;
 mod copyroom;
 mod findings;

@@ -62,7 +62,8 @@
 //! # Colours from pictures
 //!
 //! A [`CubeMap`] holds the pictures taken at a place. It is made from a sky box, a panorama or overlapping
-//! captures ([`stitch()`]). [`picture_image`] colours hits from it instead of from textures.
+//! captures ([`stitch()`]). [`picture_image`] colours hits from it instead of from textures. [`undistort`]
+//! and [`level_panorama`] turn a single photograph into the image of a view.
 //!
 //! # Threads and processors
 //!
@@ -90,6 +91,7 @@ pub use edge_samples::sample_edges;
 pub use hits::{Hits, NO_FACE};
 pub use picture::cube_map::CubeMap;
 pub use picture::cube_sources::SkyBoxTurn;
+pub use picture::level_panorama::level_panorama;
 pub use picture::picture_color::{Unseen, picture_image, picture_image_into};
 pub use picture::stitch::{StitchOptions, capture::Capture, stitch};
 pub use picture::undistort::undistort;

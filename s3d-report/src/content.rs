@@ -177,7 +177,8 @@ impl<'a> Content<'a> {
             }
             for image in data.images(area) {
                 let key = (area, image.uuid.clone());
-                if !content.photographs.contains_key(&key) {
+                // A photograph that is a panorama is shown as a location.
+                if image.frame == Frame::Panorama || !content.photographs.contains_key(&key) {
                     rooms.insert(key, Some(image.room.clone()));
                 }
                 images.push(image);

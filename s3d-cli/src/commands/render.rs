@@ -23,8 +23,9 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true,
         required_unless_present = "poses")]
     pub(crate) at: Option<DVec3>,
-    /// Render all cameras of a list instead: transforms.json, a COLMAP model, ScanNet's pose folder, a TUM
-    /// trajectory, or a CSV table (name,x,y,z and a quaternion, look_x,look_y,look_z or yaw,pitch).
+    /// Render all cameras of a list instead: transforms.json, a COLMAP model, Metashape's cameras.xml,
+    /// folders of ScanNet, 3RScan or Polycam, a trajectory of ARKitScenes or TUM, or a CSV table (name,x,y,z
+    /// and a quaternion, look_x,look_y,look_z or yaw,pitch).
     #[arg(long, value_name = "FILE", conflicts_with_all = ["at", "yaw", "pitch", "pano", "size"])]
     pub(crate) poses: Option<PathBuf>,
     /// The axis of the list's frame that points up.

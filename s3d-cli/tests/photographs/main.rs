@@ -1,6 +1,7 @@
 //! Photographs with poses, there and back. Our own renderer takes the photographs in the built-in scene, ray
 //! by ray through lenses that bend. The views made of them must coincide with the views of the mesh.
 
+mod panoramas;
 mod studio;
 
 use crate::common;

@@ -93,8 +93,8 @@ pub(crate) fn compare(sides: &Sides) -> Result<Views> {
 
                 let options = data.options();
                 let size = match (kind, photograph) {
-                    (ImageKind::Panorama, _) => [options.pano_width, options.pano_width / 2],
                     (_, Some(record)) => [record.width, record.height],
+                    (ImageKind::Panorama, None) => [options.pano_width, options.pano_width / 2],
                     (_, None) => [options.size; 2],
                 };
 

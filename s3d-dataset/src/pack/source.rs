@@ -120,10 +120,10 @@ impl Source {
             .collect()
     }
 
-    /// The record of the photograph that an image is the view of.
+    /// The record of the photograph that an image shows.
     pub(crate) fn photograph(&self, image: &DatasetImage) -> Option<&PhotographRecord> {
         let record = self.photographs.get(&(image.area, image.uuid.clone()));
-        record.filter(|_| image.frame == Frame::View(0))
+        record.filter(|record| image.frame == record.frame())
     }
 
     /// The images of an area.

@@ -218,9 +218,7 @@ fn frames<'a>(poses: &Path, cameras: &'a [PosedCamera], given: &GivenIntrinsics)
 fn tell_of_list(ctx: &Context, cameras: &[PosedCamera], untracked: usize) {
     if untracked > 0 {
         let all = cameras.len() + untracked;
-        ctx.warn(format_args!(
-            "{untracked} of {all} poses are not known (they hold an infinity) and left out"
-        ));
+        ctx.warn(format_args!("{untracked} of {all} poses are not known and left out"));
     }
     let distorted = cameras.iter().filter(|camera| camera.is_distorted()).count();
     if distorted > 0 {

@@ -47,15 +47,17 @@ impl Photographs {
         photographs
     }
 
-    /// The record of an image, if it is the view of a photograph.
+    /// The record of an image, if it is that of a photograph.
     pub(crate) fn of(&self, image: &DatasetImage) -> Option<&PhotographRecord> {
         let record = self.by_camera.get(&(image.area, image.uuid.clone()))?;
-        (image.frame == Frame::View(0)).then_some(record)
+        (image.frame == record.frame()).then_some(record)
     }
 
-    /// The area and camera of each photograph.
-    pub(crate) fn cameras(&self) -> impl Iterator<Item = (u32, &str)> {
-        self.by_camera.keys().map(|(area, uuid)| (*area, uuid.as_str()))
+    /// The area, camera and frame of each photograph.
+    pub(crate) fn cameras(&self) -> impl Iterator<Item = (u32, &str, Frame)> {
+        self.by_camera
+            .iter()
+            .map(|((area, uuid), record)| (*area, uuid.as_str(), record.frame()))
     }
 
     /// The number of photographs in an area.

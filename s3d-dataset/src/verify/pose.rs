@@ -44,7 +44,7 @@ pub(crate) fn read_and_check(
     angles(&file, &checks);
 
     let pose = exact.unwrap_or_else(|| file.pose());
-    let camera = if is_photograph {
+    let camera = if is_photograph && image.frame != Frame::Panorama {
         photographs_camera(&file, pose, size, &checks)?
     } else {
         camera(&file, pose, image.frame, size, &checks)?

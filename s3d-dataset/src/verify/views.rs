@@ -178,6 +178,7 @@ impl Views {
                     let is_listed = self.draw_of(image).is_some() || photographs.of(image).is_some();
                     is_listed || !self.by_area.contains_key(&image.area)
                 }
+                Frame::Panorama if photographs.of(image).is_some() => true,
                 // Areas without candidates have no list of locations.
                 Frame::Panorama => locations
                     .get(&image.area)
@@ -239,7 +240,7 @@ impl Views {
         }
         photographs
             .cameras()
-            .for_each(|(area, uuid)| missing(area, uuid, Frame::View(0)));
+            .for_each(|(area, uuid, frame)| missing(area, uuid, frame));
     }
 }
 

@@ -5,7 +5,7 @@ use crate::camera::table::{FARTHEST_M, ScanLocation};
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use s3d_geom::Pose;
-use s3d_geom::glam::{DQuat, DVec3, DVec4};
+use s3d_geom::glam::{DMat3, DQuat, DVec3, DVec4};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -88,7 +88,24 @@ pub fn uuid_from_name(name: &str) -> String {
 /// Returns the pose of a camera at `location`, from the world directions of OpenCV's axes (x right, y down, z
 /// forward).
 pub(crate) fn pose_from_opencv(location: DVec3, right: DVec3, down: DVec3, forward: DVec3) -> Pose {
-    Pose { location, world_from_camera: s3d_geom::glam::DMat3::from_cols(right, -down, -forward) }
+    Pose { location, world_from_camera: DMat3::from_cols(right, -down, -forward) }
+}
+
+/// Returns the pose of a camera from the transform world → camera in OpenCV's axes.
+pub(crate) fn pose_from_extrinsics(camera_from_world: DMat3, translation: DVec3) -> Pose {
+    let world_from_camera = camera_from_world.transpose();
+    let location = -(world_from_camera * translation);
+    let [right, down, forward] =
+        [world_from_camera.x_axis, world_from_camera.y_axis, world_from_camera.z_axis];
+    pose_from_opencv(location, right, down, forward)
+}
+
+/// Returns the rotation around an axis by its length, radians.
+pub(crate) fn rotation_of_axis_angle(axis: DVec3) -> DQuat {
+    let angle_rad = axis.length();
+    let (sin, cos) = libm::sincos(0.5 * angle_rad);
+    let v = axis.try_normalize().unwrap_or(DVec3::ZERO) * sin;
+    DQuat::from_xyzw(v.x, v.y, v.z, cos)
 }
 
 /// Returns the rotation of a quaternion x y z w of any length. The error is a sentence.

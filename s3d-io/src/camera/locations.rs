@@ -1,10 +1,12 @@
 //! Scan locations, from any supported list of cameras.
 
 use crate::camera::matterport::{PictureFolder, read_matterport_locations};
+use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
-use crate::camera::table::{ScanLocation, read_cameras};
+use crate::camera::table::{ScanLocation, parse_cameras};
 use crate::camera::{colmap, located, nerfstudio, poses};
 use crate::error::{Error, Result};
+use crate::fs::open::read_file;
 use s3d_geom::Pose;
 use s3d_geom::glam::{DAffine3, DMat3};
 use std::path::{Path, PathBuf};
@@ -16,7 +18,8 @@ const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a
 
 /// Reads the scan locations of `path`, a file or a folder:
 ///
-/// - `.csv`, or any extension that is not named here: the table that [`read_cameras`] reads;
+/// - `.csv`, or any extension that is not named here: the table that
+///   [`read_cameras`](crate::camera::read_cameras) reads;
 /// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a
 ///   COLMAP model;
 /// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and related programs;
@@ -29,7 +32,7 @@ const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder that holds none of
-/// these.
+/// these, and for a file of another kind, which the message names.
 pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocation>> {
     if path.is_dir() {
         return read_folder(path, world_from_file);
@@ -41,7 +44,9 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
         return picture_locations(path, nerfstudio::read(path)?, world_from_file);
     }
 
-    let mut locations = read_cameras(path)?;
+    let bytes = read_file(path)?;
+    refuse_other_kind(path, &bytes)?;
+    let mut locations = parse_cameras(&bytes, path)?;
     locations
         .iter_mut()
         .for_each(|l| l.pose = moved(&l.pose, world_from_file));
@@ -168,6 +173,13 @@ mod tests {
         let message = read("empty").unwrap_err().to_string();
         assert!(message.contains("empty") && message.contains("images.txt"), "{message}");
         assert!(matches!(read("gone"), Err(Error::Io { .. })));
+        fs::write(at("scan.e57"), b"ASTM-E57\x01\0\0\0").unwrap();
+        assert!(
+            read("scan.e57")
+                .unwrap_err()
+                .to_string()
+                .contains("is a cloud of points (E57)")
+        );
     }
 
     #[test]

@@ -16,8 +16,9 @@
 //! origin, and a list has each uuid once.
 //!
 //! [`read_posed_cameras`] reads cameras as they are. Each [`PosedCamera`] has a pose, and the size, focal
-//! lengths and lens if the list tells them. It reads `transforms.json`, COLMAP models, ScanNet's poses,
-//! Polycam's keyframes, trajectories of TUM and tables.
+//! lengths and lens if the list tells them. It reads `transforms.json`, COLMAP models, Metashape's cameras,
+//! ScanNet's and 3RScan's poses, Polycam's keyframes, trajectories of ARKitScenes and TUM, and tables.
+//! [`read_photograph_cameras`] also takes the folder of the pictures.
 //!
 //! A [`PictureFolder`] finds the pictures of each location: raw captures ([`CaptureFile`], with lens and
 //! pose), sky boxes or panoramas. [`read_picture`] reads a PNG or JPEG file. Source: [`crate::formats`],
@@ -35,18 +36,22 @@
 //! # Ok::<(), s3d_io::Error>(())
 //! ```
 
+mod arkit;
 mod colmap;
 mod located;
 mod locations;
 mod matterport;
+mod metashape;
 mod nerfstudio;
 mod numbered;
+mod other_kind;
 mod picture;
 mod polycam;
 mod posed;
 mod posed_list;
 pub(crate) mod poses;
 mod scannet;
+mod sequence;
 mod table;
 mod tum;
 
@@ -58,6 +63,6 @@ pub use matterport::{
 };
 pub use picture::{check_picture, decode_picture, read_picture, read_picture_size, read_picture_turn};
 pub use posed::{Distortion, GivenIntrinsics, IntrinsicsError, Optics, PosedCamera};
-pub use posed_list::{PosedCameras, read_posed_cameras};
+pub use posed_list::{PosedCameras, read_photograph_cameras, read_posed_cameras};
 pub use poses::PublishedLocation;
 pub use table::{ScanLocation, parse_cameras, read_cameras};

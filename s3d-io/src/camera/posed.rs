@@ -127,8 +127,8 @@ pub enum IntrinsicsError {
         /// Width and height of the photograph.
         size: [u32; 2],
     },
-    /// A photograph has a lens, and a panorama has none.
-    #[error("it is a panorama: photographs need a camera with focal lengths")]
+    /// A panorama has no lens.
+    #[error("it is a panorama, which no lens took")]
     NoLens,
     /// No lens has these numbers.
     #[error(
@@ -252,6 +252,11 @@ impl PosedCamera {
         } else {
             Ok(size)
         }
+    }
+
+    /// Returns whether the picture is a panorama. It may be tilted.
+    pub fn is_panorama(&self) -> bool {
+        self.optics == Some(Optics::Equirectangular)
     }
 
     /// Returns whether a lens distorts the picture. [`camera`](Self::camera) leaves the distortion out.

@@ -1,8 +1,9 @@
 //! Cameras with poses, from any supported list.
 
 use crate::camera::locations::{has_transforms, is_colmap_images, moved};
+use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
-use crate::camera::{colmap, located, nerfstudio, polycam, scannet, table, tum};
+use crate::camera::{arkit, colmap, located, metashape, nerfstudio, polycam, scannet, sequence, table, tum};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
@@ -10,16 +11,18 @@ use s3d_geom::glam::DAffine3;
 use std::path::{Path, PathBuf};
 
 /// The supported forms, for messages.
-const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), a \
-                     folder of ScanNet's poses (pose/0.txt) or of Polycam's keyframes, a trajectory of lines \
-                     `timestamp tx ty tz qx qy qz qw`, or a CSV table";
+const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), \
+                     Metashape's cameras.xml, a folder of ScanNet's poses (pose/0.txt), of 3RScan's \
+                     (frame-000000.pose.txt) or of Polycam's keyframes, a trajectory of ARKitScenes \
+                     (lowres_wide.traj) or of lines `timestamp tx ty tz qx qy qz qw`, or a CSV table";
 
 /// The cameras of a list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PosedCameras {
     /// The cameras in the list's order; at least one.
     pub cameras: Vec<PosedCamera>,
-    /// The number of entries that were left out, because the list says that their pose is not known.
+    /// The number of pictures that were left out, because the list has no pose for them, or says that it is
+    /// not known.
     pub untracked: usize,
     /// The files that were read.
     pub files: Vec<PathBuf>,
@@ -42,7 +45,13 @@ struct ReadList {
 ///   COLMAP model, with the list of `cameras` beside it;
 /// - a folder with ScanNet's `pose/0.txt`, or that folder itself; `intrinsic/intrinsic_color.txt` and the
 ///   first picture in `color` give the optics and the size;
+/// - a folder with 3RScan's `sequence/frame-000000.pose.txt`, or that folder itself; `_info.txt` gives the
+///   optics and the size;
 /// - a folder with Polycam's `keyframes`, or that folder itself: the corrected cameras, if there are some;
+/// - `lowres_wide.traj` of ARKitScenes, or any other file of lines with seven numbers, or a folder that holds
+///   `lowres_wide.traj`: the pictures beside it, whose names have their times, each with its `.pincam`;
+/// - an XML file, or a folder that holds `cameras.xml`: the cameras of a Metashape chunk, whose sensors may
+///   be panoramas;
 /// - any other file whose first line has a comma: a table of scan locations (see
 ///   [`read_cameras`](crate::camera::read_cameras)), which may also have `width,height` and `fov` or
 ///   `fx,fy,cx,cy`;
@@ -53,9 +62,22 @@ struct ReadList {
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the place; [`Error::Unsupported`] for a folder that holds none of
-/// these.
+/// these, and for a file of another kind, which the message names.
 pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<PosedCameras> {
-    let ReadList { mut cameras, untracked, files, named: file } = read(path)?;
+    read_photograph_cameras(path, None, world_from_file)
+}
+
+/// Reads like [`read_posed_cameras`]. `images` is the folder of the pictures, if it is known: a trajectory of
+/// ARKitScenes gives each of them its pose.
+///
+/// # Errors
+/// Like [`read_posed_cameras`].
+pub fn read_photograph_cameras(
+    path: &Path,
+    images: Option<&Path>,
+    world_from_file: &DAffine3,
+) -> Result<PosedCameras> {
+    let ReadList { mut cameras, untracked, files, named: file } = read(path, images)?;
     cameras
         .iter_mut()
         .for_each(|camera| camera.pose = moved(&camera.pose, world_from_file));
@@ -65,7 +87,7 @@ pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<Pos
         .try_for_each(|camera| located::check_place(&file, camera))?;
     if cameras.is_empty() {
         let but = if untracked > 0 {
-            format!(" but {untracked} poses that are not known")
+            format!(" but {untracked} whose poses are not known")
         } else {
             String::new()
         };
@@ -75,9 +97,9 @@ pub fn read_posed_cameras(path: &Path, world_from_file: &DAffine3) -> Result<Pos
 }
 
 /// Reads the cameras of a list in its own frame.
-fn read(path: &Path) -> Result<ReadList> {
+fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
     if path.is_dir() {
-        return read_folder(path);
+        return read_folder(path, images);
     }
 
     let mut files = vec![path.to_owned()];
@@ -89,11 +111,19 @@ fn read(path: &Path) -> Result<ReadList> {
         nerfstudio::read_posed(path)?
     } else {
         let bytes = read_file(path)?;
+        refuse_other_kind(path, &bytes)?;
         let text = text_of(&bytes, path)?;
+        if metashape::is_xml(&text) {
+            return read_xml(path, &bytes);
+        }
         let mut lines = text.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
         let first = lines
             .find(|line| !line.is_empty() && !line.starts_with(b"#"))
             .unwrap_or_default();
+        if arkit::is_trajectory(first) {
+            let (cameras, untracked, files) = arkit::read(path, &text, images)?;
+            return Ok(ReadList { untracked, ..ReadList::of_files(cameras, files) });
+        }
         if first.contains(&b',') {
             table::read_rows(path, &bytes)?
         } else {
@@ -104,7 +134,13 @@ fn read(path: &Path) -> Result<ReadList> {
     Ok(ReadList::of_files(cameras, files))
 }
 
-fn read_folder(path: &Path) -> Result<ReadList> {
+/// Reads the cameras of a Metashape chunk.
+fn read_xml(path: &Path, bytes: &[u8]) -> Result<ReadList> {
+    let (cameras, untracked) = metashape::read(path, bytes)?;
+    Ok(ReadList { untracked, ..ReadList::of_files(cameras, vec![path.to_owned()]) })
+}
+
+fn read_folder(path: &Path, images: Option<&Path>) -> Result<ReadList> {
     if let Some(images) = colmap::find(path) {
         let (cameras, intrinsics) = colmap::read_posed(&images)?;
         return Ok(ReadList::of_files(cameras, vec![images, intrinsics]));
@@ -116,6 +152,17 @@ fn read_folder(path: &Path) -> Result<ReadList> {
     if let Some((scan, files)) = scannet::find(path)? {
         let (cameras, untracked, files) = scannet::read(&scan, files)?;
         return Ok(ReadList { cameras, untracked, files, named: path.to_owned() });
+    }
+    if let Some(files) = sequence::find(path)? {
+        let (cameras, untracked, files) = sequence::read(files)?;
+        return Ok(ReadList { cameras, untracked, files, named: path.to_owned() });
+    }
+    if let Some(trajectory) = arkit::find(path) {
+        return read(&trajectory, images);
+    }
+    let xml = path.join("cameras.xml");
+    if xml.is_file() {
+        return read(&xml, images);
     }
     if let Some((files, images)) = polycam::find(path)? {
         let (cameras, files) = polycam::read(files, &images)?;
@@ -142,7 +189,8 @@ mod tests {
     fn the_form_is_found_by_its_shape() {
         let dir = tempfile::tempdir().unwrap();
         let at = |p: &str| dir.path().join(p);
-        for folder in ["colmap/sparse/0", "scan/pose", "ns", "empty"] {
+        for folder in ["colmap/sparse/0", "scan/pose", "ns", "empty", "3rscan/sequence", "arkit", "metashape"]
+        {
             fs::create_dir_all(at(folder)).unwrap();
         }
         // Each looks along +Y from (1, 2, 3).
@@ -161,6 +209,15 @@ mod tests {
         fs::write(at("trajectory.txt"), format!("# time\n0.5 1 2 3 {} 0 0 {half}\n", -half)).unwrap();
         fs::write(at("table.txt"), "\n# a table\nname,x,y,z,yaw\nfirst,1,2,3,0\n").unwrap();
         fs::write(at("plain.csv"), "first,1,2,3,0,0,0,1\n").unwrap();
+        let pose = "1 0 0 1\n0 0 1 2\n0 -1 0 3\n0 0 0 1\n";
+        fs::write(at("3rscan/sequence/frame-000007.pose.txt"), pose).unwrap();
+        fs::write(at("arkit/lowres_wide.traj"), "0.5 1.5707963267948966 0 0 -1 3 -2\n").unwrap();
+        fs::write(at("trajectory.dat"), "# seven numbers\n0.5 1.5707963267948966 0 0 -1 3 -2\n").unwrap();
+        let sensor = "<sensor id=\"0\" type=\"spherical\"><resolution width=\"8\" height=\"4\"/></sensor>";
+        let camera =
+            format!("<camera sensor_id=\"0\" label=\"a.jpg\"><transform>{pose}</transform></camera>");
+        let chunk = format!("<chunk><sensors>{sensor}</sensors><cameras>{camera}</cameras></chunk>");
+        fs::write(at("metashape/cameras.xml"), format!("<document>{chunk}</document>")).unwrap();
 
         let read = |p: &str| read_posed_cameras(&at(p), &DAffine3::IDENTITY).unwrap();
         for (path, name) in [
@@ -172,6 +229,11 @@ mod tests {
             ("trajectory.txt", "0.5"),
             ("table.txt", "first"),
             ("plain.csv", "first"),
+            ("3rscan", "frame-000007"),
+            ("arkit", "0.5"),
+            ("trajectory.dat", "0.5"),
+            ("metashape", "a.jpg"),
+            ("metashape/cameras.xml", "a.jpg"),
         ] {
             let found = read(path);
             assert_eq!((found.cameras.len(), found.untracked), (1, usize::from(path == "scan")), "{path}");
@@ -185,7 +247,11 @@ mod tests {
         let message = |p: &str| read_posed_cameras(&at(p), &DAffine3::IDENTITY).unwrap_err().to_string();
         assert!(message("empty").contains("holds no list of cameras: cameras are a transforms.json"));
         fs::write(at("scan/pose/0.txt"), "-inf -inf -inf -inf\n".repeat(4)).unwrap();
-        assert!(message("scan").contains("lists no camera but 2 poses that are not known"));
+        assert!(message("scan").contains("lists no camera but 2 whose poses are not known"));
+        fs::write(at("cloud.csv"), b"ASTM-E57\x01\0\0\0").unwrap();
+        assert!(
+            message("cloud.csv").contains("cloud.csv: is a cloud of points (E57), not a list of cameras")
+        );
         fs::write(at("far.csv"), "name,x,y,z,yaw\nfirst,1e6,2,3,0\n").unwrap();
         let scaled = DAffine3::from_mat3(DMat3::from_diagonal(DVec3::splat(100.0)));
         let far = read_posed_cameras(&at("far.csv"), &scaled).unwrap_err().to_string();

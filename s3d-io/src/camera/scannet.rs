@@ -64,7 +64,7 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
 }
 
 /// Returns whether a matrix holds an infinity or NaN.
-fn is_unknown(bytes: &[u8]) -> bool {
+pub(crate) fn is_unknown(bytes: &[u8]) -> bool {
     let words = bytes
         .split(u8::is_ascii_whitespace)
         .filter_map(|word| std::str::from_utf8(word).ok());
@@ -73,23 +73,26 @@ fn is_unknown(bytes: &[u8]) -> bool {
         .any(|number| !number.is_finite())
 }
 
-/// Reads the optics from the intrinsic matrix K: a 3 × 3 matrix, or the upper left of a 4 × 4 matrix.
+/// Reads the optics from the file of an intrinsic matrix K.
 fn optics(path: &Path) -> Result<Optics> {
     let numbers: Vec<f64> = numbers(&read_file(path)?, path)?
         .into_iter()
         .map(|(_, number)| number)
         .collect();
-    let (fx, cx, fy, cy) = match *numbers.as_slice() {
+    optics_of_matrix(&numbers).map_err(|message| Error::format(path, message))
+}
+
+/// Returns the optics of an intrinsic matrix K: a 3 × 3 matrix, or the upper left of a 4 × 4 matrix. The
+/// error is a sentence.
+pub(crate) fn optics_of_matrix(numbers: &[f64]) -> std::result::Result<Optics, String> {
+    let (fx, cx, fy, cy) = match *numbers {
         [fx, 0.0, cx, _, 0.0, fy, cy, _, 0.0, 0.0, 1.0, ..] if numbers.len() == 16 => (fx, cx, fy, cy),
         [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] => (fx, cx, fy, cy),
-        _ => {
-            let message = "is no matrix of intrinsics: fx 0 cx 0, 0 fy cy 0, 0 0 1 0, 0 0 0 1";
-            return Err(Error::format(path, message));
-        }
+        _ => return Err("is no matrix of intrinsics: fx 0 cx 0, 0 fy cy 0, 0 0 1 0, 0 0 0 1".into()),
     };
 
     if fx <= 0.0 || fy <= 0.0 {
-        return Err(Error::format(path, format!("focal lengths of {fx} and {fy} px: both must be above 0")));
+        return Err(format!("focal lengths of {fx} and {fy} px: both must be above 0"));
     }
     let center_px = Some(dvec2(cx, cy));
     Ok(Optics::Pinhole { focal_px: dvec2(fx, fy), center_px, distortion: Distortion::None })

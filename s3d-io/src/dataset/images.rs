@@ -158,8 +158,8 @@ pub fn read_views(path: &Path) -> Result<Vec<ViewRecord>> {
     read_json(path)
 }
 
-/// A photograph that became a view, in `frames.json`. The fields have the names of the file's keys. The view
-/// is [`Frame::View`] 0 of its own camera.
+/// A photograph that became a view or a panorama, in `frames.json`. The fields have the names of the file's
+/// keys. The view is [`Frame::View`] 0 of its own camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhotographRecord {
     /// The view's camera. It follows from the number of the area and the name.
@@ -181,6 +181,21 @@ pub struct PhotographRecord {
     pub agreement: Option<f64>,
     /// The agreement of photograph and mesh when they are displaced against each other: what chance gives.
     pub chance: Option<f64>,
+    /// Whether the photograph is a panorama. The file has the key for panoramas alone.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub panorama: bool,
+}
+
+impl PhotographRecord {
+    /// Returns the frame of the photograph's image.
+    pub fn frame(&self) -> Frame {
+        if self.panorama { Frame::Panorama } else { Frame::View(0) }
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// Reads `area_N/frames.json`.
@@ -303,6 +318,9 @@ mod tests {
         write_bytes(&path, text.as_bytes()).unwrap();
         let records = read_photographs(&path).unwrap();
         assert_eq!((records[0].agreement, records[0].chance, records[0].masked), (Some(0.5), None, 0.25));
+        assert_eq!(records[0].frame(), Frame::View(0));
+        write_bytes(&path, text.replace("\"seen\"", "\"panorama\": true, \"seen\"").as_bytes()).unwrap();
+        assert_eq!(read_photographs(&path).unwrap()[0].frame(), Frame::Panorama);
         write_bytes(&path, text.replace("\"a\"", "\"../a\"").as_bytes()).unwrap();
         assert!(
             read_photographs(&path)

@@ -196,10 +196,10 @@ fn cameras(dir: &Path, data: &[u8]) {
     }
 }
 
-/// Cameras with intrinsics: a table, COLMAP's cameras as text and binary, a transforms.json, a trajectory, a
-/// pose and intrinsics of ScanNet.
+/// Cameras with intrinsics: a table, COLMAP's cameras as text and binary, a transforms.json, a trajectory or
+/// XML, a pose and intrinsics of ScanNet, intrinsics of ARKitScenes and of 3RScan.
 fn posed_cameras(dir: &Path, data: &[u8]) {
-    let (which, data) = choice(data, 7);
+    let (which, data) = choice(data, 9);
     let folder = |name: &str| {
         let folder = dir.join(name);
         fs::create_dir_all(&folder).expect("the folder can be written");
@@ -230,6 +230,18 @@ fn posed_cameras(dir: &Path, data: &[u8]) {
             file(dir, "transforms.json", data)
         }
         4 => file(dir, "trajectory.txt", data),
+        7 => {
+            file(&folder("video/wide"), "1_0.5.png", b"");
+            file(&folder("video/wide_intrinsics"), "1_0.5.pincam", data);
+            file(&dir.join("video"), "lowres_wide.traj", b"0.5 0 0 0 1 2 3\n");
+            dir.join("video")
+        }
+        8 => {
+            let sequence = folder("sequence");
+            file(&sequence, "frame-000000.pose.txt", b"1 0 0 1\n0 0 1 2\n0 -1 0 3\n0 0 0 1\n");
+            file(&sequence, "_info.txt", data);
+            sequence
+        }
         _ => {
             let pose = folder("pose");
             let intrinsics = folder("intrinsic").join("intrinsic_color.txt");

@@ -3,13 +3,15 @@
 use crate::error::{Error, Result};
 use glam::DVec3;
 use rayon::prelude::*;
-use s3d_geom::{Camera, PhotoLens};
+use s3d_geom::{Camera, CameraError, PhotoLens, Pose, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::camera::{
-    IntrinsicsError, PosedCamera, PosedCameras, ScanLocation, check_picture, read_picture_turn,
-    read_posed_cameras, uuid_from_name,
+    IntrinsicsError, PosedCamera, PosedCameras, ScanLocation, check_picture, read_photograph_cameras,
+    read_picture_turn, uuid_from_name,
 };
+use s3d_io::dataset::Frame;
 use s3d_io::scene::FrameSource;
+use s3d_render::{level_panorama, undistort};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -18,6 +20,9 @@ const MAX_NAMED: usize = 20;
 
 /// The endings that a name in a list may lack.
 const ENDINGS: [&str; 6] = ["jpg", "png", "jpeg", "JPG", "PNG", "JPEG"];
+
+/// The frame of a photograph's view, the only view of its camera.
+const VIEW: Frame = Frame::View(0);
 
 /// An area's photographs.
 #[derive(Default)]
@@ -42,10 +47,71 @@ pub(crate) struct Photograph {
     /// The uuid of its view's camera.
     pub(crate) uuid: String,
     pub(crate) picture: PathBuf,
-    /// The lens that it was taken through, in its own pixels.
-    pub(crate) lens: PhotoLens,
-    /// The pinhole camera of its view.
+    pub(crate) taken: Taken,
+    /// The camera of its view: a pinhole, or a panorama.
     pub(crate) camera: Camera,
+}
+
+/// How a photograph was taken.
+#[derive(Clone, Debug)]
+pub(crate) enum Taken {
+    /// Through a lens, in the photograph's own pixels.
+    Lens(PhotoLens),
+    /// As a panorama, which may be tilted.
+    Panorama {
+        /// Width and height of the photograph.
+        size: [u32; 2],
+        pose: Pose,
+    },
+}
+
+impl Taken {
+    /// Finds out how `posed` was taken. The photograph has `size` pixels.
+    fn of(posed: &PosedCamera, offset_m: DVec3, size: [u32; 2]) -> Result<Self, IntrinsicsError> {
+        if !posed.is_panorama() {
+            return posed.photo_lens(size).map(Self::Lens);
+        }
+
+        let [width, height] = size;
+        if width.abs_diff(height.saturating_mul(2)) > 1 || width < 2 {
+            return Err(IntrinsicsError::PanoramaSize { width, height });
+        }
+        let mut pose = posed.pose;
+        pose.location -= offset_m;
+        Ok(Self::Panorama { size, pose })
+    }
+
+    /// The width and height of the photograph.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        match self {
+            Self::Lens(lens) => lens.size(),
+            Self::Panorama { size, .. } => *size,
+        }
+    }
+
+    /// The frame of the photograph's image.
+    pub(crate) fn frame(&self) -> Frame {
+        match self {
+            Self::Lens(_) => VIEW,
+            Self::Panorama { .. } => Frame::Panorama,
+        }
+    }
+
+    /// A camera of about this width for the photograph's image. Panoramas are level, and their width is even.
+    pub(crate) fn camera(&self, pose: Pose, width: u32) -> Result<Camera, CameraError> {
+        match self {
+            Self::Lens(lens) => lens.pinhole(pose, width),
+            Self::Panorama { .. } => Ok(Camera::equirectangular(pose.leveled(), (width - width % 2).max(2))),
+        }
+    }
+
+    /// The colours of the photograph as `camera` sees them.
+    pub(crate) fn colors(&self, photo: &Raster<[u8; 3]>, camera: &Camera) -> Raster<[u8; 3]> {
+        match self {
+            Self::Lens(lens) => undistort(photo, lens, camera),
+            Self::Panorama { pose, .. } => level_panorama(photo, pose, camera),
+        }
+    }
 }
 
 impl Photographs {
@@ -56,15 +122,14 @@ impl Photographs {
     /// be.
     pub(crate) fn open(source: &FrameSource, area: u32, offset_m: DVec3) -> Result<Self> {
         let PosedCameras { cameras, untracked, files } =
-            read_posed_cameras(&source.path, &source.world_from_file)?;
+            read_photograph_cameras(&source.path, source.images.as_deref(), &source.world_from_file)?;
         let listed = cameras.len();
         let list = &source.path;
 
         let mut notes = Vec::new();
         if untracked > 0 {
             notes.push(format!(
-                "{}: {untracked} of {} photographs are left out: their poses are not known (they hold an \
-                 infinity)",
+                "{}: {untracked} of {} photographs are left out: the list does not know their poses",
                 list.display(),
                 listed + untracked
             ));
@@ -224,7 +289,7 @@ fn with_ending(path: &Path) -> Option<PathBuf> {
     names.into_iter().find(|path| path.is_file())
 }
 
-/// Opens a photograph with its lens and the camera of its view. Returns its EXIF orientation too.
+/// Opens a photograph, and makes the camera of its view. Returns its EXIF orientation too.
 fn open_one(
     source: &FrameSource,
     area: u32,
@@ -235,7 +300,7 @@ fn open_one(
     let (width, height) = check_picture(&picture)?;
     let turn = read_picture_turn(&picture)?;
 
-    let lens = posed.photo_lens([width, height]).map_err(|e| match e {
+    let taken = Taken::of(posed, offset_m, [width, height]).map_err(|e| match e {
         IntrinsicsError::NoOptics => camera_error(
             &source.path,
             posed,
@@ -255,19 +320,21 @@ fn open_one(
             );
             FileError::format(&picture, message).into()
         }
-        IntrinsicsError::OtherSize { .. } => FileError::format(&picture, e.to_string()).into(),
+        IntrinsicsError::OtherSize { .. } | IntrinsicsError::PanoramaSize { .. } => {
+            FileError::format(&picture, e.to_string()).into()
+        }
         _ => camera_error(&source.path, posed, e.to_string()),
     })?;
 
     let mut pose = posed.pose;
     pose.location -= offset_m;
-    let camera = lens
-        .pinhole(pose, source.width.unwrap_or(width))
+    let camera = taken
+        .camera(pose, source.width.unwrap_or(width))
         .map_err(|e| camera_error(&source.path, posed, e.to_string()))?;
 
     let name = posed.name.clone();
     let uuid = uuid_from_name(&format!("area_{area}/{name}"));
-    Ok((Photograph { name, uuid, picture, lens, camera }, turn))
+    Ok((Photograph { name, uuid, picture, taken, camera }, turn))
 }
 
 #[cfg(test)]

@@ -1,5 +1,8 @@
 //! The cameras of a COLMAP model: `cameras.txt` or `cameras.bin`. Source: COLMAP's documentation, "Output
-//! Format" and "Camera Models".
+//! Format" and "Camera Models"; for models after the first twelve, colmap/colmap, src/colmap/sensor/models.h.
+//!
+//! An `EQUIRECTANGULAR` camera has its width and height as parameters. Its columns are azimuths that grow to
+//! the right, and its centre column looks along the camera's forward axis, as in our panoramas.
 
 use crate::camera::colmap::take;
 use crate::camera::posed::{Distortion, Optics};
@@ -14,7 +17,7 @@ use std::path::{Path, PathBuf};
 pub(crate) type Intrinsics = ([u32; 2], Optics);
 
 /// The camera models of COLMAP, in the order of their numbers: the name, and the number of parameters.
-const MODELS: [(&str, usize); 12] = [
+const MODELS: [(&str, usize); 18] = [
     ("SIMPLE_PINHOLE", 3),
     ("PINHOLE", 4),
     ("SIMPLE_RADIAL", 4),
@@ -27,7 +30,16 @@ const MODELS: [(&str, usize); 12] = [
     ("RADIAL_FISHEYE", 5),
     ("THIN_PRISM_FISHEYE", 12),
     ("RAD_TAN_THIN_PRISM_FISHEYE", 16),
+    ("SIMPLE_DIVISION", 4),
+    ("DIVISION", 5),
+    ("SIMPLE_FISHEYE", 3),
+    ("FISHEYE", 4),
+    ("EUCM", 6),
+    ("EQUIRECTANGULAR", 2),
 ];
+
+/// The name that `EQUIRECTANGULAR` had before COLMAP took it.
+const EARLIER_PANORAMA: &str = "SPHERICAL";
 
 /// Returns the list of cameras beside a list of images, and its cameras by their numbers.
 pub(crate) fn read_beside(images: &Path) -> Result<(PathBuf, HashMap<u32, Intrinsics>)> {
@@ -123,6 +135,11 @@ fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Resu
         return Err(format!("a picture of {width} × {height} pixels"));
     }
 
+    let model = if model == EARLIER_PANORAMA {
+        "EQUIRECTANGULAR"
+    } else {
+        model
+    };
     let known = MODELS.iter().find(|(name, _)| *name == model);
     let (_, count) =
         known.ok_or_else(|| format!("{} is no camera model of COLMAP", quote(model.as_bytes())))?;
@@ -153,6 +170,15 @@ fn intrinsics(model: &str, size: [u32; 2], numbers: &[f64]) -> std::result::Resu
         }
         ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => {
             pinhole([f, f], [cx, cy], Distortion::Fisheye([k1, k2, 0.0, 0.0]))
+        }
+        ("SIMPLE_FISHEYE", &[f, cx, cy]) => pinhole([f, f], [cx, cy], Distortion::Fisheye([0.0; 4])),
+        ("FISHEYE", &[fx, fy, cx, cy]) => pinhole([fx, fy], [cx, cy], Distortion::Fisheye([0.0; 4])),
+        ("EQUIRECTANGULAR", &[w, h]) if [w, h] == size.map(f64::from) => Optics::Equirectangular,
+        ("EQUIRECTANGULAR", &[w, h]) => {
+            return Err(format!(
+                "a panorama of {w} × {h} pixels in a picture of {width} × {height}: only whole panoramas \
+                 are supported"
+            ));
         }
         _ => {
             return Err(format!(
@@ -185,7 +211,9 @@ mod tests {
                        3 SIMPLE_RADIAL 640 480 500 320 240 0.1\r\n4 RADIAL 640 480 500 320 240 0.1 -0.2\n\
                        5 OPENCV 640 480 500 510 320 240 0.1 -0.2 0.003 0.004\n\
                        6 OPENCV_FISHEYE 640 480 500 510 320 240 0.1 -0.2 0.03 0.04\n\
-                       7 RADIAL 640 480 500 320 240 0 0\n";
+                       7 RADIAL 640 480 500 320 240 0 0\n\
+                       8 SIMPLE_FISHEYE 640 480 500 320 240\n9 FISHEYE 640 480 500 510 320 240\n\
+                       10 EQUIRECTANGULAR 512 256 512 256\n";
 
     /// Returns the cameras of `text` in binary.
     fn binary(text: &str) -> Vec<u8> {
@@ -215,7 +243,7 @@ mod tests {
                 panic!("camera {id}")
             };
             assert_eq!(center_px, Some(dvec2(320.0, 240.0)));
-            assert_eq!(focal_px, dvec2(500.0, if [1, 5, 6].contains(&id) { 510.0 } else { 500.0 }));
+            assert_eq!(focal_px, dvec2(500.0, if [1, 5, 6, 9].contains(&id) { 510.0 } else { 500.0 }));
             distortion
         };
         assert_eq!([1, 2, 7].map(distortion), [Distortion::None; 3]);
@@ -223,6 +251,10 @@ mod tests {
         assert_eq!(distortion(4), Distortion::OpenCv([0.1, -0.2, 0.0, 0.0, 0.0]));
         assert_eq!(distortion(5), Distortion::OpenCv([0.1, -0.2, 0.003, 0.004, 0.0]));
         assert_eq!(distortion(6), Distortion::Fisheye([0.1, -0.2, 0.03, 0.04]));
+        assert_eq!([8, 9].map(distortion), [Distortion::Fisheye([0.0; 4]); 2]);
+        assert_eq!(text[&10], ([512, 256], Optics::Equirectangular));
+        let earlier = read_text(Path::new("cameras.txt"), b"10 SPHERICAL 512 256 512 256\n").unwrap();
+        assert_eq!(earlier[&10], text[&10]);
     }
 
     #[test]
@@ -235,6 +267,8 @@ mod tests {
             ("1 PINHOLE 640 480 500 -510 320 240", "line 2: focal lengths of 500 and -510"),
             ("1 FISHY 640 480 500", "line 2: `FISHY` is no camera model"),
             ("1 FOV 640 480 500 500 320 240 0.9", "line 2: the camera model FOV is not supported"),
+            ("1 EUCM 640 480 500 500 320 240 0.5 1", "line 2: the camera model EUCM is not supported"),
+            ("1 EQUIRECTANGULAR 512 256 400 256", "line 2: a panorama of 400 × 256 pixels in a picture"),
             ("1 PINHOLE 640", "line 2: `1 PINHOLE 640`: a camera is"),
             ("9 PINHOLE 640 480 500 510 320 240", "line 2: there is a camera 9 already"),
         ] {

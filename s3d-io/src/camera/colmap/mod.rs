@@ -8,7 +8,7 @@
 
 mod cameras;
 
-use crate::camera::located::{fault, pose_from_opencv, rotation};
+use crate::camera::located::{fault, pose_from_extrinsics, rotation};
 use crate::camera::posed::PosedCamera;
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
@@ -192,11 +192,8 @@ fn pose([qw, qx, qy, qz, tx, ty, tz]: [f64; 7]) -> std::result::Result<Pose, Str
     if ![qw, qx, qy, qz, tx, ty, tz].iter().all(|v| v.is_finite()) {
         return Err("a number of its pose is not finite".into());
     }
-    let world_from_camera = DMat3::from_quat(rotation([qx, qy, qz, qw])?).transpose();
-    let location = -(world_from_camera * DVec3::new(tx, ty, tz));
-    let [right, down, forward] =
-        [world_from_camera.x_axis, world_from_camera.y_axis, world_from_camera.z_axis];
-    Ok(pose_from_opencv(location, right, down, forward))
+    let camera_from_world = DMat3::from_quat(rotation([qx, qy, qz, qw])?);
+    Ok(pose_from_extrinsics(camera_from_world, DVec3::new(tx, ty, tz)))
 }
 
 #[cfg(test)]
@@ -284,6 +281,41 @@ mod tests {
             .err()
             .unwrap();
         assert!(message.to_string().contains("line 2: `1.5 2.5 -1 3`: a picture is"), "{message}");
+    }
+
+    /// The same places in a panorama by COLMAP's formulas, written out again, and by ours.
+    #[test]
+    fn panoramas_have_the_axes_of_colmap() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        // Level, and looking along +X: the world's −Y is right, its −Z down.
+        let level = "1 0.5 0.5 -0.5 0.5 2 1.5 -0.3 1 pano.png\n";
+        std::fs::write(at("images.txt"), level).unwrap();
+        std::fs::write(at("cameras.txt"), "1 EQUIRECTANGULAR 512 256 512 256\n").unwrap();
+        for ignored in ["rigs.txt", "frames.txt"] {
+            std::fs::write(at(ignored), "1 1 CAMERA 1\n").unwrap();
+        }
+
+        let (cameras, _) = read_posed(&at("images.txt")).unwrap();
+        let camera = cameras[0].camera(&Default::default()).unwrap();
+        assert!(camera.is_panorama() && (camera.width, camera.height) == (512, 256));
+        let camera_from_world = DMat3::from_quat(DQuat::from_xyzw(0.5, -0.5, 0.5, 0.5));
+        assert!(
+            camera
+                .pose
+                .forward()
+                .abs_diff_eq(camera_from_world.transpose() * DVec3::Z, 1e-12)
+        );
+
+        for direction in [DVec3::X, -DVec3::Y, DVec3::new(1.0, 2.0, 3.0), DVec3::new(-4.0, 1.0, -2.0)] {
+            let v = camera_from_world * direction;
+            let theta = libm::atan2(v.x, v.z);
+            let phi = libm::atan2(-v.y, libm::hypot(v.x, v.z));
+            let turn = std::f64::consts::TAU;
+            let expected = [(theta / turn + 0.5) * 512.0, (0.5 - phi / (0.5 * turn)) * 256.0];
+            let (pixel, _) = camera.project(camera.pose.location + direction).unwrap();
+            assert!(pixel.abs_diff_eq(expected.into(), 1e-9), "{direction}: {pixel} {expected:?}");
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@
 use crate::export::input::photographs::Photograph;
 use glam::DVec3;
 use s3d_geom::{Camera, Raster};
-use s3d_render::{Caster, Hits, MipMaps, NO_FACE, Scene, rgb_image, undistort};
+use s3d_render::{Caster, Hits, MipMaps, NO_FACE, Scene, rgb_image};
 
 /// Pixels of the longer side.
 const SIDE: u32 = 384;
@@ -47,7 +47,7 @@ impl Agreement {
         textures: &MipMaps,
     ) -> Self {
         let camera = small(photograph);
-        let seen = undistort(photo, &photograph.lens, &camera);
+        let seen = photograph.taken.colors(photo, &camera);
         let mut hits = Hits::default();
         Caster::new(scene).cast_into(&camera, 1, &mut hits);
         let shown = rgb_image(scene, textures, &hits, &camera);
@@ -94,7 +94,7 @@ fn small(photograph: &Photograph) -> Camera {
     let Camera { pose, width, height, .. } = photograph.camera;
     let wanted = f64::from(SIDE) * f64::from(width) / f64::from(width.max(height));
     let width = width.min((wanted.round() as u32).max(1));
-    photograph.lens.pinhole(pose, width).unwrap_or(photograph.camera)
+    photograph.taken.camera(pose, width).unwrap_or(photograph.camera)
 }
 
 /// The luma of sRGB pixels, 0 to 1, as ITU-R BT.601 defines it.

@@ -20,11 +20,8 @@ use s3d_io::Error as FileError;
 use s3d_io::camera::read_picture;
 use s3d_io::dataset::{Domain, Frame, PhotographRecord};
 use s3d_label::Room;
-use s3d_render::{Caster, Hits, NO_FACE, Scene, undistort};
+use s3d_render::{Caster, Hits, NO_FACE, Scene};
 use std::time::Instant;
-
-/// The frame of a photograph's view, the only view of its camera.
-pub(crate) const VIEW: Frame = Frame::View(0);
 
 /// A photograph whose view is to be written.
 pub(crate) struct Shot<'a> {
@@ -75,13 +72,13 @@ pub(crate) fn write_photograph(
     let started = Instant::now();
     let Memory { caster, hits, buffers } = memory;
     let Shot { photograph, room } = shot;
-    let Photograph { name, uuid, picture, lens, camera } = photograph;
+    let Photograph { name, uuid, picture, taken, camera } = photograph;
     let room = room_name(*room);
-    let writer = ImageWriter { job, uuid, room: &room, frame: VIEW };
+    let frame = taken.frame();
+    let writer = ImageWriter { job, uuid, room: &room, frame };
 
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
-    let mut tally =
-        UnitTally { views: ImageTally { images: 1, ..ImageTally::default() }, ..UnitTally::default() };
+    let mut of_image = ImageTally { images: 1, ..ImageTally::default() };
     let mut files = Vec::new();
     let mut agreement = Agreement::default();
     let mut masked = 0.0;
@@ -90,12 +87,12 @@ pub(crate) fn write_photograph(
     // Poses alone need no photograph.
     if !images.is_empty() {
         let photo = read_picture(picture)?;
-        if [photo.width(), photo.height()] != lens.size() {
+        if [photo.width(), photo.height()] != taken.size() {
             return Err(FileError::format(picture, "has another size than when the export began").into());
         }
 
         agreement = Agreement::of(&photo, photograph, job.channels.scene, job.channels.textures);
-        let colors = undistort(&photo, lens, camera);
+        let colors = taken.colors(&photo, camera);
         drop(photo);
         caster.cast_into(camera, 1, hits);
 
@@ -107,7 +104,7 @@ pub(crate) fn write_photograph(
         let black = colors.pixels().iter().filter(|color| **color == [0; 3]).count();
         masked = black as f64 / colors.len() as f64;
         seen = 1.0 - pixels.pixels_missing as f64 / colors.len() as f64;
-        tally.views += pixels;
+        of_image += pixels;
     }
 
     if job.modalities.contains(&Domain::Pose) {
@@ -115,8 +112,14 @@ pub(crate) fn write_photograph(
     }
 
     files.sort();
-    tally.files = files.len() as u64;
-    tally.bytes = files.iter().map(|f| f.bytes).sum();
+    let none = ImageTally::default();
+    let is_panorama = frame == Frame::Panorama;
+    let tally = UnitTally {
+        files: files.len() as u64,
+        bytes: files.iter().map(|f| f.bytes).sum(),
+        panoramas: if is_panorama { of_image } else { none },
+        views: if is_panorama { none } else { of_image },
+    };
 
     let record = PhotographRecord {
         camera_uuid: uuid.clone(),
@@ -128,6 +131,7 @@ pub(crate) fn write_photograph(
         seen: rounded(seen),
         agreement: agreement.correlation.map(rounded),
         chance: agreement.chance.map(rounded),
+        panorama: is_panorama,
     };
     Ok(WrittenPhotograph { done: PhotographDone { area: job.area, record, tally, files }, started })
 }
@@ -214,6 +218,7 @@ mod tests {
             seen: 1.0,
             agreement,
             chance: Some(0.1),
+            panorama: false,
         }
     }
 
