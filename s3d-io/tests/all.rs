@@ -3,8 +3,8 @@
 
 mod feed;
 
-mod cloud_forms;
 mod camera_lists;
+mod cloud_forms;
 mod clouds;
 mod copyroom;
 mod findings;

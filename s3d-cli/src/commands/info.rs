@@ -13,7 +13,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// A scene file, a mesh, or the folder of a data set or of a published area.
+    /// A scene file, a mesh, or a folder: of a data set, of a published area, or of one scene of ScanNet,
+    /// ScanNet++, HM3D, Replica, 3RScan or ARKitScenes.
     #[arg(value_name = "SCENE.toml")]
     pub(crate) scene: PathBuf,
     /// The axis of a mesh that points up [default: y in glTF, guessed in others]
@@ -37,6 +38,9 @@ pub(crate) struct InfoArgs {
     /// Skip and count faults in the annotations, like an export with --lenient.
     #[arg(long)]
     pub(crate) lenient: bool,
+    /// Write the scene.toml that the folder of another data set amounts to into this folder, and nothing else.
+    #[arg(long)]
+    pub(crate) scene_toml: bool,
     #[command(flatten)]
     pub(crate) threads: Threads,
 }
@@ -48,6 +52,10 @@ pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
         seed: args.seed,
         lenient: args.lenient,
     };
+    if args.scene_toml {
+        let path = s3d_dataset::info::write_scene_toml(&args.scene)?;
+        return print(&format!("{}\n", path.display()));
+    }
     if s3d_dataset::info::is_data_set(&args.scene) {
         let info =
             on_threads(args.threads, |context| s3d_dataset::info::data_set_info(&args.scene, context))?;

@@ -20,12 +20,14 @@ use crate::survey::annotated::Annotated;
 use crate::survey::outlook::unlabelled_share;
 use crate::useful::{Finding, Headroom, mesh_findings, size_findings, stops_any};
 use s3d_geom::{Aabb, NearestFaces};
+use s3d_io::Error as FileError;
 use s3d_io::camera::ScanLocation;
 use s3d_io::mesh::MeshFile;
 use s3d_label::{Class, Room};
 use s3d_render::Scene;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::{Path, PathBuf};
 
 /// The options of [`info`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -77,6 +79,9 @@ pub struct SceneInfo {
     pub estimate: Estimate,
     /// What looks wrong, a sentence each.
     pub doubts: Vec<String>,
+    /// The text of a scene file that says what was found in the folder of another data set; `None` if the
+    /// scene has a file, or is a mesh or a published area.
+    pub scene_toml: Option<String>,
 }
 
 /// A mesh.
@@ -207,7 +212,25 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
         surface_seen: surface_seen.map(|seen| seen.to_string()),
         estimate,
         doubts,
+        scene_toml: area.found.clone(),
     })
+}
+
+/// Writes the scene file that the folder of another data set amounts to into the folder. Returns its path.
+///
+/// # Errors
+/// [`Error::File`] if the folder holds no scene of a known data set, or has a scene file already.
+pub fn write_scene_toml(folder: &Path) -> Result<PathBuf> {
+    let path = folder.join("scene.toml");
+    if path.exists() {
+        return Err(FileError::format(&path, "is there already: move it away first").into());
+    }
+    let found = s3d_io::scene::find_scene(folder)?.ok_or_else(|| {
+        let sets = s3d_io::scene::FOUND_SETS.join(", ");
+        FileError::format(folder, format!("holds no scene of a data set that is known: {sets}"))
+    })?;
+    s3d_io::fs::write_bytes(&path, found.toml.as_bytes())?;
+    Ok(path)
 }
 
 /// Collects everything that looks wrong in a survey. It stops at nothing that would stop an export.
@@ -304,6 +327,11 @@ impl MeshInfo {
 
 impl fmt::Display for SceneInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(toml) = &self.scene_toml {
+            writeln!(f, "the folder amounts to this scene.toml:\n")?;
+            toml.lines().try_for_each(|line| writeln!(f, "  {line}"))?;
+            writeln!(f)?;
+        }
         writeln!(f, "area {}\n\n{}", self.area, self.mesh)?;
 
         if !self.storeys.is_empty() {

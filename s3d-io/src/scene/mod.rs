@@ -1,10 +1,12 @@
-//! Scenes: the parts that one area is made from, named by a `scene.toml` or found in a published area.
+//! Scenes: the parts that one area is made from, named by a `scene.toml`, or found in a published area or in the folder
+//! of another data set.
 //!
 //! [`read_scene`] reads a [`SceneFile`]: the names of an area's mesh, annotations and scan locations, and how
 //! they are read. The files themselves are read by [`mesh`](crate::mesh), [`cloud`](crate::cloud) and
 //! [`camera`](crate::camera). [`PublishedArea`] finds the same parts in the folder of a published area, or of
 //! an export. A [`PictureSource`] says which of the scanner's pictures give images their colours, and a
-//! [`FrameSource`] which photographs become views. [`read_taxonomy`] reads the classes of a scene that does
+//! [`FrameSource`] which photographs become views. [`find_scene`] knows the folders of
+//! other data sets. [`read_taxonomy`] reads the classes of a scene that does
 //! not use the classes of S3DIS. An unknown key is an error with its line. Source: [`crate::formats`], "The
 //! scene file".
 //!
@@ -34,6 +36,7 @@ mod cameras;
 mod document;
 mod file;
 mod folder;
+mod found;
 mod frames;
 mod other_kind;
 mod published;
@@ -46,6 +49,7 @@ mod toml_fault;
 pub use cameras::CameraSource;
 pub use document::{parse_scene, read_scene};
 pub use file::{MeshColors, SceneFile};
+pub use found::{FOUND_SETS, FoundScene, find_scene};
 pub use frames::FrameSource;
 pub use published::{PublishedArea, PublishedMesh, PublishedOptions};
 pub use rgb::{PictureKind, PictureOptions, PictureSource, SkyBoxCaps, UnseenColor};

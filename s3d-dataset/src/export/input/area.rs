@@ -57,6 +57,8 @@ pub(crate) struct AreaInput {
     pub(crate) sources: Vec<PathBuf>,
     /// The sources that are annotations and nothing else.
     pub(crate) annotations: Vec<PathBuf>,
+    /// The scene file that says what was found in its folder, if there is none.
+    pub(crate) found: Option<String>,
     /// The records of inputs that are no files.
     pub(crate) records: Vec<InputRecord>,
 }

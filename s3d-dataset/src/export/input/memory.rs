@@ -230,6 +230,7 @@ impl AreaInput {
             files: Vec::new(),
             sources: Vec::new(),
             annotations: Vec::new(),
+            found: None,
             records: scene.records()?,
         })
     }

@@ -21,10 +21,13 @@ use crate::export::input::numbering::label_table;
 use crate::export::input::scene::Opened;
 use crate::options::placing::Placing;
 use s3d_io::Error as FileError;
-use s3d_io::cloud::OnFault;
+use s3d_io::cloud::{AnnotationOptions, OnFault};
 use s3d_label::LabelTable;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+/// The scene file of a folder, which goes before whatever else is found in it.
+const SCENE: &str = "scene.toml";
 
 /// All areas, and the table of all their labels.
 pub(crate) struct Inputs {
@@ -68,16 +71,24 @@ impl Inputs {
         for scene in scenes {
             let area = match scene {
                 SceneSource::Memory(scene) => AreaInput::in_memory(scene, asked, opened)?,
-                SceneSource::Path(path) if path.is_dir() => AreaInput::published(path, None, asked, opened)?,
+                SceneSource::Path(path) if path.is_dir() && !path.join(SCENE).is_file() => {
+                    match s3d_io::scene::find_scene(path)? {
+                        Some(mut found) => {
+                            let options = &mut found.scene.annotation_options;
+                            set_reading(options, lenient, scenes.len());
+                            AreaInput::found(found, asked, opened)?
+                        }
+                        None => AreaInput::published(path, None, asked, opened)?,
+                    }
+                }
                 SceneSource::Meshes { paths, up, units } => {
                     AreaInput::of_meshes(paths, (*up, *units), asked, opened)?
                 }
                 SceneSource::Path(path) => {
-                    let mut scene = s3d_io::scene::read_scene(path)?;
-                    let options = &mut scene.annotation_options;
-                    options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
-                    // The annotations of all areas wait in memory together.
-                    options.points_in_memory /= scenes.len() as u64;
+                    let in_folder = path.join(SCENE);
+                    let file = if path.is_dir() { &in_folder } else { path };
+                    let mut scene = s3d_io::scene::read_scene(file)?;
+                    set_reading(&mut scene.annotation_options, lenient, scenes.len());
                     AreaInput::open(scene, asked, opened)?
                 }
             };
@@ -119,6 +130,13 @@ impl Inputs {
     pub(crate) fn numbers(&self) -> Vec<u32> {
         self.areas.iter().map(|a| a.number).collect()
     }
+}
+
+/// Says how the annotations of one of several scenes are read.
+fn set_reading(options: &mut AnnotationOptions, lenient: bool, scenes: usize) {
+    options.on_fault = if lenient { OnFault::Skip } else { OnFault::Stop };
+    // The annotations of all areas wait in memory together.
+    options.points_in_memory /= scenes as u64;
 }
 
 /// Refuses areas with and without labels, and areas of different taxonomies.

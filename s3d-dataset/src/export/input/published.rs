@@ -96,6 +96,7 @@ impl AreaInput {
             files,
             sources,
             annotations: Vec::new(),
+            found: None,
             records: Vec::new(),
         })
     }

@@ -13,7 +13,7 @@ use crate::options::placing::Placing;
 use crate::record::request::InputRecord;
 use s3d_io::cloud::{AnnotatedMesh, AnnotationOptions, Annotations, OnFault};
 use s3d_io::mesh::{LengthUnit, MeshFile, MeshFormat, MeshOptions, MeshOrigin, UpAxis};
-use s3d_io::scene::{CameraSource, MeshColors, SceneFile};
+use s3d_io::scene::{CameraSource, FoundScene, MeshColors, SceneFile};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -114,7 +114,17 @@ impl AreaInput {
             cameras_path,
             pictures: scene.pictures,
             path: scene.path,
+            found: None,
         })
+    }
+
+    /// Opens a scene that was found in the folder of a known data set.
+    pub(super) fn found(found: FoundScene, asked: Option<Placing>, opened: Opened) -> Result<Self> {
+        let mut area = Self::open(found.scene, asked, opened)?;
+        area.notes.insert(0, format!("read as a scene of {}", found.set));
+        area.records.push(InputRecord::of_text("scene", &found.toml));
+        area.found = Some(found.toml);
+        Ok(area)
     }
 
     /// Opens an area of meshes alone. Their up axis and their unit are guessed if nobody says them.
@@ -213,7 +223,11 @@ pub(super) fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Pho
 
 /// The scene file, and the files and folders that it names.
 pub(super) fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
-    let mut files = vec![scene.path.clone()];
+    // A scene that was found has no file.
+    let mut files: Vec<PathBuf> = Some(scene.path.clone())
+        .filter(|path| path.exists())
+        .into_iter()
+        .collect();
     files.extend(
         scene
             .mesh
