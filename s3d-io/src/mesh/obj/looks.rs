@@ -285,7 +285,7 @@ mod tests {
         for words in [
             "line 1: the materials of \"no lib.mtl\" are missing",
             "lib.mtl, line 9: texture `gone.png` is not there; material `c`",
-            "bad.png is no PNG or JPEG image; 1 material",
+            "bad.png is no image; PNG, JPEG, WebP, BMP, TGA and TIFF are read; 1 material",
             "1 material in no library and drawn gray, the first is `f`",
         ] {
             assert!(told.contains(words), "{words}: {told}");

@@ -52,6 +52,8 @@ pub(crate) struct NormalObj<'a> {
     pub(crate) counts: [u64; 3],
     /// Whether any corner has an index into them.
     used: [bool; 3],
+    /// The columns whose indices are passed over: faces index them, and the file does not have them.
+    pub(crate) left_out: [bool; 3],
     /// How many vertices have a colour. If only some have one, the others get a colour that is not finite.
     pub(crate) colored: u64,
     /// The number of faces with three or more corners.
@@ -77,23 +79,31 @@ type Line = Option<String>;
 impl<'a> NormalObj<'a> {
     /// Returns `None` if a statement has a fault. tobj finds other faults.
     pub(crate) fn new(bytes: &'a [u8]) -> Option<Self> {
-        let obj = Self::scan(bytes, false)?;
-        // tobj does not check indices into an empty column.
-        if obj.used.iter().zip(obj.counts).any(|(used, count)| *used && count == 0) {
+        let obj = Self::scan(bytes, false, [false; 3])?;
+        // tobj does not check indices into an empty column. Only vertices are needed.
+        let [no_vertices, no_uvs, no_normals] = obj.empty_columns();
+        if no_vertices {
             return None;
         }
 
         let every_or_none = obj.colored == 0 || obj.colored == obj.counts[0];
-        if every_or_none {
-            Some(obj)
-        } else {
-            Self::scan(bytes, true)
+        if every_or_none && !no_uvs && !no_normals {
+            return Some(obj);
         }
+        Self::scan(bytes, !every_or_none, [false, no_uvs, no_normals])
+    }
+
+    /// Returns whether faces index each column although it is empty.
+    fn empty_columns(&self) -> [bool; 3] {
+        let [v, vt, vn] = self.counts.map(|count| count == 0);
+        let [of_v, of_vt, of_vn] = self.used;
+        [v && of_v, vt && of_vt, vn && of_vn]
     }
 
     /// Scans all statements. Vertices without a colour get one that is not finite if `fill_colors` is set.
-    fn scan(bytes: &'a [u8], fill_colors: bool) -> Option<Self> {
-        let mut obj = Self { bytes, ..Self::default() };
+    /// Indices into the columns of `left_out` are passed over.
+    fn scan(bytes: &'a [u8], fill_colors: bool, left_out: [bool; 3]) -> Option<Self> {
+        let mut obj = Self { bytes, left_out, ..Self::default() };
 
         let mut materials: HashMap<String, u32> = HashMap::new();
         let mut material = NO_INDEX;
@@ -198,7 +208,8 @@ impl<'a> NormalObj<'a> {
 
     /// Returns `Some(None)` for a face of fewer than three corners.
     fn face(&mut self, rest: &[u8], material: u32) -> Option<Option<Line>> {
-        let (corners, line) = match Corners::plain(rest) {
+        let plain = Corners::plain(rest).filter(|_| self.left_out == [false; 3]);
+        let (corners, line) = match plain {
             Some(corners) => (corners, None),
             None => self.any_face(rest)?,
         };
@@ -222,7 +233,13 @@ impl<'a> NormalObj<'a> {
     fn any_face(&self, mut rest: &[u8]) -> Option<(Corners, Line)> {
         let mut line = String::from("f");
         while let Some(word) = next_word(&mut rest) {
-            let [v, vt, vn] = statement::corner(word, self.counts).ok()?;
+            let mut indices = statement::corner(word, self.counts).ok()?;
+            for (index, left_out) in indices.iter_mut().zip(self.left_out) {
+                if left_out {
+                    *index = 0;
+                }
+            }
+            let [v, vt, vn] = indices;
             let [vt, vn] = [vt, vn].map(|index| if index == 0 { String::new() } else { index.to_string() });
             line += &format!(" {v}/{}/{}", vt, vn);
         }
@@ -447,7 +464,6 @@ mod tests {
     #[test]
     fn faults_are_not_passed_on() {
         for text in [
-            "f 1/1 2 3",
             "vt 0 0\nf 1/0 2/1 3/1",
             "vt 0 0\nf 1/-2 2/1 3/1",
             "vn 0 0 1\nf 1//6148914691236517206 2//1 3//1",

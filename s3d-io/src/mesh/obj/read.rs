@@ -64,6 +64,11 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         let n = count(obj.short_faces.len(), "face");
         warnings.push(format!("{n} with fewer than three corners left out, the first on line {first}"));
     }
+    for (left_out, what) in obj.left_out.iter().zip(["vertices", "texture coordinates", "normals"]) {
+        if *left_out {
+            warnings.push(format!("faces name {what}, and the file has none: they are read without them"));
+        }
+    }
     let colors = vertex_colors(&columns.colors, &mut warnings);
     warnings.append(&mut remarks);
 
@@ -464,6 +469,26 @@ mod tests {
         assert_eq!(colors_and_warnings(bytes), (vec![[255, 128, 0], [0, 0, 1], [0, 0, 255]], 0));
         let some = "v 0 0 0\nv 1 0 0 0 0 1\nv 0 1 0\nf 1 2 3\n";
         assert_eq!(colors_and_warnings(some), (vec![DEFAULT_COLOR, [0, 0, 255], DEFAULT_COLOR], 1));
+        // A program wrote NaN where it saw nothing.
+        let unseen = "v 0 0 0 nan nan nan\nv 1 0 0 0 0 1\nv 0 1 0 -nan 0 0\nf 1 2 3\n";
+        assert_eq!(colors_and_warnings(unseen), (vec![DEFAULT_COLOR, [0, 0, 255], DEFAULT_COLOR], 1));
+    }
+
+    #[test]
+    fn indices_into_columns_that_the_file_lacks_are_passed_over() {
+        let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        for (rest, words) in [
+            ("f 1//1 2//1 3//1\n", "faces name normals"),
+            ("f 1/1 2/2 3/3\n", "faces name texture coordinates"),
+            ("vn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n", "faces name texture coordinates"),
+        ] {
+            let file = read_obj(&format!("{corners}{rest}")).unwrap();
+            assert_eq!(file.mesh.faces(), [[0, 1, 2]]);
+            assert!(file.warnings.len() == 1 && file.warnings[0].starts_with(words), "{:?}", file.warnings);
+            assert_eq!(file.mesh.corner_normals(0).is_some(), rest.starts_with("vn"));
+        }
+        // An index beyond a column that is there is a fault.
+        assert!(read_obj(&format!("{corners}vn 0 0 1\nf 1//1 2//2 3//1\n")).is_err());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use crate::fs::quote::quote;
 use crate::fs::text::number;
-use crate::mesh::obj::lines::{next_word, parse_f32};
+use crate::mesh::obj::lines::next_word;
 use s3d_geom::glam::{DVec3, Vec3};
 
 /// What is wrong with a statement.
@@ -12,7 +12,8 @@ pub(crate) type Why = String;
 /// The columns that the corners of a face index.
 const COLUMNS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
-/// Reads a `v` line without its keyword: the position, divided by its weight, and the colour as written.
+/// Reads a `v` line without its keyword: the position, divided by its weight, and the colour as written. A
+/// colour that is not finite, as programs write where nothing was seen, is none.
 pub(crate) fn vertex(mut rest: &[u8]) -> Result<(Vec3, Option<[f32; 3]>), Why> {
     let words: Vec<&[u8]> = std::iter::from_fn(|| next_word(&mut rest)).take(8).collect();
     // A seventh number is the alpha of the colour.
@@ -37,15 +38,8 @@ pub(crate) fn vertex(mut rest: &[u8]) -> Result<(Vec3, Option<[f32; 3]>), Why> {
         position /= weight;
     }
 
-    let color = match color {
-        Some([r, g, b]) => Some([finite(r)?, finite(g)?, finite(b)?]),
-        None => None,
-    };
-    Ok((position, color))
-}
-
-fn finite(word: &[u8]) -> Result<f32, Why> {
-    parse_f32(word).ok_or_else(|| format!("the colour {} is no finite number", quote(word)))
+    let color = color.map(numbers).transpose()?;
+    Ok((position, color.filter(|color| color.iter().all(|c| c.is_finite()))))
 }
 
 /// Reads the position like [`vertex`], in `f64`. Returns `None` if the statement has a fault.

@@ -5,6 +5,7 @@ use crate::mesh::ply::batch::PlyBatch;
 use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::header::PlyElement;
 use crate::mesh::ply::labels::PlyLabels;
+use crate::mesh::ply::vertices::Colors;
 use s3d_geom::glam::{Vec2, Vec3, vec2};
 use s3d_geom::{NO_INDEX, triangulate_face};
 use std::path::Path;
@@ -20,6 +21,8 @@ pub(crate) struct PlyFaces {
     uvs: Vec<Vec2>,
     /// The texture of each polygon, or [`NO_INDEX`]. Empty if the file does not tell.
     textures: Vec<u32>,
+    /// The colour of each polygon. Empty if the file has none.
+    pub(crate) colors: Vec<[u8; 3]>,
     /// How many polygons have a list of texture coordinates that is neither empty nor two numbers a corner.
     pub(crate) odd_uvs: usize,
 }
@@ -43,7 +46,9 @@ impl PlyFaces {
         let corners = corner_list(path, element)?;
         let uv = element.find_list(&["texcoord", "texcoords"]);
         let texture = element.find_scalar(&["texnumber"]);
-        let wanted = std::iter::once(corners).chain(uv).chain(texture);
+        let mut colors = Colors::find(element);
+        let of_colors = colors.iter().flat_map(|colors| colors.places);
+        let wanted = std::iter::once(corners).chain(uv).chain(texture).chain(of_colors);
         reader.want(wanted.chain(labels.iter().flat_map(|l| l.properties())));
 
         let mut out = Self::default();
@@ -87,10 +92,14 @@ impl PlyFaces {
                 out.textures
                     .extend(batch.scalars(texture).iter().map(|&n| texture_index(n)));
             }
+            if let Some(colors) = &mut colors {
+                colors.add(&batch);
+            }
             if let Some(labels) = labels.as_deref_mut() {
                 labels.add(reader, &batch)?;
             }
         }
+        out.colors = colors.map_or_else(Vec::new, Colors::finish);
         if out.uvs.iter().all(|uv| uv.is_nan()) {
             out.uvs.clear();
         }

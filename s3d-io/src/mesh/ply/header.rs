@@ -126,11 +126,6 @@ pub(crate) struct PlyElement {
 }
 
 impl PlyElement {
-    /// Finds the first of `names` that is a property, in upper or lower case, and returns its index.
-    pub(crate) fn find(&self, names: &[&str]) -> Option<usize> {
-        self.find_where(names, |_| true)
-    }
-
     /// Finds like [`PlyElement::find`], among the properties that are single numbers.
     pub(crate) fn find_scalar(&self, names: &[&str]) -> Option<usize> {
         self.find_where(names, |property| !property.is_list())
@@ -323,7 +318,7 @@ mod tests {
         assert_eq!(header.elements[0].min_row_bytes(PlyEncoding::BigEndian), 1 + 1 + 2 + 2 + 4 + 4 + 4 + 8);
         let (place, face) = header.element("face").unwrap();
         assert_eq!((place, face.count), (1, u64::MAX));
-        assert_eq!(face.find(&["vertex_index", "vertex_indices"]), Some(0));
+        assert_eq!(face.find_list(&["vertex_index", "vertex_indices"]), Some(0));
         assert_eq!(
             (face.find_scalar(&["vertex_indices"]), face.find_list(&["vertex_indices"])),
             (None, Some(0))

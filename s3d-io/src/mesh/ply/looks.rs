@@ -9,6 +9,7 @@ use crate::mesh::ply::faces::{PlyFaces, PlyTriangles};
 use crate::mesh::ply::header::PlyHeader;
 use crate::mesh::ply::vertices::PlyVertices;
 use s3d_geom::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX, Texture, Wrap};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// The images that the header's comments name.
@@ -135,5 +136,44 @@ pub(crate) fn lay_textures(
             parts.face_uvs = triangles.faces.clone();
         }
         None => warnings.push("the header names a texture, but nothing has texture coordinates".into()),
+    }
+}
+
+/// The most colours of faces that become materials. A mesh with more is not painted by object.
+const MAX_FACE_COLORS: usize = 4096;
+
+/// Gives each face a material of its colour. Faces are painted where a colour stands for an object or a class,
+/// so that there are few. A mesh with many is left as it is, with a warning.
+pub(crate) fn paint_faces(
+    parts: &mut MeshParts,
+    color_of_polygon: &[[u8; 3]],
+    triangles: &PlyTriangles,
+    warnings: &mut Vec<String>,
+) {
+    let mut index: HashMap<[u8; 3], u32> = HashMap::new();
+    let mut materials = Vec::new();
+    for &color in color_of_polygon {
+        index.entry(color).or_insert_with(|| {
+            let [r, g, b] = color;
+            materials.push(Material { name: format!("color_{r:02x}{g:02x}{b:02x}"), color, texture: None });
+            materials.len() as u32 - 1
+        });
+        if materials.len() > MAX_FACE_COLORS {
+            warnings.push(format!(
+                "colours of faces are not read: there are more than {MAX_FACE_COLORS} different ones; give \
+                 colours to the vertices"
+            ));
+            return;
+        }
+    }
+
+    if !materials.is_empty() {
+        let colors = triangles
+            .polygons
+            .iter()
+            .map(|&polygon| color_of_polygon.get(polygon as usize));
+        let materials_of_faces = colors.map(|color| color.and_then(|c| index.get(c)).copied());
+        parts.face_materials = materials_of_faces.map(|m| m.unwrap_or(NO_INDEX)).collect();
+        parts.materials = materials;
     }
 }

@@ -12,7 +12,7 @@ use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::ply::faces::{PlyFaces, PlyTriangles};
 use crate::mesh::ply::header::PlyHeader;
 use crate::mesh::ply::labels::PlyLabels;
-use crate::mesh::ply::looks::{PlyLooks, lay_textures};
+use crate::mesh::ply::looks::{PlyLooks, lay_textures, paint_faces};
 use crate::mesh::ply::vertices::PlyVertices;
 use s3d_geom::{MeshParts, NO_INDEX};
 use std::io::Read;
@@ -81,16 +81,12 @@ pub(crate) fn read(
         let n = count(faces.odd_uvs, "face");
         warnings.push(format!("texture coordinates of {n} left out: not two numbers a corner"));
     }
-    let has_face_colors = header
-        .element("face")
-        .is_some_and(|(_, e)| e.find(&["red", "diffuse_red"]).is_some());
-    if has_face_colors && vertices.colors.is_empty() {
-        warnings.push("face colours are not read, but vertex colours and textures are".into());
-    }
-
     let looks = PlyLooks::load(path, &header, &mut warnings)?;
     let mut parts = MeshParts::default();
     lay_textures(&mut parts, &mut vertices, &mut faces, &triangles, &looks, &mut warnings);
+    if parts.materials.is_empty() && vertices.colors.is_empty() {
+        paint_faces(&mut parts, &faces.colors, &triangles, &mut warnings);
+    }
     let PlyTriangles { faces: triangles, polygons, cut, .. } = triangles;
     if !vertices.normals.is_empty() {
         parts.face_normals = triangles.clone();
@@ -256,8 +252,9 @@ mod tests {
         assert_eq!(two_colors("uint8", ["R", "G", "B"], ["9 8 7", "1 2 3"]), [[9, 8, 7], [1, 2, 3]]);
 
         let elements = square("", "property uchar red\nproperty uchar green\nproperty uchar blue\n", 1);
-        let file = read_ply(&elements, &format!("{SQUARE}4 0 1 2 3 9 9 9\n")).unwrap();
-        assert_eq!(file.warnings, ["face colours are not read, but vertex colours and textures are"]);
+        let file = read_ply(&elements, &format!("{SQUARE}4 0 1 2 3 9 8 7\n")).unwrap();
+        assert!(file.warnings.is_empty() && file.mesh.materials().len() == 1);
+        assert!((0..2).all(|face| matches!(file.mesh.color_of(face), FaceColor::Flat([9, 8, 7]))));
     }
 
     #[test]
@@ -313,7 +310,10 @@ mod tests {
             ("", "texture coordinates are not used: no \"comment TextureFile NAME\""),
             ("comment TextureFile gone.png\n", "texture `gone.png` is not there; its faces"),
             ("comment texturefile C:\\scans\\b.png\n", "texture `C:\\scans\\b.png` is not there; "),
-            ("comment TextureFile broken.png\n", "broken.png is no PNG or JPEG image; its faces"),
+            (
+                "comment TextureFile broken.png\n",
+                "broken.png is no image; PNG, JPEG, WebP, BMP, TGA and TIFF are read; its faces",
+            ),
         ] {
             let file = read_ply(&format!("{comment}{uv}"), rows).unwrap();
             assert!(file.warnings[0].contains(words), "{:?}", file.warnings);

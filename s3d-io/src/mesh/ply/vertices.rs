@@ -129,14 +129,19 @@ fn vectors(batch: &PlyBatch, [x, y, z]: [usize; 3]) -> impl Iterator<Item = DVec
 }
 
 /// Colours while they are read. Bytes stay bytes; other numbers wait until the largest is known.
-struct Colors {
-    places: [usize; 3],
+pub(crate) struct Colors {
+    pub(crate) places: [usize; 3],
     kind: PlyType,
     bytes: Vec<[u8; 3]>,
     numbers: Vec<[f32; 3]>,
 }
 
 impl Colors {
+    /// Finds the columns of colours. Returns `None` if there are none.
+    pub(crate) fn find(element: &PlyElement) -> Option<Self> {
+        places(element, &COLORS).map(|places| Self::new(element, places))
+    }
+
     fn new(element: &PlyElement, places: [usize; 3]) -> Self {
         let [r, g, b] = places.map(|p| element.properties.get(p).map(|p| p.kind));
         // Columns of different types are read as numbers.
@@ -144,7 +149,7 @@ impl Colors {
         Self { places, kind, bytes: Vec::new(), numbers: Vec::new() }
     }
 
-    fn add(&mut self, batch: &PlyBatch) {
+    pub(crate) fn add(&mut self, batch: &PlyBatch) {
         let [r, g, b] = self.places.map(|p| batch.scalars(p));
         let rows = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]);
         match self.kind {
@@ -156,7 +161,7 @@ impl Colors {
     /// Returns the colours as bytes. Numbers of floating point run from 0 to 1, and in some files from 0 to
     /// 255. The largest number tells the scale, with room for colours that are a little too bright. Whole
     /// numbers run to 65,535 if any is larger than 255.
-    fn finish(self) -> Vec<[u8; 3]> {
+    pub(crate) fn finish(self) -> Vec<[u8; 3]> {
         if self.kind == PlyType::U8 {
             return self.bytes;
         }
