@@ -32,6 +32,9 @@ struct Document {
 struct FrameEntry {
     file_path: String,
     transform_matrix: Vec<Vec<f64>>,
+    /// ScanNet++ marks blurred pictures, and those whose pose failed.
+    #[serde(default)]
+    is_bad: bool,
     #[serde(flatten)]
     camera: CameraKeys,
 }
@@ -70,15 +73,21 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
     Ok(pictures)
 }
 
-/// Reads the cameras of a `transforms.json`. Their poses are in the frame before its `applied_transform`.
-pub(crate) fn read_posed(path: &Path) -> Result<Vec<PosedCamera>> {
+/// Reads the cameras of a `transforms.json`, and how many more are marked as bad. Their poses are in the frame
+/// before its `applied_transform`.
+pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, usize)> {
     let document: Document = read_json(path)?;
     let applied = Applied::new(&document, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut cameras = Vec::with_capacity(document.frames.len());
-    for (i, FrameEntry { file_path: name, transform_matrix, camera }) in
-        document.frames.into_iter().enumerate()
-    {
+    let mut bad = 0;
+    for (i, frame) in document.frames.into_iter().enumerate() {
+        let FrameEntry { file_path: name, transform_matrix, is_bad, camera } = frame;
+        if is_bad {
+            bad += 1;
+            continue;
+        }
+
         let fault = |message: String| at_frame(path, i, &name, &message);
         let rows = square(&transform_matrix).map_err(|m| fault(format!("transform_matrix: {m}")))?;
         let pose = Pose::from_opengl(rows).map_err(|e| fault(format!("transform_matrix: {e}")))?;
@@ -90,7 +99,7 @@ pub(crate) fn read_posed(path: &Path) -> Result<Vec<PosedCamera>> {
         let picture = Some(folder.join(&name));
         cameras.push(PosedCamera { name, pose, size, optics, picture, line: 0 });
     }
-    Ok(cameras)
+    Ok((cameras, bad))
 }
 
 fn at_frame(path: &Path, i: usize, name: &str, message: &str) -> Error {
@@ -272,7 +281,7 @@ mod tests {
     }
 
     fn posed(text: &str) -> Result<Vec<PosedCamera>> {
-        read_with(text, read_posed)
+        read_with(text, |path| read_posed(path).map(|(cameras, _)| cameras))
     }
 
     fn read_with(text: &str, read: fn(&Path) -> Result<Vec<PosedCamera>>) -> Result<Vec<PosedCamera>> {

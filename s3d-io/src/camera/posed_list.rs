@@ -108,7 +108,8 @@ fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
         files.push(intrinsics);
         cameras
     } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-        nerfstudio::read_posed(path)?
+        let (cameras, untracked) = nerfstudio::read_posed(path)?;
+        return Ok(ReadList { untracked, ..ReadList::of_files(cameras, files) });
     } else {
         let bytes = read_file(path)?;
         refuse_other_kind(path, &bytes)?;
@@ -146,8 +147,8 @@ fn read_folder(path: &Path, images: Option<&Path>) -> Result<ReadList> {
         return Ok(ReadList::of_files(cameras, vec![images, intrinsics]));
     }
     if let Some(transforms) = has_transforms(path) {
-        let cameras = nerfstudio::read_posed(&transforms)?;
-        return Ok(ReadList::of_files(cameras, vec![transforms]));
+        let (cameras, untracked) = nerfstudio::read_posed(&transforms)?;
+        return Ok(ReadList { untracked, ..ReadList::of_files(cameras, vec![transforms]) });
     }
     if let Some((scan, files)) = scannet::find(path)? {
         let (cameras, untracked, files) = scannet::read(&scan, files)?;

@@ -83,7 +83,13 @@ struct Parts {
     labels: Option<String>,
     frames: Option<String>,
     images: Option<String>,
+    /// World from the frame of the list of photographs, if it is another one.
+    turn: Option<&'static str>,
 }
+
+/// The world of ScanNet++'s mesh from the one of its `transforms.json`, where x and y are exchanged and z points
+/// down. Source: scannetpp/scannetpp, common/utils/nerfstudio.py, `convert_frames`.
+const SCANNETPP_TURN: &str = "[[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]";
 
 fn scannetpp(dir: &Folder) -> Option<Parts> {
     let scans = ["scans/", ""]
@@ -104,6 +110,7 @@ fn scannetpp(dir: &Folder) -> Option<Parts> {
         labels: Some(format!("{scans}segments_anno.json")),
         frames: frames.map(|(list, _)| list.to_owned()),
         images: frames.map(|(_, images)| images.to_owned()),
+        turn: frames.and_then(|(list, _)| list.ends_with(".json").then_some(SCANNETPP_TURN)),
     })
 }
 
@@ -135,7 +142,7 @@ fn rescan(dir: &Folder) -> Option<Parts> {
         .filter(|_| dir.first("", |name| name.starts_with("labels.instances")).is_some());
     let mesh = dir.first("", |name| name.starts_with("mesh.refined") && name.ends_with(".obj"))?;
     let frames = Some("sequence".to_owned()).filter(|sequence| dir.has(sequence));
-    Some(Parts { mesh, up: Some(UpAxis::Z), labels, frames, images: None })
+    Some(Parts { mesh, up: Some(UpAxis::Z), labels, frames, ..Parts::default() })
 }
 
 fn arkit(dir: &Folder) -> Option<Parts> {
@@ -150,6 +157,7 @@ fn arkit(dir: &Folder) -> Option<Parts> {
         labels: None,
         frames: images.map(|_| trajectory),
         images: images.map(str::to_owned),
+        turn: None,
     })
 }
 
@@ -164,7 +172,7 @@ fn scannet(dir: &Folder) -> Option<Parts> {
         .iter()
         .all(|part| dir.has(part))
         .then(|| ".".to_owned());
-    Some(Parts { mesh, up: Some(UpAxis::Z), labels: Some(labels), frames, images: None })
+    Some(Parts { mesh, up: Some(UpAxis::Z), labels: Some(labels), frames, ..Parts::default() })
 }
 
 impl Parts {
@@ -187,6 +195,9 @@ impl Parts {
             push_row(&mut text, "path", frames);
             if let Some(images) = &self.images {
                 push_row(&mut text, "images", images);
+            }
+            if let Some(turn) = self.turn {
+                let _ = writeln!(text, "transform = {turn}    # the list has another world than the mesh");
             }
         }
         text
@@ -244,6 +255,9 @@ impl Folder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::read_posed_cameras;
+    use s3d_geom::Pose;
+    use s3d_geom::glam::DVec3;
     use std::fs;
 
     fn found(files: &[&str]) -> Option<FoundScene> {
@@ -332,6 +346,42 @@ mod tests {
             assert_eq!(told, frames, "{set}");
         }
         assert_eq!(found(&["scan.ply", "notes.txt"]), None);
+    }
+
+    #[test]
+    fn photographs_of_scannetpp_stand_in_the_world_of_the_mesh_and_bad_ones_are_left_out() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |path: &str| dir.path().join(path);
+        for folder in ["scans", "dslr/nerfstudio", "dslr/resized_images"] {
+            fs::create_dir_all(at(folder)).unwrap();
+        }
+        fs::write(at("scans/mesh_aligned_0.05.ply"), "").unwrap();
+        fs::write(at("scans/segments_anno.json"), "").unwrap();
+        // As `convert_frames` writes a camera at (1, 2, 3) with the axes of the world, OpenCV's.
+        let rows = "[[0, -1, 0, 2], [1, 0, 0, 1], [0, 0, 1, -3], [0, 0, 0, 1]]";
+        let frame = |more: &str| format!(r#"{{"file_path": "a.JPG", "transform_matrix": {rows}{more}}}"#);
+        let text = format!(
+            r#"{{"fl_x": 9, "fl_y": 9, "cx": 4, "cy": 4, "w": 8, "h": 8, "frames": [{}, {}]}}"#,
+            frame(""),
+            frame(r#", "is_bad": true"#)
+        );
+        fs::write(at("dslr/nerfstudio/transforms.json"), text).unwrap();
+
+        let frames = find_scene(dir.path()).unwrap().unwrap().scene.frames.unwrap();
+        let list = read_posed_cameras(&frames.path, &frames.world_from_file).unwrap();
+        assert_eq!((list.cameras.len(), list.untracked), (1, 1));
+        let pose = list.cameras[0].pose;
+        assert_eq!(pose.location, DVec3::new(1.0, 2.0, 3.0));
+        let same = Pose::from_opencv([
+            [1.0, 0.0, 0.0, 1.0],
+            [0.0, 1.0, 0.0, 2.0],
+            [0.0, 0.0, 1.0, 3.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
+        assert!(
+            pose.world_from_camera
+                .abs_diff_eq(same.unwrap().world_from_camera, 1e-12)
+        );
     }
 
     #[test]
