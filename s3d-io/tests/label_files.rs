@@ -4,7 +4,7 @@
 use s3d_geom::glam::{Vec3, vec3};
 use s3d_geom::{PointCloud, Raster, TriMesh};
 use s3d_io::Result;
-use s3d_io::cloud::{AnnotatedMesh, AnnotationOptions, Annotations};
+use s3d_io::cloud::{AnnotatedMesh, AnnotationOptions, Annotations, NpyWriter};
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_io::scene::read_scene;
@@ -383,6 +383,59 @@ fn a_node_belongs_to_the_object_above_it() {
     }
     let write = |dir: &Path| fs::write(dir.join("house.gltf"), gltf(&nodes, None)).unwrap();
     labels_fit(write, "house.gltf", &options());
+}
+
+#[test]
+fn numbers_are_of_vertices_or_of_faces_of_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = dir.path().join("room.obj");
+    obj(&scene, false);
+    // The file has a face without area in front, which is left out.
+    let text = fs::read_to_string(&scene).unwrap().replacen("\nf ", "\nf 1 1 2\nf ", 1);
+    fs::write(&scene, text).unwrap();
+    let mesh = read_mesh(&scene, UpAxis::Z).unwrap();
+    assert_eq!(mesh.source_faces[..3], [1, 1, 2]);
+
+    let mut classes = options();
+    for (number, word) in (0..).zip(["floor", "ceiling", "wall", "table", "chair"]) {
+        classes.classes.insert(number.to_string(), word.parse().ok());
+    }
+    let number = |object: usize| [0, 0, 1, 2, 2, 2, 2, 3, 4, 4][object];
+    let of_faces: Vec<i64> = std::iter::once(3)
+        .chain(squares().iter().map(|(_, o)| number(*o)))
+        .collect();
+    let of_vertices: Vec<i64> = squares().iter().flat_map(|(_, o)| [number(*o); 4]).collect();
+
+    for numbers in [of_faces, of_vertices] {
+        let lines = |ending: &str| numbers.iter().map(|n| format!("{n}{ending}\n")).collect::<String>();
+        let npy = dir.path().join("labels.npy");
+        let mut writer = NpyWriter::create(&npy, "<i8", &[numbers.len() as u64]).unwrap();
+        writer
+            .put(&numbers.iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>())
+            .unwrap();
+        writer.finish().unwrap();
+        for (name, text) in
+            [("labels.txt", lines("")), ("floats.txt", lines(".000000")), ("labels.npy", String::new())]
+        {
+            let path = dir.path().join(name);
+            if !text.is_empty() {
+                fs::write(&path, text).unwrap();
+            }
+            let found = faces_of(&open(&mesh, &path, &classes).unwrap());
+            let names: Vec<&str> = found.keys().map(String::as_str).collect();
+            let expected = ["ceiling_1", "chair_1", "floor_1", "table_1", "wall_1"];
+            assert_eq!(names, expected.map(|name| format!("{name} of office_1")), "{name}");
+            assert_eq!(found.values().sum::<usize>(), mesh.mesh.faces().len(), "{name}");
+        }
+    }
+
+    let path = dir.path().join("short.txt");
+    fs::write(&path, "0\n1\n2\n").unwrap();
+    let message = open(&mesh, &path, &classes).unwrap_err().to_string();
+    assert!(message.contains("short.txt: has 3 numbers, the mesh's file has"), "{message}");
+    fs::write(&path, "0\n1\nchair\n").unwrap();
+    let message = open(&mesh, &path, &classes).unwrap_err().to_string();
+    assert!(message.contains("short.txt, line 3: `chair` is no class"), "{message}");
 }
 
 #[test]

@@ -68,7 +68,7 @@ impl FaceLabels {
             companions.push(named.list);
             (named.labels, named.warnings)
         } else if let Some(labels) = &file.labels {
-            (labels.clone().into_faces(&file.mesh), Vec::new())
+            (labels.clone(), Vec::new())
         } else {
             return Err(Error::format(
                 path,
@@ -77,7 +77,24 @@ impl FaceLabels {
             ));
         };
 
-        let (labels, faces) = match labels {
+        let mut found = Self::of_labels(file, labels, options)?;
+        warnings.append(&mut found.warnings);
+        Ok(Self { warnings, companions, ..found })
+    }
+
+    /// Takes these labels of the mesh.
+    ///
+    /// # Errors
+    /// The errors of [`Annotations::of_mesh`].
+    #[expect(clippy::indexing_slicing, reason = "a mesh of no file is a caller's mistake: see `of_mesh`")]
+    pub(crate) fn of_labels(
+        file: &MeshFile,
+        labels: MeshLabels,
+        options: &AnnotationOptions,
+    ) -> Result<Self> {
+        let path = &file.sources[0].path;
+        let mut warnings = Vec::new();
+        let (labels, faces) = match labels.into_faces(&file.mesh) {
             MeshLabels::Names { labels, faces } => (labels, faces),
             MeshLabels::Objects { objects, faces, .. } => {
                 of_tags(file, &ObjectTags { objects: &objects, faces: &faces }, options, &mut warnings)?
@@ -92,7 +109,7 @@ impl FaceLabels {
                 of_tags(file, &numbers, options, &mut warnings)?
             }
         };
-        Ok(Self { labels, faces, warnings, companions })
+        Ok(Self { labels, faces, warnings, companions: Vec::new() })
     }
 
     /// Makes annotations of them for the faces of `mesh`. The points know these faces if they are the faces

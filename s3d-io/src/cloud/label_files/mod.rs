@@ -5,6 +5,7 @@
 //! faces of the scene's mesh.
 
 mod hm3d;
+mod numbers;
 mod replica;
 mod segments;
 mod transfer;
@@ -46,6 +47,8 @@ pub(crate) enum LabelFile {
     Replica(PathBuf),
     /// Objects as groups of segments: ScanNet++'s `segments_anno.json`, 3RScan's `semseg.v2.json`.
     Segments(PathBuf),
+    /// One number for each vertex or face of the scene's mesh.
+    Numbers(PathBuf),
 }
 
 impl LabelFile {
@@ -67,7 +70,8 @@ impl LabelFile {
         match name.rsplit_once('.').map_or("", |(_, ending)| ending) {
             "ply" => Ok(has_faces(&path)?.then_some(Self::Mesh(path))),
             "json" => Ok(Self::of_json(&path)),
-            "txt" => Ok(hm3d::is_list(&path).then_some(Self::Hm3d(path))),
+            "txt" if hm3d::is_list(&path) => Ok(Some(Self::Hm3d(path))),
+            "txt" | "npy" => Ok(numbers::is_list(&path).then_some(Self::Numbers(path))),
             _ => Ok(MeshFormat::of(&path).map(|_| Self::Mesh(path))),
         }
     }
@@ -107,12 +111,20 @@ impl LabelFile {
             Self::Hm3d(list) => hm3d::read(list, up, options),
             Self::Replica(list) => replica::read(list, up, options),
             Self::Segments(groups) => segments::read(groups, up, options),
+            Self::Numbers(list) => Err(Error::unsupported(
+                list,
+                "has a number for each vertex or face of a mesh: open it for the mesh that it is about",
+            )),
         }
     }
 
     fn path(&self) -> &Path {
         match self {
-            Self::Mesh(path) | Self::Hm3d(path) | Self::Replica(path) | Self::Segments(path) => path,
+            Self::Mesh(path)
+            | Self::Hm3d(path)
+            | Self::Replica(path)
+            | Self::Segments(path)
+            | Self::Numbers(path) => path,
         }
     }
 }
@@ -173,6 +185,12 @@ impl Annotations {
             found.add_companions(&labelled, file);
             return Ok(found);
         };
+
+        if let LabelFile::Numbers(list) = file {
+            let labels = numbers::read(list, scene.file)?;
+            let labels = FaceLabels::of_labels(scene.file, labels, options)?;
+            return labels.annotate(list, &scene.file.mesh, options, true);
+        }
 
         mesh_options.units = scene.units.or(scene.file.unit_said);
         let labelled = in_frame_of(file, scene, &mesh_options)?;
