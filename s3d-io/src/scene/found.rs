@@ -178,6 +178,9 @@ fn scannet(dir: &Folder) -> Option<Parts> {
 impl Parts {
     fn to_toml(&self, set: &str, dir: &Folder) -> String {
         let mut text = format!("# A scene of {set}, found in its folder.\narea = 1\n[mesh]\n");
+        if self.mesh.ends_with(".semantic.glb") {
+            text.push_str("# Its colours are those of its labels: name a textured mesh for real ones.\n");
+        }
         push_row(&mut text, "path", &self.mesh);
         if let Some(up) = self.up.filter(|_| !has_own_frame(&self.mesh)) {
             push_row(&mut text, "up", up.name());

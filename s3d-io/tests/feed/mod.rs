@@ -45,10 +45,17 @@ pub(crate) const FEEDS: &[(&str, Feed)] = &[
     ("text_cloud", text_cloud),
     ("kitti", kitti),
     ("scannet", scannet),
+    ("label_files", label_files),
     ("mat", mat),
     ("png", png),
     ("exr", exr),
 ];
+
+/// Two triangles of two objects, with columns of vertices and of faces.
+const LABELLED_PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                            property float z\nproperty int objectId\nelement face 2\n\
+                            property list uchar int vertex_indices\nproperty int object_id\nend_header\n\
+                            0 0 0 1\n1 0 0 1\n0 1 0 2\n1 1 0 2\n3 0 1 2 1\n3 1 3 2 2\n";
 
 /// A triangle with a texture, whose library is `m.mtl`.
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl wall\nf 1/1 2/1 3/1\n";
@@ -468,4 +475,35 @@ fn file_list(dir: &Path, data: &[u8]) {
         write_file_list(&again, &records).expect("what was read can be written");
         assert!(fs::read(again).is_ok_and(|written| written == data));
     }
+}
+
+/// Lists that label a mesh: of HM3D, Replica, 3RScan, ScanNet++, and of one number a vertex or face.
+fn label_files(dir: &Path, data: &[u8]) {
+    for mesh in ["mesh_semantic.ply", "labels.instances.ply", "mesh_aligned.ply", "mesh.ply"] {
+        file(dir, mesh, LABELLED_PLY.as_bytes());
+    }
+    // A triangle in the colour 39EB3C.
+    file(
+        dir,
+        "a.semantic.glb",
+        br#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 36, "uri":
+        "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}], "bufferViews": [{"buffer": 0,
+        "byteLength": 36}], "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3",
+        "count": 3}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.0409, 0.8308, 0.0452, 1]}}],
+        "nodes": [{"mesh": 0}]}"#,
+    );
+    let scene = read_mesh(&dir.join("mesh.ply"), UpAxis::Z).expect("a mesh");
+    let mesh = AnnotatedMesh { file: &scene, up: UpAxis::Z, units: None };
+
+    let names = ["a.semantic.txt", "info_semantic.json", "semseg.v2.json", "numbers.txt", "numbers.npy"];
+    let mut lists: Vec<PathBuf> = names.iter().map(|name| file(dir, name, data)).collect();
+    // ScanNet++ has segments beside its groups. The bytes are both in turn.
+    let groups = br#"{"segGroups": [{"objectId": 1, "label": "chair", "segments": [1, 2]}]}"#;
+    lists.push(file(dir, "segments_anno.json", groups));
+    file(dir, "segments.json", data);
+    for list in &lists {
+        let _ = check(dir, Annotations::open_for(&mesh, std::slice::from_ref(list), &numbered()));
+    }
+    fs::remove_file(dir.join("segments.json")).expect("the folder can be written");
 }
