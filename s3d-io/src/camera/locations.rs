@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// The supported forms, for messages.
 const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files \
-                     (*.json), the raw captures of a Matterport, a COLMAP model (images.txt or images.bin) \
+                     (*.json), the raw captures of a Matterport, an E57 file, a COLMAP model (images.txt or images.bin) \
                      or a transforms.json";
 
 /// Reads the scan locations of `path`, a file or a folder:
@@ -23,6 +23,7 @@ const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a
 /// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a
 ///   COLMAP model;
 /// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and related programs;
+/// - an E57 file: the places of its scans, level, each with the heading of its +Y;
 /// - a folder of pose files of images, as published: where the scanner stood and how it was turned;
 /// - a folder with the raw captures of a Matterport: see [`read_matterport_locations`].
 ///
@@ -42,6 +43,11 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
     }
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return picture_locations(path, nerfstudio::read(path)?, world_from_file);
+    }
+
+    #[cfg(feature = "e57")]
+    if starts_with(path, crate::camera::e57::MAGIC)? {
+        return picture_locations(path, crate::camera::e57::read(path)?, world_from_file);
     }
 
     let bytes = read_file(path)?;
@@ -88,6 +94,18 @@ fn picture_locations(
         .iter_mut()
         .for_each(|p| p.pose = moved(&p.pose, world_from_file));
     located::locations_of(path, pictures)
+}
+
+/// Returns whether a file begins with these bytes.
+#[cfg(feature = "e57")]
+fn starts_with(path: &Path, magic: &[u8]) -> Result<bool> {
+    use std::io::Read;
+    let mut head = Vec::new();
+    let read = crate::fs::open::open_file(path)?
+        .take(magic.len() as u64)
+        .read_to_end(&mut head);
+    read.map_err(|e| Error::io(path, "read", e))?;
+    Ok(head == magic)
 }
 
 /// Returns whether a file is the list of pictures of a COLMAP model.

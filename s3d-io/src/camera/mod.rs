@@ -38,6 +38,8 @@
 
 mod arkit;
 mod colmap;
+#[cfg(feature = "e57")]
+mod e57;
 mod located;
 mod locations;
 mod matterport;
