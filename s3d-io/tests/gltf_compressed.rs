@@ -118,6 +118,20 @@ fn draco_of_other_programs_is_read() {
     }
 }
 
+/// A value of a wrong kind lets only the needed parts of the JSON be read.
+#[test]
+fn odd_files_are_read_too() {
+    let mut files = vec![with_json("meshopt_khr.glb", r#""generator":"gltfpack 1.3""#, r#""generator":7"#)];
+    if cfg!(feature = "draco") {
+        let generator = r#""generator":"glTF-Transform v4.5.1""#;
+        files.push(with_json("draco_edgebreaker.glb", generator, r#""generator":7"#));
+    }
+    for bytes in files {
+        let file = read_bytes(&bytes).unwrap();
+        assert_eq!((file.mesh.faces().len(), file.warnings), (2 * (512 + 128), vec![]));
+    }
+}
+
 #[test]
 fn damaged_meshopt_is_an_error_with_file_and_primitive() {
     let fault = |from: &str, to: &str| {
