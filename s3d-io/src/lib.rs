@@ -193,6 +193,7 @@
 //! | feature | formats |
 //! |---|---|
 //! | `obj`, `gltf`, `ply` | meshes; OBJ is written too, with `png` |
+//! | `draco` | glTF that Draco compressed |
 //! | `cloud` | annotated points: the S3DIS tree, and the labels of meshes |
 //! | `las`, `e57`, `npy`, `pcd`, `text`, `kitti`, `scannet`, `mat`, `ply` | annotated points of these formats |
 //! | `camera` | lists of cameras; the scanner's pictures |

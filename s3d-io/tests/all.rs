@@ -9,6 +9,7 @@ mod clouds;
 mod copyroom;
 mod findings;
 mod gltf;
+mod gltf_compressed;
 mod hard_inputs;
 mod label_files;
 mod limits;

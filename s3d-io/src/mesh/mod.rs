@@ -9,13 +9,13 @@
 //! | ending | what is read |
 //! |---|---|
 //! | `.obj` | Wavefront OBJ in the dialects of scanners and modellers, `Kd` and `map_Kd` of its libraries |
-//! | `.gltf`, `.glb` | glTF 2.0: triangles of the default scene, base colours and their textures |
+//! | `.gltf`, `.glb` | glTF 2.0, plain or compressed: triangles of the default scene, base colours, textures |
 //! | `.ply` | ASCII and binary, either byte order: polygons, strips, colours, texture coordinates, labels |
 //!
 //! Vertices and faces keep the file's order. Polygons are cut into triangles, and a face that repeats an
 //! earlier one is left out. Textures are PNG or JPEG of at most 2²⁹ pixels each; vertices and faces are
-//! counted by 32 bits. Compressed meshes and textures (Draco, meshopt, KTX2) are refused with a message that
-//! names a way out.
+//! counted by 32 bits. glTF may be compressed by meshopt, and by Draco with the feature `draco`. Textures in
+//! KTX2 are refused with a message that names a way out.
 //!
 //! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set into a folder; [`RgbObj`] and
 //! [`SemanticObj`] write them into any writer. Source: [`crate::formats`], "Meshes".

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::fs::encoding::into_utf8;
 use crate::fs::open::read_file;
 use crate::fs::quote::quote;
-use crate::mesh::gltf::extensions::{check_required, way_out};
+use crate::mesh::gltf::extensions::{MESHOPT, check_required};
 use crate::mesh::gltf::objects::NodeWords;
 use crate::mesh::gltf::tolerant::needed;
 use base64::Engine;
@@ -19,7 +19,9 @@ use gltf::json;
 use s3d_geom::glam::DVec3;
 use serde::Deserialize;
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::fs;
+use std::mem;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -30,6 +32,8 @@ pub(crate) struct GltfDocument {
     /// The JSON. Its indices are not checked.
     pub(crate) json: gltf::Document,
     buffers: Vec<Vec<u8>>,
+    /// Why views cannot be unpacked: a sentence that follows the name of the view.
+    pub(crate) view_faults: HashMap<usize, String>,
     /// The nodes in `f64`, if any is far from its parent's origin. Otherwise empty.
     exact_nodes: Vec<ExactNode>,
     /// The names of the nodes, and what their authors added.
@@ -101,7 +105,14 @@ impl GltfDocument {
         let exact_nodes = exact_nodes(&root, text);
         let json = gltf::Document::from_json_without_validation(root);
         let words = NodeWords::of_document(text);
-        let mut document = Self { path: path.to_owned(), json, buffers: Vec::new(), exact_nodes, words };
+        let mut document = Self {
+            path: path.to_owned(),
+            json,
+            buffers: Vec::new(),
+            view_faults: HashMap::new(),
+            exact_nodes,
+            words,
+        };
         // The binary chunk stays in the memory of the file, since it is most of the file.
         let blob = blob.map(|blob| {
             bytes.truncate(blob.end);
@@ -109,7 +120,16 @@ impl GltfDocument {
             bytes
         });
         document.buffers = document.load_buffers(blob)?;
+        document.unpack()?;
         Ok(document)
+    }
+
+    /// Changes the JSON and the buffers.
+    pub(crate) fn edit(&mut self, change: impl FnOnce(&mut json::Root, &mut Vec<Vec<u8>>)) {
+        let nothing = gltf::Document::from_json_without_validation(json::Root::default());
+        let mut root = mem::replace(&mut self.json, nothing).into_json();
+        change(&mut root, &mut self.buffers);
+        self.json = gltf::Document::from_json_without_validation(root);
     }
 
     /// Returns the path of the file.
@@ -158,6 +178,9 @@ impl GltfDocument {
     /// Returns the bytes of a buffer view.
     pub(crate) fn view(&self, index: json::Index<json::buffer::View>, who: &str) -> Result<&[u8]> {
         let view = self.get(index, who, "buffer view")?;
+        if let Some(why) = self.view_faults.get(&index.value()) {
+            return Err(self.fail(format!("{who}: buffer view {index} {why}")));
+        }
         self.get(view.buffer, &format!("buffer view {index}"), "buffer")?;
         let buffer = self.buffer(view.buffer.value()).unwrap_or_default();
         let start = view.byte_offset.map_or(0, |o| o.0);
@@ -205,7 +228,12 @@ impl GltfDocument {
     fn load_buffers(&self, mut blob: Option<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
         let mut buffers = Vec::new();
         for (i, json) in self.root().buffers.iter().enumerate() {
-            let may_be_blob = i == 0 && json.uri.is_none() && !is_fallback(json);
+            let may_be_blob = i == 0 && json.uri.is_none();
+            if is_fallback(json) {
+                // Its views are unpacked from others.
+                buffers.push(Vec::new());
+                continue;
+            }
 
             let bytes = match (&json.uri, blob.take_if(|_| may_be_blob)) {
                 (Some(uri), _) => self.resource(uri).map_err(|why| {
@@ -214,16 +242,7 @@ impl GltfDocument {
                 })?,
                 (None, Some(blob)) => blob,
                 (None, _) => {
-                    // Extensions that compress data may leave out the buffer.
-                    let meshopt = self
-                        .root()
-                        .extensions_used
-                        .iter()
-                        .find(|e| e.ends_with("_meshopt_compression"));
-                    let why = meshopt.map_or_else(String::new, |e| {
-                        format!(": its data are in the extension {e}, which is not read; {}", way_out(e))
-                    });
-                    return Err(self.fail(format!("buffer {i} has neither a URI nor a chunk of a .glb{why}")));
+                    return Err(self.fail(format!("buffer {i} has neither a URI nor a chunk of a .glb")));
                 }
             };
 
@@ -291,12 +310,13 @@ impl GltfDocument {
     }
 }
 
-/// Returns whether a buffer only stands for data that an extension compresses.
+/// Returns whether a buffer only stands for data that meshopt compresses.
 fn is_fallback(buffer: &json::Buffer) -> bool {
-    let extensions = buffer.extensions.iter().flat_map(|e| &e.others);
-    extensions
-        .into_iter()
-        .any(|(_, extension)| extension.get("fallback") == Some(&true.into()))
+    let extensions = buffer.extensions.as_ref().map(|e| &e.others);
+    MESHOPT.into_iter().any(|name| {
+        let extension = extensions.and_then(|e| e.get(name));
+        extension.and_then(|e| e.get("fallback")) == Some(&true.into())
+    })
 }
 
 /// Reads the JSON. If the types of the gltf crate do not fit all of it, only the parts that are needed are
@@ -510,7 +530,7 @@ mod tests {
     fn what_is_not_read_is_refused_by_name() {
         let required =
             |e: &str| error(&format!(r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["{e}"]}}"#));
-        assert!(required("KHR_draco_mesh_compression").contains("without Draco"));
+        assert!(required("KHR_texture_basisu").contains("instead of KTX2"));
         assert!(required("XYZ_thing").contains("XYZ_thing, which is not read"));
         assert!(error(r#"{"asset": {"version": "1.0"}, "meshes": {}}"#).contains("is glTF 1.0"));
         assert!(

@@ -10,11 +10,15 @@ use serde_json::{Map, Value};
 use std::path::Path;
 
 /// The extensions that are read, or change nothing that is read. [`HARMLESS_FAMILIES`] has more.
-const HARMLESS: [&str; 25] = [
+const HARMLESS: &[&str] = &[
     // Read.
+    #[cfg(feature = "draco")]
+    DRACO,
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_node_visibility",
     "KHR_texture_transform",
     "MSFT_lod",
@@ -46,9 +50,11 @@ const HARMLESS: [&str; 25] = [
 const HARMLESS_FAMILIES: [&str; 6] =
     ["KHR_materials_", "KHR_xmp", "KHR_audio_", "KHR_physics_", "OMI_physics_", "VRM"];
 
-/// The extensions that hold compressed geometry beside a plain form. The plain form is read if it is there.
-const COMPRESSIONS: [&str; 3] =
-    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
+/// The extension that compresses primitives. A plain form may be beside it, which is read if it is there.
+pub(crate) const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// The extensions that compress buffer views.
+pub(crate) const MESHOPT: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
 /// The extensions that add, replace or move geometry, so an object that has one is not what it seems.
 const GEOMETRY: [&str; 6] = [
@@ -61,19 +67,8 @@ const GEOMETRY: [&str; 6] = [
 ];
 
 /// What the user can do about an extension that is not read.
-const WAYS_OUT: [(&str, &str); 8] = [
-    (
-        "KHR_draco_mesh_compression",
-        "export without Draco compression, or run `gltf-transform copy in.glb out.glb`",
-    ),
-    (
-        "EXT_meshopt_compression",
-        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
-    ),
-    (
-        "KHR_meshopt_compression",
-        "export without meshopt compression, or run `gltf-transform copy in.glb out.glb`",
-    ),
+const WAYS_OUT: [(&str, &str); 6] = [
+    (DRACO, "export without Draco compression, or run `gltf-transform copy in.glb out.glb`"),
     (
         "KHR_texture_basisu",
         "export PNG or JPEG textures instead of KTX2, or run `gltf-transform ktxdecompress in.glb out.glb`",
@@ -124,7 +119,7 @@ impl GltfDocument {
                     ),
                 ));
             }
-            let is_known = is_harmless(extension) || COMPRESSIONS.contains(&extension.as_str());
+            let is_known = is_harmless(extension) || extension == DRACO;
             if !is_known && !unknown.contains(extension) {
                 unknown.push(extension.clone());
             }

@@ -3,9 +3,14 @@
 mod accessor;
 mod builder;
 mod document;
+#[cfg(feature = "draco")]
+mod draco;
 mod extensions;
+mod filters;
 mod material;
+mod meshopt;
 mod objects;
 pub(crate) mod read;
 mod scene;
 mod tolerant;
+mod unpack;

@@ -52,7 +52,16 @@ const ROOT: &[(&str, Keep)] = &[
         ]),
     ),
     ("buffers", Each(&[("byteLength", All), ("extensions", All), ("uri", All)])),
-    ("bufferViews", Each(&[("buffer", All), ("byteLength", All), ("byteOffset", All), ("byteStride", All)])),
+    (
+        "bufferViews",
+        Each(&[
+            ("buffer", All),
+            ("byteLength", All),
+            ("byteOffset", All),
+            ("byteStride", All),
+            ("extensions", All),
+        ]),
+    ),
     ("extensions", Members(&[("CESIUM_RTC", All)])),
     ("extensionsUsed", All),
     ("images", Each(&[("bufferView", All), ("mimeType", Text), ("name", Text), ("uri", All)])),
