@@ -188,14 +188,16 @@
 //!
 //! Each format is a cargo feature, and all are on by default. A file whose format was left out is refused
 //! with the name of the feature that reads it. With `default-features = false, features = ["obj"]` the crate
-//! reads textured OBJ meshes and builds from 44 packages instead of 122.
+//! reads textured OBJ meshes and builds from 45 packages instead of 124.
 //!
 //! | feature | formats |
 //! |---|---|
 //! | `obj`, `gltf`, `ply` | meshes; OBJ is written too, with `png` |
 //! | `draco` | glTF that Draco compressed |
+//! | `textures` | WebP, BMP, TGA and TIFF beside PNG and JPEG |
 //! | `cloud` | annotated points: the S3DIS tree, and the labels of meshes |
 //! | `las`, `e57`, `npy`, `pcd`, `text`, `kitti`, `scannet`, `mat`, `ply` | annotated points of these formats |
+//! | `labels` | files that label the faces of a mesh: HM3D, Replica, 3RScan, ScanNet++, other meshes |
 //! | `camera` | lists of cameras; the scanner's pictures |
 //! | `png`, `exr` | the images of a data set |
 //! | `dataset` | the rest of a data set: poses, labels, instances, splits, lists, conventions |

@@ -226,7 +226,8 @@ pub fn write_scene_toml(folder: &Path) -> Result<PathBuf> {
         return Err(FileError::format(&path, "is there already: move it away first").into());
     }
     let found = s3d_io::scene::find_scene(folder)?.ok_or_else(|| {
-        let sets = s3d_io::scene::FOUND_SETS.join(", ");
+        let sets: Vec<&str> = s3d_io::scene::found_sets().collect();
+        let sets = sets.join(", ");
         FileError::format(folder, format!("holds no scene of a data set that is known: {sets}"))
     })?;
     s3d_io::fs::write_bytes(&path, found.toml.as_bytes())?;

@@ -47,7 +47,7 @@ pub(crate) mod frame_gap;
 mod kind;
 #[cfg(feature = "kitti")]
 mod kitti;
-#[cfg(feature = "label-files")]
+#[cfg(feature = "labels")]
 mod label_files;
 #[cfg(feature = "las")]
 mod las;
@@ -55,6 +55,8 @@ mod las;
 mod mat;
 #[cfg(feature = "npy")]
 pub(crate) mod npy;
+#[cfg(feature = "labels")]
+mod of_label_file;
 #[cfg(feature = "mesh")]
 mod of_mesh;
 pub(crate) mod on_fault;
@@ -77,12 +79,12 @@ pub use annotations::{
     AnnotatedInstance, AnnotatedPoints, AnnotatedRoom, AnnotationOptions, Annotations, Skipped,
 };
 pub use frame_gap::FrameGap;
-#[cfg(feature = "label-files")]
-pub use label_files::AnnotatedMesh;
 #[cfg(feature = "mat")]
 pub use mat::{MatArea, MatObject, MatRoom, MatWriter};
 #[cfg(feature = "npy")]
 pub use npy::{NpyArray, NpyWriter, NpzArchive};
+#[cfg(feature = "labels")]
+pub use of_label_file::AnnotatedMesh;
 pub use passes::{InstancePasses, InstanceReader, PointPasses};
 #[cfg(feature = "ply")]
 pub use ply::{

@@ -64,9 +64,9 @@ impl FaceLabels {
 
         let (labels, mut warnings) = if let Some(names) = names {
             names
-        } else if let Some(named) = named_beside(file, options.class_column.as_deref())? {
-            companions.push(named.list);
-            (named.labels, named.warnings)
+        } else if let Some((labels, warnings, list)) = named_beside(file, options)? {
+            companions.push(list);
+            (labels, warnings)
         } else if let Some(labels) = &file.labels {
             (labels.clone(), Vec::new())
         } else {
@@ -132,22 +132,20 @@ impl FaceLabels {
     }
 }
 
-/// Labels that a list beside a mesh gives to its faces.
-pub(crate) struct NamedFaces {
-    pub(crate) labels: MeshLabels,
-    pub(crate) warnings: Vec<String>,
-    /// The list.
-    pub(crate) list: PathBuf,
+/// Returns the labels that a list beside a mesh gives to its faces, with warnings and the path of the list.
+#[cfg(feature = "labels")]
+fn named_beside(file: &MeshFile, options: &AnnotationOptions) -> Result<Option<Named>> {
+    let named = crate::cloud::label_files::named_beside(file, options.class_column.as_deref())?;
+    Ok(named.map(|named| (named.labels, named.warnings, named.list)))
 }
-
-#[cfg(feature = "label-files")]
-use crate::cloud::label_files::named_beside;
 
 /// Without the feature, no list is read.
-#[cfg(not(feature = "label-files"))]
-fn named_beside(_: &MeshFile, _: Option<&str>) -> Result<Option<NamedFaces>> {
+#[cfg(not(feature = "labels"))]
+fn named_beside(_: &MeshFile, _: &AnnotationOptions) -> Result<Option<Named>> {
     Ok(None)
 }
+
+type Named = (MeshLabels, Vec<String>, PathBuf);
 
 /// What a file says of each face of its mesh.
 trait FaceTags {

@@ -6,8 +6,10 @@ use crate::cloud::annotations::{
 };
 use crate::cloud::frame_gap::{FrameGap, refusal};
 use crate::cloud::kind::{is_kitti, is_scannet, open_arrays, open_cloud, table};
-#[cfg(feature = "label-files")]
-use crate::cloud::label_files::{AnnotatedMesh, LabelFile};
+#[cfg(feature = "labels")]
+use crate::cloud::label_files::LabelFile;
+#[cfg(feature = "labels")]
+use crate::cloud::of_label_file::AnnotatedMesh;
 use crate::cloud::on_fault::OnFault;
 use crate::cloud::s3dis::points::PointReader;
 use crate::cloud::s3dis::tree::{AnnotationTree, TreeOptions};
@@ -73,7 +75,7 @@ impl Annotations {
         Self::open_each(
             paths,
             options,
-            #[cfg(feature = "label-files")]
+            #[cfg(feature = "labels")]
             None,
         )
     }
@@ -87,7 +89,7 @@ impl Annotations {
     ///
     /// # Panics
     /// If `paths` is empty.
-    #[cfg(feature = "label-files")]
+    #[cfg(feature = "labels")]
     pub fn open_for(
         mesh: &AnnotatedMesh<'_>,
         paths: &[PathBuf],
@@ -99,7 +101,7 @@ impl Annotations {
     fn open_each(
         paths: &[PathBuf],
         options: &AnnotationOptions,
-        #[cfg(feature = "label-files")] mesh: Option<&AnnotatedMesh<'_>>,
+        #[cfg(feature = "labels")] mesh: Option<&AnnotatedMesh<'_>>,
     ) -> Result<Self> {
         assert!(!paths.is_empty(), "no path of annotations");
         let taxonomy = options.taxonomy.clone();
@@ -107,7 +109,7 @@ impl Annotations {
         let mut clouds: Vec<Box<dyn Cloud + '_>> = Vec::new();
 
         for path in paths {
-            #[cfg(feature = "label-files")]
+            #[cfg(feature = "labels")]
             // Columns of rooms are columns of points.
             if options.room_column.is_none()
                 && let Some(file) = LabelFile::of(path)?

@@ -108,6 +108,7 @@ fn size_of_texture(bytes: &[u8]) -> std::result::Result<Header, TextureFault> {
     let (format, extension) = match guessed.or(is_tga(bytes).then_some(ImageFormat::Tga)) {
         Some(ImageFormat::Png) => (ImageFormat::Png, Some("png")),
         Some(ImageFormat::Jpeg) => (ImageFormat::Jpeg, Some("jpg")),
+        #[cfg(feature = "textures")]
         Some(format @ (ImageFormat::WebP | ImageFormat::Bmp | ImageFormat::Tga | ImageFormat::Tiff)) => {
             (format, None)
         }
@@ -148,7 +149,11 @@ fn size_of_texture(bytes: &[u8]) -> std::result::Result<Header, TextureFault> {
 }
 
 /// The formats, for messages.
-const READ: &str = "PNG, JPEG, WebP, BMP, TGA and TIFF";
+const READ: &str = if cfg!(feature = "textures") {
+    "PNG, JPEG, WebP, BMP, TGA and TIFF"
+} else {
+    "PNG and JPEG"
+};
 
 /// Returns whether the first bytes are the header of a TGA image, which has no name of its own: a map of
 /// colours or none, one of six types, its depth in bits, a width and a height.
@@ -285,6 +290,7 @@ pub(crate) mod tests {
         );
     }
 
+    #[cfg(feature = "textures")]
     #[test]
     fn textures_of_modellers_are_decoded_and_not_copied() {
         let colors = [[200, 100, 50], [1, 2, 3]];
@@ -305,7 +311,7 @@ pub(crate) mod tests {
 
     #[test]
     fn what_is_no_image_is_refused() {
-        assert!(fault_of(b"v 0 0 0".to_vec()).contains("is no image; PNG, JPEG"));
+        assert!(fault_of(b"v 0 0 0".to_vec()).contains("is no image; PNG"));
         assert!(fault_of(b"GIF89a\x01\0\x01\0".to_vec()).contains("gif"));
         let mut cut = two_pixels([1; 3], [2; 3]);
         cut.truncate(cut.len() - 20);

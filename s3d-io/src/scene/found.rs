@@ -54,8 +54,11 @@ pub fn find_scene(folder: &Path) -> Result<Option<FoundScene>> {
     Ok(Some(FoundScene { set, toml, scene }))
 }
 
+/// Looks for the files of a data set.
+type Finder = fn(&Folder) -> Option<Parts>;
+
 /// The data sets whose scenes are found, in the order of search: the surest names first.
-const SETS: [(&str, fn(&Folder) -> Option<Parts>); 6] = [
+const SETS: [(&str, Finder); 6] = [
     ("ScanNet++", scannetpp),
     ("Replica", replica),
     ("HM3D", hm3d),
@@ -64,16 +67,10 @@ const SETS: [(&str, fn(&Folder) -> Option<Parts>); 6] = [
     ("ScanNet", scannet),
 ];
 
-/// The names of the data sets whose scenes [`find_scene`] finds.
-pub const FOUND_SETS: [&str; SETS.len()] = {
-    let mut names = [""; SETS.len()];
-    let mut i = 0;
-    while i < SETS.len() {
-        names[i] = SETS[i].0;
-        i += 1;
-    }
-    names
-};
+/// Returns the names of the data sets whose scenes [`find_scene`] finds.
+pub fn found_sets() -> impl Iterator<Item = &'static str> {
+    SETS.iter().map(|(set, _)| *set)
+}
 
 /// The parts of a scene: paths below its folder.
 #[derive(Default)]
@@ -88,7 +85,7 @@ struct Parts {
 }
 
 /// The world of ScanNet++'s mesh from the one of its `transforms.json`, where x and y are exchanged and z points
-/// down. Source: scannetpp/scannetpp, common/utils/nerfstudio.py, `convert_frames`.
+/// down. Source: scannetpp/scannetpp, common/utils/nerfstudio.py.
 const SCANNETPP_TURN: &str = "[[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]";
 
 fn scannetpp(dir: &Folder) -> Option<Parts> {
@@ -360,7 +357,7 @@ mod tests {
         }
         fs::write(at("scans/mesh_aligned_0.05.ply"), "").unwrap();
         fs::write(at("scans/segments_anno.json"), "").unwrap();
-        // As `convert_frames` writes a camera at (1, 2, 3) with the axes of the world, OpenCV's.
+        // As ScanNet++ writes a camera at (1, 2, 3) with the axes of the world, OpenCV's.
         let rows = "[[0, -1, 0, 2], [1, 0, 0, 1], [0, 0, 1, -3], [0, 0, 0, 1]]";
         let frame = |more: &str| format!(r#"{{"file_path": "a.JPG", "transform_matrix": {rows}{more}}}"#);
         let text = format!(

@@ -49,7 +49,7 @@ mod toml_fault;
 pub use cameras::CameraSource;
 pub use document::{parse_scene, read_scene};
 pub use file::{MeshColors, SceneFile};
-pub use found::{FOUND_SETS, FoundScene, find_scene};
+pub use found::{FoundScene, find_scene, found_sets};
 pub use frames::FrameSource;
 pub use published::{PublishedArea, PublishedMesh, PublishedOptions};
 pub use rgb::{PictureKind, PictureOptions, PictureSource, SkyBoxCaps, UnseenColor};

@@ -5,36 +5,19 @@
 //! faces of the scene's mesh.
 
 mod hm3d;
-mod numbers;
+pub(crate) mod numbers;
 mod replica;
 mod segments;
-mod transfer;
+pub(crate) mod transfer;
 
-use crate::cloud::annotations::{AnnotationOptions, Annotations};
-use crate::cloud::frame_gap::{FrameGap, refusal};
-use crate::cloud::of_mesh::{FaceLabels, NamedFaces};
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
-use crate::mesh::file::{LengthUnit, MeshFile, MeshOptions, UpAxis};
+use crate::mesh::file::{MeshFile, MeshOptions, UpAxis};
 use crate::mesh::labels::MeshLabels;
-use crate::mesh::origin::MeshOrigin;
 use crate::mesh::ply::elements::PlyReader;
 use crate::mesh::read::{MeshFormat, read_mesh_with};
-use s3d_geom::TriMesh;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use transfer::{are_same_faces, overlap, transferred};
-
-/// The mesh that annotations label, and how its file was read.
-#[derive(Clone, Copy, Debug)]
-pub struct AnnotatedMesh<'a> {
-    /// The mesh.
-    pub file: &'a MeshFile,
-    /// The axis of its file that points up.
-    pub up: UpAxis,
-    /// The unit of its file. `None`: the unit that the file says, or metres.
-    pub units: Option<LengthUnit>,
-}
 
 /// A file of labels, by its kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -105,7 +88,7 @@ impl LabelFile {
     ///
     /// # Errors
     /// Like [`read_mesh_with`]; [`Error::Format`] for labels that are damaged or do not fit their mesh.
-    fn read(&self, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
+    pub(crate) fn read(&self, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
         match self {
             Self::Mesh(path) => read_mesh_with(path, up, options),
             Self::Hm3d(list) => hm3d::read(list, up, options),
@@ -118,7 +101,8 @@ impl LabelFile {
         }
     }
 
-    fn path(&self) -> &Path {
+    /// Returns the path of the file.
+    pub(crate) fn path(&self) -> &Path {
         match self {
             Self::Mesh(path)
             | Self::Hm3d(path)
@@ -127,6 +111,14 @@ impl LabelFile {
             | Self::Numbers(path) => path,
         }
     }
+}
+
+/// Labels that a list beside a mesh gives to its faces.
+pub(crate) struct NamedFaces {
+    pub(crate) labels: MeshLabels,
+    pub(crate) warnings: Vec<String>,
+    /// The list.
+    pub(crate) list: PathBuf,
 }
 
 /// Reads the list of objects that the data set of a mesh puts beside it, if the mesh has objects without
@@ -158,88 +150,6 @@ pub(crate) fn named_beside(file: &MeshFile, class_column: Option<&str>) -> Resul
         },
     };
     Ok(Some(NamedFaces { labels, warnings, list }))
-}
-
-impl Annotations {
-    /// Takes the labels of a file of labels for a scene's mesh. Without a mesh, the annotated points lie on
-    /// the faces of the file's own mesh, Z-up, and know no face.
-    ///
-    /// # Errors
-    /// The errors of [`LabelFile::read`] and [`Annotations::of_mesh`]; [`Error::Format`] if the two meshes
-    /// lie far apart.
-    pub(crate) fn of_label_file(
-        file: &LabelFile,
-        options: &AnnotationOptions,
-        scene: Option<&AnnotatedMesh<'_>>,
-    ) -> Result<Self> {
-        let mut mesh_options = MeshOptions {
-            class_column: options.class_column.clone(),
-            instance_column: options.instance_column.clone(),
-            origin: MeshOrigin::behind(options.offset_m),
-            units: None,
-        };
-        let Some(scene) = scene else {
-            let labelled = file.read(UpAxis::Z, &mesh_options)?;
-            let labels = FaceLabels::of_mesh(&labelled, options)?;
-            let mut found = labels.annotate(file.path(), &labelled.mesh, options, false)?;
-            found.add_companions(&labelled, file);
-            return Ok(found);
-        };
-
-        if let LabelFile::Numbers(list) = file {
-            let labels = numbers::read(list, scene.file)?;
-            let labels = FaceLabels::of_labels(scene.file, labels, options)?;
-            return labels.annotate(list, &scene.file.mesh, options, true);
-        }
-
-        mesh_options.units = scene.units.or(scene.file.unit_said);
-        let labelled = in_frame_of(file, scene, &mesh_options)?;
-        let bounds = labelled.mesh.aabb();
-        let corners = [bounds.min, bounds.max].map(|p| p.as_dvec3() + options.offset_m);
-        if let Some(gap) = FrameGap::between(corners, options.offset_m, scene.file.mesh.aabb()) {
-            return Err(refusal(file.path(), &gap));
-        }
-
-        let mut found = if are_same_faces(&labelled.mesh, &scene.file.mesh) {
-            Self::of_mesh(&labelled, options)?
-        } else {
-            let mut labels = FaceLabels::of_mesh(&labelled, options)?;
-            labels.faces = transferred(&labelled.mesh, &labels.faces, &scene.file.mesh);
-            labels
-                .annotate(file.path(), &scene.file.mesh, options, true)
-                .map_err(|_| Error::format(file.path(), "labels no surface within 10 cm of the mesh"))?
-        };
-        found.add_companions(&labelled, file);
-        Ok(found)
-    }
-
-    /// Adds the files that were read beside the file of labels.
-    fn add_companions(&mut self, labelled: &MeshFile, file: &LabelFile) {
-        let sources = labelled.sources.iter().map(|source| &source.path);
-        self.companions.extend(sources.chain(&labelled.companions).cloned());
-        self.companions.retain(|path| path != file.path());
-    }
-}
-
-/// Reads the mesh of a file of labels in the frame of the scene's mesh. Its up axis is the one of the scene's
-/// mesh file or Z, whichever brings the two meshes together: programs that label a mesh may turn it.
-fn in_frame_of(file: &LabelFile, scene: &AnnotatedMesh<'_>, options: &MeshOptions) -> Result<MeshFile> {
-    let first = file.read(scene.up, options)?;
-    let other = match scene.up {
-        UpAxis::Y => UpAxis::Z,
-        UpAxis::Z => UpAxis::Y,
-    };
-    if are_same_faces(&first.mesh, &scene.file.mesh) {
-        return Ok(first);
-    }
-
-    let fit = |mesh: &TriMesh| overlap(mesh.aabb(), scene.file.mesh.aabb());
-    let turned = file.read(other, options)?;
-    Ok(if fit(&turned.mesh) > fit(&first.mesh) + 0.1 {
-        turned
-    } else {
-        first
-    })
 }
 
 /// Returns whether a PLY file is a mesh.

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Returns whether a file is such a list: the first two lines of a text have a number each, or an array has
 /// one dimension and no names.
-pub(super) fn is_list(path: &Path) -> bool {
+pub(crate) fn is_list(path: &Path) -> bool {
     let head = head_of(path);
     if head.starts_with(b"\x93NUMPY") {
         return NpyArray::open(path).is_ok_and(|array| array.shape().len() == 1);
@@ -31,7 +31,7 @@ pub(super) fn is_list(path: &Path) -> bool {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the place for what is no whole number, and for a list of another
 /// length.
-pub(super) fn read(path: &Path, mesh: &MeshFile) -> Result<MeshLabels> {
+pub(crate) fn read(path: &Path, mesh: &MeshFile) -> Result<MeshLabels> {
     let values = if head_of(path).starts_with(b"\x93NUMPY") {
         numbers_of_array(path)?
     } else {
@@ -42,7 +42,9 @@ pub(super) fn read(path: &Path, mesh: &MeshFile) -> Result<MeshLabels> {
     let vertices = mesh.mesh.positions().len();
     let faces = faces_of_file(mesh);
     let count = values.len();
-    let element = match (count == vertices, faces.contains(&count)) {
+    // Faces of several files are numbered in each.
+    let fits_faces = mesh.sources.len() == 1 && faces.contains(&count);
+    let element = match (count == vertices, fits_faces) {
         (true, false) => LabelElement::Vertex,
         (false, true) => LabelElement::Face,
         (both, _) => {
@@ -77,10 +79,6 @@ pub(super) fn read(path: &Path, mesh: &MeshFile) -> Result<MeshLabels> {
 /// Returns the numbers of faces that the file of a mesh may have: its last faces may have been left out.
 fn faces_of_file(mesh: &MeshFile) -> std::ops::RangeInclusive<usize> {
     let seen = mesh.source_faces.iter().max().map_or(0, |&face| face as usize + 1);
-    // Faces of several files are numbered in each.
-    if mesh.sources.len() > 1 {
-        return 1..=0;
-    }
     seen..=seen + mesh.mesh.report().zero_area_faces + mesh.repeated_faces
 }
 

@@ -13,19 +13,17 @@ const SPACING_M: f32 = 0.05;
 const FEWEST_ROWS: u32 = 2;
 const MOST_ROWS: u32 = 16;
 
-/// The orders in which a face may have its corners.
-const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
-
 /// Returns whether two meshes have the same faces in the same order. Rounded positions count as the same.
-pub(super) fn are_same_faces(a: &TriMesh, b: &TriMesh) -> bool {
+pub(crate) fn are_same_faces(a: &TriMesh, b: &TriMesh) -> bool {
     let count = a.faces().len();
     count == b.faces().len()
         && (0..count as u32).all(|face| {
             let [p, q, r] = a.triangle(face);
-            let other = b.triangle(face);
-            ORDERS
+            let [a, b, c] = b.triangle(face);
+            let orders = [[a, b, c], [b, c, a], [c, a, b], [a, c, b], [c, b, a], [b, a, c]];
+            orders
                 .iter()
-                .any(|&[i, j, k]| is_near(p, other[i]) && is_near(q, other[j]) && is_near(r, other[k]))
+                .any(|&[a, b, c]| is_near(p, a) && is_near(q, b) && is_near(r, c))
         })
 }
 
@@ -35,7 +33,7 @@ fn is_near(p: Vec3, q: Vec3) -> bool {
 
 /// Returns the share of the volume of two boxes that they have in common, 0 to 1. Flat boxes have a thickness
 /// of 1 cm.
-pub(super) fn overlap(a: Aabb, b: Aabb) -> f64 {
+pub(crate) fn overlap(a: Aabb, b: Aabb) -> f64 {
     let volume = |min: Vec3, max: Vec3| {
         let size = (max - min).as_dvec3();
         if size.min_element() < 0.0 {
@@ -55,7 +53,7 @@ pub(super) fn overlap(a: Aabb, b: Aabb) -> f64 {
 /// # Panics
 /// If `label_of_face` has fewer entries than `from` has faces.
 #[expect(clippy::indexing_slicing, reason = "a column of another mesh is a caller's mistake: see Panics")]
-pub(super) fn transferred(from: &TriMesh, label_of_face: &[u32], to: &TriMesh) -> Vec<u32> {
+pub(crate) fn transferred(from: &TriMesh, label_of_face: &[u32], to: &TriMesh) -> Vec<u32> {
     let nearest_faces = NearestFaces::new(from);
     let mut labels = vec![NO_INDEX; to.faces().len()];
     let mut places = Vec::new();

@@ -88,7 +88,6 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         face_materials: faces.materials,
         face_tags: faces.polygon_of,
         textures: looks.textures,
-        ..MeshParts::default()
     };
     let mesh = checked_mesh(parts, frame, &mut warnings).map_err(|e| match e {
         MeshError::NonFinite { vertex, position } => vertex_error(path, &bytes, vertex, position),
