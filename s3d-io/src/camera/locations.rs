@@ -191,13 +191,9 @@ mod tests {
         let message = read("empty").unwrap_err().to_string();
         assert!(message.contains("empty") && message.contains("images.txt"), "{message}");
         assert!(matches!(read("gone"), Err(Error::Io { .. })));
-        fs::write(at("scan.e57"), b"ASTM-E57\x01\0\0\0").unwrap();
-        assert!(
-            read("scan.e57")
-                .unwrap_err()
-                .to_string()
-                .contains("is a cloud of points (E57)")
-        );
+        fs::write(at("scan.las"), b"LASF\x01\0\0\0").unwrap();
+        let message = read("scan.las").unwrap_err().to_string();
+        assert!(message.contains("is a cloud of points (LAS)"), "{message}");
     }
 
     #[test]
