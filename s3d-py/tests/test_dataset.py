@@ -144,7 +144,7 @@ def test_tables_are_those_of_the_files(ds: s3d.DataSet, demo: Path) -> None:
     assert votes is not None and len(votes.label) == len(mesh.faces)
     assert np.array_equal(votes.votes, np.load(demo / "area_1/3d/votes.npz")["votes"])
     source = ds.source_faces()
-    assert source is not None and source.files == ["mesh.obj"] and not source.file.any()
+    assert source is not None and source.files == ["rgb.obj"] and not source.file.any()
     assert len(source.face) == len(mesh.faces) and (np.diff(source.face.astype(np.int64)) >= 0).all()
     candidates = ds.candidates()
     kept = [c for c in candidates if c.frame is not None]
