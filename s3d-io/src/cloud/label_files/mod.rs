@@ -163,9 +163,10 @@ fn has_faces(path: &Path) -> Result<bool> {
 /// Returns the first 64 KiB of a file, or nothing if it cannot be read.
 fn head_of(path: &Path) -> Vec<u8> {
     let mut head = Vec::new();
-    // A file that cannot be read is of no known kind. Whoever reads it as another kind reports the fault.
-    let read = std::fs::File::open(path).map(|file| file.take(1 << 16).read_to_end(&mut head));
-    if read.is_err() {
+    // A file that cannot be read, or is a pipe, is of no known kind. Whoever reads it as another kind reports
+    // the fault.
+    let read = open_file(path).map(|file| file.take(1 << 16).read_to_end(&mut head));
+    if !matches!(read, Ok(Ok(_))) {
         head.clear();
     }
     head
