@@ -242,7 +242,7 @@ def test_lenient_counts_what_it_leaves_out(s3d, export, demo, reference, tmp_pat
     room = sorted(p for p in tree.iterdir() if p.is_dir())[0]
     wall = sorted(room.glob("Annotations/wall_*.txt"))[0]
     text = wall.read_bytes()
-    wall.write_bytes(b"1.0 2.0\x10 3.0 1 2 3\n" + text)
+    wall.write_bytes(b"1.0 2.0x 3.0 1 2 3\n" + text)
     shutil.copy(wall, wall.with_name("wall_1 (1).txt"))
     (room / "Annotations" / "stairs_1.txt").write_bytes(text)
     table = '[annotations]\npath = "Area_1"\n'
