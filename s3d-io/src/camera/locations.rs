@@ -3,8 +3,9 @@
 use crate::camera::matterport::{PictureFolder, read_matterport_locations};
 use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
+use crate::camera::programs::{colmap, nerfstudio};
 use crate::camera::table::{ScanLocation, parse_cameras};
-use crate::camera::{colmap, located, nerfstudio, poses};
+use crate::camera::{located, poses};
 use crate::error::{Error, Result};
 use crate::fs::open::read_file;
 use s3d_geom::Pose;
@@ -46,8 +47,8 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
     }
 
     #[cfg(feature = "e57")]
-    if starts_with(path, crate::camera::e57::MAGIC)? {
-        return picture_locations(path, crate::camera::e57::read(path)?, world_from_file);
+    if starts_with(path, crate::camera::programs::e57::MAGIC)? {
+        return picture_locations(path, crate::camera::programs::e57::read(path)?, world_from_file);
     }
 
     let bytes = read_file(path)?;

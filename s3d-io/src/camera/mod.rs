@@ -36,26 +36,17 @@
 //! # Ok::<(), s3d_io::Error>(())
 //! ```
 
-mod arkit;
-mod colmap;
-#[cfg(feature = "e57")]
-mod e57;
 mod located;
 mod locations;
 mod matterport;
-mod metashape;
-mod nerfstudio;
 mod numbered;
 mod other_kind;
 mod picture;
-mod polycam;
 mod posed;
 mod posed_list;
 pub(crate) mod poses;
-mod scannet;
-mod sequence;
+mod programs;
 mod table;
-mod tum;
 
 pub use located::uuid_from_name;
 pub use locations::read_scan_locations;

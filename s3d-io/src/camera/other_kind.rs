@@ -1,6 +1,6 @@
 //! Files that users give in place of a list of cameras.
 
-use crate::camera::metashape::PROJECT;
+use crate::camera::programs::metashape::PROJECT;
 use crate::error::{Error, Result};
 use std::path::Path;
 

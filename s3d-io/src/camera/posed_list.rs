@@ -3,7 +3,8 @@
 use crate::camera::locations::{has_transforms, is_colmap_images, moved};
 use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
-use crate::camera::{arkit, colmap, located, metashape, nerfstudio, polycam, scannet, sequence, table, tum};
+use crate::camera::programs::{arkit, colmap, metashape, nerfstudio, polycam, scannet, sequence, tum};
+use crate::camera::{located, table};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 const HEAD: u64 = 4096;
 
 /// All kinds of files that are read, for messages.
-const ALL: &str = "an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, .pcd, text (.asc, .xyz, .txt, \
-                   .csv, .pts, .ptx), SemanticKITTI's .label, a folder of Pointcept's arrays, or ScanNet's \
+const ALL: &str = "an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, .pcd, text (.asc, .xyz, \
+                   .txt, .csv, .pts, .ptx), SemanticKITTI's .label, a folder of Pointcept's arrays, or ScanNet's \
                    .aggregation.json";
 
 /// Opens a cloud: a file, or a folder that holds one.
@@ -164,8 +164,8 @@ fn unknown(path: &Path, head: &[u8]) -> Error {
 /// The file that makes a folder one of Pointcept's.
 const COORDINATES: &str = "coord.npy";
 
-/// Opens the folders of Pointcept's arrays: `dir`, or those in it, in the order of their names. Returns none if
-/// they are no such folders.
+/// Opens the folders of Pointcept's arrays: `dir`, or those in it, in the order of their names. Returns none
+/// if they are no such folders.
 pub(crate) fn open_arrays<'a>(
     dir: &Path,
     options: &'a AnnotationOptions,

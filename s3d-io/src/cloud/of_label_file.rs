@@ -8,7 +8,6 @@ use crate::cloud::of_mesh::FaceLabels;
 use crate::error::{Error, Result};
 use crate::mesh::file::{LengthUnit, MeshFile, MeshOptions, UpAxis};
 use crate::mesh::origin::MeshOrigin;
-use s3d_geom::TriMesh;
 
 /// The mesh that annotations label, and how its file was read.
 #[derive(Clone, Copy, Debug)]
@@ -71,6 +70,12 @@ impl Annotations {
                 .map_err(|_| Error::format(file.path(), "labels no surface within 10 cm of the mesh"))?
         };
         found.add_companions(&labelled, file);
+        // What is odd in the mesh of labels is told once, also if it is the scene's own.
+        let told = labelled
+            .warnings
+            .iter()
+            .filter(|warning| !scene.file.warnings.contains(warning));
+        found.warnings.extend(told.cloned());
         Ok(found)
     }
 
@@ -83,22 +88,21 @@ impl Annotations {
 }
 
 /// Reads the mesh of a file of labels in the frame of the scene's mesh. Its up axis is the one of the scene's
-/// mesh file or Z, whichever brings the two meshes together: programs that label a mesh may turn it.
+/// mesh file. If the boxes of the two have less than half in common, the other axis is tried: programs that
+/// label a mesh may turn it.
 fn in_frame_of(file: &LabelFile, scene: &AnnotatedMesh<'_>, options: &MeshOptions) -> Result<MeshFile> {
     let first = file.read(scene.up, options)?;
+    let bounds = scene.file.mesh.aabb();
+    let fit = overlap(first.mesh.aabb(), bounds);
+    if fit > 0.5 {
+        return Ok(first);
+    }
+
     let other = match scene.up {
         UpAxis::Y => UpAxis::Z,
         UpAxis::Z => UpAxis::Y,
     };
-    if are_same_faces(&first.mesh, &scene.file.mesh) {
-        return Ok(first);
-    }
-
-    let fit = |mesh: &TriMesh| overlap(mesh.aabb(), scene.file.mesh.aabb());
     let turned = file.read(other, options)?;
-    Ok(if fit(&turned.mesh) > fit(&first.mesh) + 0.1 {
-        turned
-    } else {
-        first
-    })
+    let fits_better = overlap(turned.mesh.aabb(), bounds) > fit + 0.1;
+    Ok(if fits_better { turned } else { first })
 }

@@ -30,7 +30,7 @@ impl Annotations {
     /// |---|---|
     /// | a folder | the S3DIS tree of an area, see [`AnnotationTree`] |
     /// | `….mat` | `pointcloud.mat` of a published area, see [`MatArea`](crate::cloud::MatArea) |
-    /// | a mesh, or the list of labels of HM3D, Replica, 3RScan or ScanNet++ | labels of faces: [`Annotations::open_for`] |
+    /// | a mesh; lists of HM3D, Replica, 3RScan, ScanNet++ | labels of faces: [`Annotations::open_for`] |
     /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh |
     /// | `.ply` | vertices with properties for class and instance; ASCII or binary |
     /// | `.npy` | a structured array, or rows and columns, see [`AnnotationOptions::columns`] |
@@ -38,10 +38,10 @@ impl Annotations {
     /// | `.las`, `.laz` | `classification`, and `point_source_id` as instance; extra dimensions by name |
     /// | `.e57` | several scans with their poses; attributes of extensions for classes and instances |
     /// | `.pcd` | PCL's fields, ASCII, binary or compressed; `rgb` and `rgba` may be packed |
-    /// | `.asc`, `.xyz`, `.txt`, `.csv` | a point a line; the first line, or [`AnnotationOptions::columns`], names the columns |
-    /// | `.pts`, `.ptx` | the same with a scanner's counts and poses; [`AnnotationOptions::columns`] names the columns |
+    /// | `.asc`, `.xyz`, `.txt`, `.csv` | a point a line; the first line or the options name the columns |
+    /// | `.pts`, `.ptx` | the same with a scanner's counts and poses; the options name the columns |
     /// | `.label`, `.bin` | SemanticKITTI: one beside the other, or in `labels/` and `velodyne/` |
-    /// | a folder with `coord.npy`, or folders with it | Pointcept's arrays: `color.npy`, `segment.npy`, `instance.npy` |
+    /// | a folder with `coord.npy`, or folders with it | Pointcept's arrays, an array a file |
     ///
     /// The first bytes of a file come before the ending of its name.
     ///
@@ -52,7 +52,8 @@ impl Annotations {
     /// - **class**: [`AnnotationOptions::classes`] gives the meaning of a number or a name. Names of the 13
     ///   classes mean themselves, and the usual words of ScanNet's annotators mean the nearest of the 13. The
     ///   numbers of a plain NPY array are S3DIS's (0 ceiling … 12 clutter) if neither columns nor classes
-    ///   are named, and so are those of SemanticKITTI's files and Pointcept's arrays without classes. Classes without a meaning are an error that lists them.
+    ///   are named, and so are those of SemanticKITTI's files and Pointcept's arrays without classes. Classes
+    ///   without a meaning are an error that lists them.
     /// - **instance**: points of one room and class with one number are one instance. Two classes of the file
     ///   that mean the same are kept apart, since many files number per class. Points without a number, or
     ///   with a negative one, are one instance a class and room. Instances are numbered per class and room
@@ -147,7 +148,8 @@ impl Annotations {
 
     /// Reads annotations like [`Annotations::open`], from the bytes of one file, which are read as often as
     /// necessary: a `.mat`, or a table of points in one file (`.ply`, `.npy`, `.npz`, `.las`, `.laz`, `.e57`,
-    /// `.pcd`, text). The first bytes or the extension of `name` tell the format; errors call the file `name`.
+    /// `.pcd`, text). The first bytes or the extension of `name` tell the format; errors call the file
+    /// `name`.
     ///
     /// ```
     /// use s3d_io::cloud::{AnnotationOptions, Annotations};

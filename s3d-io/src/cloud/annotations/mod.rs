@@ -13,6 +13,8 @@ use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+#[cfg(feature = "labels")]
+pub(crate) use of_faces::push_middles;
 pub use of_memory::AnnotatedPoints;
 
 /// How annotated points are read, whatever the file.

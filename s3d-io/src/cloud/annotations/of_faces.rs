@@ -8,6 +8,7 @@ use s3d_geom::glam::Vec3;
 use s3d_geom::{NO_INDEX, PointCloud, TriMesh};
 use s3d_label::{Class, Label, Room, Taxonomy};
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -127,7 +128,7 @@ impl PointBlocks for FaceBlocks<'_> {
             if self.know_faces {
                 out.positions.extend(corners);
             }
-            push_inner(corners, &mut out.positions);
+            push_middles(corners, 1..=MOST_ROWS, &mut out.positions);
             if self.know_faces {
                 out.faces.resize(out.positions.len(), face);
             }
@@ -145,10 +146,11 @@ impl PointBlocks for FaceBlocks<'_> {
     }
 }
 
-/// Appends the middles of the n × n congruent triangles that a face is cut into.
-fn push_inner([a, b, c]: [Vec3; 3], positions: &mut Vec<Vec3>) {
+/// Appends the middles of the congruent triangles that a face is cut into. They are about 5 cm apart, as far as
+/// the number of parts of an edge, which is in `rows`, allows.
+pub(crate) fn push_middles([a, b, c]: [Vec3; 3], rows: RangeInclusive<u32>, positions: &mut Vec<Vec3>) {
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-    let rows = ((longest / SPACING_M).ceil() as u32).clamp(1, MOST_ROWS);
+    let rows = ((longest / SPACING_M).ceil() as u32).clamp(*rows.start(), *rows.end());
     let u = (b - a) / rows as f32;
     let v = (c - a) / rows as f32;
     for i in 0..rows {

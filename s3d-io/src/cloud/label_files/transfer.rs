@@ -1,17 +1,16 @@
 //! Hands the labels of one mesh to the faces of another that shows the same surfaces.
 
+use crate::cloud::annotations::push_middles;
 use s3d_geom::glam::Vec3;
 use s3d_geom::{Aabb, NO_INDEX, Nearest, NearestFaces, TriMesh};
+use std::ops::RangeInclusive;
 
 /// Corners that belong together may be rounded by this, metres.
 const ROUNDED_M: f32 = 1e-3;
 /// Surfaces that are farther apart than this are not the same, metres.
 const SAME_SURFACE_M: f32 = 0.1;
-/// The distance between the places of a face that ask for a label, metres, as far as [`MOST_ROWS`] allows.
-const SPACING_M: f32 = 0.05;
-/// The fewest and the most parts that an edge is cut into.
-const FEWEST_ROWS: u32 = 2;
-const MOST_ROWS: u32 = 16;
+/// How many parts an edge of a face is cut into, for the places that ask for a label.
+const ROWS: RangeInclusive<u32> = 2..=16;
 
 /// Returns whether two meshes have the same faces in the same order. Rounded positions count as the same.
 pub(crate) fn are_same_faces(a: &TriMesh, b: &TriMesh) -> bool {
@@ -67,7 +66,7 @@ pub(crate) fn transferred(from: &TriMesh, label_of_face: &[u32], to: &TriMesh) -
         counts.clear();
         for &face in block {
             let before = places.len();
-            push_places(to.triangle(face), &mut places);
+            push_middles(to.triangle(face), ROWS, &mut places);
             counts.push(places.len() - before);
         }
         nearest_faces.nearest_many(&places, &mut nearest);
@@ -102,24 +101,6 @@ fn most_frequent(votes: &mut [u32]) -> u32 {
         }
     }
     most.1
-}
-
-/// Appends the middles of the equal triangles that a face is cut into.
-fn push_places([a, b, c]: [Vec3; 3], places: &mut Vec<Vec3>) {
-    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-    let rows = ((longest / SPACING_M).ceil() as u32).clamp(FEWEST_ROWS, MOST_ROWS);
-    let u = (b - a) / rows as f32;
-    let v = (c - a) / rows as f32;
-    for i in 0..rows {
-        for j in 0..rows - i {
-            let corner = a + u * i as f32 + v * j as f32;
-            places.push(corner + (u + v) / 3.0);
-            // The triangle that points the other way, if there is room for it.
-            if i + j + 1 < rows {
-                places.push(corner + (u + v) * (2.0 / 3.0));
-            }
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! The places of the scans of an E57 file. Source: ASTM E2807, "pose": from the frame of a scan to the frame of
-//! the file.
+//! The places of the scans of an E57 file. Source: ASTM E2807, "pose": from the frame of a scan to the frame
+//! of the file.
 
 use crate::camera::posed::PosedCamera;
 use crate::error::{Error, Result};
@@ -14,8 +14,8 @@ use std::path::Path;
 /// The first bytes of a file.
 pub(crate) const MAGIC: &[u8] = b"ASTM-E57";
 
-/// Reads where the scanner stood. A scan has the name of its guid without hyphens, which is a uuid, or else its
-/// own name. A scan without a pose is left out.
+/// Reads where the scanner stood. A scan has the name of its guid without hyphens, which is a uuid, or else
+/// its own name. A scan without a pose is left out.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if the file is damaged, no scan has a pose, or a pose has no rotation.

@@ -4,8 +4,8 @@
 //! An `EQUIRECTANGULAR` camera has its width and height as parameters. Its columns are azimuths that grow to
 //! the right, and its centre column looks along the camera's forward axis, as in our panoramas.
 
-use crate::camera::colmap::take;
 use crate::camera::posed::{Distortion, Optics};
+use crate::camera::programs::colmap::take;
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;

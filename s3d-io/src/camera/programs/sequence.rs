@@ -7,7 +7,7 @@ use crate::camera::matterport::parse_capture_pose;
 use crate::camera::numbered::{NumberedFiles, numbered_between};
 use crate::camera::picture::read_picture_size;
 use crate::camera::posed::{Optics, PosedCamera};
-use crate::camera::scannet::{is_unknown, optics_of_matrix};
+use crate::camera::programs::scannet::{is_unknown, optics_of_matrix};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
