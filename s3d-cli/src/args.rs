@@ -30,8 +30,8 @@ pub(crate) struct MeshArgs {
 #[derive(Clone, Debug, Args)]
 pub(crate) struct Scenes {
     /// Scene files, or folders of published areas (area_3) or of scenes of ScanNet, ScanNet++, HM3D, Replica,
-    /// 3RScan or ARKitScenes, one for each area; or the files of one mesh (OBJ, glTF, GLB, PLY), which becomes
-    /// an area without labels.
+    /// 3RScan or ARKitScenes, one for each area; or the files of one mesh (OBJ, glTF, GLB, PLY), which
+    /// becomes an area without labels.
     #[arg(required = true, value_name = "SCENE.toml")]
     pub(crate) scenes: Vec<PathBuf>,
     /// The axis of the mesh files that points up [default: y in glTF, guessed in others]

@@ -38,7 +38,7 @@ pub(crate) struct InfoArgs {
     /// Skip and count faults in the annotations, like an export with --lenient.
     #[arg(long)]
     pub(crate) lenient: bool,
-    /// Write the scene.toml that the folder of another data set amounts to into this folder, and nothing else.
+    /// Write the scene.toml that the folder of another data set amounts to into this folder, and no more.
     #[arg(long)]
     pub(crate) scene_toml: bool,
     #[command(flatten)]

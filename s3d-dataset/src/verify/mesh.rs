@@ -115,8 +115,8 @@ fn check_manifest(layout: &Layout, area: u32, manifest: &Manifest, file: &MeshFi
     });
 }
 
-/// Checks that each face comes from a face of the scan, in the scan's order. Data sets of earlier versions and
-/// meshes that no file held have no such list.
+/// Checks that each face comes from a face of the scan, in the scan's order. Data sets of earlier versions
+/// and meshes that no file held have no such list.
 fn check_source_faces(path: &Path, faces: usize, report: &Report) {
     if !path.exists() {
         return;

@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 
 /// The supported forms, for messages.
 const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files \
-                     (*.json), the raw captures of a Matterport, an E57 file, a COLMAP model (images.txt or images.bin) \
+                     (*.json), the raw captures of a Matterport, an E57 file, a COLMAP model (images.txt or \
+                     images.bin) \
                      or a transforms.json";
 
 /// Reads the scan locations of `path`, a file or a folder:

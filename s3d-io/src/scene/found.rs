@@ -84,8 +84,8 @@ struct Parts {
     turn: Option<&'static str>,
 }
 
-/// The world of ScanNet++'s mesh from the one of its `transforms.json`, where x and y are exchanged and z points
-/// down. Source: scannetpp/scannetpp, common/utils/nerfstudio.py.
+/// The world of ScanNet++'s mesh from the one of its `transforms.json`, where x and y are exchanged and z
+/// points down. Source: scannetpp/scannetpp, common/utils/nerfstudio.py.
 const SCANNETPP_TURN: &str = "[[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]";
 
 fn scannetpp(dir: &Folder) -> Option<Parts> {

@@ -1,5 +1,5 @@
-//! Scenes: the parts that one area is made from, named by a `scene.toml`, or found in a published area or in the folder
-//! of another data set.
+//! Scenes: the parts that one area is made from, named by a `scene.toml`, or found in a published area or in
+//! the folder of another data set.
 //!
 //! [`read_scene`] reads a [`SceneFile`]: the names of an area's mesh, annotations and scan locations, and how
 //! they are read. The files themselves are read by [`mesh`](crate::mesh), [`cloud`](crate::cloud) and

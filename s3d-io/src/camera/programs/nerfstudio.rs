@@ -73,8 +73,8 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
     Ok(pictures)
 }
 
-/// Reads the cameras of a `transforms.json`, and how many more are marked as bad. Their poses are in the frame
-/// before its `applied_transform`.
+/// Reads the cameras of a `transforms.json`, and how many more are marked as bad. Their poses are in the
+/// frame before its `applied_transform`.
 pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, usize)> {
     let document: Document = read_json(path)?;
     let applied = Applied::new(&document, path)?;

@@ -146,8 +146,8 @@ impl PointBlocks for FaceBlocks<'_> {
     }
 }
 
-/// Appends the middles of the congruent triangles that a face is cut into. They are about 5 cm apart, as far as
-/// the number of parts of an edge, which is in `rows`, allows.
+/// Appends the middles of the congruent triangles that a face is cut into. They are about 5 cm apart, as far
+/// as the number of parts of an edge, which is in `rows`, allows.
 pub(crate) fn push_middles([a, b, c]: [Vec3; 3], rows: RangeInclusive<u32>, positions: &mut Vec<Vec3>) {
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
     let rows = ((longest / SPACING_M).ceil() as u32).clamp(*rows.start(), *rows.end());

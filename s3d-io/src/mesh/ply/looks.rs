@@ -142,8 +142,8 @@ pub(crate) fn lay_textures(
 /// The most colours of faces that become materials. A mesh with more is not painted by object.
 const MAX_FACE_COLORS: usize = 4096;
 
-/// Gives each face a material of its colour. Faces are painted where a colour stands for an object or a class,
-/// so that there are few. A mesh with many is left as it is, with a warning.
+/// Gives each face a material of its colour. Faces are painted where a colour stands for an object or a
+/// class, so that there are few. A mesh with many is left as it is, with a warning.
 pub(crate) fn paint_faces(
     parts: &mut MeshParts,
     color_of_polygon: &[[u8; 3]],
