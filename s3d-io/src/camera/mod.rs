@@ -17,7 +17,8 @@
 //!
 //! [`read_posed_cameras`] reads cameras as they are. Each [`PosedCamera`] has a pose, and the size, focal
 //! lengths and lens if the list tells them. It reads `transforms.json`, COLMAP models, Metashape's cameras,
-//! ScanNet's and 3RScan's poses, Polycam's keyframes, trajectories of ARKitScenes and TUM, and tables.
+//! ScanNet's recordings, ScanNet's and 3RScan's poses, Polycam's keyframes, trajectories of ARKitScenes, Replica
+//! and TUM, and tables. A [`Recording`] has depth too.
 //! [`read_photograph_cameras`] also takes the folder of the pictures.
 //!
 //! A [`PictureFolder`] finds the pictures of each location: raw captures ([`CaptureFile`], with lens and
@@ -42,6 +43,7 @@ mod matterport;
 mod numbered;
 mod other_kind;
 mod picture;
+mod picture_file;
 mod posed;
 mod posed_list;
 pub(crate) mod poses;
@@ -55,7 +57,9 @@ pub use matterport::{
     read_intrinsics, read_matterport_locations,
 };
 pub use picture::{check_picture, decode_picture, read_picture, read_picture_size, read_picture_turn};
+pub use picture_file::PictureFile;
 pub use posed::{Distortion, GivenIntrinsics, IntrinsicsError, Optics, PosedCamera};
 pub use posed_list::{PosedCameras, read_photograph_cameras, read_posed_cameras};
 pub use poses::PublishedLocation;
+pub use programs::sens::{RecordedFrame, Recording};
 pub use table::{ScanLocation, parse_cameras, read_cameras};

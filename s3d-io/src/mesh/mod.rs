@@ -49,6 +49,8 @@ pub(crate) mod origin;
 pub(crate) mod ply;
 #[cfg(feature = "mesh")]
 pub(crate) mod read;
+#[cfg(feature = "mesh")]
+mod told_offset;
 
 #[cfg(feature = "mesh")]
 pub use file::{LengthUnit, MeshFile, MeshOptions, MeshSource, UpAxis};
@@ -62,3 +64,5 @@ pub use obj::{RgbObj, SemanticObj, TextureOut, write_rgb_obj, write_semantic_obj
 pub use origin::MeshOrigin;
 #[cfg(feature = "mesh")]
 pub use read::{MeshFormat, read_mesh, read_mesh_from, read_mesh_with};
+#[cfg(feature = "mesh")]
+pub use told_offset::ToldOffset;

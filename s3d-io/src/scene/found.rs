@@ -80,6 +80,7 @@ struct Parts {
     labels: Option<String>,
     frames: Option<String>,
     images: Option<String>,
+    masks: Option<String>,
     /// World from the frame of the list of photographs, if it is another one.
     turn: Option<&'static str>,
 }
@@ -93,25 +94,36 @@ fn scannetpp(dir: &Folder) -> Option<Parts> {
         .into_iter()
         .find(|scans| dir.has(&format!("{scans}segments_anno.json")))?;
     let frames = [
-        ("dslr/nerfstudio/transforms.json", "dslr/resized_images"),
-        ("dslr/nerfstudio/transforms_undistorted.json", "dslr/resized_undistorted_images"),
-        ("dslr/colmap", "dslr/resized_images"),
-        ("iphone/colmap", "iphone/rgb"),
+        ["dslr/nerfstudio/transforms.json", "dslr/resized_images", "dslr/resized_anon_masks"],
+        [
+            "dslr/nerfstudio/transforms_undistorted.json",
+            "dslr/resized_undistorted_images",
+            "dslr/resized_undistorted_masks",
+        ],
+        ["dslr/colmap", "dslr/resized_images", "dslr/resized_anon_masks"],
+        ["iphone/colmap", "iphone/rgb", "iphone/rgb_masks"],
     ];
     let frames = frames
         .into_iter()
-        .find(|(list, images)| dir.has(list) && dir.has(images));
+        .find(|[list, images, _]| dir.has(list) && dir.has(images));
     Some(Parts {
         mesh: dir.first(scans, |name| name.starts_with("mesh_aligned") && name.ends_with(".ply"))?,
         up: Some(UpAxis::Z),
         labels: Some(format!("{scans}segments_anno.json")),
-        frames: frames.map(|(list, _)| list.to_owned()),
-        images: frames.map(|(_, images)| images.to_owned()),
-        turn: frames.and_then(|(list, _)| list.ends_with(".json").then_some(SCANNETPP_TURN)),
+        frames: frames.map(|[list, ..]| list.to_owned()),
+        images: frames.map(|[_, images, _]| images.to_owned()),
+        masks: frames
+            .map(|[.., masks]| masks.to_owned())
+            .filter(|masks| dir.has(masks)),
+        turn: frames.and_then(|[list, ..]| list.ends_with(".json").then_some(SCANNETPP_TURN)),
     })
 }
 
 fn replica(dir: &Folder) -> Option<Parts> {
+    labelled_replica(dir).or_else(|| replica_sequence(dir))
+}
+
+fn labelled_replica(dir: &Folder) -> Option<Parts> {
     let habitat = ["habitat/", ""]
         .into_iter()
         .find(|place| dir.has(&format!("{place}info_semantic.json")))?;
@@ -120,8 +132,25 @@ fn replica(dir: &Folder) -> Option<Parts> {
         mesh,
         up: Some(UpAxis::Z),
         labels: Some(format!("{habitat}info_semantic.json")),
+        frames: trajectory(dir),
         ..Parts::default()
     })
+}
+
+/// A sequence of NICE-SLAM: the mesh lies beside the folder, and is named after it.
+fn replica_sequence(dir: &Folder) -> Option<Parts> {
+    let frames = trajectory(dir).filter(|_| dir.has("results"))?;
+    let name = dir.name();
+    let meshes = [format!("../{name}_mesh.ply"), format!("{name}_mesh.ply")];
+    let mesh = meshes.into_iter().find(|mesh| dir.has(mesh))?;
+    Some(Parts { mesh, up: Some(UpAxis::Z), frames: Some(frames), ..Parts::default() })
+}
+
+/// Returns the trajectory of a sequence of Replica.
+fn trajectory(dir: &Folder) -> Option<String> {
+    let names = ["traj.txt", "traj_w_c.txt"];
+    let name = names.into_iter().find(|name| dir.has(name))?;
+    Some(name.to_owned())
 }
 
 /// The textured mesh is taken if there is one whose textures are read; `.basis.glb` has others.
@@ -154,7 +183,7 @@ fn arkit(dir: &Folder) -> Option<Parts> {
         labels: None,
         frames: images.map(|_| trajectory),
         images: images.map(str::to_owned),
-        turn: None,
+        ..Parts::default()
     })
 }
 
@@ -168,7 +197,8 @@ fn scannet(dir: &Folder) -> Option<Parts> {
     let frames = ["pose", "intrinsic", "color"]
         .iter()
         .all(|part| dir.has(part))
-        .then(|| ".".to_owned());
+        .then(|| ".".to_owned())
+        .or_else(|| dir.first("", |name| name.ends_with(".sens")));
     Some(Parts { mesh, up: Some(UpAxis::Z), labels: Some(labels), frames, ..Parts::default() })
 }
 
@@ -195,6 +225,9 @@ impl Parts {
             push_row(&mut text, "path", frames);
             if let Some(images) = &self.images {
                 push_row(&mut text, "images", images);
+            }
+            if let Some(masks) = &self.masks {
+                push_row(&mut text, "masks", masks);
             }
             if let Some(turn) = self.turn {
                 let _ = writeln!(text, "transform = {turn}    # the list has another world than the mesh");
@@ -240,10 +273,15 @@ impl Folder {
         names.first().map(|name| format!("{below}{name}"))
     }
 
+    /// Returns the name of the folder.
+    fn name(&self) -> String {
+        let path = self.path.canonicalize().unwrap_or_else(|_| self.path.clone());
+        path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     /// Returns a room for a scene without names of rooms: of the type that the folder is named after.
     fn room(&self) -> &'static str {
-        let path = self.path.canonicalize().unwrap_or_else(|_| self.path.clone());
-        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        let name = self.name().to_lowercase();
         let types = [("office", "office_1"), ("conference", "conferenceRoom_1"), ("hall", "hallway_1")];
         types
             .iter()
@@ -285,6 +323,7 @@ mod tests {
                     "scans/segments.json",
                     "dslr/nerfstudio/transforms.json",
                     "dslr/resized_images/",
+                    "dslr/resized_anon_masks/",
                 ][..],
                 "ScanNet++",
                 "mesh_aligned_0.05.ply",
@@ -292,11 +331,11 @@ mod tests {
                 "transforms.json",
             ),
             (
-                &["mesh.ply", "habitat/mesh_semantic.ply", "habitat/info_semantic.json"],
+                &["mesh.ply", "habitat/mesh_semantic.ply", "habitat/info_semantic.json", "traj_w_c.txt"],
                 "Replica",
                 "mesh_semantic.ply",
                 "info_semantic.json",
-                "",
+                "traj_w_c.txt",
             ),
             (
                 &["00800-a.glb", "00800-a.semantic.glb", "00800-a.semantic.txt"],
@@ -327,11 +366,17 @@ mod tests {
                 "lowres_wide.traj",
             ),
             (
-                &["s_vh_clean.ply", "s_vh_clean_2.ply", "s.aggregation.json", "s_vh_clean.aggregation.json"],
+                &[
+                    "s_vh_clean.ply",
+                    "s_vh_clean_2.ply",
+                    "s.aggregation.json",
+                    "s_vh_clean.aggregation.json",
+                    "s.sens",
+                ],
                 "ScanNet",
                 "s_vh_clean_2.ply",
                 "s.aggregation.json",
-                "",
+                "s.sens",
             ),
         ] {
             let found = found(files).unwrap_or_else(|| panic!("{set}"));
@@ -342,10 +387,26 @@ mod tests {
                 .first()
                 .map_or_else(String::new, |path| name(path));
             assert_eq!(told, labels, "{set}");
-            let told = found.scene.frames.map_or_else(String::new, |frames| name(&frames.path));
+            let list = found.scene.frames.as_ref();
+            let told = list.map_or_else(String::new, |frames| name(&frames.path));
             assert_eq!(told, frames, "{set}");
+            let has_masks = list.is_some_and(|frames| frames.masks.is_some());
+            assert_eq!(has_masks, set == "ScanNet++");
         }
         assert_eq!(found(&["scan.ply", "notes.txt"]), None);
+    }
+
+    #[test]
+    fn the_mesh_of_a_sequence_lies_beside_its_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        let room = dir.path().join("room0");
+        fs::create_dir_all(room.join("results")).unwrap();
+        fs::write(room.join("traj.txt"), "").unwrap();
+        assert_eq!(find_scene(&room).unwrap(), None);
+        fs::write(dir.path().join("room0_mesh.ply"), "").unwrap();
+        let found = find_scene(&room).unwrap().unwrap();
+        assert!(found.scene.mesh[0].ends_with("../room0_mesh.ply") && found.scene.annotations.is_empty());
+        assert!(found.scene.frames.unwrap().path.ends_with("traj.txt"));
     }
 
     #[test]
