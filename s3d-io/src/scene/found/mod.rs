@@ -1,16 +1,19 @@
 //! Scenes of known data sets, found by the files in their folder.
 //!
 //! A found scene is the text of a scene file, so that a person can write it down and change it. Each data set
-//! is a function of [`SETS`] that looks for its own files. Sources: the READMEs of the data sets, named in
-//! [`crate::formats`], "Data sets as they lie on the disk".
+//! is a function of [`sets::SETS`] that looks for its own files. Sources: the READMEs of the data sets, named
+//! in [`crate::formats`], "Data sets as they lie on the disk".
+
+mod folder;
+mod parts;
+mod sets;
 
 use crate::error::{Error, Result};
-use crate::mesh::file::UpAxis;
-use crate::mesh::read::MeshFormat;
 use crate::scene::document::parse_scene;
 use crate::scene::file::SceneFile;
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use folder::Folder;
+use sets::SETS;
+use std::path::Path;
 
 /// The name of a scene file in its folder.
 const SCENE: &str = "scene.toml";
@@ -54,202 +57,9 @@ pub fn find_scene(folder: &Path) -> Result<Option<FoundScene>> {
     Ok(Some(FoundScene { set, toml, scene }))
 }
 
-/// Looks for the files of a data set.
-type Finder = fn(&Folder) -> Option<Parts>;
-
-/// The data sets whose scenes are found, in the order of search: the surest names first.
-const SETS: [(&str, Finder); 6] = [
-    ("ScanNet++", scannetpp),
-    ("Replica", replica),
-    ("HM3D", hm3d),
-    ("3RScan", rescan),
-    ("ARKitScenes", arkit),
-    ("ScanNet", scannet),
-];
-
 /// Returns the names of the data sets whose scenes [`find_scene`] finds.
 pub fn found_sets() -> impl Iterator<Item = &'static str> {
     SETS.iter().map(|(set, _)| *set)
-}
-
-/// The parts of a scene: paths below its folder.
-#[derive(Default)]
-struct Parts {
-    mesh: String,
-    up: Option<UpAxis>,
-    labels: Option<String>,
-    frames: Option<String>,
-    images: Option<String>,
-    /// World from the frame of the list of photographs, if it is another one.
-    turn: Option<&'static str>,
-}
-
-/// The world of ScanNet++'s mesh from the one of its `transforms.json`, where x and y are exchanged and z
-/// points down. Source: scannetpp/scannetpp, common/utils/nerfstudio.py.
-const SCANNETPP_TURN: &str = "[[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]";
-
-fn scannetpp(dir: &Folder) -> Option<Parts> {
-    let scans = ["scans/", ""]
-        .into_iter()
-        .find(|scans| dir.has(&format!("{scans}segments_anno.json")))?;
-    let frames = [
-        ("dslr/nerfstudio/transforms.json", "dslr/resized_images"),
-        ("dslr/nerfstudio/transforms_undistorted.json", "dslr/resized_undistorted_images"),
-        ("dslr/colmap", "dslr/resized_images"),
-        ("iphone/colmap", "iphone/rgb"),
-    ];
-    let frames = frames
-        .into_iter()
-        .find(|(list, images)| dir.has(list) && dir.has(images));
-    Some(Parts {
-        mesh: dir.first(scans, |name| name.starts_with("mesh_aligned") && name.ends_with(".ply"))?,
-        up: Some(UpAxis::Z),
-        labels: Some(format!("{scans}segments_anno.json")),
-        frames: frames.map(|(list, _)| list.to_owned()),
-        images: frames.map(|(_, images)| images.to_owned()),
-        turn: frames.and_then(|(list, _)| list.ends_with(".json").then_some(SCANNETPP_TURN)),
-    })
-}
-
-fn replica(dir: &Folder) -> Option<Parts> {
-    let habitat = ["habitat/", ""]
-        .into_iter()
-        .find(|place| dir.has(&format!("{place}info_semantic.json")))?;
-    let mesh = format!("{habitat}mesh_semantic.ply");
-    dir.has(&mesh).then(|| Parts {
-        mesh,
-        up: Some(UpAxis::Z),
-        labels: Some(format!("{habitat}info_semantic.json")),
-        ..Parts::default()
-    })
-}
-
-/// The textured mesh is taken if there is one whose textures are read; `.basis.glb` has others.
-fn hm3d(dir: &Folder) -> Option<Parts> {
-    let labels = dir.first("", |name| name.ends_with(".semantic.txt"))?;
-    let stem = labels.strip_suffix(".semantic.txt")?;
-    let meshes = [format!("{stem}.glb"), format!("{stem}.semantic.glb")];
-    let mesh = meshes.into_iter().find(|mesh| dir.has(mesh))?;
-    Some(Parts { mesh, up: Some(UpAxis::Y), labels: Some(labels), ..Parts::default() })
-}
-
-fn rescan(dir: &Folder) -> Option<Parts> {
-    let labels = dir
-        .first("", |name| name == "semseg.v2.json")
-        .filter(|_| dir.first("", |name| name.starts_with("labels.instances")).is_some());
-    let mesh = dir.first("", |name| name.starts_with("mesh.refined") && name.ends_with(".obj"))?;
-    let frames = Some("sequence".to_owned()).filter(|sequence| dir.has(sequence));
-    Some(Parts { mesh, up: Some(UpAxis::Z), labels, frames, ..Parts::default() })
-}
-
-fn arkit(dir: &Folder) -> Option<Parts> {
-    let trajectory = dir.first("", |name| name.ends_with(".traj"))?;
-    let mesh = dir.first("", |name| name.ends_with(".ply"))?;
-    let images = ["lowres_wide", "vga_wide", "wide"]
-        .into_iter()
-        .find(|images| dir.has(images));
-    Some(Parts {
-        mesh,
-        up: Some(UpAxis::Z),
-        labels: None,
-        frames: images.map(|_| trajectory),
-        images: images.map(str::to_owned),
-        turn: None,
-    })
-}
-
-fn scannet(dir: &Folder) -> Option<Parts> {
-    let is_coarse =
-        |name: &str| name.ends_with(".aggregation.json") && !name.ends_with("_vh_clean.aggregation.json");
-    let labels = dir.first("", is_coarse)?;
-    let mesh = dir
-        .first("", |name| name.ends_with("_vh_clean_2.ply"))
-        .or_else(|| dir.first("", |name| name.ends_with(".ply")))?;
-    let frames = ["pose", "intrinsic", "color"]
-        .iter()
-        .all(|part| dir.has(part))
-        .then(|| ".".to_owned());
-    Some(Parts { mesh, up: Some(UpAxis::Z), labels: Some(labels), frames, ..Parts::default() })
-}
-
-impl Parts {
-    fn to_toml(&self, set: &str, dir: &Folder) -> String {
-        let mut text = format!("# A scene of {set}, found in its folder.\narea = 1\n[mesh]\n");
-        if self.mesh.ends_with(".semantic.glb") {
-            text.push_str("# Its colours are those of its labels: name a textured mesh for real ones.\n");
-        }
-        push_row(&mut text, "path", &self.mesh);
-        if let Some(up) = self.up.filter(|_| !has_own_frame(&self.mesh)) {
-            push_row(&mut text, "up", up.name());
-        }
-
-        if let Some(labels) = &self.labels {
-            text.push_str("[annotations]\n");
-            push_row(&mut text, "path", labels);
-            // The data sets name no rooms of S3DIS's types, and many words that are none of its classes.
-            push_row(&mut text, "room", dir.room());
-            text.push_str("unknown_as_clutter = true\n");
-        }
-        if let Some(frames) = &self.frames {
-            text.push_str("[frames]\n");
-            push_row(&mut text, "path", frames);
-            if let Some(images) = &self.images {
-                push_row(&mut text, "images", images);
-            }
-            if let Some(turn) = self.turn {
-                let _ = writeln!(text, "transform = {turn}    # the list has another world than the mesh");
-            }
-        }
-        text
-    }
-}
-
-/// Appends a key and its text.
-fn push_row(text: &mut String, key: &str, value: &str) {
-    let _ = writeln!(text, "{key} = {}", toml::Value::from(value));
-}
-
-/// Whether the format of a mesh says itself which axis points up.
-fn has_own_frame(mesh: &str) -> bool {
-    MeshFormat::of(Path::new(mesh)).is_some_and(|format| format.defines_frame)
-}
-
-/// The folder of a scene.
-struct Folder {
-    path: PathBuf,
-}
-
-impl Folder {
-    fn new(path: &Path) -> Self {
-        Self { path: path.to_owned() }
-    }
-
-    /// Whether there is a file or folder at a path below.
-    fn has(&self, below: &str) -> bool {
-        self.path.join(below).exists()
-    }
-
-    /// Returns the path of the first file, by name, in a folder below whose name fits.
-    fn first(&self, below: &str, fits: impl Fn(&str) -> bool) -> Option<String> {
-        let entries = std::fs::read_dir(self.path.join(below)).ok()?;
-        let mut names: Vec<String> = entries
-            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-            .filter(|name| fits(name))
-            .collect();
-        names.sort();
-        names.first().map(|name| format!("{below}{name}"))
-    }
-
-    /// Returns a room for a scene without names of rooms: of the type that the folder is named after.
-    fn room(&self) -> &'static str {
-        let path = self.path.canonicalize().unwrap_or_else(|_| self.path.clone());
-        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-        let types = [("office", "office_1"), ("conference", "conferenceRoom_1"), ("hall", "hallway_1")];
-        types
-            .iter()
-            .find(|(word, _)| name.contains(word))
-            .map_or("lounge_1", |(_, room)| room)
-    }
 }
 
 #[cfg(test)]
@@ -346,6 +156,147 @@ mod tests {
             assert_eq!(told, frames, "{set}");
         }
         assert_eq!(found(&["scan.ply", "notes.txt"]), None);
+        assert_eq!(found(&["matterport_mesh/", "house_segmentations/"]), None);
+    }
+
+    /// All folders of a house, as they are unpacked.
+    const HOUSE: [&str; 9] = [
+        "house_segmentations/h.house",
+        "house_segmentations/h.ply",
+        "matterport_mesh/0123/0123.obj",
+        "matterport_color_images/",
+        "matterport_camera_poses/",
+        "matterport_camera_intrinsics/",
+        "matterport_skybox_images/",
+        "undistorted_camera_parameters/h.conf",
+        "undistorted_color_images/",
+    ];
+
+    #[test]
+    fn houses_of_matterport3d_are_found_whole_and_in_part() {
+        let whole = found(&HOUSE).unwrap();
+        let right = "# A scene of Matterport3D, found in its folder.\narea = 1\ntaxonomy = \"matterport40\"\n\
+            [mesh]\npath = \"matterport_mesh/0123/0123.obj\"\nup = \"z\"\n\
+            [annotations]\npath = \"house_segmentations/h.house\"\n\
+            # The file tells rooms: this one is for what lies in none.\nroom = \"openspace_1\"\n\
+            unknown_as_clutter = true\n\
+            [cameras]\npath = \"matterport_camera_poses\"\n[rgb]\nsource = \"captures\"\npath = \".\"\n\
+            [frames]\npath = \"undistorted_camera_parameters/h.conf\"\n\
+            images = \"undistorted_color_images\"\n";
+        assert_eq!((whole.set, whole.toml.as_str()), ("Matterport3D", right));
+        assert!(whole.scene.pictures.is_some() && whole.scene.frames.is_some());
+        assert_eq!(whole.scene.taxonomy.name(), "matterport40");
+
+        let labels = found(&HOUSE[..2]).unwrap().toml;
+        for row in [
+            "[mesh]\npath = \"house_segmentations/h.ply\"",
+            "[cameras]\npath = \"house_segmentations/h.house",
+        ] {
+            assert!(labels.contains(row) && !labels.contains("[rgb]"), "{labels}");
+        }
+        let bare = found(&HOUSE[2..3]).unwrap();
+        assert!(!bare.scene.is_labelled && bare.scene.cameras.is_none(), "{}", bare.toml);
+        assert!(!bare.toml.contains("taxonomy"), "{}", bare.toml);
+    }
+
+    /// A floor and a chair below and drawers above: triangles of the segments 7, 3 and 1000003.
+    #[cfg(feature = "labels")]
+    const CORNERS: [[f32; 3]; 9] = [
+        [0.0, 0.0, 0.0],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+        [1.0, 1.0, 0.4],
+        [1.4, 1.0, 0.4],
+        [1.0, 1.4, 0.4],
+        [0.0, 0.0, 3.0],
+        [4.0, 0.0, 3.0],
+        [0.0, 4.0, 3.0],
+    ];
+
+    #[cfg(feature = "labels")]
+    #[test]
+    fn a_house_of_two_storeys_has_labels_locations_and_photographs() {
+        use crate::camera::read_scan_locations;
+        use crate::cloud::{AnnotatedMesh, Annotations};
+        use crate::house::tests::{HOUSE as HOUSE_FILE, UUIDS};
+        use crate::mesh::read_mesh;
+        use crate::scene::CameraSource;
+        use s3d_geom::PointCloud;
+        use s3d_geom::glam::DVec2;
+
+        let dir = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = dir.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        };
+        let row = |[x, y, z]: [f32; 3]| format!("{x} {y} {z}\n");
+        let rows: String = CORNERS.into_iter().map(row).collect();
+        let faces = "3 0 1 2 7 0 4\n3 3 4 5 3 1 28\n3 6 7 8 1000003 2 111\n";
+        let head = "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nproperty float y\n\
+                    property float z\nelement face 3\nproperty list uchar int vertex_indices\n\
+                    property int material_id\nproperty int segment_id\nproperty int category_id\nend_header\n";
+        write("house_segmentations/h.ply", &format!("{head}{rows}{faces}"));
+        write("house_segmentations/h.house", HOUSE_FILE);
+        let vertices: String = CORNERS.into_iter().map(|corner| format!("v {}", row(corner))).collect();
+        write("matterport_mesh/01/01.obj", &format!("{vertices}f 1 2 3\nf 7 8 9\nf 4 5 6\n"));
+        let pose = "0 0 1 1\n-1 0 0 1\n0 -1 0 1.5\n0 0 0 1\n";
+        write(&format!("matterport_camera_poses/{}_pose_1_0.txt", UUIDS[0]), pose);
+        let list = "dataset matterport\nn_images 1\nintrinsics_matrix 500 0 640  0 500 511  0 0 1\n\
+                    scan d.png a_i1_0.jpg 0 0 -1 1 -1 0 0 1 0 1 0 1.5 0 0 0 1\n";
+        write("undistorted_camera_parameters/h.conf", list);
+        fs::create_dir(dir.path().join("undistorted_color_images")).unwrap();
+
+        let scene = find_scene(dir.path()).unwrap().unwrap().scene;
+        let file = read_mesh(&scene.mesh[0], scene.up).unwrap();
+        let mesh = AnnotatedMesh { file: &file, up: scene.up, units: scene.units };
+        let found = Annotations::open_for(&mesh, &scene.annotations, &scene.annotation_options).unwrap();
+        let mut labels = Vec::new();
+        for room in &found.rooms {
+            for instance in &room.instances {
+                let mut cloud = PointCloud::default();
+                instance.read(&mut cloud).unwrap();
+                cloud.faces.dedup();
+                labels.push(format!("{} of {}: {:?}", instance.class, room.room, cloud.faces));
+            }
+        }
+        labels.sort();
+        let right =
+            ["chair of bedroom_1: [2]", "chestOfDrawers of kitchen_1: [1]", "floor of bedroom_1: [0]"];
+        assert_eq!(labels, right);
+
+        let Some(CameraSource::Listed { path, world_from_file }) = scene.cameras else { panic!() };
+        let of_captures = read_scan_locations(&path, &world_from_file).unwrap();
+        let of_house = read_scan_locations(&scene.annotations[0], &world_from_file).unwrap();
+        assert_eq!((of_captures.len(), of_house.len()), (1, 2));
+        assert_eq!(of_captures[0].uuid, of_house[0].uuid);
+        let [captured, told] = [&of_captures[0].pose, &of_house[0].pose];
+        assert!(captured.world_from_camera.abs_diff_eq(told.world_from_camera, 1e-12), "{told:?}");
+
+        // The photograph was taken by that camera, so what is before both is in its middle.
+        let frames = scene.frames.unwrap();
+        let list = read_posed_cameras(&frames.path, &frames.world_from_file).unwrap();
+        let camera = list.cameras[0].camera(&Default::default()).unwrap();
+        let (seen, _) = camera.project(captured.location + captured.forward() * 3.0).unwrap();
+        assert!(seen.abs_diff_eq(DVec2::new(640.0, 512.0), 1e-9), "{seen}");
+    }
+
+    #[test]
+    fn a_house_is_found_in_the_folder_that_its_archives_are_unpacked_in() {
+        let dir = tempfile::tempdir().unwrap();
+        let house = dir.path().join("h");
+        for file in HOUSE {
+            let path = house.join("h").join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            if file.ends_with('/') {
+                fs::create_dir_all(&path).unwrap();
+            } else {
+                fs::write(&path, "").unwrap();
+            }
+        }
+        let found = find_scene(&house).unwrap().unwrap();
+        assert!(found.toml.contains("path = \"h/matterport_mesh/0123/0123.obj\""), "{}", found.toml);
+        assert!(found.toml.contains("source = \"captures\"\npath = \"h\""), "{}", found.toml);
     }
 
     #[test]
