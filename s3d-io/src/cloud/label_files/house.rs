@@ -1,11 +1,11 @@
 //! Matterport3D's labels: the segments, objects and classes of the faces of a mesh, and what the `.house`
-//! file of the house says of them. Sources: see [`crate::house`]; code/gaps/apps/mpview/mp.cpp (`ReadMeshFile`,
-//! `ReadObjectFile`).
+//! file of the house says of them. Sources: see [`crate::house`]; niessner/Matterport,
+//! code/gaps/apps/mpview/mp.cpp (`ReadMeshFile`, `ReadObjectFile`).
 //!
 //! `material_id` of a face is its segment. In the mesh of a house, it is a segment of the `.house` file,
-//! which tells its object, and this one its class and region. The mesh of a region counts segments and objects of
-//! its own, so there `segment_id` is the object and `category_id` a row of `category_mapping.tsv`, which a
-//! class of the house has too.
+//! which tells its object, and this one its class and region. The mesh of a region counts segments and
+//! objects of its own, so there `segment_id` is the object and `category_id` a row of `category_mapping.tsv`,
+//! which a class of the house has too.
 
 use crate::cloud::label_files::{files_of, folder_of, name_of};
 use crate::error::{Error, Result};

@@ -235,7 +235,8 @@ mod tests {
         let faces = "3 0 1 2 7 0 4\n3 3 4 5 3 1 28\n3 6 7 8 1000003 2 111\n";
         let head = "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nproperty float y\n\
                     property float z\nelement face 3\nproperty list uchar int vertex_indices\n\
-                    property int material_id\nproperty int segment_id\nproperty int category_id\nend_header\n";
+                    property int material_id\nproperty int segment_id\nproperty int category_id\n\
+                    end_header\n";
         write("house_segmentations/h.ply", &format!("{head}{rows}{faces}"));
         write("house_segmentations/h.house", HOUSE_FILE);
         let vertices: String = CORNERS.into_iter().map(|corner| format!("v {}", row(corner))).collect();
