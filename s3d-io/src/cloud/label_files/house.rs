@@ -299,7 +299,7 @@ mod tests {
         let sorted = instances(&found);
         assert_eq!(sorted, right);
         assert!(found.warnings[0].starts_with("6 faces without a label: they"), "{:?}", found.warnings);
-        assert_eq!(found.companions, [mesh.clone()]);
+        assert_eq!(found.companions, std::slice::from_ref(&mesh));
 
         // The file beside the mesh is found.
         let beside = of_mesh(std::slice::from_ref(&mesh), &options).unwrap();
