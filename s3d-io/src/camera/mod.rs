@@ -10,6 +10,7 @@
 //! | `images.txt`, `images.bin` | a COLMAP model |
 //! | `transforms.json` | frames of nerfstudio, Polycam, Record3D, instant-ngp |
 //! | a folder of `*.json` | pose files of a published area |
+//! | `.house` | the panoramas of a house of Matterport3D |
 //! | a folder of Matterport captures | [`read_matterport_locations`] |
 //!
 //! The pictures of a model give locations where they were taken. A location lies at most 10,000 km from the
@@ -17,8 +18,8 @@
 //!
 //! [`read_posed_cameras`] reads cameras as they are. Each [`PosedCamera`] has a pose, and the size, focal
 //! lengths and lens if the list tells them. It reads `transforms.json`, COLMAP models, Metashape's cameras,
-//! ScanNet's recordings, ScanNet's and 3RScan's poses, Polycam's keyframes, trajectories of ARKitScenes, Replica
-//! and TUM, and tables. A [`Recording`] has depth too.
+//! ScanNet's recordings, ScanNet's and 3RScan's poses, Polycam's keyframes, Matterport3D's undistorted cameras,
+//! trajectories of ARKitScenes, Replica and TUM, and tables. A [`Recording`] has depth too.
 //! [`read_photograph_cameras`] also takes the folder of the pictures.
 //!
 //! A [`PictureFolder`] finds the pictures of each location: raw captures ([`CaptureFile`], with lens and

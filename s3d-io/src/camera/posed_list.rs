@@ -5,7 +5,7 @@ use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
 use crate::camera::programs::sens::Recording;
 use crate::camera::programs::{
-    arkit, colmap, matrices, metashape, nerfstudio, polycam, scannet, sens, sequence, tum,
+    arkit, colmap, matrices, metashape, nerfstudio, polycam, scannet, sens, sequence, tum, undistorted,
 };
 use crate::camera::{located, table};
 use crate::error::{Error, Result};
@@ -18,8 +18,10 @@ use std::path::{Path, PathBuf};
 /// The supported forms, for messages.
 const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), \
                      Metashape's cameras.xml, a recording of ScanNet (.sens), a folder of ScanNet's \
-                     poses (pose/0.txt), of 3RScan's (frame-000000.pose.txt) or of Polycam's keyframes, a \
-                     trajectory of ARKitScenes (lowres_wide.traj), of matrices (16 numbers a line) or of lines `timestamp tx ty tz qx qy qz qw`, or a CSV table";
+                     poses (pose/0.txt), of 3RScan's (frame-000000.pose.txt) or of Polycam's keyframes, \
+                     Matterport3D's undistorted cameras (.conf), a trajectory of ARKitScenes \
+                     (lowres_wide.traj), of matrices (16 numbers a line) or of lines `timestamp tx ty tz qx \
+                     qy qz qw`, or a CSV table";
 
 /// The cameras of a list.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +62,8 @@ struct ReadList {
 /// - `traj.txt`, or any other file of lines with 16 numbers, or a folder that holds `traj.txt`: camera → world
 ///   in OpenCV's axes, a line for each of the pictures in `results/frame000000.jpg` or `rgb/rgb_0.png`, in
 ///   their order, with Replica's `cam_params.json`;
+/// - a file of commands such as `intrinsics_matrix`, or a folder with one such `.conf` file: the undistorted
+///   photographs of Matterport3D;
 /// - an XML file, or a folder that holds `cameras.xml`: the cameras of a Metashape chunk, whose sensors may
 ///   be panoramas;
 /// - any other file whose first line has a comma: a table of scan locations (see
@@ -112,6 +116,11 @@ fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
         return read_folder(path, images);
     }
 
+    if crate::house::is_house(path) {
+        let message = "tells where panoramas are, not what lenses photographs have: give the file in \
+                       undistorted_camera_parameters";
+        return Err(Error::unsupported(path, message));
+    }
     let mut files = vec![path.to_owned()];
     let cameras = if is_colmap_images(path) {
         let (cameras, intrinsics) = colmap::read_posed(path)?;
@@ -141,7 +150,9 @@ fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
             let (cameras, untracked, files) = matrices::read(path, &text, images)?;
             return Ok(ReadList { untracked, ..ReadList::of_files(cameras, files) });
         }
-        if first.contains(&b',') {
+        if undistorted::is_list(first) {
+            undistorted::read(path, &text)?
+        } else if first.contains(&b',') {
             table::read_rows(path, &bytes)?
         } else {
             tum::read(path, &text)?
@@ -203,6 +214,9 @@ fn read_folder(path: &Path, images: Option<&Path>) -> Result<ReadList> {
     if let Some((files, images)) = polycam::find(path)? {
         let (cameras, files) = polycam::read(files, &images)?;
         return Ok(ReadList { cameras, untracked: 0, files, named: path.to_owned() });
+    }
+    if let Some(list) = undistorted::find(path) {
+        return read(&list, images);
     }
     Err(Error::unsupported(path, format!("holds no list of cameras: {FORMS}")))
 }

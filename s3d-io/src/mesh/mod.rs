@@ -57,7 +57,7 @@ pub use file::{LengthUnit, MeshFile, MeshOptions, MeshSource, UpAxis};
 #[cfg(feature = "mesh")]
 pub use join::{read_meshes, read_meshes_with};
 #[cfg(feature = "mesh")]
-pub use labels::{LabelColumn, LabelElement, LabelledObject, MeshLabels, NO_LABEL};
+pub use labels::{LabelColumn, LabelElement, LabelledObject, LabelledRoom, MeshLabels, NO_LABEL};
 #[cfg(all(feature = "obj", feature = "png"))]
 pub use obj::{RgbObj, SemanticObj, TextureOut, write_rgb_obj, write_semantic_obj};
 #[cfg(feature = "mesh")]
