@@ -175,24 +175,15 @@ fn snapped(v: f64) -> f64 {
 
 /// Moves mesh, points and locations by `at`. The scene file does not mention it.
 fn move_all(scan: &Scan, at: [f64; 3]) {
-    let numbers = |line: &str| -> Vec<f64> { line.split(' ').map(|w| snapped(w.parse().unwrap())).collect() };
     let mut obj = String::new();
     for line in fs::read_to_string(scan.file("room.obj")).unwrap().lines() {
-        match line.strip_prefix("v ").map(numbers).as_deref() {
+        match line.strip_prefix("v ").map(snapped_numbers).as_deref() {
             Some(&[x, y, z]) => writeln!(obj, "v {} {} {}", x + at[0], y + at[2], z - at[1]).unwrap(),
             _ => writeln!(obj, "{line}").unwrap(),
         }
     }
     scan.write("room.obj", obj);
-    for path in files(&scan.file("Area_1")).into_keys() {
-        let mut text_of_points = String::new();
-        for line in fs::read_to_string(scan.file("Area_1").join(&path)).unwrap().lines() {
-            let n = numbers(line);
-            let [x, y, z] = [n[0] + at[0], n[1] + at[1], n[2] + at[2]];
-            writeln!(text_of_points, "{x} {y} {z} {} {} {}", n[3], n[4], n[5]).unwrap();
-        }
-        scan.write(&format!("Area_1/{}", text(&path)), text_of_points);
-    }
+    move_points(scan, at);
     let mut list = String::new();
     for line in fs::read_to_string(scan.file("cameras.csv")).unwrap().lines() {
         let mut words: Vec<String> = line.split(',').map(str::to_owned).collect();
@@ -202,6 +193,23 @@ fn move_all(scan: &Scan, at: [f64; 3]) {
         list += &(words.join(",") + "\n");
     }
     scan.write("cameras.csv", list);
+}
+
+fn snapped_numbers(line: &str) -> Vec<f64> {
+    line.split(' ').map(|word| snapped(word.parse().unwrap())).collect()
+}
+
+/// Moves the annotated points alone.
+fn move_points(scan: &Scan, at: [f64; 3]) {
+    for path in files(&scan.file("Area_1")).into_keys() {
+        let mut text_of_points = String::new();
+        for line in fs::read_to_string(scan.file("Area_1").join(&path)).unwrap().lines() {
+            let n = snapped_numbers(line);
+            let [x, y, z] = [n[0] + at[0], n[1] + at[1], n[2] + at[2]];
+            writeln!(text_of_points, "{x} {y} {z} {} {} {}", n[3], n[4], n[5]).unwrap();
+        }
+        scan.write(&format!("Area_1/{}", text(&path)), text_of_points);
+    }
 }
 
 const OFFSET_JSON: &str = "[500000.0,5400000.0,300.0]";
@@ -311,7 +319,7 @@ fn an_offset_beside_the_mesh_is_stated_and_joins_points_and_cameras() {
         move_all(&scan, [0.0; 3]);
         scan.write("project_offset.xyz", "500000.0 5400000.0 300.0\n");
         if moves_points {
-            move_tree(&scan);
+            move_points(&scan, UTM);
         }
         let log = scan.exported();
         assert!(log.contains("project_offset.xyz: the scan's coordinates are the mesh's plus"), "{log}");
