@@ -1,7 +1,7 @@
 //! Files that users give in place of a list of cameras.
 
 use crate::camera::programs::metashape::PROJECT;
-use crate::camera::programs::sens;
+use crate::camera::programs::{reality_capture, sens};
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -28,9 +28,6 @@ const KINDS: [(&[u8], &str); 12] = [
     (b"PK\x03\x04", "is a ZIP archive: unpack it, and give what is in it"),
 ];
 
-/// The header of RealityCapture's table of internal and external camera parameters.
-const REALITY_CAPTURE: &[u8] = b"#name,x,y,alt,heading,pitch,roll";
-
 /// Refuses a file that is no list of cameras but of a kind that is known by its first bytes.
 ///
 /// # Errors
@@ -45,14 +42,9 @@ pub(crate) fn refuse_other_kind(path: &Path, bytes: &[u8]) -> Result<()> {
         return Err(Error::unsupported(path, message));
     }
 
-    let start: Vec<u8> = bytes
-        .iter()
-        .take(REALITY_CAPTURE.len())
-        .map(u8::to_ascii_lowercase)
-        .collect();
-    if start == REALITY_CAPTURE {
-        let message = "is a table of RealityCapture's camera parameters, which does not say where the middle \
-                       of a picture is and what its lens does: export the registration for COLMAP (text)";
+    if reality_capture::is_table(bytes) {
+        let message =
+            "is RealityCapture's table of photographs, not of scan locations: give it under [frames]";
         return Err(Error::unsupported(path, message));
     }
 
@@ -80,7 +72,7 @@ mod tests {
             ("a.psz", b"PK\x03\x04", "is a project of Metashape"),
             ("a.sens", b"\x04\0\0\0\x0f\0\0\0\0\0\0\0", "is a recording of ScanNet, not scan locations"),
             ("a.csv", b"#name,x,y,alt,heading,pitch,roll,f,px,py\n", "RealityCapture"),
-            ("a.csv", b"#Name,X,Y,Alt,Heading,Pitch,Roll\n", "for COLMAP"),
+            ("a.csv", b"#Name,X,Y,Alt,Heading,Pitch,Roll,F\n", "under [frames]"),
         ] {
             let message = of(name, bytes).unwrap_err().to_string();
             assert!(message.contains(words), "{message}");

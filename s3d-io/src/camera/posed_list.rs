@@ -5,7 +5,8 @@ use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
 use crate::camera::programs::sens::Recording;
 use crate::camera::programs::{
-    arkit, colmap, matrices, metashape, nerfstudio, polycam, scannet, sens, sequence, tum, undistorted,
+    arkit, colmap, matrices, metashape, nerfstudio, polycam, reality_capture, scannet, sens, sequence, tum,
+    undistorted,
 };
 use crate::camera::{located, table};
 use crate::error::{Error, Result};
@@ -66,6 +67,8 @@ struct ReadList {
 ///   photographs of Matterport3D;
 /// - an XML file, or a folder that holds `cameras.xml`: the cameras of a Metashape chunk, whose sensors may
 ///   be panoramas;
+/// - a table that begins as RealityCapture's does: `#name,x,y,alt,heading,pitch,roll,f`, with pictures beside
+///   it;
 /// - any other file whose first line has a comma: a table of scan locations (see
 ///   [`read_cameras`](crate::camera::read_cameras)), which may also have `width,height` and `fov` or
 ///   `fx,fy,cx,cy`;
@@ -133,6 +136,10 @@ fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
         return read_recording(path);
     } else {
         let bytes = read_file(path)?;
+        if reality_capture::is_table(&bytes) {
+            let cameras = reality_capture::read(path, &bytes, images)?;
+            return Ok(ReadList::of_files(cameras, files));
+        }
         refuse_other_kind(path, &bytes)?;
         let text = text_of(&bytes, path)?;
         if metashape::is_xml(&text) {

@@ -9,6 +9,7 @@ pub(crate) mod matrices;
 pub(crate) mod metashape;
 pub(crate) mod nerfstudio;
 pub(crate) mod polycam;
+pub(crate) mod reality_capture;
 pub(crate) mod scannet;
 pub(crate) mod sens;
 pub(crate) mod sequence;
