@@ -81,6 +81,12 @@ pub(super) fn decode_mask(bytes: &[u8], size: [u32; 2]) -> Result<Raster<u8>, St
     let color_channels = channels - usize::from(color.has_alpha());
     let color_bytes = bytes_per_pixel / channels * color_channels;
     let pixels = image.as_bytes().chunks_exact(bytes_per_pixel);
-    let mask = pixels.map(|pixel| if pixel[..color_bytes].iter().all(|b| *b == 0) { 0 } else { 255 });
+    let mask = pixels.map(|pixel| {
+        if pixel[..color_bytes].iter().all(|b| *b == 0) {
+            0
+        } else {
+            255
+        }
+    });
     Ok(Raster::from_vec(size[0], size[1], mask.collect()))
 }

@@ -40,7 +40,8 @@ pub(super) fn lens_of(projection: &Projection) -> Result<CaptureLens, String> {
 
 fn pinhole(numbers: &PinholeImageProperties) -> Result<CaptureLens, String> {
     let size = [numbers.width, numbers.height];
-    let focal_px = dvec2(numbers.focal_length / numbers.pixel_width, numbers.focal_length / numbers.pixel_height);
+    let focal_px =
+        dvec2(numbers.focal_length / numbers.pixel_width, numbers.focal_length / numbers.pixel_height);
     let center_px = dvec2(numbers.principal_x, numbers.principal_y);
     let lens = Lens::new(size, focal_px, center_px, [0.0; 5]);
     lens.map(CaptureLens::from).ok_or_else(|| {

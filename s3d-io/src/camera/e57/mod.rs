@@ -98,10 +98,11 @@ impl E57Pictures {
         }
 
         if pictures.is_empty() {
-            let mut message = "has no image with a pose and a pinhole or spherical projection, so there are no \
+            let mut message =
+                "has no image with a pose and a pinhole or spherical projection, so there are no \
                                colours in it: export it from the scanner's program with its pictures, or \
                                write rgb = \"texture\""
-                .to_owned();
+                    .to_owned();
             for sentence in unused.sentences() {
                 message += &format!("; {sentence}");
             }
@@ -221,9 +222,9 @@ impl E57Picture {
     /// Returns an error about this picture, with what to do.
     fn fault(&self, path: &Path, message: &str) -> Error {
         let name = &self.name;
-        let message = format!(
-            "{name}: {message}: export the file again, or leave the location out of [cameras]"
-        );
+        let message = message.trim_end();
+        let message =
+            format!("{name}: {message}: export the file again, or leave the location out of [cameras]");
         Error::format(path, message)
     }
 }

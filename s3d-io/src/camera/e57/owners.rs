@@ -30,12 +30,16 @@ impl E57Pictures {
             let owner = owner.or_else(|| nearest(picture.pose.location, locations));
             match owner.and_then(|index| pictures.get_mut(index)) {
                 Some(numbers) => numbers.push(number),
-                None => unused.add("is not of a scan location, nor within 0.5 m of one", picture.name.clone()),
+                None => {
+                    unused.add("is not of a scan location, nor within 0.5 m of one", picture.name.clone())
+                }
             }
         }
 
         let path = self.path.display();
-        let warnings = unused.sentences().map(|sentence| format!("{path}: {sentence}, left out"));
+        let warnings = unused
+            .sentences()
+            .map(|sentence| format!("{path}: {sentence}, left out"));
         E57Owners { pictures, warnings: warnings.collect() }
     }
 

@@ -225,7 +225,13 @@ impl PreparedCapture {
 
     /// Returns the place of a direction in the picture of a straight lens. `v` is the direction in the
     /// camera's axes.
-    fn place_straight(&self, lens: &Lens, ray: &CubeRay, direction: DVec3, v: DVec3) -> Option<PlaceInPicture> {
+    fn place_straight(
+        &self,
+        lens: &Lens,
+        ray: &CubeRay,
+        direction: DVec3,
+        v: DVec3,
+    ) -> Option<PlaceInPicture> {
         let depth = self.forward.dot(direction);
         let length_2 = direction.length_squared();
         if depth <= 0.0 || length_2 > (1.0 + self.reach * self.reach) * depth * depth {

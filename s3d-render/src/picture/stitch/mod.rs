@@ -116,10 +116,7 @@ struct Stitch {
 impl Stitch {
     fn new(captures: Vec<Capture>, pose: &Pose, scene: Option<&Scene<'_>>, options: &StitchOptions) -> Self {
         assert!(!captures.is_empty(), "a cube map needs captures");
-        let sharpest = captures
-            .iter()
-            .map(|c| sharpness(&c.lens))
-            .fold(0.0, f64::max);
+        let sharpest = captures.iter().map(|c| sharpness(&c.lens)).fold(0.0, f64::max);
         let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
 
         let world_from_frame = pose.opencv_from_world().transpose();

@@ -143,7 +143,8 @@ fn what_the_mask_hides_is_a_hole_and_colours_nothing() {
 #[test]
 fn the_faces_of_a_cube_meet_without_a_gap() {
     let lens = Lens::new([64, 64], DVec2::splat(32.0), DVec2::splat(32.0), [0.0; 5]).unwrap();
-    let turns = [(0.0, 0.0), (FRAC_PI_2, 0.0), (PI, 0.0), (-FRAC_PI_2, 0.0), (0.0, FRAC_PI_2), (0.0, -FRAC_PI_2)];
+    let turns =
+        [(0.0, 0.0), (FRAC_PI_2, 0.0), (PI, 0.0), (-FRAC_PI_2, 0.0), (0.0, FRAC_PI_2), (0.0, -FRAC_PI_2)];
     let rig = Pose { location: pose().location, ..Pose::level(DVec3::ZERO, 0.7) };
     let faces: Vec<Capture> = turns
         .iter()
