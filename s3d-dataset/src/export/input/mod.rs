@@ -7,7 +7,6 @@ pub(crate) mod memory;
 pub(crate) mod mesh;
 mod numbering;
 pub(crate) mod photographs;
-mod picture_finder;
 pub(crate) mod pictures;
 mod published;
 pub(crate) mod requested;

@@ -82,7 +82,7 @@ pub(super) fn decode_mask(bytes: &[u8], size: [u32; 2]) -> Result<Raster<u8>, St
     let color_bytes = bytes_per_pixel / channels * color_channels;
     let pixels = image.as_bytes().chunks_exact(bytes_per_pixel);
     let mask = pixels.map(|pixel| {
-        if pixel[..color_bytes].iter().all(|b| *b == 0) {
+        if pixel.iter().take(color_bytes).all(|b| *b == 0) {
             0
         } else {
             255

@@ -91,7 +91,7 @@ impl Unused {
 
 impl Reason {
     fn sentence(&self) -> String {
-        let named = &self.names[..self.names.len().min(MAX_NAMED)];
+        let named: Vec<&str> = self.names.iter().take(MAX_NAMED).map(String::as_str).collect();
         let mut names = named.join(", ");
         let more = self.names.len() - named.len();
         if more > 0 {

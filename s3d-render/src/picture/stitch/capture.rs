@@ -31,6 +31,9 @@ pub struct Capture {
     /// The pixels that show the scene: 0 where the picture is to be left out, else 255. It has the picture's
     /// size. `None`: all of them.
     pub mask: Option<Raster<u8>>,
+    /// The pixels on each side that repeat the border, as [`with_border`](Self::with_border) adds them. They
+    /// tell nothing about exposure.
+    pub border_px: u32,
 }
 
 impl Capture {
@@ -51,7 +54,13 @@ impl Capture {
             return self;
         };
         let mask = self.mask.map(|mask| bordered(&mask));
-        Self { image: bordered(&self.image), lens: lens.into(), pose: self.pose, mask }
+        Self {
+            image: bordered(&self.image),
+            lens: lens.into(),
+            pose: self.pose,
+            mask,
+            border_px: self.border_px + 1,
+        }
     }
 }
 
@@ -114,6 +123,8 @@ pub(super) struct PreparedCapture {
     lens: CaptureLens,
     /// The pixels that count, as in [`Capture`].
     mask: Option<Raster<u8>>,
+    /// The pixels on each side that only repeat the border.
+    border_px: f64,
     /// World → the camera's OpenCV axes.
     camera_from_world: DMat3,
     /// From the camera to the cube's centre, in the world.
@@ -145,7 +156,7 @@ struct PlaceInPicture {
 
 impl PreparedCapture {
     pub(super) fn new(capture: Capture, pose: &Pose, scene: Option<&Scene<'_>>) -> Self {
-        let Capture { mut image, lens, pose: own, mask } = capture;
+        let Capture { mut image, lens, pose: own, mask, border_px } = capture;
         let [width, height] = lens.size();
         assert_eq!([image.width(), image.height()], [width, height], "a picture has its lens's size");
 
@@ -165,6 +176,7 @@ impl PreparedCapture {
             picture: SourceMipMap::new(image, wrap),
             lens,
             mask,
+            border_px: f64::from(border_px),
             camera_from_world: own.opencv_from_world(),
             center: pose.location - own.location,
             forward: own.forward(),
@@ -243,7 +255,7 @@ impl PreparedCapture {
         let along = lens.focal_px() * (ray.angle() * length_2.sqrt() / v.z);
         let size = dvec2(f64::from(lens.width()), f64::from(lens.height()));
         let border = if ray.whole {
-            0.5 * along.max(DVec2::ONE)
+            0.5 * along.max(DVec2::ONE) + self.border_px
         } else {
             DVec2::splat(0.5)
         };

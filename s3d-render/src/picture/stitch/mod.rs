@@ -202,7 +202,7 @@ mod tests {
                     seen(k, world * lens.direction(at).unwrap()).map(|c| (c + 0.5).clamp(0.0, 255.0) as u8)
                 });
                 let image = Raster::from_vec(160, 128, pixels.collect());
-                Capture { image, lens: lens.into(), pose: own, mask: None }
+                Capture { image, lens: lens.into(), pose: own, mask: None, border_px: 0 }
             })
             .collect()
     }
@@ -344,7 +344,7 @@ mod tests {
                 let own = Pose { location, ..turned };
                 let camera = Camera::perspective(own, 2.0 * libm::atan(160.0 / 215.0), 320, 256);
                 let image = rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
-                Capture { image, lens: lens.into(), pose: own, mask: None }
+                Capture { image, lens: lens.into(), pose: own, mask: None, border_px: 0 }
             })
             .collect();
 

@@ -1,12 +1,14 @@
 //! The scanner's pictures as the source of colours: found and checked before anything is written, and made
 //! into one cube map at a time.
 
+mod finder;
+
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::area::AreaInput;
 use crate::export::input::cameras::Cameras;
-use crate::export::input::picture_finder::{LocationPictures, PictureFinder, check_sky_box};
 use crate::export::picture_colors::PictureColors;
+use finder::{LocationPictures, PictureFinder, check_sky_box};
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::camera::{CAPTURES_A_LOCATION, CaptureFile, E57Pictures, E57Shot, ScanLocation, read_picture};
@@ -156,6 +158,7 @@ impl Pictures {
                         lens: file.lens.into(),
                         pose: file.pose,
                         mask: None,
+                        border_px: 0,
                     });
                 }
                 let scene = options.parallax.then_some(scene);
@@ -203,5 +206,5 @@ fn read_all(paths: &[PathBuf]) -> Result<Vec<Raster<[u8; 3]>>> {
 /// their borders.
 fn capture_of_shot(shot: E57Shot) -> Capture {
     let E57Shot { image, lens, pose, mask } = shot;
-    Capture { image, lens, pose, mask }.with_border()
+    Capture { image, lens, pose, mask, border_px: 0 }.with_border()
 }
