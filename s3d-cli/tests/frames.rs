@@ -302,6 +302,31 @@ fn clouds_of_a_scan_in_utm_line_up_and_an_offset_of_their_own_wins() {
     }
 }
 
+/// Photogrammetry programs write the mesh near the origin, and its offset beside it.
+#[test]
+fn an_offset_beside_the_mesh_is_stated_and_joins_points_and_cameras() {
+    let home = at_home();
+    for moves_points in [false, true] {
+        let scan = Scan::new();
+        move_all(&scan, [0.0; 3]);
+        scan.write("project_offset.xyz", "500000.0 5400000.0 300.0\n");
+        if moves_points {
+            move_tree(&scan);
+        }
+        let log = scan.exported();
+        assert!(log.contains("project_offset.xyz: the scan's coordinates are the mesh's plus"), "{log}");
+        assert_same(&home.out(), &scan.out());
+    }
+
+    // An offset that does not join them is no excuse.
+    let scan = Scan::new();
+    move_tree(&scan);
+    scan.write("project_offset.xyz", "7000 8000 9\n");
+    refused(&scan, &[&BOXES[..], &[UTM_LINE]].concat());
+    scan.write("project_offset.xyz", "7000 8000\n");
+    refused(&scan, &["project_offset.xyz: has 2 numbers: an offset is x y z"]);
+}
+
 #[test]
 fn points_that_are_near_already_say_so() {
     let (home, scan) = (at_home(), Scan::new());

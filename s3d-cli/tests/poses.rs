@@ -140,7 +140,7 @@ fn every_form_gives_the_same_images() {
         let read = posed.camera(&GivenIntrinsics::default()).unwrap();
         assert_eq!(read.k_matrix(), camera(pose).k_matrix());
         assert!(read.pose.world_from_camera.abs_diff_eq(pose.world_from_camera, 1e-12));
-        assert!(posed.picture.as_ref().unwrap().is_file());
+        assert!(posed.picture.as_ref().unwrap().path.is_file());
     }
     let again = scan.file("again");
     render(&mesh, &first, &again, &["--threads", "1"]);

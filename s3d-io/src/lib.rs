@@ -197,7 +197,7 @@
 //! | `textures` | WebP, BMP, TGA and TIFF beside PNG and JPEG |
 //! | `cloud` | annotated points: the S3DIS tree, and the labels of meshes |
 //! | `las`, `e57`, `npy`, `pcd`, `text`, `kitti`, `scannet`, `mat`, `ply` | annotated points of these formats |
-//! | `labels` | files that label the faces of a mesh: HM3D, Replica, 3RScan, ScanNet++, other meshes |
+//! | `labels` | files that label the faces of a mesh: HM3D, Replica, 3RScan, ScanNet++, Matterport3D |
 //! | `camera` | lists of cameras; the scanner's pictures |
 //! | `png`, `exr` | the images of a data set |
 //! | `dataset` | the rest of a data set: poses, labels, instances, splits, lists, conventions |
@@ -230,6 +230,8 @@ pub mod dataset;
 mod error;
 pub mod fs;
 mod guarded;
+#[cfg(any(feature = "camera", feature = "labels"))]
+mod house;
 pub mod image;
 #[cfg(feature = "mesh")]
 pub mod mesh;

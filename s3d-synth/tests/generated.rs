@@ -128,6 +128,28 @@ fn bookcases_keep_away_from_window_sills() {
     });
 }
 
+/// The property below once drew this: the back of a chair reached into the tray of the whiteboard above it.
+#[test]
+fn chairs_stay_below_the_trays_of_whiteboards() {
+    let office = RoomOptions {
+        size_m: [6.44047, 2.2],
+        windows: 0,
+        furnishing: 0.0,
+        locations: 1,
+        heights_m: [2.4; 2],
+        ..RoomOptions::new(RoomType::OFFICE)
+    };
+    check(&BuildingOptions {
+        rooms: vec![office],
+        hallway_width_m: 2.5377545,
+        hallway_height_m: 3.352246,
+        wall_m: 0.1,
+        texture_scale: 0.05,
+        seed: 14670123824546367229,
+        ..BuildingOptions::default()
+    });
+}
+
 /// `.cargo/config.toml` has the seed of random tests. An unpacked package of the crate has no such file.
 #[test]
 fn random_tests_draw_the_same_cases_in_every_run() {

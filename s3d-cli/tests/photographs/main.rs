@@ -1,7 +1,9 @@
 //! Photographs with poses, there and back. Our own renderer takes the photographs in the built-in scene, ray
 //! by ray through lenses that bend. The views made of them must coincide with the views of the mesh.
 
+mod masks;
 mod panoramas;
+mod recordings;
 mod studio;
 
 use crate::common;

@@ -19,6 +19,7 @@ use crate::stage::Stage;
 use crate::survey::annotated::{Annotated, SurveyedRoom};
 use crate::survey::candidate::Candidate;
 use crate::survey::labelled_area::LabelledArea;
+use glam::DVec3;
 use s3d_geom::Density;
 use s3d_io::dataset::{Domain, SourceFaces};
 use s3d_io::fs::create_dir;
@@ -57,7 +58,8 @@ fn write_area_assets(
 
     let sampling = account.stage(Stage::Points, Some(number));
     let density = Density::PerM2(options.points_per_m2);
-    let points = write_points(ctx, layout, &file.mesh, plan, table, (density, options.seed), file.offset_m)?;
+    let offset_m = area.frame.offset().map_or(DVec3::ZERO, DVec3::from_array);
+    let points = write_points(ctx, layout, &file.mesh, plan, table, (density, options.seed), offset_m)?;
 
     // The files of the labels are another unit's.
     let mut paths = listing::walk(&mesh_dir)?;

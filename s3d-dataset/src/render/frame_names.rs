@@ -47,7 +47,15 @@ mod tests {
         let mut cameras = Vec::new();
         for name in list {
             let name = (*name).to_owned();
-            cameras.push(PosedCamera { name, pose, size: None, optics: None, picture: None, line: 0 });
+            cameras.push(PosedCamera {
+                name,
+                pose,
+                size: None,
+                optics: None,
+                picture: None,
+                mask: None,
+                line: 0,
+            });
         }
         frame_names(&cameras)
     }

@@ -14,13 +14,21 @@ const SAME_PLACE_M: f64 = 0.01;
 
 /// Refuses a camera that is too far from the origin for a building.
 pub(crate) fn check_place(path: &Path, camera: &PosedCamera) -> Result<()> {
-    let at = camera.pose.location;
+    check_distance(path, camera.line, &camera.name, camera.pose.location)
+}
+
+/// Refuses a place, called `name`, that is too far from the origin for a building.
+pub(crate) fn check_distance(path: &Path, line: u64, name: &str, at: DVec3) -> Result<()> {
     if at.is_finite() && at.abs().max_element() <= FARTHEST_M {
         return Ok(());
     }
-    let name = quote(camera.name.as_bytes());
-    let message = format!("{name}: {at} is more than {FARTHEST_M} m from the origin");
-    Err(fault(path, camera.line, message))
+    let name = quote(name.as_bytes());
+    Err(fault(path, line, format!("{name}: {at} is more than {FARTHEST_M} m from the origin")))
+}
+
+/// Returns the uuid in a name, or the one that follows from it.
+pub(crate) fn uuid_of(name: &str) -> String {
+    uuid_in(name).unwrap_or_else(|| uuid_from_name(name))
 }
 
 /// Returns an error at a line, or about the whole file if `line` is 0.
@@ -43,7 +51,7 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<PosedCamera>) -> Result<Ve
         check_place(path, &picture)?;
         let PosedCamera { name, pose, line, .. } = picture;
         let at = pose.location;
-        let uuid = uuid_in(&name).unwrap_or_else(|| uuid_from_name(&name));
+        let uuid = uuid_of(&name);
 
         match index.get(&uuid) {
             None => {
@@ -123,7 +131,7 @@ mod tests {
 
     fn picture(name: &str, x: f64, pitch: f64) -> PosedCamera {
         let pose = Pose::from_scanner(dvec3(x, 0.0, 1.5), DQuat::from_rotation_z(0.3)).turned(0.0, pitch);
-        PosedCamera { name: name.into(), pose, size: None, optics: None, picture: None, line: 0 }
+        PosedCamera { name: name.into(), pose, size: None, optics: None, picture: None, mask: None, line: 0 }
     }
 
     #[test]

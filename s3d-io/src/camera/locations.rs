@@ -3,7 +3,7 @@
 use crate::camera::matterport::{PictureFolder, read_matterport_locations};
 use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
-use crate::camera::programs::{colmap, nerfstudio};
+use crate::camera::programs::{colmap, house, nerfstudio};
 use crate::camera::table::{ScanLocation, parse_cameras};
 use crate::camera::{located, poses};
 use crate::error::{Error, Result};
@@ -14,9 +14,8 @@ use std::path::{Path, PathBuf};
 
 /// The supported forms, for messages.
 const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a folder of pose files \
-                     (*.json), the raw captures of a Matterport, an E57 file, a COLMAP model (images.txt or \
-                     images.bin) \
-                     or a transforms.json";
+                     (*.json), the raw captures of a Matterport, a house of Matterport3D (.house), an E57 \
+                     file, a COLMAP model (images.txt or images.bin) or a transforms.json";
 
 /// Reads the scan locations of `path`, a file or a folder:
 ///
@@ -25,6 +24,7 @@ const FORMS: &str = "scan locations are a CSV table of uuid,x,y,z,qx,qy,qz,qw, a
 /// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a
 ///   COLMAP model;
 /// - `transforms.json`, or a folder that holds one: the frames of nerfstudio and related programs;
+/// - a `.house` file of Matterport3D: its panoramas, as raw captures would put them;
 /// - an E57 file: the places of its scans, level, each with the heading of its +Y;
 /// - a folder of pose files of images, as published: where the scanner stood and how it was turned;
 /// - a folder with the raw captures of a Matterport: see [`read_matterport_locations`].
@@ -46,6 +46,9 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return picture_locations(path, nerfstudio::read(path)?, world_from_file);
     }
+    if crate::house::is_house(path) {
+        return Ok(all_moved(house::read(path)?, world_from_file));
+    }
 
     #[cfg(feature = "e57")]
     if starts_with(path, crate::camera::programs::e57::MAGIC)? {
@@ -54,11 +57,15 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
 
     let bytes = read_file(path)?;
     refuse_other_kind(path, &bytes)?;
-    let mut locations = parse_cameras(&bytes, path)?;
+    Ok(all_moved(parse_cameras(&bytes, path)?, world_from_file))
+}
+
+/// Brings locations from a file's frame to the world.
+fn all_moved(mut locations: Vec<ScanLocation>, world_from_file: &DAffine3) -> Vec<ScanLocation> {
     locations
         .iter_mut()
         .for_each(|l| l.pose = moved(&l.pose, world_from_file));
-    Ok(locations)
+    locations
 }
 
 fn read_folder(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocation>> {

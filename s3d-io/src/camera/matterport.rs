@@ -305,10 +305,16 @@ pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
     let lines = lines_and_values.map(|n| n.0);
     let m = lines_and_values.map(|n| n.1);
 
+    pose_of_matrix(&m)
+        .map_err(|(number, message)| Error::line(name, lines.get(number).copied().unwrap_or(1), message))
+}
+
+/// Returns the pose of a 4×4 matrix, row by row, from the camera (x right, y down, z forward) to the world.
+/// The error is the index of the number at fault, and a sentence.
+pub(crate) fn pose_of_matrix(m: &[f64; 16]) -> std::result::Result<Pose, (usize, String)> {
     let last = [m[12], m[13], m[14], m[15] - 1.0];
     if last.iter().any(|v| v.abs() > ROTATION_ERROR) {
-        let message = format!("the last row is {} {} {} {}, not 0 0 0 1", m[12], m[13], m[14], m[15]);
-        return Err(Error::line(name, lines[12], message));
+        return Err((12, format!("the last row is {} {} {} {}, not 0 0 0 1", m[12], m[13], m[14], m[15])));
     }
 
     let rows = [[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]].map(DVec3::from_array);
@@ -322,17 +328,16 @@ pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
             "the upper left 3×3 part is no rotation: its axes are off by {off:.4} from length 1 and right \
              angles"
         );
-        return Err(Error::line(name, lines[0], message));
+        return Err((0, message));
     }
     if turn.determinant() < 0.0 {
         let message = "the upper left 3×3 part mirrors: its determinant is −1, a rotation's is 1";
-        return Err(Error::line(name, lines[0], message));
+        return Err((0, message.into()));
     }
 
     let location = DVec3::new(m[3], m[7], m[11]);
     if location.abs().max_element() > FARTHEST_M {
-        let message = format!("the camera is at {location}: are these metres?");
-        return Err(Error::line(name, lines[3], message));
+        return Err((3, format!("the camera is at {location}: are these metres?")));
     }
 
     // Makes a rotation of the rounded matrix. The viewing direction stays.

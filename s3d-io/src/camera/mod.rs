@@ -11,6 +11,7 @@
 //! | `transforms.json` | frames of nerfstudio, Polycam, Record3D, instant-ngp |
 //! | a folder of `*.json` | pose files of a published area |
 //! | `.e57` | the places of its scans |
+//! | `.house` | the panoramas of a house of Matterport3D |
 //! | a folder of Matterport captures | [`read_matterport_locations`] |
 //!
 //! The pictures of a model give locations where they were taken. A location lies at most 10,000 km from the
@@ -18,7 +19,8 @@
 //!
 //! [`read_posed_cameras`] reads cameras as they are. Each [`PosedCamera`] has a pose, and the size, focal
 //! lengths and lens if the list tells them. It reads `transforms.json`, COLMAP models, Metashape's cameras,
-//! ScanNet's and 3RScan's poses, Polycam's keyframes, trajectories of ARKitScenes and TUM, and tables.
+//! ScanNet's recordings, ScanNet's and 3RScan's poses, Polycam's keyframes, Matterport3D's undistorted cameras,
+//! trajectories of ARKitScenes, Replica and TUM, and tables. A [`Recording`] has depth too.
 //! [`read_photograph_cameras`] also takes the folder of the pictures.
 //!
 //! A [`PictureFolder`] finds the pictures of each location: raw captures ([`CaptureFile`], with lens and
@@ -45,6 +47,7 @@ mod matterport;
 mod numbered;
 mod other_kind;
 mod picture;
+mod picture_file;
 mod posed;
 mod posed_list;
 pub(crate) mod poses;
@@ -60,7 +63,9 @@ pub use matterport::{
     read_intrinsics, read_matterport_locations,
 };
 pub use picture::{check_picture, decode_picture, read_picture, read_picture_size, read_picture_turn};
+pub use picture_file::PictureFile;
 pub use posed::{Distortion, GivenIntrinsics, IntrinsicsError, Optics, PosedCamera};
 pub use posed_list::{PosedCameras, read_photograph_cameras, read_posed_cameras};
 pub use poses::PublishedLocation;
+pub use programs::sens::{RecordedFrame, Recording};
 pub use table::{ScanLocation, parse_cameras, read_cameras};

@@ -1,6 +1,7 @@
 //! Files that users give in place of a list of cameras.
 
 use crate::camera::programs::metashape::PROJECT;
+use crate::camera::programs::sens;
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -27,10 +28,6 @@ const KINDS: [(&[u8], &str); 12] = [
     (b"PK\x03\x04", "is a ZIP archive: unpack it, and give what is in it"),
 ];
 
-/// The explanation of ScanNet's recordings.
-const RECORDING: &str = "is a recording of ScanNet, not a list of cameras: unpack it with SensReader (color, \
-                         pose and intrinsic), and give the folder";
-
 /// The header of RealityCapture's table of internal and external camera parameters.
 const REALITY_CAPTURE: &[u8] = b"#name,x,y,alt,heading,pitch,roll";
 
@@ -43,8 +40,9 @@ pub(crate) fn refuse_other_kind(path: &Path, bytes: &[u8]) -> Result<()> {
     if has_ending("psx") || has_ending("psz") {
         return Err(Error::unsupported(path, PROJECT));
     }
-    if has_ending("sens") {
-        return Err(Error::unsupported(path, RECORDING));
+    if sens::is_recording(bytes) {
+        let message = "is a recording of ScanNet, not scan locations: give it under [frames]";
+        return Err(Error::unsupported(path, message));
     }
 
     let start: Vec<u8> = bytes
@@ -80,7 +78,7 @@ mod tests {
             ("a.zip", b"PK\x03\x04", "is a ZIP archive: unpack it"),
             ("a.PSX", b"<document/>", "is a project of Metashape, not its cameras: export them as XML"),
             ("a.psz", b"PK\x03\x04", "is a project of Metashape"),
-            ("a.sens", b"\x04\0\0\0", "is a recording of ScanNet, not a list of cameras: unpack it"),
+            ("a.sens", b"\x04\0\0\0\x0f\0\0\0\0\0\0\0", "is a recording of ScanNet, not scan locations"),
             ("a.csv", b"#name,x,y,alt,heading,pitch,roll,f,px,py\n", "RealityCapture"),
             ("a.csv", b"#Name,X,Y,Alt,Heading,Pitch,Roll\n", "for COLMAP"),
         ] {

@@ -9,7 +9,7 @@ use crate::image::texture::{TextureFault, decode_texture};
 use image::metadata::Orientation;
 use image::{ImageDecoder, ImageReader};
 use s3d_geom::Raster;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Seek, SeekFrom};
 use std::path::Path;
 
 /// The bytes at the end of a file in which a picture's end mark is looked for. Cameras write a little after
@@ -41,13 +41,17 @@ pub fn decode_picture(bytes: Vec<u8>, name: &Path) -> Result<Raster<[u8; 3]>> {
 /// # Errors
 /// Like [`read_picture`].
 pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
-    let file = BufReader::new(open_file(path)?);
-    let reader = ImageReader::new(file)
+    size_of(BufReader::new(open_file(path)?), path)
+}
+
+/// Returns the size of the picture that `encoded` holds. Errors call it `name`.
+fn size_of(encoded: impl BufRead + Seek, name: &Path) -> Result<(u32, u32)> {
+    let reader = ImageReader::new(encoded)
         .with_guessed_format()
-        .map_err(|e| Error::io(path, "read", e))?;
+        .map_err(|e| Error::io(name, "read", e))?;
     let size =
-        guarded(|| reader.into_dimensions()).ok_or_else(|| unreadable(path, "its header is damaged"))?;
-    size.map_err(|e| unreadable(path, &e.to_string()))
+        guarded(|| reader.into_dimensions()).ok_or_else(|| unreadable(name, "its header is damaged"))?;
+    size.map_err(|e| unreadable(name, &e.to_string()))
 }
 
 /// Returns how a PNG or JPEG file asks to be turned before it is shown, as EXIF numbers it: 1 as it is, 3
@@ -59,14 +63,18 @@ pub fn read_picture_size(path: &Path) -> Result<(u32, u32)> {
 /// # Errors
 /// Like [`read_picture`].
 pub fn read_picture_turn(path: &Path) -> Result<u8> {
-    let file = BufReader::new(open_file(path)?);
-    let reader = ImageReader::new(file)
+    turn_of(BufReader::new(open_file(path)?), path)
+}
+
+/// Returns how the picture that `encoded` holds asks to be turned. Errors call it `name`.
+pub(crate) fn turn_of(encoded: impl BufRead + Seek, name: &Path) -> Result<u8> {
+    let reader = ImageReader::new(encoded)
         .with_guessed_format()
-        .map_err(|e| Error::io(path, "read", e))?;
+        .map_err(|e| Error::io(name, "read", e))?;
     let turn = guarded(|| reader.into_decoder()?.orientation())
-        .ok_or_else(|| unreadable(path, "its header is damaged"))?;
+        .ok_or_else(|| unreadable(name, "its header is damaged"))?;
     turn.map(Orientation::to_exif)
-        .map_err(|e| unreadable(path, &e.to_string()))
+        .map_err(|e| unreadable(name, &e.to_string()))
 }
 
 /// Returns the size like [`read_picture_size`], and checks that the picture is complete.
@@ -77,18 +85,26 @@ pub fn read_picture_turn(path: &Path) -> Result<u8> {
 /// # Errors
 /// Like [`read_picture`].
 pub fn check_picture(path: &Path) -> Result<(u32, u32)> {
-    let size = read_picture_size(path)?;
-    let failed = |e| Error::io(path, "read", e);
+    check_encoded(&mut BufReader::new(open_file(path)?), path)
+}
 
-    let mut file = open_file(path)?;
-    let length = file.metadata().map_err(failed)?.len();
+/// Checks like [`check_picture`], the picture that `encoded` holds. Errors call it `name`.
+pub(crate) fn check_encoded(encoded: &mut (impl BufRead + Seek), name: &Path) -> Result<(u32, u32)> {
+    let size = size_of(&mut *encoded, name)?;
+    let failed = |e| Error::io(name, "read", e);
+
+    let length = encoded.seek(SeekFrom::End(0)).map_err(failed)?;
     let mut tail = Vec::new();
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))
+    encoded
+        .seek(SeekFrom::Start(length.saturating_sub(TAIL)))
         .map_err(failed)?;
-    file.read_to_end(&mut tail).map_err(failed)?;
+    encoded.read_to_end(&mut tail).map_err(failed)?;
 
     if !has_end(&tail) {
-        read_picture(path)?;
+        let mut whole = Vec::new();
+        encoded.rewind().map_err(failed)?;
+        encoded.read_to_end(&mut whole).map_err(failed)?;
+        decode_picture(whole, name)?;
     }
     Ok(size)
 }

@@ -1,5 +1,6 @@
 //! Cameras with poses: of photographs, or of views to render.
 
+use crate::camera::picture_file::PictureFile;
 use s3d_geom::glam::{DVec2, DVec3, dvec2};
 use s3d_geom::{Camera, CameraError, FisheyeLens, Lens, PhotoLens, Pose};
 use std::path::PathBuf;
@@ -17,7 +18,10 @@ pub struct PosedCamera {
     /// How directions become pixels, if the list tells it.
     pub optics: Option<Optics>,
     /// The picture that was taken with the camera, if the list names one. The file may not exist.
-    pub picture: Option<PathBuf>,
+    pub picture: Option<PictureFile>,
+    /// The mask of the picture, if the list names one: a picture of the same size that is black where nothing
+    /// may be shown. The file may not exist.
+    pub mask: Option<PathBuf>,
     /// The line in the list, from 1; 0 if the list has no lines.
     pub line: u64,
 }
@@ -278,7 +282,7 @@ mod tests {
 
     fn posed(size: Option<[u32; 2]>, optics: Option<Optics>) -> PosedCamera {
         let pose = Pose::level(DVec3::ONE, 0.3);
-        PosedCamera { name: "a".into(), pose, size, optics, picture: None, line: 0 }
+        PosedCamera { name: "a".into(), pose, size, optics, picture: None, mask: None, line: 0 }
     }
 
     const PHONE: Optics = Optics::Pinhole {

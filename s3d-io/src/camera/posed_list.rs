@@ -3,19 +3,25 @@
 use crate::camera::locations::{has_transforms, is_colmap_images, moved};
 use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
-use crate::camera::programs::{arkit, colmap, metashape, nerfstudio, polycam, scannet, sequence, tum};
+use crate::camera::programs::sens::Recording;
+use crate::camera::programs::{
+    arkit, colmap, matrices, metashape, nerfstudio, polycam, scannet, sens, sequence, tum, undistorted,
+};
 use crate::camera::{located, table};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
-use crate::fs::open::read_file;
+use crate::fs::open::{open_file, read_file};
 use s3d_geom::glam::DAffine3;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The supported forms, for messages.
 const FORMS: &str = "cameras are a transforms.json, a COLMAP model (cameras and images, .txt or .bin), \
-                     Metashape's cameras.xml, a folder of ScanNet's poses (pose/0.txt), of 3RScan's \
-                     (frame-000000.pose.txt) or of Polycam's keyframes, a trajectory of ARKitScenes \
-                     (lowres_wide.traj) or of lines `timestamp tx ty tz qx qy qz qw`, or a CSV table";
+                     Metashape's cameras.xml, a recording of ScanNet (.sens), a folder of ScanNet's \
+                     poses (pose/0.txt), of 3RScan's (frame-000000.pose.txt) or of Polycam's keyframes, \
+                     Matterport3D's undistorted cameras (.conf), a trajectory of ARKitScenes \
+                     (lowres_wide.traj), of matrices (16 numbers a line) or of lines `timestamp tx ty tz qx \
+                     qy qz qw`, or a CSV table";
 
 /// The cameras of a list.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,6 +50,8 @@ struct ReadList {
 ///   programs, in the world before their `applied_transform`;
 /// - `images.txt`, `images.bin`, or a folder that holds one, itself or in `0`, `sparse` or `sparse/0`: a
 ///   COLMAP model, with the list of `cameras` beside it;
+/// - `scene0000_00.sens`, or a folder that holds one such file: a [recording](Recording) of ScanNet, whose
+///   pictures are parts of the file;
 /// - a folder with ScanNet's `pose/0.txt`, or that folder itself; `intrinsic/intrinsic_color.txt` and the
 ///   first picture in `color` give the optics and the size;
 /// - a folder with 3RScan's `sequence/frame-000000.pose.txt`, or that folder itself; `_info.txt` gives the
@@ -51,6 +59,11 @@ struct ReadList {
 /// - a folder with Polycam's `keyframes`, or that folder itself: the corrected cameras, if there are some;
 /// - `lowres_wide.traj` of ARKitScenes, or any other file of lines with seven numbers, or a folder that holds
 ///   `lowres_wide.traj`: the pictures beside it, whose names have their times, each with its `.pincam`;
+/// - `traj.txt`, or any other file of lines with 16 numbers, or a folder that holds `traj.txt`: camera → world
+///   in OpenCV's axes, a line for each of the pictures in `results/frame000000.jpg` or `rgb/rgb_0.png`, in
+///   their order, with Replica's `cam_params.json`;
+/// - a file of commands such as `intrinsics_matrix`, or a folder with one such `.conf` file: the undistorted
+///   photographs of Matterport3D;
 /// - an XML file, or a folder that holds `cameras.xml`: the cameras of a Metashape chunk, whose sensors may
 ///   be panoramas;
 /// - any other file whose first line has a comma: a table of scan locations (see
@@ -103,6 +116,11 @@ fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
         return read_folder(path, images);
     }
 
+    if crate::house::is_house(path) {
+        let message = "tells where panoramas are, not what lenses photographs have: give the file in \
+                       undistorted_camera_parameters";
+        return Err(Error::unsupported(path, message));
+    }
     let mut files = vec![path.to_owned()];
     let cameras = if is_colmap_images(path) {
         let (cameras, intrinsics) = colmap::read_posed(path)?;
@@ -111,6 +129,8 @@ fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
     } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         let (cameras, untracked) = nerfstudio::read_posed(path)?;
         return Ok(ReadList { untracked, ..ReadList::of_files(cameras, files) });
+    } else if is_recording(path)? {
+        return read_recording(path);
     } else {
         let bytes = read_file(path)?;
         refuse_other_kind(path, &bytes)?;
@@ -126,7 +146,13 @@ fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
             let (cameras, untracked, files) = arkit::read(path, &text, images)?;
             return Ok(ReadList { untracked, ..ReadList::of_files(cameras, files) });
         }
-        if first.contains(&b',') {
+        if matrices::is_matrix(first) {
+            let (cameras, untracked, files) = matrices::read(path, &text, images)?;
+            return Ok(ReadList { untracked, ..ReadList::of_files(cameras, files) });
+        }
+        if undistorted::is_list(first) {
+            undistorted::read(path, &text)?
+        } else if first.contains(&b',') {
             table::read_rows(path, &bytes)?
         } else {
             tum::read(path, &text)?
@@ -134,6 +160,22 @@ fn read(path: &Path, images: Option<&Path>) -> Result<ReadList> {
     };
 
     Ok(ReadList::of_files(cameras, files))
+}
+
+/// Returns whether a file is a recording of ScanNet, by its first bytes.
+fn is_recording(path: &Path) -> Result<bool> {
+    let mut start = Vec::new();
+    open_file(path)?
+        .take(12)
+        .read_to_end(&mut start)
+        .map_err(|e| Error::io(path, "read", e))?;
+    Ok(sens::is_recording(&start))
+}
+
+/// Reads the cameras of a recording.
+fn read_recording(path: &Path) -> Result<ReadList> {
+    let (cameras, untracked) = Recording::open(path)?.cameras();
+    Ok(ReadList { untracked, ..ReadList::of_files(cameras, vec![path.to_owned()]) })
 }
 
 /// Reads the cameras of a Metashape chunk.
@@ -159,8 +201,11 @@ fn read_folder(path: &Path, images: Option<&Path>) -> Result<ReadList> {
         let (cameras, untracked, files) = sequence::read(files)?;
         return Ok(ReadList { cameras, untracked, files, named: path.to_owned() });
     }
-    if let Some(trajectory) = arkit::find(path) {
+    if let Some(trajectory) = arkit::find(path).or_else(|| matrices::find(path)) {
         return read(&trajectory, images);
+    }
+    if let Some(recording) = sens::find(path) {
+        return read(&recording, images);
     }
     let xml = path.join("cameras.xml");
     if xml.is_file() {
@@ -169,6 +214,9 @@ fn read_folder(path: &Path, images: Option<&Path>) -> Result<ReadList> {
     if let Some((files, images)) = polycam::find(path)? {
         let (cameras, files) = polycam::read(files, &images)?;
         return Ok(ReadList { cameras, untracked: 0, files, named: path.to_owned() });
+    }
+    if let Some(list) = undistorted::find(path) {
+        return read(&list, images);
     }
     Err(Error::unsupported(path, format!("holds no list of cameras: {FORMS}")))
 }

@@ -7,7 +7,7 @@ use crate::cloud::table::rows::{CloudTags, NO_INSTANCE, NO_TAG, Reading, Tag, Va
 use crate::cloud::words::class_of_word;
 use crate::error::{Error, Result};
 use crate::mesh::file::MeshFile;
-use crate::mesh::labels::{LabelledObject, MeshLabels, NO_LABEL};
+use crate::mesh::labels::{LabelledObject, MATTERPORT_NAMES, MeshLabels, NO_LABEL};
 use s3d_geom::{NO_INDEX, TriMesh};
 use s3d_label::{Class, Label};
 use std::collections::HashMap;
@@ -68,6 +68,7 @@ impl FaceLabels {
             companions.push(list);
             (labels, warnings)
         } else if let Some(labels) = &file.labels {
+            refuse_rows_of_mapping(path, labels, options)?;
             (labels.clone(), Vec::new())
         } else {
             return Err(Error::format(
@@ -97,7 +98,7 @@ impl FaceLabels {
         let (labels, faces) = match labels.into_faces(&file.mesh) {
             MeshLabels::Names { labels, faces } => (labels, faces),
             MeshLabels::Objects { objects, faces, .. } => {
-                of_tags(file, &ObjectTags { objects: &objects, faces: &faces }, options, &mut warnings)?
+                of_tags(file, &ObjectTags::new(&objects, &faces, options), options, &mut warnings)?
             }
             MeshLabels::Numbers { class, instance, .. } => {
                 let Some(class) = class else {
@@ -132,6 +133,23 @@ impl FaceLabels {
     }
 }
 
+/// Refuses the classes of Matterport3D's meshes where they would be taken for ids of mpcat40. They are rows
+/// of another table.
+fn refuse_rows_of_mapping(path: &Path, labels: &MeshLabels, options: &AnnotationOptions) -> Result<()> {
+    let MeshLabels::Numbers { class: Some(class), instance: Some(instance), .. } = labels else {
+        return Ok(());
+    };
+    let [_, object, category] = MATTERPORT_NAMES;
+    let is_matterport = class.name == category && instance.name == object;
+    if !is_matterport || options.taxonomy.name() != "matterport40" || !options.classes.is_empty() {
+        return Ok(());
+    }
+    let message = "category_id has rows of category_mapping.tsv, which are not the ids of matterport40: put \
+                   the .house file of the house beside it (of a region, into house_segmentations beside its \
+                   folder), or say in [annotations.classes] what the numbers mean";
+    Err(Error::format(path, message))
+}
+
 /// Returns the labels that a list beside a mesh gives to its faces, with warnings and the path of the list.
 #[cfg(feature = "labels")]
 fn named_beside(file: &MeshFile, options: &AnnotationOptions) -> Result<Option<Named>> {
@@ -153,8 +171,8 @@ trait FaceTags {
     fn class(&self, face: u32) -> Option<Value<'_>>;
     /// Returns the number of its object, or [`NO_LABEL`].
     fn instance(&self, face: u32) -> i64;
-    /// Returns the number of its room, if the file tells it.
-    fn room(&self, face: u32) -> Option<i64>;
+    /// Returns the number or the name of its room, if the file tells it.
+    fn room(&self, face: u32) -> Option<Value<'_>>;
 }
 
 /// Columns of numbers, one number a face.
@@ -178,7 +196,7 @@ impl FaceTags for NumberTags<'_> {
         instance.copied().unwrap_or(NO_LABEL)
     }
 
-    fn room(&self, _face: u32) -> Option<i64> {
+    fn room(&self, _face: u32) -> Option<Value<'_>> {
         None
     }
 }
@@ -187,9 +205,18 @@ impl FaceTags for NumberTags<'_> {
 struct ObjectTags<'a> {
     objects: &'a [LabelledObject],
     faces: &'a [u32],
+    /// Whether rooms are called by their names. They are if the taxonomy knows one of these; else the numbers
+    /// count.
+    by_name: bool,
 }
 
-impl ObjectTags<'_> {
+impl<'a> ObjectTags<'a> {
+    fn new(objects: &'a [LabelledObject], faces: &'a [u32], options: &AnnotationOptions) -> Self {
+        let mut names = objects.iter().filter_map(|object| object.room.as_ref()?.name.as_ref());
+        let by_name = names.any(|name| options.taxonomy.room_of_word(name).is_ok());
+        Self { objects, faces, by_name }
+    }
+
     fn object(&self, face: u32) -> Option<&LabelledObject> {
         self.objects.get(*self.faces.get(face as usize)? as usize)
     }
@@ -204,8 +231,10 @@ impl FaceTags for ObjectTags<'_> {
         self.object(face).map_or(NO_LABEL, |object| object.instance)
     }
 
-    fn room(&self, face: u32) -> Option<i64> {
-        self.object(face)?.room
+    fn room(&self, face: u32) -> Option<Value<'_>> {
+        let room = self.object(face)?.room.as_ref()?;
+        let name = room.name.as_deref().filter(|_| self.by_name);
+        Some(name.map_or(Value::Whole(room.number), Value::Name))
     }
 }
 
@@ -240,8 +269,9 @@ fn of_tags(
             };
             let class = class.ok_or_else(too_many)?;
             let room = match faces.room(face) {
-                Some(number) => tags.rooms.number(number).ok_or_else(too_many)?,
-                None => usual_room,
+                Some(Value::Name(name)) => tags.rooms.name(name).ok_or_else(too_many)?,
+                Some(Value::Whole(number)) => tags.rooms.number(number).ok_or_else(too_many)?,
+                _ => usual_room,
             };
             let instance = faces.instance(face).max(NO_INSTANCE);
             let group = *index.entry((room, class, instance)).or_insert_with(|| {

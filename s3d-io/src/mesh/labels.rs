@@ -33,8 +33,18 @@ pub struct LabelledObject {
     pub class: String,
     /// Its number. Objects of one class, room and number are one instance. [`NO_LABEL`] if it has none.
     pub instance: i64,
-    /// The number of its room, from 1, if the file tells it.
-    pub room: Option<i64>,
+    /// Its room, if the file tells it.
+    pub room: Option<LabelledRoom>,
+}
+
+/// A room of a mesh, as its file tells it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LabelledRoom {
+    /// The number among all rooms of the file, from 1.
+    pub number: i64,
+    /// The word for its type with its number among the rooms of this type, such as `b_2`, if the file tells
+    /// types. A taxonomy says what the word means.
+    pub name: Option<String>,
 }
 
 /// Labels that come with a mesh, aligned with its faces or vertices after all checks.

@@ -49,16 +49,20 @@ pub(crate) mod origin;
 pub(crate) mod ply;
 #[cfg(feature = "mesh")]
 pub(crate) mod read;
+#[cfg(feature = "mesh")]
+mod told_offset;
 
 #[cfg(feature = "mesh")]
 pub use file::{LengthUnit, MeshFile, MeshOptions, MeshSource, UpAxis};
 #[cfg(feature = "mesh")]
 pub use join::{read_meshes, read_meshes_with};
 #[cfg(feature = "mesh")]
-pub use labels::{LabelColumn, LabelElement, LabelledObject, MeshLabels, NO_LABEL};
+pub use labels::{LabelColumn, LabelElement, LabelledObject, LabelledRoom, MeshLabels, NO_LABEL};
 #[cfg(all(feature = "obj", feature = "png"))]
 pub use obj::{RgbObj, SemanticObj, TextureOut, write_rgb_obj, write_semantic_obj};
 #[cfg(feature = "mesh")]
 pub use origin::MeshOrigin;
 #[cfg(feature = "mesh")]
 pub use read::{MeshFormat, read_mesh, read_mesh_from, read_mesh_with};
+#[cfg(feature = "mesh")]
+pub use told_offset::ToldOffset;

@@ -16,6 +16,9 @@ pub struct FrameSource {
     pub path: PathBuf,
     /// The folder of the pictures that the list names. `None`: where the form of the list expects them.
     pub images: Option<PathBuf>,
+    /// The folder of the masks: for each picture one of the same name, or with another ending. `None`: the
+    /// masks that the list names, if there are some.
+    pub masks: Option<PathBuf>,
     /// The transform from the list's frame to the world (metres, Z-up): a rotation, a shift and a scale.
     pub world_from_file: DAffine3,
     /// The step through the list: 1 takes every photograph, 2 every second, starting with the first.
@@ -35,6 +38,7 @@ const WIDTHS: std::ops::RangeInclusive<u32> = 8..=16_384;
 pub(crate) struct FramesTable {
     path: PathBuf,
     images: Option<PathBuf>,
+    masks: Option<PathBuf>,
     up: Option<UpAxis>,
     transform: Option<[[f64; 4]; 4]>,
     every: Option<NonZeroU32>,
@@ -49,7 +53,7 @@ impl FramesTable {
     /// [`Error::Format`](crate::Error::Format) for the scene file if a file does not exist or a value is
     /// wrong.
     pub(crate) fn source(self, folder: SceneFolder<'_>) -> Result<FrameSource> {
-        let Self { path, images, up, transform, every, max, width } = self;
+        let Self { path, images, masks, up, transform, every, max, width } = self;
         let fault = |message: String| folder.fault(format!("[frames]: {message}"));
         if let Some(width) = width.filter(|width| !WIDTHS.contains(width)) {
             let least = WIDTHS.start();
@@ -63,7 +67,9 @@ impl FramesTable {
         let images = images
             .map(|images| folder.folder("frames.images", &images))
             .transpose()?;
-        Ok(FrameSource { path, images, world_from_file, every: every.unwrap_or(NonZeroU32::MIN), max, width })
+        let masks = masks.map(|masks| folder.folder("frames.masks", &masks)).transpose()?;
+        let every = every.unwrap_or(NonZeroU32::MIN);
+        Ok(FrameSource { path, images, masks, world_from_file, every, max, width })
     }
 }
 
@@ -90,9 +96,9 @@ mod tests {
         let plain = frames("path = \"c.csv\"\n").unwrap();
         assert!(plain.path.ends_with("c.csv") && plain.images.is_none() && plain.max.is_none());
         assert_eq!((plain.every.get(), plain.width, plain.world_from_file), (1, None, DAffine3::IDENTITY));
-        let keys = "path = \"raw\"\nimages = \"photos\"\nup = \"y\"\nevery = 7\nmax = 3\nwidth = 640\n";
+        let keys = "path = \"raw\"\nimages = \"photos\"\nmasks = \"raw\"\nup = \"y\"\nevery = 7\nmax = 3\nwidth = 640\n";
         let all = frames(keys).unwrap();
-        assert!(all.images.unwrap().ends_with("photos"));
+        assert!(all.images.unwrap().ends_with("photos") && all.masks.unwrap().ends_with("raw"));
         assert_eq!((all.every.get(), all.max.unwrap().get(), all.width), (7, 3, Some(640)));
         assert_eq!(all.world_from_file.transform_vector3(DVec3::Y), DVec3::Z);
 

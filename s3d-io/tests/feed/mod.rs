@@ -57,6 +57,12 @@ const LABELLED_PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty fl
                             property list uchar int vertex_indices\nproperty int object_id\nend_header\n\
                             0 0 0 1\n1 0 0 1\n0 1 0 2\n1 1 0 2\n3 0 1 2 1\n3 1 3 2 2\n";
 
+/// Two triangles of two segments, as Matterport3D has them.
+const MATTERPORT_PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                             property float z\nelement face 2\nproperty list uchar int vertex_indices\n\
+                             property int material_id\nproperty int segment_id\nproperty int category_id\n\
+                             end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 7 0 4\n3 1 3 2 3 1 28\n";
+
 /// A triangle with a texture, whose library is `m.mtl`.
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl wall\nf 1/1 2/1 3/1\n";
 
@@ -189,10 +195,12 @@ fn choice(data: &[u8], n: u8) -> (u8, &[u8]) {
     data.split_first().map_or((0, data), |(first, rest)| (first % n, rest))
 }
 
-/// Lists of cameras: a CSV table, a COLMAP model as text and binary, a transforms.json.
+/// Lists of cameras: a CSV table, a COLMAP model as text and binary, a transforms.json, a house of
+/// Matterport3D.
 fn cameras(dir: &Path, data: &[u8]) {
-    let (which, data) = choice(data, 4);
-    let name = ["cameras.csv", "images.txt", "images.bin", "transforms.json"][usize::from(which)];
+    let (which, data) = choice(data, 5);
+    let names = ["cameras.csv", "images.txt", "images.bin", "transforms.json", "a.house"];
+    let name = names[usize::from(which)];
     let path = file(dir, name, data);
     if let Some(found) = check(dir, read_scan_locations(&path, &DAffine3::IDENTITY)) {
         assert!(
@@ -203,8 +211,8 @@ fn cameras(dir: &Path, data: &[u8]) {
     }
 }
 
-/// Cameras with intrinsics: a table, COLMAP's cameras as text and binary, a transforms.json, a trajectory or
-/// XML, a pose and intrinsics of ScanNet, intrinsics of ARKitScenes and of 3RScan.
+/// Cameras with intrinsics: a table, COLMAP's cameras as text and binary, a transforms.json, a trajectory,
+/// XML or Matterport3D's list, a pose and intrinsics of ScanNet, intrinsics of ARKitScenes and of 3RScan.
 fn posed_cameras(dir: &Path, data: &[u8]) {
     let (which, data) = choice(data, 9);
     let folder = |name: &str| {
@@ -493,15 +501,34 @@ fn label_files(dir: &Path, data: &[u8]) {
         "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.0409, 0.8308, 0.0452, 1]}}],
         "nodes": [{"mesh": 0}]}"#,
     );
+    for mesh in ["a.ply", "region0.ply", "region1.ply"] {
+        file(dir, mesh, MATTERPORT_PLY.as_bytes());
+    }
     let scene = read_mesh(&dir.join("mesh.ply"), UpAxis::Z).expect("a mesh");
     let mesh = AnnotatedMesh { file: &scene, up: UpAxis::Z, units: None };
 
-    let names = ["a.semantic.txt", "info_semantic.json", "semseg.v2.json", "numbers.txt", "numbers.npy"];
+    let names = [
+        "a.house",
+        "region0.semseg.json",
+        "a.semantic.txt",
+        "info_semantic.json",
+        "semseg.v2.json",
+        "numbers.txt",
+        "numbers.npy",
+    ];
     let mut lists: Vec<PathBuf> = names.iter().map(|name| file(dir, name, data)).collect();
     // ScanNet++ has segments beside its groups. The bytes are both in turn.
     let groups = br#"{"segGroups": [{"objectId": 1, "label": "chair", "segments": [1, 2]}]}"#;
     lists.push(file(dir, "segments_anno.json", groups));
     file(dir, "segments.json", data);
+    // Matterport3D has segments beside its groups, and a house beside the mesh of a region.
+    file(dir, "region1.semseg.json", groups);
+    lists.push(dir.join("region1.semseg.json"));
+    for region in ["region0.fsegs.json", "region1.fsegs.json"] {
+        file(dir, region, data);
+    }
+    let region = read_mesh(&dir.join("region0.ply"), UpAxis::Z).expect("a mesh");
+    let _ = check(dir, Annotations::of_mesh(&region, &numbered()));
     for list in &lists {
         let _ = check(dir, Annotations::open_for(&mesh, std::slice::from_ref(list), &numbered()));
     }

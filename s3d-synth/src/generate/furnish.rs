@@ -253,7 +253,8 @@ pub(super) fn place(
             let width_m = between(rng, 1.2, 2.4);
             let picture = pick(rng, &style.boards);
             let tray_m = (picture == Pattern::Whiteboard).then_some(0.9);
-            let heights_m = [0.95, 2.05];
+            // The tray below it is above the backs of chairs.
+            let heights_m = [0.98, 2.05];
             hang(rng, width_m, 0.0, Thing::Board { width_m, heights_m, picture, frame: frame_look, tray_m })
         }
         Group::Picture => {

@@ -67,22 +67,44 @@ pub(crate) struct MeshFrame {
     pub(crate) bounds: Aabb,
     /// What was subtracted from the scan's coordinates, metres, in the world's axes.
     pub(crate) offset_m: DVec3,
+    /// What a program had subtracted before, as a file beside the mesh tells. Zero if `offset_m` is not.
+    pub(super) told_m: DVec3,
 }
 
 impl MeshFrame {
     /// The frame of a mesh that was read.
     pub(crate) fn of(file: &MeshFile) -> Self {
-        Self { bounds: file.mesh.aabb(), offset_m: file.offset_m }
+        Self { bounds: file.mesh.aabb(), offset_m: file.offset_m, told_m: DVec3::ZERO }
+    }
+
+    /// Takes an offset that a file beside the mesh tells.
+    pub(crate) fn told(&mut self, offset_m: DVec3) {
+        if self.offset_m == DVec3::ZERO {
+            self.told_m = offset_m;
+        }
     }
 
     /// The offset as tables have it; `None` if it is zero.
     pub(crate) fn offset(&self) -> Option<[f64; 3]> {
-        (self.offset_m != DVec3::ZERO).then(|| self.offset_m.to_array())
+        let offset_m = self.offset_m + self.told_m;
+        (offset_m != DVec3::ZERO).then(|| offset_m.to_array())
+    }
+
+    /// Opens points or cameras, from whose coordinates an offset is subtracted. If a program had moved the mesh,
+    /// they may lie beside it or where the scan was: what does not fit the mesh is opened again with the offset
+    /// that is told, and the first error is returned if that does not fit either.
+    pub(crate) fn open_beside<T>(&self, open: impl Fn(DVec3) -> Result<T>) -> Result<T> {
+        let opened = open(self.offset_m);
+        if opened.is_ok() || self.told_m == DVec3::ZERO {
+            return opened;
+        }
+        open(self.told_m).or(opened)
     }
 
     /// Logs the offset, if there is one.
     pub(crate) fn tell(&self, ctx: &Context) {
-        if let Some(offset) = self.offset() {
+        if self.offset_m != DVec3::ZERO {
+            let offset = self.offset_m.to_array();
             ctx.info(format_args!(
                 "offset_m = {offset:?} is subtracted from the coordinates of mesh, points and scan \
                  locations: the world of the data set is the scan's frame less it ([mesh] offset_m in the \

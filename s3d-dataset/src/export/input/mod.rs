@@ -3,6 +3,7 @@
 pub(crate) mod area;
 pub(crate) mod cameras;
 mod colors;
+pub(crate) mod masks;
 pub(crate) mod memory;
 pub(crate) mod mesh;
 mod numbering;

@@ -1,13 +1,14 @@
 //! Photographs with poses: found, each with its lens and the camera of its view, before anything is written.
 
 use crate::error::{Error, Result};
+use crate::export::input::masks::{check_mask_size, find_masks};
 use glam::DVec3;
 use rayon::prelude::*;
 use s3d_geom::{Camera, CameraError, PhotoLens, Pose, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::camera::{
-    IntrinsicsError, PosedCamera, PosedCameras, ScanLocation, check_picture, read_photograph_cameras,
-    read_picture_turn, uuid_from_name,
+    IntrinsicsError, PictureFile, PosedCamera, PosedCameras, ScanLocation, check_picture,
+    read_photograph_cameras, uuid_from_name,
 };
 use s3d_io::dataset::Frame;
 use s3d_io::scene::FrameSource;
@@ -46,7 +47,9 @@ pub(crate) struct Photograph {
     pub(crate) name: String,
     /// The uuid of its view's camera.
     pub(crate) uuid: String,
-    pub(crate) picture: PathBuf,
+    pub(crate) picture: PictureFile,
+    /// Hides parts of the picture.
+    pub(crate) mask: Option<PathBuf>,
     pub(crate) taken: Taken,
     /// The camera of its view: a pinhole, or a panorama.
     pub(crate) camera: Camera,
@@ -106,7 +109,7 @@ impl Taken {
     }
 
     /// The colours of the photograph as `camera` sees them.
-    pub(crate) fn colors(&self, photo: &Raster<[u8; 3]>, camera: &Camera) -> Raster<[u8; 3]> {
+    pub(super) fn colors(&self, photo: &Raster<[u8; 3]>, camera: &Camera) -> Raster<[u8; 3]> {
         match self {
             Self::Lens(lens) => undistort(photo, lens, camera),
             Self::Panorama { pose, .. } => level_panorama(photo, pose, camera),
@@ -148,22 +151,28 @@ impl Photographs {
         }
 
         let pictures = find(source, &chosen)?;
+        let mut warnings = Vec::new();
+        let masks = find_masks(source, &chosen, &mut warnings);
         // The first fault in the order of the list is reported, whichever thread finds its own first.
         let opened: Vec<Result<_>> = chosen
             .par_iter()
             .zip(pictures)
-            .map(|(posed, picture)| open_one(source, area, offset_m, posed, picture))
+            .zip(masks)
+            .map(|((posed, picture), mask)| open_one(source, area, offset_m, posed, picture, mask))
             .collect();
         let found: Vec<(Photograph, u8)> = opened.into_iter().collect::<Result<_>>()?;
 
-        let mut warnings = Vec::new();
+        let masked = found.iter().filter(|(photograph, _)| photograph.mask.is_some()).count();
+        if masked > 0 {
+            notes.push(format!("{}: {masked} photographs have masks", list.display()));
+        }
         let turned = found.iter().filter(|(_, turn)| *turn != 1).count();
         if let Some((first, turn)) = found.iter().find(|(_, turn)| *turn != 1) {
             warnings.push(format!(
                 "{turned} photographs ask to be turned when they are shown ({}: EXIF orientation {turn}): \
                  they are taken as \
                  they are stored, which is what the sizes of their cameras fit",
-                first.picture.display()
+                first.picture
             ));
         }
 
@@ -179,9 +188,15 @@ impl Photographs {
             .collect()
     }
 
-    /// All files that are read for the photographs.
+    /// All files that are read for the photographs. A picture that is a part of a file is a part of the list.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.list_files.iter().chain(self.all.iter().map(|p| &p.picture))
+        let pictures = self
+            .all
+            .iter()
+            .filter(|photograph| photograph.picture.part.is_none())
+            .map(|photograph| &photograph.picture.path);
+        let masks = self.all.iter().filter_map(|photograph| photograph.mask.as_ref());
+        self.list_files.iter().chain(pictures).chain(masks)
     }
 
     /// The same files by folder. A file of the list belongs to the list, whether that is a folder or a file;
@@ -225,7 +240,7 @@ pub(crate) fn camera_error(list: &Path, camera: &PosedCamera, message: String) -
 }
 
 /// Finds the file of each photograph.
-fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
+fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PictureFile>> {
     let mut found = Vec::new();
     let mut missing = Vec::new();
 
@@ -233,11 +248,15 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
         let candidates: Vec<PathBuf> = match (&source.images, &camera.picture) {
             (Some(folder), picture) => {
                 let name = Path::new(&camera.name);
-                let of_picture = picture.as_deref().and_then(Path::file_name);
+                let of_picture = picture.as_ref().and_then(|picture| picture.path.file_name());
                 let last = of_picture.or(name.file_name()).unwrap_or_default();
                 vec![folder.join(name), folder.join(last)]
             }
-            (None, Some(picture)) => vec![picture.clone()],
+            (None, Some(picture)) if picture.part.is_some() => {
+                found.push(picture.clone());
+                continue;
+            }
+            (None, Some(picture)) => vec![picture.path.clone()],
             (None, None) => Vec::new(),
         };
 
@@ -248,7 +267,7 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PathBuf>> {
         }
 
         match candidates.iter().find_map(|path| with_ending(path)) {
-            Some(path) => found.push(path),
+            Some(path) => found.push(path.into()),
             None => missing.push(
                 candidates
                     .first()
@@ -295,10 +314,15 @@ fn open_one(
     area: u32,
     offset_m: DVec3,
     posed: &PosedCamera,
-    picture: PathBuf,
+    picture: PictureFile,
+    mask: Option<PathBuf>,
 ) -> Result<(Photograph, u8)> {
-    let (width, height) = check_picture(&picture)?;
-    let turn = read_picture_turn(&picture)?;
+    let (width, height) = picture.check()?;
+    let turn = picture.turn()?;
+    if let Some(mask) = &mask {
+        let (mask_width, mask_height) = check_picture(mask)?;
+        check_mask_size(mask, [mask_width, mask_height], [width, height])?;
+    }
 
     let taken = Taken::of(posed, offset_m, [width, height]).map_err(|e| match e {
         IntrinsicsError::NoOptics => camera_error(
@@ -318,10 +342,10 @@ fn open_one(
                  camera is for {} × {}: store it upright, as `mogrify -auto-orient` does",
                 told[0], told[1]
             );
-            FileError::format(&picture, message).into()
+            FileError::format(&picture.path, message).into()
         }
         IntrinsicsError::OtherSize { .. } | IntrinsicsError::PanoramaSize { .. } => {
-            FileError::format(&picture, e.to_string()).into()
+            FileError::format(&picture.path, e.to_string()).into()
         }
         _ => camera_error(&source.path, posed, e.to_string()),
     })?;
@@ -334,7 +358,7 @@ fn open_one(
 
     let name = posed.name.clone();
     let uuid = uuid_from_name(&format!("area_{area}/{name}"));
-    Ok((Photograph { name, uuid, picture, taken, camera }, turn))
+    Ok((Photograph { name, uuid, picture, mask, taken, camera }, turn))
 }
 
 #[cfg(test)]
@@ -348,6 +372,7 @@ mod tests {
         FrameSource {
             path: PathBuf::from("list"),
             images: None,
+            masks: None,
             world_from_file: DAffine3::IDENTITY,
             every: NonZeroU32::new(every).unwrap(),
             max: max.and_then(NonZeroU32::new),
@@ -364,6 +389,7 @@ mod tests {
             size: None,
             optics: None,
             picture: None,
+            mask: None,
             line: 0,
         });
         choose(cameras.collect(), &source(every, max))

@@ -11,8 +11,9 @@ use crate::export::input::unit::UnitGuess;
 use crate::export::input::up_axis::UpGuess;
 use crate::options::placing::Placing;
 use crate::record::request::InputRecord;
+use glam::DVec3;
 use s3d_io::cloud::{AnnotatedMesh, AnnotationOptions, Annotations, OnFault};
-use s3d_io::mesh::{LengthUnit, MeshFile, MeshFormat, MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::mesh::{LengthUnit, MeshFile, MeshFormat, MeshOptions, MeshOrigin, ToldOffset, UpAxis};
 use s3d_io::scene::{CameraSource, FoundScene, MeshColors, SceneFile};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,7 +40,11 @@ impl AreaInput {
 
         // The mesh is read first: annotations that lie far from it need not be read.
         let mut file = source.read()?;
-        let frame = MeshFrame::of(&file);
+        let mut frame = MeshFrame::of(&file);
+        let told = told_offset(&scene)?;
+        if let Some(told) = &told {
+            frame.told(told.offset_m);
+        }
         let takes_colors = scene.mesh_colors == MeshColors::Points;
 
         let mut rooms = Vec::new();
@@ -48,7 +53,8 @@ impl AreaInput {
         let mut companions = Vec::new();
 
         if (opened.annotations || takes_colors) && scene.is_labelled {
-            let mut annotations = open_annotations(&scene, &file, &frame)?;
+            let mut annotations =
+                frame.open_beside(|offset_m| open_annotations(&scene, &file, &frame, offset_m))?;
             warnings = std::mem::take(&mut annotations.warnings);
             companions = std::mem::take(&mut annotations.companions);
             // A file that lies in a folder of annotations is read with the folder.
@@ -74,17 +80,31 @@ impl AreaInput {
         let mesh_file = opened.keep_mesh.then_some(file);
         let photographs = photographs_of(&scene, &frame)?;
 
-        let (cameras, cameras_path) =
-            Cameras::of_scene(&scene, asked, frame.offset_m)?.unwrap_or_else(|| {
-                // An area with photographs needs no other locations.
-                let cameras = if photographs.all.is_empty() {
-                    Cameras::listed_or_placed(Vec::new(), Vec::new())
-                } else {
-                    Cameras::Listed(Vec::new(), Vec::new())
-                };
-                (cameras, scene.path.clone())
-            });
-        frame.refuse_far_locations(&cameras_path, cameras.listed())?;
+        let listed = frame.open_beside(|offset_m| {
+            let found = Cameras::of_scene(&scene, asked, offset_m)?;
+            if let Some((cameras, list)) = &found {
+                frame.refuse_far_locations(list, cameras.listed())?;
+            }
+            Ok(found)
+        })?;
+        let (cameras, cameras_path) = listed.unwrap_or_else(|| {
+            // An area with photographs needs no other locations.
+            let cameras = if photographs.all.is_empty() {
+                Cameras::listed_or_placed(Vec::new(), Vec::new())
+            } else {
+                Cameras::Listed(Vec::new(), Vec::new())
+            };
+            (cameras, scene.path.clone())
+        });
+        if let Some(told) = told {
+            let [x, y, z] = told.offset_m.to_array();
+            notes.push(format!(
+                "{}: the scan's coordinates are the mesh's plus ({x}, {y}, {z}), which the data set states; \
+                 points and cameras may have either",
+                told.file.display()
+            ));
+            companions.push(told.file);
+        }
 
         Ok(Self {
             number: scene.area,
@@ -193,14 +213,19 @@ fn mesh_source(scene: &SceneFile) -> MeshSource {
 }
 
 /// Opens the annotations of a scene file: its own, or the labels of its mesh.
-fn open_annotations(scene: &SceneFile, file: &MeshFile, frame: &MeshFrame) -> Result<Annotations> {
+fn open_annotations(
+    scene: &SceneFile,
+    file: &MeshFile,
+    frame: &MeshFrame,
+    offset_m: DVec3,
+) -> Result<Annotations> {
     let options = &scene.annotation_options;
     if scene.annotations.is_empty() {
         return Ok(Annotations::of_mesh(file, options)?);
     }
     let given = Some(options.offset_m).filter(|_| scene.annotations_have_offset);
     let options = AnnotationOptions {
-        offset_m: given.unwrap_or(frame.offset_m),
+        offset_m: given.unwrap_or(offset_m),
         mesh_bounds: Some(frame.bounds),
         ..options.clone()
     };
@@ -216,9 +241,19 @@ fn has_own_frame(path: &Path) -> bool {
 /// Opens the photographs that a scene file names.
 pub(super) fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Photographs> {
     let Some(source) = &scene.frames else { return Ok(Photographs::default()) };
-    let photographs = Photographs::open(source, scene.area, frame.offset_m)?;
-    frame.refuse_far_locations(&source.path, &photographs.locations())?;
-    Ok(photographs)
+    frame.open_beside(|offset_m| {
+        let photographs = Photographs::open(source, scene.area, offset_m)?;
+        frame.refuse_far_locations(&source.path, &photographs.locations())?;
+        Ok(photographs)
+    })
+}
+
+/// Returns the offset that a program tells beside the mesh of a scene, which must not say another itself.
+fn told_offset(scene: &SceneFile) -> Result<Option<ToldOffset>> {
+    match (scene.mesh.as_slice(), scene.mesh_offset_m) {
+        ([mesh], None) => Ok(ToldOffset::beside(mesh)?),
+        _ => Ok(None),
+    }
 }
 
 /// The scene file, and the files and folders that it names.

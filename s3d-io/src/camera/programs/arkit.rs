@@ -100,7 +100,15 @@ pub(crate) fn read(
             read.push(file.clone());
         }
         let name = picture.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        cameras.push(PosedCamera { name, pose, size, optics, picture: Some(picture), line });
+        cameras.push(PosedCamera {
+            name,
+            pose,
+            size,
+            optics,
+            picture: Some(picture.into()),
+            mask: None,
+            line,
+        });
     }
 
     // Two pictures may share their intrinsics.
@@ -116,6 +124,7 @@ fn unpictured(poses: Vec<TimedPose>) -> Vec<PosedCamera> {
         size: None,
         optics: None,
         picture: None,
+        mask: None,
         line,
     };
     poses.into_iter().map(camera).collect()

@@ -78,6 +78,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
             size: None,
             optics: None,
             picture: None,
+            mask: None,
             line: 0,
         });
     }

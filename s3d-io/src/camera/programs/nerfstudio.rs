@@ -32,6 +32,7 @@ struct Document {
 struct FrameEntry {
     file_path: String,
     transform_matrix: Vec<Vec<f64>>,
+    mask_path: Option<String>,
     /// ScanNet++ marks blurred pictures, and those whose pose failed.
     #[serde(default)]
     is_bad: bool,
@@ -68,7 +69,15 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
         let pose = square(&transform_matrix)
             .and_then(|rows| Pose::from_opengl(unscaled(rows)).map_err(|e| e.to_string()))
             .map_err(|message| at_frame(path, i, &name, &format!("transform_matrix: {message}")))?;
-        pictures.push(PosedCamera { name, pose, size: None, optics: None, picture: None, line: 0 });
+        pictures.push(PosedCamera {
+            name,
+            pose,
+            size: None,
+            optics: None,
+            picture: None,
+            mask: None,
+            line: 0,
+        });
     }
     Ok(pictures)
 }
@@ -82,7 +91,7 @@ pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, usize)> {
     let mut cameras = Vec::with_capacity(document.frames.len());
     let mut bad = 0;
     for (i, frame) in document.frames.into_iter().enumerate() {
-        let FrameEntry { file_path: name, transform_matrix, is_bad, camera } = frame;
+        let FrameEntry { file_path: name, transform_matrix, mask_path, is_bad, camera } = frame;
         if is_bad {
             bad += 1;
             continue;
@@ -96,8 +105,9 @@ pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, usize)> {
         let optics = keys.optics().map_err(fault)?;
         let pose = applied.undo(pose);
 
-        let picture = Some(folder.join(&name));
-        cameras.push(PosedCamera { name, pose, size, optics, picture, line: 0 });
+        let picture = Some(folder.join(&name).into());
+        let mask = mask_path.map(|mask| folder.join(mask));
+        cameras.push(PosedCamera { name, pose, size, optics, picture, mask, line: 0 });
     }
     Ok((cameras, bad))
 }
@@ -359,7 +369,7 @@ mod tests {
         assert_eq!(cameras[1].optics, pinhole([400.0, 510.0], Distortion::None));
         assert_eq!(cameras[2].optics, pinhole([500.0, 510.0], Distortion::Fisheye([0.1, 0.0, 0.0, 0.4])));
         assert_eq!([cameras[0].size, cameras[1].size], [Some([640, 480]), Some([320, 480])]);
-        assert!(cameras[0].picture.as_ref().unwrap().ends_with("images/a.png"));
+        assert!(cameras[0].picture.as_ref().unwrap().path.ends_with("images/a.png"));
         assert_eq!(
             (cameras[0].pose.location, cameras[0].pose.forward()),
             (DVec3::new(4.0, 5.0, 6.0), DVec3::Y)

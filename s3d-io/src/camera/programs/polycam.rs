@@ -124,7 +124,8 @@ impl Keyframe {
             pose,
             size: Some([self.width, self.height]),
             optics: Some(optics),
-            picture: Some(picture),
+            picture: Some(picture.into()),
+            mask: None,
             line: 0,
         })
     }
@@ -184,7 +185,8 @@ mod tests {
                 (dvec3(1.0, -3.0, 2.0), DVec3::Y, DVec3::Z)
             );
             assert!(
-                picture.as_ref().unwrap().ends_with("corrected_images/9.jpg") && *size == Some([1024, 768])
+                picture.as_ref().unwrap().path.ends_with("corrected_images/9.jpg")
+                    && *size == Some([1024, 768])
             );
             let Some(Optics::Pinhole { focal_px, center_px, distortion }) = optics else { panic!() };
             assert_eq!((*focal_px, center_px.unwrap()), (dvec2(700.5, 701.5), dvec2(510.25, 384.5)));

@@ -4,6 +4,7 @@
 use crate::camera::matterport::{numbers, parse_capture_pose};
 use crate::camera::numbered::{NumberedFiles, numbered_files};
 use crate::camera::picture::read_picture_size;
+use crate::camera::picture_file::PictureFile;
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
@@ -49,13 +50,14 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
         }
         let pose = parse_capture_pose(&bytes, &path)?;
         let picture = ["jpg", "png"].map(|ending| scan.join("color").join(format!("{number}.{ending}")));
-        let picture = picture.into_iter().find(|path| path.is_file());
-        cameras.push(PosedCamera { name: number.to_string(), pose, size: None, optics, picture, line: 0 });
+        let picture = picture.into_iter().find(|path| path.is_file()).map(PictureFile::from);
+        let name = number.to_string();
+        cameras.push(PosedCamera { name, pose, size: None, optics, picture, mask: None, line: 0 });
     }
 
     // All pictures of a scan are of one size.
-    if let Some(picture) = cameras.iter().find_map(|camera| camera.picture.as_deref()) {
-        let (width, height) = read_picture_size(picture)?;
+    if let Some(picture) = cameras.iter().find_map(|camera| camera.picture.as_ref()) {
+        let (width, height) = read_picture_size(&picture.path)?;
         cameras
             .iter_mut()
             .for_each(|camera| camera.size = Some([width, height]));
@@ -152,7 +154,7 @@ mod tests {
         let (scan, files) = find(dir.path()).unwrap().unwrap();
         let (cameras, ..) = read(&scan, files).unwrap();
         assert!(cameras.iter().all(|camera| camera.size == Some([13, 9])));
-        assert_eq!((&cameras[0].picture, cameras[1].picture.as_ref()), (&None, Some(&picture)));
+        assert_eq!((&cameras[0].picture, cameras[1].picture.clone()), (&None, Some(picture.into())));
     }
 
     #[test]

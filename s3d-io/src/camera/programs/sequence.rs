@@ -67,12 +67,15 @@ pub(crate) fn read(files: NumberedFiles) -> Result<(Vec<PosedCamera>, usize, Vec
         let file = path.file_name().unwrap_or_default().to_string_lossy();
         let name = file.strip_suffix(POSE).unwrap_or(&file).to_owned();
         let [jpeg, png] = PICTURES.map(|ending| path.with_file_name(format!("{name}{ending}")));
-        let picture = Some(if !jpeg.is_file() && png.is_file() { png } else { jpeg });
-        cameras.push(PosedCamera { name, pose, size, optics, picture, line: 0 });
+        let picture = if !jpeg.is_file() && png.is_file() { png } else { jpeg };
+        let picture = Some(picture.into());
+        cameras.push(PosedCamera { name, pose, size, optics, picture, mask: None, line: 0 });
     }
 
     // All pictures of a sequence are of one size.
-    let first = cameras.iter().filter_map(|camera| camera.picture.as_deref());
+    let first = cameras
+        .iter()
+        .filter_map(|camera| Some(camera.picture.as_ref()?.path.as_path()));
     if size.is_none()
         && let Some(picture) = first.into_iter().find(|picture| picture.is_file())
     {
@@ -166,6 +169,7 @@ mod tests {
                     .picture
                     .as_ref()
                     .unwrap()
+                    .path
                     .ends_with("sequence/frame-000000.color.jpg")
             );
             let Some(Optics::Pinhole { focal_px, center_px, .. }) = cameras[1].optics else { panic!() };
@@ -187,7 +191,14 @@ mod tests {
         .unwrap();
         let (cameras, ..) = read(find(dir.path()).unwrap().unwrap()).unwrap();
         assert_eq!((cameras[0].optics, cameras[1].size), (None, Some([13, 9])));
-        assert!(cameras[0].picture.as_ref().unwrap().ends_with("frame-000000.color.png"));
+        assert!(
+            cameras[0]
+                .picture
+                .as_ref()
+                .unwrap()
+                .path
+                .ends_with("frame-000000.color.png")
+        );
     }
 
     #[test]

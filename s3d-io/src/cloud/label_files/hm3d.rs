@@ -8,7 +8,7 @@ use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use crate::fs::quote::count;
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis};
-use crate::mesh::labels::{LabelledObject, MeshLabels};
+use crate::mesh::labels::{LabelledObject, LabelledRoom, MeshLabels};
 use crate::mesh::read::read_mesh_with;
 use s3d_geom::glam::Vec2;
 use s3d_geom::{FaceColor, NO_INDEX, Texture, TriMesh};
@@ -104,7 +104,9 @@ pub(super) fn named(mesh: &TriMesh, list: &Path, warnings: &mut Vec<String>) -> 
         .map(|entry| LabelledObject {
             class: entry.name,
             instance: entry.number,
-            room: entry.region.map(|region| region.saturating_add(1)),
+            room: entry
+                .region
+                .map(|region| LabelledRoom { number: region.saturating_add(1), name: None }),
         })
         .collect();
     Ok(MeshLabels::Objects { objects, faces, are_names: false })

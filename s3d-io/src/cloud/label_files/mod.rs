@@ -1,10 +1,11 @@
 //! Files that label the faces of a mesh: meshes with labels of their own, and the lists of objects of HM3D,
-//! Replica, ScanNet++ and 3RScan.
+//! Replica, ScanNet++, 3RScan and Matterport3D.
 //!
 //! Each kind becomes a mesh with [`MeshLabels`](crate::mesh::MeshLabels). `transfer` hands its labels to the
 //! faces of the scene's mesh.
 
 mod hm3d;
+mod house;
 pub(crate) mod numbers;
 mod replica;
 mod segments;
@@ -12,6 +13,7 @@ pub(crate) mod transfer;
 
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
+use crate::house::is_house;
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis};
 use crate::mesh::labels::MeshLabels;
 use crate::mesh::ply::elements::PlyReader;
@@ -26,9 +28,12 @@ pub(crate) enum LabelFile {
     Mesh(PathBuf),
     /// HM3D's `….semantic.txt`.
     Hm3d(PathBuf),
+    /// Matterport3D's `.house`.
+    House(PathBuf),
     /// Replica's `info_semantic.json`.
     Replica(PathBuf),
-    /// Objects as groups of segments: ScanNet++'s `segments_anno.json`, 3RScan's `semseg.v2.json`.
+    /// Objects as groups of segments: ScanNet++'s `segments_anno.json`, 3RScan's `semseg.v2.json`,
+    /// Matterport3D's `region0.semseg.json`.
     Segments(PathBuf),
     /// One number for each vertex or face of the scene's mesh.
     Numbers(PathBuf),
@@ -52,6 +57,7 @@ impl LabelFile {
         let path = path.to_owned();
         match name.rsplit_once('.').map_or("", |(_, ending)| ending) {
             "ply" => Ok(has_faces(&path)?.then_some(Self::Mesh(path))),
+            "house" => Ok(Some(Self::House(path))),
             "json" => Ok(Self::of_json(&path)),
             "txt" if hm3d::is_list(&path) => Ok(Some(Self::Hm3d(path))),
             "txt" | "npy" => Ok(numbers::is_list(&path).then_some(Self::Numbers(path))),
@@ -66,7 +72,11 @@ impl LabelFile {
         if let Some(path) = by_name {
             return Self::of_json(&path);
         }
-        let list = files_of(dir)
+        let files = files_of(dir);
+        if let Some(house) = files.iter().find(|path| is_house(path) && path.is_file()) {
+            return Some(Self::House(house.clone()));
+        }
+        let list = files
             .into_iter()
             .find(|path| name_of(path).ends_with(".semantic.txt"))?;
         hm3d::is_list(&list).then_some(Self::Hm3d(list))
@@ -92,6 +102,7 @@ impl LabelFile {
         match self {
             Self::Mesh(path) => read_mesh_with(path, up, options),
             Self::Hm3d(list) => hm3d::read(list, up, options),
+            Self::House(house) => house::read(house, up, options),
             Self::Replica(list) => replica::read(list, up, options),
             Self::Segments(groups) => segments::read(groups, up, options),
             Self::Numbers(list) => Err(Error::unsupported(
@@ -106,6 +117,7 @@ impl LabelFile {
         match self {
             Self::Mesh(path)
             | Self::Hm3d(path)
+            | Self::House(path)
             | Self::Replica(path)
             | Self::Segments(path)
             | Self::Numbers(path) => path,
@@ -122,17 +134,25 @@ pub(crate) struct NamedFaces {
 }
 
 /// Reads the list of objects that the data set of a mesh puts beside it, if the mesh has objects without
-/// classes, or is HM3D's coloured one. A class column that the user named is meant: then there is no list.
+/// classes, or classes without words, or is HM3D's coloured one. A class column that the user named is meant:
+/// then there is no list.
 ///
 /// # Errors
 /// [`Error::Io`], and [`Error::Format`] for a list that is damaged or does not fit.
 pub(crate) fn named_beside(file: &MeshFile, class_column: Option<&str>) -> Result<Option<NamedFaces>> {
     let Some(path) = file.sources.first().map(|source| &source.path) else { return Ok(None) };
-    if class_column.is_some() || file.sources.len() > 1 {
+    if class_column.is_some() {
         return Ok(None);
     }
 
     let mut warnings = Vec::new();
+    if let Some(list) = house::house_of(file) {
+        let labels = house::named(file, &list, &mut warnings)?;
+        return Ok(Some(NamedFaces { labels, warnings, list }));
+    }
+    if file.sources.len() > 1 {
+        return Ok(None);
+    }
     let (labels, list) = match &file.labels {
         Some(labels @ MeshLabels::Numbers { class, instance: Some(_), .. }) => {
             if let Some(list) = segments::groups_of_objects_beside(path) {

@@ -77,7 +77,7 @@ pub(crate) fn read(path: &Path, mesh: &MeshFile) -> Result<MeshLabels> {
 }
 
 /// Returns the numbers of faces that the file of a mesh may have: its last faces may have been left out.
-fn faces_of_file(mesh: &MeshFile) -> std::ops::RangeInclusive<usize> {
+pub(super) fn faces_of_file(mesh: &MeshFile) -> std::ops::RangeInclusive<usize> {
     let seen = mesh.source_faces.iter().max().map_or(0, |&face| face as usize + 1);
     seen..=seen + mesh.mesh.report().zero_area_faces + mesh.repeated_faces
 }

@@ -1,8 +1,11 @@
 //! Objects as groups of segments. ScanNet++ has a segment for each vertex of its mesh (`segments.json`) and
 //! groups of them (`segments_anno.json`). 3RScan has the groups (`semseg.v2.json`) and the object of each
-//! vertex (`labels.instances.annotated.v2.ply`). Sources: scannetpp/scannetpp, common/scene_release.py and
-//! semantic/prep; WaldJohannaU/3RScan, FAQ.md.
+//! vertex (`labels.instances.annotated.v2.ply`). Matterport3D has groups (`region0.semseg.json`) and a
+//! segment for each face of the mesh of a region or house (`region0.fsegs.json`). Sources:
+//! scannetpp/scannetpp, common/scene_release.py and semantic/prep; WaldJohannaU/3RScan, FAQ.md;
+//! niessner/Matterport, data_organization.md.
 
+use crate::cloud::label_files::numbers::faces_of_file;
 use crate::cloud::label_files::{files_of, folder_of, name_of};
 use crate::cloud::scannet::{SegmentGroup, SegmentGroups, Segments};
 use crate::error::{Error, Result};
@@ -26,6 +29,9 @@ pub(super) fn groups_of_objects_beside(mesh: &Path) -> Option<PathBuf> {
 /// [`Error::Format`] if its files are not beside the groups, or do not belong together.
 pub(super) fn read(groups: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let dir = folder_of(groups);
+    if let Some(stem) = stem_of_faces(groups) {
+        return read_faces(groups, &stem, up, options);
+    }
     let segments = dir.join("segments.json");
     if segments.is_file() {
         return read_segments(groups, &segments, up, options);
@@ -44,6 +50,51 @@ pub(super) fn read(groups: &Path, up: UpAxis, options: &MeshOptions) -> Result<M
     let mut file = read_mesh_with(&labels, up, options)?;
     let columns = file.labels.as_ref().ok_or_else(|| no_objects(groups))?;
     file.labels = Some(named(columns, &file.mesh, groups)?);
+    Ok(file)
+}
+
+/// Returns the start of the names of the files that belong to Matterport3D's groups: `region0`.
+fn stem_of_faces(groups: &Path) -> Option<String> {
+    let name = groups.file_name()?.to_str()?;
+    name.strip_suffix(".semseg.json").map(str::to_owned)
+}
+
+/// Reads the mesh of Matterport3D. A face in several groups belongs to the smallest.
+fn read_faces(groups: &Path, stem: &str, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
+    let document: SegmentGroups = read_json(groups)?;
+    let [segments, mesh] = ["fsegs.json", "ply"].map(|end| groups.with_file_name(format!("{stem}.{end}")));
+    for path in [&segments, &mesh] {
+        if !path.is_file() {
+            let message = format!("a file that belongs to it is not beside it: {}", name_of(path));
+            return Err(Error::format(groups, message));
+        }
+    }
+
+    let segment_of_face = read_json::<Segments>(&segments)?.seg_indices;
+    let options = MeshOptions { class_column: None, instance_column: None, ..options.clone() };
+    let mut file = read_mesh_with(&mesh, up, &options)?;
+    let faces = faces_of_file(&file);
+    if !faces.contains(&segment_of_face.len()) {
+        let n = segment_of_face.len();
+        let message = format!(
+            "has segments for {n} faces, {} has {}: they do not belong together",
+            mesh.display(),
+            faces.end()
+        );
+        return Err(Error::format(&segments, message));
+    }
+
+    let group_of_segment = smallest_groups(&document.seg_groups, &segment_of_face);
+    let group_of_face = file.source_faces.iter().map(|face| {
+        let segment = segment_of_face.get(*face as usize);
+        let group = segment.and_then(|segment| group_of_segment.get(segment));
+        group.map_or(NO_LABEL, |group| *group as i64)
+    });
+    let column = LabelColumn { name: "objectId".into(), values: group_of_face.collect() };
+    let by_face = MeshLabels::Numbers { element: LabelElement::Face, class: None, instance: Some(column) };
+    let group_of = |number: i64| document.seg_groups.get(usize::try_from(number).ok()?);
+    file.labels = Some(named_by(&by_face, &file.mesh, groups, group_of)?);
+    file.companions.push(segments);
     Ok(file)
 }
 
@@ -88,10 +139,11 @@ fn read_segments(groups: &Path, segments: &Path, up: UpAxis, options: &MeshOptio
     Ok(file)
 }
 
-/// Returns the group of each segment: the smallest by its vertices, or else the first, of those that have it.
-fn smallest_groups(groups: &[SegmentGroup], segment_of_vertex: &[i64]) -> HashMap<i64, usize> {
+/// Returns the group of each segment: the smallest by its vertices or faces, or else the first, of those that
+/// have it.
+fn smallest_groups(groups: &[SegmentGroup], segment_of_each: &[i64]) -> HashMap<i64, usize> {
     let mut size_of_segment: HashMap<i64, u64> = HashMap::new();
-    for segment in segment_of_vertex {
+    for segment in segment_of_each {
         *size_of_segment.entry(*segment).or_default() += 1;
     }
 

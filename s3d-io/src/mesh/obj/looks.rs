@@ -7,6 +7,7 @@ use crate::image::texture::{TextureFile, read_textures};
 use crate::mesh::obj::lines::read_text;
 use crate::mesh::obj::mtl::{MtlMap, MtlMaterial, parse_mtl};
 use crate::mesh::obj::normal::ObjNames;
+use crate::mesh::obj::tiles::is_tiled;
 use s3d_geom::{DEFAULT_COLOR, Material, Raster, Texture, Wrap};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -21,12 +22,15 @@ pub(crate) struct ObjLooks {
     pub(crate) files: Vec<Option<TextureFile>>,
     /// The libraries and images that were read.
     pub(crate) companions: Vec<PathBuf>,
+    /// The materials whose texture has tiles, by index. Their images are not read yet.
+    pub(crate) tiled: Vec<(u32, LibraryMaterial)>,
 }
 
 /// A material, and the library that describes it.
-struct LibraryMaterial {
-    material: MtlMaterial,
-    library: PathBuf,
+#[derive(Clone)]
+pub(crate) struct LibraryMaterial {
+    pub(crate) material: MtlMaterial,
+    pub(crate) library: PathBuf,
 }
 
 impl ObjLooks {
@@ -44,10 +48,17 @@ impl ObjLooks {
         for name in &names.materials {
             let found = library.get(name.as_str());
             let color = found.map_or(DEFAULT_COLOR, |found| found.material.color);
+            let material = looks.materials.len() as u32;
             looks
                 .materials
                 .push(Material { name: name.clone(), color, texture: None });
-            images.add(found, folder, warnings);
+            match found.filter(|found| found.is_tiled()) {
+                Some(tiled) => {
+                    looks.tiled.push((material, tiled.clone()));
+                    images.skip(1);
+                }
+                None => images.add(found, folder, warnings),
+            }
             if found.is_none() {
                 unknown.push(name);
             }
@@ -65,7 +76,7 @@ impl ObjLooks {
 
     /// Decodes the images and assigns them to their materials. An image that repeats in two ways becomes two
     /// textures.
-    fn load_images(&mut self, images: &WantedImages, warnings: &mut Vec<String>) -> Result<()> {
+    pub(crate) fn load_images(&mut self, images: &WantedImages, warnings: &mut Vec<String>) -> Result<()> {
         let loaded = read_textures(&images.paths)?;
         for (index, (loaded, image)) in loaded.into_iter().zip(&images.paths).enumerate() {
             let users: Vec<(usize, [Wrap; 2])> = images
@@ -119,10 +130,17 @@ impl ObjLooks {
     }
 }
 
+impl LibraryMaterial {
+    /// Returns whether the material's texture has tiles.
+    fn is_tiled(&self) -> bool {
+        self.material.map.as_ref().is_some_and(|map| is_tiled(&map.file))
+    }
+}
+
 /// The images that materials name, each once.
 #[derive(Default)]
-struct WantedImages {
-    paths: Vec<PathBuf>,
+pub(crate) struct WantedImages {
+    pub(crate) paths: Vec<PathBuf>,
     /// The index of each path.
     index_of: HashMap<PathBuf, usize>,
     /// For each material the index of its image, and how it repeats.
@@ -135,15 +153,27 @@ impl WantedImages {
     fn add(&mut self, found: Option<&LibraryMaterial>, folder: &Path, warnings: &mut Vec<String>) {
         let image = found.and_then(|found| {
             let map = found.material.map.as_ref()?;
-            let path = image_path(found, map, folder, warnings)?;
-            let next = self.paths.len();
-            let index = *self.index_of.entry(path.clone()).or_insert(next);
-            if index == next {
-                self.paths.push(path);
-            }
-            Some((index, map.wrap))
+            Some((image_path(found, map, folder, warnings)?, map.wrap))
         });
-        self.of_material.push(image);
+        match image {
+            Some((path, wrap)) => self.add_found(path, wrap),
+            None => self.skip(1),
+        }
+    }
+
+    /// Adds the next material, whose image is at `path`.
+    pub(crate) fn add_found(&mut self, path: PathBuf, wrap: [Wrap; 2]) {
+        let next = self.paths.len();
+        let index = *self.index_of.entry(path.clone()).or_insert(next);
+        if index == next {
+            self.paths.push(path);
+        }
+        self.of_material.push(Some((index, wrap)));
+    }
+
+    /// Adds materials without images.
+    pub(crate) fn skip(&mut self, materials: usize) {
+        self.of_material.resize(self.of_material.len() + materials, None);
     }
 }
 

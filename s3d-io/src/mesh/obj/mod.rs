@@ -9,6 +9,7 @@ mod names;
 mod normal;
 pub(crate) mod read;
 mod statement;
+mod tiles;
 #[cfg(feature = "png")]
 mod write;
 

@@ -174,8 +174,9 @@ impl<'a> NormalObj<'a> {
     fn vertex(&mut self, rest: &[u8], fill_colors: bool) -> Option<Line> {
         self.counts[0] += 1;
         let plain = plain_numbers(rest);
-        if plain == Some(6) || !fill_colors && matches!(plain, Some(3 | 4)) {
-            self.colored += u64::from(plain == Some(6));
+        let is_colored = plain == Some(6) && are_finite(rest);
+        if is_colored || !fill_colors && matches!(plain, Some(3 | 4)) {
+            self.colored += u64::from(is_colored);
             return Some(None);
         }
 
@@ -375,6 +376,14 @@ fn plain_numbers(rest: &[u8]) -> Option<usize> {
     Some(words)
 }
 
+/// Returns whether it is plain that all decimal numbers of a line are finite as `f32`: none has an exponent or
+/// 39 digits.
+fn are_finite(numbers: &[u8]) -> bool {
+    numbers
+        .split(|byte| matches!(byte, b' ' | b'\t'))
+        .all(|word| word.len() < 39 && !word.iter().any(|byte| matches!(byte, b'e' | b'E')))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -431,6 +440,13 @@ mod tests {
         let (rest, obj) = normal("v 0 0 0 1 0 .5\nv 1 0 1e-1\nv 1 2 3 2\n").unwrap();
         assert_eq!(rest, "v 0 0 0 1 0 .5\nv 1 0 0.1 NaN NaN NaN\nv 0.5 1 1.5 NaN NaN NaN\n");
         assert_eq!(obj.colored, 1);
+        // Numbers that no `f32` holds are no colour.
+        let beyond = format!("v 0 0 0 {} 0 0\n", "9".repeat(39));
+        for line in ["v 0 0 0 0 1.5 1e99\n", &beyond] {
+            let text = format!("v 0 0 0 1 0 .5\n{line}");
+            let (rest, obj) = normal(&text).unwrap();
+            assert_eq!((&*rest, obj.colored), ("v 0 0 0 1 0 .5\nv 0 0 0 NaN NaN NaN\n", 1));
+        }
     }
 
     #[test]

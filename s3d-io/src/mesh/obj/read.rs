@@ -13,6 +13,7 @@ use crate::mesh::obj::lines::{end_lines_in_lf, logical_lines};
 use crate::mesh::obj::looks::ObjLooks;
 use crate::mesh::obj::normal::NormalObj;
 use crate::mesh::obj::statement::exact_vertex;
+use crate::mesh::obj::tiles::TiledFaces;
 use crate::mesh::origin::{FileFrame, largest};
 use s3d_geom::glam::{DVec3, Vec2, Vec3};
 use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, NO_INDEX, triangulate_face};
@@ -49,14 +50,14 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         || ObjLooks::load(path, &obj.names, &mut remarks),
     );
     let mut columns = geometry?;
-    let looks = looks?;
+    let mut looks = looks?;
 
     let unit_said = unit_in_comments(&bytes);
     warnings.extend(unit_said.filter(|_| options.units.is_none()).and_then(told));
     let frame = FileFrame::new(options.origin, options.units.or(unit_said).unwrap_or_default());
     let offset_m = columns.bring_near(&bytes, up, frame);
 
-    let faces = Triangles::new(&obj, &columns)
+    let mut faces = Triangles::new(&obj, &columns)
         .map_err(|(vertex, position)| vertex_error(path, &bytes, vertex, position))?;
     let polygons_triangulated = faces.polygons;
     tell_refused(path, &bytes, &faces, &mut warnings)?;
@@ -71,6 +72,9 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
     }
     let colors = vertex_colors(&columns.colors, &mut warnings);
     warnings.append(&mut remarks);
+    let tiled =
+        TiledFaces { uvs: &mut columns.uvs, face_uvs: &mut faces.uvs, face_materials: &mut faces.materials };
+    looks.add_tiles(path, tiled, &mut warnings)?;
 
     let parts = MeshParts {
         positions: columns.positions.into_iter().map(|p| up.world_from_file(p)).collect(),

@@ -7,6 +7,7 @@
 //! images over the pixels that show both. The chance agreement is the mean correlation with the two displaced
 //! against each other in eight directions.
 
+use crate::export::input::masks::MaskedPicture;
 use crate::export::input::photographs::Photograph;
 use glam::DVec3;
 use s3d_geom::{Camera, Raster};
@@ -39,15 +40,15 @@ impl Agreement {
         correlation < chance + 0.05 || correlation < 0.1
     }
 
-    /// Compares `photo`, the picture of `photograph`, with the mesh as its camera sees it.
+    /// Compares `picture`, that of `photograph`, with the mesh as its camera sees it.
     pub(crate) fn of(
-        photo: &Raster<[u8; 3]>,
+        picture: &MaskedPicture,
         photograph: &Photograph,
         scene: &Scene<'_>,
         textures: &MipMaps,
     ) -> Self {
         let camera = small(photograph);
-        let seen = photograph.taken.colors(photo, &camera);
+        let seen = photograph.colors(picture, &camera);
         let mut hits = Hits::default();
         Caster::new(scene).cast_into(&camera, 1, &mut hits);
         let shown = rgb_image(scene, textures, &hits, &camera);

@@ -16,8 +16,6 @@ use crate::useful::{judge_of, poses_findings};
 use agreement::Agreement;
 use rayon::prelude::*;
 use s3d_geom::Aabb;
-use s3d_io::Error as FileError;
-use s3d_io::camera::read_picture;
 use s3d_io::dataset::{Domain, Frame, PhotographRecord};
 use s3d_label::Room;
 use s3d_render::{Caster, Hits, NO_FACE, Scene};
@@ -72,7 +70,7 @@ pub(crate) fn write_photograph(
     let started = Instant::now();
     let Memory { caster, hits, buffers } = memory;
     let Shot { photograph, room } = shot;
-    let Photograph { name, uuid, picture, taken, camera } = photograph;
+    let Photograph { name, uuid, taken, camera, .. } = photograph;
     let room = room_name(*room);
     let frame = taken.frame();
     let writer = ImageWriter { job, uuid, room: &room, frame };
@@ -86,14 +84,10 @@ pub(crate) fn write_photograph(
 
     // Poses alone need no photograph.
     if !images.is_empty() {
-        let photo = read_picture(picture)?;
-        if [photo.width(), photo.height()] != taken.size() {
-            return Err(FileError::format(picture, "has another size than when the export began").into());
-        }
-
-        agreement = Agreement::of(&photo, photograph, job.channels.scene, job.channels.textures);
-        let colors = taken.colors(&photo, camera);
-        drop(photo);
+        let picture = photograph.read()?;
+        agreement = Agreement::of(&picture, photograph, job.channels.scene, job.channels.textures);
+        let colors = photograph.colors(&picture, camera);
+        drop(picture);
         caster.cast_into(camera, 1, hits);
 
         let channels = Channels { pictures: Some(PictureColors::Photograph(&colors)), ..job.channels };

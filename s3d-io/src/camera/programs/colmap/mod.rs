@@ -52,7 +52,7 @@ pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, PathBuf)> {
         })?;
         picture.size = Some(*size);
         picture.optics = Some(*optics);
-        picture.picture = folder.as_ref().map(|folder| folder.join(&picture.name));
+        picture.picture = folder.as_ref().map(|folder| folder.join(&picture.name).into());
         with_cameras.push(picture);
     }
     Ok((with_cameras, file))
@@ -177,7 +177,7 @@ fn cut_off(path: &Path, picture: u64) -> Error {
 }
 
 fn picture(name: String, pose: Pose, line: u64) -> PosedCamera {
-    PosedCamera { name, pose, size: None, optics: None, picture: None, line }
+    PosedCamera { name, pose, size: None, optics: None, picture: None, mask: None, line }
 }
 
 /// Takes the next `N` bytes.
@@ -335,7 +335,7 @@ mod tests {
         std::fs::create_dir(dir.path().join("images")).unwrap();
         let (cameras, _) = read_posed(&at("images.txt")).unwrap();
         assert_eq!([cameras[0].size, cameras[1].size], [Some([64, 48]), Some([32, 24])]);
-        assert_eq!(cameras[1].picture, Some(dir.path().join("images/b.jpg")));
+        assert_eq!(cameras[1].picture, Some(dir.path().join("images/b.jpg").into()));
     }
 
     #[test]
