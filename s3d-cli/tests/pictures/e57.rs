@@ -64,8 +64,8 @@ impl Frame {
     }
 }
 
-/// A face of a cube, 90° wide: a point (x, y, z) in front (z < 0) has the pixel c − (x / z) f / w, c + (y / z)
-/// f / h.
+/// A face of a cube, 90° wide. A point (x, y, z) in front (z < 0) has the pixel
+/// c − (x / z) f / w, c + (y / z) f / h.
 fn face(frame: Frame) -> (Raster<[u8; 3]>, PinholeImageProperties) {
     let image = frame.paint(96, 96, |u, v| dvec3((u - 48.0) / 48.0, -(v - 48.0) / 48.0, -1.0));
     let numbers = PinholeImageProperties {
@@ -188,7 +188,7 @@ fn export(scene: &Path, out: &Path, threads: &str) {
     s3d_ok(&args);
 }
 
-/// The share of a location's panorama that has the colour of the side which is there. Pixels within 10 cm of
+/// The share of a location's panorama that has the colour of the side which is there. Pixels within 15 cm of
 /// an edge do not count.
 fn right_share(out: &Path, location: &ScanLocation) -> f64 {
     let folder = out.join("area_1/pano/rgb");
@@ -202,7 +202,7 @@ fn right_share(out: &Path, location: &ScanLocation) -> f64 {
     let (mut right, mut all) = (0u32, 0u32);
     for (x, y) in (0..image.height()).flat_map(|y| (0..image.width()).map(move |x| (x, y))) {
         let seen = seen(location.pose.location, rays.at(x, y));
-        if seen.from_edge_m > 0.1 {
+        if seen.from_edge_m > 0.15 {
             let expected = COLORS[seen.side];
             let is_near = image.at(x, y).iter().zip(expected).all(|(a, b)| a.abs_diff(b) < 12);
             all += 1;

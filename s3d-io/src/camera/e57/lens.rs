@@ -46,8 +46,8 @@ fn pinhole(numbers: &PinholeImageProperties) -> Result<CaptureLens, String> {
     let lens = Lens::new(size, focal_px, center_px, [0.0; 5]);
     lens.map(CaptureLens::from).ok_or_else(|| {
         format!(
-            "no pinhole has {} × {} pixels, focalLength {}, pixelWidth {}, pixelHeight {}, principalPointX {} \
-             and principalPointY {}",
+            "no pinhole has {} × {} pixels, focalLength {}, pixelWidth {}, pixelHeight {}, \
+             principalPointX {} and principalPointY {}",
             numbers.width,
             numbers.height,
             numbers.focal_length,

@@ -13,6 +13,7 @@ mod tests;
 use crate::camera::located::{uuid_from_name, uuid_in};
 use crate::camera::locations::moved;
 use crate::camera::programs::e57::{E57File, open, rotation_of, scan_name};
+use crate::camera::table::FARTHEST_M;
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use crate::guarded::guarded;
@@ -26,6 +27,11 @@ use s3d_geom::glam::{DAffine3, DVec3, dvec3};
 use s3d_geom::{CaptureLens, Pose, Raster};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// What is said of a file without pictures.
+const NO_PICTURES: &str = "has no image with a pose and a pinhole or spherical projection, so there are no \
+                           colours in it: export it from the scanner's program with its pictures, or write \
+                           rgb = \"texture\"";
 
 /// The pictures of an E57 file that have a projection and a pose. Their pixels are read when they are asked
 /// for.
@@ -91,22 +97,16 @@ impl E57Pictures {
         let mut pictures = Vec::new();
         for (number, image) in images.into_iter().enumerate() {
             let name = name_of(number, &image);
-            match E57Picture::new(name.clone(), image, path, world_from_file)? {
+            match E57Picture::new(name.clone(), image, world_from_file) {
                 Ok(picture) => pictures.push(picture),
                 Err(reason) => unused.add(reason, name),
             }
         }
 
         if pictures.is_empty() {
-            let mut message =
-                "has no image with a pose and a pinhole or spherical projection, so there are no \
-                               colours in it: export it from the scanner's program with its pictures, or \
-                               write rgb = \"texture\""
-                    .to_owned();
-            for sentence in unused.sentences() {
-                message += &format!("; {sentence}");
-            }
-            return Err(Error::format(path, message));
+            let mut sentences = vec![NO_PICTURES.to_owned()];
+            sentences.extend(unused.sentences());
+            return Err(Error::format(path, sentences.join("; ")));
         }
         Ok(Self { path: path.to_owned(), pictures, scans: uuids, unused })
     }
@@ -175,34 +175,27 @@ impl E57Picture {
     fn new(
         name: String,
         image: Image,
-        path: &Path,
         world_from_file: &DAffine3,
-    ) -> Result<std::result::Result<Self, &'static str>> {
-        let Some(projection) = image.projection else {
-            return Ok(Err("is a preview without a projection"));
-        };
+    ) -> std::result::Result<Self, &'static str> {
+        let projection = image.projection.ok_or("is a preview without a projection")?;
         let (axes, place, mask) = match &projection {
             Projection::Pinhole(pinhole) => (Axes::Pinhole, &pinhole.blob, &pinhole.mask),
             Projection::Spherical(sphere) => (Axes::Spherical, &sphere.blob, &sphere.mask),
-            Projection::Cylindrical(_) => return Ok(Err("is cylindrical")),
+            Projection::Cylindrical(_) => return Err("is cylindrical"),
         };
-        let Some(transform) = image.transform else { return Ok(Err("has no pose")) };
-
-        let q = &transform.rotation;
-        let t = &transform.translation;
-        let place_m = dvec3(t.x, t.y, t.z);
-        let Some(rotation) = rotation_of(q) else {
-            return Err(Error::format(path, format!("{name} has a pose without a rotation: {q:?}")));
-        };
-        if !place_m.is_finite() {
-            return Err(Error::format(path, format!("{name} has a pose without a place: {t:?}")));
-        }
-
-        let pose = moved(&pose_of(place_m, rotation, axes), world_from_file);
-        let scan = image.pointcloud_guid.as_deref().and_then(key_of);
         let blob = place.data.clone();
         let mask = mask.clone();
-        Ok(Ok(Self { name, scan, pose, image: blob, mask, projection }))
+
+        let transform = image.transform.ok_or("has no pose")?;
+        let rotation = rotation_of(&transform.rotation).ok_or("has a pose without a rotation")?;
+        let t = &transform.translation;
+        let pose = moved(&pose_of(dvec3(t.x, t.y, t.z), rotation, axes), world_from_file);
+        if !pose.location.is_finite() || pose.location.abs().max_element() > FARTHEST_M {
+            return Err("has a pose more than 10,000 km from the origin");
+        }
+
+        let scan = image.pointcloud_guid.as_deref().and_then(key_of);
+        Ok(Self { name, scan, pose, image: blob, mask, projection })
     }
 
     fn lens(&self, path: &Path) -> Result<CaptureLens> {

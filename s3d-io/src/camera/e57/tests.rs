@@ -271,6 +271,16 @@ fn each_location_takes_its_own_images_in_their_order() {
             .unwrap();
     });
     maker.image("nowhere", add_pinhole);
+    maker.image("not turned", |image| {
+        let mut pose = transform(PLACE, turn());
+        pose.rotation = Quaternion { w: 0.0, x: 0.0, y: 0.0, z: 0.0 };
+        image.set_transform(pose);
+        add_pinhole(image);
+    });
+    maker.image("far", |image| {
+        image.set_transform(transform(dvec3(1e9, 0.0, 0.0), turn()));
+        add_pinhole(image);
+    });
     let (_dir, path) = maker.close();
     correct_radius(&path);
 
@@ -282,6 +292,8 @@ fn each_location_takes_its_own_images_in_their_order() {
         "image 5 `preview` is a preview without a projection",
         "image 6 `around` is cylindrical",
         "image 7 `nowhere` has no pose",
+        "image 8 `not turned` has a pose without a rotation",
+        "image 9 `far` has a pose more than 10,000 km from the origin",
     ] {
         assert!(told.contains(words), "{words}: {told}");
     }
