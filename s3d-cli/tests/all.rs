@@ -21,6 +21,7 @@ mod lists;
 mod pack;
 #[path = "photographs/main.rs"]
 mod photographs;
+#[path = "pictures/main.rs"]
 mod pictures;
 mod point_colors;
 mod poses;

@@ -77,8 +77,8 @@ mod wide;
 
 pub use aabb::Aabb;
 pub use camera::{
-    Camera, CameraError, FisheyeLens, Lens, NormalAxes, PhotoLens, Pose, Projection, Rays,
-    euler_from_rotation, rotation_from_euler,
+    Camera, CameraError, CaptureLens, FisheyeLens, Lens, NormalAxes, PhotoLens, Pose, Projection, Rays,
+    SphericalLens, euler_from_rotation, rotation_from_euler,
 };
 pub use cloud::PointCloud;
 pub use glam;

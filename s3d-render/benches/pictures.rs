@@ -35,7 +35,7 @@ fn captures(pose: &Pose) -> Vec<Capture> {
             let own = pose
                 .turned(-f64::from(k % 6) * std::f64::consts::FRAC_PI_3, [0.85, 0.0, -0.85][k as usize / 6]);
             let pose = Pose { location: own.location + 0.04 * own.forward(), ..own };
-            Capture { image: image.clone(), lens, pose }
+            Capture { image: image.clone(), lens: lens.into(), pose, mask: None, border_px: 0 }
         })
         .collect()
 }

@@ -27,7 +27,7 @@ const COMPLETE: &str = "complete";
 const LIST: &str = "files.csv";
 
 /// What RGB images are made from: the mesh, or pictures of a kind.
-const RGB_SOURCES: [&str; 4] = ["texture", "skybox", "captures", "panorama"];
+const RGB_SOURCES: [&str; 5] = ["texture", "skybox", "captures", "panorama", "e57"];
 
 /// The largest size of a manifest, bytes. Most of it is a line for each input file.
 const LARGEST: u64 = 1 << 28;

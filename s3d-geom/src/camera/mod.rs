@@ -3,18 +3,22 @@
 //! Pixel coordinates: x to the right, y down, the centre of pixel (i, j) at (i + ½, j + ½). Source:
 //! `s3d_io::formats`, "What is written".
 
+mod capture_lens;
 mod error;
 mod fisheye;
 mod intrinsics;
 mod lens;
 mod photo_lens;
 mod pose;
+mod spherical_lens;
 
+pub use capture_lens::CaptureLens;
 pub use error::CameraError;
 pub use fisheye::FisheyeLens;
 pub use lens::Lens;
 pub use photo_lens::PhotoLens;
 pub use pose::{Pose, euler_from_rotation, rotation_from_euler};
+pub use spherical_lens::SphericalLens;
 
 use glam::{DMat3, DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::PI;

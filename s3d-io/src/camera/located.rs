@@ -81,7 +81,7 @@ pub(crate) fn locations_of(path: &Path, pictures: Vec<PosedCamera>) -> Result<Ve
 
 /// Returns the first run of exactly 32 hexadecimal digits, in lower case. The hyphens of a uuid's usual form
 /// do not count.
-fn uuid_in(name: &str) -> Option<String> {
+pub(crate) fn uuid_in(name: &str) -> Option<String> {
     name.split(|c: char| !c.is_ascii_hexdigit() && c != '-')
         .map(|run| run.replace('-', "").to_ascii_lowercase())
         .find(|run| run.len() == 32)

@@ -10,6 +10,7 @@
 //! | `images.txt`, `images.bin` | a COLMAP model |
 //! | `transforms.json` | frames of nerfstudio, Polycam, Record3D, instant-ngp |
 //! | a folder of `*.json` | pose files of a published area |
+//! | `.e57` | the places of its scans |
 //! | `.house` | the panoramas of a house of Matterport3D |
 //! | a folder of Matterport captures | [`read_matterport_locations`] |
 //!
@@ -23,8 +24,8 @@
 //! [`read_photograph_cameras`] also takes the folder of the pictures.
 //!
 //! A [`PictureFolder`] finds the pictures of each location: raw captures ([`CaptureFile`], with lens and
-//! pose), sky boxes or panoramas. [`read_picture`] reads a PNG or JPEG file. Source: [`crate::formats`],
-//! "Scan locations" and "The scanner's pictures".
+//! pose), sky boxes or panoramas. `E57Pictures` finds them in an E57 file. [`read_picture`] reads a PNG or
+//! JPEG file. Source: [`crate::formats`], "Scan locations" and "The scanner's pictures".
 //!
 //! ```
 //! use s3d_geom::glam::DAffine3;
@@ -38,6 +39,8 @@
 //! # Ok::<(), s3d_io::Error>(())
 //! ```
 
+#[cfg(feature = "e57")]
+mod e57;
 mod located;
 mod locations;
 mod matterport;
@@ -51,6 +54,8 @@ pub(crate) mod poses;
 mod programs;
 mod table;
 
+#[cfg(feature = "e57")]
+pub use e57::{E57Owners, E57Pictures, E57Shot};
 pub use located::uuid_from_name;
 pub use locations::read_scan_locations;
 pub use matterport::{

@@ -3,6 +3,8 @@
 use crate::error::{Error, Result};
 use crate::fs::open::{open_file, read_file};
 use crate::guarded::guarded;
+#[cfg(feature = "e57")]
+use crate::image::texture::texture_size;
 use crate::image::texture::{TextureFault, decode_texture};
 use image::metadata::Orientation;
 use image::{ImageDecoder, ImageReader};
@@ -98,13 +100,29 @@ pub(crate) fn check_encoded(encoded: &mut (impl BufRead + Seek), name: &Path) ->
         .map_err(failed)?;
     encoded.read_to_end(&mut tail).map_err(failed)?;
 
-    // A PNG ends with the chunk IEND, a JPEG with the mark FF D9.
-    let has_end = tail.windows(4).any(|w| w == b"IEND") || tail.windows(2).any(|w| w == b"\xff\xd9");
-    if !has_end {
+    if !has_end(&tail) {
         let mut whole = Vec::new();
         encoded.rewind().map_err(failed)?;
         encoded.read_to_end(&mut whole).map_err(failed)?;
         decode_picture(whole, name)?;
+    }
+    Ok(size)
+}
+
+/// Tells whether the last bytes of a picture hold its end mark. A PNG ends with the chunk IEND, a JPEG with
+/// the mark FF D9.
+fn has_end(tail: &[u8]) -> bool {
+    tail.windows(4).any(|w| w == b"IEND") || tail.windows(2).any(|w| w == b"\xff\xd9")
+}
+
+/// Returns the width and height of a picture in pixels, and checks that it is complete, like
+/// [`check_picture`]. The error is a sentence without a subject.
+#[cfg(feature = "e57")]
+pub(crate) fn check_picture_bytes(bytes: &[u8]) -> std::result::Result<[u32; 2], String> {
+    let size = texture_size(bytes).map_err(|fault| fault.to_string())?;
+    let tail_start = bytes.len().saturating_sub(TAIL as usize);
+    if !bytes.get(tail_start..).is_some_and(has_end) {
+        decode_texture(bytes.to_vec()).map_err(|fault| fault.to_string())?;
     }
     Ok(size)
 }

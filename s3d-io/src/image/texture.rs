@@ -102,6 +102,13 @@ fn decode(
 /// The format of a texture, the extension of its file if an export copies it, and its width and height.
 type Header = (ImageFormat, Option<&'static str>, [u32; 2]);
 
+/// Returns the width and height of a texture in pixels, from its first bytes. The file can hold an image of
+/// this size.
+#[cfg(feature = "e57")]
+pub(crate) fn texture_size(bytes: &[u8]) -> std::result::Result<[u32; 2], TextureFault> {
+    size_of_texture(bytes).map(|header| header.2)
+}
+
 /// Reads the first bytes of a texture. The file can hold an image of the size that they tell.
 fn size_of_texture(bytes: &[u8]) -> std::result::Result<Header, TextureFault> {
     let guessed = image::guess_format(bytes).ok();

@@ -10,7 +10,7 @@ use crate::scene::file::{MeshColors, SceneFile};
 use crate::scene::folder::SceneFolder;
 use crate::scene::frames::FramesTable;
 use crate::scene::other_kind::{SCENE, other_kind};
-use crate::scene::rgb::{PictureSource, RgbEntry};
+use crate::scene::rgb::{PictureKind, PictureSource, RgbEntry};
 use crate::scene::taxonomy::TaxonomyEntry;
 use crate::scene::toml_fault::toml_fault;
 use s3d_geom::glam::DVec3;
@@ -67,8 +67,9 @@ struct MeshTable {
 /// [cameras]
 /// path = "cameras.csv"  # or place = 2.0: scan locations on the floor, two metres apart
 /// [rgb]               # left out: "texture"; or, before the first table, rgb = "texture"
-/// source = "captures" # or "texture", "skybox", "panorama"
-/// path = "raw"        # the pictures' folder; left out: named after the source
+/// source = "captures" # or "texture", "skybox", "panorama", "e57"
+/// path = "raw"        # the pictures' folder; left out: named after the source. "e57": the file; left out:
+///                     # the first one under [cameras] or [annotations]
 /// [frames]            # photographs with poses: see `FrameSource`
 /// path = "transforms.json"
 /// ```
@@ -168,7 +169,9 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         mesh.add_to(&mut scene, folder)?;
     }
     scene.cameras = document.cameras.map(|table| camera_source(table, folder)).transpose()?;
-    scene.pictures = document.rgb.map_or(Ok(None), |entry| picture_source(entry, folder))?;
+    scene.pictures = document
+        .rgb
+        .map_or(Ok(None), |entry| picture_source(entry, &scene, folder))?;
     scene.frames = document.frames.map(|table| table.source(folder)).transpose()?;
     Ok(scene)
 }
@@ -235,10 +238,41 @@ fn camera_source(table: CamerasTable, folder: SceneFolder<'_>) -> Result<CameraS
     }
 }
 
-fn picture_source(entry: RgbEntry, folder: SceneFolder<'_>) -> Result<Option<PictureSource>> {
-    let mut pictures = entry.pictures().map_err(|m| folder.fault(m))?;
-    if let Some(source) = &mut pictures {
-        source.path = folder.folder("rgb.path", &source.path)?;
+/// Returns the source of pictures. The annotations and the cameras of `scene` are known.
+fn picture_source(
+    entry: RgbEntry,
+    scene: &SceneFile,
+    folder: SceneFolder<'_>,
+) -> Result<Option<PictureSource>> {
+    let lacks_file = entry.lacks_file();
+    let Some(mut source) = entry.pictures().map_err(|m| folder.fault(m))? else { return Ok(None) };
+    source.path = match source.kind {
+        PictureKind::E57 if lacks_file => e57_of(scene).ok_or_else(|| {
+            folder.fault(
+                "rgb = \"e57\" needs a file: neither [cameras] nor [annotations] names an .e57; write [rgb] \
+                 with source = \"e57\" and path = \"scan.e57\"",
+            )
+        })?,
+        PictureKind::E57 => folder.file("rgb.path", &source.path)?,
+        PictureKind::SkyBox | PictureKind::Captures | PictureKind::Panorama => {
+            folder.folder("rgb.path", &source.path)?
+        }
+    };
+
+    if let Some(CameraSource::Listed { path, world_from_file }) = &scene.cameras
+        && *path == source.path
+    {
+        source.world_from_file = *world_from_file;
     }
-    Ok(pictures)
+    Ok(Some(source))
+}
+
+/// Returns the first E57 file that names the scan locations or the annotations.
+fn e57_of(scene: &SceneFile) -> Option<PathBuf> {
+    let cameras = match &scene.cameras {
+        Some(CameraSource::Listed { path, .. }) => Some(path),
+        Some(CameraSource::Placed { .. }) | None => None,
+    };
+    let is_e57 = |path: &&PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("e57"));
+    cameras.into_iter().chain(&scene.annotations).find(is_e57).cloned()
 }

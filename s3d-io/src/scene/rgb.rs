@@ -1,5 +1,6 @@
 //! The entry `rgb` of a `scene.toml`: the source of the colours of images.
 
+use s3d_geom::glam::DAffine3;
 use serde::de;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::{Deserialize, Deserializer};
@@ -11,8 +12,11 @@ use std::path::PathBuf;
 pub struct PictureSource {
     /// The kind of the pictures.
     pub kind: PictureKind,
-    /// The folder of the pictures.
+    /// The folder of the pictures. [`PictureKind::E57`]: the file.
     pub path: PathBuf,
+    /// [`PictureKind::E57`]: the transform from the frame of the file to the world, a rotation, a shift and a
+    /// scale. It is the transform of `[cameras]` if the scan locations are of the same file.
+    pub world_from_file: DAffine3,
     /// How the pictures become colours.
     pub options: PictureOptions,
 }
@@ -27,15 +31,19 @@ pub enum PictureKind {
     Captures,
     /// One equirectangular photograph for each location.
     Panorama,
+    /// The images of an E57 file, each with its pose.
+    E57,
 }
 
 impl PictureKind {
-    /// Returns the name in a scene file. It is also the default name of the folder.
+    /// Returns the name in a scene file. It is also the default name of the folder, if the pictures are in
+    /// one.
     pub fn name(self) -> &'static str {
         match self {
             Self::SkyBox => "skybox",
             Self::Captures => "captures",
             Self::Panorama => "panorama",
+            Self::E57 => "e57",
         }
     }
 }
@@ -53,9 +61,9 @@ pub struct PictureOptions {
     pub size: Option<u32>,
     /// The colour of places that no picture shows.
     pub unseen: UnseenColor,
-    /// Captures: whether the mesh is used to remove the parallax between the cameras.
+    /// Captures and E57: whether the mesh is used to remove the parallax between the cameras.
     pub parallax: bool,
-    /// Captures: whether the exposures are matched to each other.
+    /// Captures and E57: whether the exposures are matched to each other.
     pub gains: bool,
     /// Panorama: the angle from the heading of the location's original camera to the centre column, to the
     /// left, degrees.
@@ -129,6 +137,7 @@ enum Source {
     SkyBox,
     Captures,
     Panorama,
+    E57,
 }
 
 impl Source {
@@ -138,6 +147,7 @@ impl Source {
             Self::SkyBox => "skybox",
             Self::Captures => "captures",
             Self::Panorama => "panorama",
+            Self::E57 => "e57",
         }
     }
 }
@@ -149,8 +159,8 @@ impl<'de> Deserialize<'de> for RgbEntry {
             type Value = RgbEntry;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(
-                    "\"texture\", \"skybox\", \"captures\", \"panorama\", or a table with `source` and \
-                     `path`",
+                    "\"texture\", \"skybox\", \"captures\", \"panorama\", \"e57\", or a table with `source` \
+                     and `path`",
                 )
             }
             fn visit_str<E: de::Error>(self, word: &str) -> Result<RgbEntry, E> {
@@ -166,14 +176,19 @@ impl<'de> Deserialize<'de> for RgbEntry {
 }
 
 impl RgbEntry {
-    /// Returns the source of pictures, with the folder as it is written; `None` for the mesh's texture. The
+    /// Tells whether the pictures are of an E57 file that the entry does not name.
+    pub(crate) fn lacks_file(&self) -> bool {
+        self.0.source == Source::E57 && self.0.path.is_none()
+    }
+
+    /// Returns the source of pictures, with the path as it is written; `None` for the mesh's texture. The
     /// error is a sentence.
     pub(crate) fn pictures(self) -> Result<Option<PictureSource>, String> {
         let RgbTable { source, path, size, unseen, parallax, gains, yaw_deg, caps } = self.0;
-        check_key(parallax.is_some(), "parallax", source, Source::Captures)?;
-        check_key(gains.is_some(), "gains", source, Source::Captures)?;
-        check_key(yaw_deg.is_some(), "yaw_deg", source, Source::Panorama)?;
-        check_key(caps.is_some(), "caps", source, Source::SkyBox)?;
+        check_key(parallax.is_some(), "parallax", source, &[Source::Captures, Source::E57])?;
+        check_key(gains.is_some(), "gains", source, &[Source::Captures, Source::E57])?;
+        check_key(yaw_deg.is_some(), "yaw_deg", source, &[Source::Panorama])?;
+        check_key(caps.is_some(), "caps", source, &[Source::SkyBox])?;
         if size.is_some_and(|size| !(32..=8192).contains(&size)) {
             return Err(format!(
                 "rgb.size = {}: a face of the cube map has 32 to 8192 pixels",
@@ -192,6 +207,7 @@ impl RgbEntry {
             Source::SkyBox => PictureKind::SkyBox,
             Source::Captures => PictureKind::Captures,
             Source::Panorama => PictureKind::Panorama,
+            Source::E57 => PictureKind::E57,
         };
 
         let default = PictureOptions::default();
@@ -204,14 +220,16 @@ impl RgbEntry {
             caps: caps.unwrap_or(default.caps),
         };
 
-        Ok(Some(PictureSource { kind, path: path.unwrap_or_else(|| kind.name().into()), options }))
+        let path = path.unwrap_or_else(|| kind.name().into());
+        Ok(Some(PictureSource { kind, path, world_from_file: DAffine3::IDENTITY, options }))
     }
 }
 
-/// Returns an error, a sentence, if the table has a key that belongs to another source.
-fn check_key(is_there: bool, key: &str, source: Source, owner: Source) -> Result<(), String> {
-    if is_there && source != owner {
-        return Err(format!("rgb.{key} belongs to source = \"{}\"", owner.name()));
+/// Returns an error, a sentence, if the table has a key that belongs to other sources.
+fn check_key(is_there: bool, key: &str, source: Source, owners: &[Source]) -> Result<(), String> {
+    if !is_there || owners.contains(&source) {
+        return Ok(());
     }
-    Ok(())
+    let names: Vec<String> = owners.iter().map(|owner| format!("\"{}\"", owner.name())).collect();
+    Err(format!("rgb.{key} belongs to source = {}", names.join(" or ")))
 }

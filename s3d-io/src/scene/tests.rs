@@ -121,7 +121,9 @@ fn pictures_of(rgb: &str) -> Option<PictureSource> {
 
 #[test]
 fn colours_come_from_the_texture_or_from_pictures() {
-    let source = |kind, path: &str, options| Some(PictureSource { kind, path: path.into(), options });
+    let world_from_file = DAffine3::IDENTITY;
+    let source =
+        |kind, path: &str, options| Some(PictureSource { kind, path: path.into(), world_from_file, options });
     let options = PictureOptions::default();
     for texture in ["", "rgb = \"texture\"", "[rgb]\nsource = \"texture\""] {
         assert_eq!(pictures_of(texture), None);
@@ -153,6 +155,44 @@ fn colours_come_from_the_texture_or_from_pictures() {
         };
         let message = read(&text).unwrap_err().to_string();
         assert!(message.contains(words), "{rgb}: {message}");
+    }
+}
+
+#[test]
+fn images_of_an_e57_file_are_found_where_it_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    for name in ["a.obj", "scan.E57", "other.e57", "c.csv"] {
+        fs::write(dir.path().join(name), "").unwrap();
+    }
+    let path = dir.path().join("scene.toml");
+    let rgb = |annotations: &str, cameras: &str, rgb: &str| {
+        let mesh = "area = 1\n[mesh]\npath = \"a.obj\"\n";
+        let text = format!("{mesh}[annotations]\npath = \"{annotations}\"\n[cameras]\n{cameras}\n{rgb}\n");
+        fs::write(&path, text).unwrap();
+        read_scene(&path).map(|scene| scene.pictures.unwrap())
+    };
+    let plain = "[rgb]\nsource = \"e57\"\nparallax = false\ngains = false";
+
+    // The file of the locations goes first, and its frame is the pictures' frame.
+    let found = rgb("other.e57", "path = \"scan.E57\"\nup = \"y\"", plain).unwrap();
+    assert_eq!((found.kind, found.path), (PictureKind::E57, dir.path().join("scan.E57")));
+    assert_eq!(found.world_from_file.transform_vector3(DVec3::Y), DVec3::Z);
+    assert!(!found.options.parallax && !found.options.gains);
+    let found = rgb("other.e57", "path = \"c.csv\"\nup = \"y\"", plain).unwrap();
+    assert_eq!((found.path, found.world_from_file), (dir.path().join("other.e57"), DAffine3::IDENTITY));
+    let named = "[rgb]\nsource = \"e57\"\npath = \"./scan.E57\"";
+    let found = rgb("other.e57", "path = \"scan.E57\"\nup = \"y\"", named).unwrap();
+    assert_eq!(found.world_from_file.transform_vector3(DVec3::Y), DVec3::Z);
+
+    for (table, words) in [
+        (plain, "needs a file: neither [cameras] nor [annotations] names an .e57"),
+        ("[rgb]\nsource = \"e57\"\npath = \"gone.e57\"", "is not there; it should be a file"),
+        ("[rgb]\nsource = \"e57\"\npath = \".\"", "is no file"),
+        ("[rgb]\nsource = \"e57\"\nyaw_deg = 1", "rgb.yaw_deg belongs to source = \"panorama\""),
+        ("[rgb]\nsource = \"skybox\"\ngains = true", "belongs to source = \"captures\" or \"e57\""),
+    ] {
+        let message = rgb("c.csv", "place = 2", table).unwrap_err().to_string();
+        assert!(message.contains(words), "{table}: {message}");
     }
 }
 

@@ -427,7 +427,13 @@ fn e57(dir: &Path, data: &[u8]) {
         let (content, sum) = page.split_at_mut(page.len() - 4);
         sum.copy_from_slice(&crc32c(content).to_be_bytes());
     }
-    annotations(dir, &file(dir, "cloud.e57", &data));
+    let path = file(dir, "cloud.e57", &data);
+    annotations(dir, &path);
+    if let Ok(pictures) = E57Pictures::open(&path, &DAffine3::IDENTITY) {
+        let first: Vec<usize> = (0..4).collect();
+        let _ = pictures.check(&first);
+        let _ = pictures.read(&first);
+    }
 }
 
 /// CRC-32C, Castagnoli's checksum.

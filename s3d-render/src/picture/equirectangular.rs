@@ -18,7 +18,7 @@ use std::f64::consts::{PI, TAU};
 
 /// Near the poles a pixel sees many columns of a photograph and few rows, so it takes as many samples as keep
 /// the rows apart.
-const AT_POLES: TextureFilter = TextureFilter { max_taps: 256 };
+pub(crate) const AT_POLES: TextureFilter = TextureFilter { max_taps: 256 };
 
 /// The most columns that a pixel may see if eight pixels are made together. More samples would darken them,
 /// since the weights of the fast filter are rounded down.
@@ -39,9 +39,23 @@ impl CubeMap {
         pose: &Pose,
         size: Option<u32>,
     ) -> Self {
+        let (sin, cos) = libm::sincos(pose.azimuth_rad() + yaw_rad);
+        let heading = DMat3::from_cols_array(&[cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0]);
+        Self::from_sphere(photo.clone(), heading, pose, size)
+    }
+
+    /// Makes a cube map around `pose` from a photograph of all directions. `photo_from_world` turns the
+    /// world into the axes of the photograph: its centre column looks along +X, and its first row along +Z.
+    /// The photograph is taken to be from the place of `pose`.
+    pub(crate) fn from_sphere(
+        photo: Raster<[u8; 3]>,
+        photo_from_world: DMat3,
+        pose: &Pose,
+        size: Option<u32>,
+    ) -> Self {
         assert!(!photo.is_empty(), "a photograph has pixels");
         let size = Self::fitting_size(size.map_or(f64::from(photo.width()) * (1.25 / PI), f64::from));
-        let photo = Photograph::new(photo, yaw_rad, pose, size);
+        let photo = Photograph::new(photo, photo_from_world, pose, size);
         let levels = photo.mip_map.levels();
         if levels.is_usable() {
             photo.in_lanes(&levels, level())
@@ -65,14 +79,12 @@ struct Photograph {
 }
 
 impl Photograph {
-    fn new(photo: &Raster<[u8; 3]>, yaw_rad: f64, pose: &Pose, face_size: u32) -> Self {
-        let (sin, cos) = libm::sincos(pose.azimuth_rad() + yaw_rad);
-        let heading = DMat3::from_cols_array(&[cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0]);
+    fn new(photo: Raster<[u8; 3]>, photo_from_world: DMat3, pose: &Pose, face_size: u32) -> Self {
         Self {
-            mip_map: SourceMipMap::new(photo.clone(), [Wrap::Repeat, Wrap::Clamp]),
             size: [f64::from(photo.width()), f64::from(photo.height())],
+            mip_map: SourceMipMap::new(photo, [Wrap::Repeat, Wrap::Clamp]),
             pose: *pose,
-            turn: heading * pose.opencv_from_world().transpose(),
+            turn: photo_from_world * pose.opencv_from_world().transpose(),
             face_size,
         }
     }
@@ -234,7 +246,8 @@ mod tests {
             [r, g / 4, b / 2 + 100]
         });
         let photo = Raster::from_vec(700, 350, pixels.collect());
-        [288, 96].map(|size| Photograph::new(&photo, 0.7, &pose(), size))
+        let turn = DMat3::from_rotation_z(-0.7) * DMat3::from_rotation_y(0.1);
+        [288, 96].map(|size| Photograph::new(photo.clone(), turn, &pose(), size))
     }
 
     #[test]

@@ -5,14 +5,54 @@ use crate::camera::posed::PosedCamera;
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
 use crate::guarded::guarded;
-use e57::E57Reader;
+use e57::{E57Reader, PointCloud, Quaternion};
 use s3d_geom::Pose;
 use s3d_geom::glam::{DQuat, dvec3};
+use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 /// The first bytes of a file.
 pub(crate) const MAGIC: &[u8] = b"ASTM-E57";
+
+/// An open file.
+pub(crate) struct E57File {
+    pub(crate) reader: E57Reader<BufReader<File>>,
+    /// The size of the file in bytes.
+    pub(crate) size: u64,
+}
+
+/// Opens a file, and reads its lists of scans and images.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] if the file is damaged.
+pub(crate) fn open(path: &Path) -> Result<E57File> {
+    let file = open_file(path)?;
+    let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+    let file = BufReader::with_capacity(1 << 18, file);
+    // The reader belongs to another crate, and panics on some damaged files.
+    let reader = guarded(|| E57Reader::new(file))
+        .ok_or_else(|| Error::format(path, "is damaged"))?
+        .map_err(|e| Error::format(path, e.to_string()))?;
+    Ok(E57File { reader, size })
+}
+
+/// Returns the name of a scan: its guid without hyphens, which is a uuid, or else its own name.
+pub(crate) fn scan_name(number: usize, scan: &PointCloud) -> String {
+    let guid = scan.guid.as_deref().unwrap_or_default();
+    let guid: String = guid.chars().filter(char::is_ascii_hexdigit).collect();
+    if guid.len() == 32 {
+        return guid.to_lowercase();
+    }
+    scan.name.clone().unwrap_or_else(|| format!("scan_{number}"))
+}
+
+/// Returns the rotation of a pose. Returns `None` if the four numbers are none.
+pub(crate) fn rotation_of(q: &Quaternion) -> Option<DQuat> {
+    let rotation = DQuat::from_xyzw(q.x, q.y, q.z, q.w);
+    let is_rotation = rotation.is_finite() && rotation.length() >= 0.5;
+    is_rotation.then(|| rotation.normalize())
+}
 
 /// Reads where the scanner stood. A scan has the name of its guid without hyphens, which is a uuid, or else
 /// its own name. A scan without a pose is left out.
@@ -20,29 +60,21 @@ pub(crate) const MAGIC: &[u8] = b"ASTM-E57";
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if the file is damaged, no scan has a pose, or a pose has no rotation.
 pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
-    let file = BufReader::new(open_file(path)?);
-    // The reader belongs to another crate, and panics on some damaged files.
-    let scans = guarded(|| E57Reader::new(file).map(|reader| reader.pointclouds()))
-        .ok_or_else(|| Error::format(path, "is damaged"))?
-        .map_err(|e| Error::format(path, e.to_string()))?;
+    let E57File { reader, .. } = open(path)?;
+    let scans = guarded(|| reader.pointclouds()).ok_or_else(|| Error::format(path, "is damaged"))?;
 
     let mut places = Vec::new();
     for (number, scan) in scans.iter().enumerate() {
         let Some(transform) = &scan.transform else { continue };
         let q = &transform.rotation;
         let t = &transform.translation;
-        let rotation = DQuat::from_xyzw(q.x, q.y, q.z, q.w);
-        if !rotation.is_finite() || rotation.length() < 0.5 {
+        let Some(rotation) = rotation_of(q) else {
             let message = format!("scan {number}, counted from 0, has a pose without a rotation: {q:?}");
             return Err(Error::format(path, message));
-        }
-
-        let guid = scan.guid.as_deref().unwrap_or_default();
-        let guid: String = guid.chars().filter(char::is_ascii_hexdigit).collect();
-        let name = scan.name.clone().unwrap_or_else(|| format!("scan_{number}"));
+        };
         places.push(PosedCamera {
-            name: if guid.len() == 32 { guid.to_lowercase() } else { name },
-            pose: Pose::from_scanner(dvec3(t.x, t.y, t.z), rotation.normalize()),
+            name: scan_name(number, scan),
+            pose: Pose::from_scanner(dvec3(t.x, t.y, t.z), rotation),
             size: None,
             optics: None,
             picture: None,

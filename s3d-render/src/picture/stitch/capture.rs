@@ -1,13 +1,17 @@
 //! Captures, prepared so that rays of the cube can look them up.
 
 use super::lanes::{DepthLimits, LaneCapture};
-use crate::picture::cube_map::face_cameras;
+use crate::picture::cube_map::{face_cameras, face_of, place_on};
 use crate::picture::cube_sources::SourceMipMap;
+use crate::picture::equirectangular::AT_POLES;
+use crate::picture::fill::fill_unseen;
 use crate::raster::visibility::cast;
 use crate::scene::Scene;
+use crate::shade::mip_maps::TextureFilter;
 use glam::{DMat3, DVec2, DVec3, dvec2};
 use rayon::prelude::*;
-use s3d_geom::{Camera, Lens, Pose, Raster, Wrap};
+use s3d_geom::{Camera, CaptureLens, Lens, Pose, Raster, SphericalLens, Wrap};
+use std::f64::consts::TAU;
 
 /// How far behind the nearest surface a visible point may be: a part of its depth, and metres.
 const BEHIND: (f32, f32) = (0.01, 0.02);
@@ -21,9 +25,57 @@ pub struct Capture {
     /// The picture; it has the lens's size.
     pub image: Raster<[u8; 3]>,
     /// The camera's lens.
-    pub lens: Lens,
+    pub lens: CaptureLens,
     /// The place and direction of the camera in the project's axes.
     pub pose: Pose,
+    /// The pixels that show the scene: 0 where the picture is to be left out, else 255. It has the picture's
+    /// size. `None`: all of them.
+    pub mask: Option<Raster<u8>>,
+    /// The pixels on each side that repeat the border, as [`with_border`](Self::with_border) adds them. They
+    /// tell nothing about exposure.
+    pub border_px: u32,
+}
+
+impl Capture {
+    /// Returns the capture with a pixel more on each side, which repeats the border. Without it, a picture
+    /// counts only from the middle of its first pixel to the middle of its last one: pictures that end where
+    /// the next begins, such as the faces of a cube, would leave a gap. A spherical picture stays as it is.
+    ///
+    /// # Panics
+    /// If the picture or the mask does not have the lens's size.
+    #[must_use]
+    pub fn with_border(self) -> Self {
+        let CaptureLens::Straight(lens) = self.lens else { return self };
+        let size = [lens.width(), lens.height()];
+        assert_eq!([self.image.width(), self.image.height()], size, "a picture has its lens's size");
+
+        let wider = size.map(|side| side.saturating_add(2));
+        let Some(lens) = Lens::new(wider, lens.focal_px(), lens.center_px() + 1.0, lens.distortion()) else {
+            return self;
+        };
+        let mask = self.mask.map(|mask| bordered(&mask));
+        Self {
+            image: bordered(&self.image),
+            lens: lens.into(),
+            pose: self.pose,
+            mask,
+            border_px: self.border_px + 1,
+        }
+    }
+}
+
+/// Returns an image with a pixel more on each side, which repeats the border.
+fn bordered<T: Copy>(image: &Raster<T>) -> Raster<T> {
+    let last_x = image.width() - 1;
+    let last_y = image.height() - 1;
+    let mut pixels = Vec::with_capacity((image.width() as usize + 2) * (image.height() as usize + 2));
+    for y in 0..image.height() + 2 {
+        let row = image.row(y.saturating_sub(1).min(last_y));
+        pixels.push(row[0]);
+        pixels.extend_from_slice(row);
+        pixels.push(row[last_x as usize]);
+    }
+    Raster::from_vec(image.width() + 2, image.height() + 2, pixels)
 }
 
 /// The depths of the scene behind each pixel of the cube, infinite where there is none.
@@ -58,58 +110,101 @@ pub(super) struct CubeRay {
     pub(super) whole: bool,
 }
 
+impl CubeRay {
+    /// Returns the angle that the pixel covers, radians. A pixel of the cube is 2/size wide at the depth 1.
+    fn angle(&self) -> f64 {
+        self.direction.length() * 2.0 / f64::from(self.size) / self.direction.length_squared()
+    }
+}
+
 /// A prepared capture.
 pub(super) struct PreparedCapture {
     picture: SourceMipMap,
-    lens: Lens,
+    lens: CaptureLens,
+    /// The pixels that count, as in [`Capture`].
+    mask: Option<Raster<u8>>,
+    /// The pixels on each side that only repeat the border.
+    border_px: f64,
     /// World → the camera's OpenCV axes.
     camera_from_world: DMat3,
     /// From the camera to the cube's centre, in the world.
     center: DVec3,
     forward: DVec3,
-    /// The tangent of the largest angle from the axis at which the camera sees anything.
+    /// The tangent of the largest angle from the axis at which the camera sees anything. A spherical picture
+    /// sees everything.
     reach: f64,
     /// How deep the camera sees into the scene.
-    limits: Option<DepthLimits>,
+    limits: Option<SightLimits>,
+}
+
+/// How deep a camera sees into the scene.
+enum SightLimits {
+    /// A straight camera, with one depth image that covers its picture.
+    Straight(DepthLimits),
+    /// A spherical picture: the six faces of a cube with the camera's axes.
+    Around([Raster<f32>; 6]),
+}
+
+/// A place in the picture of a capture.
+struct PlaceInPicture {
+    pixel: DVec2,
+    /// The width and the height of the footprint in pixels.
+    footprint: DVec2,
+    /// 1 in the middle of the picture and 0 at a border of it.
+    inner: f64,
 }
 
 impl PreparedCapture {
     pub(super) fn new(capture: Capture, pose: &Pose, scene: Option<&Scene<'_>>) -> Self {
-        let Capture { image, lens, pose: own } = capture;
-        assert_eq!(
-            (image.width(), image.height()),
-            (lens.width(), lens.height()),
-            "a picture has its lens's size"
-        );
+        let Capture { mut image, lens, pose: own, mask, border_px } = capture;
+        let [width, height] = lens.size();
+        assert_eq!([image.width(), image.height()], [width, height], "a picture has its lens's size");
 
-        let reach = lens.reach();
-        let limits = scene.map(|scene| {
-            let camera = Camera::perspective(own, 2.0 * libm::atan(1.01 * reach), DEPTH_WIDTH, DEPTH_WIDTH);
-            let limits = depth_limits(&cast(scene, &camera).depth);
-            DepthLimits { limits, focal: camera.focal_px().x as f32 }
-        });
+        let mask = mask.filter(|mask| mask.pixels().contains(&0));
+        if let Some(mask) = &mask {
+            assert_eq!([mask.width(), mask.height()], [width, height], "a mask has its picture's size");
+            // A pixel beside the mask is filtered, and must not take the colour of what the mask hides.
+            fill_unseen(&mut image, mask);
+        }
 
+        let (reach, wrap) = match &lens {
+            CaptureLens::Straight(lens) => (lens.reach(), [Wrap::Clamp; 2]),
+            CaptureLens::Spherical(lens) if lens.is_around() => (f64::INFINITY, [Wrap::Repeat, Wrap::Clamp]),
+            CaptureLens::Spherical(_) => (f64::INFINITY, [Wrap::Clamp; 2]),
+        };
         Self {
-            picture: SourceMipMap::new(image, [Wrap::Clamp; 2]),
+            picture: SourceMipMap::new(image, wrap),
             lens,
+            mask,
+            border_px: f64::from(border_px),
             camera_from_world: own.opencv_from_world(),
             center: pose.location - own.location,
             forward: own.forward(),
             reach,
-            limits,
+            limits: scene.map(|scene| SightLimits::new(scene, &lens, &own)),
         }
     }
 
-    pub(super) fn in_lanes(&self, world_from_frame: DMat3, gain: [f32; 3]) -> LaneCapture<'_> {
-        LaneCapture {
+    /// Returns the capture as the lanes need it. Returns `None` if they do not suit it.
+    pub(super) fn in_lanes(&self, world_from_frame: DMat3, gain: [f32; 3]) -> Option<LaneCapture<'_>> {
+        let CaptureLens::Straight(lens) = &self.lens else { return None };
+        if self.mask.is_some() {
+            return None;
+        }
+        let limits = match &self.limits {
+            Some(SightLimits::Straight(limits)) => Some(limits),
+            Some(SightLimits::Around(_)) | None => None,
+        };
+        let capture = LaneCapture {
             levels: self.picture.levels(),
-            lens: &self.lens,
+            lens,
             turn: self.camera_from_world * world_from_frame,
             center: self.camera_from_world * self.center,
             reach: self.reach,
-            limits: self.limits.as_ref(),
+            limits,
             gain,
-        }
+        };
+        capture.is_usable().then_some(capture)
     }
 
     /// Returns the colour that the capture shows along a ray, and its weight. Returns `None` if it does not
@@ -119,22 +214,48 @@ impl PreparedCapture {
             (Some(_), Some(depth)) => self.center + ray.direction * depth,
             _ => ray.direction,
         };
+        let v = self.camera_from_world * direction;
+        let place = match &self.lens {
+            CaptureLens::Straight(lens) => self.place_straight(lens, ray, direction, v)?,
+            CaptureLens::Spherical(lens) => place_around(lens, ray, v)?,
+        };
+        if self.is_masked(place.pixel) || ray.depth.is_some() && self.is_hidden(v) {
+            return None;
+        }
+
+        let weight = place.inner;
+        let footprint = place.footprint;
+        let filter = match self.lens {
+            CaptureLens::Straight(_) => TextureFilter::default(),
+            CaptureLens::Spherical(_) => AT_POLES,
+        };
+        let color = self
+            .picture
+            .sample(place.pixel, DVec2::X * footprint.x, DVec2::Y * footprint.y, &filter);
+        Some((color, (weight * weight) as f32))
+    }
+
+    /// Returns the place of a direction in the picture of a straight lens. `v` is the direction in the
+    /// camera's axes.
+    fn place_straight(
+        &self,
+        lens: &Lens,
+        ray: &CubeRay,
+        direction: DVec3,
+        v: DVec3,
+    ) -> Option<PlaceInPicture> {
         let depth = self.forward.dot(direction);
         let length_2 = direction.length_squared();
         if depth <= 0.0 || length_2 > (1.0 + self.reach * self.reach) * depth * depth {
             return None;
         }
+        let pixel = lens.project(v)?;
 
-        let v = self.camera_from_world * direction;
-        let pixel = self.lens.project(v)?;
-
-        // A pixel of the cube is 2/size wide at the depth 1. Distortion hardly changes the part of the
-        // picture that it covers.
-        let step = ray.direction.length() * 2.0 / f64::from(ray.size) / ray.direction.length_squared();
-        let along = self.lens.focal_px() * (step * length_2.sqrt() / v.z);
-        let size = dvec2(f64::from(self.lens.width()), f64::from(self.lens.height()));
+        // Distortion hardly changes the part of the picture that a pixel of the cube covers.
+        let along = lens.focal_px() * (ray.angle() * length_2.sqrt() / v.z);
+        let size = dvec2(f64::from(lens.width()), f64::from(lens.height()));
         let border = if ray.whole {
-            0.5 * along.max(DVec2::ONE)
+            0.5 * along.max(DVec2::ONE) + self.border_px
         } else {
             DVec2::splat(0.5)
         };
@@ -142,29 +263,99 @@ impl PreparedCapture {
             return None;
         }
 
-        if ray.depth.is_some() && self.is_hidden(v) {
-            return None;
-        }
-
         // 1 in the middle of the picture and 0 at its border, along either axis.
         let inner = 1.0 - (2.0 * pixel / size - 1.0) * (2.0 * pixel / size - 1.0);
-        let weight = inner.x * inner.y;
-        let color = self
-            .picture
-            .sample(pixel, DVec2::X * along.x, DVec2::Y * along.y, &Default::default());
-        Some((color, (weight * weight) as f32))
+        Some(PlaceInPicture { pixel, footprint: along, inner: inner.x * inner.y })
+    }
+
+    /// Tells whether the mask leaves out a place in the picture.
+    fn is_masked(&self, pixel: DVec2) -> bool {
+        let Some(mask) = &self.mask else { return false };
+        // A cast brings what is below 0 to 0.
+        let x = (pixel.x as u32).min(mask.width() - 1);
+        let y = (pixel.y as u32).min(mask.height() - 1);
+        mask.at(x, y) == 0
     }
 
     /// Tells whether something is in front of the point `v`, in the camera's axes.
     fn is_hidden(&self, v: DVec3) -> bool {
-        let Some(DepthLimits { limits, focal }) = &self.limits else { return false };
-        let middle = 0.5 * f64::from(limits.width());
-        let at = dvec2(v.x, v.y) * (f64::from(*focal) / v.z) + middle;
-        let last = f64::from(limits.width() - 1);
-        let x = at.x.clamp(0.0, last) as u32;
-        let y = at.y.clamp(0.0, last) as u32;
-        v.z > f64::from(limits.at(x, y))
+        match &self.limits {
+            None => false,
+            Some(SightLimits::Straight(DepthLimits { limits, focal })) => {
+                let middle = 0.5 * f64::from(limits.width());
+                let at = dvec2(v.x, v.y) * (f64::from(*focal) / v.z) + middle;
+                v.z > limit_at(limits, at)
+            }
+            Some(SightLimits::Around(faces)) => {
+                let face = face_of(v);
+                let limits = &faces[face];
+                // The depth images have borders: they are wider than the face by as much on each side.
+                let middle = 0.5 * f64::from(limits.width());
+                let at = place_on(face, v) * (0.5 * f64::from(DEPTH_WIDTH)) + middle;
+                v.abs().max_element() > limit_at(limits, at)
+            }
+        }
     }
+}
+
+impl SightLimits {
+    fn new(scene: &Scene<'_>, lens: &CaptureLens, own: &Pose) -> Self {
+        match lens {
+            CaptureLens::Straight(lens) => {
+                let fov_rad = 2.0 * libm::atan(1.01 * lens.reach());
+                let camera = Camera::perspective(*own, fov_rad, DEPTH_WIDTH, DEPTH_WIDTH);
+                let limits = depth_limits(&cast(scene, &camera).depth);
+                Self::Straight(DepthLimits { limits, focal: camera.focal_px().x as f32 })
+            }
+            CaptureLens::Spherical(_) => {
+                let faces = face_cameras(own, DEPTH_WIDTH);
+                Self::Around(faces.map(|camera| depth_limits(&cast(scene, &camera).depth)))
+            }
+        }
+    }
+}
+
+/// Returns the place of a direction in a spherical picture. `v` is the direction in the camera's axes.
+fn place_around(lens: &SphericalLens, ray: &CubeRay, v: DVec3) -> Option<PlaceInPicture> {
+    let mut pixel = lens.project(v);
+    let size = dvec2(f64::from(lens.width()), f64::from(lens.height()));
+
+    // A circle of latitude shortens towards the pole, so that a pixel of the cube sees many columns there.
+    let angle = ray.angle();
+    let shortened = libm::hypot(v.x, v.z) / v.length();
+    let footprint = dvec2((angle / shortened).min(TAU), angle) / lens.pixel_rad();
+
+    // A picture counts up to half a pixel beyond its border, so that it meets its neighbours.
+    let border = if ray.whole { 0.5 * footprint } else { DVec2::splat(-0.5) };
+    let is_within = pixel.cmpgt(border) & pixel.cmplt(size - border);
+    let is_seen = (lens.is_around() || is_within.x) && (lens.is_pole_to_pole() || is_within.y);
+    if !is_seen || !pixel.is_finite() {
+        return None;
+    }
+
+    // 1 in the middle and 0 just beyond a border, along an axis that has borders.
+    let across = 2.0 * (pixel + 0.5) / (size + 1.0) - 1.0;
+    let mut inner = 1.0;
+    if !lens.is_around() {
+        inner *= 1.0 - across.x * across.x;
+    }
+    if !lens.is_pole_to_pole() {
+        inner *= 1.0 - across.y * across.y;
+    }
+
+    if lens.is_around() {
+        pixel.x = pixel.x.rem_euclid(size.x);
+    }
+    Some(PlaceInPicture { pixel, footprint, inner })
+}
+
+/// Returns the limit at a place of its image, in pixels.
+fn limit_at(limits: &Raster<f32>, at: DVec2) -> f64 {
+    let last_x = f64::from(limits.width() - 1);
+    let last_y = f64::from(limits.height() - 1);
+    let x = at.x.clamp(0.0, last_x) as u32;
+    let y = at.y.clamp(0.0, last_y) as u32;
+    f64::from(limits.at(x, y))
 }
 
 /// Returns, for every four neighbouring pixels of a depth image, how deep a visible point between them may

@@ -23,11 +23,14 @@ use gains::gains;
 use glam::DMat3;
 use lanes::{BlendKernel, LaneCapture};
 use rayon::prelude::*;
-use s3d_geom::Pose;
+use s3d_geom::{CaptureLens, Pose};
 use s3d_simd::{ProvenLevel, level};
 
 /// The width of a cube face in pixels when captures are compared.
 const GAIN_SIZE: u32 = 64;
+
+/// The distance from the centre at which a spherical picture has no parallax that can be seen.
+const SAME_PLACE_M: f64 = 1e-3;
 
 /// How captures become a cube map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,12 +59,47 @@ pub fn stitch(
     scene: Option<&Scene<'_>>,
     options: &StitchOptions,
 ) -> CubeMap {
+    let captures = match sphere_of(captures, pose, scene.is_some(), options) {
+        Ok(cube) => return cube,
+        Err(captures) => captures,
+    };
     let stitch = Stitch::new(captures, pose, scene, options);
-    let lanes = stitch.lanes();
-    if lanes.iter().all(LaneCapture::is_usable) {
-        stitch.in_lanes(&lanes, level())
-    } else {
-        stitch.pixel_by_pixel()
+    match stitch.lanes() {
+        Some(lanes) => stitch.in_lanes(&lanes, level()),
+        None => stitch.pixel_by_pixel(),
+    }
+}
+
+/// Makes the cube map of a single picture that shows every direction, if there is no parallax to remove.
+/// Returns the captures if they are others.
+fn sphere_of(
+    mut captures: Vec<Capture>,
+    pose: &Pose,
+    has_scene: bool,
+    options: &StitchOptions,
+) -> Result<CubeMap, Vec<Capture>> {
+    let [capture] = captures.as_slice() else { return Err(captures) };
+    let is_whole = matches!(&capture.lens, CaptureLens::Spherical(lens) if lens.is_whole());
+    let is_at_center = capture.pose.location.distance(pose.location) <= SAME_PLACE_M;
+    if !is_whole || capture.mask.is_some() || has_scene && !is_at_center {
+        return Err(captures);
+    }
+
+    let own = capture.pose;
+    // The rows are the picture's +X, +Y and +Z: forward, left and up.
+    let photo_from_world = DMat3::from_cols(own.forward(), -own.right(), own.up()).transpose();
+    match captures.pop() {
+        Some(capture) => Ok(CubeMap::from_sphere(capture.image, photo_from_world, pose, options.size)),
+        None => Err(captures),
+    }
+}
+
+/// Returns the pixels of a capture in the middle of its picture, per radian. A spherical picture counts a
+/// quarter more, because the corners of a face of the cube are sharper than its middle.
+fn sharpness(lens: &CaptureLens) -> f64 {
+    match lens {
+        CaptureLens::Straight(lens) => lens.focal_px().max_element(),
+        CaptureLens::Spherical(lens) => 1.25 / lens.pixel_rad().x,
     }
 }
 
@@ -78,10 +116,7 @@ struct Stitch {
 impl Stitch {
     fn new(captures: Vec<Capture>, pose: &Pose, scene: Option<&Scene<'_>>, options: &StitchOptions) -> Self {
         assert!(!captures.is_empty(), "a cube map needs captures");
-        let sharpest = captures
-            .iter()
-            .map(|c| c.lens.focal_px().max_element())
-            .fold(0.0, f64::max);
+        let sharpest = captures.iter().map(|c| sharpness(&c.lens)).fold(0.0, f64::max);
         let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
 
         let world_from_frame = pose.opencv_from_world().transpose();
@@ -101,7 +136,8 @@ impl Stitch {
         Self { pose: *pose, size, world_from_frame, views, gains, depths }
     }
 
-    fn lanes(&self) -> Vec<LaneCapture<'_>> {
+    /// Returns the captures as the lanes need them. Returns `None` if the lanes do not suit one of them.
+    fn lanes(&self) -> Option<Vec<LaneCapture<'_>>> {
         let each = self.views.iter().zip(&self.gains);
         each.map(|(view, gain)| view.in_lanes(self.world_from_frame, *gain))
             .collect()
@@ -134,6 +170,9 @@ impl Stitch {
 }
 
 #[cfg(test)]
+mod spherical_tests;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::picture::cube_map::tests::{close, color_of, pose};
@@ -162,13 +201,14 @@ mod tests {
                     let at = dvec2(f64::from(i % 160) + 0.5, f64::from(i / 160) + 0.5);
                     seen(k, world * lens.direction(at).unwrap()).map(|c| (c + 0.5).clamp(0.0, 255.0) as u8)
                 });
-                Capture { image: Raster::from_vec(160, 128, pixels.collect()), lens, pose: own }
+                let image = Raster::from_vec(160, 128, pixels.collect());
+                Capture { image, lens: lens.into(), pose: own, mask: None, border_px: 0 }
             })
             .collect()
     }
 
     /// Returns directions that are spread over the sphere.
-    fn directions() -> impl Iterator<Item = DVec3> {
+    pub(super) fn directions() -> impl Iterator<Item = DVec3> {
         (0..3000).map(|k| {
             let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 3000.0;
             let (sin, cos) = libm::sincos(2.399_963 * f64::from(k));
@@ -176,7 +216,7 @@ mod tests {
         })
     }
 
-    fn sample(cube: &CubeMap, d: DVec3) -> ([f32; 3], u8) {
+    pub(super) fn sample(cube: &CubeMap, d: DVec3) -> ([f32; 3], u8) {
         cube.sample(d, DVec3::splat(1e-9), DVec3::splat(1e-9), &TextureFilter::default())
     }
 
@@ -257,7 +297,7 @@ mod tests {
     #[test]
     fn eight_pixels_at_a_time_give_what_single_ones_do() {
         in_many_ways(|stitch| {
-            let cube = stitch.in_lanes(&stitch.lanes(), level());
+            let cube = stitch.in_lanes(&stitch.lanes().unwrap(), level());
             let plain = stitch.pixel_by_pixel();
             let mut pixels = 0;
             let mut far = 0;
@@ -276,7 +316,7 @@ mod tests {
     #[test]
     fn every_level_of_instructions_gives_the_same_bytes() {
         in_many_ways(|stitch| {
-            let lanes = stitch.lanes();
+            let lanes = stitch.lanes().unwrap();
             let cubes = ProvenLevel::all()
                 .into_iter()
                 .map(|level| stitch.in_lanes(&lanes, level));
@@ -304,7 +344,7 @@ mod tests {
                 let own = Pose { location, ..turned };
                 let camera = Camera::perspective(own, 2.0 * libm::atan(160.0 / 215.0), 320, 256);
                 let image = rgb_image(&scene, &mip_maps, &cast(&scene, &camera), &camera);
-                Capture { image, lens, pose: own }
+                Capture { image, lens: lens.into(), pose: own, mask: None, border_px: 0 }
             })
             .collect();
 

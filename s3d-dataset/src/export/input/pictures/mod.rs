@@ -1,20 +1,20 @@
 //! The scanner's pictures as the source of colours: found and checked before anything is written, and made
 //! into one cube map at a time.
 
+mod finder;
+
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::area::AreaInput;
 use crate::export::input::cameras::Cameras;
 use crate::export::picture_colors::PictureColors;
-use glam::DVec3;
+use finder::{LocationPictures, PictureFinder, check_sky_box};
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
-use s3d_io::camera::{
-    CAPTURES_A_LOCATION, CaptureFile, PictureFolder, ScanLocation, check_picture, read_picture,
-};
+use s3d_io::camera::{CAPTURES_A_LOCATION, CaptureFile, E57Pictures, E57Shot, ScanLocation, read_picture};
 use s3d_io::scene::{PictureKind, PictureSource, SkyBoxCaps};
 use s3d_render::{Capture, CubeMap, Scene, SkyBoxTurn, StitchOptions, stitch};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// How many locations without pictures a message names.
@@ -23,17 +23,12 @@ const MAX_NAMED: usize = 20;
 /// An area's pictures.
 pub(crate) struct Pictures {
     source: PictureSource,
+    /// The file of the pictures, if they are in one.
+    e57: Option<E57Pictures>,
     /// The pictures of each location; `None` where no image is asked for.
     found: Vec<Option<LocationPictures>>,
     /// What was odd about them, as a sentence each.
     pub(crate) warnings: Vec<String>,
-}
-
-/// The pictures of a location.
-enum LocationPictures {
-    SkyBox([PathBuf; 6]),
-    Captures(Vec<CaptureFile>),
-    Panorama(PathBuf),
 }
 
 impl Pictures {
@@ -56,22 +51,22 @@ impl Pictures {
             .into());
         }
 
-        let folder = PictureFolder::open(&source.path)?;
+        let finder = PictureFinder::open(source, area)?;
         let mut found = Vec::new();
         let mut missing = Vec::new();
-        let mut warnings = Vec::new();
+        let mut warnings = finder.warnings();
 
-        for location in area.cameras.listed() {
+        for (index, location) in area.cameras.listed().iter().enumerate() {
             let uuid = &location.uuid;
             let of_location = if is_asked(location) {
-                Some(find(&folder, source.kind, uuid)?)
+                Some(finder.find(index, uuid)?)
             } else {
                 None
             };
 
             found.push(match of_location {
                 Some(Ok(mut pictures)) => {
-                    pictures.check()?;
+                    finder.check(&pictures)?;
                     pictures.subtract(area.frame.offset_m);
                     if let LocationPictures::Captures(captures) = &pictures
                         && captures.len() < CAPTURES_A_LOCATION
@@ -110,13 +105,17 @@ impl Pictures {
             return Err(FileError::format(&source.path, message).into());
         }
 
-        Ok(Some(Self { source: source.clone(), found, warnings }))
+        Ok(Some(Self { source: source.clone(), e57: finder.into_e57(), found, warnings }))
     }
 
     /// Describes the pictures in a line.
     pub(crate) fn summary(&self) -> String {
         let locations = self.found.iter().flatten().count();
-        format!("{} of {locations} locations in {}", self.source.kind, self.source.path.display())
+        let kind = match self.source.kind {
+            PictureKind::E57 => "images",
+            kind => kind.name(),
+        };
+        format!("{kind} of {locations} locations in {}", self.source.path.display())
     }
 
     /// Makes a location's cube map, on all threads. Returns `None` if no image of the location is asked for.
@@ -154,8 +153,21 @@ impl Pictures {
                 let mut captures = Vec::new();
                 for read in in_parallel(files, CaptureFile::read) {
                     let file = &files[captures.len()];
-                    captures.push(Capture { image: read?, lens: file.lens, pose: file.pose });
+                    captures.push(Capture {
+                        image: read?,
+                        lens: file.lens.into(),
+                        pose: file.pose,
+                        mask: None,
+                        border_px: 0,
+                    });
                 }
+                let scene = options.parallax.then_some(scene);
+                stitch(captures, pose, scene, &StitchOptions { size: options.size, gains: options.gains })
+            }
+            LocationPictures::E57(numbers) => {
+                let Some(pictures) = &self.e57 else { return Ok(None) };
+                let shots = pictures.read(numbers)?;
+                let captures = shots.into_iter().map(capture_of_shot).collect();
                 let scene = options.parallax.then_some(scene);
                 stitch(captures, pose, scene, &StitchOptions { size: options.size, gains: options.gains })
             }
@@ -190,69 +202,9 @@ fn read_all(paths: &[PathBuf]) -> Result<Vec<Raster<[u8; 3]>>> {
         .collect::<s3d_io::Result<_>>()?)
 }
 
-/// Finds the pictures of a location, or returns the names of the missing ones.
-fn find(
-    folder: &PictureFolder,
-    kind: PictureKind,
-    uuid: &str,
-) -> s3d_io::Result<Result<LocationPictures, String>> {
-    Ok(match kind {
-        PictureKind::SkyBox => folder.sky_box(uuid).map(LocationPictures::SkyBox),
-        PictureKind::Panorama => folder.panorama(uuid).map(LocationPictures::Panorama),
-        PictureKind::Captures => match folder.captures(uuid)? {
-            captures if captures.is_empty() => Err(format!("{uuid}_i0_0.jpg to {uuid}_i2_5.jpg")),
-            captures => Ok(LocationPictures::Captures(captures)),
-        },
-    })
-}
-
-impl LocationPictures {
-    /// Moves the poses of captures from the frame of the mesh's file to where the mesh lies.
-    fn subtract(&mut self, offset_m: DVec3) {
-        if let Self::Captures(captures) = self {
-            captures
-                .iter_mut()
-                .for_each(|capture| capture.pose.location -= offset_m);
-        }
-    }
-
-    /// Checks the sizes and the ends of the files, without reading whole pictures.
-    fn check(&self) -> Result<()> {
-        match self {
-            Self::SkyBox(paths) => {
-                let mut sizes = [(0, 0); 6];
-                for (size, path) in sizes.iter_mut().zip(paths) {
-                    *size = check_picture(path)?;
-                }
-                check_sky_box(&paths[0], sizes)
-            }
-            Self::Panorama(path) => {
-                let (w, h) = check_picture(path)?;
-                if w.abs_diff(h.saturating_mul(2)) > 1 {
-                    let message = format!(
-                        "has {w} × {h} pixels: an equirectangular photograph is twice as wide as high"
-                    );
-                    return Err(FileError::format(path, message).into());
-                }
-                Ok(())
-            }
-            // Captures were checked when they were found.
-            Self::Captures(_) => Ok(()),
-        }
-    }
-}
-
-fn check_sky_box(first: &Path, sizes: [(u32, u32); 6]) -> Result<()> {
-    let side = sizes[0].0;
-    match sizes.iter().zip(0..).find(|(size, _)| **size != (side, side)) {
-        None => Ok(()),
-        Some(((w, h), k)) => {
-            let message = format!(
-                "has {} × {} pixels, and picture {k} of its sky box {w} × {h}: six are square and of one \
-                 size",
-                sizes[0].0, sizes[0].1
-            );
-            Err(FileError::format(first, message).into())
-        }
-    }
+/// Returns a picture of an E57 file as a capture. Such pictures may be the faces of a cube, which meet at
+/// their borders.
+fn capture_of_shot(shot: E57Shot) -> Capture {
+    let E57Shot { image, lens, pose, mask } = shot;
+    Capture { image, lens, pose, mask, border_px: 0 }.with_border()
 }

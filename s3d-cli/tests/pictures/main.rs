@@ -2,6 +2,8 @@
 //! sky box, a panorama, and 18 captures through a lens that distorts. They must give the same images as the
 //! mesh.
 
+mod e57;
+
 use crate::common;
 use common::{UUID_A, UUID_B, files, s3d_fails, s3d_ok, text, write_scan};
 use glam::{DVec2, DVec3, dvec2};
