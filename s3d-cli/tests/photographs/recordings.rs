@@ -3,7 +3,6 @@
 use super::first_of;
 use super::studio::*;
 use crate::common::s3d_ok;
-use crate::common::text;
 use s3d_geom::{Lens, PhotoLens, Pose, Raster};
 use s3d_io::image::read_rgb8;
 use std::fs;
