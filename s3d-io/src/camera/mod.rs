@@ -19,8 +19,9 @@
 //!
 //! [`read_posed_cameras`] reads cameras as they are. Each [`PosedCamera`] has a pose, and the size, focal
 //! lengths and lens if the list tells them. It reads `transforms.json`, COLMAP models, Metashape's cameras,
-//! ScanNet's recordings, ScanNet's and 3RScan's poses, Polycam's keyframes, Matterport3D's undistorted cameras,
-//! trajectories of ARKitScenes, Replica and TUM, and tables. A [`Recording`] has depth too.
+//! RealityCapture's table, ScanNet's recordings, ScanNet's and 3RScan's poses, Polycam's keyframes,
+//! Matterport3D's undistorted cameras, trajectories of ARKitScenes, Replica and TUM, and tables. A
+//! [`Recording`] has depth too.
 //! [`read_photograph_cameras`] also takes the folder of the pictures.
 //!
 //! A [`PictureFolder`] finds the pictures of each location: raw captures ([`CaptureFile`], with lens and

@@ -60,9 +60,9 @@ struct ReadList {
 /// - a folder with Polycam's `keyframes`, or that folder itself: the corrected cameras, if there are some;
 /// - `lowres_wide.traj` of ARKitScenes, or any other file of lines with seven numbers, or a folder that holds
 ///   `lowres_wide.traj`: the pictures beside it, whose names have their times, each with its `.pincam`;
-/// - `traj.txt`, or any other file of lines with 16 numbers, or a folder that holds `traj.txt`: camera → world
-///   in OpenCV's axes, a line for each of the pictures in `results/frame000000.jpg` or `rgb/rgb_0.png`, in
-///   their order, with Replica's `cam_params.json`;
+/// - `traj.txt`, or any other file of lines with 16 numbers, or a folder that holds `traj.txt`: camera →
+///   world in OpenCV's axes, a line for each of the pictures in `results/frame000000.jpg` or
+///   `rgb/rgb_0.png`, in their order, with Replica's `cam_params.json`;
 /// - a file of commands such as `intrinsics_matrix`, or a folder with one such `.conf` file: the undistorted
 ///   photographs of Matterport3D;
 /// - an XML file, or a folder that holds `cameras.xml`: the cameras of a Metashape chunk, whose sensors may

@@ -1,10 +1,10 @@
-//! Offsets that photogrammetry programs put beside a mesh: they subtract the offset from the scan's coordinates
-//! and write the mesh near the origin.
+//! Offsets that photogrammetry programs put beside a mesh: they subtract the offset from the scan's
+//! coordinates and write the mesh near the origin.
 //!
-//! | file | program | content |
-//! |---|---|---|
-//! | `NAME_offset.xyz` or `offset.xyz` beside the mesh, or in `../../1_initial/params` | Pix4D | three numbers: x, y, z |
-//! | `odm_georeferencing_model_geo.txt` or `coords.txt` in `../odm_georeferencing`, or beside the mesh | OpenDroneMap | a line with the coordinate system, then x and y; z is as it was |
+//! - Pix4D writes `NAME_offset.xyz` or `offset.xyz`, with x, y and z, beside the mesh or in
+//!   `../../1_initial/params`.
+//! - OpenDroneMap writes `odm_georeferencing_model_geo.txt` or `coords.txt`, with a line for the coordinate
+//!   system, then x and y, in `../odm_georeferencing` or beside the mesh. Its z is as it was.
 //!
 //! Sources: Pix4D's support, "How to visualize the 3D textured mesh with georeference"; OpenDroneMap/ODM,
 //! opendm/georef.py and the readers of WebODM.
@@ -34,8 +34,8 @@ pub struct ToldOffset {
 }
 
 impl ToldOffset {
-    /// Finds the offset of the mesh at `path`. Returns `None` if no program put a file of that kind beside it,
-    /// or if several of Pix4D's files lie there and none is named after the mesh.
+    /// Finds the offset of the mesh at `path`. Returns `None` if no program put a file of that kind beside
+    /// it, or if several of Pix4D's files lie there and none is named after the mesh.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for such a file that holds no offset.

@@ -96,7 +96,8 @@ mod tests {
         let plain = frames("path = \"c.csv\"\n").unwrap();
         assert!(plain.path.ends_with("c.csv") && plain.images.is_none() && plain.max.is_none());
         assert_eq!((plain.every.get(), plain.width, plain.world_from_file), (1, None, DAffine3::IDENTITY));
-        let keys = "path = \"raw\"\nimages = \"photos\"\nmasks = \"raw\"\nup = \"y\"\nevery = 7\nmax = 3\nwidth = 640\n";
+        let keys = "path = \"raw\"\nimages = \"photos\"\nmasks = \"raw\"\nup = \"y\"\nevery = 7\nmax = 3\n\
+                    width = 640\n";
         let all = frames(keys).unwrap();
         assert!(all.images.unwrap().ends_with("photos") && all.masks.unwrap().ends_with("raw"));
         assert_eq!((all.every.get(), all.max.unwrap().get(), all.width), (7, 3, Some(640)));

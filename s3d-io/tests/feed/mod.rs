@@ -267,6 +267,15 @@ fn posed_cameras(dir: &Path, data: &[u8]) {
         }
     };
 
+    if which == 4
+        && let Ok(recording) = Recording::open(&path)
+    {
+        for frame in &recording.frames {
+            check(dir, recording.read_depth(frame));
+            let _ = frame.color.read();
+        }
+    }
+
     let Some(found) = check(dir, read_posed_cameras(&path, &DAffine3::IDENTITY)) else { return };
     assert!(!found.cameras.is_empty());
     let half = GivenIntrinsics { width: Some(64), height: Some(32), optics: None };

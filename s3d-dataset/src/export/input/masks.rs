@@ -17,7 +17,8 @@ pub(crate) struct MaskedPicture {
 /// The pixel of a mask that hides nothing.
 const SHOWN: [u8; 3] = [255; 3];
 
-/// Reads a mask. Each pixel becomes [`SHOWN`] or black, because programs write masks of 1, of 255, and as JPEG.
+/// Reads a mask. Each pixel becomes [`SHOWN`] or black, because programs write masks of 1, of 255, and as
+/// JPEG.
 fn read_mask(path: &Path, size: [u32; 2]) -> Result<Raster<[u8; 3]>> {
     let mut mask = read_picture(path)?;
     check_mask_size(path, [mask.width(), mask.height()], size)?;
@@ -110,8 +111,8 @@ pub(super) fn find_masks(
     masks
 }
 
-/// Returns the places of a photograph's mask in a folder: by its own name, or by the photograph's name with its
-/// ending exchanged or kept.
+/// Returns the places of a photograph's mask in a folder: by its own name, or by the photograph's name with
+/// its ending exchanged or kept.
 fn named_like(folder: &Path, camera: &PosedCamera, named: Option<&Path>) -> Vec<PathBuf> {
     let name = Path::new(&camera.name);
     let photo = camera.picture.as_ref().map_or(name, |picture| &picture.path);

@@ -90,9 +90,9 @@ impl MeshFrame {
         (offset_m != DVec3::ZERO).then(|| offset_m.to_array())
     }
 
-    /// Opens points or cameras, from whose coordinates an offset is subtracted. If a program had moved the mesh,
-    /// they may lie beside it or where the scan was: what does not fit the mesh is opened again with the offset
-    /// that is told, and the first error is returned if that does not fit either.
+    /// Opens points or cameras, from whose coordinates an offset is subtracted. If a program had moved the
+    /// mesh, they may lie beside it or where the scan was: what does not fit the mesh is opened again with
+    /// the offset that is told, and the first error is returned if that does not fit either.
     pub(crate) fn open_beside<T>(&self, open: impl Fn(DVec3) -> Result<T>) -> Result<T> {
         let opened = open(self.offset_m);
         if opened.is_ok() || self.told_m == DVec3::ZERO {

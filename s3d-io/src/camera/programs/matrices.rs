@@ -1,7 +1,7 @@
 //! Trajectories of one matrix a line: 16 numbers, camera → world in OpenCV's axes, row by row. Replica's
-//! sequences have this form: `traj.txt` with pictures in `results` (cvg/nice-slam, src/utils/datasets.py), and
-//! `traj_w_c.txt` with pictures in `rgb` (Harry-Zhi/semantic_nerf, SSR/datasets/replica/replica_datasets.py).
-//! Both are in the world of Replica's meshes.
+//! sequences have this form, in the world of its meshes: `traj.txt` with pictures in `results`
+//! (cvg/nice-slam, src/utils/datasets.py), and `traj_w_c.txt` with pictures in `rgb`
+//! (Harry-Zhi/semantic_nerf, SSR/datasets/replica/replica_datasets.py).
 
 use crate::camera::matterport::pose_of_matrix;
 use crate::camera::numbered::{NumberedFiles, numbered_between};

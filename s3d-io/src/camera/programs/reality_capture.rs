@@ -1,12 +1,12 @@
 //! The table of RealityCapture, "Internal/External camera parameters":
-//! `#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2`, whose columns the user may choose. Sources: the
-//! importers of nerfstudio-project/nerfstudio (nerfstudio/process_data/realitycapture_utils.py) and of
+//! `#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2`, whose columns the user may choose. Sources:
+//! the importers of nerfstudio-project/nerfstudio (nerfstudio/process_data/realitycapture_utils.py) and of
 //! ArthurBrussee/brush (crates/brush-dataset), and RealityCapture's support, "XMP Camera Math".
 //!
 //! Angles are degrees: a camera in OpenGL's axes is turned by roll about y, by pitch about x, and by −heading
-//! about z. `f` is the focal length for a picture whose longer side is 36; `px` and `py` are the distance of the
-//! principal point from the middle, as shares of the longer side. What unit the distortion has is not documented,
-//! so lenses that distort are refused.
+//! about z. `f` is the focal length for a picture whose longer side is 36; `px` and `py` are the distance of
+//! the principal point from the middle, as shares of the longer side. The unit of the distortion is not
+//! documented, so lenses that distort are refused.
 
 use crate::camera::picture::read_picture_size;
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
@@ -109,8 +109,8 @@ impl Row<'_> {
         for column in DISTORTION {
             if self.header.place(column).is_some() && self.number(column)? != 0.0 {
                 return Err(format!(
-                    "{column} is not 0, and RealityCapture does not say how its lenses distort: export undistorted \
-                     pictures, or the registration for COLMAP (text)"
+                    "{column} is not 0, and RealityCapture does not say how its lenses distort: export \
+                     undistorted pictures, or the registration for COLMAP (text)"
                 ));
             }
         }

@@ -1,8 +1,9 @@
 //! Recordings of ScanNet: `scene0000_00.sens`, with poses, intrinsics, colour pictures and depth. Source:
-//! ScanNet/ScanNet, SensReader/README.md and SensReader/c++/src/sensorData.h. BundleFusion writes the same form.
+//! ScanNet/ScanNet, SensReader/README.md and SensReader/c++/src/sensorData.h. BundleFusion writes the same
+//! form.
 //!
-//! All numbers are little-endian. A pose is camera → world in OpenCV's axes, 4 × 4 row by row. Measurements of
-//! motion after the frames are not read.
+//! All numbers are little-endian. A pose is camera → world in OpenCV's axes, 4 × 4 row by row. Measurements
+//! of motion after the frames are not read.
 
 use crate::camera::matterport::pose_of_matrix;
 use crate::camera::picture_file::{PictureFile, read_part};

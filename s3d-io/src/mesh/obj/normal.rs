@@ -376,8 +376,8 @@ fn plain_numbers(rest: &[u8]) -> Option<usize> {
     Some(words)
 }
 
-/// Returns whether it is plain that all decimal numbers of a line are finite as `f32`: none has an exponent or
-/// 39 digits.
+/// Returns whether it is plain that all decimal numbers of a line are finite as `f32`: none has an exponent
+/// or 39 digits.
 fn are_finite(numbers: &[u8]) -> bool {
     numbers
         .split(|byte| matches!(byte, b' ' | b'\t'))

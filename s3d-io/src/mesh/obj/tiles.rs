@@ -1,5 +1,6 @@
 //! Textures in UDIM tiles: `map_Kd wall.<UDIM>.png` means an image for each square of the texture plane. The
-//! square from (u, v) to (u + 1, v + 1) is tile 1001 + u + 10 v. Source: Foundry's and Blender's manuals, "UDIM".
+//! square from (u, v) to (u + 1, v + 1) is tile 1001 + u + 10 v. Source: Foundry's and Blender's manuals,
+//! "UDIM".
 //!
 //! The faces of a material that lie in different tiles get a material each, all with one name. Their texture
 //! coordinates are moved to the first square.
@@ -103,8 +104,8 @@ struct Tile {
 }
 
 impl Tile {
-    /// Returns the square that holds a point. Returns `None` left of the first column, below the first row, and
-    /// right of the tenth column.
+    /// Returns the square that holds a point. Returns `None` left of the first column, below the first row,
+    /// and right of the tenth column.
     fn of(at: Vec2) -> Option<Self> {
         let whole = at.floor();
         let is_tile = whole.x >= 0.0 && whole.y >= 0.0 && whole.x < ROW as f32 && whole.y <= LAST as f32;
