@@ -38,6 +38,16 @@ pub enum Error {
         /// The areas of the data set, ascending.
         areas: Vec<u32>,
     },
+    /// An option belongs to other protocols.
+    #[error("{protocol} takes no {option}: {} {}", named(owners), if owners.len() == 1 { "does" } else { "do" })]
+    OtherProtocol {
+        /// The protocol.
+        protocol: Protocol,
+        /// The option's name in [`EvalOptions`](crate::EvalOptions).
+        option: &'static str,
+        /// The protocols that take it.
+        owners: &'static [Protocol],
+    },
     /// An option names classes that cannot be evaluated.
     #[error("{option}: {fault}")]
     Classes {
@@ -117,6 +127,7 @@ impl Error {
             Self::UnknownVariant { .. }
             | Self::UnknownArea { .. }
             | Self::NoFold { .. }
+            | Self::OtherProtocol { .. }
             | Self::Classes { .. }
             | Self::PanoramasOnly { .. }
             | Self::NoMedianScale { .. } => true,
@@ -145,6 +156,15 @@ impl std::fmt::Display for ClassOption {
 /// Lists numbers of areas in a sentence.
 pub(crate) fn listed(areas: &[u32]) -> String {
     areas.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// Lists protocols in a sentence.
+fn named(protocols: &[Protocol]) -> String {
+    protocols
+        .iter()
+        .map(Protocol::to_string)
+        .collect::<Vec<_>>()
+        .join(" and ")
 }
 
 fn folders(domains: &[Domain]) -> String {

@@ -21,6 +21,7 @@ pub fn evaluate(
     options: &EvalOptions,
     ctx: &Context,
 ) -> Result<Evaluation> {
+    options.check_of(protocol)?;
     let variant = options.variant_of(protocol)?;
     let data = DataSet::open(truth)?;
     let folds = options.folds.of(&data)?;

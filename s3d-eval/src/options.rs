@@ -79,6 +79,26 @@ impl FromStr for ImageKind {
 }
 
 impl EvalOptions {
+    /// Refuses options of other protocols.
+    ///
+    /// # Errors
+    /// [`Error::OtherProtocol`] for the first of them.
+    pub(crate) fn check_of(&self, protocol: Protocol) -> Result<()> {
+        const OF_IMAGES: &[Protocol] = &[Protocol::Normal, Protocol::SemPano, Protocol::Depth];
+        let given: [(bool, &str, &[Protocol]); 4] = [
+            (self.classes.is_some(), "classes", &[Protocol::Det]),
+            (self.stuff.is_some(), "stuff", &[Protocol::Panoptic]),
+            (self.median_scale, "median_scale", &[Protocol::Depth]),
+            (self.images.is_some(), "images", OF_IMAGES),
+        ];
+        for (is_given, option, owners) in given {
+            if is_given && !owners.contains(&protocol) {
+                return Err(Error::OtherProtocol { protocol, option, owners });
+            }
+        }
+        Ok(())
+    }
+
     /// Returns the variant of a protocol that these options ask for.
     ///
     /// # Errors
@@ -105,6 +125,24 @@ mod tests {
         assert_eq!(options.variant_of(Protocol::Depth).unwrap(), "unifuse");
         let error = options.variant_of(Protocol::Det).unwrap_err().to_string();
         assert!(error.contains("mmdetection3d, open3d-ml"), "{error}");
+    }
+
+    #[test]
+    fn options_of_other_protocols_are_refused() {
+        let median = EvalOptions { median_scale: true, ..EvalOptions::default() };
+        let classes = EvalOptions { classes: Some(vec!["wall".into()]), ..EvalOptions::default() };
+        let views = EvalOptions { images: Some(ImageKind::Views), ..EvalOptions::default() };
+        for (options, owner) in
+            [(&median, Protocol::Depth), (&classes, Protocol::Det), (&views, Protocol::SemPano)]
+        {
+            assert!(options.check_of(owner).is_ok());
+            let error = options.check_of(Protocol::Sem3d).unwrap_err();
+            assert!(error.is_usage(), "{error}");
+        }
+        let message = classes.check_of(Protocol::Sem3d).unwrap_err().to_string();
+        assert_eq!(message, "sem3d takes no classes: det does");
+        let message = views.check_of(Protocol::Det).unwrap_err().to_string();
+        assert_eq!(message, "det takes no images: normal and sem-pano and depth do");
     }
 
     #[test]

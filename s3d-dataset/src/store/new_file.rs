@@ -4,6 +4,8 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::store::staging::Staging;
 use crate::store::{parent_of, refuse_existing};
+use s3d_io::Error as FileError;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// A file that is written in a folder beside its place, and moved there when it is complete. Dropped before
@@ -20,7 +22,11 @@ impl NewFile {
     ///
     /// # Errors
     /// [`Error::Usage`](crate::Error::Usage) if a file is there and `overwrite` is not set.
+    /// [`Error::File`](crate::Error::File) if its folder does not exist.
     pub fn check_free(place: &Path, overwrite: bool) -> Result<()> {
+        if !parent_of(place).is_dir() {
+            return Err(FileError::io(place, "write", ErrorKind::NotFound.into()).into());
+        }
         // What a killed process left goes back to its place later.
         if Staging::is_left(&parent_of(place), name_of(place)) {
             Ok(())
@@ -60,4 +66,20 @@ impl NewFile {
 
 fn name_of(place: &Path) -> &Path {
     Path::new(place.file_name().unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_that_is_missing_is_told_before_the_work() {
+        let dir = tempfile::tempdir().unwrap();
+        let place = dir.path().join("scores.json");
+        assert!(NewFile::check_free(&place, false).is_ok());
+        let fault = NewFile::check_free(&dir.path().join("gone/scores.json"), true).unwrap_err();
+        assert!(fault.to_string().contains("gone/scores.json"), "{fault}");
+        std::fs::write(&place, "").unwrap();
+        assert!(NewFile::check_free(&place, false).is_err() && NewFile::check_free(&place, true).is_ok());
+    }
 }

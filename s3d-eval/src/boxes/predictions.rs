@@ -29,8 +29,9 @@ enum Content {
     Sample(Sample),
 }
 
-/// A box of a list.
+/// A box of a list. Other keys, such as an angle, are refused.
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct BoxEntry {
     area: u32,
     room: String,
