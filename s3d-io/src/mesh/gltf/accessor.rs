@@ -14,6 +14,7 @@ use gltf::json::Index;
 use gltf::json::accessor::{Accessor, sparse::Sparse};
 use gltf::json::buffer::View;
 use gltf::json::validation::Checked;
+use s3d_geom::NO_INDEX;
 
 /// The most elements of an accessor without data. An accessor of zeros and sparse changes can claim any
 /// number. Lawful ones belong to morph targets, which are not read.
@@ -101,6 +102,32 @@ impl GltfDocument {
             DataType::U32 if width == 1 => Ok(self.iter(&accessor).map_or_else(zeros, Iterator::collect)),
             _ => Err(self.fail(format!("{who}: accessor {index} does not hold single unsigned integers"))),
         }
+    }
+
+    /// Reads ids, which numbers of any type may hold. Returns [`NO_INDEX`] for negative numbers, and for
+    /// floats beyond 32 bits.
+    pub(crate) fn read_ids(&self, index: Index<Accessor>, who: &str) -> Result<Vec<u32>> {
+        let (accessor, width) = self.checked(index, who)?;
+        if width != 1 {
+            return Err(self.fail(format!("{who}: accessor {index} has {width} numbers an id")));
+        }
+        if accessor.count() == 0 {
+            return Ok(Vec::new());
+        }
+        let zeros = || vec![0; accessor.count()];
+        macro_rules! ids {
+            ($type:ty, $id:expr) => {
+                self.iter::<$type>(&accessor)
+                    .map_or_else(zeros, |all| all.map($id).collect())
+            };
+        }
+
+        Ok(match accessor.data_type() {
+            DataType::I8 => ids!(i8, |id| u32::try_from(id).unwrap_or(NO_INDEX)),
+            DataType::I16 => ids!(i16, |id| u32::try_from(id).unwrap_or(NO_INDEX)),
+            DataType::U8 | DataType::U16 | DataType::U32 => self.read_indices(index, who)?,
+            DataType::F32 => ids!(f32, id_of),
+        })
     }
 
     /// Returns the elements of a checked accessor that is not empty. Returns `None` if it has no data, so
@@ -207,6 +234,17 @@ impl GltfDocument {
             ))
         })?;
         Ok((bytes, stride))
+    }
+}
+
+/// Returns the id that a float is. Floats are exact up to 2²⁴.
+#[expect(clippy::cast_possible_truncation, reason = "the range is checked")]
+fn id_of(number: f32) -> u32 {
+    let rounded = number.round();
+    if (0.0..NO_INDEX as f32).contains(&rounded) {
+        rounded as u32
+    } else {
+        NO_INDEX
     }
 }
 

@@ -5,6 +5,7 @@ use crate::fs::quote::{count, quote};
 use crate::mesh::file::UpAxis;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::extensions::way_out;
+use crate::mesh::gltf::features::{FaceFeatures, FeatureObjects, Features, Triangles};
 use crate::mesh::gltf::material::{GltfLooks, default_linear, srgb_from_linear};
 use crate::mesh::gltf::scene::Instance;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
@@ -32,6 +33,7 @@ pub(crate) struct Builder<'a> {
     uv_starts: HashMap<(usize, usize), u32>,
     /// The node that is the object of each face.
     node_of_face: Vec<u32>,
+    features: FaceFeatures<'a>,
     notes: Notes,
 }
 
@@ -59,6 +61,7 @@ impl<'a> Builder<'a> {
     pub(crate) fn new(
         document: &'a GltfDocument,
         looks: &'a GltfLooks,
+        features: &'a Features<'a>,
         up: UpAxis,
         instances: &[Instance],
         offset: DVec3,
@@ -98,6 +101,7 @@ impl<'a> Builder<'a> {
             parts: MeshParts::default(),
             uv_starts: HashMap::new(),
             node_of_face: Vec::new(),
+            features: FaceFeatures::new(features),
             notes: Notes::default(),
         })
     }
@@ -110,6 +114,11 @@ impl<'a> Builder<'a> {
     /// Returns for each face so far the node that is its object.
     pub(crate) fn node_of_face(&self) -> &[u32] {
         &self.node_of_face
+    }
+
+    /// Returns the features of the faces so far that are objects. Adds what is no label to `warnings`.
+    pub(crate) fn features(&self, warnings: &mut Vec<String>) -> FeatureObjects {
+        self.features.objects(warnings)
     }
 
     /// Returns the positions of all face corners so far.
@@ -133,17 +142,17 @@ impl<'a> Builder<'a> {
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let who = format!("mesh {}{name}, primitive {p}", instance.mesh);
             self.notes.morphed += usize::from(primitive.targets.as_ref().is_some_and(|t| !t.is_empty()));
-            self.add_primitive(instance, primitive, &who, &mut shared)?;
+            self.add_primitive(instance, (p, primitive), &who, &mut shared)?;
         }
         self.node_of_face.resize(self.parts.faces.len(), instance.object);
         Ok(())
     }
 
-    /// Adds the triangles of a primitive.
+    /// Adds the triangles of a primitive, which comes with its number in the mesh.
     fn add_primitive(
         &mut self,
         instance: &Instance,
-        p: &Primitive,
+        (number, p): (usize, &Primitive),
         who: &str,
         shared: &mut Shared,
     ) -> Result<()> {
@@ -189,6 +198,15 @@ impl<'a> Builder<'a> {
                 .document
                 .fail(format!("{who}: vertex {bad} is not finite: {position}")));
         }
+
+        let of_primitive = Triangles {
+            mesh: instance.mesh.value(),
+            number,
+            primitive: p,
+            vertices: vertices.len(),
+            corners: &triangles,
+        };
+        self.features.add(&of_primitive, who);
 
         let uv_start = self.uv_start(p, vertices.len(), who)?;
         let normal_start = self.normal_start(instance, p, vertices.len(), who, shared)?;

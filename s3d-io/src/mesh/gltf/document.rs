@@ -10,6 +10,7 @@ use crate::fs::encoding::into_utf8;
 use crate::fs::open::read_file;
 use crate::fs::quote::quote;
 use crate::mesh::gltf::extensions::{MESHOPT, check_required};
+use crate::mesh::gltf::features::{FeatureAttributes, schema_uri};
 use crate::mesh::gltf::objects::NodeWords;
 use crate::mesh::gltf::tolerant::needed;
 use base64::Engine;
@@ -38,6 +39,7 @@ pub(crate) struct GltfDocument {
     exact_nodes: Vec<ExactNode>,
     /// The names of the nodes, and what their authors added.
     words: Vec<NodeWords>,
+    feature_attributes: FeatureAttributes,
 }
 
 /// The part of the JSON that is read before all of it.
@@ -103,6 +105,7 @@ impl GltfDocument {
         }
 
         let exact_nodes = exact_nodes(&root, text);
+        let feature_attributes = FeatureAttributes::of_document(&root, text);
         let json = gltf::Document::from_json_without_validation(root);
         let words = NodeWords::of_document(text);
         let mut document = Self {
@@ -112,6 +115,7 @@ impl GltfDocument {
             view_faults: HashMap::new(),
             exact_nodes,
             words,
+            feature_attributes,
         };
         // The binary chunk stays in the memory of the file, since it is most of the file.
         let blob = blob.map(|blob| {
@@ -153,6 +157,11 @@ impl GltfDocument {
     /// Returns what each node says of itself. There may be fewer of them than nodes.
     pub(crate) fn words(&self) -> &[NodeWords] {
         &self.words
+    }
+
+    /// Returns the attributes that hold feature ids.
+    pub(crate) fn feature_attributes(&self) -> &FeatureAttributes {
+        &self.feature_attributes
     }
 
     /// Returns the bytes of a buffer.
@@ -270,12 +279,13 @@ impl GltfDocument {
         }
     }
 
-    /// Returns the files of its buffers and images, if they exist.
+    /// Returns the files of its buffers, images and metadata, if they exist.
     pub(crate) fn companions(&self) -> Vec<PathBuf> {
         let buffers = self.root().buffers.iter().filter_map(|b| b.uri.as_deref());
         let images = self.root().images.iter().filter_map(|i| i.uri.as_deref());
         let files = buffers
             .chain(images)
+            .chain(schema_uri(self.root()))
             .filter(|uri| !uri.starts_with("data:") && !uri.contains("://"));
         files
             .map(|uri| self.beside(uri))
@@ -284,7 +294,7 @@ impl GltfDocument {
     }
 
     /// Returns the bytes that a URI names: the data in it, or the file beside this one.
-    fn resource(&self, uri: &str) -> std::result::Result<Vec<u8>, String> {
+    pub(crate) fn resource(&self, uri: &str) -> std::result::Result<Vec<u8>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
             let (kind, data) = data.split_once(',').ok_or("has no data")?;
             if !kind.ends_with(";base64") {

@@ -6,6 +6,7 @@ mod document;
 #[cfg(feature = "draco")]
 mod draco;
 mod extensions;
+mod features;
 mod filters;
 mod material;
 mod meshopt;

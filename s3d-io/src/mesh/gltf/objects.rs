@@ -1,18 +1,21 @@
-//! The objects that the nodes of a glTF file name: `chair|8` in scenes of ProcTHOR, `extras` of modellers and
-//! of tools for buildings, or else the plain names of nodes.
+//! The objects of a glTF file: features with a class; nodes such as `chair|8` in scenes of ProcTHOR, or with
+//! `extras` of modellers and of tools for buildings; or else the plain names of nodes.
 
 use crate::mesh::gltf::document::GltfDocument;
+use crate::mesh::gltf::features::FeatureObjects;
 use crate::mesh::labels::{LabelledObject, MeshLabels};
 use s3d_geom::NO_INDEX;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashMap;
 
-/// The keys of `extras` that hold a class, in the order of search, in lower case.
-const CLASS_KEYS: [&str; 8] =
+/// The keys of `extras`, and the properties of features, that hold a class, in the order of search, in lower
+/// case.
+pub(crate) const CLASS_KEYS: [&str; 8] =
     ["category", "class", "class_name", "label", "semantic", "semantic_label", "objecttype", "ifcclass"];
-/// The keys of `extras` that hold the number of an object, in lower case.
-const INSTANCE_KEYS: [&str; 6] = ["instance", "instance_id", "instanceid", "object_id", "objectid", "id"];
+/// The keys of `extras`, and the properties of features, that hold the number of an object, in lower case.
+pub(crate) const INSTANCE_KEYS: [&str; 6] =
+    ["instance", "instance_id", "instanceid", "object_id", "objectid", "id"];
 
 /// What a node says of itself.
 #[derive(Debug, Default, Deserialize)]
@@ -80,31 +83,52 @@ fn whole(value: &Value) -> Option<i64> {
     Some(number).filter(|number| *number >= 0)
 }
 
-/// Returns the objects of faces: `node_of_face` has for each face the node that is its object. If some nodes
-/// say their class on purpose, faces of other nodes belong to no object. Returns `None` if no node has a
-/// word.
-pub(crate) fn labels_of(document: &GltfDocument, node_of_face: &[u32]) -> Option<MeshLabels> {
+/// Returns the objects of faces: `node_of_face` has for each face the node that is its object. A feature is
+/// nearer to a face than its node, so it comes first. If there are features, or some nodes say their class on
+/// purpose, faces of other nodes belong to no object. Returns `None` if no feature and no node has a word.
+pub(crate) fn labels_of(
+    document: &GltfDocument,
+    node_of_face: &[u32],
+    features: &FeatureObjects,
+) -> Option<MeshLabels> {
     let words = document.words();
-    let some_are_labelled = words.iter().any(NodeWords::is_labelled);
+    let some_are_labelled = !features.features.is_empty() || words.iter().any(NodeWords::is_labelled);
 
-    // A node without a number is an object of its own: the numbers of such objects follow all others.
-    let counts_from = words
-        .iter()
-        .filter_map(|node| node.object()?.1)
+    // A feature or node without a number is an object of its own: the numbers of such objects follow all
+    // others.
+    let of_nodes = words.iter().filter_map(|node| node.object()?.1);
+    let of_features = features.features.iter().filter_map(|feature| feature.instance);
+    let features_from = of_nodes
+        .chain(of_features)
         .max()
         .map_or(0, |most| most.saturating_add(1));
+    let nodes_from = features_from.saturating_add(features.numbers);
 
-    let mut objects = Vec::new();
+    let mut objects: Vec<LabelledObject> = features
+        .features
+        .iter()
+        .map(|feature| LabelledObject {
+            class: feature.class.clone(),
+            instance: feature
+                .instance
+                .unwrap_or_else(|| features_from.saturating_add(feature.number)),
+            room: None,
+        })
+        .collect();
     let mut index: HashMap<u32, u32> = HashMap::new();
     let faces: Vec<u32> = node_of_face
         .iter()
-        .map(|&node| {
+        .enumerate()
+        .map(|(face, &node)| {
+            if let Some(&feature) = features.faces.get(face).filter(|feature| **feature != NO_INDEX) {
+                return feature;
+            }
             *index.entry(node).or_insert_with(|| {
                 let said = words
                     .get(node as usize)
                     .filter(|node| node.is_labelled() || !some_are_labelled);
                 let Some((class, number)) = said.and_then(NodeWords::object) else { return NO_INDEX };
-                let instance = number.unwrap_or_else(|| counts_from.saturating_add(i64::from(node)));
+                let instance = number.unwrap_or_else(|| nodes_from.saturating_add(i64::from(node)));
                 objects.push(LabelledObject { class, instance, room: None });
                 objects.len() as u32 - 1
             })

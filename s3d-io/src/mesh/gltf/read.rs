@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::mesh::file::{MeshFile, MeshOptions, UpAxis, checked_mesh};
 use crate::mesh::gltf::builder::Builder;
 use crate::mesh::gltf::document::GltfDocument;
+use crate::mesh::gltf::features::{Features, Schema};
 use crate::mesh::gltf::material::GltfLooks;
 use crate::mesh::gltf::objects::labels_of;
 use crate::mesh::gltf::scene::{Instance, Precision, instances};
@@ -29,9 +30,12 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
     let instances = instances(&document, Precision::OfFile, &mut warnings)?;
     let used = used_materials(&document, &instances)?;
     let looks = GltfLooks::load(&document, &used, &mut warnings)?;
+    let schema = Schema::read(&document, &mut warnings);
+    let features = Features::new(&document, &schema, &mut warnings);
 
     let build = |instances: &[Instance], offset_m: DVec3| {
-        let mut builder = Builder::new(&document, &looks, up, instances, frame.in_units(offset_m))?;
+        let mut builder =
+            Builder::new(&document, &looks, &features, up, instances, frame.in_units(offset_m))?;
         instances.iter().try_for_each(|instance| builder.add(instance))?;
         Ok::<_, Error>(builder)
     };
@@ -48,7 +52,8 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         }
     }
 
-    let labels = labels_of(&document, builder.node_of_face());
+    let features = builder.features(&mut warnings);
+    let labels = labels_of(&document, builder.node_of_face(), &features);
     let mut parts = builder.finish(&mut warnings);
     parts.face_tags = (0..parts.faces.len() as u32).collect();
     if parts.faces.is_empty() {
@@ -100,7 +105,7 @@ pub(crate) fn read(path: &Path, up: UpAxis) -> Result<MeshFile> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::image::texture::tests::two_pixels;
     use base64::Engine;
@@ -111,20 +116,24 @@ mod tests {
 
     /// A file under construction: accessors over one buffer, and the rest of the JSON.
     #[derive(Default)]
-    struct Fixture {
-        data: Vec<u8>,
+    pub(crate) struct Fixture {
+        pub(crate) data: Vec<u8>,
         views: Vec<String>,
-        accessors: Vec<String>,
+        pub(crate) accessors: Vec<String>,
     }
 
     impl Fixture {
-        fn accessor(&mut self, bytes: Vec<u8>, kind: &str, component: u32, count: usize) -> usize {
+        pub(crate) fn view(&mut self, bytes: Vec<u8>) -> usize {
             let offset = self.data.len();
             let length = bytes.len();
             self.data.extend(bytes);
-            let view = self.views.len();
             self.views
                 .push(format!(r#"{{"buffer": 0, "byteOffset": {offset}, "byteLength": {length}}}"#));
+            self.views.len() - 1
+        }
+
+        pub(crate) fn accessor(&mut self, bytes: Vec<u8>, kind: &str, component: u32, count: usize) -> usize {
+            let view = self.view(bytes);
             let normalized = if kind == "VEC3" && component == 5121 {
                 r#", "normalized": true"#
             } else {
@@ -137,12 +146,12 @@ mod tests {
             self.accessors.len() - 1
         }
 
-        fn floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
+        pub(crate) fn floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
             let bytes = values.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
             self.accessor(bytes, if N == 2 { "VEC2" } else { "VEC3" }, 5126, values.len())
         }
 
-        fn indices(&mut self, values: &[u16]) -> usize {
+        pub(crate) fn indices(&mut self, values: &[u16]) -> usize {
             self.accessor(values.iter().flat_map(|v| v.to_le_bytes()).collect(), "SCALAR", 5123, values.len())
         }
 
@@ -151,7 +160,7 @@ mod tests {
             self.floats(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
         }
 
-        fn json(&self, rest: &str) -> String {
+        pub(crate) fn json(&self, rest: &str) -> String {
             format!(
                 r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {},
                 "uri": "data:;base64,{}"}}],
@@ -164,7 +173,7 @@ mod tests {
         }
 
         /// Reads the file, Z-up, so that coordinates stay.
-        fn read(&self, rest: &str) -> Result<MeshFile> {
+        pub(crate) fn read(&self, rest: &str) -> Result<MeshFile> {
             let dir = tempfile::tempdir().unwrap();
             fs::write(dir.path().join("two words.png"), two_pixels([255, 188, 0], [0, 0, 255])).unwrap();
             let path = dir.path().join("a.gltf");
@@ -174,6 +183,40 @@ mod tests {
 
         fn error(&self, rest: &str) -> String {
             self.read(rest).unwrap_err().to_string()
+        }
+
+        /// Reads the file, whatever number stands for one of its numbers.
+        pub(crate) fn read_with_every_number_changed(&self, rest: &str) {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("a.gltf");
+            let json = self.json(rest);
+            let is_part = |c: char| c.is_ascii_digit();
+
+            let mut at = 0;
+            while let Some(start) = json[at..].find(is_part).map(|n| at + n) {
+                let end = json[start..].find(|c| !is_part(c)).map_or(json.len(), |n| start + n);
+                at = end;
+                // Digits in names and data stay.
+                if !json[..start].ends_with([' ', '[', ',']) {
+                    continue;
+                }
+                for other in [
+                    "0",
+                    "1",
+                    "3",
+                    "99",
+                    "4294967295",
+                    "4294967296",
+                    "18446744073709551615",
+                    "-1",
+                    "0.5",
+                    "1e40",
+                ] {
+                    let changed = format!("{}{other}{}", &json[..start], &json[end..]);
+                    fs::write(&path, changed).unwrap();
+                    let _ = super::read(&path, UpAxis::Z);
+                }
+            }
         }
     }
 
@@ -454,26 +497,6 @@ mod tests {
         );
 
         assert!(f.read(&rest).is_ok());
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.gltf");
-        let json = f.json(&rest);
-        let is_part = |c: char| c.is_ascii_digit();
-
-        let mut at = 0;
-        while let Some(start) = json[at..].find(is_part).map(|n| at + n) {
-            let end = json[start..].find(|c| !is_part(c)).map_or(json.len(), |n| start + n);
-            at = end;
-            // Digits in names and data stay.
-            if !json[..start].ends_with([' ', '[', ',']) {
-                continue;
-            }
-            for other in
-                ["0", "1", "3", "99", "4294967295", "4294967296", "18446744073709551615", "-1", "0.5", "1e40"]
-            {
-                let changed = format!("{}{other}{}", &json[..start], &json[end..]);
-                fs::write(&path, changed).unwrap();
-                let _ = super::read(&path, UpAxis::Z);
-            }
-        }
+        f.read_with_every_number_changed(&rest);
     }
 }

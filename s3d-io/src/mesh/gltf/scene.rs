@@ -129,13 +129,6 @@ pub(crate) fn instances(
     if coarser > 0 {
         warnings.push(format!("{} left out: coarser levels of others (MSFT_lod)", count(coarser, "node")));
     }
-    if has_unread_features(root) {
-        warnings.push(
-            "objects or classes of faces may be in EXT_mesh_features with EXT_structural_metadata, which are \
-             not read: names of nodes, and their extras, are"
-                .into(),
-        );
-    }
     if !unknown.is_empty() {
         warnings.push(format!("extensions of nodes and meshes that are not read: {}", unknown.join(", ")));
     }
@@ -163,21 +156,6 @@ fn roots(document: &GltfDocument) -> Result<Vec<Index<Node>>> {
         .filter(|(_, is_child)| !is_child)
         .map(|(n, _)| Index::new(n))
         .collect())
-}
-
-/// Returns whether features of meshes have properties, which may be labels.
-fn has_unread_features(root: &gltf::json::Root) -> bool {
-    let has_properties = root
-        .extensions
-        .as_ref()
-        .is_some_and(|e| e.others.contains_key("EXT_structural_metadata"));
-    let mut primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    has_properties
-        && primitives.any(|p| {
-            p.extensions
-                .as_ref()
-                .is_some_and(|e| e.others.contains_key("EXT_mesh_features"))
-        })
 }
 
 /// Checks the extensions of a mesh, once.

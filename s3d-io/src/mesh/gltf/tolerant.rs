@@ -62,7 +62,7 @@ const ROOT: &[(&str, Keep)] = &[
             ("extensions", All),
         ]),
     ),
-    ("extensions", Members(&[("CESIUM_RTC", All)])),
+    ("extensions", Members(&[("CESIUM_RTC", All), ("EXT_structural_metadata", All)])),
     ("extensionsUsed", All),
     ("images", Each(&[("bufferView", All), ("mimeType", Text), ("name", Text), ("uri", All)])),
     (

@@ -157,7 +157,7 @@ fn packing(view: &View) -> Option<(&'static str, &Value)> {
 }
 
 /// Reads a whole number, even if the JSON writes it as a decimal fraction.
-fn whole(value: &Value) -> Option<usize> {
+pub(crate) fn whole(value: &Value) -> Option<usize> {
     let float = || value.as_f64().filter(|v| v.fract() == 0.0 && (0.0..9e15).contains(v));
     let number = value.as_u64().or_else(|| float().map(|v| v as u64))?;
     usize::try_from(number).ok()
