@@ -109,7 +109,7 @@ impl Tile {
     fn of(at: Vec2) -> Option<Self> {
         let whole = at.floor();
         let is_tile = whole.x >= 0.0 && whole.y >= 0.0 && whole.x < ROW as f32 && whole.y <= LAST as f32;
-        is_tile.then(|| Self { row: whole.y as u32, column: whole.x as u32 })
+        is_tile.then_some(Self { row: whole.y as u32, column: whole.x as u32 })
     }
 
     fn number(self) -> u32 {
