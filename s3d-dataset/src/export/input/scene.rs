@@ -274,7 +274,12 @@ pub(super) fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
     if let Some(CameraSource::Listed { path, .. }) = &scene.cameras {
         files.push(path.clone());
     }
-    files.extend(scene.pictures.iter().map(|p| p.path.clone()));
+    // Pictures may be in the folder or the file that lists the locations.
+    if let Some(pictures) = &scene.pictures
+        && !files.contains(&pictures.path)
+    {
+        files.push(pictures.path.clone());
+    }
     files.extend(scene.taxonomy_file.clone());
     files
 }

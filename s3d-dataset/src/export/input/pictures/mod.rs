@@ -97,11 +97,15 @@ impl Pictures {
                 names += &format!("; and those of {more} more");
             }
 
-            let message = format!(
+            let mut message = format!(
                 "pictures of {count} of {of} locations are missing (rgb = \"{}\" in {}): {names}",
                 source.kind,
                 area.path.display()
             );
+            // A picture that is of no location may be one of the missing.
+            for warning in finder.warnings() {
+                message += &format!("; {warning}");
+            }
             return Err(FileError::format(&source.path, message).into());
         }
 
