@@ -6,7 +6,7 @@ use s3d_geom::{Camera, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::camera::{PosedCamera, read_picture};
 use s3d_io::scene::FrameSource;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// A photograph's pixels, and those of its mask: [`SHOWN`], or black.
 pub(crate) struct MaskedPicture {
@@ -112,15 +112,57 @@ pub(super) fn find_masks(
 }
 
 /// Returns the places of a photograph's mask in a folder: by its own name, or by the photograph's name with
-/// its ending exchanged or kept.
+/// its ending exchanged or kept. No name leads out of the folder, or a photograph would be its own mask.
 fn named_like(folder: &Path, camera: &PosedCamera, named: Option<&Path>) -> Vec<PathBuf> {
-    let name = Path::new(&camera.name);
-    let photo = camera.picture.as_ref().map_or(name, |picture| &picture.path);
+    let parts = Path::new(&camera.name).components();
+    let name: PathBuf = parts.filter(|part| matches!(part, Component::Normal(_))).collect();
+    let photo = camera.picture.as_ref().map_or(&name, |picture| &picture.path);
     let mut names: Vec<PathBuf> = named.and_then(Path::file_name).map(PathBuf::from).into_iter().collect();
-    for photo in [name, Path::new(photo.file_name().unwrap_or_default())] {
+    for photo in [name.as_path(), Path::new(photo.file_name().unwrap_or_default())] {
         let mut longer = photo.as_os_str().to_owned();
         longer.push(".png");
         names.extend([photo.with_extension("png"), longer.into(), photo.to_owned()]);
     }
     names.into_iter().map(|name| folder.join(name)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use s3d_geom::Pose;
+
+    /// Returns the places of the mask of a photograph that the list calls so.
+    fn places(name: &str, named: Option<&str>) -> Vec<String> {
+        let camera = PosedCamera {
+            name: name.to_owned(),
+            pose: Pose::level(DVec3::ZERO, 0.0),
+            size: None,
+            optics: None,
+            picture: Some(PathBuf::from("scan").join(name).into()),
+            mask: None,
+            line: 0,
+        };
+        let found = named_like(Path::new("masks"), &camera, named.map(Path::new));
+        found
+            .iter()
+            .map(|path| path.to_string_lossy().replace('\\', "/"))
+            .collect()
+    }
+
+    #[test]
+    fn no_name_leads_out_of_the_folder_of_masks() {
+        assert_eq!(places("a.jpg", None)[..3], ["masks/a.png", "masks/a.jpg.png", "masks/a.jpg"]);
+        assert_eq!(places("hall/a.jpg", None)[0], "masks/hall/a.png");
+        assert_eq!(places("a.jpg", Some("x/m.png"))[0], "masks/m.png");
+        for name in ["../images/a.png", "/data/images/a.png", "./../a.png"] {
+            let all = places(name, Some("/data/images/a.png"));
+            assert!(
+                all.iter()
+                    .all(|path| path.starts_with("masks/") && !path.contains("..")),
+                "{all:?}"
+            );
+            assert!(all.contains(&"masks/a.png".to_owned()), "{all:?}");
+        }
+    }
 }
