@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use s3d_geom::Pose;
 use s3d_geom::glam::{DMat3, DVec3, dvec2};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The longer side of a picture in the unit of `f`.
 const LONGER_SIDE: f64 = 36.0;
@@ -122,7 +122,7 @@ impl Row<'_> {
     }
 
     /// Returns the size of the picture. Returns `None` if it is not there.
-    fn size(&self, picture: &PathBuf) -> std::result::Result<Option<[u32; 2]>, String> {
+    fn size(&self, picture: &Path) -> std::result::Result<Option<[u32; 2]>, String> {
         if !picture.is_file() {
             return Ok(None);
         }
