@@ -4,7 +4,7 @@ use crate::fs::quote::quote;
 use crate::image::texture::{LoadedTexture, TextureFault, TextureFile, Together, decode_texture};
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::extensions::way_out;
-use crate::mesh::gltf::scene::index_of;
+use crate::mesh::gltf::words::index_of;
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index, texture};
 use rayon::prelude::*;

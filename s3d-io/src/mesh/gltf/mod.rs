@@ -15,3 +15,4 @@ pub(crate) mod read;
 mod scene;
 mod tolerant;
 mod unpack;
+mod words;

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::fs::quote::count;
 use crate::mesh::gltf::document::GltfDocument;
+use crate::mesh::gltf::words::index_of;
 use gltf::accessor::Item;
 use gltf::json::accessor::Accessor;
 use gltf::json::{Index, Mesh, Node};
@@ -202,14 +203,6 @@ fn all_instances(
 
 fn extension<'a>(node: &'a Node, name: &str) -> Option<&'a Value> {
     node.extensions.as_ref()?.others.get(name)
-}
-
-/// Reads an index, even if the JSON writes it as a decimal fraction.
-pub(crate) fn index_of(value: &Value) -> Option<u32> {
-    let number = value
-        .as_u64()
-        .or_else(|| value.as_f64().filter(|v| v.fract() == 0.0).map(|v| v as u64))?;
-    u32::try_from(number).ok()
 }
 
 /// Returns the nodes that replace others at a distance. Source: the extension MSFT_lod.

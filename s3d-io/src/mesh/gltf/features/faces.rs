@@ -4,9 +4,9 @@
 
 use crate::fs::quote::count;
 use crate::mesh::gltf::extensions::DRACO;
-use crate::mesh::gltf::features::{Features, MESH_FEATURES, METADATA, SentenceResult, no_labels, sets_of};
-use crate::mesh::gltf::scene::index_of;
+use crate::mesh::gltf::features::{Features, SentenceResult, no_labels};
 use crate::mesh::gltf::unpack::whole;
+use crate::mesh::gltf::words::{MESH_FEATURES, METADATA, index_of, sets_of};
 use gltf::json::Index;
 use gltf::json::accessor::Accessor;
 use gltf::json::mesh::Primitive;

@@ -15,61 +15,18 @@ pub(crate) use faces::{FaceFeatures, FeatureObjects, Triangles};
 use crate::fs::quote::quote;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::features::table::{Table, names_of, tells_classes};
-use crate::mesh::gltf::objects::CLASS_KEYS;
-use crate::mesh::gltf::scene::index_of;
-use gltf::json::mesh::Primitive;
-use gltf::json::{Node, Root};
-use serde::Deserialize;
+use crate::mesh::gltf::words::{CLASS_KEYS, MESH_FEATURES, METADATA, index_of, schema_uri, sets_of};
+use gltf::json::Node;
 use serde_json::Value;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
-const MESH_FEATURES: &str = "EXT_mesh_features";
-const METADATA: &str = "EXT_structural_metadata";
 const INSTANCE_FEATURES: &str = "EXT_instance_features";
 /// The most properties that a warning names.
 const MAX_NAMES: usize = 12;
 
 /// The error is a sentence that names what is damaged.
 type SentenceResult<T> = Result<T, String>;
-
-/// The accessors of attributes such as `_FEATURE_ID_0`, by mesh, primitive and name. The gltf crate forgets
-/// attributes that glTF itself does not name.
-#[derive(Debug, Default)]
-pub(crate) struct FeatureAttributes(HashMap<(usize, usize, String), u32>);
-
-impl FeatureAttributes {
-    /// Finds the attributes in the JSON. Returns none if no primitive has features.
-    pub(crate) fn of_document(root: &Root, text: &[u8]) -> Self {
-        #[derive(Deserialize)]
-        struct Meshes {
-            meshes: Vec<Primitives>,
-        }
-        #[derive(Deserialize)]
-        struct Primitives {
-            primitives: Vec<Attributes>,
-        }
-        #[derive(Deserialize)]
-        struct Attributes {
-            attributes: BTreeMap<String, Value>,
-        }
-        let mut primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-        if !primitives.any(|p| sets_of(p).is_some()) {
-            return Self::default();
-        }
-
-        let meshes = serde_json::from_slice(text).map_or_else(|_| Vec::new(), |all: Meshes| all.meshes);
-        let mut found = HashMap::new();
-        for (m, mesh) in meshes.into_iter().enumerate() {
-            for (p, primitive) in mesh.primitives.into_iter().enumerate() {
-                let ids = primitive.attributes.into_iter();
-                let ids = ids.filter(|(name, _)| name.starts_with("_FEATURE_ID_"));
-                found.extend(ids.filter_map(|(name, index)| Some(((m, p, name), index_of(&index)?))));
-            }
-        }
-        Self(found)
-    }
-}
 
 /// The schema of a file's metadata: which properties there are, and what their values mean.
 pub(crate) struct Schema<'a>(Option<Cow<'a, Value>>);
@@ -104,20 +61,8 @@ impl<'a> Schema<'a> {
     }
 }
 
-/// Returns the URI of the schema, if it is beside the file.
-pub(crate) fn schema_uri(root: &Root) -> Option<&str> {
-    let metadata = root.extensions.as_ref()?.others.get(METADATA)?;
-    metadata.get("schemaUri")?.as_str()
-}
-
 fn metadata(document: &GltfDocument) -> Option<&Value> {
     document.root().extensions.as_ref()?.others.get(METADATA)
-}
-
-/// Returns the sets of feature ids of a primitive.
-fn sets_of(p: &Primitive) -> Option<&Vec<Value>> {
-    let features = p.extensions.as_ref()?.others.get(MESH_FEATURES)?;
-    features.get("featureIds")?.as_array()
 }
 
 /// The property tables of a file that tell classes.

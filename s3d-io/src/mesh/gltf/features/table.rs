@@ -4,9 +4,8 @@
 
 use crate::fs::quote::quote;
 use crate::mesh::gltf::document::GltfDocument;
-use crate::mesh::gltf::objects::{CLASS_KEYS, INSTANCE_KEYS};
-use crate::mesh::gltf::scene::index_of;
 use crate::mesh::gltf::unpack::whole;
+use crate::mesh::gltf::words::{CLASS_KEYS, INSTANCE_KEYS, index_of};
 use gltf::json::Index;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
