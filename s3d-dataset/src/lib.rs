@@ -9,9 +9,9 @@
 //! | [`export`](mod@export), [`options`] | turn scenes into a data set, on one machine or many |
 //! | [`info`](mod@info) | tells what a scene holds and what looks wrong, before it is exported |
 //! | [`verify`](mod@verify) | reads a data set back, every pixel of it |
-//! | [`compare`](mod@compare), [`statistics`](mod@statistics) | tell what differs between two data sets; count one |
+//! | [`compare`](mod@compare), [`statistics`](mod@statistics) | say how two data sets differ; count one |
 //! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz) | write what trainers and loaders read |
-//! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: scan locations, pictures, points |
+//! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: locations, pictures, points |
 //! | [`store`], [`parallel`] | for crates that write results of their own beside a data set |
 //! | [`error`], [`event`], [`summary`] | what a call answers, and what it tells on its way |
 //!

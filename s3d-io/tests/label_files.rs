@@ -312,7 +312,8 @@ fn gltf(nodes: &[String], colors: Option<&[[u8; 3]; 9]>) -> String {
         )
     });
     format!(
-        r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}, "uri": "data:;base64,{}"}}], {looks}
+        r#"{{"asset": {{"version": "2.0"}},
+        "buffers": [{{"byteLength": {}, "uri": "data:;base64,{}"}}], {looks}
         "bufferViews": [{}], "accessors": [{}], "meshes": [{}], "nodes": [{}]}}"#,
         bytes.len(),
         base64(&bytes),

@@ -146,16 +146,16 @@ impl InputError {
             ),
             Self::Labels { why } | Self::NoSpace { why } => why.clone(),
             Self::TooManyLabels { labels, most } => format!(
-                "{labels} labels are more than {most}: loaders of the data set take a label's index from G and \
-                 B of a pixel alone, and a pixel with an R for one without a label; export the areas in \
-                 several data sets"
+                "{labels} labels are more than {most}: loaders of the data set take a label's index from G \
+                 and B of a pixel alone, and a pixel with an R for one without a label; export the areas \
+                 in several data sets"
             ),
             Self::TooManyPoints { points, points_per_m2: None, most } => format!(
                 "{points:.1e} points are more than {most:.0e}: is the mesh in metres? or ask for fewer"
             ),
             Self::TooManyPoints { points, points_per_m2: Some(density), most } => format!(
-                "{density} points a m² on {:.1} m² are {points:.1e} points, more than {most:.0e}: is the mesh \
-                 in metres? or lower {}",
+                "{density} points a m² on {:.1} m² are {points:.1e} points, more than {most:.0e}: is the \
+                 mesh in metres? or lower {}",
                 points / density,
                 names.option("points_per_m2", None)
             ),

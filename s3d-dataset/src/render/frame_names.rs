@@ -47,15 +47,7 @@ mod tests {
         let mut cameras = Vec::new();
         for name in list {
             let name = (*name).to_owned();
-            cameras.push(PosedCamera {
-                name,
-                pose,
-                size: None,
-                optics: None,
-                picture: None,
-                mask: None,
-                line: 0,
-            });
+            cameras.push(PosedCamera::new(name, pose));
         }
         frame_names(&cameras)
     }

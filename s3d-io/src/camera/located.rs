@@ -131,7 +131,7 @@ mod tests {
 
     fn picture(name: &str, x: f64, pitch: f64) -> PosedCamera {
         let pose = Pose::from_scanner(dvec3(x, 0.0, 1.5), DQuat::from_rotation_z(0.3)).turned(0.0, pitch);
-        PosedCamera { name: name.into(), pose, size: None, optics: None, picture: None, mask: None, line: 0 }
+        PosedCamera::new(name, pose)
     }
 
     #[test]

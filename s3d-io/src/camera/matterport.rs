@@ -309,6 +309,23 @@ pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
         .map_err(|(number, message)| Error::line(name, lines.get(number).copied().unwrap_or(1), message))
 }
 
+/// Reads a pose like [`read_capture_pose`]. Returns `None` if it holds an infinity or NaN: programs mark poses
+/// so that they do not know.
+pub(crate) fn read_known_pose(path: &Path) -> Result<Option<Pose>> {
+    let bytes = read_file(path)?;
+    let text = text_of(&bytes, path)?;
+    let words = text
+        .split(u8::is_ascii_whitespace)
+        .filter_map(|word| std::str::from_utf8(word).ok());
+    let is_unknown = words
+        .filter_map(|word| word.parse::<f64>().ok())
+        .any(|number| !number.is_finite());
+    if is_unknown {
+        return Ok(None);
+    }
+    parse_capture_pose(&bytes, path).map(Some)
+}
+
 /// Returns the pose of a 4×4 matrix, row by row, from the camera (x right, y down, z forward) to the world.
 /// The error is the index of the number at fault, and a sentence.
 pub(crate) fn pose_of_matrix(m: &[f64; 16]) -> std::result::Result<Pose, (usize, String)> {

@@ -146,6 +146,12 @@ pub enum IntrinsicsError {
 }
 
 impl PosedCamera {
+    /// Returns a camera of which only the name and the pose are known.
+    pub fn new(name: impl Into<String>, pose: Pose) -> Self {
+        let name = name.into();
+        Self { name, pose, size: None, optics: None, picture: None, mask: None, line: 0 }
+    }
+
     /// Returns the camera that takes the picture, without the distortion of its lens.
     ///
     /// `given` goes before what the list says. If only a size is given, the picture is scaled to it, with its
@@ -282,7 +288,7 @@ mod tests {
 
     fn posed(size: Option<[u32; 2]>, optics: Option<Optics>) -> PosedCamera {
         let pose = Pose::level(DVec3::ONE, 0.3);
-        PosedCamera { name: "a".into(), pose, size, optics, picture: None, mask: None, line: 0 }
+        PosedCamera { size, optics, ..PosedCamera::new("a", pose) }
     }
 
     const PHONE: Optics = Optics::Pinhole {

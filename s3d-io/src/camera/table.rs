@@ -301,7 +301,7 @@ impl Row<'_> {
 
         let pose = self.pose(at)?;
         let (size, optics) = self.intrinsics()?;
-        Ok(PosedCamera { name, pose, size, optics, picture: None, mask: None, line })
+        Ok(PosedCamera { size, optics, line, ..PosedCamera::new(name, pose) })
     }
 
     /// Returns the pose of the camera, which is at `at`.

@@ -383,15 +383,7 @@ mod tests {
     /// Returns the chosen ones of ten cameras, which are named 0 to 9.
     fn chosen(every: u32, max: Option<u32>) -> Vec<String> {
         let pose = Pose::level(DVec3::ZERO, 0.0);
-        let cameras = (0..10).map(|i| PosedCamera {
-            name: i.to_string(),
-            pose,
-            size: None,
-            optics: None,
-            picture: None,
-            mask: None,
-            line: 0,
-        });
+        let cameras = (0..10).map(|i| PosedCamera::new(i.to_string(), pose));
         choose(cameras.collect(), &source(every, max))
             .into_iter()
             .map(|c| c.name)

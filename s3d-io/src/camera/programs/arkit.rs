@@ -118,15 +118,7 @@ pub(crate) fn read(
 
 /// Returns a camera at each pose.
 fn unpictured(poses: Vec<TimedPose>) -> Vec<PosedCamera> {
-    let camera = |TimedPose { name, pose, line, .. }| PosedCamera {
-        name,
-        pose,
-        size: None,
-        optics: None,
-        picture: None,
-        mask: None,
-        line,
-    };
+    let camera = |TimedPose { name, pose, line, .. }| PosedCamera { line, ..PosedCamera::new(name, pose) };
     poses.into_iter().map(camera).collect()
 }
 

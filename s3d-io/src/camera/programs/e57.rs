@@ -72,15 +72,8 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
             let message = format!("scan {number}, counted from 0, has a pose without a rotation: {q:?}");
             return Err(Error::format(path, message));
         };
-        places.push(PosedCamera {
-            name: scan_name(number, scan),
-            pose: Pose::from_scanner(dvec3(t.x, t.y, t.z), rotation),
-            size: None,
-            optics: None,
-            picture: None,
-            mask: None,
-            line: 0,
-        });
+        let pose = Pose::from_scanner(dvec3(t.x, t.y, t.z), rotation);
+        places.push(PosedCamera::new(scan_name(number, scan), pose));
     }
 
     if places.is_empty() {

@@ -227,7 +227,7 @@ impl List<'_, '_> {
         let size = self.size(*sensor)?;
         let optics = Some(self.optics(*sensor, size)?);
         let pose = pose_from_opencv(location, turn.x_axis, turn.y_axis, turn.z_axis);
-        Ok(PosedCamera { name, pose, size: Some(size), optics, picture: None, mask: None, line: 0 })
+        Ok(PosedCamera { size: Some(size), optics, ..PosedCamera::new(name, pose) })
     }
 
     /// Returns the width and height of a sensor's pictures.

@@ -69,15 +69,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
         let pose = square(&transform_matrix)
             .and_then(|rows| Pose::from_opengl(unscaled(rows)).map_err(|e| e.to_string()))
             .map_err(|message| at_frame(path, i, &name, &format!("transform_matrix: {message}")))?;
-        pictures.push(PosedCamera {
-            name,
-            pose,
-            size: None,
-            optics: None,
-            picture: None,
-            mask: None,
-            line: 0,
-        });
+        pictures.push(PosedCamera::new(name, pose));
     }
     Ok(pictures)
 }

@@ -1,13 +1,12 @@
 //! The poses of a scan as ScanNet exports its `.sens` files: `pose/0.txt` …, camera → world, and
 //! `intrinsic/intrinsic_color.txt`. Source: ScanNet's README, "SensReader".
 
-use crate::camera::matterport::{numbers, parse_capture_pose};
+use crate::camera::matterport::{numbers, read_known_pose};
 use crate::camera::numbered::{NumberedFiles, numbered_files};
 use crate::camera::picture::read_picture_size;
 use crate::camera::picture_file::PictureFile;
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
-use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use s3d_geom::glam::dvec2;
 use std::path::{Path, PathBuf};
@@ -42,13 +41,11 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
     let mut read: Vec<PathBuf> = optics.iter().map(|_| intrinsics.clone()).collect();
 
     for (number, path) in files {
-        let bytes = read_file(&path)?;
         read.push(path.clone());
-        if is_unknown(&text_of(&bytes, &path)?) {
+        let Some(pose) = read_known_pose(&path)? else {
             untracked += 1;
             continue;
-        }
-        let pose = parse_capture_pose(&bytes, &path)?;
+        };
         let picture = ["jpg", "png"].map(|ending| scan.join("color").join(format!("{number}.{ending}")));
         let picture = picture.into_iter().find(|path| path.is_file()).map(PictureFile::from);
         let name = number.to_string();
@@ -63,16 +60,6 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
             .for_each(|camera| camera.size = Some([width, height]));
     }
     Ok((cameras, untracked, read))
-}
-
-/// Returns whether a matrix holds an infinity or NaN.
-pub(crate) fn is_unknown(bytes: &[u8]) -> bool {
-    let words = bytes
-        .split(u8::is_ascii_whitespace)
-        .filter_map(|word| std::str::from_utf8(word).ok());
-    words
-        .filter_map(|word| word.parse::<f64>().ok())
-        .any(|number| !number.is_finite())
 }
 
 /// Reads the optics from the file of an intrinsic matrix K.

@@ -3,11 +3,11 @@
 //!
 //! A pose is camera → world in OpenCV's axes, 4 × 4, of the colour camera itself.
 
-use crate::camera::matterport::parse_capture_pose;
+use crate::camera::matterport::read_known_pose;
 use crate::camera::numbered::{NumberedFiles, numbered_between};
 use crate::camera::picture::read_picture_size;
 use crate::camera::posed::{Optics, PosedCamera};
-use crate::camera::programs::scannet::{is_unknown, optics_of_matrix};
+use crate::camera::programs::scannet::optics_of_matrix;
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
@@ -56,14 +56,11 @@ pub(crate) fn read(files: NumberedFiles) -> Result<(Vec<PosedCamera>, usize, Vec
     let mut cameras = Vec::new();
     let mut untracked = 0;
     for (_, path) in files {
-        let bytes = read_file(&path)?;
         read.push(path.clone());
-        if is_unknown(&text_of(&bytes, &path)?) {
+        let Some(pose) = read_known_pose(&path)? else {
             untracked += 1;
             continue;
-        }
-
-        let pose = parse_capture_pose(&bytes, &path)?;
+        };
         let file = path.file_name().unwrap_or_default().to_string_lossy();
         let name = file.strip_suffix(POSE).unwrap_or(&file).to_owned();
         let [jpeg, png] = PICTURES.map(|ending| path.with_file_name(format!("{name}{ending}")));

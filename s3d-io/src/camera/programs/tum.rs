@@ -42,7 +42,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
         let turn = DMat3::from_quat(rotation([qx, qy, qz, qw]).map_err(fault)?);
         let pose = pose_from_opencv(DVec3::new(x, y, z), turn.x_axis, turn.y_axis, turn.z_axis);
         let name = (*name).to_owned();
-        cameras.push(PosedCamera { name, pose, size: None, optics: None, picture: None, mask: None, line });
+        cameras.push(PosedCamera { line, ..PosedCamera::new(name, pose) });
     }
     Ok(cameras)
 }

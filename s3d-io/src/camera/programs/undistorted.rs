@@ -150,15 +150,8 @@ impl List {
             return Err(format!("{} is listed twice", quote(name.as_bytes())));
         }
 
-        let camera = PosedCamera {
-            name: name.to_owned(),
-            pose,
-            size: Some(SIZE),
-            optics: self.optics,
-            picture: None,
-            mask: None,
-            line,
-        };
+        let camera =
+            PosedCamera { size: Some(SIZE), optics: self.optics, line, ..PosedCamera::new(name, pose) };
         self.cameras.push(camera);
         Ok(())
     }

@@ -177,7 +177,7 @@ fn cut_off(path: &Path, picture: u64) -> Error {
 }
 
 fn picture(name: String, pose: Pose, line: u64) -> PosedCamera {
-    PosedCamera { name, pose, size: None, optics: None, picture: None, mask: None, line }
+    PosedCamera { line, ..PosedCamera::new(name, pose) }
 }
 
 /// Takes the next `N` bytes.
