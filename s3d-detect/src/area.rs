@@ -1,7 +1,7 @@
 //! An area of a data set, as the detector reads it.
 
 use crate::error::{Error, Result};
-use crate::surfel::{Surfel, surfels_of};
+use crate::surfel::{Part, Surfel, surfels_of_parts};
 use glam::Vec3;
 use rayon::prelude::*;
 use s3d_dataset::{Context, DataSet};
@@ -47,7 +47,7 @@ pub struct Element {
 pub struct Area {
     /// Its number.
     pub number: u32,
-    /// Its points, thinned room by room.
+    /// Its points, thinned. The rooms of the annotation have no part in it.
     pub surfels: Vec<Surfel>,
     /// The names of its rooms.
     pub rooms: Vec<String>,
@@ -78,12 +78,11 @@ impl Area {
         let rooms = tree.rooms.par_iter().enumerate().map(|(index, room)| {
             ctx.check()?;
             let name = room.room.to_string();
-            let surfels =
-                surfels_of(&read_points(data, &room.path.join(format!("{name}.txt")))?, index as u32);
+            let points = read_points(data, &room.path.join(format!("{name}.txt")))?;
             progress.add(1);
-            Ok((name, surfels))
+            Ok((name, Part::of(&points, index as u32)))
         });
-        let (mut rooms, surfels): (Vec<String>, Vec<Vec<Surfel>>) =
+        let (mut rooms, parts): (Vec<String>, Vec<Part>) =
             rooms.collect::<Result<Vec<_>>>()?.into_iter().unzip();
 
         let mut elements = Vec::new();
@@ -103,7 +102,7 @@ impl Area {
             });
             elements.push(Element { class, room: room as u32, bbox });
         }
-        Ok(Self { number, surfels: surfels.concat(), rooms, elements })
+        Ok(Self { number, surfels: surfels_of_parts(parts), rooms, elements })
     }
 }
 

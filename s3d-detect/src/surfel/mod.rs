@@ -30,7 +30,7 @@ pub struct Surfel {
 }
 
 /// Sums over the points of a cell, about the cell's corner.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Sums {
     key: [i32; 3],
     count: f64,
@@ -39,14 +39,65 @@ struct Sums {
     squares: [f64; 6],
     color: DVec3,
     extent: Aabb,
+    /// The room with the most of its points, and how many these are.
+    room: (u32, f64),
 }
 
-/// Thins the points of the room with this number. Surfels are ordered by cell: z, then y, then x. The order
-/// of the points changes the last bits of sums at most.
+/// Thins the points of the room with this number; [`surfels_of_parts`] thins several rooms.
 ///
 /// # Panics
 /// If the cloud has no colours.
 pub fn surfels_of(points: &PointCloud, room: u32) -> Vec<Surfel> {
+    surfels_of_parts([Part::of(points, room)])
+}
+
+/// Some points of an area, summed up by cell.
+#[derive(Clone, Debug)]
+pub struct Part(Vec<Sums>);
+
+impl Part {
+    /// Sums up the points of the room with this number.
+    ///
+    /// # Panics
+    /// If the cloud has no colours.
+    pub fn of(points: &PointCloud, room: u32) -> Self {
+        Self(cells_of(points, room))
+    }
+}
+
+/// Thins the points of all parts together. A cell with points of several rooms has one surfel, and the room
+/// of most of its points; the first part wins a tie. Surfels are ordered by cell: z, then y, then x. The
+/// division into parts and the order of the points change the last bits of sums at most.
+pub fn surfels_of_parts(parts: impl IntoIterator<Item = Part>) -> Vec<Surfel> {
+    let mut pieces: Vec<Sums> = parts.into_iter().flat_map(|part| part.0).collect();
+    pieces.sort_by_key(|piece| order(piece.key));
+
+    let mut cells: Vec<Sums> = Vec::new();
+    for piece in pieces {
+        match cells.last_mut().filter(|cell| cell.key == piece.key) {
+            Some(cell) => cell.add(&piece),
+            None => cells.push(piece),
+        }
+    }
+    with_normals(&cells)
+}
+
+impl Sums {
+    /// Adds further points of the same cell.
+    fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        self.sum += other.sum;
+        self.squares.iter_mut().zip(other.squares).for_each(|(s, o)| *s += o);
+        self.color += other.color;
+        self.extent = self.extent.union(other.extent);
+        if other.room.1 > self.room.1 {
+            self.room = other.room;
+        }
+    }
+}
+
+/// Sums up the points of a room by cell, in the order of cells.
+fn cells_of(points: &PointCloud, room: u32) -> Vec<Sums> {
     assert_eq!(points.colors.len(), points.len(), "a colour a point");
     let mut order: Vec<([i32; 3], u32)> = Vec::with_capacity(points.len());
     order.extend(points.positions.iter().zip(0..).map(|(&p, i)| {
@@ -65,6 +116,7 @@ pub fn surfels_of(points: &PointCloud, room: u32) -> Vec<Surfel> {
                 squares: [0.0; 6],
                 color: DVec3::ZERO,
                 extent: Aabb::EMPTY,
+                room: (room, 0.0),
             });
         }
         let Some(cell) = cells.last_mut() else { continue };
@@ -73,13 +125,14 @@ pub fn surfels_of(points: &PointCloud, room: u32) -> Vec<Surfel> {
         let color = points.colors[i as usize];
         let p = point.as_dvec3() - corner(cell.key);
         cell.count += 1.0;
+        cell.room.1 += 1.0;
         cell.sum += p;
         let products = [p.x * p.x, p.x * p.y, p.x * p.z, p.y * p.y, p.y * p.z, p.z * p.z];
         cell.squares.iter_mut().zip(products).for_each(|(s, p)| *s += p);
         cell.color += DVec3::from(color.map(f64::from)) / 255.0;
         cell.extent = cell.extent.with(point);
     }
-    with_normals(&cells, room)
+    cells
 }
 
 /// Returns the least corner of a cell.
@@ -92,7 +145,7 @@ const COMPONENTS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2),
 
 /// Returns the surfels of cells, which are in order. The 27 cells around a cell are 9 runs of neighbours
 /// along x. From one cell to the next, the start of each run only moves on.
-fn with_normals(cells: &[Sums], room: u32) -> Vec<Surfel> {
+fn with_normals(cells: &[Sums]) -> Vec<Surfel> {
     let mut starts = [0usize; 9];
     let mut surfels = Vec::with_capacity(cells.len());
     for cell in cells {
@@ -132,7 +185,7 @@ fn with_normals(cells: &[Sums], room: u32) -> Vec<Surfel> {
             normal: normal.as_vec3(),
             curvature: curvature as f32,
             color: (cell.color / cell.count).as_vec3(),
-            room,
+            room: cell.room.0,
         });
     }
     surfels
@@ -228,6 +281,26 @@ mod tests {
         let two = surfels_of(&cloud(vec![vec3(-3.0, 0.0, 0.0), vec3(7.0, 1.0, 2.0)]), 5);
         assert_eq!((two.len(), two[1].room), (2, 5));
         assert!(surfels_of(&PointCloud::default(), 0).is_empty());
+    }
+
+    #[test]
+    fn rooms_do_not_change_the_surfels() {
+        let points: Vec<Vec3> = (0..3000u32)
+            .map(|i| vec3((i % 60) as f32 * 0.011, (i / 60) as f32 * 0.013, 0.2))
+            .collect();
+        let whole = surfels_of(&cloud(points.clone()), 0);
+        // The border between the rooms goes through cells.
+        let of_room = |room: u32| {
+            let of_room = points.iter().filter(|p| u32::from(p.x > 0.28) == room);
+            Part::of(&cloud(of_room.copied().collect()), room)
+        };
+        let rooms = surfels_of_parts([of_room(0), of_room(1)]);
+        assert_eq!(rooms.len(), whole.len());
+        for (a, b) in rooms.iter().zip(&whole) {
+            assert_eq!(a.extent, b.extent);
+            assert!((a.position - b.position).length() < 1e-6 && a.normal.dot(b.normal).abs() > 0.9999);
+            assert_eq!(a.room, u32::from(a.position.x > 0.28), "{a:?}");
+        }
     }
 
     #[test]
