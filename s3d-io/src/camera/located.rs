@@ -116,12 +116,21 @@ pub(crate) fn rotation_of_axis_angle(axis: DVec3) -> DQuat {
     DQuat::from_xyzw(v.x, v.y, v.z, cos)
 }
 
-/// Returns the rotation of a quaternion x y z w of any length. The error is a sentence.
+/// How far the length of a quaternion may be from 1. Two decimals are enough for that; angles, or columns in
+/// another order, are farther off.
+const LENGTH_SLACK: f64 = 0.05;
+
+/// Returns the rotation of a quaternion x y z w. The error is a sentence: its length is not 1.
 pub(crate) fn rotation(xyzw: [f64; 4]) -> std::result::Result<DQuat, String> {
-    let q = DVec4::from_array(xyzw)
-        .try_normalize()
-        .ok_or("the quaternion has no length")?;
-    Ok(DQuat::from_vec4(q))
+    let q = DVec4::from_array(xyzw);
+    let length = q.length();
+    if length.is_nan() || (length - 1.0).abs() > LENGTH_SLACK {
+        return Err(format!(
+            "the quaternion {xyzw:?} (x y z w) has the length {length:.3} and not 1: are the columns in this \
+             order, and no angles?"
+        ));
+    }
+    Ok(DQuat::from_vec4(q / length))
 }
 
 #[cfg(test)]
@@ -132,6 +141,17 @@ mod tests {
     fn picture(name: &str, x: f64, pitch: f64) -> PosedCamera {
         let pose = Pose::from_scanner(dvec3(x, 0.0, 1.5), DQuat::from_rotation_z(0.3)).turned(0.0, pitch);
         PosedCamera::new(name, pose)
+    }
+
+    #[test]
+    fn quaternions_have_a_length_of_one() {
+        // Two decimals.
+        let q = rotation([0.0, 0.0, 0.71, 0.71]).unwrap();
+        assert!((q.length() - 1.0).abs() < 1e-12 && (q.z - q.w).abs() < 1e-12);
+        for wrong in [[0.0; 4], [0.0, 0.0, 90.0, 0.5], [f64::NAN, 0.0, 0.0, 1.0], [1.0, 1.0, 0.0, 0.0]] {
+            let e = rotation(wrong).unwrap_err();
+            assert!(e.contains("not 1: are the columns"), "{e}");
+        }
     }
 
     #[test]

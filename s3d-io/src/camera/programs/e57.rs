@@ -1,6 +1,7 @@
 //! The places of the scans of an E57 file. Source: ASTM E2807, "pose": from the frame of a scan to the frame
 //! of the file.
 
+use crate::camera::located::rotation;
 use crate::camera::posed::PosedCamera;
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
@@ -49,9 +50,7 @@ pub(crate) fn scan_name(number: usize, scan: &PointCloud) -> String {
 
 /// Returns the rotation of a pose. Returns `None` if the four numbers are none.
 pub(crate) fn rotation_of(q: &Quaternion) -> Option<DQuat> {
-    let rotation = DQuat::from_xyzw(q.x, q.y, q.z, q.w);
-    let is_rotation = rotation.is_finite() && rotation.length() >= 0.5;
-    is_rotation.then(|| rotation.normalize())
+    rotation([q.x, q.y, q.z, q.w]).ok()
 }
 
 /// Reads where the scanner stood. A scan has the name of its guid without hyphens, which is a uuid, or else

@@ -97,7 +97,7 @@ mod tests {
             ("1 0 0 x 0 0 0 1", "a line of a trajectory"),
             ("one 0 0 0 0 0 0 1", "a line of a trajectory"),
             ("1 0 0 inf 0 0 0 1", "line 2: a number of the pose"),
-            ("1 0 0 0 0 0 0 0", "line 2: the quaternion has no length"),
+            ("1 0 0 0 0 0 0 0", "line 2: the quaternion [0.0, 0.0, 0.0, 0.0] (x y z w) has the length 0.000"),
         ] {
             let e = read(Path::new("t"), format!("1 0 0 0 0 0 0 1\n{line}\n").as_bytes()).unwrap_err();
             assert!(e.to_string().contains(words), "{e}");

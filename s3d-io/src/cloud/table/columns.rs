@@ -41,7 +41,7 @@ pub(crate) const CLASSES: [&str; 21] = [
     "object_class",
 ];
 /// Names of columns of instance numbers.
-pub(crate) const INSTANCES: [&str; 15] = [
+pub(crate) const INSTANCES: [&str; 21] = [
     "instance",
     "instance_id",
     "instance_label",
@@ -49,6 +49,12 @@ pub(crate) const INSTANCES: [&str; 15] = [
     "instance_gt",
     "instances",
     "ins_label",
+    "ins_labels",
+    "ins",
+    "inst",
+    "inst_id",
+    "inst_label",
+    "inst_labels",
     "instanceid",
     "object_id",
     "objectid",
@@ -165,6 +171,7 @@ mod tests {
         let arrays = found("coord[0] coord[1] coord[2] color[0] color[1] color[2] segment");
         assert_eq!((arrays.position, arrays.color), ([0, 1, 2], Some([3, 4, 5])));
         assert_eq!((arrays.class, arrays.instance), (6, None));
+        assert_eq!(found("x y z sem inst label").instance, Some(4));
         assert_eq!(found("x y z class label").class, 3);
         assert_eq!(found("x y z Label label").class, 4);
     }

@@ -40,6 +40,7 @@ impl Gathered {
         tags: &mut CloudTags,
         warnings: &mut Vec<String>,
     ) -> Result<Option<usize>> {
+        let mut without_instances: Vec<&Path> = Vec::new();
         for ((file, cloud), colors) in clouds.iter().enumerate().zip(colors) {
             let path = cloud.path();
             let mut sink = |rows: &Rows| self.add(file, path, rows, options.points_in_memory);
@@ -52,6 +53,9 @@ impl Gathered {
 
             let skipped = std::mem::take(&mut reading.skipped);
             let farthest_m = reading.farthest_m;
+            if !reading.has_instances {
+                without_instances.push(path);
+            }
             warnings.append(&mut reading.notes);
             if let Some(first) = skipped.first {
                 warnings.push(format!("{}: {} records left out; {first}", path.display(), skipped.count));
@@ -64,6 +68,20 @@ impl Gathered {
                     1e3 * farthest_m * f64::from(f32::EPSILON)
                 ));
             }
+        }
+
+        if let Some(first) = without_instances.first() {
+            let files = without_instances.len();
+            let others = if files > 1 {
+                format!(" and {} other files", files - 1)
+            } else {
+                String::new()
+            };
+            warnings.push(format!(
+                "{}{others}: no instance numbers, so the points of a class in a room are one instance; if a \
+                 column has them, name it, as in instance = \"object\" in [annotations]",
+                first.display()
+            ));
         }
         Ok(None)
     }

@@ -182,6 +182,8 @@ pub(crate) struct Reading<'a> {
     pub(crate) skipped: Skipped,
     /// The largest coordinate, in metres.
     pub(crate) farthest_m: f64,
+    /// Whether a point had an instance number.
+    pub(crate) has_instances: bool,
     /// What the user should know about the file, a sentence each.
     pub(crate) notes: Vec<String>,
 }
@@ -205,6 +207,7 @@ impl<'a> Reading<'a> {
             sink,
             skipped: Skipped::default(),
             farthest_m: 0.0,
+            has_instances: false,
             notes: Vec::new(),
         }
     }
@@ -272,6 +275,7 @@ impl<'a> Reading<'a> {
             }
         };
 
+        self.has_instances |= instance != NO_INSTANCE;
         self.farthest_m = self.farthest_m.max(farthest);
         if let Some(watch) = &mut self.watch {
             watch.see(row.position);
