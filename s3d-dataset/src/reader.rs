@@ -9,8 +9,9 @@ use memchr::memchr_iter;
 use s3d_geom::Camera;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, PoseFile, SourceFaces, ViewRecord,
-    read_face_votes, read_instances, read_labels, read_pose, read_source_faces, read_views,
+    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, PointBox, PoseFile, SourceFaces,
+    ViewRecord, read_face_votes, read_instances, read_labels, read_point_boxes, read_pose, read_source_faces,
+    read_views,
 };
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_label::{LabelTable, Taxonomy};
@@ -208,6 +209,19 @@ impl DataSet {
             return Ok(Vec::new());
         }
         Ok(read_instances(self.files.checked(&path)?)?)
+    }
+
+    /// Returns the boxes of the sampled points of an area: one for each file of the S3DIS tree. Returns
+    /// `None` if the area has no labels, or the data set is of an earlier version.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn point_boxes(&self, area: u32) -> Result<Option<Vec<PointBox>>> {
+        let path = self.layout().point_boxes_json(area);
+        if !self.names(&path) {
+            return Ok(None);
+        }
+        Ok(Some(read_point_boxes(self.files.checked(&path)?)?))
     }
 
     /// Returns the images of an area, sorted by scan location and room: views by number, then the panorama.

@@ -39,7 +39,11 @@ pub enum Error {
         areas: Vec<u32>,
     },
     /// An option belongs to other protocols.
-    #[error("{protocol} takes no {option}: {} {}", named(owners), if owners.len() == 1 { "does" } else { "do" })]
+    #[error(
+        "{protocol} takes no {option}: {} {}",
+        named(owners),
+        if owners.len() == 1 { "does" } else { "do" }
+    )]
     OtherProtocol {
         /// The protocol.
         protocol: Protocol,
@@ -79,6 +83,16 @@ pub enum Error {
     /// The areas that are tested have no annotated room.
     #[error("{}: no annotated room in the areas that are tested", root.display())]
     NoRooms {
+        /// The folder of the data set.
+        root: PathBuf,
+    },
+    /// The data set was made before data sets had the boxes of their sampled points.
+    #[error(
+        "{}: has no boxes of its sampled points (pointcloud_boxes.json), as an earlier version made it: \
+         export it again, or ask for the boxes of the annotations",
+        root.display()
+    )]
+    NoPointBoxes {
         /// The folder of the data set.
         root: PathBuf,
     },
@@ -131,9 +145,11 @@ impl Error {
             | Self::Classes { .. }
             | Self::PanoramasOnly { .. }
             | Self::NoMedianScale { .. } => true,
-            Self::Unlabelled { .. } | Self::NoRooms { .. } | Self::NoImages { .. } | Self::Dataset(_) => {
-                false
-            }
+            Self::Unlabelled { .. }
+            | Self::NoRooms { .. }
+            | Self::NoPointBoxes { .. }
+            | Self::NoImages { .. }
+            | Self::Dataset(_) => false,
         }
     }
 }

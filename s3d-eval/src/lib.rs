@@ -55,7 +55,7 @@ pub use error::{ClassFault, ClassOption, Error, Result};
 pub use evaluate::evaluate;
 pub use evaluation::{Evaluation, Row, Score, Table};
 pub use folds::{Fold, Folds};
-pub use options::{EvalOptions, ImageKind, UnknownImageKind};
+pub use options::{BoxSource, EvalOptions, ImageKind, UnknownBoxSource, UnknownImageKind};
 pub use protocol::{Protocol, UnknownProtocol};
 pub use s3d_dataset::Context;
 

@@ -28,9 +28,65 @@ pub struct EvalOptions {
     pub images: Option<ImageKind>,
     /// `det` only: the classes to detect, by name. `None` means the 12 of the paper.
     pub classes: Option<Vec<String>>,
+    /// `det` only: the points that the true boxes surround. `None` means [`BoxSource::Points`].
+    pub boxes: Option<BoxSource>,
     /// `panoptic` only: the stuff classes, of which each image has one segment. `None` means the stuff of the
     /// taxonomy.
     pub stuff: Option<ClassList>,
+}
+
+/// The points that the true boxes of `det` surround.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BoxSource {
+    /// The sampled points, which detectors are given (`pointcloud_boxes.json`). In S3DIS these are also the
+    /// annotated points, so published results are of this kind.
+    #[default]
+    Points,
+    /// The annotated points, from which the labels of the mesh came (`instances.json`).
+    Annotations,
+}
+
+impl BoxSource {
+    /// Returns the other source.
+    pub(crate) fn other(self) -> Self {
+        match self {
+            Self::Points => Self::Annotations,
+            Self::Annotations => Self::Points,
+        }
+    }
+
+    /// Says which points these are.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Points => "sampled points (pointcloud_boxes.json)",
+            Self::Annotations => "annotated points (instances.json)",
+        }
+    }
+}
+
+impl fmt::Display for BoxSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Points => "points",
+            Self::Annotations => "annotations",
+        })
+    }
+}
+
+/// A word that names no source of boxes.
+#[derive(Clone, Debug, PartialEq, Eq, ThisError)]
+#[error("{0:?} is no source of boxes: points and annotations are")]
+pub struct UnknownBoxSource(String);
+
+impl FromStr for BoxSource {
+    type Err = UnknownBoxSource;
+
+    fn from_str(word: &str) -> Result<Self, UnknownBoxSource> {
+        let found = [Self::Points, Self::Annotations]
+            .into_iter()
+            .find(|source| source.to_string() == word);
+        found.ok_or_else(|| UnknownBoxSource(word.to_owned()))
+    }
 }
 
 /// A kind of images.
@@ -85,8 +141,9 @@ impl EvalOptions {
     /// [`Error::OtherProtocol`] for the first of them.
     pub(crate) fn check_of(&self, protocol: Protocol) -> Result<()> {
         const OF_IMAGES: &[Protocol] = &[Protocol::Normal, Protocol::SemPano, Protocol::Depth];
-        let given: [(bool, &str, &[Protocol]); 4] = [
+        let given: [(bool, &str, &[Protocol]); 5] = [
             (self.classes.is_some(), "classes", &[Protocol::Det]),
+            (self.boxes.is_some(), "boxes", &[Protocol::Det]),
             (self.stuff.is_some(), "stuff", &[Protocol::Panoptic]),
             (self.median_scale, "median_scale", &[Protocol::Depth]),
             (self.images.is_some(), "images", OF_IMAGES),
@@ -146,7 +203,10 @@ mod tests {
     }
 
     #[test]
-    fn kinds_of_images_are_words() {
+    fn kinds_of_images_and_sources_of_boxes_are_words() {
+        assert_eq!("annotations".parse(), Ok(BoxSource::Annotations));
+        let message = "boxes".parse::<BoxSource>().unwrap_err().to_string();
+        assert!(message.contains("points and annotations are"), "{message}");
         assert_eq!("panoramas".parse::<ImageKind>().unwrap(), ImageKind::of(Frame::Panorama));
         assert_eq!("views".parse::<ImageKind>().unwrap(), ImageKind::of(Frame::View(3)));
         assert!(

@@ -30,7 +30,7 @@ pub enum Protocol {
 type Entry = (Protocol, &'static str, u32, &'static [&'static str]);
 
 const PROTOCOLS: [Entry; 8] = [
-    (Protocol::Det, "det", 1, &["mmdetection3d", "open3d-ml"]),
+    (Protocol::Det, "det", 2, &["mmdetection3d", "open3d-ml"]),
     (Protocol::Sem3d, "sem3d", 1, &["pointcept", "nanmean"]),
     (Protocol::InstAp, "inst-ap", 1, &["pointcept"]),
     (Protocol::InstCov, "inst-cov", 1, &["asis"]),

@@ -4,13 +4,12 @@
 use crate::scene;
 use s3d_dataset::s3d_label::Class;
 use s3d_eval::boxes::{ClassScore, Detection, GroundTruth, Rule, average_precision, mean};
-use s3d_eval::{Context, EvalOptions, Folds, Protocol, evaluate};
+use s3d_eval::{BoxSource, Context, EvalOptions, Folds, Protocol, evaluate};
 use s3d_io::dataset::{InstanceEntry, Layout};
-use s3d_io::fs::{checksum_of_file, read_json, write_json};
+use s3d_io::fs::{checksum_of_file, write_json};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 #[derive(Deserialize)]
@@ -129,17 +128,10 @@ fn write_with_instances(root: &Path, detected: &Detected) {
     let (bytes, sum) = checksum_of_file(&path).unwrap();
     write_json(&path, &json!({"instances": entries.collect::<Vec<_>>()})).unwrap();
 
-    // The list of files and the manifest must agree with the new file.
-    let list = root.join("files.csv");
-    let manifest = root.join("manifest.json");
     let (new_bytes, new_sum) = checksum_of_file(&path).unwrap();
-    let text = fs::read_to_string(&list).unwrap();
-    fs::write(&list, text.replace(&format!("{bytes},{sum}"), &format!("{new_bytes},{new_sum}"))).unwrap();
-    let mut value: Value = read_json(&manifest).unwrap();
-    let files = &mut value["files"];
-    files["bytes"] = (files["bytes"].as_u64().unwrap() + new_bytes - bytes).into();
-    files["xxh3_128"] = checksum_of_file(&list).unwrap().1.to_string().into();
-    write_json(&manifest, &value).unwrap();
+    scene::change_list(root, |list| {
+        list.replace(&format!("{bytes},{sum}"), &format!("{new_bytes},{new_sum}"))
+    });
 }
 
 #[test]
@@ -157,6 +149,7 @@ fn mmdetection3d_gives_the_same_for_detections_of_our_detector() {
     write_json(&found, &list.collect::<Vec<_>>()).unwrap();
     let mut options = EvalOptions::default();
     options.folds = Folds::Areas(vec![5]);
+    options.boxes = Some(BoxSource::Annotations);
     let root = folder.path().join("data set");
     write_with_instances(&root, &detected);
     let ours = evaluate(Protocol::Det, &root, &found, &options, &Context::default()).unwrap();

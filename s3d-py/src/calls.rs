@@ -80,6 +80,7 @@ pub(crate) struct Evaluated {
     median_scale: bool,
     images: Option<String>,
     classes: Option<Vec<String>>,
+    boxes: Option<String>,
     stuff: Option<Vec<String>>,
 }
 
@@ -116,6 +117,13 @@ pub(crate) fn evaluate(
         })
         .transpose()?;
     options.classes = how.classes;
+    options.boxes = how
+        .boxes
+        .map(|word| {
+            word.parse()
+                .map_err(|e: s3d_eval::UnknownBoxSource| usage(e.to_string()))
+        })
+        .transpose()?;
     options.stuff = how.stuff.map(ClassList);
 
     let evaluation = watched(py, threads, &sink, |ctx| {

@@ -20,7 +20,6 @@ use crate::survey::annotated::{Annotated, SurveyedRoom};
 use crate::survey::candidate::Candidate;
 use crate::survey::labelled_area::LabelledArea;
 use glam::DVec3;
-use s3d_geom::Density;
 use s3d_io::dataset::{Domain, SourceFaces};
 use s3d_io::fs::create_dir;
 use s3d_io::image::{Compression, Content, encode_rgb8};
@@ -57,9 +56,9 @@ fn write_area_assets(
     ctx.check()?;
 
     let sampling = account.stage(Stage::Points, Some(number));
-    let density = Density::PerM2(options.points_per_m2);
     let offset_m = area.frame.offset().map_or(DVec3::ZERO, DVec3::from_array);
-    let points = write_points(ctx, layout, &file.mesh, plan, table, (density, options.seed), offset_m)?;
+    let points =
+        write_points(ctx, layout, &file.mesh, plan, table, (options.points_per_m2, options.seed), offset_m)?;
 
     // The files of the labels are another unit's.
     let mut paths = listing::walk(&mesh_dir)?;

@@ -17,10 +17,10 @@
 //!
 //! Colours are the tree's, from 0 to 255.
 
-use super::room::{TreeRoom, as_written, count_and_min, for_each_piece};
+use super::room::{TreeRoom, count_and_min, for_each_piece};
 use super::{AREAS_OF_LOADERS, Source, for_each_room, write_lines};
 use crate::error::Result;
-use s3d_io::cloud::NpyWriter;
+use s3d_io::cloud::{NpyWriter, s3dis_coordinate};
 use s3d_io::fs::create_dir;
 use std::path::Path;
 
@@ -58,7 +58,7 @@ pub(super) fn write_pointnet(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]
             for_each_piece(source, &instance.path, |piece| {
                 bytes.clear();
                 for (p, color) in piece.positions.iter().zip(&piece.colors) {
-                    let place = std::array::from_fn::<f64, 3, _>(|k| as_written(p[k]) - min[k]);
+                    let place = std::array::from_fn::<f64, 3, _>(|k| s3dis_coordinate(p[k]) - min[k]);
                     let row = place.into_iter().chain(color.map(f64::from)).chain([class]);
                     bytes.extend(row.flat_map(f64::to_le_bytes));
                 }
@@ -102,7 +102,8 @@ pub(super) fn write_mmdet3d(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom])
             for_each_piece(source, &instance.path, |piece| {
                 bytes.clear();
                 for (p, color) in piece.positions.iter().zip(&piece.colors) {
-                    let place = std::array::from_fn::<f32, 3, _>(|k| (as_written(p[k]) - min[k]) as f32);
+                    let place =
+                        std::array::from_fn::<f32, 3, _>(|k| (s3dis_coordinate(p[k]) - min[k]) as f32);
                     bytes.extend(place.into_iter().chain(color.map(f32::from)).flat_map(f32::to_le_bytes));
                 }
                 points.put(&bytes)?;

@@ -12,10 +12,11 @@
 //! `dataset_path` is the profile's folder. `test_area_idx` picks the area to test on.
 
 use super::pickle::Pickle;
-use super::room::{TreeInstance, TreeRoom, as_written, for_each_piece};
+use super::room::{TreeInstance, TreeRoom, for_each_piece};
 use super::{Source, for_each_room};
 use crate::error::Result;
 use glam::{DMat2, DVec2, DVec3, dvec2, dvec3};
+use s3d_io::cloud::s3dis_coordinate;
 use s3d_io::fs::create_dir;
 use std::path::Path;
 
@@ -42,7 +43,7 @@ pub(super) fn write(source: &Source<'_>, dir: &Path, rooms: &[TreeRoom]) -> Resu
                     for (p, color) in piece.positions.iter().zip(&piece.colors) {
                         let row = p
                             .to_array()
-                            .map(as_written)
+                            .map(s3dis_coordinate)
                             .into_iter()
                             .chain(color.map(f64::from))
                             .chain([class]);
@@ -144,7 +145,7 @@ impl OrientedBox {
 }
 
 fn point_as_written(p: &glam::Vec3) -> DVec3 {
-    dvec3(as_written(p.x), as_written(p.y), as_written(p.z))
+    dvec3(s3dis_coordinate(p.x), s3dis_coordinate(p.y), s3dis_coordinate(p.z))
 }
 
 #[cfg(test)]

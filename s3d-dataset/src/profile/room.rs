@@ -3,7 +3,7 @@
 use super::Source;
 use crate::error::Result;
 use s3d_geom::PointCloud;
-use s3d_io::cloud::{AnnotationTree, OnFault, PointReader, TreeOptions};
+use s3d_io::cloud::{AnnotationTree, OnFault, PointReader, TreeOptions, s3dis_coordinate};
 use s3d_io::dataset::Layout;
 use s3d_label::{Class, Taxonomy};
 use std::collections::BTreeMap;
@@ -89,13 +89,6 @@ pub(super) fn for_each_piece(
     Ok(())
 }
 
-/// Returns the number in the file, as the nearest `f64`. Files hold millimetres, and a coordinate is the
-/// nearest `f32` to its text. So the nearest whole millimetre is the number in the file, unless the `f32` are
-/// farther apart.
-pub(super) fn as_written(coordinate: f32) -> f64 {
-    (f64::from(coordinate) * 1000.0).round() / 1000.0
-}
-
 /// Returns the number of points of an instance, and their smallest coordinates.
 pub(super) fn count_and_min(source: &Source<'_>, path: &Path) -> Result<(u64, [f64; 3])> {
     let mut count = 0;
@@ -104,31 +97,10 @@ pub(super) fn count_and_min(source: &Source<'_>, path: &Path) -> Result<(u64, [f
         count += piece.len() as u64;
         for p in &piece.positions {
             for (min, c) in min.iter_mut().zip(p.to_array()) {
-                *min = min.min(as_written(c));
+                *min = min.min(s3dis_coordinate(c));
             }
         }
         Ok(())
     })?;
     Ok((count, min))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn millimetres_are_read_as_numpy_reads_them() {
-        for millimetres in (-9_000_000i32..9_000_000).step_by(997) {
-            let text = format!(
-                "{}{}.{:03}",
-                if millimetres < 0 { "-" } else { "" },
-                millimetres.abs() / 1000,
-                millimetres.abs() % 1000
-            );
-            let (single, double): (f32, f64) = (text.parse().unwrap(), text.parse().unwrap());
-            if f64::from(single.abs().next_up() - single.abs()) < 0.001 {
-                assert_eq!(as_written(single), double, "{text}");
-            }
-        }
-    }
 }

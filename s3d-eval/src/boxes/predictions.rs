@@ -243,7 +243,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Adds the boxes of a room. They are in the frame of the room, whose least coordinates are 0.
+    /// Adds the boxes of a room. They are in the frame of the room, whose points have least coordinates of 0.
     fn sample(&mut self, path: &Path, sample: Sample) -> Result<()> {
         let file = |message: String| FileError::format(path, message);
         let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
@@ -268,7 +268,11 @@ impl Reader<'_> {
         };
 
         self.samples.insert(place, path.to_owned());
-        let corner = self.rooms[place].corner;
+        let Some(corner) = self.rooms[place].corner else {
+            let message = "the data set does not tell the least corner of this room's points, in whose frame \
+                           the boxes are: it has none, or was made by an earlier version";
+            return Err(file(message.to_owned()).into());
+        };
         let rows = sample.labels_3d.into_iter().zip(sample.scores_3d).zip(sample.bboxes_3d);
         for (i, ((label, score), row)) in rows.enumerate() {
             let Some(class) = self.classes.list.get(label).copied() else {
@@ -313,7 +317,7 @@ impl Reader<'_> {
             return Err(FileError::format(list, message).into());
         }
         let missing: Vec<String> = (self.rooms.iter().enumerate())
-            .filter(|(i, _)| !self.samples.contains_key(i))
+            .filter(|(i, room)| room.corner.is_some() && !self.samples.contains_key(i))
             .map(|(_, room)| format!("Area_{}_{}.json", room.area, room.name))
             .collect();
         let Some(first) = missing.first() else { return Ok(()) };
@@ -326,7 +330,8 @@ impl Reader<'_> {
     }
 }
 
-/// Returns the box of a row of `bboxes_3d` in the world. `corner` has the least coordinates of the room.
+/// Returns the box of a row of `bboxes_3d` in the world. `corner` has the least coordinates of the room's
+/// points.
 fn box_of_row(row: &[f64], corner: [f64; 3]) -> Result<Bbox, String> {
     let (x, y, z, size) = match *row {
         [x, y, z, dx, dy, dz] | [x, y, z, dx, dy, dz, 0.0] => (x, y, z, [dx, dy, dz]),

@@ -3,8 +3,8 @@
 use super::precision::{ClassScore, mean};
 use super::predictions::Predictions;
 use super::room::{Verdict, verdicts};
-use super::truth::{Classes, Room, rooms};
-use super::{Bbox, Rule, ScoredBox};
+use super::truth::{Classes, Room, Rooms, rooms};
+use super::{Bbox, Detection, GroundTruth, Rule, ScoredBox, average_precision};
 use crate::error::Result;
 use crate::tables::{Rows, tables};
 use crate::task::Task;
@@ -60,7 +60,7 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
         Rule::Mmdetection3d
     };
     let classes = Classes::new(task)?;
-    let rooms = rooms(task, &classes)?;
+    let Rooms { list: rooms, has_point_boxes } = rooms(task, &classes)?;
     let Predictions { of_rooms, mut notes } = Predictions::read(task, &classes, &rooms)?;
 
     let progress = task.ctx.progress("evaluate", "rooms", rooms.len() as u64);
@@ -92,8 +92,10 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
     } else {
         &OPEN3D_ML
     };
+    let source = task.options.boxes.unwrap_or_default();
     let truth = format!(
-        "Truth: the box along the world axes of each instance's annotated points (instances.json), for {}.{}",
+        "Truth: the box along the world axes of each instance's {}, for {}.{}",
+        source.words(),
         classes.names(),
         if task.options.classes.is_none() {
             " A class of another taxonomy is replaced by the S3DIS class that it counts as."
@@ -108,6 +110,14 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
     let flat = boxes.clone().filter(|(_, b)| (0..3).any(|k| b[k + 3] <= b[k])).count();
     if flat > 0 {
         notes.push(format!("{flat} boxes of the truth are flat: see the definition for what that means."));
+    }
+    if has_point_boxes {
+        let [quarter, half] = ceiling(&rooms, &classes.list, rule);
+        notes.push(format!(
+            "Perfect boxes of the {} would reach a mean AP of {quarter:.3} at 0.25 and {half:.3} at 0.50 \
+             here.",
+            source.other().words()
+        ));
     }
     if rule == Rule::Mmdetection3d {
         notes.extend(invented(task.folds, &judged, &classes.list));
@@ -138,6 +148,28 @@ impl OfClass {
         let judged = found.iter().map(|(score, _)| *score).zip(verdicts).collect();
         Self { truth: truth.len() as u64, judged }
     }
+}
+
+/// Returns the mean average precision, at each threshold, of detections that are the boxes of the other
+/// source. Classes without true boxes do not count.
+fn ceiling(rooms: &[Room], classes: &[Class], rule: Rule) -> [f64; 2] {
+    let of_boxes = |boxes: fn(&Room) -> &[(Class, Bbox)]| {
+        (0u32..).zip(rooms).flat_map(move |(number, room)| {
+            boxes(room).iter().map(move |(class, bbox)| (number, *class, *bbox))
+        })
+    };
+    let truth: Vec<GroundTruth> = of_boxes(|room| &room.boxes)
+        .map(|(room, class, bbox)| GroundTruth { room, class, bbox })
+        .collect();
+    let found: Vec<Detection> = of_boxes(|room| &room.other_boxes)
+        .map(|(room, class, bbox)| Detection { room, class, score: 1.0, bbox })
+        .collect();
+    let there: Vec<Class> = classes
+        .iter()
+        .copied()
+        .filter(|class| truth.iter().any(|t| t.class == *class))
+        .collect();
+    THRESHOLDS.map(|threshold| mean(&average_precision(&truth, &found, &there, threshold, rule), rule).0)
 }
 
 /// Returns a note on the classes that are detected in a fold without true boxes of them.

@@ -1,11 +1,13 @@
 //! The true boxes, from the instances of the data set.
 
 use super::Bbox;
+use crate::BoxSource;
 use crate::error::{ClassFault, ClassOption, Error, Result};
 use crate::task::Task;
 use s3d_dataset::s3d_io::Error as FileError;
-use s3d_dataset::s3d_label::{Class, Taxonomy};
+use s3d_dataset::s3d_label::{Class, Room as RoomKey, Taxonomy};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// The classes to detect.
 pub(super) struct Classes {
@@ -50,6 +52,18 @@ impl Classes {
         }
     }
 
+    /// Returns the class and the box of an instance, if it is to be detected. Errors name the file and the
+    /// label of `at`.
+    fn to_detect(&self, at: (&Path, &str), class: &str, bbox: Bbox) -> Result<Option<(Class, Bbox)>> {
+        let class = self.named(class).map_err(|e| wrong(at, e))?;
+        Ok(self.list.contains(&class).then_some((class, bbox)))
+    }
+
+    /// Returns the room of an instance. Errors name the file and the label of `at`.
+    fn room(&self, at: (&Path, &str), name: &str) -> Result<RoomKey> {
+        Ok(self.taxonomy.room(name).map_err(|e| wrong(at, e.to_string()))?)
+    }
+
     /// Lists the names of the classes to detect.
     pub(super) fn names(&self) -> String {
         self.list
@@ -60,9 +74,17 @@ impl Classes {
     }
 }
 
+/// Returns the error for an instance of a file.
+fn wrong((path, label): (&Path, &str), message: String) -> FileError {
+    FileError::format(path, format!("{label}: {message}"))
+}
+
 fn refused(fault: ClassFault) -> Error {
     Error::Classes { option: ClassOption::Classes, fault }
 }
+
+/// The classes and boxes of a room's instances. Boxes are in the world frame, in metres.
+type ClassBoxes = Vec<(Class, Bbox)>;
 
 /// A room that is tested.
 pub(super) struct Room {
@@ -70,53 +92,88 @@ pub(super) struct Room {
     pub(super) area: u32,
     /// Its name, such as `office_3`.
     pub(super) name: String,
-    /// Its boxes of the classes to detect, in the world frame, in metres.
-    pub(super) boxes: Vec<(Class, Bbox)>,
-    /// The least coordinates of all its instances.
-    pub(super) corner: [f64; 3],
+    /// Its true boxes of the classes to detect.
+    pub(super) boxes: ClassBoxes,
+    /// Its boxes of these classes by the other [source](crate::BoxSource), as far as it is there.
+    pub(super) other_boxes: ClassBoxes,
+    /// The least coordinates of its sampled points. `None` if it has none, or they are not known.
+    pub(super) corner: Option<[f64; 3]>,
 }
 
-/// Returns the rooms of all folds, ordered by fold, area, type and number.
-pub(super) fn rooms(task: &Task<'_>, classes: &Classes) -> Result<Vec<Room>> {
-    let mut rooms = Vec::new();
+/// The rooms of all folds, ordered by fold, area, type and number.
+pub(super) struct Rooms {
+    pub(super) list: Vec<Room>,
+    /// Whether the data set has the boxes of the sampled points.
+    pub(super) has_point_boxes: bool,
+}
+
+/// Reads the rooms of all folds.
+pub(super) fn rooms(task: &Task<'_>, classes: &Classes) -> Result<Rooms> {
+    let source = task.options.boxes.unwrap_or_default();
+    let mut rooms = Rooms { list: Vec::new(), has_point_boxes: true };
     for (fold, area) in task
         .folds
         .iter()
         .enumerate()
         .flat_map(|(i, f)| f.areas.iter().map(move |a| (i, *a)))
     {
-        let path = task.data.layout().instances_json(area);
         let mut of_area = BTreeMap::new();
         for instance in task.data.instances(area)? {
-            let wrong = |message: String| FileError::format(&path, format!("{}: {message}", instance.label));
-            let key = classes
-                .taxonomy
-                .room(&instance.room)
-                .map_err(|e| wrong(e.to_string()))?;
-            let class = classes.named(&instance.class).map_err(wrong)?;
-
-            let bbox = instance.bbox.map(f64::from);
-            let room = of_area.entry(key).or_insert_with(|| Room {
-                fold,
-                area,
-                name: instance.room.clone(),
-                boxes: Vec::new(),
-                corner: [f64::INFINITY; 3],
-            });
-            room.corner
-                .iter_mut()
-                .zip(bbox)
-                .for_each(|(least, v)| *least = least.min(v));
-            if classes.list.contains(&class) {
-                room.boxes.push((class, bbox));
-            }
+            let path = task.data.layout().instances_json(area);
+            let at = (path.as_path(), instance.label.as_str());
+            let room = of_area
+                .entry(classes.room(at, &instance.room)?)
+                .or_insert_with(|| Room {
+                    fold,
+                    area,
+                    name: instance.room.clone(),
+                    boxes: Vec::new(),
+                    other_boxes: Vec::new(),
+                    corner: None,
+                });
+            let boxes = room.boxes_of(BoxSource::Annotations, source);
+            boxes.extend(classes.to_detect(at, &instance.class, instance.bbox.map(f64::from))?);
         }
-        rooms.extend(of_area.into_values());
+
+        let point_boxes = task.data.point_boxes(area)?;
+        rooms.has_point_boxes &= point_boxes.is_some();
+        if source == BoxSource::Points && point_boxes.is_none() {
+            return Err(Error::NoPointBoxes { root: task.data.layout().root().to_owned() });
+        }
+
+        for found in point_boxes.unwrap_or_default() {
+            let path = task.data.layout().point_boxes_json(area);
+            let at = (path.as_path(), found.label.as_str());
+            let Some(room) = of_area.get_mut(&classes.room(at, &found.room)?) else {
+                let message = format!("{}: instances.json has no room {}", found.label, found.room);
+                return Err(FileError::format(&path, message).into());
+            };
+            let corner = room.corner.get_or_insert([f64::INFINITY; 3]);
+            corner
+                .iter_mut()
+                .zip(found.bbox)
+                .for_each(|(least, v)| *least = least.min(v));
+            let boxes = room.boxes_of(BoxSource::Points, source);
+            boxes.extend(classes.to_detect(at, &found.class, found.bbox)?);
+        }
+        rooms.list.extend(of_area.into_values());
     }
-    if rooms.is_empty() {
+
+    if rooms.list.is_empty() {
         return Err(task.no_rooms());
     }
     Ok(rooms)
+}
+
+impl Room {
+    /// Returns the list for boxes of `source`, if `truth` is the source of the true ones.
+    fn boxes_of(&mut self, source: BoxSource, truth: BoxSource) -> &mut ClassBoxes {
+        if source == truth {
+            &mut self.boxes
+        } else {
+            &mut self.other_boxes
+        }
+    }
 }
 
 #[cfg(test)]

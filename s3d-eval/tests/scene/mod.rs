@@ -1,8 +1,11 @@
-//! A data set of two areas, made once for all tests. They run at the same time, so a test that changes it takes
-//! a copy.
+//! A data set of two areas, made once for all tests. They run at the same time, so a test that changes it
+//! takes a copy.
 
 use s3d_dataset::{Context, Export, ExportOptions};
+use s3d_io::dataset::read_file_list;
+use s3d_io::fs::{checksum_of_file, read_json, write_json};
 use s3d_synth::{Building, ScanOptions};
+use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -50,6 +53,22 @@ fn copy_files(from: &Path, to: &Path) {
             fs::copy(&path, &copy).unwrap();
         }
     }
+}
+
+/// Changes the text of a data set's `files.csv`, and the manifest so that it agrees.
+pub(crate) fn change_list(root: &Path, change: impl Fn(&str) -> String) {
+    let list = root.join("files.csv");
+    let text = change(&fs::read_to_string(&list).unwrap());
+    fs::write(&list, &text).unwrap();
+    let records = read_file_list(&list).unwrap();
+
+    let path = root.join("manifest.json");
+    let mut manifest: Value = read_json(&path).unwrap();
+    let files = &mut manifest["files"];
+    files["count"] = records.len().into();
+    files["bytes"] = records.iter().map(|record| record.bytes).sum::<u64>().into();
+    files["xxh3_128"] = checksum_of_file(&list).unwrap().1.to_string().into();
+    write_json(&path, &manifest).unwrap();
 }
 
 /// The folder of a labelled data set with areas 2 and 5.

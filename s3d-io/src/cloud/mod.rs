@@ -92,6 +92,6 @@ pub use ply::{
     write_colored_points,
 };
 pub use s3dis::{
-    AnnotationTree, InstanceFile, OnFault, PointReader, RoomFiles, S3disAreaWriter, S3disInstanceWriter,
-    S3disRoomWriter, TreeOptions, read_points, write_s3dis_points,
+    AnnotationTree, InstanceFile, OnFault, PointReader, RoomFiles, S3disAreaWriter, S3disInstance,
+    S3disInstanceWriter, S3disRoomWriter, TreeOptions, read_points, s3dis_coordinate, write_s3dis_points,
 };

@@ -2,7 +2,7 @@
 
 use crate::dataset::domain::Domain;
 use crate::error::{Error, Result};
-use crate::fs::json::write_json;
+use crate::fs::atomic::write_bytes;
 use s3d_geom::NormalAxes;
 use s3d_label::NULL_NAME;
 use serde::Deserialize;
@@ -143,6 +143,11 @@ impl Conventions {
     /// # Errors
     /// [`Error::Io`].
     pub fn write(&self, path: &Path, offsets: &WorldOffsets) -> Result<u64> {
+        write_bytes(path, self.to_text(offsets).as_bytes())
+    }
+
+    /// Returns the content of `conventions.json`.
+    pub fn to_text(&self, offsets: &WorldOffsets) -> String {
         let mut json = self.to_json();
         if let Some(world) = json
             .get_mut("world")
@@ -152,7 +157,7 @@ impl Conventions {
             world.insert("offset_m".to_owned(), json!(offsets));
             world.insert("frame_of_scan".to_owned(), json!("world + offset_m of the area, in f64"));
         }
-        write_json(path, &json)
+        format!("{json:#}\n")
     }
 
     fn to_json(self) -> Value {
@@ -321,7 +326,6 @@ pub fn read_world_offsets(path: &Path) -> Result<WorldOffsets> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fs::atomic::write_bytes;
 
     #[test]
     fn choices_come_back() {

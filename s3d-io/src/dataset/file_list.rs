@@ -213,17 +213,30 @@ pub fn write_file_list(path: &Path, records: &[FileRecord]) -> Result<(u64, Chec
         return Err(Error::format(path, format!("{:?} would be in it twice", double.path)));
     }
 
+    let text = list_text(sorted);
+    write_whole(path, |w| w.write_all(text.as_bytes()))?;
+    Ok((text.len() as u64, Checksum::of(text.as_bytes())))
+}
+
+/// Returns the text of a list of sorted records.
+fn list_text<'a>(sorted: impl IntoIterator<Item = &'a FileRecord>) -> String {
     let mut text = String::from(HEADER);
     text.push('\n');
     for record in sorted {
         text += &record.to_line();
         text.push('\n');
     }
-    write_whole(path, |w| w.write_all(text.as_bytes()))?;
-    Ok((text.len() as u64, Checksum::of(text.as_bytes())))
+    text
 }
 
-/// Reads a list that [`write_file_list`] wrote, and nothing else.
+/// Returns the checksum of the list that [`write_file_list`] writes for sorted records. A list that was read
+/// has this checksum even if another program has changed its line feeds.
+pub fn file_list_checksum(sorted: &[FileRecord]) -> Checksum {
+    Checksum::of(list_text(sorted).as_bytes())
+}
+
+/// Reads a list that [`write_file_list`] wrote, and nothing else. Lines may also end with a carriage return
+/// and a line feed.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line, if
@@ -262,6 +275,7 @@ pub fn parse_file_list(mut lines: impl BufRead, name: &Path) -> Result<Vec<FileR
         let Some(text) = line.strip_suffix(b"\n") else {
             return fault("is cut off: it does not end with a line feed".to_owned());
         };
+        let text = text.strip_suffix(b"\r").unwrap_or(text);
         let Ok(text) = std::str::from_utf8(text) else {
             return fault("is no text in UTF-8".to_owned());
         };
@@ -324,6 +338,19 @@ mod tests {
 
     fn record(path: &str, content: &[u8]) -> FileRecord {
         FileRecord { path: path.into(), bytes: content.len() as u64, xxh3_128: Checksum::of(content) }
+    }
+
+    #[test]
+    fn lines_of_other_systems_are_the_same_list() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("files.csv");
+        let records = [record("a/b.png", b"1"), record("c.json", b"22")];
+        let (_, sum) = write_file_list(&path, &records).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap().replace('\n', "\r\n");
+        write_bytes(&path, text.as_bytes()).unwrap();
+        let back = read_file_list(&path).unwrap();
+        assert_eq!(back, records);
+        assert_eq!(file_list_checksum(&back), sum);
     }
 
     #[test]

@@ -5,8 +5,9 @@ use crate::dataset::layout::{Frame, ImageName, Layout, image_stem, is_valid_uuid
 use crate::error::{Error, Result};
 use crate::fs::json::read_json;
 use crate::fs::open::open_file;
+use crate::image::png::MAX_PIXELS;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fs;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -150,12 +151,43 @@ pub struct ViewRecord {
     pub frame_num: Option<u32>,
 }
 
+impl ViewRecord {
+    /// Returns what is wrong with the record by itself, if anything is.
+    fn fault(&self) -> Option<String> {
+        let Self { camera_uuid: uuid, candidate, .. } = self;
+        if !is_valid_uuid(uuid) {
+            return Some(format!("{uuid:?} is no uuid of a scan location"));
+        }
+        let angles = [self.yaw_rad, self.pitch_rad, self.fov_rad];
+        if !angles.iter().all(|angle| angle.is_finite()) {
+            return Some(format!("candidate {candidate} of {uuid} has the angles {angles:?}"));
+        }
+        let entropy = self.entropy;
+        let is_entropy = entropy.is_finite() && entropy >= 0.0;
+        (!is_entropy).then(|| format!("candidate {candidate} of {uuid} has the entropy {entropy}"))
+    }
+}
+
 /// Reads `area_N/views.json`.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if the file holds something else.
+/// [`Error::Io`]; [`Error::Format`] if the file holds something else, an invalid uuid, an entropy that is
+/// negative or not finite, or the same candidate or frame number of a location twice.
 pub fn read_views(path: &Path) -> Result<Vec<ViewRecord>> {
-    read_json(path)
+    let records: Vec<ViewRecord> = read_json(path)?;
+    let mut candidates = HashSet::new();
+    let mut frames = HashSet::new();
+    for record in &records {
+        let uuid = &record.camera_uuid;
+        let is_new = candidates.insert((uuid, record.candidate));
+        let has_own_frame = record.frame_num.is_none_or(|number| frames.insert((uuid, number)));
+        let twice =
+            || format!("candidate {} of {uuid} or its frame number stands there twice", record.candidate);
+        if let Some(fault) = record.fault().or_else(|| (!is_new || !has_own_frame).then(twice)) {
+            return Err(Error::format(path, fault));
+        }
+    }
+    Ok(records)
 }
 
 /// A photograph that became a view or a panorama, in `frames.json`. The fields have the names of the file's
@@ -191,6 +223,19 @@ impl PhotographRecord {
     pub fn frame(&self) -> Frame {
         if self.panorama { Frame::Panorama } else { Frame::View(0) }
     }
+
+    /// Returns what is wrong with the record by itself, if anything is.
+    fn fault(&self) -> Option<String> {
+        let Self { camera_uuid: uuid, name, width, height, masked, seen, .. } = self;
+        if !is_valid_uuid(uuid) {
+            return Some(format!("{uuid:?} is no uuid of a camera"));
+        }
+        if !(1..=MAX_PIXELS).contains(&(u64::from(*width) * u64::from(*height))) {
+            return Some(format!("{name} has {width} × {height} pixels, and images up to {MAX_PIXELS}"));
+        }
+        let are_shares = [masked, seen].iter().all(|share| (0.0..=1.0).contains(*share));
+        (!are_shares).then(|| format!("{name} has the shares {masked} masked and {seen} seen"))
+    }
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
@@ -201,13 +246,19 @@ fn is_false(value: &bool) -> bool {
 /// Reads `area_N/frames.json`.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Format`] if the file holds something else, or an invalid uuid.
+/// [`Error::Io`]; [`Error::Format`] if the file holds something else, an invalid uuid, a camera twice, a size
+/// that no image has, or a share beyond 0 to 1.
 pub fn read_photographs(path: &Path) -> Result<Vec<PhotographRecord>> {
     let records: Vec<PhotographRecord> = read_json(path)?;
-    match records.iter().find(|r| !is_valid_uuid(&r.camera_uuid)) {
-        None => Ok(records),
-        Some(r) => Err(Error::format(path, format!("{:?} is no uuid of a camera", r.camera_uuid))),
+    let mut cameras = HashSet::new();
+    for record in &records {
+        let is_new = cameras.insert(&record.camera_uuid);
+        let twice = || format!("the camera {} stands there twice", record.camera_uuid);
+        if let Some(fault) = record.fault().or_else(|| (!is_new).then(twice)) {
+            return Err(Error::format(path, fault));
+        }
     }
+    Ok(records)
 }
 
 /// Returns width and height of a PNG file in pixels, from its first 24 bytes.
@@ -309,6 +360,33 @@ mod tests {
     }
 
     #[test]
+    fn views_that_cannot_be_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("views.json");
+        let record = |candidate: u32, entropy: f64, frame_num: Option<u32>| ViewRecord {
+            camera_uuid: "a".into(),
+            candidate,
+            yaw_rad: 1.0,
+            pitch_rad: 0.0,
+            fov_rad: 1.0,
+            entropy,
+            frame_num,
+        };
+        let good = [record(0, 0.0, Some(0)), record(1, 1.5, None), record(2, 1.0, Some(1))];
+        crate::fs::json::write_json(&path, &good[..]).unwrap();
+        assert_eq!(read_views(&path).unwrap(), good);
+        for (odd, words) in [
+            (record(1, 1.0, None), "candidate 1 of a or its frame number stands there twice"),
+            (record(3, 1.0, Some(1)), "candidate 3 of a or its frame number stands there twice"),
+            (record(3, -1.0, None), "candidate 3 of a has the entropy -1"),
+        ] {
+            crate::fs::json::write_json(&path, &[&good[..], &[odd]].concat()).unwrap();
+            let e = read_views(&path).unwrap_err().to_string();
+            assert!(e.contains("views.json") && e.contains(words), "{e}");
+        }
+    }
+
+    #[test]
     fn photographs_are_read() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("frames.json");
@@ -321,6 +399,20 @@ mod tests {
         assert_eq!(records[0].frame(), Frame::View(0));
         write_bytes(&path, text.replace("\"seen\"", "\"panorama\": true, \"seen\"").as_bytes()).unwrap();
         assert_eq!(read_photographs(&path).unwrap()[0].frame(), Frame::Panorama);
+        for (from, to, words) in [
+            ("\"width\": 4", "\"width\": 4294967295", "4294967295 × 3 pixels"),
+            ("\"height\": 3", "\"height\": 0", "4 × 0 pixels"),
+            ("\"seen\": 1", "\"seen\": 1.5", "0.25 masked and 1.5 seen"),
+        ] {
+            write_bytes(&path, text.replace(from, to).as_bytes()).unwrap();
+            let e = read_photographs(&path).unwrap_err().to_string();
+            assert!(e.contains(words), "{e}");
+        }
+        let twice = text.replace(['[', ']'], "");
+        write_bytes(&path, format!("[{twice}, {twice}]").as_bytes()).unwrap();
+        let e = read_photographs(&path).unwrap_err().to_string();
+        assert!(e.contains("the camera a stands there twice"), "{e}");
+
         write_bytes(&path, text.replace("\"a\"", "\"../a\"").as_bytes()).unwrap();
         assert!(
             read_photographs(&path)

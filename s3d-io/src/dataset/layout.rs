@@ -259,6 +259,11 @@ impl Layout {
         self.mesh_dir(area).join("pointcloud.mat")
     }
 
+    /// `area_1/3d/pointcloud_boxes.json`: the box of each instance's points in the cloud.
+    pub fn point_boxes_json(&self, area: u32) -> PathBuf {
+        self.mesh_dir(area).join("pointcloud_boxes.json")
+    }
+
     /// `area_1/3d/instances.json`: box and voxels of each instance.
     pub fn instances_json(&self, area: u32) -> PathBuf {
         self.mesh_dir(area).join("instances.json")
@@ -536,6 +541,7 @@ mod tests {
             layout.semantic_obj(1),
             layout.point_cloud(1),
             layout.point_cloud_mat(1),
+            layout.point_boxes_json(1),
             layout.instances_json(1),
             layout.instances_npz(1),
             layout.votes_npz(1),

@@ -43,6 +43,8 @@ pub(crate) mod layout;
 #[cfg(feature = "dataset")]
 mod npz;
 #[cfg(feature = "dataset")]
+mod point_boxes;
+#[cfg(feature = "dataset")]
 pub(crate) mod pose;
 #[cfg(feature = "dataset")]
 mod source_faces;
@@ -59,7 +61,9 @@ pub use domain::{Domain, PixelKind, UnknownDomain};
 #[cfg(feature = "dataset")]
 pub use face_votes::{FaceVoteColumns, read_face_votes, read_face_votes_from, write_face_votes};
 #[cfg(feature = "dataset")]
-pub use file_list::{CheckedFile, FileRecord, parse_file_list, read_file_list, write_file_list};
+pub use file_list::{
+    CheckedFile, FileRecord, file_list_checksum, parse_file_list, read_file_list, write_file_list,
+};
 #[cfg(feature = "dataset")]
 pub use images::{
     DatasetImage, PhotographRecord, ViewRecord, check_images_complete, dataset_images, read_photographs,
@@ -73,6 +77,8 @@ pub use instances::{
 #[cfg(feature = "dataset")]
 pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};
 pub use layout::{Frame, ImageName, Layout, PROFILES, image_stem, is_valid_room, is_valid_uuid};
+#[cfg(feature = "dataset")]
+pub use point_boxes::{PointBox, read_point_boxes, write_point_boxes};
 #[cfg(feature = "dataset")]
 pub use pose::{PoseFile, read_pose};
 #[cfg(feature = "dataset")]

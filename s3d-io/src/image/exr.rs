@@ -229,6 +229,26 @@ fn is_too_short(header: &Header, bytes: &[u8]) -> bool {
     pixels.is_none_or(|pixels| pixels > MAX_PIXELS.min(bytes.len().saturating_mul(MAX_PIXELS_PER_BYTE)))
 }
 
+/// Returns the number of bits of the floats in an OpenEXR file: 16 or 32. Returns `None` if the file is
+/// something else, or its channels have other types or different ones.
+pub fn xyz_bits(bytes: &[u8]) -> Option<u8> {
+    let meta = exr::meta::MetaData::read_from_buffered(bytes, false).ok()?;
+    let mut types = meta
+        .headers
+        .iter()
+        .flat_map(|header| &header.channels.list)
+        .map(|channel| channel.sample_type);
+    let first = types.next()?;
+    if types.any(|other| other != first) {
+        return None;
+    }
+    match first {
+        SampleType::F16 => Some(16),
+        SampleType::F32 => Some(32),
+        SampleType::U32 => None,
+    }
+}
+
 /// Decodes world coordinates in half floats from a file as [`encode_xyz_half`] makes it. This takes a
 /// fraction of the time that [`decode_xyz`] takes for other files. Returns `None` if the file is of another
 /// kind or damaged; [`decode_xyz`] reads those, or tells what is wrong.

@@ -37,7 +37,8 @@ pub(crate) mod texture;
 
 #[cfg(feature = "exr")]
 pub use self::exr::{
-    decode_xyz, decode_xyz_half, encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float, write_xyz_half,
+    decode_xyz, decode_xyz_half, encode_xyz_float, encode_xyz_half, read_xyz, write_xyz_float,
+    write_xyz_half, xyz_bits,
 };
 #[cfg(feature = "png")]
 pub use self::png::{

@@ -187,6 +187,7 @@ def evaluate(
     median_scale: bool = False,
     images: str | None = None,
     classes: Sequence[str] | None = None,
+    boxes: str | None = None,
     stuff: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Progress = None,
@@ -201,8 +202,8 @@ def evaluate(
     - `folds`: "all" areas together, "each" area by itself, or the three folds of the "paper".
     - `areas`: score these areas together instead.
     - `bootstrap`: the number of draws for 95 % intervals, drawn by `seed`.
-    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` (det), `stuff` (panoptic):
-      see the protocols.
+    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` and `boxes` (det: "points"
+      or "annotations"), `stuff` (panoptic): see the protocols.
 
     Raises `FileError` for a prediction that is missing, duplicate, or of the wrong size.
     """
@@ -215,6 +216,7 @@ def evaluate(
         median_scale=median_scale,
         images=images,
         classes=None if classes is None else list(classes),
+        boxes=boxes,
         stuff=None if stuff is None else list(stuff),
     )
     data, text = _native.evaluate(protocol, root_of(truth), Path(pred), how, threads, sink(progress))

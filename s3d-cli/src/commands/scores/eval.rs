@@ -7,7 +7,7 @@ use crate::failure::{Failure, Outcome};
 use crate::values::parsed;
 use clap::{Args, ValueEnum, value_parser};
 use s3d_dataset::pack::ClassList;
-use s3d_eval::{Error, EvalOptions, Folds, ImageKind, Protocol};
+use s3d_eval::{BoxSource, Error, EvalOptions, Folds, ImageKind, Protocol};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -35,6 +35,10 @@ pub(crate) struct EvalArgs {
     /// det: the classes to detect [default: the paper's 12]
     #[arg(long, value_name = "CLASS,…", value_delimiter = ',')]
     pub(crate) classes: Vec<String>,
+    /// det: the points that true boxes surround: the sampled ones, which detectors are given, or those of the
+    /// annotations [default: points]
+    #[arg(long, value_name = "points|annotations", value_parser = parsed::<BoxSource>)]
+    pub(crate) boxes: Option<BoxSource>,
     /// panoptic: the stuff classes, each of which has one segment in an image, or none [default: the stuff of
     /// the taxonomy: ceiling,floor,wall]
     #[arg(long, value_name = "CLASS,…|none", value_parser = parsed::<ClassList>)]
@@ -80,6 +84,7 @@ pub(crate) fn run(args: EvalArgs) -> Outcome<()> {
     options.images = args.images;
     options.median_scale = args.median_scale;
     options.classes = (!args.classes.is_empty()).then_some(args.classes);
+    options.boxes = args.boxes;
     options.stuff = args.stuff;
 
     let evaluation = on_threads_or(args.threads, failure, |context| {

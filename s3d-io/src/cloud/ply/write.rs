@@ -48,7 +48,7 @@ impl PlyPointWriter {
     /// # Errors
     /// [`Error::Io`].
     pub fn create_moved(path: &Path, count: u64, offset_m: DVec3) -> Result<Self> {
-        Self::start(AtomicFile::create(path)?, path, count, offset_m)
+        Self::new_moved(AtomicFile::create(path)?, path, count, offset_m)
     }
 
     /// Gives the file its name, and returns its size in bytes.
@@ -66,10 +66,14 @@ impl<W: Write> PlyPointWriter<W> {
     /// # Errors
     /// [`Error::Io`].
     pub fn new(file: W, name: &Path, count: u64) -> Result<Self> {
-        Self::start(file, name, count, DVec3::ZERO)
+        Self::new_moved(file, name, count, DVec3::ZERO)
     }
 
-    fn start(mut file: W, name: &Path, count: u64, offset_m: DVec3) -> Result<Self> {
+    /// Starts a file like [`PlyPointWriter::new`], for points from which `offset_m` was subtracted.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn new_moved(mut file: W, name: &Path, count: u64, offset_m: DVec3) -> Result<Self> {
         let frame = match offset_m.to_array() {
             [0.0, 0.0, 0.0] => String::new(),
             [x, y, z] => {

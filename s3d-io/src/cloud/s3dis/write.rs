@@ -4,6 +4,7 @@
 
 use crate::error::{Error, Result};
 use crate::fs::atomic::{AtomicFile, create_dir, write_whole};
+use s3d_geom::Aabb;
 use s3d_geom::glam::Vec3;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -78,7 +79,7 @@ impl S3disRoomWriter {
     pub fn instance(&mut self, class: &str, number: u32) -> Result<S3disInstanceWriter<'_>> {
         let file = AtomicFile::create(self.dir.join("Annotations").join(format!("{class}_{number}.txt")))?;
         self.unfinished = true;
-        Ok(S3disInstanceWriter { room: self, file, points: 0 })
+        Ok(S3disInstanceWriter { room: self, file, points: 0, bbox: Aabb::EMPTY })
     }
 
     /// Appends points that belong to no instance. They are in the room's file only.
@@ -148,6 +149,7 @@ pub struct S3disInstanceWriter<'a> {
     room: &'a mut S3disRoomWriter,
     file: AtomicFile,
     points: u64,
+    bbox: Aabb,
 }
 
 impl S3disInstanceWriter<'_> {
@@ -161,18 +163,39 @@ impl S3disInstanceWriter<'_> {
     pub fn append(&mut self, positions: &[Vec3], colors: &[[u8; 3]]) -> Result<()> {
         self.room.append(positions, colors, Some(&mut self.file))?;
         self.points += positions.len() as u64;
+        self.bbox = self.bbox.union(Aabb::from_points(positions.iter().copied()));
         Ok(())
     }
 
-    /// Gives the instance's file its name, and returns the number of its points.
+    /// Gives the instance's file its name, and returns what it holds.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn finish(self) -> Result<u64> {
+    pub fn finish(self) -> Result<S3disInstance> {
         self.file.commit()?;
         self.room.unfinished = false;
-        Ok(self.points)
+        let bbox = self.bbox.to_array().map(s3dis_coordinate);
+        Ok(S3disInstance { points: self.points, bbox })
     }
+}
+
+/// The content of the file of one instance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct S3disInstance {
+    /// The number of points.
+    pub points: u64,
+    /// The tightest box of the points as the file has them: `[xmin, ymin, zmin, xmax, ymax, zmax]`, metres.
+    /// Without points, its ends are infinite and exchanged.
+    pub bbox: [f64; 6],
+}
+
+/// Returns the number that stands in the tree for a coordinate, in metres: the nearest whole millimetre.
+///
+/// The result is the nearest `f64` to the text, as numpy reads it. This also holds if `metres` was read from
+/// the tree, up to distances where `f32` are a millimetre apart (8 km).
+pub fn s3dis_coordinate(metres: f32) -> f64 {
+    // Text has no negative zero.
+    (f64::from(metres) * 1000.0).round() / 1000.0 + 0.0
 }
 
 /// Writes points as in the files of the tree, a line `x y z r g b` each: metres with three decimals, colours
@@ -305,6 +328,21 @@ mod tests {
         }
     }
 
+    #[test]
+    fn coordinates_are_the_numbers_of_the_text() {
+        for millimetres in (-9_000_000i32..9_000_000).step_by(997) {
+            let exact = f64::from(millimetres) / 1000.0;
+            let text = fixed3(exact as f32);
+            let single: f32 = text.parse().unwrap();
+            // Farther out, `f32` are a millimetre apart or more.
+            if f64::from(single.abs().next_up() - single.abs()) < 0.001 {
+                let double: f64 = text.parse().unwrap();
+                assert_eq!([exact as f32, single].map(s3dis_coordinate), [double; 2], "{text}");
+            }
+        }
+        assert!(s3dis_coordinate(-0.0001).is_sign_positive());
+    }
+
     fn read_text(path: PathBuf) -> String {
         std::fs::read_to_string(path).unwrap()
     }
@@ -319,11 +357,14 @@ mod tests {
         let mut chair = room.instance("chair", 1).unwrap();
         chair.append(&many[..6000], &vec![[1, 20, 255]; 6000]).unwrap();
         chair.append(&many[6000..], &vec![[0, 0, 0]; 4000]).unwrap();
-        assert_eq!(chair.finish().unwrap(), 10_000);
+        let chair = chair.finish().unwrap();
+        assert_eq!(chair.points, 10_000);
+        assert_eq!(chair.bbox, [0.0, -0.5, 2.25, 9.999, -0.5, 2.25]);
 
         let mut wall = room.instance("wall", 3).unwrap();
-        wall.append(&[vec3(-24.048, 3.997, 0.0)], &[[7, 8, 9]]).unwrap();
-        wall.finish().unwrap();
+        wall.append(&[vec3(-24.048, 3.9971, 0.0)], &[[7, 8, 9]]).unwrap();
+        // The box has the numbers of the text, not of the points.
+        assert_eq!(wall.finish().unwrap().bbox, [-24.048, 3.997, 0.0, -24.048, 3.997, 0.0]);
         room.append_unannotated(&[vec3(1.0, 2.0, 3.0)], &[[4, 5, 6]]).unwrap();
 
         let room_file = dir.path().join("Area_1/office_1/office_1.txt");

@@ -10,7 +10,7 @@ use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 /// The most pixels of an image that is read: 16 times a panorama of the data set's double size.
-pub(super) const MAX_PIXELS: u64 = 1 << 30;
+pub(crate) const MAX_PIXELS: u64 = 1 << 30;
 
 /// The most bytes that deflate can make of one.
 pub(super) const MAX_DEFLATE: u64 = 1032;
