@@ -3,24 +3,12 @@
 //! `S3D_DAMAGES=2000 cargo test -p s3d-cli damage::structured` tries more; `S3D_SEED` tries others.
 
 use super::{copy, export, files};
+use crate::common::list_files;
 use s3d_dataset::verify::VerifyOptions;
 use s3d_dataset::{Context, verify};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// Entries about how the data set was made, which no other file repeats.
-const TOLD_BY_THE_MANIFEST_ALONE: [&str; 9] = [
-    "/version",
-    "/options/lenient",
-    "/options/compression",
-    "/options/entropy_stride",
-    "/options/points_per_m2",
-    "/areas/0/faces_left_out",
-    "/areas/0/place_cameras",
-    "/areas/0/inputs",
-    "/areas/0/rgb",
-];
 
 /// Numbers that look random and are the same in every run.
 pub(crate) struct Random(pub(crate) u64);
@@ -142,18 +130,108 @@ fn damage(out: &Path, random: &mut Random) -> String {
 /// The part of an export that can be known to be right or wrong.
 fn what_matters(out: &Path) -> (Option<Value>, Vec<(PathBuf, Vec<u8>)>) {
     let manifest = fs::read(out.join("manifest.json")).ok();
-    let mut manifest: Option<Value> = manifest.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-    for place in TOLD_BY_THE_MANIFEST_ALONE {
-        if let Some(value) = manifest.as_mut().and_then(|m| m.pointer_mut(place)) {
-            *value = Value::Null;
-        }
-    }
+    let manifest: Option<Value> = manifest.and_then(|bytes| serde_json::from_slice(&bytes).ok());
     // A new file in the top folder may be the user's own.
     let ours = |path: &PathBuf| path.components().count() > 1 || export().join(path).exists();
     let files = files(out)
         .into_iter()
         .filter(|(path, _)| ours(path) && path != Path::new("manifest.json"));
     (manifest, files.collect())
+}
+
+/// Puts an extreme, a double or another order into a table, and lists the files anew: the checksums are
+/// right. Returns a description.
+fn distort(out: &Path, random: &mut Random) -> String {
+    let tables: Vec<PathBuf> = files(out)
+        .into_keys()
+        .filter(|path| path.extension().is_some_and(|ending| ending == "json"))
+        .collect();
+    // Most tables are pose files; every other kind is as likely as they are together.
+    let is_pose = |path: &&PathBuf| path.parent().is_some_and(|folder| folder.ends_with("pose"));
+    let (poses, others): (Vec<_>, Vec<_>) = tables.iter().partition(is_pose);
+    let at = random.below(others.len() + 1);
+    let name = others
+        .get(at)
+        .copied()
+        .unwrap_or_else(|| poses[random.below(poses.len())]);
+
+    let mut json: Value = serde_json::from_slice(&fs::read(out.join(name)).unwrap()).unwrap();
+    let lists = random.below(3) > 0;
+    let mut places = Vec::new();
+    if lists {
+        arrays(&json, "", &mut places);
+    }
+    if places.is_empty() {
+        leaves(&json, "", &mut places);
+    }
+    if places.is_empty() {
+        return format!("nothing in {}", name.display());
+    }
+    let place = places.swap_remove(random.below(places.len()));
+    match json.pointer_mut(&place).unwrap() {
+        Value::Array(items) => {
+            let (a, b) = (random.below(items.len()), random.below(items.len()));
+            match random.below(3) {
+                0 => items.swap(a, b),
+                1 => items.insert(b, items[a].clone()),
+                _ => drop(items.remove(a)),
+            }
+        }
+        value => {
+            let extremes = [
+                0.into(),
+                (-1).into(),
+                u32::MAX.into(),
+                u64::MAX.into(),
+                i64::MIN.into(),
+                1e308.into(),
+                (-1e-308).into(),
+                Value::Null,
+                "".into(),
+                "../../x".into(),
+            ];
+            *value = extremes[random.below(extremes.len())].clone();
+        }
+    }
+    put(&out.join(name), serde_json::to_string(&json).unwrap().as_bytes());
+    list_files(out);
+    format!("{place} of {}", name.display())
+}
+
+/// The lists of a document that are not empty, by their JSON pointers.
+fn arrays(value: &Value, place: &str, out: &mut Vec<String>) {
+    match value {
+        Value::Object(map) => map
+            .iter()
+            .for_each(|(key, v)| arrays(v, &format!("{place}/{key}"), out)),
+        Value::Array(all) => {
+            if !all.is_empty() {
+                out.push(place.to_owned());
+            }
+            all.iter()
+                .enumerate()
+                .for_each(|(i, v)| arrays(v, &format!("{place}/{i}"), out));
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn distorted_tables_never_end_a_report() {
+    let (cases, seed) = (number_of("S3D_DAMAGES", 150), number_of("S3D_SEED", 1));
+    let mut found = 0;
+    for case in 0..cases {
+        let mut random = Random(seed.wrapping_mul(7_000_003).wrapping_add(case));
+        let (_dir, out) = copy();
+        let how = distort(&out, &mut random);
+        // A kind that cannot be a manifest's is refused.
+        if let Ok(report) = verify(&out, &VerifyOptions { full: case % 10 == 0 }, &Context::default()) {
+            found += u64::from(report.fault_count() > 0);
+            let broken = report.faults.iter().find(|group| group.kind == "checks that broke off");
+            assert!(broken.is_none(), "case {case} of seed {seed}, {how}: {broken:?}");
+        }
+    }
+    assert!(2 * found > cases, "{found} of {cases} were found");
 }
 
 #[test]

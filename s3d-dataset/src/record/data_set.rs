@@ -6,10 +6,9 @@ use crate::parallel::for_each_in_order;
 use crate::record::manifest::{Head, Manifest};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, PhotographRecord, read_conventions,
-    read_file_list, read_photographs,
+    CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, PhotographRecord, file_list_checksum,
+    read_conventions, read_file_list, read_photographs,
 };
-use s3d_io::fs::checksum_of_file;
 use s3d_label::Taxonomy;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -124,7 +123,7 @@ impl Listed {
         };
 
         let records = read_file_list(&path)?;
-        let (_, sum) = checksum_of_file(&path)?;
+        let sum = file_list_checksum(&records);
         if sum != told.xxh3_128 {
             let message = format!("its checksum is {sum}, and the manifest tells of {}", told.xxh3_128);
             return Err(FileError::format(&path, message));

@@ -161,7 +161,8 @@ impl Done {
         Ok(format!("{BEFORE}{}{BETWEEN}{done}{AFTER}\n", Checksum::of(done.as_bytes())))
     }
 
-    /// Reads a unit from its line, without the line feed. Returns `None` if the line is torn or altered.
+    /// Reads a unit from its line, without the line feed. Returns `None` if the line is torn or altered, or
+    /// its unit cannot be used.
     fn from_line(line: &[u8]) -> Option<Self> {
         let line = line.strip_prefix(BEFORE.as_bytes())?.strip_suffix(AFTER.as_bytes())?;
         let (sum, rest) = line.split_at_checked(32)?;
@@ -170,7 +171,21 @@ impl Done {
         if Checksum::of(done) != sum {
             return None;
         }
-        serde_json::from_slice(done).ok()
+        serde_json::from_slice(done).ok().filter(Self::is_sound)
+    }
+
+    /// Returns whether later steps can use the unit: entropies are finite and not negative, and no camera is
+    /// there twice.
+    fn is_sound(&self) -> bool {
+        match self {
+            Self::Scores(done) => done.entropies.iter().all(|e| e.is_finite() && *e >= 0.0),
+            Self::Labels(done) => {
+                let mut seen = BTreeSet::new();
+                let mut cameras = done.locations.iter().chain(&done.photographs);
+                cameras.all(|uuid| seen.insert(uuid))
+            }
+            Self::Location(_) | Self::Photograph(_) | Self::Assets(_) => true,
+        }
     }
 }
 

@@ -11,11 +11,12 @@ use crate::survey::surface_seen::SurfaceSeen;
 use s3d_geom::Aabb;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, Layout, XyzType, read_taxonomy_json};
-use s3d_io::fs::{Checksum, read_json, write_json};
+use s3d_io::fs::{Checksum, read_json, write_bytes};
 use s3d_label::{LabelTable, Taxonomy};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -34,7 +35,7 @@ const LARGEST: u64 = 1 << 28;
 
 /// The manifest. It holds no thread counts, times or folders of the machine, so the same input and options
 /// give the same bytes. Readers of a data set call [`Manifest::read`].
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Manifest {
     generator: String,
     pub(crate) version: String,
@@ -59,6 +60,9 @@ pub(crate) struct Manifest {
     /// How `s3d xyz` made the world coordinates from depth and pose. Absent if it did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     xyz_from_depth: Option<XyzFromDepth>,
+    /// The checksum of everything else in the manifest. Absent in data sets of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    xxh3_128: Option<Checksum>,
 }
 
 /// The list of a data set's files, without itself and the manifest.
@@ -75,7 +79,7 @@ pub(crate) struct FileList {
 }
 
 /// How world coordinates were made from depth, and what that loses.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct XyzFromDepth {
     #[serde(rename = "type", with = "by_name")]
     kind: XyzType,
@@ -205,6 +209,7 @@ impl Manifest {
             taxonomy: taxonomy.map(|t| t.name().to_owned()),
             files: None,
             xyz_from_depth: None,
+            xxh3_128: None,
         }
     }
 
@@ -424,10 +429,26 @@ impl Manifest {
         profiles.dedup();
     }
 
-    /// Writes the manifest as it stands.
+    /// Writes the manifest as it stands, with its checksum.
     pub(crate) fn write(&self, layout: &Layout) -> Result<()> {
-        write_json(&layout.manifest(), self)?;
+        let path = layout.manifest();
+        let wrong = |e: serde_json::Error| FileError::format(&path, e.to_string());
+        let sum = checksum_of(&serde_json::to_value(self).map_err(wrong)?);
+
+        // The checksum is the last field, so it follows the rest of the text.
+        let text = serde_json::to_string_pretty(&Self { xxh3_128: Some(sum), ..self.clone() });
+        write_bytes(&path, (text.map_err(wrong)? + "\n").as_bytes())?;
         Ok(())
+    }
+
+    /// Returns a sentence if the manifest at `path` was changed after it was written. Its layout may have.
+    pub(crate) fn change_of(path: &Path) -> Result<Option<String>, FileError> {
+        let value: Value = read_manifest(path)?;
+        let Some(told) = value.get("xxh3_128") else { return Ok(None) };
+        let found = checksum_of(&value).to_string();
+        let message =
+            format!("was changed after it was written: its checksum is {found}, and it tells of {told}");
+        Ok((told.as_str() != Some(&found)).then_some(message))
     }
 
     /// Writes that the export is complete, and what it holds.
@@ -436,6 +457,39 @@ impl Manifest {
         self.files = Some(files);
         self.status = COMPLETE.to_owned();
         self.write(layout)
+    }
+}
+
+/// Returns the checksum of a manifest without its own, whatever the order of keys and the blanks.
+fn checksum_of(manifest: &Value) -> Checksum {
+    let mut text = String::new();
+    put(manifest, true, &mut text);
+    Checksum::of(text.as_bytes())
+}
+
+/// Appends a value with sorted keys and without blanks. The checksum of the whole is left out.
+fn put(value: &Value, is_whole: bool, text: &mut String) {
+    match value {
+        Value::Object(fields) => {
+            let fields: BTreeMap<&String, &Value> = fields.iter().collect();
+            for (key, field) in fields {
+                if !is_whole || key != "xxh3_128" {
+                    text.push_str(key);
+                    text.push(':');
+                    put(field, false, text);
+                    text.push(',');
+                }
+            }
+            text.push('}');
+        }
+        Value::Array(items) => {
+            for item in items {
+                put(item, false, text);
+                text.push(',');
+            }
+            text.push(']');
+        }
+        other => text.push_str(&other.to_string()),
     }
 }
 

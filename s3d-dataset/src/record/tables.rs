@@ -3,13 +3,16 @@
 
 use crate::context::Context;
 use crate::error::Result;
+use crate::summary::Unlabelled;
 use crate::survey::annotated::Annotated;
 use crate::survey::candidate::Candidate;
 use crate::survey::room_names::RoomNames;
+use glam::DVec2;
+use s3d_geom::{Footprint, Polygon};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FaceVoteColumns, Frame, ImageName, Layout, Split};
 use s3d_io::fs::{create_dir, write_json};
-use s3d_label::{Class, Disputes, FaceLabels, LabelId, LabelTable, VoteRow};
+use s3d_label::{Class, Disputes, FaceLabels, LabelId, LabelTable, VoteReport, VoteRow};
 use s3d_sample::Fold;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -30,11 +33,23 @@ pub(crate) struct RoomRecord {
     pub(crate) outline: Vec<OutlineRecord>,
 }
 
+impl RoomRecord {
+    /// Returns the floor of the room.
+    pub(crate) fn footprint(&self) -> Footprint {
+        let ring = |points: &Vec<[f64; 2]>| points.iter().map(|p| DVec2::from_array(*p)).collect();
+        let polygons = self.outline.iter().map(|outline| Polygon {
+            outer: ring(&outline.outer),
+            holes: outline.holes.iter().map(ring).collect(),
+        });
+        Footprint { polygons: polygons.collect(), area_m2: self.floor_m2 }
+    }
+}
+
 /// One polygon of an outline.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct OutlineRecord {
-    outer: Vec<[f64; 2]>,
-    holes: Vec<Vec<[f64; 2]>>,
+    pub(crate) outer: Vec<[f64; 2]>,
+    pub(crate) holes: Vec<Vec<[f64; 2]>>,
 }
 
 /// Writes `area_N/3d/rooms.json`.
@@ -63,7 +78,7 @@ pub(crate) fn write_rooms(layout: &Layout, area: u32, annotated: &Annotated) -> 
     Ok(())
 }
 
-fn coordinates(points: &[glam::DVec2]) -> Vec<[f64; 2]> {
+fn coordinates(points: &[DVec2]) -> Vec<[f64; 2]> {
     points.iter().map(|p| p.to_array()).collect()
 }
 
@@ -103,85 +118,91 @@ pub(crate) fn write_votes(
     disputes: &Disputes,
     table: &LabelTable,
 ) -> Result<()> {
-    #[derive(Serialize)]
-    struct Dispute {
-        classes: [&'static str; 2],
-        faces: u64,
-        m2: f64,
-    }
-    #[derive(Serialize)]
-    struct Patch {
-        labels: [String; 2],
-        faces: u64,
-        m2: f64,
-        center: [f64; 3],
-        bbox: [f32; 6],
-    }
-    #[derive(Serialize)]
-    struct Named {
-        name: String,
-        #[serde(flatten)]
-        row: VoteRecord,
-    }
-    #[derive(Serialize)]
-    struct Votes {
-        faces: u64,
-        faces_without_votes: u64,
-        m2_without_votes: f64,
-        faces_without_label: u64,
-        m2_without_label: f64,
-        total: VoteRecord,
-        rooms: Vec<Named>,
-        classes: Vec<Named>,
-        disputing_classes: Vec<Dispute>,
-        disputed_patches: Vec<Patch>,
-    }
-
-    let disputing_classes = disputes
-        .classes
-        .iter()
-        .map(|d| Dispute { classes: d.classes.map(Class::name), faces: d.faces, m2: d.area_m2 })
-        .collect();
-    let disputed_patches = disputes
-        .patches
-        .iter()
-        .take(MOST_PATCHES)
-        .map(|p| Patch {
-            labels: p.labels.map(|label| table.name_of(label)),
-            faces: p.faces,
-            m2: p.area_m2,
-            center: p.center.to_array(),
-            bbox: p.bbox.to_array(),
-        })
-        .collect();
-
-    let report = &annotated.report;
-    let unlabelled = &annotated.unlabelled;
-    let votes = Votes {
-        faces: report.face_count,
-        faces_without_votes: report.faces_without_vote,
-        m2_without_votes: unlabelled.without_votes.m2,
-        faces_without_label: unlabelled.without_label.faces,
-        m2_without_label: unlabelled.without_label.m2,
-        total: (&report.total).into(),
-        rooms: report
-            .rooms
-            .iter()
-            // The report has the rooms of all areas.
-            .filter(|(of, ..)| *of == area)
-            .map(|(_, r, row)| Named { name: r.to_string(), row: row.into() })
-            .collect(),
-        classes: report
-            .classes
-            .iter()
-            .map(|(c, row)| Named { name: c.to_string(), row: row.into() })
-            .collect(),
-        disputing_classes,
-        disputed_patches,
-    };
-
+    let votes = VotesRecord::new(area, &annotated.report, &annotated.unlabelled, disputes, table);
     write_json(&layout.votes_json(area), &votes)?;
     Ok(())
+}
+
+/// The content of `votes.json`.
+#[derive(Serialize)]
+pub(crate) struct VotesRecord {
+    faces: u64,
+    faces_without_votes: u64,
+    m2_without_votes: f64,
+    faces_without_label: u64,
+    m2_without_label: f64,
+    total: VoteRecord,
+    rooms: Vec<NamedVotes>,
+    classes: Vec<NamedVotes>,
+    disputing_classes: Vec<DisputeRecord>,
+    disputed_patches: Vec<PatchRecord>,
+}
+
+#[derive(Serialize)]
+struct NamedVotes {
+    name: String,
+    #[serde(flatten)]
+    row: VoteRecord,
+}
+
+#[derive(Serialize)]
+struct DisputeRecord {
+    classes: [&'static str; 2],
+    faces: u64,
+    m2: f64,
+}
+
+#[derive(Serialize)]
+struct PatchRecord {
+    labels: [String; 2],
+    faces: u64,
+    m2: f64,
+    center: [f64; 3],
+    bbox: [f32; 6],
+}
+
+impl VotesRecord {
+    /// Returns the content for an area. Rooms of other areas are left out.
+    pub(crate) fn new(
+        area: u32,
+        report: &VoteReport,
+        unlabelled: &Unlabelled,
+        disputes: &Disputes,
+        table: &LabelTable,
+    ) -> Self {
+        let rooms = report.rooms.iter().filter(|(of, ..)| *of == area);
+        let patches = disputes.patches.iter().take(MOST_PATCHES);
+        Self {
+            faces: report.face_count,
+            faces_without_votes: report.faces_without_vote,
+            m2_without_votes: unlabelled.without_votes.m2,
+            faces_without_label: unlabelled.without_label.faces,
+            m2_without_label: unlabelled.without_label.m2,
+            total: (&report.total).into(),
+            rooms: rooms
+                .map(|(_, r, row)| NamedVotes { name: r.to_string(), row: row.into() })
+                .collect(),
+            classes: report
+                .classes
+                .iter()
+                .map(|(c, row)| NamedVotes { name: c.to_string(), row: row.into() })
+                .collect(),
+            disputing_classes: disputes
+                .classes
+                .iter()
+                .map(|d| DisputeRecord { classes: d.classes.map(Class::name), faces: d.faces, m2: d.area_m2 })
+                .collect(),
+            disputed_patches: patches
+                .map(|p| PatchRecord {
+                    labels: p.labels.map(|label| table.name_of(label)),
+                    faces: p.faces,
+                    m2: p.area_m2,
+                    center: p.center.to_array(),
+                    bbox: p.bbox.to_array(),
+                })
+                .collect(),
+        }
+    }
 }
 
 /// Writes `area_N/3d/votes.npz`: the label of each face, and the votes for it.
@@ -219,25 +240,28 @@ fn saturating_u32(votes: u64) -> u32 {
 /// Writes `area_N/3d/instance_numbers.json`: the label in the area of each instance of the annotation tree,
 /// where numbers run by room.
 pub(crate) fn write_instance_numbers(layout: &Layout, area: u32, rooms: &[RoomNames]) -> Result<()> {
-    #[derive(Serialize)]
-    struct Mapping {
-        room: String,
-        class: &'static str,
-        number_in_room: u32,
-        label: String,
-    }
-    let mappings: Vec<Mapping> = rooms
+    let numbers: Vec<NumberRecord> = rooms
         .iter()
         .flat_map(|r| &r.instances)
-        .map(|i| Mapping {
+        .map(|i| NumberRecord {
             room: i.label.room.to_string(),
-            class: i.label.class.name(),
+            class: i.label.class.name().to_owned(),
             number_in_room: i.number_in_room,
             label: i.label.to_string(),
         })
         .collect();
-    write_json(&layout.instance_numbers_json(area), &mappings)?;
+    write_json(&layout.instance_numbers_json(area), &numbers)?;
     Ok(())
+}
+
+/// An instance of `instance_numbers.json`.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct NumberRecord {
+    pub(crate) room: String,
+    pub(crate) class: String,
+    /// The number in the room, among the instances of the class. It names the file in the S3DIS tree.
+    pub(crate) number_in_room: u32,
+    pub(crate) label: String,
 }
 
 /// Writes `area_N/views.json`: every candidate view with its draw and its entropy, and the frame numbers of

@@ -7,8 +7,7 @@ use crate::parallel::for_each_in_order;
 use crate::record::data_set::Listed;
 use crate::record::manifest::Manifest;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{Domain, FileRecord, Frame, ImageName, Layout, read_file_list};
-use s3d_io::fs::checksum_of_file;
+use s3d_io::dataset::{Domain, FileRecord, Frame, ImageName, Layout, file_list_checksum, read_file_list};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
@@ -37,12 +36,11 @@ impl Files {
         let records = report.read(Topic::Files, &path, read_file_list);
         report.expect(records.clone(), told.bytes);
 
-        if let (Some(records), Some((bytes, sum))) =
-            (&records, report.read(Topic::Files, &path, checksum_of_file))
-        {
+        if let Some(records) = &records {
+            let sum = file_list_checksum(records);
             let checks = report.of(LIST, &path);
             checks.check(sum == told.xxh3_128, || {
-                format!("{bytes} bytes with the checksum {sum}, and the manifest tells of {}", told.xxh3_128)
+                format!("its checksum is {sum}, and the manifest tells of {}", told.xxh3_128)
             });
             let count = records.len() as u64;
             let bytes = records.iter().map(|r| r.bytes).sum::<u64>();
@@ -102,6 +100,7 @@ impl Files {
             return Ok(());
         };
 
+        check_places(layout, &manifest.area_numbers, listed.keys(), report);
         for path in &there {
             report.check(listed.contains_key(&report.relative(path)), EXTRA, path, || {
                 "files.csv does not name it".to_owned()
@@ -129,6 +128,30 @@ impl Files {
                 Ok(())
             },
         )
+    }
+}
+
+/// Checks that listed files are in the folders of the manifest's areas or among the tables, and that no
+/// folder of another area is there.
+fn check_places<'a>(
+    layout: &Layout,
+    areas: &[u32],
+    listed: impl Iterator<Item = &'a String>,
+    report: &Report,
+) {
+    let entries = layout.entries(areas);
+    for name in listed {
+        let path = layout.root().join(name);
+        let is_known = entries.iter().any(|entry| path.starts_with(entry));
+        report.check(is_known, EXTRA, &path, || "belongs to no area and no table of the manifest".to_owned());
+    }
+
+    let folders = fs::read_dir(layout.root()).into_iter().flatten().flatten();
+    for folder in folders.filter(|entry| entry.path().is_dir()) {
+        let name = folder.file_name().to_string_lossy().into_owned();
+        let area = name.strip_prefix("area_").and_then(|number| number.parse::<u32>().ok());
+        let is_known = area.is_none_or(|area| areas.contains(&area));
+        report.check(is_known, EXTRA, &folder.path(), || "the manifest tells of no such area".to_owned());
     }
 }
 

@@ -3,16 +3,24 @@
 use super::labels::Labels;
 use super::report::{OfFile, Report, Topic};
 use crate::record::manifest::Manifest;
-use s3d_io::dataset::{InstanceArrays, Layout, read_instance_arrays, read_instance_members, read_instances};
+use crate::record::tables::NumberRecord;
+use s3d_io::dataset::{
+    InstanceArrays, InstanceEntry, Layout, read_instance_arrays, read_instance_members, read_instances,
+};
 use s3d_io::fs::read_json;
-use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::Path;
 
 const INSTANCES: (Topic, &str) = (Topic::Instances, "tables of instances");
 
-/// Checks `instances.json`, `instances.npz` and `instance_numbers.json` of an area.
-pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &Labels, report: &Report) {
+/// Checks `instances.json`, `instances.npz` and `instance_numbers.json` of an area. Returns the instances.
+pub(crate) fn check(
+    layout: &Layout,
+    area: u32,
+    manifest: &Manifest,
+    labels: &Labels,
+    report: &Report,
+) -> Option<Vec<InstanceEntry>> {
     let json = layout.instances_json(area);
     let npz = layout.instances_npz(area);
     let entries = report.read(Topic::Instances, &json, read_instances);
@@ -79,6 +87,7 @@ pub(crate) fn check(layout: &Layout, area: u32, manifest: &Manifest, labels: &La
     }
 
     numbers(layout, area, labels, report);
+    entries
 }
 
 /// Checks that a label has this index.
@@ -123,18 +132,10 @@ fn members(arrays: &InstanceArrays, path: &Path, report: &Report) {
     report.read(Topic::Instances, path, |path| read_instance_members(path, &arrays.point_start, each));
 }
 
-#[derive(Deserialize)]
-struct Number {
-    room: String,
-    class: String,
-    number_in_room: u32,
-    label: String,
-}
-
 /// Checks `instance_numbers.json`.
 fn numbers(layout: &Layout, area: u32, labels: &Labels, report: &Report) {
     let path = layout.instance_numbers_json(area);
-    let Some(numbers) = report.read(Topic::Instances, &path, read_json::<Vec<Number>>) else { return };
+    let Some(numbers) = report.read(Topic::Instances, &path, read_json::<Vec<NumberRecord>>) else { return };
     let checks = report.of(INSTANCES, &path);
     let mut names = BTreeSet::new();
     let mut places = BTreeSet::new();

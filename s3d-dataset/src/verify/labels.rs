@@ -42,6 +42,11 @@ impl Labels {
         }
         let taxonomy = manifest.read_taxonomy(layout, |path| report.check_size(path));
         let taxonomy = report.ok(Topic::Labels, taxonomy)?;
+        if let Some(built_in) = Taxonomy::built_in(taxonomy.name()) {
+            report.check(taxonomy == built_in, ORDER, &layout.taxonomy_json(), || {
+                format!("is not the taxonomy {} that s3d knows", taxonomy.name())
+            });
+        }
         let path = layout.labels_json();
         let mut names = report.read(Topic::Labels, &path, read_labels)?;
 

@@ -1,21 +1,17 @@
-//! Checks the exported meshes against each other and against the votes: one mesh has colours, the other
-//! labels.
+//! Checks the exported meshes against each other: one has colours, the other labels.
 
 use super::labels::Labels;
-use super::report::{OfFile, Report, Topic};
+use super::report::{Report, Topic};
+use super::votes;
 use crate::record::manifest::{Manifest, XyzLoss};
 use crate::summary::Surface;
 use s3d_geom::TriMesh;
-use s3d_io::dataset::{Layout, read_face_votes, read_source_faces};
-use s3d_io::fs::read_json;
-use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
-use s3d_label::{LabelId, fill_labels};
-use serde::Deserialize;
-use std::collections::{BTreeMap, BTreeSet};
+use s3d_io::dataset::{InstanceEntry, Layout, read_source_faces};
+use s3d_io::fs::read_file;
+use s3d_io::mesh::{MeshFile, SemanticObj, UpAxis, read_mesh};
 use std::path::Path;
 
 const MESH: (Topic, &str) = (Topic::Mesh, "meshes that differ");
-const VOTES: (Topic, &str) = (Topic::Mesh, "faces and votes");
 
 /// The index of a face whose label is not in the table.
 pub(crate) const NOT_IN_TABLE: u32 = 0xff_fffe;
@@ -31,12 +27,13 @@ pub(crate) struct LabelledMesh {
     pub(crate) is_voted: Vec<bool>,
 }
 
-/// Reads and checks both meshes of an area.
+/// Reads and checks both meshes of an area, and the votes for their labels, by `instances` if they can be
+/// read.
 pub(crate) fn read_and_check(
     layout: &Layout,
     area: u32,
     manifest: &Manifest,
-    labels: &Labels,
+    (labels, instances): (&Labels, Option<&[InstanceEntry]>),
     report: &Report,
 ) -> Option<LabelledMesh> {
     let colored = layout.rgb_obj(area);
@@ -80,7 +77,8 @@ pub(crate) fn read_and_check(
     drop(other);
     let all_in_table = !label_of_face.contains(&NOT_IN_TABLE);
     let mut labelled = LabelledMesh { file, label_of_face, all_in_table, is_voted: Vec::new() };
-    labelled.is_voted = check_votes(layout, area, &labelled, (labels, manifest.options.fill), report);
+    check_materials(&semantic.with_extension("mtl"), &labelled, labels, report);
+    labelled.is_voted = votes::check(layout, area, manifest, &labelled, (labels, instances), report);
 
     check_unlabelled(layout, area, manifest, &labelled, report);
     Some(labelled)
@@ -128,6 +126,20 @@ fn check_source_faces(path: &Path, faces: usize, report: &Report) {
     report.check(order.is_sorted(), MESH, path, || "faces are not in the order of their files".to_owned());
 }
 
+/// Checks that `semantic.mtl` has the material of each label that faces have, in its colour.
+fn check_materials(path: &Path, mesh: &LabelledMesh, labels: &Labels, report: &Report) {
+    if !mesh.all_in_table {
+        return;
+    }
+    let mut expected = Vec::new();
+    let materials = SemanticObj::new(&mesh.file.mesh, &mesh.label_of_face, &labels.names);
+    let written = materials.write_mtl(&mut expected);
+    let Some(found) = report.read(Topic::Mesh, path, read_file) else { return };
+    report.check(written.is_ok() && found == expected, MESH, path, || {
+        "its materials are not the labels of semantic.obj in their colours".to_owned()
+    });
+}
+
 /// Checks the surface without votes and without a label that the manifest tells.
 fn check_unlabelled(layout: &Layout, area: u32, manifest: &Manifest, mesh: &LabelledMesh, report: &Report) {
     let Some(told) = manifest.area(area).and_then(|entry| entry.unlabelled) else { return };
@@ -167,129 +179,4 @@ fn label_names(mesh: &TriMesh, labels: &Labels, path: &Path, report: &Report) ->
     (0..mesh.faces().len() as u32)
         .map(|face| mesh.material_of(face).map_or(NOT_IN_TABLE, |m| indices[m as usize]))
         .collect()
-}
-
-#[derive(Deserialize)]
-struct VoteRecord {
-    name: String,
-    faces_voted: u64,
-}
-
-#[derive(Deserialize)]
-struct TotalRecord {
-    faces_voted: u64,
-}
-
-#[derive(Deserialize)]
-struct VotesRecord {
-    faces: u64,
-    faces_without_votes: u64,
-    total: TotalRecord,
-    rooms: Vec<VoteRecord>,
-    classes: Vec<VoteRecord>,
-}
-
-/// Checks the labels of `semantic.obj` against the votes, and against the report on them. Returns whether
-/// each face has votes.
-fn check_votes(
-    layout: &Layout,
-    area: u32,
-    mesh: &LabelledMesh,
-    (labels, fill_m): (&Labels, Option<f64>),
-    report: &Report,
-) -> Vec<bool> {
-    let voted = check_face_votes(&layout.votes_npz(area), mesh, fill_m, report);
-
-    let path = layout.votes_json(area);
-    if let Some(votes) = report.read(Topic::Mesh, &path, read_json::<VotesRecord>) {
-        check_vote_report(&votes, &voted, labels, &report.of(VOTES, &path));
-    }
-    voted.into_iter().map(|label| label != 0).collect()
-}
-
-/// Checks the labels of `semantic.obj` against the votes of each face. Labels of faces without votes must be
-/// the ones that filling gives. Returns the labels by votes alone, 0 without votes.
-fn check_face_votes(path: &Path, mesh: &LabelledMesh, fill_m: Option<f64>, report: &Report) -> Vec<u32> {
-    let LabelledMesh { file, label_of_face, .. } = mesh;
-    let mut voted = label_of_face.clone();
-
-    // Data sets of earlier versions have no votes. A file that is listed but missing is reported with the
-    // list of files.
-    if !path.exists() {
-        return voted;
-    }
-    let Some(votes) = report.read(Topic::Mesh, path, read_face_votes) else { return voted };
-
-    let won = votes.label == *label_of_face;
-    report.check(won, VOTES, path, || "other labels won than semantic.obj has".to_owned());
-    for (label, _) in voted.iter_mut().zip(&votes.total).filter(|(_, total)| **total == 0) {
-        *label = 0;
-    }
-
-    let mut filled: Vec<LabelId> = voted.iter().map(|label| LabelId(*label)).collect();
-    if let Some(within_m) = fill_m.filter(|_| won) {
-        fill_labels(&file.mesh, &mut filled, within_m);
-    }
-    let odd = filled
-        .iter()
-        .zip(label_of_face)
-        .filter(|(filled, label)| filled.0 != **label)
-        .count();
-    report.check(!won || odd == 0, VOTES, path, || {
-        format!("{odd} faces have other labels than votes and filling give them")
-    });
-
-    let sums = votes.votes.iter().zip(&votes.runner_up_votes).zip(&votes.total);
-    let odd = sums.filter(|((first, second), total)| {
-        first < second || u64::from(**first) + u64::from(**second) > u64::from(**total)
-    });
-    let odd = odd.count();
-    report.check(odd == 0, VOTES, path, || format!("{odd} faces have votes that do not add up"));
-    voted
-}
-
-/// Checks the report on votes against the labels by votes: faces in all, by room and by class.
-fn check_vote_report(votes: &VotesRecord, voted: &[u32], labels: &Labels, checks: &OfFile<'_>) {
-    let mut per_label = vec![0u64; labels.len()];
-    for label in voted {
-        if let Some(count) = per_label.get_mut(*label as usize) {
-            *count += 1;
-        }
-    }
-
-    let mut rooms: BTreeMap<String, u64> = BTreeMap::new();
-    let mut classes: BTreeMap<&str, u64> = labels.taxonomy.classes().iter().map(|c| (c.name(), 0)).collect();
-    let mut others = 0;
-    for (name, count) in labels.names.iter().zip(&per_label).filter(|(_, count)| **count > 0) {
-        match labels.taxonomy.parse_name(name) {
-            Ok(Some(label)) => {
-                *rooms.entry(label.room.to_string()).or_default() += count;
-                *classes.entry(label.class.name()).or_default() += count;
-            }
-            _ => others += count,
-        }
-    }
-
-    let is = |what: &str, manifest: u64, found: u64| {
-        checks.check(manifest == found, || format!("{manifest} faces {what}, and semantic.obj has {found}"));
-    };
-    is("in all", votes.faces, voted.len() as u64);
-    is("without votes", votes.faces_without_votes, others);
-    is("with votes", votes.total.faces_voted, per_label.iter().sum::<u64>() - others);
-
-    // A room of the same name in another area has no faces here.
-    let mut manifest: BTreeMap<String, u64> = BTreeMap::new();
-    votes
-        .rooms
-        .iter()
-        .for_each(|r| *manifest.entry(r.name.clone()).or_default() += r.faces_voted);
-    for room in rooms.keys().chain(manifest.keys()).collect::<BTreeSet<_>>() {
-        let [told, found] = [&manifest, &rooms].map(|counts| counts.get(room).copied().unwrap_or(0));
-        is(&format!("of {room}"), told, found);
-    }
-
-    for class in &votes.classes {
-        let found = classes.get(&*class.name).copied().unwrap_or(0);
-        is(&format!("of class {}", class.name), class.faces_voted, found);
-    }
 }

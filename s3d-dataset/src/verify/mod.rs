@@ -18,9 +18,11 @@ mod photographs;
 mod points;
 mod pose;
 mod report;
+mod same_bytes;
 mod scores;
 mod tables;
 mod views;
+mod votes;
 
 use crate::context::Context;
 use crate::error::{Result, UsageError};
@@ -39,10 +41,14 @@ use s3d_io::dataset::{DatasetImage, Domain, Layout, dataset_images};
 use s3d_io::image::{Compression, pretty_color};
 use s3d_render::{MipMaps, Scene};
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 use views::Views;
+
+/// The kind of fault that ends a check early.
+const BROKEN_OFF: &str = "checks that broke off";
 
 /// The number of mismatching files of a domain that are diagnosed.
 const MAX_DIAGNOSES: usize = 25;
@@ -84,22 +90,52 @@ pub fn verify(root: impl Into<PathBuf>, options: &VerifyOptions, ctx: &Context) 
 fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
     let report = Report::new(layout);
     let Some(manifest) = report.ok(Topic::Manifest, Manifest::read(layout)) else { return Ok(report) };
-    let files = Files::read(layout, &manifest, &report);
-    let labels = Labels::read(layout, &manifest, &report);
-    tables::conventions(layout, &manifest, &report);
-    let views = Views::read(layout, &manifest, &report);
-    let photographs = Photographs::read(layout, &manifest, &report);
+
+    // Whatever happens, the report tells what was found until then.
+    let checked = catch_unwind(AssertUnwindSafe(|| check_content(ctx, layout, &manifest, full, &report)));
+    match checked {
+        Ok(result) => result?,
+        Err(panic) => {
+            let why = panic.downcast_ref::<String>().map(String::as_str);
+            let why = why.or_else(|| panic.downcast_ref().copied()).unwrap_or("no message");
+            report.fault(
+                Topic::Files,
+                BROKEN_OFF,
+                layout.root(),
+                format!("further checks were not made, because of a mistake in s3d; please report it: {why}"),
+            );
+        }
+    }
+    Ok(report)
+}
+
+fn check_content(
+    ctx: &Context,
+    layout: &Layout,
+    manifest: &Manifest,
+    full: bool,
+    report: &Report,
+) -> Result<()> {
+    let change = report.ok(Topic::Manifest, Manifest::change_of(&layout.manifest()));
+    if let Some(Some(message)) = change {
+        report.fault(Topic::Manifest, "the checksum of the manifest", &layout.manifest(), message);
+    }
+    let files = Files::read(layout, manifest, report);
+    let labels = Labels::read(layout, manifest, report);
+    tables::conventions(layout, manifest, report);
+    let views = Views::read(layout, manifest, report);
+    let photographs = Photographs::read(layout, manifest, report);
 
     let common = Common {
         ctx,
         layout,
-        manifest: &manifest,
+        manifest,
         labels: labels.as_ref(),
         views: &views,
         photographs: &photographs,
         files: &files,
         full,
-        report: &report,
+        report,
     };
 
     let mut all = Vec::new();
@@ -112,25 +148,23 @@ fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {
     }
 
     // Checks that need the images of all areas.
-    views.check_images(layout, &manifest, &all, &photographs, &report);
-    tables::splits(layout, &manifest, &all, &report);
-    tables::statistics(layout, &manifest, &report);
-    files.check_rest(ctx, layout, &manifest, &report)?;
-
-    Ok(report)
+    views.check_images(layout, manifest, &all, &photographs, report);
+    tables::splits(layout, manifest, &all, report);
+    tables::statistics(layout, manifest, report);
+    files.check_rest(ctx, layout, manifest, report)
 }
 
 fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result<()> {
     let Common { layout, manifest, labels, report, .. } = *common;
+    let instances = labels
+        .filter(|_| manifest.is_labelled())
+        .and_then(|labels| instances::check(layout, area, manifest, labels, report));
     if manifest.is_labelled() {
-        tables::rooms(layout, area, manifest, labels, report);
+        tables::rooms(layout, area, manifest, labels, instances.as_deref(), report);
     }
 
     let mesh = labels.and_then(|labels| {
-        if manifest.is_labelled() {
-            instances::check(layout, area, manifest, labels, report);
-        }
-        mesh::read_and_check(layout, area, manifest, labels, report)
+        mesh::read_and_check(layout, area, manifest, (labels, instances.as_deref()), report)
     });
 
     let (Some(labels), Some(mesh)) = (labels, &mesh) else {
@@ -233,7 +267,7 @@ fn check_images(
     reference: Option<(&Reference<'_>, &LabelledMesh, &Labels)>,
 ) -> Result<()> {
     let ctx = common.ctx;
-    let Common { layout, manifest, labels, views, photographs, files, full, report, .. } = *common;
+    let Common { layout, manifest, labels, views, photographs, files, report, .. } = *common;
     let mismatches = Mutex::new(Vec::new());
     let cameras = Mutex::new(Vec::new());
     let unlabelled = UnlabelledPixels::default();
@@ -266,8 +300,7 @@ fn check_images(
             match *item {
                 CheckItem::Points => {
                     if let Some((_, mesh, labels)) = reference {
-                        let in_all_forms = full && manifest.is_labelled();
-                        points::check(layout, area, manifest, mesh, labels, in_all_forms, report);
+                        points::check(common, area, mesh, labels)?;
                     }
                 }
                 CheckItem::Image(index) => {
@@ -284,8 +317,12 @@ fn check_images(
     let mut cameras = cameras.into_inner().unwrap_or_else(PoisonError::into_inner);
     cameras.sort_by_key(|(index, _)| *index);
 
+    if manifest.is_labelled() {
+        tables::location_rooms(layout, area, images, &cameras, report);
+    }
+
     let Some((reference, ..)) = reference else { return Ok(()) };
-    if full {
+    if common.full {
         scores::check(ctx, reference, area, images, &cameras, views)?;
     }
 

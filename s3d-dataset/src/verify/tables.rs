@@ -1,17 +1,19 @@
 //! Checks the tables beside the images: rooms, folds, lists, statistics, conventions.
 
 use super::labels::Labels;
-use super::report::{Report, Topic};
+use super::report::{OfFile, Report, Topic};
+use super::votes::box_of;
 use crate::options::profile::Profile;
 use crate::record::assets;
 use crate::record::manifest::Manifest;
+use crate::record::tables::RoomRecord;
 use crate::statistics::Statistics;
+use s3d_geom::{Aabb, Camera, Footprint};
 use s3d_io::dataset::{
-    DatasetImage, Domain, Frame, Layout, read_conventions, read_splits, read_world_offsets,
+    DatasetImage, Domain, Frame, InstanceEntry, Layout, read_conventions, read_splits, read_world_offsets,
 };
 use s3d_io::fs::{read_file, read_json};
 use s3d_sample::folds;
-use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -20,6 +22,12 @@ const CONVENTIONS: (Topic, &str) = (Topic::Tables, "conventions, assets and prof
 const ROOMS: (Topic, &str) = (Topic::Tables, "rooms");
 const SPLITS: (Topic, &str) = (Topic::Tables, "folds and lists");
 const STATISTICS: (Topic, &str) = (Topic::Tables, "statistics");
+
+/// The most differences between two documents that are listed.
+const MOST_DIFFERENCES: usize = 5;
+
+/// How far a scan location may be from the floor of the room that its files name, metres.
+const FAR_FROM_ROOM_M: f64 = 3.0;
 
 /// Checks `conventions.json` against the options, profiles against the manifest, and the files that are the
 /// same in every data set of this version.
@@ -68,6 +76,17 @@ pub(crate) fn conventions(layout: &Layout, manifest: &Manifest, report: &Report)
         return;
     }
 
+    let told = manifest.conventions().to_text(&manifest.request().world_offsets());
+    if let (Some(found), Ok(expected)) =
+        (report.read(Topic::Tables, &path, read_json::<Value>), serde_json::from_str::<Value>(&told))
+    {
+        let mut differences = Vec::new();
+        differ(&found, &expected, "", &mut differences);
+        report.check(differences.is_empty(), CONVENTIONS, &path, || {
+            format!("not the conventions of this data set: {}", first_of(&differences))
+        });
+    }
+
     for (path, text) in assets::texts(layout) {
         if let Some(found) = report.read(Topic::Tables, &path, read_file) {
             report.check(found == text.as_bytes(), CONVENTIONS, &path, || {
@@ -81,26 +100,13 @@ fn read_text(path: &Path) -> s3d_io::Result<String> {
     String::from_utf8(read_file(path)?).map_err(|_| s3d_io::Error::format(path, "is no text in UTF-8"))
 }
 
-#[derive(Deserialize)]
-struct Outline {
-    outer: Vec<[f64; 2]>,
-    holes: Vec<Vec<[f64; 2]>>,
-}
-
-#[derive(Deserialize)]
-struct RoomRecord {
-    room: String,
-    floor_m2: f64,
-    wall_direction_deg: u32,
-    outline: Vec<Outline>,
-}
-
-/// Checks `rooms.json` of an area, and the angles in its S3DIS tree.
+/// Checks `rooms.json` of an area against its instances, and the angles in its S3DIS tree.
 pub(crate) fn rooms(
     layout: &Layout,
     area: u32,
     manifest: &Manifest,
     labels: Option<&Labels>,
+    instances: Option<&[InstanceEntry]>,
     report: &Report,
 ) {
     let path = layout.rooms_json(area);
@@ -131,6 +137,9 @@ pub(crate) fn rooms(
         checks.check((inside - r.floor_m2).abs() <= 1e-6 * (1.0 + inside), || {
             format!("{}: floor_m2 is {}, and the outline holds {inside}", r.room, r.floor_m2)
         });
+        if let Some(instances) = instances {
+            check_instances_of(r, instances, &checks);
+        }
     }
 
     let tree = layout.s3dis_area_dir(area);
@@ -152,6 +161,65 @@ pub(crate) fn rooms(
     for folder in entries.filter(|e| e.path().is_dir()) {
         let name = folder.file_name().to_string_lossy().into_owned();
         checks.check(listed.contains(&name), || format!("the room {name} of the tree has no angle"));
+    }
+}
+
+/// Checks that a room has the points of its instances, and that its outline lies in their boxes.
+fn check_instances_of(room: &RoomRecord, instances: &[InstanceEntry], checks: &OfFile<'_>) {
+    let of_room = instances.iter().filter(|instance| instance.room == room.room);
+    let mut points = 0;
+    let mut around = Aabb::EMPTY;
+    for instance in of_room {
+        points += instance.points;
+        around = around.union(box_of(instance));
+    }
+    checks.check(points == room.points, || {
+        format!("{}: {} points, and its instances have {points}", room.room, room.points)
+    });
+
+    let low = around.min.as_dvec3();
+    let high = around.max.as_dvec3();
+    let rings = room
+        .outline
+        .iter()
+        .flat_map(|outline| outline.holes.iter().chain([&outline.outer]));
+    let is_inside = |[x, y]: [f64; 2]| {
+        let slack = 1e-6 * (1.0 + x.abs().max(y.abs()));
+        (low.x - slack..=high.x + slack).contains(&x) && (low.y - slack..=high.y + slack).contains(&y)
+    };
+    checks.check(rings.flatten().all(|corner| is_inside(*corner)), || {
+        format!("{}: its outline reaches beyond the boxes of its instances", room.room)
+    });
+}
+
+/// Checks that scan locations stand in their rooms. The scan's own list may name the rooms, so only a
+/// location far from its room, on the floor of another, is a fault.
+pub(crate) fn location_rooms(
+    layout: &Layout,
+    area: u32,
+    images: &[DatasetImage],
+    cameras: &[(usize, Camera)],
+    report: &Report,
+) {
+    // A file that cannot be read is reported with the rooms.
+    let Ok(rooms) = read_json::<Vec<RoomRecord>>(&layout.rooms_json(area)) else { return };
+    let floors: Vec<(&str, Footprint)> = rooms.iter().map(|room| (&*room.room, room.footprint())).collect();
+
+    let mut seen = BTreeSet::new();
+    for (index, camera) in cameras {
+        let image = &images[*index];
+        let told = floors.iter().find(|(room, _)| *room == image.room);
+        let (Some((_, floor)), true) = (told, seen.insert((&image.uuid, &image.room))) else { continue };
+
+        let place = camera.pose.location;
+        let distance = floor.distance(place.x, place.y);
+        let other = floors.iter().find(|(_, other)| other.contains(place.x, place.y));
+        let other = other.filter(|_| distance > FAR_FROM_ROOM_M && distance.is_finite());
+        let path = image.path(layout, Domain::Pose);
+        report.check(other.is_none(), (Topic::Poses, "rooms of locations"), &path, || {
+            let other = other.map_or("", |(room, _)| room);
+            format!("stands in {other}, {distance:.1} m from the floor of {}", image.room)
+        });
     }
 }
 
@@ -241,7 +309,7 @@ pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) 
         let mut differences = Vec::new();
         differ(&found, &expected, "", &mut differences);
         report.check(differences.is_empty(), STATISTICS, &path, || {
-            format!("not what is counted from the files: {}", differences.join("; "))
+            format!("not what is counted from the files: {}", first_of(&differences))
         });
     }
 
@@ -259,8 +327,19 @@ pub(crate) fn statistics(layout: &Layout, manifest: &Manifest, report: &Report) 
     }
 }
 
+/// Returns the first of some differences, and how many more there are.
+pub(crate) fn first_of(differences: &[String]) -> String {
+    let (first, more) = differences.split_at(differences.len().min(MOST_DIFFERENCES));
+    let more = if more.is_empty() {
+        String::new()
+    } else {
+        format!("; and {} more", more.len())
+    };
+    first.join("; ") + &more
+}
+
 /// Lists the places where two documents differ.
-fn differ(found: &Value, expected: &Value, place: &str, out: &mut Vec<String>) {
+pub(crate) fn differ(found: &Value, expected: &Value, place: &str, out: &mut Vec<String>) {
     match (found, expected) {
         (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
             a.iter()
@@ -274,7 +353,7 @@ fn differ(found: &Value, expected: &Value, place: &str, out: &mut Vec<String>) {
                 .for_each(|(i, (a, b))| differ(a, b, &format!("{place}/{i}"), out));
         }
         _ if found == expected => {}
-        _ => out.push(format!("{place} is {found}, counted are {expected}")),
+        _ => out.push(format!("{place} is {found}, expected is {expected}")),
     }
 }
 

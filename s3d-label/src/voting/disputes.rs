@@ -1,6 +1,6 @@
 //! Surfaces whose labels are disputed.
 
-use crate::{Class, FaceLabels, LabelId, LabelTable};
+use crate::{Class, FaceLabels, FaceVotes, LabelId, LabelTable};
 use s3d_geom::glam::DVec3;
 use s3d_geom::{Aabb, TriMesh, face_patches};
 use std::collections::BTreeMap;
@@ -79,7 +79,19 @@ impl Disputes {
     /// # Panics
     /// If the labels belong to a mesh with more faces.
     pub fn of(mesh: &TriMesh, labels: &FaceLabels, table: &LabelTable) -> Self {
-        let faces = (0u32..).zip(labels.iter());
+        Self::of_faces(mesh, labels.iter(), table)
+    }
+
+    /// Does the same from the results of all faces in order.
+    ///
+    /// # Panics
+    /// Like [`Disputes::of`].
+    pub fn of_faces(
+        mesh: &TriMesh,
+        votes: impl IntoIterator<Item = Option<FaceVotes>>,
+        table: &LabelTable,
+    ) -> Self {
+        let faces = (0u32..).zip(votes);
         let disputed: Vec<Disputed> = faces
             .filter_map(|(face, votes)| {
                 let votes = votes.filter(|votes| votes.share() < CLEAR)?;

@@ -37,7 +37,8 @@ impl VoteRow {
         }
     }
 
-    fn add_face(&mut self, face: &FaceVotes) {
+    /// Adds the result of a face to the counts of faces.
+    pub fn add_face(&mut self, face: &FaceVotes) {
         self.faces += 1;
         self.face_votes += face.total;
 

@@ -20,7 +20,7 @@ use glam::DVec3;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{DatasetImage, Domain, Frame, Layout, PhotographRecord, XyzType};
 use s3d_io::fs::read_file;
-use s3d_io::image::PngReader;
+use s3d_io::image::{PngReader, xyz_bits};
 use s3d_render::{Caster, Hits, MISSING_INDEX, NO_FACE};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -28,6 +28,7 @@ use std::sync::{Mutex, PoisonError};
 
 const SIZES: (Topic, &str) = (Topic::Images, "sizes");
 const CLASSES: (Topic, &str) = (Topic::Images, "classes");
+const TYPES: (Topic, &str) = (Topic::Images, "types of numbers");
 const MISSING: (Topic, &str) = (Topic::Images, "missing modalities");
 const INDICES: (Topic, &str) = (Topic::Images, "label indices");
 const PRETTY: (Topic, &str) = (Topic::Images, "colours of labels");
@@ -235,7 +236,19 @@ impl ImageCheck<'_> {
             // This check says more about the reason.
             Err(_) => self.files.check(path, report),
         }
-        report.ok(Topic::Images, bytes.and_then(|bytes| Opened::new(domain, &bytes, path, reader)))
+        let bytes = report.ok(Topic::Images, bytes)?;
+        let opened = report.ok(Topic::Images, Opened::new(domain, &bytes, path, reader))?;
+        if domain == Domain::GlobalXyz {
+            let is_half = matches!(opened, Opened::Pixels(Pixels::XyzHalf(_)));
+            let bits = if is_half { Some(16) } else { xyz_bits(&bytes) };
+            let told = self.manifest.conventions().xyz;
+            let expected = if told == XyzType::Half { 16 } else { 32 };
+            report.check(bits == Some(expected), TYPES, path, || {
+                let bits = bits.map_or("other numbers".to_owned(), |bits| format!("floats of {bits} bits"));
+                format!("holds {bits}, and the manifest tells of the type {told}")
+            });
+        }
+        Some(opened)
     }
 }
 
