@@ -17,6 +17,7 @@ mod eval;
 mod frames;
 mod kill;
 mod large;
+mod links;
 mod lists;
 mod pack;
 #[path = "photographs/main.rs"]

@@ -117,6 +117,20 @@ fn names_in_a_mesh_lead_nowhere() {
 }
 
 #[test]
+fn gltf_takes_files_outside_its_folder_only_if_the_scene_says_so() {
+    let scan = Scan::new();
+    let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0];
+    let bytes: Vec<u8> = corners.iter().flat_map(|number| number.to_le_bytes()).collect();
+    fs::write(scan.dir.path().join("other.bin"), &bytes).unwrap();
+    let inside = "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAAAAAIC/";
+    scan.write("m.gltf", gltf_with_names(&["wall"]).replace(inside, "../other.bin"));
+    scan.use_mesh("m.gltf");
+    scan.refused(&["m.gltf", "`../other.bin`", "outside_files = true under [mesh]"]);
+    scan.replace("scene.toml", "[mesh]\n", "[mesh]\noutside_files = true\n");
+    exports_only_into_out(&scan);
+}
+
+#[test]
 fn names_in_lists_and_annotations_lead_nowhere() {
     // A scan location is named by a hash of its picture's name.
     let scan = Scan::new();

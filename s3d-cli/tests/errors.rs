@@ -23,6 +23,28 @@ fn wrong_calls_exit_with_2() {
     s3d_fails(&["render", "a.obj", "--at", "1,2,3", "--pano", "--size", "9", "-o", "x"], 2, &["even"]);
 }
 
+/// With too few open files allowed, an export fails anywhere, and another try may do better.
+#[cfg(target_os = "linux")]
+#[test]
+fn too_many_open_files_are_temporary() {
+    let mut temporary = 0;
+    for most in 4..16 {
+        let scan = Scan::new();
+        let out = scan.out();
+        let limited = format!("ulimit -n {most}; exec \"$0\" \"$@\"");
+        let mut command = std::process::Command::new("sh");
+        command
+            .args(["-c", &limited, env!("CARGO_BIN_EXE_s3d")])
+            .args(scan.args(&out));
+        let output = command.output().unwrap();
+        let log = String::from_utf8_lossy(&output.stderr);
+        assert!(!log.contains("panicked"), "{log}");
+        assert!(matches!(output.status.code(), Some(0 | 75)), "{most}: {}: {log}", output.status);
+        temporary += u32::from(output.status.code() == Some(75));
+    }
+    assert!(temporary > 0);
+}
+
 #[test]
 fn a_missing_scene_is_named() {
     s3d_fails(&["export", "no/such/scene.toml"], 1, &["no/such/scene.toml"]);

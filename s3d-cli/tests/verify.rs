@@ -217,6 +217,18 @@ fn a_flipped_bit_in_every_kind_of_file_is_found() {
 }
 
 #[test]
+fn faults_while_another_process_is_at_work_are_temporary() {
+    let (_dir, out) = copy(demo());
+    flip(&out, "statistics.json");
+    create_dir(&out.join(".s3d")).unwrap();
+    let lock = fs::File::create(out.join(".s3d/lock")).unwrap();
+    lock.lock().unwrap();
+    common::s3d_fails(&["verify", text(&out)], 75, &[text(&out), "another process", "check it again"]);
+    drop(lock);
+    assert_eq!(verify(&out, &[]).1, 1);
+}
+
+#[test]
 fn missing_extra_and_swapped_files_are_found() {
     let (_dir, out) = copy(demo());
     let gone = first(&out, "area_1/data/normal", ".png");

@@ -116,13 +116,15 @@ fn make(
     let needed: BTreeSet<&Path> = images.iter().flat_map(|image| [&*image.pose, &*image.depth]).collect();
     data.files.require(ctx, |path| needed.contains(path))?;
 
-    let change = Change::begin(layout)?;
+    let folders = |layout: &Layout| {
+        let kinds = [Frame::Panorama, Frame::View(0)];
+        let areas = data.manifest.area_numbers.iter();
+        let pairs = areas.flat_map(|area| kinds.map(|kind| (*area, kind)));
+        Vec::from_iter(pairs.map(|(area, kind)| layout.image_dir(area, kind, Domain::GlobalXyz)))
+    };
+    let change = Change::begin(layout, &folders(layout))?;
     let staged = change.staged();
-    for area in &data.manifest.area_numbers {
-        for kind in [Frame::Panorama, Frame::View(0)] {
-            create_dir(&staged.image_dir(*area, kind, Domain::GlobalXyz))?;
-        }
-    }
+    folders(staged).iter().try_for_each(|folder| create_dir(folder))?;
 
     let conventions = data.manifest.conventions();
     let progress = ctx.progress("coordinates", "images", images.len() as u64);

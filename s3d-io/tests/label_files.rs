@@ -116,7 +116,7 @@ fn options() -> AnnotationOptions {
 
 /// Opens annotations for a mesh file, Z-up.
 fn open(mesh: &MeshFile, path: &Path, options: &AnnotationOptions) -> Result<Annotations> {
-    let mesh = AnnotatedMesh { file: mesh, up: UpAxis::Z, units: None };
+    let mesh = AnnotatedMesh { file: mesh, up: UpAxis::Z, units: None, outside_files: false };
     Annotations::open_for(&mesh, &[path.to_owned()], options)
 }
 
@@ -478,7 +478,7 @@ fn rooms_from_the_field_have_every_label() {
         let found = if scene.annotations.is_empty() {
             Annotations::of_mesh(&file, &scene.annotation_options)
         } else {
-            let mesh = AnnotatedMesh { file: &file, up: scene.up, units: None };
+            let mesh = AnnotatedMesh { file: &file, up: scene.up, units: None, outside_files: false };
             Annotations::open_for(&mesh, &scene.annotations, &scene.annotation_options)
         };
         check(&found.unwrap(), &file.mesh, "office_1");

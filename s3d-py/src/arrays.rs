@@ -20,7 +20,8 @@ pub(crate) fn view<'py, T: Element, const N: usize>(
     // the object lives, and the array keeps the object alive.
     #[allow(unsafe_code)]
     let array = unsafe { PyArray2::borrow_from_array(&shaped, mesh.clone().into_any()) };
-    array.readwrite().make_nonwriteable();
+    // By NumPy's own flag: a borrow would panic while a call on another thread reads the same rows.
+    array.getattr("flags")?.setattr("writeable", false)?;
     Ok(array)
 }
 

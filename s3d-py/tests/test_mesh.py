@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import threading
 import types
 from pathlib import Path
 
@@ -25,6 +26,29 @@ def test_a_mesh_of_arrays_shows_its_own_memory(room: s3d.Mesh) -> None:
     with pytest.raises(ValueError):
         one.flags.writeable = True
     assert repr(room) == "Mesh(14 faces, 60.0 m², 4.0 × 3.0 × 2.5 m, coloured)"
+
+
+def test_a_mesh_is_shown_while_calls_on_other_threads_read_it() -> None:
+    side = 150
+    row, column = np.divmod(np.arange(side * side), side)
+    inner = np.arange(side * side).reshape(side, side)[:-1, :-1].ravel()
+    faces = np.stack([inner, inner + 1, inner + side], 1)
+    mesh = s3d.Mesh(np.stack([row, column, row * 0], 1), faces)
+    faults: list[BaseException] = []
+
+    def read() -> None:
+        try:
+            for _ in range(20):
+                s3d.Mesh(mesh.vertices, mesh.faces)
+        except BaseException as fault:  # a panic is no Exception
+            faults.append(fault)
+
+    threads = [threading.Thread(target=read) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not faults and not mesh.vertices.flags.writeable
 
 
 def test_arrays_outlive_their_mesh() -> None:

@@ -89,6 +89,13 @@ pub enum UsageError {
         /// What lies there.
         path: PathBuf,
     },
+    /// A link lies where s3d would write or remove files: they would lie elsewhere.
+    Link {
+        /// The link.
+        path: PathBuf,
+        /// Where it leads.
+        target: PathBuf,
+    },
     /// A folder holds a plan, and a data set was to go there.
     HoldsPlan {
         /// The folder.
@@ -256,6 +263,12 @@ impl UsageError {
             Self::InTheWay { path } => format!(
                 "{} is in the way, and was not written by s3d: move it, or choose another folder",
                 path.display()
+            ),
+            Self::Link { path, target } => format!(
+                "{} is a symbolic link to {}, where s3d would write and remove files: remove the link, or \
+                 choose another folder (the output folder itself may be a link)",
+                path.display(),
+                target.display()
             ),
             Self::HoldsPlan { folder } => {
                 format!("{} holds a plan: choose another folder", folder.display())

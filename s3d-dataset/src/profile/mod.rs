@@ -92,7 +92,7 @@ fn add(ctx: &Context, data: &DataSet, wanted: &[Profile], overwrite: bool, call:
     data.files
         .require(ctx, |path| trees.iter().any(|tree| path.starts_with(tree)))?;
 
-    let change = Change::begin(layout)?;
+    let change = Change::begin(layout, &dirs)?;
     let staged = change.staged();
     write(&Source { ctx, layout, files: &data.files, taxonomy: &data.taxonomy }, staged, areas, wanted)?;
 

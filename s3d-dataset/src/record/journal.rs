@@ -354,11 +354,12 @@ impl Journal {
         let dir = layout.journal_dir();
         create_dir(&dir)?;
         let failed = |e| FileError::io(&dir, "write in", e);
+        // With `tempfile_in`, the error would lack the system's number.
         let named = tempfile::Builder::new()
             .prefix("")
             .suffix(".jsonl")
             .rand_bytes(12)
-            .tempfile_in(&dir);
+            .make_in(&dir, |path| File::options().write(true).create_new(true).open(path));
         let (file, path) = named.map_err(failed)?.keep().map_err(|e| failed(e.error))?;
         Ok(Self { path, file: Mutex::new(file), finished: Mutex::new(finished) })
     }

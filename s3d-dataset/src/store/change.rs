@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::record::listing::visit_below;
 use crate::record::pending_change::{Ready, folder, pending, ready_file};
 use crate::store::backup::{remove, rename};
+use crate::store::links::refuse_links_to;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::{create_dir, read_json, sync_data_set, sync_file, write_json};
 use std::path::{Path, PathBuf};
@@ -36,8 +37,14 @@ pub(crate) fn settle(layout: &Layout) -> Result<Option<String>> {
 }
 
 impl Change {
-    /// Begins a change of a complete data set. The caller must hold the lock.
-    pub(crate) fn begin(layout: &Layout) -> Result<Self> {
+    /// Begins a change of a complete data set, which will write to `folders`. The caller must hold the lock.
+    ///
+    /// # Errors
+    /// [`Error::Usage`](crate::Error::Usage) if one of the folders is a link, or lies below one.
+    pub(crate) fn begin(layout: &Layout, folders: &[PathBuf]) -> Result<Self> {
+        folders
+            .iter()
+            .try_for_each(|folder| refuse_links_to(layout.root(), folder))?;
         remove(&folder(layout))?;
         let staged = staged(layout);
         create_dir(staged.root())?;
@@ -84,6 +91,14 @@ fn complete(layout: &Layout) -> Result<()> {
     let root = layout.root();
     let path = ready_file(layout);
     let Ready { replaced, .. } = read_json(&path)?;
+
+    let (folders, _) = entries(staged.root())?;
+    let below = folders
+        .iter()
+        .filter_map(|folder| folder.strip_prefix(staged.root()).ok());
+    for folder in below.chain(replaced.iter().map(PathBuf::as_path)) {
+        refuse_links_to(root, &root.join(folder))?;
+    }
 
     for folder in &replaced {
         let from = staged.root().join(folder);
@@ -165,7 +180,7 @@ mod tests {
         {
             put(&layout, name, "old");
         }
-        let change = Change::begin(&layout).unwrap();
+        let change = Change::begin(&layout, &[]).unwrap();
         for name in ["profiles/pointnet/a", "area_1/data/b", "area_1/c", "files.csv", "manifest.json"] {
             put(change.staged(), name, "new");
         }

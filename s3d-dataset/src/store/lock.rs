@@ -3,6 +3,7 @@
 use crate::context::Context;
 use crate::error::{Activity, Result, TemporaryError};
 use crate::store::change;
+use crate::store::links::refuse_links_below;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use s3d_io::fs::create_dir;
@@ -30,8 +31,10 @@ impl Lock {
     ///
     /// # Errors
     /// [`Error::Temporary`](crate::Error::Temporary) if another process holds it.
+    /// [`Error::Usage`](crate::Error::Usage) if `.s3d` or a folder in it is a link.
     pub(crate) fn take(ctx: &Context, layout: &Layout, sharing: Sharing) -> Result<Self> {
         let path = layout.lock();
+        refuse_links_below(&layout.work_dir())?;
         loop {
             create_dir(&layout.work_dir())?;
 
@@ -71,6 +74,12 @@ impl Lock {
                 Err(TryLockError::Error(e)) => return Err(FileError::io(&path, "lock", e).into()),
             }
         }
+    }
+
+    /// Returns whether a process works alone in OUT.
+    pub(crate) fn is_held(layout: &Layout) -> bool {
+        let opened = File::options().read(true).open(layout.lock());
+        opened.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }
 
     /// Holds the lock of a complete data set while `work` changes it. A change of a killed process is

@@ -7,6 +7,7 @@
 
 pub(crate) mod backup;
 pub(crate) mod change;
+mod links;
 pub(crate) mod lock;
 pub(crate) mod new_file;
 pub(crate) mod new_folder;

@@ -76,6 +76,7 @@ pub(crate) fn begin(
         }
     }
 
+    state.refuse_links(layout, request)?;
     let lock = Lock::take(ctx, layout, Sharing::Alone)?;
     let begun =
         recover(layout).and_then(|state| begin_locked(layout, &state, overwrite, request, manifest, account));
@@ -119,6 +120,7 @@ pub(crate) fn begin_shard(
     manifest: &Manifest,
 ) -> Result<Begin> {
     let started = Instant::now();
+    OutputState::read(layout)?.refuse_links(layout, request)?;
     loop {
         // The first shard prepares OUT, alone for that moment.
         match Lock::take(ctx, layout, Sharing::Alone) {

@@ -8,6 +8,7 @@
 use crate::context::Context;
 use crate::error::{Activity, Error, Result, TemporaryError};
 use crate::store::backup::{remove, rename};
+use crate::store::links::refuse_link;
 use crate::store::lock::{Lock, Sharing};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
@@ -51,7 +52,7 @@ impl Staging {
     ///
     /// # Errors
     /// [`Error::Temporary`] if another process makes the same thing. [`Error::File`] if no file can be made
-    /// there, or a device or pipe has the name.
+    /// there, or a device or pipe has the name. [`Error::Usage`] if the folder is a link.
     pub(crate) fn begin(ctx: &Context, parent: &Path, name: &Path) -> Result<Self> {
         let place = parent.join(name);
         let refused = |e| Err(FileError::io(&place, "write", e).into());
@@ -64,6 +65,7 @@ impl Staging {
         }
 
         let folder = folder_of(parent, name);
+        refuse_link(&folder)?;
         let lock = Lock::take(ctx, &Layout::new(&folder), Sharing::Alone).map_err(|e| match e {
             Error::Temporary(_) => {
                 TemporaryError::InUse { path: place.clone(), by: Activity::Writing }.into()

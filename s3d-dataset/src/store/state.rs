@@ -4,7 +4,8 @@ use crate::context::Context;
 use crate::error::{Difference, Held, Overwriting, Result, UsageError, passes};
 use crate::record::manifest::{Head, Manifest};
 use crate::record::request::{Request, begun_by_other_version, read_request};
-use crate::store::backup::BACKUP;
+use crate::store::backup::{BACKUP, MOVING, TRASH};
+use crate::store::links::{refuse_link, refuse_links_below};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Layout;
 use std::ffi::OsStr;
@@ -99,6 +100,12 @@ impl OutputState {
         self.head.as_ref().map_or(Vec::new(), |head| head.area_numbers.clone())
     }
 
+    /// Returns the areas that lie there, or may: of the manifest and of an unfinished export.
+    fn areas_there(&self) -> Vec<u32> {
+        let begun = self.request.as_ref().map_or(Vec::new(), Request::numbers);
+        [self.areas_of_manifest(), begun].concat()
+    }
+
     /// Compares the folder with a request.
     pub(super) fn compare(&self, request: &Request) -> Holding {
         if let Some(manifest) = &self.manifest {
@@ -152,6 +159,9 @@ impl OutputState {
             ));
         }
 
+        let working = [layout.work_dir(), root.join(MOVING), root.join(BACKUP), root.join(TRASH)];
+        working.iter().try_for_each(|path| refuse_link(path))?;
+
         // A plan's journals would be mistaken for an export's.
         if crate::store::is_plan(root) {
             return Err(UsageError::HoldsPlan { folder: root.to_owned() }.into());
@@ -184,6 +194,16 @@ impl OutputState {
         Ok(())
     }
 
+    /// Refuses links among the folders that an export of `request` writes to or removes from.
+    pub(crate) fn refuse_links(&self, layout: &Layout, request: &Request) -> Result<()> {
+        let mut areas = request.numbers();
+        areas.extend(self.areas_there());
+        let mut entries = layout.entries(&areas);
+        entries.extend(layout.shared_dirs());
+        entries.push(layout.work_dir());
+        entries.iter().try_for_each(|entry| refuse_links_below(entry))
+    }
+
     /// Refuses a folder in which the data set, or an earlier one that it replaces, would overwrite its own
     /// input: one of the files or folders `inputs` of these areas.
     pub(crate) fn check_inputs<'p>(
@@ -195,8 +215,7 @@ impl OutputState {
         let Ok(root) = fs::canonicalize(layout.root()) else { return Ok(()) };
 
         // The areas of an earlier data set are replaced too.
-        areas.extend(self.areas_of_manifest());
-        areas.extend(self.request.as_ref().map_or(Vec::new(), Request::numbers));
+        areas.extend(self.areas_there());
         let mut entries = Layout::new(&root).entries(&areas);
         entries.push(root.join(BACKUP));
 

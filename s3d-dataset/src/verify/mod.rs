@@ -25,10 +25,11 @@ mod views;
 mod votes;
 
 use crate::context::Context;
-use crate::error::{Result, UsageError};
+use crate::error::{Result, TemporaryError, UsageError};
 use crate::export::modality::{Channels, NO_CLASS};
 use crate::parallel::for_each_in_order;
 use crate::record::manifest::Manifest;
+use crate::store::lock::Lock;
 use files::Files;
 use images::{ImageCheck, Mismatch, Reference, Scratch, UnlabelledPixels};
 use labels::Labels;
@@ -38,6 +39,7 @@ pub use report::{FaultGroup, VerifyReport};
 use report::{Report, Topic};
 use s3d_geom::Camera;
 use s3d_io::dataset::{DatasetImage, Domain, Layout, dataset_images};
+use s3d_io::fs::{Checksum, checksum_of_file};
 use s3d_io::image::{Compression, pretty_color};
 use s3d_render::{MipMaps, Scene};
 use std::collections::BTreeMap;
@@ -78,13 +80,27 @@ struct Common<'a> {
 ///
 /// # Errors
 /// [`Error::Usage`](crate::Error::Usage) if no data set is there;
+/// [`Error::Temporary`](crate::Error::Temporary) if faults are found while another process changes it;
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn verify(root: impl Into<PathBuf>, options: &VerifyOptions, ctx: &Context) -> Result<VerifyReport> {
     let layout = &Layout::new(root.into());
     if !layout.manifest().is_file() {
         return Err(UsageError::NoDataSet { folder: layout.root().to_owned() }.into());
     }
-    check_all(ctx, layout, options.full).map(Report::finish)
+    let before = manifest_checksum(layout);
+    let report = check_all(ctx, layout, options.full)?.finish();
+
+    // Every change ends with a new manifest, and holds the lock until then.
+    if report.fault_count() > 0 && (Lock::is_held(layout) || manifest_checksum(layout) != before) {
+        let root = layout.root().display();
+        let what = format!("{root}: another process changed it while it was checked: check it again later");
+        return Err(TemporaryError::Changed { what }.into());
+    }
+    Ok(report)
+}
+
+fn manifest_checksum(layout: &Layout) -> Option<Checksum> {
+    checksum_of_file(&layout.manifest()).ok().map(|(_, checksum)| checksum)
 }
 
 fn check_all(ctx: &Context, layout: &Layout, full: bool) -> Result<Report> {

@@ -18,6 +18,8 @@ pub struct AnnotatedMesh<'a> {
     pub up: UpAxis,
     /// The unit of its file. `None`: the unit that the file says, or metres.
     pub units: Option<LengthUnit>,
+    /// Whether glTF files may name files outside their folder.
+    pub outside_files: bool,
 }
 
 impl Annotations {
@@ -37,6 +39,7 @@ impl Annotations {
             instance_column: options.instance_column.clone(),
             origin: MeshOrigin::behind(options.offset_m),
             units: None,
+            outside_files: scene.is_some_and(|scene| scene.outside_files),
         };
         let Some(scene) = scene else {
             let labelled = file.read(UpAxis::Z, &mesh_options)?;

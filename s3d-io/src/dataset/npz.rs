@@ -2,8 +2,11 @@
 
 use crate::cloud::npy::write::npy_header;
 use crate::error::{Error, Result};
-use std::io::{self, BufReader, Read, Seek, Write};
+use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
@@ -17,17 +20,83 @@ pub(super) fn bytes<T, const N: usize>(
 
 /// Writes an `.npz` file: an archive of `.npy` files, stored as they are.
 pub(super) struct NpzWriter<W: Write + Seek> {
-    zip: ZipWriter<W>,
+    // Fields are dropped in this order.
+    ended: SetOnDrop,
+    zip: ZipWriter<UntilEnd<W>>,
+}
+
+/// Says that an archive is not to be completed: its writer was dropped.
+struct SetOnDrop(Arc<AtomicBool>);
+
+impl Drop for SetOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A writer that takes everything and writes nothing once the archive has ended: it was dropped, or the
+/// system has refused something. A `ZipWriter` that is dropped completes its archive, and prints to the log
+/// if that fails, as it does on a full disk.
+struct UntilEnd<W> {
+    file: W,
+    ended: Arc<AtomicBool>,
+    /// Where the next byte belongs, and the end of the file. They go on after the archive has ended.
+    at: u64,
+    end: u64,
+}
+
+impl<W> UntilEnd<W> {
+    /// Does `work` unless the archive has ended. Then `instead` is the answer.
+    fn until_end<T>(&mut self, instead: T, work: impl FnOnce(&mut W) -> io::Result<T>) -> io::Result<T> {
+        if self.ended.load(Ordering::Relaxed) {
+            return Ok(instead);
+        }
+        let done = work(&mut self.file);
+        if done.as_ref().is_err_and(|e| e.kind() != ErrorKind::Interrupted) {
+            self.ended.store(true, Ordering::Relaxed);
+        }
+        done
+    }
+}
+
+impl<W: Write> Write for UntilEnd<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.until_end(bytes.len(), |file| file.write(bytes))?;
+        self.at += written as u64;
+        self.end = self.end.max(self.at);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.until_end((), |file| file.flush())
+    }
+}
+
+impl<W: Seek> Seek for UntilEnd<W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let at = match to {
+            SeekFrom::Start(at) => at,
+            SeekFrom::Current(by) => self.at.saturating_add_signed(by),
+            SeekFrom::End(by) => self.end.saturating_add_signed(by),
+        };
+        self.at = self.until_end(at, |file| file.seek(to))?;
+        Ok(self.at)
+    }
 }
 
 impl<W: Write + Seek> NpzWriter<W> {
     pub(super) fn new(file: W) -> Self {
-        Self { zip: ZipWriter::new(file) }
+        let ended = Arc::default();
+        let zip = ZipWriter::new(UntilEnd { file, ended: Arc::clone(&ended), at: 0, end: 0 });
+        Self { ended: SetOnDrop(ended), zip }
     }
 
     /// Completes the archive, and returns the writer.
     pub(super) fn finish(self) -> io::Result<W> {
-        Ok(self.zip.finish()?)
+        let Self { ended, zip } = self;
+        let file = zip.finish()?.file;
+        drop(ended);
+        Ok(file)
     }
 
     /// Appends an array in memory. `kind` is a numpy type (`"<u4"`).
@@ -79,7 +148,7 @@ pub(super) struct NpzReader<'a, R> {
 impl<'a, R: Read + Seek> NpzReader<'a, R> {
     pub(super) fn new(file: R, path: &'a Path) -> Result<Self> {
         let zip = ZipArchive::new(BufReader::with_capacity(1 << 18, file))
-            .map_err(|e| Error::format(path, format!("no readable archive: {e}")))?;
+            .map_err(|e| refused(path, e, |e| format!("no readable archive: {e}")))?;
         Ok(Self { path, zip })
     }
 
@@ -90,7 +159,7 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
         let mut entry = self
             .zip
             .by_name(&format!("{name}.npy"))
-            .map_err(|e| Error::format(path, format!("the array {name:?}: {e}")))?;
+            .map_err(|e| refused(path, e, |e| format!("the array {name:?}: {e}")))?;
         let other = |_| Error::format(path, format!("{name:?} is no NPY array"));
         let mut start = [0; 8];
         let mut length = [0; 2];
@@ -112,14 +181,22 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
         let path = self.path;
         let (header, mut values) = self.array(name)?;
         let mut bytes = Vec::new();
-        values.read_to_end(&mut bytes).map_err(|e| damaged(path, name, &e))?;
+        values.read_to_end(&mut bytes).map_err(|e| damaged(path, name, e))?;
         check_header(path, name, &header, &kind(bytes.len()), &shape(bytes.len()))?;
         Ok(bytes)
     }
 }
 
-pub(super) fn damaged(path: &Path, name: &str, e: &std::io::Error) -> Error {
-    Error::format(path, format!("the array {name:?} is damaged: {e}"))
+pub(super) fn damaged(path: &Path, name: &str, e: io::Error) -> Error {
+    refused(path, ZipError::Io(e), |e| format!("the array {name:?} is damaged: {e}"))
+}
+
+/// Returns an error of the system as it is, since it may pass. Any other is a fault of the file.
+fn refused(path: &Path, error: ZipError, fault: impl FnOnce(&ZipError) -> String) -> Error {
+    match error {
+        ZipError::Io(e) if e.raw_os_error().is_some() => Error::io(path, "read", e),
+        other => Error::format(path, fault(&other)),
+    }
 }
 
 impl<R: Read + Seek> NpzReader<'_, R> {
@@ -128,7 +205,7 @@ impl<R: Read + Seek> NpzReader<'_, R> {
         let path = self.path;
         let (header, mut values) = self.array(name)?;
         let mut bytes = Vec::new();
-        values.read_to_end(&mut bytes).map_err(|e| damaged(path, name, &e))?;
+        values.read_to_end(&mut bytes).map_err(|e| damaged(path, name, e))?;
 
         // The type tells how many characters a text has at most.
         let head = String::from_utf8_lossy(&header).into_owned();
@@ -168,13 +245,79 @@ pub(super) fn numbers<T, const N: usize>(bytes: &[u8], from_le_bytes: impl Fn([u
 mod tests {
     use super::*;
 
+    /// A disk with room for some bytes. It counts what is refused.
+    struct Disk<'c> {
+        bytes: io::Cursor<Vec<u8>>,
+        room: u64,
+        refused: &'c std::cell::Cell<u32>,
+    }
+
+    impl Write for Disk<'_> {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if self.bytes.position() + bytes.len() as u64 > self.room {
+                self.refused.set(self.refused.get() + 1);
+                return Err(io::Error::from_raw_os_error(28));
+            }
+            self.bytes.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Seek for Disk<'_> {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.bytes.seek(to)
+        }
+    }
+
+    /// Each later try to complete the archive would fail, and print to the log.
+    #[test]
+    fn a_full_disk_refuses_once() {
+        for room in [0, 20, 100, 300, 400, 430] {
+            let refused = std::cell::Cell::new(0);
+            let disk = Disk { bytes: io::Cursor::default(), room, refused: &refused };
+            let mut archive = NpzWriter::new(disk);
+            let written = archive.array("a", "<u1", &[200], [7; 200]);
+            let written = written.and_then(|()| archive.finish().map(drop));
+            assert!(written.is_err(), "{room}");
+            assert_eq!(refused.get(), 1, "{room}");
+        }
+
+        // One that is given up is not completed.
+        let refused = std::cell::Cell::new(0);
+        let disk = Disk { bytes: io::Cursor::default(), room: 300, refused: &refused };
+        let mut archive = NpzWriter::new(disk);
+        archive.array("a", "<u1", &[100], [7; 100]).unwrap();
+        drop(archive);
+        assert_eq!(refused.get(), 0);
+    }
+
+    #[test]
+    fn errors_of_the_system_are_kept() {
+        struct Broken;
+        impl Read for Broken {
+            fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+                Err(io::Error::from_raw_os_error(5))
+            }
+        }
+        impl Seek for Broken {
+            fn seek(&mut self, _: SeekFrom) -> io::Result<u64> {
+                Ok(1000)
+            }
+        }
+        let error = NpzReader::new(Broken, Path::new("a.npz")).err().unwrap();
+        assert!(matches!(&error, Error::Io { source, .. } if source.raw_os_error() == Some(5)), "{error:?}");
+    }
+
     #[test]
     fn an_array_beyond_4_gib_has_a_header_of_64_bits() {
         for (size, is_large) in [(1 << 33, true), (1 << 20, false)] {
             let mut archive = NpzWriter::new(io::Cursor::new(Vec::new()));
             archive.start("point_index", size).unwrap();
             archive.zip.write_all(b"abc").unwrap();
-            let bytes = archive.zip.finish().unwrap().into_inner();
+            let bytes = archive.finish().unwrap().into_inner();
             // In the local header, version 4.5 is needed, and the sizes are in an extra field of the kind 1.
             assert_eq!(bytes[..4], *b"PK\x03\x04");
             let extra = 30 + "point_index.npy".len();

@@ -1,10 +1,10 @@
 //! Files that are there whole or not at all.
 
 use crate::error::{Error, Result};
-use std::fs::Permissions;
+use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
+use tempfile::TempPath;
 
 /// The size of the write buffer, bytes.
 const BUFFER: usize = 1 << 18;
@@ -18,7 +18,9 @@ const BUFFER: usize = 1 << 18;
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
-    writer: BufWriter<NamedTempFile>,
+    // Its writer is no `NamedTempFile`, which hides the numbers of the system's errors.
+    writer: BufWriter<File>,
+    temporary: TempPath,
 }
 
 impl AtomicFile {
@@ -38,14 +40,13 @@ impl AtomicFile {
             _ => Path::new("."),
         };
 
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".s3d-").suffix(".part");
-        let usual = usual_permissions();
-        if let Some(permissions) = &usual {
-            builder.permissions(permissions.clone());
-        }
-        let temporary = builder.tempfile_in(folder).map_err(|e| Error::io(&path, "write", e))?;
-        Ok(Self { path, writer: BufWriter::with_capacity(BUFFER, temporary) })
+        // With `tempfile_in`, the error would lack the system's number, and the file be private to its owner.
+        let made = tempfile::Builder::new()
+            .prefix(".s3d-")
+            .suffix(".part")
+            .make_in(folder, |path| File::options().read(true).write(true).create_new(true).open(path));
+        let (file, temporary) = made.map_err(|e| Error::io(&path, "write", e))?.into_parts();
+        Ok(Self { path, writer: BufWriter::with_capacity(BUFFER, file), temporary })
     }
 
     /// Returns the final name.
@@ -58,10 +59,10 @@ impl AtomicFile {
     /// # Errors
     /// [`Error::Io`] if the rest cannot be written or the file cannot be renamed; the file is removed then.
     pub fn commit(self) -> Result<u64> {
-        let Self { path, writer } = self;
+        let Self { path, writer, temporary } = self;
         let io = |e| Error::io(&path, "write", e);
-        let temporary = writer.into_inner().map_err(|e| io(e.into_error()))?;
-        let bytes = temporary.as_file().metadata().map_err(io)?.len();
+        let file = writer.into_inner().map_err(|e| io(e.into_error()))?;
+        let bytes = file.metadata().map_err(io)?.len();
         temporary
             .persist(&path)
             .map_err(|e| Error::io(&path, "rename the finished file to this name", e.error))?;
@@ -93,19 +94,6 @@ impl Seek for AtomicFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.writer.seek(to)
     }
-}
-
-/// Returns the permissions of an ordinary file before the umask. Temporary files would be private to their
-/// owner.
-#[cfg(unix)]
-fn usual_permissions() -> Option<Permissions> {
-    use std::os::unix::fs::PermissionsExt;
-    Some(Permissions::from_mode(0o666))
-}
-
-#[cfg(not(unix))]
-fn usual_permissions() -> Option<Permissions> {
-    None
 }
 
 /// Writes a file through `write`, whole or not at all, and returns its size in bytes.
@@ -182,6 +170,8 @@ mod tests {
 
         let e = write_bytes(&dir.path().join("none/a.txt"), b"").unwrap_err();
         assert!(matches!(&e, Error::Io { path, .. } if path.ends_with("none/a.txt")), "{e}");
+        // The number of the system's error is kept: it tells whether another try may help.
+        assert!(matches!(&e, Error::Io { source, .. } if source.raw_os_error().is_some()), "{e:?}");
         create_dir(&dir.path().join("x/y")).unwrap();
         create_dir(&dir.path().join("x/y")).unwrap();
         // A folder cannot be replaced by a file.

@@ -6,7 +6,7 @@
 use crate::error::{Error, Result};
 use crate::fs::open::read_file;
 use crate::guarded::guarded;
-use crate::image::jpeg::{missing, without_fill};
+use crate::image::jpeg::{fault, without_fill};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 use s3d_geom::Raster;
@@ -66,7 +66,7 @@ pub(crate) fn decode_texture(bytes: Vec<u8>) -> std::result::Result<LoadedTextur
     let image = guarded(|| decode(encoded, format, size))
         .unwrap_or_else(|| Err("its content is damaged".into()))
         .map_err(|e| TextureFault::Unreadable(format!("cannot be decoded: {e}")))?;
-    if is_jpeg && let Some(what) = missing(encoded, &image) {
+    if is_jpeg && let Some(what) = fault(encoded, image.height()) {
         return Err(TextureFault::Unreadable(what));
     }
     let file = extension.map(|extension| TextureFile { extension, bytes });

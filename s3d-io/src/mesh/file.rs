@@ -248,6 +248,10 @@ pub struct MeshOptions {
     /// The unit of the coordinates. By default the unit that a comment in the head of the file names, as
     /// modellers write `# File units = inches` into OBJ files, or else metres.
     pub units: Option<LengthUnit>,
+    /// Whether the buffers, images and schema of a glTF file may lie outside its folder. By default a file
+    /// that names such a file is refused: a foreign one could bring any file of the disk into what is made
+    /// of it.
+    pub outside_files: bool,
 }
 
 /// Checks the parts, whose positions are in the file's unit, and makes the mesh. Adds what was repaired to

@@ -49,6 +49,8 @@ struct MeshTable {
     offset_m: Option<[f64; 3]>,
     #[serde(default)]
     colors: MeshColors,
+    #[serde(default)]
+    outside_files: bool,
 }
 
 /// Reads a `scene.toml`:
@@ -62,6 +64,7 @@ struct MeshTable {
 /// # Subtracted from positions; left out: chosen if the mesh is far from 0.
 /// offset_m = [500000.0, 5400000.0, 300.0]
 /// colors = "points"   # a mesh without textures takes the colours of the annotated points
+/// outside_files = true  # a glTF file may name files outside its folder; left out: it is refused
 /// [annotations]       # left out: there are no labels
 /// path = "Area_1"     # or mesh = true: the labels that came with the mesh
 /// [cameras]
@@ -212,6 +215,7 @@ impl MeshTable {
         }
         scene.up = self.up.unwrap_or(UpAxis::Y);
         scene.units = self.units;
+        scene.outside_files = self.outside_files;
         Ok(())
     }
 }

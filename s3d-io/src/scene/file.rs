@@ -32,6 +32,9 @@ pub struct SceneFile {
     /// The unit of the mesh's coordinates. `None`: the unit that the mesh's file says, or metres. Points and
     /// scan locations are always in metres.
     pub units: Option<LengthUnit>,
+    /// Whether a glTF file may name files outside its folder: see
+    /// [`MeshOptions::outside_files`](crate::mesh::MeshOptions::outside_files).
+    pub outside_files: bool,
     /// The offset that is subtracted from the mesh's positions in `f64`, in the world's axes. `None`: nothing
     /// is subtracted, unless the mesh lies far from the origin
     /// ([`MeshOrigin::Near`](crate::mesh::MeshOrigin::Near)).
@@ -85,6 +88,7 @@ impl SceneFile {
             mesh,
             up,
             units: None,
+            outside_files: false,
             mesh_offset_m: None,
             mesh_colors: MeshColors::File,
             taxonomy: Taxonomy::s3dis(),

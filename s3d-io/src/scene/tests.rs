@@ -46,7 +46,12 @@ fn paths_are_resolved_and_up_is_y_unless_said() {
     assert_eq!((scene.area, scene.up), (2, UpAxis::Z));
     assert_eq!(read(&GOOD.replace("up = \"z\"\n", "")).unwrap().up, UpAxis::Y);
     assert_eq!((scene.mesh_offset_m, scene.annotations_have_offset), (None, false));
-    assert_eq!(scene.units, None);
+    assert_eq!((scene.units, scene.outside_files), (None, false));
+    assert!(
+        read(&GOOD.replace("up = \"z\"\n", "outside_files = true\n"))
+            .unwrap()
+            .outside_files
+    );
     let scaled = read(&GOOD.replace("up = \"z\"\n", "units = \"in\"\n")).unwrap();
     assert_eq!(scaled.units, Some(LengthUnit::Inch));
     assert!(read(&GOOD.replace("up = \"z\"\n", "units = \"km\"\n")).is_err());

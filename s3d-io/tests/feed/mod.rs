@@ -520,7 +520,7 @@ fn label_files(dir: &Path, data: &[u8]) {
         file(dir, mesh, MATTERPORT_PLY.as_bytes());
     }
     let scene = read_mesh(&dir.join("mesh.ply"), UpAxis::Z).expect("a mesh");
-    let mesh = AnnotatedMesh { file: &scene, up: UpAxis::Z, units: None };
+    let mesh = AnnotatedMesh { file: &scene, up: UpAxis::Z, units: None, outside_files: false };
 
     let names = [
         "a.house",

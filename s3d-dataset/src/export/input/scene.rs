@@ -207,6 +207,7 @@ fn mesh_source(scene: &SceneFile) -> MeshSource {
             instance_column: options.instance_column.clone().filter(|_| are_of_mesh),
             origin: scene.mesh_offset_m.map_or(MeshOrigin::Near, MeshOrigin::At),
             units: scene.units,
+            outside_files: scene.outside_files,
         },
         colors: Vec::new(),
     }
@@ -229,7 +230,8 @@ fn open_annotations(
         mesh_bounds: Some(frame.bounds),
         ..options.clone()
     };
-    let mesh = AnnotatedMesh { file, up: scene.up, units: scene.units };
+    let outside_files = scene.outside_files;
+    let mesh = AnnotatedMesh { file, up: scene.up, units: scene.units, outside_files };
     Ok(Annotations::open_for(&mesh, &scene.annotations, &options)?)
 }
 

@@ -54,7 +54,9 @@ pub fn plan<S: Clone + Into<SceneSource>>(
     refuse_foreign(folder)?;
 
     let scenes: Vec<SceneSource> = scenes.iter().cloned().map(Into::into).collect();
-    let job = Job::open(&scenes, &layout, &OutputState::read(&layout)?, options, None, &account)?;
+    let state = OutputState::read(&layout)?;
+    let job = Job::open(&scenes, &layout, &state, options, None, &account)?;
+    state.refuse_links(&layout, &job.request)?;
 
     let path = plan_file(folder);
     if path.exists() {

@@ -274,7 +274,7 @@ mod tests {
 
     fn open(mesh: &Path, labels: &Path, options: &AnnotationOptions) -> Result<Annotations> {
         let file = read_mesh_with(mesh, UpAxis::Z, &MeshOptions::default())?;
-        let scene = AnnotatedMesh { file: &file, up: UpAxis::Z, units: None };
+        let scene = AnnotatedMesh { file: &file, up: UpAxis::Z, units: None, outside_files: false };
         Annotations::open_for(&scene, &[labels.to_owned()], options)
     }
 

@@ -132,7 +132,7 @@ pub fn read_instance_members_from(
             .by_ref()
             .take(size)
             .read_to_end(&mut bytes)
-            .map_err(|e| damaged(path, name, &e))?;
+            .map_err(|e| damaged(path, name, e))?;
         if bytes.len() as u64 != size {
             return Err(Error::format(path, format!("the array {name:?} ends too early")));
         }
@@ -146,7 +146,7 @@ pub fn read_instance_members_from(
     match values.read(&mut [0; 1]) {
         Ok(0) => Ok(()),
         Ok(_) => Err(Error::format(path, format!("the array {name:?} goes on behind its {total} points"))),
-        Err(e) => Err(damaged(path, name, &e)),
+        Err(e) => Err(damaged(path, name, e)),
     }
 }
 

@@ -23,7 +23,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::mem;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// A glTF file with its buffers in memory.
 #[derive(Debug)]
@@ -80,12 +80,12 @@ fn is_far(node: &json::Node) -> bool {
 impl GltfDocument {
     #[cfg(test)]
     pub(crate) fn open(path: &Path) -> Result<Self> {
-        Self::read(read_file(path)?, path)
+        Self::read(read_file(path)?, path, false)
     }
 
     /// Reads a `.gltf` or `.glb` file, and its buffers, which lie beside `path`. The content tells which of
-    /// the two it is.
-    pub(crate) fn read(bytes: Vec<u8>, path: &Path) -> Result<Self> {
+    /// the two it is. Files outside the folder of `path` are refused unless `outside_files`.
+    pub(crate) fn read(bytes: Vec<u8>, path: &Path, outside_files: bool) -> Result<Self> {
         let mut bytes = into_utf8(bytes);
         let (text, blob) = if bytes.starts_with(b"glTF") {
             split_glb(path, &bytes)?
@@ -116,6 +116,10 @@ impl GltfDocument {
             words,
             feature_attributes,
         };
+        if !outside_files {
+            document.refuse_outside_files()?;
+        }
+
         // The binary chunk stays in the memory of the file, since it is most of the file.
         let blob = blob.map(|blob| {
             bytes.truncate(blob.end);
@@ -280,16 +284,37 @@ impl GltfDocument {
 
     /// Returns the files of its buffers, images and metadata, if they exist.
     pub(crate) fn companions(&self) -> Vec<PathBuf> {
-        let buffers = self.root().buffers.iter().filter_map(|b| b.uri.as_deref());
-        let images = self.root().images.iter().filter_map(|i| i.uri.as_deref());
-        let files = buffers
-            .chain(images)
-            .chain(schema_uri(self.root()))
-            .filter(|uri| !uri.starts_with("data:") && !uri.contains("://"));
-        files
+        self.file_uris()
             .map(|uri| self.beside(uri))
             .filter(|path| path.is_file())
             .collect()
+    }
+
+    /// Returns the URIs of buffers, images and metadata that name files.
+    fn file_uris(&self) -> impl Iterator<Item = &str> {
+        let buffers = self.root().buffers.iter().filter_map(|b| b.uri.as_deref());
+        let images = self.root().images.iter().filter_map(|i| i.uri.as_deref());
+        let all = buffers.chain(images).chain(schema_uri(self.root()));
+        all.filter(|uri| !uri.starts_with("data:") && !uri.contains("://"))
+    }
+
+    /// Refuses a document that names an existing file outside its folder. A link in the folder may lead
+    /// anywhere, since only the owner of the folder makes one. A file that does not exist is only missing.
+    fn refuse_outside_files(&self) -> Result<()> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        for uri in self.file_uris() {
+            let path = self.beside(uri);
+            let is_inside = path.strip_prefix(folder).is_ok_and(stays_inside);
+            if !is_inside && path.exists() {
+                return Err(self.fail(format!(
+                    "names {}, which is outside its folder: put the file, or a link to it, into the folder \
+                     and change the name, or allow such files with outside_files = true under [mesh] of a \
+                     scene.toml",
+                    quote(uri.as_bytes())
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// Returns the bytes that a URI names: the data in it, or the file beside this one.
@@ -317,6 +342,21 @@ impl GltfDocument {
             other => other.to_string(),
         })
     }
+}
+
+/// Returns whether a relative path leads out of its folder nowhere.
+fn stays_inside(path: &Path) -> bool {
+    let mut depth: u32 = 0;
+    path.components().all(|component| {
+        let next = match component {
+            Component::CurDir => Some(depth),
+            Component::Normal(_) => depth.checked_add(1),
+            Component::ParentDir => depth.checked_sub(1),
+            Component::RootDir | Component::Prefix(_) => None,
+        };
+        depth = next.unwrap_or(depth);
+        next.is_some()
+    })
 }
 
 /// Returns whether a buffer only stands for data that meshopt compresses.
@@ -549,6 +589,53 @@ mod tests {
         assert!(error("{\n\"asset\": ]").contains("line 2"));
         let harmless = r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_materials_unlit"]}"#;
         assert!(open("a.gltf", harmless.as_bytes()).is_ok());
+    }
+
+    #[test]
+    fn files_outside_the_folder_are_refused_unless_allowed() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("scan");
+        fs::create_dir_all(folder.join("parts")).unwrap();
+        let secret = dir.path().join("secret");
+        fs::write(&secret, [1, 2, 3, 4]).unwrap();
+        fs::write(folder.join("own.bin"), [5, 6, 7, 8]).unwrap();
+
+        let path = folder.join("a.gltf");
+        let read = |kind: &str, uri: &str, outside_files| {
+            let json = format!(
+                r#"{{"asset": {{"version": "2.0"}}, "{kind}": [{{"byteLength": 4, "uri": "{uri}"}}]}}"#
+            );
+            GltfDocument::read(json.into_bytes(), &path, outside_files)
+        };
+
+        let absolute = secret.to_str().unwrap().replace('\\', "/");
+        for uri in ["../secret", "%2e%2e/secret", "parts/../../secret", "./../secret", &absolute] {
+            for kind in ["buffers", "images"] {
+                let message = read(kind, uri, false).unwrap_err().to_string();
+                for part in ["a.gltf", uri, "outside_files = true"] {
+                    assert!(message.contains(part), "{message}");
+                }
+                assert!(read(kind, uri, true).is_ok());
+            }
+        }
+
+        assert_eq!(read("buffers", "parts/../own.bin", false).unwrap().buffers, [[5, 6, 7, 8]]);
+        // What does not exist is missing, as an image of another computer is.
+        assert!(read("images", "../gone.png", false).is_ok());
+        assert!(read("images", "/home/somebody/gone.png", false).is_ok());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_in_the_folder_may_lead_out() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("scan");
+        fs::create_dir(&folder).unwrap();
+        fs::write(dir.path().join("other"), [1, 2]).unwrap();
+        std::os::unix::fs::symlink("../other", folder.join("link.bin")).unwrap();
+        let json = r#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 2, "uri": "link.bin"}]}"#;
+        let document = GltfDocument::read(json.into(), &folder.join("a.gltf"), false);
+        assert_eq!(document.unwrap().buffers, [[1, 2]]);
     }
 
     fn buffer_error(b: &str) -> String {

@@ -25,7 +25,7 @@ use std::path::Path;
 /// Like [`crate::mesh::read_mesh_with`].
 pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &MeshOptions) -> Result<MeshFile> {
     let frame = FileFrame::new(options.origin, options.units.unwrap_or_default());
-    let document = GltfDocument::read(bytes, path)?;
+    let document = GltfDocument::read(bytes, path, options.outside_files)?;
     let mut warnings = Vec::new();
     let instances = instances(&document, Precision::OfFile, &mut warnings)?;
     let used = used_materials(&document, &instances)?;

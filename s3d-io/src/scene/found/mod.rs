@@ -260,7 +260,8 @@ mod tests {
 
         let scene = find_scene(dir.path()).unwrap().unwrap().scene;
         let file = read_mesh(&scene.mesh[0], scene.up).unwrap();
-        let mesh = AnnotatedMesh { file: &file, up: scene.up, units: scene.units };
+        let outside_files = scene.outside_files;
+        let mesh = AnnotatedMesh { file: &file, up: scene.up, units: scene.units, outside_files };
         let found = Annotations::open_for(&mesh, &scene.annotations, &scene.annotation_options).unwrap();
         let mut labels = Vec::new();
         for room in &found.rooms {
