@@ -250,3 +250,12 @@ fn a_table_top_is_no_room_but_is_told_of() {
     assert_eq!((info.mesh.faces, info.locations.len()), (2, 0));
     assert!(info.doubts.iter().any(|d| d.contains("an export stops here")), "{info}");
 }
+
+#[test]
+fn a_folder_without_a_scene_is_told_what_it_may_hold() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("top.obj"), "").unwrap();
+    let refused = s3d_dataset::info(dir.path(), &InfoOptions::default(), &Context::default()).unwrap_err();
+    let words = "holds no scene.toml, no published area (3d/rgb.obj), and no scene of ScanNet";
+    assert!(refused.to_string().contains(words), "{refused}");
+}

@@ -319,6 +319,25 @@ fn text_may_name_classes_and_have_colours_as_floats() {
 }
 
 #[test]
+fn colours_of_16_bits_are_cut_to_8_also_with_decimals() {
+    for (channel, expected) in [("65280", Some(255)), ("65280.000", Some(255)), ("255.500", None)] {
+        let text = format!("X,Y,Z,Red,Green,Blue,label\n1,2,3,51200.000,0.000,{channel},floor\n");
+        let text = if channel.contains('.') {
+            text
+        } else {
+            text.replace(".000", "")
+        };
+        let Some(blue) = expected else {
+            let message = refused("a.csv", text.replace("51200", "200"), &options());
+            assert!(message.contains("line 2: `255.500` is no colour"), "{message}");
+            continue;
+        };
+        let all = contents(&read("a.csv", text), "office_1");
+        assert_eq!(all[&(Class::FLOOR.index(), 1)].colors, [[200, 0, blue]], "{channel}");
+    }
+}
+
+#[test]
 fn text_that_is_no_cloud_says_what_is_missing() {
     let plain = AnnotationOptions::default();
     let two = AnnotationOptions { columns: vec!["x".to_owned(), "y".to_owned()], ..plain.clone() };

@@ -335,6 +335,10 @@ fn what_is_no_annotation_says_what_is_read() {
     for (name, bytes, words) in [
         ("points.foo", &b"no point"[..], "points.foo: is no kind of annotations that is read: "),
         ("points.bar", b"\x89HDF\r\n", "(it is HDF5: MATLAB's files are read if they end in .mat)"),
+        ("points.txt.gz", b"\x1f\x8b\x08", "(it is compressed by gzip: unpack it first)"),
+        ("points.zst", b"\x28\xb5\x2f\xfd", "(it is compressed by zstd: unpack it first)"),
+        ("points.parquet", b"PAR1", "(it is Parquet: save its columns as .npy, .ply or text)"),
+        ("points.drc", b"DRACO", "(it is points that Draco compressed: draco_decoder writes them as .ply)"),
         ("points.foo", b"1 2 3", "is an ASCII cloud without names of columns: it has 3, as in `1 2 3`"),
     ] {
         let path = dir.path().join(name);
@@ -395,6 +399,18 @@ fn headers_that_miscount_their_records_do_not_hide_the_points() {
             assert!(found.warnings.len() == 1 && found.warnings[0].contains(&there), "{:?}", found.warnings);
         }
     }
+}
+
+#[test]
+fn points_that_an_early_laszip_compressed_are_called_so() {
+    let name = "1_2_format_2.laz";
+    let mut bytes = std::fs::read(fixture(name)).unwrap();
+    let record = bytes.windows(14).position(|w| w == b"laszip encoded").unwrap() - 2;
+    assert_eq!(bytes[record + 54], 2, "points in chunks");
+    bytes[record + 54] = 1;
+    let read = Annotations::from_reader(std::io::Cursor::new(bytes), Path::new(name), &options());
+    let message = read.unwrap_err().to_string();
+    assert!(message.contains("is compressed point by point, as LASzip did before version 2"), "{message}");
 }
 
 #[test]

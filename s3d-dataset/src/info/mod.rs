@@ -8,10 +8,10 @@ pub use data_set::{DataSetInfo, data_set_info, is_data_set};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::finish::MUCH_UNLABELLED;
-use crate::export::input::Inputs;
 use crate::export::input::area::AreaInput;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
+use crate::export::input::{Inputs, no_scene};
 use crate::export::labels::label_area::label_doubts;
 use crate::export::labels::survey::{Locating, Survey, SurveyOptions, Surveyor, survey};
 use crate::export::location::{Located, room_name};
@@ -225,11 +225,7 @@ pub fn write_scene_toml(folder: &Path) -> Result<PathBuf> {
     if path.exists() {
         return Err(FileError::format(&path, "is there already: move it away first").into());
     }
-    let found = s3d_io::scene::find_scene(folder)?.ok_or_else(|| {
-        let sets: Vec<&str> = s3d_io::scene::found_sets().collect();
-        let sets = sets.join(", ");
-        FileError::format(folder, format!("holds no scene of a data set that is known: {sets}"))
-    })?;
+    let found = s3d_io::scene::find_scene(folder)?.ok_or_else(|| no_scene(folder))?;
     s3d_io::fs::write_bytes(&path, found.toml.as_bytes())?;
     Ok(path)
 }

@@ -320,8 +320,14 @@ impl Cloud for E57Cloud<'_> {
         let mut number = 0;
         let mut invalid = 0u64;
         let mut empty = 0u64;
-        for cloud in &scans {
-            let scan = Scan::new(path, self.options, cloud)?;
+        // Some programs write a scan without points in a way that cannot be read.
+        for (i, cloud) in scans.iter().enumerate().filter(|(_, scan)| scan.records > 0) {
+            let scan = Scan::new(path, self.options, cloud).map_err(|e| match e {
+                Error::Format { message, .. } if scans.len() > 1 => {
+                    Error::format(path, format!("scan {} of {}: {message}", i + 1, scans.len()))
+                }
+                e => e,
+            })?;
             let bits: u64 = cloud.prototype.iter().map(|r| bits_of(&r.data_type)).sum();
             // Points of no bits would never end.
             if u128::from(cloud.records) * u128::from(bits.max(1)) > u128::from(size) * 8 {
@@ -419,37 +425,46 @@ mod tests {
     use e57::{E57Writer, Quaternion, Transform, Translation};
     use std::f64::consts::{FRAC_PI_2, TAU};
 
-    /// Writes a scan at (1, 2, 3), turned by 90° about z. A point is three coordinates and a class.
-    fn scan(path: &Path, names: [RecordName; 3], points: &[([f64; 3], i64)]) {
+    const CARTESIAN: [RecordName; 3] =
+        [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+
+    /// Writes scans: the names of their coordinates and of another attribute.
+    fn write(path: &Path, scans: &[([RecordName; 3], &str)], points: &[([f64; 3], i64)]) {
         let mut writer = E57Writer::from_file(path, "file").unwrap();
         let extension = e57::Extension::new("ext", "http://example.org/ext");
         writer.register_extension(extension).unwrap();
-        let mut prototype: Vec<Record> = names
-            .into_iter()
-            .map(|name| Record { name, data_type: RecordDataType::F64 })
-            .collect();
-        let class = RecordName::Unknown { namespace: "ext".to_owned(), name: "class".to_owned() };
-        prototype.push(Record { name: class, data_type: RecordDataType::Integer { min: 0, max: 255 } });
+        for (names, attribute) in scans {
+            let mut prototype: Vec<Record> = names
+                .iter()
+                .map(|name| Record { name: name.clone(), data_type: RecordDataType::F64 })
+                .collect();
+            let name = RecordName::Unknown { namespace: "ext".to_owned(), name: (*attribute).to_owned() };
+            prototype.push(Record { name, data_type: RecordDataType::Integer { min: 0, max: 255 } });
+            add_scan(&mut writer, prototype, points);
+        }
+        writer.finalize().unwrap();
+    }
 
+    /// Adds a scan at (1, 2, 3), turned by 90° about z. A point is three coordinates and another attribute.
+    fn add_scan(writer: &mut E57Writer<std::fs::File>, prototype: Vec<Record>, points: &[([f64; 3], i64)]) {
         let mut scan = writer.add_pointcloud("scan", prototype).unwrap();
         let half = libm::sqrt(0.5);
         scan.set_transform(Some(Transform {
             rotation: Quaternion { w: half, x: 0.0, y: 0.0, z: half },
             translation: Translation { x: 1.0, y: 2.0, z: 3.0 },
         }));
-        for (position, class) in points {
+        for (position, attribute) in points {
             let mut values: RawValues = position.iter().map(|v| RecordValue::Double(*v)).collect();
-            values.push(RecordValue::Integer(*class));
+            values.push(RecordValue::Integer(*attribute));
             scan.add_point(values).unwrap();
         }
         scan.finalize().unwrap();
-        writer.finalize().unwrap();
     }
 
     fn read(names: [RecordName; 3], points: &[([f64; 3], i64)]) -> (Vec<[f32; 3]>, Vec<String>) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("office_1.e57");
-        scan(&path, names, points);
+        write(&path, &[(names, "class")], points);
         let classes = [("7".to_owned(), Some(s3d_label::Class::CHAIR))].into();
         let options = AnnotationOptions { classes, ..AnnotationOptions::default() };
         let found = Annotations::open(&[path], &options).unwrap();
@@ -462,17 +477,39 @@ mod tests {
 
     #[test]
     fn points_at_the_scanner_are_left_out_if_there_are_several() {
-        let names = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
         let point = ([1.0, 0.0, 0.5], 7);
         let zero = ([0.0; 3], 7);
-        let (positions, warnings) = read(names.clone(), &[zero, point, zero, ([0.0, 0.0, 1.0], 7)]);
+        let (positions, warnings) = read(CARTESIAN, &[zero, point, zero, ([0.0, 0.0, 1.0], 7)]);
         assert_eq!(positions, [[1.0, 3.0, 3.5], [1.0, 2.0, 4.0]]);
         let note = "2 of 4 points are at the scanner itself (0 0 0)";
         assert!(warnings.len() == 1 && warnings[0].contains(note), "{warnings:?}");
 
-        let (positions, warnings) = read(names, &[zero, point]);
+        let (positions, warnings) = read(CARTESIAN, &[zero, point]);
         assert_eq!(positions, [[1.0, 2.0, 3.0], [1.0, 3.0, 3.5]]);
         assert!(warnings.is_empty(), "{warnings:?}");
+    }
+
+    #[test]
+    fn the_scan_that_has_no_classes_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.e57");
+        write(&path, &[(CARTESIAN, "class"), (CARTESIAN, "quality")], &[([1.0, 0.0, 0.5], 7)]);
+        let message = Annotations::open(&[path], &AnnotationOptions::default())
+            .unwrap_err()
+            .to_string();
+        let words = "a.e57: scan 2 of 2: has no column of classes; its columns are x y z quality";
+        assert!(message.contains(words), "{message}");
+
+        // A scan without points needs none.
+        let path = dir.path().join("b.e57");
+        let mut writer = E57Writer::from_file(&path, "file").unwrap();
+        let xyz = [Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+        add_scan(&mut writer, xyz.to_vec(), &[]);
+        writer.finalize().unwrap();
+        let message = Annotations::open(&[path], &AnnotationOptions::default())
+            .unwrap_err()
+            .to_string();
+        assert!(message.ends_with("b.e57: holds no point that can be used"), "{message}");
     }
 
     #[test]

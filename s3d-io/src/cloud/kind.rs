@@ -149,6 +149,10 @@ fn unknown(path: &Path, head: &[u8]) -> Error {
     let others = [
         (&b"\x89HDF"[..], "HDF5: MATLAB's files are read if they end in .mat"),
         (b"MATLAB 5.0", "a MAT-file before v7.3: save(…, '-v7.3') writes one that is read, as .mat"),
+        (b"\x1f\x8b", "compressed by gzip: unpack it first"),
+        (b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it first"),
+        (b"PAR1", "Parquet: save its columns as .npy, .ply or text"),
+        (b"DRACO", "points that Draco compressed: draco_decoder writes them as .ply"),
         (b"glTF", "a mesh, glTF: the labels of the scene's own mesh are taken with mesh = true"),
         (b"\x89PNG", "a picture"),
         (b"\xff\xd8\xff", "a picture"),

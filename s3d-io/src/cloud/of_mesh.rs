@@ -71,11 +71,15 @@ impl FaceLabels {
             refuse_rows_of_mapping(path, labels, options)?;
             (labels.clone(), Vec::new())
         } else {
-            return Err(Error::format(
-                path,
-                "came without labels: it has no column of classes of faces or vertices (name it with \
-                 class = \"…\"), and its materials are not named as labels, as in chair_3_office_5_1",
-            ));
+            // Features of a glTF file that are none, and why.
+            let why = file.warnings.iter().find(|warning| warning.contains("are no labels"));
+            let why = why.map_or_else(String::new, |why| format!("; {why}"));
+            let message = format!(
+                "came without labels: it has no column of classes of faces or vertices (name it with class = \
+                 \"…\"), no words of nodes or features, and its materials are not named as labels, as in \
+                 chair_3_office_5_1{why}"
+            );
+            return Err(Error::format(path, message));
         };
 
         let mut found = Self::of_labels(file, labels, options)?;
@@ -463,7 +467,14 @@ mod tests {
         let plain = strip(&[(2, 1)], false)
             .replace("int label", "int foo")
             .replace("int instance", "int bar");
-        assert!(message(&plain, &options()).contains("came without labels"));
+        let without = message(&plain, &options());
+        assert!(without.contains("came without labels") && without.ends_with("chair_3_office_5_1"));
+        let mut features = read_mesh(&path, UpAxis::Z).unwrap();
+        features
+            .warnings
+            .push("features of faces are no labels: they have no property table".into());
+        let told = Annotations::of_mesh(&features, &options()).unwrap_err().to_string();
+        assert!(told.ends_with("; features of faces are no labels: they have no property table"), "{told}");
         let objects = strip(&[(2, 1)], false).replace("int label", "int foo");
         assert!(message(&objects, &options()).contains("none of classes"));
         assert!(message(&strip(&[(0, 1)], false), &options()).contains("unlabelled"));

@@ -127,11 +127,22 @@ pub fn read_scene(path: &Path) -> Result<SceneFile> {
         return Err(Error::unsupported(path, format!("is {what}; {SCENE}")));
     }
     let bytes = read_file(path)?;
-    parse_scene(
-        std::str::from_utf8(&text_of(&bytes, path)?)
-            .map_err(|_| Error::format(path, format!("is no text in UTF-8; {SCENE}")))?,
-        path,
-    )
+    let text = text_of(&bytes, path).map_err(|e| explained(e, path))?;
+    let text = std::str::from_utf8(&text)
+        .map_err(|_| Error::format(path, format!("is no text in UTF-8; {SCENE}")))?;
+    parse_scene(text, path).map_err(|e| explained(e, path))
+}
+
+/// Adds what a scene is to the error of a file that is not named as one.
+fn explained(error: Error, path: &Path) -> Error {
+    match error {
+        Error::Format { path: of, place, message }
+            if of == path && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) =>
+        {
+            Error::Format { path: of, place, message: format!("{message}; {SCENE}") }
+        }
+        e => e,
+    }
 }
 
 /// Reads like [`read_scene`], from the text of a scene file. Errors call the file `path`, and the files that

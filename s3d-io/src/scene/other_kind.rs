@@ -12,7 +12,9 @@ pub(crate) const SCENE: &str = "a scene is a text file, scene.toml, that names t
 pub(crate) fn other_kind(path: &Path) -> Option<&'static str> {
     let of_mesh = MeshFormat::of(path).map(|_| "a mesh, not a scene");
     Some(match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
-        "stl" | "fbx" | "dae" | "off" | "usd" | "usdz" => "a mesh, not a scene",
+        "stl" | "fbx" | "dae" | "off" | "usd" | "usdz" => {
+            "a mesh in a format that is not read (OBJ, glTF and PLY are), not a scene"
+        }
         "ply" => "a mesh or a cloud, not a scene",
         "las" | "laz" | "e57" | "npy" | "npz" | "mat" | "pcd" | "pts" | "ptx" | "asc" | "xyz" | "label" => {
             "a cloud of points, not a scene"

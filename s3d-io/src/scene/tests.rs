@@ -282,16 +282,25 @@ fn a_file_of_another_kind_is_called_what_it_is() {
     for (name, words) in [
         ("m.obj", "m.obj: is a mesh, not a scene"),
         ("M.GLB", "M.GLB: is a mesh, not a scene"),
+        ("m.stl", "is a mesh in a format that is not read (OBJ, glTF and PLY are), not a scene"),
         ("scan.ply", "is a mesh or a cloud, not a scene"),
         ("scan.laz", "is a cloud of points, not a scene"),
         ("cameras.csv", "is a table, not a scene"),
-        ("scene", "is no text: it holds zero bytes"),
+        ("scan.parquet", "is no text: it holds zero bytes"),
     ] {
         let path = dir.path().join(name);
         fs::write(&path, b"# Blender\no Cube\n\0").unwrap();
         let message = read_scene(&path).unwrap_err().to_string();
         assert!(message.contains(words), "{message}");
-        assert_eq!(message.contains("scene.toml, that names"), name != "scene", "{message}");
+        assert!(message.contains("scene.toml, that names"), "{message}");
+    }
+
+    for (name, is_explained) in [("points.txt", true), ("scene", true), ("scene.toml", false)] {
+        let path = dir.path().join(name);
+        fs::write(&path, "X Y Z\n1 2 3\n").unwrap();
+        let message = read_scene(&path).unwrap_err().to_string();
+        assert!(message.contains("line 1: "), "{message}");
+        assert_eq!(message.contains("scene.toml, that names"), is_explained, "{message}");
     }
 }
 

@@ -25,10 +25,21 @@ use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotationOptions, OnFault};
 use s3d_label::LabelTable;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The scene file of a folder, which goes before whatever else is found in it.
 const SCENE: &str = "scene.toml";
+
+/// The error for a folder in which no scene is found.
+pub(crate) fn no_scene(folder: &Path) -> FileError {
+    let sets: Vec<&str> = s3d_io::scene::found_sets().collect();
+    let message = format!(
+        "holds no scene.toml, no published area (3d/rgb.obj), and no scene of {}: name the file of a mesh, or \
+         write a scene.toml",
+        sets.join(", ")
+    );
+    FileError::format(folder, message)
+}
 
 /// All areas, and the table of all their labels.
 pub(crate) struct Inputs {
@@ -79,6 +90,7 @@ impl Inputs {
                             set_reading(options, lenient, scenes.len());
                             AreaInput::found(found, asked, opened)?
                         }
+                        None if !path.join("3d").is_dir() => return Err(no_scene(path).into()),
                         None => AreaInput::published(path, None, asked, opened)?,
                     }
                 }

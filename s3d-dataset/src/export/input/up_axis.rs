@@ -23,7 +23,8 @@ impl UpGuess {
     pub(super) fn of(mesh: &TriMesh) -> Self {
         let level = [Vec3::Y, Vec3::Z].map(|up| {
             let faces = (0..mesh.faces().len() as u32).filter(|f| mesh.normal(*f).dot(up).abs() > LEVEL);
-            faces.map(|f| mesh.area(f)).sum::<f64>() / mesh.total_area()
+            // A sum of nothing would be -0.
+            faces.fold(0.0, |sum, f| sum + mesh.area(f)) / mesh.total_area()
         });
         Self { level }
     }
@@ -61,7 +62,7 @@ impl UpGuess {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_geom::TriMesh;
+    use s3d_geom::{MeshParts, TriMesh};
     use s3d_synth::Building;
 
     fn turned(mesh: &TriMesh) -> TriMesh {
@@ -78,6 +79,10 @@ mod tests {
         let y = UpGuess::of(&turned(&mesh));
         assert_eq!((z.up(), y.up()), (UpAxis::Z, UpAxis::Y));
         assert!(z.doubt().is_none() && z.sentence().starts_with("+Z is taken for up: "), "{}", z.sentence());
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        let parts = MeshParts { positions, faces: vec![[0, 1, 2]], ..MeshParts::default() };
+        let sentence = UpGuess::of(&TriMesh::new(parts).unwrap()).sentence();
+        assert!(sentence.contains(": 0 % of the surface is level with +Y"), "{sentence}");
         let even = UpGuess { level: [0.3, 0.31] };
         assert!(even.doubt().unwrap().contains("up = y"));
     }

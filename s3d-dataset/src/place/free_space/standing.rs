@@ -123,10 +123,10 @@ impl Ground {
             .into_par_iter()
             .filter(|&face| facing.normal(mesh, face).z > LEVEL)
             .collect();
-        let m2: f64 = up
+        // A sum of nothing would be -0.
+        let m2 = up
             .iter()
-            .map(|&f| mesh.area(f) * f64::from(mesh.normal(f).z.abs()))
-            .sum();
+            .fold(0.0, |m2, &f| m2 + mesh.area(f) * f64::from(mesh.normal(f).z.abs()));
 
         let grid = Grid::new(mesh, m2)?;
         ctx.check()?;

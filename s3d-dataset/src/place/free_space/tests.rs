@@ -162,6 +162,11 @@ fn what_is_no_room_is_refused_with_what_was_found() {
         "{text}"
     );
 
+    let mut wall = Quads::default();
+    wall.add([[0., 0., 0.], [4., 0., 0.], [4., 0., 3.], [0., 0., 3.]]);
+    let text = message(&wall.mesh());
+    assert!(text.contains(", 0.00 m² face up; "), "{text}");
+
     let mut cube = Quads::default();
     cube.block([0., 0., 0.], [2., 2., 2.]);
     let text = message(&cube.mesh());

@@ -17,6 +17,9 @@ const MAX_POINTS_PER_BYTE: u64 = 1024;
 const VLRS_AT: u64 = 100;
 const EVLRS_AT: u64 = 243;
 
+/// The compressor of LASzip that makes no chunks.
+const WITHOUT_CHUNKS: u16 = 1;
+
 /// Wrong numbers of the header: where each stands, and the right number.
 pub(super) type Mends = Vec<(u64, u32)>;
 
@@ -57,6 +60,11 @@ pub(super) fn check_claims(source: &Source, notes: &mut Vec<String>) -> Result<M
         mends.extend(check_extended_records(path, &mut file, size, header, &points, notes));
     }
     if points.is_compressed {
+        if compressor(&mut file, header, points.start) == Some(WITHOUT_CHUNKS) {
+            let message = "is compressed point by point, as LASzip did before version 2: compress it anew, as \
+                           LAStools do with `las2las -i OLD.laz -o NEW.laz`";
+            return Err(Error::unsupported(path, message));
+        }
         check_chunk_table(path, &mut file, size, points.start)?;
     }
     Ok(mends)
@@ -170,6 +178,22 @@ fn check_extended_records(
         path.display()
     ));
     Some((EVLRS_AT, 0))
+}
+
+/// Returns which of LASzip's compressors made the points, as the first number of its record states.
+fn compressor(file: &mut BufReader<Bytes>, header: &[u8; 227], points_start: u64) -> Option<u16> {
+    let mut at = u64::from(number_at(header, 94).map_or(0, u16::from_le_bytes));
+    let mut record = [0; 56];
+    while at < points_start {
+        file.seek(SeekFrom::Start(at)).ok()?;
+        file.read_exact(&mut record).ok()?;
+        if record.get(2..)?.starts_with(b"laszip encoded") {
+            return number_at(&record, 54).map(u16::from_le_bytes);
+        }
+        let length = number_at(&record, 20).map_or(0, u16::from_le_bytes);
+        at = at.saturating_add(54).saturating_add(u64::from(length));
+    }
+    None
 }
 
 /// Checks that a compressed file has its table of chunks.

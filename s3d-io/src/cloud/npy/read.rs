@@ -136,7 +136,8 @@ impl<'a> NpyCloud<'a> {
             .map(std::borrow::Cow::into_owned)
             .collect();
         if names.is_empty() || names.len() > 64 {
-            let message = format!("holds {} arrays: points are in 1 to 64 of them", names.len());
+            let message =
+                format!("is a ZIP archive of {} NPY arrays: points are in 1 to 64 of them", names.len());
             return Err(Error::format(self.source.name(), message));
         }
         Ok(names)

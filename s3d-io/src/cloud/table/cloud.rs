@@ -5,7 +5,7 @@ use crate::error::Result;
 use s3d_label::{Class, Room, Taxonomy};
 use std::path::{Path, PathBuf};
 
-/// How a format's colours are scaled. If the format leaves it open, the narrow range is tried first.
+/// How a format's colours are scaled. If the format leaves it open, the narrowest range is tried first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum ColorRange {
     /// 16-bit numbers up to 255, or floats from 0 to 1.
@@ -13,6 +13,18 @@ pub(crate) enum ColorRange {
     Narrow,
     /// 16-bit numbers up to 65,535, or floats from 0 to 255.
     Wide,
+    /// 16-bit numbers that are written as floats.
+    Widest,
+}
+
+impl ColorRange {
+    /// Returns the range to try after this one.
+    pub(crate) fn wider(self) -> Self {
+        match self {
+            Self::Narrow => Self::Wide,
+            Self::Wide | Self::Widest => Self::Widest,
+        }
+    }
 }
 
 /// A file of rows that can be read several times.

@@ -32,7 +32,7 @@ pub(crate) fn read_tables(clouds: &[&dyn Cloud], options: &AnnotationOptions) ->
         let mut warnings = Vec::new();
         let wide = gathered.read(clouds, &colors, options, &mut tags, &mut warnings)?;
         match wide.and_then(|file| colors.get_mut(file)) {
-            Some(range) => *range = ColorRange::Wide,
+            Some(range) => *range = range.wider(),
             None => break (gathered, tags, warnings),
         }
     };

@@ -166,27 +166,31 @@ impl Field {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Color {
     Rgb([u8; 3]),
-    /// It is beyond the narrow range.
+    /// It is beyond the range, and may be in a wider one.
     Wider,
     /// This channel is beyond every range.
     Beyond(usize),
 }
 
-/// Turns three numbers into 8 bits each.
+/// Turns three numbers into 8 bits each. Of 16 bits it takes the upper 8: programs make 16 bits by a factor of
+/// 256, as the specification of LAS has it, or of 257.
 pub(crate) fn color(channels: [f64; 3], is_float: bool, range: ColorRange) -> Color {
-    // The largest number of the range, and the scale from numbers to 8 bits.
-    let (most, scale) = match (is_float, range) {
-        (false, ColorRange::Narrow) => (255.0, 1.0),
-        (false, ColorRange::Wide) => (65_535.0, 1.0 / 257.0),
-        (true, ColorRange::Narrow) => (1.0, 255.0),
-        (true, ColorRange::Wide) => (255.0, 1.0),
+    // The largest number of the range, and the way from numbers to 8 bits.
+    let (most, to_byte): (f64, fn(f64) -> f64) = match (is_float, range) {
+        (false, ColorRange::Narrow) | (true, ColorRange::Wide) => (255.0, f64::round),
+        (true, ColorRange::Narrow) => (1.0, |v| (v * 255.0).round()),
+        (false, _) | (true, ColorRange::Widest) => (65_535.0, |v| (v / 256.0).floor()),
     };
-    if let Some(i) = channels.iter().position(|v| !(0.0..=most).contains(v)) {
-        let may_be_wider = range == ColorRange::Narrow && channels.get(i).is_some_and(|v| *v > most);
+
+    let is_16_bit = most > 255.0;
+    let fits = |v: &f64| (0.0..=most).contains(v) && !(is_16_bit && v.fract() != 0.0);
+    if let Some(i) = channels.iter().position(|v| !fits(v)) {
+        let is_wider = |v: &f64| *v > most && (range == ColorRange::Narrow || v.fract() == 0.0);
+        let may_be_wider = !is_16_bit && channels.get(i).is_some_and(is_wider);
         return if may_be_wider { Color::Wider } else { Color::Beyond(i) };
     }
     #[expect(clippy::cast_possible_truncation, reason = "0 to 255: larger numbers were returned above")]
-    Color::Rgb(channels.map(|v| (v * scale).round() as u8))
+    Color::Rgb(channels.map(|v| to_byte(v) as u8))
 }
 
 /// The layout of a table: its fields, and the columns chosen among them.
@@ -483,17 +487,22 @@ mod tests {
     }
 
     #[test]
-    fn colours_of_either_range() {
-        use ColorRange::{Narrow, Wide};
+    fn colours_of_every_range() {
+        use ColorRange::{Narrow, Wide, Widest};
         for (channels, is_float, range, expected) in [
             ([0.0, 128.0, 255.0], false, Narrow, Color::Rgb([0, 128, 255])),
             ([0.0, 128.0, 256.0], false, Narrow, Color::Wider),
-            ([0.0, 128.0 * 257.0, 65_535.0], false, Wide, Color::Rgb([0, 128, 255])),
+            ([0.0, 200.0 * 256.0, 255.0 * 256.0], false, Wide, Color::Rgb([0, 200, 255])),
+            ([0.0, 200.0 * 257.0, 65_535.0], false, Wide, Color::Rgb([0, 200, 255])),
             ([0.0, 65_536.0, 0.0], false, Wide, Color::Beyond(1)),
             ([-1.0, 0.0, 0.0], false, Narrow, Color::Beyond(0)),
             ([0.0, 0.5, 1.0], true, Narrow, Color::Rgb([0, 128, 255])),
             ([0.0, 0.5, 1.5], true, Narrow, Color::Wider),
             ([0.0, 41.0, 254.6], true, Wide, Color::Rgb([0, 41, 255])),
+            ([0.0, 41.0, 256.0], true, Wide, Color::Wider),
+            ([0.0, 41.0, 255.5], true, Wide, Color::Beyond(2)),
+            ([0.0, 41_728.0, 65_280.0], true, Widest, Color::Rgb([0, 163, 255])),
+            ([0.0, 41_728.5, 65_536.0], true, Widest, Color::Beyond(1)),
             ([0.0, 0.0, f64::NAN], true, Narrow, Color::Beyond(2)),
         ] {
             assert_eq!(color(channels, is_float, range), expected, "{channels:?}");

@@ -153,7 +153,7 @@ pub(crate) struct WordTable {
 /// What a line turned out to be.
 pub(crate) enum Parsed<'a> {
     Row(Row<'a>),
-    /// A colour is beyond the narrow range.
+    /// A colour may be in a wider range.
     Wider,
     Fault(String),
 }
