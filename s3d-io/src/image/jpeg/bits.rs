@@ -25,17 +25,17 @@ impl HuffmanTable {
 
         let mut code: u32 = 0;
         let mut index: u32 = 0;
-        for (length, count) in (1..=16_u32).zip(counts) {
+        for (length, count) in (1..=16_u8).zip(counts) {
             let first = code;
             for symbol in symbols.iter().skip(index as usize).take(usize::from(*count)) {
-                if let Some(spare) = FAST.checked_sub(length) {
+                if let Some(spare) = FAST.checked_sub(u32::from(length)) {
                     let from = (code << spare) as usize;
                     let entries = table.fast.iter_mut().skip(from).take(1 << spare);
-                    entries.for_each(|entry| *entry = (length as u8, *symbol));
+                    entries.for_each(|entry| *entry = (length, *symbol));
                 }
                 code = code.wrapping_add(1);
             }
-            if let Some(entry) = table.lengths.get_mut(length as usize) {
+            if let Some(entry) = table.lengths.get_mut(usize::from(length)) {
                 *entry = (code, index.cast_signed().wrapping_sub(first.cast_signed()));
             }
             index = index.saturating_add(u32::from(*count));
@@ -119,7 +119,7 @@ impl<'a> Bits<'a> {
 
     /// Goes to the next mark, or the end of the bytes. Returns its position, how many whole bytes were left
     /// before it, and whether all of them are zeros.
-    pub(super) fn to_mark(mut self) -> (usize, usize, bool) {
+    pub(super) fn skip_to_mark(mut self) -> (usize, usize, bool) {
         let mut whole = (self.count / 8) as usize;
         let bits = self.count & !7;
         let mut are_zeros = self.buffer & 1_u64.wrapping_shl(bits).wrapping_sub(1) == 0;

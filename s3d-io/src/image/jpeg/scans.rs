@@ -271,7 +271,7 @@ impl Picture {
         }
 
         self.tell(scan);
-        let (mark, left, are_zeros) = state.bits.to_mark();
+        let (mark, left, are_zeros) = state.bits.skip_to_mark();
         if left > 0 && !(are_zeros && left <= MAX_PADDING) {
             return Err((Fault::Damaged, Damage::TooLong));
         }
@@ -363,7 +363,7 @@ impl Picture {
 
 /// Goes on behind the next restart mark, which must be the one of this number.
 fn restarted<'a>(state: State<'a>, bytes: &'a [u8], number: u8) -> Result<State<'a>, Fault> {
-    let (mark, left, are_zeros) = state.bits.to_mark();
+    let (mark, left, are_zeros) = state.bits.skip_to_mark();
     let is_next = bytes
         .get(mark..)
         .is_some_and(|rest| rest.starts_with(&[0xff, 0xd0 | number]));
