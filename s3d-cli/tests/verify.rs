@@ -49,7 +49,6 @@ fn demo() -> &'static Path {
         let small = ["--size", "64", "--pano-width", "128", "--views", "6", "--points-per-m2", "60"];
         s3d_ok(&[&["demo", "-o", text(&out), "--compression", "fast"][..], &small].concat());
         s3d_ok(&["profile", text(&out), "--to", "pointcept,open3d-ml,pointnet,mmdet3d"]);
-        list_files(&out);
         dir
     });
     static PATH: OnceLock<PathBuf> = OnceLock::new();

@@ -433,9 +433,9 @@ impl Manifest {
     pub(crate) fn write(&self, layout: &Layout) -> Result<()> {
         let path = layout.manifest();
         let wrong = |e: serde_json::Error| FileError::format(&path, e.to_string());
-        let sum = checksum_of(&serde_json::to_value(self).map_err(wrong)?);
-
-        // The checksum is the last field, so it follows the rest of the text.
+        // The checksum is of the numbers as a reader finds them in the text.
+        let text = serde_json::to_string(self).map_err(wrong)?;
+        let sum = checksum_of(&serde_json::from_str(&text).map_err(wrong)?);
         let text = serde_json::to_string_pretty(&Self { xxh3_128: Some(sum), ..self.clone() });
         write_bytes(&path, (text.map_err(wrong)? + "\n").as_bytes())?;
         Ok(())
