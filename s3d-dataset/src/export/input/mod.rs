@@ -34,8 +34,8 @@ const SCENE: &str = "scene.toml";
 pub(crate) fn no_scene(folder: &Path) -> FileError {
     let sets: Vec<&str> = s3d_io::scene::found_sets().collect();
     let message = format!(
-        "holds no scene.toml, no published area (3d/rgb.obj), and no scene of {}: name the file of a mesh, or \
-         write a scene.toml",
+        "holds no scene.toml, no published area (3d/rgb.obj), and no scene of {}: name the file of a mesh, \
+         or write a scene.toml",
         sets.join(", ")
     );
     FileError::format(folder, message)

@@ -61,8 +61,8 @@ pub(super) fn check_claims(source: &Source, notes: &mut Vec<String>) -> Result<M
     }
     if points.is_compressed {
         if compressor(&mut file, header, points.start) == Some(WITHOUT_CHUNKS) {
-            let message = "is compressed point by point, as LASzip did before version 2: compress it anew, as \
-                           LAStools do with `las2las -i OLD.laz -o NEW.laz`";
+            let message = "is compressed point by point, as LASzip did before version 2: compress it anew, \
+                           as LAStools do with `las2las -i OLD.laz -o NEW.laz`";
             return Err(Error::unsupported(path, message));
         }
         check_chunk_table(path, &mut file, size, points.start)?;

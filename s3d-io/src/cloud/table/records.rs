@@ -172,8 +172,8 @@ pub(crate) enum Color {
     Beyond(usize),
 }
 
-/// Turns three numbers into 8 bits each. Of 16 bits it takes the upper 8: programs make 16 bits by a factor of
-/// 256, as the specification of LAS has it, or of 257.
+/// Turns three numbers into 8 bits each. Of 16 bits it takes the upper 8: programs make 16 bits by a factor
+/// of 256, as the specification of LAS has it, or of 257.
 pub(crate) fn color(channels: [f64; 3], is_float: bool, range: ColorRange) -> Color {
     // The largest number of the range, and the way from numbers to 8 bits.
     let (most, to_byte): (f64, fn(f64) -> f64) = match (is_float, range) {
