@@ -378,6 +378,15 @@ fn text_that_is_no_cloud_says_what_is_missing() {
 }
 
 #[test]
+fn clouds_without_instance_numbers_are_told() {
+    let note = "a.csv: no instance numbers, so the points of a class in a room are one instance";
+    for (text, is_told) in [("x,y,z,class\n0,0,0,2\n", true), ("x,y,z,class,inst\n0,0,0,2,4\n", false)] {
+        let found = open(&file("a.csv", text).path, &options()).unwrap();
+        assert_eq!(found.warnings.iter().any(|told| told.contains(note)), is_told, "{:?}", found.warnings);
+    }
+}
+
+#[test]
 fn pts_files_may_hold_several_scans() {
     let columns = "x y z intensity r g b class".split(' ').map(str::to_owned).collect();
     let named = AnnotationOptions { columns, ..options() };

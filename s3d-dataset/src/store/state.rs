@@ -153,8 +153,8 @@ impl OutputState {
         let root = layout.root();
         if layout.root_misleads_loaders() {
             ctx.warn(format_args!(
-                "{}: \"rgb\" in the folder's name misleads loaders that swap it for another modality in whole \
-                 paths",
+                "{}: \"rgb\" in the folder's name misleads loaders that swap it for another modality in \
+                 whole paths",
                 root.display()
             ));
         }

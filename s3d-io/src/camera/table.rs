@@ -395,7 +395,7 @@ mod tests {
 
     #[test]
     fn locations_with_and_without_header() {
-        let plain = read(&format!("# a scan\n{A},1,2,3,0,0,0,1\r\n\n {B}, -1e0 ,0,0,0,0,2,0\n")).unwrap();
+        let plain = read(&format!("# a scan\n{A},1,2,3,0,0,0,1\r\n\n {B}, -1e0 ,0,0,0,0,1,0\n")).unwrap();
         assert_eq!((plain[0].uuid.as_str(), plain[0].line), (A, 2));
         assert_eq!(plain[0].pose, Pose::from_scanner(dvec3(1.0, 2.0, 3.0), DQuat::IDENTITY));
         assert_eq!((plain[1].uuid.as_str(), plain[1].line), ("508160ba5d80a2e365609578a09bab8b", 4));

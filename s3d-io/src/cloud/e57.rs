@@ -472,7 +472,9 @@ mod tests {
         found.rooms[0].instances[0].read(&mut cloud).unwrap();
         // The turn is a product of rounded numbers.
         let round = |v: f32| (v * 1e6).round() / 1e6;
-        (cloud.positions.iter().map(|p| p.to_array().map(round)).collect(), found.warnings)
+        let others = found.warnings.into_iter();
+        let others = others.filter(|warning| !warning.contains("no instance numbers"));
+        (cloud.positions.iter().map(|p| p.to_array().map(round)).collect(), others.collect())
     }
 
     #[test]

@@ -12,8 +12,8 @@ const HEAD: u64 = 4096;
 
 /// All kinds of files that are read, for messages.
 const ALL: &str = "an S3DIS tree (a folder), .ply, .npy, .npz, .las, .laz, .e57, .pcd, text (.asc, .xyz, \
-                   .txt, .csv, .pts, .ptx), SemanticKITTI's .label, a folder of Pointcept's arrays, or ScanNet's \
-                   .aggregation.json";
+                   .txt, .csv, .pts, .ptx), SemanticKITTI's .label, a folder of Pointcept's arrays, or \
+                   ScanNet's .aggregation.json";
 
 /// Opens a cloud: a file, or a folder that holds one.
 pub(crate) fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Result<Box<dyn Cloud + 'a>> {

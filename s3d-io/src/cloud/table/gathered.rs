@@ -53,7 +53,7 @@ impl Gathered {
 
             let skipped = std::mem::take(&mut reading.skipped);
             let farthest_m = reading.farthest_m;
-            if !reading.has_instances {
+            if reading.has_points && !reading.has_instances && options.columns.is_empty() {
                 without_instances.push(path);
             }
             warnings.append(&mut reading.notes);

@@ -182,6 +182,7 @@ pub(crate) struct Reading<'a> {
     pub(crate) skipped: Skipped,
     /// The largest coordinate, in metres.
     pub(crate) farthest_m: f64,
+    pub(crate) has_points: bool,
     /// Whether a point had an instance number.
     pub(crate) has_instances: bool,
     /// What the user should know about the file, a sentence each.
@@ -207,6 +208,7 @@ impl<'a> Reading<'a> {
             sink,
             skipped: Skipped::default(),
             farthest_m: 0.0,
+            has_points: false,
             has_instances: false,
             notes: Vec::new(),
         }
@@ -275,6 +277,7 @@ impl<'a> Reading<'a> {
             }
         };
 
+        self.has_points = true;
         self.has_instances |= instance != NO_INSTANCE;
         self.farthest_m = self.farthest_m.max(farthest);
         if let Some(watch) = &mut self.watch {
