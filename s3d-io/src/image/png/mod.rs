@@ -6,6 +6,7 @@ mod lines;
 #[cfg(test)]
 mod tests;
 
+#[cfg(feature = "dataset")]
 pub(crate) use self::decode::MAX_PIXELS;
 pub use self::decode::{
     decode_gray16, decode_palette8, decode_rgb8, read_gray16, read_numbers8, read_palette8, read_rgb8,
