@@ -31,5 +31,6 @@ mod shards;
 mod sources;
 mod taxonomy;
 mod unlabelled;
+#[path = "verify/main.rs"]
 mod verify;
 mod watch;

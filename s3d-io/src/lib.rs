@@ -196,7 +196,7 @@
 //! | `draco` | glTF that Draco compressed |
 //! | `textures` | WebP, BMP, TGA and TIFF beside PNG and JPEG |
 //! | `cloud` | annotated points: the S3DIS tree, and the labels of meshes |
-//! | `las`, `e57`, `npy`, `pcd`, `text`, `kitti`, `scannet`, `mat`, `ply` | annotated points of these formats |
+//! | `las`, `e57`, `npy`, `pcd`, `text`, `kitti`, `scannet`, `mat`, `ply` | annotated points of each |
 //! | `labels` | files that label the faces of a mesh: HM3D, Replica, 3RScan, ScanNet++, Matterport3D |
 //! | `camera` | lists of cameras; the scanner's pictures |
 //! | `png`, `exr` | the images of a data set |

@@ -4,6 +4,7 @@
 mod feed;
 
 mod camera_lists;
+#[path = "cloud_forms/main.rs"]
 mod cloud_forms;
 mod clouds;
 mod copyroom;

@@ -106,7 +106,7 @@ impl FaceLabels {
             }
             MeshLabels::Numbers { class, instance, .. } => {
                 let Some(class) = class else {
-                    let message = "has a column of objects, but none of classes: name it with class = \"…\"";
+                    let message = "has a column of objects and none of classes: name it with class = \"…\"";
                     return Err(Error::format(path, message));
                 };
                 let instance = instance.map(|column| column.values);

@@ -9,7 +9,7 @@
 //! | ending | what is read |
 //! |---|---|
 //! | `.obj` | Wavefront OBJ in the dialects of scanners and modellers, `Kd` and `map_Kd` of its libraries |
-//! | `.gltf`, `.glb` | glTF 2.0, plain or compressed: triangles of the default scene, base colours, textures |
+//! | `.gltf`, `.glb` | glTF 2.0, also compressed: triangles of the default scene, base colours, textures |
 //! | `.ply` | ASCII and binary, either byte order: polygons, strips, colours, texture coordinates, labels |
 //!
 //! Vertices and faces keep the file's order. Polygons are cut into triangles, and a face that repeats an

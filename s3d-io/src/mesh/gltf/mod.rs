@@ -2,6 +2,7 @@
 
 mod accessor;
 mod builder;
+mod container;
 mod document;
 #[cfg(feature = "draco")]
 mod draco;
@@ -15,4 +16,5 @@ pub(crate) mod read;
 mod scene;
 mod tolerant;
 mod unpack;
+mod uri;
 mod words;
