@@ -54,6 +54,15 @@ impl DataSet {
         &self.manifest.version
     }
 
+    /// Returns the checksum of its list of files, which has the checksum of each file: XXH3 of 128 bits, in
+    /// hexadecimal digits. Empty if the export did not finish.
+    pub fn checksum(&self) -> String {
+        self.manifest
+            .files
+            .as_ref()
+            .map_or_else(String::new, |list| list.xxh3_128.to_string())
+    }
+
     /// Returns the seed that it was made with.
     pub fn seed(&self) -> u64 {
         self.manifest.seed

@@ -17,10 +17,20 @@ pub fn bootstrap<T: Sync>(
     seed: u64,
     score: impl Fn(&[&T]) -> Vec<f64> + Sync,
 ) -> Vec<[f64; 2]> {
-    if units.is_empty() || rounds == 0 {
+    intervals(&draw(units, rounds, seed, score))
+}
+
+/// Returns the scores of each round of [`bootstrap`]. The same seed and number of units draw the same units.
+pub(crate) fn draw<T: Sync>(
+    units: &[T],
+    rounds: u32,
+    seed: u64,
+    score: impl Fn(&[&T]) -> Vec<f64> + Sync,
+) -> Vec<Vec<f64>> {
+    if units.is_empty() {
         return Vec::new();
     }
-    let of_rounds: Vec<Vec<f64>> = (0..rounds)
+    (0..rounds)
         .into_par_iter()
         .map(|round| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -28,12 +38,15 @@ pub fn bootstrap<T: Sync>(
             let drawn: Vec<&T> = units.iter().map(|_| &units[rng.random_range(0..units.len())]).collect();
             score(&drawn)
         })
-        .collect();
+        .collect()
+}
 
-    let count = of_rounds.iter().map(Vec::len).min().unwrap_or(0);
+/// Returns the 95 % interval of each score over rounds.
+pub(crate) fn intervals(rounds: &[Vec<f64>]) -> Vec<[f64; 2]> {
+    let count = rounds.iter().map(Vec::len).min().unwrap_or(0);
     (0..count)
         .map(|at| {
-            let mut values: Vec<f64> = of_rounds
+            let mut values: Vec<f64> = rounds
                 .iter()
                 .map(|scores| scores[at])
                 .filter(|value| !value.is_nan())

@@ -104,6 +104,15 @@ pub enum Error {
         /// The images that the truth is made of.
         domains: Vec<Domain>,
     },
+    /// The other predictions are of other images.
+    #[error(
+        "{}: these predictions are of other images: both must be of views, or of panoramas",
+        against.display()
+    )]
+    OtherImages {
+        /// [`EvalOptions::against`](crate::EvalOptions::against).
+        against: PathBuf,
+    },
     /// A file is wrong or missing, the disk refuses, or the call was cancelled.
     #[error(transparent)]
     Dataset(#[from] s3d_dataset::Error),
@@ -148,6 +157,7 @@ impl Error {
             Self::Unlabelled { .. }
             | Self::NoRooms { .. }
             | Self::NoPointBoxes { .. }
+            | Self::OtherImages { .. }
             | Self::NoImages { .. }
             | Self::Dataset(_) => false,
         }

@@ -1,6 +1,7 @@
 //! The call that evaluates predictions.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::evaluation::{Against, Units};
 use crate::task::Task;
 use crate::{EvalOptions, Evaluation, Protocol, boxes, images, panoptic, points};
 use s3d_dataset::{Context, DataSet};
@@ -26,14 +27,30 @@ pub fn evaluate(
     let data = DataSet::open(truth)?;
     let folds = options.folds.of(&data)?;
     let task = Task { protocol, variant, data: &data, folds: &folds, predictions, options, ctx };
-    match protocol {
-        Protocol::Det => boxes::det(&task),
-        Protocol::Sem3d => points::sem3d(&task),
-        Protocol::InstAp => points::inst_ap(&task),
-        Protocol::InstCov => points::inst_cov(&task),
-        Protocol::SemPano => images::sem_pano(&task),
-        Protocol::Depth => images::depth(&task),
-        Protocol::Normal => images::normal(&task),
-        Protocol::Panoptic => panoptic::panoptic(&task),
+    let mut evaluation = run(&task)?;
+    if let Some(predictions) = &options.against {
+        let theirs = run(&Task { predictions, ..task })?;
+        if names(&evaluation.units) != names(&theirs.units) {
+            return Err(Error::OtherImages { against: predictions.clone() });
+        }
+        evaluation.against = Some(Against::new(&evaluation, theirs));
     }
+    Ok(evaluation)
+}
+
+fn run(task: &Task<'_>) -> Result<Evaluation> {
+    match task.protocol {
+        Protocol::Det => boxes::det(task),
+        Protocol::Sem3d => points::sem3d(task),
+        Protocol::InstAp => points::inst_ap(task),
+        Protocol::InstCov => points::inst_cov(task),
+        Protocol::SemPano => images::sem_pano(task),
+        Protocol::Depth => images::depth(task),
+        Protocol::Normal => images::normal(task),
+        Protocol::Panoptic => panoptic::panoptic(task),
+    }
+}
+
+fn names(units: &Units) -> Vec<(u32, &str)> {
+    units.units.iter().map(|unit| (unit.area, &*unit.name)).collect()
 }

@@ -53,7 +53,7 @@ mod task;
 pub use bootstrap::bootstrap;
 pub use error::{ClassFault, ClassOption, Error, Result};
 pub use evaluate::evaluate;
-pub use evaluation::{Evaluation, Row, Score, Table};
+pub use evaluation::{Against, ConfusionTable, Evaluation, Row, Score, Table, Truth, UnitScores, Units};
 pub use folds::{Fold, Folds};
 pub use options::{BoxSource, EvalOptions, ImageKind, UnknownBoxSource, UnknownImageKind};
 pub use protocol::{Protocol, UnknownProtocol};

@@ -4,18 +4,26 @@ use crate::error::{Error, Result};
 use crate::{Folds, Protocol};
 use s3d_dataset::pack::ClassList;
 use s3d_io::dataset::Frame;
+use serde::{Serialize, Serializer};
 use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 use thiserror::Error as ThisError;
 
 /// The options of an evaluation. The default is the default variant of the protocol on all areas.
-#[derive(Clone, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize)]
 #[non_exhaustive]
 pub struct EvalOptions {
     /// One of [`Protocol::variants`]. `None` is the first.
+    #[serde(skip)]
     pub variant: Option<String>,
     /// The areas to test, and which of them together.
+    #[serde(skip)]
     pub folds: Folds,
+    /// Other predictions in the same form. [`Evaluation::against`](crate::Evaluation::against) has the
+    /// difference of each score, with its interval: without [`bootstrap`](Self::bootstrap), 1,000 rounds.
+    #[serde(skip)]
+    pub against: Option<PathBuf>,
     /// The number of rounds of the [`bootstrap`](crate::bootstrap()) of rooms, or of images where there are
     /// no rooms. `None` gives no intervals.
     pub bootstrap: Option<u32>,
@@ -25,14 +33,20 @@ pub struct EvalOptions {
     pub median_scale: bool,
     /// `normal` only: the kind of images to evaluate. `None` is the kind that the predictions are named
     /// after. The other protocols of images have one kind each.
+    #[serde(serialize_with = "word")]
     pub images: Option<ImageKind>,
     /// `det` only: the classes to detect, by name. `None` means the 12 of the paper.
     pub classes: Option<Vec<String>>,
     /// `det` only: the points that the true boxes surround. `None` means [`BoxSource::Points`].
+    #[serde(serialize_with = "word")]
     pub boxes: Option<BoxSource>,
     /// `panoptic` only: the stuff classes, of which each image has one segment. `None` means the stuff of the
     /// taxonomy.
     pub stuff: Option<ClassList>,
+}
+
+fn word<S: Serializer>(option: &Option<impl fmt::Display>, serializer: S) -> Result<S::Ok, S::Error> {
+    option.as_ref().map(ToString::to_string).serialize(serializer)
 }
 
 /// The points that the true boxes of `det` surround.

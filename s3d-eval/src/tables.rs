@@ -1,42 +1,74 @@
 //! Makes tables of scores over rooms or images: one for each fold, one for all, and the mean over folds.
 
+use crate::bootstrap::{draw, intervals};
+use crate::evaluation::{Table, UnitScores, Units};
 use crate::task::Task;
-use crate::{Table, bootstrap};
 
 /// The rows of a table: a name and its scores each.
 pub(crate) type Rows = Vec<(String, Vec<f64>)>;
 
-/// Makes the tables of units (rooms, images). `units` has the fold of each. `score` returns the rows of any
-/// set of units, always with the same names. Scores have intervals if the options ask for a bootstrap.
+/// A room or an image, and what was counted in it.
+pub(crate) struct Unit<T> {
+    /// The index of its fold.
+    pub(crate) fold: usize,
+    pub(crate) area: u32,
+    /// Its name in the area.
+    pub(crate) name: String,
+    pub(crate) counted: T,
+}
+
+/// The scores of an evaluation.
+pub(crate) struct Scores {
+    pub(crate) tables: Vec<Table>,
+    pub(crate) units: Units,
+    /// The scores of all tables in each round of the bootstrap, if one was asked for.
+    pub(crate) rounds: Vec<Vec<f64>>,
+}
+
+/// Makes the tables of units. `score` returns the rows of any set of units, always with the same names.
+/// Scores have intervals if the options ask for a bootstrap.
 pub(crate) fn tables<T: Sync>(
     task: &Task<'_>,
     columns: &[&str],
-    units: &[(usize, T)],
+    units: &[Unit<T>],
     score: impl Fn(&[&T]) -> Rows + Sync,
-) -> Vec<Table> {
-    let all: Vec<&(usize, T)> = units.iter().collect();
+) -> Scores {
+    let all: Vec<&Unit<T>> = units.iter().collect();
     let mut tables = of_units(task, columns, &all, &score);
 
-    if let Some(rounds) = task.options.bootstrap {
-        let intervals = bootstrap(units, rounds, task.options.seed, |drawn| {
-            of_units(task, columns, drawn, &score)
-                .iter()
-                .flat_map(Table::scores)
-                .collect()
-        });
-        let mut intervals = intervals.into_iter();
-        for table in &mut tables {
-            let count = table.scores().count();
-            table.set_intervals(intervals.by_ref().take(count));
-        }
+    let rounds = draw(units, task.rounds(), task.options.seed, |drawn| {
+        of_units(task, columns, drawn, &score)
+            .iter()
+            .flat_map(Table::scores)
+            .collect()
+    });
+    let mut intervals = intervals(&rounds).into_iter();
+    for table in &mut tables {
+        let count = table.scores().count();
+        table.set_intervals(intervals.by_ref().take(count));
     }
-    tables
+    Scores { tables, units: each(columns, units, &score), rounds }
+}
+
+/// Returns the scores of each unit by itself.
+fn each<T>(columns: &[&str], units: &[Unit<T>], score: impl Fn(&[&T]) -> Rows) -> Units {
+    let mut rows = Vec::new();
+    let units = units.iter().map(|unit| {
+        let of_unit = score(&[&unit.counted]);
+        if rows.is_empty() {
+            rows = of_unit.iter().map(|(name, _)| name.clone()).collect();
+        }
+        let scores = of_unit.into_iter().map(|(_, values)| values).collect();
+        UnitScores { area: unit.area, name: unit.name.clone(), scores }
+    });
+    let units = units.collect();
+    Units { columns: columns.iter().map(|&column| column.to_owned()).collect(), rows, units }
 }
 
 fn of_units<T>(
     task: &Task<'_>,
     columns: &[&str],
-    units: &[&(usize, T)],
+    units: &[&Unit<T>],
     score: impl Fn(&[&T]) -> Rows,
 ) -> Vec<Table> {
     let table = |title: &str, rows: Rows| {
@@ -46,17 +78,18 @@ fn of_units<T>(
         table
     };
 
-    let pooled = score(&units.iter().map(|(_, unit)| unit).collect::<Vec<_>>());
+    let pooled = score(&units.iter().map(|unit| &unit.counted).collect::<Vec<_>>());
     if let [fold] = task.folds {
         return vec![table(&fold.name, pooled)];
     }
 
     let folds: Vec<Rows> = (0..task.folds.len())
         .map(|fold| {
-            let units: Vec<&T> = units.iter().filter(|(f, _)| *f == fold).map(|(_, unit)| unit).collect();
-            let mut rows = score(&units);
+            let of_fold = units.iter().filter(|unit| unit.fold == fold);
+            let of_fold: Vec<&T> = of_fold.map(|unit| &unit.counted).collect();
+            let mut rows = score(&of_fold);
             // A fold without drawn units has no scores.
-            if units.is_empty() {
+            if of_fold.is_empty() {
                 rows.iter_mut().for_each(|(_, values)| values.fill(f64::NAN));
             }
             rows

@@ -144,6 +144,37 @@ fn a_data_set_against_itself_is_perfect() {
 }
 
 #[test]
+fn views_are_not_held_against_panoramas() {
+    let dir = tempfile::tempdir().unwrap();
+    let truth = data_set(dir.path());
+    let data = DataSet::open(&truth).unwrap();
+    let [views, panoramas] = [ImageKind::Views, ImageKind::Panoramas].map(|kind| {
+        let out = dir.path().join(kind.to_string());
+        predict(&data, &out, kind, "png", |image, path| {
+            fs::copy(image.path(data.layout(), Domain::Normal), path).unwrap();
+        });
+        out
+    });
+    let other = options(|o| o.against = Some(panoramas));
+    let error = evaluate(Protocol::Normal, &truth, &views, &other, &Context::default()).unwrap_err();
+    let told = error.to_string();
+    assert!(told.contains("panoramas: these predictions are of other images"), "{told}");
+
+    let same = options(|o| {
+        o.against = Some(views.clone());
+        o.bootstrap = Some(10);
+    });
+    let result = run(Protocol::Normal, &truth, &views, &same);
+    assert!(
+        result.against.unwrap().differences[0]
+            .scores()
+            .all(|score| score == 0.0)
+    );
+    let unit = &result.units.units[0];
+    assert!(unit.name.starts_with("camera_") && unit.scores[0].len() == 8, "{unit:?}");
+}
+
+#[test]
 fn known_differences_have_their_scores() {
     let dir = tempfile::tempdir().unwrap();
     let truth = data_set(dir.path());

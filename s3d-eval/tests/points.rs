@@ -4,7 +4,7 @@ use s3d_dataset::options::Profile;
 use s3d_dataset::profile::ProfileOptions;
 use s3d_dataset::s3d_io::cloud::NpyWriter;
 use s3d_dataset::{Export, ExportOptions, profile};
-use s3d_eval::{Context, EvalOptions, Evaluation, Folds, Protocol, Result, evaluate};
+use s3d_eval::{Context, EvalOptions, Evaluation, Folds, Protocol, Result, Table, evaluate};
 use s3d_synth::{Building, ScanOptions};
 use std::collections::BTreeMap;
 use std::fs;
@@ -173,6 +173,82 @@ fn the_profile_of_mmdetection3d_is_a_perfect_prediction_of_classes() {
     assert_eq!(titles, ["area 1", "area 5", "all folds, pooled", "mean over folds"]);
     let points: usize = rooms().values().map(|(classes, _)| classes.len()).sum();
     assert_eq!(evaluation.counted["points"], points as u64);
+}
+
+/// Writes predictions of classes of which every `step`th is the next class.
+fn write_worse_classes(dir: &Path, step: usize) {
+    for (room, (classes, _)) in rooms() {
+        let worse: Vec<i64> = (0..)
+            .zip(classes)
+            .map(|(i, class)| if i % step == 0 { (class + 1) % 13 } else { class })
+            .collect();
+        fs::write(dir.join(format!("{room}.npy")), integers(&worse)).unwrap();
+    }
+}
+
+#[test]
+fn the_answer_says_what_it_is_of_and_has_rooms_and_a_confusion_matrix() {
+    let dir = tempfile::tempdir().unwrap();
+    write_worse_classes(dir.path(), 3);
+    let evaluation = eval(Protocol::Sem3d, dir.path(), &options(Some("nanmean"), Folds::EachArea)).unwrap();
+    let json = serde_json::to_value(&evaluation).unwrap();
+    let manifest: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(data_set().join("manifest.json")).unwrap()).unwrap();
+    assert_eq!(json["truth"]["files_xxh3_128"], manifest["files"]["xxh3_128"]);
+    assert_eq!(json["truth"]["areas"], serde_json::json!([[1], [5]]));
+    assert_eq!(json["options"]["seed"], 0);
+    assert_eq!(json["evaluator"], manifest["version"]);
+
+    // Each count by the labels themselves.
+    let mut counts = vec![vec![0; 14]; 13];
+    for (classes, _) in rooms().into_values() {
+        for (i, class) in classes.into_iter().enumerate() {
+            let found = if i % 3 == 0 { (class + 1) % 13 } else { class };
+            counts[class as usize][found as usize] += 1;
+        }
+    }
+    assert_eq!(evaluation.confusion.as_ref().unwrap().counts, counts);
+
+    // A room by itself scores like a data set of this room.
+    assert_eq!(evaluation.units.units.len(), rooms().len());
+    let overall = evaluation.units.rows.iter().position(|row| row == "overall").unwrap();
+    for unit in &evaluation.units.units {
+        let (classes, _) = &rooms()[&format!("Area_{}_{}", unit.area, unit.name)];
+        let right = classes.len() - classes.len().div_ceil(3);
+        assert_eq!(unit.scores[overall][1], right as f64 / classes.len() as f64, "{}", unit.name);
+    }
+}
+
+#[test]
+fn differences_to_other_predictions_are_paired() {
+    let [better, worse] = [5, 3].map(|step| {
+        let dir = tempfile::tempdir().unwrap();
+        write_worse_classes(dir.path(), step);
+        dir
+    });
+    let against = |ours: &TempDir, theirs: &TempDir| {
+        let mut options = options(None, Folds::All);
+        options.against = Some(theirs.path().to_owned());
+        let evaluation = eval(Protocol::Sem3d, ours.path(), &options).unwrap();
+        let overall = |tables: &[Table]| tables[0].rows.last().unwrap().scores[1];
+        let found = evaluation.against.as_ref().unwrap();
+        let text = evaluation.to_markdown();
+        assert!(text.contains("minus the scores of the other predictions"), "{text}");
+        [&evaluation.tables, &found.tables, &found.differences].map(|tables| overall(tables))
+    };
+
+    // The accuracy of a room differs by little from 4/5 and 2/3, so the same rooms for both have nearly the
+    // same difference. Rooms drawn for each by itself would not.
+    let [ours, theirs, difference] = against(&better, &worse);
+    assert_eq!(difference.value, ours.value - theirs.value);
+    let [low, high] = difference.interval.unwrap();
+    assert!(low <= difference.value && difference.value <= high && high - low < 1e-3, "{difference:?}");
+    assert!(low > 0.13 && high < 0.14, "{difference:?}");
+
+    let [.., reverse] = against(&worse, &better);
+    assert_eq!(reverse.value, -difference.value);
+    let [.., same] = against(&better, &better);
+    assert_eq!((same.value, same.interval), (0.0, Some([0.0; 2])));
 }
 
 /// Reads the tree of a profile like Pointcept's preprocessing: files sorted, their classes repeated.

@@ -75,6 +75,7 @@ pub(crate) struct Evaluated {
     variant: Option<String>,
     folds: String,
     areas: Vec<u32>,
+    against: Option<PathBuf>,
     bootstrap: Option<u32>,
     seed: u64,
     median_scale: bool,
@@ -106,6 +107,7 @@ pub(crate) fn evaluate(
         "paper" => Folds::Paper,
         other => return Err(usage(format!("folds={other:?}: must be one of all, each, paper"))),
     };
+    options.against = how.against;
     options.bootstrap = how.bootstrap;
     options.seed = how.seed;
     options.median_scale = how.median_scale;
@@ -172,6 +174,7 @@ pub(crate) struct Reported {
     mesh_faces: u32,
     verify: bool,
     single: bool,
+    scores: Vec<PathBuf>,
     overwrite: bool,
 }
 
@@ -186,8 +189,8 @@ pub(crate) fn report(
     threads: Option<usize>,
     sink: Py<PyAny>,
 ) -> PyResult<PathBuf> {
-    let Reported { pano_width, thumbs, mesh_faces, verify, single, overwrite } = how;
-    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
+    let Reported { pano_width, thumbs, mesh_faces, verify, single, scores, overwrite } = how;
+    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, scores, overwrite };
     let made = watched(py, threads, &sink, |ctx| {
         let ending = if single { "_report.html" } else { "_report" };
         let to = to.map_or_else(|| s3d_dataset::store::beside(&root, ending), Ok)?;

@@ -431,6 +431,7 @@ impl<'a> Content<'a> {
             locations,
             views,
             meshes: made.meshes.clone(),
+            scores: 0,
             against: None,
             views_per_file: VIEWS_PER_FILE,
             thumbs_per_file: THUMBS_PER_FILE,

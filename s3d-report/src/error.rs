@@ -22,6 +22,9 @@ pub enum Error {
     /// There is a file in the place of the report that is no report.
     #[error("{} is there already, and was not written by s3d report: choose another name", .0.display())]
     Occupied(PathBuf),
+    /// A result of `s3d eval` is of another data set, or of another state of this one.
+    #[error("{}: these scores are of another data set: its list of files differs", .0.display())]
+    OtherDataSet(PathBuf),
     /// The report is too large for a single file.
     #[error(
         "one file of more than {} MB would open slowly or not at all: make a folder, or smaller images",

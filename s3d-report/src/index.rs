@@ -31,6 +31,8 @@ pub(crate) struct Index {
     pub(crate) locations: Vec<LocationEntry>,
     pub(crate) views: Vec<ViewEntry>,
     pub(crate) meshes: Vec<MeshEntry>,
+    /// The number of files `data/scores_N.js`.
+    pub(crate) scores: usize,
     /// The name of the folder of the other data set, if there is `compare.js`.
     pub(crate) against: Option<String>,
     /// The number of pictures in a file `data/views_N.js`.

@@ -32,6 +32,7 @@ mod mesh;
 mod packed;
 mod pixels;
 mod reduce;
+mod scores;
 mod script;
 mod selection;
 mod write;

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::faults::{Fault, Faults};
 use crate::index::{FORM, Index, Verified, folder_name};
 use crate::pixels::Widths;
+use crate::scores::Scores;
 use crate::script::{MOST_BYTES, Scripts};
 use s3d_dataset::store::{FolderKind, NewFile, NewFolder, check_apart};
 use s3d_dataset::verify::VerifyOptions;
@@ -54,6 +55,8 @@ pub struct ReportOptions {
     pub verify: bool,
     /// Whether to write a single file, which is easier to send or publish. For small data sets.
     pub single: bool,
+    /// Results of predictions on the data set to show: files that `s3d eval --json` wrote.
+    pub scores: Vec<PathBuf>,
     /// Whether to replace an earlier report.
     pub overwrite: bool,
 }
@@ -66,6 +69,7 @@ impl Default for ReportOptions {
             mesh_faces: 300_000,
             verify: false,
             single: false,
+            scores: Vec::new(),
             overwrite: false,
         }
     }
@@ -114,9 +118,10 @@ struct About {
 /// shown. If an export did not finish, the report shows the files so far.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] for the options. [`Error::Occupied`] if a file at `to` is no report.
-/// [`Error::TooLarge`] for a single file. [`Error::Dataset`] if there is no data set in `out`, its list of
-/// files is damaged, `to` cannot be written or holds something else, or the call is cancelled.
+/// [`Error::OutOfRange`] for the options. [`Error::OtherDataSet`] for scores of another data set.
+/// [`Error::Occupied`] if a file at `to` is no report. [`Error::TooLarge`] for a single file.
+/// [`Error::Dataset`] if there is no data set in `out`, its list of files or a file of scores is damaged, `to`
+/// cannot be written or holds something else, or the call is cancelled.
 pub fn report(out: &Path, to: &Path, options: &ReportOptions, ctx: &Context) -> Result<Report> {
     write(out, None, to, options, ctx)
 }
@@ -156,6 +161,8 @@ fn write(
         DataSet::open(against)?;
     }
     let data = DataSet::open_as_far_as_it_is(out, ctx)?;
+    let scores = options.scores.iter().map(|path| Scores::read(path, &data));
+    let scores = scores.collect::<Result<Vec<_>>>()?;
     let destination = Destination::begin(ctx, to, out, options)?;
     let scripts = match &destination {
         Destination::Folder(folder) => {
@@ -165,7 +172,7 @@ fn write(
         Destination::File { .. } => Scripts::Page(Mutex::default()),
     };
 
-    let written = match write_data(ctx, (out, &data), against, options, &scripts) {
+    let written = match write_data(ctx, (out, &data), against, (options, &scores), &scripts) {
         Err(_) if scripts.is_too_large() => return Err(Error::TooLarge(MOST_BYTES)),
         written => written?,
     };
@@ -202,7 +209,7 @@ fn write_data(
     ctx: &Context,
     (out, data): (&Path, &DataSet),
     against: Option<&Path>,
-    options: &ReportOptions,
+    (options, scores): (&ReportOptions, &[Scores]),
     scripts: &Scripts,
 ) -> s3d_dataset::Result<Data> {
     let mut faults = Faults::default();
@@ -214,6 +221,10 @@ fn write_data(
 
     let mut index = content.index(out, &made, faults)?;
     let mut bytes = made.bytes;
+    for (i, scores) in scores.iter().enumerate() {
+        bytes += scripts.write_list(&format!("scores_{i}"), scores)?;
+    }
+    index.scores = scores.len();
     if let Some(against) = against {
         bytes += against::write(ctx, (out, &content), against, options, scripts)?;
         index.against = Some(folder_name(against));

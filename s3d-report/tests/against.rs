@@ -22,6 +22,7 @@ const SMALL: ReportOptions = ReportOptions {
     mesh_faces: 1_000_000,
     verify: false,
     single: false,
+    scores: Vec::new(),
     overwrite: false,
 };
 

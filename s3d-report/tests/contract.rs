@@ -22,6 +22,7 @@ const SMALL: ReportOptions = ReportOptions {
     mesh_faces: 1000,
     verify: false,
     single: false,
+    scores: Vec::new(),
     overwrite: false,
 };
 
@@ -402,4 +403,48 @@ fn what_verify_finds_is_told_if_it_is_asked() {
             .any(|group| group["first"][0][0] == *path && group["count"] == 1),
         "{found}"
     );
+}
+
+#[test]
+fn scores_are_shown_and_must_be_of_this_data_set() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), true);
+    let data = DataSet::open(&out).unwrap();
+    let scores = |checksum: &str| {
+        serde_json::json!({
+            "protocol": "sem3d", "version": 1, "variant": "pointcept", "evaluator": "0.2.0",
+            "truth": {"files_xxh3_128": checksum, "areas": [[1]]},
+            "options": {"seed": 0}, "definition": ["A sentence."], "counted": {"rooms": 1},
+            "tables": [{"title": "area 1", "columns": ["IoU"], "rows": [
+                {"name": "mean", "scores": [{"value": 0.5, "interval": [0.25, null]}]},
+            ]}],
+            "confusion": {"classes": ["wall"], "counts": [[5, 1]]},
+            "units": {"columns": ["IoU"], "rows": ["mean"], "units": [
+                {"area": 1, "name": "office_1", "scores": [[null]]},
+            ]},
+            "notes": [],
+        })
+    };
+    let path = dir.path().join("ours.json");
+    let options = ReportOptions { scores: vec![path.clone()], ..SMALL };
+    let to = dir.path().join("report");
+
+    fs::write(&path, scores("0").to_string()).unwrap();
+    let error = report(&out, &to, &options, &Context::default()).unwrap_err();
+    assert!(matches!(error, Error::OtherDataSet(_)) && !to.exists(), "{error}");
+    fs::write(&path, "{}").unwrap();
+    let error = report(&out, &to, &options, &Context::default())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("ours.json") && error.contains("protocol"), "{error}");
+
+    let expected = scores(&data.checksum());
+    fs::write(&path, expected.to_string()).unwrap();
+    made(&out, &to, &options);
+    assert_eq!(value(&to, "index")["scores"], 1);
+    let shown = value(&to, "scores_0");
+    assert_eq!(shown["name"], "ours");
+    for member in ["tables", "confusion", "units", "counted"] {
+        assert_eq!(shown[member], expected[member], "{member}");
+    }
 }

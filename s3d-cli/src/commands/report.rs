@@ -36,6 +36,9 @@ pub(crate) struct ReportArgs {
     /// Write one file, to send or publish, instead of a folder. For small data sets.
     #[arg(long)]
     pub(crate) single: bool,
+    /// Show the scores in a file that `s3d eval --json` wrote. May be given several times.
+    #[arg(long, value_name = "SCORES.json")]
+    pub(crate) scores: Vec<PathBuf>,
     /// Replace an earlier report.
     #[arg(long)]
     pub(crate) overwrite: bool,
@@ -53,10 +56,11 @@ pub(crate) fn run(args: ReportArgs) -> Outcome<()> {
         mesh_faces,
         verify,
         single,
+        scores,
         overwrite,
         threads,
     } = args;
-    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, overwrite };
+    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, scores, overwrite };
     let made = on_threads(threads, |context| {
         let to = output.map_or_else(
             || s3d_dataset::store::beside(&dataset, if single { "_report.html" } else { "_report" }),

@@ -4,6 +4,7 @@ use crate::error::{Result, UsageError};
 use s3d_io::dataset::Domain;
 use s3d_io::image::Compression;
 use s3d_label::{Class, Taxonomy};
+use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -333,7 +334,7 @@ fn choice<T: Copy>(all: &[(&'static str, T)], word: &str) -> std::result::Result
 }
 
 /// Names of classes, from any taxonomy.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ClassList(pub Vec<String>);
 
 impl ClassList {

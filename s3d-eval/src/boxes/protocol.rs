@@ -6,7 +6,7 @@ use super::room::{Verdict, verdicts};
 use super::truth::{Classes, Room, Rooms, rooms};
 use super::{Bbox, Detection, GroundTruth, Rule, ScoredBox, average_precision};
 use crate::error::Result;
-use crate::tables::{Rows, tables};
+use crate::tables::{Rows, Unit, tables};
 use crate::task::Task;
 use crate::{Evaluation, Fold};
 use s3d_dataset::parallel::map_in_order;
@@ -76,7 +76,7 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
                 .map(|class| OfClass::judge(room, found, *class, rule))
                 .collect();
             progress.add(1);
-            Ok((room.fold, of_classes))
+            Ok(Unit { fold: room.fold, area: room.area, name: room.name.clone(), counted: of_classes })
         },
     )?;
     drop(progress);
@@ -125,9 +125,7 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
     let detections = of_rooms.iter().map(|found| found.len() as u64).sum();
     let counted =
         [("rooms", rooms.len() as u64), ("boxes", boxes.count() as u64), ("detections", detections)];
-    let mut evaluation = task.evaluation(&definition, counted, tables);
-    evaluation.notes = notes;
-    Ok(evaluation)
+    Ok(Evaluation { notes, ..task.evaluation(&definition, counted, tables) })
 }
 
 impl OfClass {
@@ -173,12 +171,15 @@ fn ceiling(rooms: &[Room], classes: &[Class], rule: Rule) -> [f64; 2] {
 }
 
 /// Returns a note on the classes that are detected in a fold without true boxes of them.
-fn invented(folds: &[Fold], rooms: &[(usize, Vec<OfClass>)], classes: &[Class]) -> Option<String> {
+fn invented(folds: &[Fold], rooms: &[Unit<Vec<OfClass>>], classes: &[Class]) -> Option<String> {
     let names: Vec<String> = folds
         .iter()
         .enumerate()
         .flat_map(|(i, fold)| {
-            let of_fold = rooms.iter().filter(move |(at, _)| *at == i).map(|(_, of)| of);
+            let of_fold = rooms
+                .iter()
+                .filter(move |room| room.fold == i)
+                .map(|room| &room.counted);
             let names = (0..classes.len())
                 .filter(|class| {
                     let of_class = of_fold.clone().map(|of| &of[*class]);
@@ -258,10 +259,11 @@ mod tests {
     #[test]
     fn classes_without_true_boxes_are_noted() {
         let folds = [5, 2].map(|area| Fold { name: format!("area {area}"), areas: vec![area] });
+        let room = |fold, counted| Unit { fold, area: 1, name: "office_1".to_owned(), counted };
         let rooms = vec![
-            (0, vec![of_class(1, true), of_class(0, true)]),
-            (0, vec![of_class(0, true), of_class(0, false)]),
-            (1, vec![of_class(0, false), of_class(1, true)]),
+            room(0, vec![of_class(1, true), of_class(0, true)]),
+            room(0, vec![of_class(0, true), of_class(0, false)]),
+            room(1, vec![of_class(0, false), of_class(1, true)]),
         ];
         let told = invented(&folds, &rooms, &[Class::BEAM, Class::SOFA]).unwrap();
         assert!(told.ends_with("not defined there: sofa in area 5."), "{told}");

@@ -62,6 +62,13 @@ impl Confusion {
             .for_each(|(at, count)| self.counts[*at as usize] += u64::from(*count));
     }
 
+    /// Returns a row of counts for each true class, by predicted class.
+    pub fn rows(&self) -> Vec<Vec<u64>> {
+        (0..self.classes)
+            .map(|truth| self.counts[truth * self.classes..][..self.classes].to_vec())
+            .collect()
+    }
+
     /// Returns the number of pixels that were counted.
     pub fn pixels(&self) -> u64 {
         self.counts.iter().sum()

@@ -74,19 +74,19 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
             } else {
                 hohonet_depth(&truth, &prediction)
             };
-            Ok((predicted.fold, scores))
+            Ok(predicted.unit(scores))
         },
     )?;
     drop(progress);
 
-    let empty = units.iter().filter(|(_, scores)| scores.pixels == 0).count();
+    let empty = units.iter().filter(|unit| unit.counted.pixels == 0).count();
     if empty > 0 {
         notes.push(format!(
             "{empty} panoramas without a pixel to evaluate were left out; in the script they make all scores \
              NaN."
         ));
     }
-    let replaced: u64 = units.iter().map(|(_, scores)| scores.replaced).sum();
+    let replaced: u64 = units.iter().map(|unit| unit.counted.replaced).sum();
     if replaced > 0 {
         notes.push(format!(
             "{replaced} pixels were predicted beyond 10 m and compared with 10 m instead of their truth."
@@ -94,7 +94,7 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
     }
 
     let tables = tables(task, &DEPTH_COLUMNS, &units, |units| vec![("mean".to_owned(), mean(units))]);
-    let pixels = units.iter().map(|(_, scores)| scores.pixels).sum();
+    let pixels = units.iter().map(|unit| unit.counted.pixels).sum();
     let counted = [("panoramas", images.len() as u64), ("pixels", pixels)];
     let mut definition = if is_unifuse { UNIFUSE.to_vec() } else { HOHONET.to_vec() };
     if median_scale {

@@ -4,12 +4,12 @@ use crate::Evaluation;
 use crate::error::Result;
 use crate::images::median::Medians;
 use crate::images::normal_metrics::{
-    AngleSums, DSINE_LIMITS, degrees, dsine_cosine, omnidata_cosine, omnidata_scores,
+    AngleSums, DSINE_LIMITS, degrees, dsine_cosine, median_of_angles, omnidata_cosine, omnidata_scores,
 };
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
 use crate::images::read;
 use crate::options::ImageKind;
-use crate::tables::{Rows, mean_of_defined, tables};
+use crate::tables::{Rows, Scores, mean_of_defined, tables};
 use crate::task::Task;
 use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
@@ -60,8 +60,8 @@ pub(crate) fn normal(task: &Task<'_>) -> Result<Evaluation> {
     Ok(Evaluation { notes: matched.notes, ..task.evaluation(&definition, counted, tables) })
 }
 
-/// The definition, the number of pixels, and the tables.
-type Parts = (Vec<&'static str>, u64, Vec<crate::Table>);
+/// The definition, the number of pixels, and the scores.
+type Parts = (Vec<&'static str>, u64, Scores);
 
 fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     let progress = task.ctx.progress("evaluating", "images", matched.images.len() as u64);
@@ -69,12 +69,12 @@ fn omnidata(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         cosines(task, predicted, omnidata_cosine, angles)?;
         angles.iter_mut().for_each(|angle| *angle = degrees(*angle));
         progress.add(1);
-        Ok((predicted.fold, (angles.len() as u64, omnidata_scores(angles))))
+        Ok(predicted.unit((angles.len() as u64, omnidata_scores(angles))))
     })?;
 
     let columns = ["mean (°)", "median (°)", "≤ 11.25°", "≤ 22.5°", "≤ 30°"];
     let made = tables(task, &columns, &units, mean_scores);
-    Ok((OMNIDATA.to_vec(), units.iter().map(|unit| unit.1.0).sum(), made))
+    Ok((OMNIDATA.to_vec(), units.iter().map(|unit| unit.counted.0).sum(), made))
 }
 
 fn mean_scores(units: &[&(u64, Option<[f64; 5]>)]) -> Rows {
@@ -87,8 +87,13 @@ fn mean_scores(units: &[&(u64, Option<[f64; 5]>)]) -> Rows {
     vec![("mean".to_owned(), sums.map(|sum| sum / count).to_vec())]
 }
 
-/// An image: its sums, and with intervals the number of its angles in each of [`STEPS`] steps.
-type Unit = (AngleSums, Vec<u32>);
+/// The angles of an image.
+struct Angles {
+    sums: AngleSums,
+    median: f64,
+    /// With intervals, the number of angles in each of [`STEPS`] steps.
+    steps: Vec<u32>,
+}
 
 /// The number of steps of the histograms that give the medians of the bootstrap.
 const STEPS: usize = 900;
@@ -109,7 +114,8 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
                 .for_each(|angle| steps[((angle * 5.0) as usize).min(STEPS - 1)] += 1);
         }
         progress.add(1);
-        Ok((predicted.fold, (AngleSums::of(angles), steps)))
+        let sums = AngleSums::of(angles);
+        Ok(predicted.unit(Angles { sums, median: median_of_angles(angles).unwrap_or(f64::NAN), steps }))
     })?;
 
     // The angles do not fit into memory, so that the second pass reads the images again.
@@ -129,7 +135,7 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
         .chain(below.iter().map(String::as_str));
     let mut made = tables(task, &columns.collect::<Vec<_>>(), &units, pooled_scores);
     // Medians of steps are for intervals only.
-    for (table, median) in made.iter_mut().zip(of_tables(&medians)) {
+    for (table, median) in made.tables.iter_mut().zip(of_tables(&medians)) {
         table.rows[0].scores[1].value = median;
     }
 
@@ -137,18 +143,25 @@ fn dsine(task: &Task<'_>, matched: &Matched) -> Result<Parts> {
     if with_intervals {
         definition.push("Intervals of medians are computed from angles in steps of 0.2°.");
     }
-    Ok((definition, units.iter().map(|unit| unit.1.0.pixels).sum(), made))
+    Ok((definition, units.iter().map(|unit| unit.counted.sums.pixels).sum(), made))
 }
 
-fn pooled_scores(units: &[&Unit]) -> Rows {
+fn pooled_scores(images: &[&Angles]) -> Rows {
     let mut sums = AngleSums::default();
     let mut steps = vec![0u64; STEPS];
-    for (of_image, counts) in units {
-        sums.add(of_image);
-        steps.iter_mut().zip(counts).for_each(|(sum, n)| *sum += u64::from(*n));
+    for image in images {
+        sums.add(&image.sums);
+        steps
+            .iter_mut()
+            .zip(&image.steps)
+            .for_each(|(sum, n)| *sum += u64::from(*n));
     }
+    let median = match images {
+        [image] => image.median,
+        _ => median_of_steps(&steps),
+    };
     let ([mean, rmse], below) = sums.mean_rmse_below();
-    let scores = [mean, median_of_steps(&steps), rmse].into_iter().chain(below);
+    let scores = [mean, median, rmse].into_iter().chain(below);
     vec![("all pixels".to_owned(), scores.collect())]
 }
 

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::options::ImageKind;
+use crate::tables::Unit;
 use crate::task::Task;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
@@ -29,6 +30,13 @@ pub(super) struct Predicted {
     pub(super) fold: usize,
     pub(super) image: DatasetImage,
     pub(super) file: PathBuf,
+}
+
+impl Predicted {
+    /// Returns the unit with what was counted in the image.
+    pub(super) fn unit<T>(&self, counted: T) -> Unit<T> {
+        Unit { fold: self.fold, area: self.image.area, name: self.image.stem(), counted }
+    }
 }
 
 /// All images that are tested, by area, in the order of the data set.

@@ -1,6 +1,5 @@
 //! Protocol `sem-pano`: classes of panoramas.
 
-use crate::Evaluation;
 use crate::error::{Error, Result};
 use crate::images::confusion::Confusion;
 use crate::images::panorama::PanoramaClasses;
@@ -10,6 +9,7 @@ use crate::images::resample::pillow_nearest;
 use crate::options::ImageKind;
 use crate::tables::tables;
 use crate::task::Task;
+use crate::{ConfusionTable, Evaluation};
 use s3d_dataset::DataSet;
 use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
@@ -67,15 +67,18 @@ pub(crate) fn sem_pano(task: &Task<'_>) -> Result<Evaluation> {
             let truth = truth(task.data, predicted, &classes)?;
             let confusion = compare(&truth, &predicted.file, &meaning, count)?;
             progress.add(1);
-            Ok((predicted.fold, confusion.counted()))
+            Ok(predicted.unit(confusion.counted()))
         },
     )?;
     drop(progress);
 
-    let score = |units: &[&Vec<(u32, u32)>]| {
+    let sum = |units: &[&Vec<(u32, u32)>]| {
         let mut sum = Confusion::new(count);
         units.iter().for_each(|counted| sum.add_counted(counted));
-        let scores = sum.scores();
+        sum
+    };
+    let score = |units: &[&Vec<(u32, u32)>]| {
+        let scores = sum(units).scores();
         let of_classes = taxonomy.classes().iter().zip(scores.iou).zip(scores.accuracy);
         of_classes
             .map(|((class, iou), accuracy)| (class.name().to_owned(), vec![iou, accuracy]))
@@ -83,10 +86,12 @@ pub(crate) fn sem_pano(task: &Task<'_>) -> Result<Evaluation> {
             .collect()
     };
 
-    let pixels = units.iter().flat_map(|unit| &unit.1).map(|(_, n)| u64::from(*n)).sum();
-    let counted = [("panoramas", images.len() as u64), ("pixels", pixels)];
+    let all = sum(&units.iter().map(|unit| &unit.counted).collect::<Vec<_>>());
+    let counted = [("panoramas", images.len() as u64), ("pixels", all.pixels())];
     let tables = tables(task, &["IoU", "accuracy"], &units, score);
-    Ok(Evaluation { notes, ..task.evaluation(&DEFINITION, counted, tables) })
+    let classes = taxonomy.classes().iter().map(|class| class.name().to_owned());
+    let confusion = Some(ConfusionTable { classes: classes.collect(), counts: all.rows() });
+    Ok(Evaluation { notes, confusion, ..task.evaluation(&DEFINITION, counted, tables) })
 }
 
 struct Truth {

@@ -4,7 +4,7 @@ use super::counts::{ClassCounts, PanopticCounts, PanopticScore, Segment, mean};
 use super::predictions::{Predicted, Predictions, key};
 use crate::Evaluation;
 use crate::error::{ClassOption, Error, Result};
-use crate::tables::{Rows, tables};
+use crate::tables::{Rows, Unit, tables};
 use crate::task::Task;
 use s3d_dataset::pack::ClassList;
 use s3d_dataset::parallel::map_in_order;
@@ -56,7 +56,7 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
         |(), (fold, image, predicted)| {
             let counts = truth.hold(image, predicted, &predictions)?;
             progress.add(1);
-            Ok((*fold, counts))
+            Ok(Unit { fold: *fold, area: image.area, name: image.stem(), counted: counts })
         },
     )?;
     drop(progress);
@@ -83,9 +83,7 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
         .filter(|(_, image, _)| image.frame == Frame::Panorama)
         .count() as u64;
     let counted = [("panoramas", panoramas), ("views", images.len() as u64 - panoramas)];
-    let mut evaluation = task.evaluation(&definition, counted, tables);
-    evaluation.notes = notes;
-    Ok(evaluation)
+    Ok(Evaluation { notes, ..task.evaluation(&definition, counted, tables) })
 }
 
 fn names_of(of: &[Class]) -> String {

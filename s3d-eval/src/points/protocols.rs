@@ -9,9 +9,9 @@ use super::precision::{InstanceMatches, instance_ap};
 use super::semantic::{AbsentClass, SemanticCounts, nan_mean};
 use super::truth::{Points, Room};
 use crate::error::Result;
-use crate::tables::{Rows, tables};
+use crate::tables::{Rows, Scores, Unit, tables};
 use crate::task::Task;
-use crate::{Evaluation, Table};
+use crate::{ConfusionTable, Evaluation};
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::s3d_label::Class;
 use std::path::Path;
@@ -23,8 +23,7 @@ const OF_CLASSES: &str = "Classes are the 13 of S3DIS. A class of another taxono
 
 /// The results of all rooms, and notes.
 struct Counted<T> {
-    /// The fold and the result of each room.
-    rooms: Vec<(usize, T)>,
+    rooms: Vec<Unit<T>>,
     points: u64,
     notes: Vec<String>,
 }
@@ -48,21 +47,19 @@ fn count<T: Send + Sync>(
             let points = room.points(task)?;
             let result = work(path, room, &points)?;
             progress.add(1);
-            Ok((room.fold, points.count(), result))
+            Ok((points.count(), room.unit(result)))
         },
     )?;
-    let points = results.iter().map(|(_, points, _)| points).sum();
-    let rooms = results.into_iter().map(|(fold, _, result)| (fold, result)).collect();
+    let points = results.iter().map(|(points, _)| points).sum();
+    let rooms = results.into_iter().map(|(_, room)| room).collect();
     Ok(Counted { rooms, points, notes })
 }
 
 impl<T> Counted<T> {
-    fn evaluation(self, task: &Task<'_>, definition: &[&str], tables: Vec<Table>) -> Evaluation {
+    fn evaluation(self, task: &Task<'_>, definition: &[&str], scores: Scores) -> Evaluation {
         let definition = [definition, &[TRUTH, OF_CLASSES]].concat();
         let counted = [("rooms", self.rooms.len() as u64), ("points", self.points)];
-        let mut evaluation = task.evaluation(&definition, counted, tables);
-        evaluation.notes = self.notes;
-        evaluation
+        Evaluation { notes: self.notes, ..task.evaluation(&definition, counted, scores) }
     }
 }
 
@@ -121,7 +118,10 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
         of_absent,
         "A point predicted as -1 is wrong and belongs to no class.",
     ];
-    Ok(counted.evaluation(task, &definition, tables))
+    let sum = SemanticCounts::sum(CLASSES, counted.rooms.iter().map(|room| &room.counted));
+    let classes = Class::S3DIS.map(|class| class.name().to_owned()).to_vec();
+    let confusion = Some(ConfusionTable { classes, counts: sum.rows() });
+    Ok(Evaluation { confusion, ..counted.evaluation(task, &definition, tables) })
 }
 
 /// Average precision of instances of points.

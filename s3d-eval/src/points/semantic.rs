@@ -1,14 +1,11 @@
-//! Semantic segmentation: counts of points by class, and their scores.
+//! Semantic segmentation: points by true and predicted class, and their scores.
 
-/// The numbers of points of each class: in the truth, in the prediction, and in both.
+/// The number of points of each true class that were predicted as each class.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SemanticCounts {
-    /// The points of each true class.
-    pub truth: Vec<u64>,
-    /// The points of each predicted class.
-    pub predicted: Vec<u64>,
-    /// The points whose true and predicted class is this one.
-    pub intersection: Vec<u64>,
+    classes: usize,
+    /// A row for each true class: the predicted classes, then the points that were predicted as no class.
+    counts: Vec<u64>,
 }
 
 /// The scores of a class that neither the truth nor the predictions have.
@@ -41,15 +38,14 @@ pub struct SemanticScores {
 impl SemanticCounts {
     /// Makes empty counts of this number of classes.
     pub fn new(classes: usize) -> Self {
-        let none = vec![0; classes];
-        Self { truth: none.clone(), predicted: none.clone(), intersection: none }
+        Self { classes, counts: vec![0; classes * (classes + 1)] }
     }
 
     /// Counts points by their true and predicted classes, from 0. A point whose true class does not exist,
     /// such as -1, is void and does not count. A point whose predicted class does not exist is wrong.
     pub fn add(&mut self, points: impl IntoIterator<Item = (i64, i64)>) {
         for (truth, predicted) in points {
-            if let Some(class) = usize::try_from(truth).ok().filter(|class| *class < self.truth.len()) {
+            if let Some(class) = usize::try_from(truth).ok().filter(|class| *class < self.classes) {
                 self.add_run(class, &[predicted]);
             }
         }
@@ -57,19 +53,11 @@ impl SemanticCounts {
 
     /// Counts points of one true class.
     pub(super) fn add_run(&mut self, class: usize, predicted: &[i64]) {
-        let before = self.predicted.get(class).copied().unwrap_or(0);
+        let none = self.classes;
+        let Some(row) = self.counts.chunks_exact_mut(none + 1).nth(class) else { return };
         for label in predicted {
-            if let Some(count) = usize::try_from(*label)
-                .ok()
-                .and_then(|label| self.predicted.get_mut(label))
-            {
-                *count += 1;
-            }
-        }
-        let right = self.predicted.get(class).copied().unwrap_or(0) - before;
-        if let (Some(truth), Some(both)) = (self.truth.get_mut(class), self.intersection.get_mut(class)) {
-            *truth += predicted.len() as u64;
-            *both += right;
+            let at = usize::try_from(*label).map_or(none, |label| label.min(none));
+            row[at] += 1;
         }
     }
 
@@ -77,29 +65,53 @@ impl SemanticCounts {
     pub fn sum<'a>(classes: usize, counts: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut sum = Self::new(classes);
         for counts in counts {
-            add(&mut sum.truth, &counts.truth);
-            add(&mut sum.predicted, &counts.predicted);
-            add(&mut sum.intersection, &counts.intersection);
+            sum.counts
+                .iter_mut()
+                .zip(&counts.counts)
+                .for_each(|(sum, count)| *sum += count);
         }
         sum
     }
 
+    /// Returns a row of counts for each true class: by predicted class, then the points that were predicted
+    /// as no class.
+    pub fn rows(&self) -> Vec<Vec<u64>> {
+        self.counts
+            .chunks_exact(self.classes + 1)
+            .map(<[u64]>::to_vec)
+            .collect()
+    }
+
+    /// Returns the number of points of each true class.
+    pub fn truth(&self) -> Vec<u64> {
+        self.rows().iter().map(|row| row.iter().sum()).collect()
+    }
+
+    /// Returns the number of points of each predicted class.
+    pub fn predicted(&self) -> Vec<u64> {
+        let rows = self.rows();
+        (0..self.classes)
+            .map(|class| rows.iter().map(|row| row[class]).sum())
+            .collect()
+    }
+
     /// Returns the scores of these counts.
     pub fn scores(&self, absent: AbsentClass) -> SemanticScores {
-        let both = || self.intersection.iter().copied();
-        let sides = self.truth.iter().zip(&self.predicted);
+        let rows = self.rows();
+        let both = || rows.iter().enumerate().map(|(class, row)| row[class]);
+        let [truth, predicted] = [self.truth(), self.predicted()];
         let iou: Vec<f64> = both()
-            .zip(sides)
+            .zip(truth.iter().zip(&predicted))
             .map(|(both, (t, p))| share(both, t + p - both, absent))
             .collect();
         let accuracy: Vec<f64> = both()
-            .zip(&self.truth)
+            .zip(&truth)
             .map(|(both, truth)| share(both, *truth, absent))
             .collect();
         SemanticScores {
             mean_iou: nan_mean(iou.iter().copied()),
             mean_accuracy: nan_mean(accuracy.iter().copied()),
-            overall_accuracy: share(both().sum(), self.truth.iter().sum(), absent),
+            overall_accuracy: share(both().sum(), truth.iter().sum(), absent),
             iou,
             accuracy,
         }
@@ -111,10 +123,6 @@ fn share(part: u64, whole: u64, absent: AbsentClass) -> f64 {
         AbsentClass::Zero => part as f64 / (whole as f64 + 1e-10),
         AbsentClass::LeftOut => part as f64 / whole as f64,
     }
-}
-
-fn add(sum: &mut [u64], counts: &[u64]) {
-    sum.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
 }
 
 /// Returns the mean of the values that are not NaN; NaN if there are none.
@@ -136,8 +144,8 @@ mod tests {
     fn absent_classes_are_zero_or_left_out() {
         let mut counts = SemanticCounts::new(3);
         counts.add([(0, 0), (0, 1), (1, 1), (-1, 0), (7, 1), (1, -1)]);
-        assert_eq!((&counts.truth[..], &counts.predicted[..]), (&[2, 2, 0][..], &[1, 2, 0][..]));
-        assert_eq!(counts.intersection, [1, 1, 0]);
+        assert_eq!((counts.truth(), counts.predicted()), (vec![2, 2, 0], vec![1, 2, 0]));
+        assert_eq!(counts.rows(), [[1, 1, 0, 0], [0, 1, 0, 1], [0; 4]]);
         let zero = counts.scores(AbsentClass::Zero);
         assert!((zero.mean_iou - (0.5 + 1.0 / 3.0) / 3.0).abs() < 1e-9 && zero.iou[2] == 0.0, "{zero:?}");
         let left_out = counts.scores(AbsentClass::LeftOut);

@@ -3,6 +3,7 @@
 use super::CLASSES;
 use super::matching::TrueInstance;
 use crate::error::Result;
+use crate::tables::Unit;
 use crate::task::Task;
 use s3d_dataset::profile::TreeRoom;
 
@@ -37,6 +38,11 @@ impl Room {
     /// Returns its name with its area, such as `Area_5/office_1`.
     pub(super) fn name(&self) -> String {
         format!("Area_{}/{}", self.tree.area, self.tree.name)
+    }
+
+    /// Returns the unit with what was counted in the room.
+    pub(super) fn unit<T>(&self, counted: T) -> Unit<T> {
+        Unit { fold: self.fold, area: self.tree.area, name: self.tree.name.clone(), counted }
     }
 
     /// Counts its points.

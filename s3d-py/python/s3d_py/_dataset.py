@@ -653,6 +653,7 @@ class DataSet(Sequence[View]):
         to: PathLike | None = None,
         *,
         against: DataSet | PathLike | None = None,
+        scores: Sequence[PathLike] = (),
         single: bool = False,
         verify: bool = False,
         overwrite: bool = False,
@@ -666,6 +667,7 @@ class DataSet(Sequence[View]):
 
         - `to`: the folder of the report, or its file if it is `single`; beside the data set by default.
         - `against`: another data set, shown beside this one where both differ.
+        - `scores`: files that `s3d eval --json` wrote, or `json.dump(evaluation.data, …)`.
         - `pano_width`, `thumbs`: width of panoramas and of views in the report, in pixels.
         - `mesh_faces`: a mesh with more faces is simplified.
         - `verify`: verify the data set as well, and show the result.
@@ -676,6 +678,7 @@ class DataSet(Sequence[View]):
             mesh_faces=mesh_faces,
             verify=verify,
             single=single,
+            scores=[Path(path) for path in scores],
             overwrite=overwrite,
         )
         return _native.report(

@@ -182,6 +182,7 @@ def evaluate(
     variant: str | None = None,
     folds: str = "all",
     areas: Sequence[int] = (),
+    against: PathLike | None = None,
     bootstrap: int | None = None,
     seed: int = 0,
     median_scale: bool = False,
@@ -201,6 +202,8 @@ def evaluate(
     - `variant`: the definition to follow; by default the first of the protocol.
     - `folds`: "all" areas together, "each" area by itself, or the three folds of the "paper".
     - `areas`: score these areas together instead.
+    - `against`: other predictions in the same form. `data["against"]["differences"]` has the difference of
+      each score with its interval, over 1,000 draws of the same rooms or images for both, or `bootstrap`.
     - `bootstrap`: the number of draws for 95 % intervals, drawn by `seed`.
     - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` and `boxes` (det: "points"
       or "annotations"), `stuff` (panoptic): see the protocols.
@@ -211,6 +214,7 @@ def evaluate(
         variant=variant,
         folds=folds,
         areas=list(areas),
+        against=None if against is None else Path(against),
         bootstrap=bootstrap,
         seed=seed,
         median_scale=median_scale,

@@ -146,6 +146,42 @@ export interface Verified {
   faults: { topic: string; kind: string; count: number; first: [string, string][] }[];
 }
 
+/** A table of an evaluation. A number that is not defined is null. */
+export interface ScoreTable {
+  title: string;
+  columns: string[];
+  rows: {
+    name: string;
+    scores: { value: number | null; interval: [number | null, number | null] | null }[];
+  }[];
+}
+
+/** Counts by true class; a last count of a row is of what was predicted as no class. */
+export interface ConfusionTable {
+  classes: string[];
+  counts: number[][];
+}
+
+/** A result of `s3d eval`. */
+export interface Scores {
+  name: string;
+  protocol: string;
+  version: number;
+  variant: string;
+  evaluator: string;
+  definition: string[];
+  counted: Record<string, number>;
+  tables: ScoreTable[];
+  confusion: ConfusionTable | null;
+  against: { differences: ScoreTable[] } | null;
+  notes: string[];
+  units: {
+    columns: string[];
+    rows: string[];
+    units: { area: number; name: string; scores: (number | null)[][] }[];
+  };
+}
+
 export interface Index {
   form: number;
   data_set: {
@@ -170,6 +206,8 @@ export interface Index {
   statistics: Statistics | null;
   votes: { area: number; votes: Votes }[];
   meshes: Mesh[];
+  /** The number of files `scores_N`. */
+  scores: number;
   /** The name of the data set that the report was made against. */
   against?: string | null;
   pixels_by_class: number[];

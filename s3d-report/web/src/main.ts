@@ -7,6 +7,7 @@ import { faultCount, notesPage } from "./pages/notes.js";
 import { numbersPage } from "./pages/numbers.js";
 import { panoPage } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
+import { scoresPage } from "./pages/scores.js";
 import { type Page, link, parseRoute } from "./route.js";
 import { spacePage } from "./space/page.js";
 import { viewPage } from "./pages/view.js";
@@ -25,6 +26,7 @@ function tabs(index: Index): [string, string][] {
       index.rooms.length > 0 || index.locations.length > 0 || index.views.some((v) => v.position),
     ],
     ["compare", "Compared", index.against != null],
+    ["scores", "Scores", index.scores > 0],
     ["numbers", "Numbers", true],
     ["notes", "Notes", true],
   ];
@@ -46,6 +48,8 @@ async function open(index: Index): Promise<Page> {
       return still(await planPage(index));
     case "compare":
       return comparePage(index, route);
+    case "scores":
+      return still(await scoresPage(index, route));
     case "numbers":
       return still(numbersPage(index));
     case "notes":

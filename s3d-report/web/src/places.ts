@@ -26,6 +26,14 @@ export function panoramaOf(
   return best?.href ?? null;
 }
 
+/** The link to an image of a scan location by its name in the data set: a number, or `equirectangular`. */
+export function imageLink(index: Index, area: number, uuid: string, frame: string): string | null {
+  const at = index.locations.findIndex((l) => l.area === area && l.uuid === uuid);
+  if (frame === "equirectangular") return index.locations[at]?.pano ? link("pano", [area, uuid]) : null;
+  const view = index.views.find((v) => v.location === at && String(v.frame) === frame);
+  return at >= 0 && view && view.picture !== null ? link("view", [view.picture]) : null;
+}
+
 /** The link to a disputed patch in the nearest panorama. */
 export function disputeInPanorama(index: Index, area: number, center: Rgb): string | null {
   const hasVotes = index.meshes.some((m) => m.area === area && m.has_votes);

@@ -22,6 +22,10 @@ pub(crate) struct EvalArgs {
     /// The predictions: a folder, or a file.
     #[arg(long, value_name = "DIR")]
     pub(crate) pred: PathBuf,
+    /// Other predictions in the same form: adds the difference of each score and its 95 % interval, over
+    /// draws of the same rooms or images for both (1,000 draws, or --bootstrap).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) against: Option<PathBuf>,
     /// A variant of the protocol, named after the script that it follows [default: the first in its
     /// description]
     #[arg(long, value_name = "NAME")]
@@ -79,6 +83,7 @@ pub(crate) fn run(args: EvalArgs) -> Outcome<()> {
         FoldsArg::Each => Folds::EachArea,
         FoldsArg::Paper => Folds::Paper,
     };
+    options.against = args.against;
     options.bootstrap = args.bootstrap;
     options.seed = args.seed;
     options.images = args.images;

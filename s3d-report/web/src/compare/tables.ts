@@ -3,6 +3,7 @@
 import type { Index } from "../data.js";
 import { count, h, percent, several, table } from "../dom.js";
 import { inPanorama, nameOf as nameOfView } from "../pages/view.js";
+import { imageLink } from "../places.js";
 import { link } from "../route.js";
 import type { Against, Comparison, InstanceChange, ModalityChanges, ViewName } from "./data.js";
 import { changedLink, countsWords, matrix, number, surface } from "./matrix.js";
@@ -204,11 +205,7 @@ export function modalitiesSection({ modalities }: Comparison): HTMLElement | nul
 /** The link to the image of a file of A in the report. */
 function placeOfFile(index: Index, path: string): string | null {
   const [, area, uuid, frame] = /^area_(\d+)\/.*camera_([^_]+)_.*_frame_([^_]+)_domain_/.exec(path) ?? [];
-  const at = index.locations.findIndex((l) => String(l.area) === area && l.uuid === uuid);
-  if (at < 0) return null;
-  if (frame === "equirectangular") return placeOf(index, { area: Number(area), uuid: uuid ?? "" }).href;
-  const view = index.views.find((v) => v.location === at && String(v.frame) === frame);
-  return view && view.picture !== null ? link("view", [view.picture]) : null;
+  return imageLink(index, Number(area), uuid ?? "", frame ?? "");
 }
 
 export function posesSection(index: Index, { poses }: Comparison): HTMLElement | null {
