@@ -11,3 +11,4 @@ mod panoptic;
 mod panoptic_reference;
 mod points;
 mod points_reference;
+mod points_scannet;

@@ -16,7 +16,7 @@ use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 /// Exports areas 1 and 5, with the profiles of mmdetection3d and Pointcept.
-fn data_set() -> &'static Path {
+pub(crate) fn data_set() -> &'static Path {
     static MADE: OnceLock<TempDir> = OnceLock::new();
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| {
@@ -61,7 +61,7 @@ fn data_set() -> &'static Path {
 }
 
 /// Returns the classes and the instances of the points of each room, from the profile of mmdetection3d.
-fn rooms() -> BTreeMap<String, (Vec<i64>, Vec<i64>)> {
+pub(crate) fn rooms() -> BTreeMap<String, (Vec<i64>, Vec<i64>)> {
     let arrays = data_set().join("profiles/mmdet3d/s3dis_data");
     let numbers = |path: &Path| -> Vec<i64> {
         let bytes = fs::read(path).unwrap();
@@ -85,7 +85,7 @@ fn rooms() -> BTreeMap<String, (Vec<i64>, Vec<i64>)> {
     rooms
 }
 
-fn npy(kind: &str, shape: &[u64], bytes: &[u8]) -> Vec<u8> {
+pub(crate) fn npy(kind: &str, shape: &[u64], bytes: &[u8]) -> Vec<u8> {
     let mut array = NpyWriter::new(Vec::new(), Path::new("memory"), kind, shape).unwrap();
     array.put(bytes).unwrap();
     array.into_inner().unwrap()
@@ -98,15 +98,15 @@ fn transposed(mut array: Vec<u8>) -> Vec<u8> {
     array
 }
 
-fn integers(numbers: &[i64]) -> Vec<u8> {
+pub(crate) fn integers(numbers: &[i64]) -> Vec<u8> {
     npy("<i8", &[numbers.len() as u64], &numbers.iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>())
 }
 
-fn floats(shape: &[u64], numbers: impl IntoIterator<Item = f32>) -> Vec<u8> {
+pub(crate) fn floats(shape: &[u64], numbers: impl IntoIterator<Item = f32>) -> Vec<u8> {
     npy("<f4", shape, &numbers.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<_>>())
 }
 
-fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) {
+pub(crate) fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) {
     let mut zip = ZipWriter::new(fs::File::create(path).unwrap());
     for (name, bytes) in arrays {
         zip.start_file(format!("{name}.npy"), SimpleFileOptions::default())
@@ -116,20 +116,20 @@ fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) {
     zip.finish().unwrap();
 }
 
-fn options(variant: Option<&str>, folds: Folds) -> EvalOptions {
+pub(crate) fn options(variant: Option<&str>, folds: Folds) -> EvalOptions {
     let mut options = EvalOptions::default();
     options.variant = variant.map(str::to_owned);
     options.folds = folds;
     options
 }
 
-fn eval(protocol: Protocol, predictions: &Path, options: &EvalOptions) -> Result<Evaluation> {
+pub(crate) fn eval(protocol: Protocol, predictions: &Path, options: &EvalOptions) -> Result<Evaluation> {
     evaluate(protocol, data_set(), predictions, options, &Context::default())
 }
 
 /// Asserts that all scores are 1, or 0 or not defined for a class that does not exist.
 #[track_caller]
-fn assert_perfect(evaluation: &Evaluation) {
+pub(crate) fn assert_perfect(evaluation: &Evaluation) {
     let present: Vec<&str> = ["ceiling", "floor", "wall", "door", "table", "chair"].to_vec();
     for table in &evaluation.tables {
         for row in &table.rows {
@@ -289,7 +289,7 @@ fn points_have_the_order_of_pointcept_and_scores_of_classes_are_read() {
 }
 
 /// Writes perfect predictions of instances in one of the five forms.
-fn write_instances(dir: &Path, form: usize) {
+pub(crate) fn write_instances(dir: &Path, form: usize) {
     for (room, (classes, instances)) in rooms() {
         let n = classes.len();
         let k = instances.iter().max().copied().unwrap() as usize;

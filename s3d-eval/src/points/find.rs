@@ -9,6 +9,9 @@ use s3d_io::Error as FileError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+/// The ending of lists of masks, in ScanNet's form. The masks lie in folders beside the list.
+pub(super) const LIST: &str = "txt";
+
 /// The most names that a sentence lists.
 const LISTED: usize = 5;
 
@@ -29,7 +32,9 @@ pub(super) fn find(task: &Task<'_>, rooms: &[Room], endings: &[&str]) -> Result<
     for path in files(task.predictions)? {
         let room = room_of(&path, endings).filter(|room| known.contains(room));
         let Some(room) = room else {
-            others.push(below(task.predictions, &path));
+            if !(path.is_dir() && endings.contains(&LIST)) {
+                others.push(below(task.predictions, &path));
+            }
             continue;
         };
         if let Some(first) = found.insert(room, path.clone()) {

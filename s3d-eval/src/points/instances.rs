@@ -4,6 +4,7 @@ use super::CLASSES;
 use super::find::wrong;
 use super::labels::{Labels, Runs, SEMANTIC, maybe_named, named};
 use super::matching::{Overlaps, PredictedInstance, Segments, TrueInstance, count};
+use super::scannet::listed;
 use super::truth::{Points, Room, rows_expected};
 use s3d_dataset::{Context, Error, Result, s3d_io};
 use s3d_io::cloud::{NpyArray, NpzArchive};
@@ -34,6 +35,12 @@ struct Prediction<'a> {
 /// Reads predictions for average precision. Each instance has a mask, which may overlap others, or each point
 /// has an instance. Each instance has a class and a score. Instances of class -1 are left out.
 pub(super) fn scored(path: &Path, room: &Room, points: &Points, ctx: &Context) -> Result<Instances> {
+    if path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("txt"))
+    {
+        return listed(path, room, points, ctx);
+    }
     let mut file = Prediction::open(path, room, points, ctx)?;
     let classes = file.classes()?;
     let scores = file.scores(classes.len())?;

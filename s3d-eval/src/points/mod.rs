@@ -21,6 +21,7 @@ mod labels;
 mod matching;
 mod precision;
 mod protocols;
+mod scannet;
 mod semantic;
 mod truth;
 

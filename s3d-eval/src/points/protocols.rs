@@ -2,7 +2,7 @@
 
 use super::CLASSES;
 use super::coverage::{CoverageScores, RoomCoverage, coverage};
-use super::find::find;
+use super::find::{LIST, find};
 use super::instances::{scored, segments};
 use super::labels::for_each_run;
 use super::precision::{InstanceMatches, instance_ap};
@@ -126,7 +126,7 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
 
 /// Average precision of instances of points.
 pub(crate) fn inst_ap(task: &Task<'_>) -> Result<Evaluation> {
-    let counted = count(task, &["npz"], |path, room, points| {
+    let counted = count(task, &["npz", LIST], |path, room, points| {
         let (truth, predicted) = scored(path, room, points, task.ctx)?;
         Ok(InstanceMatches::new(&truth, &predicted, CLASSES))
     })?;

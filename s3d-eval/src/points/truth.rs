@@ -56,6 +56,11 @@ impl Room {
 }
 
 impl Points {
+    /// Returns the instances, in the order of their points.
+    pub(super) fn instances(&self) -> &[TrueInstance] {
+        &self.0
+    }
+
     /// Returns the number of points.
     pub(super) fn count(&self) -> u64 {
         self.0.iter().map(|instance| instance.points).sum()
