@@ -48,6 +48,7 @@ fn run(task: &Task<'_>) -> Result<Evaluation> {
         Protocol::Depth => images::depth(task),
         Protocol::Normal => images::normal(task),
         Protocol::Panoptic => panoptic::panoptic(task),
+        Protocol::Panoptic3d => points::panoptic3d(task),
     }
 }
 

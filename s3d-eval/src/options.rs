@@ -40,8 +40,8 @@ pub struct EvalOptions {
     /// `det` only: the points that the true boxes surround. `None` means [`BoxSource::Points`].
     #[serde(serialize_with = "word")]
     pub boxes: Option<BoxSource>,
-    /// `panoptic` only: the stuff classes, of which each image has one segment. `None` means the stuff of the
-    /// taxonomy.
+    /// `panoptic` and `panoptic3d` only: the stuff classes, of which each image or room has one segment.
+    /// `None` means the stuff of the taxonomy; of S3DIS's for points.
     pub stuff: Option<ClassList>,
 }
 
@@ -158,7 +158,7 @@ impl EvalOptions {
         let given: [(bool, &str, &[Protocol]); 5] = [
             (self.classes.is_some(), "classes", &[Protocol::Det]),
             (self.boxes.is_some(), "boxes", &[Protocol::Det]),
-            (self.stuff.is_some(), "stuff", &[Protocol::Panoptic]),
+            (self.stuff.is_some(), "stuff", &[Protocol::Panoptic, Protocol::Panoptic3d]),
             (self.median_scale, "median_scale", &[Protocol::Depth]),
             (self.images.is_some(), "images", OF_IMAGES),
         ];

@@ -24,12 +24,14 @@ pub enum Protocol {
     Normal,
     /// Panoptic quality of images, like panopticapi.
     Panoptic,
+    /// Panoptic quality of points, like SuperCluster.
+    Panoptic3d,
 }
 
 /// A protocol with its name, its version and its variants. The first variant is the default.
 type Entry = (Protocol, &'static str, u32, &'static [&'static str]);
 
-const PROTOCOLS: [Entry; 8] = [
+const PROTOCOLS: [Entry; 9] = [
     (Protocol::Det, "det", 2, &["mmdetection3d", "open3d-ml"]),
     (Protocol::Sem3d, "sem3d", 1, &["pointcept", "nanmean"]),
     (Protocol::InstAp, "inst-ap", 1, &["pointcept"]),
@@ -38,6 +40,7 @@ const PROTOCOLS: [Entry; 8] = [
     (Protocol::Depth, "depth", 1, &["hohonet", "unifuse"]),
     (Protocol::Normal, "normal", 1, &["dsine", "omnidata"]),
     (Protocol::Panoptic, "panoptic", 1, &["panopticapi"]),
+    (Protocol::Panoptic3d, "panoptic3d", 1, &["supercluster"]),
 ];
 
 impl Protocol {
@@ -75,7 +78,10 @@ impl fmt::Display for Protocol {
 
 /// A word that names no protocol.
 #[derive(Clone, Debug, PartialEq, Eq, ThisError)]
-#[error("no protocol is called {0:?}: det, sem3d, inst-ap, inst-cov, sem-pano, depth, normal, panoptic are")]
+#[error(
+    "no protocol is called {0:?}: det, sem3d, inst-ap, inst-cov, sem-pano, depth, normal, panoptic, \
+     panoptic3d are"
+)]
 pub struct UnknownProtocol(String);
 
 impl FromStr for Protocol {

@@ -10,5 +10,6 @@ mod images_reference;
 mod panoptic;
 mod panoptic_reference;
 mod points;
+mod points_panoptic;
 mod points_reference;
 mod points_scannet;

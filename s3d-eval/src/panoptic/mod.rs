@@ -20,4 +20,4 @@ mod predictions;
 mod protocol;
 
 pub use counts::{ClassCounts, PanopticCounts, PanopticScore, Segment, SegmentFault, mean};
-pub(crate) use protocol::panoptic;
+pub(crate) use protocol::{COLUMNS, names_of, panoptic, rows_of_panoptic, stuff_of};

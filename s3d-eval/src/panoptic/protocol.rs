@@ -6,7 +6,6 @@ use crate::Evaluation;
 use crate::error::{ClassOption, Error, Result};
 use crate::tables::{Rows, Unit, tables};
 use crate::task::Task;
-use s3d_dataset::pack::ClassList;
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::s3d_io::Error as FileError;
 use s3d_dataset::s3d_io::dataset::{DatasetImage, Domain, Frame};
@@ -16,7 +15,7 @@ use s3d_dataset::s3d_label::{Class, LabelTable, Taxonomy};
 use s3d_geom::Raster;
 use std::collections::BTreeSet;
 
-const COLUMNS: [&str; 3] = ["PQ", "SQ", "RQ"];
+pub(crate) const COLUMNS: [&str; 3] = ["PQ", "SQ", "RQ"];
 
 /// The pixel of a semantic image that shows no surface. Source: [`s3d_io::formats`], "What is written".
 const MISSING: [u8; 3] = [13; 3];
@@ -62,7 +61,7 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     drop(progress);
 
     let classes = taxonomy.classes();
-    let tables = tables(task, &COLUMNS, &counts, |images| rows(images, classes, &truth.stuff));
+    let tables = tables(task, &COLUMNS, &counts, |images| rows_of_panoptic(images, classes, &truth.stuff));
 
     let but = match &*names_of(&truth.stuff) {
         "" => String::new(),
@@ -86,7 +85,8 @@ pub(crate) fn panoptic(task: &Task<'_>) -> Result<Evaluation> {
     Ok(Evaluation { notes, ..task.evaluation(&definition, counted, tables) })
 }
 
-fn names_of(of: &[Class]) -> String {
+/// Lists classes by name.
+pub(crate) fn names_of(of: &[Class]) -> String {
     of.iter().map(|class| class.name()).collect::<Vec<_>>().join(", ")
 }
 
@@ -152,15 +152,7 @@ impl<'a> Truth<'a> {
     fn new(task: &'a Task<'a>) -> Result<Self> {
         let Some(table) = task.data.labels()? else { return Err(task.unlabelled()) };
         let taxonomy = table.taxonomy();
-        let stuff = match &task.options.stuff {
-            Some(list) => classes_of(list, taxonomy)?,
-            None => taxonomy
-                .classes()
-                .iter()
-                .copied()
-                .filter(|class| taxonomy.is_stuff(*class))
-                .collect(),
-        };
+        let stuff = stuff_of(task, taxonomy)?;
 
         let mut masked = BTreeSet::new();
         for area in task.folds.iter().flat_map(|fold| &fold.areas) {
@@ -247,8 +239,12 @@ fn ids(image: &Raster<[u8; 3]>) -> Vec<u32> {
         .collect()
 }
 
-/// Returns the classes that the option `stuff` names, in their order and once each.
-fn classes_of(list: &ClassList, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
+/// Returns the stuff classes: those that the option names, in their order and once each, or the taxonomy's.
+pub(crate) fn stuff_of(task: &Task<'_>, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
+    let Some(list) = &task.options.stuff else {
+        let classes = taxonomy.classes().iter().copied();
+        return Ok(classes.filter(|class| taxonomy.is_stuff(*class)).collect());
+    };
     let mut classes = list
         .0
         .iter()
@@ -264,7 +260,7 @@ fn classes_of(list: &ClassList, taxonomy: &Taxonomy) -> Result<Vec<Class>> {
 }
 
 /// Returns the rows of classes, then the means over things, stuff and all.
-fn rows(images: &[&PanopticCounts], classes: &[Class], stuff: &[Class]) -> Rows {
+pub(crate) fn rows_of_panoptic(images: &[&PanopticCounts], classes: &[Class], stuff: &[Class]) -> Rows {
     let mut sum = PanopticCounts::new(classes.len());
     images.iter().for_each(|counts| sum.add_counts(counts));
     let counts = classes.iter().zip(sum.classes());

@@ -67,16 +67,42 @@ pub(super) fn scored(path: &Path, room: &Room, points: &Points, ctx: &Context) -
     Ok((truth, predicted))
 }
 
+/// The class and the instance of each point, -1 for none.
+pub(super) type Labelled = Vec<(i64, i64)>;
+
+/// Reads predictions for panoptic quality, and returns the true instances as well. Each point has an
+/// instance, -1 for none. Each point or each instance has a class, -1 for none.
+pub(super) fn labelled(
+    path: &Path,
+    room: &Room,
+    points: &Points,
+    ctx: &Context,
+) -> Result<(Vec<TrueInstance>, Labelled)> {
+    let mut file = Prediction::open(path, room, points, ctx)?;
+    let name = file.ids_without_masks("panoptic quality")?;
+    if maybe_named(path, &file.names, &SEMANTIC)?.is_some() {
+        return file.classes_and_ids(&name, -1);
+    }
+
+    let classes = file.classes()?;
+    let (truth, ids) = file.ids(&name)?;
+    let class_of = |id: i64| match usize::try_from(id) {
+        Err(_) => Ok(-1),
+        Ok(at) => classes
+            .get(at)
+            .copied()
+            .ok_or_else(|| file.without_class(&name, id, classes.len())),
+    };
+    let points = ids.iter().map(|id| Ok((class_of(*id)?, *id)));
+    let points = points.collect::<Result<_>>()?;
+    Ok((truth, points))
+}
+
 /// Reads predictions for coverage. Each point has an instance, -1 for none. Each point or each instance has a
 /// class. An instance has the class of most of its points; the lowest class wins a tie.
 pub(super) fn segments(path: &Path, room: &Room, points: &Points, ctx: &Context) -> Result<Instances> {
     let mut file = Prediction::open(path, room, points, ctx)?;
-    if let Some(masks) = maybe_named(path, &file.names, &MASKS)? {
-        let message = format!("has {masks}, which may overlap: coverage takes `instance`, one a point");
-        return Err(wrong(path, message));
-    }
-
-    let name = named(path, &file.names, &IDS)?;
+    let name = file.ids_without_masks("coverage")?;
     if maybe_named(path, &file.names, &SEMANTIC)?.is_none() {
         let classes = file.classes()?;
         let (truth, shared) = file.of_ids(&name, classes.len())?;
@@ -87,7 +113,14 @@ pub(super) fn segments(path: &Path, room: &Room, points: &Points, ctx: &Context)
         });
         return Ok((truth, predicted.collect()));
     }
-    file.of_ids_and_classes(&name)
+
+    let (truth, points) = file.classes_and_ids(&name, 0)?;
+    let mut segments = Segments::default();
+    Runs::new(&truth).split(&points, |at, part| {
+        part.iter()
+            .for_each(|(class, instance)| segments.add(Some(at), *class, *instance));
+    });
+    Ok((truth, segments.finish()))
 }
 
 impl<'a> Prediction<'a> {
@@ -168,43 +201,49 @@ impl<'a> Prediction<'a> {
             }
         });
         match failure {
-            Some(id) => {
-                let message = format!(
-                    "{name} has the instance {id}: 0 to {instances} - 1 have classes, and -1 stands for none"
-                );
-                Err(wrong(self.path, message))
-            }
+            Some(id) => Err(self.without_class(name, id, instances)),
             None => Ok((truth, shared)),
         }
     }
 
-    /// Reads an instance and a class for each point.
-    fn of_ids_and_classes(&mut self, name: &str) -> Result<Instances> {
+    /// Reads a class, at least `least`, and an instance for each point.
+    fn classes_and_ids(&mut self, name: &str, least: i64) -> Result<(Vec<TrueInstance>, Labelled)> {
         let (truth, ids) = self.ids(name)?;
         let semantic = named(self.path, &self.names, &SEMANTIC)?;
-        let (mut labels, of_labels) = Labels::new(self.archive.array(&semantic)?, self.room, self.points, 0)?;
+        let array = self.archive.array(&semantic)?;
+        let (mut labels, of_labels) = Labels::new(array, self.room, self.points, least)?;
         if of_labels != truth {
             return Err(wrong(self.path, format!("{semantic} and {name} are not of as many points")));
         }
 
-        let mut segments = Segments::default();
-        let mut runs = Runs::new(&truth);
-        let mut rest = &ids[..];
+        let mut points = Vec::with_capacity(ids.len());
         loop {
             self.ctx.check()?;
             let labels = labels.next()?;
             if labels.is_empty() {
-                return Ok((truth, segments.finish()));
+                return Ok((truth, points));
             }
-
-            let (now, later) = rest.split_at(labels.len().min(rest.len()));
-            rest = later;
-            let points: Vec<(i64, i64)> = labels.iter().copied().zip(now.iter().copied()).collect();
-            runs.split(&points, |at, part| {
-                part.iter()
-                    .for_each(|(class, instance)| segments.add(Some(at), *class, *instance));
-            });
+            let rest = ids.get(points.len()..).unwrap_or_default();
+            points.extend(labels.iter().copied().zip(rest.iter().copied()));
         }
+    }
+
+    /// Returns the name of the array with an instance for each point. Masks are refused.
+    fn ids_without_masks(&self, wanted_by: &str) -> Result<String> {
+        if let Some(masks) = maybe_named(self.path, &self.names, &MASKS)? {
+            let message =
+                format!("has {masks}, which may overlap: {wanted_by} takes `instance`, one a point");
+            return Err(wrong(self.path, message));
+        }
+        named(self.path, &self.names, &IDS)
+    }
+
+    /// Returns the error for an instance without a class.
+    fn without_class(&self, name: &str, id: i64, instances: usize) -> Error {
+        let message = format!(
+            "{name} has the instance {id}: 0 to {instances} - 1 have classes, and -1 stands for none"
+        );
+        wrong(self.path, message)
     }
 
     /// Reads the instance of each point.

@@ -1,19 +1,22 @@
-//! Protocols `sem3d`, `inst-ap` and `inst-cov`: they count rooms on all threads, then score classes.
+//! Protocols `sem3d`, `inst-ap`, `inst-cov` and `panoptic3d`: they count rooms on all threads, then score
+//! classes.
 
 use super::CLASSES;
 use super::coverage::{CoverageScores, RoomCoverage, coverage};
-use super::find::{LIST, find};
-use super::instances::{scored, segments};
+use super::find::{LIST, find, wrong};
+use super::instances::{labelled, scored, segments};
 use super::labels::for_each_run;
+use super::panoptic::panoptic_counts;
 use super::precision::{InstanceMatches, instance_ap};
 use super::semantic::{AbsentClass, SemanticCounts, nan_mean};
 use super::truth::{Points, Room};
 use crate::error::Result;
+use crate::panoptic::{COLUMNS, names_of, rows_of_panoptic, stuff_of};
 use crate::tables::{Rows, Scores, Unit, tables};
 use crate::task::Task;
 use crate::{ConfusionTable, Evaluation};
 use s3d_dataset::parallel::map_in_order;
-use s3d_dataset::s3d_label::Class;
+use s3d_dataset::s3d_label::{Class, Taxonomy};
 use std::path::Path;
 
 const TRUTH: &str = "The points of a room come from its files s3dis/Area_k/ROOM/Annotations/CLASS_N.txt, \
@@ -187,6 +190,42 @@ pub(crate) fn inst_cov(task: &Task<'_>) -> Result<Evaluation> {
         "mPrec, mRec, mCov and mWCov (the row mean) are means over the 13 classes. They are not defined if a \
          class is not; the row below leaves such classes out.",
         "Source: ASIS d71c3d6, models/ASIS/eval_iou_accuracy.py, on all points of a room, each once.",
+    ];
+    Ok(counted.evaluation(task, &definition, tables))
+}
+
+/// Panoptic quality of points.
+pub(crate) fn panoptic3d(task: &Task<'_>) -> Result<Evaluation> {
+    let stuff = stuff_of(task, &Taxonomy::s3dis())?;
+    let of_stuff: Vec<usize> = stuff.iter().map(|class| class.index()).collect();
+    let counted = count(task, &["npz"], |path, room, points| {
+        let (truth, predicted) = labelled(path, room, points, task.ctx)?;
+        let truth = (0..).zip(&truth).flat_map(|(instance, of)| {
+            std::iter::repeat_n((of.class as i64, instance), usize::try_from(of.points).unwrap_or(usize::MAX))
+        });
+        panoptic_counts(truth, predicted, &of_stuff, CLASSES).map_err(|e| wrong(path, e.to_string()))
+    })?;
+
+    let tables =
+        tables(task, &COLUMNS, &counted.rooms, |rooms| rows_of_panoptic(rooms, &Class::S3DIS, &stuff));
+
+    let source = match &*names_of(&stuff) {
+        "" => "Each instance of a room is a segment.".to_owned(),
+        stuff => {
+            format!("Each instance of a room is a segment; each stuff class ({stuff}) has one in a room.")
+        }
+    };
+    let definition = [
+        &source,
+        "A predicted point of a stuff class belongs to the segment of its class, whatever its instance. The \
+         other points of an instance are a segment with the class of most of them, in a tie the lowest \
+         number. Points without a class, and of things without an instance, are in no segment.",
+        "A true and a predicted segment of a class match if their IoU is more than 1/2, over all points of a \
+         room. No segment is too small to count.",
+        "SQ is the mean IoU of matched segments; RQ = matched / (matched + invented / 2 + missed / 2); PQ = \
+         SQ · RQ. Each is a share of 1, over the segments of all rooms.",
+        "A class without segments on either side has no scores and is left out of means.",
+        "As in superpoint_transformer eb959b6 (src/metrics/panoptic.py, PanopticQuality3D), room by room.",
     ];
     Ok(counted.evaluation(task, &definition, tables))
 }

@@ -193,8 +193,8 @@ def evaluate(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Evaluation:
-    """Scores predictions by a protocol: "det", "sem3d", "inst-ap", "inst-cov", "sem-pano", "depth", "normal"
-    or "panoptic".
+    """Scores predictions by a protocol: "det", "sem3d", "inst-ap", "inst-cov", "sem-pano", "depth", "normal",
+    "panoptic" or "panoptic3d".
 
     - `truth`: a `DataSet`, or its folder.
     - `pred`: the folder or file of predictions. The page "Evaluation" of the documentation describes its
@@ -206,7 +206,7 @@ def evaluate(
       each score with its interval, over 1,000 draws of the same rooms or images for both, or `bootstrap`.
     - `bootstrap`: the number of draws for 95 % intervals, drawn by `seed`.
     - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` and `boxes` (det: "points"
-      or "annotations"), `stuff` (panoptic): see the protocols.
+      or "annotations"), `stuff` (panoptic, panoptic3d): see the protocols.
 
     Raises `FileError` for a prediction that is missing, duplicate, or of the wrong size.
     """

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub(crate) struct EvalArgs {
     /// The definition of the scores.
     #[arg(value_parser = parsed::<Protocol>,
-        value_name = "det|sem3d|inst-ap|inst-cov|sem-pano|depth|normal|panoptic")]
+        value_name = "det|sem3d|inst-ap|inst-cov|sem-pano|depth|normal|panoptic|panoptic3d")]
     pub(crate) protocol: Protocol,
     /// The data set's folder. Nothing in it is altered.
     #[arg(long, value_name = "OUT")]
@@ -43,8 +43,8 @@ pub(crate) struct EvalArgs {
     /// annotations [default: points]
     #[arg(long, value_name = "points|annotations", value_parser = parsed::<BoxSource>)]
     pub(crate) boxes: Option<BoxSource>,
-    /// panoptic: the stuff classes, each of which has one segment in an image, or none [default: the stuff of
-    /// the taxonomy: ceiling,floor,wall]
+    /// panoptic, panoptic3d: the stuff classes, each of which has one segment in an image or a room, or none
+    /// [default: the stuff of the taxonomy: ceiling,floor,wall]
     #[arg(long, value_name = "CLASS,…|none", value_parser = parsed::<ClassList>)]
     pub(crate) stuff: Option<ClassList>,
     /// depth: scale each predicted image to the median of its truth first.
