@@ -45,6 +45,7 @@ mod evaluate;
 mod evaluation;
 mod folder;
 mod folds;
+mod hints;
 mod options;
 mod protocol;
 mod tables;

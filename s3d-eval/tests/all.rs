@@ -5,6 +5,7 @@ mod scene;
 
 mod boxes;
 mod boxes_reference;
+mod hints;
 mod images;
 mod images_reference;
 mod panoptic;

@@ -8,7 +8,7 @@ use super::{Bbox, Detection, GroundTruth, Rule, ScoredBox, average_precision};
 use crate::error::Result;
 use crate::tables::{Rows, Unit, tables};
 use crate::task::Task;
-use crate::{Evaluation, Fold};
+use crate::{Evaluation, Fold, hints};
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::s3d_label::Class;
 
@@ -122,6 +122,11 @@ pub(crate) fn det(task: &Task<'_>) -> Result<Evaluation> {
     if rule == Rule::Mmdetection3d {
         notes.extend(invented(task.folds, &judged, &classes.list));
     }
+    let sides = rooms
+        .iter()
+        .zip(&of_rooms)
+        .map(|(room, found)| (room.boxes.iter().map(|b| b.1).collect(), found.iter().map(|b| b.2).collect()));
+    notes.extend(hints::of_boxes(&sides.collect::<Vec<_>>()));
     let detections = of_rooms.iter().map(|found| found.len() as u64).sum();
     let counted =
         [("rooms", rooms.len() as u64), ("boxes", boxes.count() as u64), ("detections", detections)];

@@ -54,6 +54,11 @@ impl RoomCoverage {
         }
         Self(coverage)
     }
+
+    /// Returns the number of true and of predicted instances of each class.
+    pub(super) fn totals(&self) -> Vec<[u64; 2]> {
+        self.0.iter().map(|class| [class.truth, class.predicted]).collect()
+    }
 }
 
 /// The scores of a class, or their means, from 0 to 1.

@@ -85,6 +85,12 @@ impl InstanceMatches {
         }
         Self(matches)
     }
+
+    /// Returns the number of true and of predicted instances of each class that count.
+    pub(super) fn totals(&self) -> Vec<[u64; 2]> {
+        let sizes = |class: &ClassMatches| [class.truth.len() as u64, class.predicted.len() as u64];
+        self.0.iter().map(sizes).collect()
+    }
 }
 
 /// The average precision of instances, from 0 to 1.

@@ -11,10 +11,10 @@ use super::precision::{InstanceMatches, instance_ap};
 use super::semantic::{AbsentClass, SemanticCounts, nan_mean};
 use super::truth::{Points, Room};
 use crate::error::Result;
-use crate::panoptic::{COLUMNS, names_of, rows_of_panoptic, stuff_of};
+use crate::panoptic::{COLUMNS, ClassCounts, names_of, rows_of_panoptic, stuff_of};
 use crate::tables::{Rows, Scores, Unit, tables};
 use crate::task::Task;
-use crate::{ConfusionTable, Evaluation};
+use crate::{ConfusionTable, Evaluation, hints};
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::s3d_label::{Class, Taxonomy};
 use std::path::Path;
@@ -59,6 +59,20 @@ fn count<T: Send + Sync>(
 }
 
 impl<T> Counted<T> {
+    /// Adds a note if nothing, or a single class, is predicted. `totals` has how many of `noun` each class
+    /// has in a room, in the truth and predicted.
+    fn note_classes(&mut self, noun: &str, totals: impl Fn(&T) -> Vec<[u64; 2]>) {
+        let mut sums = vec![[0; 2]; CLASSES];
+        for room in &self.rooms {
+            let of_classes = sums
+                .iter_mut()
+                .flatten()
+                .zip(totals(&room.counted).into_iter().flatten());
+            of_classes.for_each(|(sum, count)| *sum += count);
+        }
+        self.notes.extend(hints::of_classes(noun, &sums));
+    }
+
     fn evaluation(self, task: &Task<'_>, definition: &[&str], scores: Scores) -> Evaluation {
         let definition = [definition, &[TRUTH, OF_CLASSES]].concat();
         let counted = [("rooms", self.rooms.len() as u64), ("points", self.points)];
@@ -80,13 +94,17 @@ fn rows<const N: usize>(
 
 /// Semantic segmentation of points.
 pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
-    let counted = count(task, &["npy", "npz"], |path, room, points| {
+    let mut counted = count(task, &["npy", "npz"], |path, room, points| {
         let mut counts = SemanticCounts::new(CLASSES);
         for_each_run(path, room, points, task.ctx, |instance, labels| {
             counts.add_run(instance.class, labels)
         })?;
         Ok(counts)
     })?;
+    counted.note_classes("points", |of| {
+        let sides = of.truth().into_iter().zip(of.predicted());
+        sides.map(|(truth, predicted)| [truth, predicted]).collect()
+    });
 
     let (absent, of_absent) = match task.variant {
         "nanmean" => (
@@ -129,10 +147,11 @@ pub(crate) fn sem3d(task: &Task<'_>) -> Result<Evaluation> {
 
 /// Average precision of instances of points.
 pub(crate) fn inst_ap(task: &Task<'_>) -> Result<Evaluation> {
-    let counted = count(task, &["npz", LIST], |path, room, points| {
+    let mut counted = count(task, &["npz", LIST], |path, room, points| {
         let (truth, predicted) = scored(path, room, points, task.ctx)?;
         Ok(InstanceMatches::new(&truth, &predicted, CLASSES))
     })?;
+    counted.note_classes("instances of 100 points or more", InstanceMatches::totals);
 
     let tables = tables(task, &["AP", "AP50", "AP25"], &counted.rooms, |rooms| {
         let mut ap = instance_ap(rooms);
@@ -162,10 +181,11 @@ pub(crate) fn inst_ap(task: &Task<'_>) -> Result<Evaluation> {
 
 /// Coverage of instances of points.
 pub(crate) fn inst_cov(task: &Task<'_>) -> Result<Evaluation> {
-    let counted = count(task, &["npz"], |path, room, points| {
+    let mut counted = count(task, &["npz"], |path, room, points| {
         let (truth, predicted) = segments(path, room, points, task.ctx)?;
         Ok(RoomCoverage::new(&truth, &predicted, CLASSES))
     })?;
+    counted.note_classes("instances", RoomCoverage::totals);
 
     let columns = ["precision", "recall", "coverage", "weighted coverage"];
     let tables = tables(task, &columns, &counted.rooms, |rooms| {
@@ -198,13 +218,17 @@ pub(crate) fn inst_cov(task: &Task<'_>) -> Result<Evaluation> {
 pub(crate) fn panoptic3d(task: &Task<'_>) -> Result<Evaluation> {
     let stuff = stuff_of(task, &Taxonomy::s3dis())?;
     let of_stuff: Vec<usize> = stuff.iter().map(|class| class.index()).collect();
-    let counted = count(task, &["npz"], |path, room, points| {
+    let mut counted = count(task, &["npz"], |path, room, points| {
         let (truth, predicted) = labelled(path, room, points, task.ctx)?;
         let truth = (0..).zip(&truth).flat_map(|(instance, of)| {
             std::iter::repeat_n((of.class as i64, instance), usize::try_from(of.points).unwrap_or(usize::MAX))
         });
         panoptic_counts(truth, predicted, &of_stuff, CLASSES).map_err(|e| wrong(path, e.to_string()))
     })?;
+    counted.note_classes("segments", |of| {
+        let total = |class: &ClassCounts| [class.missed, class.invented].map(|count| class.matched + count);
+        of.classes().iter().map(total).collect()
+    });
 
     let tables =
         tables(task, &COLUMNS, &counted.rooms, |rooms| rows_of_panoptic(rooms, &Class::S3DIS, &stuff));
