@@ -66,6 +66,21 @@ pub enum Error {
         /// The protocol.
         protocol: Protocol,
     },
+    /// The protocol evaluates views only, and panoramas were asked for.
+    #[error("{protocol} is of views, not of panoramas")]
+    ViewsOnly {
+        /// The protocol.
+        protocol: Protocol,
+    },
+    /// The variant of `depth` evaluates panoramas only, and views were asked for.
+    #[error(
+        "depth as {variant} is of panoramas, not of views: depth as marigold, marigold-disparity and \
+         marigold-metric is of both"
+    )]
+    DepthOfPanoramas {
+        /// The variant.
+        variant: &'static str,
+    },
     /// The variant of `depth` does not scale predictions to the median of the truth.
     #[error("depth as {variant} has no scale to the median: depth as unifuse has")]
     NoMedianScale {
@@ -153,6 +168,8 @@ impl Error {
             | Self::OtherProtocol { .. }
             | Self::Classes { .. }
             | Self::PanoramasOnly { .. }
+            | Self::ViewsOnly { .. }
+            | Self::DepthOfPanoramas { .. }
             | Self::NoMedianScale { .. } => true,
             Self::Unlabelled { .. }
             | Self::NoRooms { .. }

@@ -45,6 +45,7 @@ fn run(task: &Task<'_>) -> Result<Evaluation> {
         Protocol::InstAp => points::inst_ap(task),
         Protocol::InstCov => points::inst_cov(task),
         Protocol::SemPano => images::sem_pano(task),
+        Protocol::SemView => images::sem_view(task),
         Protocol::Depth => images::depth(task),
         Protocol::Normal => images::normal(task),
         Protocol::Panoptic => panoptic::panoptic(task),

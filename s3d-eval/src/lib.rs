@@ -1,5 +1,5 @@
-//! One evaluator for results on 2D-3D-Semantic data. It gives the scores of eight published scripts, each by
-//! its own definition, to the digit.
+//! One evaluator for results on 2D-3D-Semantic data. It gives the scores of published scripts, each by its
+//! own definition, to the digit.
 //!
 //! # From files to scores
 //!

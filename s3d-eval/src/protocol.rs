@@ -18,7 +18,9 @@ pub enum Protocol {
     InstCov,
     /// Semantic segmentation of panoramas, like HoHoNet.
     SemPano,
-    /// Depth of panoramas, like HoHoNet or UniFuse.
+    /// Semantic segmentation of views, like CMX.
+    SemView,
+    /// Depth of panoramas, like HoHoNet or UniFuse, or of any images, like Marigold.
     Depth,
     /// Surface normals of images, like DSINE or Omnidata.
     Normal,
@@ -31,13 +33,16 @@ pub enum Protocol {
 /// A protocol with its name, its version and its variants. The first variant is the default.
 type Entry = (Protocol, &'static str, u32, &'static [&'static str]);
 
-const PROTOCOLS: [Entry; 9] = [
+const DEPTH: [&str; 5] = ["hohonet", "unifuse", "marigold", "marigold-disparity", "marigold-metric"];
+
+const PROTOCOLS: [Entry; 10] = [
     (Protocol::Det, "det", 2, &["mmdetection3d", "open3d-ml"]),
     (Protocol::Sem3d, "sem3d", 1, &["pointcept", "nanmean"]),
     (Protocol::InstAp, "inst-ap", 1, &["pointcept"]),
     (Protocol::InstCov, "inst-cov", 1, &["asis"]),
     (Protocol::SemPano, "sem-pano", 1, &["hohonet"]),
-    (Protocol::Depth, "depth", 1, &["hohonet", "unifuse"]),
+    (Protocol::SemView, "sem-view", 1, &["cmx"]),
+    (Protocol::Depth, "depth", 1, &DEPTH),
     (Protocol::Normal, "normal", 1, &["dsine", "omnidata"]),
     (Protocol::Panoptic, "panoptic", 1, &["panopticapi"]),
     (Protocol::Panoptic3d, "panoptic3d", 1, &["supercluster"]),
@@ -79,7 +84,7 @@ impl fmt::Display for Protocol {
 /// A word that names no protocol.
 #[derive(Clone, Debug, PartialEq, Eq, ThisError)]
 #[error(
-    "no protocol is called {0:?}: det, sem3d, inst-ap, inst-cov, sem-pano, depth, normal, panoptic, \
+    "no protocol is called {0:?}: det, sem3d, inst-ap, inst-cov, sem-pano, sem-view, depth, normal, panoptic, \
      panoptic3d are"
 )]
 pub struct UnknownProtocol(String);

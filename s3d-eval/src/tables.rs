@@ -25,6 +25,16 @@ pub(crate) struct Scores {
     pub(crate) rounds: Vec<Vec<f64>>,
 }
 
+impl Scores {
+    /// Adds other tables of the same units.
+    pub(crate) fn extend(&mut self, others: Self) {
+        self.tables.extend(others.tables);
+        for (round, other) in self.rounds.iter_mut().zip(others.rounds) {
+            round.extend(other);
+        }
+    }
+}
+
 /// Makes the tables of units. `score` returns the rows of any set of units, always with the same names.
 /// Scores have intervals if the options ask for a bootstrap.
 pub(crate) fn tables<T: Sync>(

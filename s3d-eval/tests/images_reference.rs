@@ -1,8 +1,9 @@
 //! Compares the metrics of images with the reference programs: `reference/images/README.md`.
 
 use s3d_eval::images::{
-    AngleSums, Lanczos, PANORAMA, PanoramaClasses, dsine_angle, hohonet_depth, median_of_angles,
-    omnidata_angle, omnidata_scores, opencv_nearest, pillow_nearest, unifuse_depth,
+    Alignment, AngleSums, Confusion, Lanczos, PANORAMA, PanoramaClasses, dsine_angle, hohonet_depth,
+    marigold_depth, median_of_angles, omnidata_angle, omnidata_scores, opencv_nearest, pillow_nearest,
+    unifuse_depth,
 };
 use s3d_geom::Raster;
 use serde_json::Value;
@@ -132,7 +133,7 @@ fn pillow_gives_the_same_after_lanczos() {
 fn hohonet_gives_the_same_for_classes_of_panoramas() {
     for (fold, names) in [("1_valid", &["a", "b", "void"][..]), ("2_valid", &["c", "d"]), ("3_valid", &["f"])]
     {
-        let mut all = s3d_eval::images::Confusion::new(13);
+        let mut all = Confusion::new(13);
         for (name, width, height, seed) in PANORAMAS.into_iter().filter(|(name, ..)| names.contains(name)) {
             let class = |index: u16| CLASSES.get(usize::from(index).checked_sub(1)?).copied();
             let truth =
@@ -245,6 +246,128 @@ fn both_scripts_give_the_same_depth_scores_of_files() {
     same_depth(&[&scores[..2], &scores[3..]].concat(), &expected["hohonet"], "hohonet");
     let scores = unifuse_depth(&metres(&sampled(opencv_nearest)), &prediction, false);
     same_depth(&scores.values, &expected["unifuse"], "unifuse");
+}
+
+/// Predictions of each alignment: depth, disparity, metres.
+const ALIGNMENTS: [(&str, Alignment); 3] = [
+    ("marigold", Alignment::Depth),
+    ("marigold-disparity", Alignment::Disparity),
+    ("marigold-metric", Alignment::Metric),
+];
+
+/// The same as `affine_view`, `disparity_view` and `metric_view` in reference/images/inputs.py.
+fn view(truth: &[u16], seed: u64, alignment: Alignment) -> Vec<f64> {
+    let quantized = |value: f64| (value * 1024.0).floor() / 1024.0;
+    if alignment == Alignment::Metric {
+        return predicted_depth(truth, seed).into_iter().map(quantized).collect();
+    }
+    let predicted = |(truth, i): (&u16, u64)| {
+        let h = mix(seed + 2, i);
+        let spread = 0.8 + (h % 1024) as f64 / 1024.0 * 0.4;
+        let metres = f64::from(*truth) / 512.0;
+        quantized(match (alignment, h / 1024 % 16) {
+            (Alignment::Depth, 1) => 2.0,
+            (Alignment::Depth, _) => metres * spread * 0.25 - 3.0,
+            (_, 1) => 0.0,
+            (_, 2) => -2.0,
+            _ => 40.0 / (metres + 0.25) * spread + 3.0,
+        })
+    };
+    truth.iter().zip(0..).map(predicted).collect()
+}
+
+#[test]
+fn marigold_gives_the_same_scores_of_views() {
+    let expected = &expected()["views"];
+    let cases = [
+        ("mixed", depth(64, 48, 51), 52, None),
+        ("odd", depth(37, 27, 53), 54, None),
+        ("one", vec![0, 700, 65535, 6000], 55, None),
+        ("flat", depth(20, 10, 56), 57, Some(3.0)),
+        ("far", depth(20, 10, 56), 57, Some(-3.0)),
+    ];
+    for (name, units, seed, flat) in cases {
+        let truth = metres(&units);
+        for (variant, alignment) in ALIGNMENTS {
+            let prediction = match flat {
+                Some(value) => vec![value; truth.len()],
+                None => view(&units, seed, alignment),
+            };
+            let ours = marigold_depth(&truth, &prediction, alignment);
+            let theirs = numbers(&expected[variant][name]);
+            let is_metric = alignment == Alignment::Metric;
+            let theirs_in_64_bits = if is_metric {
+                numbers(&expected["marigold-metric in 64 bits"][name])
+            } else {
+                theirs.clone()
+            };
+            let what = format!("{variant}, {name}");
+
+            // The script averages the shares of δ in 32 bits, in which chance brings a pixel within a limit.
+            let [within, errors] = [[5, 6, 7].as_slice(), &[0, 1, 2, 3, 4, 8, 9]]
+                .map(|at| at.iter().map(|&at| (ours.values[at], theirs_in_64_bits[at])).unzip());
+            let (ours_of, theirs_of): (Vec<f64>, Vec<f64>) = errors;
+            near(&ours_of, &theirs_of, 1e-11, &what);
+            let (ours_of, theirs_of): (Vec<f64>, Vec<f64>) = within;
+            near(&ours_of, &theirs_of, 1e-7, &what);
+            near(&ours.values, &theirs, 1e-3, &what);
+
+            assert_eq!(ours.is_aligned, is_metric || flat.is_none() && name != "one", "{what}");
+        }
+    }
+
+    let none = marigold_depth(&[0.0, 10.0], &[1.0, f64::NAN], Alignment::Depth);
+    assert!(none.pixels == 0 && none.values[0].is_nan());
+}
+
+#[test]
+fn an_alignment_does_not_depend_on_the_unit() {
+    let units = depth(64, 48, 51);
+    let truth = metres(&units);
+    let prediction = view(&units, 52, Alignment::Depth);
+    let scores = |scale: f64, shift: f64| {
+        let moved: Vec<f64> = prediction.iter().map(|p| p * scale + shift).collect();
+        marigold_depth(&truth, &moved, Alignment::Depth).values
+    };
+    let plain = scores(1.0, 0.0);
+    near(&scores(-3e-9, 1e-8), &plain, 1e-9, "small");
+    // Far from 0, where the squares of predictions would lose all digits.
+    near(&scores(1.0, 1e9), &plain, 1e-3, "far");
+    near(&scores(1e200, 0.0), &plain, 1e-9, "large");
+}
+
+#[test]
+fn cmx_gives_the_same_for_classes_of_views() {
+    let mut all = Confusion::new(13);
+    for seed in [61, 64, 67] {
+        for i in 0..5000 {
+            let truth = match mix(seed, i) % 14 {
+                5 | 9 | 13 => continue,
+                class => class,
+            };
+            let guess = match mix(seed + 1, i) % 13 {
+                _ if !mix(seed + 2, i).is_multiple_of(3) => truth,
+                9 => 3,
+                class => class,
+            };
+            all.count(truth as usize, guess as usize);
+        }
+    }
+
+    let expected = &expected()["sem-view"];
+    let scores = all.view_scores();
+    assert_eq!(all.pixels(), expected["pixels"].as_u64().unwrap());
+    same(&[scores.mean_iou, scores.mean_accuracy], &numbers(&expected["mean"]), "mean");
+    same(&[scores.weighted_iou, scores.pixel_accuracy], &numbers(&expected["overall"]), "overall");
+    for (class, (ours, theirs)) in scores.iou.iter().zip(expected["iou"].as_array().unwrap()).enumerate() {
+        match theirs.as_f64() {
+            Some(theirs) => same(&[*ours], &[theirs], "class"),
+            None => assert!(ours.is_nan() && class == 9),
+        }
+    }
+    assert!(scores.iou[5] == 0.0 && scores.accuracy[5].is_nan());
+    let none = Confusion::new(2).view_scores();
+    assert!(none.mean_iou.is_nan() && none.weighted_iou.is_nan() && none.pixel_accuracy.is_nan());
 }
 
 /// Makes true and predicted vectors of evaluated pixels.

@@ -1,4 +1,6 @@
-//! Confusion matrices, and the scores that HoHoNet computes from them.
+//! Confusion matrices, and the scores that HoHoNet and CMX compute from them.
+
+use crate::tables::mean_of_defined;
 
 /// The number of pixels of each true class that were predicted as each class.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,6 +20,23 @@ pub struct ClassScores {
     pub mean_iou: f64,
     /// The mean of `accuracy` over the same classes.
     pub mean_accuracy: f64,
+}
+
+/// Scores of a [`Confusion`] in which no class is removed, each from 0 to 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewScores {
+    /// The intersection over union of each class. NaN for a class with neither true nor predicted pixels.
+    pub iou: Vec<f64>,
+    /// The share of the true pixels of each class that were found. NaN for a class without true pixels.
+    pub accuracy: Vec<f64>,
+    /// The mean of `iou` over the classes that have one. NaN if there are none.
+    pub mean_iou: f64,
+    /// The mean of `accuracy` over the classes that have one.
+    pub mean_accuracy: f64,
+    /// The mean of `iou`, in which each class counts its true pixels.
+    pub weighted_iou: f64,
+    /// The share of all pixels whose class was found.
+    pub pixel_accuracy: f64,
 }
 
 impl Confusion {
@@ -78,29 +97,71 @@ impl Confusion {
     /// of classes without true pixels first. A pixel that was predicted as one of these classes therefore
     /// counts nowhere, not even as missed.
     pub fn scores(&self) -> ClassScores {
-        let of = |truth: usize, prediction: usize| self.counts[truth * self.classes + prediction];
-        let there: Vec<usize> = (0..self.classes)
-            .filter(|&truth| (0..self.classes).any(|p| of(truth, p) > 0))
-            .collect();
-        let mut scores = ClassScores {
-            iou: vec![f64::NAN; self.classes],
-            accuracy: vec![f64::NAN; self.classes],
-            mean_iou: f64::NAN,
-            mean_accuracy: f64::NAN,
-        };
-
-        for &class in &there {
-            let found = of(class, class) as f64;
-            let truth = there.iter().map(|&other| of(class, other)).sum::<u64>() as f64;
-            let predicted = there.iter().map(|&other| of(other, class)).sum::<u64>() as f64;
-            scores.iou[class] = found / (truth + predicted - found);
-            scores.accuracy[class] = found / truth;
-        }
-
-        scores.mean_iou = mean_over(&scores.iou, &there);
-        scores.mean_accuracy = mean_over(&scores.accuracy, &there);
-        scores
+        let cells: Vec<f64> = self.counts.iter().map(|count| *count as f64).collect();
+        hohonet_scores(self.classes, &cells)
     }
+
+    /// Returns the scores of CMX's script (`utils/metric.py`, `compute_score`), which keeps all classes.
+    pub fn view_scores(&self) -> ViewScores {
+        let of = |truth: usize, prediction: usize| self.counts[truth * self.classes + prediction] as f64;
+        let classes = 0..self.classes;
+        let found: Vec<f64> = classes.clone().map(|class| of(class, class)).collect();
+        let truth: Vec<f64> = classes
+            .clone()
+            .map(|class| classes.clone().map(|p| of(class, p)).sum())
+            .collect();
+        let predicted = classes
+            .clone()
+            .map(|class| classes.clone().map(|t| of(t, class)).sum::<f64>());
+
+        let iou: Vec<f64> = predicted
+            .zip(&truth)
+            .zip(&found)
+            .map(|((predicted, truth), found)| found / (truth + predicted - found))
+            .collect();
+        let accuracy: Vec<f64> = found.iter().zip(&truth).map(|(found, truth)| found / truth).collect();
+        let all = self.pixels() as f64;
+        let there = iou.iter().zip(&truth).filter(|(_, truth)| **truth > 0.0);
+        ViewScores {
+            mean_iou: mean_of_defined(iou.iter().copied()),
+            mean_accuracy: mean_of_defined(accuracy.iter().copied()),
+            weighted_iou: if all > 0.0 {
+                there.map(|(iou, truth)| iou * (truth / all)).sum()
+            } else {
+                f64::NAN
+            },
+            pixel_accuracy: found.iter().sum::<f64>() / all,
+            iou,
+            accuracy,
+        }
+    }
+}
+
+/// Returns [`Confusion::scores`] of a matrix whose cells are counts or sums of weights, with a row for each
+/// true class.
+pub(super) fn hohonet_scores(classes: usize, cells: &[f64]) -> ClassScores {
+    let of = |truth: usize, prediction: usize| cells[truth * classes + prediction];
+    let there: Vec<usize> = (0..classes)
+        .filter(|&truth| (0..classes).any(|p| of(truth, p) > 0.0))
+        .collect();
+    let mut scores = ClassScores {
+        iou: vec![f64::NAN; classes],
+        accuracy: vec![f64::NAN; classes],
+        mean_iou: f64::NAN,
+        mean_accuracy: f64::NAN,
+    };
+
+    for &class in &there {
+        let found = of(class, class);
+        let truth = there.iter().map(|&other| of(class, other)).sum::<f64>();
+        let predicted = there.iter().map(|&other| of(other, class)).sum::<f64>();
+        scores.iou[class] = found / (truth + predicted - found);
+        scores.accuracy[class] = found / truth;
+    }
+
+    scores.mean_iou = mean_over(&scores.iou, &there);
+    scores.mean_accuracy = mean_over(&scores.accuracy, &there);
+    scores
 }
 
 fn mean_over(values: &[f64], there: &[usize]) -> f64 {

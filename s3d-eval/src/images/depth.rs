@@ -1,13 +1,17 @@
-//! Protocol `depth`: distances of panoramas.
+//! Protocol `depth`: depth of views, and distances of panoramas.
 
 use crate::Evaluation;
 use crate::error::{Error, Result};
-use crate::images::depth_metrics::{DEPTH_COLUMNS, DepthScores, hohonet_depth, unifuse_depth};
+use crate::images::depth_metrics::{DEPTH_COLUMNS, hohonet_depth_twice, unifuse_depth_twice};
+use crate::images::latitude::{BY_LATITUDE, tables_by_latitude, weights_of_pixels};
+use crate::images::marigold::{
+    Alignment, MARIGOLD_COLUMNS, is_evaluated as marigold_evaluates, marigold_depth_twice,
+};
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
-use crate::images::read::{self, Places};
+use crate::images::read::{self, Holds, Places};
 use crate::images::resample::{opencv_nearest, pillow_nearest};
 use crate::options::ImageKind;
-use crate::tables::tables;
+use crate::tables::{Unit, tables};
 use crate::task::Task;
 use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
@@ -40,49 +44,196 @@ const UNIFUSE: [&str; 6] = [
 const MEDIAN_SCALE: &str = "The predictions of each panorama are scaled so that the median of its evaluated \
      pixels is the truth's median. Of two middle values the lower is the median.";
 
+const MARIGOLD: [&str; 4] = [
+    "Images are evaluated at their own size. Pixels whose true depth is more than 0.001 m and less than 10 m \
+     are evaluated: the script's limits for NYUv2 and ScanNet. Predictions are clamped to the same limits.",
+    "Scores are computed for each image; the table has their mean over images.",
+    "δ is the larger of prediction ÷ truth and truth ÷ prediction. RMSE ln is of natural logarithms, log10 \
+     the mean error of decimal ones. iRMSE is of 1 ÷ depth. SILog is the standard deviation of errors of \
+     natural logarithms.",
+    "As in Marigold's script/depth/eval.py (commit b1dffaaa), which computes in 32 bits; here it is 64.",
+];
+
+/// The part of Marigold's definition on the alignment.
+fn of_alignment(alignment: Alignment) -> &'static str {
+    match alignment {
+        Alignment::Metric => "Predictions are metres, and are not aligned.",
+        Alignment::Depth => {
+            "Predictions are depths in any unit. In each image the scale and the shift are found by which \
+             they come nearest to the truth of the evaluated pixels, by least squares of depth."
+        }
+        Alignment::Disparity => {
+            "Predictions are disparities in any unit: large is near. In each image the scale and the shift \
+             are found by which those above 0 come nearest to 1 ÷ truth of the evaluated pixels, by least \
+             squares. Aligned disparities below 0.001 per metre become 0.001, and 1 ÷ disparity is the depth."
+        }
+    }
+}
+
+/// The script that a variant follows.
+#[derive(Clone, Copy, PartialEq)]
+enum Script {
+    Hohonet,
+    Unifuse,
+    Marigold(Alignment),
+}
+
+impl Script {
+    fn of(variant: &str) -> Self {
+        match variant {
+            "unifuse" => Self::Unifuse,
+            "marigold" => Self::Marigold(Alignment::Depth),
+            "marigold-disparity" => Self::Marigold(Alignment::Disparity),
+            "marigold-metric" => Self::Marigold(Alignment::Metric),
+            _ => Self::Hohonet,
+        }
+    }
+
+    /// Whether predictions are metres.
+    fn is_metric(self) -> bool {
+        !matches!(self, Self::Marigold(Alignment::Depth | Alignment::Disparity))
+    }
+
+    fn is_evaluated(self, truth: f64) -> bool {
+        match self {
+            Self::Hohonet => truth > 0.0,
+            Self::Unifuse => truth > 0.0 && truth <= 10.0,
+            Self::Marigold(_) => marigold_evaluates(truth),
+        }
+    }
+
+    fn places(self, size: [u32; 2]) -> Places {
+        match self {
+            Self::Hohonet => Places::new(size, pillow_nearest),
+            Self::Unifuse => Places::new(size, opencv_nearest),
+            Self::Marigold(_) => Places::all(size),
+        }
+    }
+
+    fn columns(self) -> &'static [&'static str] {
+        match self {
+            Self::Hohonet | Self::Unifuse => &DEPTH_COLUMNS,
+            Self::Marigold(_) => &MARIGOLD_COLUMNS,
+        }
+    }
+
+    fn definition(self, median_scale: bool) -> Vec<&'static str> {
+        let mut definition = match self {
+            Self::Hohonet => HOHONET.to_vec(),
+            Self::Unifuse => UNIFUSE.to_vec(),
+            Self::Marigold(_) => MARIGOLD.to_vec(),
+        };
+        match self {
+            Self::Marigold(alignment) => definition.insert(1, of_alignment(alignment)),
+            _ if median_scale => definition.insert(3, MEDIAN_SCALE),
+            _ => {}
+        }
+        definition
+    }
+}
+
 pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
+    let script = Script::of(task.variant);
     let median_scale = task.options.median_scale;
-    let is_unifuse = task.variant == "unifuse";
-    if median_scale && !is_unifuse {
+    if median_scale && script != Script::Unifuse {
         return Err(Error::NoMedianScale { variant: task.variant });
     }
-    if task.options.images == Some(ImageKind::Views) {
-        return Err(Error::PanoramasOnly { protocol: task.protocol });
+    let of_both = matches!(script, Script::Marigold(_));
+    if !of_both && task.options.images == Some(ImageKind::Views) {
+        return Err(Error::DepthOfPanoramas { variant: task.variant });
     }
 
     let wanted = Wanted {
         domain: Domain::Depth,
         besides: &[],
-        kind: Some(ImageKind::Panoramas),
+        kind: if of_both {
+            task.options.images
+        } else {
+            Some(ImageKind::Panoramas)
+        },
+        other_kind: "depth as marigold, marigold-disparity and marigold-metric evaluates views",
         endings: &["png", "npy", "npz"],
         known: &[],
     };
-    let Matched { images, mut notes, .. } = find(task, &wanted)?;
+    let Matched { images, kind, mut notes } = find(task, &wanted)?;
 
-    let progress = task.ctx.progress("evaluating", "panoramas", images.len() as u64);
+    let progress = task.ctx.progress("evaluating", kind.noun(), images.len() as u64);
     let units = map_in_order(
         task.ctx,
         &images,
         || (),
         |(), predicted| {
-            let nearest = if is_unifuse { opencv_nearest } else { pillow_nearest };
-            let farthest = if is_unifuse { 10.0 } else { f64::INFINITY };
-            let (truth, prediction) = both(task, predicted, nearest, farthest)?;
+            let scored = Scored::of(task, predicted, script)?;
             progress.add(1);
-            let scores = if is_unifuse {
-                unifuse_depth(&truth, &prediction, median_scale)
-            } else {
-                hohonet_depth(&truth, &prediction)
-            };
-            Ok(predicted.unit(scores))
+            Ok(predicted.unit(scored))
         },
     )?;
     drop(progress);
 
+    let noun = kind.noun();
+    notes.extend(notes_on(&units, noun));
+    let score = |units: &[&Scored], by: usize| {
+        let values = units
+            .iter()
+            .filter(|scored| scored.pixels > 0)
+            .map(|scored| &scored.values[by]);
+        vec![("mean".to_owned(), mean(values, script.columns().len()))]
+    };
+    let mut made = tables(task, script.columns(), &units, |units| score(units, 0));
+    let mut definition = script.definition(median_scale);
+    if kind == ImageKind::Panoramas {
+        made.extend(tables_by_latitude(task, script.columns(), &units, |units| score(units, 1)));
+        definition.push(BY_LATITUDE);
+        if median_scale || !script.is_metric() {
+            definition.push("What predictions are scaled and shifted by is the same in these tables.");
+        }
+    }
+    let pixels = units.iter().map(|unit| unit.counted.pixels).sum();
+    let counted = [(noun, images.len() as u64), ("pixels", pixels)];
+    Ok(Evaluation { notes, ..task.evaluation(&definition, counted, made) })
+}
+
+/// An image with its scores, plain and weighted by latitude.
+struct Scored {
+    pixels: u64,
+    replaced: u64,
+    is_aligned: bool,
+    values: [Vec<f64>; 2],
+}
+
+impl Scored {
+    fn of(task: &Task<'_>, predicted: &Predicted, script: Script) -> s3d_dataset::Result<Self> {
+        let Both { size, truth, prediction } = both(task, predicted, script)?;
+        let weights = weights_of_pixels(size);
+        let scores = match script {
+            Script::Hohonet => hohonet_depth_twice(&truth, &prediction, weights),
+            Script::Unifuse => unifuse_depth_twice(&truth, &prediction, task.options.median_scale, weights),
+            Script::Marigold(alignment) => {
+                let scores = marigold_depth_twice(&truth, &prediction, alignment, weights);
+                return Ok(Self {
+                    pixels: scores[0].pixels,
+                    replaced: 0,
+                    is_aligned: scores[0].is_aligned,
+                    values: scores.map(|scores| scores.values.to_vec()),
+                });
+            }
+        };
+        Ok(Self {
+            pixels: scores[0].pixels,
+            replaced: scores[0].replaced,
+            is_aligned: true,
+            values: scores.map(|scores| scores.values.to_vec()),
+        })
+    }
+}
+
+/// Returns notes on images that a script treats in a way of its own.
+fn notes_on(units: &[Unit<Scored>], noun: &str) -> Vec<String> {
+    let mut notes = Vec::new();
     let empty = units.iter().filter(|unit| unit.counted.pixels == 0).count();
     if empty > 0 {
         notes.push(format!(
-            "{empty} panoramas without a pixel to evaluate were left out; in the script they make all scores \
+            "{empty} {noun} without a pixel to evaluate were left out; in the script they make all scores \
              NaN."
         ));
     }
@@ -92,39 +243,43 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
             "{replaced} pixels were predicted beyond 10 m and compared with 10 m instead of their truth."
         ));
     }
-
-    let tables = tables(task, &DEPTH_COLUMNS, &units, |units| vec![("mean".to_owned(), mean(units))]);
-    let pixels = units.iter().map(|unit| unit.counted.pixels).sum();
-    let counted = [("panoramas", images.len() as u64), ("pixels", pixels)];
-    let mut definition = if is_unifuse { UNIFUSE.to_vec() } else { HOHONET.to_vec() };
-    if median_scale {
-        definition.insert(3, MEDIAN_SCALE);
+    let flat = units
+        .iter()
+        .filter(|unit| unit.counted.pixels > 0 && !unit.counted.is_aligned)
+        .count();
+    if flat > 0 {
+        notes.push(format!(
+            "{flat} {noun} have a single value to align. It becomes the mean of the truth, as in the script; \
+             without a disparity above 0, all depths become 10 m."
+        ));
     }
-    Ok(Evaluation { notes, ..task.evaluation(&definition, counted, tables) })
+    notes
 }
 
-/// Returns the means of scores over the images that have any.
-fn mean(units: &[&DepthScores]) -> Vec<f64> {
-    let there = units.iter().filter(|scores| scores.pixels > 0);
-    let mut sums = [0.0; DEPTH_COLUMNS.len()];
-    there
-        .clone()
-        .for_each(|scores| sums.iter_mut().zip(scores.values).for_each(|(sum, v)| *sum += v));
-    let count = there.count() as f64;
-    sums.map(|sum| sum / count).to_vec()
+/// Returns the mean of each of `columns` values over images.
+fn mean<'a>(images: impl Iterator<Item = &'a Vec<f64>>, columns: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; columns];
+    let mut count = 0.0;
+    for values in images {
+        sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += v);
+        count += 1.0;
+    }
+    sums.into_iter().map(|sum| sum / count).collect()
 }
 
-/// Returns truth and prediction in metres at the pixels of the evaluation. Missing truth is 0. Refuses a file
-/// without a prediction where the truth is above 0 and at most `farthest`.
-fn both(
-    task: &Task<'_>,
-    predicted: &Predicted,
-    nearest: fn(u32, u32) -> Vec<u32>,
-    farthest: f64,
-) -> s3d_dataset::Result<(Vec<f64>, Vec<f64>)> {
+/// Truth and prediction at the pixels of the evaluation, and the width and the height of these.
+struct Both {
+    size: [u32; 2],
+    /// Metres. Missing truth is 0.
+    truth: Vec<f64>,
+    prediction: Vec<f64>,
+}
+
+/// Reads truth and prediction. Refuses a file without a prediction where the truth is evaluated.
+fn both(task: &Task<'_>, predicted: &Predicted, script: Script) -> s3d_dataset::Result<Both> {
     let units = task.data.options().depth_units;
     let image = read::gray16(task.data, &predicted.image, Domain::Depth)?;
-    let places = Places::new([image.width(), image.height()], nearest);
+    let places = script.places([image.width(), image.height()]);
 
     let truth: Vec<f64> = places
         .sample(image.pixels())
@@ -137,16 +292,27 @@ fn both(
         let image = read_gray16(file)?;
         let size = [image.width(), image.height()];
         read::check_size(file, size, &places.sizes())?;
-        let values = places.sample_prediction(size, image.into_vec());
-        let metres = values.into_iter().map(|value| units.metres(value).unwrap_or(f64::NAN));
-        (size, metres.collect())
+        let values = places.sample_prediction(size, image.into_vec()).into_iter();
+        // Without a unit, the largest number is a number like others.
+        let number = |value: u16| {
+            if script.is_metric() {
+                units.metres(value).unwrap_or(f64::NAN)
+            } else {
+                f64::from(value)
+            }
+        };
+        (size, values.map(number).collect())
     } else {
-        let (size, values) = read::floats(file, &places.sizes(), 1)?;
+        let holds = if script.is_metric() {
+            Holds::Floats(1)
+        } else {
+            Holds::Numbers
+        };
+        let (size, values) = read::array(file, &places.sizes(), holds)?;
         (size, places.sample_prediction(size, values))
     };
 
-    let wrong =
-        |(truth, prediction): (&f64, &f64)| *truth > 0.0 && *truth <= farthest && !prediction.is_finite();
+    let wrong = |(truth, prediction): (&f64, &f64)| script.is_evaluated(*truth) && !prediction.is_finite();
     if let Some(at) = truth.iter().zip(&prediction).position(wrong) {
         let [x, y] = places.place(size, at);
         let found = if read::is_png(file) {
@@ -157,5 +323,5 @@ fn both(
         let message = format!("has {found} in column {x}, row {y}, which is evaluated: predict every pixel");
         return Err(FileError::format(file, message).into());
     }
-    Ok((truth, prediction))
+    Ok(Both { size: places.evaluated(), truth, prediction })
 }

@@ -1,5 +1,8 @@
 //! The depth metrics of HoHoNet's and UniFuse's scripts.
 
+use crate::images::latitude::Sums;
+use std::iter::repeat;
+
 /// The scores of one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthScores {
@@ -39,9 +42,23 @@ const FARTHEST: f64 = 10.0;
 /// # Panics
 /// If the slices have different lengths.
 pub fn hohonet_depth(truth: &[f64], prediction: &[f64]) -> DepthScores {
+    hohonet_depth_twice(truth, prediction, repeat(1.0))[0]
+}
+
+/// Returns the scores of [`hohonet_depth`], and the same where each pixel counts its weight.
+pub(super) fn hohonet_depth_twice(
+    truth: &[f64],
+    prediction: &[f64],
+    weights: impl Iterator<Item = f64>,
+) -> [DepthScores; 2] {
     assert_eq!(truth.len(), prediction.len(), "a prediction a pixel");
-    let pairs = truth.iter().zip(prediction).filter(|(truth, _)| **truth > 0.0);
-    scores(pairs.map(|(truth, prediction)| [truth, prediction].map(|v| v.clamp(0.01, FARTHEST))))
+    let pixels = truth.iter().zip(prediction).zip(weights);
+    let valid = pixels.filter(|((truth, _), _)| **truth > 0.0);
+    scores(
+        valid.map(|((truth, prediction), weight)| {
+            ([truth, prediction].map(|v| v.clamp(0.01, FARTHEST)), weight)
+        }),
+    )
 }
 
 /// Returns the scores of UniFuse. `truth` and `prediction` are in metres; a missing truth is 0.
@@ -56,17 +73,26 @@ pub fn hohonet_depth(truth: &[f64], prediction: &[f64]) -> DepthScores {
 /// # Panics
 /// If the slices have different lengths.
 pub fn unifuse_depth(truth: &[f64], prediction: &[f64], median_scale: bool) -> DepthScores {
+    unifuse_depth_twice(truth, prediction, median_scale, repeat(1.0))[0]
+}
+
+/// Returns the scores of [`unifuse_depth`], and the same where each pixel counts its weight, except for the
+/// medians.
+pub(super) fn unifuse_depth_twice(
+    truth: &[f64],
+    prediction: &[f64],
+    median_scale: bool,
+    weights: impl Iterator<Item = f64>,
+) -> [DepthScores; 2] {
     assert_eq!(truth.len(), prediction.len(), "a prediction a pixel");
-    let valid = truth
-        .iter()
-        .zip(prediction)
-        .filter(|(truth, _)| **truth > 0.0 && **truth <= FARTHEST);
-    let mut pairs: Vec<[f64; 2]> = valid
-        .map(|(t, p)| [t.max(0.1), if *p < 0.1 { 0.1 } else { *p }])
+    let pixels = truth.iter().zip(prediction).zip(weights);
+    let valid = pixels.filter(|((truth, _), _)| **truth > 0.0 && **truth <= FARTHEST);
+    let mut pairs: Vec<([f64; 2], f64)> = valid
+        .map(|((t, p), weight)| ([t.max(0.1), if *p < 0.1 { 0.1 } else { *p }], weight))
         .collect();
 
     let mut replaced = 0;
-    for [truth, prediction] in &mut pairs {
+    for ([truth, prediction], _) in &mut pairs {
         if *prediction > FARTHEST {
             *truth = FARTHEST;
             replaced += 1;
@@ -74,11 +100,12 @@ pub fn unifuse_depth(truth: &[f64], prediction: &[f64], median_scale: bool) -> D
     }
 
     if median_scale && !pairs.is_empty() {
-        let [truth, prediction] = [0, 1].map(|i| lower_median(pairs.iter().map(|pair| pair[i]).collect()));
+        let [truth, prediction] =
+            [0, 1].map(|i| lower_median(pairs.iter().map(|(pair, _)| pair[i]).collect()));
         let scale = truth / prediction;
-        pairs.iter_mut().for_each(|[_, prediction]| *prediction *= scale);
+        pairs.iter_mut().for_each(|([_, prediction], _)| *prediction *= scale);
     }
-    DepthScores { replaced, ..scores(pairs.into_iter()) }
+    scores(pairs.into_iter()).map(|scores| DepthScores { replaced, ..scores })
 }
 
 fn lower_median(mut values: Vec<f64>) -> f64 {
@@ -86,30 +113,38 @@ fn lower_median(mut values: Vec<f64>) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-fn scores(pairs: impl Iterator<Item = [f64; 2]>) -> DepthScores {
+/// Returns the scores of pairs of truth and prediction, and the same where each pair counts its weight.
+fn scores(pairs: impl Iterator<Item = ([f64; 2], f64)>) -> [DepthScores; 2] {
     let mut pixels = 0;
-    let mut sums = [0.0; 6];
-    let mut within = [0u64; 3];
-    for [truth, prediction] in pairs {
+    let mut sums = [Sums::EMPTY; 2];
+    for ([truth, prediction], weight) in pairs {
         let error = (truth - prediction).abs();
         let square = error * error;
-        // The larger of both quotients, since division rounds monotonically, or NaN.
-        let ratio = if truth > prediction {
-            truth / prediction
-        } else {
-            prediction / truth
-        };
-        let relative = error / truth;
+        let ratio = ratio(truth, prediction);
         let of_logs = libm::log10(ratio);
-        let terms = [error, relative, square / truth, square, of_logs * of_logs, of_logs];
-        sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-        let below = [1.25, 1.5625, 1.953125].map(|most| u64::from(ratio < most));
-        within.iter_mut().zip(below).for_each(|(count, is)| *count += is);
+        let [d1, d2, d3] = within(ratio);
+        let terms = [error, error / truth, square / truth, square, of_logs * of_logs, of_logs, d1, d2, d3];
+        sums[0].add(1.0, &terms);
+        sums[1].add(weight, &terms);
         pixels += 1;
     }
+    sums.map(|sums| {
+        let mut values = sums.means();
+        values[3..5].iter_mut().for_each(|mean| *mean = mean.sqrt());
+        DepthScores { pixels, replaced: 0, values }
+    })
+}
 
-    let [mae, abs_rel, sq_rel, square, square_of_logs, of_logs] = sums.map(|sum| sum / pixels as f64);
-    let [d1, d2, d3] = within.map(|count| count as f64 / pixels as f64);
-    let values = [mae, abs_rel, sq_rel, square.sqrt(), square_of_logs.sqrt(), of_logs, d1, d2, d3];
-    DepthScores { pixels, replaced: 0, values }
+/// Returns the larger of both quotients, since division rounds monotonically, or NaN.
+pub(super) fn ratio(truth: f64, prediction: f64) -> f64 {
+    if truth > prediction {
+        truth / prediction
+    } else {
+        prediction / truth
+    }
+}
+
+/// Returns 1 for each limit of δ above the ratio.
+pub(super) fn within(ratio: f64) -> [f64; 3] {
+    [1.25, 1.5625, 1.953125].map(|most| f64::from(u8::from(ratio < most)))
 }

@@ -1,5 +1,6 @@
 //! The metrics of surface normals of DSINE's and Omnidata's scripts.
 
+use crate::images::latitude::Sums;
 use std::f64::consts::PI;
 
 /// Returns the angle between two vectors by DSINE, in degrees. Each vector is divided by its length, at least
@@ -111,4 +112,54 @@ pub fn median_of_angles(values: &mut [f64]) -> Option<f64> {
     } else {
         (below.iter().copied().fold(f64::MIN, f64::max) + high) / 2.0
     })
+}
+
+/// Returns the scores of [`omnidata_scores`] where each angle counts its weight. The median is the least
+/// angle up to which half of the weight lies. Changes the order.
+pub(crate) fn weighted_omnidata_scores(angles: &mut [(f64, f64)]) -> Option<[f64; 5]> {
+    let mut sums = Sums::EMPTY;
+    for &(angle, weight) in &*angles {
+        let [a, b, c] = [11.25, 22.5, 30.0].map(|limit| f64::from(u8::from(angle <= limit)));
+        sums.add(weight, &[angle, a, b, c]);
+    }
+    let [mean, a, b, c] = sums.means();
+    Some([mean, weighted_median(angles)?, a, b, c])
+}
+
+/// Returns the least value up to which half of the weight lies; `None` without values. Changes the order of
+/// the pairs of value and weight.
+fn weighted_median(mut pairs: &mut [(f64, f64)]) -> Option<f64> {
+    let weigh = |pairs: &[(f64, f64)]| pairs.iter().map(|(_, weight)| weight).sum::<f64>();
+    let mut missing = weigh(pairs) / 2.0;
+    while pairs.len() > 1 {
+        let middle = pairs.len() / 2;
+        pairs.select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0));
+        let (below, above) = pairs.split_at_mut(middle);
+        let weight = weigh(below);
+        if weight >= missing {
+            pairs = below;
+        } else {
+            missing -= weight;
+            pairs = above;
+        }
+    }
+    pairs.first().map(|(value, _)| *value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_have_half_of_the_weight_below() {
+        let median = |pairs: &[(f64, f64)]| weighted_median(&mut pairs.to_vec());
+        assert_eq!(median(&[]), None);
+        assert_eq!(median(&[(3.0, 0.1)]), Some(3.0));
+        assert_eq!(median(&[(3.0, 1.0), (1.0, 1.0), (2.0, 1.0)]), Some(2.0));
+        assert_eq!(median(&[(3.0, 1.0), (1.0, 1.0)]), Some(1.0));
+        assert_eq!(median(&[(5.0, 4.0), (1.0, 1.0), (2.0, 1.0), (3.0, 1.0)]), Some(5.0));
+        assert_eq!(median(&[(1.0, 5.0), (5.0, 1.0), (2.0, 1.0), (3.0, 1.0), (4.0, 1.0)]), Some(1.0));
+        let scores = weighted_omnidata_scores(&mut [(10.0, 3.0), (20.0, 1.0)]);
+        assert_eq!(scores, Some([12.5, 10.0, 0.75, 1.0, 1.0]));
+    }
 }

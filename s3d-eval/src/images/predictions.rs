@@ -18,10 +18,23 @@ pub(super) struct Wanted<'a> {
     pub(super) besides: &'a [Domain],
     /// The kind of images. `None` is the kind that the predictions are named after.
     pub(super) kind: Option<ImageKind>,
+    /// Which protocol evaluates the other kind, as a sentence, if this one does not.
+    pub(super) other_kind: &'a str,
     /// The endings of the files of predictions.
     pub(super) endings: &'a [&'a str],
     /// The names of other files in the folder that are read.
     pub(super) known: &'a [&'a str],
+}
+
+impl Wanted<'_> {
+    /// Returns the error for a file that is named after an image of the other kind.
+    fn of_other(&self, file: &Path, found: &str, evaluated: &str) -> Error {
+        let mut message = format!("is named after {found}, and {evaluated} are evaluated");
+        if !self.other_kind.is_empty() {
+            message = format!("{message}: {}", self.other_kind);
+        }
+        FileError::format(file, message).into()
+    }
 }
 
 /// An image and its prediction.
@@ -154,12 +167,8 @@ fn kind_of(wanted: &Wanted<'_>, files: &[Option<PathBuf>; 2]) -> Result<ImageKin
             ),
         )
         .into()),
-        (Some(ImageKind::Panoramas), Some(file), _) => {
-            Err(FileError::format(file, "is named after a view, and panoramas are evaluated").into())
-        }
-        (Some(ImageKind::Views), _, Some(file)) => {
-            Err(FileError::format(file, "is named after a panorama, and views are evaluated").into())
-        }
+        (Some(ImageKind::Panoramas), Some(file), _) => Err(wanted.of_other(file, "a view", "panoramas")),
+        (Some(ImageKind::Views), _, Some(file)) => Err(wanted.of_other(file, "a panorama", "views")),
         (Some(kind), ..) => Ok(kind),
         (None, None, Some(_)) => Ok(ImageKind::Panoramas),
         (None, ..) => Ok(ImageKind::Views),

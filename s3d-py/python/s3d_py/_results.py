@@ -93,15 +93,16 @@ class Evaluation(_Answer):
     @property
     def tables(self) -> list[str]:
         """The titles of the tables: one for each fold, and with several folds one for all pooled and one for
-        the mean.
+        the mean. Panoramas have each a second time, weighted by latitude.
         """
         return [table["title"] for table in self.data["tables"]]
 
     def score(self, row: str, column: str, table: str | None = None) -> float:
         """Returns the score with these names: its row (a class, "mean", …), its column ("IoU", …) and its
-        table, by default the last of `tables`. NaN if it is not defined.
+        table, by default the last of `tables` that is not weighted by latitude. NaN if it is not defined.
         """
-        title = self.tables[-1] if table is None else table
+        plain = [title for title in self.tables if not title.endswith(", weighted by latitude")]
+        title = plain[-1] if table is None else table
         for found in self.data["tables"]:
             rows = {entry["name"]: entry["scores"] for entry in found["rows"]}
             if found["title"] == title and row in rows and column in found["columns"]:
@@ -193,8 +194,8 @@ def evaluate(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Evaluation:
-    """Scores predictions by a protocol: "det", "sem3d", "inst-ap", "inst-cov", "sem-pano", "depth", "normal",
-    "panoptic" or "panoptic3d".
+    """Scores predictions by a protocol: "det", "sem3d", "inst-ap", "inst-cov", "sem-pano", "sem-view",
+    "depth", "normal", "panoptic" or "panoptic3d".
 
     - `truth`: a `DataSet`, or its folder.
     - `pred`: the folder or file of predictions. The page "Evaluation" of the documentation describes its
@@ -205,8 +206,8 @@ def evaluate(
     - `against`: other predictions in the same form. `data["against"]["differences"]` has the difference of
       each score with its interval, over 1,000 draws of the same rooms or images for both, or `bootstrap`.
     - `bootstrap`: the number of draws for 95 % intervals, drawn by `seed`.
-    - `median_scale` (depth), `images` (normal: "views" or "panoramas"), `classes` and `boxes` (det: "points"
-      or "annotations"), `stuff` (panoptic, panoptic3d): see the protocols.
+    - `median_scale` (depth), `images` (normal, depth: "views" or "panoramas"), `classes` and `boxes` (det:
+      "points" or "annotations"), `stuff` (panoptic, panoptic3d): see the protocols.
 
     Raises `FileError` for a prediction that is missing, duplicate, or of the wrong size.
     """

@@ -114,3 +114,65 @@ def normals(n, seed):
 
 # Number of vectors and seed of each image.
 NORMALS = [(4000, 31), (1, 40), (2501, 33)]
+
+
+def quantized(values):
+    """Rounded so that 32 bits hold them exactly."""
+    return np.floor(values * 1024.0) / 1024.0
+
+
+def metric_view(truth, seed):
+    """Metres of about the truth, at a ratio of 1.25, below 0.001 m, or beyond 10 m."""
+    return quantized(predicted_depth(truth, seed))
+
+
+def affine_view(truth, seed):
+    """Depth up to scale and shift, mostly negative."""
+    h = mix(seed + 2, np.arange(truth.size)).reshape(truth.shape)
+    spread = 0.8 + (h % np.uint64(1024)).astype(np.float64) / 1024.0 * 0.4
+    out = truth.astype(np.float64) / 512.0 * spread * 0.25 - 3.0
+    out[h // np.uint64(1024) % np.uint64(16) == 1] = 2.0
+    return quantized(out)
+
+
+def disparity_view(truth, seed):
+    """Disparity up to scale and shift; some is not above 0."""
+    h = mix(seed + 2, np.arange(truth.size)).reshape(truth.shape)
+    spread = 0.8 + (h % np.uint64(1024)).astype(np.float64) / 1024.0 * 0.4
+    out = 40.0 / (truth.astype(np.float64) / 512.0 + 0.25) * spread + 3.0
+    kind = h // np.uint64(1024) % np.uint64(16)
+    out[kind == 1] = 0.0
+    out[kind == 2] = -2.0
+    return quantized(out)
+
+
+def flat_view(truth, seed):
+    return np.full(truth.shape, 3.0)
+
+
+def far_view(truth, seed):
+    return np.full(truth.shape, -3.0)
+
+
+# Name, true depth of views, seed, and the predictions of depth, disparity and metres.
+VIEWS = [("mixed", depth(64, 48, 51), 52, affine_view, disparity_view, metric_view),
+         ("odd", depth(37, 27, 53), 54, affine_view, disparity_view, metric_view),
+         ("one", np.array([[0, 700], [65535, 6000]], np.uint16), 55, affine_view, disparity_view, metric_view),
+         ("flat", depth(20, 10, 56), 57, flat_view, flat_view, flat_view),
+         ("far", depth(20, 10, 56), 57, far_view, far_view, far_view)]
+
+
+def view_classes(seed, count):
+    """True and predicted classes of pixels. Class 5 is never true, class 9 never either; 255 is no label."""
+    n = 5000
+    truth = mix(seed, np.arange(n)) % np.uint64(14)
+    truth[(truth == 5) | (truth == 9) | (truth == 13)] = 255
+    guess = mix(seed + 1, np.arange(n)) % np.uint64(count)
+    guess[guess == 9] = 3
+    right = (mix(seed + 2, np.arange(n)) % np.uint64(3) > 0) & (truth < 255)
+    guess[right] = truth[right]
+    return truth.astype(np.int64), guess.astype(np.int64)
+
+
+# Seeds of the views of a fold.
+VIEW_SEEDS = [61, 64, 67]

@@ -1,5 +1,6 @@
-"""Runs the reference programs on the inputs and writes what they say: see README.md."""
-import json, os, re, runpy, sys, types
+"""Runs the reference programs on the inputs and writes what they say: see README.md. With names of parts it runs
+these, and keeps the numbers of the others."""
+import csv, json, os, re, runpy, sys, types
 
 import numpy as np
 
@@ -8,14 +9,22 @@ here = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, here)
 import inputs
 
-np.float = float  # UniFuse's, which later numpy has not.
-import cv2, imageio.v2 as imageio, PIL, PIL.Image as Image, scipy, skimage, skimage.transform, torch
-import imageio as imageio_package
+PARTS = sys.argv[3:] or ["resampling", "sem_pano", "depths", "normals", "views", "sem_view"]
+if not set(PARTS) <= {"views", "sem_view"}:
+    np.float = float  # UniFuse's, which later numpy has not.
+    import cv2, imageio.v2 as imageio, PIL, PIL.Image as Image, scipy, skimage, skimage.transform
+    import imageio as imageio_package
 
-imageio_package.imread, imageio_package.imwrite = imageio.imread, imageio.imwrite
-out = {"versions": {"python": sys.version.split()[0], "numpy": np.__version__, "torch": torch.__version__,
-                    "Pillow": PIL.__version__, "scikit-image": skimage.__version__, "scipy": scipy.__version__,
-                    "opencv-python-headless": cv2.__version__, "imageio": imageio_package.__version__}}
+    imageio_package.imread, imageio_package.imwrite = imageio.imread, imageio.imwrite
+import torch
+
+if len(sys.argv) > 3:
+    out = json.load(open(f"{here}/expected.json"))
+else:
+    out = {"versions": {"python": sys.version.split()[0], "numpy": np.__version__, "torch": torch.__version__,
+                        "Pillow": PIL.__version__, "scikit-image": skimage.__version__,
+                        "scipy": scipy.__version__, "opencv-python-headless": cv2.__version__,
+                        "imageio": imageio_package.__version__}}
 
 
 def stub(name, **members):
@@ -26,7 +35,8 @@ def stub(name, **members):
 
 
 # The scripts import these modules, but the calls here do not use them.
-stub("pandas")
+if "views" not in PARTS:
+    stub("pandas")
 transforms = stub("torchvision.transforms", ToTensor=lambda: lambda a: a, Normalize=lambda **_: lambda a: a)
 stub("torchvision", transforms=transforms)
 
@@ -192,8 +202,68 @@ def normals():
         out["normal"]["omnidata"].append(said and [float(said[k]) for k in keys])
 
 
-resampling()
-sem_pano()
-depths()
-normals()
+def views():
+    """Marigold's script as a whole, on our views instead of its data sets."""
+    truths = {name: torch.from_numpy(np.where(truth == 65535, 0, truth / 512)) for name, truth, *_ in inputs.VIEWS}
+
+    class Views(torch.utils.data.Dataset):
+        # As in src/dataset/nyu_dataset.py and scannet_dataset.py.
+        min_depth, max_depth, name_mode, disp_name, filename_ls_path = 1e-3, 10.0, None, "views", ""
+
+        def __len__(self):
+            return len(truths)
+
+        def __getitem__(self, at):
+            name, truth = list(truths.items())[at]
+            valid = torch.logical_and(truth > self.min_depth, truth < self.max_depth)
+            return {"depth_raw_linear": truth[None], "valid_mask_raw": valid[None], "rgb_relative_path": name}
+
+    stub("src.dataset", DatasetMode=types.SimpleNamespace(EVAL=None), get_dataset=lambda *_, **__: Views(),
+         get_pred_name=lambda name, mode, suffix: name + suffix)
+    script = f"{sources}/Marigold/script/depth/eval.py"
+    os.makedirs(f"{work}/views", exist_ok=True)
+    open(f"{work}/views/empty.yaml", "w").close()
+    out["views"] = {"versions": {"numpy": np.__version__, "torch": torch.__version__}}
+    for at, (variant, alignment) in enumerate([("marigold", "least_square"), ("marigold-metric", None),
+                                               ("marigold-disparity", "least_square_disparity")]):
+        at = {"marigold": 0, "marigold-disparity": 1, "marigold-metric": 2}[variant]
+        for name, truth, seed, *predictions in inputs.VIEWS:
+            np.save(f"{work}/views/{name}.npy", predictions[at](truth, seed))
+        sys.argv = ["eval.py", "--prediction_dir", f"{work}/views", "--dataset_config", f"{work}/views/empty.yaml",
+                    "--base_data_dir", work, "--output_dir", f"{work}/views", "--no_cuda"]
+        sys.argv += ["--alignment", alignment] if alignment else []
+        runpy.run_path(script, run_name="__main__")
+        rows = csv.reader(open(f"{work}/views/per_sample_metrics.csv"))
+        out["views"][variant] = {row[0][:-4]: [float(v) for v in row[1:]] for row in rows if row[0] != "filename"}
+
+    # The script reads predictions in 32 bits, in which it computes without an alignment.
+    metrics = runpy.run_path(f"{sources}/Marigold/src/util/metric.py")
+    names = ("abs_relative_difference", "squared_relative_difference", "rmse_linear", "rmse_log", "log10",
+             "delta1_acc", "delta2_acc", "delta3_acc", "i_rmse", "silog_rmse")
+    found = {}
+    for name, _, seed, *predictions in inputs.VIEWS:
+        truth = truths[name]
+        valid = torch.logical_and(truth > 1e-3, truth < 10)
+        units = dict((n, t) for n, t, *_ in inputs.VIEWS)[name]
+        metres = torch.from_numpy(np.clip(predictions[2](units, seed), 1e-3, 10.0))
+        found[name] = [float(metrics[n](metres, truth, valid)) for n in names]
+    out["views"]["marigold-metric in 64 bits"] = found
+
+
+def sem_view():
+    """CMX's functions, in the order of its eval.py."""
+    said = runpy.run_path(f"{sources}/CMX/utils/metric.py")
+    hist, correct, labeled = np.zeros((13, 13)), 0, 0
+    for seed in inputs.VIEW_SEEDS:
+        truth, guess = inputs.view_classes(seed, 13)
+        of_view = said["hist_info"](13, guess, truth)
+        hist, labeled, correct = hist + of_view[0], labeled + of_view[1], correct + of_view[2]
+    iou, mean_iou, _, freq_iou, mean_accuracy, accuracy = said["compute_score"](hist, correct, labeled)
+    undefined = [None if np.isnan(v) else float(v) for v in iou]
+    out["sem-view"] = {"iou": undefined, "mean": [mean_iou, mean_accuracy], "overall": [freq_iou, accuracy],
+                       "pixels": int(labeled)}
+
+
+for part in PARTS:
+    globals()[part]()
 json.dump(out, open(f"{here}/expected.json", "w"), indent=1)

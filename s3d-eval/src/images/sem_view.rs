@@ -1,0 +1,90 @@
+//! Protocol `sem-view`: classes of views.
+
+use crate::Evaluation;
+use crate::error::{Error, Result};
+use crate::images::classes::{Classes, ENDINGS, LIST};
+use crate::images::confusion::Confusion;
+use crate::images::predictions::{Matched, Predicted, Wanted, find};
+use crate::images::read::{self, Places};
+use crate::options::ImageKind;
+use crate::tables::tables;
+use crate::task::Task;
+use s3d_dataset::DataSet;
+use s3d_dataset::parallel::map_in_order;
+use s3d_io::Error as FileError;
+use s3d_io::dataset::Domain;
+
+const DEFINITION: [&str; 5] = [
+    "Views are evaluated at their own size, at the pixels that have a label.",
+    "Each fold has one confusion matrix, of the pixels of all its views.",
+    "IoU is intersection over union; accuracy is the share of a class's true pixels that were found. A class \
+     that neither side has is undefined, and so is the accuracy of a class that only predictions have, whose \
+     IoU is 0. The row `mean` (mIoU, mean accuracy) leaves out what is undefined.",
+    "The row `overall` has the frequency-weighted IoU, in which each class counts its true pixels, and the \
+     pixel accuracy, the share of all pixels whose class was found.",
+    "As in CMX's utils/metric.py (commit e251d860).",
+];
+
+pub(crate) fn sem_view(task: &Task<'_>) -> Result<Evaluation> {
+    if task.options.images == Some(ImageKind::Panoramas) {
+        return Err(Error::ViewsOnly { protocol: task.protocol });
+    }
+    let classes = Classes::of(task)?;
+    let wanted = Wanted {
+        domain: Domain::Semantic,
+        besides: &[],
+        kind: Some(ImageKind::Views),
+        other_kind: "sem-pano evaluates panoramas",
+        endings: &ENDINGS,
+        known: &[LIST],
+    };
+    let Matched { images, notes, .. } = find(task, &wanted)?;
+
+    let progress = task.ctx.progress("evaluating", "views", images.len() as u64);
+    let units = map_in_order(
+        task.ctx,
+        &images,
+        || (),
+        |(), predicted| {
+            let confusion = compare(task.data, predicted, &classes)?;
+            progress.add(1);
+            Ok(predicted.unit(confusion.counted()))
+        },
+    )?;
+    drop(progress);
+
+    let tables = tables(task, &["IoU", "accuracy"], &units, |units| {
+        let scores = classes.sum(units.iter().copied()).view_scores();
+        let mut rows = classes.rows(scores.iou, scores.accuracy);
+        rows.push(("mean".to_owned(), vec![scores.mean_iou, scores.mean_accuracy]));
+        rows.push(("overall".to_owned(), vec![scores.weighted_iou, scores.pixel_accuracy]));
+        rows
+    });
+    let all = classes.sum(units.iter().map(|unit| &unit.counted));
+    let counted = [("views", images.len() as u64), ("pixels", all.pixels())];
+    Ok(Evaluation {
+        notes,
+        confusion: Some(classes.table(&all)),
+        ..task.evaluation(&DEFINITION, counted, tables)
+    })
+}
+
+/// Counts the pixels of a view by their true and their predicted class.
+fn compare(data: &DataSet, predicted: &Predicted, classes: &Classes<'_>) -> s3d_dataset::Result<Confusion> {
+    let truth = read::rgb8(data, &predicted.image, Domain::Semantic)?;
+    let places = Places::all([truth.width(), truth.height()]);
+    let (size, numbers) = classes.numbers(&predicted.file, &places)?;
+
+    let mut confusion = Confusion::new(classes.count);
+    for (at, (pixel, number)) in truth.pixels().iter().zip(&numbers).enumerate() {
+        let class = classes.of_pixel(*pixel).map_err(|message| {
+            FileError::format(&predicted.image.path(data.layout(), Domain::Semantic), message)
+        })?;
+        let Some(class) = class else { continue };
+        match classes.of_number(*number) {
+            Some(number) => confusion.count(class.into(), number.into()),
+            None => return Err(classes.no_class(&predicted.file, *number, places.place(size, at))),
+        }
+    }
+    Ok(confusion)
+}
