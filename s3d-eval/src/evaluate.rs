@@ -47,6 +47,7 @@ fn run(task: &Task<'_>) -> Result<Evaluation> {
         Protocol::SemPano => images::sem_pano(task),
         Protocol::SemView => images::sem_view(task),
         Protocol::Depth => images::depth(task),
+        Protocol::DepthEdge => images::depth_edge(task),
         Protocol::Normal => images::normal(task),
         Protocol::Panoptic => panoptic::panoptic(task),
         Protocol::Panoptic3d => points::panoptic3d(task),

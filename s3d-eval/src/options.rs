@@ -31,8 +31,8 @@ pub struct EvalOptions {
     pub seed: u64,
     /// `depth` only: scales each predicted image to the median of its truth first.
     pub median_scale: bool,
-    /// `normal`, and `depth` as Marigold: the kind of images to evaluate. `None` is the kind that the
-    /// predictions are named after. The other protocols of images have one kind each.
+    /// `normal`, `depth-edge`, and `depth` as Marigold: the kind of images to evaluate. `None` is the kind
+    /// that the predictions are named after. The other protocols of images have one kind each.
     #[serde(serialize_with = "word")]
     pub images: Option<ImageKind>,
     /// `det` only: the classes to detect, by name. `None` means the 12 of the paper.
@@ -121,9 +121,7 @@ impl ImageKind {
             Self::Views
         }
     }
-}
 
-impl ImageKind {
     /// Returns its word.
     pub(crate) fn noun(self) -> &'static str {
         match self {
@@ -162,7 +160,7 @@ impl EvalOptions {
     /// [`Error::OtherProtocol`] for the first of them.
     pub(crate) fn check_of(&self, protocol: Protocol) -> Result<()> {
         const OF_IMAGES: &[Protocol] =
-            &[Protocol::Normal, Protocol::SemPano, Protocol::SemView, Protocol::Depth];
+            &[Protocol::Normal, Protocol::SemPano, Protocol::SemView, Protocol::Depth, Protocol::DepthEdge];
         let given: [(bool, &str, &[Protocol]); 5] = [
             (self.classes.is_some(), "classes", &[Protocol::Det]),
             (self.boxes.is_some(), "boxes", &[Protocol::Det]),
@@ -221,7 +219,10 @@ mod tests {
         let message = classes.check_of(Protocol::Sem3d).unwrap_err().to_string();
         assert_eq!(message, "sem3d takes no classes: det does");
         let message = views.check_of(Protocol::Det).unwrap_err().to_string();
-        assert_eq!(message, "det takes no images: normal and sem-pano and sem-view and depth do");
+        assert_eq!(
+            message,
+            "det takes no images: normal and sem-pano and sem-view and depth and depth-edge do"
+        );
     }
 
     #[test]

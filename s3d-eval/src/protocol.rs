@@ -22,6 +22,8 @@ pub enum Protocol {
     SemView,
     /// Depth of panoramas, like HoHoNet or UniFuse, or of any images, like Marigold.
     Depth,
+    /// Boundaries in depth, like Depth Pro.
+    DepthEdge,
     /// Surface normals of images, like DSINE or Omnidata.
     Normal,
     /// Panoptic quality of images, like panopticapi.
@@ -35,7 +37,7 @@ type Entry = (Protocol, &'static str, u32, &'static [&'static str]);
 
 const DEPTH: [&str; 5] = ["hohonet", "unifuse", "marigold", "marigold-disparity", "marigold-metric"];
 
-const PROTOCOLS: [Entry; 10] = [
+const PROTOCOLS: [Entry; 11] = [
     (Protocol::Det, "det", 2, &["mmdetection3d", "open3d-ml"]),
     (Protocol::Sem3d, "sem3d", 1, &["pointcept", "nanmean"]),
     (Protocol::InstAp, "inst-ap", 1, &["pointcept"]),
@@ -43,6 +45,7 @@ const PROTOCOLS: [Entry; 10] = [
     (Protocol::SemPano, "sem-pano", 1, &["hohonet"]),
     (Protocol::SemView, "sem-view", 1, &["cmx"]),
     (Protocol::Depth, "depth", 1, &DEPTH),
+    (Protocol::DepthEdge, "depth-edge", 1, &["depth-pro"]),
     (Protocol::Normal, "normal", 1, &["dsine", "omnidata"]),
     (Protocol::Panoptic, "panoptic", 1, &["panopticapi"]),
     (Protocol::Panoptic3d, "panoptic3d", 1, &["supercluster"]),
@@ -83,11 +86,13 @@ impl fmt::Display for Protocol {
 
 /// A word that names no protocol.
 #[derive(Clone, Debug, PartialEq, Eq, ThisError)]
-#[error(
-    "no protocol is called {0:?}: det, sem3d, inst-ap, inst-cov, sem-pano, sem-view, depth, normal, panoptic, \
-     panoptic3d are"
-)]
+#[error("no protocol is called {:?}: {} are", .0, names())]
 pub struct UnknownProtocol(String);
+
+fn names() -> String {
+    let names: Vec<&str> = Protocol::all().map(Protocol::name).collect();
+    names.join(", ")
+}
 
 impl FromStr for Protocol {
     type Err = UnknownProtocol;

@@ -1,9 +1,9 @@
 //! Compares the metrics of images with the reference programs: `reference/images/README.md`.
 
 use s3d_eval::images::{
-    Alignment, AngleSums, Confusion, Lanczos, PANORAMA, PanoramaClasses, dsine_angle, hohonet_depth,
-    marigold_depth, median_of_angles, omnidata_angle, omnidata_scores, opencv_nearest, pillow_nearest,
-    unifuse_depth,
+    Alignment, AngleSums, Confusion, Lanczos, PANORAMA, PanoramaClasses, depth_edges, dsine_angle,
+    hohonet_depth, marigold_depth, median_of_angles, omnidata_angle, omnidata_scores, opencv_nearest,
+    pillow_nearest, unifuse_depth,
 };
 use s3d_geom::Raster;
 use serde_json::Value;
@@ -334,6 +334,34 @@ fn an_alignment_does_not_depend_on_the_unit() {
     // Far from 0, where the squares of predictions would lose all digits.
     near(&scores(1.0, 1e9), &plain, 1e-3, "far");
     near(&scores(1e200, 0.0), &plain, 1e-9, "large");
+}
+
+#[test]
+fn depth_pro_gives_the_same_boundaries() {
+    let expected = &expected()["depth-edge"];
+    for (name, width, height, seed) in [("boxes", 64, 48, 71), ("narrow", 9, 31, 74)] {
+        let [mut truth, mut prediction] = [Vec::new(), Vec::new()];
+        let at = |x: u64, y: u64| {
+            let block = mix(seed, (y / 6) * 31 + x / 5) % 40;
+            let units = 1000 + block * 23 + mix(seed + 1, y * width + x) % 60;
+            (block, if block == 0 { 65535 } else { units })
+        };
+        for i in 0..width * height {
+            let [x, y] = [i % width, i / width];
+            let (block, units) = at(x, y);
+            let from = if y % 7 == 0 { (x + width - 1) % width } else { x };
+            let moved = at(from, y).1 as f64 * 0.7 + (mix(seed + 2, i) % 50) as f64;
+            truth.push(if units == 65535 { 0.0 } else { units as f64 / 512.0 });
+            prediction.push(if block == 7 { -1.0 } else { moved });
+        }
+        let ours = depth_edges(&truth, &prediction, width as usize);
+        same(&ours.values, &numbers(&expected[name]), name);
+        let itself = depth_edges(&truth, &truth, width as usize);
+        assert_eq!(itself.is_complete, name == "boxes");
+        assert_eq!((itself.values[0] - 1.0).abs() < 1e-12, name == "boxes", "{itself:?}");
+    }
+    let flat = depth_edges(&[700.0 / 512.0; 72], &[2.0; 72], 9);
+    same(&flat.values, &numbers(&expected["flat"]), "flat");
 }
 
 #[test]

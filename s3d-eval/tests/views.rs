@@ -3,7 +3,7 @@
 use crate::images::{classes, depth, images, options, predict, run, write_floats};
 use crate::scene::data_set;
 use s3d_dataset::DataSet;
-use s3d_eval::images::{latitude_weights, pillow_nearest};
+use s3d_eval::images::{EdgeScores, depth_edges, latitude_weights, pillow_nearest};
 use s3d_eval::{Context, EvalOptions, Evaluation, ImageKind, Protocol, evaluate};
 use s3d_geom::Raster;
 use s3d_io::dataset::{DatasetImage, Domain};
@@ -113,6 +113,44 @@ fn depth_that_cannot_be_aligned_is_told() {
         .sum();
     let found = result.score(PLAIN, "mean", "AbsRel").unwrap();
     assert!((found - expected / views.len() as f64).abs() < 1e-9, "{found}, {expected}");
+}
+
+#[test]
+fn boundaries_of_depth_have_their_scores() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = data();
+    // In any unit, the truth itself has what it can reach. The moved one has less.
+    for kind in [ImageKind::Views, ImageKind::Panoramas] {
+        let reachable: Vec<EdgeScores> = images(&data, kind)
+            .iter()
+            .map(|image| {
+                let truth = metres(&data, image);
+                depth_edges(&truth, &truth, depth(&data, image).width() as usize)
+            })
+            .collect();
+        let expected = reachable.iter().map(|scores| scores.values[0]).sum::<f64>() / reachable.len() as f64;
+        let out = dir.path().join(format!("{kind}"));
+        predict_floats(&data, &out, kind, |metres, _| metres * 30.0);
+        let itself = run(Protocol::DepthEdge, data_set(), &out, &EvalOptions::default());
+        let found = itself.score(PLAIN, "mean", "F1").unwrap();
+        assert!((found - expected).abs() < 1e-9 && found > 0.1, "{found}, {expected}");
+        let incomplete = reachable.iter().filter(|scores| !scores.is_complete).count();
+        let told = format!("The truth of {incomplete} {kind} lacks boundaries");
+        assert_eq!(itself.notes.iter().any(|note| note.starts_with(&told)), incomplete > 0);
+        for scores in reachable.iter().filter(|scores| scores.is_complete) {
+            assert!(scores.values.iter().all(|value| (value - 1.0).abs() < 1e-12), "{scores:?}");
+        }
+
+        let out = dir.path().join(format!("{kind} moved"));
+        predict(&data, &out, kind, "npy", |image, path| {
+            let truth = depth(&data, image);
+            let at = |x: u32, y: u32| f64::from(truth.at((x + 1) % truth.width(), y));
+            let moved = (0..truth.height()).flat_map(|y| (0..truth.width()).map(move |x| at(x, y)));
+            write_floats(path, &[truth.height().into(), truth.width().into()], moved);
+        });
+        let moved = run(Protocol::DepthEdge, data_set(), &out, &EvalOptions::default());
+        assert!(moved.score(PLAIN, "mean", "F1").unwrap() < 0.8 * found, "{}", moved.to_markdown());
+    }
 }
 
 #[test]

@@ -2,21 +2,20 @@
 
 use crate::Evaluation;
 use crate::error::{Error, Result};
+use crate::images::depth_files::{Both, Form, both};
 use crate::images::depth_metrics::{DEPTH_COLUMNS, hohonet_depth_twice, unifuse_depth_twice};
 use crate::images::latitude::{BY_LATITUDE, tables_by_latitude, weights_of_pixels};
 use crate::images::marigold::{
     Alignment, MARIGOLD_COLUMNS, is_evaluated as marigold_evaluates, marigold_depth_twice,
 };
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
-use crate::images::read::{self, Holds, Places};
+use crate::images::read::Places;
 use crate::images::resample::{opencv_nearest, pillow_nearest};
 use crate::options::ImageKind;
 use crate::tables::{Unit, tables};
 use crate::task::Task;
 use s3d_dataset::parallel::map_in_order;
-use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
-use s3d_io::image::read_gray16;
 
 const HOHONET: [&str; 5] = [
     "Panoramas are evaluated at 1024 × 512 pixels. Each takes the panorama's pixel at its centre, as in \
@@ -89,24 +88,23 @@ impl Script {
         }
     }
 
-    /// Whether predictions are metres.
-    fn is_metric(self) -> bool {
-        !matches!(self, Self::Marigold(Alignment::Depth | Alignment::Disparity))
-    }
-
-    fn is_evaluated(self, truth: f64) -> bool {
+    fn form(self) -> Form {
         match self {
-            Self::Hohonet => truth > 0.0,
-            Self::Unifuse => truth > 0.0 && truth <= 10.0,
-            Self::Marigold(_) => marigold_evaluates(truth),
-        }
-    }
-
-    fn places(self, size: [u32; 2]) -> Places {
-        match self {
-            Self::Hohonet => Places::new(size, pillow_nearest),
-            Self::Unifuse => Places::new(size, opencv_nearest),
-            Self::Marigold(_) => Places::all(size),
+            Self::Hohonet => Form {
+                places: |size| Places::new(size, pillow_nearest),
+                is_metric: true,
+                is_evaluated: |truth| truth > 0.0,
+            },
+            Self::Unifuse => Form {
+                places: |size| Places::new(size, opencv_nearest),
+                is_metric: true,
+                is_evaluated: |truth| truth > 0.0 && truth <= 10.0,
+            },
+            Self::Marigold(alignment) => Form {
+                places: Places::all,
+                is_metric: alignment == Alignment::Metric,
+                is_evaluated: marigold_evaluates,
+            },
         }
     }
 
@@ -151,7 +149,11 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
         } else {
             Some(ImageKind::Panoramas)
         },
-        other_kind: "depth as marigold, marigold-disparity and marigold-metric evaluates views",
+        other_kind: if of_both {
+            ""
+        } else {
+            "depth as marigold, marigold-disparity and marigold-metric evaluates views"
+        },
         endings: &["png", "npy", "npz"],
         known: &[],
     };
@@ -176,7 +178,7 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
         let values = units
             .iter()
             .filter(|scored| scored.pixels > 0)
-            .map(|scored| &scored.values[by]);
+            .map(|scored| &scored.values[by][..]);
         vec![("mean".to_owned(), mean(values, script.columns().len()))]
     };
     let mut made = tables(task, script.columns(), &units, |units| score(units, 0));
@@ -184,7 +186,7 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
     if kind == ImageKind::Panoramas {
         made.extend(tables_by_latitude(task, script.columns(), &units, |units| score(units, 1)));
         definition.push(BY_LATITUDE);
-        if median_scale || !script.is_metric() {
+        if median_scale || !script.form().is_metric {
             definition.push("What predictions are scaled and shifted by is the same in these tables.");
         }
     }
@@ -203,7 +205,7 @@ struct Scored {
 
 impl Scored {
     fn of(task: &Task<'_>, predicted: &Predicted, script: Script) -> s3d_dataset::Result<Self> {
-        let Both { size, truth, prediction } = both(task, predicted, script)?;
+        let Both { size, truth, prediction } = both(task, predicted, &script.form())?;
         let weights = weights_of_pixels(size);
         let scores = match script {
             Script::Hohonet => hohonet_depth_twice(&truth, &prediction, weights),
@@ -257,7 +259,7 @@ fn notes_on(units: &[Unit<Scored>], noun: &str) -> Vec<String> {
 }
 
 /// Returns the mean of each of `columns` values over images.
-fn mean<'a>(images: impl Iterator<Item = &'a Vec<f64>>, columns: usize) -> Vec<f64> {
+pub(super) fn mean<'a>(images: impl Iterator<Item = &'a [f64]>, columns: usize) -> Vec<f64> {
     let mut sums = vec![0.0; columns];
     let mut count = 0.0;
     for values in images {
@@ -265,63 +267,4 @@ fn mean<'a>(images: impl Iterator<Item = &'a Vec<f64>>, columns: usize) -> Vec<f
         count += 1.0;
     }
     sums.into_iter().map(|sum| sum / count).collect()
-}
-
-/// Truth and prediction at the pixels of the evaluation, and the width and the height of these.
-struct Both {
-    size: [u32; 2],
-    /// Metres. Missing truth is 0.
-    truth: Vec<f64>,
-    prediction: Vec<f64>,
-}
-
-/// Reads truth and prediction. Refuses a file without a prediction where the truth is evaluated.
-fn both(task: &Task<'_>, predicted: &Predicted, script: Script) -> s3d_dataset::Result<Both> {
-    let units = task.data.options().depth_units;
-    let image = read::gray16(task.data, &predicted.image, Domain::Depth)?;
-    let places = script.places([image.width(), image.height()]);
-
-    let truth: Vec<f64> = places
-        .sample(image.pixels())
-        .into_iter()
-        .map(|value| units.metres(value).unwrap_or(0.0))
-        .collect();
-
-    let file = &predicted.file;
-    let (size, prediction) = if read::is_png(file) {
-        let image = read_gray16(file)?;
-        let size = [image.width(), image.height()];
-        read::check_size(file, size, &places.sizes())?;
-        let values = places.sample_prediction(size, image.into_vec()).into_iter();
-        // Without a unit, the largest number is a number like others.
-        let number = |value: u16| {
-            if script.is_metric() {
-                units.metres(value).unwrap_or(f64::NAN)
-            } else {
-                f64::from(value)
-            }
-        };
-        (size, values.map(number).collect())
-    } else {
-        let holds = if script.is_metric() {
-            Holds::Floats(1)
-        } else {
-            Holds::Numbers
-        };
-        let (size, values) = read::array(file, &places.sizes(), holds)?;
-        (size, places.sample_prediction(size, values))
-    };
-
-    let wrong = |(truth, prediction): (&f64, &f64)| script.is_evaluated(*truth) && !prediction.is_finite();
-    if let Some(at) = truth.iter().zip(&prediction).position(wrong) {
-        let [x, y] = places.place(size, at);
-        let found = if read::is_png(file) {
-            "65535 (missing)".to_owned()
-        } else {
-            prediction[at].to_string()
-        };
-        let message = format!("has {found} in column {x}, row {y}, which is evaluated: predict every pixel");
-        return Err(FileError::format(file, message).into());
-    }
-    Ok(Both { size: places.evaluated(), truth, prediction })
 }

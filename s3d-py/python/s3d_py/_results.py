@@ -195,7 +195,7 @@ def evaluate(
     progress: Progress = None,
 ) -> Evaluation:
     """Scores predictions by a protocol: "det", "sem3d", "inst-ap", "inst-cov", "sem-pano", "sem-view",
-    "depth", "normal", "panoptic" or "panoptic3d".
+    "depth", "depth-edge", "normal", "panoptic" or "panoptic3d".
 
     - `truth`: a `DataSet`, or its folder.
     - `pred`: the folder or file of predictions. The page "Evaluation" of the documentation describes its
@@ -206,8 +206,8 @@ def evaluate(
     - `against`: other predictions in the same form. `data["against"]["differences"]` has the difference of
       each score with its interval, over 1,000 draws of the same rooms or images for both, or `bootstrap`.
     - `bootstrap`: the number of draws for 95 % intervals, drawn by `seed`.
-    - `median_scale` (depth), `images` (normal, depth: "views" or "panoramas"), `classes` and `boxes` (det:
-      "points" or "annotations"), `stuff` (panoptic, panoptic3d): see the protocols.
+    - `median_scale` (depth), `images` ("views" or "panoramas", of protocols that are of both), `classes` and
+      `boxes` (det: "points" or "annotations"), `stuff` (panoptic, panoptic3d): see the protocols.
 
     Raises `FileError` for a prediction that is missing, duplicate, or of the wrong size.
     """

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub(crate) struct EvalArgs {
     /// The definition of the scores.
     #[arg(value_parser = parsed::<Protocol>,
-        value_name = "det|sem3d|inst-ap|inst-cov|sem-pano|sem-view|depth|normal|panoptic|panoptic3d")]
+        value_name = "det|sem3d|inst-ap|inst-cov|sem-pano|sem-view|depth|depth-edge|normal|panoptic|panoptic3d")]
     pub(crate) protocol: Protocol,
     /// The data set's folder. Nothing in it is altered.
     #[arg(long, value_name = "OUT")]
@@ -50,8 +50,8 @@ pub(crate) struct EvalArgs {
     /// depth: scale each predicted image to the median of its truth first.
     #[arg(long)]
     pub(crate) median_scale: bool,
-    /// normal, depth as marigold: the kind of images to test [default: the kind that the predictions are named
-    /// after]
+    /// normal, depth as marigold, depth-edge: the kind of images to test [default: the kind that the
+    /// predictions are named after]
     #[arg(long, value_parser = parsed::<ImageKind>, value_name = "views|panoramas")]
     pub(crate) images: Option<ImageKind>,
     /// Add 95 % intervals of the scores: draw rooms (or images, where there are no rooms) N times.

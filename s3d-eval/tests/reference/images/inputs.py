@@ -176,3 +176,20 @@ def view_classes(seed, count):
 
 # Seeds of the views of a fold.
 VIEW_SEEDS = [61, 64, 67]
+
+
+def edges(width, height, seed):
+    """Boxes before a wall, some missing; and a prediction that moves every seventh row by a pixel."""
+    x, y, i = grid(width, height)
+    block = mix(seed, (y // np.uint64(6)) * np.uint64(31) + x // np.uint64(5)) % np.uint64(40)
+    truth = np.uint64(1000) + block * np.uint64(23) + mix(seed + 1, i) % np.uint64(60)
+    truth[block == 0] = 65535
+    prediction = np.where(y % np.uint64(7) == 0, np.roll(truth, 1, 1), truth).astype(np.float64) * 0.7
+    prediction += (mix(seed + 2, i) % np.uint64(50)).astype(np.float64)
+    prediction[block == 7] = -1.0
+    return truth.astype(np.uint16), prediction
+
+
+# Name, truth and prediction in any unit.
+EDGES = [("boxes", *edges(64, 48, 71)), ("narrow", *edges(9, 31, 74)), ("flat", np.full((8, 9), 700, np.uint16),
+                                                                       np.full((8, 9), 2.0))]

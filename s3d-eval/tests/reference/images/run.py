@@ -9,8 +9,8 @@ here = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, here)
 import inputs
 
-PARTS = sys.argv[3:] or ["resampling", "sem_pano", "depths", "normals", "views", "sem_view"]
-if not set(PARTS) <= {"views", "sem_view"}:
+PARTS = sys.argv[3:] or ["resampling", "sem_pano", "depths", "normals", "views", "sem_view", "depth_edge"]
+if not set(PARTS) <= {"views", "sem_view", "depth_edge"}:
     np.float = float  # UniFuse's, which later numpy has not.
     import cv2, imageio.v2 as imageio, PIL, PIL.Image as Image, scipy, skimage, skimage.transform
     import imageio as imageio_package
@@ -262,6 +262,20 @@ def sem_view():
     undefined = [None if np.isnan(v) else float(v) for v in iou]
     out["sem-view"] = {"iou": undefined, "mean": [mean_iou, mean_accuracy], "overall": [freq_iou, accuracy],
                        "pixels": int(labeled)}
+
+
+def depth_edge():
+    """Depth Pro's functions. Missing pixels are NaN, which is above no limit."""
+    said = runpy.run_path(f"{sources}/ml-depth-pro/src/depth_pro/eval/boundary_metrics.py")
+    limits, weights = said["get_thresholds_and_weights"](1.05, 1.25, 10)
+    out["depth-edge"] = {}
+    for name, truth, prediction in inputs.EDGES:
+        truth = np.where(truth == 65535, np.nan, truth / 512.0)
+        prediction = np.where(np.isnan(truth), np.nan, prediction)
+        inverse = [said["invert_depth"](depth) for depth in (prediction, truth)]
+        flags = [{"return_p": True}, {"return_r": True}]
+        of = [sum(w * said["boundary_f1"](*inverse, t, **flag) for t, w in zip(limits, weights)) for flag in flags]
+        out["depth-edge"][name] = [float(v) for v in (said["SI_boundary_F1"](prediction, truth), *of)]
 
 
 for part in PARTS:
