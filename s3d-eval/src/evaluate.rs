@@ -46,6 +46,7 @@ fn run(task: &Task<'_>) -> Result<Evaluation> {
         Protocol::InstCov => points::inst_cov(task),
         Protocol::SemPano => images::sem_pano(task),
         Protocol::SemView => images::sem_view(task),
+        Protocol::SemEdge => images::sem_edge(task),
         Protocol::Depth => images::depth(task),
         Protocol::DepthEdge => images::depth_edge(task),
         Protocol::Normal => images::normal(task),

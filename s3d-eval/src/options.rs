@@ -31,8 +31,8 @@ pub struct EvalOptions {
     pub seed: u64,
     /// `depth` only: scales each predicted image to the median of its truth first.
     pub median_scale: bool,
-    /// `normal`, `depth-edge`, and `depth` as Marigold: the kind of images to evaluate. `None` is the kind
-    /// that the predictions are named after. The other protocols of images have one kind each.
+    /// `normal`, `sem-edge`, `depth-edge`, and `depth` as Marigold: the kind of images to evaluate. `None` is
+    /// the kind that the predictions are named after. The other protocols of images have one kind each.
     #[serde(serialize_with = "word")]
     pub images: Option<ImageKind>,
     /// `det` only: the classes to detect, by name. `None` means the 12 of the paper.
@@ -159,8 +159,14 @@ impl EvalOptions {
     /// # Errors
     /// [`Error::OtherProtocol`] for the first of them.
     pub(crate) fn check_of(&self, protocol: Protocol) -> Result<()> {
-        const OF_IMAGES: &[Protocol] =
-            &[Protocol::Normal, Protocol::SemPano, Protocol::SemView, Protocol::Depth, Protocol::DepthEdge];
+        const OF_IMAGES: &[Protocol] = &[
+            Protocol::Normal,
+            Protocol::SemPano,
+            Protocol::SemView,
+            Protocol::SemEdge,
+            Protocol::Depth,
+            Protocol::DepthEdge,
+        ];
         let given: [(bool, &str, &[Protocol]); 5] = [
             (self.classes.is_some(), "classes", &[Protocol::Det]),
             (self.boxes.is_some(), "boxes", &[Protocol::Det]),
@@ -221,7 +227,7 @@ mod tests {
         let message = views.check_of(Protocol::Det).unwrap_err().to_string();
         assert_eq!(
             message,
-            "det takes no images: normal and sem-pano and sem-view and depth and depth-edge do"
+            "det takes no images: normal and sem-pano and sem-view and sem-edge and depth and depth-edge do"
         );
     }
 

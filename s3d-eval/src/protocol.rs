@@ -20,6 +20,8 @@ pub enum Protocol {
     SemPano,
     /// Semantic segmentation of views, like CMX.
     SemView,
+    /// Boundaries of classes in images, like DAVIS.
+    SemEdge,
     /// Depth of panoramas, like HoHoNet or UniFuse, or of any images, like Marigold.
     Depth,
     /// Boundaries in depth, like Depth Pro.
@@ -37,13 +39,14 @@ type Entry = (Protocol, &'static str, u32, &'static [&'static str]);
 
 const DEPTH: [&str; 5] = ["hohonet", "unifuse", "marigold", "marigold-disparity", "marigold-metric"];
 
-const PROTOCOLS: [Entry; 11] = [
+const PROTOCOLS: [Entry; 12] = [
     (Protocol::Det, "det", 2, &["mmdetection3d", "open3d-ml"]),
     (Protocol::Sem3d, "sem3d", 1, &["pointcept", "nanmean"]),
     (Protocol::InstAp, "inst-ap", 1, &["pointcept"]),
     (Protocol::InstCov, "inst-cov", 1, &["asis"]),
     (Protocol::SemPano, "sem-pano", 1, &["hohonet"]),
     (Protocol::SemView, "sem-view", 1, &["cmx"]),
+    (Protocol::SemEdge, "sem-edge", 1, &["davis"]),
     (Protocol::Depth, "depth", 1, &DEPTH),
     (Protocol::DepthEdge, "depth-edge", 1, &["depth-pro"]),
     (Protocol::Normal, "normal", 1, &["dsine", "omnidata"]),

@@ -1,9 +1,9 @@
 //! Compares the metrics of images with the reference programs: `reference/images/README.md`.
 
 use s3d_eval::images::{
-    Alignment, AngleSums, Confusion, Lanczos, PANORAMA, PanoramaClasses, depth_edges, dsine_angle,
-    hohonet_depth, marigold_depth, median_of_angles, omnidata_angle, omnidata_scores, opencv_nearest,
-    pillow_nearest, unifuse_depth,
+    Alignment, AngleSums, Confusion, Lanczos, PANORAMA, PanoramaClasses, class_outlines, depth_edges,
+    dsine_angle, hohonet_depth, marigold_depth, median_of_angles, omnidata_angle, omnidata_scores,
+    opencv_nearest, pillow_nearest, unifuse_depth,
 };
 use s3d_geom::Raster;
 use serde_json::Value;
@@ -362,6 +362,47 @@ fn depth_pro_gives_the_same_boundaries() {
     }
     let flat = depth_edges(&[700.0 / 512.0; 72], &[2.0; 72], 9);
     same(&flat.values, &numbers(&expected["flat"]), "flat");
+}
+
+#[test]
+fn davis_gives_the_same_boundaries_of_classes() {
+    let expected = &expected()["sem-edge"];
+    let blocks = |width: u64, height: u64, seed: u64, shift: u64| {
+        let block = move |x: u64, y: u64| match mix(seed, (y / 13) * 37 + x / 17) % 7 {
+            6 => None,
+            class => Some(class as u8),
+        };
+        let pixels = (0..width * height).map(move |i| {
+            let [x, y] = [i % width, i / width];
+            let guess = if mix(seed + 1, i).is_multiple_of(97) {
+                (mix(seed + 2, i) % 8) as u8
+            } else {
+                block(x + shift, y + shift).unwrap_or(4)
+            };
+            let truth = block(x, y);
+            (truth, truth.map(|_| guess))
+        });
+        (pixels.unzip(), [width as u32, height as u32])
+    };
+    let plain = |guess: u8| ((vec![Some(3); 108], vec![Some(guess); 108]), [12, 9]);
+    for (name, ((truth, guess), size)) in [
+        ("near", blocks(160, 120, 81, 1)),
+        ("far", blocks(160, 120, 84, 4)),
+        ("narrow", blocks(19, 70, 87, 1)),
+        ("large", blocks(420, 300, 90, 3)),
+        ("whole", plain(3)),
+        ("other", plain(1)),
+    ] {
+        let ours = class_outlines(&truth, &guess, size);
+        assert_eq!(ours.len(), expected[name].as_object().unwrap().len(), "{name}");
+        for (class, [f, precision, recall]) in ours {
+            let theirs = expected[name][class.to_string()].as_f64().unwrap();
+            same(&[f], &[theirs], name);
+            assert!(f <= precision.max(recall) && f >= precision.min(recall));
+        }
+        let itself = class_outlines(&truth, &truth, size);
+        assert!(itself.iter().all(|(_, scores)| *scores == [1.0; 3]));
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::images::{classes, depth, images, options, predict, run, write_floats};
 use crate::scene::data_set;
 use s3d_dataset::DataSet;
-use s3d_eval::images::{EdgeScores, depth_edges, latitude_weights, pillow_nearest};
+use s3d_eval::images::{EdgeScores, class_outlines, depth_edges, latitude_weights, pillow_nearest};
 use s3d_eval::{Context, EvalOptions, Evaluation, ImageKind, Protocol, evaluate};
 use s3d_geom::Raster;
 use s3d_io::dataset::{DatasetImage, Domain};
@@ -224,6 +224,60 @@ fn classes_of_views_have_their_scores() {
     {
         let found = result.score(PLAIN, row, column).unwrap();
         assert!((found - expected).abs() < 1e-12 && found > 0.0, "{row} {column}: {found}, {expected}");
+    }
+}
+
+#[test]
+fn boundaries_of_classes_have_their_scores() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = data();
+    for kind in [ImageKind::Views, ImageKind::Panoramas] {
+        let out = dir.path().join(format!("{kind}"));
+        predict(&data, &out, kind, "png", |image, path| {
+            fs::write(path, encode_gray8(&classes(&data, image))).unwrap();
+        });
+        let result = run(Protocol::SemEdge, data_set(), &out, &EvalOptions::default());
+        let table = &result.tables[0];
+        assert!(table.scores().all(|score| score.is_nan() || score == 1.0), "{}", result.to_markdown());
+        assert_eq!((table.title.as_str(), table.rows.len()), (PLAIN, 14));
+        assert_eq!(result.score(PLAIN, "mean", "F"), Some(1.0));
+        assert_eq!(result.counted[&*kind.to_string()], images(&data, kind).len() as u64);
+
+        // Moved by three pixels, where one is near enough: each class's mean over the images that have it.
+        let out = dir.path().join(format!("{kind} moved"));
+        let moved = |truth: &Raster<u8>| {
+            let [width, height] = [truth.width(), truth.height()];
+            let at = |x: u32, y: u32| truth.at((x + 3) % width, y);
+            let pixels = (0..height).flat_map(|y| (0..width).map(move |x| at(x, y)));
+            let known = pixels.map(|class| if class == 255 { 0 } else { class });
+            Raster::from_vec(width, height, known.collect())
+        };
+        predict(&data, &out, kind, "png", |image, path| {
+            fs::write(path, encode_gray8(&moved(&classes(&data, image)))).unwrap();
+        });
+        let result = run(Protocol::SemEdge, data_set(), &out, &EvalOptions::default());
+        let mut of_walls = Vec::new();
+        for image in images(&data, kind) {
+            let truth = classes(&data, &image);
+            let guess = moved(&truth);
+            let there = truth.pixels().iter().map(|class| (*class < 255).then_some(*class));
+            let there: Vec<Option<u8>> = there.collect();
+            let guesses: Vec<Option<u8>> = there
+                .iter()
+                .zip(guess.pixels())
+                .map(|(class, guess)| class.map(|_| *guess))
+                .collect();
+            let scores = class_outlines(&there, &guesses, [truth.width(), truth.height()]);
+            of_walls.extend(
+                scores
+                    .into_iter()
+                    .filter(|(class, _)| *class == 2)
+                    .map(|(_, scores)| scores[0]),
+            );
+        }
+        let mean = of_walls.iter().sum::<f64>() / of_walls.len() as f64;
+        let found = result.score(PLAIN, "wall", "F").unwrap();
+        assert!((found - mean).abs() < 1e-12 && found < 0.9, "{found}, {mean}");
     }
 }
 

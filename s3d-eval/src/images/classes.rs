@@ -3,10 +3,13 @@
 use crate::ConfusionTable;
 use crate::error::Result;
 use crate::images::confusion::Confusion;
+use crate::images::predictions::Predicted;
 use crate::images::read::{self, Holds, Places};
 use crate::tables::Rows;
 use crate::task::Task;
+use s3d_dataset::DataSet;
 use s3d_io::Error as FileError;
+use s3d_io::dataset::Domain;
 use s3d_io::image::read_numbers8;
 use s3d_label::{LabelId, Taxonomy};
 use std::fs;
@@ -55,7 +58,7 @@ impl<'a> Classes<'a> {
     ///
     /// # Errors
     /// As [`of_label`](Self::of_label).
-    pub(super) fn of_pixel(&self, [r, g, b]: [u8; 3]) -> Result<Option<u8>, String> {
+    fn of_pixel(&self, [r, g, b]: [u8; 3]) -> Result<Option<u8>, String> {
         // Indices have 16 bits. Higher numbers are pixels that show nothing.
         if r == 0 {
             self.of_label(u16::from_be_bytes([g, b]).into())
@@ -84,13 +87,38 @@ impl<'a> Classes<'a> {
         ConfusionTable { classes: names.collect(), counts: confusion.rows() }
     }
 
-    /// Returns the rows of the classes in a table.
-    pub(super) fn rows(&self, iou: Vec<f64>, accuracy: Vec<f64>) -> Rows {
-        let classes = self.taxonomy.classes().iter();
-        classes
-            .zip(iou.into_iter().zip(accuracy))
-            .map(|(class, (iou, accuracy))| (class.name().to_owned(), vec![iou, accuracy]))
-            .collect()
+    /// Returns the rows of the classes in a table, given the scores of each class.
+    pub(super) fn rows(&self, scores: impl Iterator<Item = Vec<f64>>) -> Rows {
+        let names = self.taxonomy.classes().iter().map(|class| class.name().to_owned());
+        names.zip(scores).collect()
+    }
+
+    /// Hands on the true and the predicted class of each pixel of an image, row by row; `None` where it has
+    /// no label. Returns the width and the height.
+    pub(super) fn pair(
+        &self,
+        data: &DataSet,
+        predicted: &Predicted,
+        mut put: impl FnMut(Option<[u8; 2]>),
+    ) -> s3d_dataset::Result<[u32; 2]> {
+        let truth = read::rgb8(data, &predicted.image, Domain::Semantic)?;
+        let places = Places::all([truth.width(), truth.height()]);
+        let (size, numbers) = self.numbers(&predicted.file, &places)?;
+
+        for (at, (pixel, number)) in truth.pixels().iter().zip(&numbers).enumerate() {
+            let class = self.of_pixel(*pixel).map_err(|message| {
+                FileError::format(&predicted.image.path(data.layout(), Domain::Semantic), message)
+            })?;
+            let Some(class) = class else {
+                put(None);
+                continue;
+            };
+            match self.of_number(*number) {
+                Some(guess) => put(Some([class, guess])),
+                None => return Err(self.no_class(&predicted.file, *number, places.place(size, at))),
+            }
+        }
+        Ok(size)
     }
 
     /// Reads the numbers of a prediction at the evaluated pixels, and the size that it has.

@@ -13,10 +13,12 @@ mod marigold;
 mod median;
 mod normal;
 mod normal_metrics;
+mod outline_metrics;
 mod panorama;
 mod predictions;
 mod read;
 mod resample;
+mod sem_edge;
 mod sem_pano;
 mod sem_view;
 
@@ -29,11 +31,13 @@ pub use marigold::{Alignment, MARIGOLD_COLUMNS, MarigoldScores, marigold_depth};
 pub use normal_metrics::{
     AngleSums, DSINE_LIMITS, dsine_angle, median_of_angles, omnidata_angle, omnidata_scores,
 };
+pub use outline_metrics::class_outlines;
 pub use panorama::{PANORAMA, PanoramaClasses};
 pub use resample::{opencv_nearest, pillow_nearest};
 
 pub(crate) use depth::depth;
 pub(crate) use depth_edge::depth_edge;
 pub(crate) use normal::normal;
+pub(crate) use sem_edge::sem_edge;
 pub(crate) use sem_pano::sem_pano;
 pub(crate) use sem_view::sem_view;

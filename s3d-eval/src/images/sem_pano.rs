@@ -86,7 +86,8 @@ pub(crate) fn sem_pano(task: &Task<'_>) -> Result<Evaluation> {
 
 fn rows(classes: &Classes<'_>, scores: ClassScores) -> Rows {
     let mean = vec![scores.mean_iou, scores.mean_accuracy];
-    let mut rows = classes.rows(scores.iou, scores.accuracy);
+    let by_class = scores.iou.into_iter().zip(scores.accuracy);
+    let mut rows = classes.rows(by_class.map(|(iou, accuracy)| vec![iou, accuracy]));
     rows.push(("mean".to_owned(), mean));
     rows
 }

@@ -4,14 +4,11 @@ use crate::Evaluation;
 use crate::error::{Error, Result};
 use crate::images::classes::{Classes, ENDINGS, LIST};
 use crate::images::confusion::Confusion;
-use crate::images::predictions::{Matched, Predicted, Wanted, find};
-use crate::images::read::{self, Places};
+use crate::images::predictions::{Matched, Wanted, find};
 use crate::options::ImageKind;
 use crate::tables::tables;
 use crate::task::Task;
-use s3d_dataset::DataSet;
 use s3d_dataset::parallel::map_in_order;
-use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
 
 const DEFINITION: [&str; 5] = [
@@ -46,7 +43,12 @@ pub(crate) fn sem_view(task: &Task<'_>) -> Result<Evaluation> {
         &images,
         || (),
         |(), predicted| {
-            let confusion = compare(task.data, predicted, &classes)?;
+            let mut confusion = Confusion::new(classes.count);
+            classes.pair(task.data, predicted, |pair| {
+                if let Some([truth, guess]) = pair {
+                    confusion.count(truth.into(), guess.into());
+                }
+            })?;
             progress.add(1);
             Ok(predicted.unit(confusion.counted()))
         },
@@ -55,7 +57,8 @@ pub(crate) fn sem_view(task: &Task<'_>) -> Result<Evaluation> {
 
     let tables = tables(task, &["IoU", "accuracy"], &units, |units| {
         let scores = classes.sum(units.iter().copied()).view_scores();
-        let mut rows = classes.rows(scores.iou, scores.accuracy);
+        let by_class = scores.iou.into_iter().zip(scores.accuracy);
+        let mut rows = classes.rows(by_class.map(|(iou, accuracy)| vec![iou, accuracy]));
         rows.push(("mean".to_owned(), vec![scores.mean_iou, scores.mean_accuracy]));
         rows.push(("overall".to_owned(), vec![scores.weighted_iou, scores.pixel_accuracy]));
         rows
@@ -67,24 +70,4 @@ pub(crate) fn sem_view(task: &Task<'_>) -> Result<Evaluation> {
         confusion: Some(classes.table(&all)),
         ..task.evaluation(&DEFINITION, counted, tables)
     })
-}
-
-/// Counts the pixels of a view by their true and their predicted class.
-fn compare(data: &DataSet, predicted: &Predicted, classes: &Classes<'_>) -> s3d_dataset::Result<Confusion> {
-    let truth = read::rgb8(data, &predicted.image, Domain::Semantic)?;
-    let places = Places::all([truth.width(), truth.height()]);
-    let (size, numbers) = classes.numbers(&predicted.file, &places)?;
-
-    let mut confusion = Confusion::new(classes.count);
-    for (at, (pixel, number)) in truth.pixels().iter().zip(&numbers).enumerate() {
-        let class = classes.of_pixel(*pixel).map_err(|message| {
-            FileError::format(&predicted.image.path(data.layout(), Domain::Semantic), message)
-        })?;
-        let Some(class) = class else { continue };
-        match classes.of_number(*number) {
-            Some(number) => confusion.count(class.into(), number.into()),
-            None => return Err(classes.no_class(&predicted.file, *number, places.place(size, at))),
-        }
-    }
-    Ok(confusion)
 }

@@ -195,7 +195,7 @@ def evaluate(
     progress: Progress = None,
 ) -> Evaluation:
     """Scores predictions by a protocol: "det", "sem3d", "inst-ap", "inst-cov", "sem-pano", "sem-view",
-    "depth", "depth-edge", "normal", "panoptic" or "panoptic3d".
+    "sem-edge", "depth", "depth-edge", "normal", "panoptic" or "panoptic3d".
 
     - `truth`: a `DataSet`, or its folder.
     - `pred`: the folder or file of predictions. The page "Evaluation" of the documentation describes its

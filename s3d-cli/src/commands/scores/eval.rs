@@ -10,11 +10,14 @@ use s3d_dataset::pack::ClassList;
 use s3d_eval::{BoxSource, Error, EvalOptions, Folds, ImageKind, Protocol};
 use std::path::PathBuf;
 
+const PROTOCOLS: &str =
+    "det|sem3d|inst-ap|inst-cov|sem-pano|sem-view|sem-edge|depth|depth-edge|normal|panoptic|panoptic3d";
+
 #[derive(Debug, Args)]
 pub(crate) struct EvalArgs {
     /// The definition of the scores.
     #[arg(value_parser = parsed::<Protocol>,
-        value_name = "det|sem3d|inst-ap|inst-cov|sem-pano|sem-view|depth|depth-edge|normal|panoptic|panoptic3d")]
+        value_name = PROTOCOLS)]
     pub(crate) protocol: Protocol,
     /// The data set's folder. Nothing in it is altered.
     #[arg(long, value_name = "OUT")]
@@ -50,8 +53,8 @@ pub(crate) struct EvalArgs {
     /// depth: scale each predicted image to the median of its truth first.
     #[arg(long)]
     pub(crate) median_scale: bool,
-    /// normal, depth as marigold, depth-edge: the kind of images to test [default: the kind that the
-    /// predictions are named after]
+    /// normal, depth as marigold, depth-edge, sem-edge: the kind of images to test [default: the kind that
+    /// the predictions are named after]
     #[arg(long, value_parser = parsed::<ImageKind>, value_name = "views|panoramas")]
     pub(crate) images: Option<ImageKind>,
     /// Add 95 % intervals of the scores: draw rooms (or images, where there are no rooms) N times.
@@ -109,5 +112,16 @@ fn failure(error: Error) -> Failure {
         Error::Classes { option, fault } => Failure::Usage(format!("--{option}: {fault}")),
         error if error.is_usage() => Failure::Usage(error.to_string()),
         error => Failure::Input(error.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_help_names_all_protocols() {
+        let names: Vec<&str> = Protocol::all().map(Protocol::name).collect();
+        assert_eq!(PROTOCOLS, names.join("|"));
     }
 }

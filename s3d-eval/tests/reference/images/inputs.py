@@ -193,3 +193,23 @@ def edges(width, height, seed):
 # Name, truth and prediction in any unit.
 EDGES = [("boxes", *edges(64, 48, 71)), ("narrow", *edges(9, 31, 74)), ("flat", np.full((8, 9), 700, np.uint16),
                                                                        np.full((8, 9), 2.0))]
+
+
+def outlines(width, height, seed, shift):
+    """Classes in blocks, 255 for no label; and a prediction that is moved by rows and columns, with some noise."""
+    x, y, i = grid(width, height)
+
+    def block(x, y):
+        kind = mix(seed, (y // np.uint64(13)) * np.uint64(37) + x // np.uint64(17)) % np.uint64(7)
+        return np.where(kind == 6, np.uint64(255), kind)
+
+    prediction = block(x + np.uint64(shift), y + np.uint64(shift))
+    noisy = mix(seed + 1, i) % np.uint64(97) == 0
+    prediction = np.where(noisy, mix(seed + 2, i) % np.uint64(8), prediction)
+    return block(x, y).astype(np.int64), np.where(prediction == 255, 4, prediction).astype(np.int64)
+
+
+# Name, true and predicted classes.
+OUTLINES = [("near", *outlines(160, 120, 81, 1)), ("far", *outlines(160, 120, 84, 4)), ("narrow", *outlines(19, 70, 87, 1)),
+            ("large", *outlines(420, 300, 90, 3)), ("whole", np.full((9, 12), 3), np.full((9, 12), 3)),
+            ("other", np.full((9, 12), 3), np.full((9, 12), 1))]

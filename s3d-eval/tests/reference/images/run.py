@@ -9,8 +9,8 @@ here = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, here)
 import inputs
 
-PARTS = sys.argv[3:] or ["resampling", "sem_pano", "depths", "normals", "views", "sem_view", "depth_edge"]
-if not set(PARTS) <= {"views", "sem_view", "depth_edge"}:
+PARTS = sys.argv[3:] or ["resampling", "sem_pano", "depths", "normals", "views", "sem_view", "depth_edge", "sem_edge"]
+if not set(PARTS) <= {"views", "sem_view", "depth_edge", "sem_edge"}:
     np.float = float  # UniFuse's, which later numpy has not.
     import cv2, imageio.v2 as imageio, PIL, PIL.Image as Image, scipy, skimage, skimage.transform
     import imageio as imageio_package
@@ -276,6 +276,17 @@ def depth_edge():
         flags = [{"return_p": True}, {"return_r": True}]
         of = [sum(w * said["boundary_f1"](*inverse, t, **flag) for t, w in zip(limits, weights)) for flag in flags]
         out["depth-edge"][name] = [float(v) for v in (said["SI_boundary_F1"](prediction, truth), *of)]
+
+
+def sem_edge():
+    """DAVIS's function, on the mask of each class that is there. It returns F alone."""
+    said = runpy.run_path(f"{sources}/davis2017-evaluation/davis2017/metrics.py")
+    out["sem-edge"] = {}
+    for name, truth, prediction in inputs.OUTLINES:
+        void = truth == 255
+        there = sorted((set(truth[~void]) | set(prediction[~void])))
+        out["sem-edge"][name] = {str(c): float(said["db_eval_boundary"](truth == c, prediction == c, void))
+                                 for c in there}
 
 
 for part in PARTS:
