@@ -5,4 +5,5 @@ mod common;
 
 mod fill;
 mod library;
+mod strays;
 mod useful;

@@ -97,7 +97,7 @@ pub use taxonomy::{
 };
 #[cfg(feature = "vote")]
 pub use voting::{
-    ClassDispute, DisputedPatch, Disputes, FaceLabels, FaceVotes, Labeler, PointTally, VoteError,
+    ClassDispute, DisputedPatch, Disputes, FaceLabels, FaceVotes, Labeler, PointTally, Stray, VoteError,
     VoteOptions, VoteReport, VoteRow, Votes, fill_labels, vote,
 };
 pub use wall_direction::wall_directions_deg;

@@ -295,6 +295,7 @@ mod tests {
             "pool",
             "lenient",
             "fill",
+            "trim_strays",
             "entropy_stride",
             "modalities",
             "keep_all",

@@ -163,7 +163,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     findings.extend(size_findings(mesh, defaults.points_per_m2)?);
 
     let scene = Scene::new(mesh);
-    let survey_options = SurveyOptions { table: &inputs.table, fill_m: None, seed };
+    let survey_options = SurveyOptions { table: &inputs.table, fill_m: None, trim_m: None, seed };
     let mut surveyor = InfoSurveyor { doubts: &mut doubts, findings: &mut findings };
     let survey = survey(ctx, area, &scene, NearestFaces::new(mesh), survey_options, &mut surveyor)?;
     let Survey { annotated, located, outlooks } = survey;

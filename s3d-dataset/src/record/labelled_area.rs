@@ -116,6 +116,7 @@ mod tests {
     use crate::survey::annotated::Annotated;
     use crate::survey::annotated::{SkippedLines, SurveyedRoom};
     use crate::survey::room_names::{InstanceName, RoomNames};
+    use crate::survey::strays::Strays;
     use crate::survey::surface_seen::SurfaceSeen;
     use glam::{DMat3, DVec2, DVec3, Vec3};
     use proptest::prelude::*;
@@ -215,6 +216,7 @@ mod tests {
                     }],
                     points: u64::from(count),
                     skipped: SkippedLines::default(),
+                    strays: Strays::default(),
                 },
                 names: vec![
                     RoomNames {

@@ -157,6 +157,7 @@ impl Request {
             size,
             lenient,
             fill,
+            trim_strays,
             entropy_stride,
             // The request has these elsewhere.
             seed: _,
@@ -184,6 +185,7 @@ impl Request {
             size,
             lenient,
             fill,
+            trim_strays,
             entropy_stride,
             modalities: Vec::new(),
             ..ExportOptions::default()
@@ -423,6 +425,8 @@ pub(crate) mod tests {
         assert!(other_images.is_empty());
         assert_eq!(changed_plan(|r| r.options.size = 64), ["`size` 1080 there, 64 now"]);
         assert_eq!(changed_plan(|r| r.options.fill = Some(0.5)), ["`fill` none there, 0.5 now"]);
+        let trimmed = changed_plan(|r| r.options.trim_strays = Some(1.0));
+        assert_eq!(trimmed, ["`trim_strays` none there, 1.0 now"]);
         assert_eq!(changed_plan(|r| r.options.lenient = true), ["`lenient` now, not there"]);
         assert_eq!(changed_plan(|r| r.seed = 7), ["`seed` 0 there, 7 now"]);
 

@@ -1,6 +1,7 @@
 //! The result of annotations for an area's mesh and rooms.
 
 use crate::summary::{Surface, Unlabelled};
+use crate::survey::strays::Strays;
 use s3d_geom::{Aabb, Footprint, TriMesh};
 use s3d_label::{LabelId, Room, VoteReport, fill_labels};
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,8 @@ pub(crate) struct Annotated {
     pub(crate) points: u64,
     #[serde(skip)]
     pub(crate) skipped: SkippedLines,
+    #[serde(skip)]
+    pub(crate) strays: Strays,
 }
 
 impl Annotated {

@@ -5,4 +5,5 @@ pub(crate) mod candidate;
 pub(crate) mod labelled_area;
 pub(crate) mod outlook;
 pub(crate) mod room_names;
+pub(crate) mod strays;
 pub(crate) mod surface_seen;

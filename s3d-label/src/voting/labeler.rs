@@ -89,6 +89,38 @@ pub struct Labeler<'m> {
     nearest: Vec<Nearest>,
     /// The vertices of a chunk that are not at a corner; kept for its memory.
     others: Vec<Vec3>,
+    /// Where these vertices are in their block; kept for its memory.
+    places: Vec<usize>,
+    watch: Watch,
+}
+
+/// A point that is far from every face of the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stray {
+    /// Its index in its block.
+    pub point: usize,
+    /// Its distance to the nearest face, metres.
+    pub distance_m: f32,
+}
+
+/// What is noted of points that are far from the mesh.
+#[derive(Clone, Debug)]
+struct Watch {
+    beyond_m: f32,
+    /// Whether these points vote.
+    vote: bool,
+    found: Vec<Stray>,
+}
+
+impl Watch {
+    /// Notes a point if it is far, and returns whether it votes.
+    fn lets_vote(&mut self, point: usize, distance_m: f32) -> bool {
+        let is_stray = distance_m > self.beyond_m;
+        if is_stray {
+            self.found.push(Stray { point, distance_m });
+        }
+        self.vote || !is_stray
+    }
 }
 
 impl<'m> Labeler<'m> {
@@ -103,7 +135,42 @@ impl<'m> Labeler<'m> {
     /// If `far_m` is NaN.
     pub fn with_options(nearest_faces: &'m NearestFaces<'m>, options: VoteOptions) -> Self {
         let votes = Votes::with_options(nearest_faces.mesh().faces().len(), options);
-        Self { nearest_faces, votes, corners: None, nearest: Vec::new(), others: Vec::new() }
+        Self {
+            nearest_faces,
+            votes,
+            corners: None,
+            nearest: Vec::new(),
+            others: Vec::new(),
+            places: Vec::new(),
+            watch: Watch { beyond_m: f32::INFINITY, vote: true, found: Vec::new() },
+        }
+    }
+
+    /// Notes from now on which points of [`add_points`](Self::add_points) and
+    /// [`add_vertices`](Self::add_vertices) are farther than `beyond_m` metres from every face. They vote
+    /// only if `vote`, and otherwise count nowhere. [`take_strays`](Self::take_strays) returns them.
+    ///
+    /// ```
+    /// use s3d_geom::{NearestFaces, TriMesh, glam::{Vec3, vec3}};
+    /// use s3d_label::{LabelId, Labeler};
+    ///
+    /// let mesh = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]])?;
+    /// let nearest_faces = NearestFaces::new(&mesh);
+    /// let mut labeler = Labeler::new(&nearest_faces);
+    /// labeler.watch_strays(1.0, false);
+    /// labeler.add_points(&[Vec3::ZERO, vec3(0.0, 0.0, 40.0)], LabelId(1))?;
+    /// let strays = labeler.take_strays();
+    /// assert_eq!((strays.len(), strays[0].point, strays[0].distance_m), (1, 1, 40.0));
+    /// assert_eq!(labeler.finish().votes_of(0).unwrap().votes, 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn watch_strays(&mut self, beyond_m: f32, vote: bool) {
+        self.watch = Watch { beyond_m, vote, found: Vec::new() };
+    }
+
+    /// Returns the points far from the mesh that were added since the last call, in their order.
+    pub fn take_strays(&mut self) -> Vec<Stray> {
+        std::mem::take(&mut self.watch.found)
     }
 
     /// Adds points (world metres) with the same label, such as the points of an instance. Each votes for its
@@ -114,11 +181,13 @@ impl<'m> Labeler<'m> {
     pub fn add_points(&mut self, points: &[Vec3], label: LabelId) -> Result<(), VoteError> {
         check_points(points)?;
         check_label(label)?;
-        for points in points.chunks(CHUNK_POINTS) {
+        for (start, points) in (0..).step_by(CHUNK_POINTS).zip(points.chunks(CHUNK_POINTS)) {
             self.nearest_faces.nearest_many(points, &mut self.nearest);
-            self.nearest
-                .iter()
-                .for_each(|n| self.votes.add(n.face, label, n.distance_m));
+            for (point, n) in (start..).zip(&self.nearest) {
+                if self.watch.lets_vote(point, n.distance_m) {
+                    self.votes.add(n.face, label, n.distance_m);
+                }
+            }
         }
         Ok(())
     }
@@ -160,9 +229,10 @@ impl<'m> Labeler<'m> {
         let corners = self
             .corners
             .get_or_insert_with(|| Corners::new(self.nearest_faces.mesh()));
-        for vertices in vertices.chunks(CHUNK_POINTS) {
+        for (start, vertices) in (0..).step_by(CHUNK_POINTS).zip(vertices.chunks(CHUNK_POINTS)) {
             self.others.clear();
-            for vertex in vertices {
+            self.places.clear();
+            for (place, vertex) in (start..).zip(vertices) {
                 let mut is_corner = false;
                 for face in corners.faces_at(*vertex) {
                     self.votes.add(face, label, 0.0);
@@ -170,13 +240,16 @@ impl<'m> Labeler<'m> {
                 }
                 if !is_corner {
                     self.others.push(*vertex);
+                    self.places.push(place);
                 }
             }
 
             self.nearest_faces.nearest_many(&self.others, &mut self.nearest);
-            self.nearest
-                .iter()
-                .for_each(|n| self.votes.add(n.face, label, n.distance_m));
+            for (place, n) in self.places.iter().zip(&self.nearest) {
+                if self.watch.lets_vote(*place, n.distance_m) {
+                    self.votes.add(n.face, label, n.distance_m);
+                }
+            }
         }
         Ok(())
     }

@@ -11,6 +11,6 @@ mod votes;
 pub use disputes::{ClassDispute, DisputedPatch, Disputes};
 pub use face_labels::FaceLabels;
 pub use fill::fill_labels;
-pub use labeler::{Labeler, VoteError, vote};
+pub use labeler::{Labeler, Stray, VoteError, vote};
 pub use report::{VoteReport, VoteRow};
 pub use votes::{FaceVotes, PointTally, VoteOptions, Votes};

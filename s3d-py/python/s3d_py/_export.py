@@ -71,6 +71,8 @@ class ExportOptions(TypedDict, total=False):
     """Skips faulty annotations, and counts them."""
     fill: float
     """Gives faces without a vote the label of the surface next to them, up to this distance in metres."""
+    trim_strays: float
+    """Leaves out annotated points that are farther than this from every face of the mesh, in metres."""
     entropy_stride: int
     """The score of a candidate view counts the classes of every n-th pixel along both axes; default 4."""
     modalities: list[str]

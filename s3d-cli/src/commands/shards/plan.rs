@@ -28,8 +28,18 @@ pub(crate) struct PlanArgs {
 }
 
 /// The options of an export on which labels and scores depend, in the order of the help.
-const PLANNED: [&str; 9] =
-    ["views", "size", "seed", "place_cameras", "see", "entropy_stride", "lenient", "fill", "allow"];
+const PLANNED: [&str; 10] = [
+    "views",
+    "size",
+    "seed",
+    "place_cameras",
+    "see",
+    "entropy_stride",
+    "lenient",
+    "fill",
+    "trim_strays",
+    "allow",
+];
 
 /// The options of an export for a plan. It takes the ones in [`PLANNED`] as `s3d export` does; all others
 /// have their defaults.

@@ -5,10 +5,13 @@ use crate::error::{Error, InputError, Result};
 use crate::export::input::area::AreaInput;
 use crate::summary::Unlabelled;
 use crate::survey::annotated::{Annotated, SkippedLines, SurveyedRoom};
+use crate::survey::strays::{InstanceStrays, STRAY_M, Strays};
+use s3d_geom::glam::Vec3;
 use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance as InstancePoints, InstanceReader, PointPasses};
 use s3d_label::{FaceLabels, Label, LabelId, LabelTable, Labeler, wall_directions_deg};
+use std::borrow::Cow;
 
 /// The points of a block. Three blocks are in memory: while some points are looked up, the next are read.
 const BLOCK_POINTS: usize = 1 << 19;
@@ -26,17 +29,20 @@ pub(crate) struct AnnotatedInstance<'a> {
 /// Reads an area's annotated points, one instance at a time and block by block, and lets each point vote for
 /// its nearest face. Calls `each` with every instance, its box and its points, in the order of rooms and of
 /// numbers in the room. Fills faces without a vote that are nearer to labelled surface than `fill_m`, metres;
-/// `None` fills none. Returns the labels and the votes behind them.
+/// `None` fills none. Leaves out points that are farther from the mesh than `trim_m`, metres; `None` leaves
+/// out none. Returns the labels and the votes behind them.
 pub(crate) fn annotate(
     ctx: &Context,
     area: &AreaInput,
     nearest_faces: &NearestFaces<'_>,
     table: &LabelTable,
-    fill_m: Option<f64>,
+    [fill_m, trim_m]: [Option<f64>; 2],
     mut each: impl FnMut(AnnotatedInstance<'_>) -> Result<()> + Send,
 ) -> Result<(Annotated, FaceLabels)> {
     let mesh = nearest_faces.mesh();
     let mut labeler = Labeler::new(nearest_faces);
+    labeler.watch_strays(trim_m.unwrap_or(STRAY_M) as f32, trim_m.is_none());
+    let mut strays = Strays { left_out: trim_m.is_some(), instances: Vec::new() };
     let mut rooms = Rooms::default();
     let mut total = 0u64;
     let mut skipped = SkippedLines::default();
@@ -57,24 +63,37 @@ pub(crate) fn annotate(
 
             let mut bbox = Aabb::EMPTY;
             let mut is_handed_out = false;
+            let mut far = InstanceStrays::new(instance.label, instance.points.source());
             let take = |block: &PointCloud, is_whole: bool| -> Result<()> {
                 ctx.check()?;
-                bbox = bbox.union(Aabb::from_points(block.positions.iter().copied()));
+                // The vote tells which points are to be left out.
+                let positions = if trim_m.is_some() {
+                    vote(&mut labeler, &instance.points, block, id)?;
+                    far.take(&block.positions, &labeler.take_strays())
+                } else {
+                    Cow::Borrowed(&block.positions[..])
+                };
+                bbox = bbox.union(Aabb::from_points(positions.iter().copied()));
                 let hand_out = || {
-                    if !is_whole {
+                    if !is_whole || positions.is_empty() {
                         return Ok(());
                     }
                     is_handed_out = true;
-                    let points = &mut &block.positions[..];
+                    let points = &mut &positions[..];
                     each(AnnotatedInstance { label: instance.label, id, bbox, points })
                 };
+                let draw = || positions.iter().for_each(|p| builder.add(*p));
+                if trim_m.is_some() {
+                    return rayon::join(draw, hand_out).1;
+                }
 
                 // One thread counts votes; the others draw the floor's outline, and write.
                 let (voted, ((), handed_out)) = rayon::join(
                     || vote(&mut labeler, &instance.points, block, id),
-                    || rayon::join(|| block.positions.iter().for_each(|p| builder.add(*p)), hand_out),
+                    || rayon::join(draw, hand_out),
                 );
                 voted?;
+                far.take(&block.positions, &labeler.take_strays());
                 handed_out
             };
 
@@ -94,10 +113,17 @@ pub(crate) fn annotate(
                 continue;
             }
 
+            let mut passes = WithoutStrays { passes: &mut passes, strays: far.places() };
+            if trim_m.is_none() {
+                passes.strays = &[];
+            }
             points += passes.len();
             room_bbox = room_bbox.union(bbox);
-            if !is_handed_out {
+            if !is_handed_out && !passes.is_empty() {
                 each(AnnotatedInstance { label: instance.label, id, bbox, points: &mut passes })?;
+            }
+            if far.enlarge() || trim_m.is_some() && !far.places().is_empty() {
+                strays.instances.push(far.in_file(area.frame.offset()));
             }
         }
         total += points;
@@ -138,6 +164,7 @@ pub(crate) fn annotate(
         rooms,
         points: total,
         skipped,
+        strays,
     };
     annotated.fill(mesh, fill_m);
     Ok((annotated, labels))
@@ -169,7 +196,41 @@ pub(crate) fn unannotated(nearest_faces: &NearestFaces<'_>, table: &LabelTable) 
         rooms: Vec::new(),
         points: 0,
         skipped: SkippedLines::default(),
+        strays: Strays::default(),
     })
+}
+
+/// Passes over points without strays, which come ascending.
+struct WithoutStrays<'a> {
+    passes: &'a mut dyn PointPasses,
+    strays: &'a [u64],
+}
+
+impl PointPasses for WithoutStrays<'_> {
+    fn len(&self) -> u64 {
+        self.passes.len() - self.strays.len() as u64
+    }
+
+    fn in_memory(&self) -> Option<&[Vec3]> {
+        self.passes.in_memory().filter(|_| self.strays.is_empty())
+    }
+
+    fn pass(&mut self, each: &mut dyn FnMut(&[Vec3]) -> s3d_io::Result<()>) -> s3d_io::Result<()> {
+        if self.strays.is_empty() {
+            return self.passes.pass(each);
+        }
+        let mut strays = self.strays.iter().peekable();
+        let mut numbers = 0u64..;
+        self.passes.pass(&mut |block| {
+            let kept: Vec<Vec3> = block
+                .iter()
+                .zip(&mut numbers)
+                .filter(|(_, number)| strays.next_if(|stray| *stray == number).is_none())
+                .map(|(position, _)| *position)
+                .collect();
+            each(&kept)
+        })
+    }
 }
 
 /// The rooms so far. The last room's outline is drawn beside the work that follows.
@@ -231,4 +292,43 @@ pub(crate) fn hidden_instances(
         1 + hidden.count(),
         first.points.source()
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two blocks of three points.
+    struct Blocks([[Vec3; 3]; 2]);
+
+    impl PointPasses for Blocks {
+        fn len(&self) -> u64 {
+            6
+        }
+
+        fn in_memory(&self) -> Option<&[Vec3]> {
+            None
+        }
+
+        fn pass(&mut self, each: &mut dyn FnMut(&[Vec3]) -> s3d_io::Result<()>) -> s3d_io::Result<()> {
+            self.0.iter().try_for_each(|block| each(block))
+        }
+    }
+
+    #[test]
+    fn each_pass_leaves_the_strays_out() {
+        let at = |x: u8| Vec3::X * f32::from(x);
+        let mut blocks = Blocks([[0, 1, 2].map(at), [3, 4, 5].map(at)]);
+        let mut kept = WithoutStrays { passes: &mut blocks, strays: &[0, 2, 4] };
+        assert_eq!((kept.len(), kept.in_memory()), (3, None));
+        for _ in 0..2 {
+            let mut seen = Vec::new();
+            kept.pass(&mut |block| {
+                seen.extend_from_slice(block);
+                Ok(())
+            })
+            .unwrap();
+            assert_eq!(seen, [1, 3, 5].map(at));
+        }
+    }
 }

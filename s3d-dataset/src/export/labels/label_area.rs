@@ -63,7 +63,8 @@ pub(crate) fn label_area(
 
     // Labels and locations.
     let mut files = LabelFiles::begin(area, &prepared.file.mesh, &common)?;
-    let survey_options = SurveyOptions { table, fill_m: options.fill, seed: options.seed };
+    let survey_options =
+        SurveyOptions { table, fill_m: options.fill, trim_m: options.trim_strays, seed: options.seed };
     let mut surveyor =
         ExportSurveyor { ctx, area, table, allow: &options.allow, started, files: files.as_mut() };
     let survey = survey(ctx, area, &prepared.scene, nearest, survey_options, &mut surveyor)?;
@@ -133,6 +134,7 @@ pub(crate) fn mesh_doubts(area: &AreaInput, mesh: &TriMesh, options: &ExportOpti
 /// Returns a sentence for each oddity of the annotations.
 pub(crate) fn label_doubts(area: &AreaInput, annotated: &Annotated, table: &LabelTable) -> Vec<String> {
     let mut doubts = annotated.skipped.sentences();
+    doubts.extend(annotated.strays.sentences());
     doubts.extend(hidden_instances(area, &annotated.label_of_face, table));
     doubts.extend(overlap_doubts(&annotated.rooms));
     doubts

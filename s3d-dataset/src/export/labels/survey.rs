@@ -22,6 +22,8 @@ pub(crate) struct SurveyOptions<'a> {
     pub(crate) table: &'a LabelTable,
     /// Faces without a vote are filled from labelled surface within this distance, metres; `None` fills none.
     pub(crate) fill_m: Option<f64>,
+    /// Annotated points farther than this from the mesh are left out, metres; `None` leaves none out.
+    pub(crate) trim_m: Option<f64>,
     /// The seed of placed locations.
     pub(crate) seed: u64,
 }
@@ -75,12 +77,12 @@ pub(crate) fn survey(
     options: SurveyOptions<'_>,
     surveyor: &mut dyn Surveyor,
 ) -> Result<Survey> {
-    let SurveyOptions { table, fill_m, seed } = options;
+    let SurveyOptions { table, fill_m, trim_m, seed } = options;
 
     // What is wrong with the labels is weighed before locations are placed, which may take long.
     let (annotated, locating) = if area.is_labelled {
         let (annotated, votes) =
-            annotate(ctx, area, &nearest, table, fill_m, |instance| surveyor.instance(instance))?;
+            annotate(ctx, area, &nearest, table, [fill_m, trim_m], |instance| surveyor.instance(instance))?;
         surveyor.labels(&annotated, &votes)?;
         drop(votes);
         let labels = label_findings(scene.mesh(), &annotated, table);

@@ -41,6 +41,7 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         entropy_stride: options.entropy_stride,
         lenient: options.lenient,
         fill: options.fill,
+        trim_strays: options.trim_strays,
         modalities: vec![Domain::Pose],
         // A plan needs no panoramas and no points.
         pano_width: 8,
