@@ -3,6 +3,7 @@
 
 mod common;
 
+mod changed;
 mod fill;
 mod library;
 mod strays;

@@ -1,6 +1,7 @@
 //! What the steps of an export hand to one another: what all areas share, and a mesh that is ready for rays.
 
 use crate::account::Account;
+use crate::export::input::stamps::Stamps;
 use crate::options::ExportOptions;
 use crate::record::journal::{Journal, Unit};
 use s3d_geom::NearestFaces;
@@ -22,6 +23,8 @@ pub(crate) struct Common<'a> {
     pub(crate) cache: &'a Path,
     /// Which units this process writes.
     pub(crate) is_ours: &'a (dyn Fn(&Unit) -> bool + Sync),
+    /// The input files as they were when they were looked at first.
+    pub(crate) stamps: &'a Stamps,
 }
 
 impl Common<'_> {

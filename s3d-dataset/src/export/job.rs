@@ -13,6 +13,7 @@ use crate::export::input::cameras::Cameras;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::requested::requested_areas;
+use crate::export::input::stamps::Stamps;
 use crate::export::labels::label_area::{self, mesh_doubts};
 use crate::export::plan::Plan;
 use crate::export::run::{Run, Target};
@@ -53,6 +54,8 @@ pub(crate) struct Job<'a> {
     estimate: Estimate,
     /// The plan that labels and scores are taken from, if there is one.
     pub(crate) plan: Option<&'a Plan>,
+    /// The input files as they were when they were looked at first.
+    stamps: Stamps,
 }
 
 /// What is known after labelling. An area is `None` if all its units were done before.
@@ -122,6 +125,9 @@ impl<'a> Job<'a> {
             None => Inputs::open(scenes, placing, lenient)?,
         };
 
+        let mut stamps = Stamps::default();
+        stamps.look(inputs.areas.iter().flat_map(|area| &area.files))?;
+
         let options = if inputs.are_labelled() {
             options.clone()
         } else {
@@ -155,7 +161,8 @@ impl<'a> Job<'a> {
         }
 
         let known = plan.map(Plan::request);
-        let request = Request::new(options, requested_areas(ctx, &inputs.areas, &companions, known)?);
+        let requested = requested_areas(ctx, &inputs.areas, &companions, known, &mut stamps)?;
+        let request = Request::new(options, requested);
         if let Some(plan) = plan {
             plan.refuse_other(&request)?;
             plan.require_complete()?;
@@ -164,7 +171,7 @@ impl<'a> Job<'a> {
         loading.end();
         ctx.check()?;
         ctx.debug(format_args!("the data set will have {estimate}"));
-        Ok(Self { estimate, inputs, request, options: options.clone(), pictures, single, plan })
+        Ok(Self { estimate, inputs, request, options: options.clone(), pictures, single, plan, stamps })
     }
 
     /// Returns the manifest of an export under way.
@@ -215,7 +222,7 @@ impl<'a> Job<'a> {
     ) -> Common<'b> {
         let table = &self.inputs.table;
         let options = &self.options;
-        Common { table, layout, options, journal, account, cache, is_ours }
+        Common { table, layout, options, journal, account, cache, is_ours, stamps: &self.stamps }
     }
 
     /// Labels the areas of `scope`, and scores their unscored locations. The label files of an area are
@@ -329,6 +336,7 @@ impl<'a> Job<'a> {
                     render(&prepared)?;
                 }
             }
+            self.stamps.check()?;
         }
 
         Ok(())

@@ -12,6 +12,7 @@ pub(crate) mod pictures;
 mod published;
 pub(crate) mod requested;
 mod scene;
+pub(crate) mod stamps;
 mod unit;
 mod up_axis;
 

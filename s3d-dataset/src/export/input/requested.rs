@@ -3,6 +3,7 @@
 use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::area::AreaInput;
+use crate::export::input::stamps::Stamps;
 use crate::parallel::for_each_in_order;
 use crate::record::listing::walk;
 use crate::record::request::{InputRecord, Request, RequestedArea};
@@ -17,13 +18,14 @@ use std::sync::{Mutex, PoisonError};
 type Sums<'a> = BTreeMap<&'a Path, (u64, Checksum)>;
 
 /// Returns what each area asks for. All input files are read once, on all threads. `companions` are the
-/// further files of each area's meshes. Annotations and folders that are `known` from a plan, and have as
-/// many bytes as then, keep the plan's checksum.
+/// further files of each area's meshes. `stamps` tell whether files change meanwhile. Annotations and folders
+/// that are `known` from a plan, and have as many bytes as then, keep the plan's checksum.
 pub(crate) fn requested_areas(
     ctx: &Context,
     areas: &[AreaInput],
     companions: &[Vec<PathBuf>],
     known: Option<&Request>,
+    stamps: &mut Stamps,
 ) -> Result<Vec<RequestedArea>> {
     let paths: Vec<Vec<PathBuf>> = areas
         .iter()
@@ -64,7 +66,9 @@ pub(crate) fn requested_areas(
     let mut all: Vec<&PathBuf> = files.iter().flatten().flatten().collect();
     all.sort();
     all.dedup();
+    stamps.look(all.iter().copied())?;
     let sums = checksums(ctx, &all)?;
+    stamps.check()?;
 
     let mut requested = Vec::new();
     for ((area, paths), files) in areas.iter().zip(&paths).zip(&files) {

@@ -73,7 +73,8 @@ pub(crate) fn label_area(
         ctx.warn_each(outlook.warnings(location));
     }
 
-    // The result is kept before the journal mentions it.
+    // What was read is what the request names. The result is kept before the journal mentions it.
+    common.stamps.check()?;
     let labelled = labelled_area(ctx, area, prepared.file, survey, options)?;
     labelled.write(&common.cache_of(area.number))?;
     if let Some(files) = files {
