@@ -4,7 +4,7 @@
 use crate::error::Error;
 use crate::fs::quote::quote;
 use crate::mesh::obj::lines::{Line, logical_lines, next_word};
-use crate::mesh::obj::statement::{Why, corner, normal, out_of_range, uv, vertex};
+use crate::mesh::obj::statement::{Why, corner, normal, other, out_of_range, uv, vertex};
 use s3d_geom::glam::Vec3;
 use std::path::Path;
 
@@ -53,7 +53,7 @@ fn check(line: &Line<'_>, so_far: [u64; 3], counts: [u64; 3]) -> Result<(), Why>
             }
             Ok(())
         }
-        _ => Ok(()),
+        _ => other(keyword).map(drop),
     }
 }
 
@@ -93,6 +93,13 @@ mod tests {
         let text = b"v 0 0 0\nvt 0.5 # x\n# v 0 0 x\nvn 0 0 1\nv 1 3.1+e2 0\nv x 0 0\n";
         assert_eq!(told(text), "a.obj, line 5: `3.1+e2` is no number: `v 1 3.1+e2 0`");
         assert!(told(b"v 0 0 0 0\n").contains("line 1: the vertex has the weight 0"));
+        assert_eq!(
+            told(b"v 0 0 0\nface 1 2 3\n"),
+            "a.obj, line 2: `face` is no word of the format: `face 1 2 3`"
+        );
+        assert!(
+            told(b"g a\nF 1 2 3\n").contains("line 2: `F` is no word of the format, which has `f` in lower")
+        );
         assert_eq!(told(b"v 0 0 0\n"), "a.obj: cannot be read: why");
     }
 

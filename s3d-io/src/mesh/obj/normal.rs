@@ -14,7 +14,7 @@
 //!   (`vertex_colours_of_both_scales_and_of_some_vertices`).
 
 use crate::mesh::obj::lines::{logical_lines, next_word, text};
-use crate::mesh::obj::statement;
+use crate::mesh::obj::statement::{self, Other};
 use s3d_geom::NO_INDEX;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -65,6 +65,8 @@ pub(crate) struct NormalObj<'a> {
     pub(crate) short_faces: Vec<u64>,
     /// The number of `p` and `l` elements.
     pub(crate) points_and_lines: usize,
+    /// Statements that bring other shapes: line and word of the first, and how many there are.
+    pub(crate) other_geometry: Option<(u64, String, usize)>,
 }
 
 #[derive(Debug)]
@@ -138,8 +140,13 @@ impl<'a> NormalObj<'a> {
                     obj.points_and_lines += 1;
                     continue;
                 }
-                // Objects, groups, smoothing, curves, comments and unknown words say nothing about faces.
-                _ => continue,
+                _ => {
+                    if statement::other(keyword).ok()? == Other::Geometry {
+                        let word = || (line.number, text(keyword), 0);
+                        obj.other_geometry.get_or_insert_with(word).2 += 1;
+                    }
+                    continue;
+                }
             };
 
             match (read, line.text) {

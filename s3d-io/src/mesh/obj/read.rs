@@ -65,6 +65,13 @@ pub(crate) fn read_bytes(bytes: Vec<u8>, path: &Path, up: UpAxis, options: &Mesh
         let n = count(obj.short_faces.len(), "face");
         warnings.push(format!("{n} with fewer than three corners left out, the first on line {first}"));
     }
+    if let Some((line, word, n)) = &obj.other_geometry {
+        let n = count(*n, "statement");
+        warnings.push(format!(
+            "{n} of curves, surfaces or other files left out, the first `{word}` on line {line}: save them \
+             as faces"
+        ));
+    }
     for (left_out, what) in obj.left_out.iter().zip(["vertices", "texture coordinates", "normals"]) {
         if *left_out {
             warnings.push(format!("faces name {what}, and the file has none: they are read without them"));
@@ -456,6 +463,27 @@ mod tests {
             "1 face left out: not finite",
         ] {
             assert!(told.contains(words), "{told}");
+        }
+    }
+
+    #[test]
+    fn words_of_the_format_are_passed_over_and_others_refused() {
+        let others =
+            "o a\ng b c\ns off\nmg 1 0.5\nlod 1\nbevel on\nvp 0.1 0.2\ncstype bezier\ndeg 3\nend\n#F 1\n";
+        let file = read_obj(&format!("{SQUARE}{others}f 1 2 3\np 1\nend#x\n")).unwrap();
+        assert!(file.warnings.is_empty(), "{:?}", file.warnings);
+        let file = read_obj(&format!("{SQUARE}f 1 2 3\ncall other.obj\nsurf 0 1 0 1 1 2 3 4\n")).unwrap();
+        let told = file.warnings.join("\n");
+        let words = "2 statements of curves, surfaces or other files left out, the first `call` on line";
+        assert!(told.contains(words), "{told}");
+
+        for (line, words) in [
+            ("F 1 2 3", "`F` is no word of the format, which has `f` in lower case: `F 1 2 3`"),
+            ("face 1 2 3", "`face` is no word of the format: `face 1 2 3`"),
+            ("fo 1 2 3", "`fo` is no word"),
+        ] {
+            let message = read_obj(&format!("{SQUARE}f 1 2 3\n{line}\n")).unwrap_err().to_string();
+            assert!(message.contains(words) && message.contains(", line "), "{message}");
         }
     }
 

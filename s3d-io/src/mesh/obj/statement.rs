@@ -3,7 +3,7 @@
 
 use crate::fs::quote::quote;
 use crate::fs::text::number;
-use crate::mesh::obj::lines::next_word;
+use crate::mesh::obj::lines::{next_word, without_comment};
 use s3d_geom::glam::{DVec3, Vec3};
 
 /// What is wrong with a statement.
@@ -11,6 +11,46 @@ pub(crate) type Why = String;
 
 /// The columns that the corners of a face index.
 const COLUMNS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+/// The words that start a statement without vertices, faces and other shapes: groups and display, what
+/// belongs to curves and surfaces, points and lines. Source: Advanced Visualizer Manual, appendix B1.
+const OTHER_WORDS: &str = "g s mg o bevel c_interp d_interp lod usemap usemtl maplib mtllib shadow_obj \
+     trace_obj ctech stech vp cstype deg bmat step p l parm trim hole scrv sp end con res";
+
+/// The words that bring shapes of their own, or another file.
+const GEOMETRY_WORDS: &str = "curv curv2 surf bsp bzp cdc cdp call csh";
+
+/// What a statement without vertices and faces is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Other {
+    /// It says nothing about shapes.
+    Nothing,
+    /// It brings a shape that is not read.
+    Geometry,
+}
+
+/// Returns what a word starts that is not one of `v`, `vt`, `vn` and `f`. Comments and empty lines are no
+/// statements.
+pub(crate) fn other(keyword: &[u8]) -> Result<Other, Why> {
+    let is_among = |words: &str, word: &[u8]| words.split_ascii_whitespace().any(|of| of.as_bytes() == word);
+    let keyword = without_comment(keyword);
+    if keyword.is_empty() || is_among(OTHER_WORDS, keyword) {
+        return Ok(Other::Nothing);
+    }
+    if is_among(GEOMETRY_WORDS, keyword) {
+        return Ok(Other::Geometry);
+    }
+    let lower = keyword.to_ascii_lowercase();
+    let is_known = ["v vt vn f", OTHER_WORDS, GEOMETRY_WORDS]
+        .iter()
+        .any(|words| is_among(words, &lower));
+    let word = quote(keyword);
+    Err(if is_known {
+        format!("{word} is no word of the format, which has {} in lower case", quote(&lower))
+    } else {
+        format!("{word} is no word of the format")
+    })
+}
 
 /// Reads a `v` line without its keyword: the position, divided by its weight, and the colour as written. A
 /// colour that is not finite, as programs write where nothing was seen, is none.
