@@ -1,6 +1,6 @@
 //! An input that changes while it is read ends an export.
 
-use crate::common::options;
+use crate::common::{memory_scene, options};
 
 use s3d_dataset::{Context, Event, Export};
 use s3d_synth::{Building, ScanOptions};
@@ -62,4 +62,22 @@ fn a_changed_input_is_named() {
             .unwrap()
             .is_some()
     );
+}
+
+#[test]
+fn half_written_files_of_a_killed_plan_are_removed() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("plan");
+    let plan = |shard: Option<&str>| {
+        let shard = shard.map(|word| word.parse().unwrap());
+        s3d_dataset::plan(&[memory_scene()], &folder, &options(3), shard, &Context::default()).unwrap();
+    };
+    plan(None);
+    let parts = [folder.join(".s3d-Ab12Cd.part"), folder.join("area_2/.s3d-Ef34Gh.part")];
+    parts.iter().for_each(|part| fs::write(part, "half").unwrap());
+    // Another shard may be writing them.
+    plan(Some("1/2"));
+    assert!(parts.iter().all(|part| part.exists()));
+    plan(None);
+    assert!(!parts.iter().any(|part| part.exists()));
 }

@@ -4,6 +4,7 @@
 //! in it, because Matterport3D keeps colours, poses and intrinsics in separate ones
 //! (`matterport_color_images/`…).
 
+use crate::camera::narrow::too_narrow;
 use crate::camera::picture::{check_picture, read_picture};
 use crate::camera::table::ScanLocation;
 use crate::error::{Error, Result};
@@ -267,6 +268,9 @@ pub fn parse_intrinsics(bytes: &[u8], name: &Path) -> Result<Lens> {
     let (Some(w), Some(h)) = (side(width), side(height)) else {
         return Err(Error::line(name, lines[0], format!("a picture of {width} × {height} pixels")));
     };
+    if let Some(why) = too_narrow([w, h], DVec2::new(fx, fy)) {
+        return Err(Error::line(name, lines[2], why));
+    }
     Lens::new([w, h], DVec2::new(fx, fy), DVec2::new(cx, cy), [k1, k2, p1, p2, k3]).ok_or_else(|| {
         let message = format!(
             "no lens: fx {fx} fy {fy} cx {cx} cy {cy}, distortion {k1} {k2} {p1} {p2} {k3} (focal lengths \
@@ -502,6 +506,7 @@ mod tests {
             ("1280", "0", "a picture of 0"),
             ("1280", "-1280", "a picture of -1280"),
             ("1075.72", "0", "no lens: fx 0"),
+            ("1075.72 1075.66", "107572 107566", "an angle of view of 0.68°"),
             ("0.001", "x", "line 1: \"x\""),
         ] {
             let message = read_intrinsics(&folder.text("i.txt", &good.replacen(from, to, 1)))

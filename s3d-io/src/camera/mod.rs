@@ -45,6 +45,7 @@ mod e57;
 mod located;
 mod locations;
 mod matterport;
+mod narrow;
 mod numbered;
 mod other_kind;
 mod picture;

@@ -1,5 +1,6 @@
 //! Cameras with poses: of photographs, or of views to render.
 
+use crate::camera::narrow::{sentence, too_narrow};
 use crate::camera::picture_file::PictureFile;
 use s3d_geom::glam::{DVec2, DVec3, dvec2};
 use s3d_geom::{Camera, CameraError, FisheyeLens, Lens, PhotoLens, Pose};
@@ -140,6 +141,14 @@ pub enum IntrinsicsError {
          wrong"
     )]
     BadLens,
+    /// No lens takes pictures that narrow.
+    #[error("{}", sentence(*size, *focal_px))]
+    TooNarrow {
+        /// Width and height of the photograph.
+        size: [u32; 2],
+        /// Focal lengths in pixels of the photograph.
+        focal_px: DVec2,
+    },
     /// No camera has these numbers.
     #[error(transparent)]
     Camera(#[from] CameraError),
@@ -237,6 +246,10 @@ impl PosedCamera {
         };
         if center_px.cmplt(DVec2::ZERO).any() || center_px.cmpgt(size).any() {
             return Err(IntrinsicsError::CenterOutside { center_px, size: found });
+        }
+
+        if too_narrow(found, focal_px).is_some() {
+            return Err(IntrinsicsError::TooNarrow { size: found, focal_px });
         }
 
         let lens = match distortion {
@@ -371,6 +384,12 @@ mod tests {
         let distortion = Distortion::Fisheye([f64::NAN; 4]);
         let bad = Optics::Pinhole { focal_px: DVec2::ONE, center_px: None, distortion };
         assert_eq!(of(Some(bad)), Err(IntrinsicsError::BadLens));
+        // A digit too many.
+        let focal_px = DVec2::splat(3000.0);
+        let narrow = Optics::Pinhole { focal_px, center_px: None, distortion: Distortion::None };
+        let error = of(Some(narrow)).unwrap_err();
+        assert_eq!(error, IntrinsicsError::TooNarrow { size: [64, 32], focal_px });
+        assert!(error.to_string().contains("angle of view of 1.22°"), "{error}");
     }
 
     #[test]

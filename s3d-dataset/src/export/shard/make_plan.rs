@@ -11,6 +11,7 @@ use crate::options::ExportOptions;
 use crate::record::checked::write_checked;
 use crate::record::journal::{Finished, Journal, Unit};
 use crate::record::label_list::LabelList;
+use crate::record::listing::remove_parts;
 use crate::store::plan_file;
 use crate::store::state::{OutputState, is_working_name};
 use s3d_io::Error as FileError;
@@ -69,6 +70,10 @@ pub fn plan<S: Clone + Into<SceneSource>>(
         write_checked(&path, &PlanFile { request: job.request.of_plan(), labels })?;
     }
 
+    // Half-written files of a killed process. Those of shards stay: others may be writing them.
+    if shard == Shard::ALL {
+        remove_parts(folder, true)?;
+    }
     let journal = Journal::begin(&layout, Finished::default())?;
     let areas = &job.inputs.areas;
     for (position, area) in areas.iter().enumerate() {

@@ -1,5 +1,6 @@
 //! The pose and the lens of an image. Source: ASTM E2807, 8.4.13.4 to 8.4.13.6 and 8.4.14.4 to 8.4.14.6.
 
+use crate::camera::narrow::too_narrow;
 use e57::{PinholeImageProperties, Projection, SphericalImageProperties};
 use s3d_geom::glam::{DMat3, DQuat, DVec2, DVec3, dvec2};
 use s3d_geom::{CaptureLens, Lens, Pose, SphericalLens};
@@ -43,6 +44,9 @@ fn pinhole(numbers: &PinholeImageProperties) -> Result<CaptureLens, String> {
     let focal_px =
         dvec2(numbers.focal_length / numbers.pixel_width, numbers.focal_length / numbers.pixel_height);
     let center_px = dvec2(numbers.principal_x, numbers.principal_y);
+    if let Some(why) = too_narrow(size, focal_px) {
+        return Err(why);
+    }
     let lens = Lens::new(size, focal_px, center_px, [0.0; 5]);
     lens.map(CaptureLens::from).ok_or_else(|| {
         format!(

@@ -360,6 +360,8 @@ fn images_that_cannot_be_used_are_named() {
     assert!(message.contains("has 41 × 30 pixels, and its projection is for 40 × 30"), "{message}");
     let message = of(PinholeImageProperties { focal_length: 0.0, ..pinhole_numbers() }, jpeg());
     assert!(message.contains("focalLength 0"), "{message}");
+    let message = of(PinholeImageProperties { focal_length: 20.0, ..pinhole_numbers() }, jpeg());
+    assert!(message.contains("an angle of view of 0."), "{message}");
 
     let message = fault(|image| add_sphere(image, spherical_numbers(64, 34, TAU / 64.0)));
     assert!(message.contains("no sphere has 64 × 34 pixels"), "{message}");

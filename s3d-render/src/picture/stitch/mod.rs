@@ -103,6 +103,10 @@ fn sharpness(lens: &CaptureLens) -> f64 {
     }
 }
 
+/// The most pixels of a cube for each pixel of the captures. A single picture that is 20° wide fills the cube
+/// so thinly; a narrower one would take memory for pixels that it does not show.
+const MOST_TEXELS: f64 = 256.0;
+
 /// The data from which the pixels of the cube are made.
 struct Stitch {
     pose: Pose,
@@ -117,7 +121,9 @@ impl Stitch {
     fn new(captures: Vec<Capture>, pose: &Pose, scene: Option<&Scene<'_>>, options: &StitchOptions) -> Self {
         assert!(!captures.is_empty(), "a cube map needs captures");
         let sharpest = captures.iter().map(|c| sharpness(&c.lens)).fold(0.0, f64::max);
-        let size = CubeMap::fitting_size(options.size.map_or(2.0 * sharpest, f64::from));
+        let pixels: f64 = captures.iter().map(|c| c.image.len() as f64).sum();
+        let most = (MOST_TEXELS * pixels / 6.0).sqrt();
+        let size = CubeMap::fitting_size(options.size.map_or((2.0 * sharpest).min(most), f64::from));
 
         let world_from_frame = pose.opencv_from_world().transpose();
         let views: Vec<PreparedCapture> = captures
@@ -218,6 +224,20 @@ mod tests {
 
     pub(super) fn sample(cube: &CubeMap, d: DVec3) -> ([f32; 3], u8) {
         cube.sample(d, DVec3::splat(1e-9), DVec3::splat(1e-9), &TextureFilter::default())
+    }
+
+    /// A picture that shows little does not make a cube of thousands of pixels a side.
+    #[test]
+    fn a_narrow_picture_makes_a_small_cube() {
+        let mut captures = captures(|_, _| [90.0; 3]);
+        captures.truncate(1);
+        captures[0].lens = Lens::new([160, 128], dvec2(9000.0, 9000.0), dvec2(80.0, 64.0), [0.0; 5])
+            .unwrap()
+            .into();
+        let cube = stitch(captures, &pose(), None, &StitchOptions::default());
+        let most = (MOST_TEXELS * 160.0 * 128.0 / 6.0).sqrt();
+        assert_eq!(cube.size(), CubeMap::fitting_size(most));
+        assert!(cube.size() < 1000, "{}", cube.size());
     }
 
     #[test]
