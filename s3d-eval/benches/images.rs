@@ -42,6 +42,8 @@ fn images(criterion: &mut Criterion) {
             (Protocol::SemPano, "hohonet", Domain::Semantic),
             (Protocol::Depth, "hohonet", Domain::Depth),
             (Protocol::Depth, "unifuse", Domain::Depth),
+            (Protocol::Depth, "marigold", Domain::Depth),
+            (Protocol::DepthEdge, "depth-pro", Domain::Depth),
             (Protocol::Normal, "dsine", Domain::Normal),
             (Protocol::Normal, "omnidata", Domain::Normal),
         ] {
