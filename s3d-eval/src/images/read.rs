@@ -112,6 +112,13 @@ fn numbers_of<R: Read>(
 
     let pixels = size[0] as usize * size[1] as usize;
     let are_scores = array.is_float() && matches!(holds, Holds::Classes(_));
+    // Most arrays have the order of the result.
+    if !are_scores && axes[0].pixels == size[0] as usize && axes[2].channels == 1 {
+        let mut values = Vec::with_capacity(pixels * channels);
+        while array.read_floats(&mut values)? > 0 {}
+        return Ok((size, values));
+    }
+
     let mut values = vec![0.0; pixels * if are_scores { 1 } else { channels }];
     let mut best = vec![f64::NEG_INFINITY; if are_scores { pixels } else { 0 }];
 
