@@ -4,7 +4,8 @@
 //! not count then, and an error of a few degrees does. The photograph has an edge where its grey changes. The
 //! mesh has an edge where its colours, its depth or the direction of its surface change. Both edge images are
 //! blurred by about a pixel, and strong edges are weakened. The agreement is the correlation of the two edge
-//! images over the pixels that show both. The chance agreement is the mean correlation with the two displaced
+//! images over the pixels that show both, and whose neighbours do: where pictures end, neither has edges,
+//! which would make any two alike, noise too. The chance agreement is the mean correlation with the two displaced
 //! against each other in eight directions.
 
 use crate::export::input::masks::MaskedPicture;
@@ -21,6 +22,9 @@ const DISPLACED: f64 = 0.1;
 
 /// Fewer pixels that show both give no correlation.
 const FEWEST: usize = 500;
+
+/// How far a pixel takes part in the edges of others: by one in a difference, and by two in a blur.
+const REACH: usize = 3;
 
 /// A change of depth by this share counts as much as a turn of the surface by a right angle.
 const STEP: f64 = 0.2;
@@ -64,6 +68,7 @@ impl Agreement {
         let photo_edges = edges(&grey(&seen), size, &valid);
         let colour = edges(&grey(&shown), size, &valid);
         let shape = shape_edges(scene, &hits, &camera, &valid);
+        let valid = inner(&valid, size);
 
         // A mesh may have hardly any colours, or hardly any shape: the better agreement counts.
         let [a, b] = [colour, shape].map(|edges| Self::between(&photo_edges, &edges, size, &valid));
@@ -168,6 +173,21 @@ fn around(i: usize, width: usize) -> [usize; 4] {
     [i - 1, i + 1, i - width, i + width]
 }
 
+/// Whether each pixel has an edge that no border takes part in: all pixels within [`REACH`] are valid.
+fn inner(valid: &[bool], size: [usize; 2]) -> Vec<bool> {
+    let mut kept = valid.to_vec();
+    for _ in 0..REACH {
+        let before = std::mem::replace(&mut kept, vec![false; valid.len()]);
+        for y in 1..size[1].saturating_sub(1) {
+            for x in 1..size[0].saturating_sub(1) {
+                let mut rows = (y - 1..=y + 1).map(|row| row * size[0] + x);
+                kept[y * size[0] + x] = rows.all(|i| before[i - 1..=i + 1].iter().all(|is| *is));
+            }
+        }
+    }
+    kept
+}
+
 /// The square roots of the values, so that a few strong edges do not decide, blurred twice over 3 × 3
 /// pixels.
 fn softened(values: &[f64], size: [usize; 2]) -> Vec<f64> {
@@ -233,16 +253,33 @@ fn correlation(
 mod tests {
     use super::*;
 
+    /// Noise of this seed, 0 to 1.
+    fn noise(mut state: u32) -> Vec<f64> {
+        let next = |_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24)
+        };
+        (0..2400).map(next).collect()
+    }
+
+    /// Where pictures end, neither has edges, and half of this one does not show the mesh.
+    #[test]
+    fn noise_agrees_with_nothing() {
+        let size = [60, 40];
+        let valid: Vec<bool> = (0..2400).map(|i| i % 60 < 45).collect();
+        let [a, b] = [3, 8].map(|seed| edges(&noise(seed), size, &valid));
+        let found = Agreement::between(&a, &b, size, &inner(&valid, size));
+        let correlation = found.correlation.unwrap();
+        assert!(Agreement::is_chance(correlation, found.chance.unwrap()), "{found:?}");
+        assert!(correlation.abs() < 0.1, "{found:?}");
+        let with_borders = Agreement::between(&a, &b, size, &valid).correlation.unwrap();
+        assert!(with_borders > 0.3, "{with_borders}");
+    }
+
     #[test]
     fn a_picture_agrees_with_itself_and_not_with_itself_displaced() {
         let size = [60, 40];
-        let mut state = 1u32;
-        let noise: Vec<f64> = (0..2400)
-            .map(|_| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                f64::from(state >> 8) / f64::from(1 << 24)
-            })
-            .collect();
+        let noise = noise(1);
         let valid = vec![true; 2400];
 
         let itself = correlation(&noise, &noise, size, &valid, (0, 0)).unwrap();
