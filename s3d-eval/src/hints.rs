@@ -1,6 +1,7 @@
 //! Notes on scores that look like a mistake in the files of the predictions: another unit, another origin, a
 //! single class. They say what is seen and what may be the cause, and change no score.
 
+use crate::Table;
 use s3d_dataset::s3d_label::Class;
 
 /// A box along the axes: `[xmin, ymin, zmin, xmax, ymax, zmax]`.
@@ -51,6 +52,45 @@ pub(crate) fn of_boxes(rooms: &[(Vec<Bbox>, Vec<Bbox>)]) -> Option<String> {
     })
 }
 
+/// Returns the median of truth ÷ prediction over some pixels of an image. `None` if nothing is predicted.
+pub(crate) fn depth_ratio(truth: &[f64], prediction: &[f64]) -> Option<f64> {
+    /// Every so many pixels are looked at.
+    const STEP: usize = 16;
+    let pairs = truth.iter().zip(prediction).step_by(STEP);
+    let there = pairs.filter(|(truth, prediction)| **truth > 0.0 && **prediction > 0.0);
+    median(there.map(|(truth, prediction)| truth / prediction).collect())
+}
+
+/// Notes that distances are in another unit. An image has the median of truth ÷ prediction.
+pub(crate) fn of_depth(ratios: Vec<f64>) -> Option<String> {
+    let ratio = median(ratios)?;
+    let units = [
+        (1e-3, "in millimetres"),
+        (1.0 / 512.0, "in units of 1/512 m"),
+        (1e3, "divided by 1000 once too often"),
+        (512.0, "divided by 512 once too often"),
+    ];
+    let (_, unit) = units.into_iter().find(|(of, _)| (0.8..1.25).contains(&(ratio / of)))?;
+    Some(format!(
+        "Doubtful: true distances are {ratio:.3e} times the predicted ones (the median): are predictions \
+         {unit}? Arrays are expected in metres."
+    ))
+}
+
+/// Notes that normals point the other way, or are in other axes.
+pub(crate) fn of_angles(tables: &[Table]) -> Option<String> {
+    let mean = tables
+        .iter()
+        .filter_map(|table| Some(table.rows.first()?.scores.first()?.value));
+    let largest = mean.fold(f64::NAN, f64::max);
+    (largest > 90.0).then(|| {
+        format!(
+            "Doubtful: the mean angle is {largest:.1}°, more than by chance: do predictions point \
+             away from the camera, or are they in other axes than the data set's?"
+        )
+    })
+}
+
 /// Returns the middle value, or of two the upper; `None` without values.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
@@ -75,6 +115,19 @@ mod tests {
         );
         assert_eq!(note(&[[5, 0], [3, 1], [0, 7]]), None);
         assert_eq!(note(&[[5, 5], [0, 0]]), None);
+    }
+
+    #[test]
+    fn depth_in_other_units_is_noted() {
+        let truth = vec![2.0; 64];
+        let of = |scale: f64| depth_ratio(&truth, &vec![2.0 * scale; 64]).into_iter().collect();
+        for (scale, words) in [(1000.0, "in millimetres"), (512.0, "1/512 m"), (0.002, "divided by 512")] {
+            let told = of_depth(of(scale)).unwrap();
+            assert!(told.contains(words), "{told}");
+        }
+        assert_eq!(of_depth(of(1.0)), None);
+        assert_eq!(of_depth(of(4.0)), None);
+        assert_eq!(depth_ratio(&truth, &[0.0; 64]), None);
     }
 
     #[test]

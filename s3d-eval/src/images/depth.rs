@@ -1,6 +1,5 @@
 //! Protocol `depth`: depth of views, and distances of panoramas.
 
-use crate::Evaluation;
 use crate::error::{Error, Result};
 use crate::images::depth_files::{Both, Form, both};
 use crate::images::depth_metrics::{DEPTH_COLUMNS, hohonet_depth_twice, unifuse_depth_twice};
@@ -14,6 +13,7 @@ use crate::images::resample::{opencv_nearest, pillow_nearest};
 use crate::options::ImageKind;
 use crate::tables::{Unit, tables};
 use crate::task::Task;
+use crate::{Evaluation, hints};
 use s3d_dataset::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 
@@ -174,6 +174,7 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
 
     let noun = kind.noun();
     notes.extend(notes_on(&units, noun));
+    notes.extend(hints::of_depth(units.iter().filter_map(|unit| unit.counted.ratio).collect()));
     let score = |units: &[&Scored], by: usize| {
         let values = units
             .iter()
@@ -198,6 +199,8 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
 /// An image with its scores, plain and weighted by latitude.
 struct Scored {
     pixels: u64,
+    /// The median of truth ÷ prediction over some pixels, if predictions are in metres.
+    ratio: Option<f64>,
     replaced: u64,
     is_aligned: bool,
     values: [Vec<f64>; 2],
@@ -206,6 +209,11 @@ struct Scored {
 impl Scored {
     fn of(task: &Task<'_>, predicted: &Predicted, script: Script) -> s3d_dataset::Result<Self> {
         let Both { size, truth, prediction } = both(task, predicted, &script.form())?;
+        let ratio = if script.form().is_metric {
+            hints::depth_ratio(&truth, &prediction)
+        } else {
+            None
+        };
         let weights = weights_of_pixels(size);
         let scores = match script {
             Script::Hohonet => hohonet_depth_twice(&truth, &prediction, weights),
@@ -214,6 +222,7 @@ impl Scored {
                 let scores = marigold_depth_twice(&truth, &prediction, alignment, weights);
                 return Ok(Self {
                     pixels: scores[0].pixels,
+                    ratio,
                     replaced: 0,
                     is_aligned: scores[0].is_aligned,
                     values: scores.map(|scores| scores.values.to_vec()),
@@ -222,6 +231,7 @@ impl Scored {
         };
         Ok(Self {
             pixels: scores[0].pixels,
+            ratio,
             replaced: scores[0].replaced,
             is_aligned: true,
             values: scores.map(|scores| scores.values.to_vec()),

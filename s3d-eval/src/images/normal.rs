@@ -1,6 +1,5 @@
 //! Protocol `normal`: surface normals of views or panoramas.
 
-use crate::Evaluation;
 use crate::error::Result;
 use crate::images::latitude::{BY_LATITUDE, Sums, latitude_weights, tables_by_latitude};
 use crate::images::median::Medians;
@@ -13,6 +12,7 @@ use crate::images::read::{self, Holds};
 use crate::options::ImageKind;
 use crate::tables::{Rows, Scores, mean_of_defined, tables};
 use crate::task::Task;
+use crate::{Evaluation, hints};
 use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
@@ -51,7 +51,7 @@ pub(crate) fn normal(task: &Task<'_>) -> Result<Evaluation> {
         ImageKind::Views => "Views: normals are in the camera's axes, as the data set stores them.",
         ImageKind::Panoramas => "Panoramas: normals are in the world's axes, as the data set stores them.",
     };
-    let (mut definition, pixels, tables) = match task.variant {
+    let (mut definition, pixels, scores) = match task.variant {
         "omnidata" => omnidata(task, &matched)?,
         _ => dsine(task, &matched)?,
     };
@@ -64,7 +64,9 @@ pub(crate) fn normal(task: &Task<'_>) -> Result<Evaluation> {
         });
     }
     let counted = [(matched.kind.noun(), matched.images.len() as u64), ("pixels", pixels)];
-    Ok(Evaluation { notes: matched.notes, ..task.evaluation(&definition, counted, tables) })
+    let mut notes = matched.notes;
+    notes.extend(hints::of_angles(&scores.tables));
+    Ok(Evaluation { notes, ..task.evaluation(&definition, counted, scores) })
 }
 
 /// The definition, the number of pixels, and the scores.
