@@ -58,7 +58,7 @@ fn a_changed_input_is_named() {
     let again = Export::new([&scene]).options(options(3));
     assert!(
         again
-            .run(&dir.path().join("calm"), &Context::default())
+            .run(dir.path().join("calm"), &Context::default())
             .unwrap()
             .is_some()
     );
