@@ -1,8 +1,8 @@
 //! Segmentation of points: classes and instances of the rooms of a data set.
 //!
 //! The metrics need no files. [`SemanticCounts`] is for classes; [`InstanceMatches`] with [`instance_ap`],
-//! and [`RoomCoverage`] with [`coverage`], are for instances; [`panoptic_counts`] is for both. Each counts one
-//! room, and the scores take any number of rooms.
+//! and [`RoomCoverage`] with [`coverage`], are for instances; [`panoptic_counts`] is for both. Each counts
+//! one room, and the scores take any number of rooms.
 //!
 //! ```
 //! use s3d_eval::points::{AbsentClass, SemanticCounts};

@@ -5,8 +5,8 @@
 //! mesh has an edge where its colours, its depth or the direction of its surface change. Both edge images are
 //! blurred by about a pixel, and strong edges are weakened. The agreement is the correlation of the two edge
 //! images over the pixels that show both, and whose neighbours do: where pictures end, neither has edges,
-//! which would make any two alike, noise too. The chance agreement is the mean correlation with the two displaced
-//! against each other in eight directions.
+//! which would make any two alike, noise too. The chance agreement is the mean correlation with the two
+//! displaced against each other in eight directions.
 
 use crate::export::input::masks::MaskedPicture;
 use crate::export::input::photographs::Photograph;
