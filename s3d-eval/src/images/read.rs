@@ -1,6 +1,6 @@
 //! Reads truth and predictions from files.
 
-use crate::images::panorama::PANORAMA;
+use crate::images::PANORAMA;
 use s3d_dataset::{DataSet, Result};
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;

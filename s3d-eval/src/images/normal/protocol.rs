@@ -2,8 +2,8 @@
 
 use crate::error::Result;
 use crate::images::latitude::{BY_LATITUDE, Sums, latitude_weights, tables_by_latitude};
-use crate::images::median::Medians;
-use crate::images::normal_metrics::{
+use crate::images::normal::median::Medians;
+use crate::images::normal::metrics::{
     AngleSums, DSINE_LIMITS, degrees, dsine_cosine, median_of_angles, omnidata_cosine, omnidata_scores,
     weighted_omnidata_scores,
 };

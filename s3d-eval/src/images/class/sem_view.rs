@@ -2,8 +2,8 @@
 
 use crate::Evaluation;
 use crate::error::{Error, Result};
-use crate::images::classes::{Classes, ENDINGS, LIST};
-use crate::images::confusion::Confusion;
+use crate::images::class::classes::{Classes, ENDINGS, LIST};
+use crate::images::class::confusion::Confusion;
 use crate::images::predictions::{Matched, Wanted, find};
 use crate::options::ImageKind;
 use crate::tables::tables;

@@ -1,12 +1,12 @@
 //! Protocol `depth`: depth of views, and distances of panoramas.
 
 use crate::error::{Error, Result};
-use crate::images::depth_files::{Both, Form, both};
-use crate::images::depth_metrics::{DEPTH_COLUMNS, hohonet_depth_twice, unifuse_depth_twice};
-use crate::images::latitude::{BY_LATITUDE, tables_by_latitude, weights_of_pixels};
-use crate::images::marigold::{
+use crate::images::depth::files::{Both, Form, both};
+use crate::images::depth::marigold::{
     Alignment, MARIGOLD_COLUMNS, is_evaluated as marigold_evaluates, marigold_depth_twice,
 };
+use crate::images::depth::metrics::{DEPTH_COLUMNS, hohonet_depth_twice, unifuse_depth_twice};
+use crate::images::latitude::{BY_LATITUDE, tables_by_latitude, weights_of_pixels};
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
 use crate::images::read::Places;
 use crate::images::resample::{opencv_nearest, pillow_nearest};

@@ -2,8 +2,8 @@
 
 use crate::Evaluation;
 use crate::error::Result;
-use crate::images::classes::{Classes, ENDINGS, LIST};
-use crate::images::outline_metrics::class_outlines;
+use crate::images::class::classes::{Classes, ENDINGS, LIST};
+use crate::images::class::outline_metrics::class_outlines;
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
 use crate::tables::{Rows, mean_of_defined, tables};
 use crate::task::Task;

@@ -1,6 +1,6 @@
 //! Finds exact medians of more angles than fit into memory, in two passes.
 
-use crate::images::normal_metrics::degrees;
+use crate::images::normal::metrics::degrees;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;

@@ -1,7 +1,7 @@
 //! The classes of a panorama, prepared like HoHoNet does.
 
-use crate::images::confusion::Confusion;
-use crate::images::lanczos::Lanczos;
+use crate::images::class::confusion::Confusion;
+use crate::images::class::lanczos::Lanczos;
 use crate::images::resample::pillow_nearest;
 use s3d_geom::Raster;
 

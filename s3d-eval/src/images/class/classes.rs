@@ -2,7 +2,7 @@
 
 use crate::ConfusionTable;
 use crate::error::Result;
-use crate::images::confusion::Confusion;
+use crate::images::class::confusion::Confusion;
 use crate::images::predictions::Predicted;
 use crate::images::read::{self, Holds, Places};
 use crate::tables::Rows;

@@ -1,6 +1,6 @@
 //! The depth metrics of Marigold's script, for predictions that are metric or known up to scale and shift.
 
-use crate::images::depth_metrics::{ratio, within};
+use crate::images::depth::metrics::{ratio, within};
 use crate::images::latitude::Sums;
 use std::f64::consts::LN_10;
 use std::iter::repeat;

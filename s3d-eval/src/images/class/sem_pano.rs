@@ -2,10 +2,10 @@
 
 use crate::Evaluation;
 use crate::error::{Error, Result};
-use crate::images::classes::{Classes, ENDINGS, LIST};
-use crate::images::confusion::{ClassScores, hohonet_scores};
+use crate::images::class::classes::{Classes, ENDINGS, LIST};
+use crate::images::class::confusion::{ClassScores, hohonet_scores};
+use crate::images::class::panorama::{PANORAMA, PanoramaClasses};
 use crate::images::latitude::{BY_LATITUDE, tables_by_latitude, weights_of_pixels};
-use crate::images::panorama::{PANORAMA, PanoramaClasses};
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
 use crate::images::read::{self, Places};
 use crate::images::resample::pillow_nearest;

@@ -2,9 +2,9 @@
 
 use crate::Evaluation;
 use crate::error::Result;
-use crate::images::depth::mean;
-use crate::images::depth_files::{Both, Form, both};
-use crate::images::edge_metrics::{EdgeScores, depth_edges};
+use crate::images::depth::edge_metrics::{EdgeScores, depth_edges};
+use crate::images::depth::files::{Both, Form, both};
+use crate::images::depth::protocol::mean;
 use crate::images::predictions::{Matched, Wanted, find};
 use crate::images::read::Places;
 use crate::tables::tables;
