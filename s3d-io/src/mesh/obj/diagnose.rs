@@ -42,7 +42,7 @@ fn check(line: &Line<'_>, so_far: [u64; 3], counts: [u64; 3]) -> Result<(), Why>
         b"v" => vertex(rest).map(|_| ()),
         b"vt" => uv(rest).map(|_| ()),
         b"vn" => normal(rest).map(|_| ()),
-        b"f" => {
+        b"f" | b"fo" => {
             while let Some(word) = next_word(&mut rest) {
                 let indices = corner(word, so_far)?;
                 for (column, (index, count)) in indices.into_iter().zip(counts).enumerate() {
@@ -75,7 +75,7 @@ pub(crate) fn vertex_error(path: &Path, bytes: &[u8], vertex: u32, position: Vec
 pub(crate) fn face_line(bytes: &[u8], face: usize) -> Option<u64> {
     let mut faces = logical_lines(bytes).filter(|line| {
         let (keyword, mut rest) = line.keyword();
-        keyword == b"f" && std::iter::from_fn(|| next_word(&mut rest)).nth(2).is_some()
+        matches!(keyword, b"f" | b"fo") && std::iter::from_fn(|| next_word(&mut rest)).nth(2).is_some()
     });
     faces.nth(face).map(|line| line.number)
 }

@@ -116,7 +116,8 @@ impl<'a> NormalObj<'a> {
                 b"v" => obj.vertex(rest, fill_colors)?,
                 b"vt" => obj.uv(rest)?,
                 b"vn" => obj.normal(rest)?,
-                b"f" => match obj.face(rest, material)? {
+                // Wavefront reads `fo`, a face with its outline, as `f`.
+                b"f" | b"fo" => match obj.face(rest, material)? {
                     Some(read) => read,
                     None => {
                         obj.short_faces.push(line.number);

@@ -29,7 +29,7 @@ pub(crate) enum Other {
     Geometry,
 }
 
-/// Returns what a word starts that is not one of `v`, `vt`, `vn` and `f`. Comments and empty lines are no
+/// Returns what a word starts that is not one of `v`, `vt`, `vn`, `f` and `fo`. Comments and empty lines are no
 /// statements.
 pub(crate) fn other(keyword: &[u8]) -> Result<Other, Why> {
     let is_among = |words: &str, word: &[u8]| words.split_ascii_whitespace().any(|of| of.as_bytes() == word);
@@ -41,7 +41,7 @@ pub(crate) fn other(keyword: &[u8]) -> Result<Other, Why> {
         return Ok(Other::Geometry);
     }
     let lower = keyword.to_ascii_lowercase();
-    let is_known = ["v vt vn f", OTHER_WORDS, GEOMETRY_WORDS]
+    let is_known = ["v vt vn f fo", OTHER_WORDS, GEOMETRY_WORDS]
         .iter()
         .any(|words| is_among(words, &lower));
     let word = quote(keyword);
