@@ -20,7 +20,9 @@ function scoreTable({ title, columns, rows }: ScoreTable): HTMLElement {
         "span",
         { class: "number" },
         words(value),
-        interval && h("span", { class: "quiet" }, ` [${words(interval[0])}, ${words(interval[1])}]`),
+        value !== null &&
+          interval &&
+          h("span", { class: "quiet" }, ` [${words(interval[0])}, ${words(interval[1])}]`),
       ),
     ),
   ]);
