@@ -5,6 +5,8 @@ use crate::evaluation::{Against, Units};
 use crate::task::Task;
 use crate::{EvalOptions, Evaluation, Protocol, boxes, images, panoptic, points};
 use s3d_dataset::{Context, DataSet};
+use s3d_io::Error as FileError;
+use std::fs;
 use std::path::Path;
 
 /// Compares the predictions in the folder or file `predictions` with the data set in the folder `truth`.
@@ -27,6 +29,11 @@ pub fn evaluate(
     let data = DataSet::open(truth)?;
     let folds = options.folds.of(&data)?;
     let task = Task { protocol, variant, data: &data, folds: &folds, predictions, options, ctx };
+    if let Some(other) = &options.against {
+        // A wrong name is told before the work.
+        fs::metadata(other).map_err(|e| FileError::io(other, "read", e))?;
+    }
+
     let mut evaluation = run(&task)?;
     if let Some(predictions) = &options.against {
         let theirs = run(&Task { predictions, ..task })?;

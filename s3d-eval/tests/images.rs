@@ -168,6 +168,10 @@ fn views_are_not_held_against_panoramas() {
     let told = error.to_string();
     assert!(told.contains("panoramas: these predictions are of other images"), "{told}");
 
+    let nowhere = options(|o| o.against = Some(dir.path().join("nowhere")));
+    let error = evaluate(Protocol::Normal, &truth, dir.path(), &nowhere, &Context::default()).unwrap_err();
+    assert!(error.to_string().contains("nowhere: cannot read"), "{error}");
+
     let same = options(|o| {
         o.against = Some(views.clone());
         o.bootstrap = Some(10);
