@@ -117,7 +117,7 @@ impl<'a> NormalObj<'a> {
                 b"vt" => obj.uv(rest)?,
                 b"vn" => obj.normal(rest)?,
                 // Wavefront reads `fo`, a face with its outline, as `f`.
-                b"f" | b"fo" => match obj.face(rest, material)? {
+                b"f" | b"fo" => match obj.face(rest, material, keyword == b"f")? {
                     Some(read) => read,
                     None => {
                         obj.short_faces.push(line.number);
@@ -215,9 +215,9 @@ impl<'a> NormalObj<'a> {
         Some(Some(format!("vn {x} {y} {z}")))
     }
 
-    /// Returns `Some(None)` for a face of fewer than three corners.
-    fn face(&mut self, rest: &[u8], material: u32) -> Option<Option<Line>> {
-        let plain = Corners::plain(rest).filter(|_| self.left_out == [false; 3]);
+    /// Returns `Some(None)` for a face of fewer than three corners. `is_known` if tobj knows its keyword.
+    fn face(&mut self, rest: &[u8], material: u32, is_known: bool) -> Option<Option<Line>> {
+        let plain = Corners::plain(rest).filter(|_| is_known && self.left_out == [false; 3]);
         let (corners, line) = match plain {
             Some(corners) => (corners, None),
             None => self.any_face(rest)?,
