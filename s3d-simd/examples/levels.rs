@@ -1,5 +1,7 @@
 //! Says which levels of vector instructions tests reach on this processor: `.ci/run` prints it.
 
+#![allow(clippy::print_stdout)]
+
 use s3d_simd::ProvenLevel;
 
 fn main() {
