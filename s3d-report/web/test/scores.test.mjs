@@ -41,9 +41,9 @@ test("tables and confusion are those of the evaluation", async () => {
 test("rooms are listed by a score that is chosen", async () => {
   const { page, faults, close } = await open(browser, report, "#/scores");
   const { rows, units } = scores.units;
-  await page.getByLabel("Row").selectOption(String(rows.indexOf("overall")));
-  await page.getByLabel("Column").selectOption("1");
-  await page.getByLabel("Order").selectOption("highest");
+  await page.getByLabel("Row", { exact: true }).selectOption(String(rows.indexOf("overall")));
+  await page.getByLabel("Column", { exact: true }).selectOption("1");
+  await page.getByLabel("Order", { exact: true }).selectOption("highest");
   const shown = await page
     .locator("section", { hasText: "Rooms" })
     .last()
