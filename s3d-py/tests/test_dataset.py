@@ -223,6 +223,13 @@ def test_whole_data_sets_are_checked_compared_and_scored(ds: s3d.DataSet, tmp_pa
         shutil.copy(panorama.path("depth"), predictions)
     evaluation = ds.evaluate("depth", predictions)
     assert evaluation.score("mean", "AbsRel") == 0 and "AbsRel" in str(evaluation)
+    assert evaluation.tables == ["area 1", "area 1, weighted by latitude"]
+    against = ds.evaluate("depth", predictions, against=predictions).data["against"]
+    assert against["differences"][0]["rows"][0]["scores"][0] == {"value": 0, "interval": [0, 0]}
+    scores = tmp_path / "scores.json"
+    scores.write_text(json.dumps(evaluation.data))
+    page = ds.report(tmp_path / "page", scores=[scores], pano_width=64, thumbs=32, mesh_faces=2000)
+    assert (page.parent / "data" / "scores_0.js").exists()
     with pytest.raises(s3d.UsageError, match="no score"):
         evaluation.score("mean", "IoU")
     with pytest.raises(s3d.UsageError, match="protocol"):
