@@ -120,8 +120,8 @@ struct About {
 /// # Errors
 /// [`Error::OutOfRange`] for the options. [`Error::OtherDataSet`] for scores of another data set.
 /// [`Error::Occupied`] if a file at `to` is no report. [`Error::TooLarge`] for a single file.
-/// [`Error::Dataset`] if there is no data set in `out`, its list of files or a file of scores is damaged, `to`
-/// cannot be written or holds something else, or the call is cancelled.
+/// [`Error::Dataset`] if there is no data set in `out`, its list of files or a file of scores is damaged,
+/// `to` cannot be written or holds something else, or the call is cancelled.
 pub fn report(out: &Path, to: &Path, options: &ReportOptions, ctx: &Context) -> Result<Report> {
     write(out, None, to, options, ctx)
 }

@@ -29,8 +29,8 @@ pub(crate) enum Other {
     Geometry,
 }
 
-/// Returns what a word starts that is not one of `v`, `vt`, `vn`, `f` and `fo`. Comments and empty lines are no
-/// statements.
+/// Returns what a word starts that is not one of `v`, `vt`, `vn`, `f` and `fo`. Comments and empty lines are
+/// no statements.
 pub(crate) fn other(keyword: &[u8]) -> Result<Other, Why> {
     let is_among = |words: &str, word: &[u8]| words.split_ascii_whitespace().any(|of| of.as_bytes() == word);
     let keyword = without_comment(keyword);
