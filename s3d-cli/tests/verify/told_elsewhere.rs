@@ -25,7 +25,7 @@ fn stored(path: &Path) {
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
     for at in 0..from.len() {
         let mut member = from.by_index(at).unwrap();
-        to.start_file(member.name(), options).unwrap();
+        to.start_file(member.name().unwrap(), options).unwrap();
         std::io::copy(&mut member, &mut to).unwrap();
     }
     write_bytes(path, to.finish().unwrap().get_ref()).unwrap();
