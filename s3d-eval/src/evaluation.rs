@@ -55,7 +55,7 @@ pub struct Truth {
 }
 
 /// The scores of rooms or images, each by itself.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Units {
     /// The names of the columns.
     pub columns: Vec<String>,
@@ -271,7 +271,7 @@ mod tests {
             confusion: None,
             against: None,
             notes: Vec::new(),
-            units: Units { columns: Vec::new(), rows: Vec::new(), units: Vec::new() },
+            units: Units::default(),
             rounds: Vec::new(),
         };
 

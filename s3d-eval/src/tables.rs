@@ -43,6 +43,16 @@ pub(crate) fn tables<T: Sync>(
     units: &[Unit<T>],
     score: impl Fn(&[&T]) -> Rows + Sync,
 ) -> Scores {
+    Scores { units: each(columns, units, &score), ..only_tables(task, columns, units, &score) }
+}
+
+/// Makes the tables of units, without the scores of each unit.
+pub(crate) fn only_tables<T: Sync>(
+    task: &Task<'_>,
+    columns: &[&str],
+    units: &[Unit<T>],
+    score: impl Fn(&[&T]) -> Rows + Sync,
+) -> Scores {
     let all: Vec<&Unit<T>> = units.iter().collect();
     let mut tables = of_units(task, columns, &all, &score);
 
@@ -57,7 +67,7 @@ pub(crate) fn tables<T: Sync>(
         let count = table.scores().count();
         table.set_intervals(intervals.by_ref().take(count));
     }
-    Scores { tables, units: each(columns, units, &score), rounds }
+    Scores { tables, units: Units::default(), rounds }
 }
 
 /// Returns the scores of each unit by itself.

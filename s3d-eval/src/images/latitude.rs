@@ -1,6 +1,6 @@
 //! Scores of panoramas in which each pixel counts by its solid angle. Their rows near the poles show little.
 
-use crate::tables::{Rows, Scores, Unit, tables};
+use crate::tables::{Rows, Scores, Unit, only_tables};
 use crate::task::Task;
 use std::f64::consts::PI;
 use std::iter::repeat_n;
@@ -30,7 +30,7 @@ pub(super) fn tables_by_latitude<T: Sync>(
     units: &[Unit<T>],
     score: impl Fn(&[&T]) -> Rows + Sync,
 ) -> Scores {
-    let mut made = tables(task, columns, units, score);
+    let mut made = only_tables(task, columns, units, score);
     made.tables
         .iter_mut()
         .for_each(|table| table.title.push_str(", weighted by latitude"));

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::options::ImageKind;
 use crate::tables::Unit;
 use crate::task::Task;
+use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain};
 use std::collections::{BTreeMap, BTreeSet};
@@ -57,6 +58,30 @@ pub(super) struct Matched {
     pub(super) images: Vec<Predicted>,
     pub(super) kind: ImageKind,
     pub(super) notes: Vec<String>,
+}
+
+impl Matched {
+    /// Calls `count` with each image, on all threads, and returns the units in the order of the images.
+    pub(super) fn count<T: Send + Sync>(
+        &self,
+        task: &Task<'_>,
+        count: impl Fn(&Predicted) -> s3d_dataset::Result<T> + Sync,
+    ) -> Result<Vec<Unit<T>>> {
+        let progress = task
+            .ctx
+            .progress("evaluating", self.kind.noun(), self.images.len() as u64);
+        let units = map_in_order(
+            task.ctx,
+            &self.images,
+            || (),
+            |(), predicted| {
+                let counted = count(predicted)?;
+                progress.add(1);
+                Ok(predicted.unit(counted))
+            },
+        )?;
+        Ok(units)
+    }
 }
 
 /// The content of the folder of predictions.

@@ -93,7 +93,7 @@ class Evaluation(_Answer):
     @property
     def tables(self) -> list[str]:
         """The titles of the tables: one for each fold, and with several folds one for all pooled and one for
-        the mean. Panoramas have each a second time, weighted by latitude.
+        the mean. Scores of panoramas have each of these twice: the second is weighted by latitude.
         """
         return [table["title"] for table in self.data["tables"]]
 

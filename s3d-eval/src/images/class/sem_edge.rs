@@ -7,7 +7,6 @@ use crate::images::class::outline_metrics::class_outlines;
 use crate::images::predictions::{Matched, Predicted, Wanted, find};
 use crate::tables::{Rows, mean_of_defined, tables};
 use crate::task::Task;
-use s3d_dataset::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 
 const DEFINITION: [&str; 5] = [
@@ -36,20 +35,10 @@ pub(crate) fn sem_edge(task: &Task<'_>) -> Result<Evaluation> {
         endings: &ENDINGS,
         known: &[LIST],
     };
-    let Matched { images, kind, notes } = find(task, &wanted)?;
+    let matched = find(task, &wanted)?;
 
-    let progress = task.ctx.progress("evaluating", kind.noun(), images.len() as u64);
-    let units = map_in_order(
-        task.ctx,
-        &images,
-        || (),
-        |(), predicted| {
-            let scores = compare(task, predicted, &classes)?;
-            progress.add(1);
-            Ok(predicted.unit(scores))
-        },
-    )?;
-    drop(progress);
+    let units = matched.count(task, |predicted| compare(task, predicted, &classes))?;
+    let Matched { images, kind, notes } = matched;
 
     let columns = ["F", "precision", "recall"];
     let tables = tables(task, &columns, &units, |units| rows(&classes, units));

@@ -13,7 +13,6 @@ use crate::options::ImageKind;
 use crate::tables::{Rows, tables};
 use crate::task::Task;
 use s3d_dataset::DataSet;
-use s3d_dataset::parallel::map_in_order;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
 use std::cell::RefCell;
@@ -46,21 +45,13 @@ pub(crate) fn sem_pano(task: &Task<'_>) -> Result<Evaluation> {
         endings: &ENDINGS,
         known: &[LIST],
     };
-    let Matched { images, notes, .. } = find(task, &wanted)?;
+    let matched = find(task, &wanted)?;
 
-    let progress = task.ctx.progress("evaluating", "panoramas", images.len() as u64);
-    let units = map_in_order(
-        task.ctx,
-        &images,
-        || (),
-        |(), predicted| {
-            let truth = truth(task.data, predicted, &classes)?;
-            let counted = compare(&truth, &predicted.file, &classes)?;
-            progress.add(1);
-            Ok(predicted.unit(counted))
-        },
-    )?;
-    drop(progress);
+    let units = matched.count(task, |predicted| {
+        let truth = truth(task.data, predicted, &classes)?;
+        compare(&truth, &predicted.file, &classes)
+    })?;
+    let Matched { images, notes, .. } = matched;
 
     let columns = ["IoU", "accuracy"];
     let mut made = tables(task, &columns, &units, |units| {

@@ -8,7 +8,6 @@ use crate::images::predictions::{Matched, Wanted, find};
 use crate::options::ImageKind;
 use crate::tables::tables;
 use crate::task::Task;
-use s3d_dataset::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 
 const DEFINITION: [&str; 5] = [
@@ -35,25 +34,18 @@ pub(crate) fn sem_view(task: &Task<'_>) -> Result<Evaluation> {
         endings: &ENDINGS,
         known: &[LIST],
     };
-    let Matched { images, notes, .. } = find(task, &wanted)?;
+    let matched = find(task, &wanted)?;
 
-    let progress = task.ctx.progress("evaluating", "views", images.len() as u64);
-    let units = map_in_order(
-        task.ctx,
-        &images,
-        || (),
-        |(), predicted| {
-            let mut confusion = Confusion::new(classes.count);
-            classes.pair(task.data, predicted, |pair| {
-                if let Some([truth, guess]) = pair {
-                    confusion.count(truth.into(), guess.into());
-                }
-            })?;
-            progress.add(1);
-            Ok(predicted.unit(confusion.counted()))
-        },
-    )?;
-    drop(progress);
+    let units = matched.count(task, |predicted| {
+        let mut confusion = Confusion::new(classes.count);
+        classes.pair(task.data, predicted, |pair| {
+            if let Some([truth, guess]) = pair {
+                confusion.count(truth.into(), guess.into());
+            }
+        })?;
+        Ok(confusion.counted())
+    })?;
+    let Matched { images, notes, .. } = matched;
 
     let tables = tables(task, &["IoU", "accuracy"], &units, |units| {
         let scores = classes.sum(units.iter().copied()).view_scores();

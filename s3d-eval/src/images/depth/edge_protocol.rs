@@ -9,7 +9,6 @@ use crate::images::predictions::{Matched, Wanted, find};
 use crate::images::read::Places;
 use crate::tables::tables;
 use crate::task::Task;
-use s3d_dataset::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 
 const DEFINITION: [&str; 5] = [
@@ -36,22 +35,14 @@ pub(crate) fn depth_edge(task: &Task<'_>) -> Result<Evaluation> {
         endings: &["png", "npy", "npz"],
         known: &[],
     };
-    let Matched { images, kind, mut notes } = find(task, &wanted)?;
+    let matched = find(task, &wanted)?;
 
     let form = Form { places: Places::all, is_metric: true, is_evaluated: |truth| truth > 0.0 };
-    let progress = task.ctx.progress("evaluating", kind.noun(), images.len() as u64);
-    let units = map_in_order(
-        task.ctx,
-        &images,
-        || (),
-        |(), predicted| {
-            let Both { size, truth, prediction } = both(task, predicted, &form)?;
-            let scores = depth_edges(&truth, &prediction, size[0] as usize);
-            progress.add(1);
-            Ok(predicted.unit(scores))
-        },
-    )?;
-    drop(progress);
+    let units = matched.count(task, |predicted| {
+        let Both { size, truth, prediction } = both(task, predicted, &form)?;
+        Ok(depth_edges(&truth, &prediction, size[0] as usize))
+    })?;
+    let Matched { images, kind, mut notes } = matched;
 
     let incomplete = units.iter().filter(|unit| !unit.counted.is_complete).count();
     if incomplete > 0 {

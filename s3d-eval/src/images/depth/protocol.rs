@@ -14,7 +14,6 @@ use crate::options::ImageKind;
 use crate::tables::{Unit, tables};
 use crate::task::Task;
 use crate::{Evaluation, hints};
-use s3d_dataset::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 
 const HOHONET: [&str; 5] = [
@@ -29,8 +28,8 @@ const HOHONET: [&str; 5] = [
 ];
 
 const UNIFUSE: [&str; 6] = [
-    "Panoramas are evaluated at 1024 × 512 pixels. Each takes the panorama's pixel at its upper left corner, \
-     as in OpenCV. A prediction of the panorama's own size is sampled at the same pixels.",
+    "Panoramas are evaluated at 1024 × 512 pixels. Each takes the panorama's pixel at its upper left \
+     corner, as in OpenCV. A prediction of the panorama's own size is sampled at the same pixels.",
     "Pixels whose true distance is above 0 and at most 10 m are evaluated. Truth and prediction are raised \
      to at least 0.1 m.",
     "A fault of the script is kept: where a prediction is beyond 10 m, the truth becomes 10 m and the \
@@ -47,8 +46,8 @@ const MARIGOLD: [&str; 4] = [
     "Images are evaluated at their own size. Pixels whose true depth is more than 0.001 m and less than 10 m \
      are evaluated: the script's limits for NYUv2 and ScanNet. Predictions are clamped to the same limits.",
     "Scores are computed for each image; the table has their mean over images.",
-    "δ is the larger of prediction ÷ truth and truth ÷ prediction. RMSE ln is of natural logarithms, log10 \
-     the mean error of decimal ones. iRMSE is of 1 ÷ depth. SILog is the standard deviation of errors of \
+    "δ is the larger of prediction ÷ truth and truth ÷ prediction. RMSE ln is of natural logarithms, \
+     log10 the mean error of decimal ones. iRMSE is of 1 ÷ depth. SILog is the standard deviation of errors of \
      natural logarithms.",
     "As in Marigold's script/depth/eval.py (commit b1dffaaa), which computes in 32 bits; here it is 64.",
 ];
@@ -64,7 +63,7 @@ fn of_alignment(alignment: Alignment) -> &'static str {
         Alignment::Disparity => {
             "Predictions are disparities in any unit: large is near. In each image the scale and the shift \
              are found by which those above 0 come nearest to 1 ÷ truth of the evaluated pixels, by least \
-             squares. Aligned disparities below 0.001 per metre become 0.001, and 1 ÷ disparity is the depth."
+             squares. Aligned disparities below 0.001 per metre become 0.001; 1 ÷ disparity is the depth."
         }
     }
 }
@@ -157,20 +156,10 @@ pub(crate) fn depth(task: &Task<'_>) -> Result<Evaluation> {
         endings: &["png", "npy", "npz"],
         known: &[],
     };
-    let Matched { images, kind, mut notes } = find(task, &wanted)?;
+    let matched = find(task, &wanted)?;
 
-    let progress = task.ctx.progress("evaluating", kind.noun(), images.len() as u64);
-    let units = map_in_order(
-        task.ctx,
-        &images,
-        || (),
-        |(), predicted| {
-            let scored = Scored::of(task, predicted, script)?;
-            progress.add(1);
-            Ok(predicted.unit(scored))
-        },
-    )?;
-    drop(progress);
+    let units = matched.count(task, |predicted| Scored::of(task, predicted, script))?;
+    let Matched { images, kind, mut notes } = matched;
 
     let noun = kind.noun();
     notes.extend(notes_on(&units, noun));

@@ -103,8 +103,8 @@ fn sharpness(lens: &CaptureLens) -> f64 {
     }
 }
 
-/// The most pixels of a cube for each pixel of the captures. A single picture that is 20° wide fills the cube
-/// so thinly; a narrower one would take memory for pixels that it does not show.
+/// The most pixels of a cube for each pixel of the captures. A single picture that is 20° wide fills the
+/// cube so thinly; a narrower one would take memory for pixels that it does not show.
 const MOST_TEXELS: f64 = 256.0;
 
 /// The data from which the pixels of the cube are made.

@@ -5,7 +5,7 @@
 use crate::fs::quote::count;
 use crate::mesh::gltf::extensions::DRACO;
 use crate::mesh::gltf::features::{Features, SentenceResult, no_labels};
-use crate::mesh::gltf::unpack::whole;
+use crate::mesh::gltf::packed::unpack::whole;
 use crate::mesh::gltf::words::{MESH_FEATURES, METADATA, index_of, sets_of};
 use gltf::json::Index;
 use gltf::json::accessor::Accessor;

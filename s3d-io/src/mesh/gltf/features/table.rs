@@ -4,7 +4,7 @@
 
 use crate::fs::quote::quote;
 use crate::mesh::gltf::document::GltfDocument;
-use crate::mesh::gltf::unpack::whole;
+use crate::mesh::gltf::packed::unpack::whole;
 use crate::mesh::gltf::words::{CLASS_KEYS, INSTANCE_KEYS, index_of};
 use gltf::json::Index;
 use serde_json::{Map, Value};

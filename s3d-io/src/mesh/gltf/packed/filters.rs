@@ -92,7 +92,7 @@ fn rounded(v: f32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::gltf::meshopt::tests::hex;
+    use crate::mesh::gltf::packed::meshopt::tests::hex;
 
     fn shorts(data: &[u8]) -> Vec<i16> {
         data.as_chunks().0.iter().map(|b| i16::from_le_bytes(*b)).collect()

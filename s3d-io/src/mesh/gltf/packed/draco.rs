@@ -8,7 +8,7 @@ use crate::fs::quote::quote;
 use crate::guarded::guarded;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::extensions::DRACO;
-use crate::mesh::gltf::unpack::{Room, push_buffer};
+use crate::mesh::gltf::packed::unpack::{Room, push_buffer};
 use crate::mesh::gltf::words::index_of;
 use draco_core::decode_limits::DecodeLimits;
 use draco_core::decoder_buffer::DecoderBuffer;
