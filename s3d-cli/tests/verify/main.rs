@@ -516,13 +516,26 @@ fn exports_of_every_kind_are_clean() {
     let pictures = dir.path().join("one/panorama");
     fs::create_dir(&pictures).unwrap();
     for uuid in [UUID_A, common::UUID_B] {
-        let photo = Raster::filled(64, 32, [40, 50, 60]);
+        let colors = (0..64 * 32u32).map(|i| [4 * (i % 64) as u8, 8 * (i / 64) as u8, 60]);
+        let photo = Raster::from_vec(64, 32, colors.collect());
         write_rgb8(&pictures.join(format!("{uuid}.png")), &photo, Content::Photo, Compression::Fast).unwrap();
     }
     let toml = fs::read_to_string(&one).unwrap();
     fs::write(&one, format!("rgb = \"panorama\"\n{toml}")).unwrap();
-    let report = is_clean(&export("pictures", &[&one], &[]), &["--full"]);
+    let out = export("pictures", &[&one], &[]);
+    let report = is_clean(&out, &["--full"]);
     assert!(report.contains("come from pictures (panorama)"), "{report}");
+
+    // A view that was mirrored, or whose red and blue were exchanged, is not what the panorama shows.
+    let view = first(&out, "area_1/data/rgb", ".png");
+    let image = read_rgb8(&out.join(&view)).unwrap();
+    for changed in [mirrored(&image), image.map(|[r, g, b]| [b, g, r])] {
+        write_rgb8(&out.join(&view), &changed, Content::Photo, Compression::Fast).unwrap();
+        common::list_files(&out);
+        let (report, code) = verify(&out, &[]);
+        assert_eq!(code, 1);
+        tells(&report, &view, &["have another mean colour than area_1/pano/rgb/"]);
+    }
 }
 
 #[test]

@@ -31,6 +31,7 @@ use crate::parallel::for_each_in_order;
 use crate::record::manifest::Manifest;
 use crate::store::lock::Lock;
 use files::Files;
+use images::picture_colors;
 use images::{ImageCheck, Mismatch, Reference, Scratch, UnlabelledPixels};
 use labels::Labels;
 use mesh::{LabelledMesh, NOT_IN_TABLE};
@@ -204,7 +205,7 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
     if source != "texture" && domains.contains(&Domain::Rgb) {
         report.note(format!(
             "area {area}: the colours of its images come from pictures ({source}), which are not in the data \
-             set; they were not compared"
+             set; views were held against panoramas alone"
         ));
     }
 
@@ -286,6 +287,7 @@ fn check_images(
     let Common { layout, manifest, labels, views, photographs, files, report, .. } = *common;
     let mismatches = Mutex::new(Vec::new());
     let cameras = Mutex::new(Vec::new());
+    let view_colors = Mutex::new(Vec::new());
     let unlabelled = UnlabelledPixels::default();
     let domains = manifest.domains();
     let check = ImageCheck {
@@ -299,6 +301,7 @@ fn check_images(
         report,
         domains: &domains,
         mismatches: &mismatches,
+        view_colors: &view_colors,
         cameras: &cameras,
         unlabelled: &unlabelled,
     };
@@ -333,11 +336,11 @@ fn check_images(
     let mut cameras = cameras.into_inner().unwrap_or_else(PoisonError::into_inner);
     cameras.sort_by_key(|(index, _)| *index);
 
-    if manifest.is_labelled() {
-        tables::location_rooms(layout, area, images, &cameras, report);
-    }
+    let view_colors = view_colors.into_inner().unwrap_or_else(PoisonError::into_inner);
+    picture_colors::check(ctx, layout, images, &cameras, &view_colors, report)?;
 
     let Some((reference, ..)) = reference else { return Ok(()) };
+    tables::location_rooms(reference, images, &cameras);
     if common.full {
         scores::check(ctx, reference, area, images, &cameras, views)?;
     }

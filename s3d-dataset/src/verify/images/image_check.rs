@@ -51,6 +51,7 @@ impl ImageCheck<'_> {
         let mut files = ImageFiles {
             check: self,
             index,
+            is_view: image.frame != Frame::Panorama,
             photograph,
             pose: pose.as_ref(),
             cast,

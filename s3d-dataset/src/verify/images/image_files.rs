@@ -1,6 +1,7 @@
 //! Checks the files of one image against each other, and against the mesh.
 
 use crate::export::modality::{Drawn, Image, NO_CLASS, null_pixels, palette};
+use crate::verify::images::picture_colors::ViewColors;
 use crate::verify::images::pixels::{Difference, Opened, Pixels};
 use crate::verify::images::rays::{difference, index_of, points_of_depth};
 use crate::verify::images::{ImageCheck, Mismatch, Scratch, UnlabelledPixels};
@@ -29,6 +30,7 @@ const SLACK: f64 = 0.005;
 pub(super) struct ImageFiles<'a> {
     pub(super) check: &'a ImageCheck<'a>,
     pub(super) index: usize,
+    pub(super) is_view: bool,
     /// The record of the photograph, if the image is the view of one.
     pub(super) photograph: Option<&'a PhotographRecord>,
     pub(super) pose: Option<&'a CheckedPose>,
@@ -86,6 +88,7 @@ impl ImageFiles<'_> {
                 self.unlabelled(Some(&indices), memory);
                 self.semantic = Some(indices);
             }
+            (Domain::Rgb, Pixels::Color(colors)) => self.keep_colors(&colors),
             (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path, memory),
             (Domain::SemanticClass, Pixels::Class(places, palette)) => {
                 self.classes(&places, &palette, path, memory);
@@ -191,6 +194,19 @@ impl ImageFiles<'_> {
                 at / width
             )
         });
+    }
+
+    /// Keeps the colours of a view that come from pictures, for a comparison with its location's panorama.
+    fn keep_colors(&self, colors: &Raster<[u8; 3]>) {
+        let from_pictures = self.check.reference.is_some_and(|reference| !reference.rgb_from_mesh);
+        if from_pictures && self.is_view {
+            let view = ViewColors::new(self.index, colors);
+            self.check
+                .view_colors
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push(view);
+        }
     }
 
     /// Counts the pixels without votes, and the pixels without a label.

@@ -3,6 +3,7 @@
 pub(crate) mod diagnosis;
 mod image_check;
 mod image_files;
+pub(crate) mod picture_colors;
 pub(crate) mod pixels;
 pub(crate) mod rays;
 mod shade;
@@ -10,6 +11,7 @@ mod shade;
 use crate::export::modality::{Channels, ImageBuffers};
 use crate::record::manifest::Manifest;
 use crate::verify::files::Files;
+use crate::verify::images::picture_colors::ViewColors;
 use crate::verify::images::pixels::Difference;
 use crate::verify::labels::Labels;
 use crate::verify::mesh::LabelledMesh;
@@ -49,6 +51,8 @@ pub(crate) struct ImageCheck<'a> {
     pub(crate) domains: &'a [Domain],
     /// Files that differ from the mesh, kept for a second look.
     pub(crate) mismatches: &'a Mutex<Vec<Mismatch>>,
+    /// The colours of views that come from pictures.
+    pub(crate) view_colors: &'a Mutex<Vec<ViewColors>>,
     /// The cameras that could be read, each with the index of its image.
     pub(crate) cameras: &'a Mutex<Vec<(usize, Camera)>>,
     /// Pixels of the label images without votes and without a label.
