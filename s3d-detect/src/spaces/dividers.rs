@@ -13,6 +13,13 @@ const LEAST_M2: f64 = 2.0;
 /// The stronger one stays of two dividers nearer to each other than this, in metres.
 const APART_M: f32 = 0.12;
 
+/// A surface is level if the z of its normal is larger than this.
+const LEVEL: f32 = 0.9;
+/// The ceiling and the floor between two storeys have this share of the largest floor or ceiling at least.
+const STOREY_SHARE: f64 = 0.3;
+/// The least height of a storey, in metres.
+const STOREY_M: f32 = 1.8;
+
 /// A plane across an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divider {
@@ -37,25 +44,8 @@ pub fn find_dividers(surfels: &[Surfel]) -> Dividers {
 }
 
 fn dividers_along(axis: usize, surfels: &[Surfel]) -> Vec<Divider> {
-    let ends = surfels
-        .iter()
-        .fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], s| {
-            [least.min(s.position[axis]), most.max(s.position[axis])]
-        });
-    if surfels.is_empty() {
-        return Vec::new();
-    }
-
-    // Each surfel stands for a cell of surface. Both ends have room for a filter.
-    let margin = GAPS.end() + PEAK;
-    let bin = |x: f32| ((x - ends[0]) / BIN_M) as usize + margin;
-    let mut histogram = vec![0.0; bin(ends[1]) + margin + 1];
-    for s in surfels {
-        histogram[bin(s.position[axis])] += f64::from(CELL_M * CELL_M);
-    }
-
-    let origin = ends[0] - margin as f32 * BIN_M;
-    strongest(&respond(&histogram))
+    let Histogram { origin, m2 } = Histogram::new(axis, surfels);
+    strongest(&respond(&m2))
         .into_iter()
         .map(|(middle, gap, response)| Divider {
             at: origin + middle as f32 * 0.5 * BIN_M,
@@ -63,6 +53,61 @@ fn dividers_along(axis: usize, surfels: &[Surfel]) -> Vec<Divider> {
             response,
         })
         .collect()
+}
+
+/// Returns the heights between the storeys of an area, ascending; none if it has one storey. Such a height
+/// lies between a ceiling and the floor above it, both of much of the size of the largest floor. Storeys
+/// that begin at another height in each part of a building are not told apart.
+pub fn storey_borders(surfels: &[Surfel]) -> Vec<f32> {
+    let is_level = |s: &&Surfel| s.normal.z.abs() > LEVEL;
+    let level: Vec<Surfel> = surfels.iter().filter(is_level).copied().collect();
+    let Histogram { m2, .. } = Histogram::new(2, &level);
+    let largest = m2.windows(PEAK).map(|peak| peak.iter().sum()).fold(0.0, f64::max);
+    let heights = |s: &Surfel| s.position.z;
+    let lowest = level.iter().map(heights).fold(f32::INFINITY, f32::min);
+    let highest = level.iter().map(heights).fold(f32::NEG_INFINITY, f32::max);
+
+    let mut borders: Vec<f32> = Vec::new();
+    for divider in dividers_along(2, &level) {
+        let below = borders.last().copied().unwrap_or(lowest);
+        if divider.response >= STOREY_SHARE * largest
+            && divider.at - below >= STOREY_M
+            && highest - divider.at >= STOREY_M
+        {
+            borders.push(divider.at);
+        }
+    }
+    borders
+}
+
+/// The surface of surfels along an axis, in bins of [`BIN_M`].
+struct Histogram {
+    /// Where the first bin begins, in metres.
+    origin: f32,
+    /// The surface in each bin, in m². Both ends have room for a filter.
+    m2: Vec<f64>,
+}
+
+impl Histogram {
+    fn new(axis: usize, surfels: &[Surfel]) -> Self {
+        let ends = surfels
+            .iter()
+            .fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], s| {
+                [least.min(s.position[axis]), most.max(s.position[axis])]
+            });
+        if surfels.is_empty() {
+            return Self { origin: 0.0, m2: Vec::new() };
+        }
+
+        let margin = GAPS.end() + PEAK;
+        let bin = |x: f32| ((x - ends[0]) / BIN_M) as usize + margin;
+        let mut m2 = vec![0.0; bin(ends[1]) + margin + 1];
+        // Each surfel stands for a cell of surface.
+        for s in surfels {
+            m2[bin(s.position[axis])] += f64::from(CELL_M * CELL_M);
+        }
+        Self { origin: ends[0] - margin as f32 * BIN_M, m2 }
+    }
 }
 
 /// Returns for each place, in half bins, the largest response of all gaps, and this gap. The response of a
@@ -107,6 +152,8 @@ fn strongest(answers: &[(f64, usize)]) -> Vec<(usize, usize, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::{Vec3, vec3};
+    use s3d_geom::Aabb;
 
     #[test]
     fn two_layers_are_a_divider_and_one_layer_is_not() {
@@ -124,5 +171,41 @@ mod tests {
     #[test]
     fn no_surfels_have_no_dividers() {
         assert_eq!(find_dividers(&[]), Dividers::default());
+    }
+
+    /// Makes level surfaces of 4 × 5 m, or of a part of this.
+    fn levels(heights: &[(f32, f32)]) -> Vec<Surfel> {
+        let mut surfels = Vec::new();
+        for (z, share) in heights {
+            for i in 0..(80.0 * share) as u8 {
+                for j in 0..100u8 {
+                    let position = CELL_M * vec3(f32::from(i), f32::from(j), 0.0) + z * Vec3::Z;
+                    let extent = Aabb { min: position, max: position };
+                    let normal = Vec3::Z;
+                    surfels.push(Surfel {
+                        position,
+                        extent,
+                        normal,
+                        curvature: 0.0,
+                        color: Vec3::ZERO,
+                        room: 0,
+                    });
+                }
+            }
+        }
+        surfels
+    }
+
+    #[test]
+    fn storeys_lie_between_a_ceiling_and_a_floor() {
+        assert!(storey_borders(&[]).is_empty());
+        // Tables are thin, too, and a slab lies above a suspended ceiling.
+        let storey = [(0.0, 1.0), (0.72, 0.5), (0.76, 0.5), (2.6, 1.0), (2.9, 1.0)];
+        assert!(storey_borders(&levels(&storey)).is_empty());
+
+        // A floor with a stairwell above.
+        let house = [storey.as_slice(), &[(2.9, 0.8), (3.66, 0.4), (5.5, 1.0)]].concat();
+        let borders = storey_borders(&levels(&house));
+        assert!(borders.len() == 1 && (borders[0] - 2.75).abs() < 0.05, "{borders:?}");
     }
 }

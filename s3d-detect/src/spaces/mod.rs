@@ -6,6 +6,8 @@
 //! into cells. Neighbouring cells are [merged](merge) if no wall stands where they touch, and cells that are
 //! connected by mergers make a space. Each space gets a [canonical frame](frame).
 //!
+//! The same filter along Z tells [storeys](dividers::storey_borders) apart, which are parsed one by one.
+//!
 //! The paper does not publish the widths, the thresholds and the rule for an entrance: they are ours.
 
 pub mod dividers;
@@ -17,7 +19,7 @@ pub(crate) mod parsed_area;
 pub(crate) mod space;
 
 use crate::surfel::Surfel;
-use dividers::{Dividers, find_dividers};
+use dividers::{Dividers, find_dividers, storey_borders};
 use merge::{NO_SPACE, merge_cells};
 
 /// Returns the angle of the building's walls to the axes, in degrees, −45 to 45. It is the mean direction
@@ -40,18 +42,37 @@ pub fn building_angle_deg(surfels: &[Surfel]) -> f64 {
 /// The spaces of an area whose walls are parallel to the axes.
 #[derive(Clone, Debug)]
 pub struct Spaces {
-    /// The planes of the walls.
-    pub dividers: Dividers,
+    /// The planes of the walls of each storey, from below.
+    pub dividers: Vec<Dividers>,
     /// The space of each surfel; [`NO_SPACE`] in cells too small to be a space.
     pub of_surfel: Vec<u32>,
     /// The number of spaces.
     pub count: u32,
 }
 
-/// Parses the surfels of an area.
+/// Parses the surfels of an area, storey by storey.
 pub fn parse(surfels: &[Surfel]) -> Spaces {
-    let dividers = find_dividers(surfels);
-    let (of_surfel, count) = merge_cells(surfels, &dividers);
-    debug_assert!(of_surfel.iter().all(|&s| s < count || s == NO_SPACE));
-    Spaces { dividers, of_surfel, count }
+    let borders = storey_borders(surfels);
+    let storey_of = |s: &Surfel| borders.partition_point(|border| *border <= s.position.z);
+    let mut spaces = Spaces { dividers: Vec::new(), of_surfel: vec![NO_SPACE; surfels.len()], count: 0 };
+
+    for storey in 0..=borders.len() {
+        let places: Vec<usize> = (0..surfels.len())
+            .filter(|&i| storey_of(&surfels[i]) == storey)
+            .collect();
+        let here: Vec<Surfel> = places.iter().map(|&i| surfels[i]).collect();
+        let dividers = find_dividers(&here);
+        let (of_surfel, count) = merge_cells(&here, &dividers);
+
+        for (place, space) in places
+            .into_iter()
+            .zip(of_surfel)
+            .filter(|(_, space)| *space != NO_SPACE)
+        {
+            spaces.of_surfel[place] = spaces.count + space;
+        }
+        spaces.dividers.push(dividers);
+        spaces.count += count;
+    }
+    spaces
 }
