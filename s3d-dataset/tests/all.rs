@@ -6,5 +6,6 @@ mod common;
 mod changed;
 mod fill;
 mod library;
+mod storeys;
 mod strays;
 mod useful;

@@ -9,14 +9,14 @@ use crate::export::input::area::AreaInput;
 use crate::export::input::pictures::Pictures;
 use crate::export::input::requested::name_of;
 use crate::export::labels::label_area::label_files;
-use crate::export::location::room_of;
+use crate::export::location::Surroundings;
 use crate::export::modality::{Channels, classes_of_labels, palette};
 use crate::export::points::write_points;
 use crate::export::scoring::check_faces;
 use crate::record::journal::{AssetsDone, Done, LocationDone, Unit, tally_of};
 use crate::record::listing;
 use crate::stage::Stage;
-use crate::survey::annotated::{Annotated, SurveyedRoom};
+use crate::survey::annotated::Annotated;
 use crate::survey::candidate::Candidate;
 use crate::survey::labelled_area::LabelledArea;
 use glam::DVec3;
@@ -153,7 +153,7 @@ pub(crate) fn render_area(
         .iter()
         .map(|l| todo.contains(&Unit::Location(number, l.uuid.clone())))
         .collect();
-    let photographs = wanted_photographs(area, &annotated.rooms, todo);
+    let photographs = wanted_photographs(area, Surroundings { scene, annotated, table: common.table }, todo);
 
     // Each finished unit is written to the journal.
     let finish_location = |written: WrittenLocation| {
@@ -226,7 +226,7 @@ fn filled_faces(annotated: &Annotated) -> Vec<bool> {
 /// The photographs of an area whose views `todo` holds, each with its room.
 fn wanted_photographs<'a>(
     area: &'a AreaInput,
-    rooms: &[SurveyedRoom],
+    surroundings: Surroundings<'_>,
     todo: &BTreeSet<&Unit>,
 ) -> Vec<photographs::Shot<'a>> {
     area.photographs
@@ -234,7 +234,7 @@ fn wanted_photographs<'a>(
         .iter()
         .filter(|p| todo.contains(&Unit::Photograph(area.number, p.uuid.clone())))
         .map(|photograph| {
-            let room = room_of(rooms, photograph.camera.pose.location);
+            let room = surroundings.room_of(photograph.camera.pose.location);
             photographs::Shot { photograph, room }
         })
         .collect()

@@ -7,13 +7,17 @@ use crate::export::input::cameras::Cameras;
 use crate::options::placing::{Placing, SHARE};
 use crate::place::free_space::{FreeSpaceOptions, place_in_free_space};
 use crate::place::{Ground, Placement, place_locations};
-use crate::survey::annotated::{Annotated, SurveyedRoom};
+use crate::survey::annotated::Annotated;
+use crate::survey::rooms_around::{RoomsAround, nearest_room};
 use crate::survey::surface_seen::SurfaceSeen;
 use glam::DVec3;
 use s3d_geom::NearestFaces;
 use s3d_io::camera::ScanLocation;
 use s3d_label::{LabelTable, Room, UNKNOWN_ROOM};
 use s3d_render::Scene;
+
+/// A location sees a room if at least this many of the rays around it end there.
+const FEW_RAYS: u32 = 3;
 
 /// An area's scan locations, each with its room if there are rooms. `surface_seen` is there if the locations
 /// were placed by it.
@@ -34,13 +38,14 @@ pub(crate) fn locate(
     table: &LabelTable,
     seed: u64,
 ) -> Result<Located> {
+    let surroundings = Surroundings { scene, annotated, table };
     match &area.cameras {
         Cameras::Listed(locations, told) => {
-            let mut rooms = Vec::with_capacity(locations.len());
-            for (location, told) in locations.iter().zip(told) {
-                let known = told.filter(|told| annotated.rooms.iter().any(|r| r.room == *told));
-                rooms.push(known.or_else(|| room_of(&annotated.rooms, location.pose.location)));
-            }
+            let rooms = locations
+                .iter()
+                .zip(told)
+                .map(|(location, told)| surroundings.room_of_listed(ctx, area.number, location, *told))
+                .collect();
             Ok(Located { locations: locations.clone(), rooms, surface_seen: None })
         }
         Cameras::Placed(Placing::Apart(distance_m)) if area.is_labelled => {
@@ -78,7 +83,7 @@ pub(crate) fn locate(
             let rooms = placed
                 .locations
                 .iter()
-                .map(|location| room_of(&annotated.rooms, location.pose.location))
+                .map(|location| surroundings.room_of(location.pose.location))
                 .collect();
             Ok(Located { locations: placed.locations, rooms, surface_seen: Some(seen) })
         }
@@ -90,26 +95,58 @@ pub(crate) fn room_name(room: Option<Room>) -> String {
     room.map_or_else(|| UNKNOWN_ROOM.to_owned(), |room| room.to_string())
 }
 
-/// Returns the room in which a point stands: the room whose floor outline holds it, or else the room with the
-/// nearest outline. The first by name wins a tie. A room with too few points for an outline has the box of
-/// its points instead. An area is taken for one storey, as in the data set. Returns `None` if there is no
-/// room.
-pub(crate) fn room_of(rooms: &[SurveyedRoom], point: DVec3) -> Option<Room> {
-    let mut best = (f64::INFINITY, rooms.first()?.room);
-    for r in rooms {
-        let min = r.bbox.min.as_dvec3().truncate();
-        let max = r.bbox.max.as_dvec3().truncate();
-        let mut distance = point.truncate().distance(point.truncate().clamp(min, max));
-        // The outline lies in the box: it is no nearer, but for rounding.
-        if distance > 1.000_001 * best.0 {
-            continue;
+/// The labelled mesh of an area, which tells in which room a camera is.
+#[derive(Clone, Copy)]
+pub(crate) struct Surroundings<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) annotated: &'a Annotated,
+    pub(crate) table: &'a LabelTable,
+}
+
+impl Surroundings<'_> {
+    /// Returns the room in which a camera is: the room of the labelled surface below and around it, or where
+    /// there is little, the room whose floor outline and heights are nearest. Returns `None` if there is no
+    /// room.
+    pub(crate) fn room_of(&self, place: DVec3) -> Option<Room> {
+        let rooms = &self.annotated.rooms;
+        if rooms.is_empty() {
+            return None;
         }
-        if !r.footprint.polygons.is_empty() {
-            distance = r.footprint.distance(point.x, point.y);
-        }
-        if distance < best.0 {
-            best = (distance, r.room);
-        }
+        self.rooms_around(place)
+            .stands_in()
+            .or_else(|| nearest_room(rooms, place))
     }
-    Some(best.1)
+
+    /// Returns the room of a listed location: the room that its list tells, unless there is none of that name
+    /// or the location sees nothing of it.
+    fn room_of_listed(
+        &self,
+        ctx: &Context,
+        area: u32,
+        location: &ScanLocation,
+        told: Option<Room>,
+    ) -> Option<Room> {
+        let place = location.pose.location;
+        let known = told.filter(|told| self.annotated.rooms.iter().any(|room| room.room == *told));
+        let Some(told) = known else { return self.room_of(place) };
+
+        let around = self.rooms_around(place);
+        if around.rays_to(&told) >= FEW_RAYS {
+            return Some(told);
+        }
+        let Some(stands_in) = around.stands_in() else { return Some(told) };
+        ctx.warn(format_args!(
+            "area {area}: location {} is in {told} by its list, but sees nothing of that room. Its images are \
+             named after {stands_in}, whose surface is around it",
+            location.uuid
+        ));
+        Some(stands_in)
+    }
+
+    fn rooms_around(&self, place: DVec3) -> RoomsAround<Room> {
+        RoomsAround::of(self.scene, place, |face| {
+            let label = self.annotated.label_of_face[face as usize];
+            Some(self.table.get(label)?.room)
+        })
+    }
 }

@@ -252,6 +252,7 @@ fn is_near(a: [f64; 3], b: [f64; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::survey::columns::Columns;
     use s3d_geom::{FootprintBuilder, FootprintOptions};
     use s3d_label::Label;
 
@@ -307,6 +308,7 @@ mod tests {
             footprint: builder.finish(),
             bbox: mesh.aabb(),
             wall_direction_deg: 0,
+            columns: Columns::default(),
         }];
         let scene = Scene::new(&mesh);
         let nearest = NearestFaces::new(&mesh);

@@ -8,7 +8,6 @@ use crate::survey::annotated::Annotated;
 use crate::survey::candidate::Candidate;
 use crate::survey::room_names::RoomNames;
 use glam::DVec2;
-use s3d_geom::{Footprint, Polygon};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{Domain, FaceVoteColumns, Frame, ImageName, Layout, Split};
 use s3d_io::fs::{create_dir, write_json};
@@ -31,18 +30,6 @@ pub(crate) struct RoomRecord {
     /// The floor outline as polygons. Each has a ring around it (counter-clockwise) and rings around its
     /// holes (clockwise), in world x and y, metres.
     pub(crate) outline: Vec<OutlineRecord>,
-}
-
-impl RoomRecord {
-    /// Returns the floor of the room.
-    pub(crate) fn footprint(&self) -> Footprint {
-        let ring = |points: &Vec<[f64; 2]>| points.iter().map(|p| DVec2::from_array(*p)).collect();
-        let polygons = self.outline.iter().map(|outline| Polygon {
-            outer: ring(&outline.outer),
-            holes: outline.holes.iter().map(ring).collect(),
-        });
-        Footprint { polygons: polygons.collect(), area_m2: self.floor_m2 }
-    }
 }
 
 /// One polygon of an outline.

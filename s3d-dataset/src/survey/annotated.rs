@@ -1,6 +1,7 @@
 //! The result of annotations for an area's mesh and rooms.
 
 use crate::summary::{Surface, Unlabelled};
+use crate::survey::columns::Columns;
 use crate::survey::strays::Strays;
 use s3d_geom::{Aabb, Footprint, TriMesh};
 use s3d_label::{LabelId, Room, VoteReport, fill_labels};
@@ -93,4 +94,7 @@ pub(crate) struct SurveyedRoom {
     pub(crate) bbox: Aabb,
     /// The dominant horizontal direction of its walls, whole degrees in [0, 90).
     pub(crate) wall_direction_deg: u32,
+    /// The heights of its points, place by place. Not stored.
+    #[serde(skip)]
+    pub(crate) columns: Columns,
 }

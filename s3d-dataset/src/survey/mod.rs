@@ -2,8 +2,10 @@
 
 pub(crate) mod annotated;
 pub(crate) mod candidate;
+pub(crate) mod columns;
 pub(crate) mod labelled_area;
 pub(crate) mod outlook;
 pub(crate) mod room_names;
+pub(crate) mod rooms_around;
 pub(crate) mod strays;
 pub(crate) mod surface_seen;

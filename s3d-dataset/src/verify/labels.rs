@@ -104,6 +104,13 @@ impl Labels {
         format!("{place} ({name})")
     }
 
+    /// The name of the room of each label; `None` for the null label.
+    pub(crate) fn rooms(&self) -> Vec<Option<String>> {
+        let room_of =
+            |name: &String| self.taxonomy.parse_name(name).ok()?.map(|label| label.room.to_string());
+        self.names.iter().map(room_of).collect()
+    }
+
     /// The number of labels, including the null label.
     pub(crate) fn len(&self) -> usize {
         self.names.len()

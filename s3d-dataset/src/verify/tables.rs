@@ -8,7 +8,9 @@ use crate::record::assets;
 use crate::record::manifest::Manifest;
 use crate::record::tables::RoomRecord;
 use crate::statistics::Statistics;
-use s3d_geom::{Aabb, Camera, Footprint};
+use crate::survey::rooms_around::RoomsAround;
+use crate::verify::images::Reference;
+use s3d_geom::{Aabb, Camera};
 use s3d_io::dataset::{
     DatasetImage, Domain, Frame, InstanceEntry, Layout, read_conventions, read_splits, read_world_offsets,
 };
@@ -25,9 +27,6 @@ const STATISTICS: (Topic, &str) = (Topic::Tables, "statistics");
 
 /// The most differences between two documents that are listed.
 const MOST_DIFFERENCES: usize = 5;
-
-/// How far a scan location may be from the floor of the room that its files name, metres.
-const FAR_FROM_ROOM_M: f64 = 3.0;
 
 /// Checks `conventions.json` against the options, profiles against the manifest, and the files that are the
 /// same in every data set of this version.
@@ -192,33 +191,28 @@ fn check_instances_of(room: &RoomRecord, instances: &[InstanceEntry], checks: &O
     });
 }
 
-/// Checks that scan locations stand in their rooms. The scan's own list may name the rooms, so only a
-/// location far from its room, on the floor of another, is a fault.
+/// Checks that each location sees its room, if it sees labelled surface.
 pub(crate) fn location_rooms(
-    layout: &Layout,
-    area: u32,
+    reference: &Reference<'_>,
     images: &[DatasetImage],
     cameras: &[(usize, Camera)],
-    report: &Report,
 ) {
-    // A file that cannot be read is reported with the rooms.
-    let Ok(rooms) = read_json::<Vec<RoomRecord>>(&layout.rooms_json(area)) else { return };
-    let floors: Vec<(&str, Footprint)> = rooms.iter().map(|room| (&*room.room, room.footprint())).collect();
+    let Reference { layout, labels, mesh, report, .. } = *reference;
+    let rooms = labels.rooms();
+    let room_of_face = |face: u32| rooms.get(mesh.label_of_face[face as usize] as usize)?.clone();
 
     let mut seen = BTreeSet::new();
     for (index, camera) in cameras {
         let image = &images[*index];
-        let told = floors.iter().find(|(room, _)| *room == image.room);
-        let (Some((_, floor)), true) = (told, seen.insert((&image.uuid, &image.room))) else { continue };
+        if !seen.insert((&image.uuid, &image.room)) {
+            continue;
+        }
 
-        let place = camera.pose.location;
-        let distance = floor.distance(place.x, place.y);
-        let other = floors.iter().find(|(_, other)| other.contains(place.x, place.y));
-        let other = other.filter(|_| distance > FAR_FROM_ROOM_M && distance.is_finite());
+        let around = RoomsAround::of(reference.channels.scene, camera.pose.location, room_of_face);
+        let Some(stands_in) = around.stands_in() else { continue };
         let path = image.path(layout, Domain::Pose);
-        report.check(other.is_none(), (Topic::Poses, "rooms of locations"), &path, || {
-            let other = other.map_or("", |(room, _)| room);
-            format!("stands in {other}, {distance:.1} m from the floor of {}", image.room)
+        report.check(around.rays_to(&image.room) > 0, (Topic::Poses, "rooms of locations"), &path, || {
+            format!("sees nothing of {}: it stands in {stands_in}", image.room)
         });
     }
 }

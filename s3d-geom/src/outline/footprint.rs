@@ -59,16 +59,21 @@ pub struct FootprintBuilder {
     last: Option<([i64; 2], usize)>,
 }
 
-/// The outermost points of a grid cell: left, right, down and up.
 #[derive(Clone, Copy, Debug)]
-struct Cell([Vec2; 4]);
+struct Cell {
+    /// The outermost points: left, right, down and up.
+    outermost: [Vec2; 4],
+    /// The lowest and the highest z.
+    heights: [f32; 2],
+}
 
 impl Cell {
-    fn add(&mut self, p: Vec2) {
+    fn add(&mut self, p: Vec2, z: f32) {
+        self.heights = [self.heights[0].min(z), self.heights[1].max(z)];
         // The other coordinate breaks ties, so that the order of points does not matter.
         let by_x = (p.x, p.y);
         let by_y = (p.y, p.x);
-        let [left, right, down, up] = &mut self.0;
+        let [left, right, down, up] = &mut self.outermost;
         if by_x < (left.x, left.y) {
             *left = p;
         }
@@ -130,19 +135,26 @@ impl FootprintBuilder {
         let cell = match self.last {
             Some((last, cell)) if last == key => cell,
             _ => *self.index.entry(key).or_insert_with(|| {
-                self.cells.push(Cell([p; 4]));
+                self.cells.push(Cell { outermost: [p; 4], heights: [point.z; 2] });
                 self.cells.len() - 1
             }),
         };
         self.last = Some((key, cell));
-        self.cells[cell].add(p);
+        self.cells[cell].add(p, point.z);
+    }
+
+    /// Returns the grid cells with a point, in no particular order: the cell's number along x and y, and the
+    /// lowest and highest z of its points, metres. Cell (i, j) begins at (i, j) times
+    /// [`cell_m`](FootprintOptions::cell_m).
+    pub fn columns(&self) -> impl Iterator<Item = ([i64; 2], [f32; 2])> {
+        self.index.iter().map(|(key, cell)| (*key, self.cells[*cell].heights))
     }
 
     /// Draws the footprint of the points so far.
     pub fn finish(&self) -> Footprint {
         let mut points: Vec<Vec2> = Vec::with_capacity(2 * self.cells.len());
         for (&[i, j], &cell) in &self.index {
-            let outermost = self.cells[cell].0;
+            let outermost = self.cells[cell].outermost;
             // The outline runs through cells with an empty neighbour. For the others one point is enough.
             let is_surrounded = (-1..=1)
                 .flat_map(|di| (-1..=1).map(move |dj| [i.saturating_add(di), j.saturating_add(dj)]))

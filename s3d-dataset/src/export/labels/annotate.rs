@@ -5,6 +5,7 @@ use crate::error::{Error, InputError, Result};
 use crate::export::input::area::AreaInput;
 use crate::summary::Unlabelled;
 use crate::survey::annotated::{Annotated, SkippedLines, SurveyedRoom};
+use crate::survey::columns::Columns;
 use crate::survey::strays::{InstanceStrays, STRAY_M, Strays};
 use s3d_geom::glam::Vec3;
 use s3d_geom::{Aabb, Footprint, FootprintBuilder, FootprintOptions, NearestFaces, PointCloud};
@@ -135,6 +136,7 @@ pub(crate) fn annotate(
             footprint: Footprint::default(),
             bbox: room_bbox,
             wall_direction_deg: 0,
+            columns: Columns::of(&builder),
         };
         rooms.push(room, builder);
     }

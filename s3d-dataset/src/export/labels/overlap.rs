@@ -2,26 +2,22 @@
 //! twice.
 
 use crate::survey::annotated::SurveyedRoom;
-use s3d_geom::Aabb;
 
-/// Overlaps are reported above this share of the smaller room's floor and of the lower room's height.
-/// Neighbours share a wall.
+/// Overlaps are reported above this share of the smaller room. Neighbours share a wall.
 const MUCH: f64 = 0.2;
-/// Places along an axis at which two rooms are compared.
-const STEPS: u32 = 32;
 
 /// Returns a sentence for each pair of rooms of which one lies largely in the other.
 pub(crate) fn overlap_doubts(rooms: &[SurveyedRoom]) -> Vec<String> {
     let mut doubts = Vec::new();
     for (i, a) in rooms.iter().enumerate() {
         for b in rooms.iter().skip(i + 1) {
-            let (small, large) = if a.footprint.area_m2 <= b.footprint.area_m2 {
+            let (small, large) = if a.columns.len() <= b.columns.len() {
                 (a, b)
             } else {
                 (b, a)
             };
 
-            let share = shared(small, large);
+            let share = small.columns.share_in(&large.columns);
             if share > MUCH {
                 doubts.push(format!(
                     "rooms {} and {} overlap: {:.0} % of the floor of {} is in {} too; a face there is of \
@@ -38,62 +34,39 @@ pub(crate) fn overlap_doubts(rooms: &[SurveyedRoom]) -> Vec<String> {
     doubts
 }
 
-/// The share of the floor of `small` that is in `large` too; 0 if one is above the other.
-fn shared(small: &SurveyedRoom, large: &SurveyedRoom) -> f64 {
-    let low = small.bbox.min.max(large.bbox.min);
-    let high = small.bbox.max.min(large.bbox.max);
-    let both = Aabb { min: low, max: high };
-    let min = height(&small.bbox).min(height(&large.bbox));
-    if low.x >= high.x || low.y >= high.y || height(&both) <= MUCH * min {
-        return 0.0;
-    }
-
-    let mut of_small = 0u32;
-    let mut of_both = 0u32;
-    let low = small.bbox.min.as_dvec3();
-    let high = small.bbox.max.as_dvec3();
-    for i in 0..STEPS {
-        for j in 0..STEPS {
-            let x = place(i, low.x, high.x);
-            let y = place(j, low.y, high.y);
-            if small.footprint.contains(x, y) {
-                of_small += 1;
-                of_both += u32::from(large.footprint.contains(x, y));
-            }
-        }
-    }
-
-    f64::from(of_both) / f64::from(of_small.max(1))
-}
-
-/// The height of a box, metres.
-fn height(room: &Aabb) -> f64 {
-    f64::from(room.max.z) - f64::from(room.min.z)
-}
-
-/// The `k`th of the [`STEPS`] places between two coordinates.
-fn place(k: u32, low: f64, high: f64) -> f64 {
-    low + (high - low) * (f64::from(k) + 0.5) / f64::from(STEPS)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::survey::columns::Columns;
     use glam::{Vec3, vec3};
-    use s3d_geom::{FootprintBuilder, FootprintOptions};
+    use s3d_geom::{Aabb, FootprintBuilder, FootprintOptions};
 
     /// A room of `w` × `d` × 2.5 m with a corner at `at`.
     fn room(name: &str, at: Vec3, w: f32, d: f32) -> SurveyedRoom {
+        surveyed(name, slab(at, w, d).chain(slab(at + 2.5 * Vec3::Z, w, d)))
+    }
+
+    /// Points of a level surface of `w` × `d` m with a corner at `at`.
+    fn slab(at: Vec3, w: f32, d: f32) -> impl Iterator<Item = Vec3> {
+        let steps = || (0..=60u8).map(|i| f32::from(i) / 60.0);
+        steps().flat_map(move |x| steps().map(move |y| at + vec3(w * x, d * y, 0.0)))
+    }
+
+    fn surveyed(name: &str, points: impl Iterator<Item = Vec3>) -> SurveyedRoom {
         let mut builder = FootprintBuilder::new(FootprintOptions::default());
-        for i in 0..=60u8 {
-            for j in 0..=60u8 {
-                builder.add(at + vec3(w * f32::from(i) / 60.0, d * f32::from(j) / 60.0, 0.0));
-            }
+        let mut bbox = Aabb::EMPTY;
+        for point in points {
+            builder.add(point);
+            bbox = bbox.union(Aabb { min: point, max: point });
         }
-        let bbox = Aabb { min: at, max: at + vec3(w, d, 2.5) };
-        let room = name.parse().unwrap();
-        let footprint = builder.finish();
-        SurveyedRoom { room, points: 3721, footprint, bbox, wall_direction_deg: 0 }
+        SurveyedRoom {
+            room: name.parse().unwrap(),
+            points: 7442,
+            footprint: builder.finish(),
+            bbox,
+            wall_direction_deg: 0,
+            columns: Columns::of(&builder),
+        }
     }
 
     /// Returns the doubts about an office of 6 × 4 m and another room.
@@ -118,5 +91,15 @@ mod tests {
 
         let twice = doubts(room("office_7", Vec3::ZERO, 6.0, 4.0));
         assert!(twice[0].contains("overlap: 100 %"), "{twice:?}");
+    }
+
+    #[test]
+    fn stairs_that_join_two_storeys_are_no_overlap() {
+        // A hallway above the office; its stairs go down through a corner of the office.
+        let above = vec3(0.0, 0.0, 2.8);
+        let upper = slab(above, 6.0, 4.0).chain(slab(above + 2.5 * Vec3::Z, 6.0, 4.0));
+        let hallway = surveyed("hallway_1", upper.chain(slab(Vec3::ZERO, 1.0, 3.0)));
+        assert!(hallway.bbox.min.z == 0.0 && hallway.bbox.max.z > 5.0);
+        assert!(doubts(hallway).is_empty());
     }
 }

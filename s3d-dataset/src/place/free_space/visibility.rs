@@ -3,11 +3,11 @@
 use super::standing::Facing;
 use crate::context::Context;
 use crate::error::Result;
-use glam::{DVec3, dvec3};
+use crate::survey::rooms_around::directions;
+use glam::DVec3;
 use rayon::prelude::*;
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_render::{Scene, Sight, cast_ray};
-use std::f64::consts::PI;
 
 /// The number of surface samples per m², and the smallest and largest number of them in all.
 const SAMPLES_PER_M2: f64 = 5.0;
@@ -110,7 +110,7 @@ impl Enclosure {
         // Counts of front sides, back sides and nothing; of all directions, and near the horizon.
         let mut all = [0.0; 3];
         let mut around = [0.0; 2];
-        for direction in directions() {
+        for direction in directions(DIRECTIONS) {
             let hit = cast_ray(scene, eye, direction);
             let kind = hit.map_or(2, |hit| {
                 let normal = facing.normal(scene.mesh(), hit.face).as_dvec3();
@@ -145,14 +145,4 @@ impl Enclosure {
     pub(super) fn percent(&self) -> [f64; 3] {
         [self.front, self.back, 1.0 - self.front - self.back].map(|share| 100.0 * share)
     }
-}
-
-/// Returns evenly spread directions, a Fibonacci lattice.
-fn directions() -> impl Iterator<Item = DVec3> {
-    (0..DIRECTIONS).map(|i| {
-        let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(DIRECTIONS);
-        let (sin, cos) = libm::sincos(f64::from(i) * PI * (3.0 - 5f64.sqrt()));
-        let r = (1.0 - z * z).sqrt();
-        dvec3(r * cos, r * sin, z)
-    })
 }
