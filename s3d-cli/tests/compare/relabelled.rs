@@ -204,7 +204,7 @@ fn what_changed_is_told_from_what_has_another_number() {
         others = sum([others, all[&pair]].iter());
     }
     assert_eq!((told.len(), count(&labels["other_room"])), (renumbered.len(), 0));
-    let line = format!("  only with another number: {}: ", renumbered.len());
+    let line = format!("  renumbered, and not changed: {} instances, ", renumbered.len());
     assert!(answer.contains(&line), "{answer}");
 
     let mut by_class: BTreeMap<(String, String), (u64, f64, u64)> = BTreeMap::new();

@@ -2,8 +2,8 @@
 //!
 //! Areas are matched by number, scan locations by uuid, views by their number among the candidates of their
 //! location, classes by name, instances by the surface that they share. Files with the same bytes in both
-//! lists are not read, except label images whose indices differ in meaning. Unreadable files are reported, and
-//! the rest is compared.
+//! lists are not read, except label images whose indices differ in meaning. Unreadable files are reported,
+//! and the rest is compared.
 
 pub(crate) mod comparison;
 mod faces;

@@ -82,10 +82,7 @@ impl Comparison {
     /// The labels, classes and instances that differ.
     fn labels(&self, text: &mut Lines, labels: &LabelChanges) {
         let LabelChanges { a, b, added, gone, changed, class_changed, matrix, instances, .. } = labels;
-        let renamed = [
-            ("only with another number", &labels.renumbered),
-            ("only with the name of another room", &labels.other_room),
-        ];
+        let renamed = [("renumbered", &labels.renumbered), ("in a room of another name", &labels.other_room)];
         let is_same = added.is_empty() && gone.is_empty() && matrix.is_empty() && instances.is_empty();
         if is_same && renamed.iter().all(|(_, of)| of.is_empty()) {
             return;
@@ -95,11 +92,10 @@ impl Comparison {
         names(text, "without a partner in B", gone);
         names(text, "without a partner in A", added);
         for (what, of) in renamed.into_iter().filter(|(_, of)| !of.is_empty()) {
-            let all: Vec<String> = of.iter().map(|of| format!("{} is {}", of.a, of.b)).collect();
-            names(text, what, &all);
             let mut counts = LabelCounts::default();
             of.iter().for_each(|RenamedInstance { counts: of, .. }| counts += *of);
-            text.add(format!("    {}, which did not change", self.surface(&counts)));
+            let instances = grouped(of.len() as u64);
+            text.add(format!("  {what}, and not changed: {instances} instances, {}", self.surface(&counts)));
         }
 
         if !matrix.is_empty() {

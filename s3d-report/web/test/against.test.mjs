@@ -81,7 +81,7 @@ test("the matrix has what both data sets' meshes and images have", async () => {
   const shares = await page
     .locator(".card .quiet")
     .evaluateAll((all) => all.map((e) => Number.parseFloat(e.textContent.split(":")[1].replace("<", ""))));
-  assert.ok(shares.length >= 20);
+  assert.equal(shares.length, compare.pictures.length);
   assert.deepEqual(
     shares,
     [...shares].sort((a, b) => b - a),
@@ -95,10 +95,10 @@ test("instances with another number are one line, and each change is told", asyn
   const renumbered = [...partners].filter(([a, b]) => a !== b && classOf(a) === classOf(b));
   const moved = changedFaces.length;
   const faces = ofFaces[0].filter((a, face) => a !== ofFaces[1][face]).length - moved;
-  assert.ok(renumbered.length > 5 && faces > 2 * moved, `${renumbered.length} ${faces} ${moved}`);
+  assert.ok(renumbered.length > 5 && faces > 400, `${renumbered.length} ${faces} ${moved}`);
   const line = page.locator(".renamed summary");
-  const words = `${renumbered.length} instances have only another number, which is no change: ${grouped(faces)} faces, `;
-  assert.ok((await line.textContent()).startsWith(words), await line.textContent());
+  const words = `${renumbered.length} instances have only another number, which is no change: `;
+  assert.ok((await line.textContent()).startsWith(`${words}${grouped(faces)} faces, `));
   await line.click();
   const listed = await page.locator(".renamed li").allTextContents();
   assert.deepEqual(listed.sort(), renumbered.map(([a, b]) => `${a} is ${b}`).sort());

@@ -45,11 +45,11 @@ pub(crate) fn overlap(a: Aabb, b: Aabb) -> f64 {
     common / (volume(a.min, a.max) + volume(b.min, b.max) - common)
 }
 
-/// Returns for each face of `to` the label of the surface of `from` at its place. `label_of_face` has the label
-/// of each face of `from`.
+/// Returns for each face of `to` the label of the surface of `from` at its place. `label_of_face` has the
+/// label of each face of `from`.
 ///
-/// A face takes the label that most of its places find on the nearest face within 10 cm; the smaller label wins
-/// a tie. A face is unlabelled ([`NO_INDEX`]) if most of its places find no label.
+/// A face takes the label that most of its places find on the nearest face within 10 cm; the smaller label
+/// wins a tie. A face is unlabelled ([`NO_INDEX`]) if most of its places find no label.
 ///
 /// # Panics
 /// If `label_of_face` has fewer entries than `from` has faces.

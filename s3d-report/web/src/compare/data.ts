@@ -141,7 +141,7 @@ interface Compared {
 export interface Against extends Compared {
   /** The index of A, with B's labels and classes after its own. */
   both: Index;
-  /** The index in `both.labels` of each of B's labels: of the same instance in A, if it has the same class. */
+  /** The index in `both.labels` of each of B's labels: the one in A of the same instance and class, if any. */
   labelOfB: Uint32Array;
   /** The names that B's labels have in B, by index in `both.labels`. */
   namesInB: Map<number, string>;
@@ -149,7 +149,7 @@ export interface Against extends Compared {
   depthOfB: number;
 }
 
-/** Labels of A and B are the same if they belong to the same instance of the same class, whatever its name. */
+/** Labels of A and B are the same if they belong to the same instance and class, whatever their names. */
 function merged(index: Index, compared: Compared): Against {
   const { classes, labels } = { classes: [...index.classes], labels: [...index.labels] };
   const places = new Map(classes.map(({ name }, i) => [name, i]));

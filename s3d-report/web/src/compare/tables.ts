@@ -97,7 +97,8 @@ function renamedList(words: string, renamed: Renamed[]): HTMLElement | null {
     sum.pixels += pixels;
   }
   const only = renamed.length === 1 ? "has only" : "have only";
-  const summary = `${several(renamed.length, "instance")} ${only} ${words}, which is no change: ${countsWords(sum)}.`;
+  const subject = `${several(renamed.length, "instance")} ${only} ${words}`;
+  const summary = `${subject}, which is no change: ${countsWords(sum)}.`;
   const items = renamed.map(({ a, b }) => h("li", {}, `${a} is ${b}`));
   return h("details", { class: "renamed" }, h("summary", {}, summary), h("ul", {}, ...items));
 }

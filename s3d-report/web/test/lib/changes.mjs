@@ -63,8 +63,8 @@ export const isChanged = (a, b) => {
 export const changedFaces = ofFaces[0].flatMap((a, face) => (isChanged(a, ofFaces[1][face]) ? [face] : []));
 
 /**
- * The numbers of changed pixels by class in both; and for each image the pixels that changed, those of another
- * class, those of one pair, and those with another number for the same.
+ * The numbers of changed pixels by class in both; and for each image the pixels that changed, those of
+ * another class, those of one pair, and those with another number for the same.
  */
 function changedPixels() {
   const [pairs, ofImage] = [new Map(), new Map()];
