@@ -136,27 +136,31 @@ const KINDS: Record<InstanceChange["kind"], string> = {
   appeared: "Appeared",
 };
 
-const sizeOf = (m2: number | null): string => (m2 === null ? "–" : surface(m2));
+const instanceNames = (names: string[]): HTMLElement =>
+  h("span", { class: "names" }, names.join(" + ") || "–");
 
 export function instancesSection(against: Against): HTMLElement | null {
   const labels = against.comparison.labels;
   if (!labels) return null;
+  // Columns without any surface are left out.
+  const parts = (["lost", "gained", "relabelled"] as const).filter((part) =>
+    labels.instances.some((instance) => instance[part].m2 > 0),
+  );
   const rows = labels.instances.map((instance): Cells => {
-    const { kind, a, b, m2_a, m2_b, lost, gained, relabelled } = instance;
     const href = instanceLink(against, instance);
-    const pixels = lost.pixels + gained.pixels + relabelled.pixels;
+    const kind = KINDS[instance.kind];
+    const sizes = [instance.m2_a, instance.m2_b].flatMap((m2) => (m2 === null ? [] : [surface(m2)]));
     return [
-      href ? h("a", { href, title: "Show in 3D" }, KINDS[kind]) : KINDS[kind],
-      a.join(" + ") || "–",
-      b.join(" + ") || "–",
-      number(m2_a === null || m2_b === null ? sizeOf(m2_a ?? m2_b) : `${sizeOf(m2_a)} → ${sizeOf(m2_b)}`),
-      number(surface(lost.m2)),
-      number(surface(gained.m2)),
-      number(surface(relabelled.m2)),
-      number(count(pixels)),
+      href ? h("a", { href, title: "Show in 3D" }, kind) : kind,
+      instanceNames(instance.a),
+      instanceNames(instance.b),
+      number([...new Set(sizes)].join(" → ") || "–"),
+      ...parts.map((part) => number(surface(instance[part].m2))),
+      number(count(instance.lost.pixels + instance.gained.pixels + instance.relabelled.pixels)),
     ];
   });
-  const head = ["Change", "In A", "In B", "Surface", "Lost", "Gained", "Relabelled", "Pixels"];
+  const columns = parts.map((part) => `${part.charAt(0).toUpperCase()}${part.slice(1)}`);
+  const head = ["Change", "In A", "In B", "Surface", ...columns, "Pixels"];
   const names = (words: string, all: string[]): HTMLElement | null =>
     all.length === 0
       ? null
