@@ -289,15 +289,16 @@ fn what_changed_is_told_from_what_has_another_number() {
 }
 
 /// Writes the mesh of `semantic.obj` anew: its faces in other order, each in four, without those of labels
-/// that start with `without`. Two walls change their names.
-fn remesh(out: &Path, is_subdivided: bool, without: &str) {
+/// that start with `without`. The instances of `swapped` change their names.
+fn remesh(out: &Path, swapped: [&str; 2], is_subdivided: bool, without: &str) {
     let all = faces(out);
+    let [one, two] = swapped;
     let mut text = "mtllib semantic.mtl\n".to_owned();
     let mut count = 0;
     for (corners, name) in all.into_iter().rev().filter(|(_, name)| !name.starts_with(without)) {
         let name = match name.as_str() {
-            "wall_1_office_1_1" => "wall_2_office_1_1",
-            "wall_2_office_1_1" => "wall_1_office_1_1",
+            name if name == one => two,
+            name if name == two => one,
             other => other,
         };
         let [a, b, c] = corners;
@@ -320,35 +321,37 @@ fn remesh(out: &Path, is_subdivided: bool, without: &str) {
 
 #[test]
 fn another_mesh_of_the_same_surface_has_the_same_labels() {
-    for is_subdivided in [false, true] {
-        let (_dir, out) = altered(whole(), |out| remesh(out, is_subdivided, "none"));
-        for (a, b) in [(whole(), &*out), (&*out, whole())] {
+    let walls = ["wall_1_office_1_1", "wall_2_office_1_1"];
+    let chairs = ["chair_1_conferenceRoom_1_1", "chair_2_conferenceRoom_1_1"];
+    let (furnished, _) = scenes();
+    for (of, swapped, is_subdivided) in [
+        (whole(), walls, false),
+        (whole(), walls, true),
+        (&*furnished, chairs, false),
+        (&*furnished, chairs, true),
+    ] {
+        let (_dir, out) = altered(of, |out| remesh(out, swapped, is_subdivided, "none"));
+        for (a, b) in [(of, &*out), (&*out, of)] {
             let (answer, json, code) = compare(a, b);
             let (area, labels) = (&json["areas"][0], &json["labels"]);
-            assert_eq!(
-                (code, &area["geometry"], &area["faces_changed"]),
-                (1, &"other".into(), &0.into()),
-                "{answer}"
-            );
-            let alone = ["m2_only_a", "m2_only_b"].map(|side| area[side].as_f64().unwrap());
-            assert_eq!(alone, [0.0; 2], "{answer}");
+            assert_eq!((code, &area["geometry"]), (1, &"other".into()), "{answer}");
+            assert_eq!((&area["faces_changed"], count(&labels["matrix"])), (&0.into(), 0), "{answer}");
+            assert_eq!((&area["m2_only_a"], &area["m2_only_b"]), (&0.0.into(), &0.0.into()), "{answer}");
             let renumbered = labels["renumbered"].as_array().unwrap();
-            let names: Vec<_> = renumbered.iter().map(|of| (&of["a"], &of["b"])).collect();
-            let walls = ["wall_1_office_1_1".into(), "wall_2_office_1_1".into()];
-            assert_eq!(names, [(&walls[0], &walls[1]), (&walls[1], &walls[0])]);
-            let lists = ["instances", "matrix", "gone", "added", "other_room"];
+            let names: Vec<_> = renumbered.iter().map(|of| [&of["a"], &of["b"]]).collect();
+            let [one, two] = swapped.map(Value::from);
+            assert_eq!(names, [[&one, &two], [&two, &one]], "{answer}");
+            let lists = ["instances", "gone", "added", "other_room"];
             assert!(lists.iter().all(|list| count(&labels[*list]) == 0), "{labels:#}");
-            assert!(
-                answer.contains("note: area 1: the meshes differ; faces were compared by place"),
-                "{answer}"
-            );
+            let note = "note: area 1: the meshes differ; faces were compared by place";
+            assert!(answer.contains(note), "{answer}");
         }
     }
 }
 
 #[test]
 fn surface_that_the_other_mesh_lacks_is_told() {
-    let (_dir, out) = altered(whole(), |out| remesh(out, true, "table"));
+    let (_dir, out) = altered(whole(), |out| remesh(out, ["", ""], true, "table"));
     let (answer, json, _) = compare(whole(), &out);
     let area = &json["areas"][0];
     let table: f64 = faces(whole())

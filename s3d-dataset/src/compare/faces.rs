@@ -104,10 +104,9 @@ fn of_area(
         names.match_area(&on_a, &on_b);
 
         let alone = |of: &SharedSurface| -> f64 {
-            of.iter()
-                .filter(|((a, b), _)| *a == MISSING || *b == MISSING)
-                .map(|(_, m2)| m2)
-                .sum()
+            let alone = of.iter().filter(|((a, b), _)| *a == MISSING || *b == MISSING);
+            // A sum of nothing would be −0.
+            0.0 + alone.map(|(_, m2)| m2).sum::<f64>()
         };
         changes.m2_only_a = alone(&on_a);
         changes.m2_only_b = alone(&on_b);
