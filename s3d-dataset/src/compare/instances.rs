@@ -41,12 +41,12 @@ pub(crate) fn changes(names: &Names, pairs: &LabelPairs) -> Vec<InstanceChange> 
     let [group_of_a, group_of_b] = &group_of;
     for (&(a, b), &counts) in pairs {
         let change = names.change(a, b);
-        let from = group_of_a.get(&a).copied();
-        let to = group_of_b.get(&b).copied();
         if !change.is_true() {
             continue;
         }
 
+        let from = group_of_a.get(&a).copied();
+        let to = group_of_b.get(&b).copied();
         let is_inside = from == to;
         for (place, is_lost) in [(from, true), (to.filter(|_| !is_inside), false)] {
             let Some(of) = place.and_then(|place| all.get_mut(place)) else { continue };
