@@ -141,7 +141,7 @@ interface Compared {
 export interface Against extends Compared {
   /** The index of A, with B's labels and classes after its own. */
   both: Index;
-  /** The index in `both.labels` of each of B's labels: the one in A of the same instance and class, if any. */
+  /** The index in `both.labels` of each of B's labels: of the same instance and class in A, if there is one. */
   labelOfB: Uint32Array;
   /** The names that B's labels have in B, by index in `both.labels`. */
   namesInB: Map<number, string>;
