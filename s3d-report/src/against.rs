@@ -32,8 +32,10 @@ struct Compared<'a> {
     /// `classes` and `labels` of the other data set, like in the index.
     classes: Vec<ClassEntry>,
     labels: Vec<LabelEntry>,
+    /// For each of these labels, the index in the index of the label of the same instance.
+    partners: &'a [Option<u32>],
     depth_units_per_m: f64,
-    /// The areas with a file `changed_A.js`: they have faces with other labels.
+    /// The areas with a file `changed_A.js`: they have faces that changed.
     changed_faces: Vec<u32>,
     /// The images that differ; the Kth is in `other_K.js`.
     pictures: Vec<PictureEntry>,
@@ -56,7 +58,7 @@ struct PictureEntry {
     classes: Vec<(usize, u64)>,
 }
 
-/// `data/changed_A.js`: the faces with other labels, packed, and their largest patches.
+/// `data/changed_A.js`: the faces that changed, packed, and their largest patches.
 #[derive(Serialize)]
 struct ChangedFaces<'a> {
     faces: usize,
@@ -141,6 +143,7 @@ pub(crate) fn write(
         comparison: &comparison,
         classes: areas::classes(&other),
         labels: table.as_ref().map(areas::labels).unwrap_or_default(),
+        partners: comparison.labels.as_ref().map_or(&[], |labels| &labels.partners_of_b),
         depth_units_per_m: other.options().depth_units.per_m(),
         changed_faces,
         pictures,

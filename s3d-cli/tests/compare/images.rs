@@ -168,7 +168,7 @@ fn another_mesh_and_another_size_are_told_and_not_compared() {
     let out = with_table_moved(&["--size", "40", "--depth-units", "mm", "--normal-axes", "opencv"]);
     let (answer, json, code) = compare(whole(), &out);
     assert_eq!((code, &json["areas"][0]["geometry"]), (1, &"other".into()), "{answer}");
-    assert!(answer.contains("note: area 1: the meshes differ"), "{answer}");
+    assert!(answer.contains("note: area 1: the meshes differ; faces were compared by place"), "{answer}");
     let depth = "depth is in units of 512 in A and mm in B; its pixels were not compared";
     assert!(answer.contains(depth) && answer.contains("axes paper in A and opencv in B"), "{answer}");
     assert_eq!(entry(&json["settings"], "name", "options.size")["b"], 40);
@@ -183,7 +183,9 @@ fn another_mesh_and_another_size_are_told_and_not_compared() {
     // K is compared only where sizes are equal: for panoramas.
     let poses = &json["poses"];
     assert_eq!((&poses["same"], &poses["same_camera"], count(&poses["moved"])), (&2.into(), &10.into(), 0));
-    assert!(!answer.contains("0 faces of"), "{answer}");
+    // The table is 5 cm higher: it is found.
+    let area = &json["areas"][0];
+    assert_eq!((&area["m2_only_a"], &area["m2_only_b"]), (&0.0.into(), &0.0.into()), "{answer}");
 }
 
 #[test]

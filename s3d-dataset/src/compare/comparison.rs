@@ -160,7 +160,7 @@ impl AddAssign for LabelCounts {
 pub enum Geometry {
     /// Each face has the same corners.
     Same,
-    /// The corners differ, so faces cannot be compared.
+    /// The corners differ, so faces are compared by place: with the nearest surface of the other mesh.
     Other,
     /// A mesh could not be read.
     Unread,
@@ -182,11 +182,15 @@ pub struct AreaChanges {
     pub faces_b: Option<u64>,
     /// Whether both meshes are the same.
     pub geometry: Geometry,
-    /// The number of faces with another label.
+    /// The number of A's faces that belong to another instance or class in B.
     pub faces_changed: u64,
     /// Their area, square metres.
     pub m2_changed: f64,
-    /// The faces with another label, by number. Not in the JSON.
+    /// The surface of A at whose place B has no surface, square metres. Its labels are not compared.
+    pub m2_only_a: f64,
+    /// The surface of B at whose place A has no surface, square metres.
+    pub m2_only_b: f64,
+    /// A's faces that changed, by number. Not in the JSON.
     #[serde(skip)]
     pub faces: Vec<FaceChange>,
     /// The largest patches of such faces; patches with another class come first. Not in the JSON.
@@ -194,7 +198,7 @@ pub struct AreaChanges {
     pub patches: Vec<ChangedPatch>,
 }
 
-/// A face with another label.
+/// A face of A that belongs to another instance or class in B.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct FaceChange {
@@ -222,7 +226,10 @@ pub struct ChangedPatch {
     pub center: [f64; 3],
 }
 
-/// The differences between the labels. Labels are compared by name; their indices may differ.
+/// The differences between the labels.
+///
+/// Instances are matched by the surface that they share, whatever their names. So a face or pixel changed if
+/// it belongs to another instance, or to the same instance of another class.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LabelChanges {
@@ -230,20 +237,26 @@ pub struct LabelChanges {
     pub a: u64,
     /// The number of labels in B.
     pub b: u64,
-    /// Labels that only B has.
+    /// Labels of B without a partner in A.
     pub added: Vec<String>,
-    /// Labels that only A has.
+    /// Labels of A without a partner in B.
     pub gone: Vec<String>,
-    /// Surface and pixels with another label, of the same class or of another.
+    /// Instances that only got another number.
+    pub renumbered: Vec<RenamedInstance>,
+    /// Instances that only got the name of another room.
+    pub other_room: Vec<RenamedInstance>,
+    /// Surface and pixels that changed.
     pub changed: LabelCounts,
     /// Surface and pixels with a label of another class.
     pub class_changed: LabelCounts,
-    /// Surface and pixels with another label, by class in A and in B, the largest surface first. `<UNK>`
-    /// stands for no label, `<nothing>` for pixels that see nothing. Two equal classes stand for another
-    /// instance of the class.
+    /// What changed by class in A and in B, the largest surface first. `<UNK>` stands for no label,
+    /// `<nothing>` for pixels that see nothing. Two equal classes stand for another instance of the class.
     pub matrix: Vec<ClassPair>,
-    /// The fifty instances that changed most. The largest surface with another class comes first.
+    /// What became of the instances that changed. The largest surface with another class comes first.
     pub instances: Vec<InstanceChange>,
+    /// For each of B's labels, by index, the index of its partner in A. Not in the JSON.
+    #[serde(skip)]
+    pub partners_of_b: Vec<Option<u32>>,
 }
 
 /// Surface and pixels with labels of one class in A and of another in B.
@@ -259,17 +272,61 @@ pub struct ClassPair {
     pub counts: LabelCounts,
 }
 
-/// The surface and pixels that an instance lost and gained.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+/// An instance with the same class in A and in B under another name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct RenamedInstance {
+    /// Its label in A.
+    pub a: String,
+    /// Its label in B.
+    pub b: String,
+    /// The surface and pixels with both labels.
+    #[serde(flatten)]
+    pub counts: LabelCounts,
+}
+
+/// What became of an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum InstanceChangeKind {
+    /// It has another class.
+    Class,
+    /// It lost or gained surface or pixels.
+    Extent,
+    /// It became several.
+    Split,
+    /// Several became one.
+    Merged,
+    /// Several became several others.
+    Regrouped,
+    /// It is in A alone.
+    Vanished,
+    /// It is in B alone.
+    Appeared,
+}
+
+/// An instance that changed, or several that share most of their surface: what they lost and gained.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct InstanceChange {
-    /// The instance's label.
-    pub name: String,
-    /// Surface and pixels with this label in A alone.
+    /// What became of it.
+    pub kind: InstanceChangeKind,
+    /// Its labels in A, the largest surface first.
+    pub a: Vec<String>,
+    /// Its labels in B, the largest surface first.
+    pub b: Vec<String>,
+    /// Its surface in A, square metres; `None` if it is in B alone, or if meshes were not compared.
+    pub m2_a: Option<f64>,
+    /// Its surface in B, square metres; `None` if it is in A alone, or if meshes were not compared.
+    pub m2_b: Option<f64>,
+    /// What belongs to it in A, and to something else in B.
     pub lost: LabelCounts,
-    /// Surface and pixels with this label in B alone.
+    /// What belongs to something else in A, and to it in B.
     pub gained: LabelCounts,
-    /// The part of both that has another class on the other side.
+    /// What belongs to it in both, and changed its class or its part of the group.
+    pub relabelled: LabelCounts,
+    /// The part of these three that has another class.
     pub class_changed: LabelCounts,
 }
 
@@ -330,6 +387,8 @@ pub struct ModalityChanges {
     pub same: u64,
     /// Images with the same pixels in other bytes.
     pub same_pixels: u64,
+    /// Images of labels or classes whose pixels have other numbers, names or colours for the same.
+    pub renumbered: u64,
     /// Images with other pixels.
     pub changed: u64,
     /// Images with other cameras and other bytes, whose pixels were not compared.
@@ -353,7 +412,7 @@ pub struct ModalityChanges {
 pub struct PixelChanges {
     /// The number of pixels of these images.
     pub pixels: u64,
-    /// The number of pixels that differ.
+    /// The number of pixels that differ. For labels, those that belong to another instance or class.
     pub pixels_changed: u64,
     /// For colours, the peak signal-to-noise ratio in decibels. `None` if there is no difference.
     pub psnr_db: Option<f64>,

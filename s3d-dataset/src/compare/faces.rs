@@ -1,14 +1,17 @@
-//! Compares the labels of faces if both data sets have the same mesh.
+//! Compares the labels of faces: of the same faces, or, if the meshes differ, of surfaces at the same place.
 
 use super::comparison::{AreaChanges, ChangedPatch, FaceChange, Geometry, LabelCounts, LabelPairs, Side};
-use super::names::{NULL, Names};
+use super::matching::SharedSurface;
+use super::names::{Change, MISSING, NULL, Names};
 use super::sides::Sides;
 use crate::context::Context;
 use crate::error::Result;
 use s3d_geom::glam::DVec3;
 use s3d_geom::{TriMesh, face_patches};
 use s3d_io::Error as FileError;
+use s3d_io::cloud::labels_by_place;
 use s3d_io::mesh::{UpAxis, read_mesh};
+use std::collections::HashMap;
 
 /// The most patches that are reported for an area.
 const MAX_PATCHES: usize = 300;
@@ -19,10 +22,11 @@ struct Labelled {
     label_of_face: Vec<u32>,
 }
 
-/// Compares the meshes of all areas, and adds the faces with other labels to `pairs`.
+/// Compares the meshes of all areas, matches their instances, and adds the faces with other labels to
+/// `pairs`.
 pub(crate) fn compare(
     sides: &Sides,
-    names: Option<&Names>,
+    mut names: Option<&mut Names>,
     pairs: &mut LabelPairs,
     ctx: &Context,
 ) -> Result<Vec<AreaChanges>> {
@@ -41,12 +45,14 @@ pub(crate) fn compare(
             geometry: Geometry::OneSided,
             faces_changed: 0,
             m2_changed: 0.0,
+            m2_only_a: 0.0,
+            m2_only_b: 0.0,
             faces: Vec::new(),
             patches: Vec::new(),
         };
 
         if changes.faces_a.is_some() && changes.faces_b.is_some() {
-            changes.geometry = of_area(sides, names, area, &mut changes, pairs)?;
+            changes.geometry = of_area(sides, names.as_deref_mut(), area, &mut changes, pairs)?;
         }
         all.push(changes);
         progress.add(1);
@@ -58,7 +64,7 @@ pub(crate) fn compare(
 /// Compares the meshes of one area.
 fn of_area(
     sides: &Sides,
-    names: Option<&Names>,
+    names: Option<&mut Names>,
     area: u32,
     changes: &mut AreaChanges,
     pairs: &mut LabelPairs,
@@ -85,16 +91,36 @@ fn of_area(
     let (Some(a), Some(b)) = (a?, b?) else { return Ok(Geometry::Unread) };
 
     let faces = a.mesh.faces().len();
-    if faces != b.mesh.faces().len()
-        || (0..faces as u32).any(|face| a.mesh.triangle(face) != b.mesh.triangle(face))
-    {
-        return Ok(Geometry::Other);
-    }
+    let is_same = faces == b.mesh.faces().len()
+        && (0..faces as u32).all(|face| a.mesh.triangle(face) == b.mesh.triangle(face));
+    let (geometry, labels_in_b) = if is_same {
+        let shared = a.shared_surface(&b.label_of_face, Side::A);
+        names.match_area(&shared, &shared);
+        (Geometry::Same, b.label_of_face)
+    } else {
+        let (labels_in_b, labels_in_a) = rayon::join(|| b.labels_at(&a.mesh), || a.labels_at(&b.mesh));
+        let on_a = a.shared_surface(&labels_in_b, Side::A);
+        let on_b = b.shared_surface(&labels_in_a, Side::B);
+        names.match_area(&on_a, &on_b);
 
-    for (face, labels) in (0..).zip(a.label_of_face.iter().copied().zip(b.label_of_face.iter().copied())) {
-        if labels.0 != labels.1 {
-            let m2 = a.mesh.area(face);
-            *pairs.entry(labels).or_default() += LabelCounts { faces: 1, m2, pixels: 0 };
+        let alone = |of: &SharedSurface| -> f64 {
+            let alone = of.iter().filter(|((a, b), _)| *a == MISSING || *b == MISSING);
+            // A sum of nothing would be −0.
+            0.0 + alone.map(|(_, m2)| m2).sum::<f64>()
+        };
+        changes.m2_only_a = alone(&on_a);
+        changes.m2_only_b = alone(&on_b);
+        (Geometry::Other, labels_in_b)
+    };
+
+    for (face, labels) in (0..).zip(a.label_of_face.iter().copied().zip(labels_in_b)) {
+        let change = names.change(labels.0, labels.1);
+        if change == Change::None || labels.1 == MISSING {
+            continue;
+        }
+        let m2 = a.mesh.area(face);
+        *pairs.entry(labels).or_default() += LabelCounts { faces: 1, m2, pixels: 0 };
+        if change.is_true() {
             changes.faces_changed += 1;
             changes.m2_changed += m2;
             let a = names.index(Side::A, labels.0);
@@ -104,7 +130,58 @@ fn of_area(
     }
 
     changes.patches = patches(&a.mesh, names, &changes.faces);
-    Ok(Geometry::Same)
+    Ok(geometry)
+}
+
+impl Labelled {
+    /// The surface by label in A and in B. `others` are the labels of the other side at the faces.
+    fn shared_surface(&self, others: &[u32], side: Side) -> SharedSurface {
+        let mut shared = SharedSurface::new();
+        let mut add = |labels: (u32, u32), m2: f64| *shared.entry(labels).or_default() += m2;
+        let mut run = ((NULL, NULL), 0.0);
+        for (face, (&own, &other)) in (0..).zip(self.label_of_face.iter().zip(others)) {
+            let labels = if side == Side::A { (own, other) } else { (other, own) };
+            if labels != run.0 {
+                add(run.0, run.1);
+                run = (labels, 0.0);
+            }
+            run.1 += self.mesh.area(face);
+        }
+        add(run.0, run.1);
+        shared
+    }
+
+    /// The labels at the faces of another mesh: of the same face, in whatever order faces are, or else of
+    /// the surface at its place. [`MISSING`] where there is none.
+    fn labels_at(&self, mesh: &TriMesh) -> Vec<u32> {
+        let mut of_corners: HashMap<[[u32; 3]; 3], u32> = HashMap::new();
+        for (face, label) in (0..).zip(&self.label_of_face) {
+            of_corners.entry(corners(&self.mesh, face)).or_insert(*label);
+        }
+
+        let faces = 0..mesh.faces().len() as u32;
+        let mut labels: Vec<u32> = faces
+            .map(|face| of_corners.get(&corners(mesh, face)).copied().unwrap_or(MISSING))
+            .collect();
+        if labels.contains(&MISSING) {
+            let by_place = labels_by_place(&self.mesh, &self.label_of_face, mesh);
+            for (label, at_place) in labels.iter_mut().zip(by_place).filter(|(label, _)| **label == MISSING) {
+                *label = at_place;
+            }
+        }
+        labels
+    }
+}
+
+/// The corners of a face as bits. The smallest comes first, and their direction around the face stays.
+fn corners(mesh: &TriMesh, face: u32) -> [[u32; 3]; 3] {
+    // Adding 0 turns −0 into 0.
+    let mut corners = mesh
+        .triangle(face)
+        .map(|corner| (corner + 0.0).to_array().map(f32::to_bits));
+    let smallest = (0..3).min_by_key(|place| corners[*place]).unwrap_or(0);
+    corners.rotate_left(smallest);
+    corners
 }
 
 /// The largest patches of changed faces; patches with another class come first.

@@ -163,7 +163,10 @@ impl Images {
             FileVerdict::Unread => modality.unread += 1,
             FileVerdict::OnlyA => modality.only_a += 1,
             FileVerdict::OnlyB => modality.only_b += 1,
-            FileVerdict::Compared(of_image) if of_image.changed == 0 => modality.same_pixels += 1,
+            FileVerdict::Compared(of_image) if of_image.changed + of_image.renumbered == 0 => {
+                modality.same_pixels += 1;
+            }
+            FileVerdict::Compared(of_image) if of_image.changed == 0 => modality.renumbered += 1,
             FileVerdict::Compared(of_image) => {
                 modality.changed += 1;
                 sums[place].add(&of_image);
@@ -279,7 +282,8 @@ impl ImageComparer<'_> {
 
         // Equal bytes are the same unless their numbers mean something else.
         let has_other_labels = domain.is_semantic() && !self.means_same(domain);
-        if self.sides.are_same(&path_a, &path_b) && !has_other_labels {
+        let has_same_bytes = self.sides.are_same(&path_a, &path_b);
+        if has_same_bytes && !has_other_labels {
             return Ok(FileVerdict::Same);
         }
         if a.size != b.size || !self.has_same_form(domain) {
@@ -307,6 +311,7 @@ impl ImageComparer<'_> {
             taxonomies: [&self.sides.a, &self.sides.b].map(|data| &data.taxonomy),
         };
         match compare((&pixels_a, &pixels_b), domain, &meaning, pairs) {
+            Ok(Some(sums)) if has_same_bytes && sums.changed + sums.renumbered == 0 => Ok(FileVerdict::Same),
             Ok(Some(sums)) => Ok(FileVerdict::Compared(sums)),
             Ok(None) => Ok(FileVerdict::OtherForm),
             Err((side, message)) => {
@@ -334,7 +339,7 @@ impl ImageComparer<'_> {
                     .map(|class| class.name())
                     .eq(b.iter().map(|class| class.name()))
             }
-            Domain::Semantic => self.names.is_none_or(Names::have_same_indices),
+            Domain::Semantic | Domain::SemanticPretty => self.names.is_none_or(Names::have_same_indices),
             _ => true,
         }
     }

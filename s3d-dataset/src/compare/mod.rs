@@ -1,14 +1,17 @@
 //! Compares two data sets, first by their lists of files, then by their contents.
 //!
 //! Areas are matched by number, scan locations by uuid, views by their number among the candidates of their
-//! location, labels and classes by name. Files with the same bytes in both lists are not read, except label
-//! images whose indices differ in meaning. Unreadable files are reported, and the rest is compared.
+//! location, classes by name, instances by the surface that they share. Files with the same bytes in both
+//! lists are not read, except label images whose indices differ in meaning. Unreadable files are reported,
+//! and the rest is compared.
 
 pub(crate) mod comparison;
 mod faces;
 mod files;
 mod images;
+mod instances;
 mod lines;
+mod matching;
 mod names;
 mod pixels;
 mod poses;
@@ -18,9 +21,9 @@ mod views;
 
 pub use comparison::{
     AreaChanges, ChangedPatch, ClassPair, ClassPixels, ComparedSet, Comparison, FaceChange, FileKindChanges,
-    Geometry, ImageChange, InputChange, InstanceChange, LabelChanges, LabelCounts, LocationName,
-    ModalityChanges, PixelChanges, PoseChange, PoseChanges, SettingChange, Side, UnreadFile, ViewChanges,
-    ViewName,
+    Geometry, ImageChange, InputChange, InstanceChange, InstanceChangeKind, LabelChanges, LabelCounts,
+    LocationName, ModalityChanges, PixelChanges, PoseChange, PoseChanges, RenamedInstance, SettingChange,
+    Side, UnreadFile, ViewChanges, ViewName,
 };
 
 use crate::context::Context;
@@ -53,19 +56,14 @@ pub fn compare(a: &Path, b: &Path, options: &CompareOptions, ctx: &Context) -> R
     let (settings, inputs) = files::made(&sides)?;
     let files = files::changes(&sides);
 
-    let names = Names::read(&sides)?;
+    let mut names = Names::read(&sides)?;
     let mut pairs = LabelPairs::new();
-    let areas = faces::compare(&sides, names.as_ref(), &mut pairs, ctx)?;
+    let areas = faces::compare(&sides, names.as_mut(), &mut pairs, ctx)?;
     let views = views::compare(&sides)?;
     let images = images::compare_all(&sides, &views, names.as_ref(), &mut pairs, ctx)?;
 
     let mut notes = notes(&sides, &images);
-    notes.extend(
-        areas
-            .iter()
-            .filter(|of| of.geometry == Geometry::Other)
-            .map(|of| format!("area {}: the meshes differ; labels were compared by pixels alone", of.area)),
-    );
+    notes.extend(areas.iter().filter(|of| of.geometry == Geometry::Other).map(by_place));
 
     let same = files.iter().all(|kind| kind.changed + kind.only_a + kind.only_b == 0);
     let about_a = about(a, &sides.a);
@@ -89,6 +87,18 @@ pub fn compare(a: &Path, b: &Path, options: &CompareOptions, ctx: &Context) -> R
         notes,
         unread,
     })
+}
+
+/// The note on an area whose meshes differ.
+fn by_place(of: &AreaChanges) -> String {
+    let alone = [("A", of.m2_only_a), ("B", of.m2_only_b)]
+        .map(|(name, m2)| format!("{} m² of {name}", lines::significant(m2)));
+    let [a, b] = alone;
+    format!(
+        "area {}: the meshes differ; faces were compared by place, and {a} and {b} are over 10 cm from the \
+         other mesh",
+        of.area
+    )
 }
 
 /// Notes on what was not compared, or only together with something else.

@@ -1,15 +1,15 @@
 //! Numbers the labels of both data sets together, by name.
 
-use super::comparison::{ClassPair, ClassPixels, InstanceChange, LabelChanges, LabelCounts, LabelPairs};
+use super::comparison::{ClassPair, ClassPixels, LabelChanges, LabelCounts, LabelPairs};
 use super::comparison::{NOTHING, Side, UNLABELLED};
+use super::instances;
+use super::matching::{Matching, SharedSurface};
 use super::sides::Sides;
 use crate::error::Result;
-use s3d_label::{LabelId, LabelTable, NULL_NAME};
+use s3d_label::{LabelId, LabelTable, NULL_NAME, pretty_color};
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
-
-/// The most instances that are reported.
-const MAX_INSTANCES: usize = 50;
+use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 
 /// The most pairs of classes that are reported for an image. All pairs of S3DIS's classes fit.
 const MAX_PAIRS: usize = 256;
@@ -26,6 +26,27 @@ pub(crate) struct Names {
     number_of: BTreeMap<String, u32>,
     a: Numbered,
     b: Numbered,
+    matching: Matching,
+}
+
+/// How the label of a face or pixel differs in A and in B.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Change {
+    /// The same label.
+    None,
+    /// The same instance of the same class under another name.
+    Renumbered,
+    /// Another instance of the same class.
+    Instance,
+    /// Another class.
+    Class,
+}
+
+impl Change {
+    /// Whether the face or pixel belongs to something else. Another name of the same instance is no change.
+    pub(crate) fn is_true(self) -> bool {
+        matches!(self, Self::Instance | Self::Class)
+    }
 }
 
 /// The labels of one data set.
@@ -36,6 +57,8 @@ struct Numbered {
     classes: Vec<Option<&'static str>>,
     /// The index of each label, by number; 0 if the data set lacks the label.
     indices: Vec<u32>,
+    /// The number of each label, by its colour in pretty images; `None` if several have the colour.
+    by_color: HashMap<[u8; 3], Option<u32>>,
 }
 
 impl Names {
@@ -65,7 +88,50 @@ impl Names {
 
         let a = Numbered::new(a, &number_of);
         let b = Numbered::new(b, &number_of);
-        Self { a, b, names: all, number_of }
+        let matching = Matching::by_name(all.len(), |number| a.has(number) && b.has(number));
+        Self { a, b, names: all, number_of, matching }
+    }
+
+    /// Matches the instances of an area by the surface that they share on A's mesh and on B's.
+    pub(crate) fn match_area(&mut self, on_a: &SharedSurface, on_b: &SharedSurface) {
+        let Self { a, b, matching, .. } = self;
+        let is_in_both = |number| a.has(number) && b.has(number);
+        let is_one_class = |of_a, of_b| a.class(of_a) == b.class(of_b);
+        matching.match_area([on_a, on_b], is_in_both, is_one_class);
+    }
+
+    pub(crate) fn matching(&self) -> &Matching {
+        &self.matching
+    }
+
+    /// How two numbered labels of a face or pixel differ, the first in A and the second in B.
+    pub(crate) fn change(&self, a: u32, b: u32) -> Change {
+        let is_one_class = self.class(Side::A, a) == self.class(Side::B, b);
+        let is_same = match self.matching.partner(Side::A, a) {
+            Some(partner) => partner == b,
+            None => a == b && (a == NULL || a == MISSING),
+        };
+        match (is_one_class, is_same) {
+            (true, true) if a == b => Change::None,
+            (true, true) => Change::Renumbered,
+            (true, false) => Change::Instance,
+            (false, _) => Change::Class,
+        }
+    }
+
+    /// The numbers of all labels but the null label.
+    pub(crate) fn numbers(&self) -> Range<u32> {
+        1..self.names.len() as u32
+    }
+
+    /// The name of a numbered label.
+    pub(crate) fn name(&self, number: u32) -> &str {
+        self.names.get(number as usize).map_or("", String::as_str)
+    }
+
+    /// The number of the label with a colour of pretty images. `None` if none has it, or several.
+    pub(crate) fn of_color(&self, side: Side, color: [u8; 3]) -> Option<u32> {
+        self.of_side(side).by_color.get(&color).copied().flatten()
     }
 
     fn of_side(&self, side: Side) -> &Numbered {
@@ -102,24 +168,13 @@ impl Names {
         self.has(side, number).then_some(number)
     }
 
-    fn has(&self, side: Side, number: u32) -> bool {
-        number == NULL
-            || self
-                .of_side(side)
-                .classes
-                .get(number as usize)
-                .is_some_and(Option::is_some)
+    pub(crate) fn has(&self, side: Side, number: u32) -> bool {
+        self.of_side(side).has(number)
     }
 
     /// The class of a numbered label in a data set.
-    fn class(&self, side: Side, number: u32) -> &'static str {
-        match number {
-            MISSING => NOTHING,
-            _ => {
-                let class = self.of_side(side).classes.get(number as usize).copied().flatten();
-                class.unwrap_or(UNLABELLED)
-            }
-        }
+    pub(crate) fn class(&self, side: Side, number: u32) -> &'static str {
+        self.of_side(side).class(number)
     }
 
     /// Whether the label at index `a` of A's table and the label at index `b` of B's have the same class.
@@ -129,11 +184,11 @@ impl Names {
         a == b
     }
 
-    /// Counts an image's pixels with other labels, by class in A and in B. The most frequent pair comes
-    /// first; there are at most 256 pairs.
+    /// Counts an image's pixels that changed, by class in A and in B. The most frequent pair comes first;
+    /// there are at most 256 pairs.
     pub(crate) fn classes_of_image(&self, pairs: &LabelPairs) -> Vec<ClassPixels> {
         let mut by_class: BTreeMap<(&'static str, &'static str), u64> = BTreeMap::new();
-        for (&(a, b), counts) in pairs {
+        for (&(a, b), counts) in pairs.iter().filter(|((a, b), _)| self.change(*a, *b).is_true()) {
             *by_class
                 .entry((self.class(Side::A, a), self.class(Side::B, b)))
                 .or_default() += counts.pixels;
@@ -150,47 +205,47 @@ impl Names {
         all
     }
 
-    /// The names of the labels that one side has and the other has not.
-    fn alone(&self, side: Side, other: Side) -> Vec<String> {
-        let numbers = (1..self.names.len() as u32).filter(|n| self.has(side, *n) && !self.has(other, *n));
-        numbers.map(|n| self.names[n as usize].clone()).collect()
+    /// The names of a side's labels that have no partner on the other side.
+    fn alone(&self, side: Side) -> Vec<String> {
+        self.numbers()
+            .filter(|n| self.has(side, *n) && self.matching.partner(side, *n).is_none())
+            .map(|n| self.name(n).to_owned())
+            .collect()
     }
 
-    /// The differences between the labels. `pairs` counts the surface and pixels with another label.
+    /// For each label of B's table, the index in A's table of the same instance.
+    fn partners_of_b(&self) -> Vec<Option<u32>> {
+        let partner = |number: &u32| match *number {
+            NULL => Some(NULL),
+            number => Some(self.index(Side::A, self.matching.partner(Side::B, number)?)),
+        };
+        self.b.numbers.iter().map(partner).collect()
+    }
+
+    /// The differences between the labels. `pairs` counts the surface and pixels whose labels differ.
     pub(crate) fn changes(&self, pairs: &LabelPairs) -> LabelChanges {
         let [a, b] = [Side::A, Side::B].map(|side| self.count(side).saturating_sub(1) as u64);
         let mut changes = LabelChanges {
             a,
             b,
-            added: self.alone(Side::B, Side::A),
-            gone: self.alone(Side::A, Side::B),
+            added: self.alone(Side::B),
+            gone: self.alone(Side::A),
+            instances: instances::changes(self, pairs),
+            partners_of_b: self.partners_of_b(),
             ..LabelChanges::default()
         };
+        (changes.renumbered, changes.other_room) = instances::renamed(self, pairs);
 
         let mut matrix: BTreeMap<(&'static str, &'static str), LabelCounts> = BTreeMap::new();
-        let mut instances: BTreeMap<u32, InstanceChange> = BTreeMap::new();
         for (&(a, b), &counts) in pairs {
-            let class_a = self.class(Side::A, a);
-            let class_b = self.class(Side::B, b);
-            changes.changed += counts;
-            *matrix.entry((class_a, class_b)).or_default() += counts;
-            let of_class = if class_a == class_b {
-                LabelCounts::default()
-            } else {
-                counts
-            };
-            changes.class_changed += of_class;
-            for (number, is_lost) in [(a, true), (b, false)] {
-                if number == NULL || number == MISSING {
-                    continue;
-                }
-                let of = instances.entry(number).or_default();
-                if is_lost {
-                    of.lost += counts
-                } else {
-                    of.gained += counts
-                }
-                of.class_changed += of_class;
+            let change = self.change(a, b);
+            if change.is_true() {
+                changes.changed += counts;
+                let classes = (self.class(Side::A, a), self.class(Side::B, b));
+                *matrix.entry(classes).or_default() += counts;
+            }
+            if change == Change::Class {
+                changes.class_changed += counts;
             }
         }
 
@@ -203,18 +258,6 @@ impl Names {
         changes
             .matrix
             .sort_by_key(|pair| (pair.a == pair.b, Reverse(size(&pair.counts))));
-
-        changes.instances = instances
-            .into_iter()
-            .map(|(n, change)| InstanceChange { name: self.names[n as usize].clone(), ..change })
-            .collect();
-        changes.instances.sort_by_key(|of| {
-            let mut all = of.lost;
-            all += of.gained;
-            Reverse((size(&of.class_changed), size(&all)))
-        });
-
-        changes.instances.truncate(MAX_INSTANCES);
         changes
     }
 }
@@ -231,6 +274,7 @@ impl Numbered {
             numbers: Vec::new(),
             classes: vec![None; number_of.len()],
             indices: vec![NULL; number_of.len()],
+            by_color: HashMap::new(),
         };
         for (index, name) in (0..).zip(names_of(table)) {
             let number = number_of[&name];
@@ -238,14 +282,32 @@ impl Numbered {
             numbered.indices[number as usize] = index;
             let class = table.and_then(|table| table.class_of(LabelId(index)));
             numbered.classes[number as usize] = class.map(|class| class.name());
+            let of_color = numbered.by_color.entry(pretty_color(index));
+            of_color.and_modify(|of| *of = None).or_insert(Some(number));
         }
         numbered
+    }
+
+    fn has(&self, number: u32) -> bool {
+        number == NULL || self.classes.get(number as usize).is_some_and(Option::is_some)
+    }
+
+    fn class(&self, number: u32) -> &'static str {
+        match number {
+            MISSING => NOTHING,
+            _ => self
+                .classes
+                .get(number as usize)
+                .copied()
+                .flatten()
+                .unwrap_or(UNLABELLED),
+        }
     }
 }
 
 /// A key to sort counts by surface, then by pixels. Areas are finite and not negative, so their bits have the
 /// same order.
-fn size(counts: &LabelCounts) -> (u64, u64, u64) {
+pub(crate) fn size(counts: &LabelCounts) -> (u64, u64, u64) {
     (counts.m2.to_bits(), counts.pixels, counts.faces)
 }
 
@@ -302,12 +364,6 @@ mod tests {
         let expected =
             [("chair", "table", 10), (UNLABELLED, "chair", 3), ("wall", NOTHING, 7), ("chair", "chair", 0)];
         assert_eq!(matrix, expected);
-
-        let first = &changes.instances[0];
-        // The chair and the table lost and gained the same; in all, the chair has changed more.
-        assert_eq!((first.name.as_str(), first.lost), ("chair_2_office_1_1", counts(5, 2.5, 10)));
-        assert_eq!((first.gained, first.class_changed), (counts(0, 0.0, 0), counts(4, 0.5, 10)));
-        assert_eq!(changes.instances.len(), 4);
     }
 
     #[test]

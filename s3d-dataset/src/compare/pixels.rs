@@ -1,13 +1,16 @@
 //! Compares the pixels of two images of a modality.
 
 use super::comparison::{LabelCounts, LabelPairs, PixelChanges, Side};
-use super::names::{MISSING, Names};
+use super::names::{Change, MISSING, Names};
 use crate::export::modality::NO_CLASS;
 use crate::verify::images::pixels::Pixels;
 use s3d_geom::Raster;
 use s3d_io::dataset::{DepthUnits, Domain};
 use s3d_label::Taxonomy;
 use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
+
+/// The colour of pixels that see nothing in pretty images.
+const MISSING_COLOR: [u8; 3] = [0; 3];
 
 /// What the numbers of both images mean.
 pub(crate) struct Meaning<'a> {
@@ -21,6 +24,8 @@ pub(crate) struct Meaning<'a> {
 pub(crate) struct Sums {
     pub(crate) pixels: u64,
     pub(crate) changed: u64,
+    /// For labels and classes, the pixels whose numbers, names or colours differ and mean the same.
+    pub(crate) renumbered: u64,
     /// For colours, the sum of squared differences and the number of channel values.
     squares: u64,
     samples: u64,
@@ -35,6 +40,7 @@ impl Sums {
     pub(crate) fn add(&mut self, other: &Self) {
         self.pixels += other.pixels;
         self.changed += other.changed;
+        self.renumbered += other.renumbered;
         self.squares += other.squares;
         self.samples += other.samples;
         self.total += other.total;
@@ -53,6 +59,15 @@ impl Sums {
             psnr_db,
             mean: (self.seen > 0).then(|| self.total / self.seen as f64),
             largest: (self.seen > 0).then_some(self.largest),
+        }
+    }
+
+    /// Adds pixels whose labels differ like this. `is_equal` says whether their values are equal.
+    fn add_run(&mut self, change: Change, is_equal: bool, pixels: u64) {
+        if change.is_true() {
+            self.changed += pixels;
+        } else if change == Change::Renumbered || !is_equal {
+            self.renumbered += pixels;
         }
     }
 
@@ -95,10 +110,9 @@ pub(crate) fn compare(
     Ok(Some(match (a, b) {
         (Pixels::Color(a), Pixels::Color(b)) => match domain {
             Domain::Semantic => labels(a, b, meaning, pairs)?,
+            Domain::SemanticPretty => label_colors(a, b, meaning),
             Domain::Normal => Sums::of(a, b, |a, b| a == b, normal_angle),
             Domain::Rgb => colors(a, b),
-            // Their colours only tell instances apart.
-            Domain::SemanticPretty => Sums::of(a, b, |a, b| a == b, |_, _| None),
             // These modalities have no colours.
             Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => return Ok(None),
         },
@@ -161,7 +175,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> Option<f64> {
     (a != [0.0; 3] && b != [0.0; 3]).then(|| p.distance(q))
 }
 
-/// Compares label images by the names of labels.
+/// Compares label images by the instances that their numbers mean.
 fn labels(
     a: &Raster<[u8; 3]>,
     b: &Raster<[u8; 3]>,
@@ -182,18 +196,48 @@ fn labels(
     };
 
     let mut sums = Sums { pixels: a.len() as u64, ..Sums::default() };
-    let both: Vec<([u8; 3], [u8; 3])> = a.pixels().iter().copied().zip(b.pixels().iter().copied()).collect();
-    for run in both.chunk_by(|one, next| one == next) {
-        let Some(&(a, b)) = run.first() else { continue };
+    for (a, b, pixels) in runs(a, b) {
         let labels = (number(Side::A, a)?, number(Side::B, b)?);
-        if labels.0 != labels.1 {
-            let pixels = run.len() as u64;
-            sums.changed += pixels;
+        let change = names.change(labels.0, labels.1);
+        if change != Change::None {
             *pairs.entry(labels).or_default() += LabelCounts { pixels, ..LabelCounts::default() };
         }
+        sums.add_run(change, a == b, pixels);
     }
 
     Ok(sums)
+}
+
+/// Compares the colours of labels by the instances that they mean. Colours that no label has are compared as
+/// they are.
+fn label_colors(a: &Raster<[u8; 3]>, b: &Raster<[u8; 3]>, meaning: &Meaning<'_>) -> Sums {
+    let number = |side, color| match color {
+        MISSING_COLOR => Some(MISSING),
+        color => meaning.names.and_then(|names| names.of_color(side, color)),
+    };
+
+    let mut sums = Sums { pixels: a.len() as u64, ..Sums::default() };
+    for (a, b, pixels) in runs(a, b) {
+        let change = match (meaning.names, number(Side::A, a), number(Side::B, b)) {
+            (Some(names), Some(a), Some(b)) => names.change(a, b),
+            _ if a == b => Change::None,
+            _ => Change::Instance,
+        };
+        sums.add_run(change, a == b, pixels);
+    }
+    sums
+}
+
+/// The runs of equal pairs of pixels: the pixel in A, the pixel in B, and their number.
+fn runs(a: &Raster<[u8; 3]>, b: &Raster<[u8; 3]>) -> Vec<([u8; 3], [u8; 3], u64)> {
+    let mut runs: Vec<([u8; 3], [u8; 3], u64)> = Vec::new();
+    for (&a, &b) in a.pixels().iter().zip(b.pixels()) {
+        match runs.last_mut() {
+            Some(run) if (run.0, run.1) == (a, b) => run.2 += 1,
+            _ => runs.push((a, b, 1)),
+        }
+    }
+    runs
 }
 
 /// Compares class images by the names of classes.
@@ -201,7 +245,10 @@ fn classes(a: &Raster<u8>, b: &Raster<u8>, meaning: &Meaning<'_>) -> Result<Sums
     let names_a = class_names(Side::A, meaning.taxonomies[0], a)?;
     let names_b = class_names(Side::B, meaning.taxonomies[1], b)?;
     let is_same = |a: u8, b: u8| names_a.get(usize::from(a)) == names_b.get(usize::from(b));
-    Ok(Sums::of(a, b, is_same, |_, _| None))
+    let mut sums = Sums::of(a, b, is_same, |_, _| None);
+    let both = a.pixels().iter().zip(b.pixels());
+    sums.renumbered = both.filter(|&(&a, &b)| a != b && is_same(a, b)).count() as u64;
+    Ok(sums)
 }
 
 /// The names of a taxonomy's classes, if it has every class of an image.

@@ -1,8 +1,8 @@
 //! The text of a comparison.
 
 use super::comparison::{
-    ClassPair, ComparedSet, Comparison, FileKindChanges, Geometry, ImageChange, InstanceChange, LabelChanges,
-    LabelCounts, ModalityChanges, PoseChange, Side,
+    AreaChanges, ClassPair, ComparedSet, Comparison, FileKindChanges, Geometry, ImageChange, InstanceChange,
+    InstanceChangeKind, LabelChanges, LabelCounts, ModalityChanges, PoseChange, RenamedInstance, Side,
 };
 use super::lines::{Lines, grouped, percent, significant};
 use serde_json::Value;
@@ -47,7 +47,7 @@ impl FileKindChanges {
 
 impl ModalityChanges {
     fn is_changed(&self) -> bool {
-        let pixels = self.same_pixels + self.changed + self.other_pose + self.other_form;
+        let pixels = self.same_pixels + self.renumbered + self.changed + self.other_pose + self.other_form;
         pixels + self.unread + self.only_a + self.only_b > 0
     }
 }
@@ -81,45 +81,47 @@ impl Comparison {
 
     /// The labels, classes and instances that differ.
     fn labels(&self, text: &mut Lines, labels: &LabelChanges) {
-        let LabelChanges { a, b, added, gone, changed, class_changed, matrix, instances } = labels;
-        if added.is_empty() && gone.is_empty() && matrix.is_empty() {
+        let LabelChanges { a, b, added, gone, changed, class_changed, matrix, instances, .. } = labels;
+        let renamed = [("renumbered", &labels.renumbered), ("in a room of another name", &labels.other_room)];
+        let is_same = added.is_empty() && gone.is_empty() && matrix.is_empty() && instances.is_empty();
+        if is_same && renamed.iter().all(|(_, of)| of.is_empty()) {
             return;
         }
 
         text.add(format!("labels: {} in A, {} in B", grouped(*a), grouped(*b)));
-        names(text, "only A", gone);
-        names(text, "only B", added);
-        if matrix.is_empty() {
-            return;
+        names(text, "without a partner in B", gone);
+        names(text, "without a partner in A", added);
+        for (what, of) in renamed.into_iter().filter(|(_, of)| !of.is_empty()) {
+            let mut counts = LabelCounts::default();
+            of.iter().for_each(|RenamedInstance { counts: of, .. }| counts += *of);
+            let instances = grouped(of.len() as u64);
+            text.add(format!("  {what}, and not changed: {instances} instances, {}", self.surface(&counts)));
         }
 
-        let total = |what: &str, of: &LabelCounts| {
-            let [faces, m2, pixels] = cells(of);
-            // If no faces could be compared, their number is left out: it is unknown, not 0.
-            let by_face = self.areas.iter().any(|of| of.geometry == Geometry::Same);
-            let surface = if by_face {
-                format!("{faces} faces of {m2} m², ")
-            } else {
-                String::new()
-            };
-            format!("  {what}: {surface}{pixels} pixels")
-        };
-        text.add(total("another label", changed));
-        text.add(total("another class", class_changed));
-
+        if !matrix.is_empty() {
+            text.add(format!("  changed: {}", self.surface(changed)));
+            text.add(format!("  of these, to another class: {}", self.surface(class_changed)));
+        }
         let rows: Vec<_> = matrix.iter().take(MAX_ROWS).map(class_row).collect();
         text.table(["class in A", "class in B", "faces", "m²", "pixels"], &rows, 2);
         text.more(matrix.len().saturating_sub(MAX_ROWS));
 
-        // Instances with only another number come last, and are shown if no class changed.
-        let of_another = instances
-            .iter()
-            .filter(|of| of.class_changed != LabelCounts::default())
-            .count();
-        let told = if of_another == 0 { instances.len() } else { of_another };
-        let rows: Vec<_> = instances.iter().take(told.min(MAX_ROWS)).map(instance_row).collect();
-        text.table(["instance", "lost m²", "pixels", "gained m²", "pixels"], &rows, 1);
-        text.more(told.saturating_sub(MAX_ROWS));
+        let rows: Vec<_> = instances.iter().take(MAX_ROWS).map(instance_row).collect();
+        let titles = ["instance in A", "is in B", "lost m²", "gained m²", "relabelled m²", "pixels"];
+        text.table(titles, &rows, 2);
+        text.more(instances.len().saturating_sub(MAX_ROWS));
+    }
+
+    /// An amount of surface and pixels. If no faces could be compared, their number is left out: it is
+    /// unknown, not 0.
+    fn surface(&self, of: &LabelCounts) -> String {
+        let [faces, m2, pixels] = cells(of);
+        let is_compared = |of: &AreaChanges| matches!(of.geometry, Geometry::Same | Geometry::Other);
+        if self.areas.iter().any(is_compared) {
+            format!("{faces} faces of {m2} m², {pixels} pixels")
+        } else {
+            format!("{pixels} pixels")
+        }
     }
 
     /// The views, scan locations and photographs that differ.
@@ -147,9 +149,18 @@ impl Comparison {
     fn images(&self, text: &mut Lines) {
         let changed = self.modalities.iter().filter(|of| of.is_changed());
         let rows: Vec<_> = changed.map(modality_row).collect();
-        let titles = ["images", "same", "same pixels", "changed", "other pose", "other form", "unread"];
-        let [images, same, same_pixels, changed, other_pose, other_form, unread] = titles;
-        let titles = [images, same, same_pixels, changed, other_pose, other_form, unread, "only A", "only B"];
+        let titles = [
+            "images",
+            "same",
+            "same pixels",
+            "renumbered",
+            "changed",
+            "other pose",
+            "other form",
+            "unread",
+            "only A",
+            "only B",
+        ];
         text.table(titles, &rows, 1);
 
         let changed = self.modalities.iter().filter(|of| of.changed > 0);
@@ -251,17 +262,37 @@ fn class_row(pair: &ClassPair) -> [String; 5] {
     [pair.a.to_owned(), class_b, faces, m2, pixels]
 }
 
-fn instance_row(of: &InstanceChange) -> [String; 5] {
-    let [_, lost_m2, lost] = cells(&of.lost);
-    let [_, gained_m2, gained] = cells(&of.gained);
-    [of.name.clone(), lost_m2, lost, gained_m2, gained]
+fn instance_row(of: &InstanceChange) -> [String; 6] {
+    let words = match of.kind {
+        InstanceChangeKind::Vanished => "nothing".to_owned(),
+        InstanceChangeKind::Extent if of.a == of.b => "the same".to_owned(),
+        _ => some_names(&of.b),
+    };
+    let name = match of.kind {
+        InstanceChangeKind::Appeared => "nothing".to_owned(),
+        _ => some_names(&of.a),
+    };
+    let m2 = [of.lost, of.gained, of.relabelled].map(|of| significant(of.m2));
+    let [lost, gained, relabelled] = m2;
+    let pixels = grouped(of.lost.pixels + of.gained.pixels + of.relabelled.pixels);
+    [name, words, lost, gained, relabelled, pixels]
 }
 
-fn modality_row(of: &ModalityChanges) -> [String; 9] {
-    let counts = [of.same, of.same_pixels, of.changed, of.other_pose];
-    let [same, same_pixels, changed, other_pose] = counts.map(grouped);
+/// The first names of a group.
+fn some_names(all: &[String]) -> String {
+    let first = all.iter().take(3).map(String::as_str).collect::<Vec<_>>().join(" + ");
+    match all.len().saturating_sub(3) {
+        0 => first,
+        more => format!("{first} + {more} more"),
+    }
+}
+
+fn modality_row(of: &ModalityChanges) -> [String; 10] {
+    let counts = [of.same, of.same_pixels, of.renumbered, of.changed, of.other_pose];
+    let [same, same_pixels, renumbered, changed, other_pose] = counts.map(grouped);
     let [other_form, unread, a, b] = [of.other_form, of.unread, of.only_a, of.only_b].map(grouped);
-    [of.modality.to_owned(), same, same_pixels, changed, other_pose, other_form, unread, a, b]
+    let name = of.modality.to_owned();
+    [name, same, same_pixels, renumbered, changed, other_pose, other_form, unread, a, b]
 }
 
 fn pixels_row(of: &ModalityChanges) -> [String; 5] {

@@ -79,6 +79,8 @@ pub use annotations::{
     AnnotatedInstance, AnnotatedPoints, AnnotatedRoom, AnnotationOptions, Annotations, Skipped,
 };
 pub use frame_gap::FrameGap;
+#[cfg(feature = "labels")]
+pub use label_files::transfer::labels_by_place;
 #[cfg(feature = "mat")]
 pub use mat::{MatArea, MatObject, MatRoom, MatWriter};
 #[cfg(feature = "npy")]

@@ -2,7 +2,7 @@
 
 use crate::cloud::annotations::{AnnotationOptions, Annotations};
 use crate::cloud::frame_gap::{FrameGap, refusal};
-use crate::cloud::label_files::transfer::{are_same_faces, overlap, transferred};
+use crate::cloud::label_files::transfer::{are_same_faces, labels_by_place, overlap};
 use crate::cloud::label_files::{LabelFile, numbers};
 use crate::cloud::of_mesh::FaceLabels;
 use crate::error::{Error, Result};
@@ -67,7 +67,7 @@ impl Annotations {
             Self::of_mesh(&labelled, options)?
         } else {
             let mut labels = FaceLabels::of_mesh(&labelled, options)?;
-            labels.faces = transferred(&labelled.mesh, &labels.faces, &scene.file.mesh);
+            labels.faces = labels_by_place(&labelled.mesh, &labels.faces, &scene.file.mesh);
             labels
                 .annotate(file.path(), &scene.file.mesh, options, true)
                 .map_err(|_| Error::format(file.path(), "labels no surface within 10 cm of the mesh"))?

@@ -45,14 +45,16 @@ pub(crate) fn overlap(a: Aabb, b: Aabb) -> f64 {
     common / (volume(a.min, a.max) + volume(b.min, b.max) - common)
 }
 
-/// Returns for each face of `to` the label of the surface there, from the labels of the faces of `from`. A
-/// face takes the label that most of its places find on the nearest face within 10 cm; the smaller label wins
-/// a tie. A face is unlabelled ([`NO_INDEX`]) if most of its places find no label.
+/// Returns for each face of `to` the label of the surface of `from` at its place. `label_of_face` has the
+/// label of each face of `from`.
+///
+/// A face takes the label that most of its places find on the nearest face within 10 cm; the smaller label
+/// wins a tie. A face is unlabelled ([`NO_INDEX`]) if most of its places find no label.
 ///
 /// # Panics
 /// If `label_of_face` has fewer entries than `from` has faces.
 #[expect(clippy::indexing_slicing, reason = "a column of another mesh is a caller's mistake: see Panics")]
-pub(crate) fn transferred(from: &TriMesh, label_of_face: &[u32], to: &TriMesh) -> Vec<u32> {
+pub fn labels_by_place(from: &TriMesh, label_of_face: &[u32], to: &TriMesh) -> Vec<u32> {
     let nearest_faces = NearestFaces::new(from);
     let mut labels = vec![NO_INDEX; to.faces().len()];
     let mut places = Vec::new();
@@ -131,16 +133,16 @@ mod tests {
         // Two squares against a mesh of one face for both, and against one of small faces 4 cm away.
         let from = strip(2, 0.0);
         let labels = [0, 0, 1, NO_INDEX];
-        assert_eq!(transferred(&from, &labels, &from), labels);
-        assert_eq!(transferred(&from, &labels, &strip(2, 0.04)), labels);
-        assert_eq!(transferred(&from, &labels, &strip(2, 0.2)), [NO_INDEX; 4]);
+        assert_eq!(labels_by_place(&from, &labels, &from), labels);
+        assert_eq!(labels_by_place(&from, &labels, &strip(2, 0.04)), labels);
+        assert_eq!(labels_by_place(&from, &labels, &strip(2, 0.2)), [NO_INDEX; 4]);
 
         let corners = vec![vec3(0.0, 0.0, 0.0), vec3(1.5, 0.0, 0.0), vec3(0.0, 1.0, 0.0)];
         let across = TriMesh::from_faces(corners, vec![[0, 1, 2]]).unwrap();
-        assert_eq!(transferred(&from, &labels, &across), [0]);
+        assert_eq!(labels_by_place(&from, &labels, &across), [0]);
         let few =
             TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, vec3(0.9, 0.1, 0.0)], vec![[0, 1, 2]]).unwrap();
-        assert_eq!(transferred(&few, &[7], &from), [NO_INDEX; 4]);
+        assert_eq!(labels_by_place(&few, &[7], &from), [NO_INDEX; 4]);
     }
 
     #[test]

@@ -38,6 +38,7 @@ export interface ModalityChanges extends Pixels {
   modality: string;
   same: number;
   same_pixels: number;
+  renumbered: number;
   changed: number;
   other_pose: number;
   other_form: number;
@@ -46,12 +47,21 @@ export interface ModalityChanges extends Pixels {
   only_b: number;
 }
 
+/** Instances that share most of their surface, and what they lost and gained. */
 export interface InstanceChange {
-  name: string;
+  kind: "class" | "extent" | "split" | "merged" | "regrouped" | "vanished" | "appeared";
+  a: string[];
+  b: string[];
+  m2_a: number | null;
+  m2_b: number | null;
   lost: Counts;
   gained: Counts;
+  relabelled: Counts;
   class_changed: Counts;
 }
+
+/** An instance with another name in B. */
+export type Renamed = { a: string; b: string } & Counts;
 
 export interface Comparison {
   equal: boolean;
@@ -68,12 +78,16 @@ export interface Comparison {
     geometry: "same" | "other" | "unread" | "one_sided" | "unlabelled";
     faces_changed: number;
     m2_changed: number;
+    m2_only_a: number;
+    m2_only_b: number;
   }[];
   labels: {
     a: number;
     b: number;
     added: string[];
     gone: string[];
+    renumbered: Renamed[];
+    other_room: Renamed[];
     changed: Counts;
     class_changed: Counts;
     matrix: ({ a: string; b: string } & Counts)[];
@@ -115,6 +129,8 @@ interface Compared {
   comparison: Comparison;
   classes: Index["classes"];
   labels: Index["labels"];
+  /** The index of the label of the same instance in A, by label of B. */
+  partners: (number | null)[];
   depth_units_per_m: number;
   changed_faces: number[];
   pictures: ChangedPicture[];
@@ -125,30 +141,33 @@ interface Compared {
 export interface Against extends Compared {
   /** The index of A, with B's labels and classes after its own. */
   both: Index;
-  /** The index in `both.labels` of each of B's labels. */
+  /** The index in `both.labels` of each of B's labels: of the same instance and class in A, if there is one. */
   labelOfB: Uint32Array;
+  /** The names that B's labels have in B, by index in `both.labels`. */
+  namesInB: Map<number, string>;
   /** The factor that turns B's depths into A's units. */
   depthOfB: number;
 }
 
-/** Labels of A and B are the same if their names are; so are classes. */
+/** Labels of A and B are the same if they belong to the same instance and class, whatever their names. */
 function merged(index: Index, compared: Compared): Against {
   const { classes, labels } = { classes: [...index.classes], labels: [...index.labels] };
-  const placeOf = <T extends { name: string }>(all: T[], of: T[], made: (entry: T) => T): number[] => {
-    const places = new Map(all.map(({ name }, i) => [name, i]));
-    return of.map((entry) => places.get(entry.name) ?? all.push(made(entry)) - 1);
-  };
-  const classOfB = placeOf(classes, compared.classes, (c) => c);
-  const labelOfB = placeOf(labels, compared.labels, (label) => ({
-    ...label,
-    class: label.class === null ? null : (classOfB[label.class] ?? null),
-  }));
+  const places = new Map(classes.map(({ name }, i) => [name, i]));
+  const classOfB = compared.classes.map((of) => places.get(of.name) ?? classes.push(of) - 1);
+  const labelOfB = compared.labels.map((label, i) => {
+    const own = { ...label, class: label.class === null ? null : (classOfB[label.class] ?? null) };
+    const partner = compared.partners[i] ?? null;
+    const isSame = partner !== null && index.labels[partner]?.class === own.class;
+    return isSame ? partner : labels.push(own) - 1;
+  });
+  const namesInB = new Map(labelOfB.map((place, i) => [place, compared.labels[i]?.name ?? ""]));
   const pixels = classes.map((_, i) => (labels.some((label) => label.class === i) ? 1 : 0));
   const units = index.data_set.depth_units_per_m;
   return {
     ...compared,
     both: { ...index, classes, labels, pixels_by_class: pixels },
     labelOfB: Uint32Array.from(labelOfB),
+    namesInB,
     depthOfB: units / (compared.depth_units_per_m || units),
   };
 }
@@ -251,11 +270,18 @@ export async function loadChanges(against: Against, area: number): Promise<FaceC
   };
 }
 
+export type Side = "a" | "b";
+
+/** The name of a label in A or in B. */
+const ownName = ({ both, namesInB }: Against, label: number, side: Side): string | undefined =>
+  (side === "b" ? namesInB.get(label) : undefined) ?? both.labels[label]?.name;
+
 /** Whether the name of a class or instance means this label. The comparison calls no label `<UNK>`. */
-function isNamed({ both }: Against, label: number, name: string | null): boolean {
+function isNamed(against: Against, label: number, name: string | null, side: Side): boolean {
   if (name === null) return true;
-  const { class: of, name: its } = both.labels[label] ?? { class: null, name: "" };
-  return of === null ? name === "<UNK>" : its === name || both.classes[of]?.name === name;
+  const of = against.both.labels[label]?.class ?? null;
+  if (of === null) return name === "<UNK>";
+  return ownName(against, label, side) === name || against.both.classes[of]?.name === name;
 }
 
 /** The first group that was `was` in A and is `is` in B. If both are null, any group. */
@@ -264,14 +290,15 @@ export const groupOf = (
   { groups }: FaceChanges,
   was: string | null,
   is: string | null,
-): Group | undefined => groups.find(({ a, b }) => isNamed(against, a, was) && isNamed(against, b, is));
+): Group | undefined =>
+  groups.find(({ a, b }) => isNamed(against, a, was, "a") && isNamed(against, b, is, "b"));
 
-/** The name of a label's class or instance, as the comparison writes it. */
-export function nameOf({ both }: Against, label: number, of: "class" | "instance"): string {
-  const found = both.labels[label];
-  const its = found?.class === null || !found ? undefined : both.classes[found.class];
+/** The name of a label's class or instance in A or in B, as the comparison writes it. */
+export function nameOf(against: Against, label: number, of: "class" | "instance", side: Side): string {
+  const found = against.both.labels[label];
+  const its = found?.class === null || !found ? undefined : against.both.classes[found.class];
   if (!its || !found) return "no label";
-  return of === "class" ? its.name : found.name;
+  return of === "class" ? its.name : (ownName(against, label, side) ?? "");
 }
 
 /** The comparison's `<UNK>` and `<nothing>` in words. */

@@ -24,7 +24,8 @@ export async function changeMarks(index: Index): Promise<Map<number, ChangeMark[
     if (!changes) continue;
     const hasMesh = index.meshes.some((mesh) => mesh.area === area);
     const mark = ({ a, b, faces, m2, center }: (typeof changes.patches)[number]): ChangeMark => {
-      const [was, is] = [a, b].map((label) => nameOf(against, label, "instance"));
+      const was = nameOf(against, a, "instance", "a");
+      const is = nameOf(against, b, "instance", "b");
       return {
         at: center,
         isClass: kindOf(against, a, b) === CLASS,

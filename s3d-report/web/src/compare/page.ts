@@ -71,7 +71,13 @@ function overview(index: Index, against: Against, change: Change | null): Page {
 function heading(against: Against, change: Change | null, images: number): HTMLElement[] {
   if (!change) {
     const words = `${several(images, "image")} with different pixels, the most different first.`;
-    return [h("h2", {}, "Images that differ"), h("p", { class: "quiet" }, words)];
+    const labels = against.comparison.modalities.find((m) => m.modality === "semantic");
+    const renumbered = labels?.renumbered ?? 0;
+    const more = ` In ${several(renumbered, "image")}, labels differ in their numbers alone.`;
+    return [
+      h("h2", {}, "Images that differ"),
+      h("p", { class: "quiet" }, renumbered > 0 ? words + more : words),
+    ];
   }
   const counts = against.comparison.labels?.matrix.find(({ a, b }) => a === change.was && b === change.is);
   const solid = counts && changedLink(against, counts, { ...change });

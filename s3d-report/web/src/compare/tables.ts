@@ -5,7 +5,7 @@ import { count, h, percent, several, table } from "../dom.js";
 import { inPanorama, nameOf as nameOfView } from "../pages/view.js";
 import { imageLink } from "../places.js";
 import { link } from "../route.js";
-import type { Against, Comparison, InstanceChange, ModalityChanges, ViewName } from "./data.js";
+import type { Against, Comparison, InstanceChange, ModalityChanges, Renamed, ViewName } from "./data.js";
 import { changedLink, countsWords, matrix, number, surface } from "./matrix.js";
 import { MODALITY_NAMES } from "./picture.js";
 
@@ -58,57 +58,109 @@ export function madeWith({ a, b, labels, settings, inputs }: Comparison): HTMLEl
 export function labelsSection(against: Against): HTMLElement | null {
   const { labels, areas } = against.comparison;
   if (!labels) return null;
-  const meshes = areas
-    .filter(({ geometry }) => geometry === "other" || geometry === "unread" || geometry === "one_sided")
-    .map(({ area, geometry }) => {
-      const words = {
-        other: "its meshes differ, so labels are compared by pixels alone",
-        unread: "a mesh could not be read, so labels are compared by pixels alone",
-        one_sided: "only one of the data sets has it",
-      }[geometry as "other"];
-      return h("p", {}, `Area ${area}: ${words}.`);
-    });
+  const meshes = areas.flatMap(({ area, geometry, m2_only_a, m2_only_b }) => {
+    if (geometry === "same" || geometry === "unlabelled") return [];
+    const words = {
+      other:
+        `its meshes differ, so faces are compared by place; ${surface(m2_only_a)} of A and ` +
+        `${surface(m2_only_b)} of B are over 10 cm from the other mesh`,
+      unread: "a mesh could not be read, so labels are compared by pixels and names alone",
+      one_sided: "only one of the data sets has it",
+    }[geometry];
+    return [h("p", {}, `Area ${area}: ${words}.`)];
+  });
   const { changed, class_changed: other } = labels;
   const none = changed.faces + changed.pixels === 0;
   const words = none
-    ? "No face and no pixel has another label."
-    : `Another class: ${countsWords(other)}. ` +
-      `Another label, including other instances of the same class: ${countsWords(changed)}.`;
+    ? "No face and no pixel belongs to another instance or class."
+    : `Another class: ${countsWords(other)}. ` + `Another instance or class: ${countsWords(changed)}.`;
+  const renamed = [
+    renamedList("another number", labels.renumbered),
+    renamedList("the name of another room", labels.other_room),
+  ];
   const solid = against.changed_faces.flatMap((area) => {
     if (!against.both.meshes.some((mesh) => mesh.area === area)) return [];
     const words = against.both.meshes.length > 1 ? `Changes of area ${area} in 3D` : "Changes in 3D";
     return [h("a", { href: link("space", [area], { show: "changed" }) }, words)];
   });
   const places = solid.length > 0 ? h("p", { class: "places" }, ...solid) : null;
-  return section("Labels", h("p", {}, words), ...meshes, matrix(against), places);
+  return section("Labels", h("p", {}, words), ...renamed, ...meshes, matrix(against), places);
+}
+
+/** Instances that are the same under another name: one line, and the list to unfold. */
+function renamedList(words: string, renamed: Renamed[]): HTMLElement | null {
+  if (renamed.length === 0) return null;
+  const sum = { faces: 0, m2: 0, pixels: 0 };
+  for (const { faces, m2, pixels } of renamed) {
+    sum.faces += faces;
+    sum.m2 += m2;
+    sum.pixels += pixels;
+  }
+  const only = renamed.length === 1 ? "has only" : "have only";
+  const subject = `${several(renamed.length, "instance")} ${only} ${words}`;
+  const summary = `${subject}, which is no change: ${countsWords(sum)}.`;
+  const items = renamed.map(({ a, b }) => h("li", {}, `${a} is ${b}`));
+  return h("details", { class: "renamed" }, h("summary", {}, summary), h("ul", {}, ...items));
 }
 
 /** The area of an instance is the last number of its name. */
 const areaOf = (name: string): string => name.split("_").at(-1) ?? "";
 
-function instanceLink(against: Against, { name, lost, gained }: InstanceChange): string | null {
-  const most = lost.m2 >= gained.m2 ? "was" : "is";
-  const href = changedLink(against, most === "was" ? lost : gained, { [most]: name });
-  const area = areaOf(name);
+/** The link to faces that changed, named by the instance that they left or joined. */
+function instanceLink(against: Against, change: InstanceChange): string | null {
+  const { kind, a, b, lost, gained, relabelled } = change;
+  const isLoss = kind === "vanished" || (kind === "extent" && lost.m2 >= gained.m2);
+  const [was, is] = {
+    class: [a[0], b[0]],
+    extent: isLoss ? [a[0]] : [undefined, b[0]],
+    split: [undefined, b[1]],
+    merged: [a[1]],
+    regrouped: [a[1]],
+    vanished: [a[0]],
+    appeared: [undefined, b[0]],
+  }[kind];
+  const counts = relabelled.faces > 0 ? relabelled : isLoss ? lost : gained;
+  const href = changedLink(against, counts, { ...(was && { was }), ...(is && { is }) });
+  const area = areaOf(was ?? is ?? "");
   const there = against.changed_faces.some((number) => String(number) === area);
   return href && there ? href.replace("#/space?", `#/space/${area}?`) : href;
 }
 
+const KINDS: Record<InstanceChange["kind"], string> = {
+  class: "Another class",
+  extent: "Another extent",
+  split: "Split",
+  merged: "Merged",
+  regrouped: "Regrouped",
+  vanished: "Vanished",
+  appeared: "Appeared",
+};
+
+const instanceNames = (names: string[]): HTMLElement =>
+  h("span", { class: "names" }, names.join(" + ") || "–");
+
 export function instancesSection(against: Against): HTMLElement | null {
   const labels = against.comparison.labels;
   if (!labels) return null;
+  // Columns without any surface are left out.
+  const parts = (["lost", "gained", "relabelled"] as const).filter((part) =>
+    labels.instances.some((instance) => instance[part].m2 > 0),
+  );
   const rows = labels.instances.map((instance): Cells => {
     const href = instanceLink(against, instance);
+    const kind = KINDS[instance.kind];
+    const sizes = [instance.m2_a, instance.m2_b].flatMap((m2) => (m2 === null ? [] : [surface(m2)]));
     return [
-      href ? h("a", { href, title: "Show in 3D" }, instance.name) : instance.name,
-      number(surface(instance.lost.m2)),
-      number(count(instance.lost.pixels)),
-      number(surface(instance.gained.m2)),
-      number(count(instance.gained.pixels)),
-      number(surface(instance.class_changed.m2)),
+      href ? h("a", { href, title: "Show in 3D" }, kind) : kind,
+      instanceNames(instance.a),
+      instanceNames(instance.b),
+      number([...new Set(sizes)].join(" → ") || "–"),
+      ...parts.map((part) => number(surface(instance[part].m2))),
+      number(count(instance.lost.pixels + instance.gained.pixels + instance.relabelled.pixels)),
     ];
   });
-  const head = ["Instance", "Lost", "Pixels", "Gained", "Pixels", "Another class"];
+  const columns = parts.map((part) => `${part.charAt(0).toUpperCase()}${part.slice(1)}`);
+  const head = ["Change", "In A", "In B", "Surface", ...columns, "Pixels"];
   const names = (words: string, all: string[]): HTMLElement | null =>
     all.length === 0
       ? null
@@ -119,10 +171,10 @@ export function instancesSection(against: Against): HTMLElement | null {
           h("p", {}, all.join(", ")),
         );
   return section(
-    "Instances",
+    "Instances that changed",
     ...some(head, rows),
-    names("only in A", labels.gone),
-    names("only in B", labels.added),
+    names("of A without a partner in B", labels.gone),
+    names("of B without a partner in A", labels.added),
   );
 }
 
@@ -171,6 +223,7 @@ export function viewsSection(index: Index, { views }: Comparison): HTMLElement |
 const COLUMNS: [keyof ModalityChanges, string][] = [
   ["same", "Same"],
   ["same_pixels", "Same pixels"],
+  ["renumbered", "Renumbered"],
   ["changed", "Changed"],
   ["other_pose", "Other pose"],
   ["other_form", "Other form"],

@@ -4,7 +4,7 @@ import type { Index, Mesh } from "../data.js";
 import { append, choice, count, h, several } from "../dom.js";
 import type { Modality } from "../gl.js";
 import { legendOf } from "../readout.js";
-import { type Against, groupOf, loadAgainst, loadChanges, nameOf } from "../compare/data.js";
+import { type Against, type Side, groupOf, loadAgainst, loadChanges, nameOf } from "../compare/data.js";
 import { type Page, type Route, link, replaceRoute } from "../route.js";
 import { type Look, type Mark, lookFrom, marksOf, queryOf, showsOf } from "./look.js";
 import type { Show } from "./paint.js";
@@ -220,10 +220,10 @@ const CHANGES = 50;
 function changeList(against: Against, view: SpaceView): HTMLElement | null {
   const groups = view.changes?.groups.slice(0, CHANGES) ?? [];
   if (groups.length === 0) return null;
-  const name = (label: number): string => nameOf(against, label, "instance");
+  const name = (label: number, side: Side): string => nameOf(against, label, "instance", side);
   const entries = groups.map(({ a, b, faces }, i): [string, string] => [
     String(i),
-    `${name(a)} is ${name(b)} · ${several(faces.length, "face")}`,
+    `${name(a, "a")} is ${name(b, "b")} · ${several(faces.length, "face")}`,
   ]);
   const list = choice("Changed labels", [["", "Changed labels…"], ...entries], "", (value) => {
     const group = groups[Number(value)];

@@ -24,9 +24,8 @@ function labelsOfFaces(folder) {
 }
 
 const mesh = readObj(join(dataset, "area_1/3d/rgb.obj"));
-/** The label of each face in both, and the faces whose labels differ. */
+/** The label of each face in both. */
 export const ofFaces = [dataset, other].map(labelsOfFaces);
-export const changedFaces = ofFaces[0].flatMap((label, face) => (label === ofFaces[1][face] ? [] : [face]));
 /** The surface of a face, m². */
 export const surfaceOf = (face) => {
   const [a, b, c] = mesh.faces[face].map((vertex) => mesh.vertices[vertex]);
@@ -35,22 +34,53 @@ export const surfaceOf = (face) => {
 };
 
 /**
- * The numbers of changed pixels by class in both; and for each image the pixels of another class, and of
- * one pair.
+ * The instance of B that is an instance of A: they share over half of the surface of both together. No
+ * instance has two such partners.
+ */
+function partnersOf() {
+  const sums = new Map();
+  const add = (key, m2) => sums.set(key, (sums.get(key) ?? 0) + m2);
+  ofFaces[0].forEach((a, face) => {
+    const [b, m2] = [ofFaces[1][face], surfaceOf(face)];
+    for (const key of [`A ${a}`, `B ${b}`, `both ${a} ${b}`]) add(key, m2);
+  });
+  const partners = new Map();
+  for (const [key, m2] of sums) {
+    const [kind, a, b] = key.split(" ");
+    if (kind !== "both" || isNone(a) || isNone(b)) continue;
+    if (m2 / (sums.get(`A ${a}`) + sums.get(`B ${b}`) - m2) > 0.5) partners.set(a, b);
+  }
+  return partners;
+}
+export const partners = partnersOf();
+
+/** Whether the labels of a face or pixel in A and in B are of other instances or classes. */
+export const isChanged = (a, b) => {
+  const isOne = [a, b].some((name) => isNone(name) || name === "<nothing>") ? a === b : partners.get(a) === b;
+  return !isOne || classOf(a) !== classOf(b);
+};
+/** The faces that changed. */
+export const changedFaces = ofFaces[0].flatMap((a, face) => (isChanged(a, ofFaces[1][face]) ? [face] : []));
+
+/**
+ * The numbers of changed pixels by class in both; and for each image the pixels that changed, those of
+ * another class, those of one pair, and those with another number for the same.
  */
 function changedPixels() {
   const [pairs, ofImage] = [new Map(), new Map()];
   for (const kind of ["data", "pano"])
     for (const name of readdirSync(join(dataset, `area_1/${kind}/semantic`))) {
       const images = [dataset, other].map((folder) => readPng(join(folder, `area_1/${kind}/semantic`, name)));
-      const own = { classes: 0, chair_table: 0 };
+      const own = { changed: 0, classes: 0, chair_table: 0, renumbered: 0 };
       for (let y = 0; y < images[0].height; y++)
         for (let x = 0; x < images[0].width; x++) {
-          const [a, b] = images.map((image, side) => {
-            const [r, g, b] = image.at(x, y);
-            return names[side][r * 65536 + g * 256 + b] ?? "<nothing>";
-          });
-          if (a === b) continue;
+          const values = images.map((image) => image.at(x, y));
+          const [a, b] = values.map(([r, g, b], side) => names[side][r * 65536 + g * 256 + b] ?? "<nothing>");
+          if (!isChanged(a, b)) {
+            if (values[0].join() !== values[1].join()) own.renumbered += 1;
+            continue;
+          }
+          own.changed += 1;
           const pair = `${classOf(a)} ${classOf(b)}`;
           pairs.set(pair, (pairs.get(pair) ?? 0) + 1);
           if (classOf(a) !== classOf(b)) own.classes += 1;
