@@ -2,8 +2,8 @@
 
 import { comparePage } from "./compare/page.js";
 import { FORM, type Index, load } from "./data.js";
-import { append, h } from "./dom.js";
-import { faultCount, notesPage } from "./pages/notes.js";
+import { append, count, h, named, tamed } from "./dom.js";
+import { damageOf, notesPage } from "./pages/notes.js";
 import { numbersPage } from "./pages/numbers.js";
 import { panoPage } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
@@ -73,14 +73,19 @@ async function start(): Promise<void> {
   const numbered = new Intl.Collator("en", { numeric: true });
   if (index.views.some((view) => view.photograph !== null))
     index.views.sort((a, b) => numbered.compare(a.photograph ?? "", b.photograph ?? ""));
-  document.title = `${index.data_set.name} · s3d report`;
-  const header = h("header", {}, h("a", { class: "title", href: link("") }, index.data_set.name));
+  const header = h("header", {}, h("a", { class: "title", href: link("") }, named(index.data_set.name)));
   const nav = h("nav", { "aria-label": "Parts of the report" });
   for (const [page, name] of tabs(index)) {
-    const faults = page === "notes" ? faultCount(index) : 0;
+    const damage = page === "notes" ? damageOf(index) : null;
     const badge =
-      faults > 0 &&
-      h("span", { class: "badge", "aria-label": `${faults} files are missing or damaged` }, faults);
+      damage &&
+      damage.count > 0 &&
+      h(
+        "span",
+        { class: "badge", title: damage.words },
+        h("span", { "aria-hidden": "true" }, count(damage.count)),
+        h("span", { class: "hidden" }, ` (${damage.words})`),
+      );
     nav.append(h("a", { href: link(page), "data-page": page }, name, badge || ""));
   }
   header.append(nav);
@@ -101,6 +106,8 @@ async function start(): Promise<void> {
     now?.close();
     now = page;
     place.replaceChildren(page.element);
+    const heading = page.element.querySelector("h1")?.textContent ?? "";
+    document.title = tamed([heading, index.data_set.name, "s3d report"].filter(Boolean).join(" · "));
     window.scrollTo(0, 0);
     page.start?.setAttribute("tabindex", "-1");
     page.start?.focus();

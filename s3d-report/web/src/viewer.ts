@@ -1,7 +1,7 @@
 // A picture with two modalities, a movable line between them, and a readout for the pointer.
 
 import type { Index, Picture, Rgb } from "./data.js";
-import { append, choice, h } from "./dom.js";
+import { append, choice, flat, h } from "./dom.js";
 import { type FaceVotes, loadFaceVotes } from "./faces.js";
 import { type Gaze, clampGaze, focal, panoramaAt } from "./geometry.js";
 import {
@@ -26,7 +26,7 @@ const NAMES: Record<Modality, string> = {
   class: "Class",
   instance: "Instance",
   unlabelled: "Unlabelled",
-  contested: "Contested",
+  contested: "Disputed",
   changed: "Changed",
 };
 
@@ -168,7 +168,7 @@ export class Viewer {
       this.draw();
     });
     append(this.overlay, this.marks.elements);
-    this.canvas.setAttribute("aria-label", options.title);
+    this.canvas.setAttribute("aria-label", flat(options.title));
     this.canvas.setAttribute("role", "img");
     this.modalities = options.other?.modalities ?? modalitiesOf(index, options.area, picture);
     this.renderer = new Renderer(this.canvas, index);

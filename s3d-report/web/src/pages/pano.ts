@@ -1,7 +1,7 @@
 // A scan location: its panorama, its neighbours, and its position on the plan.
 
 import { type Index, type Location, type Picture, load } from "../data.js";
-import { append, choice, h, percent, roomName } from "../dom.js";
+import { append, choice, h, percent, roomName, several } from "../dom.js";
 import { type Gaze, directionIn, panoramaPoint, panoramaScreen, screenAt } from "../geometry.js";
 import { storeysOf } from "../storeys.js";
 import { plan } from "./floor.js";
@@ -85,12 +85,17 @@ export async function panoPage(
     window.location.hash = to;
   });
   const facts = [
-    location.seen?.coverage != null && `sees ${percent(location.seen.coverage)}`,
-    location.seen?.instances != null && `${location.seen.instances} instances`,
-    location.seen?.unlabelled != null && `${percent(location.seen.unlabelled)} without a label`,
+    location.seen?.coverage != null && `scan coverage ${percent(location.seen.coverage)}`,
+    location.seen?.instances != null && several(location.seen.instances, "instance"),
+    location.seen?.unlabelled != null && `${percent(location.seen.unlabelled)} unlabelled`,
   ].filter(Boolean);
   const element = h("main", { class: "look" });
-  const head = h("div", { class: "look-head" }, h("h1", { class: "hidden" }, roomName(location.room)), name);
+  const head = h(
+    "div",
+    { class: "look-head" },
+    h("h1", { class: "hidden" }, `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`),
+    name,
+  );
   append(head, [h("p", { class: "quiet" }, facts.join(" · "))]);
   element.append(head);
   if (!location.pano) {

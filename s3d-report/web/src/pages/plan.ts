@@ -3,7 +3,7 @@
 import { depthRamp, gradient } from "../colors.js";
 import { type ChangeMark, changeMarks } from "../compare/marks.js";
 import type { Index } from "../data.js";
-import { append, h, metres2, several } from "../dom.js";
+import { append, h, metres2, named, say, several } from "../dom.js";
 import { storeysOf } from "../storeys.js";
 import { plan } from "./floor.js";
 
@@ -40,7 +40,7 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
       hasHeight: (z) => on(z),
       changes,
       told: (now) => {
-        told.textContent = now ?? summary;
+        say(told, now ?? summary);
       },
     });
     if (storeys.count > 1) element.setAttribute("aria-label", `Plan of storey ${storey + 1} of area ${area}`);
@@ -58,7 +58,7 @@ function legend(index: Index, changes: ChangeMark[]): HTMLElement {
   if (index.locations.some((l) => l.position && l.seen?.coverage != null)) {
     const ramp = h("span", { class: "ramp" });
     ramp.style.background = gradient(depthRamp);
-    append(line, ["share of a panorama that sees the mesh: 0 %", ramp, "100 %"]);
+    append(line, ["Scan coverage of a panorama: 0 %", ramp, "100 %"]);
   }
   if (index.votes.some(({ votes }) => votes.disputed_patches.length > 0))
     append(line, [h("span", { class: "entry" }, h("span", { class: "key patch-key" }), "disputed patch")]);
@@ -68,7 +68,7 @@ function legend(index: Index, changes: ChangeMark[]): HTMLElement {
   ] as const) {
     if (!changes.some((mark) => mark.isClass === isClass)) continue;
     const key = h("span", { class: isClass ? "key change-key class" : "key change-key" });
-    append(line, [h("span", { class: "entry" }, key, `${words} in ${index.against ?? "B"}`)]);
+    append(line, [h("span", { class: "entry" }, key, `${words} in ${named(index.against ?? "B")}`)]);
   }
   return line;
 }

@@ -1,7 +1,7 @@
 // One view, large: the slider, the readout, and why the view was kept.
 
 import { type Index, type View, loadPicture } from "../data.js";
-import { append, h, percent, roomName } from "../dom.js";
+import { append, count, h, named, percent, roomName } from "../dom.js";
 import { viewPoint, viewScreen } from "../geometry.js";
 import { placeOf } from "../gl.js";
 import { type Route, link, replaceRoute } from "../route.js";
@@ -29,7 +29,7 @@ export function reasonOf(view: View): string {
 
 /** The name of a view. */
 export function nameOf(index: Index, view: View): string {
-  if (view.photograph !== null) return view.photograph;
+  if (view.photograph !== null) return named(view.photograph);
   const uuid = view.location === null ? "" : (index.locations[view.location]?.uuid.slice(0, 8) ?? "");
   const number = view.frame === null ? `candidate ${view.candidate ?? "?"}` : `view ${view.frame}`;
   return `${roomName(view.room)} · ${uuid} · ${number}`;
@@ -60,15 +60,15 @@ function facts(index: Index, view: View): HTMLElement {
   add("Entropy", view.entropy === null ? null : `${view.entropy.toFixed(3)} nats`);
   add("Yaw", degrees(view.yaw_deg));
   add("Pitch", degrees(view.pitch_deg));
-  add("Angle of view", degrees(view.fov_deg));
-  add("Sees the mesh", share(view.seen?.coverage));
-  add("Without a label", share(view.seen?.unlabelled));
-  add("Instances", view.seen?.instances == null ? null : String(view.seen.instances));
+  add("Field of view", degrees(view.fov_deg));
+  add("Scan coverage", share(view.seen?.coverage));
+  add("Unlabelled", share(view.seen?.unlabelled));
+  add("Instances", view.seen?.instances == null ? null : count(view.seen.instances));
   const shares = [...(view.seen?.classes ?? [])].sort((a, b) => b[1] - a[1]).slice(0, 6);
   add(
     "Classes",
     shares
-      .map(([c, n]) => `${index.classes[c]?.name ?? "?"} ${percent(n)}`.replaceAll(" ", "\u00a0"))
+      .map(([c, n]) => `${named(index.classes[c]?.name ?? "?")} ${percent(n)}`.replaceAll(" ", "\u00a0"))
       .join(", "),
   );
   return list;

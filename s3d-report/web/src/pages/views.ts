@@ -2,7 +2,7 @@
 
 import { css } from "../colors.js";
 import { type Index, type View, loadThumb } from "../data.js";
-import { append, choice, h, percent, roomName } from "../dom.js";
+import { append, choice, count, h, named, percent, roomName, several } from "../dom.js";
 import { type Route, link, replaceRoute } from "../route.js";
 import { inPanorama, nameOf, reasonOf } from "./view.js";
 
@@ -16,12 +16,12 @@ interface Property {
 
 const PROPERTIES: Property[] = [
   { key: "entropy", name: "Entropy", of: (v) => v.entropy, step: 0.05 },
-  { key: "coverage", name: "Coverage %", of: (v) => hundred(v.seen?.coverage), step: 1 },
-  { key: "unlabelled", name: "Unlabelled %", of: (v) => hundred(v.seen?.unlabelled), step: 1 },
+  { key: "coverage", name: "Scan coverage, %", of: (v) => hundred(v.seen?.coverage), step: 1 },
+  { key: "unlabelled", name: "Unlabelled, %", of: (v) => hundred(v.seen?.unlabelled), step: 1 },
   { key: "instances", name: "Instances", of: (v) => v.seen?.instances ?? null, step: 1 },
-  { key: "yaw", name: "Yaw °", of: (v) => yawOf(v), step: 5 },
-  { key: "pitch", name: "Pitch °", of: (v) => v.pitch_deg, step: 5 },
-  { key: "fov", name: "Angle of view °", of: (v) => v.fov_deg, step: 5 },
+  { key: "yaw", name: "Yaw, °", of: (v) => yawOf(v), step: 5 },
+  { key: "pitch", name: "Pitch, °", of: (v) => v.pitch_deg, step: 5 },
+  { key: "fov", name: "Field of view, °", of: (v) => v.fov_deg, step: 5 },
 ];
 
 /** The yaw to the left, half a turn at most. */
@@ -108,7 +108,7 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       const number = (view: View): number => value(view) ?? -sign * Infinity;
       shown.sort((a, b) => sign * (number(a) - number(b)) || 0);
     }
-    total.textContent = `${shown.length} of ${index.views.length}`;
+    total.textContent = `${count(shown.length)} of ${several(index.views.length, "view")}`;
     grid.replaceChildren();
     cards = 0;
     addCards();
@@ -163,14 +163,14 @@ function controls(
     return `${areas ? `area ${area}, ` : ""}${roomName(room ?? "")}`;
   };
   const present = index.classes
-    .map((c, i): [string, string] => [String(i), c.name])
+    .map((c, i): [string, string] => [String(i), named(c.name)])
     .filter(([i]) => index.pixels_by_class[Number(i)]);
   const dropped = index.views.some((v) => v.frame === null);
   const photographs = index.views.some((v) => v.photograph !== null);
-  const kinds: [string, string][] = [["pictures", "All pictures"]];
+  const kinds: [string, string][] = [["pictures", "Views with a picture"]];
   if (photographs && index.views.some((v) => v.frame !== null && v.photograph === null))
     kinds.push(["kept", "Kept views"], ["photograph", "Photographs"]);
-  if (dropped) kinds.push(["dropped", "Dropped candidates"]);
+  if (dropped) kinds.push(["dropped", "Dropped views"]);
   const sorts: [string, string][] = [
     ["", "In order"],
     ...there.map((p): [string, string] => [p.key, p.name]),
@@ -279,7 +279,11 @@ function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLEleme
   const body = [
     view.picture === null ? h("span", { class: "no-thumb" }, placeholder(view)) : image,
     strip,
-    h("span", { class: "card-name" }, view.photograph ?? roomName(view.room)),
+    h(
+      "span",
+      { class: "card-name" },
+      view.photograph === null ? roomName(view.room) : named(view.photograph),
+    ),
     h("span", { class: "quiet" }, numbers.join(" · ")),
   ];
   const label = `${name}. ${reasonOf(view)}`;

@@ -1,7 +1,7 @@
 // The page of a mesh in 3D: its controls, and the list of disputed patches.
 
 import type { Index, Mesh } from "../data.js";
-import { append, choice, count, h, several } from "../dom.js";
+import { append, choice, count, h, named, several } from "../dom.js";
 import type { Modality } from "../gl.js";
 import { legendOf } from "../readout.js";
 import { type Against, groupOf, loadAgainst, loadChanges, nameOf } from "../compare/data.js";
@@ -186,7 +186,7 @@ function measureButton(view: SpaceView): HTMLButtonElement {
 function boxChoice(index: Index, view: SpaceView): HTMLElement | null {
   const found = new Set(view.boxes.map(({ label }) => index.labels[label]?.class ?? null));
   const classes = index.classes
-    .map(({ name }, i): [string, string] => [String(i), `Boxes: ${name}`])
+    .map(({ name }, i): [string, string] => [String(i), `Boxes: ${named(name)}`])
     .filter(([i]) => found.has(Number(i)));
   if (classes.length === 0) return null;
   const entries: [string, string][] = [["", "No boxes"], ["all", "Boxes: all instances"], ...classes];
@@ -203,9 +203,9 @@ function patchList(index: Index, view: SpaceView): HTMLElement | null {
   if (patches.length === 0) return null;
   const entries = patches.map(({ labels, faces, m2 }, i): [string, string] => [
     String(i),
-    `${labels.join(" or ")} · ${several(faces, "face")} · ${m2.toFixed(4)} m²`,
+    `${labels.map(named).join(" or ")} · ${several(faces, "face")} · ${m2.toFixed(4)} m²`,
   ]);
-  const list = choice("Contested patches", [["", "Contested patches…"], ...entries], "", (value) => {
+  const list = choice("Disputed patches", [["", "Disputed patches…"], ...entries], "", (value) => {
     const patch = patches[Number(value)];
     if (value !== "" && patch) view.visit(patch.center, Math.sqrt(patch.m2), true);
   });

@@ -58,7 +58,7 @@ export function hold(told, own, [i, j], [width, height]) {
   const name = own.label(x, y);
   const where = `pixel ${i},${j}, of the data set ${x},${y}`;
   assert.equal(told.pixel, `${i},${j}`, where);
-  assert.equal(told.class, name.startsWith("<UNK>") ? "no label" : name.split("_")[0], where);
+  assert.equal(told.class, name.startsWith("<UNK>") ? "unlabelled" : name.split("_")[0], where);
   if (!name.startsWith("<UNK>")) assert.equal(told.instance, name, where);
   const xyz = told["X Y Z"].trim().split(/\s+/).map(Number);
   const ours = own.xyz.at(x, y);
