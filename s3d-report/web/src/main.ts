@@ -3,6 +3,7 @@
 import { comparePage } from "./compare/page.js";
 import { FORM, type Index, load } from "./data.js";
 import { append, count, h, named, tamed } from "./dom.js";
+import { comeBack, leave, pointTabs, remember } from "./memory.js";
 import { damageOf, notesPage } from "./pages/notes.js";
 import { numbersPage } from "./pages/numbers.js";
 import { panoPage } from "./pages/pano.js";
@@ -95,6 +96,7 @@ async function start(): Promise<void> {
   let turn = 0;
   const show = async (): Promise<void> => {
     const mine = ++turn;
+    if (now) leave(now);
     now?.element.setAttribute("inert", "");
     const page = await open(index).catch((e: unknown) =>
       still(failure(e instanceof Error ? e.message : String(e))),
@@ -108,19 +110,16 @@ async function start(): Promise<void> {
     place.replaceChildren(page.element);
     const heading = page.element.querySelector("h1")?.textContent ?? "";
     document.title = tamed([heading, index.data_set.name, "s3d report"].filter(Boolean).join(" · "));
-    window.scrollTo(0, 0);
-    page.start?.setAttribute("tabindex", "-1");
-    page.start?.focus();
-    page.start?.scrollIntoView();
-    const current = parseRoute(window.location.hash).page || tabs(index)[0]?.[0];
-    for (const tab of nav.querySelectorAll("a")) {
-      const is = tab.dataset["page"] === (current === "view" ? "views" : current);
-      if (is) tab.setAttribute("aria-current", "page");
-      else tab.removeAttribute("aria-current");
-    }
+    const address = window.location.hash || link("");
+    const route = parseRoute(address);
+    const current = route.page || (tabs(index)[0]?.[0] ?? "");
+    remember({ ...route, page: current }, address);
+    comeBack(page, address);
+    pointTabs(nav, route, current);
     document.body.dataset["ready"] = String(mine);
     performance.mark("shown");
   };
+  history.scrollRestoration = "manual";
   window.addEventListener("hashchange", () => void show());
   await show();
 }

@@ -15,6 +15,7 @@ import {
   Renderer,
   placeOf,
 } from "./gl.js";
+import { chosen } from "./memory.js";
 import { Marks, type Projected } from "./marks.js";
 import { type Spot, legendOf, tell } from "./readout.js";
 import { spaceLink } from "./route.js";
@@ -88,11 +89,11 @@ export function modalitiesOf(index: Index, area: number, picture: Picture): Moda
 
 /** The look in an address, as far as the picture has the modalities. */
 export function lookFrom(query: URLSearchParams, there: Modality[], gaze: Gaze | null): Look {
-  const of = (name: string, otherwise: Modality[]): Modality => {
-    const word = query.get(name) as Modality;
+  const of = (name: "left" | "right", otherwise: Modality[]): Modality => {
+    const word = (query.get(name) ?? chosen[name]) as Modality;
     return there.includes(word) ? word : (otherwise.find((m) => there.includes(m)) ?? there[0] ?? "rgb");
   };
-  const split = Number(query.get("split") ?? "0.5");
+  const split = Number(query.get("split") ?? chosen.split ?? "0.5");
   return {
     left: of("left", ["rgb"]),
     right: of("right", ["class", "depth", "normal"]),
@@ -101,16 +102,23 @@ export function lookFrom(query: URLSearchParams, there: Modality[], gaze: Gaze |
   };
 }
 
-export function queryOf(look: Look): Record<string, string> {
+/** The part of an address with the direction of view. */
+export function gazeQuery({ lon, lat, fov }: Gaze): Record<string, string> {
   const degrees = (radians: number): string => ((radians * 180) / Math.PI).toFixed(1);
-  const gaze = look.gaze;
-  return {
-    ...(gaze && { lon: degrees(gaze.lon), lat: degrees(gaze.lat), fov: degrees(gaze.fov) }),
-    left: look.left,
-    right: look.right,
-    split: look.split.toFixed(3),
-  };
+  return { lon: degrees(lon), lat: degrees(lat), fov: degrees(fov) };
 }
+
+/** The part of an address with the layers and the line between them. */
+export const layersOf = ({ left, right, split }: Look): Record<string, string> => ({
+  left,
+  right,
+  split: split.toFixed(3),
+});
+
+export const queryOf = (look: Look): Record<string, string> => ({
+  ...(look.gaze && gazeQuery(look.gaze)),
+  ...layersOf(look),
+});
 
 export class Viewer {
   readonly element: HTMLElement;
@@ -227,6 +235,7 @@ export class Viewer {
     const pick = (label: string, ...sides: ("left" | "right")[]): HTMLElement =>
       choice(label, there, this.look[sides[0] ?? "left"], (value) => {
         for (const side of sides) this.look[side] = value as Modality;
+        if (sides.length === 1) Object.assign(chosen, { left: this.look.left, right: this.look.right });
         this.changed();
       });
     const two = [
@@ -387,6 +396,7 @@ export class Viewer {
 
   private moveSplit(to: number): void {
     this.look.split = Math.min(1, Math.max(0, to));
+    chosen.split = this.look.split;
     this.changed();
   }
 

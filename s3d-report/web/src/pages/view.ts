@@ -86,15 +86,22 @@ export async function viewPage(
   }
   const pictures = index.views.filter((v) => v.picture !== null);
   const place = pictures.indexOf(view);
+  const steps: { element: HTMLAnchorElement; picture: number }[] = [];
   const step = (by: number, words: string, sign: string): HTMLElement | null => {
     const to = pictures[place + by];
-    return to
-      ? h("a", { class: "step", href: link("view", [to.picture ?? 0]), "aria-label": words }, sign)
-      : null;
+    if (!to) return null;
+    const element = h("a", { class: "step", "aria-label": words }, sign);
+    steps.push({ element, picture: to.picture ?? 0 });
+    return element;
+  };
+  // The next view has the same layers.
+  const pointSteps = (layers: Record<string, string>): void => {
+    for (const { element, picture } of steps) element.href = link("view", [picture], layers);
   };
   const there = inPanorama(index, view);
   const head = h("div", { class: "look-head" }, h("h1", {}, nameOf(index, view)));
   append(head, [step(-1, "Previous view", "←"), step(1, "Next view", "→")]);
+  pointSteps({});
   const aside = h("aside", {}, h("p", {}, reasonOf(view)), facts(index, view));
   append(aside, [there && h("p", {}, h("a", { href: there }, "Look there in the panorama"))]);
   const body = h("div", { class: "view-body" });
@@ -117,8 +124,12 @@ export async function viewPage(
       const [left, top, w, h_] = placeOf(picture.of, width, height);
       return at && [at[0] * w + left * at[2], at[1] * h_ + top * at[2], at[2]];
     },
-    changed: (now) => replaceRoute("view", [at], queryOf(now)),
+    changed: (now) => {
+      pointSteps(queryOf(now));
+      replaceRoute("view", [at], queryOf(now));
+    },
   });
+  pointSteps(queryOf(look));
   viewer.element.classList.add("flat");
   viewer.element.style.setProperty("--shape", String(picture.of[0] / picture.of[1]));
   append(body, [viewer.element, aside]);

@@ -3,7 +3,7 @@
 import { css } from "../colors.js";
 import { type Index, type View, loadThumb } from "../data.js";
 import { append, choice, count, h, named, percent, roomName, several } from "../dom.js";
-import { type Route, link, replaceRoute } from "../route.js";
+import { type Page, type Route, link, replaceRoute } from "../route.js";
 import { inPanorama, nameOf, reasonOf } from "./view.js";
 
 /** A property to sort and filter by: a number, or nothing where a view has none. */
@@ -35,7 +35,7 @@ const hundred = (share: number | null | undefined): number | null => (share == n
 /** The number of cards that are added at a time. */
 const BATCH = 60;
 
-export function viewsPage(index: Index, route: Route): { element: HTMLElement; close: () => void } {
+export function viewsPage(index: Index, route: Route): Page {
   const query = Object.fromEntries(route.query) as Record<string, string>;
   const there = PROPERTIES.filter((p) => index.views.some((v) => p.of(v) !== null));
   const shareOf = (view: View): number => {
@@ -45,6 +45,12 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
   const grid = h("div", { class: "grid", role: "list" });
   const total = h("p", { class: "quiet", role: "status" });
   const more = h("div", { class: "more" });
+  // A new entry of the history: the way back leads to the filters.
+  const clear = h("button", { type: "button", class: "clear" }, "Clear filters");
+  clear.addEventListener("click", () => {
+    const kept = Object.entries(query).filter(([key]) => !filtersIn(query).includes(key));
+    window.location.hash = link("views", [], Object.fromEntries(kept));
+  });
   let shown: View[] = [];
   let cards = 0;
 
@@ -108,6 +114,7 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       const number = (view: View): number => value(view) ?? -sign * Infinity;
       shown.sort((a, b) => sign * (number(a) - number(b)) || 0);
     }
+    clear.hidden = filtersIn(query).length === 0;
     total.textContent = `${count(shown.length)} of ${several(index.views.length, "view")}`;
     grid.replaceChildren();
     cards = 0;
@@ -122,7 +129,8 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       update();
     };
   const element = h("main", { class: "page wide" }, h("h1", {}, "Views"));
-  element.append(controls(index, there, query, set), total, grid, more);
+  const counted = h("div", { class: "counted" }, total, clear);
+  element.append(controls(index, there, query, set), counted, grid, more);
   update();
   return {
     element,
@@ -130,8 +138,15 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       thumbs.disconnect();
       bottom.disconnect();
     },
+    reach: (height) => {
+      while (cards < shown.length && document.documentElement.scrollHeight < height) addCards();
+    },
   };
 }
+
+/** The parts of an address that leave views out. */
+const filtersIn = (query: Record<string, string>): string[] =>
+  Object.keys(query).filter((key) => key !== "sort" && key !== "order");
 
 /** The rank of a view's room among all, by area and name. */
 function roomPlace(index: Index): (view: View) => number {

@@ -90,7 +90,8 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
       legend.replaceChildren(...legendOf(index, LEGENDS[look.show], [0, 0]));
       window.clearTimeout(timer);
       timer = window.setTimeout(() => {
-        if (element.isConnected) replaceRoute("space", [mesh.area], queryOf(look, view.stand));
+        if (element.isConnected && !element.inert)
+          replaceRoute("space", [mesh.area], queryOf(look, view.stand));
       }, PAUSE);
     },
     progress: (words) => {
