@@ -9,6 +9,7 @@ import { numbersPage } from "./pages/numbers.js";
 import { panoPage } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
 import { scoresPage } from "./pages/scores.js";
+import { paletteOf } from "./palette.js";
 import { type Page, link, parseRoute } from "./route.js";
 import { spacePage } from "./space/page.js";
 import { viewPage } from "./pages/view.js";
@@ -70,6 +71,8 @@ async function start(): Promise<void> {
     throw new Error(
       `data/index.js has form ${index.form}, and this page reads ${FORM}: make the report again`,
     );
+  const colors = paletteOf(index.classes.map(({ name }) => name));
+  index.classes.forEach((each, i) => (each.color = colors[i] ?? each.color));
   // Photographs are numbered in the natural order of their names.
   const numbered = new Intl.Collator("en", { numeric: true });
   if (index.views.some((view) => view.photograph !== null))

@@ -19,6 +19,7 @@ import { chosen } from "./memory.js";
 import { Marks, type Projected } from "./marks.js";
 import { type Spot, legendOf, tell } from "./readout.js";
 import { spaceLink } from "./route.js";
+import { pictureTools } from "./tools.js";
 
 const NAMES: Record<Modality, string> = {
   rgb: "Colour",
@@ -145,6 +146,8 @@ export class Viewer {
   private rest = 0;
   private pending = false;
   private closed = false;
+  /** The label under the pointer, whose pixels light up. */
+  private lit: number | null = null;
 
   private constructor(
     private readonly index: Index,
@@ -168,6 +171,9 @@ export class Viewer {
     );
     const frame = h("div", { class: "frame" }, this.canvas, this.overlay, this.line);
     this.element = h("section", { class: "viewer" }, this.bar, frame, this.readout, this.legend);
+    const { canvas, element } = this;
+    const dataSet = index.data_set.name;
+    frame.append(pictureTools({ element, canvas, dataSet, draw: () => this.renderer.draw(this.look) }));
     this.measuring = h("button", { type: "button", "aria-pressed": "false" }, "Measure");
     this.measuring.addEventListener("click", () => {
       const on = this.measuring.getAttribute("aria-pressed") !== "true";
@@ -333,6 +339,7 @@ export class Viewer {
       },
       { passive: false },
     );
+    for (const event of ["pointerleave", "blur"]) canvas.addEventListener(event, () => this.light(null));
     canvas.addEventListener("keydown", (event) => this.key(event));
     // Only focus by the keyboard counts; a touch gives the focus too, but has a place of its own.
     canvas.addEventListener("focus", () => {
@@ -434,7 +441,7 @@ export class Viewer {
 
   private paint(): void {
     if (this.closed) return;
-    this.renderer.draw(this.look);
+    this.renderer.draw({ ...this.look, lit: this.lit });
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.marks.draw((point) => this.options.screen(point, this.look.gaze, width, height), width, height);
     this.options.drawn?.(width, height);
@@ -496,12 +503,21 @@ export class Viewer {
     return { pixel: `${i},${j}`, spot, other };
   }
 
+  /** Lights up the pixels of an instance; none with null. */
+  private light(label: number | null): void {
+    const lit = this.others || !label ? null : label;
+    if (lit === this.lit) return;
+    this.lit = lit;
+    this.draw();
+  }
+
   /** Shows the values at a point of the canvas. */
   private readAt(x: number, y: number, box: DOMRect): void {
     window.clearTimeout(this.rest);
     this.readout.replaceChildren();
     delete this.readout.dataset["pixel"];
     const found = this.spotAt(x, y, box);
+    this.light(found?.spot.label ?? null);
     if (!found) return;
     const { room } = this.options;
     const { spot } = found;

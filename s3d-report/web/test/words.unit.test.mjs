@@ -2,10 +2,10 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { source } from "./lib/unit.mjs";
+import { bundled } from "./lib/bundled.mjs";
 
-const { flat, named, roomName } = await source("dom.ts");
-const { alike, damageOf } = await source("pages/notes.ts");
+const { flat, named, roomName } = await bundled("dom.ts");
+const { alike, damageOf } = await bundled("pages/notes.ts");
 
 test("a name in an attribute keeps its direction to itself", () => {
   assert.equal(flat(`Enter ${named("office 1")}, 2 m`), "Enter office 1, 2 m");

@@ -3,6 +3,7 @@
 
 import { type Index, type Picture, type Rgb, load, loadPicture } from "../data.js";
 import { unpack } from "../faces.js";
+import { paletteOf } from "../palette.js";
 
 export interface Counts {
   faces: number;
@@ -139,6 +140,12 @@ function merged(index: Index, compared: Compared): Against {
     return of.map((entry) => places.get(entry.name) ?? all.push(made(entry)) - 1);
   };
   const classOfB = placeOf(classes, compared.classes, (c) => c);
+  // Classes of B alone get colours that A's do not have.
+  const colors = paletteOf(
+    classes.map(({ name }) => name),
+    index.classes.map(({ color }) => color),
+  );
+  classes.forEach((each, i) => (classes[i] = { ...each, color: colors[i] ?? each.color }));
   const labelOfB = placeOf(labels, compared.labels, (label) => ({
     ...label,
     class: label.class === null ? null : (classOfB[label.class] ?? null),

@@ -8,6 +8,8 @@ import { type Against, groupOf, loadAgainst, loadChanges, nameOf } from "../comp
 import { type Page, type Route, link, replaceRoute } from "../route.js";
 import { type Look, type Mark, lookFrom, marksOf, queryOf, showsOf } from "./look.js";
 import type { Show } from "./paint.js";
+import { pictureTools } from "../tools.js";
+import { treePanel } from "./tree.js";
 import { SpaceView } from "./view.js";
 
 /** Browsers limit the changes of the address in a minute; this is the time between two, ms. */
@@ -118,10 +120,14 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
   view.readout.append(h("span", { class: "quiet" }, hint));
   const frame = h("div", { class: "frame" }, view.canvas, view.overlay, status);
   const viewer = h("section", { class: "viewer space" }, bar, frame, view.readout, legend, simplified(mesh));
+  const { canvas } = view;
+  const draw = (): void => view.drawPlain();
+  frame.append(pictureTools({ element: viewer, canvas, dataSet: index.data_set.name, draw }));
   const element = h("main", { class: "look in-space" }, tools, faults, viewer);
   const fill = async (): Promise<void> => {
     await view.load();
     element.dataset["loaded"] = "mesh";
+    append(frame, [tree(index, view)]);
     append(tools, [boxChoice(index, view), patchList(index, view), against && changeList(against, view)]);
     await view.loadTextures();
     element.dataset["loaded"] = "all";
@@ -195,6 +201,25 @@ function boxChoice(index: Index, view: SpaceView): HTMLElement | null {
   return choice("Boxes of instances", entries, look.boxes === null ? "" : String(look.boxes), (value) => {
     look.boxes = value === "" ? null : value === "all" ? "all" : Number(value);
     view.refresh(true);
+  });
+}
+
+/** The rooms and their instances, if the mesh has labels. */
+function tree(index: Index, view: SpaceView): HTMLElement | null {
+  const { look } = view;
+  return treePanel(index, view.mesh.has_votes ? view.boxes : [], {
+    only: look.only,
+    isolate: (of) => {
+      look.only = of;
+      view.refresh();
+    },
+    light: (label) => view.light(label),
+    visit: ({ box: [x0 = 0, y0 = 0, z0 = 0, x1 = 0, y1 = 0, z1 = 0] }) =>
+      view.visit(
+        [(x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2],
+        Math.hypot(x1 - x0, y1 - y0, z1 - z0) / 2,
+        true,
+      ),
   });
 }
 

@@ -6,17 +6,23 @@ import { cpSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync }
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { readout } from "./browser.mjs";
+import { bundled } from "./bundled.mjs";
 import { readPng, readXyz } from "./images.mjs";
 
 export const report = process.env["S3D_REPORT"];
 export const dataset = process.env["S3D_DATASET"];
 export const bare = process.env["S3D_BARE_REPORT"];
 export const json = (path, folder = dataset) => JSON.parse(readFileSync(join(folder, path), "utf8"));
+const { paletteOf } = await bundled("palette.ts");
 export const index = readIndex(report);
 
 function readIndex(folder) {
   const script = readFileSync(join(folder, "data/index.js"), "utf8");
-  return JSON.parse(JSON.parse(script.slice('s3dReport("index",'.length, script.lastIndexOf(");"))));
+  const read = JSON.parse(JSON.parse(script.slice('s3dReport("index",'.length, script.lastIndexOf(");"))));
+  // The page has colours of its own for classes.
+  const colors = paletteOf(read.classes.map(({ name }) => name));
+  read.classes.forEach((each, i) => (each.color = colors[i]));
+  return read;
 }
 
 /** A data set's own images of a panorama or view. */
