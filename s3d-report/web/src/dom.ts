@@ -151,7 +151,9 @@ export function table(head: string[], rows: Child[][]): HTMLTableElement {
       h(
         "tr",
         {},
-        ...head.map((text, i) => h("th", { scope: "col", class: isNumber(i) && "of-numbers" }, text)),
+        ...head.map((text, i) =>
+          text === "" ? h("td", {}) : h("th", { scope: "col", class: isNumber(i) && "of-numbers" }, text),
+        ),
       ),
     ),
     h("tbody", {}, ...rows.map((row) => h("tr", {}, ...row.map((cell) => h("td", {}, cell))))),

@@ -75,6 +75,7 @@ test("the tree leads to instances, and one class alone has its colours", async (
   assert.equal(await chair.locator("summary").textContent(), `chair ${chairs.length}`);
   await chair.locator("summary").click();
   const buttons = chair.getByRole("button");
+  await buttons.first().waitFor();
   assert.equal(await buttons.count(), chairs.length);
   const before = await queryOf(page);
   await buttons.first().click();

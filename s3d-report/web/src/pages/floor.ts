@@ -96,7 +96,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
   const element = s("svg", {
     class: small ? "plan small" : "plan",
     viewBox: `0 0 ${box.w} ${box.h}`,
-    role: small ? "img" : "group",
+    role: "group",
     "aria-label": `Plan of area ${area}`,
   });
   element.style.setProperty("--unit", `${unit}px`);

@@ -5,6 +5,7 @@ import { type ChangeMark, changeMarks } from "../compare/marks.js";
 import type { Index } from "../data.js";
 import { append, h, metres2, named, say, several } from "../dom.js";
 import { storeysOf } from "../storeys.js";
+import { saves } from "./export.js";
 import { plan } from "./floor.js";
 
 function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElement {
@@ -48,6 +49,7 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
       storeys.count > 1 && h("h3", {}, `Storey ${storey + 1}`),
       told,
       h("div", { class: "sheet" }, element),
+      saves(element, index.data_set.name, element.getAttribute("aria-label") ?? "Plan"),
     ]);
   }
   return section;

@@ -4,6 +4,8 @@ import { css } from "../colors.js";
 import { type Index, type View, loadThumb } from "../data.js";
 import { append, choice, count, h, named, percent, roomName, several } from "../dom.js";
 import { type Page, type Route, link, replaceRoute } from "../route.js";
+import { type Range, brush } from "./brush.js";
+import { WIDTH, canDraw, drawDropped } from "./dropped.js";
 import { inPanorama, nameOf, reasonOf } from "./view.js";
 
 /** A property to sort and filter by: a number, or nothing where a view has none. */
@@ -59,13 +61,22 @@ export function viewsPage(index: Index, route: Route): Page {
       for (const { isIntersecting, target } of seen) {
         if (!isIntersecting) continue;
         thumbs.unobserve(target);
+        const none = (words: string): void => target.replaceWith(h("span", { class: "no-thumb" }, words));
+        const view = drawn.get(target);
+        if (view) {
+          drawDropped(view, target as HTMLCanvasElement).then(
+            (is) => is || none("no colours"),
+            (e: unknown) => none(String(e)),
+          );
+          continue;
+        }
         const picture = Number((target as HTMLElement).dataset["picture"]);
         loadThumb(index, picture).then(
           (url) => {
             if (url !== null) (target as HTMLImageElement).src = url;
-            else target.replaceWith(h("span", { class: "no-thumb" }, "no colours"));
+            else none("no colours");
           },
-          (e: unknown) => target.replaceWith(h("span", { class: "no-thumb" }, String(e))),
+          (e: unknown) => none(String(e)),
         );
       }
     },
@@ -230,28 +241,37 @@ function controls(
     present.length > 0 &&
       choice("Class", [["", "All classes"], ...present], query["class"] ?? "", set("class")),
   ]);
-  const number = (name: string, label: string, step: number): HTMLElement => {
+  const number = (name: string, label: string, step: number, changed = () => {}): HTMLInputElement => {
     const input = h("input", {
       type: "number",
       step,
       value: query[name] ?? "",
       "aria-label": label,
-      input: () => set(name)(input.value),
+      input: () => {
+        set(name)(input.value);
+        changed();
+      },
     });
     return input;
   };
   const ranges = h("div", { class: "ranges" });
   for (const p of there) {
-    append(ranges, [
-      h(
-        "label",
-        {},
-        h("span", {}, p.name),
-        number(`${p.key}_min`, `${p.name}, at least`, p.step),
-        "to",
-        number(`${p.key}_max`, `${p.name}, at most`, p.step),
-      ),
-    ]);
+    const rangeNow = (): Range => [bound(query[`${p.key}_min`]), bound(query[`${p.key}_max`])];
+    const values = index.views.flatMap((view) => p.of(view) ?? []);
+    const show = (): void => chart.show(rangeNow());
+    const least = number(`${p.key}_min`, `${p.name}, at least`, p.step, show);
+    const most = number(`${p.key}_max`, `${p.name}, at most`, p.step, show);
+    const chart = brush(p.name, values, rangeNow(), ([min, max]) => {
+      for (const [input, end, value] of [
+        [least, "min", min],
+        [most, "max", max],
+      ] as const) {
+        input.value = value === null ? "" : String(value);
+        set(`${p.key}_${end}`)(input.value);
+      }
+    });
+    const fields = h("span", { class: "ends" }, least, "to", most);
+    append(ranges, [h("div", { class: "range" }, h("span", {}, p.name), chart.element, fields)]);
   }
   if (present.length > 0)
     append(ranges, [
@@ -266,11 +286,23 @@ function controls(
   return h("div", {}, bar, h("details", { open }, h("summary", {}, "Filter by numbers"), ranges));
 }
 
-/** The text in place of a picture. */
-function placeholder(view: View): string {
-  if (view.frame !== null) return "missing";
+/** Why a view was dropped, in short; null if it was not. */
+function dropped(view: View): string | null {
+  if (view.frame !== null || view.photograph !== null) return null;
   return view.place?.reason === "lowest" ? "dropped: lowest entropy" : "dropped: not drawn";
 }
+
+/** What stands in the place of a picture: a dropped view is drawn from the panorama of its location. */
+function stand(index: Index, view: View, thumbs: IntersectionObserver): Element {
+  if (!canDraw(index, view)) return h("span", { class: "no-thumb" }, dropped(view) ?? "missing");
+  const canvas = h("canvas", { class: "drawn", width: WIDTH, height: WIDTH });
+  drawn.set(canvas, view);
+  thumbs.observe(canvas);
+  return canvas;
+}
+
+/** The views of canvases. */
+const drawn = new WeakMap<Element, View>();
 
 function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLElement {
   const name = nameOf(index, view);
@@ -285,6 +317,7 @@ function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLEleme
     strip.append(part);
   }
   const numbers = [
+    dropped(view),
     view.entropy !== null && `entropy ${view.entropy.toFixed(2)}`,
     view.fov_deg !== null && `${view.fov_deg.toFixed(0)}°`,
     view.seen?.unlabelled && view.seen.unlabelled >= 0.005
@@ -292,7 +325,7 @@ function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLEleme
       : null,
   ].filter(Boolean);
   const body = [
-    view.picture === null ? h("span", { class: "no-thumb" }, placeholder(view)) : image,
+    view.picture === null ? stand(index, view, thumbs) : image,
     strip,
     h(
       "span",
@@ -300,9 +333,9 @@ function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLEleme
       view.photograph === null ? roomName(view.room) : named(view.photograph),
     ),
     h("span", { class: "quiet" }, numbers.join(" · ")),
+    h("span", { class: "hidden" }, `${name}. ${reasonOf(view)}`),
   ];
-  const label = `${name}. ${reasonOf(view)}`;
-  const inner =
-    to === null ? h("div", {}, ...body) : h("a", { href: to, "aria-label": label, title: label }, ...body);
+  const title = `${name}. ${reasonOf(view)}`;
+  const inner = to === null ? h("div", {}, ...body) : h("a", { href: to, title }, ...body);
   return h("div", { class: "card", role: "listitem" }, inner);
 }
