@@ -20,15 +20,21 @@ async function pixelsOf(location: number): Promise<Pixels | null> {
   return context.getImageData(0, 0, canvas.width, canvas.height);
 }
 
-/** Only the last panorama is kept: views of one location stand together. */
-let last: { location: number; pixels: Promise<Pixels | null> } | null = null;
+/** The number of panoramas that are kept. */
+const KEPT = 3;
+const panoramas = new Map<number, Promise<Pixels | null>>();
 
 function panoramaOf(location: number): Promise<Pixels | null> {
-  if (last?.location === location) return last.pixels;
-  const pixels = pixelsOf(location);
-  last = { location, pixels };
+  const pixels = panoramas.get(location) ?? pixelsOf(location);
+  panoramas.delete(location);
+  panoramas.set(location, pixels);
+  pixels.catch(() => panoramas.delete(location));
+  for (const old of [...panoramas.keys()].slice(0, -KEPT)) panoramas.delete(old);
   return pixels;
 }
+
+/** The drawing under way: one after the other, so that few panoramas are in memory at once. */
+let drawing: Promise<unknown> = Promise.resolve();
 
 /** Whether a view can be drawn from its panorama. */
 export const canDraw = (index: Index, { location, yaw_deg, pitch_deg, fov_deg }: View): boolean =>
@@ -39,7 +45,13 @@ export const canDraw = (index: Index, { location, yaw_deg, pitch_deg, fov_deg }:
   fov_deg !== null;
 
 /** Draws a view on a canvas; false if there is no panorama in colour. */
-export async function drawDropped(view: View, canvas: HTMLCanvasElement): Promise<boolean> {
+export function drawDropped(view: View, canvas: HTMLCanvasElement): Promise<boolean> {
+  const drawn = drawing.then(() => !canvas.isConnected || draw(view, canvas));
+  drawing = drawn.catch(() => false);
+  return drawn;
+}
+
+async function draw(view: View, canvas: HTMLCanvasElement): Promise<boolean> {
   const from = await panoramaOf(view.location ?? -1);
   const context = canvas.getContext("2d");
   if (!from || !context) return false;
