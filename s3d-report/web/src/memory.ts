@@ -64,7 +64,12 @@ export function comeBack(page: Page, address: string): void {
   }
   const details = [...element.querySelectorAll("details")];
   if (details.length === place.open.length)
-    details.forEach((each, i) => (each.open = place.open[i] ?? false));
+    details.forEach((each, i) => {
+      if (each.open === place.open[i]) return;
+      each.open = !each.open;
+      // What is made when it opens is needed at once.
+      each.dispatchEvent(new Event("toggle"));
+    });
   page.reach?.(place.scroll + window.innerHeight);
   window.scrollTo(0, place.scroll);
   if (!place.focus) return;

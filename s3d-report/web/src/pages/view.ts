@@ -1,7 +1,7 @@
 // One view, large: the slider, the readout, and why the view was kept.
 
 import { type Index, type View, loadPicture } from "../data.js";
-import { append, count, h, named, percent, roomName } from "../dom.js";
+import { append, count, h, named, percent, roomName, several } from "../dom.js";
 import { viewPoint, viewScreen } from "../geometry.js";
 import { placeOf } from "../gl.js";
 import { type Route, link, replaceRoute } from "../route.js";
@@ -12,10 +12,10 @@ export function reasonOf(view: View): string {
   if (view.photograph !== null) return "A photograph: each photograph is a view.";
   if (!view.place) return "views.json does not list it.";
   const { reason, rank, pool } = view.place;
-  const place = `its entropy is number ${rank} of ${pool} candidates`;
+  const place = `its entropy is number ${rank} of ${several(pool, "view")}`;
   switch (reason) {
     case "all":
-      return `Kept, as all candidates are: ${place}.`;
+      return `Kept, as all views are: ${place}.`;
     case "highest":
       return `Kept: ${place}, among the highest 60 %.`;
     case "drawn":
@@ -31,7 +31,7 @@ export function reasonOf(view: View): string {
 export function nameOf(index: Index, view: View): string {
   if (view.photograph !== null) return named(view.photograph);
   const uuid = view.location === null ? "" : (index.locations[view.location]?.uuid.slice(0, 8) ?? "");
-  const number = view.frame === null ? `candidate ${view.candidate ?? "?"}` : `view ${view.frame}`;
+  const number = view.frame === null ? `dropped view ${view.candidate ?? "?"}` : `view ${view.frame}`;
   return `${roomName(view.room)} · ${uuid} · ${number}`;
 }
 

@@ -157,7 +157,9 @@ export function viewsPage(index: Index, route: Route): Page {
 
 /** The parts of an address that leave views out. */
 const filtersIn = (query: Record<string, string>): string[] =>
-  Object.keys(query).filter((key) => key !== "sort" && key !== "order");
+  Object.keys(query).filter((key) =>
+    key === "show" ? query[key] !== "pictures" : key !== "sort" && key !== "order",
+  );
 
 /** The rank of a view's room among all, by area and name. */
 function roomPlace(index: Index): (view: View) => number {
@@ -254,36 +256,43 @@ function controls(
     });
     return input;
   };
-  const ranges = h("div", { class: "ranges" });
-  for (const p of there) {
-    const rangeNow = (): Range => [bound(query[`${p.key}_min`]), bound(query[`${p.key}_max`])];
-    const values = index.views.flatMap((view) => p.of(view) ?? []);
-    const show = (): void => chart.show(rangeNow());
-    const least = number(`${p.key}_min`, `${p.name}, at least`, p.step, show);
-    const most = number(`${p.key}_max`, `${p.name}, at most`, p.step, show);
-    const chart = brush(p.name, values, rangeNow(), ([min, max]) => {
-      for (const [input, end, value] of [
-        [least, "min", min],
-        [most, "max", max],
-      ] as const) {
-        input.value = value === null ? "" : String(value);
-        set(`${p.key}_${end}`)(input.value);
-      }
-    });
-    const fields = h("span", { class: "ends" }, least, "to", most);
-    append(ranges, [h("div", { class: "range" }, h("span", {}, p.name), chart.element, fields)]);
-  }
-  if (present.length > 0)
-    append(ranges, [
-      h(
-        "label",
-        {},
-        h("span", {}, "Class, at least %"),
-        number("share", "Share of the class, at least, %", 1),
-      ),
-    ]);
+  const fill = (): void => {
+    const ranges = h("div", { class: "ranges" });
+    for (const p of there) {
+      const rangeNow = (): Range => [bound(query[`${p.key}_min`]), bound(query[`${p.key}_max`])];
+      const values = index.views.flatMap((view) => p.of(view) ?? []);
+      const show = (): void => chart.show(rangeNow());
+      const least = number(`${p.key}_min`, `${p.name}, at least`, p.step, show);
+      const most = number(`${p.key}_max`, `${p.name}, at most`, p.step, show);
+      const chart = brush(p.name, values, rangeNow(), ([min, max]) => {
+        for (const [input, end, value] of [
+          [least, "min", min],
+          [most, "max", max],
+        ] as const) {
+          input.value = value === null ? "" : String(value);
+          set(`${p.key}_${end}`)(input.value);
+        }
+      });
+      const fields = h("span", { class: "ends" }, least, "to", most);
+      append(ranges, [h("div", { class: "range" }, h("span", {}, p.name), chart.element, fields)]);
+    }
+    if (present.length > 0)
+      append(ranges, [
+        h(
+          "label",
+          {},
+          h("span", {}, "Class, at least %"),
+          number("share", "Share of the class, at least, %", 1),
+        ),
+      ]);
+    details.append(ranges);
+  };
   const open = Object.keys(query).some((key) => /_(min|max)$|^share$/.test(key));
-  return h("div", {}, bar, h("details", { open }, h("summary", {}, "Filter by numbers"), ranges));
+  const details = h("details", { open }, h("summary", {}, "Filter by numbers"));
+  // Histograms of many views take a moment, so they are made when somebody looks.
+  if (open) fill();
+  else details.addEventListener("toggle", fill, { once: true });
+  return h("div", {}, bar, details);
 }
 
 /** Why a view was dropped, in short; null if it was not. */

@@ -78,7 +78,7 @@ export function treePanel(index: Index, boxes: Box[], options: TreeOptions): HTM
     return element;
   };
   const classOf = ({ class: of, instances }: OfClass): HTMLElement =>
-    folded([keyOf(index, of), h("bdi", {}, index.classes[of]?.name ?? "")], instances.length, () =>
+    folded([keyOf(index, of), named(index.classes[of]?.name ?? "")], instances.length, () =>
       instances.map(button),
     );
   const found = [...new Set(rooms.flatMap(({ classes }) => classes.map((c) => c.class)))].sort(
@@ -96,7 +96,7 @@ export function treePanel(index: Index, boxes: Box[], options: TreeOptions): HTM
   );
   const list = rooms.map(({ room, classes }) =>
     folded(
-      [h("bdi", {}, ...[roomName(room)])],
+      [roomName(room)],
       classes.reduce((sum, { instances }) => sum + instances.length, 0),
       () => classes.map(classOf),
     ),
