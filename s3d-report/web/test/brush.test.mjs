@@ -50,21 +50,15 @@ test("a dropped view is drawn as its panorama shows it", async () => {
   const { page, faults, close } = await open(browser, report, "#/views?show=dropped&sort=fov");
   const canvases = page.locator(".card canvas");
   assert.ok((await canvases.count()) > 0);
-  await page.waitForFunction(() => {
-    const canvas = document.querySelector(".card canvas");
-    return canvas?.getContext("2d").getImageData(0, 0, 1, 1).data[3] === 255;
-  });
+  // Also where the locations of the views alternate. An empty canvas is a short file.
+  await page.waitForFunction(() =>
+    [...document.querySelectorAll(".card canvas")].every((canvas) => canvas.toDataURL().length > 2500),
+  );
   const colors = await canvases
     .first()
     .evaluate((canvas) => [...canvas.getContext("2d").getImageData(0, 0, 128, 128).data]);
   assert.ok(new Set(colors).size > 20, "the picture has one colour");
   assert.match(await page.locator(".card").first().textContent(), /dropped: (lowest entropy|not drawn)/);
-  // Also where the locations of the views alternate.
-  await page.waitForFunction(() =>
-    [...document.querySelectorAll(".card canvas")].every(
-      (canvas) => canvas.getContext("2d").getImageData(64, 64, 1, 1).data[3] === 255,
-    ),
-  );
   assert.equal(await page.locator(".no-thumb").count(), 0);
   assert.deepEqual(faults, []);
   await close();

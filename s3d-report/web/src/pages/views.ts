@@ -50,7 +50,7 @@ export function viewsPage(index: Index, route: Route): Page {
   // A new entry of the history: the way back leads to the filters.
   const clear = h("button", { type: "button", class: "clear" }, "Clear filters");
   clear.addEventListener("click", () => {
-    const kept = Object.entries(query).filter(([key]) => !filtersIn(query).includes(key));
+    const kept = Object.entries(query).filter(([key]) => isOrder(key));
     window.location.hash = link("views", [], Object.fromEntries(kept));
   });
   let shown: View[] = [];
@@ -155,11 +155,11 @@ export function viewsPage(index: Index, route: Route): Page {
   };
 }
 
+const isOrder = (key: string): boolean => key === "sort" || key === "order";
+
 /** The parts of an address that leave views out. */
 const filtersIn = (query: Record<string, string>): string[] =>
-  Object.keys(query).filter((key) =>
-    key === "show" ? query[key] !== "pictures" : key !== "sort" && key !== "order",
-  );
+  Object.keys(query).filter((key) => !isOrder(key) && !(key === "show" && query[key] === "pictures"));
 
 /** The rank of a view's room among all, by area and name. */
 function roomPlace(index: Index): (view: View) => number {

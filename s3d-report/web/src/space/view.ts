@@ -310,7 +310,8 @@ export class SpaceView {
     );
     this.readout.replaceChildren();
     const label = hit && (this.votes?.label[hit.face] ?? null);
-    this.light(label || null);
+    // Where changes are shown, their colours count.
+    this.light(this.look.show === "changed" ? null : label || null);
     if (!hit) return null;
     const spot = { label, face: hit.face, distance: hit.distance, point: hit.point };
     const told = tell(this.index, spot, { room: "", hasDepth: true }, this.votes);

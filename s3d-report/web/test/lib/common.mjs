@@ -18,8 +18,13 @@ export const index = readIndex(report);
 
 function readIndex(folder) {
   const script = readFileSync(join(folder, "data/index.js"), "utf8");
-  const read = JSON.parse(JSON.parse(script.slice('s3dReport("index",'.length, script.lastIndexOf(");"))));
-  // The page has colours of its own for classes.
+  return coloured(
+    JSON.parse(JSON.parse(script.slice('s3dReport("index",'.length, script.lastIndexOf(");")))),
+  );
+}
+
+/** An index with the page's own colours of classes. */
+export function coloured(read) {
   const colors = paletteOf(read.classes.map(({ name }) => name));
   read.classes.forEach((each, i) => (each.color = colors[i]));
   return read;
