@@ -59,11 +59,11 @@ fn names_do_not_turn_the_log_around() {
     assert!(said.contains(r"no\u{202e}such\u{2067}\u{61c}\x1b[31m.toml"), "{said}");
     let json = log("json");
     assert!(!json.contains(['\u{202e}', '\u{2067}', '\u{61c}', '\u{1b}']), "{json}");
-    let lines = json
+    let mut lines = json
         .lines()
         .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     let named = |line: serde_json::Value| line["message"].as_str().is_some_and(|said| said.contains(name));
-    assert!(lines.into_iter().any(named), "{json}");
+    assert!(lines.any(named), "{json}");
 }
 
 #[test]
