@@ -1,6 +1,7 @@
 //! The answer of a command: text on standard output, and JSON on request.
 
 use crate::failure::Outcome;
+use crate::upright::{upright_json, upright_text};
 use clap::Args;
 use s3d_dataset::store::NewFile;
 use s3d_dataset::{Context, Error, Result};
@@ -47,12 +48,21 @@ impl JsonArgs {
         }
         let json = serde_json::to_string_pretty(answer)
             .map_err(|e| FileError::io("standard output".as_ref(), "write", io::Error::from(e)))?;
-        print(&(json + "\n"))
+        print_json(&(json + "\n"))
     }
 }
 
 /// Writes the answer of a command to standard output.
 pub(crate) fn print(text: &str) -> Outcome<()> {
+    write(&upright_text(text))
+}
+
+/// Writes the answer of a command in JSON to standard output.
+pub(crate) fn print_json(json: &str) -> Outcome<()> {
+    write(&upright_json(json))
+}
+
+fn write(text: &str) -> Outcome<()> {
     match stdout().write_all(text.as_bytes()) {
         // Whoever reads may stop early: `s3d stats OUT | head`.
         Err(e) if e.kind() != ErrorKind::BrokenPipe => {

@@ -1,6 +1,7 @@
 //! Standard error while a command runs: log lines, and progress with its rate and the time left. It is text
 //! for a person, or one JSON object a line for a program.
 
+use crate::upright::{upright_json, upright_line};
 use clap::ValueEnum;
 use indicatif::{
     HumanFloatCount, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle,
@@ -266,9 +267,15 @@ struct LineAboveBars;
 impl Write for LineAboveBars {
     /// Never fails: hours of work go on although nobody reads the log any more.
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        let text = String::from_utf8_lossy(line);
+        let shown = if is_json() {
+            upright_json(&text)
+        } else {
+            upright_line(&text)
+        };
         let _ = match bars() {
-            Some(bars) => bars.suspend(|| io::stderr().write_all(line)),
-            None => io::stderr().write_all(line),
+            Some(bars) => bars.suspend(|| io::stderr().write_all(shown.as_bytes())),
+            None => io::stderr().write_all(shown.as_bytes()),
         };
         Ok(line.len())
     }

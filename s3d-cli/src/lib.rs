@@ -13,6 +13,7 @@ mod flags;
 mod hint;
 mod panics;
 mod stop;
+mod upright;
 mod values;
 
 use clap::Parser;

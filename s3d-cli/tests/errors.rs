@@ -45,6 +45,27 @@ fn too_many_open_files_are_temporary() {
     assert!(temporary > 0);
 }
 
+/// A name in a message neither controls the terminal nor turns the line around.
+#[test]
+fn names_do_not_turn_the_log_around() {
+    let name = "no\u{202e}such\u{2067}\u{61c}\u{1b}[31m.toml";
+    let log = |format: &str| {
+        let run = s3d(&["--log", format, "info", name]);
+        assert_eq!(run.status.code(), Some(1));
+        String::from_utf8(run.stderr).unwrap()
+    };
+
+    let said = log("text");
+    assert!(said.contains(r"no\u{202e}such\u{2067}\u{61c}\x1b[31m.toml"), "{said}");
+    let json = log("json");
+    assert!(!json.contains(['\u{202e}', '\u{2067}', '\u{61c}', '\u{1b}']), "{json}");
+    let mut lines = json
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let named = |line: serde_json::Value| line["message"].as_str().is_some_and(|said| said.contains(name));
+    assert!(lines.any(named), "{json}");
+}
+
 #[test]
 fn a_missing_scene_is_named() {
     s3d_fails(&["export", "no/such/scene.toml"], 1, &["no/such/scene.toml"]);

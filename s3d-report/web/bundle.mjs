@@ -1,6 +1,7 @@
 // Makes one file of the page: markup, style and program. `node bundle.mjs FILE`.
 
 import { build, transform } from "esbuild";
+import { createHash } from "node:crypto";
 import { readFile, writeFile } from "node:fs/promises";
 
 const here = (name) => new URL(name, import.meta.url);
@@ -29,7 +30,13 @@ const js = await build({
   define: { LICENCES: JSON.stringify(licences) },
   target,
 });
+const [ofStyle, program] = [css.code.trim(), js.outputFiles[0].text.trim()];
+
+// The page runs this program and no other: the policy names it by its hash.
+const hash = (text) => `sha256-${createHash("sha256").update(text).digest("base64")}`;
 const page = (await readFile(here("page.html"), "utf8"))
-  .replace("STYLE", () => css.code.trim())
-  .replace("SCRIPT", () => js.outputFiles[0].text.trim());
+  .replace("STYLE_HASH", hash(ofStyle))
+  .replace("SCRIPT_HASH", hash(program))
+  .replace("STYLE", () => ofStyle)
+  .replace("SCRIPT", () => program);
 await writeFile(process.argv[2], page);

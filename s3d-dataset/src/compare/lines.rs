@@ -61,7 +61,7 @@ fn indent(column: usize) -> usize {
 
 /// Whether a character controls a terminal or the direction of text.
 fn is_odd(c: char) -> bool {
-    let turns = ['\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'].contains(&c);
+    let turns = ['\u{61c}', '\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'].contains(&c);
     c.is_control()
         || turns
         || ('\u{202a}'..='\u{202e}').contains(&c)

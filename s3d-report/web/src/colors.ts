@@ -10,11 +10,14 @@ export const NULL_LABEL: Rgb = [128, 128, 128];
 export const OTHER_CLASS: Rgb = [255, 0, 255];
 export const OTHER_INSTANCE: Rgb = [255, 190, 40];
 
+/** The tint of the instance under the pointer. */
+export const LIT: Rgb = [255, 222, 0];
+
 /** A colour as a GLSL expression. */
 export const shader = (color: Rgb): string => `vec3(${color.map((c) => (c / 255).toFixed(6)).join(", ")})`;
 
 /** A colour of OKLCH (B. Ottosson, 2020), clipped to sRGB. */
-function oklch(lightness: number, chroma: number, hueDeg: number): Rgb {
+export function oklch(lightness: number, chroma: number, hueDeg: number): Rgb {
   const hue = (hueDeg * Math.PI) / 180;
   const [a, b] = [chroma * Math.cos(hue), chroma * Math.sin(hue)];
   const l = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3;

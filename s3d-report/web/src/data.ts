@@ -280,7 +280,9 @@ export function load<T>(key: string): Promise<T> {
   file.catch(() => files.delete(key));
   const kind = key.split("_")[0] ?? "";
   const same = [...files.keys()].filter((k) => k.split("_")[0] === kind);
-  for (const old of same.slice(0, Math.max(0, same.length - (KEPT[kind] ?? 1)))) files.delete(old);
+  for (const old of same.slice(0, Math.max(0, same.length - (KEPT[kind] ?? 1))))
+    // A file that is arriving would be asked for twice.
+    if (!arriving.has(old)) files.delete(old);
   return file as Promise<T>;
 }
 

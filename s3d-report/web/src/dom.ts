@@ -1,15 +1,53 @@
-// Elements. All text becomes text nodes, so a name cannot be markup.
+// Elements. All text becomes text nodes, so a name cannot be markup. Names that come from data are marked by
+// `named`: an element shows such a name in a <bdi>, so that its direction does not spread to the words
+// around it.
 
 type Child = Node | string | number | null | undefined | false;
 type Properties = Record<string, string | number | boolean | null | undefined | ((event: never) => void)>;
 
 const SVG = "http://www.w3.org/2000/svg";
 
+/** What surrounds a name in text: characters that are none. */
+const [OPEN, CLOSE] = ["\ufdd0", "\ufdd1"];
+/** Characters that turn the direction of text, and letters from right to left. */
+const MARKS = /[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
+const LEFTWARD = /[\u0590-\u08ff\ufb1d-\ufdcf\ufdf0-\ufdff\ufe70-\ufefc]|[\ud802\ud803\ud83a\ud83b]/;
+
+/** A name from data, to be a part of text. */
+export const named = (name: string): string => OPEN + name.replace(/[\ufdd0\ufdd1]/g, "") + CLOSE;
+
+/** Text without marks that turn its direction. */
+export const tamed = (text: string): string => text.replace(MARKS, "\ufffd");
+
+/** Text for places without elements, as attributes are: names have isolates where they need some. */
+export function flat(text: string): string {
+  return text.replace(/\ufdd0([^\ufdd1]*)\ufdd1/g, (_, name: string) => {
+    const plain = tamed(name);
+    return LEFTWARD.test(plain) ? `\u2068${plain}\u2069` : plain;
+  });
+}
+
+/** Text as nodes: names in <bdi>. */
+function nodes(text: string): (Node | string)[] {
+  return text.split(/(\ufdd0[^\ufdd1]*\ufdd1)/).flatMap((part): (Node | string)[] => {
+    if (!part.startsWith(OPEN)) return part === "" ? [] : [part];
+    const element = document.createElement("bdi");
+    element.append(part.slice(1, -1));
+    return [element];
+  });
+}
+
+/** Replaces the content of an element by text. */
+export function say(element: Element, text: string): void {
+  element.replaceChildren();
+  append(element, [text]);
+}
+
 function fill(element: Element, properties: Properties, children: Child[]): void {
   for (const [name, value] of Object.entries(properties)) {
     if (value === null || value === undefined || value === false) continue;
     if (typeof value === "function") element.addEventListener(name, value as EventListener);
-    else element.setAttribute(name, value === true ? "" : String(value));
+    else element.setAttribute(name, value === true ? "" : flat(String(value)));
   }
   append(element, children);
 }
@@ -17,7 +55,10 @@ function fill(element: Element, properties: Properties, children: Child[]): void
 export function append(element: Element, children: Child[]): void {
   for (const child of children) {
     if (child === null || child === undefined || child === false) continue;
-    element.append(typeof child === "number" ? String(child) : child);
+    if (child instanceof Node) element.append(child);
+    else if (element.namespaceURI === SVG || element.tagName === "OPTION")
+      element.append(flat(String(child)));
+    else element.append(...nodes(String(child)));
   }
 }
 
@@ -67,10 +108,10 @@ function search(
   value: string,
   chosen: (value: string) => void,
 ): HTMLElement {
-  const values = new Map(entries.map(([entry, text]) => [text, entry]));
+  const values = new Map(entries.map(([entry, text]) => [flat(text), entry]));
   const options = h("datalist", { id: `list-${++lists}` });
   for (const [, text] of entries) options.append(h("option", { value: text }));
-  let now = entries.find(([entry]) => entry === value)?.[1] ?? "";
+  let now = flat(entries.find(([entry]) => entry === value)?.[1] ?? "");
   const field = h("input", {
     type: "text",
     "aria-label": label,
@@ -110,7 +151,9 @@ export function table(head: string[], rows: Child[][]): HTMLTableElement {
       h(
         "tr",
         {},
-        ...head.map((text, i) => h("th", { scope: "col", class: isNumber(i) && "of-numbers" }, text)),
+        ...head.map((text, i) =>
+          text === "" ? h("td", {}) : h("th", { scope: "col", class: isNumber(i) && "of-numbers" }, text),
+        ),
       ),
     ),
     h("tbody", {}, ...rows.map((row) => h("tr", {}, ...row.map((cell) => h("td", {}, cell))))),
@@ -129,9 +172,9 @@ export function percent(share: number): string {
 /** `1 room`, `2 rooms`. */
 export const several = (n: number, noun: string): string => `${count(n)} ${noun}${n === 1 ? "" : "s"}`;
 
-/** `conferenceRoom_1` in words. */
+/** `conferenceRoom_1` in words, as a name. */
 export function roomName(room: string): string {
   if (room === "" || room === "unknown_1") return "unknown room";
   const words = room.replace(/([a-z])([A-Z])/g, "$1 $2").replaceAll("_", " ");
-  return words === words.toUpperCase() ? words : words.toLowerCase().replace(/^wc/, "WC");
+  return named(words === words.toUpperCase() ? words : words.toLowerCase().replace(/^wc/, "WC"));
 }

@@ -2,6 +2,7 @@
 // another picture of the same camera on the right.
 
 import {
+  LIT,
   MISSING,
   NULL_LABEL,
   OTHER_CLASS,
@@ -41,7 +42,7 @@ precision highp float;
 uniform sampler2D rgb, normal, depth, label, face, classes, instances, ramp, margins, margin_ramp;
 uniform sampler2D rgb_b, normal_b, depth_b, label_b;
 uniform vec2 size;
-uniform float line, focal, nearest, farthest;
+uniform float line, focal, nearest, farthest, lit;
 uniform int left, right;
 uniform bool sphere, colored, two, colored_b;
 uniform vec2 gaze, origin, extent;
@@ -115,6 +116,14 @@ void main() {
     }
   }
   color = vec4(show(at.x < line ? left : right, uv, two && at.x >= line), 1.0);
+  if (lit < 0.0) return;
+  // The instance under the pointer: tinted, with a light edge.
+  bool is_lit = number(texture(label, uv)) == lit;
+  vec2 beside[4] = vec2[](dFdx(uv), -dFdx(uv), dFdy(uv), -dFdy(uv));
+  bool edge = false;
+  for (int i = 0; i < 4; i++) edge = edge || number(texture(label, uv + 1.5 * beside[i])) == lit;
+  if (is_lit) color.rgb = mix(color.rgb, ${shader(LIT)}, 0.45);
+  else if (edge) color.rgb = vec3(1.0);
 }`;
 
 /** The numbers of a picture's pixels; null for modalities that it does not have. */
@@ -149,6 +158,8 @@ export interface Scene {
   split: number;
   /** The direction of view in a panorama; null for a view, which is flat. */
   gaze: Gaze | null;
+  /** The label that lights up. */
+  lit?: number | null;
 }
 
 /** The rectangle of a flat picture with this shape on a canvas: left, top, width, height. */
@@ -370,6 +381,7 @@ export class Renderer {
     });
     gl.uniform2f(at("size"), width, height);
     gl.uniform1f(at("line"), scene.split * width);
+    gl.uniform1f(at("lit"), scene.lit ?? -1);
     gl.uniform1i(at("left"), MODALITIES.indexOf(scene.left));
     gl.uniform1i(at("right"), MODALITIES.indexOf(scene.right));
     gl.uniform1i(at("sphere"), scene.gaze ? 1 : 0);

@@ -2,12 +2,14 @@
 
 import { comparePage } from "./compare/page.js";
 import { FORM, type Index, load } from "./data.js";
-import { append, h } from "./dom.js";
-import { faultCount, notesPage } from "./pages/notes.js";
+import { append, count, h, named, tamed } from "./dom.js";
+import { comeBack, leave, pointTabs, remember } from "./memory.js";
+import { damageOf, notesPage } from "./pages/notes.js";
 import { numbersPage } from "./pages/numbers.js";
 import { panoPage } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
 import { scoresPage } from "./pages/scores.js";
+import { paletteOf } from "./palette.js";
 import { type Page, link, parseRoute } from "./route.js";
 import { spacePage } from "./space/page.js";
 import { viewPage } from "./pages/view.js";
@@ -69,18 +71,25 @@ async function start(): Promise<void> {
     throw new Error(
       `data/index.js has form ${index.form}, and this page reads ${FORM}: make the report again`,
     );
+  const colors = paletteOf(index.classes.map(({ name }) => name));
+  index.classes.forEach((each, i) => (each.color = colors[i] ?? each.color));
   // Photographs are numbered in the natural order of their names.
   const numbered = new Intl.Collator("en", { numeric: true });
   if (index.views.some((view) => view.photograph !== null))
     index.views.sort((a, b) => numbered.compare(a.photograph ?? "", b.photograph ?? ""));
-  document.title = `${index.data_set.name} · s3d report`;
-  const header = h("header", {}, h("a", { class: "title", href: link("") }, index.data_set.name));
+  const header = h("header", {}, h("a", { class: "title", href: link("") }, named(index.data_set.name)));
   const nav = h("nav", { "aria-label": "Parts of the report" });
   for (const [page, name] of tabs(index)) {
-    const faults = page === "notes" ? faultCount(index) : 0;
+    const damage = page === "notes" ? damageOf(index) : null;
     const badge =
-      faults > 0 &&
-      h("span", { class: "badge", "aria-label": `${faults} files are missing or damaged` }, faults);
+      damage &&
+      damage.count > 0 &&
+      h(
+        "span",
+        { class: "badge", title: damage.words },
+        h("span", { "aria-hidden": "true" }, count(damage.count)),
+        h("span", { class: "hidden" }, ` (${damage.words})`),
+      );
     nav.append(h("a", { href: link(page), "data-page": page }, name, badge || ""));
   }
   header.append(nav);
@@ -90,6 +99,7 @@ async function start(): Promise<void> {
   let turn = 0;
   const show = async (): Promise<void> => {
     const mine = ++turn;
+    if (now) leave(now);
     now?.element.setAttribute("inert", "");
     const page = await open(index).catch((e: unknown) =>
       still(failure(e instanceof Error ? e.message : String(e))),
@@ -101,19 +111,18 @@ async function start(): Promise<void> {
     now?.close();
     now = page;
     place.replaceChildren(page.element);
-    window.scrollTo(0, 0);
-    page.start?.setAttribute("tabindex", "-1");
-    page.start?.focus();
-    page.start?.scrollIntoView();
-    const current = parseRoute(window.location.hash).page || tabs(index)[0]?.[0];
-    for (const tab of nav.querySelectorAll("a")) {
-      const is = tab.dataset["page"] === (current === "view" ? "views" : current);
-      if (is) tab.setAttribute("aria-current", "page");
-      else tab.removeAttribute("aria-current");
-    }
+    const heading = page.element.querySelector("h1")?.textContent ?? "";
+    document.title = tamed([heading, index.data_set.name, "s3d report"].filter(Boolean).join(" · "));
+    const address = window.location.hash || link("");
+    const route = parseRoute(address);
+    const current = route.page || (tabs(index)[0]?.[0] ?? "");
+    remember({ ...route, page: current }, address);
+    comeBack(page, address);
+    pointTabs(nav, route, current);
     document.body.dataset["ready"] = String(mine);
     performance.mark("shown");
   };
+  history.scrollRestoration = "manual";
   window.addEventListener("hashchange", () => void show());
   await show();
 }

@@ -2,7 +2,7 @@
 
 import { OTHER_CLASS, OTHER_INSTANCE, css, depthRamp, gradient, marginRamp } from "./colors.js";
 import type { Index, Rgb } from "./data.js";
-import { h, percent, roomName } from "./dom.js";
+import { h, named, percent, roomName } from "./dom.js";
 import { type FaceVotes, NO_VOTES, SURE } from "./faces.js";
 import type { Modality } from "./gl.js";
 
@@ -31,7 +31,7 @@ function tellVotes(index: Index, votes: FaceVotes, face: number): HTMLElement[] 
   if (margin === SURE && !votes.runnerUp[face]) return [];
   const other = index.labels[votes.runnerUp[face] ?? 0];
   const told = [entry("margin", percent(margin / SURE))];
-  if (other) told.push(entry("runner-up", other.class === null ? "no label" : other.name));
+  if (other) told.push(entry("runner-up", other.class === null ? "unlabelled" : named(other.name)));
   return told;
 }
 
@@ -49,9 +49,9 @@ export function tell(
     const of_class = label?.class === null || label === undefined ? undefined : index.classes[label.class];
     if (label && of_class) {
       room = label.name.split("_").slice(2, 4).join("_");
-      told.push(h("span", { class: "entry", "data-is": "class" }, key(of_class.color), of_class.name));
-      told.push(entry("instance", label.name));
-    } else told.push(entry("class", "no label"));
+      told.push(h("span", { class: "entry", "data-is": "class" }, key(of_class.color), named(of_class.name)));
+      told.push(entry("instance", named(label.name)));
+    } else told.push(entry("class", "unlabelled"));
   }
   told.push(entry("room", roomName(room)));
   if (spot.distance === null) told.push(entry("distance", picture.hasDepth ? "nothing seen" : "not stored"));
@@ -82,14 +82,14 @@ export function legendOf(index: Index, shown: Modality[], range: [number, number
     legend.push(h("span", { class: "entry" }, key([128, 128, 128]), "no votes"));
   }
   if (shown.includes("unlabelled"))
-    legend.push(h("span", { class: "entry" }, key([255, 0, 255]), "no label"));
+    legend.push(h("span", { class: "entry" }, key([255, 0, 255]), "unlabelled"));
   if (shown.includes("changed")) {
     legend.push(h("span", { class: "entry" }, key(OTHER_CLASS), "another class"));
     legend.push(h("span", { class: "entry" }, key(OTHER_INSTANCE), "another instance of the class"));
   }
   if (shown.includes("class")) {
     for (const [i, { name, color }] of index.classes.entries())
-      if (index.pixels_by_class[i]) legend.push(h("span", { class: "entry" }, key(color), name));
+      if (index.pixels_by_class[i]) legend.push(h("span", { class: "entry" }, key(color), named(name)));
   }
   return legend;
 }

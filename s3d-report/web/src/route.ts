@@ -1,5 +1,7 @@
 // The part of the address after `#`: a page, its content, and its look.
 
+import { remember } from "./memory.js";
+
 export interface Route {
   page: string;
   path: string[];
@@ -12,6 +14,8 @@ export interface Page {
   close: () => void;
   /** The element that is scrolled into view at first, and gets the focus. */
   start?: HTMLElement;
+  /** Loads so much of the page that it is this high, CSS pixels. */
+  reach?: (height: number) => void;
 }
 
 export function parseRoute(hash: string): Route {
@@ -45,7 +49,9 @@ export function link(
 
 /** Changes the address without a new entry in the history, and without opening the page again. */
 export function replaceRoute(page: string, path: (string | number)[], query: Record<string, string>): void {
-  history.replaceState(null, "", link(page, path, query));
+  const address = link(page, path, query);
+  history.replaceState(null, "", address);
+  remember({ page, path: path.map(String) }, address);
 }
 
 /** A number in the address, if it is within bounds; otherwise the given one. */

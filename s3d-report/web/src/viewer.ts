@@ -1,7 +1,7 @@
 // A picture with two modalities, a movable line between them, and a readout for the pointer.
 
 import type { Index, Picture, Rgb } from "./data.js";
-import { append, choice, h } from "./dom.js";
+import { append, choice, flat, h } from "./dom.js";
 import { type FaceVotes, loadFaceVotes } from "./faces.js";
 import { type Gaze, clampGaze, focal, panoramaAt } from "./geometry.js";
 import {
@@ -15,9 +15,11 @@ import {
   Renderer,
   placeOf,
 } from "./gl.js";
+import { chosen } from "./memory.js";
 import { Marks, type Projected } from "./marks.js";
 import { type Spot, legendOf, tell } from "./readout.js";
 import { spaceLink } from "./route.js";
+import { pictureTools } from "./tools.js";
 
 const NAMES: Record<Modality, string> = {
   rgb: "Colour",
@@ -26,7 +28,7 @@ const NAMES: Record<Modality, string> = {
   class: "Class",
   instance: "Instance",
   unlabelled: "Unlabelled",
-  contested: "Contested",
+  contested: "Disputed",
   changed: "Changed",
 };
 
@@ -88,11 +90,11 @@ export function modalitiesOf(index: Index, area: number, picture: Picture): Moda
 
 /** The look in an address, as far as the picture has the modalities. */
 export function lookFrom(query: URLSearchParams, there: Modality[], gaze: Gaze | null): Look {
-  const of = (name: string, otherwise: Modality[]): Modality => {
-    const word = query.get(name) as Modality;
+  const of = (name: "left" | "right", otherwise: Modality[]): Modality => {
+    const word = (query.get(name) ?? chosen[name]) as Modality;
     return there.includes(word) ? word : (otherwise.find((m) => there.includes(m)) ?? there[0] ?? "rgb");
   };
-  const split = Number(query.get("split") ?? "0.5");
+  const split = Number(query.get("split") ?? chosen.split ?? "0.5");
   return {
     left: of("left", ["rgb"]),
     right: of("right", ["class", "depth", "normal"]),
@@ -101,16 +103,23 @@ export function lookFrom(query: URLSearchParams, there: Modality[], gaze: Gaze |
   };
 }
 
-export function queryOf(look: Look): Record<string, string> {
+/** The part of an address with the direction of view. */
+export function gazeQuery({ lon, lat, fov }: Gaze): Record<string, string> {
   const degrees = (radians: number): string => ((radians * 180) / Math.PI).toFixed(1);
-  const gaze = look.gaze;
-  return {
-    ...(gaze && { lon: degrees(gaze.lon), lat: degrees(gaze.lat), fov: degrees(gaze.fov) }),
-    left: look.left,
-    right: look.right,
-    split: look.split.toFixed(3),
-  };
+  return { lon: degrees(lon), lat: degrees(lat), fov: degrees(fov) };
 }
+
+/** The part of an address with the layers and the line between them. */
+export const layersOf = ({ left, right, split }: Look): Record<string, string> => ({
+  left,
+  right,
+  split: split.toFixed(3),
+});
+
+export const queryOf = (look: Look): Record<string, string> => ({
+  ...(look.gaze && gazeQuery(look.gaze)),
+  ...layersOf(look),
+});
 
 export class Viewer {
   readonly element: HTMLElement;
@@ -137,6 +146,8 @@ export class Viewer {
   private rest = 0;
   private pending = false;
   private closed = false;
+  /** The label under the pointer, whose pixels light up. */
+  private lit: number | null = null;
 
   private constructor(
     private readonly index: Index,
@@ -160,6 +171,9 @@ export class Viewer {
     );
     const frame = h("div", { class: "frame" }, this.canvas, this.overlay, this.line);
     this.element = h("section", { class: "viewer" }, this.bar, frame, this.readout, this.legend);
+    const { canvas, element } = this;
+    const dataSet = index.data_set.name;
+    frame.append(pictureTools({ element, canvas, dataSet, draw: () => this.renderer.draw(this.look) }));
     this.measuring = h("button", { type: "button", "aria-pressed": "false" }, "Measure");
     this.measuring.addEventListener("click", () => {
       const on = this.measuring.getAttribute("aria-pressed") !== "true";
@@ -168,7 +182,7 @@ export class Viewer {
       this.draw();
     });
     append(this.overlay, this.marks.elements);
-    this.canvas.setAttribute("aria-label", options.title);
+    this.canvas.setAttribute("aria-label", flat(options.title));
     this.canvas.setAttribute("role", "img");
     this.modalities = options.other?.modalities ?? modalitiesOf(index, options.area, picture);
     this.renderer = new Renderer(this.canvas, index);
@@ -227,6 +241,7 @@ export class Viewer {
     const pick = (label: string, ...sides: ("left" | "right")[]): HTMLElement =>
       choice(label, there, this.look[sides[0] ?? "left"], (value) => {
         for (const side of sides) this.look[side] = value as Modality;
+        if (sides.length === 1) Object.assign(chosen, { left: this.look.left, right: this.look.right });
         this.changed();
       });
     const two = [
@@ -324,6 +339,7 @@ export class Viewer {
       },
       { passive: false },
     );
+    for (const event of ["pointerleave", "blur"]) canvas.addEventListener(event, () => this.light(null));
     canvas.addEventListener("keydown", (event) => this.key(event));
     // Only focus by the keyboard counts; a touch gives the focus too, but has a place of its own.
     canvas.addEventListener("focus", () => {
@@ -387,6 +403,7 @@ export class Viewer {
 
   private moveSplit(to: number): void {
     this.look.split = Math.min(1, Math.max(0, to));
+    chosen.split = this.look.split;
     this.changed();
   }
 
@@ -424,7 +441,7 @@ export class Viewer {
 
   private paint(): void {
     if (this.closed) return;
-    this.renderer.draw(this.look);
+    this.renderer.draw({ ...this.look, lit: this.lit });
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.marks.draw((point) => this.options.screen(point, this.look.gaze, width, height), width, height);
     this.options.drawn?.(width, height);
@@ -486,12 +503,21 @@ export class Viewer {
     return { pixel: `${i},${j}`, spot, other };
   }
 
+  /** Lights up the pixels of an instance; none with null. */
+  private light(label: number | null): void {
+    const lit = this.others || !label ? null : label;
+    if (lit === this.lit) return;
+    this.lit = lit;
+    this.draw();
+  }
+
   /** Shows the values at a point of the canvas. */
   private readAt(x: number, y: number, box: DOMRect): void {
     window.clearTimeout(this.rest);
     this.readout.replaceChildren();
     delete this.readout.dataset["pixel"];
     const found = this.spotAt(x, y, box);
+    this.light(found?.spot.label ?? null);
     if (!found) return;
     const { room } = this.options;
     const { spot } = found;

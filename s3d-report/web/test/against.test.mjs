@@ -22,6 +22,7 @@ import {
   surfaceOf,
 } from "./lib/changes.mjs";
 import {
+  coloured,
   dataset,
   degrees,
   near,
@@ -35,7 +36,7 @@ import {
 
 const report = process.env["S3D_AGAINST_REPORT"];
 const equal = process.env["S3D_EQUAL_REPORT"];
-const index = readPicture(report, "index");
+const index = coloured(readPicture(report, "index"));
 const compare = readPicture(report, "compare");
 const grouped = (n) => n.toLocaleString("en");
 

@@ -88,7 +88,8 @@ test("the grid of 101,736 candidates stays quick, and its list of locations is s
     t.diagnostic(`${words} in ${Date.now() - start} ms`);
     assert.ok(Date.now() - start < PATIENCE_MS, words);
   };
-  const total = async () => Number((await page.locator("[role=status]").textContent()).split(" ")[0]);
+  const total = async () =>
+    Number((await page.locator("[role=status]").textContent()).split(" ")[0].replaceAll(",", ""));
   assert.equal(await total(), index.views.filter((view) => view.frame !== null).length);
   assert.equal(await page.locator(".card").count(), 60);
   await timed("sorted", () => page.getByLabel("Sort by").selectOption("entropy"));

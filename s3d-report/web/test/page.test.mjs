@@ -2,7 +2,7 @@
 // Each test fails on any error of the console, and on any request that leaves the report's folder.
 
 import assert from "node:assert/strict";
-import { rmSync } from "node:fs";
+import { readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { go, launch, open, readout, tap } from "./lib/browser.mjs";
@@ -79,7 +79,9 @@ test("names are text, whatever they are, and files that are missing are told", a
   await withCopy(hostileIndex, async (folder) => {
     const { page, faults, close } = await open(browser, folder, "#/notes");
     assert.equal(await page.locator("header .title").textContent(), hostile);
-    assert.equal(await page.locator(".badge").textContent(), "3");
+    // The badge counts the damage alone, and its name says so. A name keeps its direction to itself.
+    assert.equal(await page.locator(".badge").textContent(), "1 (1 file missing or damaged)");
+    assert.equal(await page.locator("header .title > bdi").textContent(), hostile);
     assert.equal(await page.locator("code").first().textContent(), hostile);
     // A warning links to its place.
     const warnings = page.locator("section", { hasText: "Warnings of the export" }).locator("li");
@@ -93,6 +95,23 @@ test("names are text, whatever they are, and files that are missing are told", a
     assert.deepEqual(faults, []);
     await go(page, "#/view/0");
     assert.match(await page.locator("[role=alert]").textContent(), /data\/views_0\.js cannot be read/);
+    await close();
+  });
+});
+
+test("the page runs its own program alone, and takes its data from its own folder", async () => {
+  const inject = (_, folder) => {
+    const file = join(folder, "index.html");
+    const foreign = `<base href="https://example.org/"><script>document.title = "foreign"</script>`;
+    writeFileSync(file, readFileSync(file, "utf8").replace("<!-- data -->", foreign));
+  };
+  await withCopy(inject, async (folder) => {
+    const { page, faults, close } = await open(browser, folder, "#/notes");
+    assert.match(await page.title(), /^Notes · /);
+    assert.ok(
+      faults.length >= 2 && faults.every((words) => /Content.Security.Policy/i.test(words)),
+      faults[0],
+    );
     await close();
   });
 });

@@ -59,7 +59,7 @@ test("the plan has the rooms, and the locations in the colour of what they see",
     for (let y = 0; y < depth.height; y++)
       for (let x = 0; x < depth.width; x++) seen += depth.at(x, y)[0] === 65535 ? 0 : 1;
     const share = seen / (depth.width * depth.height);
-    near(Number.parseFloat(words.split("sees ")[1]), 100 * share, 0.51, `${uuid} sees`);
+    near(Number.parseFloat(words.split("coverage ")[1]), 100 * share, 0.51, `${uuid} sees`);
     const place = Math.min(7, Math.floor(share * 8));
     const color = stops[place].map((c, k) => c + (share * 8 - place) * (stops[place + 1][k] - c));
     fill.forEach((c, k) => near(c, color[k], 8, `colour of ${uuid}`));

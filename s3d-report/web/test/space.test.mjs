@@ -63,7 +63,7 @@ function hold(told, hit) {
   const where = `face ${hit.face} at ${hit.point}`;
   assert.equal(told.face, String(hit.face), where);
   const label = labels[hit.face];
-  assert.equal(told.class, label === 0 ? "no label" : names[label].split("_")[0], where);
+  assert.equal(told.class, label === 0 ? "unlabelled" : names[label].split("_")[0], where);
   if (label !== 0) {
     assert.equal(told.instance, names[label], where);
     const room = names[label].split("_").slice(2, 4).join(" ");
@@ -301,11 +301,11 @@ test("boxes and frustums are drawn, and scan locations are entered", async () =>
   await close();
 });
 
-test("a contested patch is flown to, and at rest nothing is drawn", async () => {
+test("a disputed patch is flown to, and at rest nothing is drawn", async () => {
   const { page, faults, close } = await open(browser, report, `#/space/${area}`);
   await loaded(page);
   const patches = index.votes.find((v) => v.area === area).votes.disputed_patches;
-  const list = page.getByLabel("Contested patches");
+  const list = page.getByLabel("Disputed patches");
   assert.equal(await list.locator("option").count(), 1 + patches.length);
   let seen = 0;
   for (const [i, patch] of patches.slice(0, 6).entries()) {
@@ -574,7 +574,7 @@ for (const [form, place] of [
       await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
       const told = await readout(page);
       assert.deepEqual(Object.keys(told).sort(), ["X Y Z", "distance", "face", "pixel"]);
-      for (const label of ["Colours", "Rooms", "Boxes of instances", "Contested patches"])
+      for (const label of ["Colours", "Rooms", "Boxes of instances", "Disputed patches"])
         assert.equal(await page.getByLabel(label, { exact: true }).count(), 0, label);
       assert.ok(Number(await page.getByLabel("Cut away what is above").inputValue()) > 1.5);
       assert.equal(await page.locator("[role=alert]").count(), 0);

@@ -1,6 +1,6 @@
 //! `s3d detect`: the paper's baseline detector, trained, run, and measured.
 
-use crate::answer::print;
+use crate::answer::{print, print_json};
 use crate::args::Threads;
 use crate::commands::scores::on_threads_or;
 use crate::failure::{Failure, Outcome};
@@ -161,11 +161,11 @@ fn print_table(args: &TableArgs) -> Outcome<()> {
             })
             .collect::<Result<Vec<_>>>()
     })?;
-    print(&if args.json {
-        table::json(&tables)
+    if args.json {
+        print_json(&table::json(&tables))
     } else {
-        table::markdown(&tables)
-    })
+        print(&table::markdown(&tables))
+    }
 }
 
 /// Translates an error of the detector into the words of the command line.

@@ -3,6 +3,7 @@
 
 import { type Index, type Picture, type Rgb, load, loadPicture } from "../data.js";
 import { unpack } from "../faces.js";
+import { paletteOf } from "../palette.js";
 
 export interface Counts {
   faces: number;
@@ -154,6 +155,12 @@ function merged(index: Index, compared: Compared): Against {
   const { classes, labels } = { classes: [...index.classes], labels: [...index.labels] };
   const places = new Map(classes.map(({ name }, i) => [name, i]));
   const classOfB = compared.classes.map((of) => places.get(of.name) ?? classes.push(of) - 1);
+  // Classes of B alone get colours that A's do not have.
+  const colors = paletteOf(
+    classes.map(({ name }) => name),
+    index.classes.map(({ color }) => color),
+  );
+  classes.forEach((each, i) => (classes[i] = { ...each, color: colors[i] ?? each.color }));
   const labelOfB = compared.labels.map((label, i) => {
     const own = { ...label, class: label.class === null ? null : (classOfB[label.class] ?? null) };
     const partner = compared.partners[i] ?? null;

@@ -4,7 +4,7 @@
 import { bar, spread } from "./charts.js";
 import { css } from "../colors.js";
 import type { Index, VoteSpread, Votes } from "../data.js";
-import { append, count, h, percent, table } from "../dom.js";
+import { append, count, h, named, percent, several, table } from "../dom.js";
 import { patchLink } from "../places.js";
 
 const number = (words: string): HTMLElement => h("span", { class: "number" }, words);
@@ -42,10 +42,10 @@ function byName(index: Index, kind: "Class" | "Room", votes: Votes): HTMLElement
   const key = (name: string): HTMLElement => {
     const square = h("span", { class: "key" });
     square.style.background = color(name);
-    return h("span", {}, kind === "Class" ? square : null, name);
+    return h("span", {}, kind === "Class" ? square : null, named(name));
   };
   return table(
-    [kind, "Points", "Faces", "Votes a face", "Contested", "Under ¾"],
+    [kind, "Points", "Faces", "Votes a face", "Disputed", "Under ¾"],
     parts.map((part) => [
       key(part.name),
       number(count(part.points)),
@@ -71,7 +71,7 @@ function matrix(index: Index, area: number, votes: Votes): HTMLElement {
   const order = index.classes.map((c) => c.name);
   const names = [...involved].sort((a, b) => order.indexOf(a) - order.indexOf(b));
   const words = (d: Votes["disputing_classes"][number]): string =>
-    `${d.classes.join(" and ")}: ${count(d.faces)} faces, ${d.m2.toFixed(3)} m²`;
+    `${d.classes.map(named).join(" and ")}: ${several(d.faces, "face")}, ${d.m2.toFixed(3)} m²`;
   const cell = (d: Votes["disputing_classes"][number], text: string): HTMLElement => {
     const href = largest(index, area, votes, d.classes);
     return href
@@ -82,7 +82,7 @@ function matrix(index: Index, area: number, votes: Votes): HTMLElement {
     return table(
       ["Classes", "Faces", "Surface"],
       disputes.map((d) => [
-        cell(d, d.classes.join(" and ")),
+        cell(d, d.classes.map(named).join(" and ")),
         number(count(d.faces)),
         number(`${d.m2.toFixed(3)} m²`),
       ]),
@@ -92,7 +92,7 @@ function matrix(index: Index, area: number, votes: Votes): HTMLElement {
     "tr",
     {},
     h("td", {}),
-    ...names.map((name) => h("th", { scope: "col" }, h("span", {}, name))),
+    ...names.map((name) => h("th", { scope: "col" }, h("span", {}, named(name)))),
   );
   const rows = names.map((row, i) => {
     const cells = names.slice(0, i + 1).map((column) => {
@@ -103,7 +103,7 @@ function matrix(index: Index, area: number, votes: Votes): HTMLElement {
       if (d) td.style.setProperty("--share", `${Math.round(12 + 58 * (d.faces / most))}%`);
       return td;
     });
-    return h("tr", {}, h("th", { scope: "row" }, row), ...cells);
+    return h("tr", {}, h("th", { scope: "row" }, named(row)), ...cells);
   });
   return h("table", { class: "matrix" }, h("thead", {}, head), h("tbody", {}, ...rows));
 }

@@ -3,7 +3,7 @@
 import { css, depthRamp } from "../colors.js";
 import type { ChangeMark } from "../compare/marks.js";
 import type { Index, Location, Rgb, View } from "../data.js";
-import { append, count, metres2, percent, roomName, s, several } from "../dom.js";
+import { append, flat, metres2, percent, named, roomName, s, several } from "../dom.js";
 import { type Box, boxOf, middleOf, sizeOf } from "../outline.js";
 import { patchLink } from "../places.js";
 import { link } from "../route.js";
@@ -96,7 +96,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
   const element = s("svg", {
     class: small ? "plan small" : "plan",
     viewBox: `0 0 ${box.w} ${box.h}`,
-    role: small ? "img" : "group",
+    role: "group",
     "aria-label": `Plan of area ${area}`,
   });
   element.style.setProperty("--unit", `${unit}px`);
@@ -158,17 +158,18 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
   for (const view of photographs) {
     const place = at(view.position[0], view.position[1]);
     const dot = s("circle", { class: "photograph", cx: place[0], cy: place[1], r: 0.8 * unit });
-    dot.append(s("title", {}, view.photograph));
+    const name = named(view.photograph ?? "");
+    dot.append(s("title", {}, name));
     if (small || view.picture === null) {
       element.append(dot);
       continue;
     }
-    const to = s("a", { href: link("view", [view.picture]), "aria-label": view.photograph }, dot);
+    const to = s("a", { href: link("view", [view.picture]), "aria-label": name }, dot);
     const { forward, fov_deg: fov } = view;
     const level = forward && Math.hypot(forward[0], forward[1]) > 0.1;
     const heading = (): [number, number][] =>
       level && fov !== null ? [[Math.atan2(forward[1], forward[0]), fov * RADIANS]] : [];
-    reveal(to, place, heading, () => view.photograph ?? "");
+    reveal(to, place, heading, () => name);
     element.append(to);
   }
   const crowd = Math.min(1, Math.max(0.35, 8 / Math.sqrt(stands.length)));
@@ -176,7 +177,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
   for (const [location, i] of stands) {
     const place = at(location.position?.[0] ?? 0, location.position?.[1] ?? 0);
     const coverage = location.seen?.coverage ?? null;
-    const sees = coverage === null ? "" : `, sees ${percent(coverage)}`;
+    const sees = coverage === null ? "" : `, scan coverage ${percent(coverage)}`;
     const title = `${roomName(location.room)}, ${location.uuid.slice(0, 8)}${sees}`;
     const current = i === options.current;
     const dot = s("circle", {
@@ -228,7 +229,7 @@ function patches(
       if (!hasHeight(center[2])) continue;
       const [x, y] = at(center[0], center[1]);
       const r = 0.7 * unit;
-      const words = `${labels.join(" or ")}: ${count(faces)} faces, ${m2.toFixed(3)} m²`;
+      const words = `${labels.map(named).join(" or ")}: ${several(faces, "face")}, ${m2.toFixed(3)} m²`;
       const mark = s("path", { class: "patch", d: `M${x},${y - r}l${r},${r}l${-r},${r}l${-r},${-r}Z` });
       mark.append(s("title", {}, words));
       const href = patchLink(index, area, center);
@@ -271,7 +272,7 @@ function names(
     const box = boxOf(largest);
     const name = roomName(room.name);
     // A letter is about one hundredth of the plan wide; pointing at a room shows its name in any case.
-    if (Math.min(name.length, 24) * unit > 1.6 * box.w || box.h < 2 * unit) continue;
+    if (Math.min(flat(name).length, 24) * unit > 1.6 * box.w || box.h < 2 * unit) continue;
     const [x, y] = at(...middleOf(largest));
     // Beside the middle, or above or below it, if a location is there.
     const taken = ([right, down]: [number, number]): boolean =>
@@ -286,7 +287,7 @@ function names(
     const [right, down] = places.find((place) => !taken(place)) ?? [0, -0.5];
     const [tx, ty] = [x + right * unit, y + down * unit];
     const text = s("text", { class: "name", x: tx, y: ty });
-    text.append(name, s("tspan", { class: "size", x: tx, dy: "1.1em" }, metres2(room.floor_m2)));
+    append(text, [name, s("tspan", { class: "size", x: tx, dy: "1.1em" }, metres2(room.floor_m2))]);
     found.push(text);
   }
   return found;

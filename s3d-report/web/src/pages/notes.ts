@@ -1,21 +1,23 @@
 // What users should check: missing or damaged files, unlabelled surface, disputed classes.
 
 import type { Index } from "../data.js";
-import { append, count, h, metres2, percent, several, table } from "../dom.js";
+import { append, count, h, metres2, named, percent, several, table } from "../dom.js";
 import { disputeInPanorama } from "../places.js";
 import { link, spaceLink } from "../route.js";
 
 /** The licences of bundled packages, inserted by bundle.mjs. */
 declare const LICENCES: { name: string; version: string; text: string }[];
 
-const warningsOf = (index: Index): string[] => index.areas.flatMap((area) => area.warnings ?? []);
-
-/** The number of notes on the tab: faults of files, and warnings of the export. */
-export const faultCount = (index: Index): number =>
-  index.faults.length +
-  warningsOf(index).length +
-  (index.data_set.missing_yet?.length ?? 0) +
-  (index.verified?.faults ?? []).reduce((sum, group) => sum + group.count, 0);
+/** What is damaged: the number, and words for what is counted. */
+export function damageOf(index: Index): { count: number; words: string } {
+  const files = index.faults.length;
+  const found = (index.verified?.faults ?? []).reduce((sum, group) => sum + group.count, 0);
+  const words = [
+    files > 0 && `${several(files, "file")} missing or damaged`,
+    found > 0 && `${several(found, "fault")} found by s3d verify`,
+  ];
+  return { count: files + found, words: words.filter(Boolean).join(", ") };
+}
 
 /** The link for a warning: the location that it names, or the unlabelled surface. */
 function placeOfWarning(index: Index, warning: string): [string, string] | null {
@@ -26,19 +28,37 @@ function placeOfWarning(index: Index, warning: string): [string, string] | null 
   return null;
 }
 
+/** Warnings that differ only in numbers and identifiers, together, in the order of the first of each. */
+export function alike<T extends { warning: string }>(warnings: T[]): T[][] {
+  const groups = new Map<string, T[]>();
+  for (const each of warnings) {
+    const form = each.warning.replace(/[0-9a-f-]{8,}|\d+(?:\.\d+)?/g, "#");
+    const group = groups.get(form) ?? [];
+    groups.set(form, [...group, each]);
+  }
+  return [...groups.values()];
+}
+
 function warnings(index: Index): HTMLElement | null {
-  const items = index.areas.flatMap((area) =>
-    (area.warnings ?? []).map((warning) => {
-      const place = placeOfWarning(index, warning);
-      const of = index.areas.length > 1 ? `Area ${area.area}: ` : "";
-      const item = h("li", {}, `${of}${warning}`);
-      append(item, place ? [" (", h("a", { href: place[0] }, place[1]), ")"] : []);
-      return item;
-    }),
+  const all = index.areas.flatMap(({ area, warnings = [] }) =>
+    warnings.map((warning) => ({ area, warning })),
   );
-  return items.length === 0
-    ? null
-    : h("section", {}, h("h2", {}, "Warnings of the export"), h("ul", {}, ...items));
+  if (all.length === 0) return null;
+  const item = ({ area, warning }: { area: number; warning: string }): HTMLElement => {
+    const place = placeOfWarning(index, warning);
+    const of = index.areas.length > 1 ? `Area ${area}: ` : "";
+    const line = h("li", {}, of, named(warning));
+    append(line, place ? [" (", h("a", { href: place[0] }, place[1]), ")"] : []);
+    return line;
+  };
+  const items = alike(all).map(([first = { area: 0, warning: "" }, ...others]) => {
+    const line = item(first);
+    if (others.length === 0) return line;
+    const summary = h("summary", {}, `${several(others.length, "warning")} like this`);
+    append(line, [h("details", {}, summary, h("ul", {}, ...others.map(item)))]);
+    return line;
+  });
+  return h("section", {}, h("h2", {}, "Warnings of the export"), h("ul", {}, ...items));
 }
 
 function missing(index: Index): HTMLElement | null {
@@ -59,7 +79,7 @@ function faults(index: Index): HTMLElement {
     append(section, [h("p", {}, "Every file that this report reads is as it was written.")]);
     return section;
   }
-  const rows = index.faults.map(({ path, message }) => [fileName(index, path), message]);
+  const rows = index.faults.map(({ path, message }) => [fileName(index, path), named(message)]);
   append(section, [
     h("p", {}, `${several(index.faults.length, "file")} missing or damaged:`),
     table(["File", "What is wrong"], rows),
@@ -69,7 +89,7 @@ function faults(index: Index): HTMLElement {
 
 /** The name of a file, with a link to its picture. */
 function fileName(index: Index, path: string): HTMLElement {
-  const name = h("code", {}, path);
+  const name = h("code", {}, named(path));
   const [, uuid, frame] = /\/camera_([0-9A-Za-z-]+)_.*_frame_(\d+|equirectangular)_/.exec(path) ?? [];
   const area = Number(/^area_(\d+)\//.exec(path)?.[1]);
   const at = index.locations.findIndex((l) => l.area === area && l.uuid === uuid);
@@ -85,8 +105,8 @@ function verified(index: Index): HTMLElement | null {
   const words = `${several(files, "file")} and ${several(checks, "check")}: ${several(all, "fault")}.`;
   const section = h("section", {}, h("h2", {}, "Verified"), h("p", {}, words));
   const rows = found.flatMap(({ topic, count: n, first }) => {
-    const named = first.map(([path, message]) => [topic, fileName(index, path), message]);
-    return n > first.length ? [...named, [topic, "", `${count(n - first.length)} more like this`]] : named;
+    const lines = first.map(([path, message]) => [topic, fileName(index, path), named(message)]);
+    return n > first.length ? [...lines, [topic, "", `${count(n - first.length)} more like this`]] : lines;
   });
   append(section, [
     rows.length > 0 && table(["", "File", "What is wrong"], rows),
@@ -104,8 +124,8 @@ function surface(index: Index): HTMLElement | null {
         h(
           "li",
           {},
-          `${of}${count(area.faces_left_out)} faces of the input were left out: ` +
-            "they have no area, or the corners of an earlier face.",
+          `${of}${several(area.faces_left_out, "face")} of the input were left out, ` +
+            "without an area or with the corners of an earlier face.",
         ),
       );
     }
@@ -117,7 +137,7 @@ function surface(index: Index): HTMLElement | null {
         h(
           "li",
           {},
-          `${of}${count(bare.faces)} faces have no label (${metres2(bare.m2)}${pixels}): `,
+          `${of}${several(bare.faces, "face")} unlabelled (${metres2(bare.m2)}${pixels}): `,
           h("a", { href: to }, "views that show most of it"),
           ...(index.meshes.some((mesh) => mesh.area === area.area)
             ? [
@@ -131,11 +151,7 @@ function surface(index: Index): HTMLElement | null {
     const filled = (area.unlabelled?.without_votes.faces ?? 0) - (bare?.faces ?? 0);
     if (filled > 0)
       items.push(
-        h(
-          "li",
-          {},
-          `${of}${count(filled)} faces have no votes, and took the label of the surface beside them.`,
-        ),
+        h("li", {}, `${of}${several(filled, "face")} without votes took the label of the surface beside.`),
       );
     if (area.offset_m)
       items.push(
@@ -163,7 +179,7 @@ function disputes(index: Index): HTMLElement | null {
     found = true;
     const patches = votes.disputed_patches.slice(0, 12).map((p) => {
       const near = disputeInPanorama(index, area, p.center);
-      const name = p.labels.join(" or ");
+      const name = p.labels.map(named).join(" or ");
       const solid = index.meshes.some((mesh) => mesh.area === area) && spaceLink(area, p.center);
       return [
         name,
@@ -175,7 +191,7 @@ function disputes(index: Index): HTMLElement | null {
     });
     if (patches.length > 0)
       append(section, [
-        h("h3", {}, "Largest patches"),
+        h("h3", {}, "Largest disputed patches"),
         table(["Labels", "Faces", "Surface", "", ""], patches),
       ]);
   }
@@ -198,7 +214,10 @@ function about(index: Index): HTMLElement {
     name,
     typeof value === "object" ? JSON.stringify(value) : String(value),
   ]);
-  const taxonomy = d.taxonomy === null ? "without labels" : `${index.labels.length} labels of ${d.taxonomy}`;
+  const taxonomy =
+    d.taxonomy === null
+      ? "without labels"
+      : `${several(index.labels.length, "label")} of ${named(d.taxonomy)}`;
   return h(
     "section",
     {},
@@ -206,7 +225,7 @@ function about(index: Index): HTMLElement {
     h(
       "p",
       {},
-      `${d.name}: made by s3d ${d.version} with seed ${d.seed}; ` +
+      `${named(d.name)}: made by s3d ${d.version} with seed ${d.seed}; ` +
         `${count(d.files)} files, ${(d.bytes / 1e6).toFixed(1)} MB; ${taxonomy}.`,
     ),
     h("details", {}, h("summary", {}, "Options of the export"), table(["Option", "Value"], options)),

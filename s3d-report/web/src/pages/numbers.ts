@@ -3,7 +3,7 @@
 import { bar, histogram } from "./charts.js";
 import { css } from "../colors.js";
 import type { Index, View } from "../data.js";
-import { append, count, h, metres2, percent, roomName, table } from "../dom.js";
+import { append, count, h, metres2, named, percent, roomName, table } from "../dom.js";
 import { link } from "../route.js";
 import { votesSection } from "./disputes.js";
 import { yawOf } from "./views.js";
@@ -61,7 +61,7 @@ function tables(index: Index): HTMLElement {
     table(
       head("Class"),
       byArea(
-        found.map((c) => [c, (i) => instances(i)?.[c] ?? 0]),
+        found.map((c) => [named(c), (i) => instances(i)?.[c] ?? 0]),
         n,
       ),
     ),
@@ -95,7 +95,7 @@ function classes(index: Index): HTMLElement | null {
   const surface = index.surface_by_class;
   const rows = index.classes.map(({ name, color }, i) => {
     return {
-      name,
+      name: named(name),
       color: css(color),
       pixels: index.pixels_by_class[i] ?? 0,
       ...(surface[i] ?? { faces: 0, m2: 0 }),
@@ -108,7 +108,7 @@ function classes(index: Index): HTMLElement | null {
   const most = Math.max(...shown.map((row) => row.pixels));
   const words =
     `${count(all)} pixels of panoramas and views see the mesh; ` +
-    `${percent(index.pixels_unlabelled / all)} of them have no label. ` +
+    `${percent(index.pixels_unlabelled / all)} of them are unlabelled. ` +
     `A class leads to the views that show most of it.`;
   const number = (text: string): HTMLElement => h("span", { class: "number" }, text);
   const cells = shown.map((row) => [
@@ -171,7 +171,7 @@ function distributions(index: Index): HTMLElement | null {
       href: href("pitch"),
     }),
     histogram({
-      title: "Angle of view",
+      title: "Field of view",
       unit: "°",
       from: 10,
       to: 75,
@@ -191,7 +191,7 @@ function distributions(index: Index): HTMLElement | null {
     }),
   ];
   const words =
-    "Kept views, with dropped candidates on top in grey, and the distribution that candidates are drawn from. " +
+    "Kept views, with dropped views on top in grey, and the distribution that views are drawn from. " +
     "A bar leads to its views; arrow keys go from bar to bar.";
   return h(
     "section",

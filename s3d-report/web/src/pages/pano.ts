@@ -1,12 +1,13 @@
 // A scan location: its panorama, its neighbours, and its position on the plan.
 
 import { type Index, type Location, type Picture, load } from "../data.js";
-import { append, choice, h, percent, roomName } from "../dom.js";
+import { append, choice, h, percent, roomName, several } from "../dom.js";
 import { type Gaze, directionIn, panoramaPoint, panoramaScreen, screenAt } from "../geometry.js";
+import { gazes } from "../memory.js";
 import { storeysOf } from "../storeys.js";
 import { plan } from "./floor.js";
 import { type Route, link, numberOf, replaceRoute } from "../route.js";
-import { Viewer, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
+import { Viewer, gazeQuery, layersOf, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
 
 const RADIANS = Math.PI / 180;
 
@@ -81,16 +82,22 @@ export async function panoPage(
       const area = index.areas.length > 1 ? `area ${l.area}, ` : "";
       return [link("pano", [l.area, l.uuid]), `${area}${roomName(l.room)} · ${l.uuid.slice(0, 8)}`];
     });
+  let layers: Record<string, string> = {};
   const name = choice("Scan location", entries, link("pano", [location.area, location.uuid]), (to) => {
-    window.location.hash = to;
+    window.location.hash = `${to}?${new URLSearchParams(layers)}`;
   });
   const facts = [
-    location.seen?.coverage != null && `sees ${percent(location.seen.coverage)}`,
-    location.seen?.instances != null && `${location.seen.instances} instances`,
-    location.seen?.unlabelled != null && `${percent(location.seen.unlabelled)} without a label`,
+    location.seen?.coverage != null && `scan coverage ${percent(location.seen.coverage)}`,
+    location.seen?.instances != null && several(location.seen.instances, "instance"),
+    location.seen?.unlabelled != null && `${percent(location.seen.unlabelled)} unlabelled`,
   ].filter(Boolean);
   const element = h("main", { class: "look" });
-  const head = h("div", { class: "look-head" }, h("h1", { class: "hidden" }, roomName(location.room)), name);
+  const head = h(
+    "div",
+    { class: "look-head" },
+    h("h1", { class: "hidden" }, `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`),
+    name,
+  );
   append(head, [h("p", { class: "quiet" }, facts.join(" · "))]);
   element.append(head);
   if (!location.pano) {
@@ -98,10 +105,13 @@ export async function panoPage(
     return { element, close: () => {} };
   }
   const picture = await load<Picture>(`pano_${at}`);
+  // Without a direction in the address one looks where one looked before.
+  const before = route.query.has("lon") ? undefined : gazes.get(location.uuid);
+  const asked = before ? new URLSearchParams(before) : route.query;
   const gaze: Gaze = {
-    lon: numberOf(route.query, "lon", -360, 360, 0) * RADIANS,
-    lat: numberOf(route.query, "lat", -90, 90, -4) * RADIANS,
-    fov: numberOf(route.query, "fov", 8, 120, 90) * RADIANS,
+    lon: numberOf(asked, "lon", -360, 360, 0) * RADIANS,
+    lat: numberOf(asked, "lat", -90, 90, -4) * RADIANS,
+    fov: numberOf(asked, "fov", 8, 120, 90) * RADIANS,
   };
   const storeys = storeysOf(index, location.area);
   const storey = location.position && storeys.ofHeight(location.position[2]);
@@ -116,6 +126,7 @@ export async function panoPage(
         });
   const marks: { button: HTMLElement; lon: number; lat: number }[] = [];
   const look = lookFrom(route.query, modalitiesOf(index, location.area, picture), gaze);
+  layers = layersOf(look);
   let viewer: Viewer | null = null;
   const opened = await Viewer.open(index, picture, look, {
     title: `Panorama of ${roomName(location.room)}; arrow keys turn, plus and minus zoom`,
@@ -125,6 +136,8 @@ export async function panoPage(
     position: location.position,
     screen: (point, now, width, height) => panoramaScreen(location, now ?? gaze, width, height, point),
     changed: (now) => {
+      layers = layersOf(now);
+      if (now.gaze) gazes.set(location.uuid, gazeQuery(now.gaze));
       replaceRoute("pano", [location.area, location.uuid], queryOf(now));
       if (now.gaze) map?.look((location.azimuth_rad ?? 0) - now.gaze.lon, now.gaze.fov);
     },
@@ -158,7 +171,7 @@ export async function panoPage(
     opened.overlay.append(button);
   }
   if (map) opened.overlay.append(h("div", { class: "inset" }, map.element));
-  if (picture.depth !== null && !route.query.has("lon")) {
+  if (picture.depth !== null && !asked.has("lon")) {
     gaze.lon = firstLook((u, v) => opened.depthAt(u, v)) * RADIANS;
     opened.lookAt(gaze);
   }

@@ -3,8 +3,9 @@
 import { depthRamp, gradient } from "../colors.js";
 import { type ChangeMark, changeMarks } from "../compare/marks.js";
 import type { Index } from "../data.js";
-import { append, h, metres2, several } from "../dom.js";
+import { append, h, metres2, named, say, several } from "../dom.js";
 import { storeysOf } from "../storeys.js";
+import { saves } from "./export.js";
 import { plan } from "./floor.js";
 
 function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElement {
@@ -40,7 +41,7 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
       hasHeight: (z) => on(z),
       changes,
       told: (now) => {
-        told.textContent = now ?? summary;
+        say(told, now ?? summary);
       },
     });
     if (storeys.count > 1) element.setAttribute("aria-label", `Plan of storey ${storey + 1} of area ${area}`);
@@ -48,6 +49,7 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
       storeys.count > 1 && h("h3", {}, `Storey ${storey + 1}`),
       told,
       h("div", { class: "sheet" }, element),
+      saves(element, index.data_set.name, element.getAttribute("aria-label") ?? "Plan"),
     ]);
   }
   return section;
@@ -58,7 +60,7 @@ function legend(index: Index, changes: ChangeMark[]): HTMLElement {
   if (index.locations.some((l) => l.position && l.seen?.coverage != null)) {
     const ramp = h("span", { class: "ramp" });
     ramp.style.background = gradient(depthRamp);
-    append(line, ["share of a panorama that sees the mesh: 0 %", ramp, "100 %"]);
+    append(line, ["Scan coverage of a panorama: 0 %", ramp, "100 %"]);
   }
   if (index.votes.some(({ votes }) => votes.disputed_patches.length > 0))
     append(line, [h("span", { class: "entry" }, h("span", { class: "key patch-key" }), "disputed patch")]);
@@ -68,7 +70,7 @@ function legend(index: Index, changes: ChangeMark[]): HTMLElement {
   ] as const) {
     if (!changes.some((mark) => mark.isClass === isClass)) continue;
     const key = h("span", { class: isClass ? "key change-key class" : "key change-key" });
-    append(line, [h("span", { class: "entry" }, key, `${words} in ${index.against ?? "B"}`)]);
+    append(line, [h("span", { class: "entry" }, key, `${words} in ${named(index.against ?? "B")}`)]);
   }
   return line;
 }

@@ -1,7 +1,7 @@
 // Scores of predictions: tables, the confusion of classes, and each room or image.
 
 import { type ConfusionTable, type Index, type ScoreTable, type Scores, load } from "../data.js";
-import { choice, count, h, percent, roomName, table } from "../dom.js";
+import { choice, count, h, named, percent, roomName, table } from "../dom.js";
 import { imageLink } from "../places.js";
 import { type Route, link, replaceRoute } from "../route.js";
 
@@ -14,7 +14,7 @@ const words = (value: number | null): string => (value === null ? "–" : value.
 
 function scoreTable({ title, columns, rows }: ScoreTable): HTMLElement {
   const cells = rows.map(({ name, scores }) => [
-    name,
+    named(name),
     ...scores.map(({ value, interval }) =>
       h(
         "span",
@@ -41,7 +41,7 @@ function confusion({ classes, counts }: ConfusionTable): HTMLElement {
     const n = counts[row]?.[column] ?? 0;
     const share = n / (all[row] ?? 1);
     const told =
-      `${names[row] ?? ""} predicted as ${names[column] ?? ""}: ` +
+      `${named(names[row] ?? "")} predicted as ${named(names[column] ?? "")}: ` +
       `${count(n)} of ${count(all[row] ?? 0)} (${percent(share)})`;
     const shown = h("span", { title: told, "aria-label": told }, n === 0 ? "" : percent(share));
     const td = h("td", { class: row === column && "same" }, shown);
@@ -50,9 +50,14 @@ function confusion({ classes, counts }: ConfusionTable): HTMLElement {
   };
 
   const caption = "True class by row, predicted class by column. A cell has its share of the true class.";
-  const head = columns.map((at) => h("th", { scope: "col" }, h("span", {}, names[at] ?? "")));
+  const head = columns.map((at) => h("th", { scope: "col" }, h("span", {}, named(names[at] ?? ""))));
   const body = rows.map((row) =>
-    h("tr", {}, h("th", { scope: "row" }, names[row] ?? ""), ...columns.map((column) => cell(row, column))),
+    h(
+      "tr",
+      {},
+      h("th", { scope: "row" }, named(names[row] ?? "")),
+      ...columns.map((column) => cell(row, column)),
+    ),
   );
   return h(
     "section",
@@ -188,7 +193,10 @@ export async function scoresPage(index: Index, route: Route): Promise<HTMLElemen
     const scores = all[at];
     place.replaceChildren(scores ? result(index, scores) : h("p", {}, "There are no such scores."));
   };
-  const names = all.map(({ name, protocol }, i): [string, string] => [String(i), `${name} (${protocol})`]);
+  const names = all.map(({ name, protocol }, i): [string, string] => [
+    String(i),
+    `${named(name)} (${protocol})`,
+  ]);
   const chooser =
     all.length > 1 &&
     choice("Predictions", names, String(asked), (value) => {

@@ -1,7 +1,7 @@
 // One view, large: the slider, the readout, and why the view was kept.
 
 import { type Index, type View, loadPicture } from "../data.js";
-import { append, h, percent, roomName } from "../dom.js";
+import { append, count, h, named, percent, roomName, several } from "../dom.js";
 import { viewPoint, viewScreen } from "../geometry.js";
 import { placeOf } from "../gl.js";
 import { type Route, link, replaceRoute } from "../route.js";
@@ -12,10 +12,10 @@ export function reasonOf(view: View): string {
   if (view.photograph !== null) return "A photograph: each photograph is a view.";
   if (!view.place) return "views.json does not list it.";
   const { reason, rank, pool } = view.place;
-  const place = `its entropy is number ${rank} of ${pool} candidates`;
+  const place = `its entropy is number ${rank} of ${several(pool, "view")}`;
   switch (reason) {
     case "all":
-      return `Kept, as all candidates are: ${place}.`;
+      return `Kept, as all views are: ${place}.`;
     case "highest":
       return `Kept: ${place}, among the highest 60 %.`;
     case "drawn":
@@ -29,9 +29,9 @@ export function reasonOf(view: View): string {
 
 /** The name of a view. */
 export function nameOf(index: Index, view: View): string {
-  if (view.photograph !== null) return view.photograph;
+  if (view.photograph !== null) return named(view.photograph);
   const uuid = view.location === null ? "" : (index.locations[view.location]?.uuid.slice(0, 8) ?? "");
-  const number = view.frame === null ? `candidate ${view.candidate ?? "?"}` : `view ${view.frame}`;
+  const number = view.frame === null ? `dropped view ${view.candidate ?? "?"}` : `view ${view.frame}`;
   return `${roomName(view.room)} · ${uuid} · ${number}`;
 }
 
@@ -60,15 +60,15 @@ function facts(index: Index, view: View): HTMLElement {
   add("Entropy", view.entropy === null ? null : `${view.entropy.toFixed(3)} nats`);
   add("Yaw", degrees(view.yaw_deg));
   add("Pitch", degrees(view.pitch_deg));
-  add("Angle of view", degrees(view.fov_deg));
-  add("Sees the mesh", share(view.seen?.coverage));
-  add("Without a label", share(view.seen?.unlabelled));
-  add("Instances", view.seen?.instances == null ? null : String(view.seen.instances));
+  add("Field of view", degrees(view.fov_deg));
+  add("Scan coverage", share(view.seen?.coverage));
+  add("Unlabelled", share(view.seen?.unlabelled));
+  add("Instances", view.seen?.instances == null ? null : count(view.seen.instances));
   const shares = [...(view.seen?.classes ?? [])].sort((a, b) => b[1] - a[1]).slice(0, 6);
   add(
     "Classes",
     shares
-      .map(([c, n]) => `${index.classes[c]?.name ?? "?"} ${percent(n)}`.replaceAll(" ", "\u00a0"))
+      .map(([c, n]) => `${named(index.classes[c]?.name ?? "?")} ${percent(n)}`.replaceAll(" ", "\u00a0"))
       .join(", "),
   );
   return list;
@@ -86,15 +86,22 @@ export async function viewPage(
   }
   const pictures = index.views.filter((v) => v.picture !== null);
   const place = pictures.indexOf(view);
+  const steps: { element: HTMLAnchorElement; picture: number }[] = [];
   const step = (by: number, words: string, sign: string): HTMLElement | null => {
     const to = pictures[place + by];
-    return to
-      ? h("a", { class: "step", href: link("view", [to.picture ?? 0]), "aria-label": words }, sign)
-      : null;
+    if (!to) return null;
+    const element = h("a", { class: "step", "aria-label": words }, sign);
+    steps.push({ element, picture: to.picture ?? 0 });
+    return element;
+  };
+  // The next view has the same layers.
+  const pointSteps = (layers: Record<string, string>): void => {
+    for (const { element, picture } of steps) element.href = link("view", [picture], layers);
   };
   const there = inPanorama(index, view);
   const head = h("div", { class: "look-head" }, h("h1", {}, nameOf(index, view)));
   append(head, [step(-1, "Previous view", "←"), step(1, "Next view", "→")]);
+  pointSteps({});
   const aside = h("aside", {}, h("p", {}, reasonOf(view)), facts(index, view));
   append(aside, [there && h("p", {}, h("a", { href: there }, "Look there in the panorama"))]);
   const body = h("div", { class: "view-body" });
@@ -117,8 +124,12 @@ export async function viewPage(
       const [left, top, w, h_] = placeOf(picture.of, width, height);
       return at && [at[0] * w + left * at[2], at[1] * h_ + top * at[2], at[2]];
     },
-    changed: (now) => replaceRoute("view", [at], queryOf(now)),
+    changed: (now) => {
+      pointSteps(queryOf(now));
+      replaceRoute("view", [at], queryOf(now));
+    },
   });
+  pointSteps(queryOf(look));
   viewer.element.classList.add("flat");
   viewer.element.style.setProperty("--shape", String(picture.of[0] / picture.of[1]));
   append(body, [viewer.element, aside]);

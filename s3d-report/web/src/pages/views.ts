@@ -2,8 +2,10 @@
 
 import { css } from "../colors.js";
 import { type Index, type View, loadThumb } from "../data.js";
-import { append, choice, h, percent, roomName } from "../dom.js";
-import { type Route, link, replaceRoute } from "../route.js";
+import { append, choice, count, h, named, percent, roomName, several } from "../dom.js";
+import { type Page, type Route, link, replaceRoute } from "../route.js";
+import { type Range, brush } from "./brush.js";
+import { WIDTH, canDraw, drawDropped } from "./dropped.js";
 import { inPanorama, nameOf, reasonOf } from "./view.js";
 
 /** A property to sort and filter by: a number, or nothing where a view has none. */
@@ -16,12 +18,12 @@ interface Property {
 
 const PROPERTIES: Property[] = [
   { key: "entropy", name: "Entropy", of: (v) => v.entropy, step: 0.05 },
-  { key: "coverage", name: "Coverage %", of: (v) => hundred(v.seen?.coverage), step: 1 },
-  { key: "unlabelled", name: "Unlabelled %", of: (v) => hundred(v.seen?.unlabelled), step: 1 },
+  { key: "coverage", name: "Scan coverage, %", of: (v) => hundred(v.seen?.coverage), step: 1 },
+  { key: "unlabelled", name: "Unlabelled, %", of: (v) => hundred(v.seen?.unlabelled), step: 1 },
   { key: "instances", name: "Instances", of: (v) => v.seen?.instances ?? null, step: 1 },
-  { key: "yaw", name: "Yaw °", of: (v) => yawOf(v), step: 5 },
-  { key: "pitch", name: "Pitch °", of: (v) => v.pitch_deg, step: 5 },
-  { key: "fov", name: "Angle of view °", of: (v) => v.fov_deg, step: 5 },
+  { key: "yaw", name: "Yaw, °", of: (v) => yawOf(v), step: 5 },
+  { key: "pitch", name: "Pitch, °", of: (v) => v.pitch_deg, step: 5 },
+  { key: "fov", name: "Field of view, °", of: (v) => v.fov_deg, step: 5 },
 ];
 
 /** The yaw to the left, half a turn at most. */
@@ -35,7 +37,7 @@ const hundred = (share: number | null | undefined): number | null => (share == n
 /** The number of cards that are added at a time. */
 const BATCH = 60;
 
-export function viewsPage(index: Index, route: Route): { element: HTMLElement; close: () => void } {
+export function viewsPage(index: Index, route: Route): Page {
   const query = Object.fromEntries(route.query) as Record<string, string>;
   const there = PROPERTIES.filter((p) => index.views.some((v) => p.of(v) !== null));
   const shareOf = (view: View): number => {
@@ -45,6 +47,12 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
   const grid = h("div", { class: "grid", role: "list" });
   const total = h("p", { class: "quiet", role: "status" });
   const more = h("div", { class: "more" });
+  // A new entry of the history: the way back leads to the filters.
+  const clear = h("button", { type: "button", class: "clear" }, "Clear filters");
+  clear.addEventListener("click", () => {
+    const kept = Object.entries(query).filter(([key]) => isOrder(key));
+    window.location.hash = link("views", [], Object.fromEntries(kept));
+  });
   let shown: View[] = [];
   let cards = 0;
 
@@ -53,13 +61,22 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       for (const { isIntersecting, target } of seen) {
         if (!isIntersecting) continue;
         thumbs.unobserve(target);
+        const none = (words: string): void => target.replaceWith(h("span", { class: "no-thumb" }, words));
+        const view = drawn.get(target);
+        if (view) {
+          drawDropped(view, target as HTMLCanvasElement).then(
+            (is) => is || none("no colours"),
+            (e: unknown) => none(String(e)),
+          );
+          continue;
+        }
         const picture = Number((target as HTMLElement).dataset["picture"]);
         loadThumb(index, picture).then(
           (url) => {
             if (url !== null) (target as HTMLImageElement).src = url;
-            else target.replaceWith(h("span", { class: "no-thumb" }, "no colours"));
+            else none("no colours");
           },
-          (e: unknown) => target.replaceWith(h("span", { class: "no-thumb" }, String(e))),
+          (e: unknown) => none(String(e)),
         );
       }
     },
@@ -108,7 +125,8 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       const number = (view: View): number => value(view) ?? -sign * Infinity;
       shown.sort((a, b) => sign * (number(a) - number(b)) || 0);
     }
-    total.textContent = `${shown.length} of ${index.views.length}`;
+    clear.hidden = filtersIn(query).length === 0;
+    total.textContent = `${count(shown.length)} of ${several(index.views.length, "view")}`;
     grid.replaceChildren();
     cards = 0;
     addCards();
@@ -122,7 +140,8 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       update();
     };
   const element = h("main", { class: "page wide" }, h("h1", {}, "Views"));
-  element.append(controls(index, there, query, set), total, grid, more);
+  const counted = h("div", { class: "counted" }, total, clear);
+  element.append(controls(index, there, query, set), counted, grid, more);
   update();
   return {
     element,
@@ -130,8 +149,17 @@ export function viewsPage(index: Index, route: Route): { element: HTMLElement; c
       thumbs.disconnect();
       bottom.disconnect();
     },
+    reach: (height) => {
+      while (cards < shown.length && document.documentElement.scrollHeight < height) addCards();
+    },
   };
 }
+
+const isOrder = (key: string): boolean => key === "sort" || key === "order";
+
+/** The parts of an address that leave views out. */
+const filtersIn = (query: Record<string, string>): string[] =>
+  Object.keys(query).filter((key) => !isOrder(key) && !(key === "show" && query[key] === "pictures"));
 
 /** The rank of a view's room among all, by area and name. */
 function roomPlace(index: Index): (view: View) => number {
@@ -163,14 +191,14 @@ function controls(
     return `${areas ? `area ${area}, ` : ""}${roomName(room ?? "")}`;
   };
   const present = index.classes
-    .map((c, i): [string, string] => [String(i), c.name])
+    .map((c, i): [string, string] => [String(i), named(c.name)])
     .filter(([i]) => index.pixels_by_class[Number(i)]);
   const dropped = index.views.some((v) => v.frame === null);
   const photographs = index.views.some((v) => v.photograph !== null);
-  const kinds: [string, string][] = [["pictures", "All pictures"]];
+  const kinds: [string, string][] = [["pictures", "Views with a picture"]];
   if (photographs && index.views.some((v) => v.frame !== null && v.photograph === null))
     kinds.push(["kept", "Kept views"], ["photograph", "Photographs"]);
-  if (dropped) kinds.push(["dropped", "Dropped candidates"]);
+  if (dropped) kinds.push(["dropped", "Dropped views"]);
   const sorts: [string, string][] = [
     ["", "In order"],
     ...there.map((p): [string, string] => [p.key, p.name]),
@@ -215,47 +243,75 @@ function controls(
     present.length > 0 &&
       choice("Class", [["", "All classes"], ...present], query["class"] ?? "", set("class")),
   ]);
-  const number = (name: string, label: string, step: number): HTMLElement => {
+  const number = (name: string, label: string, step: number, changed = () => {}): HTMLInputElement => {
     const input = h("input", {
       type: "number",
       step,
       value: query[name] ?? "",
       "aria-label": label,
-      input: () => set(name)(input.value),
+      input: () => {
+        set(name)(input.value);
+        changed();
+      },
     });
     return input;
   };
-  const ranges = h("div", { class: "ranges" });
-  for (const p of there) {
-    append(ranges, [
-      h(
-        "label",
-        {},
-        h("span", {}, p.name),
-        number(`${p.key}_min`, `${p.name}, at least`, p.step),
-        "to",
-        number(`${p.key}_max`, `${p.name}, at most`, p.step),
-      ),
-    ]);
-  }
-  if (present.length > 0)
-    append(ranges, [
-      h(
-        "label",
-        {},
-        h("span", {}, "Class, at least %"),
-        number("share", "Share of the class, at least, %", 1),
-      ),
-    ]);
+  const fill = (): void => {
+    const ranges = h("div", { class: "ranges" });
+    for (const p of there) {
+      const rangeNow = (): Range => [bound(query[`${p.key}_min`]), bound(query[`${p.key}_max`])];
+      const values = index.views.flatMap((view) => p.of(view) ?? []);
+      const show = (): void => chart.show(rangeNow());
+      const least = number(`${p.key}_min`, `${p.name}, at least`, p.step, show);
+      const most = number(`${p.key}_max`, `${p.name}, at most`, p.step, show);
+      const chart = brush(p.name, values, rangeNow(), ([min, max]) => {
+        for (const [input, end, value] of [
+          [least, "min", min],
+          [most, "max", max],
+        ] as const) {
+          input.value = value === null ? "" : String(value);
+          set(`${p.key}_${end}`)(input.value);
+        }
+      });
+      const fields = h("span", { class: "ends" }, least, "to", most);
+      append(ranges, [h("div", { class: "range" }, h("span", {}, p.name), chart.element, fields)]);
+    }
+    if (present.length > 0)
+      append(ranges, [
+        h(
+          "label",
+          {},
+          h("span", {}, "Class, at least %"),
+          number("share", "Share of the class, at least, %", 1),
+        ),
+      ]);
+    details.append(ranges);
+  };
   const open = Object.keys(query).some((key) => /_(min|max)$|^share$/.test(key));
-  return h("div", {}, bar, h("details", { open }, h("summary", {}, "Filter by numbers"), ranges));
+  const details = h("details", { open }, h("summary", {}, "Filter by numbers"));
+  // Histograms of many views take a moment, so they are made when somebody looks.
+  if (open) fill();
+  else details.addEventListener("toggle", fill, { once: true });
+  return h("div", {}, bar, details);
 }
 
-/** The text in place of a picture. */
-function placeholder(view: View): string {
-  if (view.frame !== null) return "missing";
+/** Why a view was dropped, in short; null if it was not. */
+function dropped(view: View): string | null {
+  if (view.frame !== null || view.photograph !== null) return null;
   return view.place?.reason === "lowest" ? "dropped: lowest entropy" : "dropped: not drawn";
 }
+
+/** What stands in the place of a picture: a dropped view is drawn from the panorama of its location. */
+function stand(index: Index, view: View, thumbs: IntersectionObserver): Element {
+  if (!canDraw(index, view)) return h("span", { class: "no-thumb" }, dropped(view) ?? "missing");
+  const canvas = h("canvas", { class: "drawn", width: WIDTH, height: WIDTH });
+  drawn.set(canvas, view);
+  thumbs.observe(canvas);
+  return canvas;
+}
+
+/** The views of canvases. */
+const drawn = new WeakMap<Element, View>();
 
 function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLElement {
   const name = nameOf(index, view);
@@ -270,6 +326,7 @@ function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLEleme
     strip.append(part);
   }
   const numbers = [
+    dropped(view),
     view.entropy !== null && `entropy ${view.entropy.toFixed(2)}`,
     view.fov_deg !== null && `${view.fov_deg.toFixed(0)}°`,
     view.seen?.unlabelled && view.seen.unlabelled >= 0.005
@@ -277,13 +334,17 @@ function card(index: Index, view: View, thumbs: IntersectionObserver): HTMLEleme
       : null,
   ].filter(Boolean);
   const body = [
-    view.picture === null ? h("span", { class: "no-thumb" }, placeholder(view)) : image,
+    view.picture === null ? stand(index, view, thumbs) : image,
     strip,
-    h("span", { class: "card-name" }, view.photograph ?? roomName(view.room)),
+    h(
+      "span",
+      { class: "card-name" },
+      view.photograph === null ? roomName(view.room) : named(view.photograph),
+    ),
     h("span", { class: "quiet" }, numbers.join(" · ")),
+    h("span", { class: "hidden" }, `${name}. ${reasonOf(view)}`),
   ];
-  const label = `${name}. ${reasonOf(view)}`;
-  const inner =
-    to === null ? h("div", {}, ...body) : h("a", { href: to, "aria-label": label, title: label }, ...body);
+  const title = `${name}. ${reasonOf(view)}`;
+  const inner = to === null ? h("div", {}, ...body) : h("a", { href: to, title }, ...body);
   return h("div", { class: "card", role: "listitem" }, inner);
 }

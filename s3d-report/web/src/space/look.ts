@@ -10,6 +10,8 @@ export type Mark = (typeof MARKS)[number];
 export interface Look {
   show: Show;
   marks: Set<Mark>;
+  /** The class that alone has its colours; null for all. */
+  only: number | null;
   /** The instances whose boxes are shown: a class, all, or none. */
   boxes: number | "all" | null;
   /** The height above which all is cut away; null means just below the ceilings. */
@@ -49,13 +51,16 @@ export function lookFrom(index: Index, mesh: Mesh, query: URLSearchParams, chang
   const there = marksOf(index, mesh);
   const named = query.get("marks")?.split(",") ?? ["rooms", "locations"];
   const boxes = query.get("boxes");
+  const isClass = (word: string | null): boolean =>
+    word !== null && /^\d+$/.test(word) && index.classes[Number(word)] !== undefined;
+  const only = query.get("only");
   const section = query.get("section");
   const height = section === null || section.trim() === "" ? Number.NaN : Number(section);
-  const of_class = boxes !== null && /^\d+$/.test(boxes) && index.classes[Number(boxes)] !== undefined;
   return {
     show: showsOf(mesh, changed).includes(show) ? show : "texture",
     marks: new Set(there.filter((mark) => named.includes(mark))),
-    boxes: boxes === "all" ? "all" : of_class ? Number(boxes) : null,
+    only: isClass(only) ? Number(only) : null,
+    boxes: boxes === "all" ? "all" : isClass(boxes) ? Number(boxes) : null,
     section: section === "none" ? Infinity : Number.isFinite(height) ? height : null,
     at: point(query.get("at")),
     from: point(query.get("from")),
@@ -73,6 +78,7 @@ export function queryOf(look: Look, { at, from }: Stand): Record<string, string>
     show: look.show,
     ...(section !== null && { section: Number.isFinite(section) ? section.toFixed(2) : "none" }),
     marks: [...look.marks].join(","),
+    ...(look.only !== null && { only: String(look.only) }),
     ...(look.boxes !== null && { boxes: String(look.boxes) }),
   };
 }

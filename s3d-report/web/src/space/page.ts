@@ -1,13 +1,15 @@
 // The page of a mesh in 3D: its controls, and the list of disputed patches.
 
 import type { Index, Mesh } from "../data.js";
-import { append, choice, count, h, several } from "../dom.js";
+import { append, choice, count, h, named, several } from "../dom.js";
 import type { Modality } from "../gl.js";
 import { legendOf } from "../readout.js";
 import { type Against, type Side, groupOf, loadAgainst, loadChanges, nameOf } from "../compare/data.js";
 import { type Page, type Route, link, replaceRoute } from "../route.js";
 import { type Look, type Mark, lookFrom, marksOf, queryOf, showsOf } from "./look.js";
 import type { Show } from "./paint.js";
+import { pictureTools } from "../tools.js";
+import { treePanel } from "./tree.js";
 import { SpaceView } from "./view.js";
 
 /** Browsers limit the changes of the address in a minute; this is the time between two, ms. */
@@ -90,7 +92,8 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
       legend.replaceChildren(...legendOf(index, LEGENDS[look.show], [0, 0]));
       window.clearTimeout(timer);
       timer = window.setTimeout(() => {
-        if (element.isConnected) replaceRoute("space", [mesh.area], queryOf(look, view.stand));
+        if (element.isConnected && !element.inert)
+          replaceRoute("space", [mesh.area], queryOf(look, view.stand));
       }, PAUSE);
     },
     progress: (words) => {
@@ -117,10 +120,14 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
   view.readout.append(h("span", { class: "quiet" }, hint));
   const frame = h("div", { class: "frame" }, view.canvas, view.overlay, status);
   const viewer = h("section", { class: "viewer space" }, bar, frame, view.readout, legend, simplified(mesh));
+  const { canvas } = view;
+  const draw = (): void => view.drawPlain();
+  frame.append(pictureTools({ element: viewer, canvas, dataSet: index.data_set.name, draw }));
   const element = h("main", { class: "look in-space" }, tools, faults, viewer);
   const fill = async (): Promise<void> => {
     await view.load();
     element.dataset["loaded"] = "mesh";
+    append(frame, [tree(index, view)]);
     append(tools, [boxChoice(index, view), patchList(index, view), against && changeList(against, view)]);
     await view.loadTextures();
     element.dataset["loaded"] = "all";
@@ -186,7 +193,7 @@ function measureButton(view: SpaceView): HTMLButtonElement {
 function boxChoice(index: Index, view: SpaceView): HTMLElement | null {
   const found = new Set(view.boxes.map(({ label }) => index.labels[label]?.class ?? null));
   const classes = index.classes
-    .map(({ name }, i): [string, string] => [String(i), `Boxes: ${name}`])
+    .map(({ name }, i): [string, string] => [String(i), `Boxes: ${named(name)}`])
     .filter(([i]) => found.has(Number(i)));
   if (classes.length === 0) return null;
   const entries: [string, string][] = [["", "No boxes"], ["all", "Boxes: all instances"], ...classes];
@@ -197,15 +204,34 @@ function boxChoice(index: Index, view: SpaceView): HTMLElement | null {
   });
 }
 
+/** The rooms and their instances, if the mesh has labels. */
+function tree(index: Index, view: SpaceView): HTMLElement | null {
+  const { look } = view;
+  return treePanel(index, view.mesh.has_votes ? view.boxes : [], {
+    only: look.only,
+    isolate: (of) => {
+      look.only = of;
+      view.refresh();
+    },
+    light: (label) => view.light(label),
+    visit: ({ box: [x0 = 0, y0 = 0, z0 = 0, x1 = 0, y1 = 0, z1 = 0] }) =>
+      view.visit(
+        [(x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2],
+        Math.hypot(x1 - x0, y1 - y0, z1 - z0) / 2,
+        true,
+      ),
+  });
+}
+
 /** The disputed patches with the largest surface; each is a link to its place. */
 function patchList(index: Index, view: SpaceView): HTMLElement | null {
   const patches = index.votes.find(({ area }) => area === view.mesh.area)?.votes.disputed_patches ?? [];
   if (patches.length === 0) return null;
   const entries = patches.map(({ labels, faces, m2 }, i): [string, string] => [
     String(i),
-    `${labels.join(" or ")} · ${several(faces, "face")} · ${m2.toFixed(4)} m²`,
+    `${labels.map(named).join(" or ")} · ${several(faces, "face")} · ${m2.toFixed(4)} m²`,
   ]);
-  const list = choice("Contested patches", [["", "Contested patches…"], ...entries], "", (value) => {
+  const list = choice("Disputed patches", [["", "Disputed patches…"], ...entries], "", (value) => {
     const patch = patches[Number(value)];
     if (value !== "" && patch) view.visit(patch.center, Math.sqrt(patch.m2), true);
   });

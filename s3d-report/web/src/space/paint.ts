@@ -15,6 +15,7 @@ import {
   Vector3,
 } from "three";
 import {
+  LIT,
   NULL_LABEL,
   OTHER_CLASS,
   OTHER_INSTANCE,
@@ -67,6 +68,7 @@ uniform vec3 plain;
 uniform bool textured, colored;
 uniform int show;
 uniform float section;
+uniform int lit, only;
 in vec2 at;
 in vec3 tinted;
 in float height;
@@ -77,6 +79,13 @@ out vec4 color;
 
 vec3 named(sampler2D table, uint index) {
   return texelFetch(table, ivec2(int(index % ${TABLE_WIDTH}u), int(index / ${TABLE_WIDTH}u)), 0).rgb;
+}
+
+// The number of a label's class, from 1; 0 without one.
+int class_of(uint label) {
+  ivec2 place = ivec2(int(label % ${TABLE_WIDTH}u), int(label / ${TABLE_WIDTH}u));
+  vec2 bytes = vec2(texelFetch(classes, place, 0).a, texelFetch(instances, place, 0).a) * 255.0;
+  return int(bytes.x + 256.0 * bytes.y + 0.5);
 }
 
 void main() {
@@ -97,6 +106,8 @@ void main() {
     if (differs > 0.5) color.rgb = other * light;
     else color.rgb = mix(vec3(dot(seen, vec3(0.2126, 0.7152, 0.0722))), vec3(0.55), 0.45);
   } else color.rgb = label == 0u ? vec3(1.0, 0.0, 1.0) : vec3(0.82 * light);
+  if (only > 0 && class_of(label) != only) color.rgb = vec3(0.78 * light);
+  if (lit > 0 && int(label) == lit) color.rgb = mix(color.rgb, ${shader(LIT)}, 0.5);
   color.a = 1.0;
 }`;
 
@@ -111,6 +122,8 @@ function table(pixels: Uint8Array, width: number, rows: number): DataTexture {
 export class Paint {
   private readonly show = { value: 0 };
   private readonly section = { value: 0 };
+  private readonly lit = { value: 0 };
+  private readonly only = { value: 0 };
   private readonly tables: Record<string, { value: Texture }>;
   private readonly blank = table(new Uint8Array([255, 255, 255, 255]), 1, 1);
   private readonly images = new Map<number, Texture>();
@@ -134,6 +147,12 @@ export class Paint {
     this.section.value = section;
   }
 
+  /** Lights up the faces of a label, and shows the other classes than one in grey. */
+  mark(lit: number | null, only: number | null): void {
+    this.lit.value = lit ?? 0;
+    this.only.value = only === null ? 0 : only + 1;
+  }
+
   /** The material for the faces of a part that have the material at this index. */
   of(part: Part, place: number): RawShaderMaterial {
     const { color, texture } = this.mesh.materials[place] ?? { color: NULL_LABEL, texture: null };
@@ -147,6 +166,8 @@ export class Paint {
         ...this.tables,
         show: this.show,
         section: this.section,
+        lit: this.lit,
+        only: this.only,
         image: { value: image ?? this.blank },
         textured: { value: image !== undefined },
         colored: { value: part.color !== null },

@@ -60,6 +60,7 @@ export class SpaceView {
   private loaded = false;
   private pending = false;
   private closed = false;
+  private lit: number | null = null;
 
   constructor(
     private readonly index: Index,
@@ -144,6 +145,19 @@ export class SpaceView {
   refresh(lines = false): void {
     if (lines) this.fillLines();
     this.changed();
+  }
+
+  /** Lights up the faces of an instance; none with null. */
+  light(label: number | null): void {
+    if (label === this.lit) return;
+    this.lit = label;
+    this.draw();
+  }
+
+  /** Draws what the picture of the canvas is to show. */
+  drawPlain(): void {
+    this.lit = null;
+    this.paintNow();
   }
 
   /** Starts or ends measuring. */
@@ -268,6 +282,7 @@ export class SpaceView {
     canvas.addEventListener("keydown", (event) => {
       if (event.key === "Enter") this.click(this.readAt(0.5, 0.5));
     });
+    for (const event of ["pointerleave", "blur"]) canvas.addEventListener(event, () => this.light(null));
     canvas.addEventListener("keyup", () => this.readAt(0.5, 0.5));
     canvas.addEventListener("focus", () => {
       if (canvas.matches(":focus-visible")) this.readAt(0.5, 0.5);
@@ -294,8 +309,10 @@ export class SpaceView {
       this.look.section ?? Infinity,
     );
     this.readout.replaceChildren();
+    const label = hit && (this.votes?.label[hit.face] ?? null);
+    // Where changes are shown, their colours count.
+    this.light(this.look.show === "changed" ? null : label || null);
     if (!hit) return null;
-    const label = this.votes?.label[hit.face] ?? null;
     const spot = { label, face: hit.face, distance: hit.distance, point: hit.point };
     const told = tell(this.index, spot, { room: "", hasDepth: true }, this.votes);
     const labels = this.changes?.labelsOf(hit.face);
@@ -350,6 +367,7 @@ export class SpaceView {
     if (this.closed || !this.loaded) return;
     const { show, section } = this.look;
     this.paint.set(show, section ?? Infinity);
+    this.paint.mark(this.lit, this.look.only);
     this.cut.constant = Math.min(SKY, section ?? SKY);
     this.surface.useMaterials(show === "texture" || show === "margin" || show === "changed");
     this.renderer.render(this.scene, this.eye.camera);

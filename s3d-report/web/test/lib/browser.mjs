@@ -27,6 +27,9 @@ const DRAWN = { "webgl.force-enabled": true };
 /** The installed Firefox, by WebDriver BiDi, or else Chromium. Firefox has WebGL only with a display. */
 export const isFirefox = process.env["S3D_BROWSER"] === "firefox";
 
+/** Why the 3D view is not tested, if it is not: Firefox without a graphics card stops in it now and then. */
+export const no3d = isFirefox && !process.env["S3D_FIREFOX_3D"] && "S3D_FIREFOX_3D is not set";
+
 export function launch() {
   const [name, named, places] = isFirefox
     ? ["Firefox", process.env["S3D_FIREFOX"], FIREFOX]

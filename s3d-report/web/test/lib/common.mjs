@@ -6,17 +6,28 @@ import { cpSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync }
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { readout } from "./browser.mjs";
+import { bundled } from "./bundled.mjs";
 import { readPng, readXyz } from "./images.mjs";
 
 export const report = process.env["S3D_REPORT"];
 export const dataset = process.env["S3D_DATASET"];
 export const bare = process.env["S3D_BARE_REPORT"];
 export const json = (path, folder = dataset) => JSON.parse(readFileSync(join(folder, path), "utf8"));
+const { paletteOf } = await bundled("palette.ts");
 export const index = readIndex(report);
 
 function readIndex(folder) {
   const script = readFileSync(join(folder, "data/index.js"), "utf8");
-  return JSON.parse(JSON.parse(script.slice('s3dReport("index",'.length, script.lastIndexOf(");"))));
+  return coloured(
+    JSON.parse(JSON.parse(script.slice('s3dReport("index",'.length, script.lastIndexOf(");")))),
+  );
+}
+
+/** An index with the page's own colours of classes. */
+export function coloured(read) {
+  const colors = paletteOf(read.classes.map(({ name }) => name));
+  read.classes.forEach((each, i) => (each.color = colors[i]));
+  return read;
 }
 
 /** A data set's own images of a panorama or view. */
@@ -58,7 +69,7 @@ export function hold(told, own, [i, j], [width, height]) {
   const name = own.label(x, y);
   const where = `pixel ${i},${j}, of the data set ${x},${y}`;
   assert.equal(told.pixel, `${i},${j}`, where);
-  assert.equal(told.class, name.startsWith("<UNK>") ? "no label" : name.split("_")[0], where);
+  assert.equal(told.class, name.startsWith("<UNK>") ? "unlabelled" : name.split("_")[0], where);
   if (!name.startsWith("<UNK>")) assert.equal(told.instance, name, where);
   const xyz = told["X Y Z"].trim().split(/\s+/).map(Number);
   const ours = own.xyz.at(x, y);

@@ -1,0 +1,90 @@
+// A drawing of the page as a file: SVG with the colours that it has now, and PNG.
+
+import { h } from "../dom.js";
+import { fileName, save } from "../tools.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+/** The width of the PNG file, pixels, and of the margin in both, as a share of the width. */
+const WIDTH = 2000;
+const MARGIN = 0.02;
+
+/** What a shape looks like is told by these, and its geometry by the others. */
+const LOOKS = [
+  "fill",
+  "fill-opacity",
+  "fill-rule",
+  "stroke",
+  "stroke-width",
+  "stroke-opacity",
+  "stroke-linejoin",
+  "opacity",
+  "font-size",
+  "font-family",
+  "text-anchor",
+  "paint-order",
+];
+const GEOMETRY = ["d", "x", "y", "dx", "dy", "cx", "cy", "r", "width", "height"];
+
+/** A copy that needs no style sheet. Links become groups. */
+function plain(element: Element): Element {
+  const isLink = element.tagName === "a";
+  const copy = document.createElementNS(SVG, isLink ? "g" : element.tagName);
+  for (const name of GEOMETRY) {
+    const value = element.getAttribute(name);
+    if (value !== null) copy.setAttribute(name, value);
+  }
+  if (!isLink && element.tagName !== "title") {
+    const style = getComputedStyle(element);
+    for (const name of LOOKS) copy.setAttribute(name, style.getPropertyValue(name));
+  }
+  for (const child of element.childNodes)
+    if (child instanceof Element) copy.append(plain(child));
+    else if (child.nodeType === Node.TEXT_NODE) copy.append(child.textContent ?? "");
+  return copy;
+}
+
+/** The text of a drawing that stands on the page, and its shape: height by width. */
+export function svgOf(drawing: SVGSVGElement): { text: string; shape: number } {
+  const { x, y, width, height } = drawing.viewBox.baseVal;
+  const margin = MARGIN * width;
+  const [w, h_] = [width + 2 * margin, height + 2 * margin];
+  const root = document.createElementNS(SVG, "svg");
+  const box = [x - margin, y - margin, w, h_];
+  root.setAttribute("viewBox", box.join(" "));
+  root.setAttribute("width", String(WIDTH));
+  root.setAttribute("height", String(Math.round((WIDTH * h_) / w)));
+  const paper = document.createElementNS(SVG, "rect");
+  ["x", "y", "width", "height"].forEach((name, i) => paper.setAttribute(name, String(box[i])));
+  paper.setAttribute("fill", getComputedStyle(drawing.parentElement ?? drawing).backgroundColor);
+  root.append(paper, ...[...drawing.children].map(plain));
+  return { text: new XMLSerializer().serializeToString(root), shape: h_ / w };
+}
+
+async function png(drawing: SVGSVGElement): Promise<Blob | null> {
+  const { text, shape } = svgOf(drawing);
+  const image = new Image();
+  image.src = `data:image/svg+xml,${encodeURIComponent(text)}`;
+  await image.decode();
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [WIDTH, Math.round(WIDTH * shape)];
+  canvas.getContext("2d")?.drawImage(image, 0, 0, canvas.width, canvas.height);
+  return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
+}
+
+/** Buttons that save a drawing. */
+export function saves(drawing: SVGSVGElement, dataSet: string, name: string): HTMLElement {
+  const button = (words: string, act: () => Promise<void> | void): HTMLElement =>
+    h("button", { type: "button", "aria-label": `${words} of ${name}`, click: act }, words);
+  return h(
+    "div",
+    { class: "saves" },
+    button("Save SVG", () => {
+      const { text } = svgOf(drawing);
+      save(fileName(dataSet, name, "svg"), new Blob([text], { type: "image/svg+xml" }));
+    }),
+    button("Save PNG", async () => {
+      const file = await png(drawing);
+      if (file) save(fileName(dataSet, name, "png"), file);
+    }),
+  );
+}
