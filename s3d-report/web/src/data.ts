@@ -51,6 +51,8 @@ export interface Room {
   area: number;
   name: string;
   floor_m2: number;
+  /** The height of its floor; missing in older reports. */
+  floor?: number | null;
   heights: [number, number] | null;
   outline: [number, number][][];
 }
@@ -110,7 +112,7 @@ export interface Votes {
   rooms: VotesOf[];
   classes: VotesOf[];
   disputing_classes: { classes: [string, string]; faces: number; m2: number }[];
-  disputed_patches: { labels: [string, string]; faces: number; m2: number; center: Rgb }[];
+  disputed_patches: { labels: [string, string]; faces: number; m2: number; center: Rgb; bbox?: number[] }[];
 }
 
 export interface VoteSpread {

@@ -104,7 +104,7 @@ export async function panoPage(
     fov: numberOf(route.query, "fov", 8, 120, 90) * RADIANS,
   };
   const storeys = storeysOf(index, location.area);
-  const storey = location.position && storeys.ofHeight(location.position[2]);
+  const storey = location.position && storeys.of(location.position[2], location.room);
   const map =
     storey === null
       ? null
@@ -112,7 +112,7 @@ export async function panoPage(
           small: true,
           current: at,
           hasRoom: (room) => storeys.ofRoom(room) === storey,
-          hasHeight: (z) => storeys.ofHeight(z) === storey,
+          hasHeight: (z, room) => storeys.of(z, room) === storey,
         });
   const marks: { button: HTMLElement; lon: number; lat: number }[] = [];
   const look = lookFrom(route.query, modalitiesOf(index, location.area, picture), gaze);

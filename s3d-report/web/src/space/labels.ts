@@ -7,7 +7,7 @@ import { link } from "../route.js";
 import type { Eye } from "./eye.js";
 import type { Box } from "./files.js";
 import { floorOf, middleOf } from "./lines.js";
-import type { Look } from "./look.js";
+import { type Look, slabIn } from "./look.js";
 import type { Surface } from "./surface.js";
 
 /** The largest number of locations that are marked at once: those nearest to the point of interest. */
@@ -57,17 +57,17 @@ export class Labels {
 
   /** Moves all labels to their places on a canvas of this size. Labels above the section are hidden. */
   place(eye: Eye, surface: Surface, look: Look, width: number, height: number): void {
-    const section = look.section ?? Infinity;
+    const slab = slabIn(look);
     const { at: target, from } = eye.stand;
     const hidden = (at: Rgb): boolean => {
       const camera = eye.camera.position;
-      const hit = surface.pick(camera, new Vector3(...at).sub(camera).normalize(), section);
+      const hit = surface.pick(camera, new Vector3(...at).sub(camera).normalize(), slab);
       return hit !== null && hit.distance < away(at, from) - SLACK;
     };
     const put = ({ element, at }: Label, wanted: boolean, hides: boolean): void => {
       const [x, y, w] = eye.screen(at, width, height);
       const inside = w > 0 && x > 0 && x < width * w && y > 0 && y < height * w;
-      const shown = wanted && inside && at[2] < section && !(hides && hidden(at));
+      const shown = wanted && inside && at[2] < slab.high && at[2] >= slab.low && !(hides && hidden(at));
       element.hidden = !shown;
       if (shown) element.style.transform = `translate(${x / w}px, ${y / w}px)`;
     };
@@ -78,7 +78,7 @@ export class Labels {
     }
     for (const label of near) put(label, look.marks.has("locations"), true);
     // Seen from inside, names of other rooms would appear in the walls.
-    const above = from[2] > Math.min(section, this.mesh.max[2]);
+    const above = from[2] > Math.min(slab.high, this.mesh.max[2]);
     for (const label of this.rooms) put(label, look.marks.has("rooms") && above, false);
   }
 }

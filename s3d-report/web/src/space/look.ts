@@ -1,6 +1,7 @@
 // How a mesh is shown, as kept in the address.
 
 import type { Index, Mesh, Rgb } from "../data.js";
+import type { Slab } from "../storeys.js";
 import { SHOWS, type Show } from "./paint.js";
 import type { Stand } from "./eye.js";
 
@@ -14,6 +15,8 @@ export interface Look {
   boxes: number | "all" | null;
   /** The height above which all is cut away; null means just below the ceilings. */
   section: number | null;
+  /** The height below which all is cut away. */
+  base: number;
   at: Rgb | null;
   from: Rgb | null;
   /** Whether the address names a point to mark. */
@@ -44,19 +47,28 @@ function point(text: string | null): Rgb | null {
   return numbers.length === 3 && numbers.every((c) => Math.abs(c) < 1e7) ? (numbers as Rgb) : null;
 }
 
+function numberIn(query: URLSearchParams, name: string): number | null {
+  const text = query.get(name) ?? "";
+  const value = text.trim() === "" ? Number.NaN : Number(text);
+  return Number.isFinite(value) ? value : null;
+}
+
+/** The part of the area that is drawn. */
+export const slabIn = ({ section, base }: Look): Slab => ({ low: base, high: section ?? Infinity });
+
 export function lookFrom(index: Index, mesh: Mesh, query: URLSearchParams, changed: boolean): Look {
   const show = query.get("show") as Show;
   const there = marksOf(index, mesh);
   const named = query.get("marks")?.split(",") ?? ["rooms", "locations"];
   const boxes = query.get("boxes");
   const section = query.get("section");
-  const height = section === null || section.trim() === "" ? Number.NaN : Number(section);
   const of_class = boxes !== null && /^\d+$/.test(boxes) && index.classes[Number(boxes)] !== undefined;
   return {
     show: showsOf(mesh, changed).includes(show) ? show : "texture",
     marks: new Set(there.filter((mark) => named.includes(mark))),
     boxes: boxes === "all" ? "all" : of_class ? Number(boxes) : null,
-    section: section === "none" ? Infinity : Number.isFinite(height) ? height : null,
+    section: section === "none" ? Infinity : numberIn(query, "section"),
+    base: numberIn(query, "base") ?? -Infinity,
     at: point(query.get("at")),
     from: point(query.get("from")),
     place: !query.has("show") || !query.has("marks"),
@@ -66,12 +78,13 @@ export function lookFrom(index: Index, mesh: Mesh, query: URLSearchParams, chang
 
 export function queryOf(look: Look, { at, from }: Stand): Record<string, string> {
   const words = (place: Rgb): string => place.map((c) => c.toFixed(3)).join(",");
-  const { section } = look;
+  const { section, base } = look;
   return {
     at: words(at),
     from: words(from),
     show: look.show,
     ...(section !== null && { section: Number.isFinite(section) ? section.toFixed(2) : "none" }),
+    ...(Number.isFinite(base) && { base: base.toFixed(2) }),
     marks: [...look.marks].join(","),
     ...(look.boxes !== null && { boxes: String(look.boxes) }),
   };

@@ -24,6 +24,7 @@ import {
   shader,
 } from "../colors.js";
 import type { Index, Mesh } from "../data.js";
+import type { Slab } from "../storeys.js";
 import type { Part } from "./files.js";
 
 export const SHOWS = ["texture", "class", "instance", "margin", "unlabelled", "changed"] as const;
@@ -66,7 +67,7 @@ uniform sampler2D image, classes, instances, ramp;
 uniform vec3 plain;
 uniform bool textured, colored;
 uniform int show;
-uniform float section;
+uniform float section, base;
 in vec2 at;
 in vec3 tinted;
 in float height;
@@ -81,7 +82,7 @@ vec3 named(sampler2D table, uint index) {
 
 void main() {
   vec3 image_color = texture(image, at).rgb;
-  if (height > section) discard;
+  if (height > section || height < base) discard;
   vec3 seen = textured ? image_color : (colored ? tinted : plain) * light;
   uint label = of & 0xffffffu, margin = of >> 24;
   vec3 none = ${shader(NULL_LABEL)};
@@ -111,6 +112,7 @@ function table(pixels: Uint8Array, width: number, rows: number): DataTexture {
 export class Paint {
   private readonly show = { value: 0 };
   private readonly section = { value: 0 };
+  private readonly base = { value: 0 };
   private readonly tables: Record<string, { value: Texture }>;
   private readonly blank = table(new Uint8Array([255, 255, 255, 255]), 1, 1);
   private readonly images = new Map<number, Texture>();
@@ -129,9 +131,10 @@ export class Paint {
     };
   }
 
-  set(show: Show, section: number): void {
+  set(show: Show, { low, high }: Slab): void {
     this.show.value = SHOWS.indexOf(show);
-    this.section.value = section;
+    this.section.value = high;
+    this.base.value = low;
   }
 
   /** The material for the faces of a part that have the material at this index. */
@@ -147,6 +150,7 @@ export class Paint {
         ...this.tables,
         show: this.show,
         section: this.section,
+        base: this.base,
         image: { value: image ?? this.blank },
         textured: { value: image !== undefined },
         colored: { value: part.color !== null },

@@ -3,6 +3,7 @@
 import {
   BufferAttribute,
   BufferGeometry,
+  DoubleSide,
   FrontSide,
   Group,
   type Material,
@@ -15,6 +16,8 @@ import { MeshBVH } from "three-mesh-bvh";
 import type { Rgb } from "../data.js";
 import type { FaceChanges } from "../compare/data.js";
 import { type FaceVotes, NO_VOTES } from "../faces.js";
+import type { Slab } from "../storeys.js";
+import { type Level, belowCeilings, levelOf } from "./ceilings.js";
 import type { Part } from "./files.js";
 import type { Paint } from "./paint.js";
 
@@ -29,26 +32,32 @@ export interface Hit {
 const SHADE = 0.66;
 const LAMP = new Vector3(0.35, -0.45, 0.82).normalize();
 
-/**
- * The distance of the section below the ceilings, and the least height of a ceiling above its floor,
- * metres.
- */
-const BELOW_CEILING = 0.1;
-const ROOM = 1.9;
-
 /** The number of vertices in a sample. */
 const SAMPLE = 4000;
 
-/** A height and the surface at it, m². */
-type Level = [z: number, m2: number];
+/** A line to a point ends this much before it, metres. */
+const SHORT = 0.02;
 
-/** The height below which lies this share of the surface. */
-function levelOf(levels: Level[], share: number): number | null {
-  const sorted = [...levels].sort((a, b) => a[0] - b[0]);
-  const all = sorted.reduce((sum, [, m2]) => sum + m2, 0);
-  let below = 0;
-  return sorted.find(([, m2]) => (below += m2) >= share * all)?.[0] ?? null;
+/** The edges of some faces: two ends for each edge that only one of them has. */
+export interface Border {
+  points: number[];
+  m2: number;
 }
+
+/** A border is drawn this far off its faces; and the reach of a search for a face, metres. */
+const RAISED = 0.008;
+const NEARBY = 0.2;
+
+const cornersOf = (vertices: Float32Array, index: Uint32Array, face: number): [Vector3, Vector3, Vector3] =>
+  [0, 1, 2].map((k) => new Vector3().fromArray(vertices, 3 * (index[3 * face + k] ?? 0))) as [
+    Vector3,
+    Vector3,
+    Vector3,
+  ];
+
+/** A name for an edge; vertices of two parts are one if they are at the same place. */
+const key = (a: Vector3, b: Vector3): string =>
+  [a, b].map((end) => [end.x, end.y, end.z].map((c) => Math.round(1e3 * c)).join()).join(" ");
 
 export class Surface {
   readonly group = new Group();
@@ -147,24 +156,25 @@ export class Surface {
     return (1 + SHADE) / 2 + ((1 - SHADE) / 2) * normal.dot(LAMP);
   }
 
-  /** A height just below the ceilings; null without any. */
-  ceiling(): number | null {
-    const floor = levelOf(this.up, 0.02);
-    if (floor === null) return null;
-    const ceilings = this.down.filter(([z]) => z > floor + ROOM);
-    const lowest = levelOf(ceilings, 0.1);
-    return lowest === null ? null : lowest - BELOW_CEILING;
+  /** The height of the lowest floor; null without any. */
+  floor(): number | null {
+    return levelOf(this.up, 0.02);
   }
 
-  /** A sample of the vertices below the section. */
-  sample(section: number): Rgb[] {
+  /** A height just below the ceilings that are over a floor, and not over the next; null without any. */
+  ceiling(floor: number, above: number): number | null {
+    return belowCeilings(this.down, floor, above);
+  }
+
+  /** A sample of the vertices in a slab. */
+  sample({ low, high }: Slab): Rgb[] {
     const points: Rgb[] = [];
     const all = this.parts.reduce((sum, { vertices }) => sum + vertices.length / 3, 0);
     const step = Math.max(1, Math.floor(all / SAMPLE));
     for (const { vertices } of this.parts)
       for (let i = 0; i < vertices.length; i += 3 * step) {
         const [x = 0, y = 0, z = 0] = vertices.subarray(i, i + 3);
-        if (z <= section) points.push([x, y, z]);
+        if (z >= low && z <= high) points.push([x, y, z]);
       }
     return points;
   }
@@ -172,16 +182,10 @@ export class Surface {
   /** The point on some faces that is nearest to their middle, and their surface; null if none is shown. */
   placeOf(faces: Set<number>): { at: Rgb; m2: number } | null {
     const found: { at: Vector3; m2: number }[] = [];
-    const corner = (vertices: Float32Array, vertex: number): Vector3 =>
-      new Vector3().fromArray(vertices, 3 * vertex);
     for (const { vertices, index, face } of this.parts)
       face.forEach((number, f) => {
         if (!faces.has(number)) return;
-        const [a, b, c] = [0, 1, 2].map((k) => corner(vertices, index[3 * f + k] ?? 0)) as [
-          Vector3,
-          Vector3,
-          Vector3,
-        ];
+        const [a, b, c] = cornersOf(vertices, index, f);
         const m2 = b.clone().sub(a).cross(c.clone().sub(a)).length() / 2;
         found.push({ at: a.add(b).add(c).divideScalar(3), m2 });
       });
@@ -194,15 +198,14 @@ export class Surface {
     return { at: [x, y, z], m2 };
   }
 
-  /** The first front of a face that a ray hits, below the section. */
-  pick(origin: Vector3, direction: Vector3, section: number): Hit | null {
-    // The part of the ray below the section.
-    let [near, far] = [0, Infinity];
-    const meets = (section - origin.z) / direction.z;
-    if (origin.z > section) {
-      if (direction.z >= 0) return null;
-      near = meets;
-    } else if (direction.z > 0) far = meets;
+  /** The first front of a face that a ray hits in a slab. */
+  pick(origin: Vector3, direction: Vector3, { low, high }: Slab): Hit | null {
+    // The part of the ray in the slab.
+    const ends = [(low - origin.z) / direction.z, (high - origin.z) / direction.z].sort((a, b) => a - b);
+    const isLevel = direction.z === 0;
+    if (isLevel && (origin.z < low || origin.z > high)) return null;
+    const [near, far] = isLevel ? [0, Infinity] : [Math.max(0, ends[0] ?? 0), ends[1] ?? Infinity];
+    if (far < near) return null;
     this.ray.set(origin, direction);
     let best: Hit | null = null;
     for (const { bvh, face } of this.parts) {
@@ -212,6 +215,56 @@ export class Surface {
       best = { face: face[hit.faceIndex ?? 0] ?? 0, point: [x, y, z], distance: hit.distance };
     }
     return best;
+  }
+
+  /** Whether no face, front or back, lies between two points. */
+  isFree(from: Rgb, to: Rgb): boolean {
+    const way = new Vector3(...to).sub(new Vector3(...from));
+    const far = way.length() - SHORT;
+    this.ray.set(new Vector3(...from), way.normalize());
+    return this.parts.every(({ bvh }) => far <= SHORT || !bvh.raycastFirst(this.ray, DoubleSide, SHORT, far));
+  }
+
+  /** The direction that the face next to a point looks in; null if there is no face nearby. */
+  normalAt(point: Rgb): Vector3 | null {
+    let best: { distance: number; normal: Vector3 } | null = null;
+    for (const { bvh, vertices, index } of this.parts) {
+      const near = bvh.closestPointToPoint(new Vector3(...point), undefined, 0, best?.distance ?? NEARBY);
+      if (!near || near.distance >= (best?.distance ?? NEARBY)) continue;
+      const [a, b, c] = cornersOf(vertices, index, near.faceIndex);
+      const normal = b.sub(a).cross(c.sub(a));
+      if (normal.length() > 0) best = { distance: near.distance, normal: normal.normalize() };
+    }
+    return best?.normal ?? null;
+  }
+
+  /** The border of the faces in a box (lowest and highest x, y, z) that are wanted, raised off them. */
+  border(box: number[], wanted: (face: number) => boolean): Border {
+    const edges = new Map<string, number[]>();
+    const within = ({ x, y, z }: Vector3): boolean =>
+      [x, y, z].every((c, k) => c >= (box[k] ?? 0) - RAISED && c <= (box[k + 3] ?? 0) + RAISED);
+    let m2 = 0;
+    for (const { vertices, index, face } of this.parts)
+      face.forEach((number, f) => {
+        if (!wanted(number)) return;
+        const corners = cornersOf(vertices, index, f);
+        if (!corners.every(within)) return;
+        const [a, b, c] = corners;
+        const normal = b.clone().sub(a).cross(c.clone().sub(a));
+        m2 += normal.length() / 2;
+        normal.setLength(RAISED);
+        corners.forEach((corner, k) => {
+          const next = corners[(k + 1) % 3] ?? corner;
+          const [there, back] = [key(corner, next), key(next, corner)];
+          if (edges.has(back)) edges.delete(back);
+          else
+            edges.set(
+              there,
+              [corner, next].flatMap((end) => end.clone().add(normal).toArray()),
+            );
+        });
+      });
+    return { points: [...edges.values()].flat(), m2 };
   }
 
   close(): void {
