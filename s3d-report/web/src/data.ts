@@ -7,6 +7,8 @@ export interface Seen {
   coverage: number | null;
   unlabelled: number | null;
   instances: number | null;
+  /** The median depth around the horizon, metres; missing in older reports. */
+  depth_m?: number | null;
   /** Indices of classes, and their shares of the pixels. */
   classes: [number, number][];
 }

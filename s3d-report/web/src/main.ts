@@ -3,6 +3,8 @@
 import { comparePage } from "./compare/page.js";
 import { FORM, type Index, load } from "./data.js";
 import { append, h } from "./dom.js";
+import { findField } from "./overview/find.js";
+import { overviewPage } from "./overview/page.js";
 import { faultCount, notesPage } from "./pages/notes.js";
 import { numbersPage } from "./pages/numbers.js";
 import { panoPage } from "./pages/pano.js";
@@ -17,6 +19,7 @@ const still = (element: HTMLElement): Page => ({ element, close: () => {} });
 
 function tabs(index: Index): [string, string][] {
   const all: [string, string, boolean][] = [
+    ["overview", "Overview", index.meshes.length > 0],
     ["pano", "Panoramas", index.locations.some((l) => l.pano)],
     ["space", "3D", index.meshes.length > 0],
     ["views", "Views", index.views.length > 0],
@@ -36,6 +39,8 @@ function tabs(index: Index): [string, string][] {
 async function open(index: Index): Promise<Page> {
   const route = parseRoute(window.location.hash);
   switch (route.page || tabs(index)[0]?.[0]) {
+    case "overview":
+      return overviewPage(index, route);
     case "pano":
       return panoPage(index, route);
     case "space":
@@ -83,7 +88,7 @@ async function start(): Promise<void> {
       h("span", { class: "badge", "aria-label": `${faults} files are missing or damaged` }, faults);
     nav.append(h("a", { href: link(page), "data-page": page }, name, badge || ""));
   }
-  header.append(nav);
+  header.append(nav, findField(index));
   const place = h("div", { id: "place" });
   document.body.replaceChildren(header, place);
   let now: Page | null = null;

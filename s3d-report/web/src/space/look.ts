@@ -10,6 +10,11 @@ export type Mark = (typeof MARKS)[number];
 
 export interface Look {
   show: Show;
+  /** What is shown right of a line at this share of the width; null without a line. */
+  beyond: Show | null;
+  line: number;
+  /** The class that keeps its colours; null means all do. */
+  only: number | null;
   marks: Set<Mark>;
   /** The instances whose boxes are shown: a class, all, or none. */
   boxes: number | "all" | null;
@@ -21,13 +26,17 @@ export interface Look {
   from: Rgb | null;
   /** Whether the address names a point to mark. */
   place: boolean;
+  /** The name of an instance to find. */
+  instance: string | null;
   /** The class or instance in A and in B of changed faces to find; null if there is nothing to find. */
   find: { was: string | null; is: string | null } | null;
 }
 
 /** The colours in which the faces of a mesh can be shown. */
 export const showsOf = (mesh: Mesh, changed: boolean): Show[] =>
-  SHOWS.filter((show) => (show === "changed" ? changed : show === "texture" || mesh.has_votes));
+  SHOWS.filter((show) =>
+    show === "changed" ? changed : show === "texture" || show === "normal" || mesh.has_votes,
+  );
 
 /** The lines that can be drawn in a mesh. */
 export function marksOf(index: Index, mesh: Mesh): Mark[] {
@@ -65,6 +74,9 @@ export function lookFrom(index: Index, mesh: Mesh, query: URLSearchParams, chang
   const of_class = boxes !== null && /^\d+$/.test(boxes) && index.classes[Number(boxes)] !== undefined;
   return {
     show: showsOf(mesh, changed).includes(show) ? show : "texture",
+    beyond: null,
+    line: 0.5,
+    only: null,
     marks: new Set(there.filter((mark) => named.includes(mark))),
     boxes: boxes === "all" ? "all" : of_class ? Number(boxes) : null,
     section: section === "none" ? Infinity : numberIn(query, "section"),
@@ -72,6 +84,7 @@ export function lookFrom(index: Index, mesh: Mesh, query: URLSearchParams, chang
     at: point(query.get("at")),
     from: point(query.get("from")),
     place: !query.has("show") || !query.has("marks"),
+    instance: query.get("instance"),
     find: query.has("was") || query.has("is") ? { was: query.get("was"), is: query.get("is") } : null,
   };
 }

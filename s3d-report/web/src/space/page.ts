@@ -21,6 +21,7 @@ const SHOW_NAMES: Record<Show, string> = {
   margin: "Vote margin",
   unlabelled: "Unlabelled",
   changed: "Changed",
+  normal: "Normals",
 };
 
 const LEGENDS: Record<Show, Modality[]> = {
@@ -30,6 +31,7 @@ const LEGENDS: Record<Show, Modality[]> = {
   margin: ["contested"],
   unlabelled: ["unlabelled"],
   changed: ["changed"],
+  normal: [],
 };
 
 const MARK_NAMES: Record<Mark, string> = {

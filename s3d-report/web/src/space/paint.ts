@@ -26,8 +26,9 @@ import {
 import type { Index, Mesh } from "../data.js";
 import type { Slab } from "../storeys.js";
 import type { Part } from "./files.js";
+import type { Look } from "./look.js";
 
-export const SHOWS = ["texture", "class", "instance", "margin", "unlabelled", "changed"] as const;
+export const SHOWS = ["texture", "class", "instance", "margin", "unlabelled", "changed", "normal"] as const;
 export type Show = (typeof SHOWS)[number];
 
 // The fourth number of a position is the light of its face; `told` has 24 bits of its label, 8 of its margin;
@@ -44,13 +45,13 @@ uniform mat4 modelMatrix, modelViewMatrix, projectionMatrix;
 uniform vec2 uvOrigin, uvStep;
 out vec2 at;
 out vec3 tinted;
-out float height;
+out vec3 world;
 flat out float light;
 flat out float differs;
 flat out uint of;
 void main() {
   vec4 place = vec4(position.xyz, 1.0);
-  height = (modelMatrix * place).z;
+  world = (modelMatrix * place).xyz;
   light = position.w / 65535.0;
   at = uvOrigin + uvStep * uv;
   tinted = tint;
@@ -66,38 +67,47 @@ precision highp usampler2D;
 uniform sampler2D image, classes, instances, ramp;
 uniform vec3 plain;
 uniform bool textured, colored;
-uniform int show;
-uniform float section, base;
+// What is shown left of a line and on it, and right of it, and the class that is not grey, or -1.
+uniform int show, beyond, only;
+uniform float line, section, base;
 in vec2 at;
 in vec3 tinted;
-in float height;
+in vec3 world;
 flat in float light;
 flat in float differs;
 flat in uint of;
 out vec4 color;
 
-vec3 named(sampler2D table, uint index) {
-  return texelFetch(table, ivec2(int(index % ${TABLE_WIDTH}u), int(index / ${TABLE_WIDTH}u)), 0).rgb;
+vec4 named(sampler2D table, uint index) {
+  return texelFetch(table, ivec2(int(index % ${TABLE_WIDTH}u), int(index / ${TABLE_WIDTH}u)), 0);
 }
 
 void main() {
   vec3 image_color = texture(image, at).rgb;
-  if (height > section || height < base) discard;
+  vec3 normal = normalize(cross(dFdx(world), dFdy(world)));
+  if (world.z > section || world.z < base) discard;
+  int shown = gl_FragCoord.x < line ? show : beyond;
   vec3 seen = textured ? image_color : (colored ? tinted : plain) * light;
   uint label = of & 0xffffffu, margin = of >> 24;
   vec3 none = ${shader(NULL_LABEL)};
-  if (show == 0) color.rgb = seen;
-  else if (show == 1) color.rgb = named(classes, label) * light;
-  else if (show == 2) color.rgb = named(instances, label) * light;
-  else if (show == 3) {
+  if (shown == 0) color.rgb = seen;
+  else if (shown == 1) color.rgb = named(classes, label).rgb * light;
+  else if (shown == 2) color.rgb = named(instances, label).rgb * light;
+  else if (shown == 6) color.rgb = 0.5 + 0.5 * normal;
+  else if (shown == 3) {
     vec3 led = texelFetch(ramp, ivec2(int(margin), 0), 0).rgb;
     // A little of the colours, so that shapes can be made out.
     color.rgb = mix(margin == 255u ? none : led, vec3(dot(seen, vec3(0.2126, 0.7152, 0.0722))), 0.25);
-  } else if (show == 5) {
+  } else if (shown == 5) {
     vec3 other = differs > 1.5 ? ${shader(OTHER_CLASS)} : ${shader(OTHER_INSTANCE)};
     if (differs > 0.5) color.rgb = other * light;
     else color.rgb = mix(vec3(dot(seen, vec3(0.2126, 0.7152, 0.0722))), vec3(0.55), 0.45);
   } else color.rgb = label == 0u ? vec3(1.0, 0.0, 1.0) : vec3(0.82 * light);
+  if (only >= 0) {
+    vec2 number = 255.0 * vec2(named(classes, label).a, named(instances, label).a) + 0.5;
+    if (int(number.x) + 256 * int(number.y) != only + 1)
+      color.rgb = mix(vec3(dot(seen, vec3(0.2126, 0.7152, 0.0722))), vec3(0.62), 0.65);
+  }
   color.a = 1.0;
 }`;
 
@@ -111,6 +121,9 @@ function table(pixels: Uint8Array, width: number, rows: number): DataTexture {
 /** The materials of a mesh. A change here applies to all of them. */
 export class Paint {
   private readonly show = { value: 0 };
+  private readonly beyond = { value: 0 };
+  private readonly line = { value: 0 };
+  private readonly only = { value: -1 };
   private readonly section = { value: 0 };
   private readonly base = { value: 0 };
   private readonly tables: Record<string, { value: Texture }>;
@@ -131,8 +144,12 @@ export class Paint {
     };
   }
 
-  set(show: Show, { low, high }: Slab): void {
+  /** Sets what is drawn. The line between two colourings is at so many pixels from the left. */
+  set({ show, beyond, only }: Look, line: number, { low, high }: Slab): void {
     this.show.value = SHOWS.indexOf(show);
+    this.beyond.value = SHOWS.indexOf(beyond ?? show);
+    this.line.value = line;
+    this.only.value = only ?? -1;
     this.section.value = high;
     this.base.value = low;
   }
@@ -149,6 +166,9 @@ export class Paint {
       uniforms: {
         ...this.tables,
         show: this.show,
+        beyond: this.beyond,
+        line: this.line,
+        only: this.only,
         section: this.section,
         base: this.base,
         image: { value: image ?? this.blank },

@@ -9,12 +9,12 @@ import { type FaceVotes, SURE, loadFaceVotes } from "../faces.js";
 import { Marks } from "../marks.js";
 import { tell } from "../readout.js";
 import { type Slab, WHOLE, fullest, slabOf, storeysOf } from "../storeys.js";
-import { Eye, type Stand, rgb } from "./eye.js";
+import { Eye, type Sides, type Stand, rgb } from "./eye.js";
 import { type Box, loadBoxes, loadPart, loadTextures } from "./files.js";
 import { Labels } from "./labels.js";
 import { borderLines, boxLines, drop, floorOf, frustums, roomLines } from "./lines.js";
 import { type Look, type Mark, slabIn } from "./look.js";
-import { Paint } from "./paint.js";
+import { Paint, type Show } from "./paint.js";
 import { type Hit, Surface } from "./surface.js";
 
 /** A press that moves no farther counts as a click, CSS pixels. */
@@ -29,6 +29,10 @@ export interface ViewOptions {
   against: Against | null;
   /** Called when the look or the viewpoint changes. */
   changed: () => void;
+  /** Whether the area is turned slowly at first. */
+  turns?: boolean;
+  /** The pixels at the sides of the canvas that something lies over. */
+  covered?: () => Sides;
   /** Called as files arrive, and with the fault of a file. */
   progress: (words: string) => void;
   fault: (words: string) => void;
@@ -247,10 +251,30 @@ export class SpaceView {
     this.look.section = high;
   }
 
+  private fromAbove(): Stand {
+    return this.eye.overview(this.surface.sample(slabIn(this.look)), this.options.turns);
+  }
+
+  /** Goes to the instance that the address names, and shows its box. */
+  private findInstance(): boolean {
+    const { look, votes, index } = this;
+    const label = index.labels.findIndex(({ name }) => name === look.instance);
+    if (label <= 0 || !votes) return false;
+    const faces: number[] = [];
+    votes.label.forEach((of, face) => of === label && faces.push(face));
+    const boxes = this.boxes.filter((box) => box.label === label);
+    const found = this.visitFaces(faces, false);
+    if (found) {
+      this.marked.add(boxLines(index, boxes, null));
+      this.marks.pinAt(null, "");
+    }
+    return found;
+  }
+
   /** Shows a storey, or all of them, from above. */
   showStorey(storey: number | null): void {
     this.cutTo(this.slabOf(storey));
-    this.eye.fly(this.eye.overview(this.surface.sample(slabIn(this.look))));
+    this.eye.fly(this.fromAbove());
     this.changed();
   }
 
@@ -299,7 +323,11 @@ export class SpaceView {
     if (this.look.section === null) this.cutTo(this.firstSlab());
     if (at && from) this.eye.set({ at, from });
     else if (at) this.visit(at, 0.5, false);
-    else if (!this.findChange()) this.eye.set(this.eye.overview(this.surface.sample(slabIn(this.look))));
+    else if (!this.findChange() && !this.findInstance()) {
+      this.eye.set(this.fromAbove());
+      if (this.options.turns && !window.matchMedia("(prefers-reduced-motion: reduce)").matches)
+        this.eye.turn();
+    }
     if (at && from && place) this.marks.pinAt(at, "");
   }
 
@@ -448,7 +476,7 @@ export class SpaceView {
     if (width === 0 || height === 0) return;
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     this.renderer.setSize(width, height, false);
-    this.eye.resize(width, height);
+    this.eye.resize(width, height, this.options.covered?.());
     this.paintNow();
   }
 
@@ -468,11 +496,13 @@ export class SpaceView {
 
   private paintNow(): void {
     if (this.closed || !this.loaded) return;
-    const { show, section, base } = this.look;
-    this.paint.set(show, slabIn(this.look));
+    const { show, beyond, section, base } = this.look;
+    this.paint.set(this.look, this.look.line * this.canvas.width, slabIn(this.look));
     this.cut.constant = Math.min(SKY, section ?? SKY);
     this.bottom.constant = Math.min(SKY, -base);
-    this.surface.useMaterials(show === "texture" || show === "margin" || show === "changed");
+    const flat: (Show | null)[] = ["class", "instance", "unlabelled", "normal", null];
+    const isFlat = flat.includes(show) && flat.includes(beyond) && this.look.only === null;
+    this.surface.useMaterials(!isFlat);
     this.renderer.render(this.scene, this.eye.camera);
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.labels.place(this.eye, this.surface, this.look, width, height);
