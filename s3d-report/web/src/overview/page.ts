@@ -118,8 +118,10 @@ function fillStage(index: Index, mesh: Mesh, stage: HTMLElement, element: HTMLEl
 function coveredBy(element: HTMLElement): { left: number; right: number; top: number; bottom: number } {
   const stage = element.querySelector(".stage")?.getBoundingClientRect();
   const none = { left: 0, right: 0, top: 0, bottom: 0 };
-  if (!stage || getComputedStyle(element).display !== "block") return none;
+  if (!stage) return none;
   const over = (name: string): DOMRect | undefined => element.querySelector(name)?.getBoundingClientRect();
+  const isStacked = getComputedStyle(element).display !== "block";
+  if (isStacked) return { ...none, bottom: over(".overview-bar")?.height ?? 0 };
   return {
     left: 0.6 * (over(".overview-head")?.width ?? 0),
     right: 0.6 * (over(".overview-side")?.width ?? 0),

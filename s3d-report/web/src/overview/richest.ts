@@ -28,7 +28,7 @@ function entropyOf(shares: Float32Array): number {
 function riches(view: View, shares: Float32Array): number {
   const coverage = view.seen?.coverage ?? 1;
   const entropy = view.entropy ?? (view.seen?.classes.length ? entropyOf(shares) : (view.seen?.depth_m ?? 1));
-  return coverage * entropy;
+  return coverage ** 2 * entropy;
 }
 
 function featuresOf(index: Index, view: View): Features {

@@ -33,7 +33,7 @@ function ringOf(points: Rgb[]): Rgb[] {
     return [sorted[few] ?? 0, sorted.at(-1 - few) ?? 0] as const;
   });
   const [[x0, x1], [y0, y1], [z0, z1]] = ends as [Range, Range, Range];
-  const radius = (0.92 * Math.hypot(x1 - x0, y1 - y0)) / 2;
+  const radius = (0.86 * Math.hypot(x1 - x0, y1 - y0)) / 2;
   return Array.from({ length: 48 }, (_, k) => {
     const angle = (2 * Math.PI * k) / 24;
     const [x, y] = [radius * Math.cos(angle), radius * Math.sin(angle)];
@@ -144,7 +144,7 @@ export class Eye {
   /** A viewpoint obliquely from above that sees all of the points, also if they are turned `around`. */
   overview(points: Rgb[], around = false): Stand {
     const back = new Vector3(0.3, -0.62, 0.9).normalize();
-    if (around) points = ringOf(points);
+    if (around) points = [...points, ...ringOf(points)];
     const right = new Vector3(0, 0, 1).cross(back).normalize();
     const up = back.clone().cross(right);
     const half = Math.tan((FOV * Math.PI) / 360);
@@ -172,7 +172,9 @@ export class Eye {
       .multiplyScalar((most[0] - least[0]) / 2)
       .addScaledVector(up, (most[1] - least[1]) / 2);
     const at = middle.addScaledVector(back, (near + far) / 2);
-    const from = at.clone().addScaledVector(back, Math.max(1, 1.18 * (away - (near + far) / 2)));
+    const from = at
+      .clone()
+      .addScaledVector(back, Math.max(1, (around ? 1.06 : 1.18) * (away - (near + far) / 2)));
     return { at: rgb(at), from: rgb(from) };
   }
 

@@ -15,6 +15,9 @@ const MOST = 200;
 /** A surface hides a location only if it is nearer by this much, metres. */
 const SLACK = 0.05;
 
+/** Rooms that are so much lower than another one are on another storey, metres. */
+const STOREY = 1.8;
+
 interface Label {
   element: HTMLElement;
   at: Rgb;
@@ -79,6 +82,9 @@ export class Labels {
     for (const label of near) put(label, look.marks.has("locations"), true);
     // Seen from inside, names of other rooms would appear in the walls.
     const above = from[2] > Math.min(slab.high, this.mesh.max[2]);
-    for (const label of this.rooms) put(label, look.marks.has("rooms") && above, false);
+    // A floor may hide the rooms below it, but walls hide no names.
+    const heights = this.rooms.map((room) => room.at[2]).filter((z) => z < slab.high);
+    const top = Math.max(...heights) - STOREY;
+    for (const label of this.rooms) put(label, look.marks.has("rooms") && above, label.at[2] < top);
   }
 }
