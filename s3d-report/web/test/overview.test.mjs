@@ -138,7 +138,7 @@ test("anything is found by its name, from every page", async () => {
   await page.keyboard.press("/");
   await page.keyboard.type("zzz");
   assert.equal(await field.getAttribute("aria-expanded"), "false");
-  assert.match(await page.locator(".find [role=status]").textContent(), /Nothing/);
+  assert.match(await page.locator(".find [aria-live]").textContent(), /Nothing/);
   await field.fill("");
   assert.equal(await field.getAttribute("aria-expanded"), "true");
   await page.keyboard.press("Escape");

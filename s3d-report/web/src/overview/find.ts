@@ -20,7 +20,7 @@ export function findField(index: Index): HTMLElement {
     autocomplete: "off",
     spellcheck: "false",
   });
-  const told = h("span", { class: "hidden", role: "status" });
+  const told = h("span", { class: "hidden", "aria-live": "polite" });
   let things: Thing[] | null = null;
   let found: Thing[] = [];
   let at = 0;

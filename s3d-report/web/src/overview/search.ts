@@ -29,6 +29,8 @@ function roomLink(index: Index, room: Index["rooms"][number]): string {
   return `${spaceLink(room.area, at, from, "texture")}&marks=rooms%2Clocations`;
 }
 
+const natural = new Intl.Collator("en", { numeric: true });
+
 /** All things, the kinds in the order in which they are shown. */
 export function thingsOf(index: Index): Thing[] {
   const of = (area: number): string => (index.areas.length > 1 ? ` · area ${area}` : "");
@@ -51,6 +53,7 @@ export function thingsOf(index: Index): Thing[] {
       : link("views", [], { class: String(label.class), sort: "share" });
     return [{ kind: "Instance", name, href }];
   });
+  instances.sort((a, b) => natural.compare(a.name, b.name));
   const locations = index.locations.flatMap((l): Thing[] => {
     const name = `${roomName(l.room)} · ${l.uuid.slice(0, 8)}${of(l.area)}`;
     const there = l.position && meshes.has(l.area);

@@ -60,9 +60,13 @@ export function middleOf(room: Room, floor: number): Rgb {
   return best[1];
 }
 
-/** The outline of a patch, from pairs of ends. */
-export const borderLines = (points: number[]): Object3D =>
-  wide(points, Array<Rgb>(points.length / 6).fill(KEPT), 3.5);
+/** The outline of a patch, from pairs of ends; nothing hides it. */
+export function borderLines(points: number[]): Object3D {
+  const lines = wide(points, Array<Rgb>(points.length / 6).fill(KEPT), 3.5);
+  lines.material.depthTest = false;
+  lines.renderOrder = 1;
+  return lines;
+}
 
 export function roomLines(rooms: { room: Room; floor: number }[]): Object3D {
   const points: number[] = [];

@@ -36,13 +36,7 @@ const LAMP = new Vector3(0.35, -0.45, 0.82).normalize();
 const SAMPLE = 4000;
 
 /** A line to a point ends this much before it, metres. */
-const SHORT = 0.02;
-
-/** The edges of some faces: two ends for each edge that only one of them has. */
-export interface Border {
-  points: number[];
-  m2: number;
-}
+const SHORT = 0.002;
 
 /** A border is drawn this far off its faces; and the reach of a search for a face, metres. */
 const RAISED = 0.008;
@@ -55,9 +49,23 @@ const cornersOf = (vertices: Float32Array, index: Uint32Array, face: number): [V
     Vector3,
   ];
 
-/** A name for an edge; vertices of two parts are one if they are at the same place. */
-const key = (a: Vector3, b: Vector3): string =>
-  [a, b].map((end) => [end.x, end.y, end.z].map((c) => Math.round(1e3 * c)).join()).join(" ");
+/** A name for a corner; vertices of two parts are one if they are at the same place. */
+const key = ({ x, y, z }: Vector3): string => [x, y, z].map((c) => Math.round(1e3 * c)).join();
+
+/** The triangles that hang together by corners with the one next to a point. */
+function together<T extends readonly Vector3[]>(triangles: T[], at: Vector3): T[] {
+  const touching = new Map<string, T[]>();
+  for (const triangle of triangles)
+    for (const corner of triangle)
+      touching.set(key(corner), [...(touching.get(key(corner)) ?? []), triangle]);
+  const off = (triangle: T): number => Math.min(...triangle.map((corner) => corner.distanceTo(at)));
+  const first = triangles.reduce<T | null>((best, t) => (best && off(best) <= off(t) ? best : t), null);
+  const found = new Set<T>(first ? [first] : []);
+  // The set grows while it is gone through.
+  for (const triangle of found)
+    for (const corner of triangle) for (const next of touching.get(key(corner)) ?? []) found.add(next);
+  return [...found];
+}
 
 export class Surface {
   readonly group = new Group();
@@ -238,33 +246,34 @@ export class Surface {
     return best?.normal ?? null;
   }
 
-  /** The border of the faces in a box (lowest and highest x, y, z) that are wanted, raised off them. */
-  border(box: number[], wanted: (face: number) => boolean): Border {
-    const edges = new Map<string, number[]>();
+  /**
+   * The border of the faces in a box (lowest and highest x, y, z) that are wanted and hang together with the
+   * one next to a point, raised off them: two ends for each edge that only one of them has.
+   */
+  border(box: number[], at: Rgb, wanted: (face: number) => boolean): number[] {
     const within = ({ x, y, z }: Vector3): boolean =>
       [x, y, z].every((c, k) => c >= (box[k] ?? 0) - RAISED && c <= (box[k + 3] ?? 0) + RAISED);
-    let m2 = 0;
+    const found: [Vector3, Vector3, Vector3][] = [];
     for (const { vertices, index, face } of this.parts)
       face.forEach((number, f) => {
-        if (!wanted(number)) return;
-        const corners = cornersOf(vertices, index, f);
-        if (!corners.every(within)) return;
-        const [a, b, c] = corners;
-        const normal = b.clone().sub(a).cross(c.clone().sub(a));
-        m2 += normal.length() / 2;
-        normal.setLength(RAISED);
-        corners.forEach((corner, k) => {
-          const next = corners[(k + 1) % 3] ?? corner;
-          const [there, back] = [key(corner, next), key(next, corner)];
-          if (edges.has(back)) edges.delete(back);
-          else
-            edges.set(
-              there,
-              [corner, next].flatMap((end) => end.clone().add(normal).toArray()),
-            );
-        });
+        const corners = wanted(number) ? cornersOf(vertices, index, f) : [];
+        if (corners.length === 3 && corners.every(within)) found.push(corners as [Vector3, Vector3, Vector3]);
       });
-    return { points: [...edges.values()].flat(), m2 };
+
+    const edges = new Map<string, number[]>();
+    for (const [a, b, c] of together(found, new Vector3(...at))) {
+      const raise = b.clone().sub(a).cross(c.clone().sub(a)).setLength(RAISED);
+      for (const [from, to] of [
+        [a, b],
+        [b, c],
+        [c, a],
+      ] as const) {
+        const back = `${key(to)} ${key(from)}`;
+        const ends = [from, to].flatMap((end) => end.clone().add(raise).toArray());
+        if (!edges.delete(back)) edges.set(`${key(from)} ${key(to)}`, ends);
+      }
+    }
+    return [...edges.values()].flat();
   }
 
   close(): void {

@@ -45,6 +45,8 @@ export type Patch = Votes["disputed_patches"][number];
 const sizeOf = ({ m2, bbox }: Patch): number =>
   bbox ? Math.max(...[0, 1, 2].map((k) => ((bbox[k + 3] ?? 0) - (bbox[k] ?? 0)) / 2)) : Math.sqrt(m2);
 
+/** Two labels dispute a face whose first label leads by this share of its votes at most. */
+const DISPUTED = 0.5;
 /** The centre of a patch that an address names is no farther away, metres. */
 const SAME = 2e-3;
 /** The viewpoint of a patch: so many times as far away as it is wide, within these distances, metres. */
@@ -217,13 +219,15 @@ export class SpaceView {
   }
 
   /** The border of a patch's faces; null if none of them is shown. */
-  private borderOf({ labels, bbox }: Patch): number[] | null {
+  private borderOf({ labels, bbox, center }: Patch): number[] | null {
     const { votes } = this;
     const [first, second] = labels.map((name) => this.index.labels.findIndex((l) => l.name === name));
     if (!votes || !bbox) return null;
     const isDisputed = (face: number): boolean =>
-      votes.label[face] === first && votes.runnerUp[face] === second && (votes.margin[face] ?? SURE) < SURE;
-    const { points } = this.surface.border(bbox, isDisputed);
+      votes.label[face] === first &&
+      votes.runnerUp[face] === second &&
+      (votes.margin[face] ?? SURE) <= DISPUTED * SURE;
+    const points = this.surface.border(bbox, center, isDisputed);
     return points.length > 0 ? points : null;
   }
 
@@ -352,25 +356,29 @@ export class SpaceView {
     });
     if (seen) return moved(at, seen, Math.min(1, away / seen.length()));
 
-    for (const distance of [away, away / 2, away / 4]) {
-      const found = this.around(normal)
-        .filter(faces)
-        .map((back) => moved(at, back, distance))
-        .find((from) => isFree(from) && this.isShown(from, at, size));
-      if (found) return found;
-    }
+    for (const rises of [
+      [30, 55, 8, 80],
+      [-25, -60],
+    ])
+      for (const distance of [away, away / 2, away / 4]) {
+        const found = this.around(normal, rises)
+          .filter(faces)
+          .map((back) => moved(at, back, distance))
+          .find((from) => isFree(from) && this.isShown(from, at, size));
+        if (found) return found;
+      }
     return normal ? moved(at, normal, NEAREST / 2) : this.eye.stand.from;
   }
 
-  /** Directions to look from: those near the current one first, and those from below last. */
-  private around(normal: Vector3 | null): Vector3[] {
+  /** Directions to look from, by their angle above the horizon: first those in front, or near the current one. */
+  private around(normal: Vector3 | null, rises: number[]): Vector3[] {
     const { from, at } = this.eye.stand;
     const ahead =
       normal && Math.hypot(normal.x, normal.y) > 0.5
         ? [normal.x, normal.y]
         : [from[0] - at[0], from[1] - at[1]];
     const azimuth = Math.atan2(ahead[1] ?? 0, ahead[0] ?? 1);
-    return [30, 55, 8, -25, -60].flatMap((degrees) =>
+    return rises.flatMap((degrees) =>
       Array.from({ length: 16 }, (_, k) => {
         const turned = azimuth + (k % 2 === 0 ? k / 2 : -(k + 1) / 2) * (Math.PI / 8);
         const rise = (degrees * Math.PI) / 180;
