@@ -148,7 +148,7 @@ test("anything is found by its name, from every page", async () => {
   await close();
 });
 
-test("a house of two storeys opens on the one with more rooms, and each is cut above its own ceilings", async () => {
+test("two storeys: the one with more rooms opens, and each is cut above its own ceilings", async () => {
   await withCopy(
     (write) => Object.entries(house()).forEach(([key, value]) => write(key, value)),
     async (folder) => {

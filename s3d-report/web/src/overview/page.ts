@@ -35,6 +35,7 @@ export async function overviewPage(index: Index, route: Route): Promise<Page> {
   const stage = h("div", { class: "stage" });
   const element = h("main", { class: "overview" }, stage, head(index, mesh));
   const strip = richestViews(index, mesh);
+  if (!strip) element.classList.add("without-views");
   try {
     const view = fillStage(index, mesh, stage, element);
     append(element, [strip]);

@@ -51,7 +51,7 @@ export class Eye {
   private isTurning = false;
   /** Called when a slow turn begins or ends. */
   turned: (on: boolean) => void = () => {};
-  /** The part of the canvas that nothing lies over: the shares of its size, and how far it is off the middle. */
+  /** The part that nothing lies over: shares of the canvas, and how far it is off the middle. */
   private free = { width: 1, height: 1, right: 0, down: 0 };
 
   /** `moved` is called whenever the viewpoint changes. */

@@ -9,13 +9,14 @@ import { type FaceVotes, SURE, loadFaceVotes } from "../faces.js";
 import { Marks } from "../marks.js";
 import { tell } from "../readout.js";
 import { type Slab, WHOLE, fullest, slabOf, storeysOf } from "../storeys.js";
-import { Eye, type Sides, type Stand, rgb } from "./eye.js";
+import { Eye, type Sides, type Stand } from "./eye.js";
 import { type Box, loadBoxes, loadPart, loadTextures } from "./files.js";
 import { Labels } from "./labels.js";
 import { borderLines, boxLines, drop, floorOf, frustums, roomLines } from "./lines.js";
 import { type Look, type Mark, slabIn } from "./look.js";
 import { Paint, type Show } from "./paint.js";
 import { type Hit, Surface } from "./surface.js";
+import { vantage } from "./vantage.js";
 
 /** A press that moves no farther counts as a click, CSS pixels. */
 const STILL = 5;
@@ -49,20 +50,7 @@ const sizeOf = ({ m2, bbox }: Patch): number =>
 const DISPUTED = 0.5;
 /** The centre of a patch that an address names is no farther away, metres. */
 const SAME = 2e-3;
-/** The viewpoint of a patch: so many times as far away as it is wide, within these distances, metres. */
-const AWAY = 5;
-const [NEAREST, FARTHEST] = [0.7, 3];
-/** The least cosine of the angle at which a face is looked at. */
-const FACING = 0.25;
-
-/** The number of scan locations that are tried, the nearest first. */
-const MOST_STANDS = 30;
-
 const rounded = (height: number): number => (Number.isFinite(height) ? Number(height.toFixed(2)) : height);
-
-/** A point, moved by a multiple of a vector. */
-const moved = (from: Rgb, way: Vector3, times: number): Rgb =>
-  rgb(new Vector3(...from).addScaledVector(way, times));
 
 /** An extension that TypeScript does not know. */
 interface ProvokingVertex {
@@ -335,65 +323,14 @@ export class SpaceView {
     if (at && from && place) this.marks.pinAt(at, "");
   }
 
-  /**
-   * A viewpoint with a free view of a place, in front of its face: towards a scan location that sees it, or
-   * else as near as possible to the current direction.
-   */
+  /** A viewpoint with a free view of a place. */
   private vantage(at: Rgb, size: number): Rgb {
-    const away = Math.min(FARTHEST, Math.max(NEAREST, AWAY * size));
-    const normal = this.surface.normalAt(at);
-    const off = 0.02 + (this.mesh.cell_m ?? 0);
-    const target = normal ? moved(at, normal, off) : at;
-    const faces = (back: Vector3): boolean => !normal || back.dot(normal) > FACING;
-    const isFree = (from: Rgb): boolean => this.surface.isFree(from, target);
-
     const stands = this.index.locations.flatMap(({ area, position }) =>
-      area === this.mesh.area && position ? [new Vector3(...position).sub(new Vector3(...at))] : [],
+      area === this.mesh.area && position ? [position] : [],
     );
-    stands.sort((a, b) => a.length() - b.length());
-    const seen = stands.slice(0, MOST_STANDS).find((way) => {
-      return faces(way.clone().normalize()) && way.length() > NEAREST / 2 && isFree(moved(at, way, 1));
-    });
-    if (seen) return moved(at, seen, Math.min(1, away / seen.length()));
-
-    for (const rises of [
-      [30, 55, 8, 80],
-      [-25, -60],
-    ])
-      for (const distance of [away, away / 2, away / 4]) {
-        const found = this.around(normal, rises)
-          .filter(faces)
-          .map((back) => moved(at, back, distance))
-          .find((from) => isFree(from) && this.isShown(from, at, size));
-        if (found) return found;
-      }
-    return normal ? moved(at, normal, NEAREST / 2) : this.eye.stand.from;
-  }
-
-  /** Directions to look from, by their angle above the horizon: first those in front, or near the current one. */
-  private around(normal: Vector3 | null, rises: number[]): Vector3[] {
-    const { from, at } = this.eye.stand;
-    const ahead =
-      normal && Math.hypot(normal.x, normal.y) > 0.5
-        ? [normal.x, normal.y]
-        : [from[0] - at[0], from[1] - at[1]];
-    const azimuth = Math.atan2(ahead[1] ?? 0, ahead[0] ?? 1);
-    return rises.flatMap((degrees) =>
-      Array.from({ length: 16 }, (_, k) => {
-        const turned = azimuth + (k % 2 === 0 ? k / 2 : -(k + 1) / 2) * (Math.PI / 8);
-        const rise = (degrees * Math.PI) / 180;
-        const level = Math.cos(rise);
-        return new Vector3(level * Math.cos(turned), level * Math.sin(turned), Math.sin(rise));
-      }),
-    );
-  }
-
-  /** Whether the front of a face near a place is what one sees from a viewpoint. */
-  private isShown(from: Rgb, at: Rgb, size: number): boolean {
-    const ray = new Vector3(...at).sub(new Vector3(...from)).normalize();
-    const hit = this.surface.pick(new Vector3(...from), ray, slabIn(this.look));
-    const near = 0.02 + size / 4 + (this.mesh.cell_m ?? 0);
-    return hit !== null && Math.hypot(...hit.point.map((c, axis) => c - (at[axis] ?? 0))) < near;
+    const { surface, look, mesh } = this;
+    const place = { at, size, slack: mesh.cell_m ?? 0 };
+    return vantage(surface, slabIn(look), place, stands, this.eye.stand);
   }
 
   private listen(): void {

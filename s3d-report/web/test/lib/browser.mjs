@@ -40,8 +40,8 @@ export function launch() {
 }
 
 /**
- * Opens a report (a folder or one file) from the disk, for a user who wants no motion unless `motion`. `faults` collects errors, and requests that leave
- * the folder.
+ * Opens a report (a folder or one file) from the disk, for a user who wants no motion unless `motion`.
+ * `faults` collects errors, and requests that leave the folder.
  */
 export async function open(browser, folder, hash, options = {}) {
   const { width = 1440, height = 900, touch = false, motion = false, dark = false } = options;
