@@ -5,7 +5,7 @@ import type { Index, Rgb, View } from "../data.js";
 /** Views farther apart than this are as far apart as can be, metres. */
 const FAR = 6;
 /** The parts of a distance: another room, another place, another content, another direction. */
-const PARTS = { room: 0.35, place: 0.25, content: 0.25, direction: 0.15 };
+const PARTS = { room: 0.45, place: 0.2, content: 0.25, direction: 0.1 };
 
 interface Features {
   view: View;
@@ -74,7 +74,7 @@ export function richest(views: View[], index: Index, most: number): View[] {
     let best = -1;
     let worth = -1;
     all.forEach(({ quality }, i) => {
-      const value = (nearest[i] ?? 0) * quality ** 2;
+      const value = (nearest[i] ?? 0) * quality;
       if (value > worth) [best, worth] = [i, value];
     });
     const next = all[best];
