@@ -5,7 +5,7 @@ use crate::index::{AreaVotes, ClassEntry, LabelEntry, RoomEntry, rounded};
 use s3d_dataset::{DataSet, Result};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::InstanceEntry;
-use s3d_label::{LabelId, LabelTable, pretty_color};
+use s3d_label::{Class, LabelId, LabelTable, pretty_color};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -39,6 +39,11 @@ fn json<T: DeserializeOwned>(data: &DataSet, path: &Path, faults: &mut Faults) -
     faults.keep(data.layout().root(), read)
 }
 
+/// Returns the one of two floors that has more points.
+fn largest_of(a: (u64, f32), b: (u64, f32)) -> (u64, f32) {
+    if b.0 > a.0 { b } else { a }
+}
+
 pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomEntry>> {
     let mut rooms = Vec::new();
     for &area in data.areas() {
@@ -49,7 +54,12 @@ pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomEntry
             .unwrap_or_default();
 
         let mut heights: BTreeMap<String, [f32; 2]> = BTreeMap::new();
-        for InstanceEntry { room, bbox: [_, _, low, _, _, high], .. } in instances {
+        let mut floors: BTreeMap<String, (u64, f32)> = BTreeMap::new();
+        for InstanceEntry { room, class, points, bbox: [_, _, low, _, _, high], .. } in instances {
+            if class == Class::FLOOR.name() {
+                let largest = floors.entry(room.clone()).or_default();
+                *largest = largest_of(*largest, (points, 0.5 * (low + high)));
+            }
             let range = heights.entry(room).or_insert([low, high]);
             *range = [range[0].min(low), range[1].max(high)];
         }
@@ -59,10 +69,12 @@ pub(crate) fn rooms(data: &DataSet, faults: &mut Faults) -> Result<Vec<RoomEntry
                 .into_iter()
                 .flat_map(|p| std::iter::once(p.outer).chain(p.holes));
             let heights = heights.get(&name).map(|range| range.map(|z| rounded(z.into(), 3)));
+            let floor = floors.get(&name).map(|(_, z)| rounded((*z).into(), 3));
             RoomEntry {
                 area,
                 name,
                 floor_m2,
+                floor,
                 heights,
                 outline: rings
                     .map(|ring| ring.iter().map(|p| p.map(|c| rounded(c, 3))).collect())

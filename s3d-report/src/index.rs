@@ -131,6 +131,9 @@ pub(crate) struct RoomEntry {
     pub(crate) area: u32,
     pub(crate) name: String,
     pub(crate) floor_m2: f64,
+    /// The height of its floor in the world, in metres: the middle of the box of the floor with the most
+    /// points.
+    pub(crate) floor: Option<f64>,
     /// The lowest and the highest z of its instances in the world, in metres.
     pub(crate) heights: Option<[f64; 2]>,
     /// Rings of x and y in the world, in metres, rounded to millimetres: outer rings and holes, to fill by

@@ -44,6 +44,8 @@ pub(crate) struct Shares {
     pub(crate) instances: Option<usize>,
     /// The share of each class that occurs.
     pub(crate) classes: Vec<(usize, f64)>,
+    /// The median depth around the horizon: of the shown pixels in the middle half of the rows, in metres.
+    pub(crate) depth_m: Option<f64>,
     #[serde(skip)]
     pub(crate) pixels_by_class: BTreeMap<usize, u64>,
     #[serde(skip)]
@@ -119,7 +121,10 @@ impl Images {
             .map(|counted| counted.missing)
             .or(no_depth)
             .or(no_color);
-        let seen = shares(size, counted, missing);
+        let depth_m = depth
+            .as_ref()
+            .and_then(|depth| median_depth(depth, data.options().depth_units.per_m()));
+        let seen = Shares { depth_m, ..shares(size, counted, missing) };
         Ok(Some(Self { size, seen, widths, rgb, normal, label, depth }))
     }
 
@@ -340,9 +345,25 @@ fn shares([width, height]: [u32; 2], counted: Option<Counted>, missing: Option<u
         unlabelled: counted.as_ref().map(|c| share(c.unlabelled)),
         instances: counted.as_ref().map(|c| c.instances),
         classes: classes.collect(),
+        depth_m: None,
         pixels_unlabelled: counted.as_ref().map_or(0, |c| c.unlabelled),
         pixels_by_class: counted.map(|c| c.by_class).unwrap_or_default(),
     }
+}
+
+/// Returns the median of the middle half of the rows, in metres. `None` if nothing is seen there.
+fn median_depth(depth: &Raster<u16>, units_per_m: f64) -> Option<f64> {
+    let rows = depth.height() / 4..depth.height() - depth.height() / 4;
+    let mut seen: Vec<u16> = rows
+        .flat_map(|y| depth.row(y))
+        .copied()
+        .filter(|units| *units != MISSING_DEPTH)
+        .collect();
+    if seen.is_empty() {
+        return None;
+    }
+    let middle = seen.len() / 2;
+    Some(rounded(f64::from(*seen.select_nth_unstable(middle).1) / units_per_m, 3))
 }
 
 /// Adds the fault of an image without any file that can be shown.
@@ -356,6 +377,14 @@ pub(crate) fn nothing_left(data: &DataSet, image: &DatasetImage, faults: &mut Fa
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_median_depth_is_of_the_middle_rows() {
+        let rows = [[9; 4], [512, 1024, 2048, MISSING_DEPTH], [1024, 512, 2048, 1024], [9; 4]];
+        let depth = Raster::from_vec(4, 4, rows.concat());
+        assert_eq!(median_depth(&depth, 512.0), Some(2.0));
+        assert_eq!(median_depth(&Raster::from_vec(1, 1, vec![MISSING_DEPTH]), 512.0), None);
+    }
 
     #[test]
     fn pixels_of_labels_are_counted() {

@@ -172,6 +172,10 @@ fn pictures_are_the_data_sets_own() {
     assert_eq!(by_class + index["pixels_unlabelled"].as_u64().unwrap(), pixels);
     let rooms = index["rooms"].as_array().unwrap();
     assert_eq!(rooms.len(), 4);
+    for room in rooms {
+        let floor = room["floor"].as_f64().unwrap();
+        assert!(floor.abs() < 0.05, "{room}");
+    }
     for heights in rooms.iter().map(|room| &room["heights"]) {
         let [low, high] = [0, 1].map(|i| heights[i].as_f64().unwrap());
         assert!(low.abs() < 0.1 && (2.0..4.0).contains(&high), "{heights}");

@@ -7,6 +7,8 @@ export interface Seen {
   coverage: number | null;
   unlabelled: number | null;
   instances: number | null;
+  /** The median depth around the horizon, metres; missing in older reports. */
+  depth_m?: number | null;
   /** Indices of classes, and their shares of the pixels. */
   classes: [number, number][];
 }
@@ -51,6 +53,8 @@ export interface Room {
   area: number;
   name: string;
   floor_m2: number;
+  /** The height of its floor; missing in older reports. */
+  floor?: number | null;
   heights: [number, number] | null;
   outline: [number, number][][];
 }
@@ -110,7 +114,7 @@ export interface Votes {
   rooms: VotesOf[];
   classes: VotesOf[];
   disputing_classes: { classes: [string, string]; faces: number; m2: number }[];
-  disputed_patches: { labels: [string, string]; faces: number; m2: number; center: Rgb }[];
+  disputed_patches: { labels: [string, string]; faces: number; m2: number; center: Rgb; bbox?: number[] }[];
 }
 
 export interface VoteSpread {

@@ -172,6 +172,9 @@ export function percent(share: number): string {
 /** `1 room`, `2 rooms`. */
 export const several = (n: number, noun: string): string => `${count(n)} ${noun}${n === 1 ? "" : "s"}`;
 
+/** The room in the name of an instance: `chair_3_conferenceRoom_1_1`. */
+export const roomOf = (label: string): string => label.split("_").slice(2, 4).join("_");
+
 /** `conferenceRoom_1` in words, as a name. */
 export function roomName(room: string): string {
   if (room === "" || room === "unknown_1") return "unknown room";

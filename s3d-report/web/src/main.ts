@@ -4,6 +4,8 @@ import { comparePage } from "./compare/page.js";
 import { FORM, type Index, load } from "./data.js";
 import { append, count, h, named, tamed } from "./dom.js";
 import { comeBack, leave, pointTabs, remember } from "./memory.js";
+import { findField } from "./overview/find.js";
+import { overviewPage } from "./overview/page.js";
 import { damageOf, notesPage } from "./pages/notes.js";
 import { numbersPage } from "./pages/numbers.js";
 import { panoPage } from "./pages/pano.js";
@@ -19,6 +21,7 @@ const still = (element: HTMLElement): Page => ({ element, close: () => {} });
 
 function tabs(index: Index): [string, string][] {
   const all: [string, string, boolean][] = [
+    ["overview", "Overview", index.meshes.length > 0],
     ["pano", "Panoramas", index.locations.some((l) => l.pano)],
     ["space", "3D", index.meshes.length > 0],
     ["views", "Views", index.views.length > 0],
@@ -38,6 +41,8 @@ function tabs(index: Index): [string, string][] {
 async function open(index: Index): Promise<Page> {
   const route = parseRoute(window.location.hash);
   switch (route.page || tabs(index)[0]?.[0]) {
+    case "overview":
+      return overviewPage(index, route);
     case "pano":
       return panoPage(index, route);
     case "space":
@@ -92,7 +97,7 @@ async function start(): Promise<void> {
       );
     nav.append(h("a", { href: link(page), "data-page": page }, name, badge || ""));
   }
-  header.append(nav);
+  header.append(nav, findField(index));
   const place = h("div", { id: "place" });
   document.body.replaceChildren(header, place);
   let now: Page | null = null;

@@ -2,7 +2,7 @@
 
 import { OTHER_CLASS, OTHER_INSTANCE, css, depthRamp, gradient, marginRamp } from "./colors.js";
 import type { Index, Rgb } from "./data.js";
-import { h, named, percent, roomName } from "./dom.js";
+import { h, named, percent, roomName, roomOf } from "./dom.js";
 import { type FaceVotes, NO_VOTES, SURE } from "./faces.js";
 import type { Modality } from "./gl.js";
 
@@ -48,7 +48,7 @@ export function tell(
     const label = index.labels[spot.label];
     const of_class = label?.class === null || label === undefined ? undefined : index.classes[label.class];
     if (label && of_class) {
-      room = label.name.split("_").slice(2, 4).join("_");
+      room = roomOf(label.name);
       told.push(h("span", { class: "entry", "data-is": "class" }, key(of_class.color), named(of_class.name)));
       told.push(entry("instance", named(label.name)));
     } else told.push(entry("class", "unlabelled"));

@@ -1,6 +1,7 @@
 // A picture with two modalities, a movable line between them, and a readout for the pointer.
 
 import type { Index, Picture, Rgb } from "./data.js";
+import { type Divider, divider } from "./divider.js";
 import { append, choice, flat, h } from "./dom.js";
 import { type FaceVotes, loadFaceVotes } from "./faces.js";
 import { type Gaze, clampGaze, focal, panoramaAt } from "./geometry.js";
@@ -126,7 +127,7 @@ export class Viewer {
   /** Lies over the canvas, for drawings in it. */
   readonly overlay = h("div", { class: "overlay" });
   private readonly canvas = h("canvas", { tabindex: 0 });
-  private readonly line: HTMLElement;
+  private readonly divider: Divider;
   private readonly readout = h("output", { class: "readout", "aria-live": "polite" });
   private readonly legend = h("div", { class: "legend" });
   private readonly bar = h("div", { class: "viewer-bar" });
@@ -155,21 +156,13 @@ export class Viewer {
     private readonly look: Look,
     private readonly options: ViewerOptions,
   ) {
-    this.line = h(
-      "div",
-      {
-        class: "split",
-        role: "slider",
-        tabindex: 0,
-        "aria-label": options.other ? "Line between A and B" : "Line between the two modalities",
-        "aria-valuemin": 0,
-        "aria-valuemax": 100,
-        keydown: (event: KeyboardEvent) => this.splitKey(event),
-        pointerdown: (event: PointerEvent) => this.splitDrag(event),
-      },
-      h("span", { class: "grip", "aria-hidden": "true" }),
+    const label = options.other ? "Line between A and B" : "Line between the two modalities";
+    this.divider = divider(
+      label,
+      () => this.canvas,
+      (share) => this.moveSplit(share),
     );
-    const frame = h("div", { class: "frame" }, this.canvas, this.overlay, this.line);
+    const frame = h("div", { class: "frame" }, this.canvas, this.overlay, this.divider.line);
     this.element = h("section", { class: "viewer" }, this.bar, frame, this.readout, this.legend);
     const { canvas, element } = this;
     const dataSet = index.data_set.name;
@@ -222,6 +215,17 @@ export class Viewer {
     const [i, j] = [Math.min(width - 1, Math.floor(u * width)), Math.min(height - 1, Math.floor(v * height))];
     const value = depth?.[j * width + i];
     return value === undefined || value === NO_DEPTH ? null : value;
+  }
+
+  /** The depth, in metres, and the class of a place in the picture. */
+  pixelAt(u: number, v: number): { depth: number | null; place: number | null } {
+    const { width, height, label } = this.numbers;
+    const [i, j] = [Math.min(width - 1, Math.floor(u * width)), Math.min(height - 1, Math.floor(v * height))];
+    const units = this.depthAt(u, v);
+    return {
+      depth: units === null ? null : units / this.index.data_set.depth_units_per_m,
+      place: this.index.labels[label?.[j * width + i] ?? 0]?.class ?? null,
+    };
   }
 
   /** The labels of both pictures, if they have the same size. */
@@ -369,50 +373,16 @@ export class Viewer {
     this.readMiddle();
   }
 
-  private splitKey(event: KeyboardEvent): void {
-    const steps: Record<string, number> = {
-      ArrowLeft: -0.02,
-      ArrowDown: -0.02,
-      ArrowRight: 0.02,
-      ArrowUp: 0.02,
-    };
-    const ends: Record<string, number> = { Home: 0, End: 1 };
-    const to = ends[event.key] ?? (event.key in steps ? this.look.split + (steps[event.key] ?? 0) : null);
-    if (to === null) return;
-    event.preventDefault();
-    this.moveSplit(to);
-  }
-
-  private splitDrag(down: PointerEvent): void {
-    down.preventDefault();
-    this.line.setPointerCapture(down.pointerId);
-    this.line.focus();
-    const move = (event: PointerEvent): void => {
-      const box = this.canvas.getBoundingClientRect();
-      this.moveSplit((event.clientX - box.left) / box.width);
-    };
-    const end = (): void => {
-      this.line.removeEventListener("pointermove", move);
-      this.line.removeEventListener("pointerup", end);
-      this.line.removeEventListener("pointercancel", end);
-    };
-    this.line.addEventListener("pointermove", move);
-    this.line.addEventListener("pointerup", end);
-    this.line.addEventListener("pointercancel", end);
-  }
-
   private moveSplit(to: number): void {
-    this.look.split = Math.min(1, Math.max(0, to));
-    chosen.split = this.look.split;
+    this.look.split = to;
+    chosen.split = to;
     this.changed();
   }
 
   private changed(): void {
     const percent = Math.round(100 * this.look.split);
-    this.line.style.left = `${100 * this.look.split}%`;
-    this.line.setAttribute("aria-valuenow", String(percent));
     const names = this.others ? ["A", "B"] : [NAMES[this.look.left], NAMES[this.look.right]];
-    this.line.setAttribute("aria-valuetext", `${names[0]} on ${percent} %, ${names[1]} on the rest`);
+    this.divider.put(this.look.split, `${names[0]} on ${percent} %, ${names[1]} on the rest`);
     this.fillLegend();
     if (this.look.left === "contested" || this.look.right === "contested") void this.loadVotes();
     // The address belongs to the viewer only while it is on the page.

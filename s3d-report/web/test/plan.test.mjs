@@ -208,7 +208,7 @@ test("storeys of an area are apart, also rooms that nobody stands in", async () 
     (write) => write("index", changed),
     async (folder) => {
       const { page, faults, close } = await open(browser, folder, "#/plan");
-      assert.deepEqual(await page.locator("h3").allTextContents(), ["Storey 1", "Storey 2"]);
+      assert.deepEqual(await page.locator("h3").allTextContents(), ["Ground floor", "First floor"]);
       const storeys = await page.locator("svg.plan").evaluateAll((plans) =>
         plans.map((p) => ({
           rooms: [...p.querySelectorAll(".room title")].map((t) => t.textContent.split(",")[0]).sort(),

@@ -306,7 +306,12 @@ test("a disputed patch is flown to, and at rest nothing is drawn", async () => {
   await loaded(page);
   const patches = index.votes.find((v) => v.area === area).votes.disputed_patches;
   const list = page.getByLabel("Disputed patches");
-  assert.equal(await list.locator("option").count(), 1 + patches.length);
+  const listed = (await list.locator("option").allTextContents()).slice(1).map(Number.parseFloat);
+  assert.equal(listed.length, patches.length);
+  assert.ok(
+    listed.every((m2, i) => i === 0 || m2 <= listed[i - 1]),
+    "the largest patch is first",
+  );
   let seen = 0;
   for (const [i, patch] of patches.slice(0, 6).entries()) {
     await list.selectOption(String(i));
@@ -315,7 +320,9 @@ test("a disputed patch is flown to, and at rest nothing is drawn", async () => {
       words(patch.center),
     );
     await settle(page);
-    const { at, section } = await queryOf(page);
+    const { at, from, section } = await queryOf(page);
+    // From no place in the floor or below it.
+    assert.ok(numbers(from)[2] > 0, from);
     assert.ok(distance(numbers(at), patch.center) < 0.001, `${at} and ${patch.center}`);
     assert.ok(section === "none" || Number(section) > patch.center[2], section);
     const box = await canvasOf(page);
@@ -574,7 +581,9 @@ for (const [form, place] of [
       await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
       const told = await readout(page);
       assert.deepEqual(Object.keys(told).sort(), ["X Y Z", "distance", "face", "pixel"]);
-      for (const label of ["Colours", "Rooms", "Boxes of instances", "Disputed patches"])
+      const colors = await page.getByLabel("Colours").locator("option").allTextContents();
+      assert.deepEqual(colors, ["Texture", "Normals"]);
+      for (const label of ["Rooms", "Boxes of instances", "Disputed patches"])
         assert.equal(await page.getByLabel(label, { exact: true }).count(), 0, label);
       assert.ok(Number(await page.getByLabel("Cut away what is above").inputValue()) > 1.5);
       assert.equal(await page.locator("[role=alert]").count(), 0);

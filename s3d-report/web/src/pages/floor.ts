@@ -3,7 +3,7 @@
 import { css, depthRamp } from "../colors.js";
 import type { ChangeMark } from "../compare/marks.js";
 import type { Index, Location, Rgb, View } from "../data.js";
-import { append, flat, metres2, percent, named, roomName, s, several } from "../dom.js";
+import { append, flat, metres2, named, percent, roomName, roomOf, s, several } from "../dom.js";
 import { type Box, boxOf, middleOf, sizeOf } from "../outline.js";
 import { patchLink } from "../places.js";
 import { link } from "../route.js";
@@ -15,7 +15,8 @@ export interface FloorOptions {
   current?: number;
   /** The rooms to show; all by default. */
   hasRoom?: (room: string) => boolean;
-  hasHeight?: (z: number) => boolean;
+  /** Whether a point at this height is shown; the name of its room is known or empty. */
+  hasHeight?: (z: number, room: string) => boolean;
   /** Changes of labels against another data set. */
   changes?: ChangeMark[];
   /** Called with words for the location under the pointer or with the focus; with null when there is none. */
@@ -79,10 +80,13 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
   const rooms = index.rooms.filter((room) => room.area === area && hasRoom(room.name));
   const stands = index.locations
     .map((location, i): [Location, number] => [location, i])
-    .filter(([l]) => l.area === area && l.position !== null && hasHeight(l.position[2]));
+    .filter(([l]) => l.area === area && l.position !== null && hasHeight(l.position[2], l.room));
   const photographs = index.views.filter(
     (view): view is View & { position: Rgb } =>
-      view.area === area && view.photograph !== null && !!view.position && hasHeight(view.position[2]),
+      view.area === area &&
+      view.photograph !== null &&
+      !!view.position &&
+      hasHeight(view.position[2], view.room),
   );
   const points = [
     ...rooms.flatMap((room) => room.outline.flat()),
@@ -219,14 +223,14 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
 function patches(
   index: Index,
   area: number,
-  hasHeight: (z: number) => boolean,
+  hasHeight: (z: number, room: string) => boolean,
   at: (x: number, y: number) => [number, number],
   unit: number,
 ): SVGElement {
   const group = s("g", { class: "patches" });
   for (const { votes } of index.votes.filter((v) => v.area === area)) {
     for (const { labels, center, faces, m2 } of votes.disputed_patches) {
-      if (!hasHeight(center[2])) continue;
+      if (!hasHeight(center[2], roomOf(labels[0]))) continue;
       const [x, y] = at(center[0], center[1]);
       const r = 0.7 * unit;
       const words = `${labels.map(named).join(" or ")}: ${several(faces, "face")}, ${m2.toFixed(3)} m²`;
@@ -242,11 +246,11 @@ function patches(
 /** Changes of labels, each a link to it in 3D; changes of class lie on top. */
 function changed(
   marks: ChangeMark[],
-  hasHeight: (z: number) => boolean,
+  hasHeight: (z: number, room: string) => boolean,
   at: (x: number, y: number) => [number, number],
   unit: number,
 ): SVGElement[] {
-  const shown = marks.filter((mark) => hasHeight(mark.at[2]));
+  const shown = marks.filter((mark) => hasHeight(mark.at[2], ""));
   return [...shown].reverse().map(({ at: place, isClass, words, href }) => {
     const [x, y] = at(place[0], place[1]);
     const r = (isClass ? 0.75 : 0.5) * unit;

@@ -4,6 +4,7 @@ import { type Index, type Location, type Picture, load } from "../data.js";
 import { append, choice, h, percent, roomName, several } from "../dom.js";
 import { type Gaze, directionIn, panoramaPoint, panoramaScreen, screenAt } from "../geometry.js";
 import { gazes } from "../memory.js";
+import { firstLocation, firstLook } from "../overview/richest.js";
 import { storeysOf } from "../storeys.js";
 import { plan } from "./floor.js";
 import { type Route, link, numberOf, replaceRoute } from "../route.js";
@@ -14,31 +15,10 @@ const RADIANS = Math.PI / 180;
 /** A neighbour may be this much farther than the seen surface, in metres, since pixels are coarse. */
 const SLACK = 0.3;
 
-/** The location that sees the most, since some stand outside the scanned space. */
-function best(index: Index): number {
-  const seen = (l: Location): number => (l.pano ? (l.seen?.coverage ?? 0) : -1);
-  const most = index.locations.reduce((max, l) => Math.max(max, seen(l)), -1);
-  return most < 0 ? -1 : index.locations.findIndex((l) => seen(l) === most);
-}
-
-/** The first direction of view in a panorama: straight ahead, unless little is seen there. */
-function firstLook(depthAt: (u: number, v: number) => number | null): number {
-  const shareAt = (lon: number): number => {
-    const turns = Array.from({ length: 15 }, (_, i) => (lon + (i - 7) * 6) / 360 + 0.5);
-    const rows = [0.38, 0.44, 0.5, 0.56, 0.62];
-    const seen = turns.flatMap((u) => rows.filter((v) => depthAt(u - Math.floor(u), v) !== null));
-    return seen.length / (turns.length * rows.length);
-  };
-  if (shareAt(0) > 0.75) return 0;
-  const turns = Array.from({ length: 24 }, (_, i) => 15 * (i - 12));
-  const shares = turns.map(shareAt);
-  return turns[shares.indexOf(Math.max(...shares))] ?? 0;
-}
-
 export function locationAt(index: Index, route: Route): number {
   const [area, uuid] = route.path;
   const named = index.locations.findIndex((l) => String(l.area) === area && l.uuid === uuid);
-  return route.path.length === 0 ? best(index) : named;
+  return route.path.length === 0 ? firstLocation(index) : named;
 }
 
 /** The visible other locations of the area, with direction and distance, the farthest first. */
@@ -114,7 +94,7 @@ export async function panoPage(
     fov: numberOf(asked, "fov", 8, 120, 90) * RADIANS,
   };
   const storeys = storeysOf(index, location.area);
-  const storey = location.position && storeys.ofHeight(location.position[2]);
+  const storey = location.position && storeys.of(location.position[2], location.room);
   const map =
     storey === null
       ? null
@@ -122,7 +102,7 @@ export async function panoPage(
           small: true,
           current: at,
           hasRoom: (room) => storeys.ofRoom(room) === storey,
-          hasHeight: (z) => storeys.ofHeight(z) === storey,
+          hasHeight: (z, room) => storeys.of(z, room) === storey,
         });
   const marks: { button: HTMLElement; lon: number; lat: number }[] = [];
   const look = lookFrom(route.query, modalitiesOf(index, location.area, picture), gaze);
@@ -172,7 +152,7 @@ export async function panoPage(
   }
   if (map) opened.overlay.append(h("div", { class: "inset" }, map.element));
   if (picture.depth !== null && !asked.has("lon")) {
-    gaze.lon = firstLook((u, v) => opened.depthAt(u, v)) * RADIANS;
+    gaze.lon = firstLook((u, v) => opened.pixelAt(u, v)) * RADIANS;
     opened.lookAt(gaze);
   }
   map?.look((location.azimuth_rad ?? 0) - gaze.lon, gaze.fov);

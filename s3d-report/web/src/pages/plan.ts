@@ -11,7 +11,7 @@ import { plan } from "./floor.js";
 function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElement {
   const section = h("section", { class: "area-plan" }, h("h2", {}, `Area ${area}`));
   const storeys = storeysOf(index, area);
-  const { ofRoom } = storeys;
+  const { all, of, ofRoom } = storeys;
   const there = {
     rooms: index.rooms.filter((room) => room.area === area),
     stands: index.locations.filter((location) => location.area === area),
@@ -21,13 +21,12 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
     append(section, [h("p", { class: "quiet" }, "It has no rooms, scan locations or photographs.")]);
     return section;
   }
-  for (let storey = 0; storey < storeys.count; storey++) {
-    const on = (z: number | undefined): boolean => z === undefined || storeys.ofHeight(z) === storey;
-    const rooms = there.rooms.filter((room) => ofRoom(room.name) === storey);
+  for (const [storey, { name, rooms }] of all.entries()) {
+    const on = (z: number, room?: string): boolean => of(z, room) === storey;
     const floor = rooms.reduce((sum, room) => sum + room.floor_m2, 0);
-    const stands = there.stands.filter((l) => (l.position ? on(l.position[2]) : storey === 0)).length;
+    const stands = there.stands.filter((l) => (l.position ? on(l.position[2], l.room) : storey === 0)).length;
     const photographs = there.photographs.filter((v) =>
-      v.position ? on(v.position[2]) : storey === 0,
+      v.position ? on(v.position[2], v.room) : storey === 0,
     ).length;
     const words = [
       rooms.length > 0 && `${several(rooms.length, "room")}, ${metres2(floor)}`,
@@ -38,15 +37,15 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
     const told = h("p", { class: "quiet", role: "status" }, summary);
     const { element } = plan(index, area, {
       hasRoom: (room) => ofRoom(room) === storey,
-      hasHeight: (z) => on(z),
+      hasHeight: on,
       changes,
       told: (now) => {
         say(told, now ?? summary);
       },
     });
-    if (storeys.count > 1) element.setAttribute("aria-label", `Plan of storey ${storey + 1} of area ${area}`);
+    if (all.length > 1) element.setAttribute("aria-label", `Plan of area ${area}: ${name}`);
     append(section, [
-      storeys.count > 1 && h("h3", {}, `Storey ${storey + 1}`),
+      all.length > 1 && h("h3", {}, name),
       told,
       h("div", { class: "sheet" }, element),
       saves(element, index.data_set.name, element.getAttribute("aria-label") ?? "Plan"),

@@ -10,6 +10,12 @@ export const FOV = 50;
 /** The duration of a flight, ms. */
 const FLIGHT = 700;
 const NEAREST = 0.05;
+/** The duration of a slow turn, ms. */
+const TURN = 100_000;
+
+/** Lengths at the sides of a rectangle. */
+export type Sides = Record<"left" | "right" | "top" | "bottom", number>;
+const NO_SIDES: Sides = { left: 0, right: 0, top: 0, bottom: 0 };
 
 export interface Stand {
   at: Rgb;
@@ -18,11 +24,35 @@ export interface Stand {
 
 export const rgb = ({ x, y, z }: Vector3): Rgb => [x, y, z];
 
+/** The upper and the lower rim of a cylinder around some points. */
+function ringOf(points: Rgb[]): Rgb[] {
+  const ends = [0, 1, 2].map((axis) => {
+    // The few outermost points are left out: scans have strays.
+    const sorted = points.map((point) => point[axis] ?? 0).sort((a, b) => a - b);
+    const few = Math.floor(sorted.length / 200);
+    return [sorted[few] ?? 0, sorted.at(-1 - few) ?? 0] as const;
+  });
+  const [[x0, x1], [y0, y1], [z0, z1]] = ends as [Range, Range, Range];
+  const radius = (0.86 * Math.hypot(x1 - x0, y1 - y0)) / 2;
+  return Array.from({ length: 48 }, (_, k) => {
+    const angle = (2 * Math.PI * k) / 24;
+    const [x, y] = [radius * Math.cos(angle), radius * Math.sin(angle)];
+    return [(x0 + x1) / 2 + x, (y0 + y1) / 2 + y, k < 24 ? z0 : z1];
+  });
+}
+
+type Range = readonly [number, number];
+
 export class Eye {
   readonly camera = new PerspectiveCamera(FOV, 1, 0.1, 1000);
   private readonly controls: OrbitControls;
   private readonly size: number;
   private flight = 0;
+  private isTurning = false;
+  /** Called when a slow turn begins or ends. */
+  turned: (on: boolean) => void = () => {};
+  /** The part that nothing lies over: shares of the canvas, and how far it is off the middle. */
+  private free = { width: 1, height: 1, right: 0, down: 0 };
 
   /** `moved` is called whenever the viewpoint changes. */
   constructor(
@@ -46,8 +76,18 @@ export class Eye {
     return { at: rgb(this.controls.target), from: rgb(this.camera.position) };
   }
 
-  resize(width: number, height: number): void {
+  /** `covered` has the pixels at each side of the canvas that something lies over. */
+  resize(width: number, height: number, covered: Sides = NO_SIDES): void {
+    const { left, right, top, bottom } = covered;
     this.camera.aspect = width / height;
+    this.free = {
+      width: Math.max(0.2, 1 - (left + right) / width),
+      height: Math.max(0.2, 1 - (top + bottom) / height),
+      right: (left - right) / 2 / width,
+      down: (top - bottom) / 2 / height,
+    };
+    const off = [-this.free.right * width, -this.free.down * height] as const;
+    this.camera.setViewOffset(width, height, ...off, width, height);
     this.update();
   }
 
@@ -80,12 +120,35 @@ export class Eye {
     this.flight = requestAnimationFrame(step);
   }
 
-  /** A viewpoint obliquely from above that sees all of the points. */
-  overview(points: Rgb[]): Stand {
+  /** Turns slowly about the middle until the next touch, key or flight. */
+  turn(): void {
+    this.land();
+    this.isTurning = true;
+    this.turned(true);
+    let last = performance.now();
+    const step = (now: number): void => {
+      const passed = Math.min(100, now - last);
+      // Half of the frames are enough for a slow turn.
+      if (passed > 25) {
+        last = now;
+        const { target } = this.controls;
+        const back = this.camera.position.clone().sub(target);
+        const angle = (-2 * Math.PI * passed) / TURN;
+        this.put(target.clone(), target.clone().add(back.applyAxisAngle(this.camera.up, angle)));
+      }
+      this.flight = requestAnimationFrame(step);
+    };
+    this.flight = requestAnimationFrame(step);
+  }
+
+  /** A viewpoint obliquely from above that sees all of the points, also if they are turned `around`. */
+  overview(points: Rgb[], around = false): Stand {
     const back = new Vector3(0.3, -0.62, 0.9).normalize();
+    if (around) points = [...points, ...ringOf(points)];
     const right = new Vector3(0, 0, 1).cross(back).normalize();
     const up = back.clone().cross(right);
-    const tan = Math.tan((FOV * Math.PI) / 360);
+    const half = Math.tan((FOV * Math.PI) / 360);
+    const tan = [half * this.camera.aspect * this.free.width, half * this.free.height] as const;
     // By axis of the canvas: a point that is z nearer to the camera needs tan * z more room on both of its
     // sides.
     const [most, least] = [
@@ -98,21 +161,20 @@ export class Eye {
       const z = p.dot(back);
       [near, far] = [Math.max(near, z), Math.min(far, z)];
       [right, up].forEach((axis, i) => {
-        const room = z * tan * (i === 0 ? this.camera.aspect : 1);
+        const room = z * (tan[i] ?? half);
         most[i] = Math.max(most[i] ?? 0, p.dot(axis) + room);
         least[i] = Math.max(least[i] ?? 0, room - p.dot(axis));
       });
     }
     if (near < far) return this.stand;
-    const away = Math.max(
-      (most[0] + least[0]) / (2 * tan * this.camera.aspect),
-      (most[1] + least[1]) / (2 * tan),
-    );
+    const away = Math.max((most[0] + least[0]) / (2 * tan[0]), (most[1] + least[1]) / (2 * tan[1]));
     const middle = right
       .multiplyScalar((most[0] - least[0]) / 2)
       .addScaledVector(up, (most[1] - least[1]) / 2);
     const at = middle.addScaledVector(back, (near + far) / 2);
-    const from = at.clone().addScaledVector(back, Math.max(1, 1.18 * (away - (near + far) / 2)));
+    const from = at
+      .clone()
+      .addScaledVector(back, Math.max(1, (around ? 1.06 : 1.18) * (away - (near + far) / 2)));
     return { at: rgb(at), from: rgb(from) };
   }
 
@@ -140,7 +202,8 @@ export class Eye {
     const { camera } = this;
     const [x, y, z] = rgb(new Vector3(...point).applyMatrix4(camera.matrixWorldInverse));
     const f = height / 2 / Math.tan((FOV * Math.PI) / 360);
-    return [f * x - (width / 2) * z, -f * y - (height / 2) * z, -z];
+    const [right, down] = [0.5 + this.free.right, 0.5 + this.free.down];
+    return [f * x - right * width * z, -f * y - down * height * z, -z];
   }
 
   close(): void {
@@ -148,8 +211,11 @@ export class Eye {
     this.controls.dispose();
   }
 
-  private land(): void {
+  /** Ends a flight or a turn. */
+  land(): void {
     cancelAnimationFrame(this.flight);
+    if (this.isTurning) this.turned(false);
+    this.isTurning = false;
   }
 
   private put(at: Vector3, from: Vector3): void {

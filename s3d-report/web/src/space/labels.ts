@@ -7,13 +7,16 @@ import { link } from "../route.js";
 import type { Eye } from "./eye.js";
 import type { Box } from "./files.js";
 import { floorOf, middleOf } from "./lines.js";
-import type { Look } from "./look.js";
+import { type Look, slabIn } from "./look.js";
 import type { Surface } from "./surface.js";
 
 /** The largest number of locations that are marked at once: those nearest to the point of interest. */
 const MOST = 200;
 /** A surface hides a location only if it is nearer by this much, metres. */
 const SLACK = 0.05;
+
+/** Rooms that are so much lower than another one are on another storey, metres. */
+const STOREY = 1.8;
 
 interface Label {
   element: HTMLElement;
@@ -57,17 +60,17 @@ export class Labels {
 
   /** Moves all labels to their places on a canvas of this size. Labels above the section are hidden. */
   place(eye: Eye, surface: Surface, look: Look, width: number, height: number): void {
-    const section = look.section ?? Infinity;
+    const slab = slabIn(look);
     const { at: target, from } = eye.stand;
     const hidden = (at: Rgb): boolean => {
       const camera = eye.camera.position;
-      const hit = surface.pick(camera, new Vector3(...at).sub(camera).normalize(), section);
+      const hit = surface.pick(camera, new Vector3(...at).sub(camera).normalize(), slab);
       return hit !== null && hit.distance < away(at, from) - SLACK;
     };
     const put = ({ element, at }: Label, wanted: boolean, hides: boolean): void => {
       const [x, y, w] = eye.screen(at, width, height);
       const inside = w > 0 && x > 0 && x < width * w && y > 0 && y < height * w;
-      const shown = wanted && inside && at[2] < section && !(hides && hidden(at));
+      const shown = wanted && inside && at[2] < slab.high && at[2] >= slab.low && !(hides && hidden(at));
       element.hidden = !shown;
       if (shown) element.style.transform = `translate(${x / w}px, ${y / w}px)`;
     };
@@ -78,7 +81,10 @@ export class Labels {
     }
     for (const label of near) put(label, look.marks.has("locations"), true);
     // Seen from inside, names of other rooms would appear in the walls.
-    const above = from[2] > Math.min(section, this.mesh.max[2]);
-    for (const label of this.rooms) put(label, look.marks.has("rooms") && above, false);
+    const above = from[2] > Math.min(slab.high, this.mesh.max[2]);
+    // A floor may hide the rooms below it, but walls hide no names.
+    const heights = this.rooms.map((room) => room.at[2]).filter((z) => z < slab.high);
+    const top = Math.max(...heights) - STOREY;
+    for (const label of this.rooms) put(label, look.marks.has("rooms") && above, label.at[2] < top);
   }
 }

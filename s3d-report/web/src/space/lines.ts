@@ -12,6 +12,7 @@ import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 import type { Index, Mesh, Rgb, Room, View } from "../data.js";
+import { roomOf } from "../dom.js";
 import type { Box } from "./files.js";
 
 /** The height of an outline above its floor, and the length of a frustum, metres. */
@@ -34,16 +35,17 @@ function wide(points: number[], colors: Rgb[], width: number): LineSegments2 {
   return lines;
 }
 
-/** The height of a room's floor: the top of its floor's boxes, or else the lowest point of its instances. */
+/** The height of a room's floor: the top of its largest floor, or else the lowest point of its instances. */
 export function floorOf(index: Index, mesh: Mesh, boxes: Box[], room: Room): number {
-  let floor: number | null = null;
+  let floor: { m2: number; top: number } | null = null;
   for (const { label, box } of boxes) {
     const { name, class: place } = index.labels[label] ?? { name: "", class: null };
     const is = place !== null && index.classes[place]?.name === "floor";
-    if (is && name.split("_").slice(2, 4).join("_") === room.name)
-      floor = Math.max(floor ?? -Infinity, box[5] ?? 0);
+    const [x0 = 0, y0 = 0, , x1 = 0, y1 = 0, top = 0] = box;
+    const m2 = (x1 - x0) * (y1 - y0);
+    if (is && roomOf(name) === room.name && m2 > (floor?.m2 ?? -1)) floor = { m2, top };
   }
-  return floor ?? room.heights?.[0] ?? mesh.min[2];
+  return floor?.top ?? room.floor ?? room.heights?.[0] ?? mesh.min[2];
 }
 
 /** The place for a room's name: the middle of the box of its largest ring. */
@@ -56,6 +58,14 @@ export function middleOf(room: Room, floor: number): Rgb {
     if (size > best[0]) best = [size, [(x0 + x1) / 2, (y0 + y1) / 2, floor]];
   }
   return best[1];
+}
+
+/** The outline of a patch, from pairs of ends; nothing hides it. */
+export function borderLines(points: number[]): Object3D {
+  const lines = wide(points, Array<Rgb>(points.length / 6).fill(KEPT), 3.5);
+  lines.material.depthTest = false;
+  lines.renderOrder = 1;
+  return lines;
 }
 
 export function roomLines(rooms: { room: Room; floor: number }[]): Object3D {

@@ -1,6 +1,7 @@
 // How a mesh is shown, as kept in the address.
 
 import type { Index, Mesh, Rgb } from "../data.js";
+import type { Slab } from "../storeys.js";
 import { SHOWS, type Show } from "./paint.js";
 import type { Stand } from "./eye.js";
 
@@ -9,24 +10,33 @@ export type Mark = (typeof MARKS)[number];
 
 export interface Look {
   show: Show;
-  marks: Set<Mark>;
-  /** The class that alone has its colours; null for all. */
+  /** What is shown right of a line at this share of the width; null without a line. */
+  beyond: Show | null;
+  line: number;
+  /** The class that keeps its colours; null means all do. */
   only: number | null;
+  marks: Set<Mark>;
   /** The instances whose boxes are shown: a class, all, or none. */
   boxes: number | "all" | null;
   /** The height above which all is cut away; null means just below the ceilings. */
   section: number | null;
+  /** The height below which all is cut away. */
+  base: number;
   at: Rgb | null;
   from: Rgb | null;
   /** Whether the address names a point to mark. */
   place: boolean;
+  /** The name of an instance to find. */
+  instance: string | null;
   /** The class or instance in A and in B of changed faces to find; null if there is nothing to find. */
   find: { was: string | null; is: string | null } | null;
 }
 
 /** The colours in which the faces of a mesh can be shown. */
 export const showsOf = (mesh: Mesh, changed: boolean): Show[] =>
-  SHOWS.filter((show) => (show === "changed" ? changed : show === "texture" || mesh.has_votes));
+  SHOWS.filter((show) =>
+    show === "changed" ? changed : show === "texture" || show === "normal" || mesh.has_votes,
+  );
 
 /** The lines that can be drawn in a mesh. */
 export function marksOf(index: Index, mesh: Mesh): Mark[] {
@@ -46,6 +56,15 @@ function point(text: string | null): Rgb | null {
   return numbers.length === 3 && numbers.every((c) => Math.abs(c) < 1e7) ? (numbers as Rgb) : null;
 }
 
+function numberIn(query: URLSearchParams, name: string): number | null {
+  const text = query.get(name) ?? "";
+  const value = text.trim() === "" ? Number.NaN : Number(text);
+  return Number.isFinite(value) ? value : null;
+}
+
+/** The part of the area that is drawn. */
+export const slabIn = ({ section, base }: Look): Slab => ({ low: base, high: section ?? Infinity });
+
 export function lookFrom(index: Index, mesh: Mesh, query: URLSearchParams, changed: boolean): Look {
   const show = query.get("show") as Show;
   const there = marksOf(index, mesh);
@@ -55,28 +74,32 @@ export function lookFrom(index: Index, mesh: Mesh, query: URLSearchParams, chang
     word !== null && /^\d+$/.test(word) && index.classes[Number(word)] !== undefined;
   const only = query.get("only");
   const section = query.get("section");
-  const height = section === null || section.trim() === "" ? Number.NaN : Number(section);
   return {
     show: showsOf(mesh, changed).includes(show) ? show : "texture",
-    marks: new Set(there.filter((mark) => named.includes(mark))),
+    beyond: null,
+    line: 0.5,
     only: isClass(only) ? Number(only) : null,
+    marks: new Set(there.filter((mark) => named.includes(mark))),
     boxes: boxes === "all" ? "all" : isClass(boxes) ? Number(boxes) : null,
-    section: section === "none" ? Infinity : Number.isFinite(height) ? height : null,
+    section: section === "none" ? Infinity : numberIn(query, "section"),
+    base: numberIn(query, "base") ?? -Infinity,
     at: point(query.get("at")),
     from: point(query.get("from")),
     place: !query.has("show") || !query.has("marks"),
+    instance: query.get("instance"),
     find: query.has("was") || query.has("is") ? { was: query.get("was"), is: query.get("is") } : null,
   };
 }
 
 export function queryOf(look: Look, { at, from }: Stand): Record<string, string> {
   const words = (place: Rgb): string => place.map((c) => c.toFixed(3)).join(",");
-  const { section } = look;
+  const { section, base } = look;
   return {
     at: words(at),
     from: words(from),
     show: look.show,
     ...(section !== null && { section: Number.isFinite(section) ? section.toFixed(2) : "none" }),
+    ...(Number.isFinite(base) && { base: base.toFixed(2) }),
     marks: [...look.marks].join(","),
     ...(look.only !== null && { only: String(look.only) }),
     ...(look.boxes !== null && { boxes: String(look.boxes) }),

@@ -9,6 +9,7 @@ import { type Page, type Route, link, replaceRoute } from "../route.js";
 import { type Look, type Mark, lookFrom, marksOf, queryOf, showsOf } from "./look.js";
 import type { Show } from "./paint.js";
 import { pictureTools } from "../tools.js";
+import { storeyButtons } from "./levels.js";
 import { treePanel } from "./tree.js";
 import { SpaceView } from "./view.js";
 
@@ -22,6 +23,7 @@ const SHOW_NAMES: Record<Show, string> = {
   margin: "Vote margin",
   unlabelled: "Unlabelled",
   changed: "Changed",
+  normal: "Normals",
 };
 
 const LEGENDS: Record<Show, Modality[]> = {
@@ -31,6 +33,7 @@ const LEGENDS: Record<Show, Modality[]> = {
   margin: ["contested"],
   unlabelled: ["unlabelled"],
   changed: ["changed"],
+  normal: [],
 };
 
 const MARK_NAMES: Record<Mark, string> = {
@@ -89,6 +92,7 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
     against,
     changed: () => {
       slide();
+      press();
       legend.replaceChildren(...legendOf(index, LEGENDS[look.show], [0, 0]));
       window.clearTimeout(timer);
       timer = window.setTimeout(() => {
@@ -102,11 +106,12 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
     },
     fault: (words) => faults.append(h("p", { role: "alert" }, words)),
   });
+  const { buttons, press } = storeyButtons(view);
   const { slider, slide } = section(mesh, look, () => view.refresh());
   const areas = index.meshes.map((m): [string, string] => [link("space", [m.area]), `Area ${m.area}`]);
   const place = choice("Area", areas, link("space", [mesh.area]), (to) => (window.location.hash = to));
   const tools = h("div", { class: "tools" }, h("h1", { class: "hidden" }, `Area ${mesh.area} in 3D`));
-  append(tools, [areas.length > 1 && place, slider, ...switches(index, view)]);
+  append(tools, [areas.length > 1 && place, buttons, slider, ...switches(index, view)]);
   const changed = against?.changed_faces.includes(mesh.area) ?? false;
   const colors = showsOf(mesh, changed).map((show): [string, string] => [show, SHOW_NAMES[show]]);
   const bar = h("div", { class: "viewer-bar" });
@@ -225,15 +230,16 @@ function tree(index: Index, view: SpaceView): HTMLElement | null {
 
 /** The disputed patches with the largest surface; each is a link to its place. */
 function patchList(index: Index, view: SpaceView): HTMLElement | null {
-  const patches = index.votes.find(({ area }) => area === view.mesh.area)?.votes.disputed_patches ?? [];
+  const found = index.votes.find(({ area }) => area === view.mesh.area)?.votes.disputed_patches ?? [];
+  const patches = [...found].sort((a, b) => b.m2 - a.m2);
   if (patches.length === 0) return null;
   const entries = patches.map(({ labels, faces, m2 }, i): [string, string] => [
     String(i),
-    `${labels.map(named).join(" or ")} · ${several(faces, "face")} · ${m2.toFixed(4)} m²`,
+    `${m2.toFixed(4)} m² · ${labels.map(named).join(" or ")} · ${several(faces, "face")}`,
   ]);
   const list = choice("Disputed patches", [["", "Disputed patches…"], ...entries], "", (value) => {
     const patch = patches[Number(value)];
-    if (value !== "" && patch) view.visit(patch.center, Math.sqrt(patch.m2), true);
+    if (value !== "" && patch) view.visit(patch.center, 0, true);
   });
   list.classList.add("patches");
   return list;

@@ -3,6 +3,7 @@
 import {
   BufferAttribute,
   BufferGeometry,
+  DoubleSide,
   FrontSide,
   Group,
   type Material,
@@ -15,6 +16,8 @@ import { MeshBVH } from "three-mesh-bvh";
 import type { Rgb } from "../data.js";
 import type { FaceChanges } from "../compare/data.js";
 import { type FaceVotes, NO_VOTES } from "../faces.js";
+import type { Slab } from "../storeys.js";
+import { type Level, belowCeilings, levelOf } from "./ceilings.js";
 import type { Part } from "./files.js";
 import type { Paint } from "./paint.js";
 
@@ -29,25 +32,39 @@ export interface Hit {
 const SHADE = 0.66;
 const LAMP = new Vector3(0.35, -0.45, 0.82).normalize();
 
-/**
- * The distance of the section below the ceilings, and the least height of a ceiling above its floor,
- * metres.
- */
-const BELOW_CEILING = 0.1;
-const ROOM = 1.9;
-
 /** The number of vertices in a sample. */
 const SAMPLE = 4000;
 
-/** A height and the surface at it, m². */
-type Level = [z: number, m2: number];
+/** A line to a point ends this much before it, metres. */
+const SHORT = 0.002;
 
-/** The height below which lies this share of the surface. */
-function levelOf(levels: Level[], share: number): number | null {
-  const sorted = [...levels].sort((a, b) => a[0] - b[0]);
-  const all = sorted.reduce((sum, [, m2]) => sum + m2, 0);
-  let below = 0;
-  return sorted.find(([, m2]) => (below += m2) >= share * all)?.[0] ?? null;
+/** A border is drawn this far off its faces; and the reach of a search for a face, metres. */
+const RAISED = 0.008;
+const NEARBY = 0.2;
+
+const cornersOf = (vertices: Float32Array, index: Uint32Array, face: number): [Vector3, Vector3, Vector3] =>
+  [0, 1, 2].map((k) => new Vector3().fromArray(vertices, 3 * (index[3 * face + k] ?? 0))) as [
+    Vector3,
+    Vector3,
+    Vector3,
+  ];
+
+/** A name for a corner; vertices of two parts are one if they are at the same place. */
+const key = ({ x, y, z }: Vector3): string => [x, y, z].map((c) => Math.round(1e3 * c)).join();
+
+/** The triangles that hang together by corners with the one next to a point. */
+function together<T extends readonly Vector3[]>(triangles: T[], at: Vector3): T[] {
+  const touching = new Map<string, T[]>();
+  for (const triangle of triangles)
+    for (const corner of triangle)
+      touching.set(key(corner), [...(touching.get(key(corner)) ?? []), triangle]);
+  const off = (triangle: T): number => Math.min(...triangle.map((corner) => corner.distanceTo(at)));
+  const first = triangles.reduce<T | null>((best, t) => (best && off(best) <= off(t) ? best : t), null);
+  const found = new Set<T>(first ? [first] : []);
+  // The set grows while it is gone through.
+  for (const triangle of found)
+    for (const corner of triangle) for (const next of touching.get(key(corner)) ?? []) found.add(next);
+  return [...found];
 }
 
 export class Surface {
@@ -147,24 +164,25 @@ export class Surface {
     return (1 + SHADE) / 2 + ((1 - SHADE) / 2) * normal.dot(LAMP);
   }
 
-  /** A height just below the ceilings; null without any. */
-  ceiling(): number | null {
-    const floor = levelOf(this.up, 0.02);
-    if (floor === null) return null;
-    const ceilings = this.down.filter(([z]) => z > floor + ROOM);
-    const lowest = levelOf(ceilings, 0.1);
-    return lowest === null ? null : lowest - BELOW_CEILING;
+  /** The height of the lowest floor; null without any. */
+  floor(): number | null {
+    return levelOf(this.up, 0.02);
   }
 
-  /** A sample of the vertices below the section. */
-  sample(section: number): Rgb[] {
+  /** A height just below the ceilings that are over a floor, and not over the next; null without any. */
+  ceiling(floor: number, above: number): number | null {
+    return belowCeilings(this.down, floor, above);
+  }
+
+  /** A sample of the vertices in a slab. */
+  sample({ low, high }: Slab): Rgb[] {
     const points: Rgb[] = [];
     const all = this.parts.reduce((sum, { vertices }) => sum + vertices.length / 3, 0);
     const step = Math.max(1, Math.floor(all / SAMPLE));
     for (const { vertices } of this.parts)
       for (let i = 0; i < vertices.length; i += 3 * step) {
         const [x = 0, y = 0, z = 0] = vertices.subarray(i, i + 3);
-        if (z <= section) points.push([x, y, z]);
+        if (z >= low && z <= high) points.push([x, y, z]);
       }
     return points;
   }
@@ -172,16 +190,10 @@ export class Surface {
   /** The point on some faces that is nearest to their middle, and their surface; null if none is shown. */
   placeOf(faces: Set<number>): { at: Rgb; m2: number } | null {
     const found: { at: Vector3; m2: number }[] = [];
-    const corner = (vertices: Float32Array, vertex: number): Vector3 =>
-      new Vector3().fromArray(vertices, 3 * vertex);
     for (const { vertices, index, face } of this.parts)
       face.forEach((number, f) => {
         if (!faces.has(number)) return;
-        const [a, b, c] = [0, 1, 2].map((k) => corner(vertices, index[3 * f + k] ?? 0)) as [
-          Vector3,
-          Vector3,
-          Vector3,
-        ];
+        const [a, b, c] = cornersOf(vertices, index, f);
         const m2 = b.clone().sub(a).cross(c.clone().sub(a)).length() / 2;
         found.push({ at: a.add(b).add(c).divideScalar(3), m2 });
       });
@@ -194,15 +206,14 @@ export class Surface {
     return { at: [x, y, z], m2 };
   }
 
-  /** The first front of a face that a ray hits, below the section. */
-  pick(origin: Vector3, direction: Vector3, section: number): Hit | null {
-    // The part of the ray below the section.
-    let [near, far] = [0, Infinity];
-    const meets = (section - origin.z) / direction.z;
-    if (origin.z > section) {
-      if (direction.z >= 0) return null;
-      near = meets;
-    } else if (direction.z > 0) far = meets;
+  /** The first front of a face that a ray hits in a slab. */
+  pick(origin: Vector3, direction: Vector3, { low, high }: Slab): Hit | null {
+    // The part of the ray in the slab.
+    const ends = [(low - origin.z) / direction.z, (high - origin.z) / direction.z].sort((a, b) => a - b);
+    const isLevel = direction.z === 0;
+    if (isLevel && (origin.z < low || origin.z > high)) return null;
+    const [near, far] = isLevel ? [0, Infinity] : [Math.max(0, ends[0] ?? 0), ends[1] ?? Infinity];
+    if (far < near) return null;
     this.ray.set(origin, direction);
     let best: Hit | null = null;
     for (const { bvh, face } of this.parts) {
@@ -212,6 +223,57 @@ export class Surface {
       best = { face: face[hit.faceIndex ?? 0] ?? 0, point: [x, y, z], distance: hit.distance };
     }
     return best;
+  }
+
+  /** Whether no face, front or back, lies between two points. */
+  isFree(from: Rgb, to: Rgb): boolean {
+    const way = new Vector3(...to).sub(new Vector3(...from));
+    const far = way.length() - SHORT;
+    this.ray.set(new Vector3(...from), way.normalize());
+    return this.parts.every(({ bvh }) => far <= SHORT || !bvh.raycastFirst(this.ray, DoubleSide, SHORT, far));
+  }
+
+  /** The direction that the face next to a point looks in; null if there is no face nearby. */
+  normalAt(point: Rgb): Vector3 | null {
+    let best: { distance: number; normal: Vector3 } | null = null;
+    for (const { bvh, vertices, index } of this.parts) {
+      const near = bvh.closestPointToPoint(new Vector3(...point), undefined, 0, best?.distance ?? NEARBY);
+      if (!near || near.distance >= (best?.distance ?? NEARBY)) continue;
+      const [a, b, c] = cornersOf(vertices, index, near.faceIndex);
+      const normal = b.sub(a).cross(c.sub(a));
+      if (normal.length() > 0) best = { distance: near.distance, normal: normal.normalize() };
+    }
+    return best?.normal ?? null;
+  }
+
+  /**
+   * The border of the faces in a box (lowest and highest x, y, z) that are wanted and hang together with the
+   * one next to a point, raised off them: two ends for each edge that only one of them has.
+   */
+  border(box: number[], at: Rgb, wanted: (face: number) => boolean): number[] {
+    const within = ({ x, y, z }: Vector3): boolean =>
+      [x, y, z].every((c, k) => c >= (box[k] ?? 0) - RAISED && c <= (box[k + 3] ?? 0) + RAISED);
+    const found: [Vector3, Vector3, Vector3][] = [];
+    for (const { vertices, index, face } of this.parts)
+      face.forEach((number, f) => {
+        const corners = wanted(number) ? cornersOf(vertices, index, f) : [];
+        if (corners.length === 3 && corners.every(within)) found.push(corners as [Vector3, Vector3, Vector3]);
+      });
+
+    const edges = new Map<string, number[]>();
+    for (const [a, b, c] of together(found, new Vector3(...at))) {
+      const raise = b.clone().sub(a).cross(c.clone().sub(a)).setLength(RAISED);
+      for (const [from, to] of [
+        [a, b],
+        [b, c],
+        [c, a],
+      ] as const) {
+        const back = `${key(to)} ${key(from)}`;
+        const ends = [from, to].flatMap((end) => end.clone().add(raise).toArray());
+        if (!edges.delete(back)) edges.set(`${key(from)} ${key(to)}`, ends);
+      }
+    }
+    return [...edges.values()].flat();
   }
 
   close(): void {

@@ -1,20 +1,22 @@
 // A mesh on a canvas, drawn when something changes, with a readout for the pointer.
 
 import { ColorManagement, Group, LinearSRGBColorSpace, Plane, Scene, Vector3, WebGLRenderer } from "three";
-import type { Index, Mesh, Rgb } from "../data.js";
+import type { Index, Mesh, Rgb, Votes } from "../data.js";
 import { type Against, type FaceChanges, groupOf, loadChanges } from "../compare/data.js";
 import { tellBoth } from "../compare/words.js";
-import { append, h } from "../dom.js";
-import { type FaceVotes, loadFaceVotes } from "../faces.js";
+import { append, h, roomOf } from "../dom.js";
+import { type FaceVotes, SURE, loadFaceVotes } from "../faces.js";
 import { Marks } from "../marks.js";
 import { tell } from "../readout.js";
-import { Eye, type Stand } from "./eye.js";
+import { type Slab, WHOLE, fullest, slabOf, storeysOf } from "../storeys.js";
+import { Eye, type Sides, type Stand } from "./eye.js";
 import { type Box, loadBoxes, loadPart, loadTextures } from "./files.js";
 import { Labels } from "./labels.js";
-import { boxLines, drop, floorOf, frustums, roomLines } from "./lines.js";
-import type { Look, Mark } from "./look.js";
-import { Paint } from "./paint.js";
+import { borderLines, boxLines, drop, floorOf, frustums, roomLines } from "./lines.js";
+import { type Look, type Mark, slabIn } from "./look.js";
+import { Paint, type Show } from "./paint.js";
 import { type Hit, Surface } from "./surface.js";
+import { vantage } from "./vantage.js";
 
 /** A press that moves no farther counts as a click, CSS pixels. */
 const STILL = 5;
@@ -28,10 +30,27 @@ export interface ViewOptions {
   against: Against | null;
   /** Called when the look or the viewpoint changes. */
   changed: () => void;
+  /** Whether the area is turned slowly at first. */
+  turns?: boolean;
+  /** The pixels at the sides of the canvas that something lies over. */
+  covered?: () => Sides;
   /** Called as files arrive, and with the fault of a file. */
   progress: (words: string) => void;
   fault: (words: string) => void;
 }
+
+/** Adjacent faces whose labels two labels dispute. */
+export type Patch = Votes["disputed_patches"][number];
+
+/** The size of a patch: half of its longest side. */
+const sizeOf = ({ m2, bbox }: Patch): number =>
+  bbox ? Math.max(...[0, 1, 2].map((k) => ((bbox[k + 3] ?? 0) - (bbox[k] ?? 0)) / 2)) : Math.sqrt(m2);
+
+/** Two labels dispute a face whose first label leads by this share of its votes at most. */
+const DISPUTED = 0.5;
+/** The centre of a patch that an address names is no farther away, metres. */
+const SAME = 2e-3;
+const rounded = (height: number): number => (Number.isFinite(height) ? Number(height.toFixed(2)) : height);
 
 /** An extension that TypeScript does not know. */
 interface ProvokingVertex {
@@ -51,7 +70,11 @@ export class SpaceView {
   private readonly surface: Surface;
   private readonly scene = new Scene();
   private readonly lines = new Group();
+  private readonly marked = new Group();
   private readonly cut = new Plane(new Vector3(0, 0, -1), SKY);
+  private readonly bottom = new Plane(new Vector3(0, 0, 1), SKY);
+  readonly storeys;
+  private readonly slabs = new Map<number | null, Slab>();
   private readonly marks = new Marks();
   private readonly labels: Labels;
   private readonly resized = new ResizeObserver(() => this.resize());
@@ -75,14 +98,15 @@ export class SpaceView {
     this.renderer = new WebGLRenderer({ canvas: this.canvas, context: gl });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.setClearColor(0, 0);
-    this.renderer.clippingPlanes = [this.cut];
+    this.renderer.clippingPlanes = [this.cut, this.bottom];
     // All corners of a face have the same values. With the first corner as the provoking one, WebGL needs
     // no extra work.
     const corners = gl.getExtension("WEBGL_provoking_vertex") as ProvokingVertex | null;
     corners?.provokingVertexWEBGL(corners.FIRST_VERTEX_CONVENTION_WEBGL);
     this.paint = new Paint(index, mesh);
     this.surface = new Surface(this.paint);
-    this.scene.add(this.surface.group, this.lines);
+    this.scene.add(this.surface.group, this.lines, this.marked);
+    this.storeys = storeysOf(index, mesh.area);
     this.eye = new Eye(this.canvas, mesh, () => this.changed());
     this.canvas.setAttribute("aria-label", `Area ${mesh.area} in 3D; arrow keys turn, plus and minus zoom`);
     this.labels = new Labels(index, mesh, this.overlay);
@@ -169,11 +193,94 @@ export class SpaceView {
 
   /** Goes to a viewpoint of a place. If the section cuts the place away, the section is lifted. */
   visit(at: Rgb, size: number, flying: boolean): void {
-    if (at[2] > (this.look.section ?? Infinity) - SLACK) this.look.section = Infinity;
-    this.marks.pinAt(at, "");
-    const to = { at, from: this.vantage(at, size) };
+    const patch = this.patchAt(at);
+    this.reveal(at, patch?.labels[0] ?? "");
+    drop(this.marked);
+    const border = patch && this.borderOf(patch);
+    if (border) this.marked.add(borderLines(border));
+    this.marks.pinAt(border ? null : at, "");
+    const to = { at, from: this.vantage(at, patch ? sizeOf(patch) : size) };
     if (flying) this.eye.fly(to);
     else this.eye.set(to);
+    this.changed();
+  }
+
+  /** Shows the storey of a place on an instance; all of the area, if this is not enough to see it. */
+  private reveal(at: Rgb, label: string): void {
+    const shows = ({ low, high }: Slab): boolean => at[2] >= low && at[2] <= high - SLACK;
+    if (shows(slabIn(this.look))) return;
+    const slab = this.slabOf(this.storeys.of(at[2], roomOf(label)));
+    this.cutTo(shows(slab) ? slab : WHOLE);
+  }
+
+  /** The disputed patch with this centre. */
+  private patchAt(at: Rgb): Patch | null {
+    const patches = this.index.votes.find(({ area }) => area === this.mesh.area)?.votes.disputed_patches;
+    const off = ({ center }: Patch): number => Math.hypot(...center.map((c, k) => c - (at[k] ?? 0)));
+    return patches?.find((patch) => off(patch) < SAME) ?? null;
+  }
+
+  /** The border of a patch's faces; null if none of them is shown. */
+  private borderOf({ labels, bbox, center }: Patch): number[] | null {
+    const { votes } = this;
+    const [first, second] = labels.map((name) => this.index.labels.findIndex((l) => l.name === name));
+    if (!votes || !bbox) return null;
+    const isDisputed = (face: number): boolean =>
+      votes.label[face] === first &&
+      votes.runnerUp[face] === second &&
+      (votes.margin[face] ?? SURE) <= DISPUTED * SURE;
+    const points = this.surface.border(bbox, center, isDisputed);
+    return points.length > 0 ? points : null;
+  }
+
+  /** The part of the area that shows a storey, or all storeys, below the ceilings. */
+  slabOf(storey: number | null): Slab {
+    const known = this.slabs.get(storey) ?? this.slabFor(storey);
+    if (this.loaded) this.slabs.set(storey, known);
+    return known;
+  }
+
+  private slabFor(storey: number | null): Slab {
+    const { all } = this.storeys;
+    const top = all.length - 1;
+    if (top > 0) {
+      const slab = slabOf(all, storey ?? top, (floor, above) => this.surface.ceiling(floor, above));
+      return { low: storey === null ? -Infinity : slab.low, high: rounded(slab.high) };
+    }
+    const floor = this.surface.floor();
+    const high = floor === null ? null : this.surface.ceiling(floor, Infinity);
+    return { low: -Infinity, high: rounded(high ?? Infinity) };
+  }
+
+  private cutTo({ low, high }: Slab): void {
+    this.look.base = low;
+    this.look.section = high;
+  }
+
+  private fromAbove(): Stand {
+    return this.eye.overview(this.surface.sample(slabIn(this.look)), this.options.turns);
+  }
+
+  /** Goes to the instance that the address names, and shows its box. */
+  private findInstance(): boolean {
+    const { look, votes, index } = this;
+    const label = index.labels.findIndex(({ name }) => name === look.instance);
+    if (label <= 0 || !votes) return false;
+    const faces: number[] = [];
+    votes.label.forEach((of, face) => of === label && faces.push(face));
+    const boxes = this.boxes.filter((box) => box.label === label);
+    const found = this.visitFaces(faces, false);
+    if (found) {
+      this.marked.add(boxLines(index, boxes, null));
+      this.marks.pinAt(null, "");
+    }
+    return found;
+  }
+
+  /** Shows a storey, or all of them, from above. */
+  showStorey(storey: number | null): void {
+    this.cutTo(this.slabOf(storey));
+    this.eye.fly(this.fromAbove());
     this.changed();
   }
 
@@ -197,6 +304,7 @@ export class SpaceView {
     this.resized.disconnect();
     this.eye.close();
     drop(this.lines);
+    drop(this.marked);
     this.surface.close();
     this.paint.close();
     const context = this.renderer.getContext();
@@ -205,49 +313,38 @@ export class SpaceView {
   }
 
   /**
-   * The section by default: just below the ceilings, unless the viewpoint is below them, or the target
-   * above.
+   * What is shown by default: the storey of the target, or else the one with the most rooms, just below the
+   * ceilings; all of the area, if the viewpoint is below them, or the target above.
    */
-  private firstSection(): number {
-    const height = this.surface.ceiling();
+  private firstSlab(): Slab {
     const { at, from } = this.look;
-    if (height === null || (from && from[2] < height) || (at && at[2] > height - SLACK)) return Infinity;
-    return Number(height.toFixed(2));
+    const slab = this.slabOf(at ? this.storeys.of(at[2]) : fullest(this.storeys.all));
+    if ((from && from[2] < slab.high) || (at && at[2] > slab.high - SLACK)) return WHOLE;
+    return slab;
   }
 
   private start(): void {
     this.resize();
     const { at, from, place } = this.look;
-    this.look.section ??= this.firstSection();
+    if (this.look.section === null) this.cutTo(this.firstSlab());
     if (at && from) this.eye.set({ at, from });
     else if (at) this.visit(at, 0.5, false);
-    else if (!this.findChange()) this.eye.set(this.eye.overview(this.surface.sample(this.look.section)));
-    if (at && place) this.marks.pinAt(at, "");
+    else if (!this.findChange() && !this.findInstance()) {
+      this.eye.set(this.fromAbove());
+      if (this.options.turns && !window.matchMedia("(prefers-reduced-motion: reduce)").matches)
+        this.eye.turn();
+    }
+    if (at && from && place) this.marks.pinAt(at, "");
   }
 
-  /** A viewpoint with a free view of a place, as near as possible to the current direction. */
+  /** A viewpoint with a free view of a place. */
   private vantage(at: Rgb, size: number): Rgb {
-    const { from, at: was } = this.eye.stand;
-    const ahead = Math.atan2(from[1] - was[1], from[0] - was[0]);
-    const away = Math.max(1, 3 * size);
-    const section = this.look.section ?? Infinity;
-    const near = 0.02 + size / 4 + (this.mesh.cell_m ?? 0);
-    let best: { off: number; from: Rgb } | null = null;
-    for (const degrees of [30, 55, 8, -25]) {
-      for (let k = 0; k < 16; k++) {
-        const azimuth = ahead + (k % 2 === 0 ? k / 2 : -(k + 1) / 2) * (Math.PI / 8);
-        const rise = (degrees * Math.PI) / 180;
-        const level = Math.cos(rise);
-        const back = new Vector3(level * Math.cos(azimuth), level * Math.sin(azimuth), Math.sin(rise));
-        const eye = new Vector3(...at).addScaledVector(back, away);
-        const hit = this.surface.pick(eye, back.negate(), section);
-        const off = hit ? Math.hypot(...hit.point.map((c, axis) => c - (at[axis] ?? 0))) : Infinity;
-        const found = { off, from: [eye.x, eye.y, eye.z] as Rgb };
-        if (off < near) return found.from;
-        if (!best || off < best.off) best = found;
-      }
-    }
-    return best?.from ?? from;
+    const stands = this.index.locations.flatMap(({ area, position }) =>
+      area === this.mesh.area && position ? [position] : [],
+    );
+    const { surface, look, mesh } = this;
+    const place = { at, size, slack: mesh.cell_m ?? 0 };
+    return vantage(surface, slabIn(look), place, stands, this.eye.stand);
   }
 
   private listen(): void {
@@ -303,11 +400,7 @@ export class SpaceView {
   /** Shows the values at a point of the canvas, which is given in shares of its size. */
   private readAt(u: number, v: number): Hit | null {
     if (!this.loaded) return null;
-    const hit = this.surface.pick(
-      this.eye.camera.position,
-      this.eye.ray(u, v),
-      this.look.section ?? Infinity,
-    );
+    const hit = this.surface.pick(this.eye.camera.position, this.eye.ray(u, v), slabIn(this.look));
     this.readout.replaceChildren();
     const label = hit && (this.votes?.label[hit.face] ?? null);
     // Where changes are shown, their colours count.
@@ -345,7 +438,7 @@ export class SpaceView {
     if (width === 0 || height === 0) return;
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     this.renderer.setSize(width, height, false);
-    this.eye.resize(width, height);
+    this.eye.resize(width, height, this.options.covered?.());
     this.paintNow();
   }
 
@@ -365,11 +458,13 @@ export class SpaceView {
 
   private paintNow(): void {
     if (this.closed || !this.loaded) return;
-    const { show, section } = this.look;
-    this.paint.set(show, section ?? Infinity);
-    this.paint.mark(this.lit, this.look.only);
+    const { show, beyond, section, base } = this.look;
+    this.paint.set(this.look, this.look.line * this.canvas.width, slabIn(this.look), this.lit);
     this.cut.constant = Math.min(SKY, section ?? SKY);
-    this.surface.useMaterials(show === "texture" || show === "margin" || show === "changed");
+    this.bottom.constant = Math.min(SKY, -base);
+    const flat: (Show | null)[] = ["class", "instance", "unlabelled", "normal", null];
+    const isFlat = flat.includes(show) && flat.includes(beyond) && this.look.only === null;
+    this.surface.useMaterials(!isFlat);
     this.renderer.render(this.scene, this.eye.camera);
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.labels.place(this.eye, this.surface, this.look, width, height);

@@ -43,11 +43,20 @@ export function launch() {
 }
 
 /**
- * Opens a report (a folder or one file) from the disk. `faults` collects errors, and requests that leave
- * the folder.
+ * Opens a report (a folder or one file) from the disk, for a user who wants no motion unless `motion`.
+ * `faults` collects errors, and requests that leave the folder.
  */
-export async function open(browser, folder, hash, { width = 1440, height = 900, touch = false } = {}) {
-  const context = await browser.newContext({ viewport: { width, height }, hasTouch: touch });
+export async function open(browser, folder, hash, options = {}) {
+  const { width = 1440, height = 900, touch = false, motion = false, dark = false } = options;
+  // Without motion the overview does not turn, which would keep a processor busy.
+  const still = isFirefox || motion ? {} : { reducedMotion: "reduce" };
+  const colorScheme = dark ? "dark" : "light";
+  const context = await browser.newContext({
+    viewport: { width, height },
+    hasTouch: touch,
+    colorScheme,
+    ...still,
+  });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE_MS);
   const faults = [];

@@ -1,0 +1,158 @@
+// The richest views, no two alike; and the first panorama, which looks into a room.
+
+import type { Index, Rgb, View } from "../data.js";
+
+/** Views farther apart than this are as far apart as can be, metres. */
+const FAR = 6;
+/** The parts of a distance: another room, another place, another content, another direction. */
+const PARTS = { room: 0.45, place: 0.2, content: 0.25, direction: 0.1 };
+
+interface Features {
+  view: View;
+  at: Rgb | null;
+  room: string;
+  /** The direction from +X, radians. */
+  heading: number | null;
+  shares: Float32Array;
+  /** How rich it is, from 0 to 1. */
+  quality: number;
+}
+
+/** The entropy of some shares, nats. */
+function entropyOf(shares: Float32Array): number {
+  const all = shares.reduce((sum, share) => sum + share, 0);
+  return shares.reduce((sum, share) => (share > 0 ? sum - (share / all) * Math.log(share / all) : sum), 0);
+}
+
+/** How rich a view is, before it is compared: its entropy where that is known. */
+function riches(view: View, shares: Float32Array): number {
+  const coverage = view.seen?.coverage ?? 1;
+  const entropy = view.entropy ?? (view.seen?.classes.length ? entropyOf(shares) : (view.seen?.depth_m ?? 1));
+  return coverage ** 2 * entropy;
+}
+
+function featuresOf(index: Index, view: View): Features {
+  const location = view.location === null ? undefined : index.locations[view.location];
+  const shares = new Float32Array(index.classes.length);
+  for (const [place, share] of view.seen?.classes ?? []) shares[place] = share;
+  const { forward } = view;
+  const turned = location?.azimuth_rad != null && view.yaw_deg !== null;
+  return {
+    view,
+    at: view.position ?? location?.position ?? null,
+    room: `${view.area}/${view.room}`,
+    heading: turned
+      ? (location.azimuth_rad ?? 0) + ((view.yaw_deg ?? 0) * Math.PI) / 180
+      : forward
+        ? Math.atan2(forward[1], forward[0])
+        : null,
+    shares,
+    quality: riches(view, shares),
+  };
+}
+
+function distance(a: Features, b: Features): number {
+  const away = a.at && b.at ? Math.hypot(...a.at.map((c, k) => c - (b.at?.[k] ?? 0))) : 0;
+  const differ = a.shares.reduce((sum, share, i) => sum + Math.abs(share - (b.shares[i] ?? 0)), 0) / 2;
+  const turned = a.heading !== null && b.heading !== null ? (1 - Math.cos(a.heading - b.heading)) / 2 : 0;
+  return (
+    (a.room === b.room ? 0 : PARTS.room) +
+    PARTS.place * Math.min(1, away / FAR) +
+    PARTS.content * Math.min(1, differ) +
+    PARTS.direction * turned
+  );
+}
+
+/** So many views, the richest first, and each next one rich and far from all before. */
+export function richest(views: View[], index: Index, most: number): View[] {
+  const all = views.filter((view) => view.picture !== null).map((view) => featuresOf(index, view));
+  const highest = all.reduce((max, { quality }) => Math.max(max, quality), 1e-9);
+  for (const one of all) one.quality /= highest;
+  const nearest = new Float64Array(all.length).fill(1);
+  const chosen: View[] = [];
+  while (chosen.length < Math.min(most, all.length)) {
+    let best = -1;
+    let worth = -1;
+    all.forEach(({ quality }, i) => {
+      const value = (nearest[i] ?? 0) * quality;
+      if (value > worth) [best, worth] = [i, value];
+    });
+    const next = all[best];
+    if (!next || worth <= 0) break;
+    chosen.push(next.view);
+    all.forEach((other, i) => (nearest[i] = Math.min(nearest[i] ?? 0, distance(next, other))));
+    nearest[best] = 0;
+  }
+  return chosen;
+}
+
+/**
+ * The location whose panorama looks into a room: by the mean entropy of its views, or by its median distance
+ * where there are no labels. One that sees little is taken only if there is no other.
+ */
+export function firstLocation(index: Index): number {
+  const entropies = new Map<number, { sum: number; n: number }>();
+  const isLabelled = index.classes.length > 0;
+  for (const { location, entropy } of index.views) {
+    if (location === null || entropy === null || !isLabelled) continue;
+    const { sum, n } = entropies.get(location) ?? { sum: 0, n: 0 };
+    entropies.set(location, { sum: sum + entropy, n: n + 1 });
+  }
+  let best = -1;
+  let worth: [number, number] = [-1, -1];
+  index.locations.forEach(({ pano, seen }, i) => {
+    if (!pano) return;
+    const coverage = seen?.coverage ?? 0;
+    const views = entropies.get(i);
+    const rich = views
+      ? views.sum / views.n
+      : isLabelled && entropies.size > 0
+        ? 0
+        : (seen?.depth_m ?? coverage);
+    const value: [number, number] = [Math.min(coverage, ENOUGH), rich];
+    if (value[0] > worth[0] || (value[0] === worth[0] && value[1] > worth[1])) [best, worth] = [i, value];
+  });
+  return best;
+}
+
+/** A panorama that sees this share of the sphere is in a room. */
+const ENOUGH = 0.75;
+
+/** A pixel of a panorama: metres, and a class. */
+export interface Pixel {
+  depth: number | null;
+  place: number | null;
+}
+
+/** A first look is this wide and high, degrees, and one of so many. */
+const [WIDE, HIGH, LOOKS] = [84, 46, 24];
+
+/** The direction of a panorama that shows the most, degrees to the right: classes and depth. */
+export function firstLook(pixelAt: (u: number, v: number) => Pixel): number {
+  const columns = Array.from({ length: 120 }, (_, i) =>
+    Array.from({ length: 7 }, (__, j) =>
+      pixelAt((i + 0.5) / 120, 0.5 + (HIGH / 180) * ((j + 0.5) / 7 - 0.42)),
+    ),
+  );
+  const half = Math.round((WIDE / 360) * 60);
+  const worth = (look: number): number => {
+    const middle = Math.round((look / LOOKS) * 120);
+    const seen = Array.from(
+      { length: 2 * half + 1 },
+      (_, k) => columns[(middle + k - half + 120) % 120] ?? [],
+    ).flat();
+    const depths = seen.flatMap(({ depth }) => depth ?? []).sort((a, b) => a - b);
+    if (depths.length === 0) return 0;
+    const counts = new Map<number, number>();
+    for (const { place } of seen) if (place !== null) counts.set(place, (counts.get(place) ?? 0) + 1);
+    const entropy = entropyOf(Float32Array.from(counts.values()));
+    const near = depths[Math.floor(depths.length / 10)] ?? 0;
+    const median = depths[Math.floor(depths.length / 2)] ?? 0;
+    return (depths.length / seen.length) * (entropy + 0.5 * Math.log1p(median) + 0.4 * Math.log1p(near));
+  };
+  const all = Array.from({ length: LOOKS }, (_, look) => worth(look));
+  const ahead = all[LOOKS / 2] ?? 0;
+  const best = Math.max(...all);
+  // Straight ahead, if this is about as good.
+  return ahead >= 0.97 * best ? 0 : (360 / LOOKS) * all.indexOf(best) - 180;
+}
