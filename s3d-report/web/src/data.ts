@@ -263,6 +263,8 @@ const KEPT: Record<string, number> = {
 };
 
 const files = new Map<string, Promise<unknown>>();
+/** Files that are not here yet: none of them is asked for twice, whether it is kept or not. */
+const coming = new Map<string, Promise<unknown>>();
 const arriving = new Map<string, (text: string, packed: boolean) => void>();
 
 window.s3dReport = (key, text, packed = false) => arriving.get(key)?.(text, packed);
@@ -277,16 +279,19 @@ export function unpacked(text: string): Response {
 
 /** The value in the file `data/KEY.js`. */
 export function load<T>(key: string): Promise<T> {
-  const there = files.get(key);
+  const there = files.get(key) ?? coming.get(key);
   files.delete(key);
   const file = there ?? run(key);
+  if (!there) {
+    const arrived = (): boolean => coming.delete(key);
+    coming.set(key, file);
+    file.then(arrived, arrived);
+  }
   files.set(key, file);
   file.catch(() => files.delete(key));
   const kind = key.split("_")[0] ?? "";
   const same = [...files.keys()].filter((k) => k.split("_")[0] === kind);
-  for (const old of same.slice(0, Math.max(0, same.length - (KEPT[kind] ?? 1))))
-    // A file that is arriving would be asked for twice.
-    if (!arriving.has(old)) files.delete(old);
+  for (const old of same.slice(0, Math.max(0, same.length - (KEPT[kind] ?? 1)))) files.delete(old);
   return file as Promise<T>;
 }
 

@@ -2,7 +2,7 @@
 
 import { css } from "../colors.js";
 import type { Index } from "../data.js";
-import { append, choice, count, h, named, roomName } from "../dom.js";
+import { append, choice, count, h, named, roomName, roomOf } from "../dom.js";
 import type { Box } from "./files.js";
 
 export interface OfClass {
@@ -16,7 +16,7 @@ export function treeOf(index: Index, boxes: Box[]): { room: string; classes: OfC
   for (const box of boxes) {
     const label = index.labels[box.label];
     if (!label || label.class === null) continue;
-    const room = label.name.split("_").slice(2, 4).join("_");
+    const room = roomOf(label.name);
     const classes = rooms.get(room) ?? new Map<number, Box[]>();
     rooms.set(room, classes);
     classes.set(label.class, [...(classes.get(label.class) ?? []), box]);
