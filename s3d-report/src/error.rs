@@ -25,6 +25,14 @@ pub enum Error {
     /// A result of `s3d eval` is of another data set, or of another state of this one.
     #[error("{}: these scores are of another data set: its list of files differs", .0.display())]
     OtherDataSet(PathBuf),
+    /// A poster shows a mesh, and the data set has none.
+    #[error("{}: area {area} has no mesh to make a poster of", .root.display())]
+    NoMesh {
+        /// The folder of the data set.
+        root: PathBuf,
+        /// The number of the area.
+        area: u32,
+    },
     /// The report is too large for a single file.
     #[error(
         "one file of more than {} MB would open slowly or not at all: make a folder, or smaller images",

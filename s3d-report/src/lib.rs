@@ -2,7 +2,7 @@
 //!
 //! [`report`] reads a data set and writes a folder. `index.html` is the page with its style and its program.
 //! `data/` has reduced images, the mesh, and their tables. The data set is not altered. [`report_against`]
-//! shows another data set beside it, with the differences.
+//! shows another data set beside it, with the differences. [`poster`] makes one picture of a data set.
 //!
 //! [`files`] describes the files of the folder. The source of the page is in `web/`, in TypeScript.
 //! Its bundle is in `web/dist/`, so that this crate builds without Node.
@@ -31,6 +31,7 @@ mod index;
 mod mesh;
 mod packed;
 mod pixels;
+mod poster;
 mod reduce;
 mod scores;
 mod script;
@@ -39,6 +40,7 @@ mod write;
 
 pub use error::{Error, Result};
 pub use faults::Fault;
+pub use poster::poster;
 pub use s3d_dataset::Context;
 pub use write::{Report, ReportOptions, report, report_against};
 

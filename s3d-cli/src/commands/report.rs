@@ -39,7 +39,10 @@ pub(crate) struct ReportArgs {
     /// Show the scores in a file that `s3d eval --json` wrote. May be given several times.
     #[arg(long, value_name = "SCORES.json")]
     pub(crate) scores: Vec<PathBuf>,
-    /// Replace an earlier report.
+    /// Also draw the building from above, half in colours and half in classes: a PNG of 1600 × 1000 pixels.
+    #[arg(long, value_name = "FILE.png")]
+    pub(crate) poster: Option<PathBuf>,
+    /// Replace an earlier report, and an earlier poster.
     #[arg(long)]
     pub(crate) overwrite: bool,
     #[command(flatten)]
@@ -57,6 +60,7 @@ pub(crate) fn run(args: ReportArgs) -> Outcome<()> {
         verify,
         single,
         scores,
+        poster,
         overwrite,
         threads,
     } = args;
@@ -66,6 +70,11 @@ pub(crate) fn run(args: ReportArgs) -> Outcome<()> {
             || s3d_dataset::store::beside(&dataset, if single { "_report.html" } else { "_report" }),
             Ok,
         )?;
+        // What cannot be drawn is told before the report is made.
+        let drawn = poster.map(|file| s3d_report::poster(&dataset, &file, overwrite, context));
+        if let Some(Err(error)) = drawn {
+            return Ok(Err(error));
+        }
         Ok(match against {
             Some(other) => s3d_report::report_against(&dataset, &other, &to, &options, context),
             None => s3d_report::report(&dataset, &to, &options, context),

@@ -41,7 +41,7 @@ const COMMANDS: [&str; 30] = [
     "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o views --overwrite",
     "profile out --to mmdet3d",
     "report out --pano-width 32 --thumbs 16",
-    "report out --single -o new.html --pano-width 32 --thumbs 16",
+    "report out --single -o new.html --poster new.png --pano-width 32 --thumbs 16",
     "report out --against out --pano-width 32 --thumbs 16",
     "compare out out --json new.json",
     "eval det --truth out --pred boxes.json --json new.json",

@@ -115,6 +115,7 @@ mod tests {
     use crate::summary::{Surface, Unlabelled};
     use crate::survey::annotated::Annotated;
     use crate::survey::annotated::{SkippedLines, SurveyedRoom};
+    use crate::survey::columns::Columns;
     use crate::survey::room_names::{InstanceName, RoomNames};
     use crate::survey::strays::Strays;
     use crate::survey::surface_seen::SurfaceSeen;
@@ -213,6 +214,7 @@ mod tests {
                         },
                         bbox: boxes.0,
                         wall_direction_deg: 89,
+                        columns: Columns::default(),
                     }],
                     points: u64::from(count),
                     skipped: SkippedLines::default(),

@@ -1,0 +1,295 @@
+//! A picture of a data set: its mesh from above, opened below the ceilings, in colours and in classes.
+
+use crate::areas::rooms;
+use crate::error::{Error, Result};
+use crate::faults::Faults;
+use rayon::prelude::*;
+use s3d_dataset::store::{NewFile, check_apart};
+use s3d_dataset::{Context, DataSet};
+use s3d_geom::glam::{DVec2, DVec3, dvec2, dvec3};
+use s3d_geom::{Camera, Pose, Raster, TriMesh};
+use s3d_io::image::{Compression, Content, write_rgb8};
+use s3d_label::{LabelId, LabelTable};
+use s3d_render::{MipMaps, Scene, TextureFilter, cast_ray, rgb_of_ray};
+use std::path::Path;
+
+/// The size of the picture, in pixels.
+const SIZE: [u32; 2] = [1600, 1000];
+
+/// Rays along each side of a pixel.
+const SAMPLES: u32 = 2;
+
+/// The horizontal angle of view, degrees.
+const FOV_DEG: f64 = 38.0;
+
+/// The direction from the middle of the building to the camera.
+const BACK: DVec3 = dvec3(0.3, -0.62, 0.9);
+
+/// The background, and the line between colours and classes.
+const GROUND: [f32; 3] = [58.0, 58.0, 63.0];
+const LINE: [f32; 3] = [255.0; 3];
+const LINE_PX: u32 = 3;
+
+/// The share of the mesh's own brightness in the colours of classes, so that shapes can be made out, and the
+/// weights of red, green and blue in it.
+const DETAIL: f32 = 0.35;
+const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
+/// The colour of faces without a label.
+const NO_CLASS: [u8; 3] = [120; 3];
+
+/// The floors of a storey lie within this height, metres.
+const STOREY_M: f64 = 1.8;
+/// A ceiling is at least this high above its floor, metres.
+const CEILING_M: f64 = 1.9;
+/// The building is opened this much below its ceilings, or this high above the floor if it has none, metres.
+const BELOW_CEILING_M: f64 = 0.1;
+const OPEN_M: f64 = 2.2;
+/// The share of the ceilings that may lie lower than the height that counts as theirs.
+const LOW_CEILINGS: f64 = 0.1;
+
+/// The most faces that are seen from behind along a ray.
+const MOST_BACKS: u32 = 64;
+
+/// Draws a picture of the data set in the folder `out`, and writes it to `to`, a PNG of 1600 × 1000 pixels,
+/// whole or not at all. It shows the mesh of the first area obliquely from above, with the storey of most
+/// rooms opened below its ceilings: colours on the left, classes on the right. Without labels it has colours
+/// alone. Faces are seen from the front only.
+///
+/// # Errors
+/// [`Error::NoMesh`] if the first area has no mesh. [`Error::Dataset`] if there is no data set in `out`, a
+/// file that it needs is damaged, `to` cannot be written, or is there and not to be replaced.
+pub fn poster(out: &Path, to: &Path, overwrite: bool, ctx: &Context) -> Result<()> {
+    check_apart(to, out)?;
+    let data = DataSet::open(out)?;
+    let area = data.areas().first().copied().unwrap_or_default();
+    let file = NewFile::begin(ctx, to, overwrite)?;
+    let Some(mesh_file) = data.mesh(area)? else { return Err(Error::NoMesh { root: out.to_owned(), area }) };
+    let table = data.labels()?;
+    let classes = match (&table, data.face_votes(area)?) {
+        (Some(table), Some(votes)) => Some(class_colors(&data, table, &votes.label)),
+        _ => None,
+    };
+
+    let mesh = &mesh_file.mesh;
+    let floors: Vec<f64> = rooms(&data, &mut Faults::default())?
+        .iter()
+        .filter(|room| room.area == area)
+        .filter_map(|room| room.floor)
+        .collect();
+    let picture = draw(mesh, classes.as_deref(), section(mesh, &floors));
+    write_rgb8(file.path(), &picture, Content::Photo, Compression::default())?;
+    Ok(file.finish()?)
+}
+
+/// Returns the colour of each face's class.
+fn class_colors(data: &DataSet, table: &LabelTable, labels: &[u32]) -> Vec<[u8; 3]> {
+    let color = |label: &u32| {
+        let class = table.class_of(LabelId(*label))?;
+        Some(data.taxonomy()?.color(class))
+    };
+    labels.iter().map(|label| color(label).unwrap_or(NO_CLASS)).collect()
+}
+
+/// Returns the height below which a mesh is shown: just below the ceilings of the storey with the most
+/// floors.
+fn section(mesh: &TriMesh, floors: &[f64]) -> f64 {
+    let mut floors = floors.to_vec();
+    floors.sort_by(f64::total_cmp);
+    let mut storeys: Vec<Vec<f64>> = Vec::new();
+    for floor in floors {
+        match storeys
+            .last_mut()
+            .filter(|storey| floor - storey.first().unwrap_or(&floor) <= STOREY_M)
+        {
+            Some(storey) => storey.push(floor),
+            None => storeys.push(vec![floor]),
+        }
+    }
+
+    // The lowest of equals.
+    let fullest = storeys.iter().enumerate().rev().max_by_key(|(_, storey)| storey.len());
+    let lowest = fullest.and_then(|(_, storey)| storey.first().copied());
+    let lowest = lowest.unwrap_or(f64::from(mesh.aabb().min.z));
+    let above = fullest
+        .and_then(|(i, _)| storeys.get(i + 1)?.first().copied())
+        .unwrap_or(f64::INFINITY);
+
+    let mut ceilings: Vec<(f64, f64)> = (0u32..)
+        .take(mesh.faces().len())
+        .filter(|face| mesh.normal(*face).z < -0.9)
+        .map(|face| {
+            let z = mesh
+                .triangle(face)
+                .iter()
+                .map(|corner| f64::from(corner.z))
+                .sum::<f64>()
+                / 3.0;
+            (z, mesh.area(face))
+        })
+        .filter(|(z, _)| (lowest + CEILING_M..above).contains(z))
+        .collect();
+    ceilings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f64 = ceilings.iter().map(|(_, m2)| m2).sum();
+    let mut below = 0.0;
+    let low = ceilings.iter().find(|(_, m2)| {
+        below += m2;
+        below >= LOW_CEILINGS * all
+    });
+    low.map_or(lowest + OPEN_M, |(z, _)| z - BELOW_CEILING_M)
+}
+
+/// Returns a camera obliquely above a mesh that sees all of it below the height `section`.
+fn camera_of(mesh: &TriMesh, section: f64) -> Camera {
+    let low = mesh.aabb().min.as_dvec3();
+    let high = mesh
+        .aabb()
+        .max
+        .as_dvec3()
+        .with_z(section.min(f64::from(mesh.aabb().max.z)));
+    let middle = 0.5 * (low + high);
+    let back = BACK.normalize();
+    let [width, height] = SIZE.map(|side| side * SAMPLES);
+
+    // The least distance from which each corner is in the picture.
+    let right = DVec3::Z.cross(back).normalize();
+    let up = back.cross(right);
+    let half = (0.5 * FOV_DEG.to_radians()).tan();
+    let halves = dvec2(half, half * f64::from(height) / f64::from(width));
+    let corners = (0..8).map(|i| {
+        let pick = |bit: u32, low: f64, high: f64| if i >> bit & 1 == 0 { low } else { high };
+        dvec3(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z)) - middle
+    });
+    let distance = corners
+        .map(|corner| {
+            let beside: DVec2 = dvec2(corner.dot(right), corner.dot(up)).abs() / halves;
+            corner.dot(back) + beside.max_element()
+        })
+        .fold(0.0, f64::max);
+
+    let eye = middle + 1.04 * distance * back;
+    let pose = Pose::look_at(eye, middle, DVec3::Z).unwrap_or_else(|_| Pose::level(eye, 0.0));
+    Camera::perspective(pose, FOV_DEG.to_radians(), width, height)
+}
+
+/// Draws a mesh below the height `section`: its colours, and on the right half the colours `classes` of its
+/// faces, if there are some.
+fn draw(mesh: &TriMesh, classes: Option<&[[u8; 3]]>, section: f64) -> Raster<[u8; 3]> {
+    let camera = camera_of(mesh, section);
+    let scene = Scene::new(mesh);
+    let textures = MipMaps::new(mesh);
+    let filter = TextureFilter::default();
+    let rays = camera.rays();
+    let middle = SIZE[0] / 2;
+
+    let color = |x: u32, y: u32| -> [f32; 3] {
+        let direction = rays.at(x, y);
+        let Some(face) = first_front(&scene, camera.pose.location, direction, section) else { return GROUND };
+        let seen = rgb_of_ray(&scene, &textures, &camera, direction, face, &filter).map(f32::from);
+        let Some(classes) = classes.filter(|_| x / SAMPLES >= middle) else { return seen };
+
+        let class = classes.get(face as usize).copied().unwrap_or(NO_CLASS);
+        let facing = mesh.normal(face).as_dvec3().dot(direction.normalize()).abs() as f32;
+        let gray = LUMA
+            .iter()
+            .zip(seen)
+            .map(|(weight, channel)| weight * channel)
+            .sum::<f32>();
+        class.map(|channel| (1.0 - DETAIL) * f32::from(channel) * (0.6 + 0.4 * facing) + DETAIL * gray)
+    };
+    let pixel = |x: u32, y: u32| -> [u8; 3] {
+        if classes.is_some() && x.abs_diff(middle) <= LINE_PX / 2 {
+            return LINE.map(|channel| channel as u8);
+        }
+        let mut sum = [0.0; 3];
+        for sample in 0..SAMPLES * SAMPLES {
+            let seen = color(x * SAMPLES + sample % SAMPLES, y * SAMPLES + sample / SAMPLES);
+            sum.iter_mut().zip(seen).for_each(|(sum, channel)| *sum += channel);
+        }
+        sum.map(|channel| (channel / (SAMPLES * SAMPLES) as f32).round() as u8)
+    };
+
+    let [width, height] = SIZE;
+    let rows: Vec<Vec<[u8; 3]>> = (0..height)
+        .into_par_iter()
+        .map(|y| (0..width).map(|x| pixel(x, y)).collect())
+        .collect();
+    Raster::from_vec(width, height, rows.concat())
+}
+
+/// Returns the first face along a ray whose front is seen, below the height `section`.
+fn first_front(scene: &Scene<'_>, eye: DVec3, direction: DVec3, section: f64) -> Option<u32> {
+    let above = eye.z - section;
+    if above > 0.0 && direction.z >= 0.0 {
+        return None;
+    }
+    let mut origin = eye + direction * (above / -direction.z).max(0.0);
+    for _ in 0..MOST_BACKS {
+        let hit = cast_ray(scene, origin, direction)?;
+        if scene.mesh().normal(hit.face).as_dvec3().dot(direction) < 0.0 {
+            return Some(hit.face);
+        }
+        origin += direction * (hit.t * (1.0 + 1e-9) + 1e-6);
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use s3d_geom::glam::vec3;
+
+    /// A floor, a ceiling and their height; all level faces of 4 × 4 m.
+    fn slabs(heights: &[(f32, bool)]) -> TriMesh {
+        let mut positions = Vec::new();
+        let mut faces = Vec::new();
+        for (z, up) in heights {
+            let first = positions.len() as u32;
+            positions.extend([[0., 0.], [4., 0.], [4., 4.], [0., 4.]].map(|[x, y]| vec3(x, y, *z)));
+            let [a, b, c, d] = [first, first + 1, first + 2, first + 3];
+            faces.extend(if *up {
+                [[a, b, c], [a, c, d]]
+            } else {
+                [[a, c, b], [a, d, c]]
+            });
+        }
+        TriMesh::from_faces(positions, faces).unwrap()
+    }
+
+    #[test]
+    fn the_storey_of_most_rooms_is_opened_below_its_ceiling() {
+        let house = slabs(&[(0.0, true), (2.5, false), (2.8, true), (5.2, false)]);
+        assert!((section(&house, &[0.0, 0.1, 2.8]) - 2.4).abs() < 1e-5);
+        assert!((section(&house, &[0.0, 2.8, 2.9]) - 5.1).abs() < 1e-5);
+        // Without a ceiling, and without rooms.
+        assert_eq!(section(&slabs(&[(1.0, true)]), &[]), 1.0 + OPEN_M);
+    }
+
+    #[test]
+    fn all_corners_are_in_the_picture() {
+        let house = slabs(&[(0.0, true), (2.5, false)]);
+        let camera = camera_of(&house, 2.4);
+        for corner in house.positions() {
+            let (pixel, _) = camera.project(corner.with_z(corner.z.min(2.4)).as_dvec3()).unwrap();
+            let is_inside = pixel.cmpge(DVec2::ZERO).all()
+                && pixel.x <= f64::from(camera.width)
+                && pixel.y <= f64::from(camera.height);
+            assert!(is_inside, "{corner}: {pixel}");
+        }
+    }
+
+    #[test]
+    fn ceilings_are_cut_away_and_backs_seen_through() {
+        let house = slabs(&[(0.0, true), (1.0, false), (2.5, false)]);
+        let scene = Scene::new(&house);
+        let eye = dvec3(2.2, 1.9, 9.0);
+        // The table at 1 m has no front here.
+        assert!(matches!(first_front(&scene, eye, DVec3::NEG_Z, 2.4), Some(0 | 1)));
+        assert_eq!(first_front(&scene, eye, DVec3::Z, 2.4), None);
+        let picture = draw(&house, Some(&[[200, 0, 0]; 6]), 2.4);
+        let right = picture.at(SIZE[0] * 5 / 8, SIZE[1] / 2);
+        assert!(right[0] > right[1] + 80 && right[1] == right[2], "{right:?}");
+        assert_eq!(picture.at(SIZE[0] / 2, 10), [255; 3]);
+        assert_eq!(picture.at(0, 0), GROUND.map(|c| c as u8));
+    }
+}
