@@ -136,8 +136,8 @@ impl Surroundings<'_> {
         }
         let Some(stands_in) = around.stands_in() else { return Some(told) };
         ctx.warn(format_args!(
-            "area {area}: location {} is in {told} by its list, but sees nothing of that room. Its images are \
-             named after {stands_in}, whose surface is around it",
+            "area {area}: location {} is in {told} by its list, but sees nothing of that room. Its images \
+             are named after {stands_in}, whose surface is around it",
             location.uuid
         ));
         Some(stands_in)

@@ -116,8 +116,8 @@ impl Difference {
         let Self { row, column, of_view, of_panorama } = self;
         let [of_view, of_panorama] = [of_view, of_panorama].map(|color| color.round().to_array());
         format!(
-            "of {PARTS} × {PARTS} parts, {count} have another mean colour than {panorama} there; the first, in \
-             row {} and column {}: {of_view:?} for {of_panorama:?}",
+            "of {PARTS} × {PARTS} parts, {count} have another mean colour than {panorama} there; the first, \
+             in row {} and column {}: {of_view:?} for {of_panorama:?}",
             row + 1,
             column + 1
         )

@@ -111,10 +111,10 @@ export function writeLarge(report, out) {
   const packed = deflateSync(JSON.stringify(index)).toString("base64");
   writeFileSync(join(out, "data/index.js"), `s3dReport("index","${packed}",true);\n`);
   const [pano, views, thumbs] = ["pano_0", "views_0", "thumbs_0"].map((key) => read(report, key));
-  const best = index.locations.reduce(
-    (b, l, i) => (l.seen.coverage > index.locations[b].seen.coverage ? i : b),
-    0,
-  );
+  // The page opens the panorama with the richest views first; each location has as many.
+  const riches = index.locations.map(() => 0);
+  index.views.forEach(({ location, entropy }) => (riches[location] += entropy));
+  const best = riches.indexOf(Math.max(...riches));
   for (const at of new Set([best, 0, 1, 2, 3, 4, 5, 700])) write(`pano_${at}`, { ...pano, face: null });
   write("views_0", views);
   const kept = index.views.filter((view) => view.picture !== null).length;
