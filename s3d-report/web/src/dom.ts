@@ -175,9 +175,12 @@ export const several = (n: number, noun: string): string => `${count(n)} ${noun}
 /** The room in the name of an instance: `chair_3_conferenceRoom_1_1`. */
 export const roomOf = (label: string): string => label.split("_").slice(2, 4).join("_");
 
-/** `conferenceRoom_1` in words, as a name. */
-export function roomName(room: string): string {
-  if (room === "" || room === "unknown_1") return "unknown room";
+/** `conferenceRoom_1` in words. */
+export function roomWords(room: string): string {
   const words = room.replace(/([a-z])([A-Z])/g, "$1 $2").replaceAll("_", " ");
-  return named(words === words.toUpperCase() ? words : words.toLowerCase().replace(/^wc/, "WC"));
+  return words === words.toUpperCase() ? words : words.toLowerCase().replace(/^wc/, "WC");
 }
+
+/** `conferenceRoom_1` in words, as a name. */
+export const roomName = (room: string): string =>
+  room === "" || room === "unknown_1" ? "unknown room" : named(roomWords(room));

@@ -192,11 +192,10 @@ test("storeys of an area are apart, also rooms that nobody stands in", async () 
   const changed = structuredClone(index);
   const up = 3.2;
   const [above, empty] = ["office_1", "lounge_1"];
-  // The lounge's storey follows from its heights, the office's from its location, and the floors below from
-  // both.
+  // The lounge's storey follows from its floor, the office's from its location, and the floors below from both.
   for (const room of changed.rooms) {
-    if (room.name === empty) room.heights = room.heights.map((z) => z + up);
-    if (room.name === above) room.heights = null;
+    if (room.name === empty) room.floor += up;
+    if (room.name === above) [room.floor, room.heights] = [null, null];
   }
   changed.locations = changed.locations.filter((l) => l.room !== empty);
   for (const l of changed.locations) if (l.room === above) l.position[2] += up;

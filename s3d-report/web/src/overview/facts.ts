@@ -1,7 +1,7 @@
 // What a data set is, in a sentence and a few numbers: only what the index has.
 
 import type { Index } from "../data.js";
-import { count, roomName } from "../dom.js";
+import { count, roomWords, tamed } from "../dom.js";
 import { storeysOf } from "../storeys.js";
 
 const WORDS = "no one two three four five six seven eight nine ten eleven twelve".split(" ");
@@ -31,7 +31,7 @@ function listed(parts: string[]): string {
 function types(index: Index): string {
   const found = new Map<string, number>();
   for (const { name } of index.rooms) {
-    const type = roomName(name.replace(/_\d+$/, ""));
+    const type = tamed(roomWords(name.replace(/_\d+$/, "")));
     found.set(type, (found.get(type) ?? 0) + 1);
   }
   const sorted = [...found].sort((a, b) => b[1] - a[1]);
