@@ -4,9 +4,9 @@ use crate::areas;
 use crate::content::{Content, Shown};
 use crate::faults::{Fault, Faults};
 use crate::index::{ClassEntry, LabelEntry, folder_name};
-use crate::packed::packed;
 use crate::pixels::Images;
 use crate::script::Scripts;
+use crate::script::packed::packed;
 use crate::write::ReportOptions;
 use s3d_dataset::compare::{
     ChangedPatch, ClassPixels, CompareOptions, Comparison, ImageChange, PixelChanges,

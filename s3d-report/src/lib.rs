@@ -29,7 +29,6 @@ mod error;
 mod faults;
 mod index;
 mod mesh;
-mod packed;
 mod pixels;
 mod poster;
 mod reduce;

@@ -2,9 +2,9 @@
 
 use crate::faults::Faults;
 use crate::index::{MaterialEntry, MeshEntry, Surface, VoteSpread, rounded};
-use crate::packed::{jpeg_url, packed};
 use crate::reduce::{mean, reduced_size};
 use crate::script::Scripts;
+use crate::script::packed::{jpeg_url, packed};
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::{Context, DataSet, Result};
 use s3d_geom::glam::{DVec3, Vec2, Vec3, vec2};

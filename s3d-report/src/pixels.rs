@@ -3,8 +3,8 @@
 
 use crate::faults::{Faults, name};
 use crate::index::rounded;
-use crate::packed::{jpeg_url, png_url};
 use crate::reduce::{Mean, Nearest, mean, pack, shown_size};
+use crate::script::packed::{jpeg_url, png_url};
 use jpeg_encoder::EncodingError;
 use s3d_dataset::{DataSet, Result};
 use s3d_geom::Raster;

@@ -340,7 +340,9 @@ fn check_images(
     picture_colors::check(ctx, layout, images, &cameras, &view_colors, report)?;
 
     let Some((reference, ..)) = reference else { return Ok(()) };
-    tables::location_rooms(reference, images, &cameras);
+    if manifest.is_labelled() {
+        tables::location_rooms(ctx, reference, images, &cameras)?;
+    }
     if common.full {
         scores::check(ctx, reference, area, images, &cameras, views)?;
     }

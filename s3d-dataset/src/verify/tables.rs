@@ -3,7 +3,10 @@
 use super::labels::Labels;
 use super::report::{OfFile, Report, Topic};
 use super::votes::box_of;
+use crate::context::Context;
+use crate::error::Result;
 use crate::options::profile::Profile;
+use crate::parallel::for_each_in_order;
 use crate::record::assets;
 use crate::record::manifest::Manifest;
 use crate::record::tables::RoomRecord;
@@ -192,29 +195,43 @@ fn check_instances_of(room: &RoomRecord, instances: &[InstanceEntry], checks: &O
 }
 
 /// Checks that each location sees its room, if it sees labelled surface.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
 pub(crate) fn location_rooms(
+    ctx: &Context,
     reference: &Reference<'_>,
     images: &[DatasetImage],
     cameras: &[(usize, Camera)],
-) {
+) -> Result<()> {
     let Reference { layout, labels, mesh, report, .. } = *reference;
     let rooms = labels.rooms();
-    let room_of_face = |face: u32| rooms.get(mesh.label_of_face[face as usize] as usize)?.clone();
+    let room_of_face = |face: u32| rooms.get(mesh.label_of_face[face as usize] as usize)?.as_deref();
 
     let mut seen = BTreeSet::new();
-    for (index, camera) in cameras {
-        let image = &images[*index];
-        if !seen.insert((&image.uuid, &image.room)) {
-            continue;
-        }
+    let firsts: Vec<(&DatasetImage, &Camera)> = cameras
+        .iter()
+        .map(|(index, camera)| (&images[*index], camera))
+        .filter(|(image, _)| seen.insert((&image.uuid, &image.room)))
+        .collect();
 
+    let check = |image: &DatasetImage, camera: &Camera| {
         let around = RoomsAround::of(reference.channels.scene, camera.pose.location, room_of_face);
-        let Some(stands_in) = around.stands_in() else { continue };
+        let Some(stands_in) = around.stands_in() else { return };
         let path = image.path(layout, Domain::Pose);
-        report.check(around.rays_to(&image.room) > 0, (Topic::Poses, "rooms of locations"), &path, || {
+        report.check(around.rays_to(&&*image.room) > 0, (Topic::Poses, "rooms of locations"), &path, || {
             format!("sees nothing of {}: it stands in {stands_in}", image.room)
         });
-    }
+    };
+    for_each_in_order(
+        ctx,
+        &firsts,
+        || (),
+        |(), (image, camera)| {
+            check(image, camera);
+            Ok(())
+        },
+    )
 }
 
 /// Checks `splits.json` and the lists of panoramas: everything they name must be there, and everything there

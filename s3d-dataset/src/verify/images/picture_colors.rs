@@ -38,9 +38,10 @@ impl ViewColors {
     /// Returns the colours of the image `image`.
     pub(crate) fn new(image: usize, pixels: &Raster<[u8; 3]>) -> Self {
         let part = |row: u32, column: u32| {
-            let [ys, xs] =
-                [(row, pixels.height()), (column, pixels.width())].map(|(part, of)| bounds(part, of));
+            let ys = bounds(row, pixels.height());
+            let xs = bounds(column, pixels.width());
             let mut sum = [0u64; 3];
+
             for y in ys.clone() {
                 let row = &pixels.row(y)[xs.start as usize..xs.end as usize];
                 row.iter()
@@ -77,6 +78,7 @@ pub(crate) fn check(
     for view in views {
         of_location.entry(&images[view.image].uuid).or_default().push(view);
     }
+
     let is_panorama = |image: &DatasetImage| image.frame == Frame::Panorama && image.has(Domain::Rgb);
     let panoramas: Vec<usize> = (0..images.len())
         .filter(|i| is_panorama(&images[*i]) && of_location.contains_key(images[*i].uuid.as_str()))
@@ -93,7 +95,7 @@ pub(crate) fn check(
             let camera = Camera { width: panorama.width(), height: panorama.height(), ..**camera };
             for view in &of_location[images[*index].uuid.as_str()] {
                 let Some(view_camera) = cameras.get(&view.image) else { continue };
-                let wrong = differences(view, view_camera, &camera, &panorama);
+                let wrong = other_colors(view, view_camera, &camera, &panorama);
                 let path = images[view.image].path(layout, Domain::Rgb);
                 let panorama = images[*index].relative_path(Domain::Rgb);
                 report.check(wrong.len() <= FEW, COLORS, &path, || wrong[0].sentence(wrong.len(), &panorama));
@@ -104,14 +106,14 @@ pub(crate) fn check(
 }
 
 /// A part of a view whose colour is not the panorama's.
-struct Difference {
+struct OtherColor {
     row: u32,
     column: u32,
     of_view: Vec3,
     of_panorama: Vec3,
 }
 
-impl Difference {
+impl OtherColor {
     fn sentence(&self, count: usize, panorama: &str) -> String {
         let Self { row, column, of_view, of_panorama } = self;
         let [of_view, of_panorama] = [of_view, of_panorama].map(|color| color.round().to_array());
@@ -125,22 +127,22 @@ impl Difference {
 }
 
 /// Returns the parts of a view whose colour is not the panorama's.
-fn differences(
+fn other_colors(
     view: &ViewColors,
     camera: &Camera,
     panorama_camera: &Camera,
     panorama: &Raster<[u8; 3]>,
-) -> Vec<Difference> {
-    let mut differences = Vec::new();
+) -> Vec<OtherColor> {
+    let mut others = Vec::new();
     for (i, of_view) in (0..).zip(&view.parts) {
         let (row, column) = (i / PARTS, i % PARTS);
         let (of_panorama, spread) = expected(row, column, camera, panorama_camera, panorama);
         let off = (*of_view - of_panorama).abs() - spread;
         if off.max_element() > ALLOWED {
-            differences.push(Difference { row, column, of_view: *of_view, of_panorama });
+            others.push(OtherColor { row, column, of_view: *of_view, of_panorama });
         }
     }
-    differences
+    others
 }
 
 /// Returns the mean colour of a panorama in the directions of a part of a view, and how much the mean changes

@@ -56,8 +56,8 @@ pub(crate) fn read(path: &Path, mesh: &MeshFile) -> Result<MeshLabels> {
             return Err(Error::format(
                 path,
                 format!(
-                    "has {count} numbers, the mesh's file has {vertices} vertices and {} faces, {why}: labels \
-                     of faces may be properties of the mesh itself, in a PLY file",
+                    "has {count} numbers, the mesh's file has {vertices} vertices and {} faces, {why}: \
+                     labels of faces may be properties of the mesh itself, in a PLY file",
                     faces.end()
                 ),
             ));

@@ -201,9 +201,9 @@ impl Cloud for LasCloud<'_> {
         // Whoever gives 31 a meaning knows of it.
         if cut > 0 && !self.options.classes.contains_key("31") {
             reading.notes.push(format!(
-                "{shown}: {cut} points have the class 31, the largest in this point format: larger classes may \
-                 have been cut to it. Save as LAS 1.4 with a point format of 6 to 10, or classes as an extra \
-                 dimension"
+                "{shown}: {cut} points have the class 31, the largest in this point format: larger classes \
+                 may have been cut to it. Save as LAS 1.4 with a point format of 6 to 10, or classes as an \
+                 extra dimension"
             ));
         }
         Ok(true)

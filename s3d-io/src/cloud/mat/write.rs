@@ -50,7 +50,7 @@ fn user_block() -> [u8; 512] {
 /// | `….object.Bbox` | single, 1 × 6 | smallest x y z, largest x y z of `points` |
 /// | `….object.Voxels` | single, 216 × 6 | the boxes of its voxels, as in `instances.json`: z fastest |
 /// | `….object.Voxel_Occupancy` | uint8, 216 × 1 | 1 where a voxel holds a point |
-/// | `….object.Points_per_Voxel` | cell, 216 × 1 | rows of `points` in each voxel: uint32, n × 1, from 1 |
+/// | `….object.Points_per_Voxel` | cell, 216 × 1 | rows of `points` in each: uint32, n × 1, from 1 |
 ///
 /// Box and voxels are computed from `points`. A room without objects and an object without points are left
 /// out. As in MATLAB's own files, a struct array of one element holds the fields themselves, and a longer one

@@ -1,7 +1,9 @@
 //! Writes data as scripts: a page that was opened from the disk may run scripts, but may not fetch files. In
 //! a report of one file, the data is in the page.
 
-use crate::packed::packed;
+pub(crate) mod packed;
+
+use packed::packed;
 use s3d_dataset::{Error, Result};
 use s3d_io::Error as FileError;
 use s3d_io::fs::write_bytes;
