@@ -3,7 +3,7 @@
 import { comparePage } from "./compare/page.js";
 import { FORM, type Index, load } from "./data.js";
 import { append, count, h, named, tamed } from "./dom.js";
-import { comeBack, leave, pointTabs, remember } from "./memory.js";
+import { comeBack, leave, pointTabs, remember } from "./route/memory.js";
 import { findField } from "./overview/find.js";
 import { overviewPage } from "./overview/page.js";
 import { damageOf, notesPage } from "./pages/notes.js";
@@ -12,7 +12,7 @@ import { panoPage } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
 import { scoresPage } from "./pages/scores.js";
 import { paletteOf } from "./palette.js";
-import { type Page, link, parseRoute } from "./route.js";
+import { type Page, link, parseRoute } from "./route/route.js";
 import { spacePage } from "./space/page.js";
 import { viewPage } from "./pages/view.js";
 import { viewsPage } from "./pages/views.js";

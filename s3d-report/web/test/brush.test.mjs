@@ -65,7 +65,7 @@ test("a dropped view is drawn as its panorama shows it", async () => {
 });
 
 test("a cut through a panorama looks where the view looks", async () => {
-  const { cut } = await bundled("geometry.ts");
+  const { cut } = await bundled("picture/geometry.ts");
   // A panorama whose colours are longitude and latitude.
   const [width, height] = [360, 180];
   const data = new Uint8ClampedArray(4 * width * height);

@@ -2,7 +2,7 @@
 // docs/compare.md). A is the data set of the report, B the other.
 
 import { type Index, type Picture, type Rgb, load, loadPicture } from "../data.js";
-import { unpack } from "../faces.js";
+import { unpack } from "../picture/faces.js";
 import { paletteOf } from "../palette.js";
 
 export interface Counts {

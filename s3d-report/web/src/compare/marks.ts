@@ -2,7 +2,7 @@
 
 import type { Index, Rgb } from "../data.js";
 import { count } from "../dom.js";
-import { spaceLink } from "../route.js";
+import { spaceLink } from "../route/route.js";
 import { CLASS, kindOf, loadAgainst, loadChanges, nameOf } from "./data.js";
 import { surface } from "./matrix.js";
 

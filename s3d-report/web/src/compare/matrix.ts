@@ -1,7 +1,7 @@
 // Changed labels by class in A and class in B.
 
 import { append, count, h, metres2, several, table } from "../dom.js";
-import { link } from "../route.js";
+import { link } from "../route/route.js";
 import { type Against, type Counts, classWords } from "./data.js";
 import { changeWords, imagesByChange, imagesOf } from "./order.js";
 

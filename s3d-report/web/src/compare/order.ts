@@ -1,6 +1,6 @@
 // The order of changed images in a list, and the images that show one change of labels.
 
-import { type Route, link } from "../route.js";
+import { type Route, link } from "../route/route.js";
 import { type Against, type ChangedPicture, type Pixels, classWords } from "./data.js";
 
 /** A change of labels, by class in A and in B; the list of images may be limited to it. */

@@ -2,7 +2,7 @@
 
 import { type Index, type Picture, load, loadThumb } from "../data.js";
 import { append, count, h, percent, several } from "../dom.js";
-import { type Page, type Route, link } from "../route.js";
+import { type Page, type Route, link } from "../route/route.js";
 import { type Against, type ChangedPicture, loadAgainst } from "./data.js";
 import { changedLink } from "./matrix.js";
 import { type Change, changeOf, changeWords, mostChanged, orderOf } from "./order.js";

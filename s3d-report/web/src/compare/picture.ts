@@ -2,11 +2,11 @@
 
 import type { Index, Location, Picture, Rgb, View } from "../data.js";
 import { append, h, percent, roomName } from "../dom.js";
-import { type Gaze, panoramaPoint, panoramaScreen, viewPoint, viewScreen } from "../geometry.js";
-import { type Modality, placeOf } from "../gl.js";
+import { type Gaze, panoramaPoint, panoramaScreen, viewPoint, viewScreen } from "../picture/geometry.js";
+import { type Modality, placeOf } from "../picture/gl.js";
 import { inPanorama, nameOf as nameOfView } from "../pages/view.js";
-import { type Page, type Route, link, numberOf, replaceRoute, spaceLink } from "../route.js";
-import { type Look, Viewer, type ViewerOptions, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
+import { type Page, type Route, link, numberOf, replaceRoute, spaceLink } from "../route/route.js";
+import { type Look, Viewer, type ViewerOptions, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
 import { type Against, CLASS, type ChangedPicture, INSTANCE, type Pixels, kindOf, loadPair } from "./data.js";
 import { changeOf, changeWords, imagesOf, orderOf } from "./order.js";
 import { tellBoth } from "./words.js";

@@ -3,8 +3,8 @@
 import type { Index } from "../data.js";
 import { count, h, percent, several, table } from "../dom.js";
 import { inPanorama, nameOf as nameOfView } from "../pages/view.js";
-import { imageLink } from "../places.js";
-import { link } from "../route.js";
+import { imageLink } from "../route/places.js";
+import { link } from "../route/route.js";
 import type { Against, Comparison, InstanceChange, ModalityChanges, Renamed, ViewName } from "./data.js";
 import { changedLink, countsWords, matrix, number, surface } from "./matrix.js";
 import { MODALITY_NAMES } from "./picture.js";

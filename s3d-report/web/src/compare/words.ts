@@ -1,6 +1,6 @@
 // The labels of a pixel in A and in B, in words.
 
-import { entry, key } from "../readout.js";
+import { entry, key } from "../picture/readout.js";
 import { type Against, nameOf } from "./data.js";
 
 /** Words for the label under the pointer in A and in B. */

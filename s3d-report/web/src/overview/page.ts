@@ -2,11 +2,11 @@
 // storeys and classes, and its richest views.
 
 import { type Index, type Mesh, loadThumb } from "../data.js";
-import { divider } from "../divider.js";
+import { divider } from "../picture/divider.js";
 import { append, choice, h, named, percent } from "../dom.js";
 import { nameOf } from "../pages/view.js";
-import { key } from "../readout.js";
-import { type Page, type Route, link } from "../route.js";
+import { key } from "../picture/readout.js";
+import { type Page, type Route, link } from "../route/route.js";
 import { storeyButtons } from "../space/levels.js";
 import { type Look, lookFrom, showsOf } from "../space/look.js";
 import type { Show } from "../space/paint.js";

@@ -5,7 +5,7 @@ import { bar, spread } from "./charts.js";
 import { css } from "../colors.js";
 import type { Index, VoteSpread, Votes } from "../data.js";
 import { append, count, h, named, percent, several, table } from "../dom.js";
-import { patchLink } from "../places.js";
+import { patchLink } from "../route/places.js";
 
 const number = (words: string): HTMLElement => h("span", { class: "number" }, words);
 

@@ -1,7 +1,7 @@
 // Small pictures of dropped views, drawn from the panorama of their location.
 
 import { type Index, type Picture, type View, load } from "../data.js";
-import { type Pixels, cut } from "../geometry.js";
+import { type Pixels, cut } from "../picture/geometry.js";
 
 /** The width of a small picture, pixels. */
 export const WIDTH = 128;

@@ -5,8 +5,8 @@ import type { ChangeMark } from "../compare/marks.js";
 import type { Index, Location, Rgb, View } from "../data.js";
 import { append, flat, metres2, named, percent, roomName, roomOf, s, several } from "../dom.js";
 import { type Box, boxOf, middleOf, sizeOf } from "../outline.js";
-import { patchLink } from "../places.js";
-import { link } from "../route.js";
+import { patchLink } from "../route/places.js";
+import { link } from "../route/route.js";
 
 export interface FloorOptions {
   /** For the corner of a panorama: without words. */

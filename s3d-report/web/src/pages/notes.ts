@@ -2,8 +2,8 @@
 
 import type { Index } from "../data.js";
 import { append, count, h, metres2, named, percent, several, table } from "../dom.js";
-import { disputeInPanorama } from "../places.js";
-import { link, spaceLink } from "../route.js";
+import { disputeInPanorama } from "../route/places.js";
+import { link, spaceLink } from "../route/route.js";
 
 /** The licences of bundled packages, inserted by bundle.mjs. */
 declare const LICENCES: { name: string; version: string; text: string }[];

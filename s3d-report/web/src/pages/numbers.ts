@@ -4,7 +4,7 @@ import { bar, histogram } from "./charts.js";
 import { css } from "../colors.js";
 import type { Index, View } from "../data.js";
 import { append, count, h, metres2, named, percent, roomName, table } from "../dom.js";
-import { link } from "../route.js";
+import { link } from "../route/route.js";
 import { votesSection } from "./disputes.js";
 import { yawOf } from "./views.js";
 

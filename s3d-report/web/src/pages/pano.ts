@@ -2,13 +2,13 @@
 
 import { type Index, type Location, type Picture, load } from "../data.js";
 import { append, choice, h, percent, roomName, several } from "../dom.js";
-import { type Gaze, directionIn, panoramaPoint, panoramaScreen, screenAt } from "../geometry.js";
-import { gazes } from "../memory.js";
+import { type Gaze, directionIn, panoramaPoint, panoramaScreen, screenAt } from "../picture/geometry.js";
+import { gazes } from "../route/memory.js";
 import { firstLocation, firstLook } from "../overview/richest.js";
 import { storeysOf } from "../storeys.js";
 import { plan } from "./floor.js";
-import { type Route, link, numberOf, replaceRoute } from "../route.js";
-import { Viewer, gazeQuery, layersOf, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
+import { type Route, link, numberOf, replaceRoute } from "../route/route.js";
+import { Viewer, gazeQuery, layersOf, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
 
 const RADIANS = Math.PI / 180;
 

@@ -2,8 +2,8 @@
 
 import { type ConfusionTable, type Index, type ScoreTable, type Scores, load } from "../data.js";
 import { choice, count, h, named, percent, roomName, table } from "../dom.js";
-import { imageLink } from "../places.js";
-import { type Route, link, replaceRoute } from "../route.js";
+import { imageLink } from "../route/places.js";
+import { type Route, link, replaceRoute } from "../route/route.js";
 
 /** The number of rooms or images in a list. */
 const MOST = 50;

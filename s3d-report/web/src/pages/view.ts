@@ -2,10 +2,10 @@
 
 import { type Index, type View, loadPicture } from "../data.js";
 import { append, count, h, named, percent, roomName, several } from "../dom.js";
-import { viewPoint, viewScreen } from "../geometry.js";
-import { placeOf } from "../gl.js";
-import { type Route, link, replaceRoute } from "../route.js";
-import { Viewer, lookFrom, modalitiesOf, queryOf } from "../viewer.js";
+import { viewPoint, viewScreen } from "../picture/geometry.js";
+import { placeOf } from "../picture/gl.js";
+import { type Route, link, replaceRoute } from "../route/route.js";
+import { Viewer, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
 
 /** A sentence that says why a view was kept or dropped. */
 export function reasonOf(view: View): string {

@@ -3,7 +3,7 @@
 import { css } from "../colors.js";
 import { type Index, type View, loadThumb } from "../data.js";
 import { append, choice, count, h, named, percent, roomName, several } from "../dom.js";
-import { type Page, type Route, link, replaceRoute } from "../route.js";
+import { type Page, type Route, link, replaceRoute } from "../route/route.js";
 import { type Range, brush } from "./brush.js";
 import { WIDTH, canDraw, drawDropped } from "./dropped.js";
 import { inPanorama, nameOf, reasonOf } from "./view.js";

@@ -3,7 +3,7 @@
 import { PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Mesh, Rgb } from "../data.js";
-import type { Projected } from "../marks.js";
+import type { Projected } from "../picture/marks.js";
 
 /** The vertical angle of view, degrees. */
 export const FOV = 50;

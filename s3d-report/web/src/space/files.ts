@@ -1,7 +1,7 @@
 // The files of a mesh: unpacked, and checked against their own numbers and the index.
 
 import { type Mesh, type Rgb, load } from "../data.js";
-import { unpack } from "../faces.js";
+import { unpack } from "../picture/faces.js";
 
 /** A part of a mesh, its faces sorted by material. */
 export interface Part {

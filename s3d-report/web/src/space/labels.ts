@@ -3,7 +3,7 @@
 import { Vector3 } from "three";
 import type { Index, Mesh, Rgb } from "../data.js";
 import { h, roomName } from "../dom.js";
-import { link } from "../route.js";
+import { link } from "../route/route.js";
 import type { Eye } from "./eye.js";
 import type { Box } from "./files.js";
 import { floorOf, middleOf } from "./lines.js";

@@ -2,10 +2,10 @@
 
 import type { Index, Mesh } from "../data.js";
 import { append, choice, count, h, named, several } from "../dom.js";
-import type { Modality } from "../gl.js";
-import { legendOf } from "../readout.js";
+import type { Modality } from "../picture/gl.js";
+import { legendOf } from "../picture/readout.js";
 import { type Against, type Side, groupOf, loadAgainst, loadChanges, nameOf } from "../compare/data.js";
-import { type Page, type Route, link, replaceRoute } from "../route.js";
+import { type Page, type Route, link, replaceRoute } from "../route/route.js";
 import { type Look, type Mark, lookFrom, marksOf, queryOf, showsOf } from "./look.js";
 import type { Show } from "./paint.js";
 import { pictureTools } from "../tools.js";

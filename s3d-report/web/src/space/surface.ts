@@ -15,7 +15,7 @@ import {
 import { MeshBVH } from "three-mesh-bvh";
 import type { Rgb } from "../data.js";
 import type { FaceChanges } from "../compare/data.js";
-import { type FaceVotes, NO_VOTES } from "../faces.js";
+import { type FaceVotes, NO_VOTES } from "../picture/faces.js";
 import type { Slab } from "../storeys.js";
 import { type Level, belowCeilings, levelOf } from "./ceilings.js";
 import type { Part } from "./files.js";

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bundled } from "./lib/bundled.mjs";
+import { bundled } from "../lib/bundled.mjs";
 
 const { storeysOf, slabOf, fullest, wordsOf } = await bundled("storeys.ts");
 const { belowCeilings } = await bundled("space/ceilings.ts");

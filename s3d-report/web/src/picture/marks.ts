@@ -1,8 +1,8 @@
 // Marks in a picture: the point that was clicked last, and a measuring line. Both are in world coordinates,
 // so they stay in place while the view turns.
 
-import type { Rgb } from "./data.js";
-import { h, s } from "./dom.js";
+import type { Rgb } from "../data.js";
+import { h, s } from "../dom.js";
 
 /** A point of the screen as x·w, y·w and w; w is not positive for points behind. */
 export type Projected = [number, number, number];

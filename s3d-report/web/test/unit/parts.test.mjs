@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bundled } from "./lib/bundled.mjs";
+import { bundled } from "../lib/bundled.mjs";
 
 const { fileName } = await bundled("tools.ts");
 const { treeOf } = await bundled("space/tree.ts");

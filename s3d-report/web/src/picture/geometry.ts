@@ -1,6 +1,6 @@
 // Pixels, rays and points, by the conventions of the data set (conventions.json).
 
-import type { Location, Picture, Rgb } from "./data.js";
+import type { Location, Picture, Rgb } from "../data.js";
 
 export type Vec3 = Rgb;
 

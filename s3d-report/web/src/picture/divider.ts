@@ -1,6 +1,6 @@
 // The line between two pictures of the same place, which is dragged, or moved by keys.
 
-import { h } from "./dom.js";
+import { h } from "../dom.js";
 
 export interface Divider {
   line: HTMLElement;

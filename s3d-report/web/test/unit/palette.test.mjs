@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bundled } from "./lib/bundled.mjs";
+import { bundled } from "../lib/bundled.mjs";
 
 const { paletteOf } = await bundled("palette.ts");
 

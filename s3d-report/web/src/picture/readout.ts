@@ -1,8 +1,8 @@
 // The values under the pointer in words, and the legend of the colours.
 
-import { OTHER_CLASS, OTHER_INSTANCE, css, depthRamp, gradient, marginRamp } from "./colors.js";
-import type { Index, Rgb } from "./data.js";
-import { h, named, percent, roomName, roomOf } from "./dom.js";
+import { OTHER_CLASS, OTHER_INSTANCE, css, depthRamp, gradient, marginRamp } from "../colors.js";
+import type { Index, Rgb } from "../data.js";
+import { h, named, percent, roomName, roomOf } from "../dom.js";
 import { type FaceVotes, NO_VOTES, SURE } from "./faces.js";
 import type { Modality } from "./gl.js";
 

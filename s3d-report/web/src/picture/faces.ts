@@ -1,6 +1,6 @@
 // The votes for the faces of a mesh: `faces_A.js`.
 
-import { load, unpacked } from "./data.js";
+import { load, unpacked } from "../data.js";
 
 /** The margin of a face without votes. */
 export const NO_VOTES = 255;

@@ -1,7 +1,7 @@
 // Links that show a world point: in the nearest panorama, and in 3D.
 
-import type { Index, Rgb } from "./data.js";
-import { directionIn } from "./geometry.js";
+import type { Index, Rgb } from "../data.js";
+import { directionIn } from "../picture/geometry.js";
 import { link, spaceLink } from "./route.js";
 
 const DEGREES = 180 / Math.PI;

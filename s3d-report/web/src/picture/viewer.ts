@@ -1,8 +1,8 @@
 // A picture with two modalities, a movable line between them, and a readout for the pointer.
 
-import type { Index, Picture, Rgb } from "./data.js";
+import type { Index, Picture, Rgb } from "../data.js";
 import { type Divider, divider } from "./divider.js";
-import { append, choice, flat, h } from "./dom.js";
+import { append, choice, flat, h } from "../dom.js";
 import { type FaceVotes, loadFaceVotes } from "./faces.js";
 import { type Gaze, clampGaze, focal, panoramaAt } from "./geometry.js";
 import {
@@ -16,11 +16,11 @@ import {
   Renderer,
   placeOf,
 } from "./gl.js";
-import { chosen } from "./memory.js";
+import { chosen } from "../route/memory.js";
 import { Marks, type Projected } from "./marks.js";
 import { type Spot, legendOf, tell } from "./readout.js";
-import { spaceLink } from "./route.js";
-import { pictureTools } from "./tools.js";
+import { spaceLink } from "../route/route.js";
+import { pictureTools } from "../tools.js";
 
 const NAMES: Record<Modality, string> = {
   rgb: "Colour",

@@ -12,8 +12,8 @@ import {
   labelTable,
   marginRamp,
   shader,
-} from "./colors.js";
-import type { Index, Picture } from "./data.js";
+} from "../colors.js";
+import type { Index, Picture } from "../data.js";
 import { type Gaze, focal } from "./geometry.js";
 
 export const MODALITIES = [

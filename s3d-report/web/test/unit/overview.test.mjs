@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bundled } from "./lib/bundled.mjs";
+import { bundled } from "../lib/bundled.mjs";
 
 const { richest, firstLocation, firstLook } = await bundled("overview/richest.ts");
 const { matches, thingsOf } = await bundled("overview/search.ts");
