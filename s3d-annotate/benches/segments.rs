@@ -1,0 +1,2 @@
+//! Segments of a mesh.
+fn main() {}
