@@ -3,7 +3,7 @@
 use crate::commands::scores::{detect, eval};
 use crate::commands::shards::{merge, plan};
 use crate::commands::{
-    compare, demo, export, info, pack, profile, render, report, sample, stats, verify, xyz,
+    compare, demo, export, info, pack, profile, render, report, sample, segments, stats, verify, xyz,
 };
 use crate::console::LogFormat;
 use crate::failure::Outcome;
@@ -102,6 +102,16 @@ pub(crate) enum Command {
     /// Sample a mesh densely and uniformly into a coloured point cloud.
     #[command(after_help = "Example:\n  s3d sample scan/rgb.obj -o cloud.ply --points-per-m2 10000")]
     Sample(sample::SampleArgs),
+    /// Cut a mesh into segments, as ScanNet's and Matterport3D's tools read them.
+    #[command(
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d segments scene0000_00_vh_clean_2.ply -o scene0000_00_vh_clean_2.0.010000.segs.json\n",
+            "  s3d segments scan.obj -o scan.fsegs.json --scale 0.01\n",
+            "The method is Felzenszwalb and Huttenlocher's, on the turn of the surface and its colours.",
+        )
+    )]
+    Segments(segments::SegmentsArgs),
     /// Render a mesh from one camera or a list of cameras, in every modality that needs no annotation.
     #[command(
         after_help = concat!(
@@ -223,6 +233,7 @@ impl Command {
             | Self::Plan(_)
             | Self::Merge(_)
             | Self::Sample(_)
+            | Self::Segments(_)
             | Self::Pack(_)
             | Self::Xyz(_)
             | Self::Profile(_)
@@ -242,6 +253,7 @@ impl Command {
             Self::Plan(args) => plan::run(args),
             Self::Merge(args) => merge::run(args),
             Self::Sample(args) => sample::run(args),
+            Self::Segments(args) => segments::run(args),
             Self::Render(args) => render::run(args),
             Self::Info(args) => info::run(args),
             Self::Pack(args) => pack::run(args),

@@ -75,6 +75,10 @@ fn a_missing_scene_is_named() {
     for name in ["x.las", "x.npy", "x"] {
         s3d_fails(&["sample", "no/such.obj", "-o", name], 2, &[name, "ends with .ply"]);
     }
+    for name in ["x.segs.json", "x.fsegs.json"] {
+        s3d_fails(&["segments", "no/such.obj", "-o", name], 1, &["no/such.obj"]);
+    }
+    s3d_fails(&["segments", "no/such.obj", "-o", "x.json"], 2, &["x.json", "NAME.segs.json"]);
     s3d_fails(&["stats", "no/such"], 1, &["no/such"]);
 }
 

@@ -10,6 +10,7 @@ pub(crate) mod render;
 pub(crate) mod report;
 pub(crate) mod sample;
 pub(crate) mod scores;
+pub(crate) mod segments;
 pub(crate) mod shards;
 pub(crate) mod stats;
 pub(crate) mod verify;

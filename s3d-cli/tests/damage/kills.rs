@@ -35,6 +35,7 @@ const COMMANDS: [&str; 30] = [
     "pack out --to parquet -o new.parquet",
     "sample scan/room.obj -o new.ply --points 200000",
     "sample scan/room.obj -o old.ply --points 200000 --overwrite",
+    "segments scan/room.obj -o new.segs.json",
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o new",
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o old --pano --overwrite",
     "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o new/views",
