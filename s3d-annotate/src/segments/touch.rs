@@ -4,7 +4,7 @@ use super::borders::Border;
 use super::forest::Forest;
 use rayon::prelude::*;
 use s3d_geom::TriMesh;
-use s3d_geom::glam::{Vec3, vec3};
+use s3d_geom::glam::Vec3;
 
 /// The edge of the cells in which pieces meet, in metres.
 const CELL_M: f32 = 0.04;
@@ -41,7 +41,7 @@ pub(super) fn touches(mesh: &TriMesh, borders: &[Border], segment_of_face: &[u32
         .fold(Vec::new, |mut cells, face| {
             // Neighbouring samples share cells.
             let mut of_face = Vec::new();
-            samples(mesh, face, |point| of_face.extend(cells_around(point - corner)));
+            samples(mesh, face, |point| add_cells_around(point - corner, &mut of_face));
             of_face.sort_unstable();
             of_face.dedup();
             cells.extend(of_face.iter().map(|cell| (*cell, segment_of_face[face as usize])));
@@ -96,14 +96,20 @@ fn samples(mesh: &TriMesh, face: u32, mut visit: impl FnMut(Vec3)) {
     }
 }
 
-/// Returns the cells within [`NEAR_M`] of a point: one, or up to eight at the corner of a cell. A cell is a
-/// number of 63 bits; the point is relative to the least corner of the mesh.
-fn cells_around(point: Vec3) -> impl Iterator<Item = u64> {
-    let [from, to] =
-        [-NEAR_M, NEAR_M].map(|d| ((point + vec3(d, d, d)).max(Vec3::ZERO) / CELL_M).as_u64vec3());
-    (from.x..=to.x).flat_map(move |x| {
-        (from.y..=to.y).flat_map(move |y| (from.z..=to.z).map(move |z| x << 42 | y << 21 | z))
-    })
+/// Adds the cells within [`NEAR_M`] of a point: one, or up to eight at the corner of a cell. A cell is a number
+/// of 63 bits; the point is relative to the least corner of the mesh.
+fn add_cells_around(point: Vec3, cells: &mut Vec<u64>) {
+    const PER_M: f32 = 1.0 / CELL_M;
+    let range = |x: f32| {
+        let from = ((x - NEAR_M) * PER_M) as u32;
+        let to = ((x + NEAR_M) * PER_M) as u32;
+        u64::from(from)..=u64::from(to)
+    };
+    for x in range(point.x) {
+        for y in range(point.y) {
+            cells.extend(range(point.z).map(|z| x << 42 | y << 21 | z));
+        }
+    }
 }
 
 #[cfg(test)]
@@ -111,6 +117,7 @@ mod tests {
     use super::super::borders::borders;
     use super::*;
     use s3d_geom::MeshParts;
+    use s3d_geom::glam::vec3;
     use s3d_geom::primitives::{cuboid, grid};
 
     /// A floor, a box so far above it, and a box in the air. Each is a segment.
