@@ -78,7 +78,7 @@ fn a_folder_of_labels_annotates_its_mesh_and_no_other() {
             .iter()
             .map(move |i| format!("{}_{} of {}", i.class, i.number, room.room))
     });
-    assert_eq!(names.collect::<Vec<_>>(), ["wall_1 of office_3", "chair_1 of lobby_1"]);
+    assert_eq!(names.collect::<Vec<_>>(), ["chair_1 of lobby_1", "wall_1 of office_3"]);
     assert!(found.warnings.iter().any(|told| told.contains("up to event 3 of 5")), "{:?}", found.warnings);
 
     let message = open(dir.path(), mesh(Vec3::Z)).unwrap_err().to_string();

@@ -126,10 +126,7 @@ impl LabelFolder {
     /// [`Error::RoomType`] for words that are not in the taxonomy; [`Error::File`] and [`Error::Broken`] if
     /// the event cannot be written. Nothing is changed then.
     pub fn add(&mut self, revision: u64, action: Action, at_ms: Option<u64>) -> Result<u64> {
-        let now = self.state.revision();
-        if revision != now {
-            return Err(Error::Stale { given: revision, now });
-        }
+        let now = self.check_revision(revision)?;
         self.check_words(&action)?;
         self.state.check(&action)?;
 
@@ -144,6 +141,7 @@ impl LabelFolder {
     /// # Errors
     /// [`Fault::Nothing`] if no action is in effect, and the errors of [`LabelFolder::add`].
     pub fn undo(&mut self, revision: u64, at_ms: Option<u64>) -> Result<u64> {
+        self.check_revision(revision)?;
         let why = "no action is left to be taken back";
         match self.state.next_undo() {
             Some(of) => self.add(revision, Action::Undo { of }, at_ms),
@@ -158,6 +156,7 @@ impl LabelFolder {
     /// [`Fault::Nothing`] if there is none, or something else was done since, and the errors of
     /// [`LabelFolder::add`].
     pub fn redo(&mut self, revision: u64, at_ms: Option<u64>) -> Result<u64> {
+        self.check_revision(revision)?;
         let why = "no action is left to be brought back";
         match self.state.next_redo() {
             Some(of) => self.add(revision, Action::Redo { of }, at_ms),
@@ -168,6 +167,16 @@ impl LabelFolder {
     /// Returns the log.
     pub fn log(&self) -> &Path {
         self.log.path()
+    }
+
+    /// Returns the revision of the labels, if it is this one.
+    fn check_revision(&self, given: u64) -> Result<u64> {
+        let now = self.state.revision();
+        if given == now {
+            Ok(now)
+        } else {
+            Err(Error::Stale { given, now })
+        }
     }
 
     fn check_words(&self, action: &Action) -> Result<()> {

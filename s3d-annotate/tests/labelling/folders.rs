@@ -24,6 +24,7 @@ fn one_process_at_a_time_and_only_from_the_last_revision() {
     let stale = labels.add(0, paint(&[0], 2, "table"), None).unwrap_err();
     assert!(matches!(stale, Error::Stale { given: 0, now: 1 }), "{stale}");
     assert!(matches!(labels.redo(1, None), Err(Error::Fault(_))));
+    assert!(matches!(labels.undo(0, None), Err(Error::Stale { given: 0, now: 1 })));
 
     drop(labels);
     let labels = open(&path).unwrap();
@@ -48,6 +49,8 @@ fn words_of_no_taxonomy_are_refused_and_old_ones_are_kept() {
     let other = Taxonomy::built_in("scannet20").unwrap();
     let mut labels = LabelFolder::open(dir.path(), &strip(6, 1, 0.0), &other).unwrap();
     labels.add(1, paint(&[1], 2, "bed"), None).unwrap();
+    assert_eq!((labels.undo(2, None).unwrap(), labels.state().instances().len()), (3, 1));
+    assert_eq!((labels.redo(3, None).unwrap(), labels.state().instances()[&2].as_str()), (4, "bed"));
     labels.write_labels(&strip(6, 1, 0.0)).unwrap();
     let saved = SavedLabels::read(dir.path()).unwrap();
     let words: Vec<&str> = saved.class[..2]
