@@ -16,6 +16,7 @@ mod errors;
 mod eval;
 mod frames;
 mod kill;
+mod label_folder;
 mod large;
 mod links;
 mod lists;

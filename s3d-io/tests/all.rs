@@ -18,3 +18,4 @@ mod mesh_dialects;
 mod pointcloud_mat;
 mod published;
 mod readers;
+mod saved_labels;

@@ -13,6 +13,7 @@
 //! | PLY, NPY, NPZ, LAS, LAZ, E57, PCD, text | columns or attributes of points |
 //! | SemanticKITTI, Pointcept | a file of labels, or arrays in a folder |
 //! | ScanNet | objects as lists of segments of a mesh |
+//! | `scan.labels` | a folder of labels of faces: [`SavedLabels`] |
 //! | a mesh | labels of its faces or vertices: [`Annotations::of_mesh`], [`Annotations::from_face_labels`] |
 //! | memory | [`AnnotatedPoints`] |
 //!
@@ -79,6 +80,8 @@ pub use annotations::{
     AnnotatedInstance, AnnotatedPoints, AnnotatedRoom, AnnotationOptions, Annotations, Skipped,
 };
 pub use frame_gap::FrameGap;
+#[cfg(feature = "labels")]
+pub use label_files::saved::{EVENTS_FILE, LABELS_FILE, SavedLabels, mesh_checksum};
 #[cfg(feature = "labels")]
 pub use label_files::transfer::labels_by_place;
 #[cfg(feature = "mat")]

@@ -3,7 +3,7 @@
 use crate::cloud::annotations::{AnnotationOptions, Annotations};
 use crate::cloud::frame_gap::{FrameGap, refusal};
 use crate::cloud::label_files::transfer::{are_same_faces, labels_by_place, overlap};
-use crate::cloud::label_files::{LabelFile, numbers};
+use crate::cloud::label_files::{LabelFile, numbers, saved};
 use crate::cloud::of_mesh::FaceLabels;
 use crate::error::{Error, Result};
 use crate::mesh::file::{LengthUnit, MeshFile, MeshOptions, UpAxis};
@@ -53,6 +53,14 @@ impl Annotations {
             let labels = numbers::read(list, scene.file)?;
             let labels = FaceLabels::of_labels(scene.file, labels, options)?;
             return labels.annotate(list, &scene.file.mesh, options, true);
+        }
+
+        if let LabelFile::Saved(archive) = file {
+            let (labels, warning) = saved::read_for(archive, scene.file)?;
+            let labels = FaceLabels::of_labels(scene.file, labels, options)?;
+            let mut found = labels.annotate(archive, &scene.file.mesh, options, true)?;
+            found.warnings.extend(warning);
+            return Ok(found);
         }
 
         mesh_options.units = scene.units.or(scene.file.unit_said);

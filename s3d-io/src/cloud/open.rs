@@ -31,6 +31,7 @@ impl Annotations {
     /// | a folder | the S3DIS tree of an area, see [`AnnotationTree`] |
     /// | `….mat` | `pointcloud.mat` of a published area, see [`MatArea`](crate::cloud::MatArea) |
     /// | a mesh; lists of HM3D, Replica, 3RScan, ScanNet++ | labels of faces: [`Annotations::open_for`] |
+    /// | a folder with `labels.npz` | labels of faces: [`SavedLabels`](crate::cloud::SavedLabels) |
     /// | a folder with an `*.aggregation.json`, or that file | a scan of ScanNet: vertices of its mesh |
     /// | `.ply` | vertices with properties for class and instance; ASCII or binary |
     /// | `.npy` | a structured array, or rows and columns, see [`AnnotationOptions::columns`] |

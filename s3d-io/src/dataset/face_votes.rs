@@ -1,6 +1,6 @@
 //! The votes of the annotated points for each face: `votes.npz`.
 
-use crate::dataset::npz::{NpzReader, NpzWriter, bytes, numbers};
+use crate::cloud::npy::npz::{NpzReader, NpzWriter, bytes, numbers};
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
 use crate::fs::open::open_file;

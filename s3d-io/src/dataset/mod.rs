@@ -41,8 +41,6 @@ mod instances;
 mod labels;
 pub(crate) mod layout;
 #[cfg(feature = "dataset")]
-mod npz;
-#[cfg(feature = "dataset")]
 mod point_boxes;
 #[cfg(feature = "dataset")]
 pub(crate) mod pose;

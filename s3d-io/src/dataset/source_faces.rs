@@ -1,6 +1,6 @@
 //! Where each face of a data set's mesh comes from: `source_faces.npz`.
 
-use crate::dataset::npz::{NpzReader, NpzWriter, bytes, numbers};
+use crate::cloud::npy::npz::{NpzReader, NpzWriter, bytes, numbers};
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
 use crate::fs::open::open_file;
@@ -49,15 +49,7 @@ pub fn write_source_faces(path: &Path, source: &SourceFaces) -> Result<u64> {
 
 fn write_archive(file: AtomicFile, source: &SourceFaces) -> io::Result<AtomicFile> {
     let mut archive = NpzWriter::new(file);
-    let longest = source.files.iter().map(|name| name.chars().count()).max();
-    let length = longest.unwrap_or(0).max(1);
-    let mut names = Vec::with_capacity(4 * length * source.files.len());
-    for name in &source.files {
-        let end = names.len() + 4 * length;
-        names.extend(name.chars().flat_map(|c| u32::from(c).to_le_bytes()));
-        names.resize(end, 0);
-    }
-    archive.array("files", &format!("<U{length}"), &[source.files.len() as u64], names)?;
+    archive.texts("files", &source.files)?;
 
     for (name, column) in [("file", &source.file), ("face", &source.face)] {
         let data = bytes(column.iter().copied(), u32::to_le_bytes);

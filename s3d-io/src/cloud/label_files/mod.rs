@@ -1,5 +1,5 @@
 //! Files that label the faces of a mesh: meshes with labels of their own, and the lists of objects of HM3D,
-//! Replica, ScanNet++, 3RScan and Matterport3D.
+//! Replica, ScanNet++, 3RScan and Matterport3D, and folders of labels that `s3d-annotate` makes.
 //!
 //! Each kind becomes a mesh with [`MeshLabels`](crate::mesh::MeshLabels). `transfer` hands its labels to the
 //! faces of the scene's mesh.
@@ -8,6 +8,7 @@ mod hm3d;
 mod house;
 pub(crate) mod numbers;
 mod replica;
+pub(crate) mod saved;
 mod segments;
 pub(crate) mod transfer;
 
@@ -37,6 +38,8 @@ pub(crate) enum LabelFile {
     Segments(PathBuf),
     /// One number for each vertex or face of the scene's mesh.
     Numbers(PathBuf),
+    /// The archive in a folder of labels, for each face of the scene's mesh: see [`saved`].
+    Saved(PathBuf),
 }
 
 impl LabelFile {
@@ -67,6 +70,9 @@ impl LabelFile {
 
     /// Finds the file of labels in a folder of a data set.
     fn in_folder(dir: &Path) -> Option<Self> {
+        if let Some(archive) = saved::archive_in(dir) {
+            return Some(Self::Saved(archive));
+        }
         let usual = ["segments_anno.json", "semseg.v2.json", "info_semantic.json"];
         let by_name = usual.iter().map(|name| dir.join(name)).find(|path| path.is_file());
         if let Some(path) = by_name {
@@ -109,6 +115,10 @@ impl LabelFile {
                 list,
                 "has a number for each vertex or face of a mesh: open it for the mesh that it is about",
             )),
+            Self::Saved(archive) => Err(Error::unsupported(
+                archive,
+                "has labels for each face of a mesh: open it for the mesh that it is about",
+            )),
         }
     }
 
@@ -120,7 +130,8 @@ impl LabelFile {
             | Self::House(path)
             | Self::Replica(path)
             | Self::Segments(path)
-            | Self::Numbers(path) => path,
+            | Self::Numbers(path)
+            | Self::Saved(path) => path,
         }
     }
 }

@@ -4,6 +4,8 @@ mod array;
 pub(crate) mod folder;
 mod header;
 mod literal;
+#[cfg(feature = "dataset")]
+pub(crate) mod npz;
 pub(crate) mod read;
 pub(crate) mod write;
 

@@ -1,6 +1,6 @@
 //! Reads `instances.npz` back.
 
-use crate::dataset::npz::{NpzReader, check_header, damaged, numbers};
+use crate::cloud::npy::npz::{NpzReader, check_header, damaged, numbers};
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
 use std::io::{Read, Seek};

@@ -5,9 +5,9 @@
 //! counted from the box's smallest corner, has the index (ix · 6 + iy) · 6 + iz. Source:
 //! [`crate::formats`], "What is written".
 
+use crate::cloud::npy::npz::{NpzWriter, bytes};
 use crate::cloud::passes::PointPasses;
 use crate::dataset::instances::members::VoxelMembers;
-use crate::dataset::npz::{NpzWriter, bytes};
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
 use crate::fs::json::read_json;

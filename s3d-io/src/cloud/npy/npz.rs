@@ -1,4 +1,4 @@
-//! Archives of numpy arrays, which are written beside a data set's tables.
+//! Archives of numpy arrays, which are written beside tables of a data set, and in folders of labels.
 
 use crate::cloud::npy::write::npy_header;
 use crate::error::{Error, Result};
@@ -11,7 +11,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 /// Returns the bytes of an array's values.
-pub(super) fn bytes<T, const N: usize>(
+pub(crate) fn bytes<T, const N: usize>(
     values: impl Iterator<Item = T>,
     to_le_bytes: impl Fn(T) -> [u8; N],
 ) -> Vec<u8> {
@@ -19,7 +19,7 @@ pub(super) fn bytes<T, const N: usize>(
 }
 
 /// Writes an `.npz` file: an archive of `.npy` files, stored as they are.
-pub(super) struct NpzWriter<W: Write + Seek> {
+pub(crate) struct NpzWriter<W: Write + Seek> {
     // Fields are dropped in this order.
     ended: SetOnDrop,
     zip: ZipWriter<UntilEnd<W>>,
@@ -85,14 +85,14 @@ impl<W: Seek> Seek for UntilEnd<W> {
 }
 
 impl<W: Write + Seek> NpzWriter<W> {
-    pub(super) fn new(file: W) -> Self {
+    pub(crate) fn new(file: W) -> Self {
         let ended = Arc::default();
         let zip = ZipWriter::new(UntilEnd { file, ended: Arc::clone(&ended), at: 0, end: 0 });
         Self { ended: SetOnDrop(ended), zip }
     }
 
     /// Completes the archive, and returns the writer.
-    pub(super) fn finish(self) -> io::Result<W> {
+    pub(crate) fn finish(self) -> io::Result<W> {
         let Self { ended, zip } = self;
         let file = zip.finish()?.file;
         drop(ended);
@@ -100,7 +100,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     }
 
     /// Appends an array in memory. `kind` is a numpy type (`"<u4"`).
-    pub(super) fn array(
+    pub(crate) fn array(
         &mut self,
         name: &str,
         kind: &str,
@@ -109,6 +109,19 @@ impl<W: Write + Seek> NpzWriter<W> {
     ) -> io::Result<()> {
         let mut data = data.as_ref();
         self.stream(name, kind, shape, data.len() as u64, &mut data)
+    }
+
+    /// Appends an array of texts, of type `<U…`.
+    pub(crate) fn texts(&mut self, name: &str, texts: &[impl AsRef<str>]) -> io::Result<()> {
+        let longest = texts.iter().map(|text| text.as_ref().chars().count()).max();
+        let length = longest.unwrap_or(0).max(1);
+        let mut data = Vec::with_capacity(4 * length * texts.len());
+        for text in texts {
+            let end = data.len() + 4 * length;
+            data.extend(text.as_ref().chars().flat_map(|c| u32::from(c).to_le_bytes()));
+            data.resize(end, 0);
+        }
+        self.array(name, &format!("<U{length}"), &[texts.len() as u64], data)
     }
 
     /// Starts an array of about `size` bytes. Beyond 4 GiB its header needs room for 64 bits.
@@ -121,7 +134,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     }
 
     /// Appends an array of `size` bytes from a reader.
-    pub(super) fn stream(
+    pub(crate) fn stream(
         &mut self,
         name: &str,
         kind: &str,
@@ -140,13 +153,13 @@ impl<W: Write + Seek> NpzWriter<W> {
 }
 
 /// Reads an `.npz` file.
-pub(super) struct NpzReader<'a, R> {
+pub(crate) struct NpzReader<'a, R> {
     path: &'a Path,
     zip: ZipArchive<BufReader<R>>,
 }
 
 impl<'a, R: Read + Seek> NpzReader<'a, R> {
-    pub(super) fn new(file: R, path: &'a Path) -> Result<Self> {
+    pub(crate) fn new(file: R, path: &'a Path) -> Result<Self> {
         let zip = ZipArchive::new(BufReader::with_capacity(1 << 18, file))
             .map_err(|e| refused(path, e, |e| format!("no readable archive: {e}")))?;
         Ok(Self { path, zip })
@@ -154,7 +167,7 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
 
     /// Returns the header of an array, and a reader of its values. The archive's checksum is compared at the
     /// end of the values.
-    pub(super) fn array(&mut self, name: &str) -> Result<(Vec<u8>, impl Read + '_)> {
+    pub(crate) fn array(&mut self, name: &str) -> Result<(Vec<u8>, impl Read + '_)> {
         let path = self.path;
         let mut entry = self
             .zip
@@ -172,7 +185,7 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
 
     /// Returns the bytes of an array's values, after a check of its type and shape. Both are told from the
     /// number of bytes.
-    pub(super) fn whole(
+    pub(crate) fn whole(
         &mut self,
         name: &str,
         kind: impl Fn(usize) -> String,
@@ -187,7 +200,7 @@ impl<'a, R: Read + Seek> NpzReader<'a, R> {
     }
 }
 
-pub(super) fn damaged(path: &Path, name: &str, e: io::Error) -> Error {
+pub(crate) fn damaged(path: &Path, name: &str, e: io::Error) -> Error {
     refused(path, ZipError::Io(e), |e| format!("the array {name:?} is damaged: {e}"))
 }
 
@@ -201,7 +214,7 @@ fn refused(path: &Path, error: ZipError, fault: impl FnOnce(&ZipError) -> String
 
 impl<R: Read + Seek> NpzReader<'_, R> {
     /// Returns the texts of an array of type `<U…`.
-    pub(super) fn texts(&mut self, name: &str) -> Result<Vec<String>> {
+    pub(crate) fn texts(&mut self, name: &str) -> Result<Vec<String>> {
         let path = self.path;
         let (header, mut values) = self.array(name)?;
         let mut bytes = Vec::new();
@@ -229,7 +242,7 @@ impl<R: Read + Seek> NpzReader<'_, R> {
 }
 
 /// Refuses an array of another type or shape.
-pub(super) fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, shape: &[u64]) -> Result<()> {
+pub(crate) fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, shape: &[u64]) -> Result<()> {
     if header == npy_header(kind, shape) {
         return Ok(());
     }
@@ -237,7 +250,7 @@ pub(super) fn check_header(path: &Path, name: &str, header: &[u8], kind: &str, s
 }
 
 /// Returns the values in an array's bytes.
-pub(super) fn numbers<T, const N: usize>(bytes: &[u8], from_le_bytes: impl Fn([u8; N]) -> T) -> Vec<T> {
+pub(crate) fn numbers<T, const N: usize>(bytes: &[u8], from_le_bytes: impl Fn([u8; N]) -> T) -> Vec<T> {
     bytes.as_chunks().0.iter().map(|b| from_le_bytes(*b)).collect()
 }
 
