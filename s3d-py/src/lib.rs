@@ -15,6 +15,7 @@ mod export;
 mod mesh;
 mod points;
 mod scene;
+mod segments;
 mod work;
 
 /// `s3d_py._native`.
@@ -41,6 +42,8 @@ mod native {
     use super::points::{fill, sample, vote};
     #[pymodule_export]
     use super::scene::{Scene, encode_png, look_at};
+    #[pymodule_export]
+    use super::segments::segments;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -66,6 +66,7 @@ from ._results import (
     verify,
 )
 from ._scene import Images, Rays, Scene
+from ._segments import Segments, segments
 
 __all__ = [
     "AnnotatedPoints",
@@ -102,6 +103,7 @@ __all__ = [
     "Room",
     "Scene",
     "SceneLike",
+    "Segments",
     "SourceFaces",
     "Statistics",
     "Task",
@@ -128,6 +130,7 @@ __all__ = [
     "sample",
     "save_boxes",
     "save_points",
+    "segments",
     "verify",
     "vote",
 ]

@@ -62,6 +62,14 @@ def look_at(eye: Sequence[float], target: Sequence[float], up: Sequence[float]) 
 def sample(
     mesh: Mesh, per_m2: float, total: int | None, seed: int, threads: int | None, sink: Sink
 ) -> tuple[_F32, _U8, _U32]: ...
+def segments(
+    mesh: Mesh,
+    scale_m2: float,
+    smallest_m2: float,
+    color: float,
+    threads: int | None,
+    sink: Sink,
+) -> tuple[_U32, _U32, _F32]: ...
 def vote(
     mesh: Mesh, xyz: _F32, labels: _I64, threads: int | None, sink: Sink
 ) -> tuple[_I32, _U32, _I32, _U32, _U32, _F32, _F32]: ...
