@@ -7,7 +7,7 @@ use crate::index::{
 };
 use crate::mesh;
 use crate::pixels::{Images, Made, Picture, Shares, Widths, nothing_left};
-use crate::reduce::nearest;
+use crate::raster::reduce::nearest;
 use crate::script::Scripts;
 use crate::selection::{PoolPlace, places};
 use crate::write::ReportOptions;
@@ -328,7 +328,8 @@ impl<'a> Content<'a> {
                                 ctx.check()?;
                                 let (one, texts) = self.make(image, of_view, tools, &mut faults)?;
                                 made.push(one);
-                                let (picture, thumb) = texts.map(|texts| (texts.picture, texts.thumb)).unzip();
+                                let (picture, thumb) =
+                                    texts.map(|texts| (texts.picture, texts.thumb)).unzip();
                                 pictures.push(picture);
                                 thumbs.push(thumb.flatten());
                                 progress.add(1);

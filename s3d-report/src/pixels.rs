@@ -3,8 +3,8 @@
 
 use crate::faults::{Faults, name};
 use crate::index::rounded;
-use crate::look::{Sample, first_look};
-use crate::reduce::{Mean, Nearest, mean, pack, shown_size, squared_loss, unpack};
+use crate::raster::look::{Sample, first_look};
+use crate::raster::reduce::{Mean, Nearest, mean, pack, shown_size, squared_loss, unpack};
 use crate::script::packed::{jpeg_url, png_url};
 use jpeg_encoder::EncodingError;
 use s3d_dataset::{DataSet, Result};

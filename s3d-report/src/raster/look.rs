@@ -81,7 +81,11 @@ mod tests {
         // Many classes at the right, a quarter turn from the middle.
         let right = first_look(|u, v| Sample {
             depth_m: Some(2.0),
-            class: Some(if (0.65..0.85).contains(&u) { (40.0 * (u + v)) as usize } else { 1 }),
+            class: Some(if (0.65..0.85).contains(&u) {
+                (40.0 * (u + v)) as usize
+            } else {
+                1
+            }),
         });
         assert!((right - 90.0).abs() <= 15.0, "{right}");
         // Depth alone, behind.

@@ -385,9 +385,7 @@ const COMPARED: usize = 4;
 /// `missing`. It is 0 if there are none.
 pub(crate) fn squared_loss(image: &Raster<[u8; 3]>, reduced: &Raster<[u8; 3]>, missing: [u8; 3]) -> f64 {
     let [width, height] = [image.width(), image.height()];
-    let columns: Vec<usize> = (0..width)
-        .map(|x| edge(x, reduced.width(), width) as usize)
-        .collect();
+    let columns: Vec<usize> = (0..width).map(|x| edge(x, reduced.width(), width) as usize).collect();
     let mut sum = 0;
     let mut seen = 0;
     for (y, line) in (0..height).zip(image.rows()).step_by(COMPARED) {
