@@ -161,7 +161,10 @@ impl Images {
     ) -> Result<Made, EncodingError> {
         let size = shown_size(self.size, self.widths.lossless);
         // Reduces the smaller image again: means of means.
-        let small = |width, rgb: &Raster<_>| mean(rgb, shown_size(self.size, width), Some(MISSING_COLOR));
+        let small = |width: u32, rgb: &Raster<_>| {
+            let size = shown_size(self.size, width.min(rgb.width()));
+            mean(rgb, size, Some(MISSING_COLOR))
+        };
         let thumb = self
             .widths
             .thumb
