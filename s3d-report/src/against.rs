@@ -4,7 +4,7 @@ use crate::areas;
 use crate::content::{Content, Shown};
 use crate::faults::{Fault, Faults};
 use crate::index::{ClassEntry, LabelEntry, folder_name};
-use crate::pixels::Images;
+use crate::pixels::{Images, Widths};
 use crate::script::Scripts;
 use crate::script::packed::packed;
 use crate::write::ReportOptions;
@@ -198,13 +198,14 @@ fn write_picture(
 ) -> Result<Option<u64>> {
     let widths = match pair.shown {
         Shown::Picture(_) => options.of_views(),
-        Shown::Panorama(_) => options.of_panoramas(),
+        // Both are shown at the same width.
+        Shown::Panorama(_) => Widths { sharp: None, ..options.of_panoramas() },
     };
     let read = Images::read(data, &pair.other, table, widths, (reader, faults))?;
     let Some(images) = read else { return Ok(None) };
     let path = pair.other.path(data.layout(), Domain::Rgb);
-    let (picture, _) = images
+    let made = images
         .picture(|_| None)
         .map_err(|e| FileError::format(&path, e.to_string()))?;
-    Ok(Some(scripts.write(&format!("other_{number}"), &picture)?))
+    Ok(Some(scripts.write(&format!("other_{number}"), &made.picture)?))
 }

@@ -6,8 +6,8 @@ use crate::index::{
     DataSetEntry, FORM, Index, LocationEntry, MeshEntry, Surface, ViewEntry, degrees, folder_name, rounded,
 };
 use crate::mesh;
-use crate::pixels::{Images, Picture, Shares, Widths, nothing_left};
-use crate::reduce::nearest;
+use crate::pixels::{Images, Made, Picture, Shares, Widths, nothing_left};
+use crate::raster::reduce::nearest;
 use crate::script::Scripts;
 use crate::selection::{PoolPlace, places};
 use crate::write::ReportOptions;
@@ -73,6 +73,15 @@ struct Located {
 pub(crate) struct ReadImage {
     located: Option<Located>,
     pub(crate) seen: Option<Shares>,
+    /// The first direction of view in a panorama.
+    look_deg: Option<f64>,
+}
+
+/// The texts for the files of an image.
+struct Texts {
+    picture: ViewPicture,
+    thumb: Option<String>,
+    sharp: Option<String>,
 }
 
 /// All images and meshes that were written.
@@ -83,6 +92,8 @@ pub(crate) struct Written {
     pub(crate) panoramas: Vec<ReadImage>,
     /// In the order of `Content::views`.
     pub(crate) views: Vec<ReadImage>,
+    /// The small images of panoramas, by location.
+    small: Vec<Option<String>>,
     meshes: Vec<MeshEntry>,
     /// Classes and their surface in an area.
     surfaces: Vec<(usize, Surface)>,
@@ -239,7 +250,7 @@ impl<'a> Content<'a> {
         faults: &mut Faults,
     ) -> Result<Written> {
         let progress = ctx.progress("reporting", "images", (self.panoramas.len() + self.views.len()) as u64);
-        let mut written = Written::default();
+        let mut written = Written { small: vec![None; self.locations.len()], ..Written::default() };
 
         for &area in self.data.areas() {
             let read = faults.keep(self.data.layout().root(), self.data.mesh(area))?.flatten();
@@ -253,6 +264,9 @@ impl<'a> Content<'a> {
                 written.bytes += bytes;
             }
             self.write_pictures(ctx, options, (area, mesh), (scripts, &progress), (faults, &mut written))?;
+        }
+        for (file, small) in written.small.chunks(THUMBS_PER_FILE).enumerate() {
+            written.bytes += scripts.write(&format!("panos_{file}"), &small)?;
         }
         Ok(written)
     }
@@ -290,13 +304,18 @@ impl<'a> Content<'a> {
             |tools, job| {
                 let mut faults = Faults::default();
                 let mut made = Vec::new();
+                let mut small = None;
                 let mut bytes = 0;
 
                 match job {
                     Job::Panorama(i, image) => {
-                        let (one, picture, _) = self.make(image, of_panorama, tools, &mut faults)?;
-                        if let Some(picture) = picture {
+                        let (one, texts) = self.make(image, of_panorama, tools, &mut faults)?;
+                        if let Some(Texts { picture, thumb, sharp }) = texts {
                             bytes += scripts.write(&format!("pano_{i}"), &picture.picture)?;
+                            if let Some(sharp) = sharp {
+                                bytes += scripts.write(&format!("sharp_{i}"), &sharp)?;
+                            }
+                            small = thumb.map(|thumb| (*i, thumb));
                         }
                         made.push(one);
                         progress.add(1);
@@ -307,10 +326,12 @@ impl<'a> Content<'a> {
                             let mut pictures = Vec::with_capacity(some.len());
                             for image in some {
                                 ctx.check()?;
-                                let (one, picture, thumb) = self.make(image, of_view, tools, &mut faults)?;
+                                let (one, texts) = self.make(image, of_view, tools, &mut faults)?;
                                 made.push(one);
+                                let (picture, thumb) =
+                                    texts.map(|texts| (texts.picture, texts.thumb)).unzip();
                                 pictures.push(picture);
-                                thumbs.push(thumb);
+                                thumbs.push(thumb.flatten());
                                 progress.add(1);
                             }
                             let file = chunk * (THUMBS_PER_FILE / VIEWS_PER_FILE) + k;
@@ -319,13 +340,18 @@ impl<'a> Content<'a> {
                         bytes += scripts.write(&format!("thumbs_{chunk}"), &thumbs)?;
                     }
                 }
-                Ok((made, bytes, faults.into_vec()))
+                Ok((made, small, bytes, faults.into_vec()))
             },
         )?;
 
-        for (job, (made, bytes, found)) in jobs.iter().zip(results) {
+        for (job, (made, small, bytes, found)) in jobs.iter().zip(results) {
             written.bytes += bytes;
             faults.extend(found);
+            if let Some((i, thumb)) = small
+                && let Some(place) = written.small.get_mut(i)
+            {
+                *place = Some(thumb);
+            }
             match job {
                 Job::Panorama(..) => written.panoramas.extend(made),
                 Job::Views(..) => written.views.extend(made),
@@ -334,15 +360,14 @@ impl<'a> Content<'a> {
         Ok(())
     }
 
-    /// Reads an image. Returns its entry, its picture and its small image. The faces of its pixels are cast
-    /// again.
+    /// Reads an image. Returns its entry, and the texts for its files. The faces of its pixels are cast again.
     fn make(
         &self,
         image: &DatasetImage,
         widths: Widths,
         Tools { reader, caster }: &mut Tools<'_, '_>,
         faults: &mut Faults,
-    ) -> Result<(ReadImage, Option<ViewPicture>, Option<String>)> {
+    ) -> Result<(ReadImage, Option<Texts>)> {
         let root = self.data.layout().root();
         let images = Images::read(self.data, image, self.table.as_ref(), widths, (reader, faults))?;
         if images.is_none() {
@@ -360,16 +385,23 @@ impl<'a> Content<'a> {
         }
         let located = pose.as_ref().map(|pose| Located::new(pose, size));
 
-        let Some(images) = images else { return Ok((ReadImage { located, seen: None }, None, None)) };
-        let (picture, thumb) = images
+        let Some(images) = images else {
+            return Ok((ReadImage { located, seen: None, look_deg: None }, None));
+        };
+        let Made { picture, thumb, sharp } = images
             .picture(|size| Some(faces(caster.as_mut()?, camera.as_ref()?, size)))
             .map_err(|e| FileError::format(&image.path(self.data.layout(), Domain::Rgb), e.to_string()))?;
         let pinhole = camera.filter(|_| image.frame != Frame::Panorama).map(|camera| {
             let [[fx, _, cx], [_, fy, cy], _] = camera.k_matrix();
             Pinhole { k: [fx, fy, cx, cy], rt: camera.pose.rt_matrix() }
         });
-        let read = ReadImage { located, seen: Some(images.seen) };
-        Ok((read, Some(ViewPicture { picture, camera: pinhole }), thumb))
+        let units_per_m = self.data.options().depth_units.per_m();
+        let look_deg = match image.frame {
+            Frame::Panorama => images.first_look(self.table.as_ref(), units_per_m),
+            Frame::View(_) => None,
+        };
+        let read = ReadImage { located, seen: Some(images.seen), look_deg };
+        Ok((read, Some(Texts { picture: ViewPicture { picture, camera: pinhole }, thumb, sharp })))
     }
 
     /// Returns the index of the report.
@@ -472,6 +504,7 @@ impl<'a> Content<'a> {
                 entry.azimuth_rad = Some(located.azimuth_rad);
             }
             entry.pano = made.seen.is_some();
+            entry.look_deg = made.look_deg;
             entry.seen.clone_from(&made.seen);
         }
         entries

@@ -152,6 +152,8 @@ pub(crate) struct LocationEntry {
     pub(crate) azimuth_rad: Option<f64>,
     /// Whether there is a file `data/pano_N.js`, where N is the index of the location.
     pub(crate) pano: bool,
+    /// The direction in which the panorama is looked at first, in degrees to the right of its centre column.
+    pub(crate) look_deg: Option<f64>,
     pub(crate) seen: Option<Shares>,
 }
 

@@ -2,7 +2,7 @@
 
 use crate::faults::Faults;
 use crate::index::{MaterialEntry, MeshEntry, Surface, VoteSpread, rounded};
-use crate::reduce::{mean, reduced_size};
+use crate::raster::reduce::{mean, reduced_size};
 use crate::script::Scripts;
 use crate::script::packed::{jpeg_url, packed};
 use s3d_dataset::parallel::map_in_order;

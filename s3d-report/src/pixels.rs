@@ -3,7 +3,8 @@
 
 use crate::faults::{Faults, name};
 use crate::index::rounded;
-use crate::reduce::{Mean, Nearest, mean, pack, shown_size};
+use crate::raster::look::{Sample, first_look};
+use crate::raster::reduce::{Mean, Nearest, mean, pack, shown_size, squared_loss, unpack};
 use crate::script::packed::{jpeg_url, png_url};
 use jpeg_encoder::EncodingError;
 use s3d_dataset::{DataSet, Result};
@@ -20,6 +21,10 @@ use std::path::{Path, PathBuf};
 /// The colour of a pixel that sees nothing, or that is outside of its photograph.
 const MISSING_COLOR: [u8; 3] = [0; 3];
 
+/// Colours have a file at a greater width if the mean loss of the smaller picture is more than this, in
+/// levels of 255: if its PSNR against the larger one is below 40 dB.
+const LOSS: f64 = 2.55;
+
 /// The images of a picture as `data:` URLs.
 #[derive(Serialize)]
 pub(crate) struct Picture {
@@ -32,6 +37,18 @@ pub(crate) struct Picture {
     pub(crate) depth: Option<String>,
     pub(crate) label: Option<String>,
     pub(crate) face: Option<String>,
+    /// The width and the height of the colours in a file of their own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) sharp: Option<[u32; 2]>,
+}
+
+/// The pictures of an image as texts for the files.
+pub(crate) struct Made {
+    pub(crate) picture: Picture,
+    /// The small image of its colours.
+    pub(crate) thumb: Option<String>,
+    /// Its colours at a greater width.
+    pub(crate) sharp: Option<String>,
 }
 
 /// What the pixels of an image show, as shares of all its pixels.
@@ -58,8 +75,19 @@ pub(crate) struct Widths {
     /// The width of depth, label and normals.
     pub(crate) lossless: u32,
     pub(crate) rgb: u32,
-    /// The width of a small image for a grid.
+    /// The width of a small image, which is shown first.
     pub(crate) thumb: Option<u32>,
+    /// The width of the colours in a file of their own, if they are wider and show more than `rgb`.
+    pub(crate) sharp: Option<u32>,
+}
+
+/// The colours of a picture, reduced.
+struct Colors {
+    image: Raster<[u8; 3]>,
+    /// The same at a greater width, if that shows more.
+    sharp: Option<Raster<[u8; 3]>>,
+    /// The number of missing pixels of the file.
+    missing: u64,
 }
 
 /// The images of a picture that exist and are whole, reduced, and what they show.
@@ -68,6 +96,7 @@ pub(crate) struct Images {
     pub(crate) seen: Shares,
     widths: Widths,
     rgb: Option<Raster<[u8; 3]>>,
+    sharp: Option<Raster<[u8; 3]>>,
     normal: Option<Raster<[u8; 3]>>,
     label: Option<Raster<[u8; 3]>>,
     depth: Option<Raster<u16>>,
@@ -83,16 +112,12 @@ impl Images {
         (reader, faults): (&mut PngReader, &mut Faults),
     ) -> Result<Option<Self>> {
         let mut files = Files { data, image, size: None, reader, faults };
-        let mut no_color = None;
-        let rgb = files
-            .colors(Domain::Rgb, widths.rgb, MISSING_COLOR)?
-            .map(|(rgb, missing)| {
-                no_color = Some(missing);
-                rgb
-            });
+        let colors = files.colors(Domain::Rgb, (widths.rgb, widths.sharp), MISSING_COLOR)?;
+        let no_color = colors.as_ref().map(|colors| colors.missing);
+        let (rgb, sharp) = colors.map_or((None, None), |colors| (Some(colors.image), colors.sharp));
         let normal = files
-            .colors(Domain::Normal, widths.lossless, MISSING_NORMAL)?
-            .map(|(normal, _)| normal);
+            .colors(Domain::Normal, (widths.lossless, None), MISSING_NORMAL)?
+            .map(|colors| colors.image);
 
         let mut label = None;
         let mut counted = None;
@@ -125,7 +150,7 @@ impl Images {
             .as_ref()
             .and_then(|depth| median_depth(depth, data.options().depth_units.per_m()));
         let seen = Shares { depth_m, ..shares(size, counted, missing) };
-        Ok(Some(Self { size, seen, widths, rgb, normal, label, depth }))
+        Ok(Some(Self { size, seen, widths, rgb, sharp, normal, label, depth }))
     }
 
     /// Returns the shown images, and a small one for a grid. `face` returns the face of each pixel of an
@@ -133,10 +158,13 @@ impl Images {
     pub(crate) fn picture(
         &self,
         face: impl FnOnce([u32; 2]) -> Option<Raster<u32>>,
-    ) -> Result<(Picture, Option<String>), EncodingError> {
+    ) -> Result<Made, EncodingError> {
         let size = shown_size(self.size, self.widths.lossless);
         // Reduces the smaller image again: means of means.
-        let small = |width, rgb: &Raster<_>| mean(rgb, shown_size(self.size, width), Some(MISSING_COLOR));
+        let small = |width: u32, rgb: &Raster<_>| {
+            let size = shown_size(self.size, width.min(rgb.width()));
+            mean(rgb, size, Some(MISSING_COLOR))
+        };
         let thumb = self
             .widths
             .thumb
@@ -152,8 +180,29 @@ impl Images {
             depth: self.depth.as_ref().map(depth),
             label: self.label.as_ref().map(|label| png_url(label, Content::Labels)),
             face: face(size).map(|face| png_url(&face.map(pack), Content::Labels)),
+            sharp: self.sharp.as_ref().map(|sharp| [sharp.width(), sharp.height()]),
         };
-        Ok((picture, jpeg(thumb.as_ref())?))
+        Ok(Made { picture, thumb: jpeg(thumb.as_ref())?, sharp: jpeg(self.sharp.as_ref())? })
+    }
+
+    /// Returns the direction in which the panorama is looked at first, in degrees to the right of its centre
+    /// column. `None` without depth.
+    pub(crate) fn first_look(&self, table: Option<&LabelTable>, units_per_m: f64) -> Option<f64> {
+        let depth = self.depth.as_ref()?;
+        let place = |share: f64, side: u32| ((share * f64::from(side)) as u32).min(side.saturating_sub(1));
+        let class = |label: &[u8; 3]| table?.class_of(LabelId(unpack(*label)));
+        Some(first_look(|u, v| {
+            let [x, y] = [place(u, depth.width()), place(v, depth.height())];
+            let units = depth.at(x, y);
+            Sample {
+                depth_m: (units != MISSING_DEPTH).then(|| f64::from(units) / units_per_m),
+                class: self
+                    .label
+                    .as_ref()
+                    .and_then(|label| class(&label.at(x, y)))
+                    .map(|class| class.index()),
+            }
+        }))
     }
 }
 
@@ -195,19 +244,33 @@ impl Files<'_> {
         Ok(self.faults.keep(layout.root(), read)?.map(|taken| (taken, path)))
     }
 
-    /// Reads means of colours, and the number of missing pixels of the file.
+    /// Reads means of colours at a width, and at a greater one if that shows more.
     fn colors(
         &mut self,
         domain: Domain,
-        width: u32,
+        (width, sharp): (u32, Option<u32>),
         missing: [u8; 3],
-    ) -> Result<Option<(Raster<[u8; 3]>, u64)>> {
+    ) -> Result<Option<Colors>> {
         let taken = self.take(domain, PngReader::rgb8, |size, lines| {
-            let mut mean = Mean::new(size, shown_size(size, width), Some(missing));
-            lines.for_each(|line| mean.line(line));
-            (mean.missing(), mean.finish())
+            let small = shown_size(size, width);
+            let mut mean = Mean::new(size, small, Some(missing));
+            let mut sharp = sharp
+                .map(|width| shown_size(size, width))
+                .filter(|sharp| sharp.iter().zip(small).all(|(sharp, small)| *sharp > small))
+                .map(|sharp| Mean::new(size, sharp, Some(missing)));
+            lines.for_each(|line| {
+                mean.line(line);
+                sharp.iter_mut().for_each(|sharp| sharp.line(line));
+            });
+
+            let found = mean.missing();
+            let image = mean.finish();
+            let sharp = sharp
+                .map(Mean::finish)
+                .filter(|sharp| squared_loss(sharp, &image, missing) > LOSS * LOSS);
+            Colors { image, sharp, missing: found }
         })?;
-        Ok(taken.map(|((missing, image), _)| (image, missing)))
+        Ok(taken.map(|(colors, _)| colors))
     }
 
     /// Reads labels, and counts their pixels.

@@ -4,6 +4,7 @@ use crate::against;
 use crate::content::{Content, ReadImage};
 use crate::error::{Error, Result};
 use crate::faults::{Fault, Faults};
+use crate::first::First;
 use crate::index::{FORM, Index, Verified, folder_name};
 use crate::pixels::Widths;
 use crate::scores::Scores;
@@ -28,6 +29,8 @@ const HEAD_END: &str = "<meta name=\"viewport\"";
 
 /// The widths that panoramas may have, in pixels.
 pub(crate) const PANO_WIDTHS: RangeInclusive<u32> = 16..=16_384;
+/// The width of the sharpest colours of panoramas: all graphics cards have textures so wide.
+const SHARP_WIDTH: u32 = 4096;
 /// The widths that views may have, in pixels.
 pub(crate) const THUMB_WIDTHS: RangeInclusive<u32> = 16..=2048;
 /// The numbers of faces that a mesh may have.
@@ -45,7 +48,8 @@ const KIND: FolderKind = FolderKind {
 /// The options of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportOptions {
-    /// The width of panoramas in pixels. Smaller panoramas keep their width.
+    /// The width of panoramas in pixels. Smaller panoramas keep their width. The colours of a panorama also
+    /// have a file twice as wide, up to 4096 pixels, where that shows more.
     pub pano_width: u32,
     /// The width of views in pixels. The colours of a large view are twice as wide.
     pub thumbs: u32,
@@ -78,12 +82,17 @@ impl Default for ReportOptions {
 impl ReportOptions {
     /// Returns the widths of the images of panoramas.
     pub(crate) fn of_panoramas(&self) -> Widths {
-        Widths { lossless: self.pano_width, rgb: self.pano_width, thumb: None }
+        Widths {
+            lossless: self.pano_width,
+            rgb: self.pano_width,
+            thumb: Some(2 * self.thumbs),
+            sharp: Some((2 * self.pano_width).min(SHARP_WIDTH)),
+        }
     }
 
     /// Returns the widths of the images of views.
     pub(crate) fn of_views(&self) -> Widths {
-        Widths { lossless: self.thumbs, rgb: 2 * self.thumbs, thumb: Some(self.thumbs) }
+        Widths { lossless: self.thumbs, rgb: 2 * self.thumbs, thumb: Some(self.thumbs), sharp: None }
     }
 }
 
@@ -233,6 +242,7 @@ fn write_data(
         index.verified = Some(Verified::from(verify(out, &VerifyOptions::default(), ctx)?));
     }
     bytes += scripts.write_list("index", &index)?;
+    bytes += scripts.write("first", &First::of(&index))?;
 
     Ok(Data { index, panoramas: shown_count(&made.panoramas), views: shown_count(&made.views), bytes })
 }

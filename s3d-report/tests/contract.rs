@@ -2,13 +2,13 @@
 
 use crate::common;
 
-use common::{data_set, export, files, numbers, pair, url_bytes, value};
+use common::{data_set, export, files, list_files, numbers, pair, url_bytes, value};
 use s3d_dataset::event::UnitKind;
 use s3d_dataset::{Cancel, Context, DataSet, Event};
 use s3d_geom::Raster;
 use s3d_geom::glam::{DMat3, DVec3, dvec3};
 use s3d_io::dataset::{DatasetImage, Domain, Frame};
-use s3d_io::image::{decode_gray16, decode_rgb8, decode_xyz};
+use s3d_io::image::{Compression, Content, decode_gray16, decode_rgb8, decode_xyz, write_rgb8};
 use s3d_report::{Error, Report, ReportOptions, report};
 use serde_json::Value;
 use std::f64::consts::PI;
@@ -182,6 +182,53 @@ fn pictures_are_the_data_sets_own() {
     }
     assert_eq!(index["votes"][0]["area"], 1);
     assert!(index["areas"][0]["inputs"].is_null());
+}
+
+#[test]
+fn what_is_shown_first_is_small_and_colours_are_sharp_where_that_shows_more() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), true);
+    let to = dir.path().join("report");
+    let jpeg = |url: &Value| image::load_from_memory(&url_bytes(url, "jpeg")).unwrap();
+
+    // Panoramas of 160 pixels; 80 would be a half, and 53 are a third.
+    for (pano_width, sharp) in [(40, Some([80, 40])), (80, Some([160, 80])), (160, None)] {
+        made(&out, &to, &ReportOptions { pano_width, overwrite: true, ..SMALL });
+        let index = value(&to, "index");
+        let small = value(&to, "panos_0");
+        for (i, location) in index["locations"].as_array().unwrap().iter().enumerate() {
+            let look = location["look_deg"].as_f64().unwrap();
+            assert!((-180.0..180.0).contains(&look) && look % 15.0 == 0.0, "{look}");
+            let small = jpeg(&small[i]);
+            assert_eq!((small.width(), small.height()), (48.min(pano_width), 24.min(pano_width / 2)));
+
+            let picture = value(&to, &format!("pano_{i}"));
+            assert_eq!(pair(&picture["size"]), [pano_width, pano_width / 2]);
+            let file = to.join(format!("data/sharp_{i}.js"));
+            assert_eq!((picture.get("sharp").map(pair), file.exists()), (sharp, sharp.is_some()));
+            if let Some(sharp) = sharp {
+                let colors = jpeg(&value(&to, &format!("sharp_{i}")));
+                assert_eq!([colors.width(), colors.height()], sharp);
+            }
+        }
+    }
+    let first = value(&to, "first");
+    assert_eq!(first["name"], "data set");
+    let parts = ["meshes", "panoramas", "views", "plan"];
+    assert!(parts.iter().all(|part| first["parts"][part] == true), "{first}");
+    assert!(["against", "scores"].iter().all(|part| first["parts"][part] == false), "{first}");
+    assert_eq!(first["outline"].as_array().unwrap().len(), 4);
+
+    // Grey images lose nothing when they are halved.
+    let data = DataSet::open(&out).unwrap();
+    for image in data.images(1).iter().filter(|image| image.frame == Frame::Panorama) {
+        let path = image.path(data.layout(), Domain::Rgb);
+        let gray = Raster::filled(160, 80, [90; 3]);
+        write_rgb8(&path, &gray, Content::Photo, Compression::Fast).unwrap();
+    }
+    list_files(&out);
+    made(&out, &to, &ReportOptions { pano_width: 80, overwrite: true, ..SMALL });
+    assert!(value(&to, "pano_0").get("sharp").is_none() && !to.join("data/sharp_0.js").exists());
 }
 
 #[test]

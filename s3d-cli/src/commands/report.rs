@@ -18,7 +18,8 @@ pub(crate) struct ReportArgs {
     /// The report's folder, or its file with --single [default: beside OUT: OUT_report]
     #[arg(short, long, value_name = "PATH")]
     pub(crate) output: Option<PathBuf>,
-    /// Width of panoramas in the report, in pixels. Smaller panoramas keep their width.
+    /// Width of panoramas in the report, in pixels. Smaller panoramas keep their width. Their colours are
+    /// twice as wide, up to 4096 pixels, where that shows more.
     #[arg(long, value_name = "PIXELS", default_value_t = 2048,
         value_parser = value_parser!(u32).range(16..=16_384))]
     pub(crate) pano_width: u32,

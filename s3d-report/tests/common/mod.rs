@@ -5,11 +5,12 @@
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use s3d_dataset::s3d_io::dataset::{FileRecord, Layout, write_file_list};
 use s3d_dataset::{Context, Export, ExportOptions};
 use s3d_geom::Raster;
 use s3d_io::image::decode_rgb8;
 use s3d_synth::{Building, ScanOptions};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -88,4 +89,19 @@ pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         }
     }
     found
+}
+
+/// Writes the lists of a data set anew.
+pub(crate) fn list_files(out: &Path) {
+    let layout = Layout::new(out);
+    let paths = files(out).into_keys().map(|path| out.join(path));
+    let listed = paths.filter(|path| *path != layout.manifest() && *path != layout.file_list());
+    let records: Vec<FileRecord> = listed.map(|path| FileRecord::of_file(out, &path).unwrap()).collect();
+    let (_, sum) = write_file_list(&layout.file_list(), &records).unwrap();
+    let bytes: u64 = records.iter().map(|record| record.bytes).sum();
+    let mut manifest: Value = serde_json::from_slice(&fs::read(layout.manifest()).unwrap()).unwrap();
+    manifest["files"] = json!({
+        "list": "files.csv", "count": records.len(), "bytes": bytes, "xxh3_128": sum.to_string()
+    });
+    fs::write(layout.manifest(), manifest.to_string()).unwrap();
 }

@@ -26,6 +26,8 @@ export interface Location {
   position: Rgb | null;
   azimuth_rad: number | null;
   pano: boolean;
+  /** The first direction of view, degrees to the right of the centre column. */
+  look_deg?: number | null;
   seen: Seen | null;
 }
 
@@ -239,7 +241,20 @@ export interface Picture {
   /** Faces of `rgb.obj`, from 0. */
   face: string | null;
   camera?: Pinhole | null;
+  /** The width and the height of the colours in a file of their own; missing if there is none. */
+  sharp?: [number, number];
 }
+
+/** What is shown before the index is read. */
+export interface First {
+  name: string;
+  parts: Parts;
+  /** Rings of x and y, metres. */
+  outline: [number, number][][];
+}
+
+/** The parts of a report that are not empty. */
+export type Parts = Record<"meshes" | "panoramas" | "views" | "plan" | "against" | "scores", boolean>;
 
 declare global {
   interface Window {
@@ -253,7 +268,10 @@ export const FORM = 2;
 /** The number of files of a kind that are kept. The least recently used file goes first. */
 const KEPT: Record<string, number> = {
   index: 1,
+  first: 0,
   pano: 4,
+  panos: 10,
+  sharp: 2,
   other: 4,
   views: 6,
   thumbs: 40,
@@ -336,4 +354,11 @@ export function loadThumb(index: Index, picture: number): Promise<string | null>
   const file = Math.floor(picture / index.thumbs_per_file);
   const thumbs = load<(string | null)[]>(`thumbs_${file}`);
   return thumbs.then((all) => all[picture % index.thumbs_per_file] ?? null);
+}
+
+/** The small image of a location's panorama; null if it has none. */
+export function loadSmallPano(index: Index, location: number): Promise<string | null> {
+  const file = Math.floor(location / index.thumbs_per_file);
+  const all = load<(string | null)[]>(`panos_${file}`);
+  return all.then((small) => small[location % index.thumbs_per_file] ?? null);
 }

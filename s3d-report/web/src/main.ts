@@ -1,46 +1,47 @@
 // The whole page: its tabs, and the open one.
 
 import { comparePage } from "./compare/page.js";
-import { FORM, type Index, load } from "./data.js";
-import { append, count, h, named, tamed } from "./dom.js";
+import { FORM, type First, type Index, type Parts, load } from "./data.js";
+import { append, count, h, tamed } from "./dom.js";
+import { headerOf, painted, sketch, tabsOf } from "./first.js";
 import { comeBack, leave, pointTabs, remember } from "./route/memory.js";
 import { findField } from "./overview/find.js";
 import { overviewPage } from "./overview/page.js";
 import { damageOf, notesPage } from "./pages/notes.js";
 import { numbersPage } from "./pages/numbers.js";
-import { panoPage } from "./pages/pano.js";
+import { panoPage, panoSight } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
 import { scoresPage } from "./pages/scores.js";
 import { paletteOf } from "./palette.js";
-import { type Page, link, parseRoute } from "./route/route.js";
+import { type Page, type Sight, link, parseRoute } from "./route/route.js";
 import { spacePage } from "./space/page.js";
-import { viewPage } from "./pages/view.js";
+import { viewPage, viewSight } from "./pages/view.js";
 import { viewsPage } from "./pages/views.js";
 
 const still = (element: HTMLElement): Page => ({ element, close: () => {} });
 
-function tabs(index: Index): [string, string][] {
-  const all: [string, string, boolean][] = [
-    ["overview", "Overview", index.meshes.length > 0],
-    ["pano", "Panoramas", index.locations.some((l) => l.pano)],
-    ["space", "3D", index.meshes.length > 0],
-    ["views", "Views", index.views.length > 0],
-    [
-      "plan",
-      "Plan",
-      index.rooms.length > 0 || index.locations.length > 0 || index.views.some((v) => v.position),
-    ],
-    ["compare", "Compared", index.against != null],
-    ["scores", "Scores", index.scores > 0],
-    ["numbers", "Numbers", true],
-    ["notes", "Notes", true],
-  ];
-  return all.filter(([, , there]) => there).map(([page, name]) => [page, name]);
+/** The parts of the report that an index tells of. */
+const partsOf = (index: Index): Parts => ({
+  meshes: index.meshes.length > 0,
+  panoramas: index.locations.some((l) => l.pano),
+  views: index.views.length > 0,
+  plan: index.rooms.length > 0 || index.locations.length > 0 || index.views.some((v) => v.position),
+  against: index.against != null,
+  scores: index.scores > 0,
+});
+
+/** What is shown of a page while its file is read, if it has anything. */
+async function sightOf(index: Index): Promise<Sight | null> {
+  const route = parseRoute(window.location.hash);
+  const page = route.page || (tabsOf(partsOf(index))[0] ?? "");
+  const sight = page === "pano" ? panoSight(index, route) : page === "view" ? viewSight(index, route) : null;
+  // The page tells what is wrong with a file.
+  return (await sight?.catch(() => null)) ?? null;
 }
 
 async function open(index: Index): Promise<Page> {
   const route = parseRoute(window.location.hash);
-  switch (route.page || tabs(index)[0]?.[0]) {
+  switch (route.page || tabsOf(partsOf(index))[0]) {
     case "overview":
       return overviewPage(index, route);
     case "pano":
@@ -71,7 +72,20 @@ function failure(words: string): HTMLElement {
 }
 
 async function start(): Promise<void> {
+  const place = h("div", { id: "place" });
+  const shell = document.querySelectorAll("body > :not(script)");
+  // A folder without this file is damaged, and the index tells more of that.
+  const first = await load<First>("first").catch(() => null);
+  const sketched = first && sketch(first, place);
+  if (sketched) {
+    shell.forEach((element) => element.remove());
+    document.body.prepend(sketched, place);
+    await painted();
+    performance.mark("sketched");
+  }
+
   const index = await load<Index>("index");
+  performance.mark("read");
   if (index.form !== FORM)
     throw new Error(
       `data/index.js has form ${index.form}, and this page reads ${FORM}: make the report again`,
@@ -82,30 +96,38 @@ async function start(): Promise<void> {
   const numbered = new Intl.Collator("en", { numeric: true });
   if (index.views.some((view) => view.photograph !== null))
     index.views.sort((a, b) => numbered.compare(a.photograph ?? "", b.photograph ?? ""));
-  const header = h("header", {}, h("a", { class: "title", href: link("") }, named(index.data_set.name)));
-  const nav = h("nav", { "aria-label": "Parts of the report" });
-  for (const [page, name] of tabs(index)) {
-    const damage = page === "notes" ? damageOf(index) : null;
-    const badge =
-      damage &&
-      damage.count > 0 &&
-      h(
-        "span",
-        { class: "badge", title: damage.words },
-        h("span", { "aria-hidden": "true" }, count(damage.count)),
-        h("span", { class: "hidden" }, ` (${damage.words})`),
-      );
-    nav.append(h("a", { href: link(page), "data-page": page }, name, badge || ""));
+  const damage = damageOf(index);
+  const badge = h(
+    "span",
+    { class: "badge", title: damage.words },
+    h("span", { "aria-hidden": "true" }, count(damage.count)),
+    h("span", { class: "hidden" }, ` (${damage.words})`),
+  );
+  const parts = partsOf(index);
+  const isSame = (other: First | null): boolean =>
+    other?.name === index.data_set.name && tabsOf(other.parts).join() === tabsOf(parts).join();
+  const header = isSame(first) && sketched ? sketched : headerOf(index.data_set.name, parts);
+  if (damage.count > 0) header.querySelector('a[data-page="notes"]')?.append(badge);
+  header.append(findField(index));
+  if (header !== sketched) {
+    sketched?.remove();
+    shell.forEach((element) => element.remove());
+    document.body.prepend(header, place);
   }
-  header.append(nav, findField(index));
-  const place = h("div", { id: "place" });
-  document.body.replaceChildren(header, place);
+  const nav = header.querySelector("nav") ?? header;
   let now: Page | null = null;
   let turn = 0;
   const show = async (): Promise<void> => {
     const mine = ++turn;
     if (now) leave(now);
     now?.element.setAttribute("inert", "");
+    const sight = await sightOf(index);
+    if (mine !== turn) return;
+    if (sight) {
+      place.replaceChildren(sight.element);
+      sight.draw();
+      performance.mark("sighted");
+    }
     const page = await open(index).catch((e: unknown) =>
       still(failure(e instanceof Error ? e.message : String(e))),
     );
@@ -120,7 +142,7 @@ async function start(): Promise<void> {
     document.title = tamed([heading, index.data_set.name, "s3d report"].filter(Boolean).join(" · "));
     const address = window.location.hash || link("");
     const route = parseRoute(address);
-    const current = route.page || (tabs(index)[0]?.[0] ?? "");
+    const current = route.page || (tabsOf(parts)[0] ?? "");
     remember({ ...route, page: current }, address);
     comeBack(page, address);
     pointTabs(nav, route, current);

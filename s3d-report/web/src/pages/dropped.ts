@@ -2,22 +2,14 @@
 
 import { type Index, type Picture, type View, load } from "../data.js";
 import { type Pixels, cut } from "../picture/geometry.js";
+import { decoded } from "../picture/images.js";
 
 /** The width of a small picture, pixels. */
 export const WIDTH = 128;
 
 async function pixelsOf(location: number): Promise<Pixels | null> {
   const { rgb } = (await load<Picture | null>(`pano_${location}`)) ?? { rgb: null };
-  if (rgb === null) return null;
-  const image = new Image();
-  image.src = rgb;
-  await image.decode();
-  const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [image.naturalWidth, image.naturalHeight];
-  const context = canvas.getContext("2d", { willReadFrequently: true });
-  if (!context) return null;
-  context.drawImage(image, 0, 0);
-  return context.getImageData(0, 0, canvas.width, canvas.height);
+  return rgb === null ? null : decoded(rgb);
 }
 
 /** The number of panoramas that are kept. */

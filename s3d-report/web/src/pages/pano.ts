@@ -1,13 +1,21 @@
 // A scan location: its panorama, its neighbours, and its position on the plan.
 
-import { type Index, type Location, type Picture, load } from "../data.js";
+import { type Index, type Location, type Picture, load, loadSmallPano } from "../data.js";
 import { append, choice, h, percent, roomName, several } from "../dom.js";
-import { type Gaze, directionIn, panoramaPoint, panoramaScreen, screenAt } from "../picture/geometry.js";
+import {
+  type Gaze,
+  directionIn,
+  drawn,
+  panoramaPoint,
+  panoramaScreen,
+  screenAt,
+} from "../picture/geometry.js";
+import { decoded } from "../picture/images.js";
 import { gazes } from "../route/memory.js";
-import { firstLocation, firstLook } from "../overview/richest.js";
+import { firstLocation } from "../overview/richest.js";
 import { storeysOf } from "../storeys.js";
 import { plan } from "./floor.js";
-import { type Route, link, numberOf, replaceRoute } from "../route/route.js";
+import { type Route, type Sight, link, numberOf, replaceRoute } from "../route/route.js";
 import { Viewer, gazeQuery, layersOf, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
 
 const RADIANS = Math.PI / 180;
@@ -42,6 +50,59 @@ function neighbours(
   return found.sort((a, b) => b.distance - a.distance);
 }
 
+/** The direction of view that an address asks for, or the one before, or the first. */
+function gazeOf(location: Location, route: Route): Gaze {
+  const before = route.query.has("lon") ? undefined : gazes.get(location.uuid);
+  const asked = before ? new URLSearchParams(before) : route.query;
+  return {
+    lon: numberOf(asked, "lon", -360, 360, location.look_deg ?? 0) * RADIANS,
+    lat: numberOf(asked, "lat", -90, 90, -4) * RADIANS,
+    fov: numberOf(asked, "fov", 8, 120, 90) * RADIANS,
+  };
+}
+
+/** The name of a location and what its panorama sees. */
+function headOf(location: Location, name: HTMLElement): HTMLElement {
+  const facts = [
+    location.seen?.coverage != null && `scan coverage ${percent(location.seen.coverage)}`,
+    location.seen?.instances != null && several(location.seen.instances, "instance"),
+    location.seen?.unlabelled != null && `${percent(location.seen.unlabelled)} unlabelled`,
+  ].filter(Boolean);
+  const title = `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`;
+  const head = h("div", { class: "look-head" }, h("h1", { class: "hidden" }, title), name);
+  append(head, [h("p", { class: "quiet" }, facts.join(" · "))]);
+  return head;
+}
+
+/** The width of the first sight, pixels. */
+const SIGHT = 480;
+
+/** What is shown of a panorama while its file is read: its small image. Null if there is none. */
+export async function panoSight(index: Index, route: Route): Promise<Sight | null> {
+  const at = locationAt(index, route);
+  const location = index.locations[at];
+  const url = location?.pano ? await loadSmallPano(index, at) : null;
+  const small = url === null ? null : await decoded(url);
+  if (!location || !small) return null;
+
+  const canvas = h("canvas", { "aria-hidden": "true" });
+  const name = h("span", {}, `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`);
+  const frame = h("section", { class: "viewer" }, h("div", { class: "frame" }, canvas));
+  const element = h("main", { class: "look", "aria-busy": "true" }, headOf(location, name), frame);
+  const draw = (): void => {
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    const scale = Math.min(1, SIGHT / Math.max(1, width, height));
+    canvas.width = Math.max(1, Math.round(scale * width));
+    canvas.height = Math.max(1, Math.round(scale * height));
+    const context = canvas.getContext("2d");
+    const pixels = context?.createImageData(canvas.width, canvas.height);
+    if (!context || !pixels) return;
+    pixels.data.set(drawn(small, gazeOf(location, route), canvas.width, canvas.height));
+    context.putImageData(pixels, 0, 0);
+  };
+  return { element, draw };
+}
+
 export async function panoPage(
   index: Index,
   route: Route,
@@ -66,33 +127,13 @@ export async function panoPage(
   const name = choice("Scan location", entries, link("pano", [location.area, location.uuid]), (to) => {
     window.location.hash = `${to}?${new URLSearchParams(layers)}`;
   });
-  const facts = [
-    location.seen?.coverage != null && `scan coverage ${percent(location.seen.coverage)}`,
-    location.seen?.instances != null && several(location.seen.instances, "instance"),
-    location.seen?.unlabelled != null && `${percent(location.seen.unlabelled)} unlabelled`,
-  ].filter(Boolean);
-  const element = h("main", { class: "look" });
-  const head = h(
-    "div",
-    { class: "look-head" },
-    h("h1", { class: "hidden" }, `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`),
-    name,
-  );
-  append(head, [h("p", { class: "quiet" }, facts.join(" · "))]);
-  element.append(head);
+  const element = h("main", { class: "look" }, headOf(location, name));
   if (!location.pano) {
     append(element, [h("p", {}, "This location has no panorama in the report.")]);
     return { element, close: () => {} };
   }
   const picture = await load<Picture>(`pano_${at}`);
-  // Without a direction in the address one looks where one looked before.
-  const before = route.query.has("lon") ? undefined : gazes.get(location.uuid);
-  const asked = before ? new URLSearchParams(before) : route.query;
-  const gaze: Gaze = {
-    lon: numberOf(asked, "lon", -360, 360, 0) * RADIANS,
-    lat: numberOf(asked, "lat", -90, 90, -4) * RADIANS,
-    fov: numberOf(asked, "fov", 8, 120, 90) * RADIANS,
-  };
+  const gaze = gazeOf(location, route);
   const storeys = storeysOf(index, location.area);
   const storey = location.position && storeys.of(location.position[2], location.room);
   const map =
@@ -151,11 +192,8 @@ export async function panoPage(
     opened.overlay.append(button);
   }
   if (map) opened.overlay.append(h("div", { class: "inset" }, map.element));
-  if (picture.depth !== null && !asked.has("lon")) {
-    gaze.lon = firstLook((u, v) => opened.pixelAt(u, v)) * RADIANS;
-    opened.lookAt(gaze);
-  }
   map?.look((location.azimuth_rad ?? 0) - gaze.lon, gaze.fov);
   element.append(opened.element);
+  if (picture.sharp) void opened.sharpen(load<string>(`sharp_${at}`));
   return { element, close: () => opened.close() };
 }

@@ -1,10 +1,11 @@
 // One view, large: the slider, the readout, and why the view was kept.
 
-import { type Index, type View, loadPicture } from "../data.js";
+import { type Index, type View, loadPicture, loadThumb } from "../data.js";
 import { append, count, h, named, percent, roomName, several } from "../dom.js";
 import { viewPoint, viewScreen } from "../picture/geometry.js";
 import { placeOf } from "../picture/gl.js";
-import { type Route, link, replaceRoute } from "../route/route.js";
+import { image as decodedImage } from "../picture/images.js";
+import { type Route, type Sight, link, replaceRoute } from "../route/route.js";
 import { Viewer, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
 
 /** A sentence that says why a view was kept or dropped. */
@@ -72,6 +73,20 @@ function facts(index: Index, view: View): HTMLElement {
       .join(", "),
   );
   return list;
+}
+
+/** What is shown of a view while its file is read: its small image. Null if there is none. */
+export async function viewSight(index: Index, route: Route): Promise<Sight | null> {
+  const view = index.views.find((v) => v.picture === Number(route.path[0] ?? ""));
+  if (!view || view.picture === null) return null;
+  const url = await loadThumb(index, view.picture);
+  if (url === null) return null;
+  const image = await decodedImage(url);
+  const frame = h("section", { class: "viewer flat" }, h("div", { class: "frame" }, image));
+  frame.style.setProperty("--shape", String(image.naturalWidth / Math.max(1, image.naturalHeight)));
+  const head = h("div", { class: "look-head" }, h("h1", {}, nameOf(index, view)));
+  const body = h("div", { class: "view-body" }, frame);
+  return { element: h("main", { class: "look", "aria-busy": "true" }, head, body), draw: () => {} };
 }
 
 export async function viewPage(

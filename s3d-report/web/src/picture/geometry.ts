@@ -152,18 +152,22 @@ export interface Pixels {
   data: Uint8ClampedArray;
 }
 
-/** The square image of a panorama with this yaw (to the left), pitch and field of view, in degrees. */
-export function cut(from: Pixels, yaw: number, pitch: number, fov: number, width: number): Uint8ClampedArray {
-  const pixels = new Uint8ClampedArray(4 * width * width);
-  const radians = Math.PI / 180;
-  const gaze = { lon: -yaw * radians, lat: pitch * radians, fov: fov * radians };
-  for (let y = 0; y < width; y++)
+/** The image of a panorama in a direction, on a canvas of this size. */
+export function drawn(from: Pixels, gaze: Gaze, width: number, height: number): Uint8ClampedArray {
+  const pixels = new Uint8ClampedArray(4 * width * height);
+  for (let y = 0; y < height; y++)
     for (let x = 0; x < width; x++) {
-      const [u, v] = panoramaAt(gaze, width, width, x + 0.5, y + 0.5);
+      const [u, v] = panoramaAt(gaze, width, height, x + 0.5, y + 0.5);
       const column = Math.min(from.width - 1, Math.floor(u * from.width));
       const row = Math.min(from.height - 1, Math.max(0, Math.floor(v * from.height)));
       const at = 4 * (row * from.width + column);
       pixels.set(from.data.subarray(at, at + 4), 4 * (y * width + x));
     }
   return pixels;
+}
+
+/** The square image of a panorama with this yaw (to the left), pitch and field of view, in degrees. */
+export function cut(from: Pixels, yaw: number, pitch: number, fov: number, width: number): Uint8ClampedArray {
+  const radians = Math.PI / 180;
+  return drawn(from, { lon: -yaw * radians, lat: pitch * radians, fov: fov * radians }, width, width);
 }

@@ -1,130 +1,13 @@
 // A picture on a WebGL2 canvas, on a sphere or flat. Left and right of a line it shows two modalities, or
 // another picture of the same camera on the right.
 
-import {
-  LIT,
-  MISSING,
-  NULL_LABEL,
-  OTHER_CLASS,
-  OTHER_INSTANCE,
-  TABLE_WIDTH,
-  depthRamp,
-  labelTable,
-  marginRamp,
-  shader,
-} from "../colors.js";
+import { MISSING, NULL_LABEL, TABLE_WIDTH, depthRamp, labelTable, marginRamp } from "../colors.js";
 import type { Index, Picture } from "../data.js";
 import { type Gaze, focal } from "./geometry.js";
+import { fitted, image, numbers, pixelsOf } from "./images.js";
+import { MARGINS_WIDTH, MODALITIES, type Modality, PIXELS, VERTICES } from "./shader.js";
 
-export const MODALITIES = [
-  "rgb",
-  "depth",
-  "normal",
-  "class",
-  "instance",
-  "unlabelled",
-  "contested",
-  "changed",
-] as const;
-export type Modality = (typeof MODALITIES)[number];
-
-/** The number of columns in the table of margins by face. */
-const MARGINS_WIDTH = 4096;
-
-const VERTICES = `#version 300 es
-void main() {
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-  gl_Position = vec4(4.0 * corner - 1.0, 0.0, 1.0);
-}`;
-
-const PIXELS = `#version 300 es
-precision highp float;
-uniform sampler2D rgb, normal, depth, label, face, classes, instances, ramp, margins, margin_ramp;
-uniform sampler2D rgb_b, normal_b, depth_b, label_b;
-uniform vec2 size;
-uniform float line, focal, nearest, farthest, lit;
-uniform int left, right;
-uniform bool sphere, colored, two, colored_b;
-uniform vec2 gaze, origin, extent;
-uniform vec3 missing, no_votes;
-uniform float faces;
-out vec4 color;
-const float PI = 3.14159265358979;
-
-float number(vec4 pixel) {
-  vec3 bytes = floor(pixel.rgb * 255.0 + 0.5);
-  return bytes.r * 65536.0 + bytes.g * 256.0 + bytes.b;
-}
-
-vec4 named(sampler2D table, float index) {
-  ivec2 place = ivec2(int(index) % ${TABLE_WIDTH}, int(index) / ${TABLE_WIDTH});
-  return texelFetch(table, place, 0);
-}
-
-vec2 class_of(float index) {
-  return index == 855309.0 ? vec2(-1.0) : vec2(named(classes, index).a, named(instances, index).a);
-}
-
-vec3 show(int modality, vec2 uv, bool b) {
-  vec3 seen = b ? texture(rgb_b, uv).rgb : texture(rgb, uv).rgb;
-  bool is_colored = b ? colored_b : colored;
-  if (modality == 0) return seen;
-  if (modality == 2) return b ? texture(normal_b, uv).rgb : texture(normal, uv).rgb;
-  if (modality == 1) {
-    float units = number(b ? texture(depth_b, uv) : texture(depth, uv));
-    float place = clamp((units - nearest) / (farthest - nearest), 0.0, 1.0);
-    return units == 65535.0 ? missing : texture(ramp, vec2(place, 0.5)).rgb;
-  }
-  float light = is_colored ? dot(seen, vec3(0.2126, 0.7152, 0.0722)) : 0.6;
-  if (modality == 6) {
-    float of_face = number(texture(face, uv));
-    if (of_face == 16777215.0 || faces == 0.0) return missing;
-    int place = int(of_face);
-    ivec2 at = ivec2(place % ${MARGINS_WIDTH}, place / ${MARGINS_WIDTH});
-    float margin = of_face < faces ? floor(texelFetch(margins, at, 0).r * 255.0 + 0.5) : 255.0;
-    vec3 shade = margin == 255.0 ? no_votes : texture(margin_ramp, vec2((margin + 0.5) / 255.0, 0.5)).rgb;
-    return mix(shade, vec3(light), 0.2);
-  }
-  float index = number(b ? texture(label_b, uv) : texture(label, uv));
-  if (modality == 7) {
-    float other = number(b ? texture(label, uv) : texture(label_b, uv));
-    bool is_class = class_of(index) != class_of(other);
-    vec3 other_color = is_class ? ${shader(OTHER_CLASS)} : ${shader(OTHER_INSTANCE)};
-    if (index != other) return is_colored ? mix(other_color, seen, 0.25) : other_color;
-    return 0.5 * mix(vec3(light), is_colored ? seen : vec3(light), 0.5);
-  }
-  if (index == 855309.0) return missing;
-  if (modality == 5) return index == 0.0 ? vec3(1.0, 0.0, 1.0) : vec3(0.12 + 0.7 * light);
-  vec3 flat_color = (modality == 3 ? named(classes, index) : named(instances, index)).rgb;
-  return is_colored ? mix(flat_color, seen, 0.3) : flat_color;
-}
-
-void main() {
-  vec2 at = vec2(gl_FragCoord.x, size.y - gl_FragCoord.y);
-  vec2 uv;
-  if (sphere) {
-    vec2 ray = vec2(at.x - size.x / 2.0, size.y / 2.0 - at.y) / focal;
-    float forward = cos(gaze.y) - ray.y * sin(gaze.y);
-    float rise = sin(gaze.y) + ray.y * cos(gaze.y);
-    float lon = gaze.x + atan(ray.x, forward);
-    uv = vec2(fract(lon / (2.0 * PI) + 0.5), 0.5 - atan(rise, length(vec2(ray.x, forward))) / PI);
-  } else {
-    uv = (at - origin) / extent;
-    if (any(lessThan(uv, vec2(0.0))) || any(greaterThanEqual(uv, vec2(1.0)))) {
-      color = vec4(0.0);
-      return;
-    }
-  }
-  color = vec4(show(at.x < line ? left : right, uv, two && at.x >= line), 1.0);
-  if (lit < 0.0) return;
-  // The instance under the pointer: tinted, with a light edge.
-  bool is_lit = number(texture(label, uv)) == lit;
-  vec2 beside[4] = vec2[](dFdx(uv), -dFdx(uv), dFdy(uv), -dFdy(uv));
-  bool edge = false;
-  for (int i = 0; i < 4; i++) edge = edge || number(texture(label, uv + 1.5 * beside[i])) == lit;
-  if (is_lit) color.rgb = mix(color.rgb, ${shader(LIT)}, 0.45);
-  else if (edge) color.rgb = vec3(1.0);
-}`;
+export { MODALITIES, type Modality };
 
 /** The numbers of a picture's pixels; null for modalities that it does not have. */
 export interface Numbers {
@@ -171,29 +54,6 @@ export function placeOf(
   const scale = Math.min(width / of[0], height / of[1]);
   const [w, h] = [of[0] * scale, of[1] * scale];
   return [(width - w) / 2, (height - h) / 2, w, h];
-}
-
-async function image(url: string): Promise<HTMLImageElement> {
-  const element = new Image();
-  element.src = url;
-  await element.decode();
-  return element;
-}
-
-/** The pixels of an image as 24-bit numbers. */
-function numbers(element: HTMLImageElement): { width: number; height: number; values: Uint32Array } {
-  const { naturalWidth: width, naturalHeight: height } = element;
-  const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [width, height];
-  const context = canvas.getContext("2d", { willReadFrequently: true, colorSpace: "srgb" });
-  if (!context) throw new Error("this browser cannot draw on a canvas");
-  context.drawImage(element, 0, 0);
-  const bytes = context.getImageData(0, 0, width, height).data;
-  const values = new Uint32Array(width * height);
-  for (let i = 0; i < values.length; i++) {
-    values[i] = ((bytes[4 * i] ?? 0) << 16) | ((bytes[4 * i + 1] ?? 0) << 8) | (bytes[4 * i + 2] ?? 0);
-  }
-  return { width, height, values };
 }
 
 export class Renderer {
@@ -250,7 +110,7 @@ export class Renderer {
 
   private upload(
     name: string,
-    source: Uint8Array | HTMLImageElement,
+    source: Uint8Array | HTMLImageElement | HTMLCanvasElement,
     width: number,
     height: number,
     filter: number,
@@ -309,6 +169,15 @@ export class Renderer {
       label: labels?.values ?? null,
       face: faces?.values ?? null,
     };
+  }
+
+  /** Uploads other colours of the same picture. */
+  async sharpen(url: string): Promise<void> {
+    const { gl } = this;
+    const colors = await image(url);
+    if (gl.isContextLost()) return;
+    const most = Number(gl.getParameter(gl.MAX_TEXTURE_SIZE));
+    this.upload("rgb", fitted(colors, most), 0, 0, gl.LINEAR);
   }
 
   /** Uploads the picture for the right of the line, and returns the numbers of its pixels. */
@@ -414,13 +283,6 @@ export class Renderer {
   close(): void {
     this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
-}
-
-/** 24-bit numbers as pixels. */
-function pixelsOf(values: Uint32Array): Uint8Array {
-  const pixels = new Uint8Array(4 * values.length);
-  values.forEach((value, i) => pixels.set([value >> 16, (value >> 8) & 255, value & 255, 255], 4 * i));
-  return pixels;
 }
 
 /** The 1st and the 98th percentile of the depths. */

@@ -197,6 +197,20 @@ export class Viewer {
     return viewer;
   }
 
+  /** Shows the colours of a file that has more of them. If it cannot be read, this is told. */
+  async sharpen(colors: Promise<string>): Promise<void> {
+    try {
+      const url = await colors;
+      if (this.closed) return;
+      await this.renderer.sharpen(url);
+      this.draw();
+      this.element.dataset["sharp"] = "true";
+    } catch (e) {
+      if (!this.closed)
+        append(this.element, [h("p", { role: "alert" }, e instanceof Error ? e.message : String(e))]);
+    }
+  }
+
   close(): void {
     this.closed = true;
     window.clearTimeout(this.rest);
@@ -215,17 +229,6 @@ export class Viewer {
     const [i, j] = [Math.min(width - 1, Math.floor(u * width)), Math.min(height - 1, Math.floor(v * height))];
     const value = depth?.[j * width + i];
     return value === undefined || value === NO_DEPTH ? null : value;
-  }
-
-  /** The depth, in metres, and the class of a place in the picture. */
-  pixelAt(u: number, v: number): { depth: number | null; place: number | null } {
-    const { width, height, label } = this.numbers;
-    const [i, j] = [Math.min(width - 1, Math.floor(u * width)), Math.min(height - 1, Math.floor(v * height))];
-    const units = this.depthAt(u, v);
-    return {
-      depth: units === null ? null : units / this.index.data_set.depth_units_per_m,
-      place: this.index.labels[label?.[j * width + i] ?? 0]?.class ?? null,
-    };
   }
 
   /** The labels of both pictures, if they have the same size. */

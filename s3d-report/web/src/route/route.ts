@@ -18,6 +18,13 @@ export interface Page {
   reach?: (height: number) => void;
 }
 
+/** What is shown of a page while it is made. */
+export interface Sight {
+  element: HTMLElement;
+  /** Draws it, once it has its place. */
+  draw: () => void;
+}
+
 export function parseRoute(hash: string): Route {
   const text = hash.replace(/^#\/?/, "");
   const at = text.indexOf("?");

@@ -22,6 +22,8 @@ import { vantage } from "./vantage.js";
 const STILL = 5;
 /** A point this close below the section is cut away as well, metres. */
 const SLACK = 0.05;
+/** Until the ceilings are known, a storey is cut this high above its floors, metres. */
+const OPEN = 2.2;
 /** Higher than everything, metres. */
 const SKY = 1e6;
 
@@ -81,6 +83,9 @@ export class SpaceView {
   private votes: FaceVotes | null = null;
   private measuring = false;
   private loaded = false;
+  /** Whether the outlines of rooms are shown, until all of the mesh is there. */
+  private sketched = false;
+  private top = SKY;
   private pending = false;
   private closed = false;
   private lit: number | null = null;
@@ -132,13 +137,36 @@ export class SpaceView {
       options.progress(`Loading the mesh: file ${part + 1} of ${mesh.files}.`);
       const read = await this.tried(loadPart(mesh, part));
       if (read && !this.closed) this.surface.add(read, this.votes, this.changes);
+      if (this.sketched) this.draw();
     }
     options.progress("");
     if (this.closed) return;
     this.loaded = true;
+    this.sketched = false;
     this.labels.nameRooms(this.boxes);
     this.fillLines();
     this.start();
+  }
+
+  /** Shows the outlines of the rooms of the storey that is shown first, from about the same viewpoint. */
+  private sketch(): void {
+    const { index, mesh, look, storeys } = this;
+    const isSought = look.find !== null || look.instance !== null;
+    const rooms = storeys.all[fullest(storeys.all)]?.rooms ?? [];
+    if (rooms.length === 0 || isSought || (look.at !== null && look.from === null)) return;
+    const outlines = rooms.map((room) => ({ room, floor: floorOf(index, mesh, [], room) }));
+    drop(this.lines);
+    this.lines.add(roomLines(outlines));
+    const points = outlines.flatMap(({ room, floor }) =>
+      room.outline.flat().flatMap(([x, y]): Rgb[] => [
+        [x, y, floor],
+        [x, y, floor + OPEN],
+      ]),
+    );
+    this.top = Math.max(...points.map(([, , z]) => z));
+    this.sketched = true;
+    const { at, from } = look;
+    this.eye.set(at && from ? { at, from } : this.eye.overview(points, this.options.turns));
   }
 
   /** Loads the textures, and shows each file as it arrives. */
@@ -439,6 +467,7 @@ export class SpaceView {
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     this.renderer.setSize(width, height, false);
     this.eye.resize(width, height, this.options.covered?.());
+    if (!this.loaded) this.sketch();
     this.paintNow();
   }
 
@@ -457,8 +486,9 @@ export class SpaceView {
   }
 
   private paintNow(): void {
-    if (this.closed || !this.loaded) return;
-    const { show, beyond, section, base } = this.look;
+    if (this.closed || !(this.loaded || this.sketched)) return;
+    const { show, beyond, base } = this.look;
+    const section = this.look.section ?? (this.sketched ? this.top : null);
     this.paint.set(this.look, this.look.line * this.canvas.width, slabIn(this.look), this.lit);
     this.cut.constant = Math.min(SKY, section ?? SKY);
     this.bottom.constant = Math.min(SKY, -base);

@@ -44,10 +44,10 @@ export function launch() {
 
 /**
  * Opens a report (a folder or one file) from the disk, for a user who wants no motion unless `motion`.
- * `faults` collects errors, and requests that leave the folder.
+ * `faults` collects errors, and requests that leave the folder. With `waits` false it need not be complete.
  */
 export async function open(browser, folder, hash, options = {}) {
-  const { width = 1440, height = 900, touch = false, motion = false, dark = false } = options;
+  const { width = 1440, height = 900, touch = false, motion = false, dark = false, waits = true } = options;
   // Without motion the overview does not turn, which would keep a processor busy.
   const still = isFirefox || motion ? {} : { reducedMotion: "reduce" };
   const colorScheme = dark ? "dark" : "light";
@@ -75,7 +75,7 @@ export async function open(browser, folder, hash, options = {}) {
     dialog.dismiss();
   });
   await page.goto(`${root}${isFile ? "" : "index.html"}${hash}`);
-  await ready(page);
+  if (waits) await ready(page);
   return { page, faults, close: () => context.close() };
 }
 

@@ -110,12 +110,25 @@ export function writeLarge(report, out) {
     );
   const packed = deflateSync(JSON.stringify(index)).toString("base64");
   writeFileSync(join(out, "data/index.js"), `s3dReport("index","${packed}",true);\n`);
-  const [pano, views, thumbs] = ["pano_0", "views_0", "thumbs_0"].map((key) => read(report, key));
+  const keys = ["first", "pano_0", "sharp_0", "panos_0", "views_0", "thumbs_0"];
+  const [first, pano, sharp, small, views, thumbs] = keys.map((key) => read(report, key));
+  const outline = index.rooms.filter((room) => room.area === 1).flatMap((room) => room.outline);
+  write("first", {
+    ...first,
+    name: index.data_set.name,
+    parts: { ...first.parts, meshes: false },
+    outline,
+  });
   // The page opens the panorama with the richest views first; each location has as many.
   const riches = index.locations.map(() => 0);
   index.views.forEach(({ location, entropy }) => (riches[location] += entropy));
   const best = riches.indexOf(Math.max(...riches));
-  for (const at of new Set([best, 0, 1, 2, 3, 4, 5, 700])) write(`pano_${at}`, { ...pano, face: null });
+  for (const at of new Set([best, 0, 1, 2, 3, 4, 5, 700])) {
+    write(`pano_${at}`, { ...pano, face: null });
+    write(`sharp_${at}`, sharp);
+  }
+  const dim = Array(48).fill(small[0]);
+  for (let k = 0; k * 48 < index.locations.length; k++) write(`panos_${k}`, dim);
   write("views_0", views);
   const kept = index.views.filter((view) => view.picture !== null).length;
   const dot = "data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7";

@@ -1,11 +1,11 @@
-// The overview's choices, without a browser: the richest views, the first panorama and its first look, what
-// is found, and what is said of a data set.
+// The overview's choices, without a browser: the richest views, the first panorama, what is found,
+// and what is said of a data set.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bundled } from "../lib/bundled.mjs";
 
-const { richest, firstLocation, firstLook } = await bundled("overview/richest.ts");
+const { richest, firstLocation } = await bundled("overview/richest.ts");
 const { matches, thingsOf } = await bundled("overview/search.ts");
 const { numbersOf, sentenceOf } = await bundled("overview/facts.ts");
 
@@ -93,22 +93,6 @@ test("the first panorama looks into a room", () => {
   assert.equal(firstLocation(made({ locations, views })), 0);
   assert.equal(firstLocation(made({ locations: [] })), -1);
   assert.equal(firstLocation(made({ locations: [locations[2]] })), 0);
-});
-
-test("the first look is towards what there is to see", () => {
-  // A wall near the camera straight ahead, and to the right a room with many classes.
-  const right = (u) => u > 0.62 && u < 0.88;
-  const look = firstLook((u, v) =>
-    right(u) ? { depth: 4, place: Math.floor(37 * u + 11 * v) % 3 } : { depth: 0.4, place: 0 },
-  );
-  assert.ok(look >= 75 && look <= 105, `${look}`);
-  assert.equal(
-    firstLook(() => ({ depth: 2, place: 1 })),
-    0,
-  );
-  // Without labels distance decides; where nothing is seen, there is nothing to look at.
-  const behind = firstLook((u) => ({ depth: u < 0.2 || u > 0.8 ? 5 : u < 0.6 ? null : 1, place: null }));
-  assert.ok(Math.abs(behind) >= 150, `${behind}`);
 });
 
 test("things are found by their words, and lead to their pages", () => {

@@ -373,6 +373,33 @@ pub(crate) fn pack(value: u32) -> [u8; 3] {
     [r, g, b]
 }
 
+/// Returns the number in a pixel: the inverse of [`pack`].
+pub(crate) fn unpack([r, g, b]: [u8; 3]) -> u32 {
+    u32::from_be_bytes([0, r, g, b])
+}
+
+/// Every so many lines of an image are compared with its reduction.
+const COMPARED: usize = 4;
+
+/// Returns the mean squared difference of an image from its reduction, by channels of pixels that are not
+/// `missing`. It is 0 if there are none.
+pub(crate) fn squared_loss(image: &Raster<[u8; 3]>, reduced: &Raster<[u8; 3]>, missing: [u8; 3]) -> f64 {
+    let [width, height] = [image.width(), image.height()];
+    let columns: Vec<usize> = (0..width).map(|x| edge(x, reduced.width(), width) as usize).collect();
+    let mut sum = 0;
+    let mut seen = 0;
+    for (y, line) in (0..height).zip(image.rows()).step_by(COMPARED) {
+        let of_reduced = reduced.row(edge(y, reduced.height(), height));
+        for (pixel, x) in line.iter().zip(&columns).filter(|(pixel, _)| **pixel != missing) {
+            let of_reduced = of_reduced.get(*x).unwrap_or(pixel);
+            let squared = |(a, b): (&u8, &u8)| u64::from(a.abs_diff(*b)).pow(2);
+            sum += pixel.iter().zip(of_reduced).map(squared).sum::<u64>();
+            seen += pixel.len();
+        }
+    }
+    sum as f64 / f64::max(seen as f64, 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -481,8 +508,22 @@ mod tests {
     }
 
     #[test]
+    fn the_loss_of_a_reduction_is_by_seen_pixels() {
+        let [black, gray] = [[0; 3], [10; 3]];
+        let lines = [[black, gray, [12; 3], gray], [gray; 4]].concat();
+        let image = Raster::from_vec(4, 2, lines);
+        let half = mean(&image, [2, 1], Some(black));
+        assert_eq!(half.pixels(), [gray, [11; 3]]);
+        // The first line: the black pixel is missing, and the others are 0, 1 and 1 off.
+        assert!((squared_loss(&image, &half, black) - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!(squared_loss(&image, &image, black), 0.0);
+        assert_eq!(squared_loss(&Raster::from_vec(1, 1, vec![black]), &half, black), 0.0);
+    }
+
+    #[test]
     fn numbers_are_packed_from_red_to_blue() {
         assert_eq!(pack(0x0102_0304), [2, 3, 4]);
+        assert_eq!(unpack([2, 3, 4]), 0x0002_0304);
         assert_eq!(pack(65_535), [0, 255, 255]);
     }
 }
