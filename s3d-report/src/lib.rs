@@ -27,6 +27,7 @@ mod areas;
 mod content;
 mod error;
 mod faults;
+mod ground;
 mod index;
 mod mesh;
 mod pixels;
@@ -35,6 +36,7 @@ mod reduce;
 mod scores;
 mod script;
 mod selection;
+mod storeys;
 mod write;
 
 pub use error::{Error, Result};
