@@ -12,6 +12,7 @@ import { panoPage } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
 import { scoresPage } from "./pages/scores.js";
 import { paletteOf } from "./palette.js";
+import { fillScreen, isPresentable, presentPage } from "./present/page.js";
 import { type Page, link, parseRoute } from "./route/route.js";
 import { spacePage } from "./space/page.js";
 import { viewPage } from "./pages/view.js";
@@ -52,9 +53,11 @@ async function open(index: Index): Promise<Page> {
     case "view":
       return viewPage(index, route);
     case "plan":
-      return still(await planPage(index));
+      return still(await planPage(index, route));
     case "compare":
       return comparePage(index, route);
+    case "present":
+      return presentPage(index, route);
     case "scores":
       return still(await scoresPage(index, route));
     case "numbers":
@@ -64,6 +67,15 @@ async function open(index: Index): Promise<Page> {
     default:
       return still(failure("There is no such page in this report."));
   }
+}
+
+/** The link to the presentation, which fills the screen. */
+function presentLink(): HTMLElement {
+  const to = h("a", { class: "present-link", href: link("present") }, "Present");
+  to.addEventListener("click", (event) => {
+    if (!event.ctrlKey && !event.metaKey && !event.shiftKey && event.button === 0) fillScreen();
+  });
+  return to;
 }
 
 function failure(words: string): HTMLElement {
@@ -97,7 +109,8 @@ async function start(): Promise<void> {
       );
     nav.append(h("a", { href: link(page), "data-page": page }, name, badge || ""));
   }
-  header.append(nav, findField(index));
+  const present = isPresentable(index) ? presentLink() : null;
+  append(header, [nav, present, findField(index)]);
   const place = h("div", { id: "place" });
   document.body.replaceChildren(header, place);
   let now: Page | null = null;
@@ -105,6 +118,7 @@ async function start(): Promise<void> {
   const show = async (): Promise<void> => {
     const mine = ++turn;
     if (now) leave(now);
+    const hasPresented = now !== null && header.hidden;
     now?.element.setAttribute("inert", "");
     const page = await open(index).catch((e: unknown) =>
       still(failure(e instanceof Error ? e.message : String(e))),
@@ -115,6 +129,8 @@ async function start(): Promise<void> {
     }
     now?.close();
     now = page;
+    header.hidden = page.element.classList.contains("present");
+    document.body.classList.toggle("presenting", header.hidden);
     place.replaceChildren(page.element);
     const heading = page.element.querySelector("h1")?.textContent ?? "";
     document.title = tamed([heading, index.data_set.name, "s3d report"].filter(Boolean).join(" · "));
@@ -124,6 +140,7 @@ async function start(): Promise<void> {
     remember({ ...route, page: current }, address);
     comeBack(page, address);
     pointTabs(nav, route, current);
+    if (hasPresented && !header.hidden) present?.focus();
     document.body.dataset["ready"] = String(mine);
     performance.mark("shown");
   };
