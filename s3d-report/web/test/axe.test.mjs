@@ -17,12 +17,16 @@ after(() => browser?.close());
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const { area, uuid } = index.locations.find((l) => l.pano);
 const PAGES = [
+  `#/overview/${area}?right=instance&line=0.3`,
   `#/pano/${area}/${uuid}`,
   `#/space/${area}`,
   "#/views?show=pictures",
   "#/views?entropy_min=0.1",
   "#/view/0",
   "#/plan",
+  "#/plan?ground=none",
+  "#/present?step=1",
+  "#/present?step=3",
   "#/numbers",
   "#/notes",
 ];
@@ -32,6 +36,7 @@ const skip = isFirefox && "axe is run in Chromium";
 
 for (const [scheme, width] of [
   ["light", 1440],
+  ["light", 900],
   ["dark", 390],
 ]) {
   test(`axe finds nothing in ${scheme} at ${width}`, { skip }, async () => {

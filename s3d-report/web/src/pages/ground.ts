@@ -55,6 +55,8 @@ export function groundLayer(
   let coming: Promise<void> | null = null;
   const get = async (): Promise<void> => {
     const { image, mask } = await load<Picture>(`ground_${number}`);
+    if (typeof image !== "string")
+      throw new Error(`data/ground_${number}.js is damaged (it has no image): make the report again`);
     const picture = s("image", { ...place, href: image });
     if (mask !== null) {
       const id = `seen-${number}`;
