@@ -175,8 +175,8 @@ fn whole(from: f64, to: f64, end: u32) -> std::ops::Range<u32> {
     first..last.max(first)
 }
 
-/// Returns twice the surface of a triangle, positive if `p` is on the inner side of the edge. The two faces at
-/// an edge get the same number with the other sign, so that no point lies between them.
+/// Returns twice the surface of a triangle, positive if `p` is on the inner side of the edge. The two faces
+/// at an edge get the same number with the other sign, so that no point lies between them.
 fn side(from: DVec2, to: DVec2, p: DVec2) -> f64 {
     if (from.x, from.y) <= (to.x, to.y) {
         (to - from).perp_dot(p - from)

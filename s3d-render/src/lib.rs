@@ -59,7 +59,8 @@
 //! removes stair-steps from a colour image. A function that ends in `_into` writes to an image that exists
 //! already.
 //!
-//! [`image_from_above`] needs no camera: it sees a mesh straight from above, cut at two heights, as a plan does.
+//! [`image_from_above`] needs no camera: it sees a mesh straight from above, cut at two heights, as a plan
+//! does.
 //!
 //! # Colours from pictures
 //!

@@ -34,8 +34,8 @@ const MARGIN: [f64; 2] = [0.05, 0.3];
 const STRAYS: f64 = 0.005;
 const SAMPLE: usize = 100_000;
 
-/// What lies beside something higher is darker by this share at most, as if it was lit from all sides. Heights
-/// up to so many metres count, at these distances, metres.
+/// What lies beside something higher is darker by this share at most, as if it was lit from all sides.
+/// Heights up to so many metres count, at these distances, metres.
 const SHADE: f32 = 0.45;
 const SHADE_M: f32 = 0.8;
 const REACHES_M: [f64; 2] = [0.06, 0.22];
@@ -268,8 +268,8 @@ fn draw(
     })
 }
 
-/// Returns an image whose pixels are the means of `samples` × `samples` pixels, as far as these see something,
-/// with the greatest height.
+/// Returns an image whose pixels are the means of `samples` × `samples` pixels, as far as these see
+/// something, with the greatest height.
 fn mean_of(seen: FromAbove, samples: u32) -> FromAbove {
     if samples == 1 {
         return seen;

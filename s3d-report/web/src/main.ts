@@ -18,6 +18,9 @@ import { spacePage } from "./space/page.js";
 import { viewPage } from "./pages/view.js";
 import { viewsPage } from "./pages/views.js";
 
+/** A page that takes longer is told to be on its way, ms. */
+const SLOW = 250;
+
 const still = (element: HTMLElement): Page => ({ element, close: () => {} });
 
 function tabs(index: Index): [string, string][] {
@@ -120,13 +123,17 @@ async function start(): Promise<void> {
     if (now) leave(now);
     const hasPresented = now !== null && header.hidden;
     now?.element.setAttribute("inert", "");
+    // What takes long is told.
+    const slow = window.setTimeout(() => place.setAttribute("aria-busy", "true"), SLOW);
     const page = await open(index).catch((e: unknown) =>
       still(failure(e instanceof Error ? e.message : String(e))),
     );
+    window.clearTimeout(slow);
     if (mine !== turn) {
       page.close();
       return;
     }
+    place.removeAttribute("aria-busy");
     now?.close();
     now = page;
     header.hidden = page.element.classList.contains("present");

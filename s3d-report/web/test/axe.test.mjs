@@ -83,7 +83,7 @@ test("borders of controls, rooms and dots on the plan stand out by 3:1 at least"
     const [paper] = await styleOf("body", "backgroundColor");
     await go(page, scheme === "light" ? "#/views?sort=yaw" : "#/views?sort=pitch");
     const [edge, sheet] = await styleOf("select", "borderTopColor", "backgroundColor");
-    await go(page, "#/plan");
+    await go(page, "#/plan?ground=none");
     const [room, wall] = await styleOf(".plan .room", "fill", "stroke");
     const [rim] = await styleOf(".plan .stand", "stroke");
     for (const [a, b, what] of [

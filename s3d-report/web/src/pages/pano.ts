@@ -5,12 +5,33 @@ import { append, choice, h, percent, roomName, several } from "../dom.js";
 import { type Gaze, directionIn, panoramaPoint, panoramaScreen, screenAt } from "../picture/geometry.js";
 import { gazes } from "../route/memory.js";
 import { firstLocation, firstLook } from "../overview/richest.js";
-import { storeysOf } from "../storeys.js";
+import { type Storeys, storeysOf } from "../storeys.js";
 import { plan } from "./floor.js";
 import { type Route, link, numberOf, replaceRoute } from "../route/route.js";
 import { Viewer, gazeQuery, layersOf, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
 
 const RADIANS = Math.PI / 180;
+
+/** One walks to a location that is this close to the direction of view at most, radians. */
+const AHEAD = 40 * RADIANS;
+
+/** Links to the panoramas of other storeys that are nearest to a location; null if there are none. */
+function otherStoreys(index: Index, here: Location, storeys: Storeys): HTMLElement | null {
+  if (storeys.all.length < 2 || !here.position) return null;
+  const [x, y, z] = here.position;
+  const current = storeys.of(z, here.room);
+  const links = storeys.all.flatMap(({ name }, storey) => {
+    if (storey === current) return [h("span", { "aria-current": "true" }, name)];
+    const away = (l: Location): number => Math.hypot((l.position?.[0] ?? 0) - x, (l.position?.[1] ?? 0) - y);
+    const there = index.locations.filter(
+      (l) => l.area === here.area && l.pano && l.position && storeys.of(l.position[2], l.room) === storey,
+    );
+    const nearest = there.sort((a, b) => away(a) - away(b))[0];
+    return nearest ? [h("a", { href: link("pano", [nearest.area, nearest.uuid]) }, name)] : [];
+  });
+  if (links.length < 2) return null;
+  return h("nav", { class: "storeys", "aria-label": "Storeys" }, ...links.reverse());
+}
 
 /** A neighbour may be this much farther than the seen surface, in metres, since pixels are coarse. */
 const SLACK = 0.3;
@@ -78,7 +99,8 @@ export async function panoPage(
     h("h1", { class: "hidden" }, `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`),
     name,
   );
-  append(head, [h("p", { class: "quiet" }, facts.join(" · "))]);
+  const storeys = storeysOf(index, location.area);
+  append(head, [otherStoreys(index, location, storeys), h("p", { class: "quiet" }, facts.join(" · "))]);
   element.append(head);
   if (!location.pano) {
     append(element, [h("p", {}, "This location has no panorama in the report.")]);
@@ -93,7 +115,6 @@ export async function panoPage(
     lat: numberOf(asked, "lat", -90, 90, -4) * RADIANS,
     fov: numberOf(asked, "fov", 8, 120, 90) * RADIANS,
   };
-  const storeys = storeysOf(index, location.area);
   const storey = location.position && storeys.of(location.position[2], location.room);
   const map =
     storey === null
@@ -104,12 +125,12 @@ export async function panoPage(
           hasRoom: (room) => storeys.ofRoom(room) === storey,
           hasHeight: (z, room) => storeys.of(z, room) === storey,
         });
-  const marks: { button: HTMLElement; lon: number; lat: number }[] = [];
+  const marks: { button: HTMLElement; lon: number; lat: number; distance: number }[] = [];
   const look = lookFrom(route.query, modalitiesOf(index, location.area, picture), gaze);
   layers = layersOf(look);
   let viewer: Viewer | null = null;
   const opened = await Viewer.open(index, picture, look, {
-    title: `Panorama of ${roomName(location.room)}; arrow keys turn, plus and minus zoom`,
+    title: `Panorama of ${roomName(location.room)}; arrow keys turn, plus and minus zoom, W and S walk`,
     area: location.area,
     room: location.room,
     point: (i, j, distance) => panoramaPoint(location, picture, i, j, distance),
@@ -147,9 +168,21 @@ export async function panoPage(
     };
     const button = h("button", { class: "walk", "aria-label": `Walk to ${words}`, click: walk });
     button.append(h("span", { class: "walk-name" }, words));
-    marks.push({ button, lon, lat });
+    marks.push({ button, lon, lat, distance });
     opened.overlay.append(button);
   }
+  /** Walks to the nearest location ahead, or behind. */
+  opened.element.addEventListener("keydown", (event) => {
+    const turned = { w: 0, s: Math.PI }[event.key.toLowerCase()];
+    const isTyping = (event.target as Element).matches("select, input");
+    if (turned === undefined || isTyping || event.ctrlKey || event.metaKey || event.altKey) return;
+    const off = (lon: number): number => {
+      const angle = lon - (opened.gaze ?? gaze).lon - turned;
+      return Math.abs(Math.atan2(Math.sin(angle), Math.cos(angle)));
+    };
+    const ahead = marks.filter(({ lon }) => off(lon) < AHEAD).sort((a, b) => a.distance - b.distance)[0];
+    ahead?.button.click();
+  });
   if (map) opened.overlay.append(h("div", { class: "inset" }, map.element));
   if (picture.depth !== null && !asked.has("lon")) {
     gaze.lon = firstLook((u, v) => opened.pixelAt(u, v)) * RADIANS;

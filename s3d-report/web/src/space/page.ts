@@ -127,7 +127,9 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
     look.show = to as Show;
     view.refresh();
   });
-  append(bar, [colors.length > 1 && show, measureButton(view)]);
+  const above = h("button", { type: "button", title: "See all of what is shown" }, "From above");
+  above.addEventListener("click", () => view.lookFromAbove());
+  append(bar, [colors.length > 1 && show, measureButton(view), above]);
   const hint =
     "Drag to turn, scroll to zoom, double-click to go closer, point at something to know what it is.";
   view.readout.append(h("span", { class: "quiet" }, hint));

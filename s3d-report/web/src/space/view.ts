@@ -291,6 +291,11 @@ export class SpaceView {
     this.changed();
   }
 
+  /** Flies to where all of what is shown is seen. */
+  lookFromAbove(): void {
+    this.eye.fly(this.fromAbove());
+  }
+
   /** Cuts the area to a storey, or to all of them. */
   openStorey(storey: number | null): void {
     this.storey = storey;
