@@ -123,6 +123,9 @@ function fillStage(
   place();
   const { buttons, press } = storeyButtons(view);
   view.readout.classList.add("over");
+  // It lies over the building, so that it goes with the pointer or the focus.
+  for (const event of ["pointerleave", "blur"])
+    view.canvas.addEventListener(event, () => view.readout.replaceChildren());
   stage.append(view.canvas, view.overlay, wipe.line, status, view.readout);
   const side = h("div", { class: "overview-side" });
   append(side, [buttons, legend(index, mesh, view)]);
