@@ -26,9 +26,18 @@ function differs(a, b) {
   return n / (a.data.length / 44);
 }
 
+/** The scene without what lies over it, which comes and goes. */
 async function shot(page) {
+  const over = (visibility) =>
+    page.evaluate((to) => {
+      for (const name of [".present-controls", ".present-progress"])
+        document.querySelector(name).style.visibility = to;
+    }, visibility);
+  await over("hidden");
   await drawn(page);
-  return PNG.sync.read(await page.locator(".present-stage").screenshot());
+  const file = await page.locator(".present-stage").screenshot();
+  await over("");
+  return PNG.sync.read(file);
 }
 
 for (const [width, height, dark] of [
