@@ -59,6 +59,9 @@
 //! removes stair-steps from a colour image. A function that ends in `_into` writes to an image that exists
 //! already.
 //!
+//! [`image_from_above`] needs no camera: it sees a mesh straight from above, cut at two heights, as a plan
+//! does.
+//!
 //! # Colours from pictures
 //!
 //! A [`CubeMap`] holds the pictures taken at a place. It is made from a sky box, a panorama or overlapping
@@ -79,6 +82,7 @@
 )]
 
 mod edge_samples;
+mod from_above;
 mod hits;
 mod picture;
 mod raster;
@@ -88,6 +92,7 @@ mod shade;
 mod simd;
 
 pub use edge_samples::sample_edges;
+pub use from_above::{FromAbove, GroundGrid, image_from_above};
 pub use hits::{Hits, NO_FACE};
 pub use picture::cube_map::CubeMap;
 pub use picture::cube_sources::SkyBoxTurn;

@@ -2,8 +2,10 @@
 
 use crate::areas;
 use crate::faults::Faults;
+use crate::ground::{self, Known};
 use crate::index::{
-    DataSetEntry, FORM, Index, LocationEntry, MeshEntry, Surface, ViewEntry, degrees, folder_name, rounded,
+    DataSetEntry, FORM, GroundEntry, Index, LocationEntry, MeshEntry, RoomEntry, Surface, ViewEntry, degrees,
+    folder_name, rounded,
 };
 use crate::mesh;
 use crate::pixels::{Images, Made, Picture, Shares, Widths, nothing_left};
@@ -95,8 +97,11 @@ pub(crate) struct Written {
     /// The small images of panoramas, by location.
     small: Vec<Option<String>>,
     meshes: Vec<MeshEntry>,
+    grounds: Vec<GroundEntry>,
     /// Classes and their surface in an area.
     surfaces: Vec<(usize, Surface)>,
+    /// The rooms of all areas.
+    rooms: Vec<RoomEntry>,
 }
 
 /// A pinhole camera, by which the page computes rays.
@@ -250,7 +255,11 @@ impl<'a> Content<'a> {
         faults: &mut Faults,
     ) -> Result<Written> {
         let progress = ctx.progress("reporting", "images", (self.panoramas.len() + self.views.len()) as u64);
-        let mut written = Written { small: vec![None; self.locations.len()], ..Written::default() };
+        let mut written = Written {
+            small: vec![None; self.locations.len()],
+            rooms: areas::rooms(self.data, faults)?,
+            ..Written::default()
+        };
 
         for &area in self.data.areas() {
             let read = faults.keep(self.data.layout().root(), self.data.mesh(area))?.flatten();
@@ -264,11 +273,42 @@ impl<'a> Content<'a> {
                 written.bytes += bytes;
             }
             self.write_pictures(ctx, options, (area, mesh), (scripts, &progress), (faults, &mut written))?;
+            if let Some(mesh) = mesh {
+                self.write_ground(ctx, (area, mesh), scripts, &mut written)?;
+            }
         }
         for (file, small) in written.small.chunks(THUMBS_PER_FILE).enumerate() {
             written.bytes += scripts.write(&format!("panos_{file}"), &small)?;
         }
         Ok(written)
+    }
+
+    /// Writes the ground of the plan of an area whose pictures are written: they tell the places of its
+    /// locations.
+    fn write_ground(
+        &self,
+        ctx: &Context,
+        (area, mesh): (u32, &TriMesh),
+        scripts: &Scripts,
+        written: &mut Written,
+    ) -> Result<()> {
+        let locations = self.locations(written);
+        let of_views = self.views.iter().zip(&written.views);
+        let photographs = of_views.filter(|(image, _)| {
+            image.area == area && self.photographs.contains_key(&(area, image.uuid.clone()))
+        });
+        let known = Known {
+            area,
+            rooms: written.rooms.iter().filter(|room| room.area == area).collect(),
+            locations: locations.iter().filter(|location| location.area == area).collect(),
+            photographs: photographs
+                .filter_map(|(_, made)| Some(made.located.as_ref()?.position))
+                .collect(),
+        };
+        let (entries, bytes) = ground::write(ctx, mesh, &known, written.grounds.len(), scripts)?;
+        written.grounds.extend(entries);
+        written.bytes += bytes;
+        Ok(())
     }
 
     /// Writes the pictures of an area.
@@ -450,7 +490,6 @@ impl<'a> Content<'a> {
         let locations = self.locations(made);
         let views = self.view_entries(made);
         let labels = self.table.as_ref().map(areas::labels).unwrap_or_default();
-        let rooms = areas::rooms(data, &mut faults)?;
         let votes = areas::votes(data, &mut faults)?;
         let statistics = areas::statistics(data, &mut faults)?;
         Ok(Index {
@@ -459,10 +498,11 @@ impl<'a> Content<'a> {
             areas: areas::areas(data)?,
             classes,
             labels,
-            rooms,
+            rooms: made.rooms.clone(),
             locations,
             views,
             meshes: made.meshes.clone(),
+            grounds: made.grounds.clone(),
             scores: 0,
             against: None,
             views_per_file: VIEWS_PER_FILE,

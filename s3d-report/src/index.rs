@@ -31,6 +31,8 @@ pub(crate) struct Index {
     pub(crate) locations: Vec<LocationEntry>,
     pub(crate) views: Vec<ViewEntry>,
     pub(crate) meshes: Vec<MeshEntry>,
+    /// The grounds of plans, each with a file `data/ground_N.js`, where N is its index.
+    pub(crate) grounds: Vec<GroundEntry>,
     /// The number of files `data/scores_N.js`.
     pub(crate) scores: usize,
     /// The name of the folder of the other data set, if there is `compare.js`.
@@ -126,7 +128,7 @@ pub(crate) struct LabelEntry {
     pub(crate) color: [u8; 3],
 }
 
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(crate) struct RoomEntry {
     pub(crate) area: u32,
     pub(crate) name: String,
@@ -219,6 +221,23 @@ pub(crate) struct MaterialEntry {
     /// The colour of faces without a texture and without colours of vertices.
     pub(crate) color: [u8; 3],
     pub(crate) texture: Option<u32>,
+}
+
+/// The ground of a plan: a storey from above.
+#[derive(Clone, Serialize)]
+pub(crate) struct GroundEntry {
+    pub(crate) area: u32,
+    /// The heights of the lowest and the highest floor of the storey in the world, in metres.
+    pub(crate) floors: [f64; 2],
+    /// The height above which all is cut away, in metres; `None` if nothing is.
+    pub(crate) cut: Option<f64>,
+    /// The least x and the greatest y in the world, in metres.
+    pub(crate) west: f64,
+    pub(crate) north: f64,
+    /// Width and height in pixels.
+    pub(crate) size: [u32; 2],
+    /// The side of a pixel in metres.
+    pub(crate) pixel_m: f64,
 }
 
 /// The distribution of the votes of the faces of an area, from `votes.npz`.

@@ -28,6 +28,7 @@ mod content;
 mod error;
 mod faults;
 mod first;
+mod ground;
 mod index;
 mod mesh;
 mod pixels;
@@ -36,6 +37,7 @@ mod raster;
 mod scores;
 mod script;
 mod selection;
+mod storeys;
 mod write;
 
 pub use error::{Error, Result};

@@ -5,4 +5,5 @@ mod common;
 
 mod against;
 mod contract;
+mod ground;
 mod meshes;

@@ -7,7 +7,8 @@ import { readFile, writeFile } from "node:fs/promises";
 const here = (name) => new URL(name, import.meta.url);
 const target = ["chrome111", "firefox113", "safari16.4"];
 
-const style = await readFile(here("style.css"), "utf8");
+const styles = ["style.css", "present.css"].map((name) => readFile(here(name), "utf8"));
+const style = (await Promise.all(styles)).join("\n");
 const css = await transform(style, { loader: "css", minify: true, target });
 
 // The page shows the terms of all that is bundled.

@@ -101,7 +101,7 @@ impl<'a> PixelByPixel<'a> {
 }
 
 /// Rounds a colour to 8 bits. The result is never black.
-fn seen_color(color: [f32; 3]) -> [u8; 3] {
+pub(crate) fn seen_color(color: [f32; 3]) -> [u8; 3] {
     match color.map(|channel| (channel + 0.5) as u8) {
         [0, 0, 0] => [1, 1, 1],
         rgb => rgb,

@@ -152,6 +152,22 @@ export interface Verified {
   faults: { topic: string; kind: string; count: number; first: [string, string][] }[];
 }
 
+/** The ground of a plan: a storey from above, below its ceilings. */
+export interface Ground {
+  area: number;
+  /** The heights of the lowest and the highest floor of the storey. */
+  floors: [number, number];
+  /** The height above which all is cut away. */
+  cut: number | null;
+  /** The least x and the greatest y, metres. */
+  west: number;
+  north: number;
+  /** Width and height in pixels. */
+  size: [number, number];
+  /** The side of a pixel, metres. */
+  pixel_m: number;
+}
+
 /** A table of an evaluation. A number that is not defined is null. */
 export interface ScoreTable {
   title: string;
@@ -212,6 +228,8 @@ export interface Index {
   statistics: Statistics | null;
   votes: { area: number; votes: Votes }[];
   meshes: Mesh[];
+  /** Each with a file `ground_N`; missing in older reports. */
+  grounds?: Ground[];
   /** The number of files `scores_N`. */
   scores: number;
   /** The name of the data set that the report was made against. */
@@ -277,6 +295,7 @@ const KEPT: Record<string, number> = {
   thumbs: 40,
   mesh: 0,
   textures: 0,
+  ground: 0,
   compare: 0,
 };
 

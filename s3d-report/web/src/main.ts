@@ -13,10 +13,14 @@ import { panoPage, panoSight } from "./pages/pano.js";
 import { planPage } from "./pages/plan.js";
 import { scoresPage } from "./pages/scores.js";
 import { paletteOf } from "./palette.js";
+import { fillScreen, isPresentable, presentPage } from "./present/page.js";
 import { type Page, type Sight, link, parseRoute } from "./route/route.js";
 import { spacePage } from "./space/page.js";
 import { viewPage, viewSight } from "./pages/view.js";
 import { viewsPage } from "./pages/views.js";
+
+/** A page that takes longer is told to be on its way, ms. */
+const SLOW = 250;
 
 const still = (element: HTMLElement): Page => ({ element, close: () => {} });
 
@@ -53,9 +57,11 @@ async function open(index: Index): Promise<Page> {
     case "view":
       return viewPage(index, route);
     case "plan":
-      return still(await planPage(index));
+      return still(await planPage(index, route));
     case "compare":
       return comparePage(index, route);
+    case "present":
+      return presentPage(index, route);
     case "scores":
       return still(await scoresPage(index, route));
     case "numbers":
@@ -65,6 +71,15 @@ async function open(index: Index): Promise<Page> {
     default:
       return still(failure("There is no such page in this report."));
   }
+}
+
+/** The link to the presentation, which fills the screen. */
+function presentLink(): HTMLElement {
+  const to = h("a", { class: "present-link", href: link("present") }, "Present");
+  to.addEventListener("click", (event) => {
+    if (!event.ctrlKey && !event.metaKey && !event.shiftKey && event.button === 0) fillScreen();
+  });
+  return to;
 }
 
 function failure(words: string): HTMLElement {
@@ -108,7 +123,8 @@ async function start(): Promise<void> {
     other?.name === index.data_set.name && tabsOf(other.parts).join() === tabsOf(parts).join();
   const header = isSame(first) && sketched ? sketched : headerOf(index.data_set.name, parts);
   if (damage.count > 0) header.querySelector('a[data-page="notes"]')?.append(badge);
-  header.append(findField(index));
+  const present = isPresentable(index) ? presentLink() : null;
+  append(header, [present, findField(index)]);
   if (header !== sketched) {
     sketched?.remove();
     shell.forEach((element) => element.remove());
@@ -120,7 +136,10 @@ async function start(): Promise<void> {
   const show = async (): Promise<void> => {
     const mine = ++turn;
     if (now) leave(now);
+    const hasPresented = now !== null && header.hidden;
     now?.element.setAttribute("inert", "");
+    // What takes long is told.
+    const slow = window.setTimeout(() => place.setAttribute("aria-busy", "true"), SLOW);
     const sight = await sightOf(index);
     if (mine !== turn) return;
     if (sight) {
@@ -131,12 +150,16 @@ async function start(): Promise<void> {
     const page = await open(index).catch((e: unknown) =>
       still(failure(e instanceof Error ? e.message : String(e))),
     );
+    window.clearTimeout(slow);
     if (mine !== turn) {
       page.close();
       return;
     }
+    place.removeAttribute("aria-busy");
     now?.close();
     now = page;
+    header.hidden = page.element.classList.contains("present");
+    document.body.classList.toggle("presenting", header.hidden);
     place.replaceChildren(page.element);
     const heading = page.element.querySelector("h1")?.textContent ?? "";
     document.title = tamed([heading, index.data_set.name, "s3d report"].filter(Boolean).join(" · "));
@@ -146,6 +169,7 @@ async function start(): Promise<void> {
     remember({ ...route, page: current }, address);
     comeBack(page, address);
     pointTabs(nav, route, current);
+    if (hasPresented && !header.hidden) present?.focus();
     document.body.dataset["ready"] = String(mine);
     performance.mark("shown");
   };

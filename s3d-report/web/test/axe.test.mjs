@@ -17,12 +17,16 @@ after(() => browser?.close());
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const { area, uuid } = index.locations.find((l) => l.pano);
 const PAGES = [
+  `#/overview/${area}?right=instance&line=0.3`,
   `#/pano/${area}/${uuid}`,
   `#/space/${area}`,
   "#/views?show=pictures",
   "#/views?entropy_min=0.1",
   "#/view/0",
   "#/plan",
+  "#/plan?ground=none",
+  "#/present?step=1",
+  "#/present?step=3",
   "#/numbers",
   "#/notes",
 ];
@@ -32,6 +36,7 @@ const skip = isFirefox && "axe is run in Chromium";
 
 for (const [scheme, width] of [
   ["light", 1440],
+  ["light", 900],
   ["dark", 390],
 ]) {
   test(`axe finds nothing in ${scheme} at ${width}`, { skip }, async () => {
@@ -78,7 +83,7 @@ test("borders of controls, rooms and dots on the plan stand out by 3:1 at least"
     const [paper] = await styleOf("body", "backgroundColor");
     await go(page, scheme === "light" ? "#/views?sort=yaw" : "#/views?sort=pitch");
     const [edge, sheet] = await styleOf("select", "borderTopColor", "backgroundColor");
-    await go(page, "#/plan");
+    await go(page, "#/plan?ground=none");
     const [room, wall] = await styleOf(".plan .room", "fill", "stroke");
     const [rim] = await styleOf(".plan .stand", "stroke");
     for (const [a, b, what] of [

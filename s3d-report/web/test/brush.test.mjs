@@ -94,11 +94,27 @@ test("the plan is saved as SVG and as PNG", { skip: noFiles }, async () => {
   assert.equal(svg.name, "demo_Plan_of_area_1.svg");
   const text = svg.bytes.toString();
   assert.match(text, /^<svg xmlns="http:\/\/www.w3.org\/2000\/svg"/);
-  assert.equal(text.match(/<circle/g).length, index.locations.filter((l) => l.position).length);
-  assert.ok(!/class=|href|var\(|style=/.test(text));
+  // Each location has a dot and, on the ground, a rim.
+  assert.equal(text.match(/<circle/g).length, 2 * index.locations.filter((l) => l.position).length);
+  assert.ok(!/class=|var\(|style=/.test(text));
+  // The ground and its mask are in the file.
+  assert.deepEqual(
+    [...text.matchAll(/href="(.{16})/g)].map(([, to]) => to),
+    ["data:image/png;b", "data:image/jpeg;"],
+  );
   const png = PNG.sync.read((await saved(/Save PNG/)).bytes);
   assert.equal(png.width, 2000);
   assert.ok(new Set(png.data).size > 20, "the picture is empty");
+  const many = (file) => {
+    const colors = new Set();
+    for (let at = 0; at < file.data.length; at += 4 * 97) colors.add(file.data.readUInt32BE(at) >> 12);
+    return colors.size;
+  };
+  await page.getByLabel("Mesh from above").uncheck();
+  const plain = (await saved(/Save SVG/)).bytes.toString();
+  assert.ok(!/href|<mask|<image/.test(plain) && plain.length < text.length / 5);
+  const bare = PNG.sync.read((await saved(/Save PNG/)).bytes);
+  assert.ok(many(png) > 5 * many(bare), `${many(png)} colours with the ground, ${many(bare)} without`);
   assert.deepEqual(faults, []);
   await close();
 });

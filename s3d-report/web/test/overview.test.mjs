@@ -265,3 +265,77 @@ test("the building turns slowly until it is touched", async () => {
   assert.deepEqual(faults, []);
   await close();
 });
+
+for (const [width, dark] of [
+  [1440, false],
+  [900, true],
+  [390, false],
+]) {
+  test(`the address has what the overview shows at ${width}, and opens it again`, async () => {
+    await withCopy(
+      (write) => Object.entries(house()).forEach(([key, value]) => write(key, value)),
+      async (folder) => {
+        const { page, faults, close } = await open(browser, folder, "", { width, dark });
+        await loaded(page);
+        await page.waitForTimeout(400);
+        assert.equal(await hashOf(page), "", "nothing was chosen yet");
+        const wait = (words) => page.waitForFunction((w) => window.location.hash.includes(w), words);
+        await page.getByRole("button", { name: /^First floor/ }).click();
+        await wait("storey=1");
+        await page.getByRole("button", { name: "Instance", exact: true }).click();
+        await wait("right=instance");
+        await page.getByRole("button", { name: /^wall/ }).click();
+        await wait(`only=${index.classes.findIndex(({ name }) => name === "wall")}`);
+        await page.getByRole("slider").focus();
+        for (let k = 0; k < 5; k++) await page.keyboard.press("ArrowLeft");
+        await wait("line=0.400");
+        assert.ok(!(await hashOf(page)).includes("from="), "the viewpoint was not touched");
+        await page.locator(".stage canvas").focus();
+        await page.keyboard.press("ArrowLeft");
+        await page.keyboard.press("+");
+        await wait("from=");
+        await page.getByRole("slider").focus();
+        await page.waitForTimeout(400);
+        const hash = await hashOf(page);
+        const before = await shot(page);
+
+        // Back and forth.
+        await go(page, "#/numbers");
+        await page.goBack();
+        await loaded(page);
+        assert.equal(await hashOf(page), hash);
+        assert.ok(differs(await shot(page), before) < 0.02, "the same picture as before");
+        await close();
+
+        const other = await open(browser, folder, hash, { width, dark });
+        await loaded(other.page);
+        const shown = other.page.locator("[aria-pressed=true]");
+        const pressed = await shown.allTextContents();
+        assert.deepEqual(pressed.map((words) => words.split(/ [·\d]|\d/)[0]).sort(), [
+          "First floor",
+          "Instance",
+          "wall",
+        ]);
+        assert.ok(differs(await shot(other.page), before) < 0.02, "the same picture elsewhere");
+        // A storey that one chooses is seen from where all of it is seen.
+        await other.page.getByRole("button", { name: /^Ground floor/ }).click();
+        await other.page.waitForFunction(() => !window.location.hash.includes("from="));
+        assert.deepEqual([...faults, ...other.faults], []);
+        await other.close();
+      },
+    );
+  });
+}
+
+test("an overview's address that says nonsense shows what is shown at first", async () => {
+  const { page, faults, close } = await open(
+    browser,
+    report,
+    "#/overview/1?storey=7&right=x&line=y&only=99&at=1",
+  );
+  await loaded(page);
+  assert.equal(await page.getByRole("slider").getAttribute("aria-valuenow"), "50");
+  assert.deepEqual(await page.locator("[aria-pressed=true]").allTextContents(), ["Class"]);
+  assert.deepEqual(faults, []);
+  await close();
+});

@@ -5,9 +5,10 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { launch, open, ready } from "./lib/browser.mjs";
+import { drawn, go, launch, open, ready } from "./lib/browser.mjs";
 import { dataset, degrees, index, json, near, report, stemOf, withCopy } from "./lib/common.mjs";
 import { readPng } from "./lib/images.mjs";
+import { PNG } from "pngjs";
 
 let browser;
 before(async () => {
@@ -226,6 +227,104 @@ test("storeys of an area are apart, also rooms that nobody stands in", async () 
         { rooms: ["lounge 1", "office 1"], standing, patches: patches.length - on },
       ]);
       assert.deepEqual(faults, []);
+      await close();
+    },
+  );
+});
+
+/** The contrast of two colours as the page computes them (WCAG 2.2). */
+function contrast(a, b) {
+  const light = (color) => {
+    const [r, g, blue] = color
+      .match(/[\d.]+/g)
+      .slice(0, 3)
+      .map((word) => Number(word) / 255)
+      .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * blue;
+  };
+  const [high, low] = [light(a), light(b)].sort((x, y) => y - x);
+  return (high + 0.05) / (low + 0.05);
+}
+
+for (const [width, dark] of [
+  [1440, false],
+  [900, true],
+  [390, false],
+]) {
+  test(`the mesh from above lies under the plan at ${width}, and can be put away`, async () => {
+    const { page, faults, close } = await open(browser, report, "#/plan", { width, dark });
+    const image = page.locator(".plan .ground > image");
+    await image.waitFor({ state: "attached" });
+    const [ground] = index.grounds;
+    const room = index.rooms.find(({ name }) => name.startsWith("conference"));
+    // The places of the rooms and of the ground on the screen are those of the world.
+    const placed = await page.evaluate(() => {
+      const box = (selector, text) => {
+        const all = [...document.querySelectorAll(selector)];
+        const { x, y, width, height } = all
+          .find((e) => e.textContent.startsWith(text))
+          .getBoundingClientRect();
+        return { x, y, width, height };
+      };
+      return { room: box(".plan .room", "conference"), ground: box(".plan .ground > image", "") };
+    });
+    const [xs, ys] = [0, 1].map((k) => room.outline.flat().map((point) => point[k]));
+    const scale = placed.ground.width / (ground.size[0] * ground.pixel_m);
+    near((placed.room.x - placed.ground.x) / scale, Math.min(...xs) - ground.west, 0.06, "west");
+    near((placed.room.y - placed.ground.y) / scale, ground.north - Math.max(...ys), 0.06, "north");
+    near(placed.ground.height / scale, ground.size[1] * ground.pixel_m, 0.02, "height");
+
+    const colors = async () => {
+      await page.mouse.move(2, 2);
+      await drawn(page);
+      const png = PNG.sync.read(await page.locator(".plan").first().screenshot());
+      const found = new Set();
+      for (let at = 0; at < png.data.length; at += 4 * 7) found.add(png.data.readUInt32BE(at) >> 12);
+      return found.size;
+    };
+    await page.waitForTimeout(300);
+    const many = await colors();
+    const styles = await page.evaluate(() => {
+      const of = (selector) => getComputedStyle(document.querySelector(selector));
+      const [name, size, wall, rim] = [".name", ".size", ".room", ".casing"].map((s) => of(`.plan ${s}`));
+      return {
+        name: [name.fill, name.stroke],
+        size: [size.fill, name.stroke],
+        wall: [wall.stroke, rim.stroke],
+        widths: [wall.strokeWidth, rim.strokeWidth].map(parseFloat),
+      };
+    });
+    assert.ok(contrast(...styles.name) >= 4.5 && contrast(...styles.size) >= 4.5, JSON.stringify(styles));
+    assert.ok(contrast(...styles.wall) >= 3, JSON.stringify(styles));
+    assert.ok(styles.widths[1] > 2 * styles.widths[0], "the rim is wider than the line");
+
+    const box = page.getByLabel("Mesh from above");
+    await box.uncheck();
+    assert.equal(await page.evaluate(() => window.location.hash), "#/plan?ground=none");
+    const few = await colors();
+    assert.ok(many > 4 * few, `${many} colours with the ground, ${few} without`);
+    // The choice is remembered, and part of the address.
+    await go(page, "#/numbers");
+    await page.locator("nav").getByText("Plan", { exact: true }).click();
+    await ready(page);
+    assert.equal(await page.evaluate(() => window.location.hash), "#/plan?ground=none");
+    assert.ok(!(await page.getByLabel("Mesh from above").isChecked()));
+    assert.equal(await page.locator(".plan .ground > image").count(), 0, "what is not shown is not loaded");
+    await page.getByLabel("Mesh from above").check();
+    await image.waitFor({ state: "attached" });
+    assert.deepEqual(faults, []);
+    await close();
+  });
+}
+
+test("a ground that cannot be read is told of, and the plan is shown", async () => {
+  await withCopy(
+    (write) => write("ground_0", 7),
+    async (folder) => {
+      const { page, close } = await open(browser, folder, "#/plan");
+      await page.getByRole("alert").waitFor();
+      assert.match(await page.getByRole("alert").textContent(), /ground_0\.js is damaged/);
+      assert.equal(await page.locator(".plan .room").count(), index.rooms.length);
       await close();
     },
   );

@@ -2,6 +2,7 @@
 // docs/compare.md). A is the data set of the report, B the other.
 
 import { type Index, type Picture, type Rgb, load, loadPicture } from "../data.js";
+import { named } from "../dom.js";
 import { unpack } from "../picture/faces.js";
 import { paletteOf } from "../palette.js";
 
@@ -300,14 +301,17 @@ export const groupOf = (
 ): Group | undefined =>
   groups.find(({ a, b }) => isNamed(against, a, was, "a") && isNamed(against, b, is, "b"));
 
-/** The name of a label's class or instance in A or in B, as the comparison writes it. */
+/** The name of a label's class or instance in A or in B, as the comparison writes it, for text. */
 export function nameOf(against: Against, label: number, of: "class" | "instance", side: Side): string {
   const found = against.both.labels[label];
   const its = found?.class === null || !found ? undefined : against.both.classes[found.class];
-  if (!its || !found) return "no label";
-  return of === "class" ? its.name : (ownName(against, label, side) ?? "");
+  if (!its || !found) return "unlabelled";
+  return named(of === "class" ? its.name : (ownName(against, label, side) ?? ""));
 }
 
-/** The comparison's `<UNK>` and `<nothing>` in words. */
+/** What is one thing in A and another in B. */
+export const changedWords = (was: string, is: string): string => `${was} in A, ${is} in B`;
+
+/** A class in words; the comparison has `<UNK>` and `<nothing>`, too. */
 export const classWords = (name: string): string =>
-  name === "<UNK>" ? "no label" : name === "<nothing>" ? "nothing seen" : name;
+  name === "<UNK>" ? "unlabelled" : name === "<nothing>" ? "nothing seen" : named(name);

@@ -1,9 +1,9 @@
 // Marks changed labels on the plan, in the middle of each patch of changed faces.
 
 import type { Index, Rgb } from "../data.js";
-import { count } from "../dom.js";
+import { several } from "../dom.js";
 import { spaceLink } from "../route/route.js";
-import { CLASS, kindOf, loadAgainst, loadChanges, nameOf } from "./data.js";
+import { CLASS, changedWords, kindOf, loadAgainst, loadChanges, nameOf } from "./data.js";
 import { surface } from "./matrix.js";
 
 /** A change of labels at a point of an area. */
@@ -29,7 +29,7 @@ export async function changeMarks(index: Index): Promise<Map<number, ChangeMark[
       return {
         at: center,
         isClass: kindOf(against, a, b) === CLASS,
-        words: `${was} is ${is}: ${count(faces)} faces, ${surface(m2)}`,
+        words: `${changedWords(was, is)}: ${several(faces, "face")}, ${surface(m2)}`,
         href: hasMesh ? spaceLink(area, center, null, "changed") : null,
       };
     };

@@ -14,7 +14,7 @@ export const surface = (m2: number): string =>
   m2 === 0 ? "0" : m2 >= 10 ? metres2(m2) : `${m2.toPrecision(3)} m²`;
 
 export const countsWords = ({ faces, m2, pixels }: Counts): string =>
-  `${count(faces)} faces, ${surface(m2)}, ${count(pixels)} pixels`;
+  `${several(faces, "face")}, ${surface(m2)}, ${several(pixels, "pixel")}`;
 
 /** The link to changed faces of a class or instance in A (`was`) and in B (`is`). */
 export function changedLink(
@@ -74,9 +74,9 @@ export function matrix(against: Against): HTMLElement | null {
       const pair = pairs.find(({ a, b }) => a === row && b === column);
       if (!pair) return h("td", { class: row === column && "same" });
       const lines = [
-        h("strong", {}, bySurface ? surface(pair.m2) : `${count(pair.pixels)} pixels`),
-        h("span", {}, `${count(pair.faces)} faces`),
-        bySurface && h("span", {}, `${count(pair.pixels)} pixels`),
+        h("strong", {}, bySurface ? surface(pair.m2) : several(pair.pixels, "pixel")),
+        h("span", {}, several(pair.faces, "face")),
+        bySurface && h("span", {}, several(pair.pixels, "pixel")),
         row === column && h("span", {}, "another instance"),
       ].filter((line) => line !== false);
       const td = h("td", { class: row === column && "same" }, linked(pair, ...lines));

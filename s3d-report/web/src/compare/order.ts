@@ -1,7 +1,7 @@
 // The order of changed images in a list, and the images that show one change of labels.
 
 import { type Route, link } from "../route/route.js";
-import { type Against, type ChangedPicture, type Pixels, classWords } from "./data.js";
+import { type Against, type ChangedPicture, type Pixels, changedWords, classWords } from "./data.js";
 
 /** A change of labels, by class in A and in B; the list of images may be limited to it. */
 export interface Change {
@@ -15,7 +15,7 @@ export const changeOf = ({ query }: Route): Change | null => {
 };
 
 export const changeWords = ({ was, is }: Change): string =>
-  was === is ? `${classWords(was)}, another instance` : `${classWords(was)} is ${classWords(is)}`;
+  was === is ? `${classWords(was)}, another instance` : changedWords(classWords(was), classWords(is));
 
 /** The images that show a change. */
 export const imagesOf = (change: Change): string => link("compare", [], { ...change });

@@ -1,7 +1,7 @@
 // The differences between the shown data set, A, and another, B.
 
 import { type Index, type Picture, load, loadThumb } from "../data.js";
-import { append, count, h, percent, several } from "../dom.js";
+import { append, count, h, named, percent, several } from "../dom.js";
 import { type Page, type Route, link } from "../route/route.js";
 import { type Against, type ChangedPicture, loadAgainst } from "./data.js";
 import { changedLink } from "./matrix.js";
@@ -46,7 +46,11 @@ export async function comparePage(index: Index, route: Route): Promise<Page> {
 function overview(index: Index, against: Against, change: Change | null): Page {
   const { comparison } = against;
   const { a, b, equal, full } = comparison;
-  const element = h("main", { class: "page compared" }, h("h1", {}, `${a.folder} against ${b.folder}`));
+  const element = h(
+    "main",
+    { class: "page compared" },
+    h("h1", {}, `${named(a.folder)} against ${named(b.folder)}`),
+  );
   const read = full ? "every file of both was read" : "by their checksums";
   const words = equal
     ? `Both are equal: the same files with the same bytes (${read}).`
@@ -62,7 +66,7 @@ function overview(index: Index, against: Against, change: Change | null): Page {
     posesSection(index, comparison),
     filesSection(comparison),
     faultsSection(against),
-    h("section", {}, h("h2", {}, "Made with"), madeWith(comparison)),
+    h("section", {}, h("h2", {}, "How they were made"), madeWith(comparison)),
   ]);
   return { element, close, ...(change && grid && { start: grid }) };
 }
@@ -84,7 +88,7 @@ function heading(against: Against, change: Change | null, images: number): HTMLE
   const words =
     images === 0
       ? "No image shows this change."
-      : `${several(images, "image")} with ${count(counts?.pixels ?? 0)} pixels with this change, ` +
+      : `${several(images, "image")} with this change, in ${several(counts?.pixels ?? 0, "pixel")}, ` +
         "the image with the most first.";
   const places = h("p", { class: "places" });
   append(places, [
@@ -124,7 +128,7 @@ function images(
     }
     shown = Math.min(order.length, shown + BATCH);
     more.hidden = shown === order.length;
-    more.textContent = `Show more of ${order.length}`;
+    more.textContent = `Show more of ${count(order.length)}`;
   };
   more.addEventListener("click", () => {
     const first = grid.children.length;
@@ -168,7 +172,7 @@ function card(
   thumbs.observe(image);
   const [modality, pixels] = mostChanged(changed) ?? ["", null];
   const share = pixels ? (ofChange ?? pixels.pixels_changed) / Math.max(1, pixels.pixels) : 0;
-  const what = ofChange === undefined ? (MODALITY_NAMES[modality] ?? modality) : `${count(ofChange)} pixels`;
+  const what = ofChange === undefined ? (MODALITY_NAMES[modality] ?? modality) : several(ofChange, "pixel");
   const words = `${what}: ${percent(share)}`;
   const strip = h(
     "span",
@@ -177,7 +181,7 @@ function card(
     h("span", {}),
   );
   [share, 1 - share].forEach((part, i) => ((strip.children[i] as HTMLElement).style.flexGrow = String(part)));
-  const label = `${name}. ${words} of the pixels ${change ? "changed so" : "differ"}`;
+  const label = `${name}. ${words} of the pixels ${change ? "show this change" : "differ"}`;
   const href = link("compare", [number], { ...change });
   const body = [image, strip, h("span", { class: "card-name" }, name), h("span", { class: "quiet" }, words)];
   return h(

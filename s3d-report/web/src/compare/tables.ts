@@ -1,11 +1,19 @@
 // Tables of the differences between two data sets.
 
 import type { Index } from "../data.js";
-import { count, h, percent, several, table } from "../dom.js";
+import { count, h, named, percent, several, table } from "../dom.js";
 import { inPanorama, nameOf as nameOfView } from "../pages/view.js";
 import { imageLink } from "../route/places.js";
 import { link } from "../route/route.js";
-import type { Against, Comparison, InstanceChange, ModalityChanges, Renamed, ViewName } from "./data.js";
+import {
+  type Against,
+  type Comparison,
+  type InstanceChange,
+  type ModalityChanges,
+  type Renamed,
+  type ViewName,
+  changedWords,
+} from "./data.js";
 import { changedLink, countsWords, matrix, number, surface } from "./matrix.js";
 import { MODALITY_NAMES } from "./picture.js";
 
@@ -35,7 +43,7 @@ const value = (of: unknown): string =>
 /** How A and B were made: both data sets, and the settings and inputs that differ. */
 export function madeWith({ a, b, labels, settings, inputs }: Comparison): HTMLElement {
   const rows: [string, string, string][] = [
-    ["Data set", a.folder, b.folder],
+    ["Data set", named(a.folder), named(b.folder)],
     ["Made by", `s3d ${a.version}`, `s3d ${b.version}`],
     ["Files", count(a.files), count(b.files)],
     ["Size", `${(a.bytes / 1e6).toFixed(1)} MB`, `${(b.bytes / 1e6).toFixed(1)} MB`],
@@ -46,7 +54,7 @@ export function madeWith({ a, b, labels, settings, inputs }: Comparison): HTMLEl
   if (!settings.some(({ name }) => name === "seed")) rows.push(["Seed", String(a.seed), String(b.seed)]);
   for (const { name, a: ofA, b: ofB } of settings) rows.push([name, value(ofA), value(ofB)]);
   for (const { area, path, a: ofA, b: ofB } of inputs)
-    rows.push([`Input of area ${area}: ${path}`, value(ofA?.slice(0, 12)), value(ofB?.slice(0, 12))]);
+    rows.push([`Input of area ${area}: ${named(path)}`, value(ofA?.slice(0, 12)), value(ofB?.slice(0, 12))]);
   const element = table(
     ["", "A", "B"],
     rows.map((row) => (row[1] === row[2] ? row : row.map((cell) => h("strong", {}, cell)))),
@@ -75,8 +83,8 @@ export function labelsSection(against: Against): HTMLElement | null {
     ? "No face and no pixel belongs to another instance or class."
     : `Another class: ${countsWords(other)}. ` + `Another instance or class: ${countsWords(changed)}.`;
   const renamed = [
-    renamedList("another number", labels.renumbered),
-    renamedList("the name of another room", labels.other_room),
+    renamedList("renumbered", labels.renumbered),
+    renamedList("named by another room", labels.other_room),
   ];
   const solid = against.changed_faces.flatMap((area) => {
     if (!against.both.meshes.some((mesh) => mesh.area === area)) return [];
@@ -96,10 +104,9 @@ function renamedList(words: string, renamed: Renamed[]): HTMLElement | null {
     sum.m2 += m2;
     sum.pixels += pixels;
   }
-  const only = renamed.length === 1 ? "has only" : "have only";
-  const subject = `${several(renamed.length, "instance")} ${only} ${words}`;
-  const summary = `${subject}, which is no change: ${countsWords(sum)}.`;
-  const items = renamed.map(({ a, b }) => h("li", {}, `${a} is ${b}`));
+  const subject = `${several(renamed.length, "instance")} ${words}`;
+  const summary = `${subject}, otherwise the same: ${countsWords(sum)}.`;
+  const items = renamed.map(({ a, b }) => h("li", {}, changedWords(named(a), named(b))));
   return h("details", { class: "renamed" }, h("summary", {}, summary), h("ul", {}, ...items));
 }
 
@@ -137,7 +144,7 @@ const KINDS: Record<InstanceChange["kind"], string> = {
 };
 
 const instanceNames = (names: string[]): HTMLElement =>
-  h("span", { class: "names" }, names.join(" + ") || "–");
+  h("span", { class: "names" }, names.map(named).join(" + ") || "–");
 
 export function instancesSection(against: Against): HTMLElement | null {
   const labels = against.comparison.labels;
@@ -168,7 +175,7 @@ export function instancesSection(against: Against): HTMLElement | null {
           "details",
           {},
           h("summary", {}, `${several(all.length, "label")} ${words}`),
-          h("p", {}, all.join(", ")),
+          h("p", {}, all.map(named).join(", ")),
         );
   return section(
     "Instances that changed",
@@ -190,7 +197,7 @@ function placeOf(index: Index, { area, uuid, candidate }: ViewName): { name: str
     const href = view.picture === null ? inPanorama(index, view) : link("view", [view.picture]);
     return { name: nameOfView(index, view), href };
   }
-  const name = candidate === undefined ? uuid : `${uuid.slice(0, 8)} · candidate ${candidate}`;
+  const name = candidate === undefined ? named(uuid) : `${uuid.slice(0, 8)} · candidate ${candidate}`;
   const pano = location?.pano && candidate === undefined ? link("pano", [area, uuid]) : null;
   return { name: index.areas.length > 1 ? `area ${area} · ${name}` : name, href: pano };
 }
@@ -266,7 +273,7 @@ export function posesSection(index: Index, { poses }: Comparison): HTMLElement |
     const href = placeOfFile(index, a);
     const name = a.split("/").at(-1) ?? a;
     return [
-      href ? h("a", { href }, name) : name,
+      href ? h("a", { href }, named(name)) : named(name),
       number(`${m.toPrecision(3)} m`),
       number(`${degrees.toPrecision(3)}°`),
       number(k_px === null ? "other size" : `${k_px.toPrecision(3)} px`),
@@ -279,7 +286,7 @@ export function filesSection({ files }: Comparison): HTMLElement | null {
   const differ = files.filter((kind) => kind.changed + kind.only_a + kind.only_b > 0);
   if (differ.length === 0) return null;
   const rows = differ.map((kind): Cells => {
-    const list = h("ul", {}, ...kind.first.map((path) => h("li", {}, h("code", {}, path))));
+    const list = h("ul", {}, ...kind.first.map((path) => h("li", {}, h("code", {}, named(path)))));
     return [
       h("details", {}, h("summary", {}, kind.kind), list),
       number(count(kind.same)),
@@ -300,10 +307,10 @@ export function faultsSection({ comparison, faults }: Against): HTMLElement | nu
   const rows = [
     ...comparison.unread.map(({ side, path, message }): Cells => [
       side.toUpperCase(),
-      h("code", {}, path),
+      h("code", {}, named(path)),
       message,
     ]),
-    ...faults.map(({ path, message }): Cells => ["B", h("code", {}, path), message]),
+    ...faults.map(({ path, message }): Cells => ["B", h("code", {}, named(path)), message]),
   ];
   const notes = comparison.notes.map((note) => h("li", {}, note));
   const element = section(

@@ -63,7 +63,7 @@ export function findField(index: Index): HTMLElement {
     list.replaceChildren(...options);
     list.hidden = found.length === 0;
     field.setAttribute("aria-expanded", String(found.length > 0));
-    told.textContent = found.length === 0 ? "Nothing has this name." : `${found.length} found`;
+    told.textContent = found.length === 0 ? "Nothing has that name." : `${found.length} found`;
     point(0);
   };
 

@@ -6,16 +6,19 @@ import { divider } from "../picture/divider.js";
 import { append, choice, h, named, percent } from "../dom.js";
 import { nameOf } from "../pages/view.js";
 import { key } from "../picture/readout.js";
-import { type Page, type Route, link } from "../route/route.js";
+import { type Page, type Route, link, replaceRoute } from "../route/route.js";
 import { storeyButtons } from "../space/levels.js";
-import { type Look, lookFrom, showsOf } from "../space/look.js";
+import { type Look, showsOf } from "../space/look.js";
 import type { Show } from "../space/paint.js";
 import { SpaceView } from "../space/view.js";
 import { numbersOf, sentenceOf } from "./facts.js";
+import { overviewLook, overviewQuery, storeyIn } from "./look.js";
 import { richest } from "./richest.js";
 
 /** The number of views in the strip. */
 const STRIP = 12;
+/** Browsers limit the changes of the address in a minute; this is the time between two, ms. */
+const PAUSE = 250;
 
 const BEYOND_NAMES: Partial<Record<Show, string>> = {
   texture: "Colour",
@@ -37,9 +40,9 @@ export async function overviewPage(index: Index, route: Route): Promise<Page> {
   const strip = richestViews(index, mesh);
   if (!strip) element.classList.add("without-views");
   try {
-    const view = fillStage(index, mesh, stage, element);
+    const close = fillStage(index, mesh, route, stage, element);
     append(element, [strip]);
-    return { element, close: () => view.close() };
+    return { element, close };
   } catch (e) {
     // Without WebGL the rest is shown.
     stage.append(h("p", { role: "alert" }, e instanceof Error ? e.message : String(e)));
@@ -64,19 +67,38 @@ function head(index: Index, mesh: Mesh): HTMLElement {
   return about;
 }
 
-/** The building, with its buttons and its legend. */
-function fillStage(index: Index, mesh: Mesh, stage: HTMLElement, element: HTMLElement): SpaceView {
+/** Fills the stage with the building, its buttons and its legend. Returns what closes it. */
+function fillStage(
+  index: Index,
+  mesh: Mesh,
+  route: Route,
+  stage: HTMLElement,
+  element: HTMLElement,
+): () => void {
   const shows = showsOf(mesh, false).filter((show) => show in BEYOND_NAMES);
-  const look: Look = {
-    ...lookFrom(index, mesh, new URLSearchParams({ marks: "locations" }), false),
-    beyond: shows.includes("class") ? "class" : "normal",
-  };
+  const look: Look = overviewLook(index, mesh, shows, route.query);
   const status = h("p", { class: "quiet progress", role: "status" });
+  let timer = 0;
+  let address = window.location.hash;
+  /** The address says what is shown, once this is not what is shown at first. */
+  const tellAddress = (): void => {
+    timer = 0;
+    const query = overviewQuery(shows, view);
+    const now = link("overview", [mesh.area], query);
+    const isFirst = Object.keys(query).length === 0 && !address.includes("?");
+    if (now === address || isFirst || !element.isConnected || element.inert) return;
+    address = now;
+    replaceRoute("overview", [mesh.area], query);
+  };
   const view = new SpaceView(index, mesh, look, {
     against: null,
     turns: true,
+    storey: storeyIn(index, mesh, route.query),
     covered: () => coveredBy(element),
-    changed: () => press(),
+    changed: () => {
+      press();
+      timer ||= window.setTimeout(tellAddress, PAUSE);
+    },
     progress: (words) => {
       status.textContent = words;
       status.hidden = words === "";
@@ -101,6 +123,9 @@ function fillStage(index: Index, mesh: Mesh, stage: HTMLElement, element: HTMLEl
   place();
   const { buttons, press } = storeyButtons(view);
   view.readout.classList.add("over");
+  // It lies over the building, so that it goes with the pointer or the focus.
+  for (const event of ["pointerleave", "blur"])
+    view.canvas.addEventListener(event, () => view.readout.replaceChildren());
   stage.append(view.canvas, view.overlay, wipe.line, status, view.readout);
   const side = h("div", { class: "overview-side" });
   append(side, [buttons, legend(index, mesh, view)]);
@@ -112,7 +137,10 @@ function fillStage(index: Index, mesh: Mesh, stage: HTMLElement, element: HTMLEl
     element.dataset["loaded"] = "all";
   };
   void fill();
-  return view;
+  return () => {
+    window.clearTimeout(timer);
+    view.close();
+  };
 }
 
 /** The pixels at the sides of the stage that something lies over, half of wide ones: they are not full. */
@@ -150,7 +178,11 @@ function colourings(shows: Show[], view: SpaceView, changed: () => void): HTMLEl
   };
   press();
   const stop = h("button", { type: "button", class: "stop", "aria-label": "Stop turning" }, "Stop");
-  stop.addEventListener("click", () => view.eye.land());
+  stop.addEventListener("click", () => {
+    view.eye.touched = true;
+    view.eye.land();
+    view.refresh();
+  });
   view.eye.turned = (on) => (stop.hidden = !on);
   stop.hidden = true;
   bar.append(...made.map(({ button }) => button), stop);
@@ -171,7 +203,7 @@ function legend(index: Index, mesh: Mesh, view: SpaceView): HTMLElement | null {
     const share = h("span", { class: "quiet" }, percent(m2 / all));
     const button = h(
       "button",
-      { type: "button", "aria-pressed": "false" },
+      { type: "button", "aria-pressed": String(view.look.only === i) },
       key(of.color),
       named(of.name),
       share,

@@ -87,10 +87,10 @@ export function richest(views: View[], index: Index, most: number): View[] {
 }
 
 /**
- * The location whose panorama looks into a room: by the mean entropy of its views, or by its median distance
- * where there are no labels. One that sees little is taken only if there is no other.
+ * The locations with panoramas, those that look into a room first: by the mean entropy of their views, or by
+ * their median distance where there are no labels. Those that see little come last.
  */
-export function firstLocation(index: Index): number {
+function rankedLocations(index: Index): number[] {
   const entropies = new Map<number, { sum: number; n: number }>();
   const isLabelled = index.classes.length > 0;
   for (const { location, entropy } of index.views) {
@@ -98,10 +98,8 @@ export function firstLocation(index: Index): number {
     const { sum, n } = entropies.get(location) ?? { sum: 0, n: 0 };
     entropies.set(location, { sum: sum + entropy, n: n + 1 });
   }
-  let best = -1;
-  let worth: [number, number] = [-1, -1];
-  index.locations.forEach(({ pano, seen }, i) => {
-    if (!pano) return;
+  const ranked = index.locations.flatMap(({ pano, seen }, i) => {
+    if (!pano) return [];
     const coverage = seen?.coverage ?? 0;
     const views = entropies.get(i);
     const rich = views
@@ -109,10 +107,36 @@ export function firstLocation(index: Index): number {
       : isLabelled && entropies.size > 0
         ? 0
         : (seen?.depth_m ?? coverage);
-    const value: [number, number] = [Math.min(coverage, ENOUGH), rich];
-    if (value[0] > worth[0] || (value[0] === worth[0] && value[1] > worth[1])) [best, worth] = [i, value];
+    return [{ i, coverage: Math.min(coverage, ENOUGH), rich }];
   });
-  return best;
+  ranked.sort((a, b) => b.coverage - a.coverage || b.rich - a.rich);
+  return ranked.map(({ i }) => i);
+}
+
+/** The location whose panorama is shown first; -1 without any. */
+export const firstLocation = (index: Index): number => rankedLocations(index)[0] ?? -1;
+
+/** Panoramas of unknown rooms are at least this far from each other, metres. */
+const APART = 2.5;
+
+/** So many locations with panoramas that show the most, no two in the same room. */
+export function richestPanoramas(index: Index, areas: number[], most: number): number[] {
+  const chosen: number[] = [];
+  const isNew = (i: number): boolean => {
+    const here = index.locations[i];
+    return chosen.every((other) => {
+      const there = index.locations[other];
+      if (!here || !there || here.area !== there.area || here.room !== there.room) return true;
+      const isKnown = here.room !== "" && here.room !== "unknown_1";
+      if (isKnown || !here.position || !there.position) return false;
+      return Math.hypot(...here.position.map((c, k) => c - (there.position?.[k] ?? 0))) >= APART;
+    });
+  };
+  for (const i of rankedLocations(index)) {
+    const location = index.locations[i];
+    if (chosen.length < most && location && areas.includes(location.area) && isNew(i)) chosen.push(i);
+  }
+  return chosen;
 }
 
 /** A panorama that sees this share of the sphere is in a room. */

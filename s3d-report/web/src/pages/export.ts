@@ -1,6 +1,6 @@
 // A drawing of the page as a file: SVG with the colours that it has now, and PNG.
 
-import { h } from "../dom.js";
+import { append, h } from "../dom.js";
 import { fileName, save } from "../tools.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -24,12 +24,18 @@ const LOOKS = [
   "paint-order",
 ];
 const GEOMETRY = ["d", "x", "y", "dx", "dy", "cx", "cy", "r", "width", "height"];
+/** What images need besides: their content is in the file. */
+const IMAGE = ["href", "mask", "preserveAspectRatio", "id"];
 
-/** A copy that needs no style sheet. Links become groups. */
-function plain(element: Element): Element {
+/** A copy that needs no style sheet. Links become groups. Null if it is not shown. */
+function plain(element: Element): Element | null {
   const isLink = element.tagName === "a";
+  const isMask = element.tagName === "mask";
+  // The content of a mask is never displayed by itself.
+  if (!isMask && getComputedStyle(element).display === "none") return null;
   const copy = document.createElementNS(SVG, isLink ? "g" : element.tagName);
-  for (const name of GEOMETRY) {
+  const isImage = isMask || element.tagName === "image";
+  for (const name of isImage ? [...GEOMETRY, ...IMAGE] : GEOMETRY) {
     const value = element.getAttribute(name);
     if (value !== null) copy.setAttribute(name, value);
   }
@@ -38,7 +44,7 @@ function plain(element: Element): Element {
     for (const name of LOOKS) copy.setAttribute(name, style.getPropertyValue(name));
   }
   for (const child of element.childNodes)
-    if (child instanceof Element) copy.append(plain(child));
+    if (child instanceof Element) append(copy, [plain(child)]);
     else if (child.nodeType === Node.TEXT_NODE) copy.append(child.textContent ?? "");
   return copy;
 }
@@ -56,7 +62,7 @@ export function svgOf(drawing: SVGSVGElement): { text: string; shape: number } {
   const paper = document.createElementNS(SVG, "rect");
   ["x", "y", "width", "height"].forEach((name, i) => paper.setAttribute(name, String(box[i])));
   paper.setAttribute("fill", getComputedStyle(drawing.parentElement ?? drawing).backgroundColor);
-  root.append(paper, ...[...drawing.children].map(plain));
+  append(root, [paper, ...[...drawing.children].map(plain)]);
   return { text: new XMLSerializer().serializeToString(root), shape: h_ / w };
 }
 
@@ -71,18 +77,25 @@ async function png(drawing: SVGSVGElement): Promise<Blob | null> {
   return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
 }
 
-/** Buttons that save a drawing. */
-export function saves(drawing: SVGSVGElement, dataSet: string, name: string): HTMLElement {
-  const button = (words: string, act: () => Promise<void> | void): HTMLElement =>
+/** Buttons that save a drawing, which `whole` completes before. */
+export function saves(
+  drawing: SVGSVGElement,
+  dataSet: string,
+  name: string,
+  whole: () => Promise<void>,
+): HTMLElement {
+  const button = (words: string, act: () => Promise<void>): HTMLElement =>
     h("button", { type: "button", "aria-label": `${words} of ${name}`, click: act }, words);
   return h(
     "div",
     { class: "saves" },
-    button("Save SVG", () => {
+    button("Save SVG", async () => {
+      await whole();
       const { text } = svgOf(drawing);
       save(fileName(dataSet, name, "svg"), new Blob([text], { type: "image/svg+xml" }));
     }),
     button("Save PNG", async () => {
+      await whole();
       const file = await png(drawing);
       if (file) save(fileName(dataSet, name, "png"), file);
     }),

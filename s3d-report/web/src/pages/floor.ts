@@ -5,6 +5,7 @@ import type { ChangeMark } from "../compare/marks.js";
 import type { Index, Location, Rgb, View } from "../data.js";
 import { append, flat, metres2, named, percent, roomName, roomOf, s, several } from "../dom.js";
 import { type Box, boxOf, middleOf, sizeOf } from "../outline.js";
+import { type GroundLayer, cornersOf, groundLayer } from "./ground.js";
 import { patchLink } from "../route/places.js";
 import { link } from "../route/route.js";
 
@@ -17,6 +18,8 @@ export interface FloorOptions {
   hasRoom?: (room: string) => boolean;
   /** Whether a point at this height is shown; the name of its room is known or empty. */
   hasHeight?: (z: number, room: string) => boolean;
+  /** The index of the ground, if there is one. */
+  ground?: number | null;
   /** Changes of labels against another data set. */
   changes?: ChangeMark[];
   /** Called with words for the location under the pointer or with the focus; with null when there is none. */
@@ -28,6 +31,7 @@ export interface Plan {
   element: SVGSVGElement;
   /** Turns the wedge of the current location: heading from +X towards +Y, and angle of view. */
   look: (azimuth_rad: number, fov_rad: number) => void;
+  ground: GroundLayer | null;
 }
 
 /** Alternative positions for a room's name, in hundredths of the plan's size. */
@@ -88,10 +92,13 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
       !!view.position &&
       hasHeight(view.position[2], view.room),
   );
+  const under = index.grounds?.[options.ground ?? -1];
   const points = [
     ...rooms.flatMap((room) => room.outline.flat()),
     ...stands.map(([location]) => location.position ?? []),
     ...photographs.map((view) => view.position),
+    // Where there are rooms, the ground ends beside them.
+    ...(under && rooms.length === 0 ? cornersOf(under) : []),
   ];
   const box = boxOf(points);
   const unit = Math.max(box.w, box.h) / 100;
@@ -104,14 +111,18 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
     "aria-label": `Plan of area ${area}`,
   });
   element.style.setProperty("--unit", `${unit}px`);
+  const ground = under ? groundLayer(under, options.ground ?? 0, at) : null;
+  if (ground) element.append(ground.element);
   const ringPath = (ring: [number, number][]): string => {
     const corners = ring.map(([x, y]) => at(x, y).map((c) => c.toFixed(3)));
     return `M${corners.map((corner) => corner.join(",")).join("L")}Z`;
   };
   for (const room of rooms) {
+    const d = room.outline.map(ringPath).join("");
+    if (ground) element.append(s("path", { class: "casing", d }));
     const outline = s("path", {
       class: "room",
-      d: room.outline.map(ringPath).join(""),
+      d,
       "fill-rule": "evenodd",
       "stroke-width": 0.35 * unit,
     });
@@ -195,6 +206,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
       if (coverage !== null) dot.style.fill = css(coverageColor(coverage));
     }
     dot.append(s("title", {}, title));
+    if (ground) element.append(s("circle", { class: "casing", cx: place[0], cy: place[1], r: radius }));
     const href = location.pano ? link("pano", [location.area, location.uuid]) : null;
     const target = href ? s("a", { href, "aria-label": title }, dot) : dot;
     if (!small) {
@@ -216,7 +228,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
     const [x, y] = at(current.position[0], current.position[1]);
     wedge.setAttribute("d", sector(x, y, (small ? 16 : 9) * unit, azimuth, fov));
   };
-  return { element, look };
+  return { element, look, ground };
 }
 
 /** Disputed patches, each a link to a place that shows it. */

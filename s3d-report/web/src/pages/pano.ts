@@ -13,12 +13,33 @@ import {
 import { decoded } from "../picture/images.js";
 import { gazes } from "../route/memory.js";
 import { firstLocation } from "../overview/richest.js";
-import { storeysOf } from "../storeys.js";
+import { type Storeys, storeysOf } from "../storeys.js";
 import { plan } from "./floor.js";
 import { type Route, type Sight, link, numberOf, replaceRoute } from "../route/route.js";
 import { Viewer, gazeQuery, layersOf, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
 
 const RADIANS = Math.PI / 180;
+
+/** One walks to a location that is this close to the direction of view at most, radians. */
+const AHEAD = 40 * RADIANS;
+
+/** Links to the panoramas of other storeys that are nearest to a location; null if there are none. */
+function otherStoreys(index: Index, here: Location, storeys: Storeys): HTMLElement | null {
+  if (storeys.all.length < 2 || !here.position) return null;
+  const [x, y, z] = here.position;
+  const current = storeys.of(z, here.room);
+  const links = storeys.all.flatMap(({ name }, storey) => {
+    if (storey === current) return [h("span", { "aria-current": "true" }, name)];
+    const away = (l: Location): number => Math.hypot((l.position?.[0] ?? 0) - x, (l.position?.[1] ?? 0) - y);
+    const there = index.locations.filter(
+      (l) => l.area === here.area && l.pano && l.position && storeys.of(l.position[2], l.room) === storey,
+    );
+    const nearest = there.sort((a, b) => away(a) - away(b))[0];
+    return nearest ? [h("a", { href: link("pano", [nearest.area, nearest.uuid]) }, name)] : [];
+  });
+  if (links.length < 2) return null;
+  return h("nav", { class: "storeys", "aria-label": "Storeys" }, ...links.reverse());
+}
 
 /** A neighbour may be this much farther than the seen surface, in metres, since pixels are coarse. */
 const SLACK = 0.3;
@@ -61,8 +82,8 @@ function gazeOf(location: Location, route: Route): Gaze {
   };
 }
 
-/** The name of a location and what its panorama sees. */
-function headOf(location: Location, name: HTMLElement): HTMLElement {
+/** The name of a location, links to other storeys, and what its panorama sees. */
+function headOf(location: Location, name: HTMLElement, storeys: HTMLElement | null = null): HTMLElement {
   const facts = [
     location.seen?.coverage != null && `scan coverage ${percent(location.seen.coverage)}`,
     location.seen?.instances != null && several(location.seen.instances, "instance"),
@@ -70,7 +91,7 @@ function headOf(location: Location, name: HTMLElement): HTMLElement {
   ].filter(Boolean);
   const title = `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`;
   const head = h("div", { class: "look-head" }, h("h1", { class: "hidden" }, title), name);
-  append(head, [h("p", { class: "quiet" }, facts.join(" · "))]);
+  append(head, [storeys, h("p", { class: "quiet" }, facts.join(" · "))]);
   return head;
 }
 
@@ -127,14 +148,18 @@ export async function panoPage(
   const name = choice("Scan location", entries, link("pano", [location.area, location.uuid]), (to) => {
     window.location.hash = `${to}?${new URLSearchParams(layers)}`;
   });
-  const element = h("main", { class: "look" }, headOf(location, name));
+  const storeys = storeysOf(index, location.area);
+  const element = h(
+    "main",
+    { class: "look" },
+    headOf(location, name, otherStoreys(index, location, storeys)),
+  );
   if (!location.pano) {
     append(element, [h("p", {}, "This location has no panorama in the report.")]);
     return { element, close: () => {} };
   }
   const picture = await load<Picture>(`pano_${at}`);
   const gaze = gazeOf(location, route);
-  const storeys = storeysOf(index, location.area);
   const storey = location.position && storeys.of(location.position[2], location.room);
   const map =
     storey === null
@@ -145,12 +170,12 @@ export async function panoPage(
           hasRoom: (room) => storeys.ofRoom(room) === storey,
           hasHeight: (z, room) => storeys.of(z, room) === storey,
         });
-  const marks: { button: HTMLElement; lon: number; lat: number }[] = [];
+  const marks: { button: HTMLElement; lon: number; lat: number; distance: number }[] = [];
   const look = lookFrom(route.query, modalitiesOf(index, location.area, picture), gaze);
   layers = layersOf(look);
   let viewer: Viewer | null = null;
   const opened = await Viewer.open(index, picture, look, {
-    title: `Panorama of ${roomName(location.room)}; arrow keys turn, plus and minus zoom`,
+    title: `Panorama of ${roomName(location.room)}; arrow keys turn, plus and minus zoom, W and S walk`,
     area: location.area,
     room: location.room,
     point: (i, j, distance) => panoramaPoint(location, picture, i, j, distance),
@@ -188,9 +213,21 @@ export async function panoPage(
     };
     const button = h("button", { class: "walk", "aria-label": `Walk to ${words}`, click: walk });
     button.append(h("span", { class: "walk-name" }, words));
-    marks.push({ button, lon, lat });
+    marks.push({ button, lon, lat, distance });
     opened.overlay.append(button);
   }
+  /** Walks to the nearest location ahead, or behind. */
+  opened.element.addEventListener("keydown", (event) => {
+    const turned = { w: 0, s: Math.PI }[event.key.toLowerCase()];
+    const isTyping = (event.target as Element).matches("select, input");
+    if (turned === undefined || isTyping || event.ctrlKey || event.metaKey || event.altKey) return;
+    const off = (lon: number): number => {
+      const angle = lon - (opened.gaze ?? gaze).lon - turned;
+      return Math.abs(Math.atan2(Math.sin(angle), Math.cos(angle)));
+    };
+    const ahead = marks.filter(({ lon }) => off(lon) < AHEAD).sort((a, b) => a.distance - b.distance)[0];
+    ahead?.button.click();
+  });
   if (map) opened.overlay.append(h("div", { class: "inset" }, map.element));
   map?.look((location.azimuth_rad ?? 0) - gaze.lon, gaze.fov);
   element.append(opened.element);

@@ -5,10 +5,18 @@ import { type ChangeMark, changeMarks } from "../compare/marks.js";
 import type { Index } from "../data.js";
 import { append, h, metres2, named, say, several } from "../dom.js";
 import { storeysOf } from "../storeys.js";
+import { type Route, replaceRoute } from "../route/route.js";
 import { saves } from "./export.js";
 import { plan } from "./floor.js";
+import { type GroundLayer, groundOf, pixelWords, shown } from "./ground.js";
 
-function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElement {
+/** A plan on the page, and what lies under it. */
+interface Sheet {
+  element: SVGSVGElement;
+  ground: GroundLayer;
+}
+
+function areaPlan(index: Index, area: number, changes: ChangeMark[], sheets: Sheet[]): HTMLElement {
   const section = h("section", { class: "area-plan" }, h("h2", {}, `Area ${area}`));
   const storeys = storeysOf(index, area);
   const { all, of, ofRoom } = storeys;
@@ -17,7 +25,8 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
     stands: index.locations.filter((location) => location.area === area),
     photographs: index.views.filter((view) => view.area === area && view.photograph !== null),
   };
-  if (there.rooms.length + there.stands.length + there.photographs.length === 0) {
+  const hasGround = index.grounds?.some((ground) => ground.area === area) ?? false;
+  if (there.rooms.length + there.stands.length + there.photographs.length === 0 && !hasGround) {
     append(section, [h("p", { class: "quiet" }, "It has no rooms, scan locations or photographs.")]);
     return section;
   }
@@ -28,14 +37,18 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
     const photographs = there.photographs.filter((v) =>
       v.position ? on(v.position[2], v.room) : storey === 0,
     ).length;
+    const ground = groundOf(index, area, storeys, storey);
+    const under = index.grounds?.[ground ?? -1];
     const words = [
       rooms.length > 0 && `${several(rooms.length, "room")}, ${metres2(floor)}`,
       stands > 0 && several(stands, "scan location"),
       photographs > 0 && several(photographs, "photograph"),
+      under && `ground: ${pixelWords(under)}`,
     ].filter(Boolean);
     const summary = words.join(" · ");
     const told = h("p", { class: "quiet", role: "status" }, summary);
-    const { element } = plan(index, area, {
+    const drawn = plan(index, area, {
+      ground,
       hasRoom: (room) => ofRoom(room) === storey,
       hasHeight: on,
       changes,
@@ -43,12 +56,16 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[]): HTMLElemen
         say(told, now ?? summary);
       },
     });
+    const { element } = drawn;
+    if (drawn.ground) sheets.push({ element, ground: drawn.ground });
     if (all.length > 1) element.setAttribute("aria-label", `Plan of area ${area}: ${name}`);
     append(section, [
       all.length > 1 && h("h3", {}, name),
       told,
       h("div", { class: "sheet" }, element),
-      saves(element, index.data_set.name, element.getAttribute("aria-label") ?? "Plan"),
+      saves(element, index.data_set.name, element.getAttribute("aria-label") ?? "Plan", async () => {
+        if (shown.ground) await drawn.ground?.fill();
+      }),
     ]);
   }
   return section;
@@ -74,7 +91,40 @@ function legend(index: Index, changes: ChangeMark[]): HTMLElement {
   return line;
 }
 
-export async function planPage(index: Index): Promise<HTMLElement> {
+/** A switch for the ground of all plans, which are loaded when they come into sight. */
+function groundSwitch(sheets: Sheet[], fault: (words: string) => void): HTMLElement | null {
+  if (sheets.length === 0) return null;
+  const seen = new IntersectionObserver(
+    (entries) => {
+      for (const { isIntersecting, target } of entries) {
+        const sheet = sheets.find(({ element }) => element === target);
+        if (!isIntersecting || !sheet || !shown.ground) continue;
+        seen.unobserve(target);
+        sheet.ground.fill().catch((e: unknown) => fault(e instanceof Error ? e.message : String(e)));
+      }
+    },
+    { rootMargin: "300px" },
+  );
+  const put = (): void => {
+    for (const { element } of sheets) {
+      element.classList.toggle("on-ground", shown.ground);
+      seen.unobserve(element);
+      if (shown.ground) seen.observe(element);
+    }
+  };
+  put();
+  const box = h("input", { type: "checkbox", checked: shown.ground });
+  box.addEventListener("change", () => {
+    shown.ground = box.checked;
+    put();
+    replaceRoute("plan", [], shown.ground ? {} : { ground: "none" });
+  });
+  return h("label", { class: "tool" }, box, "Mesh from above");
+}
+
+export async function planPage(index: Index, route: Route): Promise<HTMLElement> {
+  const asked = route.query.get("ground");
+  if (asked !== null) shown.ground = asked !== "none";
   let trouble = "";
   const marks = await changeMarks(index).catch((e: unknown) => {
     trouble = e instanceof Error ? e.message : String(e);
@@ -87,6 +137,9 @@ export async function planPage(index: Index): Promise<HTMLElement> {
     trouble === "" ? null : h("p", { role: "alert" }, trouble),
     legend(index, [...marks.values()].flat()),
   );
-  for (const { area } of index.areas) page.append(areaPlan(index, area, marks.get(area) ?? []));
+  const sheets: Sheet[] = [];
+  const plans = index.areas.map(({ area }) => areaPlan(index, area, marks.get(area) ?? [], sheets));
+  const ground = groundSwitch(sheets, (words) => page.prepend(h("p", { role: "alert" }, words)));
+  append(page, [ground, ...plans]);
   return page;
 }

@@ -31,6 +31,10 @@ export function remember(route: Pick<Route, "page" | "path">, address: string): 
   now = address;
 }
 
+/** The address that was visited before any of this kind of page; null if there is none. */
+export const lastBefore = (kind: string): string | null =>
+  [...addresses].findLast(([visited]) => visited !== kind)?.[1] ?? null;
+
 const signature = (element: Element): string =>
   [element.tagName, element.getAttribute("href"), element.getAttribute("aria-label")].join(" ");
 

@@ -49,6 +49,8 @@ export class Eye {
   private readonly size: number;
   private flight = 0;
   private isTurning = false;
+  /** Whether the user has chosen the viewpoint. */
+  touched = false;
   /** Called when a slow turn begins or ends. */
   turned: (on: boolean) => void = () => {};
   /** The part that nothing lies over: shares of the canvas, and how far it is off the middle. */
@@ -68,7 +70,10 @@ export class Eye {
     this.controls.minDistance = NEAREST;
     this.controls.maxDistance = 6 * this.size;
     this.controls.addEventListener("change", () => this.update());
-    this.controls.addEventListener("start", () => this.land());
+    this.controls.addEventListener("start", () => {
+      this.touched = true;
+      this.land();
+    });
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -247,6 +252,7 @@ export class Eye {
     const [turn, zoom] = [turns[event.key], zooms[event.key]];
     if (!turn && !zoom) return;
     event.preventDefault();
+    this.touched = true;
     this.land();
     const at = this.controls.target.clone();
     const [x, y, z] = rgb(this.camera.position.clone().sub(at));

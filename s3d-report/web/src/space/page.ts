@@ -4,7 +4,15 @@ import type { Index, Mesh } from "../data.js";
 import { append, choice, count, h, named, several } from "../dom.js";
 import type { Modality } from "../picture/gl.js";
 import { legendOf } from "../picture/readout.js";
-import { type Against, type Side, groupOf, loadAgainst, loadChanges, nameOf } from "../compare/data.js";
+import {
+  type Against,
+  type Side,
+  changedWords,
+  groupOf,
+  loadAgainst,
+  loadChanges,
+  nameOf,
+} from "../compare/data.js";
 import { type Page, type Route, link, replaceRoute } from "../route/route.js";
 import { type Look, type Mark, lookFrom, marksOf, queryOf, showsOf } from "./look.js";
 import type { Show } from "./paint.js";
@@ -20,7 +28,7 @@ const SHOW_NAMES: Record<Show, string> = {
   texture: "Texture",
   class: "Class",
   instance: "Instance",
-  margin: "Vote margin",
+  margin: "Disputed",
   unlabelled: "Unlabelled",
   changed: "Changed",
   normal: "Normals",
@@ -119,7 +127,9 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
     look.show = to as Show;
     view.refresh();
   });
-  append(bar, [colors.length > 1 && show, measureButton(view)]);
+  const above = h("button", { type: "button", title: "See all of what is shown" }, "From above");
+  above.addEventListener("click", () => view.lookFromAbove());
+  append(bar, [colors.length > 1 && show, measureButton(view), above]);
   const hint =
     "Drag to turn, scroll to zoom, double-click to go closer, point at something to know what it is.";
   view.readout.append(h("span", { class: "quiet" }, hint));
@@ -255,7 +265,7 @@ function changeList(against: Against, view: SpaceView): HTMLElement | null {
   const name = (label: number, side: Side): string => nameOf(against, label, "instance", side);
   const entries = groups.map(({ a, b, faces }, i): [string, string] => [
     String(i),
-    `${name(a, "a")} is ${name(b, "b")} · ${several(faces.length, "face")}`,
+    `${changedWords(name(a, "a"), name(b, "b"))} · ${several(faces.length, "face")}`,
   ]);
   const list = choice("Changed labels", [["", "Changed labels…"], ...entries], "", (value) => {
     const group = groups[Number(value)];

@@ -34,6 +34,8 @@ export interface ViewOptions {
   changed: () => void;
   /** Whether the area is turned slowly at first. */
   turns?: boolean;
+  /** The storey that is shown at first, null for all; by default the one with the most rooms. */
+  storey?: number | null;
   /** The pixels at the sides of the canvas that something lies over. */
   covered?: () => Sides;
   /** Called as files arrive, and with the fault of a file. */
@@ -76,6 +78,8 @@ export class SpaceView {
   private readonly cut = new Plane(new Vector3(0, 0, -1), SKY);
   private readonly bottom = new Plane(new Vector3(0, 0, 1), SKY);
   readonly storeys;
+  /** The storey that is shown; null for all of them. */
+  storey: number | null;
   private readonly slabs = new Map<number | null, Slab>();
   private readonly marks = new Marks();
   private readonly labels: Labels;
@@ -112,6 +116,7 @@ export class SpaceView {
     this.surface = new Surface(this.paint);
     this.scene.add(this.surface.group, this.lines, this.marked);
     this.storeys = storeysOf(index, mesh.area);
+    this.storey = options.storey === undefined ? fullest(this.storeys.all) : options.storey;
     this.eye = new Eye(this.canvas, mesh, () => this.changed());
     this.canvas.setAttribute("aria-label", `Area ${mesh.area} in 3D; arrow keys turn, plus and minus zoom`);
     this.labels = new Labels(index, mesh, this.overlay);
@@ -285,7 +290,8 @@ export class SpaceView {
     this.look.section = high;
   }
 
-  private fromAbove(): Stand {
+  /** A viewpoint from above that sees all of what is shown. */
+  fromAbove(): Stand {
     return this.eye.overview(this.surface.sample(slabIn(this.look)), this.options.turns);
   }
 
@@ -307,9 +313,21 @@ export class SpaceView {
 
   /** Shows a storey, or all of them, from above. */
   showStorey(storey: number | null): void {
-    this.cutTo(this.slabOf(storey));
+    this.openStorey(storey);
+    this.eye.touched = false;
     this.eye.fly(this.fromAbove());
     this.changed();
+  }
+
+  /** Flies to where all of what is shown is seen. */
+  lookFromAbove(): void {
+    this.eye.fly(this.fromAbove());
+  }
+
+  /** Cuts the area to a storey, or to all of them. */
+  openStorey(storey: number | null): void {
+    this.storey = storey;
+    this.cutTo(this.slabOf(storey));
   }
 
   /** Goes to the middle of some faces. Stays if none of them is shown. */
@@ -354,9 +372,12 @@ export class SpaceView {
   private start(): void {
     this.resize();
     const { at, from, place } = this.look;
-    if (this.look.section === null) this.cutTo(this.firstSlab());
-    if (at && from) this.eye.set({ at, from });
-    else if (at) this.visit(at, 0.5, false);
+    if (this.options.storey !== undefined) this.openStorey(this.options.storey);
+    else if (this.look.section === null) this.cutTo(this.firstSlab());
+    if (at && from) {
+      this.eye.set({ at, from });
+      this.eye.touched = true;
+    } else if (at) this.visit(at, 0.5, false);
     else if (!this.findChange() && !this.findInstance()) {
       this.eye.set(this.fromAbove());
       if (this.options.turns && !window.matchMedia("(prefers-reduced-motion: reduce)").matches)
@@ -402,6 +423,7 @@ export class SpaceView {
       if (!hit || this.measuring) return;
       const { from } = this.eye.stand;
       const back = from.map((c, axis) => c + 0.5 * ((hit.point[axis] ?? 0) - c)) as Rgb;
+      this.eye.touched = true;
       this.eye.fly({ at: hit.point, from: back });
     });
     canvas.addEventListener("keydown", (event) => {

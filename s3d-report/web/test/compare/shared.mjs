@@ -62,7 +62,7 @@ export function samples(own, size, count) {
   return Object.values(found).flatMap(some);
 }
 
-export const words = (name) => (isNone(name) ? "no label" : `${name.split("_")[0]} · ${name}`);
+export const words = (name) => (isNone(name) ? "unlabelled" : `${name.split("_")[0]} · ${name}`);
 
 export const colorsAt = (png, [x, y]) =>
   Array.from(png.data.subarray(4 * (y * png.width + x), 4 * (y * png.width + x) + 3));

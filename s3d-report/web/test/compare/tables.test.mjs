@@ -55,7 +55,9 @@ test("the matrix has what both data sets' meshes and images have", async () => {
     .evaluateAll((all) => all.map((a) => a.getAttribute("aria-label")));
   const shown = cells.map((words) => {
     const found =
-      /^(\S+?)(?:, another instance| is (\S+)): ([\d,]+) faces, ([\d.]+) m², ([\d,]+) pixels/.exec(words);
+      /^(\S+?)(?:, another instance| in A, (\S+) in B): ([\d,]+) faces?, ([\d.]+) m², ([\d,]+) pixels?/.exec(
+        words,
+      );
     assert.ok(found, words);
     const [, a, b, faces, m2, pixels] = found;
     const number = (text) => Number(text.replaceAll(",", ""));
@@ -92,11 +94,11 @@ test("instances with another number are one line, and each change is told", asyn
   const faces = ofFaces[0].filter((a, face) => a !== ofFaces[1][face]).length - moved;
   assert.ok(renumbered.length > 5 && faces > 400, `${renumbered.length} ${faces} ${moved}`);
   const line = page.locator(".renamed summary");
-  const words = `${renumbered.length} instances have only another number, which is no change: `;
+  const words = `${renumbered.length} instances renumbered, otherwise the same: `;
   assert.ok((await line.textContent()).startsWith(`${words}${grouped(faces)} faces, `));
   await line.click();
   const listed = await page.locator(".renamed li").allTextContents();
-  assert.deepEqual(listed.sort(), renumbered.map(([a, b]) => `${a} is ${b}`).sort());
+  assert.deepEqual(listed.sort(), renumbered.map(([a, b]) => `${a} in A, ${b} in B`).sort());
 
   const rows = page.locator("section", { hasText: "Instances that changed" }).locator("tbody tr");
   const cells = await rows.evaluateAll((all) =>
@@ -130,12 +132,12 @@ test("a cell of the matrix leads to the images that show the change, and back", 
   const { page, faults, close } = await open(browser, report, "#/compare");
   const all = await page.locator(".card").count();
   const cell = page.locator(".matrix td:not(.same) a").first();
-  assert.match(await cell.getAttribute("aria-label"), /^chair is table: /);
+  assert.match(await cell.getAttribute("aria-label"), /^chair in A, table in B: /);
   await cell.click();
   await page.waitForFunction(() => location.hash === "#/compare?was=chair&is=table");
   await ready(page);
   const list = page.locator("section", { has: page.locator(".grid") });
-  await list.getByRole("heading", { name: "Images that differ: chair is table" }).waitFor();
+  await list.getByRole("heading", { name: "Images that differ: chair in A, table in B" }).waitFor();
   const box = await list.boundingBox();
   assert.ok(box.y >= -1 && box.y < 450, `the list is at ${box.y}`);
   assert.ok(await list.evaluate((section) => document.activeElement === section));
@@ -161,7 +163,7 @@ test("a cell of the matrix leads to the images that show the change, and back", 
   );
   const sum = pixels.reduce((a, b) => a + b, 0);
   assert.equal(sum, pixelPairs.get("chair table"));
-  assert.ok((await list.textContent()).includes(`${grouped(sum)} pixels with this change`));
+  assert.ok((await list.textContent()).includes(`with this change, in ${grouped(sum)} pixels`));
   // From one of these images to the next, and back.
   await list.locator(".card a").first().click();
   await page.waitForSelector(".viewer canvas");
@@ -173,13 +175,16 @@ test("a cell of the matrix leads to the images that show the change, and back", 
     assert.equal((await queryOf(page)).is, "table");
   }
   assert.equal(await page.getByLabel("Image that differs less").count(), 0);
-  await page.getByRole("link", { name: "Images: chair is table" }).click();
+  await page.getByRole("link", { name: "Images: chair in A, table in B" }).click();
   await list.getByRole("link", { name: "All images that differ" }).click();
   await page.getByRole("heading", { name: "Images that differ", exact: true }).waitFor();
   assert.equal(await page.evaluate(() => location.hash), "#/compare");
   assert.equal(await page.locator(".card").count(), all);
   await go(page, "#/compare?was=sofa&is=<script>");
-  assert.match(await page.locator("main").textContent(), /sofa is <script>No image shows this change/);
+  assert.match(
+    await page.locator("main").textContent(),
+    /sofa in A, <script> in BNo image shows this change/,
+  );
   assert.deepEqual(faults, []);
   await close();
 });
@@ -218,21 +223,22 @@ test("in 3D and on the plan, what changed is where it changed", async () => {
   const entries = await list.locator("option").allTextContents();
   const pairs = new Map();
   for (const face of changedFaces) {
-    const pair = ofFaces.map((labels) => labels[face]).join(" is ");
+    const pair = `${ofFaces.map((labels) => labels[face]).join(" in A, ")} in B`;
     pairs.set(pair, (pairs.get(pair) ?? 0) + 1);
   }
-  const wanted = [...pairs].map(([pair, n]) => `${pair} · ${n} faces`);
+  const wanted = [...pairs].map(([pair, n]) => `${pair} · ${n} face${n === 1 ? "" : "s"}`);
   assert.deepEqual(entries.slice(1).sort(), wanted.sort());
-  assert.equal(entries[1], `${a} is ${b} · ${pairs.get(`${a} is ${b}`)} faces`);
+  assert.equal(entries[1], `${a} in A, ${b} in B · ${pairs.get(`${a} in A, ${b} in B`)} faces`);
   const next = entries.findIndex((entry) => entry.startsWith("sofa_"));
   await list.selectOption({ index: next });
   await page.waitForTimeout(1200);
   const second = (await middle()).told;
-  const pair = ofFaces.map((labels) => labels[second.face]).join(" is ");
+  const pair = `${ofFaces.map((labels) => labels[second.face]).join(" in A, ")} in B`;
   assert.ok(entries[next].startsWith(`${pair} `), `${entries[next]}, and it is ${pair}`);
 
   await go(page, "#/plan");
-  const label = ({ was, is, faces }) => `Changed: ${was} is ${is}: ${grouped(faces)} faces, `;
+  const label = ({ was, is, faces }) =>
+    `Changed: ${was} in A, ${is} in B: ${grouped(faces)} face${faces === 1 ? "" : "s"}, `;
   const marks = await page
     .locator(".plan a:has(.change)")
     .evaluateAll((all) => all.map((mark) => mark.getAttribute("aria-label").replace(/[\d.]+ m²$/, "")));
@@ -240,7 +246,7 @@ test("in 3D and on the plan, what changed is where it changed", async () => {
   const ofClass = patches.filter(({ was, is }) => classOf(was) !== classOf(is));
   assert.equal(await page.locator(".plan a:has(.change.class)").count(), ofClass.length);
   const mark = page.locator(".plan a:has(.change.class)").last();
-  assert.ok((await mark.getAttribute("aria-label")).startsWith(`Changed: ${a} is ${b}: `));
+  assert.ok((await mark.getAttribute("aria-label")).startsWith(`Changed: ${a} in A, ${b} in B: `));
   await mark.focus();
   await page.keyboard.press("Enter");
   await page.waitForSelector("[data-loaded=all]");
@@ -266,7 +272,7 @@ test("faces without a label in A are marked on the plan, too", async () => {
       const name = compare.labels[1].name;
       assert.equal(
         await mark.getAttribute("aria-label"),
-        `Changed: no label is ${name}: 1,234 faces, 0.500 m²`,
+        `Changed: unlabelled in A, ${name} in B: 1,234 faces, 0.500 m²`,
       );
       const circle = page.locator(".plan .stand").first();
       const [at, stand] = [await mark.boundingBox(), await circle.boundingBox()];
@@ -392,7 +398,7 @@ test("at 390 pixels all of it can be read", async () => {
   }
   const box = await page.locator(".viewer canvas").boundingBox();
   await tap(page, box.x + 0.3 * box.width, box.y + 0.6 * box.height);
-  assert.match((await readout(page)).A, /·|no label|nothing/);
+  assert.match((await readout(page)).A, /·|unlabelled|nothing/);
   assert.deepEqual(faults, []);
   await close();
 });
