@@ -6,3 +6,4 @@ mod common;
 mod against;
 mod contract;
 mod meshes;
+mod poster;
