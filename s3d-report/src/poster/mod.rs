@@ -60,8 +60,8 @@ const MOST_BACKS: u32 = 64;
 /// that are damaged, become warnings.
 ///
 /// # Errors
-/// [`Error::NoMesh`] if no area has a mesh, or none has one yet. [`Error::Dataset`] if there is no data set in `out`, the mesh is
-/// damaged, `to` cannot be written, or is there and not to be replaced.
+/// [`Error::NoMesh`] if no area has a mesh, or none has one yet. [`Error::Dataset`] if there is no data set
+/// in `out`, the mesh is damaged, `to` cannot be written, or is there and not to be replaced.
 pub fn poster(out: &Path, to: &Path, overwrite: bool, ctx: &Context) -> Result<()> {
     check_apart(to, out)?;
     let data = DataSet::open_as_far_as_it_is(out, ctx)?;
