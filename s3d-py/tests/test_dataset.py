@@ -242,8 +242,16 @@ def test_whole_data_sets_are_checked_compared_and_scored(ds: s3d.DataSet, tmp_pa
 
 
 def test_a_page_and_packages_are_made(ds: s3d.DataSet, tmp_path: Path) -> None:
-    page = ds.report(tmp_path / "page", pano_width=64, thumbs=32, mesh_faces=2000)
+    poster = tmp_path / "poster.png"
+    page = ds.report(tmp_path / "page", poster=poster, pano_width=64, thumbs=32, mesh_faces=2000)
     assert page.name == "index.html" and page.exists()
+    # A PNG tells its width and height in its first chunk.
+    png = poster.read_bytes()
+    size = int.from_bytes(png[16:20], "big"), int.from_bytes(png[20:24], "big")
+    assert png[1:4] == b"PNG" and size == (1600, 1000)
+    with pytest.raises(s3d.UsageError):
+        ds.report(tmp_path / "other", poster=poster)
+    assert not (tmp_path / "other").exists()
     package = ds.pack("coco", tmp_path / "coco", images="views", stuff=[])
     assert package == tmp_path / "coco" and (package / "pack.json").exists()
     with pytest.raises(s3d.UsageError):

@@ -26,12 +26,15 @@ pub enum Error {
     #[error("{}: these scores are of another data set: its list of files differs", .0.display())]
     OtherDataSet(PathBuf),
     /// A poster shows a mesh, and the data set has none.
-    #[error("{}: area {area} has no mesh to make a poster of", .root.display())]
+    #[error(
+        "{}: there is no mesh to make a poster of{}",
+        .root.display(), if *.is_finished { "" } else { " yet: the export did not finish" }
+    )]
     NoMesh {
         /// The folder of the data set.
         root: PathBuf,
-        /// The number of the area.
-        area: u32,
+        /// Whether the export finished.
+        is_finished: bool,
     },
     /// The report is too large for a single file.
     #[error(

@@ -7,3 +7,4 @@ mod against;
 mod contract;
 mod ground;
 mod meshes;
+mod poster;

@@ -654,6 +654,7 @@ class DataSet(Sequence[View]):
         *,
         against: DataSet | PathLike | None = None,
         scores: Sequence[PathLike] = (),
+        poster: PathLike | None = None,
         single: bool = False,
         verify: bool = False,
         overwrite: bool = False,
@@ -668,6 +669,8 @@ class DataSet(Sequence[View]):
         - `to`: the folder of the report, or its file if it is `single`; beside the data set by default.
         - `against`: another data set, shown beside this one where both differ.
         - `scores`: files that `s3d eval --json` wrote, or `json.dump(evaluation.data, …)`.
+        - `poster`: a file for a picture of the building from above, half in colours and half in classes: a PNG
+          of 1600 × 1000 pixels.
         - `pano_width`, `thumbs`: width of panoramas and of views in the report, in pixels.
         - `mesh_faces`: a mesh with more faces is simplified.
         - `verify`: verify the data set as well, and show the result.
@@ -680,6 +683,7 @@ class DataSet(Sequence[View]):
             single=single,
             scores=[Path(path) for path in scores],
             overwrite=overwrite,
+            poster=_path(poster),
         )
         return _native.report(
             self.root, _path(to), None if against is None else root_of(against), how, threads, sink(progress)

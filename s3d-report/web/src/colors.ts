@@ -1,11 +1,12 @@
 // Colours for values without a colour of their own: distances, classes, instances.
 
 import type { Index, Rgb } from "./data.js";
+import rules from "./palette.json" with { type: "json" };
 
 /** Where nothing was seen. */
-export const MISSING: Rgb = [0, 0, 0];
+export const MISSING = rules.missing as Rgb;
 /** Surface without a label, in images of classes and instances. */
-export const NULL_LABEL: Rgb = [128, 128, 128];
+export const NULL_LABEL = rules.unlabelled as Rgb;
 /** A label of another class in the other data set, and another instance of the same class there. */
 export const OTHER_CLASS: Rgb = [255, 0, 255];
 export const OTHER_INSTANCE: Rgb = [255, 190, 40];

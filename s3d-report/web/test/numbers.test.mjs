@@ -223,3 +223,23 @@ test("a bar of a histogram leads to its views", async () => {
   assert.deepEqual(faults, []);
   await close();
 });
+
+test("text has the page's own font, and its figures are equally wide", async () => {
+  const { page, faults, close } = await open(browser, report, "#/numbers");
+  const loaded = await page.evaluate(async () => {
+    await document.fonts.ready;
+    return [...document.fonts].filter(({ status }) => status === "loaded").map(({ family }) => family);
+  });
+  assert.ok(
+    loaded.some((family) => family.includes("IBM Plex Sans")),
+    `${loaded}`,
+  );
+  const widths = await page.evaluate(() => {
+    const measure = document.createElement("canvas").getContext("2d");
+    measure.font = getComputedStyle(document.body).font;
+    return [..."0123456789"].map((figure) => measure.measureText(figure.repeat(10)).width);
+  });
+  assert.ok(Math.max(...widths) - Math.min(...widths) < 0.01, `${widths}`);
+  assert.deepEqual(faults, []);
+  await close();
+});

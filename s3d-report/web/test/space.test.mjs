@@ -558,7 +558,9 @@ test("in 3D names are text, a simplified mesh says so, and what cannot be shown 
     await go(page, "#/notes");
     await page.getByText("Licences").click();
     const licences = await page.locator("pre").allTextContents();
-    assert.ok(licences.length === 2 && licences.every((licence) => /MIT License/.test(licence)));
+    assert.equal(licences.length, 3);
+    assert.ok(licences.slice(0, 2).every((licence) => /MIT License/.test(licence)));
+    assert.match(licences[2], /IBM Corp[^]*SIL OPEN FONT LICENSE Version 1\.1/);
     await page.evaluate(() => (HTMLCanvasElement.prototype.getContext = () => null));
     await go(page, `#/space/${area}`);
     assert.match(await page.locator("[role=alert]").textContent(), /no WebGL 2/);

@@ -199,10 +199,10 @@ function disputes(index: Index): HTMLElement | null {
 }
 
 function licences(): HTMLElement {
-  const others = LICENCES.map(({ name, version }) => `${name} ${version}`).join(" and ");
+  const others = LICENCES.map(({ name, version }) => `${name} ${version}`);
   const words =
     "This page is part of s3d, which is under the MIT licence or the Apache licence 2.0, as you choose. " +
-    `It contains ${others}, under these terms:`;
+    `It contains ${others.slice(0, -1).join(", ")} and ${others.at(-1)}, under these terms:`;
   const details = h("details", {}, h("summary", {}, "Licences"), h("p", {}, words));
   for (const { name, text } of LICENCES) append(details, [h("h3", {}, name), h("pre", {}, text)]);
   return details;

@@ -1,6 +1,7 @@
 // The page's colours of classes, as people with any kind of colour vision see them. Without a browser.
 
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { bundled } from "../lib/bundled.mjs";
 
@@ -98,4 +99,10 @@ test("given colours stay, and the others keep away from them", () => {
   const all = paletteOf(names, given);
   assert.deepEqual(all.slice(0, 2), given);
   assert.ok(Math.min(...Object.values(leastOf(all))) > 20);
+});
+
+test("colours are those that the poster has", () => {
+  const golden = JSON.parse(readFileSync(new URL("../../../tests/palette.json", import.meta.url), "utf8"));
+  assert.ok(golden.length >= 4);
+  for (const { names, colors } of golden) assert.deepEqual(paletteOf(names), colors, `${names}`);
 });

@@ -1,15 +1,18 @@
 //! A picture of a data set: its mesh from above, opened below the ceilings, in colours and in classes.
 
-use crate::areas::rooms;
+mod palette;
+
+use crate::areas::{classes, rooms};
 use crate::error::{Error, Result};
-use crate::faults::Faults;
+use crate::faults::{Fault, Faults};
+use palette::{palette_of, unlabelled};
 use rayon::prelude::*;
 use s3d_dataset::store::{NewFile, check_apart};
 use s3d_dataset::{Context, DataSet};
 use s3d_geom::glam::{DVec2, DVec3, dvec2, dvec3};
 use s3d_geom::{Camera, Pose, Raster, TriMesh};
 use s3d_io::image::{Compression, Content, write_rgb8};
-use s3d_label::{LabelId, LabelTable};
+use s3d_label::LabelId;
 use s3d_render::{MipMaps, Scene, TextureFilter, cast_ray, rgb_of_ray};
 use std::path::Path;
 
@@ -25,8 +28,8 @@ const FOV_DEG: f64 = 38.0;
 /// The direction from the middle of the building to the camera.
 const BACK: DVec3 = dvec3(0.3, -0.62, 0.9);
 
-/// The background, and the line between colours and classes.
-const GROUND: [f32; 3] = [58.0, 58.0, 63.0];
+/// The background, which is the overview's in the dark, and the line between colours and classes.
+const GROUND: [f32; 3] = [60.0, 60.0, 66.0];
 const LINE: [f32; 3] = [255.0; 3];
 const LINE_PX: u32 = 3;
 
@@ -34,9 +37,6 @@ const LINE_PX: u32 = 3;
 /// weights of red, green and blue in it.
 const DETAIL: f32 = 0.35;
 const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
-
-/// The colour of faces without a label.
-const NO_CLASS: [u8; 3] = [120; 3];
 
 /// The floors of a storey lie within this height, metres.
 const STOREY_M: f64 = 1.8;
@@ -53,42 +53,74 @@ const MOST_BACKS: u32 = 64;
 
 /// Draws a picture of the data set in the folder `out`, and writes it to `to`, a PNG of 1600 × 1000 pixels,
 /// whole or not at all. It shows the mesh of the first area obliquely from above, with the storey of most
-/// rooms opened below its ceilings: colours on the left, classes on the right. Without labels it has colours
-/// alone. Faces are seen from the front only.
+/// rooms opened below its ceilings: colours on the left, classes on the right, in the colours of the page.
+/// Without labels it has colours alone. Faces are seen from the front only.
+///
+/// If an export did not finish, the first area that has a mesh so far is shown. Areas before it, and files
+/// that are damaged, become warnings.
 ///
 /// # Errors
-/// [`Error::NoMesh`] if the first area has no mesh. [`Error::Dataset`] if there is no data set in `out`, a
-/// file that it needs is damaged, `to` cannot be written, or is there and not to be replaced.
+/// [`Error::NoMesh`] if no area has a mesh, or none has one yet. [`Error::Dataset`] if there is no data set
+/// in `out`, the mesh is damaged, `to` cannot be written, or is there and not to be replaced.
 pub fn poster(out: &Path, to: &Path, overwrite: bool, ctx: &Context) -> Result<()> {
     check_apart(to, out)?;
-    let data = DataSet::open(out)?;
-    let area = data.areas().first().copied().unwrap_or_default();
+    let data = DataSet::open_as_far_as_it_is(out, ctx)?;
     let file = NewFile::begin(ctx, to, overwrite)?;
-    let Some(mesh_file) = data.mesh(area)? else { return Err(Error::NoMesh { root: out.to_owned(), area }) };
-    let table = data.labels()?;
-    let classes = match (&table, data.face_votes(area)?) {
-        (Some(table), Some(votes)) => Some(class_colors(&data, table, &votes.label)),
-        _ => None,
+    let Some((area, mesh)) = first_mesh(&data)? else {
+        return Err(Error::NoMesh { root: out.to_owned(), is_finished: data.missing_yet().is_none() });
     };
 
-    let mesh = &mesh_file.mesh;
-    let floors: Vec<f64> = rooms(&data, &mut Faults::default())?
+    let mut faults = Faults::default();
+    let classes = class_colors(&data, area, &mut faults)?;
+    let floors: Vec<f64> = rooms(&data, &mut faults)?
         .iter()
         .filter(|room| room.area == area)
         .filter_map(|room| room.floor)
         .collect();
-    let picture = draw(mesh, classes.as_deref(), section(mesh, &floors));
+    let picture = draw(&mesh, classes.as_deref(), section(&mesh, &floors));
     write_rgb8(file.path(), &picture, Content::Photo, Compression::default())?;
-    Ok(file.finish()?)
+    file.finish()?;
+
+    for without in data.areas().iter().take_while(|each| **each != area) {
+        let words = "has no mesh yet: the poster shows another area";
+        ctx.warn(format_args!("{}: area {without} {words}", out.display()));
+    }
+    for Fault { path, message } in faults.into_vec() {
+        ctx.warn(format_args!("{}: {message}", out.join(path).display()));
+    }
+    Ok(())
 }
 
-/// Returns the colour of each face's class.
-fn class_colors(data: &DataSet, table: &LabelTable, labels: &[u32]) -> Vec<[u8; 3]> {
+/// Returns the first area that has a mesh, and the mesh. An export that did not finish may lack some.
+fn first_mesh(data: &DataSet) -> Result<Option<(u32, TriMesh)>> {
+    for &area in data.areas() {
+        if let Some(file) = data.mesh(area)? {
+            return Ok(Some((area, file.mesh)));
+        }
+    }
+    Ok(None)
+}
+
+/// Returns the colour of each face's class. `None` without labels.
+fn class_colors(data: &DataSet, area: u32, faults: &mut Faults) -> Result<Option<Vec<[u8; 3]>>> {
+    let root = data.layout().root();
+    let table = faults.keep(root, data.labels())?.flatten();
+    let votes = faults.keep(root, data.face_votes(area))?.flatten();
+    let (Some(table), Some(votes)) = (table, votes) else { return Ok(None) };
+
+    let names: Vec<&str> = classes(data).iter().map(|class| class.name).collect();
+    let palette = palette_of(&names);
     let color = |label: &u32| {
         let class = table.class_of(LabelId(*label))?;
-        Some(data.taxonomy()?.color(class))
+        palette.get(class.index()).copied()
     };
-    labels.iter().map(|label| color(label).unwrap_or(NO_CLASS)).collect()
+    Ok(Some(
+        votes
+            .label
+            .iter()
+            .map(|label| color(label).unwrap_or_else(unlabelled))
+            .collect(),
+    ))
 }
 
 /// Returns the height below which a mesh is shown: just below the ceilings of the storey with the most
@@ -188,7 +220,7 @@ fn draw(mesh: &TriMesh, classes: Option<&[[u8; 3]]>, section: f64) -> Raster<[u8
         let seen = rgb_of_ray(&scene, &textures, &camera, direction, face, &filter).map(f32::from);
         let Some(classes) = classes.filter(|_| x / SAMPLES >= middle) else { return seen };
 
-        let class = classes.get(face as usize).copied().unwrap_or(NO_CLASS);
+        let class = classes.get(face as usize).copied().unwrap_or_else(unlabelled);
         let facing = mesh.normal(face).as_dvec3().dot(direction.normalize()).abs() as f32;
         let gray = LUMA
             .iter()
