@@ -191,15 +191,10 @@ pub(crate) fn report(
     sink: Py<PyAny>,
 ) -> PyResult<PathBuf> {
     let Reported { pano_width, thumbs, mesh_faces, verify, single, scores, overwrite, poster } = how;
-    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, scores, overwrite };
+    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, scores, poster, overwrite };
     let made = watched(py, threads, &sink, |ctx| {
         let ending = if single { "_report.html" } else { "_report" };
         let to = to.map_or_else(|| s3d_dataset::store::beside(&root, ending), Ok)?;
-        // What cannot be drawn is told before the report is made.
-        let drawn = poster.map(|file| s3d_report::poster(&root, &file, overwrite, ctx));
-        if let Some(Err(error)) = drawn {
-            return Ok(Err(error));
-        }
         let made = match against {
             Some(other) => s3d_report::report_against(&root, &other, &to, &options, ctx),
             None => s3d_report::report(&root, &to, &options, ctx),

@@ -36,6 +36,9 @@ pub enum Error {
         /// Whether the export finished.
         is_finished: bool,
     },
+    /// The place of the poster lies in the report, which is written as a whole.
+    #[error("{}: the poster lies in the report's own place: choose another one", .0.display())]
+    PosterInReport(PathBuf),
     /// The report is too large for a single file.
     #[error(
         "one file of more than {} MB would open slowly or not at all: make a folder, or smaller images",

@@ -7,6 +7,7 @@ use crate::faults::{Fault, Faults};
 use crate::first::First;
 use crate::index::{FORM, Index, Verified, folder_name};
 use crate::pixels::Widths;
+use crate::poster;
 use crate::scores::Scores;
 use crate::script::{MOST_BYTES, Scripts};
 use s3d_dataset::store::{FolderKind, NewFile, NewFolder, check_apart};
@@ -61,7 +62,9 @@ pub struct ReportOptions {
     pub single: bool,
     /// Results of predictions on the data set to show: files that `s3d eval --json` wrote.
     pub scores: Vec<PathBuf>,
-    /// Whether to replace an earlier report.
+    /// A file for the picture that [`poster`](crate::poster()) draws. It appears together with the report.
+    pub poster: Option<PathBuf>,
+    /// Whether to replace an earlier report, and an earlier poster.
     pub overwrite: bool,
 }
 
@@ -74,6 +77,7 @@ impl Default for ReportOptions {
             verify: false,
             single: false,
             scores: Vec::new(),
+            poster: None,
             overwrite: false,
         }
     }
@@ -172,7 +176,20 @@ fn write(
     let data = DataSet::open_as_far_as_it_is(out, ctx)?;
     let scores = options.scores.iter().map(|path| Scores::read(path, &data));
     let scores = scores.collect::<Result<Vec<_>>>()?;
+    if let Some(poster) = &options.poster {
+        check_apart(poster, out)?;
+        check_apart(poster, to).map_err(|_| Error::PosterInReport(poster.clone()))?;
+    }
     let destination = Destination::begin(ctx, to, out, options)?;
+
+    // What cannot be drawn is told before the report is made.
+    let poster = options.poster.as_ref().map(|place| {
+        let file = NewFile::begin(ctx, place, options.overwrite || destination.was_placing())?;
+        poster::draw(&data, file.path(), ctx)?;
+        Ok::<_, Error>(file)
+    });
+    let poster = poster.transpose()?;
+
     let scripts = match &destination {
         Destination::Folder(folder) => {
             create_dir(&folder.path().join("data"))?;
@@ -187,6 +204,11 @@ fn write(
     };
     let Data { index, panoramas, views, mut bytes } = written;
     let page = destination.page();
+    if let Some(poster) = poster {
+        // After a kill in between, the same call goes on.
+        destination.begin_placing()?;
+        poster.finish()?;
+    }
     bytes += destination.finish(scripts)?;
 
     for sentence in data.missing_yet().into_iter().flatten() {
@@ -267,6 +289,20 @@ impl Destination {
         match to.symlink_metadata() {
             Ok(_) if !is_report() => Err(Error::Occupied(to.to_owned())),
             _ => Ok(Self::File { place: to.to_owned(), file: NewFile::begin(ctx, to, options.overwrite)? }),
+        }
+    }
+
+    fn was_placing(&self) -> bool {
+        match self {
+            Self::Folder(folder) => folder.was_placing(),
+            Self::File { file, .. } => file.was_placing(),
+        }
+    }
+
+    fn begin_placing(&self) -> s3d_dataset::Result<()> {
+        match self {
+            Self::Folder(folder) => folder.begin_placing(),
+            Self::File { file, .. } => file.begin_placing(),
         }
     }
 

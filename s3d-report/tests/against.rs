@@ -23,6 +23,7 @@ const SMALL: ReportOptions = ReportOptions {
     verify: false,
     single: false,
     scores: Vec::new(),
+    poster: None,
     overwrite: false,
 };
 

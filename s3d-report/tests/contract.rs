@@ -23,6 +23,7 @@ const SMALL: ReportOptions = ReportOptions {
     verify: false,
     single: false,
     scores: Vec::new(),
+    poster: None,
     overwrite: false,
 };
 
@@ -398,7 +399,7 @@ fn one_file_has_all_of_it() {
     let page = fs::read_to_string(&file).unwrap();
     assert_eq!((&report_of_one.page, report_of_one.bytes), (&file, page.len() as u64));
     // The page has the same values, ahead of the program that reads them.
-    let (before, program) = page.split_once("</head>").unwrap();
+    let (before, program) = page.rsplit_once("<script>").unwrap();
     assert!(program.contains("s3dReport"));
     let mut found = 0;
     for element in before.split("<script type=\"application/json\" data-key=\"").skip(1) {

@@ -7,7 +7,7 @@ use s3d_dataset::event::UnitKind;
 use s3d_dataset::{Cancel, Context, DataSet, Event};
 use s3d_geom::Raster;
 use s3d_io::image::decode_rgb8;
-use s3d_report::{Error, poster};
+use s3d_report::{Error, ReportOptions, poster, report};
 use serde::Deserialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -119,4 +119,39 @@ fn an_export_that_did_not_finish_has_a_poster_once_there_is_a_mesh() {
     let error = poster(&out, &to, false, &Context::default()).unwrap_err();
     assert!(matches!(error, Error::NoMesh { is_finished: false, .. }), "{error}");
     assert!(error.to_string().ends_with("yet: the export did not finish") && !to.exists(), "{error}");
+}
+
+#[test]
+fn a_poster_appears_with_its_report_or_not_at_all() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = data_set(dir.path(), false);
+    let [to, place] = ["report", "poster.png"].map(|name| dir.path().join(name));
+    let options =
+        ReportOptions { pano_width: 32, thumbs: 16, poster: Some(place.clone()), ..ReportOptions::default() };
+
+    // The report ends early.
+    let cancel = Cancel::default();
+    let theirs = cancel.clone();
+    let cancelled = Context::default()
+        .cancelled_by(cancel)
+        .observed_by(move |event: &Event<'_>| {
+            if matches!(event, Event::TaskAdvanced { .. }) {
+                theirs.cancel();
+            }
+        });
+    let error = report(&out, &to, &options, &cancelled).unwrap_err();
+    assert!(matches!(error, Error::Dataset(s3d_dataset::Error::Cancelled)), "{error}");
+    assert!(!to.exists() && !place.exists());
+
+    report(&out, &to, &options, &Context::default()).unwrap();
+    let made = fs::read(&place).unwrap();
+    let alone = dir.path().join("alone.png");
+    poster(&out, &alone, false, &Context::default()).unwrap();
+    assert_eq!(made, fs::read(&alone).unwrap());
+
+    // In the report it would go with an earlier report.
+    let within = ReportOptions { poster: Some(to.join("poster.png")), overwrite: true, ..options };
+    let error = report(&out, &to, &within, &Context::default()).unwrap_err();
+    assert!(matches!(error, Error::PosterInReport(_)), "{error}");
+    assert!(to.join("index.html").exists());
 }

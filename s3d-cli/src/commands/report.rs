@@ -65,17 +65,12 @@ pub(crate) fn run(args: ReportArgs) -> Outcome<()> {
         overwrite,
         threads,
     } = args;
-    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, scores, overwrite };
+    let options = ReportOptions { pano_width, thumbs, mesh_faces, verify, single, scores, poster, overwrite };
     let made = on_threads(threads, |context| {
         let to = output.map_or_else(
             || s3d_dataset::store::beside(&dataset, if single { "_report.html" } else { "_report" }),
             Ok,
         )?;
-        // What cannot be drawn is told before the report is made.
-        let drawn = poster.map(|file| s3d_report::poster(&dataset, &file, overwrite, context));
-        if let Some(Err(error)) = drawn {
-            return Ok(Err(error));
-        }
         Ok(match against {
             Some(other) => s3d_report::report_against(&dataset, &other, &to, &options, context),
             None => s3d_report::report(&dataset, &to, &options, context),

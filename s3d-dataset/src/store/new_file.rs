@@ -55,6 +55,20 @@ impl NewFile {
         &self.path
     }
 
+    /// Returns whether a process was killed while it moved the same file into place. Then what it had moved
+    /// before may be replaced.
+    pub fn was_placing(&self) -> bool {
+        self.staging.was_placing()
+    }
+
+    /// Records that things are being moved into place, of which this file is the last.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn begin_placing(&self) -> Result<()> {
+        self.staging.begin_placing()
+    }
+
     /// Moves the file to its place, over an earlier one.
     ///
     /// # Errors

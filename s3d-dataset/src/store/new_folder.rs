@@ -106,6 +106,20 @@ impl NewFolder {
         &self.place
     }
 
+    /// Returns whether a process was killed while it moved the same folder into place. Then what it had moved
+    /// before may be replaced.
+    pub fn was_placing(&self) -> bool {
+        self.staging.was_placing()
+    }
+
+    /// Records that things are being moved into place, of which this folder is the last.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn begin_placing(&self) -> Result<()> {
+        self.staging.begin_placing()
+    }
+
     /// Moves the folder to its place, over an earlier one. It must hold [`FolderKind::about`] by now.
     ///
     /// # Errors

@@ -155,7 +155,7 @@ impl Staging {
 
     /// Records that the new thing is being moved into place. The file is empty, so it either exists or does
     /// not; a temporary file beside it would stay after a kill.
-    fn begin_placing(&self) -> Result<()> {
+    pub(crate) fn begin_placing(&self) -> Result<()> {
         let path = placing_in(&self.folder);
         fs::File::create(&path).map_err(|e| FileError::io(&path, "write", e))?;
         Ok(())

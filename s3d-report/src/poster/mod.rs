@@ -66,20 +66,27 @@ pub fn poster(out: &Path, to: &Path, overwrite: bool, ctx: &Context) -> Result<(
     check_apart(to, out)?;
     let data = DataSet::open_as_far_as_it_is(out, ctx)?;
     let file = NewFile::begin(ctx, to, overwrite)?;
-    let Some((area, mesh)) = first_mesh(&data)? else {
+    draw(&data, file.path(), ctx)?;
+    file.finish()?;
+    Ok(())
+}
+
+/// Draws the picture of a data set and writes it to `to`.
+pub(crate) fn draw(data: &DataSet, to: &Path, ctx: &Context) -> Result<()> {
+    let out = data.layout().root();
+    let Some((area, mesh)) = first_mesh(data)? else {
         return Err(Error::NoMesh { root: out.to_owned(), is_finished: data.missing_yet().is_none() });
     };
 
     let mut faults = Faults::default();
-    let classes = class_colors(&data, area, &mut faults)?;
-    let floors: Vec<f64> = rooms(&data, &mut faults)?
+    let classes = class_colors(data, area, &mut faults)?;
+    let floors: Vec<f64> = rooms(data, &mut faults)?
         .iter()
         .filter(|room| room.area == area)
         .filter_map(|room| room.floor)
         .collect();
-    let picture = draw(&mesh, classes.as_deref(), section(&mesh, &floors));
-    write_rgb8(file.path(), &picture, Content::Photo, Compression::default())?;
-    file.finish()?;
+    let picture = picture(&mesh, classes.as_deref(), section(&mesh, &floors));
+    write_rgb8(to, &picture, Content::Photo, Compression::default())?;
 
     for without in data.areas().iter().take_while(|each| **each != area) {
         let words = "has no mesh yet: the poster shows another area";
@@ -206,7 +213,7 @@ fn camera_of(mesh: &TriMesh, section: f64) -> Camera {
 
 /// Draws a mesh below the height `section`: its colours, and on the right half the colours `classes` of its
 /// faces, if there are some.
-fn draw(mesh: &TriMesh, classes: Option<&[[u8; 3]]>, section: f64) -> Raster<[u8; 3]> {
+fn picture(mesh: &TriMesh, classes: Option<&[[u8; 3]]>, section: f64) -> Raster<[u8; 3]> {
     let camera = camera_of(mesh, section);
     let scene = Scene::new(mesh);
     let textures = MipMaps::new(mesh);
@@ -318,7 +325,7 @@ mod tests {
         // The table at 1 m has no front here.
         assert!(matches!(first_front(&scene, eye, DVec3::NEG_Z, 2.4), Some(0 | 1)));
         assert_eq!(first_front(&scene, eye, DVec3::Z, 2.4), None);
-        let picture = draw(&house, Some(&[[200, 0, 0]; 6]), 2.4);
+        let picture = picture(&house, Some(&[[200, 0, 0]; 6]), 2.4);
         let right = picture.at(SIZE[0] * 5 / 8, SIZE[1] / 2);
         assert!(right[0] > right[1] + 80 && right[1] == right[2], "{right:?}");
         assert_eq!(picture.at(SIZE[0] / 2, 10), [255; 3]);

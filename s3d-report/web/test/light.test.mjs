@@ -109,7 +109,7 @@ test("the link is copied, and the picture saved under the route's name", { skip:
     .grantPermissions(["clipboard-read", "clipboard-write"])
     .catch(() => {});
   await page.getByRole("button", { name: "Copy link" }).click();
-  assert.equal(await page.locator(".tools-told").textContent(), "Link copied");
+  await page.locator(".tools-told", { hasText: "Link copied" }).waitFor();
   const arrives = page.waitForEvent("download");
   await page.getByRole("button", { name: "Save picture" }).click();
   const file = await arrives;

@@ -240,7 +240,7 @@ test("a link says what is shown, and follows it", async () => {
   assert.ok(Math.abs(angle - Math.PI / 24) < 0.001, `an arrow turns by ${angle}`);
   // A drag turns as well, and the address shows the same again.
   const box = await canvasOf(page);
-  await page.mouse.move(box.x + box.width * 0.6, box.y + 30);
+  await page.mouse.move(box.x + box.width * 0.6, box.y + 120);
   await page.mouse.down();
   await page.mouse.move(box.x + box.width * 0.5, box.y + 50, { steps: 3 });
   await page.mouse.up();

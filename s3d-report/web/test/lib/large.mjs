@@ -96,6 +96,7 @@ export function largeIndex(small) {
     statistics: { areas: areas.map(({ area }) => ({ ...small.statistics.areas[0], area })) },
     votes: areas.map(({ area }) => ({ area, votes: small.votes[0].votes })),
     meshes: [],
+    grounds: [],
   };
 }
 
