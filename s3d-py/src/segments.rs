@@ -8,6 +8,9 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use s3d_annotate::segments::{SegmentOptions, segment_faces};
 
+/// The segment of each face, the nodes of each merge, its cost.
+type Columns<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<f32>>);
+
 /// Returns the segment of each face, and the nodes and costs of the merges.
 #[pyfunction]
 pub(crate) fn segments<'py>(
@@ -18,7 +21,7 @@ pub(crate) fn segments<'py>(
     color: f64,
     threads: Option<usize>,
     sink: Py<PyAny>,
-) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<f32>>)> {
+) -> PyResult<Columns<'py>> {
     if !(scale_m2.is_finite() && scale_m2 > 0.0) {
         return Err(usage(format!("scale_m2={scale_m2}: must be a number above 0")));
     }

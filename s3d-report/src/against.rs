@@ -4,10 +4,10 @@ use crate::areas;
 use crate::content::{Content, Shown};
 use crate::faults::{Fault, Faults};
 use crate::index::{ClassEntry, LabelEntry, folder_name};
+use crate::options::ReportOptions;
 use crate::pixels::{Images, Widths};
 use crate::script::Scripts;
 use crate::script::packed::packed;
-use crate::write::ReportOptions;
 use s3d_dataset::compare::{
     ChangedPatch, ClassPixels, CompareOptions, Comparison, ImageChange, PixelChanges,
 };

@@ -8,11 +8,11 @@ use crate::index::{
     folder_name, rounded,
 };
 use crate::mesh;
+use crate::options::ReportOptions;
 use crate::pixels::{Images, Made, Picture, Shares, Widths, nothing_left};
 use crate::raster::reduce::nearest;
 use crate::script::Scripts;
 use crate::selection::{PoolPlace, places};
-use crate::write::ReportOptions;
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::{Context, DataSet, Progress, Result};
 use s3d_geom::{Camera, Raster, TriMesh};

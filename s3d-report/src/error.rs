@@ -1,6 +1,6 @@
 //! Why a report was not made.
 
-use crate::write::{MESH_FACES, PANO_WIDTHS, ReportOptions, THUMB_WIDTHS};
+use crate::options::{MESH_FACES, PANO_WIDTHS, ReportOptions, THUMB_WIDTHS};
 use std::path::PathBuf;
 use thiserror::Error as ThisError;
 

@@ -31,6 +31,7 @@ mod first;
 mod ground;
 mod index;
 mod mesh;
+mod options;
 mod pixels;
 mod poster;
 mod raster;
@@ -42,9 +43,10 @@ mod write;
 
 pub use error::{Error, Result};
 pub use faults::Fault;
+pub use options::ReportOptions;
 pub use poster::poster;
 pub use s3d_dataset::Context;
-pub use write::{Report, ReportOptions, report, report_against};
+pub use write::{Report, report, report_against};
 
 #[doc = include_str!("../docs/report.md")]
 pub mod files {}
