@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,6 @@ def test_the_tree_joins_segments(room: s3d.Mesh) -> None:
     "wrong",
     [{"scale_m2": 0.0}, {"scale_m2": np.nan}, {"smallest_m2": -1.0}, {"color": np.inf}],
 )
-def test_wrong_values_are_named(room: s3d.Mesh, wrong: dict[str, float]) -> None:
+def test_wrong_values_are_named(room: s3d.Mesh, wrong: dict[str, Any]) -> None:
     with pytest.raises(s3d.UsageError, match=next(iter(wrong))):
         s3d.segments(room, **wrong)
