@@ -17,8 +17,8 @@ use std::path::Path;
 /// The most pixels along a side.
 const MOST_PIXELS: f64 = 2048.0;
 
-/// The least side of a pixel, metres: a plan is some 900 points wide.
-const FINEST_M: f64 = 0.008;
+/// The least side of a pixel, metres.
+const FINEST_M: f64 = 0.005;
 
 /// Larger pixels are means of 2 × 2 samples, metres.
 const COARSE_M: f64 = 0.02;

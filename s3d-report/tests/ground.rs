@@ -77,8 +77,7 @@ fn the_ground_is_the_mesh_from_above() {
         let entry = &grounds[0];
         assert_eq!(entry["area"], 1);
         let (image, mask) = images(&to, 0, entry);
-        let longest = image.width().max(image.height());
-        assert!(longest <= 2048 && entry["pixel_m"] == 0.008, "as fine as it may be: {longest}");
+        assert!(image.width().max(image.height()) == 2048, "as fine as it may be");
 
         let cut = entry["cut"].as_f64().unwrap();
         assert!((2.0..3.5).contains(&cut), "below the ceilings: {cut}");
