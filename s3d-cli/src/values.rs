@@ -11,16 +11,6 @@ pub(crate) fn stored_xyz(word: &str) -> Result<XyzType, String> {
     }
 }
 
-pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
-    finite(text).and_then(|v| {
-        if v >= 0.0 {
-            Ok(v)
-        } else {
-            Err("must not be below 0".to_owned())
-        }
-    })
-}
-
 pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
     let v = finite(text)?;
     if v > 0.0 && v < 180.0 {

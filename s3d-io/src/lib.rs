@@ -197,7 +197,7 @@
 //! | `textures` | WebP, BMP, TGA and TIFF beside PNG and JPEG |
 //! | `cloud` | annotated points: the S3DIS tree, and the labels of meshes |
 //! | `las`, `e57`, `npy`, `pcd`, `text`, `kitti`, `scannet`, `mat`, `ply` | annotated points of each |
-//! | `labels` | files that label the faces of a mesh: HM3D, Replica, 3RScan, ScanNet++, Matterport3D, `scan.labels` |
+//! | `labels` | files that label faces: HM3D, Replica, 3RScan, ScanNet++, Matterport3D, `scan.labels` |
 //! | `camera` | lists of cameras; the scanner's pictures |
 //! | `png`, `exr` | the images of a data set |
 //! | `dataset` | the rest of a data set: poses, labels, instances, splits, lists, conventions |

@@ -14,24 +14,40 @@ pub(crate) const THUMB_WIDTHS: RangeInclusive<u32> = 16..=2048;
 pub(crate) const MESH_FACES: RangeInclusive<u32> = 1000..=10_000_000;
 
 /// The options of a report.
+///
+/// This is the one place that says an option. With the feature `clap` it is a group of arguments of a command
+/// line: comments of fields are help texts.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct ReportOptions {
-    /// The width of panoramas in pixels. Smaller panoramas keep their width. The colours of a panorama also
-    /// have a file twice as wide, up to 4096 pixels, where that shows more.
+    /// Width of panoramas in the report, in pixels. Smaller panoramas keep their width. Their colours are
+    /// twice as wide, up to 4096 pixels, where that shows more.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PIXELS", default_value_t = 2048,
+        value_parser = clap::value_parser!(u32).range(16..=16_384)))]
     pub pano_width: u32,
-    /// The width of views in pixels. The colours of a large view are twice as wide.
+    /// Width of views in the report, in pixels. The colours of a large view are twice as wide.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PIXELS", default_value_t = 256,
+        value_parser = clap::value_parser!(u32).range(16..=2048)))]
     pub thumbs: u32,
-    /// The most faces of the mesh of an area. A larger mesh is simplified.
+    /// The most faces of the mesh of an area in the report. A larger mesh is simplified.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FACES", default_value_t = 300_000,
+        value_parser = clap::value_parser!(u32).range(1000..=10_000_000)))]
     pub mesh_faces: u32,
-    /// Whether to verify every pixel of the data set, and show the result.
+    /// Verify every pixel of the data set as well, and show the result.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub verify: bool,
-    /// Whether to write a single file, which is easier to send or publish. For small data sets.
+    /// Write one file, to send or publish, instead of a folder. For small data sets.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub single: bool,
-    /// Results of predictions on the data set to show: files that `s3d eval --json` wrote.
+    /// Show the scores in a file that `s3d eval --json` wrote. May be given several times.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SCORES.json"))]
     pub scores: Vec<PathBuf>,
-    /// A file for the picture that [`poster`](crate::poster()) draws. It appears together with the report.
+    /// Also draw the building from above, half in colours and half in classes: a PNG of 1600 × 1000 pixels,
+    /// which appears together with the report.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE.png"))]
     pub poster: Option<PathBuf>,
-    /// Whether to replace an earlier report, and an earlier poster.
+    /// Replace an earlier report, and an earlier poster.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub overwrite: bool,
 }
 

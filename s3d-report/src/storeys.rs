@@ -88,6 +88,15 @@ impl Storeys {
         storeys
     }
 
+    /// Returns the storey with the most rooms, the lowest of equals.
+    pub(crate) fn fullest(&self) -> usize {
+        let rooms = |storey: usize| self.rooms.iter().filter(|(_, z)| self.of_height(*z) == storey).count();
+        (0..self.floors.len())
+            .rev()
+            .max_by_key(|storey| rooms(*storey))
+            .unwrap_or(0)
+    }
+
     /// Returns the storey of a point in a room, whose name may be empty.
     pub(crate) fn of(&self, z: f64, room: &str) -> usize {
         self.of_height(self.floor_around(z, room).unwrap_or(z))
@@ -191,11 +200,11 @@ fn level_of(levels: &[(f32, f64)], share: f64) -> Option<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use s3d_geom::glam::vec3;
 
-    fn room(name: &str, floor: f64) -> RoomEntry {
+    pub(crate) fn room(name: &str, floor: f64) -> RoomEntry {
         RoomEntry {
             area: 1,
             name: name.into(),
@@ -211,7 +220,7 @@ mod tests {
     }
 
     /// Level faces of 4 × 4 m, by height and whether they face upwards.
-    fn slabs(heights: &[(f32, bool)]) -> TriMesh {
+    pub(crate) fn slabs(heights: &[(f32, bool)]) -> TriMesh {
         let mut positions = Vec::new();
         let mut faces = Vec::new();
         for (z, up) in heights {

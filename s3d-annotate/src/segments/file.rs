@@ -2,6 +2,8 @@
 
 use super::{SegmentOptions, Segments, segment_faces};
 use s3d_dataset::error::UsageError;
+#[cfg(feature = "clap")]
+use s3d_dataset::options::words;
 use s3d_dataset::store::NewFile;
 use s3d_dataset::{Context, Result};
 use s3d_geom::TriMesh;
@@ -13,14 +15,20 @@ use std::path::Path;
 /// The segment of what has none: a face that was left out of the mesh.
 const NO_SEGMENT: i64 = -1;
 
-/// How the segments of a mesh file are made and written.
+/// How the segments of a mesh file are made and written. With the feature `clap` it is a group of
+/// arguments of a command line.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct SegmentFileOptions {
     /// How the mesh is cut.
+    #[cfg_attr(feature = "clap", command(flatten))]
     pub segments: SegmentOptions,
-    /// The unit of the mesh file. `None`: the unit that the file states, or else metres.
+    /// The unit of the file [default: what the file says, or else metres]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "m|cm|mm|ft|in",
+        value_parser = words::parsed::<LengthUnit>))]
     pub units: Option<LengthUnit>,
-    /// Replace an existing file.
+    /// Replace the file if it exists.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub overwrite: bool,
 }
 

@@ -41,8 +41,8 @@ impl Looks {
     /// Returns how much two faces differ across the edge between them, from 0.
     ///
     /// It is 1 − cosine of the turn between the normals, and its square where the surface bends away from
-    /// the viewer: things are round and have corners, and stand on others in hollow edges. Added is the distance
-    /// of the colours in Oklab, times `color`.
+    /// the viewer: things are round and have corners, and stand on others in hollow edges. Added is the
+    /// distance of the colours in Oklab, times `color`.
     pub(super) fn difference(&self, mesh: &TriMesh, border: &Border, color: f32) -> f32 {
         let [a, b] = border.faces.map(|face| face as usize);
         let sign = if border.is_flipped { -1.0 } else { 1.0 };

@@ -19,6 +19,8 @@ pub use tree::MergeTree;
 use borders::borders;
 use looks::Looks;
 use rayon::prelude::*;
+#[cfg(feature = "clap")]
+use s3d_dataset::options::words;
 use s3d_geom::TriMesh;
 use std::collections::BTreeMap;
 use tree::{Region, Seam, merge};
@@ -26,26 +28,28 @@ use tree::{Region, Seam, merge};
 /// The difference where pieces touch without an edge: as between surfaces that face each other.
 const AT_TOUCH: f64 = 2.0;
 
-/// How a mesh is cut into segments.
+/// How a mesh is cut into segments. With the feature `clap` it is a group of arguments of a command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct SegmentOptions {
-    /// The larger, the larger the segments: the scale of observation of Felzenszwalb and Huttenlocher, with
-    /// areas in place of numbers of nodes, in m².
+    /// The scale of Felzenszwalb and Huttenlocher, in m²: the larger, the larger the segments. Areas take the
+    /// place of their numbers of nodes.
+    #[cfg_attr(feature = "clap", arg(long = "scale", value_name = "M2", default_value_t = 0.002,
+        value_parser = words::positive))]
     pub scale_m2: f64,
-    /// A smaller segment joins a neighbour, m².
+    /// A segment smaller than this joins a neighbour, m².
+    #[cfg_attr(feature = "clap", arg(long = "smallest", value_name = "M2", default_value_t = 0.003,
+        value_parser = words::not_negative))]
     pub smallest_m2: f64,
     /// How much colours count against shape; 0: not at all.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "WEIGHT", default_value_t = 1.0,
+        value_parser = words::not_negative))]
     pub color: f64,
-}
-
-impl SegmentOptions {
-    /// The value of [`Default`].
-    pub const DEFAULT: Self = Self { scale_m2: 0.002, smallest_m2: 0.003, color: 1.0 };
 }
 
 impl Default for SegmentOptions {
     fn default() -> Self {
-        Self::DEFAULT
+        Self { scale_m2: 0.002, smallest_m2: 0.003, color: 1.0 }
     }
 }
 

@@ -96,8 +96,8 @@ fn samples(mesh: &TriMesh, face: u32, mut visit: impl FnMut(Vec3)) {
     }
 }
 
-/// Adds the cells within [`NEAR_M`] of a point: one, or up to eight at the corner of a cell. A cell is a number
-/// of 63 bits; the point is relative to the least corner of the mesh.
+/// Adds the cells within [`NEAR_M`] of a point: one, or up to eight at the corner of a cell. A cell is a
+/// number of 63 bits; the point is relative to the least corner of the mesh.
 fn add_cells_around(point: Vec3, cells: &mut Vec<u64>) {
     const PER_M: f32 = 1.0 / CELL_M;
     let range = |x: f32| {

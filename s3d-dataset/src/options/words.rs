@@ -32,6 +32,16 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses a finite number from 0.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    let v = finite(text)?;
+    if v >= 0.0 {
+        Ok(v)
+    } else {
+        Err("must not be below 0".to_owned())
+    }
+}
+
 /// Parses the width of a panorama.
 pub fn even_width(text: &str) -> Result<u32, String> {
     match text.trim().parse::<u32>() {

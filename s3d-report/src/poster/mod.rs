@@ -5,6 +5,8 @@ mod palette;
 use crate::areas::{classes, rooms};
 use crate::error::{Error, Result};
 use crate::faults::{Fault, Faults};
+use crate::index::RoomEntry;
+use crate::storeys::{Levels, Storeys};
 use palette::{palette_of, unlabelled};
 use rayon::prelude::*;
 use s3d_dataset::store::{NewFile, check_apart};
@@ -38,16 +40,6 @@ const LINE_PX: u32 = 3;
 const DETAIL: f32 = 0.35;
 const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
-/// The floors of a storey lie within this height, metres.
-const STOREY_M: f64 = 1.8;
-/// A ceiling is at least this high above its floor, metres.
-const CEILING_M: f64 = 1.9;
-/// The building is opened this much below its ceilings, or this high above the floor if it has none, metres.
-const BELOW_CEILING_M: f64 = 0.1;
-const OPEN_M: f64 = 2.2;
-/// The share of the ceilings that may lie lower than the height that counts as theirs.
-const LOW_CEILINGS: f64 = 0.1;
-
 /// The most faces that are seen from behind along a ray.
 const MOST_BACKS: u32 = 64;
 
@@ -80,12 +72,9 @@ pub(crate) fn draw(data: &DataSet, to: &Path, ctx: &Context) -> Result<()> {
 
     let mut faults = Faults::default();
     let classes = class_colors(data, area, &mut faults)?;
-    let floors: Vec<f64> = rooms(data, &mut faults)?
-        .iter()
-        .filter(|room| room.area == area)
-        .filter_map(|room| room.floor)
-        .collect();
-    let picture = picture(&mesh, classes.as_deref(), section(&mesh, &floors));
+    let rooms = rooms(data, &mut faults)?;
+    let rooms: Vec<&RoomEntry> = rooms.iter().filter(|room| room.area == area).collect();
+    let picture = picture(&mesh, classes.as_deref(), section(&mesh, &rooms));
     write_rgb8(to, &picture, Content::Photo, Compression::default())?;
 
     for without in data.areas().iter().take_while(|each| **each != area) {
@@ -130,52 +119,12 @@ fn class_colors(data: &DataSet, area: u32, faults: &mut Faults) -> Result<Option
     ))
 }
 
-/// Returns the height below which a mesh is shown: just below the ceilings of the storey with the most
-/// floors.
-fn section(mesh: &TriMesh, floors: &[f64]) -> f64 {
-    let mut floors = floors.to_vec();
-    floors.sort_by(f64::total_cmp);
-    let mut storeys: Vec<Vec<f64>> = Vec::new();
-    for floor in floors {
-        match storeys
-            .last_mut()
-            .filter(|storey| floor - storey.first().unwrap_or(&floor) <= STOREY_M)
-        {
-            Some(storey) => storey.push(floor),
-            None => storeys.push(vec![floor]),
-        }
-    }
-
-    // The lowest of equals.
-    let fullest = storeys.iter().enumerate().rev().max_by_key(|(_, storey)| storey.len());
-    let lowest = fullest.and_then(|(_, storey)| storey.first().copied());
-    let lowest = lowest.unwrap_or(f64::from(mesh.aabb().min.z));
-    let above = fullest
-        .and_then(|(i, _)| storeys.get(i + 1)?.first().copied())
-        .unwrap_or(f64::INFINITY);
-
-    let mut ceilings: Vec<(f64, f64)> = (0u32..)
-        .take(mesh.faces().len())
-        .filter(|face| mesh.normal(*face).z < -0.9)
-        .map(|face| {
-            let z = mesh
-                .triangle(face)
-                .iter()
-                .map(|corner| f64::from(corner.z))
-                .sum::<f64>()
-                / 3.0;
-            (z, mesh.area(face))
-        })
-        .filter(|(z, _)| (lowest + CEILING_M..above).contains(z))
-        .collect();
-    ceilings.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let all: f64 = ceilings.iter().map(|(_, m2)| m2).sum();
-    let mut below = 0.0;
-    let low = ceilings.iter().find(|(_, m2)| {
-        below += m2;
-        below >= LOW_CEILINGS * all
-    });
-    low.map_or(lowest + OPEN_M, |(z, _)| z - BELOW_CEILING_M)
+/// Returns the height below which a mesh is shown: just below the ceilings of the storey with the most rooms,
+/// or infinity if it has none.
+fn section(mesh: &TriMesh, rooms: &[&RoomEntry]) -> f64 {
+    let storeys = Storeys::new(rooms, &[]);
+    let [_, high] = storeys.slab(storeys.fullest(), &Levels::of(mesh));
+    high
 }
 
 /// Returns a camera obliquely above a mesh that sees all of it below the height `section`.
@@ -276,32 +225,19 @@ fn first_front(scene: &Scene<'_>, eye: DVec3, direction: DVec3, section: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use s3d_geom::glam::vec3;
-
-    /// A floor, a ceiling and their height; all level faces of 4 × 4 m.
-    fn slabs(heights: &[(f32, bool)]) -> TriMesh {
-        let mut positions = Vec::new();
-        let mut faces = Vec::new();
-        for (z, up) in heights {
-            let first = positions.len() as u32;
-            positions.extend([[0., 0.], [4., 0.], [4., 4.], [0., 4.]].map(|[x, y]| vec3(x, y, *z)));
-            let [a, b, c, d] = [first, first + 1, first + 2, first + 3];
-            faces.extend(if *up {
-                [[a, b, c], [a, c, d]]
-            } else {
-                [[a, c, b], [a, d, c]]
-            });
-        }
-        TriMesh::from_faces(positions, faces).unwrap()
-    }
+    use crate::storeys::tests::{room, slabs};
 
     #[test]
     fn the_storey_of_most_rooms_is_opened_below_its_ceiling() {
         let house = slabs(&[(0.0, true), (2.5, false), (2.8, true), (5.2, false)]);
-        assert!((section(&house, &[0.0, 0.1, 2.8]) - 2.4).abs() < 1e-5);
-        assert!((section(&house, &[0.0, 2.8, 2.9]) - 5.1).abs() < 1e-5);
+        let opened = |floors: [f64; 3]| {
+            let rooms = floors.map(|floor| room("a", floor));
+            section(&house, &rooms.each_ref())
+        };
+        assert!((opened([0.0, 0.1, 2.8]) - 2.4).abs() < 1e-5);
+        assert!((opened([0.0, 2.8, 2.9]) - 5.1).abs() < 1e-5);
         // Without a ceiling, and without rooms.
-        assert_eq!(section(&slabs(&[(1.0, true)]), &[]), 1.0 + OPEN_M);
+        assert_eq!(section(&slabs(&[(1.0, true)]), &[]), f64::INFINITY);
     }
 
     #[test]

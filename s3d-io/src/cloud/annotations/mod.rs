@@ -38,8 +38,8 @@ pub struct AnnotationOptions {
     pub instance_column: Option<String>,
     /// The name of the column of rooms. `None`: there is no such column.
     pub room_column: Option<String>,
-    /// The names of the columns, in order, for a file that does not name them: a plain NPY array or a text. In
-    /// a text, they come before the file's own names. Empty: a plain array has `x y z r g b class` and, if
+    /// The names of the columns, in order, for a file that does not name them: a plain NPY array or a text.
+    /// In a text, they come before the file's own names. Empty: a plain array has `x y z r g b class` and, if
     /// there is one more column, `instance`; a text must name its columns.
     pub columns: Vec<String>,
     /// The offset that is subtracted from coordinates in `f64`, before they are rounded to `f32`: metres.
