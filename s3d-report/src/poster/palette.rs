@@ -1,7 +1,7 @@
 //! The page's own colours of classes, for pictures.
 //!
 //! The page chooses them in `web/src/palette.ts`, by the same steps. The words and numbers of both are in
-//! `web/src/palette.json`, and the colours that both must choose in `tests/palette.json`.
+//! `src/poster/palette.json`, and the colours that both must choose in `tests/palette.json`.
 
 use serde::Deserialize;
 use std::sync::LazyLock;
@@ -46,7 +46,7 @@ struct Strong {
 }
 
 static RULES: LazyLock<Rules> = LazyLock::new(|| {
-    let text = include_str!("../../web/src/palette.json");
+    let text = include_str!("palette.json");
     serde_json::from_str(text).expect("the rules are a part of the program")
 });
 

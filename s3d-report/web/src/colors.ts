@@ -1,7 +1,7 @@
 // Colours for values without a colour of their own: distances, classes, instances.
 
 import type { Index, Rgb } from "./data.js";
-import rules from "./palette.json" with { type: "json" };
+import rules from "../../src/poster/palette.json" with { type: "json" };
 
 /** Where nothing was seen. */
 export const MISSING = rules.missing as Rgb;

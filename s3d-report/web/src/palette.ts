@@ -4,7 +4,7 @@
 
 import { MISSING, NULL_LABEL, oklch } from "./colors.js";
 import type { Rgb } from "./data.js";
-import rules from "./palette.json" with { type: "json" };
+import rules from "../../src/poster/palette.json" with { type: "json" };
 
 type Matrix = [Rgb, Rgb, Rgb];
 type Range = [number, number];
