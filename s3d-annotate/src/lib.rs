@@ -3,6 +3,8 @@
 //! [`segments`] cuts a mesh into patches that a person labels in one stroke, with the tree by which they join
 //! to larger ones. [`segments::segment_file`] writes them for ScanNet's and Matterport3D's tools.
 //!
+//! [`outputs`] writes labels for other programs: a PLY mesh, ScanNet, ScanNet++, S3DIS.
+//!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
 //! use s3d_geom::{MeshParts, TriMesh, glam::{Vec3, vec3}, primitives::{cuboid, grid}};
@@ -28,6 +30,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 pub mod labelling;
+pub mod outputs;
 pub mod segments;
 
 /// The README's example, compiled.
