@@ -3,7 +3,8 @@
 //! [`segments`] cuts a mesh into patches that a person labels in one stroke, with the tree by which they join
 //! to larger ones. [`segments::segment_file`] writes them for ScanNet's and Matterport3D's tools.
 //!
-//! [`outputs`] writes labels for other programs: a PLY mesh, ScanNet, ScanNet++, S3DIS.
+//! [`outputs`] writes labels for other programs: a PLY mesh, ScanNet, ScanNet++, S3DIS. [`proposals`] reads
+//! labels of others, for a person to accept.
 //!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
@@ -31,6 +32,7 @@
 
 pub mod labelling;
 pub mod outputs;
+pub mod proposals;
 pub mod segments;
 
 /// The README's example, compiled.

@@ -1,4 +1,6 @@
 //! The tests of this crate as one program.
 
 mod labelling;
+mod outputs;
+mod proposals;
 mod segments;

@@ -56,9 +56,9 @@ mod vertices;
 
 use crate::labelling::LabelFolder;
 use crate::segments::Segments;
+use s3d_dataset::error::InputError;
 #[cfg(feature = "clap")]
 use s3d_dataset::options::words;
-use s3d_dataset::error::InputError;
 use s3d_dataset::store::{FolderKind, NewFolder};
 use s3d_dataset::{Context, Result};
 use s3d_geom::TriMesh;
@@ -317,7 +317,9 @@ impl<'a> Labelled<'a> {
 
 /// Returns the name of the scene of a folder of labels: without `.labels`.
 fn scene_of(labels: &Path) -> std::borrow::Cow<'_, str> {
-    let name = labels.file_name().filter(|_| labels.extension().is_some_and(|e| e == "labels"));
+    let name = labels
+        .file_name()
+        .filter(|_| labels.extension().is_some_and(|e| e == "labels"));
     let stem = name.and_then(|_| labels.file_stem()).or(labels.file_name());
     stem.map_or("scan".into(), |stem| stem.to_string_lossy())
 }

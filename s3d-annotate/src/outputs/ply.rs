@@ -31,10 +31,14 @@ impl Labelled<'_> {
 
         let numbers = self.numbers_of_classes();
         let room_of_face = self.labels.state().room_of_face(self.mesh);
-        let rows = self.instance_of_face.iter().zip(&room_of_face).map(|(&instance, &room)| {
-            let class = numbers.get(self.class(instance)).filter(|_| instance != NONE);
-            [class.map_or(-1, |class| *class as i32), number(instance), number(room)]
-        });
+        let rows = self
+            .instance_of_face
+            .iter()
+            .zip(&room_of_face)
+            .map(|(&instance, &room)| {
+                let class = numbers.get(self.class(instance)).filter(|_| instance != NONE);
+                [class.map_or(-1, |class| *class as i32), number(instance), number(room)]
+            });
         let rows: Vec<[i32; 3]> = rows.collect();
 
         let mut names: Vec<String> = Vec::new();
@@ -52,12 +56,22 @@ impl Labelled<'_> {
     }
 
     /// Writes the mesh, with numbers of its faces if there are any.
-    pub(super) fn write_mesh(&self, path: &Path, rows: Option<&[[i32; 3]]>, comments: &[String]) -> Result<()> {
+    pub(super) fn write_mesh(
+        &self,
+        path: &Path,
+        rows: Option<&[[i32; 3]]>,
+        comments: &[String],
+    ) -> Result<()> {
         write_whole(path, |w| self.write_mesh_to(w, rows, comments))?;
         Ok(())
     }
 
-    fn write_mesh_to(&self, w: &mut dyn Write, rows: Option<&[[i32; 3]]>, comments: &[String]) -> io::Result<()> {
+    fn write_mesh_to(
+        &self,
+        w: &mut dyn Write,
+        rows: Option<&[[i32; 3]]>,
+        comments: &[String],
+    ) -> io::Result<()> {
         let mesh = self.mesh;
         let colors = vertex_colors(mesh);
         writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment made by s3d label")?;
@@ -75,7 +89,9 @@ impl Labelled<'_> {
             writeln!(w, "comment {line}")?;
         }
         writeln!(w, "element vertex {}", mesh.positions().len())?;
-        ["x", "y", "z"].iter().try_for_each(|name| writeln!(w, "property float {name}"))?;
+        ["x", "y", "z"]
+            .iter()
+            .try_for_each(|name| writeln!(w, "property float {name}"))?;
         if colors.is_some() {
             let names = ["red", "green", "blue"];
             names.iter().try_for_each(|name| writeln!(w, "property uchar {name}"))?;

@@ -88,7 +88,9 @@ impl Labelled<'_> {
         }
         let shown = path.display();
         if unlabelled_m2 > 0.0 {
-            ctx.warn(format_args!("{shown}: {unlabelled_m2:.2} m² without a label are left out of the points"));
+            ctx.warn(format_args!(
+                "{shown}: {unlabelled_m2:.2} m² without a label are left out of the points"
+            ));
         }
         if elsewhere_m2 > 0.0 {
             ctx.warn(format_args!(

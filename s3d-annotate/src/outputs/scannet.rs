@@ -67,7 +67,12 @@ impl Refined {
 
 impl Labelled<'_> {
     /// Writes the scan into a folder, and returns its objects.
-    pub(super) fn write_scannet(&self, folder: &Path, segments: &Segments, ctx: &Context) -> Result<Vec<Object>> {
+    pub(super) fn write_scannet(
+        &self,
+        folder: &Path,
+        segments: &Segments,
+        ctx: &Context,
+    ) -> Result<Vec<Object>> {
         let refined = Refined::new(&segments.segment_of_face, self.instance_of_face);
         // Vertices without a face have one more segment.
         let rest = refined.instances.len() as u32;

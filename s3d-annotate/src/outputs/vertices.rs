@@ -52,6 +52,8 @@ pub(super) fn vertex_colors(mesh: &TriMesh) -> Option<Vec<[u8; 3]>> {
         }
     }
     // The conversion saturates.
-    let means = sums.iter().map(|(sum, count)| sum.map(|s| (s / f64::from(*count).max(1.0)).round() as u8));
+    let means = sums
+        .iter()
+        .map(|(sum, count)| sum.map(|s| (s / f64::from(*count).max(1.0)).round() as u8));
     Some(means.collect())
 }
