@@ -88,8 +88,8 @@ impl<'t> ClassNames<'t> {
         match &self.file {
             Some(file) => format!("add it to {}; \"\" is for no class", file.display()),
             None => format!(
-                "numbers are places among the {} classes of {}, from 0; for others, say names in NAME.classes.json \
-                 beside the file, as in {{\"4\": {:?}, \"9\": \"\"}}",
+                "numbers are places among the {} classes of {}, from 0; for others, say names in \
+                 NAME.classes.json beside the file, as in {{\"4\": {:?}, \"9\": \"\"}}",
                 self.taxonomy.classes().len(),
                 self.taxonomy.name(),
                 self.taxonomy.classes().last().map_or("chair", |class| class.name())
