@@ -4,6 +4,9 @@
 //! to larger ones. [`segments::segment_file`] writes them for ScanNet's and Matterport3D's tools.
 //! [`labelling`] keeps the labels, and [`workbench`] makes them of a person's gestures.
 //!
+//! [`outputs`] writes labels for other programs: a PLY mesh, ScanNet, ScanNet++, S3DIS. [`proposals`] reads
+//! labels of others, for a person to accept.
+//!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
 //! use s3d_geom::{MeshParts, TriMesh, glam::{Vec3, vec3}, primitives::{cuboid, grid}};
@@ -29,6 +32,8 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 pub mod labelling;
+pub mod outputs;
+pub mod proposals;
 pub mod segments;
 pub mod workbench;
 
