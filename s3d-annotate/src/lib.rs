@@ -2,6 +2,7 @@
 //!
 //! [`segments`] cuts a mesh into patches that a person labels in one stroke, with the tree by which they join
 //! to larger ones. [`segments::segment_file`] writes them for ScanNet's and Matterport3D's tools.
+//! [`structure`] finds floors, ceilings, walls and rooms without labels.
 //!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
@@ -29,6 +30,7 @@
 
 pub mod labelling;
 pub mod segments;
+pub mod structure;
 
 /// The README's example, compiled.
 #[cfg(doctest)]
