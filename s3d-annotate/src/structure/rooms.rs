@@ -13,6 +13,9 @@ const NARROW: f64 = 0.75;
 /// A room has a place this far from all walls, metres.
 const LEAST_RADIUS_M: f64 = 0.35;
 
+/// No part of a room is narrower than twice this, metres.
+const CORE_M: f64 = 0.2;
+
 /// The size of the smallest room, m².
 const LEAST_M2: f64 = 0.9;
 
@@ -62,13 +65,21 @@ pub(super) fn rooms(scan: &Scan, storey: &Storey) -> (Vec<u32>, u32) {
         }
     }
 
+    for basin in &mut basin_of {
+        *basin = if *basin == u32::MAX {
+            u32::MAX
+        } else {
+            basins.root(*basin)
+        };
+    }
+    cut_strips(scan, &distance, &mut basin_of);
+
     // What is too small, or has no floor, is no room.
     let mut tally = vec![Tally::default(); basins.parent.len()];
     for cell in 0..distance.len() {
         if basin_of[cell] == u32::MAX {
             continue;
         }
-        basin_of[cell] = basins.root(basin_of[cell]);
         let tally = &mut tally[basin_of[cell] as usize];
         tally.cells += 1;
         tally.floor += usize::from(storey.has_floor[cell]);
@@ -99,6 +110,32 @@ pub(super) fn rooms(scan: &Scan, storey: &Storey) -> (Vec<u32>, u32) {
             .collect(),
         count,
     )
+}
+
+/// Takes strips that hang on a basin from it, such as the inside of a wall with a leak. What is left is near
+/// a wide place of the same basin.
+fn cut_strips(scan: &Scan, distance: &[f32], basin_of: &mut [u32]) {
+    let is_core = |cell: usize| f64::from(distance[cell]) * scan.grid.step_m >= CORE_M;
+    let mut is_kept: Vec<bool> = (0..basin_of.len()).map(is_core).collect();
+    let mut ring: Vec<usize> = (0..is_kept.len()).filter(|cell| is_kept[*cell]).collect();
+    // As many steps lead from the core of a corner to its end.
+    for _ in 0..(2.0 * CORE_M / scan.grid.step_m) as usize {
+        let mut next = Vec::new();
+        for cell in ring {
+            for beside in scan.grid.beside(cell) {
+                if !is_kept[beside] && basin_of[beside] == basin_of[cell] {
+                    is_kept[beside] = true;
+                    next.push(beside);
+                }
+            }
+        }
+        ring = next;
+    }
+    for (basin, is_kept) in basin_of.iter_mut().zip(is_kept) {
+        if !is_kept {
+            *basin = u32::MAX;
+        }
+    }
 }
 
 /// What a basin has, in cells.

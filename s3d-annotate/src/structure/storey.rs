@@ -30,6 +30,9 @@ const DOOR_M: f64 = 2.15;
 /// The share of the heights between doors and ceiling that a wall fills at least.
 const FILLED: f64 = 0.6;
 
+/// The share of them that is in one of the cells.
+const PART: f64 = 0.25;
+
 /// A lintel over an opening wider than this is a beam in a room, metres.
 const WIDEST_DOOR_M: f64 = 1.6;
 
@@ -204,26 +207,34 @@ impl Storey {
     /// doors and windows too, and furniture does not.
     fn filled(&self, scan: &Scan, layers: &[u128]) -> Vec<bool> {
         let floor_m = self.floor_m;
-        let count = |cell: usize, low_m: f64, high_m: f64| {
+        let share = |layers: u128, low_m: f64, high_m: f64| {
             let [from, to] = [low_m, high_m].map(|z| ((z / LAYER_M).round().max(0.0) as u32).min(126));
             if to <= from {
                 return 0.0;
             }
             let mask = ((1u128 << (to - from)) - 1) << from;
-            f64::from((layers[cell] & mask).count_ones()) / f64::from(to - from)
+            f64::from((layers & mask).count_ones()) / f64::from(to - from)
+        };
+        // A wall on the border of two cells has its samples in both.
+        let both = |cell: usize| {
+            scan.grid
+                .beside(cell)
+                .fold(layers[cell], |all, next| all | layers[next])
         };
         let mut is_filled: Vec<bool> = (0..layers.len())
             .map(|cell| {
                 let top = f64::from(self.ceiling_m[cell]) - floor_m - 0.1;
                 // Under a low ceiling, there is little above doors.
-                top.is_finite() && count(cell, DOOR_M.min(top - 0.25), top) >= FILLED
+                let low = DOOR_M.min(top - 0.25);
+                let is_part = top.is_finite() && share(layers[cell], low, top) >= PART;
+                is_part && share(both(cell), low, top) >= FILLED
             })
             .collect();
 
         // What is open below, over a floor, and wider than a door is a beam.
         let floor_near =
             |cell: usize| self.has_floor[cell] || scan.grid.beside(cell).any(|next| self.has_floor[next]);
-        let is_lintel = |cell: usize| floor_near(cell) && count(cell, 0.2, 1.9) <= 0.25;
+        let is_lintel = |cell: usize| floor_near(cell) && share(both(cell), 1.0, 1.9) <= 0.25;
         let lintels: Vec<bool> = (0..layers.len())
             .map(|cell| is_filled[cell] && is_lintel(cell))
             .collect();

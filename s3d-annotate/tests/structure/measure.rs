@@ -96,6 +96,32 @@ impl Measured {
                     .collect::<Vec<_>>()
             ));
         }
+        let mut has = vec![false; scene.mesh.faces().len()];
+        for su in &found.surfaces {
+            for f in su.faces.iter() {
+                has[f as usize] = true;
+            }
+        }
+        let mut miss: BTreeMap<String, (f64, [f32; 6])> = BTreeMap::new();
+        for f in 0..scene.mesh.faces().len() as u32 {
+            let i = &scene.instances[scene.instance_of_face[f as usize] as usize];
+            if has[f as usize] || i.class != Class::WALL {
+                continue;
+            }
+            let e = miss
+                .entry(format!("{} {}", i.room, i.number))
+                .or_insert((0.0, [9e9, 9e9, 9e9, -9e9, -9e9, -9e9]));
+            e.0 += scene.mesh.area(f);
+            for p in scene.mesh.triangle(f) {
+                for k in 0..3 {
+                    e.1[k] = e.1[k].min(p[k]);
+                    e.1[k + 3] = e.1[k + 3].max(p[k]);
+                }
+            }
+        }
+        for (k, v) in miss {
+            worst.push(format!("MISS {k} {v:?}"));
+        }
         for r in &building.rooms {
             worst.push(format!("T {} {:?} {:?}", r.room, r.low, r.high));
         }
