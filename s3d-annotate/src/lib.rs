@@ -6,6 +6,7 @@
 //!
 //! [`outputs`] writes labels for other programs: a PLY mesh, ScanNet, ScanNet++, S3DIS. [`proposals`] reads
 //! labels of others, for a person to accept.
+//! [`structure`] finds floors, ceilings, walls and rooms without labels.
 //!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
@@ -36,6 +37,7 @@ pub mod outputs;
 pub mod proposals;
 pub mod segments;
 pub mod workbench;
+pub mod structure;
 
 /// The README's example, compiled.
 #[cfg(doctest)]

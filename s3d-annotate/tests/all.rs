@@ -5,3 +5,4 @@ mod outputs;
 mod proposals;
 mod segments;
 mod workbench;
+mod structure;
