@@ -2,6 +2,7 @@
 //!
 //! [`segments`] cuts a mesh into patches that a person labels in one stroke, with the tree by which they join
 //! to larger ones. [`segments::segment_file`] writes them for ScanNet's and Matterport3D's tools.
+//! [`review`] tells what to label next, and what looks wrong.
 //!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
@@ -28,6 +29,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 pub mod labelling;
+pub mod review;
 pub mod segments;
 
 /// The README's example, compiled.

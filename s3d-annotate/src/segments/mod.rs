@@ -16,6 +16,8 @@ mod tree;
 pub use file::{SegmentFileOptions, segment_file};
 pub use tree::MergeTree;
 
+pub(crate) use looks::mean_colors;
+
 use borders::borders;
 use looks::Looks;
 use rayon::prelude::*;
