@@ -2,7 +2,8 @@
 //!
 //! [`segments`] cuts a mesh into patches that a person labels in one stroke, with the tree by which they join
 //! to larger ones. [`segments::segment_file`] writes them for ScanNet's and Matterport3D's tools.
-//! [`review`] tells what to label next, and what looks wrong.
+//! [`labelling`] keeps the labels, and [`workbench`] makes them of a person's gestures. [`review`] tells what
+//! to label next, and what looks wrong.
 //!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
@@ -31,6 +32,7 @@
 pub mod labelling;
 pub mod review;
 pub mod segments;
+pub mod workbench;
 
 /// The README's example, compiled.
 #[cfg(doctest)]

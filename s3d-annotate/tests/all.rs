@@ -3,3 +3,4 @@
 mod labelling;
 mod review;
 mod segments;
+mod workbench;

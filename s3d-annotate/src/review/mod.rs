@@ -43,12 +43,6 @@ use crate::labelling::State;
 use crate::segments::Segments;
 use s3d_geom::TriMesh;
 
-/// TEMPORARY.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patch { /// f
- pub face: u32, /// n
- pub node: u32 }
-
 /// The labels of a mesh, to be looked at.
 ///
 /// # Panics

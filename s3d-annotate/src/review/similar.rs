@@ -1,7 +1,7 @@
 //! More of a thing.
 
 use super::Review;
-use super::Patch;
+use crate::workbench::Patch;
 
 /// Patches that differ more from a thing are not like it: see
 /// [`Descriptor::difference`](super::descriptor::Descriptor::difference).

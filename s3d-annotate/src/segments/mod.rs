@@ -64,6 +64,11 @@ pub struct Segments {
     pub tree: MergeTree,
 }
 
+/// Returns the pairs of faces that share an edge.
+pub(crate) fn borders_of(mesh: &TriMesh) -> Vec<[u32; 2]> {
+    borders(mesh).iter().map(|border| border.faces).collect()
+}
+
 /// Cuts a mesh into segments, and joins these to a tree.
 ///
 /// Faces that share an edge differ by the turn of their normals, the noise of a scan smoothed, and by the
