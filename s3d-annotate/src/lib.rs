@@ -2,7 +2,8 @@
 //!
 //! [`segments`] cuts a mesh into patches that a person labels in one stroke, with the tree by which they join
 //! to larger ones. [`segments::segment_file`] writes them for ScanNet's and Matterport3D's tools.
-//! [`labelling`] keeps the labels, and [`workbench`] makes them of a person's gestures.
+//! [`labelling`] keeps the labels, and [`workbench`] makes them of a person's gestures. [`review`] tells what
+//! to label next, and what looks wrong.
 //!
 //! [`outputs`] writes labels for other programs: a PLY mesh, ScanNet, ScanNet++, S3DIS. [`proposals`] reads
 //! labels of others, for a person to accept.
@@ -35,9 +36,10 @@
 pub mod labelling;
 pub mod outputs;
 pub mod proposals;
+pub mod review;
 pub mod segments;
-pub mod workbench;
 pub mod structure;
+pub mod workbench;
 
 /// The README's example, compiled.
 #[cfg(doctest)]

@@ -3,6 +3,7 @@
 mod labelling;
 mod outputs;
 mod proposals;
+mod review;
 mod segments;
-mod workbench;
 mod structure;
+mod workbench;
