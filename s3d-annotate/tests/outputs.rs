@@ -112,8 +112,8 @@ impl Labelled {
             .collect()
     }
 
-    /// Asserts that 99.9 % of the surface away from borders has its truth, and as many of the faces there that
-    /// have a label: small ones may have no point. Most of the surface must be away from borders.
+    /// Asserts that 99.9 % of the surface away from borders has its truth, and as many of the faces there
+    /// that have a label: small ones may have no point. Most of the surface must be away from borders.
     fn assert_same(&self, found: &[Option<Found>], truth: &[Found]) {
         let mesh = &self.scene.mesh;
         let [mut inside_m2, mut same_m2, mut faces, mut same] = [0.0; 4];
@@ -462,8 +462,8 @@ fn words_of_another_taxonomy_stay_in_the_output_and_lead_nowhere_else() {
     labelled.write(OutputFormat::ScanNetPp);
 }
 
-/// A floor of 40 × 40 squares with an instance on each side and bare surface between them. A face of the first
-/// is one of its own. All of it is one segment.
+/// A floor of 40 × 40 squares with an instance on each side and bare surface between them. A face of the
+/// first is one of its own. All of it is one segment.
 fn cut_floor(folder: &Path) -> (TriMesh, Segments, LabelFolder) {
     let mesh = TriMesh::new(grid(Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0, [40, 40])).unwrap();
     let segments = segment_faces(&mesh, &SegmentOptions::default());

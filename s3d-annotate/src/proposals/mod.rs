@@ -18,8 +18,9 @@
 //!
 //! A number is the place of a class in the taxonomy, from 0: for S3DIS 0 is ceiling and 12 is clutter.
 //! Negative numbers and 255 are no class. The numbers of a data set (NYU40's from 1) and words that the
-//! taxonomy does not know need names: `NAME.classes.json` or `classes.json` beside the file. It is a list, `["wall", "chair", null]`, or
-//! an object, `{"4": "wall", "shelves": "bookcase", "9": ""}`; `null` and `""` are no class.
+//! taxonomy does not know need names: `NAME.classes.json` or `classes.json` beside the file. It is a list,
+//! `["wall", "chair", null]`, or an object, `{"4": "wall", "shelves": "bookcase", "9": ""}`; `null` and `""`
+//! are no class.
 //!
 //! # Instances
 //!
