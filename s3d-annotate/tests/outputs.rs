@@ -4,6 +4,8 @@ use s3d_annotate::labelling::{Action, FaceRuns, LabelFolder, Room as DrawnRoom};
 use s3d_annotate::outputs::{OutputFormat, OutputOptions, write_output};
 use s3d_annotate::segments::{SegmentOptions, Segments, segment_faces};
 use s3d_dataset::Context;
+use s3d_geom::glam::Vec3;
+use s3d_geom::primitives::grid;
 use s3d_geom::{NearestFaces, PointCloud, TriMesh};
 use s3d_io::cloud::{AnnotatedMesh, AnnotationOptions, Annotations};
 use s3d_io::mesh::{LabelColumn, LabelElement, MeshFile, MeshLabels, UpAxis, read_mesh};
@@ -110,8 +112,8 @@ impl Labelled {
             .collect()
     }
 
-    /// Asserts that 99.9 % of the surface away from borders has its truth, and as many of the faces there that
-    /// have a label: small ones may have no point. Most of the surface must be away from borders.
+    /// Asserts that 99.9 % of the surface away from borders has its truth, and as many of the faces there
+    /// that have a label: small ones may have no point. Most of the surface must be away from borders.
     fn assert_same(&self, found: &[Option<Found>], truth: &[Found]) {
         let mesh = &self.scene.mesh;
         let [mut inside_m2, mut same_m2, mut faces, mut same] = [0.0; 4];
@@ -458,6 +460,67 @@ fn words_of_another_taxonomy_stay_in_the_output_and_lead_nowhere_else() {
     assert!(!odd.is_empty() && odd.iter().all(|path| path.starts_with("Area_1")), "{odd:?}");
     labelled.write(OutputFormat::ScanNet);
     labelled.write(OutputFormat::ScanNetPp);
+}
+
+/// A floor of 40 × 40 squares with an instance on each side and bare surface between them. A face of the
+/// first is one of its own. All of it is one segment.
+fn cut_floor(folder: &Path) -> (TriMesh, Segments, LabelFolder) {
+    let mesh = TriMesh::new(grid(Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0, [40, 40])).unwrap();
+    let segments = segment_faces(&mesh, &SegmentOptions::default());
+    assert_eq!(segments.tree.leaf_count(), 1);
+    let mut labels = LabelFolder::open(&folder.join("floor.labels"), &mesh, &Taxonomy::s3dis()).unwrap();
+    for (faces, class) in [(0..1000, "floor"), (2000..3200, "table"), (401..402, "chair")] {
+        let instance = labels.state().next_instance();
+        let faces = FaceRuns::of_range(faces);
+        act(&mut labels, Action::Paint { faces, instance, class: Some(class.into()) });
+    }
+    (mesh, segments, labels)
+}
+
+#[test]
+fn an_instance_may_end_within_a_segment_and_one_without_a_vertex_is_left_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let (mesh, segments, labels) = cut_floor(dir.path());
+    let options = OutputOptions::default();
+    for (format, below) in [(OutputFormat::ScanNet, ""), (OutputFormat::ScanNetPp, "scans")] {
+        let ctx = Context::default();
+        let to = dir.path().join(format.name());
+        write_output(format, &labels, &mesh, &segments, &to, &options, &ctx).unwrap();
+        // A triangle within a floor has the smaller area at each corner.
+        assert_eq!(ctx.warnings(), 1);
+
+        let found = read_back(&to.join(below), &mesh, &in_one_room(), false);
+        let of = |face: usize| found[face].map(|(class, number, _)| (class, number));
+        // Faces along a cut may be on either side.
+        assert!((0..900).all(|face| of(face) == Some((Class::FLOOR, 1))));
+        assert!((1100..1900).all(|face| of(face).is_none()));
+        assert!((2100..3200).all(|face| of(face) == Some((Class::TABLE, 1))));
+    }
+
+    // The points have it.
+    let mut labels = labels;
+    let office = DrawnRoom { kind: Some("office".into()), ..DrawnRoom::default() };
+    act(&mut labels, Action::Room { room: 1, is: office });
+    act(&mut labels, Action::PaintRoom { faces: FaceRuns::of_range(0..3200), room: Some(1) });
+    let to = dir.path().join("tree");
+    let ctx = Context::default();
+    let sparse = OutputOptions { points_per_m2: 1.0, ..options };
+    write_output(OutputFormat::S3dis, &labels, &mesh, &segments, &to, &sparse, &ctx).unwrap();
+    let chair = fs::read_to_string(to.join("Area_1/office_1/Annotations/chair_1.txt")).unwrap();
+    assert_eq!(chair.lines().count(), 1);
+
+    for points_per_m2 in [0.0, -1.0, f64::NAN, 1e12] {
+        let to = dir.path().join("none");
+        let odd = OutputOptions { points_per_m2, ..options };
+        let error = write_output(OutputFormat::S3dis, &labels, &mesh, &segments, &to, &odd, &ctx);
+        assert!(error.unwrap_err().to_string().contains("density") && !to.exists());
+    }
+    let inside = labels.path().join("output");
+    let error = write_output(OutputFormat::S3dis, &labels, &mesh, &segments, &inside, &options, &ctx);
+    assert!(error.unwrap_err().to_string().contains("another place"));
+    let wrong = dir.path().join("floor.obj");
+    let error = write_output(OutputFormat::Ply, &labels, &mesh, &segments, &wrong, &options, &ctx);
+    assert!(error.unwrap_err().to_string().contains(".ply"));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use s3d_annotate::labelling::{Action, FaceRuns, LabelFolder};
 use s3d_annotate::outputs::{OutputFormat, OutputOptions, write_output};
 use s3d_annotate::proposals::{Proposal, read_proposals};
 use s3d_annotate::segments::{SegmentOptions, segment_faces};
-use s3d_dataset::{Context, Result};
+use s3d_dataset::{Context, Event, Result};
 use s3d_geom::glam::{Vec3, vec3};
 use s3d_geom::primitives::{cuboid, grid};
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
@@ -14,6 +14,7 @@ use s3d_label::Taxonomy;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
+use std::sync::{Arc, Mutex};
 
 /// A floor of 4 × 4 m, of 3,200 faces and 1,681 vertices, and two chests 5 cm above it, of 12 faces each.
 fn room() -> TriMesh {
@@ -235,8 +236,8 @@ fn lists_that_do_not_fit_are_told() {
 }
 
 /// The points of the room, with a class and, if wanted, an instance each.
-fn cloud(mesh: &TriMesh, with_instances: bool) -> String {
-    let sampler = SurfaceSampler::new(mesh, Density::PerM2(4000.0), 1);
+fn cloud(mesh: &TriMesh, points_per_m2: f64, with_instances: bool) -> String {
+    let sampler = SurfaceSampler::new(mesh, Density::PerM2(points_per_m2), 1);
     let mut points = PointCloud::default();
     sampler.sample(0..sampler.len(), &mut points);
     let mut ply = format!("ply\nformat ascii 1.0\nelement vertex {}\n", points.len() + 1);
@@ -263,12 +264,22 @@ fn points_vote_for_faces() {
     let mesh = room();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("net.ply");
-    for with_instances in [false, true] {
-        fs::write(&path, cloud(&mesh, with_instances)).unwrap();
-        let ctx = Context::default();
+    // 20 points a face of the floor, and fewer points than faces.
+    for (points_per_m2, with_instances) in [(4000.0, false), (4000.0, true), (150.0, true)] {
+        fs::write(&path, cloud(&mesh, points_per_m2, with_instances)).unwrap();
+        let heard = Arc::new(Mutex::new(Vec::new()));
+        let list = Arc::clone(&heard);
+        let ctx = Context::default().observed_by(move |event: &Event<'_>| {
+            if let Event::Message { text, .. } = event {
+                list.lock().unwrap().push((*text).to_owned());
+            }
+        });
         let found = read_proposals(&path, &mesh, &Taxonomy::s3dis(), &ctx).unwrap();
         // One point lies a metre above the floor.
-        assert_eq!(ctx.warnings(), 1);
+        let heard = heard.lock().unwrap().join("; ");
+        assert!(heard.contains("1 of its points are farther than 0.1 m"), "{heard}");
+        assert!(!heard.contains(";"), "{heard}");
+
         if with_instances {
             let [floor, one, other] = room_of("net.ply, instance ");
             assert_eq!(shown(&found), [floor + "1", one + "2", other + "3"]);
@@ -277,7 +288,7 @@ fn points_vote_for_faces() {
         }
     }
 
-    fs::write(&path, cloud(&mesh, false).replace(" 7 \n", " 70 \n")).unwrap();
+    fs::write(&path, cloud(&mesh, 4000.0, false).replace(" 7 \n", " 70 \n")).unwrap();
     let why = message(&path, &mesh);
     assert!(
         why.contains("\"70\"") && why.contains("NAME.classes.json") && !why.contains("[annotations"),

@@ -59,7 +59,7 @@ use crate::segments::Segments;
 use s3d_dataset::error::InputError;
 #[cfg(feature = "clap")]
 use s3d_dataset::options::words;
-use s3d_dataset::store::{FolderKind, NewFolder};
+use s3d_dataset::store::{FolderKind, NewFolder, check_apart};
 use s3d_dataset::{Context, Result};
 use s3d_geom::TriMesh;
 use s3d_geom::glam::DVec3;
@@ -189,9 +189,9 @@ impl Default for OutputOptions {
 ///
 /// # Errors
 /// [`Error::Input`](s3d_dataset::Error::Input) if `mesh` is not the mesh of the labels, nothing is labelled,
-/// or, for S3DIS, nothing is in a room with a type. [`Error::Usage`](s3d_dataset::Error::Usage) if `to`
-/// exists and is not to be replaced, is a folder of something else, or lies in the folder of labels, and for
-/// too many points. [`Error::File`](s3d_dataset::Error::File);
+/// `to` lies in the folder of labels, or, for S3DIS, nothing is in a room with a type.
+/// [`Error::Usage`](s3d_dataset::Error::Usage) if `to` exists and is not to be replaced, or is a folder of
+/// something else, and for too many points. [`Error::File`](s3d_dataset::Error::File);
 /// [`Error::Cancelled`](s3d_dataset::Error::Cancelled).
 pub fn write_output(
     format: OutputFormat,
@@ -203,6 +203,11 @@ pub fn write_output(
     ctx: &Context,
 ) -> Result<PathBuf> {
     let labelled = Labelled::new(labels, mesh, *options)?;
+    check_apart(to, labels.path()).map_err(|_| {
+        let why = "an output does not lie in the folder of labels, nor the folder of labels in it: name \
+                   another place";
+        InputError::Unfit { path: to.to_owned(), why: why.to_owned() }
+    })?;
     if format == OutputFormat::Ply {
         labelled.write_ply(to, ctx)?;
         return Ok(to.to_owned());

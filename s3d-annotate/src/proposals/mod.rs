@@ -17,9 +17,10 @@
 //! # Classes
 //!
 //! A number is the place of a class in the taxonomy, from 0: for S3DIS 0 is ceiling and 12 is clutter.
-//! Negative numbers and 255 are no class. Other numbers, and words that the taxonomy does not know, need
-//! names: `NAME.classes.json` or `classes.json` beside the file. It is a list, `["wall", "chair", null]`, or
-//! an object, `{"4": "wall", "shelves": "bookcase", "9": ""}`; `null` and `""` are no class.
+//! Negative numbers and 255 are no class. The numbers of a data set (NYU40's from 1) and words that the
+//! taxonomy does not know need names: `NAME.classes.json` or `classes.json` beside the file. It is a list,
+//! `["wall", "chair", null]`, or an object, `{"4": "wall", "shelves": "bookcase", "9": ""}`; `null` and `""`
+//! are no class.
 //!
 //! # Instances
 //!
@@ -30,7 +31,12 @@
 //!
 //! # Points
 //!
-//! Each point votes for its nearest face, if it is within 10 cm. A face takes the proposal with most votes.
+//! Each point votes for its nearest face, if it is within 10 cm. A face takes the proposal with most votes. A
+//! face without a vote takes that of the labelled surface around it, if it is within 5 cm.
+//!
+//! # What is not read
+//!
+//! Masks of photographs, and the names of classes in an archive.
 //!
 //! [`Annotations::open`]: s3d_io::cloud::Annotations::open
 
@@ -135,13 +141,13 @@ fn grouped(path: &Path, mesh: &TriMesh, key_of_face: &[Option<Key>], ctx: &Conte
         let faces = faces.into_iter().collect();
         found.push((place, Proposal { class: class.name().to_owned(), faces, source }));
     }
-    let [mut dropped, mut dropped_m2] = [0.0; 2];
+    let (mut dropped, mut dropped_m2) = (0u32, 0.0);
     for piece in face_patches(mesh, &loose) {
         let members = || piece.iter().filter_map(|place| loose.get(*place));
         let area_m2: f64 = members().map(|(face, _)| mesh.area(*face)).sum();
         let Some(class) = members().next().and_then(|(_, class)| classes.get(class)) else { continue };
         if area_m2 < SMALLEST_M2 {
-            dropped += 1.0;
+            dropped += 1;
             dropped_m2 += area_m2;
             continue;
         }
@@ -149,7 +155,7 @@ fn grouped(path: &Path, mesh: &TriMesh, key_of_face: &[Option<Key>], ctx: &Conte
         let class_name = class.name().to_owned();
         found.push((class.index(), Proposal { class: class_name, faces, source: file.to_string() }));
     }
-    if dropped > 0.0 {
+    if dropped > 0 {
         ctx.warn(format_args!(
             "{}: {dropped} pieces below {SMALLEST_M2} m², together {dropped_m2:.3} m², are no proposals",
             path.display()

@@ -8,11 +8,15 @@ use s3d_geom::{NearestFaces, PointCloud, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance, AnnotatedMesh, AnnotationOptions, Annotations};
 use s3d_io::mesh::{MeshFile, UpAxis};
-use s3d_label::{LabelId, Labeler, MAX_LABELS};
+use s3d_label::{LabelId, Labeler, MAX_LABELS, fill_labels};
 use std::path::Path;
 
 /// A point that is farther from every face than this does not vote, metres.
 const NEAR_M: f32 = 0.1;
+
+/// Faces without a point take the label of labelled surface nearer than this, metres: the points of a network
+/// are often fewer than the faces.
+const FILL_M: f64 = 0.05;
 
 /// Returns what each face belongs to.
 ///
@@ -25,7 +29,12 @@ pub(super) fn keys(
     ctx: &Context,
 ) -> Result<Vec<Option<Key>>> {
     let annotations = open(path, mesh, names)?;
-    annotations.warnings.iter().for_each(|warning| ctx.warn(warning));
+    // Advice about columns in a scene's file is of no use here.
+    let warnings = annotations
+        .warnings
+        .iter()
+        .filter(|warning| !warning.contains("in [annotations]"));
+    warnings.for_each(|warning| ctx.warn(warning));
     let instances: Vec<&AnnotatedInstance> =
         annotations.rooms.iter().flat_map(|room| &room.instances).collect();
     if instances.len() >= MAX_LABELS {
@@ -43,20 +52,26 @@ pub(super) fn keys(
     labeler.watch_strays(NEAR_M, false);
     let mut keys: Vec<Option<Key>> = vec![None];
     let mut far = 0;
+    let mut know_faces = true;
     for (number, instance) in (1..).zip(instances) {
         ctx.check()?;
         keys.push(Some((instance.class, are_numbered.then_some(i64::from(number)))));
-        far += vote(&mut labeler, instance, LabelId(number))?;
+        let voted = vote(&mut labeler, instance, LabelId(number))?;
+        far += voted.far;
+        know_faces &= voted.know_faces;
     }
     if far > 0 {
         let shown = path.display();
         ctx.warn(format_args!(
-            "{shown}: {far} points are farther than {NEAR_M} m from the mesh and do not count"
+            "{shown}: {far} of its points are farther than {NEAR_M} m from the mesh and do not count"
         ));
     }
-    let labels = labeler.finish();
+    let mut labels = labeler.finish().into_label_of_face();
+    if !know_faces {
+        fill_labels(mesh, &mut labels, FILL_M);
+    }
     let key = |label: &LabelId| keys.get(label.0 as usize).copied().flatten();
-    Ok(labels.label_of_face().iter().map(key).collect())
+    Ok(labels.iter().map(key).collect())
 }
 
 /// Opens the annotations.
@@ -92,17 +107,26 @@ fn is_tree(path: &Path) -> bool {
     rooms.into_iter().any(|room| room.path().join("Annotations").is_dir())
 }
 
-/// Lets the points of an instance vote, and returns how many are too far from the mesh.
-fn vote(labeler: &mut Labeler<'_>, instance: &AnnotatedInstance, label: LabelId) -> Result<usize> {
+/// What became of the points of an instance.
+struct Voted {
+    /// The number of points that are too far from the mesh.
+    far: usize,
+    /// Whether the points belong to faces or vertices of the mesh.
+    know_faces: bool,
+}
+
+/// Lets the points of an instance vote.
+fn vote(labeler: &mut Labeler<'_>, instance: &AnnotatedInstance, label: LabelId) -> Result<Voted> {
     let mut points = PointCloud::default();
     instance.read(&mut points)?;
+    let has_faces = points.faces.len() == points.len();
     let voted = if instance.are_vertices() {
         labeler.add_vertices(&points.positions, label)
-    } else if points.faces.len() == points.len() {
+    } else if has_faces {
         labeler.add_points_on_faces(&points.faces, label)
     } else {
         labeler.add_points(&points.positions, label)
     };
     voted.map_err(|e| FileError::format(instance.path(), e.to_string()))?;
-    Ok(labeler.take_strays().len())
+    Ok(Voted { far: labeler.take_strays().len(), know_faces: has_faces || instance.are_vertices() })
 }
