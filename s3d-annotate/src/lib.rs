@@ -38,6 +38,8 @@ pub mod outputs;
 pub mod proposals;
 pub mod review;
 pub mod segments;
+#[cfg(feature = "server")]
+pub mod server;
 pub mod structure;
 pub mod workbench;
 

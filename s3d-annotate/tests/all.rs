@@ -5,5 +5,7 @@ mod outputs;
 mod proposals;
 mod review;
 mod segments;
+#[cfg(feature = "server")]
+mod server;
 mod structure;
 mod workbench;

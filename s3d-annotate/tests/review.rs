@@ -26,12 +26,17 @@ impl Scene {
 
     fn act(&mut self, action: Action) {
         let number = self.state.revision() + 1;
-        self.state.apply(Event { version: 1, number, at_ms: None, action }).unwrap();
+        self.state
+            .apply(Event { version: 1, number, at_ms: None, action })
+            .unwrap();
     }
 
     fn faces_of(&self, instance: usize) -> FaceRuns {
         let of_face = self.truth.instance_of_face.iter().zip(0u32..);
-        of_face.filter(|(of, _)| **of as usize == instance).map(|(_, face)| face).collect()
+        of_face
+            .filter(|(of, _)| **of as usize == instance)
+            .map(|(_, face)| face)
+            .collect()
     }
 
     /// Labels an instance of the truth, and returns its number.
@@ -85,12 +90,19 @@ fn house() -> Building {
 fn explore() {
     for building in [demo(), house()] {
         let mut scene = Scene::new(&building);
-        eprintln!("{} faces {} instances {}", scene.truth.title, scene.truth.mesh.faces().len(), scene.truth.instances.len());
+        eprintln!(
+            "{} faces {} instances {}",
+            scene.truth.title,
+            scene.truth.mesh.faces().len(),
+            scene.truth.instances.len()
+        );
         let t = std::time::Instant::now();
         Surroundings::new(&scene.truth.mesh, &scene.segments);
         eprintln!("surroundings {:?}", t.elapsed());
         let mut size = vec![0.0; scene.truth.instances.len()];
-        for (f, i) in (0u32..).zip(&scene.truth.instance_of_face) { size[*i as usize] += scene.truth.mesh.area(f); }
+        for (f, i) in (0u32..).zip(&scene.truth.instance_of_face) {
+            size[*i as usize] += scene.truth.mesh.area(f);
+        }
         // Costs of the best nodes and of their parents.
         let (mut pure, mut whole, mut n, mut right, mut guessed) = (0, 0, 0, 0, 0);
         let mut skipped = vec![];
@@ -100,21 +112,51 @@ fn explore() {
             let t = std::time::Instant::now();
             let Some(doubt) = scene.review().next_doubt(&skipped) else { break };
             worst = worst.max(t.elapsed());
-            if doubt.area_m2 < 0.05 { break; }
+            if doubt.area_m2 < 0.05 {
+                break;
+            }
             let mut share: BTreeMap<u32, f64> = BTreeMap::new();
-            let set: std::collections::BTreeSet<u32> = scene.segments.tree.segments_of(doubt.node).iter().copied().collect();
+            let set: std::collections::BTreeSet<u32> =
+                scene.segments.tree.segments_of(doubt.node).iter().copied().collect();
             for (f, i) in (0u32..).zip(&scene.truth.instance_of_face) {
-                if set.contains(&scene.segments.segment_of_face[f as usize]) && scene.state.instance_of_face()[f as usize] == 0 { *share.entry(*i).or_default() += scene.truth.mesh.area(f); }
+                if set.contains(&scene.segments.segment_of_face[f as usize])
+                    && scene.state.instance_of_face()[f as usize] == 0
+                {
+                    *share.entry(*i).or_default() += scene.truth.mesh.area(f);
+                }
             }
             let total: f64 = share.values().sum();
             let (&best, &m2) = share.iter().max_by(|a, b| a.1.total_cmp(b.1)).unwrap();
             n += 1;
             let class = scene.truth.instances[best as usize].class.name();
             let ok = m2 > 0.95 * total;
-            if ok { pure += 1; if m2 > 0.9 * size[best as usize] { whole += 1; } }
-            if let Some(g) = &doubt.guess { guessed += 1; if g.class == class { right += 1; } }
-            if !ok || n % 20 == 0 { eprintln!("  {n}: {:.2} m2 cost {:.3} pure {:.2} of {class} whole {:.2} guess {:?}", doubt.area_m2, scene.segments.tree.cost(doubt.node), m2 / total, m2 / size[best as usize], doubt.guess.as_ref().map(|g| &g.class)); }
-            if ok && done.insert(best) { scene.label(best as usize); } else { skipped.push(scene.segments.segment_of_face[doubt.face as usize]); }
+            if ok {
+                pure += 1;
+                if m2 > 0.9 * size[best as usize] {
+                    whole += 1;
+                }
+            }
+            if let Some(g) = &doubt.guess {
+                guessed += 1;
+                if g.class == class {
+                    right += 1;
+                }
+            }
+            if !ok || n % 20 == 0 {
+                eprintln!(
+                    "  {n}: {:.2} m2 cost {:.3} pure {:.2} of {class} whole {:.2} guess {:?}",
+                    doubt.area_m2,
+                    scene.segments.tree.cost(doubt.node),
+                    m2 / total,
+                    m2 / size[best as usize],
+                    doubt.guess.as_ref().map(|g| &g.class)
+                );
+            }
+            if ok && done.insert(best) {
+                scene.label(best as usize);
+            } else {
+                skipped.push(scene.segments.segment_of_face[doubt.face as usize]);
+            }
         }
         eprintln!("doubts {n} pure {pure} whole {whole} guessed {guessed} right {right}; slowest {worst:?}");
 
@@ -126,18 +168,32 @@ fn explore() {
         let t = std::time::Instant::now();
         let checks = scene.review().checks();
         eprintln!("checks {:?}", t.elapsed());
-        for c in &checks { eprintln!("  {:?} {}", c.kind, c.text); }
+        for c in &checks {
+            eprintln!("  {:?} {}", c.kind, c.text);
+        }
 
         // Similar.
         let (mut hits, mut found, mut wanted) = (0, 0, 0);
         for i in 0..scene.truth.instances.len() {
             let class = scene.truth.instances[i].class;
-            if ![Class::CHAIR, Class::TABLE, Class::BOOKCASE, Class::WINDOW].contains(&class) { continue }
-            let mut s = Scene { truth: scene.truth.clone(), segments: scene.segments.clone(), surroundings: scene.surroundings.clone(), state: State::of_mesh(&scene.truth.mesh) };
+            if ![Class::CHAIR, Class::TABLE, Class::BOOKCASE, Class::WINDOW].contains(&class) {
+                continue;
+            }
+            let mut s = Scene {
+                truth: scene.truth.clone(),
+                segments: scene.segments.clone(),
+                surroundings: scene.surroundings.clone(),
+                state: State::of_mesh(&scene.truth.mesh),
+            };
             let number = s.label(i);
             let patches = s.review().similar_patches(number);
             found += patches.len();
-            hits += patches.iter().filter(|p| s.truth.instances[s.truth.instance_of_face[p.face as usize] as usize].class == class).count();
+            hits += patches
+                .iter()
+                .filter(|p| {
+                    s.truth.instances[s.truth.instance_of_face[p.face as usize] as usize].class == class
+                })
+                .count();
             wanted += s.truth.instances.iter().filter(|x| x.class == class).count() - 1;
         }
         eprintln!("similar: found {found} of {wanted}, right {hits}");

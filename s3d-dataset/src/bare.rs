@@ -11,7 +11,6 @@ use crate::place::{PlaceOptions, place_cameras};
 use glam::DVec3;
 use s3d_geom::{Camera, Pose, Raster, TriMesh};
 use s3d_io::camera::ScanLocation;
-use s3d_io::mesh::MeshFile;
 use s3d_label::Taxonomy;
 use s3d_render::Scene;
 use std::fmt;
@@ -22,7 +21,8 @@ use std::sync::Arc;
 /// order and frame. Its annotations are not read, and need not exist.
 pub struct BareScene {
     area: AreaInput,
-    file: Arc<MeshFile>,
+    mesh: Arc<TriMesh>,
+    mesh_files: Vec<PathBuf>,
 }
 
 impl fmt::Debug for BareScene {
@@ -48,15 +48,16 @@ impl BareScene {
     /// # Errors
     /// [`Error::Input`] or [`Error::File`] if the scene cannot be exported.
     pub fn open(scene: impl Into<SceneSource>, ctx: &Context) -> Result<Self> {
-        let area = Inputs::open_bare(scene.into())?;
-        let file = area.read_mesh()?;
+        let mut area = Inputs::open_bare(scene.into())?;
+        let file = area.take_mesh()?;
         area.tell_mesh(ctx, &file);
-        Ok(Self { area, file })
+        let mesh_files = file.sources.into_iter().map(|source| source.path).collect();
+        Ok(Self { area, mesh: Arc::new(file.mesh), mesh_files })
     }
 
     /// Returns the mesh.
-    pub fn mesh(&self) -> &TriMesh {
-        &self.file.mesh
+    pub fn mesh(&self) -> &Arc<TriMesh> {
+        &self.mesh
     }
 
     /// Returns what was named: a scene file, a folder, or a mesh.
@@ -70,8 +71,13 @@ impl BareScene {
     }
 
     /// Returns the files that the mesh is read from.
-    pub fn mesh_files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.file.sources.iter().map(|source| &source.path)
+    pub fn mesh_files(&self) -> &[PathBuf] {
+        &self.mesh_files
+    }
+
+    /// Returns what was subtracted from the scan's own coordinates, metres.
+    pub fn offset_m(&self) -> DVec3 {
+        self.area.frame.offset_m
     }
 
     /// Returns where the images of an export are taken: the listed locations, or else where its photographs

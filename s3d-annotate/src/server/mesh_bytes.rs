@@ -24,7 +24,12 @@ pub(super) fn positions(mesh: &TriMesh) -> Vec<u8> {
 
 /// Three vertices a face.
 pub(super) fn faces(mesh: &TriMesh) -> Vec<u8> {
-    mesh.faces().as_flattened().iter().copied().flat_map(u32::to_le_bytes).collect()
+    mesh.faces()
+        .as_flattened()
+        .iter()
+        .copied()
+        .flat_map(u32::to_le_bytes)
+        .collect()
 }
 
 /// Three bytes a vertex; empty without colours of vertices.
