@@ -36,7 +36,10 @@ pub(super) struct Cells {
 impl Cells {
     pub(super) fn new(mesh: &TriMesh) -> Self {
         let faces = 0..mesh.faces().len() as u32;
-        let edges_m: f64 = faces.clone().map(|face| f64::from(longest_edge(mesh.triangle(face)).0)).sum();
+        let edges_m: f64 = faces
+            .clone()
+            .map(|face| f64::from(longest_edge(mesh.triangle(face)).0))
+            .sum();
         let too_many = (mesh.total_area() / MOST_M2).sqrt().max(edges_m / MOST_EDGES_M);
         let mut cells = Self {
             corner: mesh.aabb().min - CELL_M,
@@ -76,7 +79,9 @@ impl Cells {
     /// The cell that a point is in. Points beyond the cells are in the outermost ones.
     pub(super) fn at(&self, point: Vec3) -> Cell {
         // The conversion saturates.
-        let [x, y, z] = ((point - self.corner) / self.edge_m).to_array().map(|x| (x as u64).min(LAST));
+        let [x, y, z] = ((point - self.corner) / self.edge_m)
+            .to_array()
+            .map(|x| (x as u64).min(LAST));
         x << 42 | y << 21 | z
     }
 

@@ -115,8 +115,10 @@ impl Review<'_> {
 
     fn in_pieces(&self, faces_of: &BTreeMap<u32, Vec<u32>>) -> Vec<Finding> {
         let name = self.names();
-        let instances: Vec<(&u32, &Vec<u32>)> =
-            faces_of.iter().filter(|(instance, _)| !self.is_one_of(**instance, &DIVIDED)).collect();
+        let instances: Vec<(&u32, &Vec<u32>)> = faces_of
+            .iter()
+            .filter(|(instance, _)| !self.is_one_of(**instance, &DIVIDED))
+            .collect();
         let found: Vec<Option<(u32, Vec<Piece>)>> = instances
             .into_par_iter()
             .map(|(instance, faces)| {
@@ -142,10 +144,17 @@ impl Review<'_> {
         let cells = &self.surroundings.cells;
         let of_face = self.state.instance_of_face();
         let is_floor = |instance: u32| {
-            self.state.instances().get(&instance).is_some_and(|class| class == "floor")
+            self.state
+                .instances()
+                .get(&instance)
+                .is_some_and(|class| class == "floor")
         };
-        let floors: BTreeMap<u32, bool> =
-            self.state.instances().keys().map(|instance| (*instance, is_floor(*instance))).collect();
+        let floors: BTreeMap<u32, bool> = self
+            .state
+            .instances()
+            .keys()
+            .map(|instance| (*instance, is_floor(*instance)))
+            .collect();
         let is_under_a_storey: BTreeMap<u32, bool> = (self.state.instances().keys())
             .map(|instance| (*instance, self.is_one_of(*instance, &UNDER_A_STOREY)))
             .collect();
@@ -167,7 +176,10 @@ impl Review<'_> {
                     continue;
                 }
                 let height = |cell: Cell| column(cell).1;
-                let under = column_of[..i].iter().rev().find(|under| height(under.0) + gap <= height(cell));
+                let under = column_of[..i]
+                    .iter()
+                    .rev()
+                    .find(|under| height(under.0) + gap <= height(cell));
                 let Some(&(under, other, _)) = under else { continue };
                 let is_near = height(under) + reach >= height(cell);
                 if is_near && !is_under_a_storey.get(&other).is_some_and(|is| *is) {
@@ -184,7 +196,8 @@ impl Review<'_> {
             for piece in pieces(self.mesh, cells, &faces) {
                 if piece.area_m2 >= LEAST_ABOVE_M2 {
                     let (name, area_m2) = (name(instance), piece.area_m2);
-                    let text = format!("{area_m2:.2} m² of {name} lie above something else, like a table top");
+                    let text =
+                        format!("{area_m2:.2} m² of {name} lie above something else, like a table top");
                     findings.push((CheckKind::FloorAbove, text, Some(instance), piece.faces));
                 }
             }
@@ -198,12 +211,14 @@ impl Review<'_> {
         }
         let room_of_face = self.state.room_of_face(self.mesh);
         let room_names = self.state.room_names();
-        let room_name =
-            |room: u32| room_names.get(&room).cloned().unwrap_or_else(|| format!("room {room}"));
+        let room_name = |room: u32| room_names.get(&room).cloned().unwrap_or_else(|| format!("room {room}"));
         let name = self.names();
 
         let mut findings = Vec::new();
-        for (&instance, faces) in faces_of.iter().filter(|(instance, _)| !self.is_one_of(**instance, &BETWEEN)) {
+        for (&instance, faces) in faces_of
+            .iter()
+            .filter(|(instance, _)| !self.is_one_of(**instance, &BETWEEN))
+        {
             let mut in_room: BTreeMap<u32, Piece> = BTreeMap::new();
             for &face in faces {
                 let empty = || Piece { faces: Vec::new(), area_m2: 0.0 };
@@ -217,7 +232,10 @@ impl Review<'_> {
 
             let all_m2: f64 = rooms.iter().map(|(_, piece)| piece.area_m2).sum();
             let least_m2 = LEAST_IN_ROOM_M2.max(LEAST_IN_ROOM * all_m2);
-            let second = rooms.iter().position(|(_, piece)| piece.area_m2 < least_m2).unwrap_or(rooms.len());
+            let second = rooms
+                .iter()
+                .position(|(_, piece)| piece.area_m2 < least_m2)
+                .unwrap_or(rooms.len());
             rooms.truncate(second);
             let mut rooms = rooms.into_iter();
             if let (Some((first, _)), Some((second, piece))) = (rooms.next(), rooms.next()) {
@@ -239,23 +257,30 @@ impl Review<'_> {
             .collect();
         faces.sort_unstable();
 
-        let found = pieces(self.mesh, &self.surroundings.cells, &faces).into_iter().map(|piece| {
-            // The place is on the largest patch.
-            let mut patches: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-            for face in piece.faces {
-                patches.entry(self.segments.segment_of_face[face as usize]).or_default().push(face);
-            }
-            let count = patches.len();
-            let area_m2 = piece.area_m2;
-            let text = match count {
-                1 => format!("{area_m2:.2} m² have no label"),
-                _ => format!("{area_m2:.2} m² have no label, in {count} patches side by side"),
-            };
-            let largest = patches.into_iter().max_by(|a, b| {
-                open_m2[a.0 as usize].total_cmp(&open_m2[b.0 as usize]).then(b.0.cmp(&a.0))
+        let found = pieces(self.mesh, &self.surroundings.cells, &faces)
+            .into_iter()
+            .map(|piece| {
+                // The place is on the largest patch.
+                let mut patches: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+                for face in piece.faces {
+                    patches
+                        .entry(self.segments.segment_of_face[face as usize])
+                        .or_default()
+                        .push(face);
+                }
+                let count = patches.len();
+                let area_m2 = piece.area_m2;
+                let text = match count {
+                    1 => format!("{area_m2:.2} m² have no label"),
+                    _ => format!("{area_m2:.2} m² have no label, in {count} patches side by side"),
+                };
+                let largest = patches.into_iter().max_by(|a, b| {
+                    open_m2[a.0 as usize]
+                        .total_cmp(&open_m2[b.0 as usize])
+                        .then(b.0.cmp(&a.0))
+                });
+                (CheckKind::Unlabelled, text, None, largest.map_or_else(Vec::new, |(_, faces)| faces))
             });
-            (CheckKind::Unlabelled, text, None, largest.map_or_else(Vec::new, |(_, faces)| faces))
-        });
         found.collect()
     }
 }

@@ -58,9 +58,8 @@ impl Sums {
         let area_m2 = mesh.area(face);
         let sum = a + b + c;
         // The integral of a product over a triangle.
-        let product = |i: usize, j: usize| {
-            area_m2 / 12.0 * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + sum[i] * sum[j])
-        };
+        let product =
+            |i: usize, j: usize| area_m2 / 12.0 * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + sum[i] * sum[j]);
         let up = f64::from(mesh.normal(face).z);
         Self {
             area_m2,

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::cmp::Reverse;
 
 /// Nodes up to this cost of a merge are taken for one thing.
-const ONE_THING: f32 = 0.3;
+const ONE_THING: f32 = 1.4;
 
 /// Things that differ more than this are not of one kind: see [`Descriptor::difference`].
 const SAME_KIND: f64 = 4.0;
@@ -88,8 +88,9 @@ impl Review<'_> {
     fn open_things(&self, open_m2: &[f64]) -> Vec<u32> {
         let tree = &self.segments.tree;
         let mut things = Vec::new();
-        let mut rest: Vec<u32> =
-            (0..tree.node_count()).filter(|node| tree.parent(*node).is_none()).collect();
+        let mut rest: Vec<u32> = (0..tree.node_count())
+            .filter(|node| tree.parent(*node).is_none())
+            .collect();
         while let Some(node) = rest.pop() {
             let open = open_m2[node as usize];
             if open <= 0.0 {

@@ -34,7 +34,10 @@ pub(super) fn pieces(mesh: &TriMesh, cells: &Cells, faces: &[u32]) -> Vec<Piece>
     let mut piece_of_set: Vec<Option<usize>> = vec![None; occupied.len()];
     for &face in faces {
         // The cells of a face touch each other: any of them will do.
-        let place = cells.of(face).first().map_or(0, |cell| occupied.partition_point(|other| other < cell));
+        let place = cells
+            .of(face)
+            .first()
+            .map_or(0, |cell| occupied.partition_point(|other| other < cell));
         let set = root(&mut sets, place as u32) as usize;
         let piece = *piece_of_set[set].get_or_insert_with(|| {
             found.push(Piece { faces: Vec::new(), area_m2: 0.0 });

@@ -78,9 +78,15 @@ impl Surroundings {
 
     /// The faces of a node that have no label.
     pub(super) fn open_faces(&self, segments: &Segments, node: u32, instance_of_face: &[u32]) -> Vec<u32> {
-        let of_node = segments.tree.segments_of(node).iter().flat_map(|segment| self.faces_of(*segment));
-        let mut open: Vec<u32> =
-            of_node.copied().filter(|face| instance_of_face[*face as usize] == 0).collect();
+        let of_node = segments
+            .tree
+            .segments_of(node)
+            .iter()
+            .flat_map(|segment| self.faces_of(*segment));
+        let mut open: Vec<u32> = of_node
+            .copied()
+            .filter(|face| instance_of_face[*face as usize] == 0)
+            .collect();
         open.sort_unstable();
         open
     }

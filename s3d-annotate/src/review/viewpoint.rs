@@ -37,7 +37,11 @@ pub(super) fn view_of(mesh: &TriMesh, surroundings: &Surroundings, faces: &[u32]
     let near_middle = |a: &&(u32, Vec3), b: &&(u32, Vec3)| {
         a.1.distance_squared(middle).total_cmp(&b.1.distance_squared(middle))
     };
-    let size_m = 2.0 * samples.iter().map(|(_, place)| place.distance(middle)).fold(0f32, f32::max);
+    let size_m = 2.0
+        * samples
+            .iter()
+            .map(|(_, place)| place.distance(middle))
+            .fold(0f32, f32::max);
 
     let mut best: Option<(f32, View)> = None;
     for distance in DISTANCES {
@@ -57,8 +61,11 @@ pub(super) fn view_of(mesh: &TriMesh, surroundings: &Surroundings, faces: &[u32]
             let seen: Vec<(f32, (u32, Vec3))> = seen.collect();
             let worth: f32 = seen.iter().map(|(worth, _)| worth).sum();
             if worth > best.map_or(0.0, |(worth, _)| worth)
-                && let Some(&(face, at)) =
-                    seen.iter().filter(|(worth, _)| *worth > 0.1).map(|(_, seen)| seen).min_by(near_middle)
+                && let Some(&(face, at)) = seen
+                    .iter()
+                    .filter(|(worth, _)| *worth > 0.1)
+                    .map(|(_, seen)| seen)
+                    .min_by(near_middle)
             {
                 best = Some((worth, View { face, at, from }));
             }
@@ -101,7 +108,9 @@ fn directions() -> impl Iterator<Item = Vec3> {
 fn is_room_to_stand(surroundings: &Surroundings, at: Vec3) -> bool {
     let near = 2.0 * surroundings.cells.edge_m;
     let around = [Vec3::ZERO, Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
-    around.iter().all(|offset| !surroundings.cells.is_occupied(at + *offset * near))
+    around
+        .iter()
+        .all(|offset| !surroundings.cells.is_occupied(at + *offset * near))
 }
 
 /// Whether no surface lies between two places, up to a little in front of the second.
@@ -111,11 +120,11 @@ fn is_free(surroundings: &Surroundings, from: Vec3, to: Vec3) -> bool {
     let length_m = way.length() - SLACK_M.max(3.0 * cells.edge_m);
     let step_m = 0.6 * cells.edge_m;
     let direction = way.normalize_or_zero();
-    (1..(length_m / step_m).max(0.0) as u32).all(|i| !cells.is_occupied(from + direction * (i as f32 * step_m)))
+    (1..(length_m / step_m).max(0.0) as u32)
+        .all(|i| !cells.is_occupied(from + direction * (i as f32 * step_m)))
 }
 
 /// A place as numbers of 64 bits.
 pub(super) fn numbers(place: Vec3) -> [f64; 3] {
     place.as_dvec3().to_array()
 }
-
