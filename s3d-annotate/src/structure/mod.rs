@@ -82,8 +82,8 @@ pub struct Surface {
 /// ```
 pub fn find_structure(mesh: &TriMesh) -> Structure {
     let scan = Scan::new(mesh);
-    let floors = storeys::floors(&scan);
-    let fronts = Fronts::find(&scan, &floors);
+    let mut floors = storeys::floors(&scan);
+    let fronts = Fronts::find(&scan, &mut floors);
 
     let mut found = Structure::default();
     let mut is_taken = vec![false; scan.facets.len()];
@@ -144,6 +144,7 @@ impl Finder<'_> {
                 fronts: self.fronts,
                 room_of_cell: &room_of_cell,
                 rim_of_cell: &rim_of_cell,
+                near_of_cell: &near_of_cell,
                 depth: &depth,
                 room,
             };
