@@ -249,7 +249,9 @@ impl Storey {
         let lintels: Vec<bool> = (0..layers.len())
             .map(|cell| is_filled[cell] && is_lintel(cell))
             .collect();
-        for piece in pieces(scan, |cell| lintels[cell], |_, _| true) {
+        // Cells that touch in corners are of one lintel.
+        let is_near = |cell: usize| lintels[cell] || scan.grid.beside(cell).any(|next| lintels[next]);
+        for piece in pieces(scan, is_near, |_, _| true) {
             let mut low = [usize::MAX; 2];
             let mut high = [0; 2];
             for &cell in &piece {
@@ -259,7 +261,7 @@ impl Storey {
             }
             let [x, y] = [0, 1].map(|k| (high[k] - low[k]) as f64 * scan.grid.step_m);
             if x.hypot(y) > WIDEST_DOOR_M {
-                piece.into_iter().for_each(|cell| is_filled[cell] = false);
+                piece.into_iter().for_each(|cell| is_filled[cell] &= !lintels[cell]);
             }
         }
         is_filled
