@@ -29,7 +29,7 @@ const LEAST_LENGTH_M: f64 = 0.4;
 const SQUARE_M: f64 = 0.1;
 
 /// How far inside and outside of a wall the room is looked for, metres.
-const ASIDE_M: f64 = 0.2;
+pub(super) const ASIDE_M: f64 = 0.2;
 
 /// What faces of a room need.
 pub(super) struct Place<'a> {
