@@ -26,7 +26,7 @@ use crate::labelling::{FaceRuns, Room, RoomPart};
 use distance::{distances, spread};
 use planes::Plane;
 use s3d_geom::TriMesh;
-use scan::Scan;
+use scan::{Facet, Scan};
 use serde::Serialize;
 use storey::{Fronts, Storey};
 use surfaces::Place;
@@ -81,9 +81,9 @@ pub struct Surface {
 /// # Ok::<(), s3d_geom::MeshError>(())
 /// ```
 pub fn find_structure(mesh: &TriMesh) -> Structure {
-    let scan = Scan::new(mesh);
-    let floors = storeys::floors(&scan);
-    let fronts = Fronts::find(&scan, &floors);
+    let Some(scan) = Scan::new(mesh) else { return Structure::default() };
+    let mut floors = storeys::floors(&scan);
+    let fronts = Fronts::find(&scan, &mut floors);
 
     let mut found = Structure::default();
     let mut is_taken = vec![false; scan.facets.len()];
@@ -124,8 +124,8 @@ impl Finder<'_> {
         let mut faces_of = vec![Vec::new(); count as usize + 1];
         for (face, facet) in (0u32..).zip(&self.scan.facets) {
             if facet.middle.z >= self.storey.low_m && facet.middle.z <= self.storey.high_m {
-                let cell = grid.cell(facet.middle.truncate());
-                faces_of[near_of_cell[cell] as usize].push(face);
+                let room = self.room_of(facet, &rim_of_cell, &near_of_cell);
+                faces_of[room as usize].push(face);
             }
         }
         let mut cells_of = vec![Vec::new(); count as usize + 1];
@@ -144,6 +144,7 @@ impl Finder<'_> {
                 fronts: self.fronts,
                 room_of_cell: &room_of_cell,
                 rim_of_cell: &rim_of_cell,
+                near_of_cell: &near_of_cell,
                 depth: &depth,
                 room,
             };
@@ -200,6 +201,29 @@ impl Finder<'_> {
                 .for_each(|part| part.heights = heights);
         }
         highest
+    }
+
+    /// Returns the room that a face bounds, or 0: the one that its front looks into, or the one nearest to it.
+    /// A wall may be a single sheet between two rooms.
+    fn room_of(&self, facet: &Facet, rim_of_cell: &[u32], near_of_cell: &[u32]) -> u32 {
+        let place = facet.middle.truncate();
+        let near = near_of_cell[self.scan.grid.cell(place)];
+        let side = match self.fronts {
+            Fronts::Inside => 1.0,
+            Fronts::Outside => -1.0,
+            Fronts::Mixed => return near,
+        };
+        if !facet.is_upright() {
+            return near;
+        }
+        let aside = facet.normal.truncate().normalize_or_zero() * (side * surfaces::ASIDE_M);
+        let before = self.scan.grid.cell(place + aside);
+        match (rim_of_cell[before], near_of_cell[before]) {
+            (room, _) if room != 0 => room,
+            // A beam along a wall cuts a strip of floor off the room.
+            (_, room) if room != 0 && self.storey.has_floor[before] => room,
+            _ => near,
+        }
     }
 
     /// Returns the heights of the floor and of the highest ceiling of a room, metres.
