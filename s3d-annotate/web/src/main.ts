@@ -136,7 +136,10 @@ async function start(): Promise<void> {
     tell();
     view.draw();
   };
-  classes.changed = () => status.take(classes.inHand);
+  classes.changed = () => {
+    status.take(classes.inHand);
+    view.paint.hand.value.fromArray(look.of(classes.inHand)).divideScalar(255);
+  };
   classes.left = () => canvas.focus();
   view.drawn = () => {
     stands.place();

@@ -61,7 +61,7 @@ precision highp float;
 precision highp int;
 precision highp usampler2D;
 uniform sampler2D image, colors, lights, photograph;
-uniform vec3 plain, stand;
+uniform vec3 plain, stand, hand;
 uniform bool textured, colored, inPhotograph;
 uniform float cover, section, ratio;
 in vec2 at;
@@ -91,7 +91,7 @@ void main() {
     color.rgb = mix(color.rgb, own.rgb, 0.12 + 0.63 * line);
   }
   if (lit == ${LIGHTS.hovered}) color.rgb = mix(color.rgb, ${shader(LIT)}, 0.5);
-  else if (lit == ${LIGHTS.taken}) color.rgb = mix(color.rgb, ${shader(LIT)}, 0.72);
+  else if (lit == ${LIGHTS.taken}) color.rgb = mix(color.rgb, hand, 0.78);
   else if (lit == ${LIGHTS.erased}) color.rgb = mix(color.rgb, ${shader(ERASED)}, 0.6);
   else if (lit == ${LIGHTS.doubt}) color.rgb = mix(color.rgb, ${shader([255, 130, 20])}, 0.55);
   else if (lit == ${LIGHTS.similar}) color.rgb = mix(color.rgb, ${shader([70, 220, 250])}, 0.55);
@@ -110,6 +110,8 @@ export class LabelPaint {
   readonly section = { value: 1e9 };
   readonly ratio = { value: 1 };
   readonly inPhotograph = { value: false };
+  /** The colour of the class in hand. */
+  readonly hand = { value: new Vector3() };
   readonly stand = { value: new Vector3() };
   readonly photograph: { value: Texture };
   private readonly blank = blank();
@@ -137,6 +139,7 @@ export class LabelPaint {
         section: this.section,
         ratio: this.ratio,
         inPhotograph: this.inPhotograph,
+        hand: this.hand,
         stand: this.stand,
         photograph: this.photograph,
         colors: { value: colors },

@@ -5,6 +5,9 @@ import { DataTexture, NearestFilter, RGBAFormat, RedFormat } from "three";
 /** Faces in a row of a texture. */
 export const WIDTH = 2048;
 
+/** Ranges that are uploaded count so many components a pixel, whatever the format. */
+const COMPONENTS = 4;
+
 /** What lights up a face; a higher number covers a lower one. */
 export const LIGHTS = { none: 0, similar: 1, doubt: 2, hovered: 3, taken: 4, erased: 5 } as const;
 export type Light = keyof typeof LIGHTS;
@@ -18,10 +21,7 @@ class Column {
   readonly bytes: Uint8Array;
   private readonly dirty = new Set<number>();
 
-  constructor(
-    faces: number,
-    private readonly size: 1 | 4,
-  ) {
+  constructor(faces: number, size: 1 | 4) {
     const rows = Math.max(1, Math.ceil(faces / WIDTH));
     this.bytes = new Uint8Array(size * WIDTH * rows);
     this.texture = new DataTexture(this.bytes, WIDTH, rows, size === 1 ? RedFormat : RGBAFormat);
@@ -35,10 +35,10 @@ class Column {
 
   /** Marks the changed rows for the next picture. Many rows are uploaded as a whole. */
   flush(): void {
-    const { dirty, texture, size } = this;
+    const { dirty, texture } = this;
     if (dirty.size === 0) return;
     if (dirty.size * 2 > texture.image.height) texture.clearUpdateRanges();
-    else for (const row of dirty) texture.addUpdateRange(row * WIDTH * size, WIDTH * size);
+    else for (const row of dirty) texture.addUpdateRange(row * WIDTH * COMPONENTS, WIDTH * COMPONENTS);
     dirty.clear();
     texture.needsUpdate = true;
   }
