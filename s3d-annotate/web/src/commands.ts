@@ -16,6 +16,13 @@ import { SHOWS, type Show } from "./space/paint.js";
 /** What lies this much below the next floor belongs to a storey, metres. */
 const BELOW = 0.4;
 
+const SHOWN: Record<Show, string> = {
+  both: "Labels over the colours.",
+  labels: "Labels alone.",
+  left: "What has no label yet.",
+  colors: "Colours alone.",
+};
+
 export interface Tools {
   classes: Classes;
   cuts: Cuts;
@@ -166,7 +173,7 @@ export class Commands {
     const all = Object.keys(SHOWS) as Show[];
     const next = all[(all.indexOf(view.showing) + 1) % all.length] ?? "both";
     view.show(next);
-    say({ colors: "Colours alone.", both: "Labels over the colours.", labels: "Labels alone." }[next]);
+    say(SHOWN[next]);
   }
 
   private frame(): void {

@@ -22,6 +22,7 @@ import { Proposals } from "./proposals.js";
 import { Review } from "./review.js";
 import { Frame, type Scene } from "./scene.js";
 import { readBytes, readJson } from "./server.js";
+import { keepAddress } from "./space/address.js";
 import { FaceTable } from "./space/table.js";
 import { View } from "./space/view.js";
 import { Work } from "./work.js";
@@ -141,10 +142,6 @@ async function start(): Promise<void> {
     view.paint.hand.value.fromArray(look.of(classes.inHand)).divideScalar(255);
   };
   classes.left = () => canvas.focus();
-  view.drawn = () => {
-    stands.place();
-    if (cuts.way === "box") cuts.draw();
-  };
   view.entered = () => stands.entered();
   new Pointer(desk, painting, cuts);
 
@@ -172,6 +169,12 @@ async function start(): Promise<void> {
     progress.textContent = `Preparing the mesh: ${Math.round(100 * share)} %`;
   });
   progress.remove();
+  const moved = keepAddress(view, where);
+  view.drawn = () => {
+    stands.place();
+    if (cuts.way === "box") cuts.draw();
+    moved();
+  };
   for (const warning of scene.warnings) status.say(warning, true);
   help.openOnce();
   if (!help.element.open) canvas.focus();

@@ -99,8 +99,10 @@ export class Review {
   /** Leaves what is asked. Returns whether something was. */
   leave(): boolean {
     const had = this.similar !== null || this.doubt !== null;
-    if (this.similar) this.desk.table.light("similar", null);
-    else this.put(null);
+    if (this.similar) {
+      this.desk.table.light("similar", null);
+      this.desk.say("");
+    } else this.put(null);
     this.similar = null;
     this.desk.view.draw();
     return had;

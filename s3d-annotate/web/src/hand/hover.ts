@@ -69,6 +69,7 @@ export class Hover {
     if (stays && now.instance === instance && work.at(now.face) === instance) {
       now.face = hit.face;
       now.at = hit.point;
+      this.changed();
       return;
     }
     this.put({ face: hit.face, node, at: hit.point });

@@ -31,6 +31,11 @@ export class Status {
 
   /** Tells of the patch under the pointer. */
   hover(now: Hovered | null, name: string | null, proposed: string | null, level: number): void {
+    // For tests, and whoever extends the page.
+    const { dataset } = this.element;
+    dataset["face"] = now ? String(now.face) : "";
+    dataset["node"] = now ? String(now.node) : "";
+    dataset["instance"] = now ? String(now.instance) : "";
     if (!now) {
       say(this.patch, "");
       return;

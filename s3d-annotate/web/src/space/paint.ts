@@ -17,8 +17,8 @@ import type { Part } from "../../../../s3d-report/web/src/space/files.js";
 import type { Place, Scene } from "../scene.js";
 import { type FaceTable, LIGHTS, WIDTH } from "./table.js";
 
-/** How strongly labels cover the colours. */
-export const SHOWS = { colors: 0, both: 0.55, labels: 1 } as const;
+/** How strongly labels cover the colours; 2 shows what has no label. */
+export const SHOWS = { both: 0.55, labels: 1, left: 2, colors: 0 } as const;
 export type Show = keyof typeof SHOWS;
 
 const ERASED: Place = [222, 60, 50];
@@ -82,13 +82,14 @@ void main() {
   float grey = dot(seen, vec3(0.2126, 0.7152, 0.0722));
   float shade = inPhotograph ? 0.75 + 0.5 * grey : light;
   // Without their colours, faces keep a little of them, so that shapes can be made out.
-  float bare = inPhotograph ? 0.0 : max(0.0, (cover - 0.6) / 0.4);
+  float bare = inPhotograph ? 0.0 : cover > 1.5 ? 0.0 : max(0.0, (cover - 0.6) / 0.4);
   color.rgb = mix(seen, vec3(0.62 * shade + 0.2 * grey), bare);
-  if (own.a > 0.75) color.rgb = mix(color.rgb, own.rgb * shade, cover);
+  if (cover > 1.5) color.rgb = own.a > 0.75 ? vec3(0.82 * shade) : mix(color.rgb, vec3(1.0, 0.0, 1.0), 0.6);
+  else if (own.a > 0.75) color.rgb = mix(color.rgb, own.rgb * shade, cover);
   else if (own.a > 0.25 && cover > 0.0) {
-    float band = fract((gl_FragCoord.x + gl_FragCoord.y) / (11.0 * ratio));
-    float line = smoothstep(0.0, 0.1, band) * (1.0 - smoothstep(0.36, 0.46, band));
-    color.rgb = mix(color.rgb, own.rgb, 0.12 + 0.63 * line);
+    float band = fract((gl_FragCoord.x + gl_FragCoord.y) / (14.0 * ratio));
+    float line = smoothstep(0.0, 0.08, band) * (1.0 - smoothstep(0.26, 0.34, band));
+    color.rgb = mix(color.rgb, own.rgb, 0.08 + 0.62 * line);
   }
   if (lit == ${LIGHTS.hovered}) color.rgb = mix(color.rgb, ${shader(LIT)}, 0.5);
   else if (lit == ${LIGHTS.taken}) color.rgb = mix(color.rgb, hand, 0.78);

@@ -1,10 +1,40 @@
 // A stand-in for the server of `s3d label`: node mock.mjs OBJ PORT.
 import { createServer } from "node:http";
-import { readFileSync, existsSync } from "node:fs";
+import { readFileSync, existsSync, readdirSync } from "node:fs";
 import { dirname, join } from "node:path";
+import { createRequire } from "node:module";
+const { PNG } = createRequire(new URL("../../../../s3d-report/web/package.json", import.meta.url))("pngjs");
 
 const [obj, port] = process.argv.slice(2);
 const dir = dirname(obj);
+const photos = [];
+{
+  const root = join(dir, "../area_1/pano/rgb");
+  if (existsSync(root))
+    for (const name of readdirSync(root)) {
+      const pose = JSON.parse(readFileSync(join(root, "../pose", name.replace("_rgb.png", "_pose.json"))));
+      const [, , [fx, fy]] = pose.camera_rt_matrix;
+      const png = PNG.sync.read(readFileSync(join(root, name)));
+      const out = new PNG({ width: png.width, height: png.height });
+      const shift = Math.round((Math.atan2(fx, fy) / (2 * Math.PI)) * png.width);
+      for (let y = 0; y < png.height; y++)
+        for (let x = 0; x < png.width; x++) {
+          const u = (x - shift + png.width) % png.width;
+          png.data.copy(
+            out.data,
+            4 * (y * png.width + x),
+            4 * (y * png.width + u),
+            4 * (y * png.width + u) + 4,
+          );
+        }
+      photos.push({
+        name: pose.room + "_" + pose.camera_uuid.slice(0, 4),
+        at: pose.camera_location,
+        kind: "panorama",
+        png: PNG.sync.write(out),
+      });
+    }
+}
 const page = new URL("../../../src/server/page.html", import.meta.url);
 const mats = [],
   textures = [],
@@ -102,19 +132,30 @@ for (const [c, a, b] of borders) {
   cost.push(c);
 }
 console.log(n, "faces", num.size, "segments", parent.length, "nodes");
-const leaves = new Map();
-const facesOf = (node) => {
-  if (!leaves.has(node)) {
-    const s = [];
-    for (let f = 0; f < n; f++) {
-      let x = seg[f];
-      while (x !== node && parent[x] !== 0xffffffff) x = parent[x];
-      if (x === node) s.push(f);
-    }
-    leaves.set(node, s);
+const N = parent.length,
+  size = new Uint32Array(N),
+  first = new Uint32Array(N);
+for (const s of seg) size[s]++;
+parent.forEach((p, x) => {
+  if (p !== 0xffffffff) size[p] += size[x];
+});
+{
+  const nx = new Uint32Array(N);
+  let roots = 0;
+  for (let x = N - 1; x >= 0; x--) {
+    const p = parent[x];
+    const at = p === 0xffffffff ? roots : nx[p];
+    if (p === 0xffffffff) roots += size[x];
+    else nx[p] += size[x];
+    first[x] = nx[x] = at;
   }
-  return leaves.get(node);
-};
+}
+const order = new Uint32Array(n);
+{
+  const at = first.slice();
+  for (let f = 0; f < n; f++) order[at[seg[f]]++] = f;
+}
+const facesOf = (node) => [...order.subarray(first[node], first[node] + size[node])].sort((a, b) => a - b);
 const classes = "ceiling floor wall beam column window door table chair sofa bookcase board clutter".split(
   " ",
 );
@@ -169,10 +210,25 @@ const structure = () => {
         parts: [
           {
             outline: [
-              [0, 0],
-              [5, 0],
-              [5, 4],
-              [0, 4],
+              [12, 4],
+              [18, 4],
+              [18, 10],
+              [12, 10],
+            ],
+            heights: [0, 2.8],
+          },
+        ],
+      },
+      {
+        kind: "lounge",
+        name: null,
+        parts: [
+          {
+            outline: [
+              [18.2, 4],
+              [26, 4],
+              [26, 10],
+              [18.2, 10],
             ],
             heights: [0, 2.8],
           },
@@ -244,7 +300,29 @@ const act = (g) => {
     }
     for (const i of v.rooms) rooms.set(next++, struct.rooms[i]);
   } else if (k === "room") rooms.set(v.room ?? next++, v.is);
-  else throw Error("not mocked: " + k);
+  else if (k === "remove_room") rooms.delete(v.room);
+  else if (k === "join_rooms") {
+    const a = rooms.get(v.into);
+    rooms.set(v.into, { ...a, parts: [...a.parts, ...v.rooms.flatMap((r) => rooms.get(r).parts)] });
+    for (const r of v.rooms) rooms.delete(r);
+  } else if (k === "split_room") {
+    const a = rooms.get(v.room),
+      [[x0, y0], [x1, y1]] = v.line,
+      side = ([x, y]) => (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0);
+    const half = (sign) => {
+      const o = a.parts[0].outline,
+        out = [];
+      o.forEach((p, i) => {
+        const q = o[(i + 1) % o.length],
+          [s, u] = [side(p) * sign, side(q) * sign];
+        if (s >= 0) out.push(p);
+        if (s * u < 0) out.push(p.map((c, k) => c + ((q[k] - c) * s) / (s - u)));
+      });
+      return { ...a, parts: [{ ...a.parts[0], outline: out }] };
+    };
+    rooms.set(v.room, half(1));
+    rooms.set(next++, half(-1));
+  } else throw Error("not mocked: " + k);
 };
 const bin = {
   "positions.bin": () => Float32Array.from(V.flat()),
@@ -295,13 +373,60 @@ createServer(async (q, r) => {
         textures: textures.length,
         nodes: parent.length,
         segments: num.size,
-        photographs: [],
+        photographs: photos.map(({ png, ...p }) => p),
         warnings: [],
       });
     if (path === "state.json") return json(state());
     if (path === "structure.json") return json((struct ??= structure()));
-    if (path === "doubt.json") return json({ doubt: null });
-    if (path === "checks.json") return json({ checks: [] });
+    if (path.startsWith("photograph/")) return r.end(photos[+path.slice(11)].png);
+    if (path === "doubt.json") {
+      const not = new Set(
+        new URL(q.url, "http://x").searchParams.get("not").split(",").filter(Boolean).map(Number),
+      );
+      let best = null;
+      for (let s = 0; s < num.size; s++) {
+        if (not.has(s)) continue;
+        const fs = facesOf(s).filter((f) => !label[f]);
+        const a = fs.reduce((t, f) => t + area[f], 0);
+        if (fs.length && (!best || a > best.a)) best = { a, f: fs[0], s };
+      }
+      if (!best) return json({ doubt: null });
+      const at = V[F[best.f][0]],
+        nn = normal[best.f];
+      const [cl] = [...inst.values()];
+      return json({
+        doubt: {
+          face: best.f,
+          node: best.s,
+          area_m2: best.a,
+          at,
+          from: at.map((c, k) => c + 2 * nn[k] + (k === 2 ? 0.3 : 0.1)),
+          guess: cl ? { class: cl, like: cl + "_1" } : null,
+        },
+      });
+    }
+    if (path === "similar.json") {
+      const out = [];
+      for (let s = 0; s < num.size && out.length < 7; s++) {
+        const fs = facesOf(s);
+        if (!label[fs[0]] && fs.length > 20 && fs.length < 60) out.push({ face: fs[0], node: s });
+      }
+      return json({ patches: out });
+    }
+    if (path === "save") return json({ saved: ["labels.npz", "rooms.json"] });
+    if (path === "write") return json({ written: "/tmp/demo.labels/" + JSON.parse(body).format });
+    if (path === "checks.json")
+      return json({
+        checks: [
+          {
+            kind: "two_pieces",
+            text: "chair_3 has two pieces, 1.2 m apart",
+            at: [22, 6, 1],
+            from: [20, 4, 2],
+            instance: 3,
+          },
+        ],
+      });
     if (path === "gesture") {
       const { revision: at, gesture } = JSON.parse(body);
       if (at !== revision) return json({ error: "stale", revision }, 409);
