@@ -299,11 +299,11 @@ test("when another window changed the labels, they are shown, and the gesture is
 test("when the server is gone, a banner says so, and the gesture arrives when it is back", async () => {
   const at = await find(page, small);
   await page.keyboard.press("9");
-  await page.route("**/*", (route) => route.abort());
+  await page.context().setOffline(true);
   await page.mouse.click(at.x, at.y);
   await page.waitForSelector(".banner:not([hidden])");
   assert.match(await page.locator(".saved").textContent(), /gone/);
-  await page.unroute("**/*");
+  await page.context().setOffline(false);
   await page.waitForSelector(".banner", { state: "hidden" });
   await settled(page);
   const { instances } = await state(page);

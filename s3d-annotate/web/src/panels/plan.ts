@@ -112,7 +112,7 @@ export class Plan {
       role: "button",
       tabindex: 0,
       "aria-pressed": String(isChosen),
-      "aria-label": `${room.proposed === null ? "" : "Proposed "}${name}, ${area}`,
+      "aria-label": `${room.proposed === null ? "" : "Proposed "}${name} ${area}`,
       "data-key": room.key,
     });
     for (const { outline } of room.is.parts)
@@ -122,10 +122,12 @@ export class Plan {
     );
     const [x, y] = middleOf(largest.outline);
     const size = 15 * scale;
-    group.append(
-      s("text", { x, y: -y, "font-size": size }, named(name)),
-      s("text", { x, y: -y + 1.25 * size, "font-size": size * 0.9, class: "area" }, area),
-    );
+    const lines = [
+      s("tspan", { x, y: -y }, named(name)),
+      " ",
+      s("tspan", { x, y: -y + 1.25 * size, class: "area" }, area),
+    ];
+    group.append(s("text", { "font-size": size }, ...lines));
     group.addEventListener("keydown", (event) => {
       if (event.key !== " " && event.key !== "Enter") return;
       if (event.key === "Enter" && isChosen) return;
