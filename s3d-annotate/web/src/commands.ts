@@ -132,7 +132,7 @@ export class Commands {
     if (work.last === null || work.last === other) {
       work.last = other;
       this.desk.say(
-        `${words(work.instance(other)?.name ?? "")} is the one to join to. Press M over another.`,
+        `${words(work.instance(other)?.name ?? "this")} is the one to join to. Press M over another.`,
       );
       return;
     }

@@ -181,6 +181,7 @@ async function start(): Promise<void> {
   document.body.dataset["ready"] = "true";
   const fault = (e: unknown): void => status.say(e instanceof Error ? e.message : String(e), true);
   view.loadTextures().then(() => (document.body.dataset["loaded"] = "all"), fault);
+  void work.awaitPixels();
   proposals.load().then(() => (document.body.dataset["proposed"] = "true"), fault);
 }
 

@@ -66,14 +66,16 @@ export class Review {
     try {
       const { patches } = await readJson<{ patches: Patch[] }>(`similar.json?instance=${instance}`);
       if (patches.length === 0) {
-        desk.say(`Nothing without a label looks like ${words(like.name)}.`);
+        desk.say(`Nothing without a label looks like ${words(like.name ?? like.class)}.`);
         return;
       }
       this.similar = { patches, class: like.class };
       const faces = patches.flatMap((patch) => [...desk.work.patch(patch)]);
       desk.table.light("similar", Uint32Array.from(faces));
       desk.view.draw();
-      desk.say(`${patches.length} like ${words(like.name)}. Enter takes them all, Escape none.`);
+      desk.say(
+        `${patches.length} like ${words(like.name ?? like.class)}. Enter takes them all, Escape none.`,
+      );
     } catch (e) {
       desk.say(e instanceof Error ? e.message : String(e), true);
     }

@@ -26,7 +26,8 @@ export interface Scene {
 
 export interface Instance {
   number: number;
-  name: string;
+  /** Null without faces. */
+  name: string | null;
   class: string;
   faces: number;
   area_m2: number;
@@ -65,7 +66,6 @@ export interface State {
 export interface Structure {
   surfaces: { class: string; faces: FaceRuns; room: number | null; area_m2: number }[];
   rooms: RoomShape[];
-  proposals: { class: string; faces: FaceRuns; source: string }[];
 }
 
 export interface Doubt {

@@ -16,10 +16,20 @@ export type Saved = "saved" | "saving" | "gone";
 /** The time between questions to a server that is gone, ms. */
 const PATIENCE = 2000;
 
+/** Scenes without planned views have no pixels to wait for. */
+const PIXEL_TRIES = 60;
+
+/** A state without the instances that have no faces any more. */
+const present = (state: State): State => ({
+  ...state,
+  instances: state.instances.filter(({ faces }) => faces > 0),
+});
+
 export class Work {
   private waiting: Promise<unknown> = Promise.resolve();
   private open = 0;
   saved: Saved = "saved";
+  state: State;
   /** The instance that gestures add to. */
   last: number | null = null;
   private readonly byNumber = new Map<number, Instance>();
@@ -34,8 +44,9 @@ export class Work {
     readonly tree: Tree,
     /** The instance of each face, 0 without one. */
     readonly instances: Uint32Array,
-    public state: State,
+    state: State,
   ) {
+    this.state = present(state);
     this.number();
   }
 
@@ -116,9 +127,9 @@ export class Work {
 
   private take({ state, changed }: Change): void {
     const before = new Set(this.byNumber.keys());
-    this.state = state;
+    this.state = present(state);
     this.number();
-    const born = state.instances.filter(({ number }) => !before.has(number));
+    const born = this.state.instances.filter(({ number }) => !before.has(number));
     if (born.length > 0) this.last = born.at(-1)?.number ?? this.last;
     for (const [instance, runs] of changed) {
       const faces = facesOf(runs);
@@ -135,10 +146,22 @@ export class Work {
       readBytes("labels.bin", 4 * this.instances.length),
     ]);
     this.instances.set(new Uint32Array(labels));
-    this.state = state;
+    this.state = present(state);
     this.number();
     this.painted(this.instances.keys());
     this.changed();
+  }
+
+  /** Asks for the state until the server has counted the pixels of the planned views. */
+  async awaitPixels(): Promise<void> {
+    for (let k = 0; k < PIXEL_TRIES && this.state.total_pixels === 0; k++) {
+      await new Promise((done) => window.setTimeout(done, PATIENCE + 200 * k));
+      if (this.open > 0) continue;
+      const state = await readJson<State>("state.json").catch(() => null);
+      if (state?.revision !== this.state.revision || this.open > 0) continue;
+      this.state = present(state);
+      this.changed();
+    }
   }
 
   /** Waits until the server answers again. */

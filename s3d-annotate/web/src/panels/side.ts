@@ -110,7 +110,7 @@ export class Side {
         "button",
         { type: "button", click: visit, "aria-pressed": String(isLast) },
         swatch,
-        h("span", { class: "what" }, named(instance.name)),
+        h("span", { class: "what" }, named(instance.name ?? instance.class)),
         h("span", { class: "amount" }, metres2(instance.area_m2)),
       );
       return h("li", {}, button);

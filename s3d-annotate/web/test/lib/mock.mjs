@@ -235,7 +235,6 @@ const structure = () => {
         ],
       },
     ],
-    proposals: [],
   };
 };
 let struct;
