@@ -35,6 +35,7 @@ export class Status {
     const { dataset } = this.element;
     dataset["face"] = now ? String(now.face) : "";
     dataset["node"] = now ? String(now.node) : "";
+    dataset["faces"] = now ? String(now.faces.length) : "";
     dataset["instance"] = now ? String(now.instance) : "";
     if (!now) {
       say(this.patch, "");
