@@ -16,6 +16,7 @@ mod guard;
 mod mesh_bytes;
 mod options;
 mod routes;
+mod scene_file;
 
 pub use options::LabelOptions;
 
@@ -95,7 +96,12 @@ pub fn label(
 
     serve(&desk, options, ctx, ready).map_err(|e| FileError::io("127.0.0.1".as_ref(), "serve", e))?;
     desk.save(true).map_err(failure)?;
-    ctx.info(format_args!("the labels are in {}", folder.display()));
+    let shown = folder.display();
+    if scene_file::write_scene_file(&desk.scene, &folder)? {
+        ctx.info(format_args!("the labels are in {shown}: s3d export takes this folder"));
+    } else {
+        ctx.info(format_args!("the labels are in {shown}: the scene takes them as [annotations] path"));
+    }
     Ok(())
 }
 
