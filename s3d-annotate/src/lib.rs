@@ -5,6 +5,10 @@
 //! [`labelling`] keeps the labels, and [`workbench`] makes them of a person's gestures. [`review`] tells what
 //! to label next, and what looks wrong.
 //!
+//! [`outputs`] writes labels for other programs: a PLY mesh, ScanNet, ScanNet++, S3DIS. [`proposals`] reads
+//! labels of others, for a person to accept.
+//! [`structure`] finds floors, ceilings, walls and rooms without labels.
+//!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
 //! use s3d_geom::{MeshParts, TriMesh, glam::{Vec3, vec3}, primitives::{cuboid, grid}};
@@ -30,8 +34,13 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 pub mod labelling;
+pub mod outputs;
+pub mod proposals;
 pub mod review;
 pub mod segments;
+#[cfg(feature = "server")]
+pub mod server;
+pub mod structure;
 pub mod workbench;
 
 /// The README's example, compiled.
