@@ -2,6 +2,9 @@
 
 mod labelling;
 mod outputs;
+mod person;
+mod person_oracle;
+mod person_scenes;
 mod proposals;
 mod review;
 mod segments;

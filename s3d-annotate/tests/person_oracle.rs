@@ -1,0 +1,600 @@
+//! A simulated person: it knows what each face is, and labels with the gestures of the page alone.
+//!
+//! Each gesture is one stroke. The person always makes the one that puts the largest area right, within what
+//! a hand can do:
+//!
+//! - A drag goes over at most [`MOST_PATCHES`] patches within [`REACH_M`] of the first. It has one level of the
+//!   tree for all of them, as the page has, and begins on faces of one instance or of none. It labels a new
+//!   thing, or adds to one.
+//! - A box is a rectangle of four clicks in the plane of a thing, or upright around it on its largest side.
+//! - A brush is a straight swath with round ends, of one of three widths, over faces of one instance or none.
+//! - "More like it" labels all patches that the review proposes for a thing, with one stroke, and one more for
+//!   each patch that has to be taken out first.
+//! - The structure of a room is accepted with one stroke, as found by the crate itself. A proposal that is
+//!   not one thing stays wrong until it is put right by strokes. Pieces of one thing are joined by strokes.
+
+use super::person_scenes::Known;
+use s3d_annotate::labelling::FaceRuns;
+use s3d_annotate::review::{Review, Surroundings};
+use s3d_annotate::segments::{SegmentOptions, segment_faces};
+use s3d_annotate::structure::find_structure;
+use s3d_annotate::workbench::{Gesture, Knife, Patch, Proposal, Proposals, Selection, Workbench};
+use s3d_geom::glam::Vec3;
+use s3d_label::Taxonomy;
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A drag touches so many patches at most.
+const MOST_PATCHES: usize = 12;
+
+/// A drag goes no farther from its first patch, metres.
+const REACH_M: f32 = 3.0;
+
+/// The levels of the tree that the person tries: costs of nodes.
+const LEVELS: [f32; 14] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 4.5, 7.0];
+
+/// Half the widths of brushes, and the longest half of a swath, metres.
+const BRUSHES_M: [f32; 3] = [0.04, 0.1, 0.25];
+const SWATH_M: f32 = 0.6;
+
+/// A box cuts within this of its plane, metres, as the workbench says.
+const BOX_M: f32 = 0.15;
+
+/// What the person has done.
+#[derive(Clone, Debug)]
+pub(crate) struct Session {
+    /// The things of the scene.
+    pub(crate) things: usize,
+    /// The share of the surface that had the right instance after each stroke; the first entry is before any.
+    pub(crate) right: Vec<f64>,
+    /// The number of strokes of each kind.
+    pub(crate) kinds: BTreeMap<&'static str, usize>,
+    /// The share of the surface that is of the largest thing in its segment, before the work.
+    pub(crate) purity_before: f64,
+    /// The same of patches in the end, which are segments divided by cuts.
+    pub(crate) purity_after: f64,
+}
+
+impl Session {
+    /// The strokes until this share is right.
+    pub(crate) fn strokes_to(&self, share: f64) -> Option<usize> {
+        self.right.iter().position(|right| *right >= share)
+    }
+}
+
+/// A gesture that the person could make.
+struct Idea {
+    kind: &'static str,
+    gesture: Gesture,
+    /// The area that it would put right, m², less what it would spoil.
+    gain_m2: f64,
+    strokes: usize,
+    /// The things of the instances that it makes, in their order; none for an instance that exists.
+    makes: Vec<u32>,
+}
+
+impl Idea {
+    fn gain_a_stroke(&self) -> f64 {
+        self.gain_m2 / self.strokes as f64
+    }
+}
+
+/// Area by segment, instance and thing.
+type Shares = Vec<(u32, u32, u32, f64)>;
+
+struct Person<'a> {
+    scene: &'a Known,
+    bench: Workbench,
+    surroundings: Surroundings,
+    areas: Vec<f64>,
+    middles: Vec<Vec3>,
+    total_m2: f64,
+    /// The instance that stands for each thing, 0 for none.
+    instance_of: Vec<u32>,
+    /// The node of each segment at each level.
+    cuts: Vec<Vec<u32>>,
+    /// The middle of each node.
+    node_middles: Vec<Vec3>,
+    session: Session,
+}
+
+/// Labels a scene until `share` of it is right, no more can be done, or `most` strokes are made.
+pub(crate) fn label(scene: &Known, folder: &Path, share: f64, most: usize) -> Session {
+    let mut person = Person::new(scene, folder);
+    person.accept_structure();
+    while person.right() < share && person.session.right.len() <= most {
+        let Some(idea) = person.best_idea() else { break };
+        person.perform(idea);
+    }
+    person.session.purity_after = person.purity();
+    person.session
+}
+
+impl<'a> Person<'a> {
+    fn new(scene: &'a Known, folder: &Path) -> Self {
+        let mesh = Arc::new(scene.mesh.clone());
+        let segments = Arc::new(segment_faces(&mesh, &SegmentOptions::default()));
+        let surroundings = Surroundings::new(&mesh, &segments);
+        let structure = find_structure(&mesh);
+        let mut bench = Workbench::open(folder, Arc::clone(&mesh), Arc::clone(&segments), &Taxonomy::s3dis())
+            .expect("a new folder");
+        let surfaces = structure.surfaces.into_iter().map(|surface| Proposal {
+            class: surface.class.to_owned(),
+            faces: surface.faces,
+            room: surface.room.map(|room| room as u32),
+            source: "structure".to_owned(),
+        });
+        bench.propose(Proposals { surfaces: surfaces.collect(), rooms: structure.rooms });
+
+        let faces = 0..mesh.faces().len() as u32;
+        let areas: Vec<f64> = faces.clone().map(|face| mesh.area(face)).collect();
+        let middles: Vec<Vec3> = faces
+            .map(|face| mesh.triangle(face).iter().sum::<Vec3>() / 3.0)
+            .collect();
+        let known = |face: usize| scene.thing_of_face[face] != 0;
+        let total_m2 = (0..areas.len())
+            .filter(|face| known(*face))
+            .map(|face| areas[face])
+            .sum();
+
+        let tree = &segments.tree;
+        let mut sums = vec![(Vec3::ZERO, 0.0); tree.node_count() as usize];
+        for (face, segment) in segments.segment_of_face.iter().enumerate() {
+            let sum = &mut sums[*segment as usize];
+            sum.0 += middles[face] * areas[face] as f32;
+            sum.1 += areas[face] as f32;
+        }
+        for node in tree.leaf_count()..tree.node_count() {
+            for child in tree.children(node).into_iter().flatten() {
+                let of_child = sums[child as usize];
+                sums[node as usize].0 += of_child.0;
+                sums[node as usize].1 += of_child.1;
+            }
+        }
+        let mut person = Self {
+            scene,
+            bench,
+            surroundings,
+            areas,
+            middles,
+            total_m2,
+            instance_of: vec![0; scene.classes.len()],
+            cuts: LEVELS.iter().map(|cost| tree.nodes_at(*cost)).collect(),
+            node_middles: sums.iter().map(|(sum, area)| *sum / *area).collect(),
+            session: Session {
+                things: scene.things(),
+                right: vec![0.0],
+                kinds: BTreeMap::new(),
+                purity_before: 0.0,
+                purity_after: 0.0,
+            },
+        };
+        person.session.purity_before = person.purity();
+        person
+    }
+
+    fn of_face(&self) -> &[u32] {
+        self.bench.labels().state().instance_of_face()
+    }
+
+    fn is_right(&self, thing: u32, instance: u32) -> bool {
+        thing != 0 && instance != 0 && self.instance_of[thing as usize] == instance
+    }
+
+    /// The share of the surface that has the right instance.
+    fn right(&self) -> f64 {
+        let of_face = self.of_face();
+        let is_right = |face: &usize| self.is_right(self.scene.thing_of_face[*face], of_face[*face]);
+        (0..of_face.len())
+            .filter(is_right)
+            .map(|face| self.areas[face])
+            .sum::<f64>()
+            / self.total_m2
+    }
+
+    fn shares(&self) -> Shares {
+        let mut shares: HashMap<(u32, u32, u32), f64> = HashMap::new();
+        let segments = &self.bench.segments().segment_of_face;
+        for (face, &instance) in self.of_face().iter().enumerate() {
+            let thing = self.scene.thing_of_face[face];
+            *shares.entry((segments[face], instance, thing)).or_default() += self.areas[face];
+        }
+        let mut shares: Shares = shares.into_iter().map(|((s, i, t), area)| (s, i, t, area)).collect();
+        shares.sort_by_key(|(s, i, t, _)| (*s, *i, *t));
+        shares
+    }
+
+    /// The share of the known surface that is of the largest thing of its patch.
+    fn purity(&self) -> f64 {
+        let mut largest_m2 = 0.0;
+        for patch in self.shares().chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let of_things = patch
+                .iter()
+                .filter(|(.., thing, _)| *thing != 0)
+                .map(|(.., area)| *area);
+            largest_m2 += of_things.fold(0f64, f64::max);
+        }
+        largest_m2 / self.total_m2
+    }
+
+    /// Accepts the proposals room by room.
+    fn accept_structure(&mut self) {
+        let proposals = self.bench.proposals();
+        let mut of_room: BTreeMap<Option<u32>, Vec<u32>> = BTreeMap::new();
+        for (number, surface) in (0u32..).zip(&proposals.surfaces) {
+            of_room.entry(surface.room).or_default().push(number);
+        }
+        for (room, surfaces) in of_room {
+            let gesture = Gesture::Accept { surfaces, rooms: Vec::from_iter(room) };
+            self.perform(Idea { kind: "accept", gesture, gain_m2: 0.0, strokes: 1, makes: Vec::new() });
+        }
+    }
+
+    fn perform(&mut self, idea: Idea) {
+        let state = self.bench.labels().state();
+        let first = state.next_instance();
+        let revision = state.revision();
+        let done = self.bench.perform(revision, &idea.gesture, None);
+        done.unwrap_or_else(|e| panic!("{} does not fit: {e}: {:?}", idea.kind, idea.gesture));
+        for (instance, thing) in (first..).zip(idea.makes) {
+            self.instance_of[thing as usize] = instance;
+        }
+        if idea.kind == "accept" {
+            self.meet(first);
+        }
+        let right = self.right();
+        self.session.right.extend(vec![right; idea.strokes]);
+        *self.session.kinds.entry(idea.kind).or_default() += idea.strokes;
+    }
+
+    /// New instances stand for the thing that they have most of, the one with most of it first.
+    fn meet(&mut self, first: u32) {
+        let mut shares: BTreeMap<(u32, u32), f64> = BTreeMap::new();
+        for (face, &instance) in self.of_face().iter().enumerate().filter(|(_, i)| **i >= first) {
+            *shares.entry((instance, self.scene.thing_of_face[face])).or_default() += self.areas[face];
+        }
+        let mut largest: Vec<(f64, u32, u32)> = Vec::new();
+        let shares: Vec<((u32, u32), f64)> = shares.into_iter().collect();
+        for of_instance in shares.chunk_by(|a, b| a.0.0 == b.0.0) {
+            let known = of_instance.iter().filter(|((_, thing), _)| *thing != 0);
+            largest.extend(
+                known
+                    .max_by(|a, b| a.1.total_cmp(&b.1))
+                    .map(|((i, t), area)| (*area, *i, *t)),
+            );
+        }
+        largest.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (_, instance, thing) in largest {
+            if self.instance_of[thing as usize] == 0 {
+                self.instance_of[thing as usize] = instance;
+            }
+        }
+    }
+
+    /// The idea with the largest gain a stroke; `None` if nothing is worth a stroke.
+    fn best_idea(&self) -> Option<Idea> {
+        let shares = self.shares();
+        let mut ideas = self.drags(&shares);
+        let drag_m2 = ideas.iter().map(Idea::gain_a_stroke).fold(0.0, f64::max);
+        ideas.extend(self.joins(&shares));
+
+        // What is left of each thing, most first: only much of it is worth a look.
+        let mut left_m2: BTreeMap<u32, f64> = BTreeMap::new();
+        for (_, instance, thing, area) in &shares {
+            if *thing != 0 && !self.is_right(*thing, *instance) {
+                *left_m2.entry(*thing).or_default() += area;
+            }
+        }
+        let mut left: Vec<(u32, f64)> = left_m2.into_iter().filter(|(_, m2)| *m2 > drag_m2).collect();
+        left.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        for (thing, _) in left.into_iter().take(12) {
+            ideas.extend(self.boxes(thing));
+            ideas.extend(self.swaths(thing));
+        }
+        ideas.extend(self.more_like());
+        let best = ideas
+            .into_iter()
+            .max_by(|a, b| a.gain_a_stroke().total_cmp(&b.gain_a_stroke()))?;
+        (best.gain_m2 > 1e-4).then_some(best)
+    }
+
+    /// Drags over patches, the best level for each thing.
+    fn drags(&self, shares: &Shares) -> Vec<Idea> {
+        let mut best: BTreeMap<u32, (f64, Vec<(u32, u32)>)> = BTreeMap::new();
+        for cut in &self.cuts {
+            // What each patch of this level has: the area of each thing.
+            let mut patches: BTreeMap<(u32, u32), Vec<(u32, f64)>> = BTreeMap::new();
+            for (segment, instance, thing, area) in shares {
+                patches
+                    .entry((cut[*segment as usize], *instance))
+                    .or_default()
+                    .push((*thing, *area));
+            }
+            let mut drags: BTreeMap<(u32, u32), Vec<(f64, u32)>> = BTreeMap::new();
+            for ((node, instance), has) in patches {
+                let mut of_thing: BTreeMap<u32, f64> = BTreeMap::new();
+                has.iter()
+                    .for_each(|(thing, area)| *of_thing.entry(*thing).or_default() += area);
+                let right_m2 = of_thing
+                    .iter()
+                    .find(|(thing, _)| self.is_right(**thing, instance))
+                    .map_or(0.0, |x| *x.1);
+                let all_m2: f64 = of_thing.values().sum();
+                for (&thing, &area) in of_thing.iter().filter(|(thing, _)| **thing != 0) {
+                    if self.is_right(thing, instance) {
+                        continue;
+                    }
+                    // What is spoilt counts, and what is swallowed counts half.
+                    let gain = area - right_m2 - 0.5 * (all_m2 - area - right_m2);
+                    if gain > 0.0 {
+                        drags.entry((thing, instance)).or_default().push((gain, node));
+                    }
+                }
+            }
+            for ((thing, instance), mut touched) in drags {
+                touched.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                let first = self.node_middles[touched[0].1 as usize];
+                touched.retain(|(_, node)| self.node_middles[*node as usize].distance(first) <= REACH_M);
+                touched.truncate(MOST_PATCHES);
+                let gain: f64 = touched.iter().map(|(gain, _)| gain).sum();
+                if best.get(&thing).is_none_or(|(before, _)| gain > *before) {
+                    let nodes = touched.iter().map(|(_, node)| (*node, instance));
+                    best.insert(thing, (gain, nodes.collect()));
+                }
+            }
+        }
+        // Only the best few need their faces.
+        let mut best: Vec<(u32, (f64, Vec<(u32, u32)>))> = best.into_iter().collect();
+        best.sort_by(|a, b| b.1.0.total_cmp(&a.1.0).then(a.0.cmp(&b.0)));
+        best.truncate(1);
+        let ideas = best.into_iter().map(|(thing, (gain_m2, nodes))| {
+            let patches = nodes
+                .into_iter()
+                .map(|(node, instance)| self.patch_in(node, instance))
+                .collect();
+            self.paint("drag", thing, Selection { patches, ..Selection::default() }, gain_m2)
+        });
+        ideas.collect()
+    }
+
+    /// The patch of a node and an instance.
+    fn patch_in(&self, node: u32, instance: u32) -> Patch {
+        let segments = self.bench.segments();
+        let of_face = self.of_face();
+        let face = (0..of_face.len()).find(|face| {
+            of_face[*face] == instance && segments.tree.has(node, segments.segment_of_face[*face])
+        });
+        Patch { face: face.expect("the patch has a face") as u32, node }
+    }
+
+    /// Labels a new thing, or adds to it.
+    fn paint(&self, kind: &'static str, thing: u32, what: Selection, gain_m2: f64) -> Idea {
+        let instance = self.instance_of[thing as usize];
+        let class = self.scene.classes[thing as usize].clone();
+        if instance == 0 {
+            let gesture = Gesture::Label { what, class };
+            return Idea { kind, gesture, gain_m2, strokes: 1, makes: vec![thing] };
+        }
+        Idea { kind, gesture: Gesture::Add { what, instance }, gain_m2, strokes: 1, makes: Vec::new() }
+    }
+
+    /// Joins of an instance that is a piece of a thing to the instance that stands for it.
+    fn joins(&self, shares: &Shares) -> Vec<Idea> {
+        let mut of_instance: BTreeMap<u32, BTreeMap<u32, f64>> = BTreeMap::new();
+        for (_, instance, thing, area) in shares.iter().filter(|(_, instance, ..)| *instance != 0) {
+            *of_instance.entry(*instance).or_default().entry(*thing).or_default() += area;
+        }
+        let mut ideas = Vec::new();
+        for (instance, has) in of_instance {
+            if self.instance_of.contains(&instance) {
+                continue;
+            }
+            let most = has
+                .iter()
+                .filter(|(thing, _)| **thing != 0)
+                .max_by(|a, b| a.1.total_cmp(b.1));
+            if let Some((thing, area)) = most
+                && self.instance_of[*thing as usize] != 0
+            {
+                let into = self.instance_of[*thing as usize];
+                let gesture = Gesture::Join { into, instances: vec![instance] };
+                let swallowed: f64 = has.values().sum::<f64>() - area;
+                let gain_m2 = area - 0.5 * swallowed;
+                ideas.push(Idea { kind: "join", gesture, gain_m2, strokes: 1, makes: Vec::new() });
+            }
+        }
+        ideas
+    }
+
+    /// The faces of a thing that are not right.
+    fn left_of(&self, thing: u32) -> Vec<u32> {
+        let of_face = self.of_face();
+        let is_left = |face: &u32| {
+            self.scene.thing_of_face[*face as usize] == thing
+                && !self.is_right(thing, of_face[*face as usize])
+        };
+        (0..of_face.len() as u32).filter(is_left).collect()
+    }
+
+    /// What some faces of one instance would gain if they were given to a thing.
+    fn gain(&self, thing: u32, faces: impl Iterator<Item = u32>) -> f64 {
+        let of_face = self.of_face();
+        faces
+            .map(|face| {
+                let (is, instance) = (self.scene.thing_of_face[face as usize], of_face[face as usize]);
+                let area = self.areas[face as usize];
+                match () {
+                    () if is == thing => area,
+                    () if self.is_right(is, instance) => -area,
+                    () => -0.5 * area,
+                }
+            })
+            .sum()
+    }
+
+    /// A box around what is left of a thing that has no instance yet, on the plane of its largest face.
+    fn boxes(&self, thing: u32) -> Option<Idea> {
+        if self.instance_of[thing as usize] != 0 {
+            return None;
+        }
+        let left = self.left_of(thing);
+        let mesh = self.bench.mesh();
+        // The direction that most of it faces.
+        let mut toward: BTreeMap<[i32; 3], f64> = BTreeMap::new();
+        for face in &left {
+            let direction = (mesh.normal(*face) * 2.0).round().as_ivec3().to_array();
+            *toward.entry(direction).or_default() += self.areas[*face as usize];
+        }
+        let direction = toward.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        let side: Vec<u32> = left
+            .iter()
+            .copied()
+            .filter(|face| (mesh.normal(*face) * 2.0).round().as_ivec3().to_array() == direction)
+            .collect();
+        let normal = side
+            .iter()
+            .map(|face| mesh.normal(*face) * self.areas[*face as usize] as f32);
+        let normal = normal.sum::<Vec3>().try_normalize()?;
+        let across = if normal.z.abs() > 0.8 { Vec3::X } else { Vec3::Z };
+        let u = (across - normal * normal.dot(across)).normalize();
+        let v = normal.cross(u);
+        let project = |point: Vec3| [u.dot(point), v.dot(point), normal.dot(point)];
+        let (mut low, mut high, mut height, mut area) = ([f32::MAX; 2], [f32::MIN; 2], 0.0, 0.0);
+        for face in &side {
+            for corner in mesh.triangle(*face) {
+                let at = project(corner);
+                for i in 0..2 {
+                    low[i] = low[i].min(at[i]);
+                    high[i] = high[i].max(at[i]);
+                }
+            }
+            let weight = self.areas[*face as usize] as f32;
+            height += weight * project(self.middles[*face as usize])[2];
+            area += weight;
+        }
+        height /= area;
+
+        // The patch is that of the instance that has most of it, up to the root of the tree.
+        let of_face = self.of_face();
+        let mut of_instance: BTreeMap<u32, f64> = BTreeMap::new();
+        for face in &side {
+            *of_instance.entry(of_face[*face as usize]).or_default() += self.areas[*face as usize];
+        }
+        let instance = of_instance.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        let face = *side.iter().find(|face| of_face[**face as usize] == instance)?;
+        let segment = self.bench.segments().segment_of_face[face as usize];
+        let corner = |a: f32, b: f32| u * a + v * b + normal * height;
+        let corners = [
+            corner(low[0], low[1]),
+            corner(high[0], low[1]),
+            corner(high[0], high[1]),
+            corner(low[0], high[1]),
+        ];
+        let is_inside = |face: u32| {
+            let at = project(self.middles[face as usize]);
+            (0..2).all(|i| at[i] > low[i] && at[i] < high[i]) && (at[2] - height).abs() <= BOX_M
+        };
+        let mut best: Option<Idea> = None;
+        for cut in &self.cuts {
+            let at = Patch { face, node: cut[segment as usize] };
+            let patch = self.bench.patch(at).ok()?;
+            let gain_m2 = self.gain(thing, patch.iter().filter(|face| is_inside(*face)));
+            if gain_m2 > best.as_ref().map_or(0.0, |idea| idea.gain_m2) {
+                let class = Some(self.scene.classes[thing as usize].clone());
+                let gesture = Gesture::Cut { at, by: Knife::Box { corners }, class };
+                best = Some(Idea { kind: "box", gesture, gain_m2, strokes: 1, makes: vec![thing] });
+            }
+        }
+        best
+    }
+
+    /// A swath of the brush over what is left of a thing.
+    fn swaths(&self, thing: u32) -> Option<Idea> {
+        let left = self.left_of(thing);
+        let largest = |a: &&u32, b: &&u32| self.areas[**a as usize].total_cmp(&self.areas[**b as usize]);
+        let seeds = [left.get(left.len() / 2), left.iter().max_by(largest), left.first()];
+        let of_face = self.of_face();
+        let mut best: Option<Idea> = None;
+        for &seed in seeds.into_iter().flatten() {
+            let center = self.middles[seed as usize];
+            let near: Vec<Vec3> = left
+                .iter()
+                .map(|face| self.middles[*face as usize])
+                .filter(|at| at.distance(center) < SWATH_M)
+                .collect();
+            let farthest = near
+                .iter()
+                .max_by(|a, b| a.distance(center).total_cmp(&b.distance(center)))?;
+            let opposite = near
+                .iter()
+                .max_by(|a, b| a.distance(*farthest).total_cmp(&b.distance(*farthest)))?;
+            for ends in [[*farthest, *opposite], [center, center]] {
+                for radius_m in BRUSHES_M {
+                    let along = ends[1] - ends[0];
+                    let is_under = |face: &u32| {
+                        let at = self.middles[*face as usize];
+                        let t = along.dot(at - ends[0]) / along.length_squared().max(1e-12);
+                        at.distance(ends[0] + along * t.clamp(0.0, 1.0)) <= radius_m
+                            && of_face[*face as usize] == of_face[seed as usize]
+                    };
+                    let under: Vec<u32> = (0..of_face.len() as u32).filter(is_under).collect();
+                    let gain_m2 = self.gain(thing, under.iter().copied());
+                    if gain_m2 > best.as_ref().map_or(0.0, |idea| idea.gain_m2) {
+                        let faces: FaceRuns = under.into_iter().collect();
+                        let what = Selection { faces, ..Selection::default() };
+                        best = Some(self.paint("brush", thing, what, gain_m2));
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// "More like it" for a thing that is done.
+    fn more_like(&self) -> Option<Idea> {
+        let review = Review {
+            mesh: self.bench.mesh(),
+            segments: self.bench.segments(),
+            surroundings: &self.surroundings,
+            state: self.bench.labels().state(),
+        };
+        let mut best: Option<Idea> = None;
+        for (thing, &instance) in (0u32..).zip(&self.instance_of).filter(|(_, instance)| **instance != 0) {
+            let class = &self.scene.classes[thing as usize];
+            let (mut kept, mut makes, mut gain_m2, mut wrong) = (Vec::new(), Vec::new(), 0.0, 0);
+            for patch in review.similar_patches(instance) {
+                let Ok(faces) = self.bench.patch(patch) else { continue };
+                let mut of_thing: BTreeMap<u32, f64> = BTreeMap::new();
+                for face in faces.iter() {
+                    *of_thing.entry(self.scene.thing_of_face[face as usize]).or_default() +=
+                        self.areas[face as usize];
+                }
+                let most = of_thing.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+                let Some((other, _)) = most else { continue };
+                let gain = self.gain(other, faces.iter());
+                let is_new = self.instance_of[other as usize] == 0 && !makes.contains(&other);
+                if other != 0 && is_new && self.scene.classes[other as usize] == *class && gain > 0.0 {
+                    kept.push(patch);
+                    makes.push(other);
+                    gain_m2 += gain;
+                } else {
+                    wrong += 1;
+                }
+            }
+            let strokes = 1 + wrong;
+            if kept.is_empty() {
+                continue;
+            }
+            let gesture = Gesture::LabelEach { patches: kept, class: class.clone() };
+            let idea = Idea { kind: "more like it", gesture, gain_m2, strokes, makes };
+            if best
+                .as_ref()
+                .is_none_or(|best| idea.gain_a_stroke() > best.gain_a_stroke())
+            {
+                best = Some(idea);
+            }
+        }
+        best
+    }
+}
