@@ -203,8 +203,8 @@ impl Finder<'_> {
         highest
     }
 
-    /// Returns the room that a face bounds, or 0: the one that its front looks into, or the one nearest to it.
-    /// A wall may be a single sheet between two rooms.
+    /// Returns the room that a face bounds, or 0: the one that its front looks into, or the one nearest to
+    /// it. A wall may be a single sheet between two rooms.
     fn room_of(&self, facet: &Facet, rim_of_cell: &[u32], near_of_cell: &[u32]) -> u32 {
         let place = facet.middle.truncate();
         let near = near_of_cell[self.scan.grid.cell(place)];

@@ -175,8 +175,8 @@ impl Storey {
         self.ceiling_m[cell] - self.top_m[cell] > LOWER_M
     }
 
-    /// Takes the large pieces of what is highest as ceilings, and extends them over walls and holes. Elsewhere, nine of ten high columns are no higher than what
-    /// counts as the ceiling.
+    /// Takes the large pieces of what is highest as ceilings, and extends them over walls and holes.
+    /// Elsewhere, nine of ten high columns are no higher than what counts as the ceiling.
     fn extend_ceilings(&mut self, scan: &Scan, highest: &mut [f32]) {
         let place = highest.len() * 9 / 10;
         let usual = if highest.is_empty() {
@@ -287,8 +287,8 @@ fn closed(scan: &Scan, is_seen: &[bool]) -> Vec<bool> {
     is_inside
 }
 
-/// Returns the connected pieces of a set of cells, by their lowest cells. Neighbours are connected if they are
-/// `alike`.
+/// Returns the connected pieces of a set of cells, by their lowest cells. Neighbours are connected if they
+/// are `alike`.
 pub(super) fn pieces(
     scan: &Scan,
     is_in: impl Fn(usize) -> bool,

@@ -4,6 +4,7 @@ mod measure;
 mod shapes;
 
 use measure::Measured;
+use s3d_annotate::labelling::Room;
 use s3d_annotate::structure::{Structure, find_structure};
 use s3d_geom::glam::Vec3;
 use s3d_geom::{Polygon, TriMesh};
@@ -173,6 +174,24 @@ fn a_corridor_around_a_core_is_a_room_of_several_parts() {
             .count()
     };
     assert_eq!(walls(0) + walls(1), 8);
+}
+
+#[test]
+fn a_hall_over_two_storeys_is_a_room_of_the_lower_one() {
+    let mut shapes = Shapes::default();
+    shapes
+        .walls([0.0, 0.0], [4.0, 5.0], [0.0, 2.5])
+        .ceiling([0.0, 0.0], [4.0, 5.0], 2.5)
+        .walls([0.0, 0.0], [4.0, 5.0], [2.8, 5.3])
+        .ceiling([0.0, 0.0], [4.0, 5.0], 5.3)
+        .walls([4.2, 0.0], [9.0, 5.0], [0.0, 5.3])
+        .ceiling([4.2, 0.0], [9.0, 5.0], 5.3);
+    let found = find_structure(&shapes.turned(30.0));
+    assert_eq!(found.rooms.len(), 3, "{found:#?}");
+    let bottom = |room: &Room| (10.0 * room.parts[0].heights[0]).round();
+    // The mesh stands at 1.2 m.
+    assert_eq!(found.rooms.iter().map(bottom).collect::<Vec<_>>(), [11.0, 11.0, 39.0]);
+    assert_eq!(counts(&found), [3, 2, 12]);
 }
 
 #[test]
