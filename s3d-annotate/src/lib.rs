@@ -2,6 +2,12 @@
 //!
 //! [`segments`] cuts a mesh into patches that a person labels in one stroke, with the tree by which they join
 //! to larger ones. [`segments::segment_file`] writes them for ScanNet's and Matterport3D's tools.
+//! [`labelling`] keeps the labels, and [`workbench`] makes them of a person's gestures. [`review`] tells what
+//! to label next, and what looks wrong.
+//!
+//! [`outputs`] writes labels for other programs: a PLY mesh, ScanNet, ScanNet++, S3DIS. [`proposals`] reads
+//! labels of others, for a person to accept.
+//! [`structure`] finds floors, ceilings, walls and rooms without labels.
 //!
 //! ```
 //! use s3d_annotate::segments::{SegmentOptions, segment_faces};
@@ -28,7 +34,14 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 pub mod labelling;
+pub mod outputs;
+pub mod proposals;
+pub mod review;
 pub mod segments;
+#[cfg(feature = "server")]
+pub mod server;
+pub mod structure;
+pub mod workbench;
 
 /// The README's example, compiled.
 #[cfg(doctest)]

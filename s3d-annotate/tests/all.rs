@@ -1,4 +1,11 @@
 //! The tests of this crate as one program.
 
 mod labelling;
+mod outputs;
+mod proposals;
+mod review;
 mod segments;
+#[cfg(feature = "server")]
+mod server;
+mod structure;
+mod workbench;

@@ -34,17 +34,30 @@ pub(crate) struct Scenes {
     /// becomes an area without labels.
     #[arg(required = true, value_name = "SCENE.toml")]
     pub(crate) scenes: Vec<PathBuf>,
-    /// The axis of the mesh files that points up [default: y in glTF, guessed in others]
-    #[arg(long, value_parser = parsed::<UpAxis>, value_name = "y|z")]
-    pub(crate) up: Option<UpAxis>,
-    /// The unit of the mesh files [default: metres in glTF; in others what the file says, or else guessed
-    /// from the height of rooms]
-    #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
-    pub(crate) units: Option<LengthUnit>,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
 }
 
 impl Scenes {
     pub(crate) fn sources(&self) -> Vec<SceneSource> {
-        SceneSource::list(self.scenes.iter().cloned(), self.up, self.units)
+        SceneSource::list(self.scenes.iter().cloned(), self.frame.up, self.frame.units)
+    }
+}
+
+/// The frame of meshes that are named without a scene file.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct FrameArgs {
+    /// The axis of a mesh that points up [default: y in glTF, guessed in others]
+    #[arg(long, value_parser = parsed::<UpAxis>, value_name = "y|z")]
+    up: Option<UpAxis>,
+    /// The unit of a mesh [default: metres in glTF; in others what the file says, or else guessed from the
+    /// height of rooms]
+    #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
+    units: Option<LengthUnit>,
+}
+
+impl FrameArgs {
+    pub(crate) fn source(self, scene: PathBuf) -> SceneSource {
+        SceneSource::list([scene], self.up, self.units).remove(0)
     }
 }

@@ -3,7 +3,7 @@
 use crate::commands::scores::{detect, eval};
 use crate::commands::shards::{merge, plan};
 use crate::commands::{
-    compare, demo, export, info, pack, profile, render, report, sample, segments, stats, verify, xyz,
+    compare, demo, export, info, label, pack, profile, render, report, sample, segments, stats, verify, xyz,
 };
 use crate::console::LogFormat;
 use crate::failure::Outcome;
@@ -112,6 +112,17 @@ pub(crate) enum Command {
         )
     )]
     Segments(segments::SegmentsArgs),
+    /// Label a bare scan: a page on this machine, where strokes become classes and instances.
+    #[command(
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d label scan.glb\n",
+            "  s3d label scan.glb --write scannet\n",
+            "Each stroke is on the disk at once, in scan.labels; Ctrl-C ends the server. `s3d export` reads \
+             the labels as [annotations] path = \"scan.labels\".",
+        )
+    )]
+    Label(label::LabelArgs),
     /// Render a mesh from one camera or a list of cameras, in every modality that needs no annotation.
     #[command(
         after_help = concat!(
@@ -238,6 +249,7 @@ impl Command {
             | Self::Xyz(_)
             | Self::Profile(_)
             | Self::Report(_)
+            | Self::Label(_)
             | Self::Compare(_)
             | Self::Eval(_)
             | Self::Detect(_) => true,
@@ -254,6 +266,7 @@ impl Command {
             Self::Merge(args) => merge::run(args),
             Self::Sample(args) => sample::run(args),
             Self::Segments(args) => segments::run(args),
+            Self::Label(args) => label::run(args),
             Self::Render(args) => render::run(args),
             Self::Info(args) => info::run(args),
             Self::Pack(args) => pack::run(args),

@@ -125,6 +125,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 mod account;
+mod bare;
 pub mod compare;
 mod condition;
 mod context;
@@ -150,6 +151,7 @@ mod useful;
 pub mod verify;
 pub mod xyz;
 
+pub use bare::{BarePanorama, BareScene};
 pub use compare::compare;
 pub use context::{Cancel, Context, Observer, Progress};
 pub use error::{Error, Result};

@@ -75,9 +75,34 @@ impl State {
                 let is_same = self.painted_rooms.all_have(faces, room.unwrap_or(NONE));
                 nothing_if(is_same, "all these faces are painted so")
             }
+            Action::All { actions } => self.check_all(actions),
             Action::Undo { of } => its_turn(*of, self.next_undo(), "taken back"),
             Action::Redo { of } => its_turn(*of, self.next_redo(), "brought back"),
         }
+    }
+
+    /// Several actions make new things alone, whose numbers ascend: none depends on one before.
+    fn check_all(&self, actions: &[Action]) -> Result<(), Fault> {
+        nothing_if(actions.is_empty(), "no action is named")?;
+        let [mut next_instance, mut next_room] = [self.next_instance, self.next_room];
+        for action in actions {
+            match action {
+                Action::Paint { faces, instance, class: Some(_) } => {
+                    self.check_faces(faces)?;
+                    next_instance = following(*instance, next_instance)
+                        .ok_or(Fault::InstanceNumber { number: *instance, next: next_instance })?;
+                }
+                Action::Room { room, is } if !self.rooms.contains_key(room) => {
+                    if !is.parts.iter().all(is_shape) {
+                        return Err(Fault::RoomShape);
+                    }
+                    next_room = following(*room, next_room)
+                        .ok_or(Fault::RoomNumber { number: *room, next: next_room })?;
+                }
+                _ => return Err(Fault::NotNew),
+            }
+        }
+        Ok(())
     }
 
     fn check_faces(&self, faces: &FaceRuns) -> Result<(), Fault> {
@@ -100,12 +125,9 @@ impl State {
 
     fn check_new_instance(&self, number: u32) -> Result<(), Fault> {
         let next = self.next_instance;
-        let is_free = (next..=MAX_NUMBER).contains(&number);
-        if is_free {
-            Ok(())
-        } else {
-            Err(Fault::InstanceNumber { number, next })
-        }
+        following(number, next)
+            .map(drop)
+            .ok_or(Fault::InstanceNumber { number, next })
     }
 
     fn room(&self, number: u32) -> Result<&Room, Fault> {
@@ -114,13 +136,15 @@ impl State {
 
     fn check_new_room(&self, number: u32) -> Result<(), Fault> {
         let next = self.next_room;
-        let is_free = (next..=MAX_NUMBER).contains(&number);
-        if is_free {
-            Ok(())
-        } else {
-            Err(Fault::RoomNumber { number, next })
-        }
+        following(number, next)
+            .map(drop)
+            .ok_or(Fault::RoomNumber { number, next })
     }
+}
+
+/// Returns the number after a new one, or `None` if the new one is below the `next` or too large.
+fn following(number: u32, next: u32) -> Option<u32> {
+    (next..=MAX_NUMBER).contains(&number).then(|| number + 1)
 }
 
 fn nothing_if(is_so: bool, why: &'static str) -> Result<(), Fault> {

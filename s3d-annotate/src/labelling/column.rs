@@ -118,9 +118,9 @@ impl Column {
         }
     }
 
-    /// Gives faces back what they had before.
+    /// Gives faces back what they had before. What was noted last comes first: a face may have changed twice.
     pub(super) fn restore(&mut self, before: &[Stretch]) {
-        for (stretch, had) in before {
+        for (stretch, had) in before.iter().rev() {
             if let Some(&has) = self.of_face.get(stretch.start as usize) {
                 self.hand_over(stretch, has, *had);
             }

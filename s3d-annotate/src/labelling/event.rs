@@ -121,6 +121,12 @@ pub enum Action {
         /// The room. `None`: the outlines count again.
         room: Option<u32>,
     },
+    /// Does several actions as one, so that one undo takes them back: new instances ([`Action::Paint`] with a
+    /// class), and new rooms ([`Action::Room`]). Others are refused.
+    All {
+        /// The actions, in their order, at least one.
+        actions: Vec<Action>,
+    },
     /// Takes back the last action that is in effect.
     Undo {
         /// The number of the event of this action.

@@ -42,6 +42,28 @@ pub enum Fault {
         /// The number of faces of the mesh.
         count: u32,
     },
+    /// One of several actions makes nothing new.
+    #[error("several actions at once make new instances and new rooms only")]
+    NotNew,
+    /// There is no such patch: the face is not in the segments of the node.
+    #[error("there is no patch at face {face} in node {node} of the tree")]
+    NoSuchPatch {
+        /// The face.
+        face: u32,
+        /// The node of the tree of segments.
+        node: u32,
+    },
+    /// A cut has no shape: its points are the same, lie on a line, or are not finite.
+    #[error("the points of a cut make no plane: they are the same, on one line, or not finite")]
+    CutShape,
+    /// There is no such proposal.
+    #[error("there is no proposal {number}: there are {count}, counted from 0")]
+    NoSuchProposal {
+        /// Its number.
+        number: u32,
+        /// How many there are.
+        count: u32,
+    },
     /// The action changes nothing. The words say why.
     #[error("nothing to do: {why}")]
     Nothing {

@@ -170,7 +170,7 @@ impl LabelFolder {
     }
 
     /// Returns the revision of the labels, if it is this one.
-    fn check_revision(&self, given: u64) -> Result<u64> {
+    pub(crate) fn check_revision(&self, given: u64) -> Result<u64> {
         let now = self.state.revision();
         if given == now {
             Ok(now)
@@ -189,6 +189,7 @@ impl LabelFolder {
                     self.taxonomy.room_type(kind)?;
                 }
             }
+            Action::All { actions } => actions.iter().try_for_each(|action| self.check_words(action))?,
             _ => {}
         }
         Ok(())

@@ -214,10 +214,15 @@ impl State {
     /// Does what an action says, which was checked, and notes what was before.
     fn perform(&mut self, number: u64, action: Action) {
         let mut before = Before::default();
-        match &action {
+        self.change(&action, &mut before);
+        self.done.push(Step { number, action, before });
+    }
+
+    fn change(&mut self, action: &Action, before: &mut Before) {
+        match action {
             Action::Paint { faces, instance, class } => {
                 if let Some(class) = class {
-                    self.set_class(*instance, Some(class.clone()), &mut before);
+                    self.set_class(*instance, Some(class.clone()), before);
                 }
                 self.instances.set(faces, *instance, &mut before.instances);
             }
@@ -226,48 +231,48 @@ impl State {
                 for instance in instances {
                     let faces = self.instances.faces_of(*instance);
                     self.instances.set(&faces, *into, &mut before.instances);
-                    self.set_class(*instance, None, &mut before);
+                    self.set_class(*instance, None, before);
                 }
             }
             Action::Cut { instance, faces, new } => {
                 let class = self.classes.get(instance).cloned();
-                self.set_class(*new, class, &mut before);
+                self.set_class(*new, class, before);
                 let faces = self.instances.among(faces, *instance);
                 self.instances.set(&faces, *new, &mut before.instances);
             }
             Action::Class { instance, class } => {
-                self.set_class(*instance, Some(class.clone()), &mut before);
+                self.set_class(*instance, Some(class.clone()), before);
             }
-            Action::Room { room, is } => self.set_room(*room, Some(is.clone()), &mut before),
+            Action::Room { room, is } => self.set_room(*room, Some(is.clone()), before),
             Action::SplitRoom { room, new, line } => {
                 if let Some(Ok([left, right])) = self.rooms.get(room).map(|is| split(is, *line)) {
-                    self.set_room(*room, Some(left), &mut before);
-                    self.set_room(*new, Some(right), &mut before);
+                    self.set_room(*room, Some(left), before);
+                    self.set_room(*new, Some(right), before);
                 }
             }
             Action::JoinRooms { into, rooms } => {
                 for room in rooms {
-                    self.move_painted(*room, *into, &mut before);
+                    self.move_painted(*room, *into, before);
                     let parts = self.rooms.get(room).map(|is| is.parts.clone());
-                    self.set_room(*room, None, &mut before);
+                    self.set_room(*room, None, before);
                     if let Some(mut all) = self.rooms.get(into).cloned() {
                         all.parts.extend(parts.unwrap_or_default());
-                        self.set_room(*into, Some(all), &mut before);
+                        self.set_room(*into, Some(all), before);
                     }
                 }
             }
             Action::RemoveRoom { room } => {
-                self.move_painted(*room, NONE, &mut before);
-                self.set_room(*room, None, &mut before);
+                self.move_painted(*room, NONE, before);
+                self.set_room(*room, None, before);
             }
             Action::PaintRoom { faces, room } => {
                 self.painted_rooms
                     .set(faces, room.unwrap_or(NONE), &mut before.painted_rooms);
             }
+            Action::All { actions } => actions.iter().for_each(|action| self.change(action, before)),
             // They are no actions that are done or taken back.
-            Action::Undo { .. } | Action::Redo { .. } => return,
+            Action::Undo { .. } | Action::Redo { .. } => {}
         }
-        self.done.push(Step { number, action, before });
     }
 
     fn move_painted(&mut self, room: u32, to: u32, before: &mut Before) {

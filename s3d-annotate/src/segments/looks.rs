@@ -25,11 +25,7 @@ impl Looks {
     pub(super) fn new(mesh: &TriMesh, borders: &[Border]) -> Self {
         let faces = 0..mesh.faces().len() as u32;
         let area_m2: Vec<f64> = faces.clone().into_par_iter().map(|face| mesh.area(face)).collect();
-        let color = faces
-            .clone()
-            .into_par_iter()
-            .map(|face| oklab(mean_color(mesh, face)))
-            .collect();
+        let color = mean_colors(mesh);
 
         let mut normal: Vec<Vec3> = faces.into_par_iter().map(|face| mesh.normal(face)).collect();
         for _ in 0..ROUNDS {
@@ -53,6 +49,12 @@ impl Looks {
         let bend = if is_hollow { turn } else { turn * turn };
         bend + color * self.color[a].distance(self.color[b])
     }
+}
+
+/// Returns the mean colour of each face in Oklab.
+pub(crate) fn mean_colors(mesh: &TriMesh) -> Vec<Vec3> {
+    let faces = (0..mesh.faces().len() as u32).into_par_iter();
+    faces.map(|face| oklab(mean_color(mesh, face))).collect()
 }
 
 fn middle(mesh: &TriMesh, face: u32) -> Vec3 {

@@ -16,6 +16,8 @@ mod tree;
 pub use file::{SegmentFileOptions, segment_file};
 pub use tree::MergeTree;
 
+pub(crate) use looks::mean_colors;
+
 use borders::borders;
 use looks::Looks;
 use rayon::prelude::*;
@@ -60,6 +62,11 @@ pub struct Segments {
     pub segment_of_face: Vec<u32>,
     /// What makes larger patches of them.
     pub tree: MergeTree,
+}
+
+/// Returns the pairs of faces that share an edge.
+pub(crate) fn borders_of(mesh: &TriMesh) -> Vec<[u32; 2]> {
+    borders(mesh).iter().map(|border| border.faces).collect()
 }
 
 /// Cuts a mesh into segments, and joins these to a tree.

@@ -81,6 +81,13 @@ impl MergeTree {
         &self.order[begin as usize..end as usize]
     }
 
+    /// Returns whether a segment is one of a node's; false if one of them does not exist.
+    pub fn has(&self, node: u32, segment: u32) -> bool {
+        let range = self.range.get(node as usize).zip(self.range.get(segment as usize));
+        // The places of a segment are one place.
+        segment < self.leaves && range.is_some_and(|(node, leaf)| node[0] <= leaf[0] && leaf[1] <= node[1])
+    }
+
     /// Returns the largest node of each segment whose cost is at most `cost`, as one entry a segment.
     pub fn nodes_at(&self, cost: f32) -> Vec<u32> {
         // From the roots down: a node whose parent is within the cost has the parent's.

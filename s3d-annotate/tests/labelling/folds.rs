@@ -44,6 +44,12 @@ fn any_action() -> impl Strategy<Value = Action> {
         1 => number().prop_map(|room| Action::RemoveRoom { room }),
         2 => (some_faces(), prop::option::of(number()))
             .prop_map(|(faces, room)| Action::PaintRoom { faces, room }),
+        2 => prop::collection::vec((some_faces(), class()), 0..4).prop_map(|all| Action::All {
+            actions: all
+                .into_iter()
+                .map(|(faces, class)| Action::Paint { faces, instance: 0, class: Some(class) })
+                .collect(),
+        }),
         5 => Just(Action::Undo { of: 0 }),
         3 => Just(Action::Redo { of: 0 }),
     ]
@@ -54,6 +60,14 @@ fn with_free_numbers(state: &State, action: Action) -> Action {
     match action {
         Action::Paint { faces, class: Some(class), .. } => {
             Action::Paint { faces, instance: state.next_instance(), class: Some(class) }
+        }
+        Action::All { mut actions } => {
+            for (action, free) in actions.iter_mut().zip(state.next_instance()..) {
+                if let Action::Paint { instance, .. } = action {
+                    *instance = free;
+                }
+            }
+            Action::All { actions }
         }
         Action::Cut { instance, faces, .. } => Action::Cut { instance, faces, new: state.next_instance() },
         Action::SplitRoom { room, line, .. } => Action::SplitRoom { room, new: state.next_room(), line },
@@ -114,6 +128,7 @@ impl Plain {
                 faces.iter().for_each(|f| self.room[f as usize] = room.unwrap_or(0));
             }
             Action::Room { .. } | Action::SplitRoom { .. } => {}
+            Action::All { actions } => actions.iter().for_each(|action| self.act(action)),
             Action::Undo { .. } | Action::Redo { .. } => panic!("they are not in effect"),
         }
     }

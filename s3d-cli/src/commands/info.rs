@@ -2,13 +2,11 @@
 
 use super::on_threads;
 use crate::answer::print;
-use crate::args::Threads;
+use crate::args::{FrameArgs, Threads};
 use crate::failure::Outcome;
-use crate::values::{parsed, positive};
+use crate::values::positive;
 use clap::Args;
-use s3d_dataset::export::SceneSource;
 use s3d_dataset::info::InfoOptions;
-use s3d_io::mesh::{LengthUnit, UpAxis};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -17,13 +15,8 @@ pub(crate) struct InfoArgs {
     /// ScanNet++, HM3D, Replica, 3RScan or ARKitScenes.
     #[arg(value_name = "SCENE.toml")]
     pub(crate) scene: PathBuf,
-    /// The axis of a mesh that points up [default: y in glTF, guessed in others]
-    #[arg(long, value_parser = parsed::<UpAxis>, value_name = "y|z")]
-    pub(crate) up: Option<UpAxis>,
-    /// The unit of a mesh [default: metres in glTF; in others what the file says, or else guessed from the
-    /// height of rooms]
-    #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
-    pub(crate) units: Option<LengthUnit>,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
     /// Place scan locations on the floor of every room instead of reading them: at least this far apart
     /// within a room, 1.5 m high, clear of walls and objects.
     #[arg(long, value_name = "METRES", value_parser = positive)]
@@ -61,7 +54,7 @@ pub(crate) fn run(args: InfoArgs) -> Outcome<()> {
             on_threads(args.threads, |context| s3d_dataset::info::data_set_info(&args.scene, context))?;
         return print(&info.to_string());
     }
-    let scene = SceneSource::list([args.scene], args.up, args.units).remove(0);
+    let scene = args.frame.source(args.scene);
     let info = on_threads(args.threads, |context| s3d_dataset::info(scene, &options, context))?;
     print(&info.to_string())
 }

@@ -4,6 +4,7 @@ pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod export;
 pub(crate) mod info;
+pub(crate) mod label;
 pub(crate) mod pack;
 pub(crate) mod profile;
 pub(crate) mod render;

@@ -99,6 +99,15 @@ impl AreaInput {
             .map_or_else(|| self.source.read(), |file| Ok(Arc::clone(file)))
     }
 
+    /// Returns the mesh itself, which is not in memory afterwards.
+    pub(crate) fn take_mesh(&mut self) -> Result<MeshFile> {
+        let file = match self.mesh_file.take() {
+            Some(file) => file,
+            None => self.source.read()?,
+        };
+        Ok(Arc::unwrap_or_clone(file))
+    }
+
     /// Estimates how much an export of the area writes. Where locations are placed, a fifth of the mesh
     /// counts as floor, and no more of them are counted than stand 2 m apart: a slip in their distance is
     /// another finding.

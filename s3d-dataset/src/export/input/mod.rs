@@ -69,6 +69,12 @@ impl Inputs {
         Ok(Self { areas, table })
     }
 
+    /// Opens a scene without its annotations, which need not exist.
+    pub(crate) fn open_bare(scene: SceneSource) -> Result<AreaInput> {
+        let mut areas = Self::open_areas(&[scene], None, false, false)?;
+        Ok(areas.remove(0))
+    }
+
     fn open_areas(
         scenes: &[SceneSource],
         asked: Option<Placing>,

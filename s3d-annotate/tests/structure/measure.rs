@@ -1,0 +1,259 @@
+//! How well structure found fits what is true.
+
+use s3d_annotate::labelling::Room;
+use s3d_annotate::structure::{Structure, find_structure};
+use s3d_geom::Polygon;
+use s3d_geom::glam::{DVec2, dvec2};
+use s3d_label::Class;
+use s3d_synth::{AnnotatedScene, Building};
+use std::collections::BTreeMap;
+
+/// What may lie in the plane of a wall, to be cut out.
+const IN_WALLS: [Class; 5] = [Class::BOARD, Class::DOOR, Class::WINDOW, Class::BEAM, Class::COLUMN];
+
+/// The three classes of structure, with the word for each.
+const STRUCTURE: [(Class, &str); 3] =
+    [(Class::FLOOR, "floor"), (Class::CEILING, "ceiling"), (Class::WALL, "wall")];
+
+/// The fit of what was found. Areas count.
+#[derive(Debug)]
+#[expect(dead_code, reason = "printed")]
+pub(super) struct Measured {
+    pub(super) title: String,
+    faces: usize,
+    seconds: f64,
+    /// The share of each class that is proposed as it.
+    pub(super) recall: BTreeMap<&'static str, f64>,
+    /// The share of the proposals of each class that is of it, or lies in a wall.
+    pub(super) precision: BTreeMap<&'static str, f64>,
+    /// The mean and the least IoU of instances of structure with the surface that fits best.
+    pub(super) instances: [f64; 2],
+    /// Surfaces more than instances.
+    pub(super) surplus: i64,
+    /// Rooms found and true.
+    pub(super) rooms: [usize; 2],
+    /// The least IoU of a true room with the room that fits best.
+    pub(super) room_iou: f64,
+    worst: Vec<String>,
+}
+
+impl Measured {
+    pub(super) fn of(building: &Building) -> Self {
+        let scene = building.build().unwrap();
+        let start = std::time::Instant::now();
+        let found = find_structure(&scene.mesh);
+        let seconds = start.elapsed().as_secs_f64();
+        let (recall, precision) = shares(&scene, &found);
+        let fits = instance_fits(&scene, &found);
+        let mut worst: Vec<String> = fits
+            .iter()
+            .filter(|fit| fit.0 < 0.9)
+            .map(|fit| format!("{fit:?}"))
+            .collect();
+        let mut wrong: BTreeMap<String, f64> = BTreeMap::new();
+        for surface in &found.surfaces {
+            for face in surface.faces.iter() {
+                let i = &scene.instances[scene.instance_of_face[face as usize] as usize];
+                if STRUCTURE.contains(&(i.class, surface.class)) {
+                    continue;
+                }
+                let t = scene.mesh.triangle(face);
+                let m = (t[0] + t[1] + t[2]) / 3.0;
+                let n = scene.mesh.normal(face);
+                let k = format!(
+                    "{} in {} {:?} n {:.1},{:.1},{:.1}",
+                    surface.class,
+                    i.room,
+                    i.class.name(),
+                    n.x,
+                    n.y,
+                    n.z
+                );
+                let e = wrong.entry(k.clone()).or_default();
+                *e += scene.mesh.area(face);
+                if *e > 0.5 && *e - scene.mesh.area(face) < 0.5 {
+                    worst.push(format!("WRONG {k} at {m}"));
+                }
+            }
+        }
+        for (k, v) in &wrong {
+            if *v > 0.3 {
+                worst.push(format!("wrong {v:.2} {k}"));
+            }
+        }
+        for r in &found.rooms {
+            worst.push(format!(
+                "{:?}",
+                r.parts
+                    .iter()
+                    .map(|p| (
+                        p.heights,
+                        p.outline
+                            .iter()
+                            .map(|c| c.map(|v| (v * 100.0).round() / 100.0))
+                            .collect::<Vec<_>>()
+                    ))
+                    .collect::<Vec<_>>()
+            ));
+        }
+        let mut has = vec![false; scene.mesh.faces().len()];
+        for su in &found.surfaces {
+            for f in su.faces.iter() {
+                has[f as usize] = true;
+            }
+        }
+        let mut miss: BTreeMap<String, (f64, [f32; 6])> = BTreeMap::new();
+        for f in 0..scene.mesh.faces().len() as u32 {
+            let i = &scene.instances[scene.instance_of_face[f as usize] as usize];
+            if has[f as usize] || i.class != Class::WALL {
+                continue;
+            }
+            let e = miss
+                .entry(format!("{} {}", i.room, i.number))
+                .or_insert((0.0, [9e9, 9e9, 9e9, -9e9, -9e9, -9e9]));
+            e.0 += scene.mesh.area(f);
+            for p in scene.mesh.triangle(f) {
+                for k in 0..3 {
+                    e.1[k] = e.1[k].min(p[k]);
+                    e.1[k + 3] = e.1[k + 3].max(p[k]);
+                }
+            }
+        }
+        for (k, v) in miss {
+            worst.push(format!("MISS {k} {v:?}"));
+        }
+        for r in &building.rooms {
+            worst.push(format!("T {} {:?} {:?}", r.room, r.low, r.high));
+        }
+        let room_fits = room_fits(building, &found.rooms);
+        worst.extend(room_fits.iter().filter(|fit| fit.0 < 0.9).map(|fit| format!("{fit:?}")));
+        let least = |fits: &[(f64, String)]| fits.iter().map(|fit| fit.0).fold(1.0, f64::min);
+        Self {
+            title: scene.title.clone(),
+            faces: scene.mesh.faces().len(),
+            seconds,
+            recall,
+            precision,
+            instances: [fits.iter().map(|fit| fit.0).sum::<f64>() / fits.len() as f64, least(&fits)],
+            surplus: found.surfaces.len() as i64 - fits.len() as i64,
+            rooms: [found.rooms.len(), building.rooms.len()],
+            room_iou: least(&room_fits),
+            worst,
+        }
+    }
+
+    pub(super) fn check(&self) {
+        let is_well = |share: &f64, least: f64| *share >= least;
+        assert!(self.recall.values().all(|share| is_well(share, 0.95)), "{self:#?}");
+        assert!(self.precision.values().all(|share| is_well(share, 0.97)), "{self:#?}");
+        assert_eq!(self.rooms[0], self.rooms[1], "{self:#?}");
+        assert!(self.room_iou >= 0.9, "{self:#?}");
+        assert!(self.instances[0] >= 0.95, "{self:#?}");
+    }
+}
+
+type Shares = BTreeMap<&'static str, f64>;
+
+fn shares(scene: &AnnotatedScene, found: &Structure) -> (Shares, Shares) {
+    let class_of = |face: u32| scene.instances[scene.instance_of_face[face as usize] as usize].class;
+    let [mut whole, mut right, mut proposed, mut fit] = [const { Shares::new() }; 4];
+    for face in 0..scene.mesh.faces().len() as u32 {
+        if let Some((_, word)) = STRUCTURE.iter().find(|(class, _)| *class == class_of(face)) {
+            *whole.entry(*word).or_default() += scene.mesh.area(face);
+        }
+    }
+    for surface in &found.surfaces {
+        for face in surface.faces.iter() {
+            let class = class_of(face);
+            let is_class = STRUCTURE.contains(&(class, surface.class));
+            let is_fit = is_class || (surface.class == "wall" && IN_WALLS.contains(&class));
+            *right.entry(surface.class).or_default() += if is_class { scene.mesh.area(face) } else { 0.0 };
+            *proposed.entry(surface.class).or_default() += scene.mesh.area(face);
+            *fit.entry(surface.class).or_default() += if is_fit { scene.mesh.area(face) } else { 0.0 };
+        }
+    }
+    let ratio = |part: &Shares, all: &Shares| {
+        all.iter()
+            .map(|(word, area)| (*word, part.get(word).copied().unwrap_or(0.0) / area))
+            .collect()
+    };
+    (ratio(&right, &whole), ratio(&fit, &proposed))
+}
+
+/// The best IoU of each instance of structure with a surface, without what lies in walls.
+fn instance_fits(scene: &AnnotatedScene, found: &Structure) -> Vec<(f64, String)> {
+    let mut size = vec![0.0; scene.instances.len()];
+    for (face, instance) in (0u32..).zip(&scene.instance_of_face) {
+        size[*instance as usize] += scene.mesh.area(face);
+    }
+    let mut best = vec![0f64; size.len()];
+    for surface in &found.surfaces {
+        let mut shared: BTreeMap<u32, f64> = BTreeMap::new();
+        let mut whole = 0.0;
+        for face in surface.faces.iter() {
+            let instance = scene.instance_of_face[face as usize];
+            let class = scene.instances[instance as usize].class;
+            if !IN_WALLS.contains(&class) {
+                *shared.entry(instance).or_default() += scene.mesh.area(face);
+                whole += scene.mesh.area(face);
+            }
+        }
+        for (instance, both) in shared {
+            if STRUCTURE.contains(&(scene.instances[instance as usize].class, surface.class)) {
+                let iou = both / (whole + size[instance as usize] - both);
+                best[instance as usize] = best[instance as usize].max(iou);
+            }
+        }
+    }
+    let of = |place: usize| {
+        let instance = &scene.instances[place];
+        let is_structure = STRUCTURE.iter().any(|(class, _)| *class == instance.class);
+        let name =
+            format!("{:?}_{} in {} {:.2} m²", instance.class, instance.number, instance.room, size[place]);
+        is_structure.then_some((best[place], name))
+    };
+    (0..size.len()).filter_map(of).collect()
+}
+
+/// The best IoU of each true room, as seen from above.
+fn room_fits(building: &Building, rooms: &[Room]) -> Vec<(f64, String)> {
+    let origin = building.origin.as_dvec3();
+    let fit = |room: &s3d_synth::building::RoomPlan| {
+        let [low, high] = [room.low, room.high].map(|corner| corner.as_dvec2() + origin.truncate());
+        let body_m = origin.z + f64::from(room.floor_m) + 1.0;
+        let truth =
+            Polygon { outer: vec![low, dvec2(high.x, low.y), high, dvec2(low.x, high.y)], holes: vec![] };
+        let best = rooms.iter().map(|found| {
+            let parts: Vec<Polygon> = found
+                .parts
+                .iter()
+                .filter(|part| part.heights[0] < body_m && part.heights[1] > body_m)
+                .map(|part| Polygon {
+                    outer: part.outline.iter().copied().map(DVec2::from).collect(),
+                    holes: vec![],
+                })
+                .collect();
+            let [mut both, mut either] = [0.0; 2];
+            let corners = parts.iter().flat_map(|part| part.outer.iter().copied());
+            let (mut min, mut max) = (low, high);
+            corners.for_each(|corner| (min, max) = (min.min(corner), max.max(corner)));
+            let step = 0.05;
+            let mut y = min.y;
+            while y < max.y {
+                let mut x = min.x;
+                while x < max.x {
+                    let place = dvec2(x, y);
+                    let is_found = parts.iter().any(|part| part.contains(place));
+                    let is_true = truth.contains(place);
+                    both += f64::from(is_found && is_true);
+                    either += f64::from(is_found || is_true);
+                    x += step;
+                }
+                y += step;
+            }
+            both / either
+        });
+        (best.fold(0.0, f64::max), room.room.to_string())
+    };
+    building.rooms.iter().map(fit).collect()
+}
