@@ -327,15 +327,41 @@ test("the server's sentence is said when a gesture does not fit", async () => {
   assert.equal((await under(page, at.x, at.y)).instance, 0);
 });
 
-test("one goes into a photograph and labels in it", async () => {
+test("one goes into a photograph, labels in it, and walks to another", async () => {
+  await opened.close();
+  await server.close();
+  server = await serve({ scene: "scan/photographed.toml" });
+  opened = await open(browser, server.url);
+  page = opened.page;
   const { photographs } = await page.evaluate(async () => (await fetch("scene.json")).json());
-  if (photographs.length === 0) return;
+  assert.equal(photographs.length, 6);
+  const outside = await page.screenshot();
   await page.keyboard.press("g");
-  await page.waitForTimeout(1500);
+  await page.waitForSelector("body[data-photograph]");
   const at = await find(page, ({ instance }) => instance === 0);
   await page.mouse.click(at.x, at.y);
   await settled(page);
   assert.ok((await labels(page))[at.face] > 0);
+  // Two photographs see each other, at least.
+  const there = [];
+  for (let k = 0; k < 6 && there.length === 0; k++) {
+    for (let turn = 0; turn < 12; turn++) {
+      await page.keyboard.press("ArrowRight");
+      await page.keyboard.press("ArrowRight");
+      await drawn(page);
+      there.push(...(await page.locator(".walk:visible").all()));
+      if (there.length > 0) break;
+    }
+  }
+  if (there.length > 0) {
+    const before = await page.getAttribute("body", "data-photograph");
+    await there[0].focus();
+    await page.keyboard.press("Enter");
+    await page.waitForFunction((was) => document.body.dataset.photograph !== was, before);
+  }
+  await page.locator("canvas").focus();
   await page.keyboard.press("Escape");
+  await page.waitForSelector("body:not([data-photograph])");
+  assert.notDeepEqual(await page.screenshot(), outside);
   assert.deepEqual(opened.faults, []);
 });
