@@ -150,7 +150,7 @@ export class Commands {
     const instance = this.under();
     const { work, inHand, perform } = this.desk;
     if (instance === null) return;
-    if (work.instance(instance)?.class === inHand()) this.desk.say(`This is a ${words(inHand())} already.`);
+    if (work.instance(instance)?.class === inHand()) this.desk.say(`This is ${words(inHand())} already.`);
     else void perform({ class: { instance, class: inHand() } });
   }
 

@@ -99,6 +99,8 @@ export const HANDS: readonly { shown: string; does: string }[] = [
   { shown: "Right drag", does: "turn; also Space + drag" },
   { shown: "Middle drag", does: "move; also Ctrl + drag" },
   { shown: "Wheel", does: "zoom" },
+  { shown: "Arrows, + and −", does: "turn and zoom" },
+  { shown: "Space", does: "without a pointer: label what is in the middle" },
 ];
 
 const COMMANDS = new Map(KEYS.flatMap(({ command, keys }) => keys.map((key) => [key, command] as const)));

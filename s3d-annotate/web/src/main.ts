@@ -142,7 +142,11 @@ async function start(): Promise<void> {
     view.paint.hand.value.fromArray(look.of(classes.inHand)).divideScalar(255);
   };
   classes.left = () => canvas.focus();
-  view.entered = () => stands.entered();
+  view.entered = () => {
+    stands.entered();
+    if (view.photograph === null) delete document.body.dataset["photograph"];
+    else document.body.dataset["photograph"] = String(view.photograph);
+  };
   new Pointer(desk, painting, cuts);
 
   document.body.append(

@@ -46,7 +46,7 @@ export class Review {
     const rest = `${doubt.area_m2.toFixed(2)} m².`;
     this.told(
       guess
-        ? `A ${words(guess.class)}, like ${words(guess.like)}? ${rest} Enter: yes. Tab: next.`
+        ? `Perhaps ${words(guess.class)}, like ${words(guess.like)}. ${rest} Enter: yes. Tab: next.`
         : `What is this? ${rest} Label it, or Tab: next.`,
       guess !== null,
     );

@@ -15,7 +15,7 @@ const LIMIT = 1500;
 let browser, server;
 before(async () => {
   browser = await launch();
-  server = await serve({ fine: true });
+  server = await serve({ scene: "scan/fine.obj" });
 });
 after(async () => {
   await browser?.close();

@@ -118,7 +118,7 @@ export class Painting {
     const taken = this.faces.reduce((sum, { length }) => sum + length, 0);
     if (whole && whole.faces === taken) {
       // All of an object: it gets another class, and stays the object that it is.
-      if (whole.class === desk.inHand()) desk.say(`This is a ${words(whole.class)} already.`);
+      if (whole.class === desk.inHand()) desk.say(`This is ${words(whole.class)} already.`);
       else await desk.perform({ class: { instance: whole.number, class: desk.inHand() } });
       desk.work.last = whole.number;
     } else await desk.perform({ label: { what, class: desk.inHand() } });

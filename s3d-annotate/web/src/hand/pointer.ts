@@ -8,6 +8,8 @@ export class Pointer {
   private readonly held = new Set<string>();
   private readonly fingers = new Set<number>();
   private cutting = false;
+  /** Whether the keys point: at the middle of the view. */
+  private isKeyed = false;
 
   constructor(
     private readonly desk: Desk,
@@ -26,10 +28,33 @@ export class Pointer {
     canvas.addEventListener("wheel", (event) => this.wheel(event), { capture: true, passive: false });
     window.addEventListener("keydown", (event) => this.held.add(event.code));
     window.addEventListener("keyup", (event) => this.held.delete(event.code));
+    canvas.addEventListener("focus", () => {
+      this.isKeyed = desk.hover.x < 0 && canvas.matches(":focus-visible");
+      if (this.isKeyed) this.aim();
+    });
+    canvas.addEventListener("keyup", (event) => this.keyed(event));
     window.addEventListener("blur", () => this.held.clear());
   }
 
+  /** Points at the middle of the view. */
+  private aim(): void {
+    const { view, hover } = this.desk;
+    const middle = view.screen(view.eye.stand.at);
+    const box = view.canvas.getBoundingClientRect();
+    if (middle) hover.move(box.left + middle[0], box.top + middle[1]);
+  }
+
+  private keyed(event: KeyboardEvent): void {
+    if (!this.isKeyed) return;
+    const { hover } = this.desk;
+    if (event.key === " " && this.cuts.way === null && hover.x >= 0) {
+      this.painting.begin(event.shiftKey ? "add" : event.altKey ? "erase" : "label", hover.x, hover.y);
+      void this.painting.end();
+    } else if (event.key.startsWith("Arrow") || "+-=".includes(event.key)) this.aim();
+  }
+
   private down(event: PointerEvent): void {
+    this.isKeyed = false;
     const { view, hover } = this.desk;
     view.canvas.focus({ preventScroll: true });
     if (event.pointerType === "touch") {
@@ -63,6 +88,7 @@ export class Pointer {
 
   private move(event: PointerEvent): void {
     if (this.fingers.size > 1) return;
+    this.isKeyed = false;
     const { clientX: x, clientY: y } = event;
     if (this.painting.isOpen) this.painting.move(x, y);
     else if (this.cuts.way !== null && (event.buttons === 0 || this.cutting)) {
