@@ -26,7 +26,7 @@ use crate::labelling::{FaceRuns, Room, RoomPart};
 use distance::{distances, spread};
 use planes::Plane;
 use s3d_geom::TriMesh;
-use scan::{Facet, Scan};
+use scan::{Facet, Grid, Scan};
 use serde::Serialize;
 use storey::{Fronts, Storey};
 use surfaces::Place;
@@ -129,7 +129,7 @@ impl Finder<'_> {
             }
         }
         let mut cells_of = vec![Vec::new(); count as usize + 1];
-        let mut outline_of_cell = room_of_cell.clone();
+        let mut outline_of_cell = filled_out(grid, &room_of_cell, &near_of_cell);
         spread(grid, &mut outline_of_cell, 1);
         for (cell, room) in outline_of_cell.iter().enumerate() {
             cells_of[*room as usize].push(cell);
@@ -243,4 +243,21 @@ impl Finder<'_> {
                 .min(self.above.unwrap_or(f64::INFINITY)),
         ]
     }
+}
+
+/// Returns the room of each cell, with the narrow notches filled that columns and shelves leave: rooms grow
+/// by the distance of walls and shrink again, a closing of mathematical morphology (Serra, "Image analysis
+/// and mathematical morphology", 1982).
+fn filled_out(grid: &Grid, room_of_cell: &[u32], near_of_cell: &[u32]) -> Vec<u32> {
+    let is_border = |cell: usize| {
+        let near = near_of_cell[cell];
+        near == 0 || grid.beside(cell).any(|next| near_of_cell[next] != near)
+    };
+    let distance = distances(grid, is_border);
+    let reach = (WALL_M / grid.step_m) as f32;
+    let of = |cell: usize| match room_of_cell[cell] {
+        0 if distance[cell] >= reach => near_of_cell[cell],
+        room => room,
+    };
+    (0..room_of_cell.len()).map(of).collect()
 }
