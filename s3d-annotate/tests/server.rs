@@ -141,6 +141,12 @@ fn strokes_reach_the_disk_before_the_answer_and_labels_follow_at_the_end() {
         (&json!(NAME), &json!(12), &json!("chair"))
     );
 
+    let segments = fs::read(server.labels().join("segments.json")).unwrap();
+    let segments: Value = serde_json::from_slice(&segments).unwrap();
+    let nodes = segments["parent"].as_array().unwrap().len();
+    assert_eq!((&segments["segIndices"][11], segments["cost"].as_array().unwrap().len()), (&json!(5), nodes));
+    assert_eq!(scene["nodes"], nodes);
+
     let chair = json!({ "label": { "what": what(0, 0), "class": "chair" } });
     let (status, done) = server.gesture(0, &chair);
     assert_eq!(

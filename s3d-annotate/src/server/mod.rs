@@ -89,6 +89,7 @@ pub fn label(
         return Ok(());
     }
 
+    bench.labels().write_segments(bench.segments()).map_err(failure)?;
     let name = file_name(scene.path());
     let desk = Arc::new(Desk::new(scene, bench, name, ctx));
     let looking = Arc::clone(&desk);

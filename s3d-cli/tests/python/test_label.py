@@ -72,7 +72,7 @@ def test_the_evening(s3d, demo, tmp_path, monkeypatch):
     assert (labels["instance"] >= 0).mean() > 0.1 and len(state["rooms"]) == len(labels["rooms"])
     instances = json.loads((tmp_path / "dataset/area_1/3d/instances.json").read_text())["instances"]
     assert {instance["class"] for instance in instances} == {"floor", "ceiling", "wall"}
-    assert {instance["room"] for instance in instances} == set(labels["rooms"])
+    assert {instance["room"] for instance in instances} == set(labels["room_names"])
     assert (tmp_path / "dataset_report/index.html").is_file()
     for made in ["scan_labelled.ply", "scan_scannet", "scan_scannetpp", "scan_s3dis"]:
         assert (tmp_path / made).exists(), made
