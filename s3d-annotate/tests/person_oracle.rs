@@ -288,7 +288,7 @@ impl<'a> Person<'a> {
         }
         let mut left: Vec<(u32, f64)> = left_m2.into_iter().filter(|(_, m2)| *m2 > drag_m2).collect();
         left.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        for (thing, _) in left.into_iter().take(12) {
+        for (thing, _) in left.into_iter().take(8) {
             ideas.extend(self.boxes(thing));
             ideas.extend(self.swaths(thing));
         }
@@ -495,11 +495,15 @@ impl<'a> Person<'a> {
             let at = project(self.middles[face as usize]);
             (0..2).all(|i| at[i] > low[i] && at[i] < high[i]) && (at[2] - height).abs() <= BOX_M
         };
+        let segments = self.bench.segments();
+        let of_instance = (0..of_face.len() as u32).filter(|face| of_face[*face as usize] == instance);
+        let inside: Vec<u32> = of_instance.filter(|face| is_inside(*face)).collect();
         let mut best: Option<Idea> = None;
         for cut in &self.cuts {
             let at = Patch { face, node: cut[segment as usize] };
-            let patch = self.bench.patch(at).ok()?;
-            let gain_m2 = self.gain(thing, patch.iter().filter(|face| is_inside(*face)));
+            let is_in_node =
+                |face: &u32| segments.tree.has(at.node, segments.segment_of_face[*face as usize]);
+            let gain_m2 = self.gain(thing, inside.iter().copied().filter(is_in_node));
             if gain_m2 > best.as_ref().map_or(0.0, |idea| idea.gain_m2) {
                 let class = Some(self.scene.classes[thing as usize].clone());
                 let gesture = Gesture::Cut { at, by: Knife::Box { corners }, class };
@@ -529,6 +533,10 @@ impl<'a> Person<'a> {
             let opposite = near
                 .iter()
                 .max_by(|a, b| a.distance(*farthest).total_cmp(&b.distance(*farthest)))?;
+            let around: Vec<u32> = (0..of_face.len() as u32)
+                .filter(|face| of_face[*face as usize] == of_face[seed as usize])
+                .filter(|face| self.middles[*face as usize].distance(center) < 2.0 * SWATH_M)
+                .collect();
             for ends in [[*farthest, *opposite], [center, center]] {
                 for radius_m in BRUSHES_M {
                     let along = ends[1] - ends[0];
@@ -536,9 +544,8 @@ impl<'a> Person<'a> {
                         let at = self.middles[*face as usize];
                         let t = along.dot(at - ends[0]) / along.length_squared().max(1e-12);
                         at.distance(ends[0] + along * t.clamp(0.0, 1.0)) <= radius_m
-                            && of_face[*face as usize] == of_face[seed as usize]
                     };
-                    let under: Vec<u32> = (0..of_face.len() as u32).filter(is_under).collect();
+                    let under: Vec<u32> = around.iter().copied().filter(is_under).collect();
                     let gain_m2 = self.gain(thing, under.iter().copied());
                     if gain_m2 > best.as_ref().map_or(0.0, |idea| idea.gain_m2) {
                         let faces: FaceRuns = under.into_iter().collect();
@@ -559,9 +566,14 @@ impl<'a> Person<'a> {
             surroundings: &self.surroundings,
             state: self.bench.labels().state(),
         };
-        let mut best: Option<Idea> = None;
+        // The last thing of each class is asked for.
+        let mut last: BTreeMap<&String, (u32, u32)> = BTreeMap::new();
         for (thing, &instance) in (0u32..).zip(&self.instance_of).filter(|(_, instance)| **instance != 0) {
-            let class = &self.scene.classes[thing as usize];
+            let of_class = last.entry(&self.scene.classes[thing as usize]).or_default();
+            *of_class = (*of_class).max((instance, thing));
+        }
+        let mut best: Option<Idea> = None;
+        for (class, (instance, _)) in last {
             let (mut kept, mut makes, mut gain_m2, mut wrong) = (Vec::new(), Vec::new(), 0.0, 0);
             for patch in review.similar_patches(instance) {
                 let Ok(faces) = self.bench.patch(patch) else { continue };

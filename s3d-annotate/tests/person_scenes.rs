@@ -33,7 +33,7 @@ pub(crate) fn house() -> Known {
 
 /// An open office of about 90 instances, without its hallway.
 pub(crate) fn office() -> Known {
-    let room = RoomOptions { size_m: [9.0, 6.0], windows: 3, ..RoomOptions::new(RoomType::OPENSPACE) };
+    let room = RoomOptions { size_m: [11.0, 8.0], windows: 4, ..RoomOptions::new(RoomType::OPENSPACE) };
     let options =
         BuildingOptions { rooms: vec![room], texture_scale: 0.1, seed: 5, ..BuildingOptions::default() };
     let scene = Building::generate(&options)
