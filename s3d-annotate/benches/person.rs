@@ -6,9 +6,12 @@
 mod person_oracle;
 #[path = "../tests/person_scenes.rs"]
 mod person_scenes;
+#[path = "../tests/person_session.rs"]
+mod person_session;
 
-use person_oracle::{Session, label};
+use person_oracle::label;
 use person_scenes::{Known, copy_room, demo, house, office};
+use person_session::Session;
 
 /// No session has more strokes.
 const MOST: usize = 150;

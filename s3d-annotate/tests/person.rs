@@ -1,7 +1,8 @@
 //! How many strokes a simulated person needs. `cargo bench -p s3d-annotate --bench person` has more scenes.
 
-use super::person_oracle::{Session, label};
+use super::person_oracle::label;
 use super::person_scenes::{Known, demo, office};
+use super::person_session::Session;
 use std::path::Path;
 
 fn session(scene: &Known) -> Session {
