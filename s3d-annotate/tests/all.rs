@@ -4,7 +4,9 @@ mod labelling;
 mod outputs;
 mod person;
 mod person_oracle;
+#[expect(dead_code, reason = "the bench has more scenes")]
 mod person_scenes;
+mod person_session;
 mod proposals;
 mod review;
 mod segments;

@@ -3,17 +3,17 @@
 //! Each gesture is one stroke. The person always makes the one that puts the largest area right, within what
 //! a hand can do:
 //!
-//! - A drag goes over at most [`MOST_PATCHES`] patches within [`REACH_M`] of the first. It has one level of the
-//!   tree for all of them, as the page has, and begins on faces of one instance or of none. It labels a new
-//!   thing, or adds to one.
-//! - A box is a rectangle of four clicks in the plane of a thing, or upright around it on its largest side.
+//! - A drag goes over at most [`MOST_PATCHES`] patches within [`REACH_M`] of the first. As on the page, it has
+//!   one level of the tree for all of them, and stays on faces of one instance or of none.
+//! - A box is a rectangle of four clicks around the largest side of a thing.
 //! - A brush is a straight swath with round ends, of one of three widths, over faces of one instance or none.
-//! - "More like it" labels all patches that the review proposes for a thing, with one stroke, and one more for
-//!   each patch that has to be taken out first.
+//! - "More like it" labels all patches that the review proposes for a thing, with one stroke, and one more
+//!   for each patch that has to be taken out first.
 //! - The structure of a room is accepted with one stroke, as found by the crate itself. A proposal that is
 //!   not one thing stays wrong until it is put right by strokes. Pieces of one thing are joined by strokes.
 
 use super::person_scenes::Known;
+use super::person_session::Session;
 use s3d_annotate::labelling::FaceRuns;
 use s3d_annotate::review::{Review, Surroundings};
 use s3d_annotate::segments::{SegmentOptions, segment_faces};
@@ -40,28 +40,6 @@ const SWATH_M: f32 = 0.6;
 
 /// A box cuts within this of its plane, metres, as the workbench says.
 const BOX_M: f32 = 0.15;
-
-/// What the person has done.
-#[derive(Clone, Debug)]
-pub(crate) struct Session {
-    /// The things of the scene.
-    pub(crate) things: usize,
-    /// The share of the surface that had the right instance after each stroke; the first entry is before any.
-    pub(crate) right: Vec<f64>,
-    /// The number of strokes of each kind.
-    pub(crate) kinds: BTreeMap<&'static str, usize>,
-    /// The share of the surface that is of the largest thing in its segment, before the work.
-    pub(crate) purity_before: f64,
-    /// The same of patches in the end, which are segments divided by cuts.
-    pub(crate) purity_after: f64,
-}
-
-impl Session {
-    /// The strokes until this share is right.
-    pub(crate) fn strokes_to(&self, share: f64) -> Option<usize> {
-        self.right.iter().position(|right| *right >= share)
-    }
-}
 
 /// A gesture that the person could make.
 struct Idea {
@@ -94,8 +72,8 @@ struct Person<'a> {
     instance_of: Vec<u32>,
     /// The node of each segment at each level.
     cuts: Vec<Vec<u32>>,
-    /// The middle of each node.
-    node_middles: Vec<Vec3>,
+    /// A place on each segment.
+    segment_middles: Vec<Vec3>,
     session: Session,
 }
 
@@ -114,7 +92,16 @@ pub(crate) fn label(scene: &Known, folder: &Path, share: f64, most: usize) -> Se
 impl<'a> Person<'a> {
     fn new(scene: &'a Known, folder: &Path) -> Self {
         let mesh = Arc::new(scene.mesh.clone());
-        let segments = Arc::new(segment_faces(&mesh, &SegmentOptions::default()));
+        let segments = Arc::new(segment_faces(
+            &mesh,
+            &SegmentOptions {
+                scale_m2: std::env::var("SCALE")
+                    .ok()
+                    .and_then(|x| x.parse().ok())
+                    .unwrap_or(0.002),
+                ..SegmentOptions::default()
+            },
+        ));
         let surroundings = Surroundings::new(&mesh, &segments);
         let structure = find_structure(&mesh);
         let mut bench = Workbench::open(folder, Arc::clone(&mesh), Arc::clone(&segments), &Taxonomy::s3dis())
@@ -139,18 +126,9 @@ impl<'a> Person<'a> {
             .sum();
 
         let tree = &segments.tree;
-        let mut sums = vec![(Vec3::ZERO, 0.0); tree.node_count() as usize];
+        let mut segment_middles = vec![Vec3::ZERO; tree.leaf_count() as usize];
         for (face, segment) in segments.segment_of_face.iter().enumerate() {
-            let sum = &mut sums[*segment as usize];
-            sum.0 += middles[face] * areas[face] as f32;
-            sum.1 += areas[face] as f32;
-        }
-        for node in tree.leaf_count()..tree.node_count() {
-            for child in tree.children(node).into_iter().flatten() {
-                let of_child = sums[child as usize];
-                sums[node as usize].0 += of_child.0;
-                sums[node as usize].1 += of_child.1;
-            }
+            segment_middles[*segment as usize] = middles[face];
         }
         let mut person = Self {
             scene,
@@ -161,7 +139,7 @@ impl<'a> Person<'a> {
             total_m2,
             instance_of: vec![0; scene.classes.len()],
             cuts: LEVELS.iter().map(|cost| tree.nodes_at(*cost)).collect(),
-            node_middles: sums.iter().map(|(sum, area)| *sum / *area).collect(),
+            segment_middles,
             session: Session {
                 things: scene.things(),
                 right: vec![0.0],
@@ -275,7 +253,7 @@ impl<'a> Person<'a> {
     /// The idea with the largest gain a stroke; `None` if nothing is worth a stroke.
     fn best_idea(&self) -> Option<Idea> {
         let shares = self.shares();
-        let mut ideas = self.drags(&shares);
+        let mut ideas = Vec::from_iter(self.drag(&shares));
         let drag_m2 = ideas.iter().map(Idea::gain_a_stroke).fold(0.0, f64::max);
         ideas.extend(self.joins(&shares));
 
@@ -288,7 +266,7 @@ impl<'a> Person<'a> {
         }
         let mut left: Vec<(u32, f64)> = left_m2.into_iter().filter(|(_, m2)| *m2 > drag_m2).collect();
         left.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        for (thing, _) in left.into_iter().take(12) {
+        for (thing, _) in left.into_iter().take(8) {
             ideas.extend(self.boxes(thing));
             ideas.extend(self.swaths(thing));
         }
@@ -299,8 +277,8 @@ impl<'a> Person<'a> {
         (best.gain_m2 > 1e-4).then_some(best)
     }
 
-    /// Drags over patches, the best level for each thing.
-    fn drags(&self, shares: &Shares) -> Vec<Idea> {
+    /// The drag over patches that gains most, at the level that is best for its thing.
+    fn drag(&self, shares: &Shares) -> Option<Idea> {
         let mut best: BTreeMap<u32, (f64, Vec<(u32, u32)>)> = BTreeMap::new();
         for cut in &self.cuts {
             // What each patch of this level has: the area of each thing.
@@ -334,8 +312,12 @@ impl<'a> Person<'a> {
             }
             for ((thing, instance), mut touched) in drags {
                 touched.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-                let first = self.node_middles[touched[0].1 as usize];
-                touched.retain(|(_, node)| self.node_middles[*node as usize].distance(first) <= REACH_M);
+                let place = |node: u32| {
+                    let segments = self.bench.segments().tree.segments_of(node);
+                    self.segment_middles[segments[0] as usize]
+                };
+                let first = place(touched[0].1);
+                touched.retain(|(_, node)| place(*node).distance(first) <= REACH_M);
                 touched.truncate(MOST_PATCHES);
                 let gain: f64 = touched.iter().map(|(gain, _)| gain).sum();
                 if best.get(&thing).is_none_or(|(before, _)| gain > *before) {
@@ -485,21 +467,21 @@ impl<'a> Person<'a> {
         let face = *side.iter().find(|face| of_face[**face as usize] == instance)?;
         let segment = self.bench.segments().segment_of_face[face as usize];
         let corner = |a: f32, b: f32| u * a + v * b + normal * height;
-        let corners = [
-            corner(low[0], low[1]),
-            corner(high[0], low[1]),
-            corner(high[0], high[1]),
-            corner(low[0], high[1]),
-        ];
+        let [[a, b], [c, d]] = [low, high];
+        let corners = [corner(a, b), corner(c, b), corner(c, d), corner(a, d)];
         let is_inside = |face: u32| {
             let at = project(self.middles[face as usize]);
             (0..2).all(|i| at[i] > low[i] && at[i] < high[i]) && (at[2] - height).abs() <= BOX_M
         };
+        let segments = self.bench.segments();
+        let of_instance = (0..of_face.len() as u32).filter(|face| of_face[*face as usize] == instance);
+        let inside: Vec<u32> = of_instance.filter(|face| is_inside(*face)).collect();
         let mut best: Option<Idea> = None;
         for cut in &self.cuts {
             let at = Patch { face, node: cut[segment as usize] };
-            let patch = self.bench.patch(at).ok()?;
-            let gain_m2 = self.gain(thing, patch.iter().filter(|face| is_inside(*face)));
+            let is_in_node =
+                |face: &u32| segments.tree.has(at.node, segments.segment_of_face[*face as usize]);
+            let gain_m2 = self.gain(thing, inside.iter().copied().filter(is_in_node));
             if gain_m2 > best.as_ref().map_or(0.0, |idea| idea.gain_m2) {
                 let class = Some(self.scene.classes[thing as usize].clone());
                 let gesture = Gesture::Cut { at, by: Knife::Box { corners }, class };
@@ -529,6 +511,10 @@ impl<'a> Person<'a> {
             let opposite = near
                 .iter()
                 .max_by(|a, b| a.distance(*farthest).total_cmp(&b.distance(*farthest)))?;
+            let around: Vec<u32> = (0..of_face.len() as u32)
+                .filter(|face| of_face[*face as usize] == of_face[seed as usize])
+                .filter(|face| self.middles[*face as usize].distance(center) < 2.0 * SWATH_M)
+                .collect();
             for ends in [[*farthest, *opposite], [center, center]] {
                 for radius_m in BRUSHES_M {
                     let along = ends[1] - ends[0];
@@ -536,9 +522,8 @@ impl<'a> Person<'a> {
                         let at = self.middles[*face as usize];
                         let t = along.dot(at - ends[0]) / along.length_squared().max(1e-12);
                         at.distance(ends[0] + along * t.clamp(0.0, 1.0)) <= radius_m
-                            && of_face[*face as usize] == of_face[seed as usize]
                     };
-                    let under: Vec<u32> = (0..of_face.len() as u32).filter(is_under).collect();
+                    let under: Vec<u32> = around.iter().copied().filter(is_under).collect();
                     let gain_m2 = self.gain(thing, under.iter().copied());
                     if gain_m2 > best.as_ref().map_or(0.0, |idea| idea.gain_m2) {
                         let faces: FaceRuns = under.into_iter().collect();
@@ -559,9 +544,14 @@ impl<'a> Person<'a> {
             surroundings: &self.surroundings,
             state: self.bench.labels().state(),
         };
-        let mut best: Option<Idea> = None;
+        // The last thing of each class is asked for.
+        let mut last: BTreeMap<&String, (u32, u32)> = BTreeMap::new();
         for (thing, &instance) in (0u32..).zip(&self.instance_of).filter(|(_, instance)| **instance != 0) {
-            let class = &self.scene.classes[thing as usize];
+            let of_class = last.entry(&self.scene.classes[thing as usize]).or_default();
+            *of_class = (*of_class).max((instance, thing));
+        }
+        let mut best: Option<Idea> = None;
+        for (class, (instance, _)) in last {
             let (mut kept, mut makes, mut gain_m2, mut wrong) = (Vec::new(), Vec::new(), 0.0, 0);
             for patch in review.similar_patches(instance) {
                 let Ok(faces) = self.bench.patch(patch) else { continue };

@@ -1,7 +1,7 @@
 //! Scenes whose instances are known, for a simulated person: from modelled buildings, as they are and as a
 //! scanner would have them, and a real scan.
 
-use s3d_geom::glam::{IVec3, Vec3, ivec3};
+use s3d_geom::glam::{IVec3, Vec3, ivec3, vec3};
 use s3d_geom::{FaceColor, MeshParts, NearestFaces, PointCloud, TriMesh};
 use s3d_io::cloud::{AnnotationTree, read_points};
 use s3d_io::mesh::{UpAxis, read_mesh};
@@ -33,7 +33,7 @@ pub(crate) fn house() -> Known {
 
 /// An open office of about 90 instances, without its hallway.
 pub(crate) fn office() -> Known {
-    let room = RoomOptions { size_m: [9.0, 6.0], windows: 3, ..RoomOptions::new(RoomType::OPENSPACE) };
+    let room = RoomOptions { size_m: [11.0, 8.0], windows: 4, ..RoomOptions::new(RoomType::OPENSPACE) };
     let options =
         BuildingOptions { rooms: vec![room], texture_scale: 0.1, seed: 5, ..BuildingOptions::default() };
     let scene = Building::generate(&options)
@@ -126,7 +126,8 @@ impl Known {
     pub(crate) fn scanned(&self, cell_m: f32, noise_m: f32) -> Self {
         let mesh = &self.mesh;
         let nearest = NearestFaces::new(mesh);
-        let low = mesh.aabb().min - 3.0 * cell_m;
+        // Walls and floors do not lie on corners of the grid.
+        let low = mesh.aabb().min - cell_m * vec3(3.37, 3.29, 3.43);
         let place = |corner: IVec3| low + corner.as_vec3() * cell_m;
 
         // The corners of the grid near the surface.
@@ -180,7 +181,7 @@ impl Known {
             }
         }
 
-        // A vertex a cell in which the sign changes, and a quadrilateral an edge of the grid at which it does.
+        // A vertex a cell in which the sign changes, and a quadrilateral an edge at which it does.
         let mut vertex_of_cell: HashMap<[i32; 3], u32> = HashMap::new();
         let mut positions: Vec<Vec3> = Vec::new();
         let mut faces: Vec<[u32; 3]> = Vec::new();

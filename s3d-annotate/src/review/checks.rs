@@ -132,7 +132,7 @@ impl Review<'_> {
             let count = pieces.len();
             let name = name(instance);
             let text = format!(
-                "{name} is in {count} pieces that do not touch: the largest have {first:.2} and {second:.2} m²"
+                "{name} is in {count} pieces that do not touch, the largest of {first:.2} and {second:.2} m²"
             );
             let smaller = pieces.into_iter().nth(1).map_or_else(Vec::new, |piece| piece.faces);
             (CheckKind::TwoPieces, text, Some(instance), smaller)

@@ -3,14 +3,12 @@
 use s3d_geom::TriMesh;
 use s3d_geom::glam::{DVec3, Vec3};
 
-/// The weight of each number of a [`Descriptor`]: a difference of 1 / weight counts as much as any other.
-const WEIGHTS: [f64; 11] = [
-    // The area, the three extents: as logarithms, so a quarter is a quarter of anything.
-    3.0, 5.0, 4.0, 4.0, // Heights of the lowest and the highest point above the floor, metres.
-    4.0, 3.0, // How level the surface is, and how much of it looks up rather than down.
-    6.0, 2.0, // Lightness, and the two axes of colour in Oklab.
-    5.0, 15.0, 15.0,
-];
+/// The weights of the numbers of a [`Descriptor`]: what differs by 1 / weight counts as 1.
+///
+/// The numbers are: the area and the three extents, as logarithms; the heights of the lowest and the highest
+/// point above the floor, metres; how level the surface is, and how much of it looks up rather than down;
+/// lightness and the two axes of colour in Oklab.
+const WEIGHTS: [f64; 11] = [3.0, 5.0, 4.0, 4.0, 4.0, 3.0, 6.0, 2.0, 5.0, 15.0, 15.0];
 
 /// An extent is taken to be this much larger, metres, so that thin things do not differ by their noise.
 const NOISE_M: f64 = 0.02;
@@ -120,7 +118,7 @@ impl Sums {
 }
 
 impl Descriptor {
-    /// Returns how much two things differ: 0 for equal ones, and about 1 for two of a kind.
+    /// Returns how much two things differ: 0 for equal ones, and mostly below 3 for two of a kind.
     pub(super) fn difference(&self, other: &Self) -> f64 {
         let squares = self.0.iter().zip(other.0).zip(WEIGHTS).map(|((a, b), weight)| {
             let difference = weight * (a - b);

@@ -14,10 +14,12 @@ impl Review<'_> {
     /// height above the floor, colour, and share of level surface.
     pub fn similar_patches(&self, instance: u32) -> Vec<Patch> {
         let of_face = self.state.instance_of_face();
-        let instances = self.surroundings.of_instances(self.mesh, of_face);
-        let Some(thing) = instances.get(&instance).map(|sums| self.surroundings.descriptor(sums)) else {
+        let faces = self.state.faces_of(instance);
+        if faces.is_empty() {
             return Vec::new();
-        };
+        }
+        let thing = self.surroundings.sums(self.mesh, faces.iter());
+        let thing = self.surroundings.descriptor(&thing);
 
         let open_m2 = self.open_areas();
         let tree = &self.segments.tree;

@@ -96,6 +96,16 @@ impl Surroundings {
         sums.descriptor(self.floor_under(sums.bottom_m()))
     }
 
+    /// Returns the sums of some faces.
+    pub(super) fn sums(&self, mesh: &TriMesh, faces: impl Iterator<Item = u32>) -> Sums {
+        let origin = mesh.aabb().min;
+        let mut sums = Sums::default();
+        for face in faces {
+            sums.add(&Sums::of_face(mesh, face, self.colors[face as usize], origin));
+        }
+        sums
+    }
+
     /// Returns the sums of each instance that has a face.
     pub(super) fn of_instances(&self, mesh: &TriMesh, instance_of_face: &[u32]) -> BTreeMap<u32, Sums> {
         let origin = mesh.aabb().min;

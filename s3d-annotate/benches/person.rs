@@ -1,0 +1,71 @@
+//! The strokes that a simulated person needs until 90, 95 and 99 % of the surface has the right instance, and
+//! the purity of patches before and after the work. It counts strokes, and not time. Arguments: words of the
+//! names of scenes; none: all.
+
+#[path = "../tests/person_oracle.rs"]
+mod person_oracle;
+#[path = "../tests/person_scenes.rs"]
+mod person_scenes;
+#[path = "../tests/person_session.rs"]
+mod person_session;
+
+use person_oracle::label;
+use person_scenes::{Known, copy_room, demo, house, office};
+use person_session::Session;
+
+/// No session has more strokes.
+const MOST: usize = 150;
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let is_asked = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word.as_str()));
+    let scenes: [(&str, &dyn Fn() -> Option<Known>); 6] = [
+        ("office", &|| Some(office())),
+        ("office, scanned", &|| Some(office().scanned(0.05, 0.004))),
+        ("demo", &|| Some(demo())),
+        ("demo, scanned", &|| Some(demo().scanned(0.06, 0.004))),
+        ("house", &|| Some(house())),
+        ("copyroom", &copy_room),
+    ];
+
+    println!("| scene | faces | things | rooms | accepted | to 90 % | 95 % | 99 % | end | purity | after |");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for (_, scene) in scenes.iter().filter(|(name, _)| is_asked(name)) {
+        // The scan of the copy room may not be there.
+        if let Some(scene) = scene() {
+            let folder = tempfile::tempdir().expect("a folder for the labels");
+            let session = label(&scene, &folder.path().join("scan.labels"), 0.99, MOST);
+            println!("{}", row(&scene, &session));
+        }
+    }
+}
+
+fn row(scene: &Known, session: &Session) -> String {
+    let strokes = |share: f64| {
+        session
+            .strokes_to(share)
+            .map_or("–".to_owned(), |strokes| strokes.to_string())
+    };
+    let count = |kind: &str| session.kinds.get(kind).copied().unwrap_or(0);
+    let kinds: Vec<String> = session
+        .kinds
+        .iter()
+        .map(|(kind, strokes)| format!("{strokes} {kind}"))
+        .collect();
+    let rooms = count("accept");
+    format!(
+        "| {} | {} | {} | {rooms} | {:.3} | {} | {} | {} | {:.3} after {}: {} | {:.3} | {:.3} |",
+        scene.name,
+        scene.mesh.faces().len(),
+        session.things,
+        session.right[rooms],
+        strokes(0.9),
+        strokes(0.95),
+        strokes(0.99),
+        session.right.last().copied().unwrap_or_default(),
+        session.right.len() - 1,
+        kinds.join(", "),
+        session.purity_before,
+        session.purity_after,
+    )
+}

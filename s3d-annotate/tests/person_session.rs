@@ -1,0 +1,25 @@
+//! What a simulated person has done.
+
+use std::collections::BTreeMap;
+
+/// What the person has done.
+#[derive(Clone, Debug)]
+pub(crate) struct Session {
+    /// The things of the scene.
+    pub(crate) things: usize,
+    /// The share of the surface that had the right instance after each stroke; the first entry is before any.
+    pub(crate) right: Vec<f64>,
+    /// The number of strokes of each kind.
+    pub(crate) kinds: BTreeMap<&'static str, usize>,
+    /// The share of the surface that is of the largest thing in its segment, before the work.
+    pub(crate) purity_before: f64,
+    /// The same of patches in the end, which are segments divided by cuts.
+    pub(crate) purity_after: f64,
+}
+
+impl Session {
+    /// The strokes until this share is right.
+    pub(crate) fn strokes_to(&self, share: f64) -> Option<usize> {
+        self.right.iter().position(|right| *right >= share)
+    }
+}
