@@ -9,7 +9,7 @@ const SEEN = "s3d-label-card";
  * the first use has been seen.
  */
 export async function open(browser, url, options = {}) {
-  const { width = 1440, height = 900, dark = false, card = false, hash = "", touch = false } = options;
+  const { width = 1120, height = 760, dark = false, card = false, hash = "", touch = false } = options;
   const context = await browser.newContext({
     viewport: { width, height },
     colorScheme: dark ? "dark" : "light",
