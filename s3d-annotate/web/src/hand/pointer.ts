@@ -10,6 +10,7 @@ export class Pointer {
   private cutting = false;
   /** Whether the keys point: at the middle of the view. */
   private isKeyed = false;
+  private isOver = false;
 
   constructor(
     private readonly desk: Desk,
@@ -23,13 +24,14 @@ export class Pointer {
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", (event) => this.cancel(event));
     canvas.addEventListener("pointerleave", () => {
+      this.isOver = false;
       if (!this.painting.isOpen) desk.hover.clear();
     });
     canvas.addEventListener("wheel", (event) => this.wheel(event), { capture: true, passive: false });
     window.addEventListener("keydown", (event) => this.held.add(event.code));
     window.addEventListener("keyup", (event) => this.held.delete(event.code));
     canvas.addEventListener("focus", () => {
-      this.isKeyed = desk.hover.x < 0 && canvas.matches(":focus-visible");
+      this.isKeyed = !this.isOver && canvas.matches(":focus-visible");
       if (this.isKeyed) this.aim();
     });
     canvas.addEventListener("keyup", (event) => this.keyed(event));
@@ -89,6 +91,7 @@ export class Pointer {
   private move(event: PointerEvent): void {
     if (this.fingers.size > 1) return;
     this.isKeyed = false;
+    this.isOver = true;
     const { clientX: x, clientY: y } = event;
     if (this.painting.isOpen) this.painting.move(x, y);
     else if (this.cuts.way !== null && (event.buttons === 0 || this.cutting)) {

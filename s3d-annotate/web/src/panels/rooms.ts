@@ -24,7 +24,7 @@ export const heightsOf = ({ parts }: RoomShape): [number, number] => [
 ];
 
 export const nameOf = ({ room, is }: Pick<Drawn, "room" | "is">): string =>
-  words(is.name ?? room?.name ?? is.kind ?? "room");
+  words(is.name ?? room?.name ?? is.kind ?? (room ? `room ${room.number}` : "room"));
 
 /** All rooms, and the storeys that they make. */
 export function drawnRooms(state: State, proposals: Proposals): { rooms: Drawn[]; storeys: Storeys } {

@@ -9,7 +9,7 @@ const SEEN = "s3d-label-card";
  * the first use has been seen.
  */
 export async function open(browser, url, options = {}) {
-  const { width = 1440, height = 900, dark = false, card = false, hash = "", touch = false } = options;
+  const { width = 1120, height = 760, dark = false, card = false, hash = "", touch = false } = options;
   const context = await browser.newContext({
     viewport: { width, height },
     colorScheme: dark ? "dark" : "light",
@@ -17,6 +17,9 @@ export async function open(browser, url, options = {}) {
     hasTouch: touch,
   });
   if (!card) await context.addInitScript((key) => window.localStorage.setItem(key, "1"), SEEN);
+  // The page of the sources, for a server that was built before.
+  const path = process.env["S3D_PAGE"];
+  if (path) await context.route(url, (route) => route.fulfill({ path, contentType: "text/html" }));
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
   const faults = [];

@@ -62,9 +62,9 @@ export const classOf = (label) => (label === null || label.startsWith("<") ? nul
 
 /**
  * For each label, the largest nodes of the tree that are of it, the largest first: those of whose surface at
- * least `purity` has the label. `rest` is the surface in none of them, m².
+ * least `purity` has the label.
  */
-export function nodesOf({ segment, parent, nodes }, faces, purity = 0.985) {
+export function nodesOf({ segment, parent, nodes, segments }, faces, purity = 0.985) {
   const sums = Array.from({ length: nodes }, () => new Map());
   faces.forEach(({ label, m2 }, face) => {
     const sum = sums[segment[face]];
@@ -74,10 +74,12 @@ export function nodesOf({ segment, parent, nodes }, faces, purity = 0.985) {
     const up = sums[parent[node]];
     if (up) for (const [label, m2] of sums[node]) up.set(label, (up.get(label) ?? 0) + m2);
   }
-  const best = sums.map((sum) => {
+  const best = sums.map((sum, node) => {
     const all = [...sum.values()].reduce((a, b) => a + b, 0);
     const [label, m2] = [...sum].reduce((a, b) => (b[1] > a[1] ? b : a), [null, 0]);
-    return { label, m2, isPure: m2 >= purity * all && classOf(label) !== null };
+    // A segment is of the label that most of it has.
+    const least = node < segments ? 0.5 : purity;
+    return { label, m2, isPure: m2 >= least * all && classOf(label) !== null };
   });
   const wanted = new Map();
   best.forEach(({ label, m2, isPure }, node) => {
