@@ -88,3 +88,24 @@ fn a_folder_of_labels_annotates_its_mesh_and_no_other() {
         .to_string();
     assert!(message.contains("open it for the mesh"), "{message}");
 }
+
+#[test]
+fn labels_in_no_room_with_a_type_are_left_out_and_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = MeshFile::in_memory("scan.ply", mesh(Vec3::ONE));
+    let open = || {
+        let mesh = AnnotatedMesh { file: &file, up: UpAxis::Z, units: None, outside_files: false };
+        Annotations::open_for(&mesh, &[dir.path().to_owned()], &AnnotationOptions::default())
+    };
+
+    // The chair is in no room, and the wall in an office.
+    labels().write(dir.path()).unwrap();
+    let found = open().unwrap();
+    assert_eq!(found.rooms.iter().map(|room| room.instances.len()).collect::<Vec<_>>(), [1]);
+    assert!(found.warnings[0].contains("0.5 m² with labels are in no room"), "{:?}", found.warnings);
+
+    // Nothing is left.
+    SavedLabels { room: vec![-1, 5], ..labels() }.write(dir.path()).unwrap();
+    let error = open().unwrap_err().to_string();
+    assert!(error.contains("no label is in a room that has a type"), "{error}");
+}

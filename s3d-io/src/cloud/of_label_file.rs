@@ -56,10 +56,10 @@ impl Annotations {
         }
 
         if let LabelFile::Saved(archive) = file {
-            let (labels, warning) = saved::read_for(archive, scene.file)?;
+            let (labels, warnings) = saved::read_for(archive, scene.file, options.room.is_none())?;
             let labels = FaceLabels::of_labels(scene.file, labels, options)?;
             let mut found = labels.annotate(archive, &scene.file.mesh, options, true)?;
-            found.warnings.extend(warning);
+            found.warnings.extend(warnings);
             return Ok(found);
         }
 

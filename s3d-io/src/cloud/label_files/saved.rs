@@ -9,7 +9,7 @@ use crate::fs::open::open_file;
 use crate::mesh::file::MeshFile;
 use crate::mesh::labels::{LabelledObject, LabelledRoom, MeshLabels};
 use s3d_geom::{NO_INDEX, TriMesh};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -205,6 +205,42 @@ impl SavedLabels {
         }
     }
 
+    /// Takes the labels from faces that are in no room with a type. Returns a warning if there are some.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if there are no others.
+    fn leave_out_roomless(&mut self, archive: &Path, mesh: &TriMesh) -> Result<Option<String>> {
+        let typed = self.rooms.iter().filter(|(_, name)| !name.is_empty());
+        let typed: HashSet<i32> = typed.map(|(number, _)| *number).collect();
+
+        let (mut kept, mut left_out_m2) = (0u64, 0.0);
+        let columns = self.class.iter_mut().zip(&self.room);
+        for (face, (class, room)) in (0..).zip(columns).filter(|(_, (class, _))| **class != NONE) {
+            if typed.contains(room) {
+                kept += 1;
+            } else {
+                *class = NONE;
+                left_out_m2 += mesh.area(face);
+            }
+        }
+
+        let how = "rooms get their types on the plan of `s3d label`";
+        if kept == 0 && left_out_m2 > 0.0 {
+            let message = format!(
+                "no label is in a room that has a type: {how}; or say room = \"office_1\" under \
+                 [annotations], if all of it is one room"
+            );
+            return Err(Error::format(archive, message));
+        }
+        let path = archive.display();
+        Ok((left_out_m2 > 0.0).then(|| {
+            format!(
+                "{path}: {left_out_m2:.1} m² with labels are in no room that has a type, and count as \
+                 unlabelled: {how}"
+            )
+        }))
+    }
+
     /// Returns the labels as objects: one for each instance and room.
     fn into_mesh_labels(self) -> MeshLabels {
         let room_names: HashMap<i32, String> = self.rooms.into_iter().collect();
@@ -243,18 +279,25 @@ pub(super) fn archive_in(dir: &Path) -> Option<PathBuf> {
     is_one.then(|| dir.join(LABELS_FILE))
 }
 
-/// Reads the labels in `folder` for the faces of a mesh, with a warning if the log has more than they have.
+/// Reads the labels in `folder` for the faces of a mesh, with warnings, such as that the log has more than
+/// they have. `needs_rooms`: nothing says where labels belong that are in no room with a type. They are left
+/// out then.
 ///
 /// # Errors
-/// The errors of [`SavedLabels::read`]; [`Error::Format`] if they are about another mesh, or not written yet.
-pub(crate) fn read_for(archive: &Path, mesh: &MeshFile) -> Result<(MeshLabels, Option<String>)> {
+/// The errors of [`SavedLabels::read`]; [`Error::Format`] if they are about another mesh, not written yet, or
+/// all left out.
+pub(crate) fn read_for(
+    archive: &Path,
+    mesh: &MeshFile,
+    needs_rooms: bool,
+) -> Result<(MeshLabels, Vec<String>)> {
     let folder = super::folder_of(archive);
     if !archive.exists() {
         let message = "is not there yet: the labels of this folder were never written, only their log";
         return Err(Error::format(archive, message));
     }
 
-    let labels = SavedLabels::read(&folder)?;
+    let mut labels = SavedLabels::read(&folder)?;
     let faces = mesh.mesh.faces().len();
     if labels.mesh != mesh_checksum(&mesh.mesh) || labels.class.len() != faces {
         let n = labels.class.len();
@@ -266,7 +309,11 @@ pub(crate) fn read_for(archive: &Path, mesh: &MeshFile) -> Result<(MeshLabels, O
     }
 
     let revision = labels.revision;
-    let warning = last_event(&folder.join(EVENTS_FILE))
+    let mut warnings = Vec::new();
+    if needs_rooms {
+        warnings.extend(labels.leave_out_roomless(archive, &mesh.mesh)?);
+    }
+    let newer = last_event(&folder.join(EVENTS_FILE))
         .filter(|last| *last > revision)
         .map(|last| {
             let path = archive.display();
@@ -274,7 +321,8 @@ pub(crate) fn read_for(archive: &Path, mesh: &MeshFile) -> Result<(MeshLabels, O
                 "{path}: has the labels up to event {revision} of {last}: write them anew to have the rest"
             )
         });
-    Ok((labels.into_mesh_labels(), warning))
+    warnings.extend(newer);
+    Ok((labels.into_mesh_labels(), warnings))
 }
 
 /// Returns the number of the last event of a log, if it can be told from its end.
