@@ -16,7 +16,6 @@ pub(crate) struct Threads {
 #[derive(Debug, Args)]
 pub(crate) struct MeshArgs {
     /// The mesh: OBJ, glTF, GLB or PLY.
-    #[arg(value_name = "MESH")]
     pub(crate) mesh: PathBuf,
     /// The axis of the file that points up.
     #[arg(long, default_value = "y", value_parser = parsed::<UpAxis>, value_name = "y|z")]

@@ -522,3 +522,44 @@ fn an_earlier_data_set_that_is_the_input_is_not_overwritten() {
     s3d_fails(&call, 2, &["over its own input", "area_1/3d/rgb.obj"]);
     assert!(files(&out) == before);
 }
+
+#[test]
+fn calls_that_make_no_sense_exit_with_2() {
+    for bad in [
+        &["export"] as &[&str],
+        &["export", "a.toml", "--pano-width", "4095"],
+        &["export", "a.toml", "--modalities", "rgb,smell"],
+        &["export", "a.toml", "--pool", "sea"],
+        &["export", "a.toml", "--xyz", "double"],
+        &["export", "a.toml", "--normal-axes", "left"],
+        &["export", "a.toml", "--depth-units", "inch"],
+        &["export", "a.toml", "--pad-labels", "0"],
+        &["export", "a.toml", "--pad-labels", "65537"],
+        &["export", "a.toml", "--profile", "sea"],
+        &["xyz", "out", "--type", "none"],
+        &["profile", "out"],
+        &["compare", "out"],
+        &["compare", "out", "other", "--overwrite"],
+        &["report", "out", "--pano-width", "15"],
+        &["report", "out", "--thumbs", "4096"],
+        &["export", "a.toml", "--compression", "9"],
+        &["export", "--only", "00112233445566778899aabbccddeeff", "a.toml"],
+        &["export", "a.toml", "--points-per-m2", "nan"],
+        &["render", "a.obj", "--at", "1,2", "-o", "x"],
+        &["render", "a.obj", "--at", "1,2,3", "--fov", "180", "-o", "x"],
+        &["render", "a.obj", "-o", "x"],
+        &["render", "a.obj", "--at", "1,2,3", "--poses", "p", "-o", "x"],
+        &["render", "a.obj", "--poses", "p", "--pano", "-o", "x"],
+        &["render", "a.obj", "--poses", "p", "--k", "9,9,4", "-o", "x"],
+        &["render", "a.obj", "--poses", "p", "--k", "9,0,4,4", "-o", "x"],
+        &["render", "a.obj", "--at", "1,2,3", "--width", "64", "-o", "x"],
+        &["render", "a.obj", "--at", "1,2,3", "--fov", "60", "--pano", "-o", "x"],
+    ] {
+        assert_eq!(s3d(bad).status.code(), Some(2), "{bad:?}");
+    }
+    // A number below zero is a number: what is wrong is the file.
+    let below = ["render", "a.obj", "--at", "-1,2,3", "-o", "x"];
+    assert_eq!(s3d(&below).status.code(), Some(1));
+    let poses = ["render", "a.obj", "--poses", "p", "--k", "9,9,-4,4", "--width", "8", "-o", "x"];
+    assert_eq!(s3d(&poses).status.code(), Some(1));
+}

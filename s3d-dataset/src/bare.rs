@@ -11,6 +11,7 @@ use crate::place::{PlaceOptions, place_cameras};
 use glam::DVec3;
 use s3d_geom::{Camera, Pose, Raster, TriMesh};
 use s3d_io::camera::ScanLocation;
+use s3d_io::mesh::{LengthUnit, UpAxis};
 use s3d_label::Taxonomy;
 use s3d_render::Scene;
 use std::fmt;
@@ -73,6 +74,12 @@ impl BareScene {
     /// Returns the files that the mesh is read from.
     pub fn mesh_files(&self) -> &[PathBuf] {
         &self.mesh_files
+    }
+
+    /// Returns the axis of the mesh files that points up, and their unit if it was said or guessed; `None` for
+    /// a mesh that is not read from files of meshes.
+    pub fn mesh_axes(&self) -> Option<(UpAxis, Option<LengthUnit>)> {
+        self.area.mesh_axes()
     }
 
     /// Returns what was subtracted from the scan's own coordinates, metres.

@@ -1,4 +1,4 @@
-// Makes one file of the page: markup, style and program. `node bundle.mjs FILE`.
+// Makes one file of a page: markup, style and program. `node bundle.mjs report|label FILE`.
 
 import { build, transform } from "esbuild";
 import { createHash } from "node:crypto";
@@ -6,6 +6,22 @@ import { readFile, writeFile } from "node:fs/promises";
 
 const here = (name) => new URL(name, import.meta.url);
 const target = ["chrome111", "firefox113", "safari16.4"];
+
+/** The pages: that of `s3d report`, and that of `s3d label`, which shares sources and packages with it. */
+const PAGES = {
+  report: {
+    program: "src/main.ts",
+    styles: ["base.css", "style.css", "present.css"],
+    markup: "page.html",
+  },
+  label: {
+    program: "../../s3d-annotate/web/src/main.ts",
+    styles: ["base.css", "../../s3d-annotate/web/label.css"],
+    markup: "../../s3d-annotate/web/label.html",
+  },
+};
+const [name, output] = process.argv.slice(2);
+const { program, styles, markup } = PAGES[name];
 
 // The font's Latin letters. Those of other scripts are the system's.
 const FONT = "@fontsource-variable/ibm-plex-sans";
@@ -21,36 +37,37 @@ const face = async (script) => {
 };
 const faces = await Promise.all(["latin", "latin-ext"].map(face));
 
-const styles = ["style.css", "present.css"].map((name) => readFile(here(name), "utf8"));
-const style = [...faces, ...(await Promise.all(styles))].join("\n");
-const css = await transform(style, { loader: "css", minify: true, target });
+const sheets = await Promise.all(styles.map((path) => readFile(here(path), "utf8")));
+const css = await transform([...faces, ...sheets].join("\n"), { loader: "css", minify: true, target });
 
 // The page shows the terms of all that is bundled.
 const licences = [];
-for (const name of [...Object.keys((await json("package.json")).dependencies), FONT]) {
-  const { version } = await json(`node_modules/${name}/package.json`);
-  const text = (await readFile(here(`node_modules/${name}/LICENSE`), "utf8")).trim();
-  licences.push({ name, version, text });
+for (const dependency of [...Object.keys((await json("package.json")).dependencies), FONT]) {
+  const { version } = await json(`node_modules/${dependency}/package.json`);
+  const text = (await readFile(here(`node_modules/${dependency}/LICENSE`), "utf8")).trim();
+  licences.push({ name: dependency, version, text });
 }
 
 const js = await build({
-  entryPoints: [here("src/main.ts").pathname],
+  entryPoints: [here(program).pathname],
   bundle: true,
   format: "iife",
   minify: true,
   write: false,
   legalComments: "inline",
   charset: "ascii",
+  // Sources outside this folder find their packages here.
+  nodePaths: [here("node_modules").pathname],
   define: { LICENCES: JSON.stringify(licences) },
   target,
 });
-const [ofStyle, program] = [css.code.trim(), js.outputFiles[0].text.trim()];
+const [ofStyle, ofProgram] = [css.code.trim(), js.outputFiles[0].text.trim()];
 
 // The page runs this program and no other: the policy names it by its hash.
 const hash = (text) => `sha256-${createHash("sha256").update(text).digest("base64")}`;
-const page = (await readFile(here("page.html"), "utf8"))
+const page = (await readFile(here(markup), "utf8"))
   .replace("STYLE_HASH", hash(ofStyle))
-  .replace("SCRIPT_HASH", hash(program))
+  .replace("SCRIPT_HASH", hash(ofProgram))
   .replace("STYLE", () => ofStyle)
-  .replace("SCRIPT", () => program);
-await writeFile(process.argv[2], page);
+  .replace("SCRIPT", () => ofProgram);
+await writeFile(output, page);

@@ -68,5 +68,5 @@ pub use event::{Action, EVENT_VERSION, Event, Room, RoomPart};
 pub use face_runs::FaceRuns;
 pub use fault::Fault;
 pub use folder::LabelFolder;
-pub use output::ROOMS_FILE;
+pub use output::{ROOMS_FILE, SEGMENTS_FILE};
 pub use state::{MAX_NUMBER, State, Tally};

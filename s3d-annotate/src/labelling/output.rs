@@ -5,6 +5,7 @@ use super::error::{Error, Result};
 use super::event::Room;
 use super::folder::LabelFolder;
 use super::state::State;
+use crate::segments::Segments;
 use s3d_geom::TriMesh;
 use s3d_io::cloud::{LABELS_FILE, SavedLabels, mesh_checksum};
 use s3d_io::fs::{Checksum, write_json};
@@ -15,6 +16,21 @@ use std::path::PathBuf;
 
 /// The name of the list of rooms in a folder of labels.
 pub const ROOMS_FILE: &str = "rooms.json";
+
+/// The name of the patches and their tree in a folder of labels.
+pub const SEGMENTS_FILE: &str = "segments.json";
+
+/// What `segments.json` holds.
+#[derive(Serialize)]
+struct SegmentList<'s> {
+    mesh: Checksum,
+    /// The segment of each face, under the name that ScanNet's files have for it.
+    #[serde(rename = "segIndices")]
+    segment_of_face: &'s [u32],
+    /// The node that joins each node to another; `null` for a root. The first nodes are the segments.
+    parent: Vec<Option<u32>>,
+    cost: Vec<f32>,
+}
 
 /// What `rooms.json` holds.
 #[derive(Serialize)]
@@ -112,6 +128,24 @@ impl LabelFolder {
         let labels = self.state().saved_labels(self.mesh(), &room_of_face, self.taxonomy());
         labels.write(self.path())?;
         self.write_rooms(mesh, &room_of_face)
+    }
+
+    /// Writes `segments.json` into the folder: the segment of each face (`segIndices`), and the tree that makes
+    /// larger patches of them: for each node its `parent` and its `cost`. Only people's tools read it.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn write_segments(&self, segments: &Segments) -> Result<()> {
+        let tree = &segments.tree;
+        let nodes = 0..tree.node_count();
+        let list = SegmentList {
+            mesh: self.mesh(),
+            segment_of_face: &segments.segment_of_face,
+            parent: nodes.clone().map(|node| tree.parent(node)).collect(),
+            cost: nodes.map(|node| tree.cost(node)).collect(),
+        };
+        write_json(&self.path().join(SEGMENTS_FILE), &list)?;
+        Ok(())
     }
 
     fn write_rooms(&self, mesh: &TriMesh, room_of_face: &[u32]) -> Result<()> {

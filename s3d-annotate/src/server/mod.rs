@@ -16,6 +16,7 @@ mod guard;
 mod mesh_bytes;
 mod options;
 mod routes;
+mod scene_file;
 
 pub use options::LabelOptions;
 
@@ -88,6 +89,7 @@ pub fn label(
         return Ok(());
     }
 
+    bench.labels().write_segments(bench.segments()).map_err(failure)?;
     let name = file_name(scene.path());
     let desk = Arc::new(Desk::new(scene, bench, name, ctx));
     let looking = Arc::clone(&desk);
@@ -95,7 +97,12 @@ pub fn label(
 
     serve(&desk, options, ctx, ready).map_err(|e| FileError::io("127.0.0.1".as_ref(), "serve", e))?;
     desk.save(true).map_err(failure)?;
-    ctx.info(format_args!("the labels are in {}", folder.display()));
+    let shown = folder.display();
+    if scene_file::write_scene_file(&desk.scene, &folder)? {
+        ctx.info(format_args!("the labels are in {shown}: s3d export takes this folder"));
+    } else {
+        ctx.info(format_args!("the labels are in {shown}: the scene takes them as [annotations] path"));
+    }
     Ok(())
 }
 

@@ -26,7 +26,7 @@ use crate::labelling::{FaceRuns, Room, RoomPart};
 use distance::{distances, spread};
 use planes::Plane;
 use s3d_geom::TriMesh;
-use scan::Scan;
+use scan::{Facet, Grid, Scan};
 use serde::Serialize;
 use storey::{Fronts, Storey};
 use surfaces::Place;
@@ -81,9 +81,9 @@ pub struct Surface {
 /// # Ok::<(), s3d_geom::MeshError>(())
 /// ```
 pub fn find_structure(mesh: &TriMesh) -> Structure {
-    let scan = Scan::new(mesh);
-    let floors = storeys::floors(&scan);
-    let fronts = Fronts::find(&scan, &floors);
+    let Some(scan) = Scan::new(mesh) else { return Structure::default() };
+    let mut floors = storeys::floors(&scan);
+    let fronts = Fronts::find(&scan, &mut floors);
 
     let mut found = Structure::default();
     let mut is_taken = vec![false; scan.facets.len()];
@@ -124,12 +124,12 @@ impl Finder<'_> {
         let mut faces_of = vec![Vec::new(); count as usize + 1];
         for (face, facet) in (0u32..).zip(&self.scan.facets) {
             if facet.middle.z >= self.storey.low_m && facet.middle.z <= self.storey.high_m {
-                let cell = grid.cell(facet.middle.truncate());
-                faces_of[near_of_cell[cell] as usize].push(face);
+                let room = self.room_of(facet, &rim_of_cell, &near_of_cell);
+                faces_of[room as usize].push(face);
             }
         }
         let mut cells_of = vec![Vec::new(); count as usize + 1];
-        let mut outline_of_cell = room_of_cell.clone();
+        let mut outline_of_cell = filled_out(grid, &room_of_cell, &near_of_cell);
         spread(grid, &mut outline_of_cell, 1);
         for (cell, room) in outline_of_cell.iter().enumerate() {
             cells_of[*room as usize].push(cell);
@@ -144,6 +144,7 @@ impl Finder<'_> {
                 fronts: self.fronts,
                 room_of_cell: &room_of_cell,
                 rim_of_cell: &rim_of_cell,
+                near_of_cell: &near_of_cell,
                 depth: &depth,
                 room,
             };
@@ -202,6 +203,29 @@ impl Finder<'_> {
         highest
     }
 
+    /// Returns the room that a face bounds, or 0: the one that its front looks into, or the one nearest to
+    /// it. A wall may be a single sheet between two rooms.
+    fn room_of(&self, facet: &Facet, rim_of_cell: &[u32], near_of_cell: &[u32]) -> u32 {
+        let place = facet.middle.truncate();
+        let near = near_of_cell[self.scan.grid.cell(place)];
+        let side = match self.fronts {
+            Fronts::Inside => 1.0,
+            Fronts::Outside => -1.0,
+            Fronts::Mixed => return near,
+        };
+        if !facet.is_upright() {
+            return near;
+        }
+        let aside = facet.normal.truncate().normalize_or_zero() * (side * surfaces::ASIDE_M);
+        let before = self.scan.grid.cell(place + aside);
+        match (rim_of_cell[before], near_of_cell[before]) {
+            (room, _) if room != 0 => room,
+            // A beam along a wall cuts a strip of floor off the room.
+            (_, room) if room != 0 && self.storey.has_floor[before] => room,
+            _ => near,
+        }
+    }
+
     /// Returns the heights of the floor and of the highest ceiling of a room, metres.
     fn heights(&self, cells: &[usize]) -> [f64; 2] {
         let mut tops: Vec<f32> = cells
@@ -219,4 +243,21 @@ impl Finder<'_> {
                 .min(self.above.unwrap_or(f64::INFINITY)),
         ]
     }
+}
+
+/// Returns the room of each cell, with the narrow notches filled that columns and shelves leave: rooms grow
+/// by the distance of walls and shrink again, a closing of mathematical morphology (Serra, "Image analysis
+/// and mathematical morphology", 1982).
+fn filled_out(grid: &Grid, room_of_cell: &[u32], near_of_cell: &[u32]) -> Vec<u32> {
+    let is_border = |cell: usize| {
+        let near = near_of_cell[cell];
+        near == 0 || grid.beside(cell).any(|next| near_of_cell[next] != near)
+    };
+    let distance = distances(grid, is_border);
+    let reach = (WALL_M / grid.step_m) as f32;
+    let of = |cell: usize| match room_of_cell[cell] {
+        0 if distance[cell] >= reach => near_of_cell[cell],
+        room => room,
+    };
+    (0..room_of_cell.len()).map(of).collect()
 }

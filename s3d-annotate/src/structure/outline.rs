@@ -95,7 +95,7 @@ fn rings(scan: &Scan, cells: &[usize]) -> Vec<Vec<DVec2>> {
     rings
 }
 
-/// Twice the area would do, but this is the area: positive if the ring runs counter-clockwise.
+/// Returns the area of a ring: positive if it runs counter-clockwise.
 fn area(ring: &[DVec2]) -> f64 {
     let next = ring.iter().cycle().skip(1);
     0.5 * ring.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum::<f64>()

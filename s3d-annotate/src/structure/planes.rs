@@ -110,8 +110,8 @@ fn upward(normal: DVec3) -> DVec3 {
     if (z, y, x) < (0.0, 0.0, 0.0) { -normal } else { normal }
 }
 
-/// Fits a plane to the faces of a seed, and then to all faces near it. It begins with the densest layer of the
-/// seed, so that a panel just before a wall does not draw the plane towards it.
+/// Fits a plane to the faces of a seed, and then to all faces near it. It begins with the densest layer of
+/// the seed, so that a panel just before a wall does not draw the plane towards it.
 fn fitted(facets: &[Facet], seed: &[u32], all: impl Iterator<Item = u32>, has_sides: bool) -> Plane {
     let all: Vec<u32> = all.collect();
     let mut normal = seed.iter().fold(DVec3::ZERO, |sum, face| {
@@ -184,8 +184,8 @@ fn median(values: &[(f64, f64)]) -> f64 {
     middle.map_or(0.0, |(value, _)| *value)
 }
 
-/// Returns the median offset of some faces, and three and a half standard deviations from it, as the median of
-/// the distances tells them.
+/// Returns the median offset of some faces, and three and a half standard deviations from it, as the median
+/// of the distances tells them.
 fn spread(facets: &[Facet], faces: &[u32], normal: DVec3) -> (f64, f64) {
     let mut offsets = offsets(facets, faces, normal);
     let middle = median(&offsets);
@@ -197,7 +197,8 @@ fn spread(facets: &[Facet], faces: &[u32], normal: DVec3) -> (f64, f64) {
     (middle, (3.5 * 1.48 * median(&offsets)).clamp(least, most))
 }
 
-/// Returns the normal of the plane that fits some faces best by least squares, tilted from `normal`. A weak pull towards `normal` holds the plane of a narrow strip.
+/// Returns the normal of the plane that fits some faces best by least squares, tilted from `normal`. A weak
+/// pull towards `normal` holds the plane of a narrow strip.
 fn fit(facets: &[Facet], faces: &[u32], normal: DVec3) -> DVec3 {
     let (mut middle, mut weight) = (DVec3::ZERO, 0.0);
     for facet in faces.iter().map(|face| &facets[*face as usize]) {

@@ -44,18 +44,20 @@ pub(super) fn rooms(scan: &Scan, storey: &Storey) -> (Vec<u32>, u32) {
     for cell in order {
         let cell = cell as usize;
         let here_m = f64::from(distance[cell]) * step_m;
-        let mut around: Vec<u32> = around(scan, cell)
-            .filter(|next| basin_of[*next] != u32::MAX)
-            .map(|next| basins.root(basin_of[next]))
-            .collect();
-        around.sort_unstable_by(|a, b| basins.by_peak(*a, *b));
-        around.dedup();
-
-        let Some((&first, others)) = around.split_first() else {
+        let reached: Vec<usize> = around(scan, cell).filter(|next| basin_of[*next] != u32::MAX).collect();
+        // The way up leads to the basin.
+        let up = reached
+            .iter()
+            .reduce(|a, b| if distance[*b] > distance[*a] { b } else { a });
+        let Some(&up) = up else {
             basin_of[cell] = basins.add(here_m);
             continue;
         };
-        basin_of[cell] = first;
+        basin_of[cell] = basins.root(basin_of[up]);
+        let mut meeting: Vec<u32> = reached.iter().map(|next| basins.root(basin_of[*next])).collect();
+        meeting.sort_unstable_by(|a, b| basins.by_peak(*a, *b));
+        meeting.dedup();
+        let Some((&first, others)) = meeting.split_first() else { continue };
         for &other in others {
             let lower_m = basins.peak_m[other as usize];
             let is_door = here_m <= WIDEST_DOOR_M && here_m < NARROW * lower_m && lower_m >= LEAST_RADIUS_M;

@@ -6,6 +6,9 @@ use s3d_geom::glam::{DVec2, DVec3, dvec2};
 /// The edge of the cells of the plan, metres. Larger scans have larger cells.
 const STEP_M: f64 = 0.05;
 
+/// The largest edge of cells that show doors, metres.
+const LARGEST_STEP_M: f64 = 0.25;
+
 /// The most cells of a plan: those of 200 × 200 m.
 const MOST_CELLS: f64 = 16e6;
 
@@ -127,7 +130,8 @@ pub(super) struct Scan {
 }
 
 impl Scan {
-    pub(super) fn new(mesh: &TriMesh) -> Self {
+    /// Samples a mesh. `None` if its size asks for cells so large that no door fits into them.
+    pub(super) fn new(mesh: &TriMesh) -> Option<Self> {
         let bounds = mesh.aabb();
         let [low, high] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3().truncate());
         let size = high - low;
@@ -142,6 +146,9 @@ impl Scan {
             cells > MOST_CELLS || samples > MOST_SAMPLES
         } {
             step_m *= 1.5;
+            if step_m > LARGEST_STEP_M {
+                return None;
+            }
         }
 
         let cells = (size / step_m + 2.0 * RIM).floor() + 1.0;
@@ -170,7 +177,7 @@ impl Scan {
             let column = &mut samples[first[cell] as usize..first[cell + 1] as usize];
             column.sort_unstable_by(|a, b| a.z.total_cmp(&b.z).then(a.face.cmp(&b.face)));
         }
-        Self { grid, facets, samples, first }
+        Some(Self { grid, facets, samples, first })
     }
 
     /// Returns the samples above a cell, from below.

@@ -79,20 +79,31 @@ impl Fronts {
         }
     }
 
-    /// Finds the direction from floors, which are seen from above.
-    pub(super) fn find(scan: &Scan, floors: &[f64]) -> Self {
-        let [mut up_m2, mut down_m2] = [0.0; 2];
-        for facet in scan.facets.iter().filter(|facet| facet.is_level()) {
-            if floors.iter().any(|floor| (facet.middle.z - floor).abs() < 0.05) {
-                let side = if facet.normal.z > 0.0 { &mut up_m2 } else { &mut down_m2 };
-                *side += facet.area_m2;
+    /// Finds the direction from the largest floor, which is seen from above, and leaves out of `floors` what
+    /// is seen from below: a ceiling over floor that was not scanned.
+    pub(super) fn find(scan: &Scan, floors: &mut Vec<f64>) -> Self {
+        let share_up = |floor_m: f64| {
+            let on = scan
+                .facets
+                .iter()
+                .filter(|facet| facet.is_level() && (facet.middle.z - floor_m).abs() < 0.05);
+            let [mut up_m2, mut all_m2] = [0.0; 2];
+            for facet in on {
+                up_m2 += if facet.normal.z > 0.0 { facet.area_m2 } else { 0.0 };
+                all_m2 += facet.area_m2;
             }
-        }
-        match up_m2 / (up_m2 + down_m2) {
-            share if share > 0.9 => Self::Inside,
-            share if share < 0.1 => Self::Outside,
+            (up_m2 / f64::max(all_m2, f64::MIN_POSITIVE), all_m2)
+        };
+        let shares: Vec<(f64, f64)> = floors.iter().map(|floor| share_up(*floor)).collect();
+        let largest = shares.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let fronts = match largest {
+            Some((share, _)) if *share > 0.9 => Self::Inside,
+            Some((share, _)) if *share < 0.1 => Self::Outside,
             _ => Self::Mixed,
-        }
+        };
+        let mut shares = shares.into_iter();
+        floors.retain(|_| shares.next().is_some_and(|(share, _)| fronts.look(share - 0.5)));
+        fronts
     }
 }
 
@@ -164,8 +175,8 @@ impl Storey {
         self.ceiling_m[cell] - self.top_m[cell] > LOWER_M
     }
 
-    /// Takes the large pieces of what is highest as ceilings, and extends them over walls and holes. Elsewhere, nine of ten high columns are no higher than what
-    /// counts as the ceiling.
+    /// Takes the large pieces of what is highest as ceilings, and extends them over walls and holes.
+    /// Elsewhere, nine of ten high columns are no higher than what counts as the ceiling.
     fn extend_ceilings(&mut self, scan: &Scan, highest: &mut [f32]) {
         let place = highest.len() * 9 / 10;
         let usual = if highest.is_empty() {
@@ -238,7 +249,9 @@ impl Storey {
         let lintels: Vec<bool> = (0..layers.len())
             .map(|cell| is_filled[cell] && is_lintel(cell))
             .collect();
-        for piece in pieces(scan, |cell| lintels[cell], |_, _| true) {
+        // Cells that touch in corners are of one lintel.
+        let is_near = |cell: usize| lintels[cell] || scan.grid.beside(cell).any(|next| lintels[next]);
+        for piece in pieces(scan, is_near, |_, _| true) {
             let mut low = [usize::MAX; 2];
             let mut high = [0; 2];
             for &cell in &piece {
@@ -248,7 +261,7 @@ impl Storey {
             }
             let [x, y] = [0, 1].map(|k| (high[k] - low[k]) as f64 * scan.grid.step_m);
             if x.hypot(y) > WIDEST_DOOR_M {
-                piece.into_iter().for_each(|cell| is_filled[cell] = false);
+                piece.into_iter().for_each(|cell| is_filled[cell] &= !lintels[cell]);
             }
         }
         is_filled
@@ -274,8 +287,8 @@ fn closed(scan: &Scan, is_seen: &[bool]) -> Vec<bool> {
     is_inside
 }
 
-/// Returns the connected pieces of a set of cells, by their lowest cells. Neighbours are connected if they are
-/// `alike`.
+/// Returns the connected pieces of a set of cells, by their lowest cells. Neighbours are connected if they
+/// are `alike`.
 pub(super) fn pieces(
     scan: &Scan,
     is_in: impl Fn(usize) -> bool,

@@ -29,7 +29,7 @@ const LEAST_LENGTH_M: f64 = 0.4;
 const SQUARE_M: f64 = 0.1;
 
 /// How far inside and outside of a wall the room is looked for, metres.
-const ASIDE_M: f64 = 0.2;
+pub(super) const ASIDE_M: f64 = 0.2;
 
 /// What faces of a room need.
 pub(super) struct Place<'a> {
@@ -41,6 +41,8 @@ pub(super) struct Place<'a> {
     pub(super) room_of_cell: &'a [u32],
     /// The same, with the cells of the walls around a room.
     pub(super) rim_of_cell: &'a [u32],
+    /// The same, with the cells up to 30 cm from a room.
+    pub(super) near_of_cell: &'a [u32],
     /// The distance of each cell to the nearest one outside of rooms, in cells.
     pub(super) depth: &'a [f32],
     /// The number of the room.
@@ -135,7 +137,11 @@ impl Place<'_> {
         let aside = facet.normal.truncate().normalize_or_zero() * ASIDE_M;
         let side = |sign: f64| {
             let at = |sign: f64| self.scan.grid.cell(facet.middle.truncate() + aside * sign);
-            self.rim_of_cell[at(sign)] == self.room && self.room_of_cell[at(-sign)] != self.room
+            let front = at(sign);
+            // A beam along a wall cuts a strip of floor off the room.
+            let is_strip = self.near_of_cell[front] == self.room && self.storey.has_floor[front];
+            let is_before = self.rim_of_cell[front] == self.room || is_strip;
+            is_before && self.room_of_cell[at(-sign)] != self.room
         };
         match self.fronts {
             Fronts::Inside => side(1.0),

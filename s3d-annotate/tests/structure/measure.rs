@@ -17,138 +17,60 @@ const STRUCTURE: [(Class, &str); 3] =
 
 /// The fit of what was found. Areas count.
 #[derive(Debug)]
-#[expect(dead_code, reason = "printed")]
+#[expect(dead_code, reason = "some are only printed")]
 pub(super) struct Measured {
-    pub(super) title: String,
+    title: String,
     faces: usize,
-    seconds: f64,
     /// The share of each class that is proposed as it.
-    pub(super) recall: BTreeMap<&'static str, f64>,
+    recall: BTreeMap<&'static str, f64>,
     /// The share of the proposals of each class that is of it, or lies in a wall.
-    pub(super) precision: BTreeMap<&'static str, f64>,
+    precision: BTreeMap<&'static str, f64>,
     /// The mean and the least IoU of instances of structure with the surface that fits best.
-    pub(super) instances: [f64; 2],
+    instances: [f64; 2],
     /// Surfaces more than instances.
-    pub(super) surplus: i64,
+    surplus: i64,
     /// Rooms found and true.
-    pub(super) rooms: [usize; 2],
+    rooms: [usize; 2],
     /// The least IoU of a true room with the room that fits best.
-    pub(super) room_iou: f64,
-    worst: Vec<String>,
+    room_iou: f64,
+    /// Instances and rooms that nothing fits well.
+    bad: Vec<String>,
 }
 
 impl Measured {
     pub(super) fn of(building: &Building) -> Self {
         let scene = building.build().unwrap();
-        let start = std::time::Instant::now();
         let found = find_structure(&scene.mesh);
-        let seconds = start.elapsed().as_secs_f64();
         let (recall, precision) = shares(&scene, &found);
         let fits = instance_fits(&scene, &found);
-        let mut worst: Vec<String> = fits
-            .iter()
-            .filter(|fit| fit.0 < 0.9)
-            .map(|fit| format!("{fit:?}"))
-            .collect();
-        let mut wrong: BTreeMap<String, f64> = BTreeMap::new();
-        for surface in &found.surfaces {
-            for face in surface.faces.iter() {
-                let i = &scene.instances[scene.instance_of_face[face as usize] as usize];
-                if STRUCTURE.contains(&(i.class, surface.class)) {
-                    continue;
-                }
-                let t = scene.mesh.triangle(face);
-                let m = (t[0] + t[1] + t[2]) / 3.0;
-                let n = scene.mesh.normal(face);
-                let k = format!(
-                    "{} in {} {:?} n {:.1},{:.1},{:.1}",
-                    surface.class,
-                    i.room,
-                    i.class.name(),
-                    n.x,
-                    n.y,
-                    n.z
-                );
-                let e = wrong.entry(k.clone()).or_default();
-                *e += scene.mesh.area(face);
-                if *e > 0.5 && *e - scene.mesh.area(face) < 0.5 {
-                    worst.push(format!("WRONG {k} at {m}"));
-                }
-            }
-        }
-        for (k, v) in &wrong {
-            if *v > 0.3 {
-                worst.push(format!("wrong {v:.2} {k}"));
-            }
-        }
-        for r in &found.rooms {
-            worst.push(format!(
-                "{:?}",
-                r.parts
-                    .iter()
-                    .map(|p| (
-                        p.heights,
-                        p.outline
-                            .iter()
-                            .map(|c| c.map(|v| (v * 100.0).round() / 100.0))
-                            .collect::<Vec<_>>()
-                    ))
-                    .collect::<Vec<_>>()
-            ));
-        }
-        let mut has = vec![false; scene.mesh.faces().len()];
-        for su in &found.surfaces {
-            for f in su.faces.iter() {
-                has[f as usize] = true;
-            }
-        }
-        let mut miss: BTreeMap<String, (f64, [f32; 6])> = BTreeMap::new();
-        for f in 0..scene.mesh.faces().len() as u32 {
-            let i = &scene.instances[scene.instance_of_face[f as usize] as usize];
-            if has[f as usize] || i.class != Class::WALL {
-                continue;
-            }
-            let e = miss
-                .entry(format!("{} {}", i.room, i.number))
-                .or_insert((0.0, [9e9, 9e9, 9e9, -9e9, -9e9, -9e9]));
-            e.0 += scene.mesh.area(f);
-            for p in scene.mesh.triangle(f) {
-                for k in 0..3 {
-                    e.1[k] = e.1[k].min(p[k]);
-                    e.1[k + 3] = e.1[k + 3].max(p[k]);
-                }
-            }
-        }
-        for (k, v) in miss {
-            worst.push(format!("MISS {k} {v:?}"));
-        }
-        for r in &building.rooms {
-            worst.push(format!("T {} {:?} {:?}", r.room, r.low, r.high));
-        }
         let room_fits = room_fits(building, &found.rooms);
-        worst.extend(room_fits.iter().filter(|fit| fit.0 < 0.9).map(|fit| format!("{fit:?}")));
+        let bad = fits.iter().chain(&room_fits).filter(|fit| fit.0 < 0.9);
+        let bad = bad.map(|(iou, name)| format!("{iou:.2} {name}")).collect();
         let least = |fits: &[(f64, String)]| fits.iter().map(|fit| fit.0).fold(1.0, f64::min);
         Self {
             title: scene.title.clone(),
             faces: scene.mesh.faces().len(),
-            seconds,
             recall,
             precision,
             instances: [fits.iter().map(|fit| fit.0).sum::<f64>() / fits.len() as f64, least(&fits)],
             surplus: found.surfaces.len() as i64 - fits.len() as i64,
             rooms: [found.rooms.len(), building.rooms.len()],
             room_iou: least(&room_fits),
-            worst,
+            bad,
         }
     }
 
+    /// Prints the fit, and checks that it is about as good as it was.
+    #[expect(clippy::print_stdout, reason = "figures to look at with --nocapture")]
     pub(super) fn check(&self) {
-        let is_well = |share: &f64, least: f64| *share >= least;
-        assert!(self.recall.values().all(|share| is_well(share, 0.95)), "{self:#?}");
-        assert!(self.precision.values().all(|share| is_well(share, 0.97)), "{self:#?}");
+        println!("{self:#?}");
+        assert!(self.recall.values().all(|share| *share >= 0.98), "{self:#?}");
+        assert!(self.precision.values().all(|share| *share >= 0.985), "{self:#?}");
+        assert!(self.instances[0] >= 0.99 && self.instances[1] >= 0.75, "{self:#?}");
         assert_eq!(self.rooms[0], self.rooms[1], "{self:#?}");
-        assert!(self.room_iou >= 0.9, "{self:#?}");
-        assert!(self.instances[0] >= 0.95, "{self:#?}");
+        assert!(self.room_iou >= 0.95, "{self:#?}");
+        // Wide columns and sofas with high backs.
+        assert!(self.surplus <= self.rooms[1] as i64 / 2, "{self:#?}");
     }
 }
 
@@ -238,9 +160,9 @@ fn room_fits(building: &Building, rooms: &[Room]) -> Vec<(f64, String)> {
             let (mut min, mut max) = (low, high);
             corners.for_each(|corner| (min, max) = (min.min(corner), max.max(corner)));
             let step = 0.05;
-            let mut y = min.y;
+            let mut y = min.y + 0.5 * step;
             while y < max.y {
-                let mut x = min.x;
+                let mut x = min.x + 0.5 * step;
                 while x < max.x {
                     let place = dvec2(x, y);
                     let is_found = parts.iter().any(|part| part.contains(place));

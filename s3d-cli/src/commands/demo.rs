@@ -44,6 +44,15 @@ pub(crate) struct DemoArgs {
     /// Replace an earlier data set in OUT.
     #[arg(long)]
     pub(crate) overwrite: bool,
+    #[command(flatten)]
+    pub(crate) options: SizeArgs,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+/// The demo's options are the export's, at a reduced size.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SizeArgs {
     /// The number of candidate views at each scan location [default: 24, or 4 with --areas]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(0..=100_000))]
     pub(crate) views: Option<u32>,
@@ -65,14 +74,11 @@ pub(crate) struct DemoArgs {
     /// small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
     pub(crate) compression: Compression,
-    #[command(flatten)]
-    pub(crate) threads: Threads,
 }
 
 impl DemoArgs {
-    /// The options are the export's, at a reduced size.
     fn export_options(&self) -> ExportOptions {
-        let Self { views, size, pano_width, seed, points_per_m2, compression, .. } = *self;
+        let SizeArgs { views, size, pano_width, seed, points_per_m2, compression } = self.options;
         let is_generated = self.areas.is_some();
         let all = ExportOptions {
             views: views.unwrap_or(if is_generated { 4 } else { 24 }),

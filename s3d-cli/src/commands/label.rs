@@ -11,7 +11,6 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(crate) struct LabelArgs {
     /// A scene file, a mesh, or the folder of a scene, as `s3d export` takes them.
-    #[arg(value_name = "SCENE")]
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) frame: FrameArgs,
@@ -22,9 +21,7 @@ pub(crate) struct LabelArgs {
 }
 
 pub(crate) fn run(args: LabelArgs) -> Outcome<()> {
-    let LabelArgs { scene, frame, options, threads } = args;
-    on_threads(threads, |context| {
-        // The address, or what was written. Who does not read it can read the log.
-        label(frame.source(scene), &options, context, |told| drop(print(&format!("{told}\n"))))
-    })
+    // What is told is the address of the page, or what was written.
+    let ready = |told: &str| drop(print(&format!("{told}\n")));
+    on_threads(args.threads, |ctx| label(args.frame.source(args.scene), &args.options, ctx, ready))
 }

@@ -10,7 +10,6 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(crate) struct SegmentsArgs {
     /// The mesh: OBJ, glTF, GLB or PLY.
-    #[arg(value_name = "MESH")]
     pub(crate) mesh: PathBuf,
     /// The file of the segments: NAME.segs.json has one for each vertex, as in ScanNet; NAME.fsegs.json has
     /// one for each face, as in Matterport3D.

@@ -6,6 +6,8 @@
 use super::structured::{Random, number_of};
 use super::{SMALL, common, folder};
 use common::{files, s3d_ok, text, write_scan};
+use s3d_annotate::labelling::{Action, FaceRuns, LabelFolder};
+use s3d_dataset::{BareScene, Context};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +18,7 @@ use tempfile::TempDir;
 
 /// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
 /// shards). A new command that writes needs a line here.
-const COMMANDS: [&str; 31] = [
+const COMMANDS: [&str; 33] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -36,6 +38,8 @@ const COMMANDS: [&str; 31] = [
     "sample scan/room.obj -o new.ply --points 200000",
     "sample scan/room.obj -o old.ply --points 200000 --overwrite",
     "segments scan/room.obj -o new.segs.json",
+    "label scan/room.obj -o labels --write ply",
+    "label scan/room.obj -o labels --write scannet --to new",
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o new",
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o old --pano --overwrite",
     "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o new/views",
@@ -91,6 +95,7 @@ impl Template {
             "area = 1\n[mesh]\npath = \"room.obj\"\n[frames]\npath = \"../views/transforms.json\"\n";
         fs::write(at("scan/photographs.toml"), photographs).unwrap();
         fs::write(at("boxes.json"), "[]").unwrap();
+        label(&at("scan/room.obj"), &at("labels"));
         let files = files(&at(""));
         Self { dir, files }
     }
@@ -105,6 +110,16 @@ impl Template {
         }
         folder
     }
+}
+
+/// Labels the first faces of a mesh.
+fn label(mesh: &Path, folder: &Path) {
+    let scene = BareScene::open(mesh.to_owned(), &Context::default()).unwrap();
+    let mut labels = LabelFolder::open(folder, scene.mesh(), scene.taxonomy()).unwrap();
+    let class = Some("floor".to_owned());
+    labels
+        .add(0, Action::Paint { faces: FaceRuns::of_range(0..2), instance: 1, class }, None)
+        .unwrap();
 }
 
 /// Runs a command in a folder, and kills it after a while if it is not done by then.

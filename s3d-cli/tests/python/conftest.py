@@ -42,6 +42,7 @@ def s3d():
         assert done.returncode == code, f"{arguments}: exit {done.returncode}\n{done.stdout}\n{done.stderr}"
         return done
 
+    run.binary = str(binary)
     return run
 
 

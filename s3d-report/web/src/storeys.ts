@@ -65,7 +65,7 @@ function grouped(floors: Floor[]): Floor[][] {
   return groups;
 }
 
-export function storeysOf(index: Index, area: number): Storeys {
+export function storeysOf(index: Pick<Index, "rooms" | "locations">, area: number): Storeys {
   const rooms = index.rooms.filter((room) => room.area === area);
   const named = new Map(rooms.map((room) => [room.name, room]));
   const isIn = (z: number, name: string): boolean => {

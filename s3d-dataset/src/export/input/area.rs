@@ -14,7 +14,7 @@ use crate::survey::room_names::{InstanceName, RoomNames};
 use crate::useful::{Estimate, Finding, count_findings};
 use s3d_geom::{Camera, TriMesh};
 use s3d_io::cloud::AnnotatedInstance;
-use s3d_io::mesh::MeshFile;
+use s3d_io::mesh::{LengthUnit, MeshFile, UpAxis};
 use s3d_io::scene::PictureSource;
 use s3d_label::{Label, Room, Taxonomy};
 use std::path::PathBuf;
@@ -106,6 +106,14 @@ impl AreaInput {
             None => self.source.read()?,
         };
         Ok(Arc::unwrap_or_clone(file))
+    }
+
+    /// The axis of the mesh files that points up, and their unit if it was said or guessed.
+    pub(crate) fn mesh_axes(&self) -> Option<(UpAxis, Option<LengthUnit>)> {
+        match &self.source {
+            MeshSource::Files { up, options, .. } => Some((*up, options.units)),
+            MeshSource::Published(_) | MeshSource::Memory(_) => None,
+        }
     }
 
     /// Estimates how much an export of the area writes. Where locations are placed, a fifth of the mesh

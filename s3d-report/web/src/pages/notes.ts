@@ -2,11 +2,9 @@
 
 import type { Index } from "../data.js";
 import { append, count, h, metres2, named, percent, several, table } from "../dom.js";
+import { licences } from "../licences.js";
 import { disputeInPanorama } from "../route/places.js";
 import { link, spaceLink } from "../route/route.js";
-
-/** The licences of bundled packages, inserted by bundle.mjs. */
-declare const LICENCES: { name: string; version: string; text: string }[];
 
 /** What is damaged: the number, and words for what is counted. */
 export function damageOf(index: Index): { count: number; words: string } {
@@ -196,16 +194,6 @@ function disputes(index: Index): HTMLElement | null {
       ]);
   }
   return found ? section : null;
-}
-
-function licences(): HTMLElement {
-  const others = LICENCES.map(({ name, version }) => `${name} ${version}`);
-  const words =
-    "This page is part of s3d, which is under the MIT licence or the Apache licence 2.0, as you choose. " +
-    `It contains ${others.slice(0, -1).join(", ")} and ${others.at(-1)}, under these terms:`;
-  const details = h("details", {}, h("summary", {}, "Licences"), h("p", {}, words));
-  for (const { name, text } of LICENCES) append(details, [h("h3", {}, name), h("pre", {}, text)]);
-  return details;
 }
 
 function about(index: Index): HTMLElement {

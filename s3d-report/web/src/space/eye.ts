@@ -1,6 +1,6 @@
 // The viewpoint in 3D: orbit, keys, and flights.
 
-import { PerspectiveCamera, Vector3 } from "three";
+import { type MOUSE, PerspectiveCamera, type TOUCH, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Mesh, Rgb } from "../data.js";
 import type { Projected } from "../picture/marks.js";
@@ -59,7 +59,7 @@ export class Eye {
   /** `moved` is called whenever the viewpoint changes. */
   constructor(
     canvas: HTMLCanvasElement,
-    mesh: Mesh,
+    mesh: Pick<Mesh, "min" | "max">,
     private readonly moved: () => void,
   ) {
     this.size = Math.max(1, Math.hypot(...mesh.max.map((c, axis) => c - (mesh.min[axis] ?? 0))));
@@ -75,6 +75,22 @@ export class Eye {
       this.land();
     });
     canvas.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  /** What dragging does with each button and with fingers; null leaves it to others. */
+  hands(
+    buttons: Record<"left" | "middle" | "right", MOUSE | null>,
+    fingers: Record<"one" | "two", TOUCH | null>,
+  ): void {
+    const { left: LEFT, middle: MIDDLE, right: RIGHT } = buttons;
+    this.controls.mouseButtons = { LEFT, MIDDLE, RIGHT };
+    const touches: { ONE?: TOUCH | null; TWO?: TOUCH | null } = this.controls.touches;
+    [touches.ONE, touches.TWO] = [fingers.one, fingers.two];
+  }
+
+  /** Whether the pointer, the wheel and fingers move the viewpoint. */
+  set isFree(on: boolean) {
+    this.controls.enabled = on;
   }
 
   get stand(): Stand {

@@ -19,7 +19,12 @@ import { type FaceVotes, NO_VOTES } from "../picture/faces.js";
 import type { Slab } from "../storeys.js";
 import { type Level, belowCeilings, levelOf } from "./ceilings.js";
 import type { Part } from "./files.js";
-import type { Paint } from "./paint.js";
+
+/** Makes the materials of the faces. */
+export interface Painter {
+  /** The material for the faces of a part that have the material at this index. */
+  of: (part: Part, place: number) => Material;
+}
 
 /** The hit of a ray: the face's index in the data set's mesh. */
 export interface Hit {
@@ -76,7 +81,7 @@ export class Surface {
   private readonly down: Level[] = [];
   private readonly ray = new Ray();
 
-  constructor(private readonly paint: Paint) {}
+  constructor(private readonly paint: Painter) {}
 
   add(part: Part, votes: FaceVotes | null, changes: FaceChanges | null): void {
     const faces = part.face.length;

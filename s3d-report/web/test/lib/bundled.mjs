@@ -13,7 +13,9 @@ export async function bundled(name) {
   try {
     const outfile = join(folder, "module.mjs");
     const entry = new URL(`../../src/${name}`, import.meta.url).pathname;
-    await build({ entryPoints: [entry], bundle: true, format: "esm", outfile });
+    // Sources outside this folder find their packages here.
+    const nodePaths = [new URL("../../node_modules", import.meta.url).pathname];
+    await build({ entryPoints: [entry], bundle: true, format: "esm", outfile, nodePaths });
     return await import(outfile);
   } finally {
     rmSync(folder, { recursive: true });

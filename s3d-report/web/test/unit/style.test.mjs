@@ -4,7 +4,9 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
-const style = readFileSync(new URL("../../style.css", import.meta.url), "utf8");
+const style = ["base.css", "style.css", "../../s3d-annotate/web/label.css"]
+  .map((name) => readFileSync(new URL(`../../${name}`, import.meta.url), "utf8"))
+  .join("\n");
 
 /** The values of a property, in all rules. */
 const values = (property) =>
