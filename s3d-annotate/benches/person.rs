@@ -2,6 +2,8 @@
 //! the purity of patches before and after the work. It counts strokes, and not time. Arguments: words of the
 //! names of scenes; none: all.
 
+#![allow(clippy::print_stdout, reason = "the table is its result")]
+
 #[path = "../tests/person_oracle.rs"]
 mod person_oracle;
 #[path = "../tests/person_scenes.rs"]

@@ -92,16 +92,7 @@ pub(crate) fn label(scene: &Known, folder: &Path, share: f64, most: usize) -> Se
 impl<'a> Person<'a> {
     fn new(scene: &'a Known, folder: &Path) -> Self {
         let mesh = Arc::new(scene.mesh.clone());
-        let segments = Arc::new(segment_faces(
-            &mesh,
-            &SegmentOptions {
-                scale_m2: std::env::var("SCALE")
-                    .ok()
-                    .and_then(|x| x.parse().ok())
-                    .unwrap_or(0.002),
-                ..SegmentOptions::default()
-            },
-        ));
+        let segments = Arc::new(segment_faces(&mesh, &SegmentOptions::default()));
         let surroundings = Surroundings::new(&mesh, &segments);
         let structure = find_structure(&mesh);
         let mut bench = Workbench::open(folder, Arc::clone(&mesh), Arc::clone(&segments), &Taxonomy::s3dis())
@@ -326,18 +317,15 @@ impl<'a> Person<'a> {
                 }
             }
         }
-        // Only the best few need their faces.
-        let mut best: Vec<(u32, (f64, Vec<(u32, u32)>))> = best.into_iter().collect();
-        best.sort_by(|a, b| b.1.0.total_cmp(&a.1.0).then(a.0.cmp(&b.0)));
-        best.truncate(1);
-        let ideas = best.into_iter().map(|(thing, (gain_m2, nodes))| {
-            let patches = nodes
-                .into_iter()
-                .map(|(node, instance)| self.patch_in(node, instance))
-                .collect();
-            self.paint("drag", thing, Selection { patches, ..Selection::default() }, gain_m2)
-        });
-        ideas.collect()
+        // Only the best one needs its faces.
+        let best = best
+            .into_iter()
+            .max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.0.cmp(&a.0)));
+        best.map(|(thing, (gain_m2, nodes))| {
+            let patches = nodes.into_iter().map(|(node, instance)| self.patch_in(node, instance));
+            let what = Selection { patches: patches.collect(), ..Selection::default() };
+            self.paint("drag", thing, what, gain_m2)
+        })
     }
 
     /// The patch of a node and an instance.

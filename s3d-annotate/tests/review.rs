@@ -146,7 +146,6 @@ fn doubts_lead_to_one_thing_after_the_other() {
         }
         let shares = [of_one_thing / doubts, in_sight / doubts, guesses / doubts, right / guesses];
         let title = &scene.truth.title;
-        println!("{title}: {doubts} doubts, {shares:.2?}");
         assert!(shares[0] > 0.9 && shares[1] > 0.9, "{title}: {shares:?}");
         assert!(shares[2] > 0.3 && shares[3] > 0.8, "{title}: {shares:?}");
         assert!(doubts < 1.2 * scene.truth.instances.len() as f64, "{title}: {doubts}");
@@ -179,7 +178,6 @@ fn more_of_a_thing_is_found() {
                 .count() as f64;
             wanted -= 1.0;
         }
-        println!("{}: {found} patches, {right} right, {wanted} wanted", empty.truth.title);
         assert!(right > 0.85 * found && right > 0.5 * wanted, "{found} {right} {wanted}");
     }
 }
