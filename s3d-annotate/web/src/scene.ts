@@ -39,8 +39,10 @@ export interface RoomPart {
 }
 
 export interface RoomShape {
-  kind: string | null;
-  name: string | null;
+  /** Missing without a type. */
+  kind?: string | null;
+  /** Missing if the number names the room. */
+  name?: string | null;
   parts: RoomPart[];
 }
 

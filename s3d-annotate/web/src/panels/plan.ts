@@ -248,7 +248,7 @@ export class Plan {
       void this.desk.perform({ room: { room: number, is: { ...is, ...shape } } });
     };
     const types = this.desk.scene.room_types;
-    const known = is.kind === null || types.includes(is.kind) ? types : [is.kind, ...types];
+    const known = !is.kind || types.includes(is.kind) ? types : [is.kind, ...types];
     const entries = [["", "no type"], ...known.map((type) => [type, words(type)])] as [string, string][];
     const heights = heightsOf(is);
     const height = (k: 0 | 1, name: string): HTMLElement => {
