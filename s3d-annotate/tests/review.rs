@@ -267,6 +267,14 @@ fn true_labels_raise_no_alarm_and_planted_mistakes_are_found() {
                 .any(|face| face == nearest.nearest(Vec3::from(above[0].at.map(|x| x as f32))).face)
         );
 
+        // A room whose type was forgotten.
+        let mut untyped = scene.clone();
+        let (&room, is) = scene.state.rooms().first_key_value().unwrap();
+        untyped.act(Action::Room { room, is: Room { kind: None, ..is.clone() } });
+        let checks = untyped.review().checks();
+        assert_eq!(kinds(&checks), [(CheckKind::NoType, None)], "{checks:?}");
+        assert!(checks[0].text.starts_with("room 1 has no type"));
+
         // A door that was forgotten.
         let door = of(Class::DOOR)[0];
         let mut forgotten = scene.clone();

@@ -65,6 +65,8 @@ pub enum CheckKind {
     FloorAbove,
     /// An instance is in two rooms.
     TwoRooms,
+    /// A room has no type.
+    NoType,
     /// Patches have no label.
     Unlabelled,
 }
@@ -81,6 +83,7 @@ impl Review<'_> {
     ///   table. Under the floor of an upper storey comes a ceiling, a beam or a wall first.
     /// - An instance with at least 0.03 m² and a tenth of itself in a second room. Walls, doors, windows,
     ///   columns, beams and curtains may lie between rooms.
+    /// - A room that holds labels and has no type: an export leaves them out.
     /// - Segments with more than 0.05 m² without a label; neighbours make one check.
     pub fn checks(&self) -> Vec<Check> {
         let mut faces_of: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -91,7 +94,11 @@ impl Review<'_> {
 
         let mut findings = self.in_pieces(&faces_of);
         findings.extend(self.floors_above());
-        findings.extend(self.in_two_rooms(&faces_of));
+        if !self.state.rooms().is_empty() {
+            let room_of_face = self.state.room_of_face(self.mesh);
+            findings.extend(self.in_two_rooms(&faces_of, &room_of_face));
+            findings.extend(self.without_type(&room_of_face));
+        }
         findings.extend(self.unlabelled());
         findings
             .into_par_iter()
@@ -205,11 +212,25 @@ impl Review<'_> {
         findings
     }
 
-    fn in_two_rooms(&self, faces_of: &BTreeMap<u32, Vec<u32>>) -> Vec<Finding> {
-        if self.state.rooms().is_empty() {
-            return Vec::new();
+    fn without_type(&self, room_of_face: &[u32]) -> Vec<Finding> {
+        let rooms = self.state.rooms().iter().filter(|(_, room)| room.kind.is_none());
+        let mut faces_in: BTreeMap<u32, Vec<u32>> = rooms.map(|(room, _)| (*room, Vec::new())).collect();
+        let labelled = self.state.instance_of_face().iter().zip(room_of_face);
+        for (face, (_, room)) in (0u32..).zip(labelled).filter(|(_, (instance, _))| **instance != 0) {
+            if let Some(faces) = faces_in.get_mut(room) {
+                faces.push(face);
+            }
         }
-        let room_of_face = self.state.room_of_face(self.mesh);
+
+        let with_labels = faces_in.into_iter().filter(|(_, faces)| !faces.is_empty());
+        let findings = with_labels.map(|(room, faces)| {
+            let text = format!("room {room} has no type: an export leaves its labels out");
+            (CheckKind::NoType, text, None, faces)
+        });
+        findings.collect()
+    }
+
+    fn in_two_rooms(&self, faces_of: &BTreeMap<u32, Vec<u32>>, room_of_face: &[u32]) -> Vec<Finding> {
         let room_names = self.state.room_names();
         let room_name = |room: u32| room_names.get(&room).cloned().unwrap_or_else(|| format!("room {room}"));
         let name = self.names();
