@@ -8,14 +8,14 @@
 mod person_oracle;
 #[path = "../tests/person_scenes.rs"]
 mod person_scenes;
-#[path = "../tests/person_session.rs"]
-mod person_session;
+#[path = "../tests/person_sitting.rs"]
+mod person_sitting;
 
 use person_oracle::label;
 use person_scenes::{Known, copy_room, demo, house, office};
-use person_session::Session;
+use person_sitting::Sitting;
 
-/// No session has more strokes.
+/// No sitting has more strokes.
 const MOST: usize = 150;
 
 fn main() {
@@ -36,20 +36,20 @@ fn main() {
         // The scan of the copy room may not be there.
         if let Some(scene) = scene() {
             let folder = tempfile::tempdir().expect("a folder for the labels");
-            let session = label(&scene, &folder.path().join("scan.labels"), 0.99, MOST);
-            println!("{}", row(&scene, &session));
+            let sitting = label(&scene, &folder.path().join("scan.labels"), 0.99, MOST);
+            println!("{}", row(&scene, &sitting));
         }
     }
 }
 
-fn row(scene: &Known, session: &Session) -> String {
+fn row(scene: &Known, sitting: &Sitting) -> String {
     let strokes = |share: f64| {
-        session
+        sitting
             .strokes_to(share)
             .map_or("–".to_owned(), |strokes| strokes.to_string())
     };
-    let count = |kind: &str| session.kinds.get(kind).copied().unwrap_or(0);
-    let kinds: Vec<String> = session
+    let count = |kind: &str| sitting.kinds.get(kind).copied().unwrap_or(0);
+    let kinds: Vec<String> = sitting
         .kinds
         .iter()
         .map(|(kind, strokes)| format!("{strokes} {kind}"))
@@ -59,15 +59,15 @@ fn row(scene: &Known, session: &Session) -> String {
         "| {} | {} | {} | {rooms} | {:.3} | {} | {} | {} | {:.3} after {}: {} | {:.3} | {:.3} |",
         scene.name,
         scene.mesh.faces().len(),
-        session.things,
-        session.right[rooms],
+        sitting.things,
+        sitting.right[rooms],
         strokes(0.9),
         strokes(0.95),
         strokes(0.99),
-        session.right.last().copied().unwrap_or_default(),
-        session.right.len() - 1,
+        sitting.right.last().copied().unwrap_or_default(),
+        sitting.right.len() - 1,
         kinds.join(", "),
-        session.purity_before,
-        session.purity_after,
+        sitting.purity_before,
+        sitting.purity_after,
     )
 }

@@ -6,7 +6,7 @@ mod person;
 mod person_oracle;
 #[expect(dead_code, reason = "the bench has more scenes")]
 mod person_scenes;
-mod person_session;
+mod person_sitting;
 mod proposals;
 mod review;
 mod segments;

@@ -2,10 +2,10 @@
 
 use super::person_oracle::label;
 use super::person_scenes::{Known, demo, office};
-use super::person_session::Session;
+use super::person_sitting::Sitting;
 use std::path::Path;
 
-fn session(scene: &Known) -> Session {
+fn sitting(scene: &Known) -> Sitting {
     // Each stroke syncs the log: a folder in memory takes less time.
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() {
@@ -19,19 +19,19 @@ fn session(scene: &Known) -> Session {
 
 #[test]
 fn a_room_of_90_things_takes_60_strokes_to_95_percent_and_90_to_99() {
-    let session = session(&office());
-    assert!((85..100).contains(&session.things), "{}", session.things);
-    let [to_95, to_99] = [0.95, 0.99].map(|share| session.strokes_to(share).unwrap());
+    let sitting = sitting(&office());
+    assert!((85..100).contains(&sitting.things), "{}", sitting.things);
+    let [to_95, to_99] = [0.95, 0.99].map(|share| sitting.strokes_to(share).unwrap());
     // It takes 30 and 43.
     assert!(to_95 <= 45 && to_99 <= 65, "{to_95} and {to_99}");
-    assert!(session.purity_after >= 0.97, "{}", session.purity_after);
+    assert!(sitting.purity_after >= 0.97, "{}", sitting.purity_after);
 }
 
 #[test]
 fn the_built_in_scene_takes_a_stroke_for_two_things() {
-    let session = session(&demo());
-    let [to_95, to_99] = [0.95, 0.99].map(|share| session.strokes_to(share).unwrap());
+    let sitting = sitting(&demo());
+    let [to_95, to_99] = [0.95, 0.99].map(|share| sitting.strokes_to(share).unwrap());
     // It takes 46 and 63 for 140 things in four rooms.
     assert!(to_95 <= 65 && to_99 <= 90, "{to_95} and {to_99}");
-    assert!(session.purity_after >= 0.97, "{}", session.purity_after);
+    assert!(sitting.purity_after >= 0.97, "{}", sitting.purity_after);
 }

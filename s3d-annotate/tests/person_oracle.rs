@@ -13,7 +13,7 @@
 //!   not one thing stays wrong until it is put right by strokes. Pieces of one thing are joined by strokes.
 
 use super::person_scenes::Known;
-use super::person_session::Session;
+use super::person_sitting::Sitting;
 use s3d_annotate::labelling::FaceRuns;
 use s3d_annotate::review::{Review, Surroundings};
 use s3d_annotate::segments::{SegmentOptions, segment_faces};
@@ -74,19 +74,19 @@ struct Person<'a> {
     cuts: Vec<Vec<u32>>,
     /// A place on each segment.
     segment_middles: Vec<Vec3>,
-    session: Session,
+    sitting: Sitting,
 }
 
 /// Labels a scene until `share` of it is right, no more can be done, or `most` strokes are made.
-pub(crate) fn label(scene: &Known, folder: &Path, share: f64, most: usize) -> Session {
+pub(crate) fn label(scene: &Known, folder: &Path, share: f64, most: usize) -> Sitting {
     let mut person = Person::new(scene, folder);
     person.accept_structure();
-    while person.right() < share && person.session.right.len() <= most {
+    while person.right() < share && person.sitting.right.len() <= most {
         let Some(idea) = person.best_idea() else { break };
         person.perform(idea);
     }
-    person.session.purity_after = person.purity();
-    person.session
+    person.sitting.purity_after = person.purity();
+    person.sitting
 }
 
 impl<'a> Person<'a> {
@@ -131,7 +131,7 @@ impl<'a> Person<'a> {
             instance_of: vec![0; scene.classes.len()],
             cuts: LEVELS.iter().map(|cost| tree.nodes_at(*cost)).collect(),
             segment_middles,
-            session: Session {
+            sitting: Sitting {
                 things: scene.things(),
                 right: vec![0.0],
                 kinds: BTreeMap::new(),
@@ -139,7 +139,7 @@ impl<'a> Person<'a> {
                 purity_after: 0.0,
             },
         };
-        person.session.purity_before = person.purity();
+        person.sitting.purity_before = person.purity();
         person
     }
 
@@ -213,8 +213,8 @@ impl<'a> Person<'a> {
             self.meet(first);
         }
         let right = self.right();
-        self.session.right.extend(vec![right; idea.strokes]);
-        *self.session.kinds.entry(idea.kind).or_default() += idea.strokes;
+        self.sitting.right.extend(vec![right; idea.strokes]);
+        *self.sitting.kinds.entry(idea.kind).or_default() += idea.strokes;
     }
 
     /// New instances stand for the thing that they have most of, the one with most of it first.

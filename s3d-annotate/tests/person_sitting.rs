@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 /// What the person has done.
 #[derive(Clone, Debug)]
-pub(crate) struct Session {
+pub(crate) struct Sitting {
     /// The things of the scene.
     pub(crate) things: usize,
     /// The share of the surface that had the right instance after each stroke; the first entry is before any.
@@ -17,7 +17,7 @@ pub(crate) struct Session {
     pub(crate) purity_after: f64,
 }
 
-impl Session {
+impl Sitting {
     /// The strokes until this share is right.
     pub(crate) fn strokes_to(&self, share: f64) -> Option<usize> {
         self.right.iter().position(|right| *right >= share)
