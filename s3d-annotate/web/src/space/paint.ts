@@ -1,19 +1,9 @@
 // The colours of the faces: those of the mesh or of a photograph, and those of the labels on them.
 
-import {
-  DataTexture,
-  FrontSide,
-  GLSL3,
-  LinearFilter,
-  LinearMipmapLinearFilter,
-  RawShaderMaterial,
-  RepeatWrapping,
-  Texture,
-  Vector2,
-  Vector3,
-} from "three";
+import { type RawShaderMaterial, type Texture, Vector3 } from "three";
 import { LIT, shader } from "../../../../s3d-report/web/src/colors.js";
 import type { Part } from "../../../../s3d-report/web/src/space/files.js";
+import { Materials } from "../../../../s3d-report/web/src/space/materials.js";
 import type { Place, Scene } from "../scene.js";
 import { type FaceTable, LIGHTS, WIDTH } from "./table.js";
 
@@ -99,12 +89,6 @@ void main() {
   color.a = 1.0;
 }`;
 
-const blank = (): Texture => {
-  const texture = new DataTexture(new Uint8Array([255, 255, 255, 255]), 1, 1);
-  texture.needsUpdate = true;
-  return texture;
-};
-
 /** The materials of a mesh. A change here applies to all of them. */
 export class LabelPaint {
   readonly cover = { value: SHOWS.both as number };
@@ -115,61 +99,33 @@ export class LabelPaint {
   readonly hand = { value: new Vector3() };
   readonly stand = { value: new Vector3() };
   readonly photograph: { value: Texture };
-  private readonly blank = blank();
-  private readonly images = new Map<number, Texture>();
-  private readonly made: { material: RawShaderMaterial; texture: number | null }[] = [];
+  private readonly materials: Materials;
 
   constructor(
-    private readonly scene: Scene,
+    scene: Scene,
     private readonly table: FaceTable,
   ) {
-    this.photograph = { value: this.blank };
+    this.materials = new Materials({ vertices: VERTICES, pixels: PIXELS }, scene.materials, [200, 200, 200]);
+    this.photograph = { value: this.materials.blank };
   }
 
   of(part: Part, place: number): RawShaderMaterial {
-    const { color, texture } = this.scene.materials[place] ?? { color: [200, 200, 200], texture: null };
-    const image = part.uv && texture !== null ? this.images.get(texture) : undefined;
     const { colors, lights } = this.table.textures;
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: VERTICES,
-      fragmentShader: PIXELS,
-      side: FrontSide,
-      uniforms: {
-        cover: this.cover,
-        section: this.section,
-        ratio: this.ratio,
-        inPhotograph: this.inPhotograph,
-        hand: this.hand,
-        stand: this.stand,
-        photograph: this.photograph,
-        colors: { value: colors },
-        lights: { value: lights },
-        image: { value: image ?? this.blank },
-        textured: { value: image !== undefined },
-        colored: { value: part.color !== null },
-        plain: { value: new Vector3(...color).divideScalar(255) },
-        uvOrigin: { value: new Vector2(...part.uvOrigin) },
-        uvStep: { value: new Vector2(...part.uvStep) },
-      },
+    return this.materials.of(part, place, {
+      cover: this.cover,
+      section: this.section,
+      ratio: this.ratio,
+      inPhotograph: this.inPhotograph,
+      hand: this.hand,
+      stand: this.stand,
+      photograph: this.photograph,
+      colors: { value: colors },
+      lights: { value: lights },
     });
-    this.made.push({ material, texture: part.uv && texture });
-    return material;
   }
 
   /** Shows a texture of the mesh in existing and later materials. */
   take(texture: number, image: HTMLImageElement, anisotropy: number): void {
-    const made = new Texture(image);
-    made.wrapS = made.wrapT = RepeatWrapping;
-    made.minFilter = LinearMipmapLinearFilter;
-    made.magFilter = LinearFilter;
-    made.anisotropy = anisotropy;
-    made.needsUpdate = true;
-    this.images.set(texture, made);
-    for (const { material, texture: its } of this.made) {
-      if (its !== texture) continue;
-      (material.uniforms["image"] as { value: Texture }).value = made;
-      (material.uniforms["textured"] as { value: boolean }).value = true;
-    }
+    this.materials.take(texture, image, anisotropy);
   }
 }

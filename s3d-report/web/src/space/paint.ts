@@ -1,19 +1,6 @@
 // The colours of the faces: one shader, which reads them from textures or from a table by face.
 
-import {
-  DataTexture,
-  FrontSide,
-  GLSL3,
-  LinearFilter,
-  LinearMipmapLinearFilter,
-  NearestFilter,
-  RGBAFormat,
-  RawShaderMaterial,
-  RepeatWrapping,
-  Texture,
-  Vector2,
-  Vector3,
-} from "three";
+import { DataTexture, NearestFilter, RGBAFormat, type RawShaderMaterial, type Texture } from "three";
 import {
   LIT,
   NULL_LABEL,
@@ -28,6 +15,7 @@ import type { Index, Mesh } from "../data.js";
 import type { Slab } from "../storeys.js";
 import type { Part } from "./files.js";
 import type { Look } from "./look.js";
+import { Materials } from "./materials.js";
 
 export const SHOWS = ["texture", "class", "instance", "margin", "unlabelled", "changed", "normal"] as const;
 export type Show = (typeof SHOWS)[number];
@@ -134,14 +122,10 @@ export class Paint {
   private readonly base = { value: 0 };
   private readonly lit = { value: 0 };
   private readonly tables: Record<string, { value: Texture }>;
-  private readonly blank = table(new Uint8Array([255, 255, 255, 255]), 1, 1);
-  private readonly images = new Map<number, Texture>();
-  private readonly made: { material: RawShaderMaterial; texture: number | null }[] = [];
+  private readonly materials: Materials;
 
-  constructor(
-    index: Index,
-    private readonly mesh: Mesh,
-  ) {
+  constructor(index: Index, mesh: Mesh) {
+    this.materials = new Materials({ vertices: VERTICES, pixels: PIXELS }, mesh.materials, NULL_LABEL);
     const [classes, instances] = [labelTable(index, "class"), labelTable(index, "instance")];
     this.tables = {
       classes: { value: table(classes.pixels, TABLE_WIDTH, classes.rows) },
@@ -167,53 +151,25 @@ export class Paint {
 
   /** The material for the faces of a part that have the material at this index. */
   of(part: Part, place: number): RawShaderMaterial {
-    const { color, texture } = this.mesh.materials[place] ?? { color: NULL_LABEL, texture: null };
-    const image = part.uv && texture !== null ? this.images.get(texture) : undefined;
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: VERTICES,
-      fragmentShader: PIXELS,
-      side: FrontSide,
-      uniforms: {
-        ...this.tables,
-        show: this.show,
-        beyond: this.beyond,
-        line: this.line,
-        only: this.only,
-        section: this.section,
-        base: this.base,
-        lit: this.lit,
-        image: { value: image ?? this.blank },
-        textured: { value: image !== undefined },
-        colored: { value: part.color !== null },
-        plain: { value: new Vector3(...color).divideScalar(255) },
-        uvOrigin: { value: new Vector2(...part.uvOrigin) },
-        uvStep: { value: new Vector2(...part.uvStep) },
-      },
+    return this.materials.of(part, place, {
+      ...this.tables,
+      show: this.show,
+      beyond: this.beyond,
+      line: this.line,
+      only: this.only,
+      section: this.section,
+      base: this.base,
+      lit: this.lit,
     });
-    this.made.push({ material, texture: part.uv && texture });
-    return material;
   }
 
   /** Uploads the image of a texture, for existing and later materials. */
   take(texture: number, image: HTMLImageElement, anisotropy: number): void {
-    const made = new Texture(image);
-    made.wrapS = made.wrapT = RepeatWrapping;
-    made.minFilter = LinearMipmapLinearFilter;
-    made.magFilter = LinearFilter;
-    made.anisotropy = anisotropy;
-    made.needsUpdate = true;
-    this.images.set(texture, made);
-    for (const { material, texture: its } of this.made) {
-      if (its !== texture) continue;
-      (material.uniforms["image"] as { value: Texture }).value = made;
-      (material.uniforms["textured"] as { value: boolean }).value = true;
-    }
+    this.materials.take(texture, image, anisotropy);
   }
 
   close(): void {
-    for (const { material } of this.made) material.dispose();
-    for (const texture of [...this.images.values(), this.blank]) texture.dispose();
+    this.materials.close();
     for (const { value } of Object.values(this.tables)) value.dispose();
   }
 }
