@@ -319,3 +319,26 @@ fn floods_are_bounded() {
         }
     });
 }
+
+#[test]
+fn labels_are_carried_over_into_a_new_folder_only() {
+    let mut server = Server::start();
+    let chair = json!({ "label": { "what": what(0, 0), "class": "chair" } });
+    assert_eq!(server.gesture(0, &chair).0, 200);
+    server.end();
+
+    let old = server.folder.path().join(NAME);
+    let options = LabelOptions {
+        carry_over: vec![old.clone(), server.labels()],
+        output: Some(server.folder.path().join("new.labels")),
+        write: Some(s3d_annotate::outputs::OutputFormat::Ply),
+        ..LabelOptions::default()
+    };
+    let context = Context::default();
+    label(old.clone(), &options, &context, |path| assert!(path.ends_with("new_labelled.ply"))).unwrap();
+    let log = fs::read_to_string(server.folder.path().join("new.labels/events.jsonl")).unwrap();
+    assert!(log.contains("chair"), "{log}");
+
+    let again = label(old, &options, &context, |_| panic!("labels were replaced")).unwrap_err();
+    assert!(again.to_string().contains("has labels already"), "{again}");
+}

@@ -28,7 +28,6 @@ use crate::workbench::Workbench;
 use connections::Bounded;
 use desk::Desk;
 use guard::Guard;
-use s3d_dataset::error::UsageError;
 use s3d_dataset::export::SceneSource;
 use s3d_dataset::{BareScene, Context, Error, Result};
 use s3d_io::Error as FileError;
@@ -156,8 +155,8 @@ fn carry(old_scene: &Path, old_labels: &Path, scene: &BareScene, folder: &Path, 
     let from = LabelFolder::open(old_labels, old.mesh(), old.taxonomy()).map_err(failure)?;
     let mut to = LabelFolder::open(folder, scene.mesh(), scene.taxonomy()).map_err(failure)?;
     if to.state().revision() > 0 {
-        let note = Some("labels are carried over into a new folder");
-        return Err(UsageError::Exists { path: folder.to_owned(), note }.into());
+        let why = "has labels already: others are carried over into a new folder only";
+        return Err(FileError::format(folder, why).into());
     }
 
     let CarriedOver { actions, report } = carry_over(old.mesh(), from.state(), scene.mesh());
