@@ -86,12 +86,18 @@ impl Measured {
         // Wide columns and sofas with high backs.
         assert!(self.surplus <= self.rooms[1] as i64 / 2, "{self:#?}");
     }
-}
 
-impl Measured {
+    /// Prints the fit of a scan, and checks that it is about as good as it was. Where planes lie on the grid
+    /// of the scan, noise turns many of their faces.
     #[expect(clippy::print_stdout, reason = "figures to look at with --nocapture")]
     pub(super) fn check_scan(&self) {
-        println!("{self:?}");
+        println!("{self:#?}");
+        assert!(self.recall.values().all(|share| *share >= 0.77), "{self:#?}");
+        assert!(self.precision.values().all(|share| *share >= 0.85), "{self:#?}");
+        assert!(self.instances[0] >= 0.82 && self.instances[1] >= 0.6, "{self:#?}");
+        assert_eq!(self.rooms[0], self.rooms[1], "{self:#?}");
+        assert!(self.room_iou >= 0.98, "{self:#?}");
+        assert!(self.surplus <= 1, "{self:#?}");
     }
 }
 

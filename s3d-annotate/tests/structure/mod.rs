@@ -233,15 +233,6 @@ fn a_scan_with_noise() {
     assert!((length - f64::from(size.y)).abs() < 0.15 * rooms as f64, "{length} of {size}");
 }
 
-/// Where grids of scans lie.
-const OFFSETS: [(Vec3, f32); 5] = [
-    (Vec3::ZERO, 0.0),
-    (Vec3::splat(0.5), 0.0),
-    (vec3(0.25, 0.5, 0.0), 0.0),
-    (vec3(0.0, 0.0, 0.25), 7.0),
-    (vec3(0.63, 0.71, 0.57), 0.0),
-];
-
 fn office() -> Building {
     let room = RoomOptions { size_m: [7.0, 5.0], windows: 2, ..RoomOptions::new(RoomType::OPENSPACE) };
     let options =
@@ -251,15 +242,16 @@ fn office() -> Building {
 
 #[test]
 fn an_office_scanned_on_any_grid() {
-    for (offset, degrees) in OFFSETS {
+    // Its planes lie on the grid, at a half and a quarter of its cells, and across it.
+    for (offset, degrees) in [(Vec3::ZERO, 0.0), (vec3(0.25, 0.5, 0.0), 0.0), (vec3(0.0, 0.0, 0.25), 7.0)] {
         Measured::of_scan(&office(), ScanGrid { cell_m: 0.05, noise_m: 0.004, offset, degrees }).check_scan();
     }
 }
 
 #[test]
 fn the_built_in_scene_scanned_on_any_grid() {
-    for (offset, degrees) in OFFSETS {
-        let grid = ScanGrid { cell_m: 0.06, noise_m: 0.004, offset, degrees };
+    for offset in [0.0, 0.5] {
+        let grid = ScanGrid { cell_m: 0.06, noise_m: 0.004, offset: Vec3::splat(offset), degrees: 0.0 };
         Measured::of_scan(&coarse(Building::demo()), grid).check_scan();
     }
 }

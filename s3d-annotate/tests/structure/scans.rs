@@ -65,15 +65,20 @@ pub(super) fn scanned(scene: &AnnotatedScene, grid: ScanGrid) -> AnnotatedScene 
                     positions.len() as u32 - 1
                 })
             });
-            let pair = if here < 0.0 { [[a, d, c], [a, c, b]] } else { [[a, b, c], [a, c, d]] };
+            let pair = if here < 0.0 {
+                [[a, b, c], [a, c, d]]
+            } else {
+                [[a, d, c], [a, c, b]]
+            };
             faces.extend(pair);
         }
     }
 
     let scanned = TriMesh::new(MeshParts { positions, faces, ..MeshParts::default() }).unwrap();
     let faces = 0..scanned.faces().len() as u32;
-    let middles: Vec<Vec3> =
-        faces.map(|face| scanned.triangle(face).iter().sum::<Vec3>() / 3.0).collect();
+    let middles: Vec<Vec3> = faces
+        .map(|face| scanned.triangle(face).iter().sum::<Vec3>() / 3.0)
+        .collect();
     nearest.nearest_many(&middles, &mut found);
     let instance_of = |face: u32| scene.instance_of_face[face as usize];
     let instance_of_face = found.iter().map(|near| instance_of(near.face)).collect();
