@@ -249,9 +249,8 @@ fn an_office_scanned_on_any_grid() {
 }
 
 #[test]
-fn the_built_in_scene_scanned_on_any_grid() {
-    for offset in [0.0, 0.5] {
-        let grid = ScanGrid { cell_m: 0.06, noise_m: 0.004, offset: Vec3::splat(offset), degrees: 0.0 };
-        Measured::of_scan(&coarse(Building::demo()), grid).check_scan();
-    }
+fn the_built_in_scene_scanned() {
+    // Half a cell off the grid of the scan, the faces of a beam are the most broken.
+    let grid = ScanGrid { cell_m: 0.06, noise_m: 0.004, offset: Vec3::splat(0.5), degrees: 0.0 };
+    Measured::of_scan(&coarse(Building::demo()), grid).check_scan();
 }
