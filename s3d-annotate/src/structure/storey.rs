@@ -164,7 +164,7 @@ impl Storey {
         let is_filled = storey.filled(scan, &layers);
         let is_inside = closed(scan, &is_seen);
         storey.is_free = (0..cells)
-            .map(|cell| is_inside[cell] && !is_filled[cell] && !storey.is_recess(cell))
+            .map(|cell| is_inside[cell] && !is_filled[cell] && !storey.is_opening(scan, cell))
             .collect();
         storey
     }
@@ -173,6 +173,17 @@ impl Storey {
     /// to the wall.
     pub(super) fn is_recess(&self, cell: usize) -> bool {
         self.ceiling_m[cell] - self.top_m[cell] > LOWER_M
+    }
+
+    /// Returns whether a cell is in the recess of a window or door. What is over a floor and higher than a
+    /// door is the underside of a beam: it parts no rooms. In a scan with noise, only some of its cells are
+    /// lower than the ceiling around them, and those would be narrow passages.
+    fn is_opening(&self, scan: &Scan, cell: usize) -> bool {
+        // Noise takes the floor from single cells.
+        let beside = scan.grid.beside(cell).filter(|next| self.has_floor[*next]);
+        let is_over_floor = self.has_floor[cell] || beside.count() >= 2;
+        let is_beam = is_over_floor && f64::from(self.top_m[cell]) > self.floor_m + DOOR_M;
+        self.is_recess(cell) && !is_beam
     }
 
     /// Takes the large pieces of what is highest as ceilings, and extends them over walls and holes.

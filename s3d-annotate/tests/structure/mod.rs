@@ -1,15 +1,18 @@
 //! The structure of scenes whose instances and rooms are known, and of small made-up meshes.
 
 mod measure;
+mod scans;
 mod shapes;
 
 use measure::Measured;
 use s3d_annotate::labelling::Room;
 use s3d_annotate::structure::{Structure, find_structure};
-use s3d_geom::glam::Vec3;
+use s3d_geom::glam::{Vec3, vec3};
 use s3d_geom::{Polygon, TriMesh};
+use s3d_label::RoomType;
 use s3d_synth::scenes::scan_like;
-use s3d_synth::{Building, BuildingOptions};
+use s3d_synth::{Building, BuildingOptions, RoomOptions};
+use scans::ScanGrid;
 use shapes::{Shapes, two_rooms};
 
 fn coarse(building: Building) -> Building {
@@ -228,4 +231,26 @@ fn a_scan_with_noise() {
     let length = areas(&found).iter().sum::<f64>() / 6.0;
     let size = scan_like(30_000, 3).aabb().max;
     assert!((length - f64::from(size.y)).abs() < 0.15 * rooms as f64, "{length} of {size}");
+}
+
+fn office() -> Building {
+    let room = RoomOptions { size_m: [7.0, 5.0], windows: 2, ..RoomOptions::new(RoomType::OPENSPACE) };
+    let options =
+        BuildingOptions { rooms: vec![room], texture_scale: 0.05, seed: 5, ..BuildingOptions::default() };
+    Building::generate(&options).unwrap()
+}
+
+#[test]
+fn an_office_scanned_on_any_grid() {
+    // Its planes lie on the grid, at a half and a quarter of its cells, and across it.
+    for (offset, degrees) in [(Vec3::ZERO, 0.0), (vec3(0.25, 0.5, 0.0), 0.0), (vec3(0.0, 0.0, 0.25), 7.0)] {
+        Measured::of_scan(&office(), ScanGrid { cell_m: 0.05, noise_m: 0.004, offset, degrees }).check_scan();
+    }
+}
+
+#[test]
+fn the_built_in_scene_scanned() {
+    // Half a cell off the grid of the scan, the faces of a beam are the most broken.
+    let grid = ScanGrid { cell_m: 0.06, noise_m: 0.004, offset: Vec3::splat(0.5), degrees: 0.0 };
+    Measured::of_scan(&coarse(Building::demo()), grid).check_scan();
 }
