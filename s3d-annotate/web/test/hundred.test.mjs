@@ -13,7 +13,7 @@ import { serve } from "./lib/server.mjs";
 import { Sight } from "./lib/sight.mjs";
 import { classOf, facesOf, readScene, roomOf } from "./lib/truth.mjs";
 
-/** Without a graphics card, a small window is drawn much sooner. */
+/** Without a graphics card, a small window of large pixels is drawn much sooner. */
 const SIZE = { width: 720, height: 400 };
 /** The person ends when so much of the surface is right, or no stroke puts so much right, m². */
 const SHARE = 0.985;
@@ -190,7 +190,7 @@ test("a hundred gestures label the built-in scene", async (t) => {
   const scene = await readScene(server.url);
   const faces = facesOf(scene, `${demo}/area_1/3d/semantic.obj`);
   assert.ok(faces.filter(({ label }) => label === null).length < 0.01 * faces.length);
-  const { page, faults, close } = await open(browser, server.url, SIZE);
+  const { page, faults, close } = await open(browser, server.url, { ...SIZE, scale: 0.25 });
   const person = new Person(scene, faces, new Sight(scene, { ...SIZE, ...(await covered(page)) }));
   const keys = new Map(
     await page

@@ -245,11 +245,14 @@ export class Person {
     let tried = 0;
     for (const stand of this.stands(thing, this.patch(anchor, instance))) {
       this.sight.look(stand);
-      const first = this.seen(thing, anchor, instance);
-      if (!first) continue;
+      const seen = touched.flatMap(({ node }) => this.seen(thing, node, instance) ?? []);
+      if (!seen.some(({ face }) => this.holds(anchor, face))) continue;
+      // The stroke has one level: the highest of its patches' own.
+      const level = ({ face }) => this.scene.cost[this.nodeAt(this.scene.segment[face], cost)];
+      const first = seen.reduce((a, b) => (level(b) > level(a) ? b : a));
       const nodeFrom = this.nodeAt(this.scene.segment[first.face], cost);
       const own = this.scene.cost[nodeFrom];
-      const others = touched.slice(1).flatMap(({ node }) => this.seen(thing, node, instance) ?? []);
+      const others = seen.filter((one) => one !== first);
       const paths = [[first.pixel]];
       let [path, rest] = [[first.pixel], others.map(({ pixel }) => pixel)];
       while (rest.length > 0) {
@@ -281,7 +284,7 @@ export class Person {
               patches: way.length,
             };
         }
-      if (best && ++tried >= 6) break;
+      if (best && ++tried >= 12) break;
     }
     return best;
   }
