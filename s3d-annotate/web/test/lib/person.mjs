@@ -28,7 +28,7 @@ export class Person {
     /** What each face is: from 1, 0 if nobody knows. */
     this.thing = Uint16Array.from(faces, ({ label }) => number.get(label) ?? 0);
     this.near = faces.map(({ middle }) => middle.map((c, k) => c - scene.origin[k]));
-    this.all = faces.reduce((sum, { m2 }, face) => sum + (this.thing[face] > 0 ? m2 : 0), 0);
+    this.all = faces.reduce((sum, { m2 }) => sum + m2, 0);
     /** The instance that stands for each thing, 0 without one. */
     this.instanceOf = new Uint32Array(this.names.length);
     this.instances = new Uint32Array(faces.length);
@@ -97,17 +97,18 @@ export class Person {
     return thing > 0 && instance > 0 && this.instanceOf[thing] === instance;
   }
 
-  /** The share of the surface that has the right instance. */
+  /** The share of the surface that has the right instance, or none where it was generated without one. */
   get right() {
     let sum = 0;
     this.faces.forEach(({ m2 }, face) => {
-      if (this.isRight(this.thing[face], this.instances[face])) sum += m2;
+      const [thing, instance] = [this.thing[face], this.instances[face]];
+      if (thing === 0 ? instance === 0 : this.isRight(thing, instance)) sum += m2;
     });
     return sum / this.all;
   }
 
-  /** The instances stand for the thing that they have most of, the one with most of it first. */
-  meet() {
+  /** The instances stand for the thing of their class that they have most of, the one with most of it first. */
+  meet(classes) {
     const shares = new Map();
     this.instances.forEach((instance, face) => {
       if (instance === 0) return;
@@ -115,7 +116,7 @@ export class Person {
       shares.set(instance, of.set(this.thing[face], (of.get(this.thing[face]) ?? 0) + this.faces[face].m2));
     });
     const most = [...shares].flatMap(([instance, of]) => {
-      const known = [...of].filter(([thing]) => thing > 0);
+      const known = [...of].filter(([thing]) => classes.get(instance) === classOf(this.names[thing]));
       return known.length > 0 ? [[instance, ...known.reduce((a, b) => (b[1] > a[1] ? b : a))]] : [];
     });
     for (const [instance, thing] of most.sort((a, b) => b[2] - a[2]))
@@ -130,6 +131,7 @@ export class Person {
       if (is === thing) sum += this.isRight(thing, instance) ? 0 : m2;
       else if (this.isRight(is, instance)) sum -= m2;
       else if (is > 0) sum -= 0.5 * m2;
+      else if (instance === 0) sum -= m2;
     }
     return sum;
   }
