@@ -9,9 +9,18 @@ const SEEN = "s3d-label-card";
  * the first use has been seen.
  */
 export async function open(browser, url, options = {}) {
-  const { width = 1120, height = 760, dark = false, card = false, hash = "", touch = false } = options;
+  const {
+    width = 1120,
+    height = 760,
+    dark = false,
+    card = false,
+    hash = "",
+    touch = false,
+    scale = 1,
+  } = options;
   const context = await browser.newContext({
     viewport: { width, height },
+    deviceScaleFactor: scale,
     colorScheme: dark ? "dark" : "light",
     reducedMotion: "reduce",
     hasTouch: touch,

@@ -33,6 +33,7 @@ export async function readScene(url) {
     index: new Uint32Array(await bytes("faces.bin")),
     segment: new Uint32Array(await bytes("segments.bin")),
     parent: new Uint32Array(tree, 0, scene.nodes),
+    cost: new Float32Array(tree, 4 * scene.nodes, scene.nodes),
   };
 }
 
@@ -60,42 +61,5 @@ export function facesOf({ positions, index, origin }, semantic) {
 /** The class of a label such as `chair_3_office_1_1`; null without one. */
 export const classOf = (label) => (label === null || label.startsWith("<") ? null : label.split("_")[0]);
 
-/**
- * For each label, the largest nodes of the tree that are of it, the largest first: those of whose surface at
- * least `purity` has the label.
- */
-export function nodesOf({ segment, parent, nodes, segments }, faces, purity = 0.985) {
-  const sums = Array.from({ length: nodes }, () => new Map());
-  faces.forEach(({ label, m2 }, face) => {
-    const sum = sums[segment[face]];
-    sum.set(label, (sum.get(label) ?? 0) + m2);
-  });
-  for (let node = 0; node < nodes; node++) {
-    const up = sums[parent[node]];
-    if (up) for (const [label, m2] of sums[node]) up.set(label, (up.get(label) ?? 0) + m2);
-  }
-  const best = sums.map((sum, node) => {
-    const all = [...sum.values()].reduce((a, b) => a + b, 0);
-    const [label, m2] = [...sum].reduce((a, b) => (b[1] > a[1] ? b : a), [null, 0]);
-    // A segment is of the label that most of it has.
-    const least = node < segments ? 0.5 : purity;
-    return { label, m2, isPure: m2 >= least * all && classOf(label) !== null };
-  });
-  const wanted = new Map();
-  best.forEach(({ label, m2, isPure }, node) => {
-    const up = best[parent[node]];
-    if (!isPure || (up?.isPure && up.label === label)) return;
-    wanted.set(label, [...(wanted.get(label) ?? []), { node, m2 }]);
-  });
-  for (const list of wanted.values()) list.sort((a, b) => b.m2 - a.m2);
-  return wanted;
-}
-
-/** The faces of each node that is asked for. */
-export function facesIn({ segment, parent }, wanted) {
-  const found = new Map([...wanted].map((node) => [node, []]));
-  segment.forEach((leaf, face) => {
-    for (let node = leaf; node !== undefined; node = parent[node]) found.get(node)?.push(face);
-  });
-  return found;
-}
+/** The room of such a label, `office_1`. */
+export const roomOf = (label) => label.split("_").slice(2, 4).join("_");
