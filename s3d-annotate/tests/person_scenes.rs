@@ -204,7 +204,7 @@ impl Known {
                     })
                 });
                 let [a, b, c, d] = quad;
-                let pair = if here < 0.0 {
+                let pair = if here >= 0.0 {
                     [[a, d, c], [a, c, b]]
                 } else {
                     [[a, b, c], [a, c, d]]

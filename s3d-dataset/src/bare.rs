@@ -47,7 +47,8 @@ impl BareScene {
     /// Opens a scene file, a folder of a known set, or a mesh. What is odd goes to `ctx` as warnings.
     ///
     /// # Errors
-    /// [`Error::Input`] or [`Error::File`] if the scene cannot be exported.
+    /// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be
+    /// exported.
     pub fn open(scene: impl Into<SceneSource>, ctx: &Context) -> Result<Self> {
         let mut area = Inputs::open_bare(scene.into())?;
         let file = area.take_mesh()?;
@@ -116,7 +117,7 @@ impl BareScene {
     /// with this number.
     ///
     /// # Errors
-    /// [`Error::File`] if the photograph cannot be read.
+    /// [`Error::File`](crate::Error::File) if the photograph cannot be read.
     pub fn panorama(&self, number: usize, width: u32) -> Result<Option<Raster<[u8; 3]>>> {
         let Some(photograph) = self.photographed().nth(number) else { return Ok(None) };
         let photo = photograph.read()?;

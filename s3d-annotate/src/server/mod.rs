@@ -5,7 +5,7 @@
 //! origin, and no other interface is ever listened on. The work itself is that of the other modules: handlers
 //! call them, and add nothing.
 //!
-//! What is written when: [`LabelFolder`](crate::labelling::LabelFolder) appends each event to `events.jsonl`
+//! What is written when: [`LabelFolder`] appends each event to `events.jsonl`
 //! at once; `labels.npz` and `rooms.json` follow when nobody has changed the labels for ten seconds, on
 //! request, and at the end.
 

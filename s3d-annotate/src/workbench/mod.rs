@@ -1,7 +1,7 @@
 //! A mesh on the workbench: its segments, its labels, and the gestures that a person labels it with.
 //!
 //! A person points at patches, draws cuts, accepts proposals. A [`Gesture`] says so, and a [`Workbench`] makes
-//! the [`Action`](crate::labelling::Action) of it that the log keeps. The page of `s3d label` and the tests'
+//! the [`Action`] of it that the log keeps. The page of `s3d label` and the tests'
 //! simulated person use the same calls.
 //!
 //! ```
