@@ -284,6 +284,13 @@ test("rooms are accepted, split, joined, named and measured on the plan", async 
     (await state(page)).rooms.some(({ is }) => is.kind === kinds[2]),
     await said(),
   );
+  // The room keeps the focus, so that another digit is another type of it.
+  await page.locator(".room.chosen").focus();
+  for (const digit of ["1", "2"]) {
+    await page.keyboard.press(digit);
+    await settled(page);
+  }
+  assert.ok((await state(page)).rooms.some(({ is }) => is.kind === kinds[2]), await said());
   await page.locator(".room-form input").nth(1).fill("3.21");
   await page.keyboard.press("Enter");
   await settled(page);

@@ -100,7 +100,16 @@ export class Plan {
     svg.addEventListener("pointerdown", (event) => this.down(event));
     svg.addEventListener("pointermove", (event) => this.move(event));
     svg.addEventListener("pointerup", (event) => void this.up(event));
+    // Who types the type of a room goes on with the same room.
+    const focused = this.sheet.contains(document.activeElement) ? document.activeElement : null;
+    const key = focused instanceof SVGElement ? focused.dataset["key"] : undefined;
     this.sheet.replaceChildren(svg);
+    if (key !== undefined) this.focus(key);
+  }
+
+  private focus(key: string): void {
+    const rooms = [...this.svg.querySelectorAll<SVGElement>("[data-key]")];
+    rooms.find((room) => room.dataset["key"] === key)?.focus({ preventScroll: true });
   }
 
   private shape(room: Drawn, scale: number): SVGElement {
@@ -142,10 +151,7 @@ export class Plan {
     const had = this.chosen.includes(key);
     this.chosen = had ? this.chosen.filter((other) => other !== key) : [...this.chosen.slice(-1), key];
     this.tell();
-    const focused = [...this.svg.querySelectorAll<SVGElement>("[data-key]")].find(
-      (g) => g.dataset["key"] === key,
-    );
-    focused?.focus({ preventScroll: true });
+    this.focus(key);
   }
 
   private place(event: PointerEvent): Point {
