@@ -290,7 +290,10 @@ test("rooms are accepted, split, joined, named and measured on the plan", async 
     await page.keyboard.press(digit);
     await settled(page);
   }
-  assert.ok((await state(page)).rooms.some(({ is }) => is.kind === kinds[2]), await said());
+  assert.ok(
+    (await state(page)).rooms.some(({ is }) => is.kind === kinds[2]),
+    await said(),
+  );
   await page.locator(".room-form input").nth(1).fill("3.21");
   await page.keyboard.press("Enter");
   await settled(page);
