@@ -4,8 +4,8 @@ use super::Key;
 use super::names::ClassNames;
 use s3d_geom::TriMesh;
 use s3d_io::Error as FileError;
-use s3d_io::cloud::{NpyArray, NpzArchive};
-use s3d_io::fs::{open_file, read_file};
+use s3d_io::cloud::{NpyArray, NpzArchive, is_number_list, read_number_list, read_whole_numbers};
+use s3d_io::fs::open_file;
 use s3d_io::mesh::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
 use std::collections::HashMap;
 use std::io::Read;
@@ -57,19 +57,11 @@ impl List {
         if head.starts_with(b"PK\x03\x04") {
             return Self::of_archive(path, mesh, names);
         }
-        if head.starts_with(b"\x93NUMPY") {
-            // Tables of named columns are no plain arrays.
-            let Ok(mut array) = NpyArray::open(path) else { return Ok(None) };
-            if array.shape().len() != 1 {
-                return Ok(None);
-            }
-            let element = element(path, length(&array), mesh)?;
-            return Ok(Some(Self { element, class: numbers(&mut array)?, instance: None }));
-        }
-        if !is_list(&head) {
+        // Tables of named columns and of several dimensions are no lists.
+        if !is_number_list(path) {
             return Ok(None);
         }
-        let class = numbers_of_text(path)?;
+        let class = read_number_list(path)?;
         let element = element(path, class.len() as u64, mesh)?;
         Ok(Some(Self { element, class, instance: None }))
     }
@@ -111,7 +103,7 @@ impl List {
             }
             let length = length(&array);
             let element = element(array.name(), length, mesh)?;
-            Ok((length, numbers(&mut array)?, element))
+            Ok((length, read_whole_numbers(&mut array)?, element))
         };
         let (length, class, element) = column(&class)?;
         let instance = match instance {
@@ -199,58 +191,4 @@ fn element(path: &Path, count: u64, mesh: &TriMesh) -> Result<LabelElement> {
 
 fn length<R: Read>(array: &NpyArray<R>) -> u64 {
     array.shape().first().copied().unwrap_or(0)
-}
-
-/// Reads the numbers of an array. NaN is no label.
-fn numbers<R: Read>(array: &mut NpyArray<R>) -> Result<Vec<i64>> {
-    let mut whole = Vec::new();
-    if !array.is_float() {
-        while array.read_integers(&mut whole)? > 0 {}
-        return Ok(whole);
-    }
-    let mut floats = Vec::new();
-    while array.read_floats(&mut floats)? > 0 {}
-    for (place, &value) in floats.iter().enumerate() {
-        whole.push(whole_number(value).ok_or_else(|| {
-            let message = format!("number {place}, counted from 0, is {value}, which is not whole");
-            FileError::format(array.name(), message)
-        })?);
-    }
-    Ok(whole)
-}
-
-/// Whether the first two lines of a text have a number each.
-fn is_list(head: &[u8]) -> bool {
-    let mut lines = head
-        .split(|b| *b == b'\n')
-        .map(<[u8]>::trim_ascii)
-        .filter(|line| !line.is_empty());
-    let is_number = |line: &[u8]| std::str::from_utf8(line).is_ok_and(|text| text.parse::<f64>().is_ok());
-    // A text may have one line only.
-    lines.next().is_some_and(is_number) && lines.next().is_none_or(is_number)
-}
-
-fn numbers_of_text(path: &Path) -> Result<Vec<i64>> {
-    let bytes = read_file(path)?;
-    let mut numbers = Vec::new();
-    for (line, written) in (1..).zip(bytes.split(|b| *b == b'\n')) {
-        let written = written.trim_ascii();
-        if written.is_empty() {
-            continue;
-        }
-        let number = std::str::from_utf8(written).ok().and_then(|word| word.parse().ok());
-        numbers.push(number.and_then(whole_number).ok_or_else(|| {
-            let shown: String = String::from_utf8_lossy(written).chars().take(40).collect();
-            FileError::line(path, line, format!("{shown:?} is no class: a line has one whole number"))
-        })?);
-    }
-    Ok(numbers)
-}
-
-/// Returns a number that is whole. NaN is no label.
-fn whole_number(value: f64) -> Option<i64> {
-    if value.is_nan() {
-        return Some(NO_LABEL);
-    }
-    (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i64)
 }

@@ -26,6 +26,7 @@ pub(super) struct Desk {
     pub(super) scene: BareScene,
     pub(super) name: String,
     pub(super) warnings: Vec<String>,
+    total_m2: f64,
     bench: Mutex<Workbench>,
     surroundings: OnceLock<Surroundings>,
     is_structure_found: OnceLock<()>,
@@ -39,6 +40,7 @@ pub(super) struct Desk {
 impl Desk {
     pub(super) fn new(scene: BareScene, bench: Workbench, name: String, ctx: &Context) -> Self {
         Self {
+            total_m2: scene.mesh().total_area(),
             scene,
             name,
             warnings: bench.labels().warnings().to_vec(),
@@ -164,14 +166,13 @@ impl Desk {
             is: is.clone(),
         });
         let (_, unlabelled_m2) = state.unlabelled();
-        let total_m2 = self.mesh().total_area();
         let (labelled_pixels, total_pixels) = self.pixels_of(state);
         StateOf {
             revision: state.revision(),
             instances: instances.collect(),
             rooms: rooms.collect(),
-            labelled_m2: (total_m2 - unlabelled_m2).max(0.0),
-            total_m2,
+            labelled_m2: (self.total_m2 - unlabelled_m2).max(0.0),
+            total_m2: self.total_m2,
             labelled_pixels,
             total_pixels,
             can_undo: state.next_undo().is_some(),
@@ -194,10 +195,9 @@ impl Desk {
     /// # Errors
     /// Those of [`LabelFolder::write_labels`](crate::labelling::LabelFolder::write_labels).
     pub(super) fn save(&self, at_once: bool) -> Result<(), Error> {
-        let bench = self.bench();
-        let changed = *self.changed();
-        let is_due = at_once || changed.is_some_and(|changed| changed.elapsed() >= REST);
-        if is_due {
+        let is_at_rest = self.changed().is_some_and(|changed| changed.elapsed() >= REST);
+        if at_once || is_at_rest {
+            let bench = self.bench();
             bench.labels().write_labels(self.mesh())?;
             *self.changed() = None;
         }

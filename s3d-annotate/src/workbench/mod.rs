@@ -1,7 +1,7 @@
 //! A mesh on the workbench: its segments, its labels, and the gestures that a person labels it with.
 //!
-//! A person points at patches, draws cuts, accepts proposals. A [`Gesture`] says so, and a [`Workbench`] makes
-//! the [`Action`] of it that the log keeps. The page of `s3d label` and the tests'
+//! A person points at patches, draws cuts, accepts proposals. A [`Gesture`] says so, and a [`Workbench`]
+//! makes the [`Action`] of it that the log keeps. The page of `s3d label` and the tests'
 //! simulated person use the same calls.
 //!
 //! ```
@@ -83,7 +83,8 @@ pub struct Change {
 }
 
 impl Workbench {
-    /// Opens the labels of a mesh, or begins them: see [`LabelFolder::open`]. `segments` are those of the mesh.
+    /// Opens the labels of a mesh, or begins them: see [`LabelFolder::open`]. `segments` are those of the
+    /// mesh.
     ///
     /// # Errors
     /// The errors of [`LabelFolder::open`].

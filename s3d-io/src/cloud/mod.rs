@@ -81,6 +81,8 @@ pub use annotations::{
 };
 pub use frame_gap::FrameGap;
 #[cfg(feature = "labels")]
+pub use label_files::numbers::{is_number_list, read_number_list, read_whole_numbers};
+#[cfg(feature = "labels")]
 pub use label_files::saved::{EVENTS_FILE, LABELS_FILE, SavedLabels, mesh_checksum};
 #[cfg(feature = "labels")]
 pub use label_files::transfer::labels_by_place;

@@ -3,8 +3,8 @@
 //! the importers of nerfstudio-project/nerfstudio (nerfstudio/process_data/realitycapture_utils.py) and of
 //! ArthurBrussee/brush (crates/brush-dataset), and RealityCapture's support, "XMP Camera Math".
 //!
-//! Angles are degrees: a camera in OpenGL's axes is turned by roll about y, by pitch about x, and by −heading
-//! about z. `f` is the focal length for a picture whose longer side is 36; `px` and `py` are the distance of
+//! Angles are degrees: a camera in OpenGL's axes is turned by roll about y, by pitch about x, and by
+//! −heading about z. `f` is the focal length for a picture whose longer side is 36; `px` and `py` are the distance of
 //! the principal point from the middle, as shares of the longer side. The unit of the distortion is not
 //! documented, so lenses that distort are refused.
 

@@ -2,8 +2,8 @@
 //! ScanNet/ScanNet, SensReader/README.md and SensReader/c++/src/sensorData.h. BundleFusion writes the same
 //! form.
 //!
-//! All numbers are little-endian. A pose is camera → world in OpenCV's axes, 4 × 4 row by row. Measurements
-//! of motion after the frames are not read.
+//! All numbers are little-endian. A pose is camera → world in OpenCV's axes, 4 × 4 row by row.
+//! Measurements of motion after the frames are not read.
 
 use crate::camera::matterport::pose_of_matrix;
 use crate::camera::picture_file::{PictureFile, read_part};

@@ -63,7 +63,7 @@ impl LabelFile {
             "house" => Ok(Some(Self::House(path))),
             "json" => Ok(Self::of_json(&path)),
             "txt" if hm3d::is_list(&path) => Ok(Some(Self::Hm3d(path))),
-            "txt" | "npy" => Ok(numbers::is_list(&path).then_some(Self::Numbers(path))),
+            "txt" | "npy" => Ok(numbers::is_number_list(&path).then_some(Self::Numbers(path))),
             _ => Ok(MeshFormat::of(&path).map(|_| Self::Mesh(path))),
         }
     }

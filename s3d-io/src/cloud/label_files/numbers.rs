@@ -8,21 +8,20 @@ use crate::fs::encoding::text_of;
 use crate::fs::open::read_file;
 use crate::mesh::file::MeshFile;
 use crate::mesh::labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
+use std::io::Read;
 use std::path::Path;
 
-/// Returns whether a file is such a list: the first two lines of a text have a number each, or an array has
-/// one dimension and no names.
-pub(crate) fn is_list(path: &Path) -> bool {
+/// Returns whether a file is a list of numbers: the first two lines of a text have a number each, or an NPY
+/// array has one dimension and no names.
+pub fn is_number_list(path: &Path) -> bool {
     let head = head_of(path);
     if head.starts_with(b"\x93NUMPY") {
         return NpyArray::open(path).is_ok_and(|array| array.shape().len() == 1);
     }
     let text = String::from_utf8_lossy(&head);
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    let first_two = [lines.next(), lines.next()];
-    first_two
-        .iter()
-        .all(|line| line.is_some_and(|line| line.parse::<f64>().is_ok()))
+    let is_number = |line: &str| line.parse::<f64>().is_ok();
+    lines.next().is_some_and(is_number) && lines.next().is_some_and(is_number)
 }
 
 /// Reads the classes of the vertices or faces of a mesh. The length of the list says which of the two it is
@@ -32,11 +31,7 @@ pub(crate) fn is_list(path: &Path) -> bool {
 /// [`Error::Io`]; [`Error::Format`] with the place for what is no whole number, and for a list of another
 /// length.
 pub(crate) fn read(path: &Path, mesh: &MeshFile) -> Result<MeshLabels> {
-    let values = if head_of(path).starts_with(b"\x93NUMPY") {
-        numbers_of_array(path)?
-    } else {
-        numbers_of_text(path)?
-    };
+    let values = read_number_list(path)?;
     let values: Vec<i64> = values.into_iter().map(|n| if n < 0 { NO_LABEL } else { n }).collect();
 
     let vertices = mesh.mesh.positions().len();
@@ -82,25 +77,15 @@ pub(super) fn faces_of_file(mesh: &MeshFile) -> std::ops::RangeInclusive<usize> 
     seen..=seen + mesh.mesh.report().zero_area_faces + mesh.repeated_faces
 }
 
-fn numbers_of_array(path: &Path) -> Result<Vec<i64>> {
-    let mut array = NpyArray::open(path)?;
-    let mut whole = Vec::new();
-    if !array.is_float() {
-        while array.read_integers(&mut whole)? > 0 {}
-        return Ok(whole);
+/// Reads whole numbers of a list: a text of one a line, or an NPY array. A NaN is
+/// [`NO_LABEL`](crate::mesh::NO_LABEL).
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] with the place for what is no whole number.
+pub fn read_number_list(path: &Path) -> Result<Vec<i64>> {
+    if head_of(path).starts_with(b"\x93NUMPY") {
+        return read_whole_numbers(&mut NpyArray::open(path)?);
     }
-
-    let mut floats = Vec::new();
-    while array.read_floats(&mut floats)? > 0 {}
-    for (place, &value) in (0..).zip(&floats) {
-        whole.push(whole_number(value).ok_or_else(|| {
-            Error::format(path, format!("number {place}, counted from 0, is {value}, which is no class"))
-        })?);
-    }
-    Ok(whole)
-}
-
-fn numbers_of_text(path: &Path) -> Result<Vec<i64>> {
     let bytes = read_file(path)?;
     let text = text_of(&bytes, path)?;
     let mut numbers = Vec::new();
@@ -116,6 +101,30 @@ fn numbers_of_text(path: &Path) -> Result<Vec<i64>> {
         })?);
     }
     Ok(numbers)
+}
+
+/// Reads the rest of the numbers of an array, which are whole, whatever their type. A NaN is
+/// [`NO_LABEL`](crate::mesh::NO_LABEL).
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] with the place of a number that is not whole, and if the file ends before
+/// the array.
+pub fn read_whole_numbers<R: Read>(array: &mut NpyArray<R>) -> Result<Vec<i64>> {
+    let mut whole = Vec::new();
+    if !array.is_float() {
+        while array.read_integers(&mut whole)? > 0 {}
+        return Ok(whole);
+    }
+
+    let mut floats = Vec::new();
+    while array.read_floats(&mut floats)? > 0 {}
+    for (place, &value) in floats.iter().enumerate() {
+        whole.push(whole_number(value).ok_or_else(|| {
+            let message = format!("number {place}, counted from 0, is {value}, which is not whole");
+            Error::format(array.name(), message)
+        })?);
+    }
+    Ok(whole)
 }
 
 /// Returns a number that is whole. NaN is no label.
