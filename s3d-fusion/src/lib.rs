@@ -1,0 +1,9 @@
+//! Raw scans to meshes: depth pictures with poses, and laser scans whose scanner's place is known, are fused to a mesh
+//! with colours. Values in, values out: no files.
+
+// Only a caller's mistake panics, and a section "Panics" names it. Loops take their indices from checked
+// columns.
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
+)]
