@@ -58,6 +58,9 @@ pub enum ScanError {
     /// A number of the options is out of its range, or is no number.
     #[error(transparent)]
     Range(#[from] RangeError),
+    /// Another scan is in the folder.
+    #[error("{} is there and differs from the scan", .0.display())]
+    Differs(std::path::PathBuf),
     /// The caller did not want to go on.
     #[error("cancelled")]
     Cancelled,

@@ -41,6 +41,8 @@ mod scan;
 mod scene;
 pub mod scenes;
 mod sight;
+#[cfg(feature = "files")]
+mod whole;
 
 pub use building::{Building, BuildingError};
 pub use error::RangeError;

@@ -6,18 +6,14 @@ use crate::args::Threads;
 use crate::failure::{Failure, Outcome};
 use crate::values::{even_width, parsed, positive};
 use clap::{Args, value_parser};
-use s3d_dataset::error::InputError;
-use s3d_dataset::{Cancel, Context, Error, Export, ExportOptions, Result};
-use s3d_io::Error as FileError;
+use s3d_dataset::{Context, Error, Export, ExportOptions};
 use s3d_io::dataset::Layout;
-use s3d_io::fs::create_dir;
 use s3d_io::image::Compression;
 use s3d_synth::{
     AnnotatedScene, Building, BuildingError, BuildingOptions, ScanError, ScanOptions, SightOptions,
     is_area_scan, is_demo_scan,
 };
-use std::fs;
-use std::io;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use tracing::info;
 
@@ -120,28 +116,17 @@ impl Scene {
         }
     }
 
-    fn write(&self, folder: &Path, options: &ExportOptions, cancel: &Cancel) -> Result<PathBuf> {
-        let made = match self.area {
-            None => Building::demo().build().map(|scene| (scene, ScanOptions::default())),
+    /// Makes the scene, and says how it is scanned.
+    fn make(&self, options: &ExportOptions) -> Result<(AnnotatedScene, ScanOptions), BuildingError> {
+        match self.area {
+            None => Ok((Building::demo().build()?, ScanOptions::default())),
             Some(area) => generated(area, options),
-        };
-        let (scene, scan) = made.map_err(|e| unfit(folder, &e))?;
-
-        scene
-            .write_scan(folder, &scan, || !cancel.is_cancelled())
-            .map_err(|e| match e {
-                ScanError::File(e) => e.into(),
-                ScanError::Cancelled => Error::Cancelled,
-                other => unfit(folder, &other).into(),
-            })
+        }
     }
 }
 
 /// Generates an area, and returns its visible part with the options of its scan.
-fn generated(
-    area: u32,
-    options: &ExportOptions,
-) -> std::result::Result<(AnnotatedScene, ScanOptions), BuildingError> {
+fn generated(area: u32, options: &ExportOptions) -> Result<(AnnotatedScene, ScanOptions), BuildingError> {
     let building = Building::generate(&BuildingOptions::area(area, options.seed)?)?;
     let sight = SightOptions::default();
     let seen = building.build()?.seen(&sight)?;
@@ -153,10 +138,6 @@ fn generated(
         ..ScanOptions::default()
     };
     Ok((seen, scan))
-}
-
-fn unfit(folder: &Path, why: &impl ToString) -> InputError {
-    InputError::Unfit { path: folder.to_owned(), why: why.to_string() }
 }
 
 pub(crate) fn run(args: DemoArgs) -> Outcome<()> {
@@ -211,75 +192,27 @@ fn make(
         }
     }
 
-    let part = output.join(SCAN_PART);
     for scene in scenes {
-        put(scene, &part, options, overwrite, context)?;
+        context.check()?;
+        let unfit = |e: &dyn Display| Failure::Input(format!("{}: {e}", scene.folder.display()));
+        let (made, scan) = scene.make(options).map_err(|e| unfit(&e))?;
+        made.put_scan(&scene.folder, &output.join(SCAN_PART), &scan, overwrite, || {
+            !context.cancel.is_cancelled()
+        })
+        .map_err(|e| match e {
+            ScanError::File(e) => e.into(),
+            ScanError::Cancelled => Error::Cancelled.into(),
+            ScanError::Differs(folder) => Failure::Usage(format!(
+                "{} is there and differs from {}: choose another folder, or replace it with --overwrite",
+                folder.display(),
+                scene.name()
+            )),
+            other => unfit(&other),
+        })?;
         info!("{} is in {}", scene.name(), scene.folder.display());
     }
     export.run(output, context)?;
     Ok(())
-}
-
-/// Writes the scene to `part`, then moves it to its folder. A scene that is in the folder already, from a
-/// demo that was stopped, stays if it is the same to the byte. If it differs, somebody may have changed it,
-/// and only `overwrite` replaces it.
-fn put(
-    scene: &Scene,
-    part: &Path,
-    options: &ExportOptions,
-    overwrite: bool,
-    context: &Context,
-) -> Outcome<()> {
-    let folder = &scene.folder;
-    let cancel = &context.cancel;
-    context.check()?;
-    remove(part)?;
-    scene.write(part, options, cancel)?;
-
-    if !folder.exists() {
-        if let Some(parent) = folder.parent() {
-            create_dir(parent)?;
-        }
-        return Ok(fs::rename(part, folder).map_err(|e| FileError::io(folder, "move the scene to", e))?);
-    }
-
-    let is_same = same(part, folder).map_err(|e| FileError::io(folder, "read", e))?;
-    remove(part)?;
-    if is_same {
-        return Ok(());
-    }
-    if !overwrite {
-        return Err(Failure::Usage(format!(
-            "{} is there and differs from {}: choose another folder, or replace it with --overwrite",
-            folder.display(),
-            scene.name()
-        )));
-    }
-
-    // Other files in the folder stay.
-    scene.write(folder, options, cancel)?;
-    Ok(())
-}
-
-/// Whether every file and folder of `a` is in `b` with the same bytes.
-fn same(a: &Path, b: &Path) -> io::Result<bool> {
-    if !a.is_dir() {
-        return Ok(b.is_file() && fs::read(a)? == fs::read(b)?);
-    }
-    for entry in fs::read_dir(a)? {
-        let entry = entry?;
-        if !same(&entry.path(), &b.join(entry.file_name()))? {
-            return Ok(false);
-        }
-    }
-    Ok(true)
-}
-
-fn remove(folder: &Path) -> Result<()> {
-    match fs::remove_dir_all(folder) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(FileError::io(folder, "remove", e).into()),
-        _ => Ok(()),
-    }
 }
 
 #[cfg(test)]
