@@ -3,7 +3,8 @@
 use crate::commands::scores::{detect, eval};
 use crate::commands::shards::{merge, plan};
 use crate::commands::{
-    compare, demo, export, info, label, pack, profile, render, report, sample, segments, stats, verify, xyz,
+    compare, demo, export, fuse, info, label, pack, profile, render, report, sample, segments, stats, verify,
+    xyz,
 };
 use crate::console::LogFormat;
 use crate::failure::Outcome;
@@ -77,6 +78,16 @@ pub(crate) enum Command {
         )
     )]
     Export(export::ExportArgs),
+    /// Fuse a raw scan, depth pictures or laser scans, to a mesh. `s3d export` takes raw scans too.
+    #[command(
+        after_help = concat!(
+            "Examples:\n",
+            "  s3d fuse scan.e57 -o mesh.ply\n",
+            "  s3d fuse keyframes -o scan --close 0.3\n",
+            "  s3d fuse kitchen.las --origin 1.2,3.4,1.5 -o mesh.glb --cell 0.02",
+        )
+    )]
+    Fuse(fuse::FuseArgs),
     /// Label scenes and score their views ahead of an export that many machines share.
     #[command(
         after_help = concat!(
@@ -240,6 +251,7 @@ impl Command {
         match self {
             Self::Demo(_)
             | Self::Export(_)
+            | Self::Fuse(_)
             | Self::Plan(_)
             | Self::Merge(_)
             | Self::Sample(_)
@@ -261,6 +273,7 @@ impl Command {
         match self {
             Self::Demo(args) => demo::run(args),
             Self::Export(args) => export::run(args),
+            Self::Fuse(args) => fuse::run(args),
             Self::Plan(args) => plan::run(args),
             Self::Merge(args) => merge::run(args),
             Self::Sample(args) => sample::run(args),

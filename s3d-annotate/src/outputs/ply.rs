@@ -6,9 +6,8 @@ use s3d_dataset::error::UsageError;
 use s3d_dataset::store::NewFile;
 use s3d_dataset::{Context, Result};
 use s3d_geom::glam::DVec3;
-use s3d_io::fs::write_whole;
+use s3d_io::mesh::{FaceColumn, MeshOut, write_ply_mesh};
 use std::collections::{BTreeMap, HashMap};
-use std::io::{self, Write};
 use std::path::Path;
 
 /// The names of more instances than these are not in the header, whose size readers limit.
@@ -62,63 +61,26 @@ impl Labelled<'_> {
         rows: Option<&[[i32; 3]]>,
         comments: &[String],
     ) -> Result<()> {
-        write_whole(path, |w| self.write_mesh_to(w, rows, comments))?;
-        Ok(())
-    }
-
-    fn write_mesh_to(
-        &self,
-        w: &mut dyn Write,
-        rows: Option<&[[i32; 3]]>,
-        comments: &[String],
-    ) -> io::Result<()> {
-        let mesh = self.mesh;
-        let colors = vertex_colors(mesh);
-        writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment made by s3d label")?;
+        let mut lines = vec!["made by s3d label".to_owned()];
         let offset_m = self.options.offset_m;
         if offset_m != DVec3::ZERO {
             let [x, y, z] = offset_m.to_array();
-            writeln!(w, "comment offset_m {x:?} {y:?} {z:?}: add it for the scan's own coordinates")?;
+            lines.push(format!("offset_m {x:?} {y:?} {z:?}: add it for the scan's own coordinates"));
         }
-        for comment in comments {
-            // A comment is a line of ASCII.
-            let line: String = comment
-                .chars()
-                .map(|c| if matches!(c, ' '..='~') { c } else { '?' })
-                .collect();
-            writeln!(w, "comment {line}")?;
-        }
-        writeln!(w, "element vertex {}", mesh.positions().len())?;
-        ["x", "y", "z"]
-            .iter()
-            .try_for_each(|name| writeln!(w, "property float {name}"))?;
-        if colors.is_some() {
-            let names = ["red", "green", "blue"];
-            names.iter().try_for_each(|name| writeln!(w, "property uchar {name}"))?;
-        }
-        writeln!(w, "element face {}\nproperty list uchar int vertex_indices", mesh.faces().len())?;
-        if rows.is_some() {
-            COLUMNS.iter().try_for_each(|name| writeln!(w, "property int {name}"))?;
-        }
-        writeln!(w, "end_header")?;
+        lines.extend_from_slice(comments);
 
-        let mut colors = colors.iter().flatten();
-        for position in mesh.positions() {
-            for coordinate in position.to_array() {
-                w.write_all(&coordinate.to_le_bytes())?;
-            }
-            if let Some(color) = colors.next() {
-                w.write_all(color)?;
-            }
-        }
-        let mut rows = rows.into_iter().flatten();
-        for face in mesh.faces() {
-            w.write_all(&[3])?;
-            face.iter().try_for_each(|corner| w.write_all(&corner.to_le_bytes()))?;
-            if let Some(row) = rows.next() {
-                row.iter().try_for_each(|number| w.write_all(&number.to_le_bytes()))?;
-            }
-        }
+        let values = rows.map(|rows| [0, 1, 2].map(|k| rows.iter().map(|row| row[k]).collect::<Vec<i32>>()));
+        let columns = values.iter().flatten().zip(COLUMNS);
+        let columns: Vec<FaceColumn<'_>> =
+            columns.map(|(values, name)| FaceColumn { name, values }).collect();
+        let mesh = MeshOut {
+            positions: self.mesh.positions(),
+            faces: self.mesh.faces(),
+            colors: &vertex_colors(self.mesh).unwrap_or_default(),
+            columns: &columns,
+            comments: &lines,
+        };
+        write_ply_mesh(path, &mesh)?;
         Ok(())
     }
 

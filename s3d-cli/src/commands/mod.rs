@@ -3,6 +3,7 @@
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod export;
+pub(crate) mod fuse;
 pub(crate) mod info;
 pub(crate) mod label;
 pub(crate) mod pack;

@@ -18,7 +18,8 @@
 //! KTX2 are refused with a message that names a way out.
 //!
 //! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set into a folder; [`RgbObj`] and
-//! [`SemanticObj`] write them into any writer. Source: [`crate::formats`], "Meshes".
+//! [`SemanticObj`] write them into any writer. [`write_ply_mesh`] and [`write_glb_mesh`] write a mesh of
+//! coloured vertices. Source: [`crate::formats`], "Meshes".
 //!
 //! ```
 //! use s3d_io::mesh::{UpAxis, read_mesh};
@@ -51,6 +52,8 @@ pub(crate) mod ply;
 pub(crate) mod read;
 #[cfg(feature = "mesh")]
 mod told_offset;
+#[cfg(any(feature = "gltf", feature = "ply"))]
+mod write;
 
 #[cfg(feature = "mesh")]
 pub use file::{LengthUnit, MeshFile, MeshOptions, MeshSource, UpAxis};
@@ -66,3 +69,9 @@ pub use origin::MeshOrigin;
 pub use read::{MeshFormat, read_mesh, read_mesh_from, read_mesh_with};
 #[cfg(feature = "mesh")]
 pub use told_offset::ToldOffset;
+#[cfg(feature = "gltf")]
+pub use write::write_glb_mesh;
+#[cfg(feature = "ply")]
+pub use write::write_ply_mesh;
+#[cfg(any(feature = "gltf", feature = "ply"))]
+pub use write::{FaceColumn, MeshOut};

@@ -9,6 +9,7 @@ use crate::scene::cameras::{CameraSource, CamerasTable, similarity};
 use crate::scene::file::{MeshColors, SceneFile};
 use crate::scene::folder::SceneFolder;
 use crate::scene::frames::FramesTable;
+use crate::scene::fuse::{FuseKeys, FusePaths, FuseSource};
 use crate::scene::other_kind::{SCENE, other_kind};
 use crate::scene::rgb::{PictureKind, PictureSource, RgbEntry};
 use crate::scene::taxonomy::TaxonomyEntry;
@@ -44,6 +45,11 @@ struct PublishedTable {
 struct MeshTable {
     path: Option<PathBuf>,
     paths: Option<Vec<PathBuf>>,
+    fuse: Option<FusePaths>,
+    cell_m: Option<f64>,
+    max_error_m: Option<f64>,
+    range_m: Option<f64>,
+    close_m: Option<f64>,
     up: Option<UpAxis>,
     units: Option<LengthUnit>,
     offset_m: Option<[f64; 3]>,
@@ -58,7 +64,7 @@ struct MeshTable {
 /// ```toml
 /// area = 1
 /// [mesh]
-/// path = "rgb.obj"    # or paths = ["floor_1.ply", "floor_2.ply"]
+/// path = "rgb.obj"    # or paths = ["floor_1.ply", "floor_2.ply"], or fuse = "scan.e57": see `FuseSource`
 /// up   = "y"          # or "z"; left out: "y"
 /// units = "cm"        # or "m", "mm", "ft", "in"; left out: what the mesh's file says, or metres
 /// # Subtracted from positions; left out: chosen if the mesh is far from 0.
@@ -176,7 +182,11 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
 
     if scene.published.is_none() {
         let mesh = document.mesh.ok_or_else(|| folder.fault("missing field `mesh`"))?;
-        scene.mesh = mesh.files(folder)?;
+        scene.fuse = mesh.fuse_keys().source(path, folder)?;
+        scene.mesh = match &scene.fuse {
+            Some(fuse) => mesh.fused(fuse, folder)?,
+            None => mesh.files(folder)?,
+        };
         if let Some(table) = &document.annotations {
             add_annotations(table, &mut scene, folder)?;
         }
@@ -212,6 +222,25 @@ impl MeshTable {
         }
     }
 
+    fn fuse_keys(&self) -> FuseKeys<'_> {
+        let Self { up, cell_m, max_error_m, range_m, close_m, .. } = *self;
+        FuseKeys { fuse: self.fuse.as_ref(), up, cell_m, max_error_m, range_m, close_m }
+    }
+
+    /// Returns the mesh that `fuse` makes, which stands in the world of the scan.
+    fn fused(&self, fuse: &FuseSource, folder: SceneFolder<'_>) -> Result<Vec<PathBuf>> {
+        let others = [
+            ("path", self.path.is_some()),
+            ("paths", self.paths.is_some()),
+            ("units", self.units.is_some()),
+            ("outside_files", self.outside_files),
+        ];
+        match others.iter().find(|(_, is_given)| *is_given) {
+            Some((key, _)) => Err(folder.fault(format!("mesh.fuse makes the mesh: leave out mesh.{key}"))),
+            None => Ok(vec![fuse.mesh()]),
+        }
+    }
+
     /// Adds everything but the files. The annotations of `scene` are known.
     fn add_to(&self, scene: &mut SceneFile, folder: SceneFolder<'_>) -> Result<()> {
         scene.mesh_offset_m = self.offset_m.map(DVec3::from_array);
@@ -224,7 +253,8 @@ impl MeshTable {
                 folder.fault("mesh.colors = \"points\" needs the path of a cloud under [annotations]")
             );
         }
-        scene.up = self.up.unwrap_or(UpAxis::Y);
+        let up = if scene.fuse.is_some() { Some(UpAxis::Z) } else { self.up };
+        scene.up = up.unwrap_or(UpAxis::Y);
         scene.units = self.units;
         scene.outside_files = self.outside_files;
         Ok(())

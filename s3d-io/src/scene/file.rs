@@ -4,6 +4,7 @@ use crate::cloud::annotations::AnnotationOptions;
 use crate::mesh::file::{LengthUnit, UpAxis};
 use crate::scene::cameras::CameraSource;
 use crate::scene::frames::FrameSource;
+use crate::scene::fuse::FuseSource;
 use crate::scene::rgb::PictureSource;
 use s3d_geom::glam::{DAffine3, DVec3};
 use s3d_label::Taxonomy;
@@ -26,6 +27,8 @@ pub struct SceneFile {
     pub world_from_published: DAffine3,
     /// The files of the textured mesh, at least one. Several are joined in this order.
     pub mesh: Vec<PathBuf>,
+    /// The raw scan that the mesh is fused from. `mesh` is then its [`FuseSource::mesh`], which need not exist.
+    pub fuse: Option<FuseSource>,
     /// The axis of the mesh that points up. The default is +Y, which glTF defines and the published OBJ files
     /// use.
     pub up: UpAxis,
@@ -86,6 +89,7 @@ impl SceneFile {
             published: None,
             world_from_published: DAffine3::IDENTITY,
             mesh,
+            fuse: None,
             up,
             units: None,
             outside_files: false,

@@ -27,7 +27,12 @@ fn read(text: &str) -> Result<SceneFile> {
     if scene.published.is_some() {
         return Ok(scene);
     }
-    assert_eq!(scene.mesh[0], dir.path().join("a.obj"));
+    let mesh = if scene.fuse.is_some() {
+        "scene.fused/mesh.ply"
+    } else {
+        "a.obj"
+    };
+    assert_eq!(scene.mesh[0], dir.path().join(mesh));
     assert!(
         scene
             .annotations
@@ -349,4 +354,27 @@ fn every_fault_is_named() {
         assert!(message.contains(words) && message.contains("scene.toml"), "{to}: {message}");
     }
     assert!(matches!(read_scene(Path::new("gone.toml")), Err(Error::Io { .. })));
+}
+
+#[test]
+fn a_mesh_is_fused_from_a_raw_scan() {
+    let with = |keys: &str| read(&GOOD.replace("path = \"a.obj\"", keys));
+    let scene = with("fuse = \"c.csv\"\ncell_m = 0.02\nclose_m = 0.3").unwrap();
+    let fuse = scene.fuse.unwrap();
+    assert!(fuse.inputs[0].ends_with("c.csv") && fuse.folder.ends_with("scene.fused"));
+    assert_eq!((scene.mesh, scene.up), (vec![fuse.mesh()], UpAxis::Z));
+    let lengths = [fuse.cell_m, fuse.close_m, fuse.max_error_m, fuse.range_m];
+    assert_eq!(lengths, [Some(0.02), Some(0.3), None, None]);
+
+    for (keys, words) in [
+        ("fuse = []", "at least one path"),
+        ("fuse = \"gone.e57\"", "mesh.fuse = \"gone.e57\""),
+        ("fuse = \"c.csv\"\npath = \"a.obj\"", "leave out mesh.path"),
+        ("fuse = \"c.csv\"\nunits = \"cm\"", "leave out mesh.units"),
+        ("fuse = \"c.csv\"\ncell_m = 0", "mesh.cell_m = 0 must be metres"),
+        ("path = \"a.obj\"\ncell_m = 0.01", "a key beside mesh.fuse"),
+    ] {
+        let message = with(keys).unwrap_err().to_string();
+        assert!(message.contains(words) && message.contains("scene.toml"), "{keys}: {message}");
+    }
 }

@@ -268,7 +268,7 @@ pub(crate) fn srgb_from_linear(light: f32) -> u8 {
 }
 
 /// Decodes an sRGB byte to light from 0 to 1.
-fn linear_from_srgb(byte: u8) -> f32 {
+pub(crate) fn linear_from_srgb(byte: u8) -> f32 {
     let encoded = f64::from(byte) / 255.0;
     (if encoded <= 0.040_45 {
         encoded / 12.92

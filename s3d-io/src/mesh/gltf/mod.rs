@@ -14,3 +14,5 @@ mod scene;
 mod tolerant;
 mod uri;
 mod words;
+
+pub(crate) use material::linear_from_srgb;

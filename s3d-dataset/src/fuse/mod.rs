@@ -1,0 +1,120 @@
+//! A raw scan becomes a mesh, and the scene file that an export takes.
+//!
+//! [`fuse`] reads depth pictures or laser scans (`images`), gathers them in a grid, in tiles if that does not
+//! fit into the memory, and simplifies the surface (`surface`). A folder holds the mesh, a scene file that
+//! names what else the scan brings (`scene_text`), and a record of what it was made from (`kept`). Exports of
+//! a raw scan keep such a folder beside it.
+
+mod images;
+mod kept;
+mod options;
+mod scene_text;
+mod surface;
+
+pub(crate) use kept::fused_scene;
+pub use options::FuseOptions;
+
+use crate::context::Context;
+use crate::error::{Error, Result, UsageError};
+use crate::store::new_folder::FolderKind;
+use crate::store::{NewFile, NewFolder};
+use images::Images;
+use kept::Record;
+use s3d_io::fs::{write_bytes, write_json};
+use s3d_io::mesh::{FaceColumn, MeshOut, write_glb_mesh, write_ply_mesh};
+use std::path::{Path, PathBuf};
+use surface::{Made, surface};
+
+/// A folder with a fused mesh.
+const FUSED: FolderKind =
+    FolderKind { about: "fused.json", generator: "s3d fuse", noun: "the fused mesh", action: "write" };
+
+/// What was fused.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fused {
+    /// The number of depth pictures, or of laser scans.
+    pub images: usize,
+    /// The number of faces of the fused surface.
+    pub fused_faces: usize,
+    /// The number of faces of the mesh.
+    pub faces: usize,
+    /// The largest distance of the fused surface from the mesh, metres.
+    pub max_error_m: f64,
+    /// The number of holes that were closed.
+    pub closed: usize,
+}
+
+/// Fuses the files and folders of a raw scan to a mesh.
+///
+/// `output` is a mesh (`.ply`, Z-up, or `.glb`), or else a folder, which gets `mesh.ply`, and a `scene.toml`
+/// that an export takes: it names the scan's photographs and places too.
+///
+/// # Errors
+/// [`Error::File`] and [`Error::Input`] for a raw scan that cannot be used. [`Error::Usage`] if `output` exists
+/// and is not to be replaced. [`Error::Cancelled`].
+pub fn fuse(
+    inputs: &[PathBuf],
+    output: &Path,
+    options: &FuseOptions,
+    overwrite: bool,
+    ctx: &Context,
+) -> Result<Fused> {
+    let ending = output.extension().map(|ending| ending.to_ascii_lowercase());
+    let is_glb = ending.as_ref().is_some_and(|ending| ending == "glb");
+    if !is_glb && !ending.as_ref().is_some_and(|ending| ending == "ply") {
+        if output.extension().is_some() && !output.is_dir() {
+            let why = "a fused mesh is a .ply or a .glb; a name without an ending is a folder";
+            return Err(UsageError::WrongEnding { path: output.to_owned(), why }.into());
+        }
+        return fuse_folder(inputs, output, options, overwrite, ctx);
+    }
+
+    NewFile::check_free(output, overwrite)?;
+    let images = Images::open(inputs, options, ctx)?;
+    let made = surface(&images, options, ctx)?;
+    let file = NewFile::begin(ctx, output, overwrite)?;
+    write(file.path(), &made, &images, is_glb)?;
+    file.finish()?;
+    Ok(made.told(ctx, output))
+}
+
+/// Fuses a raw scan to a folder.
+fn fuse_folder(
+    inputs: &[PathBuf],
+    output: &Path,
+    options: &FuseOptions,
+    overwrite: bool,
+    ctx: &Context,
+) -> Result<Fused> {
+    let Some(first) = inputs.first() else { return Err(Error::unfit(output, "no raw scan is named")) };
+    // What the files are now is what the mesh is made of.
+    let record = Record::of(inputs, options)?;
+    let folder = NewFolder::begin(ctx, output, first, FUSED, overwrite)?;
+    let images = Images::open(inputs, options, ctx)?;
+    let made = surface(&images, options, ctx)?;
+
+    write(&folder.path().join("mesh.ply"), &made, &images, false)?;
+    let scene = scene_text::scene(&images, output)?;
+    if let Some(locations) = &scene.locations {
+        write_bytes(&folder.path().join(scene_text::LOCATIONS), locations.as_bytes())?;
+    }
+    write_bytes(&folder.path().join("scene.toml"), scene.toml.as_bytes())?;
+    write_json(&folder.path().join(FUSED.about), &record)?;
+    folder.finish()?;
+    Ok(made.told(ctx, output))
+}
+
+fn write(path: &Path, made: &Made, images: &Images, is_glb: bool) -> Result<()> {
+    let closed = [FaceColumn { name: "closed", values: &made.closed }];
+    let mut comments = vec!["fused from a raw scan by s3d fuse".to_owned()];
+    comments.extend(images.offset_comment());
+    let mesh = MeshOut {
+        positions: &made.positions,
+        faces: &made.faces,
+        colors: &made.colors,
+        columns: if made.closed.is_empty() { &[] } else { &closed },
+        comments: &comments,
+    };
+    if is_glb { write_glb_mesh(path, &mesh) } else { write_ply_mesh(path, &mesh) }?;
+    Ok(())
+}

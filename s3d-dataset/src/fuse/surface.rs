@@ -1,0 +1,143 @@
+//! The surface of a raw scan: gathered in a grid, simplified, and closed where that was asked for.
+
+use super::images::{Images, Seen};
+use super::{FuseOptions, Fused};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use glam::Vec3;
+use s3d_fusion::{
+    CloseOptions, DecimateOptions, FusedMesh, Fusion, FusionError, FusionOptions, MeshColumns, SensorNoise, Surface, Tile,
+    close_holes, decimate,
+};
+use std::path::Path;
+
+/// A mesh of less surface than this is no room, square metres.
+const LEAST_ROOM_M2: f64 = 4.0;
+
+/// A mesh that was made of a raw scan.
+pub(super) struct Made {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) faces: Vec<[u32; 3]>,
+    pub(super) colors: Vec<[u8; 3]>,
+    /// 1 for each face that closes a hole; empty if nothing was to be closed.
+    pub(super) closed: Vec<i32>,
+    about: Fused,
+}
+
+impl Made {
+    /// Says what was made.
+    pub(super) fn told(self, ctx: &Context, output: &Path) -> Fused {
+        let Fused { images, fused_faces, faces, max_error_m, closed } = self.about;
+        ctx.info(format_args!(
+            "{}: {faces} faces of {fused_faces}, which lie within {:.1} mm of them, from {images} {}",
+            output.display(),
+            max_error_m * 1e3,
+            if images == 1 { "image" } else { "images" },
+        ));
+        if !self.closed.is_empty() {
+            ctx.info(format_args!("{closed} holes were closed along their plane"));
+        }
+        self.about
+    }
+}
+
+/// Makes the mesh of images.
+pub(super) fn surface(images: &Images, options: &FuseOptions, ctx: &Context) -> Result<Made> {
+    let unfit = |e: &dyn std::fmt::Display| Error::unfit(images.path(), e.to_string());
+    let fused = gather(images, options, ctx)?;
+    let fused_faces = fused.faces.len();
+    let about = Fused { images: images.len(), fused_faces, faces: fused_faces, max_error_m: 0.0, closed: 0 };
+    let FusedMesh { positions, faces, colors, .. } = fused;
+    let mut made = Made { positions, faces, colors, closed: Vec::new(), about };
+
+    if options.max_error_m > 0.0 {
+        ctx.check()?;
+        let task = ctx.progress("simplifying", "meshes", 1);
+        let columns = MeshColumns { positions: &made.positions, faces: &made.faces, colors: &made.colors };
+        let limits = DecimateOptions {
+            max_error_m: options.max_error_m as f32,
+            target_faces: options.faces.map(|faces| faces as usize),
+            ..DecimateOptions::default()
+        };
+        let small = decimate(&columns, &limits).map_err(|e| unfit(&e))?;
+        (made.positions, made.faces, made.colors) = (small.positions, small.faces, small.colors);
+        made.about.max_error_m = small.max_error_m;
+        task.add(1);
+    }
+
+    if let Some(close_m) = options.close_m {
+        ctx.check()?;
+        let columns = MeshColumns { positions: &made.positions, faces: &made.faces, colors: &made.colors };
+        let limits = CloseOptions { max_m: close_m as f32, ..CloseOptions::default() };
+        let closed = close_holes(&columns, &limits).map_err(|e| unfit(&e))?;
+        made.closed = closed.is_new.iter().map(|is_new| i32::from(*is_new)).collect();
+        (made.positions, made.faces, made.colors) = (closed.positions, closed.faces, closed.colors);
+        made.about.closed = closed.holes;
+    }
+    made.about.faces = made.faces.len();
+
+    let area_m2 = area(&made);
+    if area_m2 < LEAST_ROOM_M2 {
+        ctx.warn(format_args!(
+            "{}: the mesh has {area_m2:.2} m²: a scan of an object, or coordinates that are no metres?",
+            images.path().display()
+        ));
+    }
+    Ok(made)
+}
+
+/// The area of a mesh, square metres.
+fn area(made: &Made) -> f64 {
+    let corner = |vertex: u32| made.positions[vertex as usize].as_dvec3();
+    let twice = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(corner);
+        (b - a).cross(c - a).length()
+    };
+    made.faces.iter().map(twice).sum::<f64>() / 2.0
+}
+
+/// Gathers all images in one grid, or in the grids of tiles if one does not fit.
+fn gather(images: &Images, options: &FuseOptions, ctx: &Context) -> Result<FusedMesh> {
+    let of = |e: FusionError| Error::unfit(images.path(), e.to_string());
+    let fusion_options = FusionOptions { cell_m: options.cell_m, ..FusionOptions::default() };
+    let least_piece_m2 = fusion_options.least_piece_m2();
+
+    let whole = Fusion::new(fusion_options.clone()).map_err(of)?;
+    let most_bytes = (options.memory_gib * f64::from(1 << 30)) as u64;
+    if let Some(whole) = fill(whole, images, most_bytes, ctx)? {
+        return whole.mesh().map_err(of);
+    }
+
+    let mut tiles = images.tile(&fusion_options, ctx)?.halves().to_vec();
+    ctx.info(format_args!("the grid takes more than {} GiB: it is fused in tiles", options.memory_gib));
+    let mut surfaces = Vec::new();
+    while let Some(tile) = tiles.pop() {
+        let grid = Fusion::within(fusion_options.clone(), tile).map_err(of)?;
+        match fill(grid, images, most_bytes, ctx)? {
+            Some(grid) => surfaces.push(grid.surface()),
+            None if tile.is_single() => {
+                return Err(Error::unfit(images.path(), "one block does not fit into the memory that is allowed"));
+            }
+            None => tiles.extend(tile.halves()),
+        }
+    }
+    let surface = Surface::join(surfaces).map_err(of)?;
+    surface.into_mesh(least_piece_m2).map_err(of)
+}
+
+/// Adds all images to a grid. Returns `None` if it becomes too large.
+fn fill(mut grid: Fusion, images: &Images, most_bytes: u64, ctx: &Context) -> Result<Option<Fusion>> {
+    let task = ctx.progress("fusing", images.unit(), images.len() as u64);
+    let mut fits = true;
+    images.each(ctx, |seen, of| {
+        let added = match seen {
+            Seen::Image(image) => grid.add(&image),
+            Seen::Rays(rays) => grid.add_rays(&rays.origins, &rays.points, &rays.colors, SensorNoise::LASER),
+        };
+        added.map_err(|e| Error::unfit(of, e.to_string()))?;
+        task.add(1);
+        fits = grid.bytes() <= most_bytes;
+        Ok(fits)
+    })?;
+    Ok(fits.then_some(grid))
+}
