@@ -1,0 +1,1 @@
+//! A sparse grid of blocks of voxels.
