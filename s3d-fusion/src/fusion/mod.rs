@@ -1,8 +1,15 @@
 //! Ranges are gathered in a grid of signed distances.
 
+mod images;
+mod pyramid;
+mod view;
+mod walk;
+
 use crate::extract::{FusedMesh, Surface};
+use crate::grid::{FARTHEST, Grid, Place, SIDE};
 use crate::{FusionError, RangeImage, SensorNoise};
-use s3d_geom::glam::Vec3;
+use images::Adding;
+use s3d_geom::glam::{DVec3, Vec3};
 
 /// How ranges are fused.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,10 +37,80 @@ pub struct Tile {
     pub to: [i32; 3],
 }
 
+impl Tile {
+    /// Whether the grid of a tile needs a block: it is in the tile, or its voxels are corners of cells of the tile.
+    fn holds(&self, block: Place) -> bool {
+        (0..3).all(|k| (self.from[k]..=self.to[k]).contains(&block[k]))
+    }
+}
+
+/// Lengths of a grid, metres.
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    cell: f64,
+    /// The truncation before surfaces.
+    front: f64,
+}
+
+impl Scale {
+    /// The side of a block.
+    fn block(&self) -> f64 {
+        self.cell * f64::from(SIDE)
+    }
+
+    /// The block of a point; `None` if it is too far away.
+    fn block_of(&self, point: DVec3) -> Option<Place> {
+        let place = (point / self.block()).floor();
+        let is_near = place.abs().max_element() < f64::from(FARTHEST - 8);
+        is_near.then(|| place.as_ivec3().to_array())
+    }
+
+    /// How far behind a surface its distance is gathered. The corners of a cell that the surface crosses are at most √3
+    /// cells behind it, and noise must not make a side.
+    fn behind(&self, sigma_m: f32) -> f32 {
+        (2.0 * self.cell as f32 + 2.0 * sigma_m).min(self.front as f32)
+    }
+
+    /// How far before and behind a hit, along the ray, distances are gathered at most.
+    fn most_along(&self) -> f64 {
+        4.0 * self.front
+    }
+
+    /// How far before and behind a hit, along its ray, distances are gathered if the ray meets the surface at this
+    /// cosine.
+    fn along_ray(&self, cosine: f32, sigma_m: f32) -> [f64; 2] {
+        let lengths = [self.front, f64::from(self.behind(sigma_m))];
+        lengths.map(|length| (length / f64::from(cosine)).min(self.most_along()))
+    }
+
+    /// The weight of a distance to the plane of a hit; `None` if it counts nothing. `before` is how far before the hit
+    /// the voxel is along its ray.
+    ///
+    /// Near the hit it is 1. It falls with the distance from the hit, so the nearest surface decides in corners, and it
+    /// ends behind the surface, so both sides of thin things stay apart.
+    #[inline(always)]
+    fn weight(&self, distance: f32, before: f32, sigma_m: f32) -> Option<f32> {
+        let cell = self.cell as f32;
+        let behind = self.behind(sigma_m);
+        if distance <= -behind {
+            return None;
+        }
+        let near = before / (1.5 * cell);
+        let side = (distance + behind) / (behind - 0.5 * cell - sigma_m).max(0.5 * cell);
+        let side = side.min(1.0);
+        Some(side * side / (1.0 + near * near))
+    }
+}
+
 /// Ranges become a mesh: truncated signed distances on a sparse grid of voxels.
 #[derive(Debug)]
 pub struct Fusion {
     options: FusionOptions,
+    scale: Scale,
+    tile: Option<Tile>,
+    grid: Grid,
+    /// The number of images and calls with rays so far.
+    added: u32,
 }
 
 impl Fusion {
@@ -42,23 +119,41 @@ impl Fusion {
     /// # Errors
     /// [`FusionError::Option`].
     pub fn new(options: FusionOptions) -> Result<Self, FusionError> {
-        Ok(Self { options })
+        let check = |what, value: f64, least: f64, most: f64| {
+            let is_within = (least..=most).contains(&value);
+            is_within
+                .then_some(())
+                .ok_or(FusionError::Option { what, value, least, most })
+        };
+        check("the size of a cell in metres", options.cell_m, 0.001, 1.0)?;
+        check("the truncation in cells", options.truncation_cells, 2.5, 16.0)?;
+        check("the smallest piece in cells", options.least_piece_cells, 0.0, 1e6)?;
+
+        let scale = Scale { cell: options.cell_m, front: options.cell_m * options.truncation_cells };
+        Ok(Self { options, scale, tile: None, grid: Grid::default(), added: 0 })
     }
 
     /// Makes an empty grid that is limited to a box of blocks. [`Surface::join`] makes one surface of many tiles.
     ///
     /// # Errors
     /// [`FusionError::Option`], [`FusionError::Tile`].
-    pub fn within(_options: FusionOptions, _tile: Tile) -> Result<Self, FusionError> {
-        todo!()
+    pub fn within(options: FusionOptions, tile: Tile) -> Result<Self, FusionError> {
+        let Tile { from, to } = tile;
+        let is_box = (0..3).all(|k| from[k] < to[k] && from[k].abs() < FARTHEST && to[k].abs() < FARTHEST);
+        if !is_box {
+            return Err(FusionError::Tile { from, to });
+        }
+        Ok(Self { tile: Some(tile), ..Self::new(options)? })
     }
 
     /// Adds what a sensor saw from one place.
     ///
     /// # Errors
     /// [`FusionError::TooFar`].
-    pub fn add(&mut self, _image: &RangeImage) -> Result<(), FusionError> {
-        todo!()
+    pub fn add(&mut self, image: &RangeImage) -> Result<(), FusionError> {
+        let adding = Adding { image, scale: self.scale, tile: self.tile, number: self.added };
+        self.added += 1;
+        adding.add_to(&mut self.grid)
     }
 
     /// Adds rays with an origin each, as mobile scanners measure them, in world metres. `colors` is empty or has one
@@ -78,17 +173,18 @@ impl Fusion {
 
     /// Returns the number of bytes that blocks and their directory take.
     pub fn bytes(&self) -> u64 {
-        todo!()
+        self.grid.bytes()
     }
 
     /// Returns the number of blocks.
     pub fn blocks(&self) -> usize {
-        todo!()
+        self.grid.blocks.len()
     }
 
     /// Returns the surface of the grid, to be joined with those of other tiles.
     pub fn surface(&self) -> Surface {
-        todo!()
+        let tile = self.tile.map(|t| [t.from, t.to]);
+        Surface::of_grid(&self.grid, self.scale.cell, self.scale.front, tile)
     }
 
     /// Returns the mesh.

@@ -123,6 +123,17 @@ impl AngleGrid {
         Some([self.columns.index(azimuth_rad)?, self.rows.index(elevation_rad)?])
     }
 
+    /// Returns the first and last columns of a range of azimuths, or `None` if they are not neighbours.
+    pub(crate) fn columns_between(&self, from_rad: f64, to_rad: f64) -> Option<[u32; 2]> {
+        let is_one = from_rad > -PI && to_rad < PI;
+        is_one.then(|| self.columns.between(from_rad, to_rad)).flatten()
+    }
+
+    /// Returns the first and last rows of a range of elevations, or `None` if one is outside.
+    pub(crate) fn rows_between(&self, from_rad: f64, to_rad: f64) -> Option<[u32; 2]> {
+        self.rows.between(from_rad, to_rad)
+    }
+
     /// Returns where a point is from the middle of a pixel, in 1/254 of a pixel, at most half a pixel.
     pub(crate) fn offset(&self, pixel: [u32; 2], point: DVec3) -> [i8; 2] {
         self.off_middle(pixel, point)
@@ -194,29 +205,29 @@ impl Axis {
 
         // From one known angle to the next, whole turns as the usual step says.
         let (first, start) = *known.first()?;
-        let mut angles = vec![start - step * first as f64; sums.len()];
+        let mut angles: Vec<f64> = (0..sums.len())
+            .map(|i| start + step * (i as f64 - first as f64))
+            .collect();
         let (mut at, mut angle) = (first, start);
         for &(next, raw) in &known {
             let expected = angle + step * (next - at) as f64;
             let reached = expected + wrapped(raw - expected);
-            for i in at..=next {
-                let share = if next == at {
-                    0.0
-                } else {
-                    (i - at) as f64 / (next - at) as f64
-                };
-                angles[i] = angle + (reached - angle) * share;
-            }
+            let each = (reached - angle) / (next - at).max(1) as f64;
+            let between = angles.iter_mut().take(next + 1).skip(at).enumerate();
+            between.for_each(|(i, slot)| *slot = angle + each * i as f64);
             (at, angle) = (next, reached);
         }
-        for i in 0..sums.len() {
-            if i < first {
-                angles[i] = start + step * (i as f64 - first as f64);
-            } else if i > at {
-                angles[i] = angle + step * (i - at) as f64;
-            }
-        }
+        let behind = angles.iter_mut().skip(at).enumerate();
+        behind.for_each(|(i, slot)| *slot = angle + step * i as f64);
         Some(Self::new(angles.into_iter().map(wrapped).collect(), step.abs(), span))
+    }
+
+    /// Returns the smallest and largest index of a range of angles, with one more on each side.
+    fn between(&self, from_rad: f64, to_rad: f64) -> Option<[u32; 2]> {
+        let [a, b] = [self.index(from_rad)?, self.index(to_rad)?];
+        let is_straight = (f64::from(a.abs_diff(b)) - (to_rad - from_rad) / self.step_rad).abs() < 3.0;
+        let last = self.angles_rad.len() as u32 - 1;
+        is_straight.then(|| [a.min(b).saturating_sub(1), (a.max(b) + 1).min(last)])
     }
 
     #[inline]

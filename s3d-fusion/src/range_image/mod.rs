@@ -2,11 +2,13 @@
 
 mod angles;
 mod points;
+mod surfels;
 
 use crate::{FusionError, SensorNoise};
-use angles::AngleGrid;
+pub(crate) use angles::{AngleGrid, angles_of};
 use s3d_geom::glam::{DVec3, Vec3, dvec2};
 use s3d_geom::{PhotoLens, Pose, Raster};
+pub(crate) use surfels::Surfel;
 
 /// What the numbers of a raster of ranges are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,6 +195,24 @@ impl RangeImage {
             return Err(FusionError::NotMetres { median_m });
         }
         Ok(Self { pose, directions, ranges, offsets, colors: Vec::new(), noise })
+    }
+
+    /// Returns how pixels become rays.
+    pub(crate) fn directions(&self) -> &Directions {
+        &self.directions
+    }
+
+    /// Returns the point that a pixel shows, in OpenCV's axes of the sensor, on the plane fitted to it.
+    pub(crate) fn ray(&self, pixel: usize, surfel: &Surfel) -> Vec3 {
+        let [x, y] = [pixel % self.width() as usize, pixel / self.width() as usize];
+        match &self.directions {
+            Directions::Lens(lens) => {
+                let middle = dvec2(x as f64 + 0.5, y as f64 + 0.5);
+                lens.direction(middle)
+                    .map_or(Vec3::NAN, |d| (d / d.z).as_vec3() * surfel.range)
+            }
+            Directions::Angles(grid) => grid.direction([x as u32, y as u32]).as_vec3() * surfel.range,
+        }
     }
 
     /// Returns the place and rotation of the sensor.

@@ -64,7 +64,7 @@ pub(crate) fn binned(points: &[DVec3]) -> Option<Binned> {
         let pixel = y as usize * width as usize + x as usize;
         let range = p.length() as f32;
         let slot = &mut ranges.pixels_mut()[pixel];
-        if !(*slot <= range) {
+        if slot.is_nan() || range < *slot {
             *slot = range;
             point_of_pixel[pixel] = i as u32;
         }
