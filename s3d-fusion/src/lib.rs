@@ -7,3 +7,16 @@
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
+
+mod error;
+mod extract;
+mod fusion;
+mod grid;
+mod noise;
+mod range_image;
+
+pub use error::FusionError;
+pub use extract::{FusedMesh, Surface};
+pub use fusion::{Fusion, FusionOptions, Tile};
+pub use noise::SensorNoise;
+pub use range_image::{RangeImage, RangeKind};

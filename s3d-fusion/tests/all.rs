@@ -1,1 +1,4 @@
 //! The tests of this folder, as one program.
+
+mod common;
+mod surfaces;

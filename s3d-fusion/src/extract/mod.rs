@@ -1,0 +1,8 @@
+//! The mesh of the zero level of a grid, by marching cubes.
+
+mod mesh;
+mod surface;
+mod table;
+
+pub use mesh::FusedMesh;
+pub use surface::Surface;

@@ -1,0 +1,198 @@
+//! Ranges are gathered in a grid of signed distances.
+
+mod images;
+mod pyramid;
+mod view;
+mod walk;
+
+use crate::extract::{FusedMesh, Surface};
+use crate::grid::{FARTHEST, Grid, Place, SIDE};
+use crate::{FusionError, RangeImage, SensorNoise};
+use images::Adding;
+use s3d_geom::glam::{DVec3, Vec3};
+
+/// How ranges are fused.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FusionOptions {
+    /// The size of a cell of the grid, metres: 0.001 to 1.
+    pub cell_m: f64,
+    /// How far before a surface its distance is gathered, in cells: 2 to 16.
+    pub truncation_cells: f64,
+    /// Pieces of the mesh that have less surface than this many faces of cells are left out: 0 to 1,000,000.
+    pub least_piece_cells: f64,
+}
+
+impl Default for FusionOptions {
+    fn default() -> Self {
+        Self { cell_m: 0.01, truncation_cells: 4.0, least_piece_cells: 100.0 }
+    }
+}
+
+/// A box of blocks of 8 × 8 × 8 voxels: block (i, j, k) starts at world metres 8·cell·(i, j, k).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tile {
+    /// The first block on each axis.
+    pub from: [i32; 3],
+    /// The block behind the last one on each axis.
+    pub to: [i32; 3],
+}
+
+impl Tile {
+    /// Whether the grid of a tile needs a block: it is in the tile, or its voxels are corners of cells of the tile.
+    fn holds(&self, block: Place) -> bool {
+        (0..3).all(|k| (self.from[k]..=self.to[k]).contains(&block[k]))
+    }
+}
+
+/// Lengths of a grid, metres.
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    cell: f64,
+    /// The truncation before surfaces.
+    front: f64,
+}
+
+impl Scale {
+    /// The side of a block.
+    fn block(&self) -> f64 {
+        self.cell * f64::from(SIDE)
+    }
+
+    /// The block of a point; `None` if it is too far away.
+    fn block_of(&self, point: DVec3) -> Option<Place> {
+        let place = (point / self.block()).floor();
+        let is_near = place.abs().max_element() < f64::from(FARTHEST - 8);
+        is_near.then(|| place.as_ivec3().to_array())
+    }
+
+    /// How far behind a surface its distance is gathered. The corners of a cell that the surface crosses are at most √3
+    /// cells behind it, and noise must not make a side.
+    fn behind(&self, sigma_m: f32) -> f32 {
+        (2.0 * self.cell as f32 + 2.0 * sigma_m).min(self.front as f32)
+    }
+
+    /// How far before and behind a hit, along the ray, distances are gathered at most.
+    fn most_along(&self) -> f64 {
+        4.0 * self.front
+    }
+
+    /// How far before and behind a hit, along its ray, distances are gathered if the ray meets the surface at this
+    /// cosine.
+    fn along_ray(&self, cosine: f32, sigma_m: f32) -> [f64; 2] {
+        let lengths = [self.front, f64::from(self.behind(sigma_m))];
+        lengths.map(|length| (length / f64::from(cosine)).min(self.most_along()))
+    }
+
+    /// The weight of a distance to the plane of a hit; `None` if it counts nothing. `before` is how far before the hit
+    /// the voxel is along its ray.
+    ///
+    /// Near the hit it is 1. It falls with the distance from the hit, so the nearest surface decides in corners, and it
+    /// ends behind the surface, so both sides of thin things stay apart.
+    #[inline(always)]
+    fn weight(&self, distance: f32, before: f32, sigma_m: f32) -> Option<f32> {
+        let cell = self.cell as f32;
+        let behind = self.behind(sigma_m);
+        if distance <= -behind {
+            return None;
+        }
+        let near = before / (1.5 * cell);
+        let side = (distance + behind) / (behind - 0.5 * cell - sigma_m).max(0.5 * cell);
+        let side = side.min(1.0);
+        Some(side * side / (1.0 + near * near))
+    }
+}
+
+/// Ranges become a mesh: truncated signed distances on a sparse grid of voxels.
+#[derive(Debug)]
+pub struct Fusion {
+    options: FusionOptions,
+    scale: Scale,
+    tile: Option<Tile>,
+    grid: Grid,
+    /// The number of images and calls with rays so far.
+    added: u32,
+}
+
+impl Fusion {
+    /// Makes an empty grid.
+    ///
+    /// # Errors
+    /// [`FusionError::Option`].
+    pub fn new(options: FusionOptions) -> Result<Self, FusionError> {
+        let check = |what, value: f64, least: f64, most: f64| {
+            let is_within = (least..=most).contains(&value);
+            is_within
+                .then_some(())
+                .ok_or(FusionError::Option { what, value, least, most })
+        };
+        check("the size of a cell in metres", options.cell_m, 0.001, 1.0)?;
+        check("the truncation in cells", options.truncation_cells, 2.5, 16.0)?;
+        check("the smallest piece in cells", options.least_piece_cells, 0.0, 1e6)?;
+
+        let scale = Scale { cell: options.cell_m, front: options.cell_m * options.truncation_cells };
+        Ok(Self { options, scale, tile: None, grid: Grid::default(), added: 0 })
+    }
+
+    /// Makes an empty grid that is limited to a box of blocks. [`Surface::join`] makes one surface of many tiles.
+    ///
+    /// # Errors
+    /// [`FusionError::Option`], [`FusionError::Tile`].
+    pub fn within(options: FusionOptions, tile: Tile) -> Result<Self, FusionError> {
+        let Tile { from, to } = tile;
+        let is_box = (0..3).all(|k| from[k] < to[k] && from[k].abs() < FARTHEST && to[k].abs() < FARTHEST);
+        if !is_box {
+            return Err(FusionError::Tile { from, to });
+        }
+        Ok(Self { tile: Some(tile), ..Self::new(options)? })
+    }
+
+    /// Adds what a sensor saw from one place.
+    ///
+    /// # Errors
+    /// [`FusionError::TooFar`].
+    pub fn add(&mut self, image: &RangeImage) -> Result<(), FusionError> {
+        let adding = Adding { image, scale: self.scale, tile: self.tile, number: self.added };
+        self.added += 1;
+        adding.add_to(&mut self.grid)
+    }
+
+    /// Adds rays with an origin each, as mobile scanners measure them, in world metres. `colors` is empty or has one
+    /// entry a point.
+    ///
+    /// # Errors
+    /// [`FusionError::Count`], [`FusionError::Noise`], [`FusionError::TooFar`].
+    pub fn add_rays(
+        &mut self,
+        _origins: &[Vec3],
+        _points: &[Vec3],
+        _colors: &[[u8; 3]],
+        _noise: SensorNoise,
+    ) -> Result<(), FusionError> {
+        todo!()
+    }
+
+    /// Returns the number of bytes that blocks and their directory take.
+    pub fn bytes(&self) -> u64 {
+        self.grid.bytes()
+    }
+
+    /// Returns the number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.grid.blocks.len()
+    }
+
+    /// Returns the surface of the grid, to be joined with those of other tiles.
+    pub fn surface(&self) -> Surface {
+        let tile = self.tile.map(|t| [t.from, t.to]);
+        Surface::of_grid(&self.grid, self.scale.cell, self.scale.front, tile)
+    }
+
+    /// Returns the mesh.
+    ///
+    /// # Errors
+    /// [`FusionError::NoSurface`].
+    pub fn mesh(&self) -> Result<FusedMesh, FusionError> {
+        let cell_m2 = self.options.cell_m * self.options.cell_m;
+        self.surface().into_mesh(self.options.least_piece_cells * cell_m2)
+    }
+}
