@@ -7,3 +7,9 @@
     not(test),
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
+
+mod columns;
+mod decimate;
+
+pub use columns::{ColumnsError, MeshColumns};
+pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
