@@ -8,6 +8,8 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod columns;
+mod decimate;
 mod error;
 mod extract;
 mod fusion;
@@ -15,6 +17,8 @@ mod grid;
 mod noise;
 mod range_image;
 
+pub use columns::{ColumnsError, MeshColumns};
+pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
 pub use error::FusionError;
 pub use extract::{FusedMesh, Surface};
 pub use fusion::{Fusion, FusionOptions, Tile};

@@ -1,0 +1,185 @@
+//! Fewer faces under a bound of the error: edges are collapsed by quadrics, and every collapse is measured.
+//!
+//! Sources: M. Garland and P. Heckbert, "Surface simplification using quadric error metrics", 1997, and
+//! "Simplifying surfaces with color and texture using quadric error metrics", 1998; H. Hoppe, "New quadric
+//! metric for simplifying meshes with appearance attributes", 1999; P. Lindstrom and G. Turk, "Fast and
+//! memory efficient polygonal simplification", 1998 (borders).
+//!
+//! The quadrics say which edge goes next and where its vertex goes. They say nothing about distances: sums
+//! over many faces grow with the noise of the faces' directions. So the old surface is sampled (vertices,
+//! middles of edges, middles of faces), each sample belongs to a face, and a collapse is done only if all
+//! samples around it are within the bound of a face that stays.
+//!
+//! # What the bound means
+//!
+//! It holds for the surface as it came, with its noise. A flat wall whose noise stays within the bound
+//! becomes a few faces. Noise whose peaks exceed the bound stays as bumps: for normal noise of a standard
+//! deviation of two thirds of the bound, an eighth of the vertices are peaks. The bound should then be three
+//! to four standard deviations.
+
+mod collapse;
+mod distance;
+mod patch;
+mod quadric;
+mod whole;
+
+use crate::columns::{ColumnsError, MeshColumns};
+use collapse::{Limits, collapse_edges};
+use s3d_geom::glam::Vec3;
+use thiserror::Error;
+use whole::Whole;
+
+/// How a mesh is decimated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DecimateOptions {
+    /// No vertex, middle of an edge or middle of a face of the old surface is farther from the new one than
+    /// this, metres. The points of a border are as near to the border.
+    pub max_error_m: f32,
+    /// The number of faces at which to stop; the bound holds nevertheless. `None` goes on as far as the
+    /// bound allows.
+    pub target_faces: Option<usize>,
+    /// The largest difference of colours: the root of the mean square over the samples of a face and the
+    /// channels, in steps of 1/255. It keeps the edges of what is flat on a wall.
+    pub max_color_error: f32,
+    /// How far a surface may move, in metres, to save a difference of colours from black to white. It decides
+    /// which edges go first.
+    pub color_weight_m: f64,
+}
+
+impl Default for DecimateOptions {
+    fn default() -> Self {
+        Self { max_error_m: 0.003, target_faces: None, max_color_error: 20.0, color_weight_m: 0.01 }
+    }
+}
+
+/// A mesh with fewer faces, made by [`decimate`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Decimated {
+    /// The vertices, in world metres.
+    pub positions: Vec<Vec3>,
+    /// Three indices into `positions` per face.
+    pub faces: Vec<[u32; 3]>,
+    /// The colours of the vertices, sRGB: none, or one per vertex.
+    pub colors: Vec<[u8; 3]>,
+    /// For each vertex, an old vertex that became it: the nearer one at each collapse. It carries columns of
+    /// vertices over.
+    pub vertex_of: Vec<u32>,
+    /// For each face, the old face that it was before its corners moved; ascending.
+    pub face_of: Vec<u32>,
+    /// The largest distance of a sample of the old surface from the new one that was measured, metres.
+    pub max_error_m: f64,
+    /// The root of the mean squared distance of the samples, metres.
+    pub rms_error_m: f64,
+}
+
+/// The reason why a mesh is not decimated.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum DecimateError {
+    /// The columns are not a mesh.
+    #[error(transparent)]
+    Columns(#[from] ColumnsError),
+    /// An option is negative or not a number.
+    #[error("{what} is {value}: give a number that is not negative")]
+    Option {
+        /// What the option is.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// Pieces of about this many faces are decimated on their own, then what lies between them.
+const FACES_A_PIECE: f64 = 40_000.0;
+
+/// Pieces stop at this multiple of the target, so that the last round chooses among all edges.
+const SLACK: f64 = 3.0;
+
+/// The share of the bound that samples may use. The rest is for what lies between samples.
+const SHARE: f32 = 0.95;
+
+/// Collapses edges while the old surface stays within the bound of the new one.
+///
+/// Borders and creases are kept within the bound, no face turns over, and the surface stays a manifold where
+/// it was one. Around edges with more than two faces, and vertices where two surfaces touch, nothing changes.
+/// Faces that name a vertex twice are dropped, and so are vertices that no face uses.
+///
+/// The same mesh gives the same bytes for any number of threads: cubes of a size that depends on the mesh
+/// alone are decimated in parallel, then the whole.
+///
+/// ```
+/// use s3d_fusion::{DecimateOptions, MeshColumns, decimate};
+/// use s3d_geom::{glam::Vec3, primitives::grid};
+///
+/// // A floor of 20,000 faces is two.
+/// let floor = grid(Vec3::ZERO, Vec3::X * 5.0, Vec3::Y * 5.0, [100, 100]);
+/// let columns = MeshColumns { positions: &floor.positions, faces: &floor.faces, colors: &[] };
+/// let small = decimate(&columns, &DecimateOptions::default())?;
+/// assert!(small.faces.len() <= 4 && small.max_error_m <= 0.003);
+/// # Ok::<(), s3d_fusion::DecimateError>(())
+/// ```
+///
+/// # Errors
+/// [`DecimateError`] for columns that are not a mesh, and options that are negative or not a number.
+pub fn decimate(mesh: &MeshColumns<'_>, options: &DecimateOptions) -> Result<Decimated, DecimateError> {
+    mesh.check()?;
+    let numbers = [
+        ("the largest error", f64::from(options.max_error_m)),
+        ("the largest difference of colours", f64::from(options.max_color_error)),
+        ("the weight of colours", options.color_weight_m),
+    ];
+    if let Some((what, value)) = numbers.into_iter().find(|(_, v)| !v.is_finite() || *v < 0.0) {
+        return Err(DecimateError::Option { what, value });
+    }
+
+    let mut whole = Whole::new(mesh, options.color_weight_m / 255.0);
+    let faces = whole.alive();
+    let target = options.target_faces.unwrap_or(0);
+    let limits =
+        |faces| Limits { distance_m: SHARE * options.max_error_m, color: options.max_color_error, faces };
+
+    if faces as f64 > 2.0 * FACES_A_PIECE {
+        let cell_m = (whole.area() * FACES_A_PIECE / faces as f64).sqrt().max(1e-3);
+        whole.by_cubes(cell_m, |piece| {
+            let share = target as f64 * piece.alive as f64 / faces as f64;
+            collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
+        });
+    }
+    if whole.alive() > target {
+        whole.at_once(|all| collapse_edges(all, &limits(target)));
+    }
+    Ok(compact(&whole, !mesh.colors.is_empty()))
+}
+
+/// The faces that are alive, and the vertices that they use.
+fn compact(whole: &Whole, with_colors: bool) -> Decimated {
+    let [max_error_m, rms_error_m] = whole.errors_m();
+    let mut small = Decimated { max_error_m, rms_error_m, ..Decimated::default() };
+    small.face_of = (0..whole.faces.len() as u32)
+        .filter(|&f| whole.is_alive[f as usize])
+        .collect();
+
+    let mut number = vec![u32::MAX; whole.positions.len()];
+    small
+        .face_of
+        .iter()
+        .for_each(|&f| whole.faces[f as usize].iter().for_each(|&v| number[v as usize] = 0));
+    for v in 0..whole.positions.len() {
+        if number[v] == 0 {
+            number[v] = small.positions.len() as u32;
+            small.positions.push(whole.positions[v]);
+            small.vertex_of.push(whole.nearest_vertex[v]);
+            if with_colors {
+                small.colors.push(whole.colors[v].to_array().map(|c| c.round() as u8));
+            }
+        }
+    }
+    let faces = small.face_of.iter();
+    small.faces = faces
+        .map(|&f| whole.faces[f as usize].map(|v| number[v as usize]))
+        .collect();
+    small
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,295 @@
+//! The whole mesh while it is decimated, and its pieces.
+
+use super::distance::to_triangle;
+use super::patch::{Freedom, Lists, NONE, Patch, Sample};
+use super::quadric::Quadric;
+use crate::columns::MeshColumns;
+use rayon::prelude::*;
+use s3d_geom::glam::{DVec3, Vec3};
+
+/// The whole mesh. Faces and vertices keep their numbers and are dropped at the end.
+pub(super) struct Whole {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) colors: Vec<Vec3>,
+    pub(super) nearest_vertex: Vec<u32>,
+    pub(super) faces: Vec<[u32; 3]>,
+    pub(super) is_alive: Vec<bool>,
+    pub(super) samples: Vec<Sample>,
+    /// The face that each sample is near to.
+    pub(super) face_of_sample: Vec<u32>,
+    border_points: Vec<Vec3>,
+    /// The vertex that the border edge of a point starts at.
+    start_of_border_point: Vec<u32>,
+    color_scale_m: f64,
+}
+
+impl Whole {
+    /// Takes the samples of a mesh: its vertices, the middles of its edges, and the middles of its faces.
+    pub(super) fn new(mesh: &MeshColumns<'_>, color_scale_m: f64) -> Self {
+        let has_colors = !mesh.colors.is_empty();
+        let color_scale_m = if has_colors { color_scale_m } else { 0.0 };
+        let is_face = |f: &[u32; 3]| f[0] != f[1] && f[1] != f[2] && f[2] != f[0];
+        let color = |v: u32| if has_colors { mesh.colors[v as usize] } else { [0; 3] };
+        let mut edges: Vec<([u32; 2], u32, bool)> = (0..)
+            .zip(mesh.faces)
+            .filter(|(_, f)| is_face(f))
+            .flat_map(|(face, f)| {
+                [0, 1, 2].map(|i| {
+                    let (from, to) = (f[i], f[(i + 1) % 3]);
+                    ([from.min(to), from.max(to)], face, from < to)
+                })
+            })
+            .collect();
+        edges.par_sort_unstable();
+
+        let mut samples = Vec::new();
+        let mut face_of_sample = Vec::new();
+        let mut take = |corners: &[u32], face: u32| {
+            let share = 1.0 / corners.len() as f32;
+            let at = corners.iter().map(|&v| mesh.positions[v as usize] * share).sum();
+            let sums = corners.iter().fold([0u32; 3], |sum, &v| {
+                let color = color(v);
+                [0, 1, 2].map(|i| sum[i] + u32::from(color[i]))
+            });
+            samples.push(Sample { at, color: sums.map(|s| (s / corners.len() as u32) as u8) });
+            face_of_sample.push(face);
+        };
+
+        let mut is_taken = vec![false; mesh.positions.len()];
+        for (face, corners) in (0..).zip(mesh.faces).filter(|(_, f)| is_face(f)) {
+            take(corners, face);
+            for &v in corners {
+                if !std::mem::replace(&mut is_taken[v as usize], true) {
+                    take(&[v], face);
+                }
+            }
+        }
+        let (mut border_points, mut start_of_border_point) = (Vec::new(), Vec::new());
+        for sides in edges.chunk_by(|a, b| a.0 == b.0) {
+            let ([low, high], face, ascends) = sides[0];
+            take(&[low, high], face);
+            if sides.len() == 1 {
+                let start = if ascends { low } else { high };
+                let [p, q] = [low, high].map(|v| mesh.positions[v as usize]);
+                border_points.extend([mesh.positions[start as usize], p.midpoint(q)]);
+                start_of_border_point.extend([start; 2]);
+            }
+        }
+
+        Self {
+            positions: mesh.positions.to_vec(),
+            colors: (0..mesh.positions.len() as u32)
+                .map(|v| Vec3::from(color(v).map(f32::from)))
+                .collect(),
+            nearest_vertex: (0..mesh.positions.len() as u32).collect(),
+            faces: mesh.faces.to_vec(),
+            is_alive: mesh.faces.iter().map(is_face).collect(),
+            samples,
+            face_of_sample,
+            border_points,
+            start_of_border_point,
+            color_scale_m,
+        }
+    }
+
+    pub(super) fn alive(&self) -> usize {
+        self.is_alive.iter().filter(|&&alive| alive).count()
+    }
+
+    /// The area of the surface, m².
+    pub(super) fn area(&self) -> f64 {
+        let areas = self
+            .faces
+            .iter()
+            .zip(&self.is_alive)
+            .filter(|(_, alive)| **alive)
+            .map(|(f, _)| {
+                let [a, b, c] = f.map(|v| self.positions[v as usize].as_dvec3());
+                0.5 * (b - a).cross(c - a).length()
+            });
+        areas.sum()
+    }
+
+    /// Distances of the samples from the surface: the largest, and the root of the mean square. Metres.
+    pub(super) fn errors_m(&self) -> [f64; 2] {
+        let squared = |(sample, &face): (&Sample, &u32)| {
+            let triangle = self.faces[face as usize].map(|v| self.positions[v as usize]);
+            f64::from(to_triangle(sample.at, triangle).0)
+        };
+        let pairs = self.samples.iter().zip(&self.face_of_sample);
+        let (worst, sum) = pairs
+            .map(squared)
+            .fold((0.0, 0.0), |(worst, sum), d| (f64::max(worst, d), sum + d));
+        [worst.sqrt(), (sum / self.samples.len().max(1) as f64).sqrt()]
+    }
+
+    /// Cuts the mesh into pieces: the vertices in a cube of the edge `cell_m` are one. `work` changes each
+    /// piece, in parallel, and what it did is taken over. Pieces share no face that may change.
+    pub(super) fn by_cubes(&mut self, cell_m: f64, work: impl Fn(&mut Patch) + Sync) {
+        let cell = |p: &Vec3| (p.as_dvec3() / cell_m).floor().as_ivec3().to_array();
+        let cells: Vec<[i32; 3]> = self.positions.par_iter().map(cell).collect();
+        let mut numbers = cells.clone();
+        numbers.par_sort_unstable();
+        numbers.dedup();
+        let cell_of: Vec<u32> = cells
+            .par_iter()
+            .map(|c| numbers.partition_point(|n| n < c) as u32)
+            .collect();
+        self.by_cells(&cell_of, work);
+    }
+
+    /// `work` changes the whole mesh as one piece.
+    pub(super) fn at_once(&mut self, work: impl Fn(&mut Patch) + Sync) {
+        self.by_cells(&vec![0; self.positions.len()], work);
+    }
+
+    fn by_cells(&mut self, cell_of: &[u32], work: impl Fn(&mut Patch) + Sync) {
+        let alive = || (0..).zip(&self.faces).filter(|(i, _)| self.is_alive[*i as usize]);
+
+        // A face is known to the cell of each of its corners; a cell owns it if all are there.
+        let mut faces: Vec<(u32, u32)> = Vec::with_capacity(self.faces.len());
+        let mut owner = vec![NONE; self.faces.len()];
+        let mut freedom = vec![Freedom::Free; self.positions.len()];
+        for (face, corners) in alive() {
+            let [a, b, c] = corners.map(|v| cell_of[v as usize]);
+            faces.push((a, face));
+            if b != a {
+                faces.push((b, face));
+            }
+            if c != a && c != b {
+                faces.push((c, face));
+            }
+            if a == b && b == c {
+                owner[face as usize] = a;
+            } else {
+                corners.iter().for_each(|&v| freedom[v as usize] = Freedom::Fixed);
+            }
+        }
+        faces.par_sort_unstable();
+
+        let mut samples: Vec<(u32, u32)> = (0..)
+            .zip(&self.face_of_sample)
+            .map(|(i, &f)| (owner[f as usize], i))
+            .filter(|(cell, _)| *cell != NONE)
+            .collect();
+        samples.par_sort_unstable();
+        let starts = (0..).zip(&self.start_of_border_point);
+        let mut border: Vec<(u32, u32)> = starts.map(|(i, &v)| (cell_of[v as usize], i)).collect();
+        border.par_sort_unstable();
+
+        let groups: Vec<&[(u32, u32)]> = faces.chunk_by(|a, b| a.0 == b.0).collect();
+        let done: Vec<Piece> = groups
+            .par_iter()
+            .map(|group| {
+                let cell = group[0].0;
+                let mut piece = self.piece(group, of_cell(&samples, cell), of_cell(&border, cell), |v| {
+                    if cell_of[v as usize] == cell {
+                        freedom[v as usize]
+                    } else {
+                        Freedom::Frozen
+                    }
+                });
+                piece.patch.prepare();
+                work(&mut piece.patch);
+                piece.patch.quadrics = Vec::new();
+                piece
+            })
+            .collect();
+        for piece in &done {
+            self.take_over(piece);
+        }
+    }
+
+    /// The piece of some faces, with its samples and points of the border: pairs of a cell and a number.
+    fn piece(
+        &self,
+        faces: &[(u32, u32)],
+        samples: &[(u32, u32)],
+        border: &[(u32, u32)],
+        freedom: impl Fn(u32) -> Freedom,
+    ) -> Piece {
+        let faces: Vec<u32> = faces.iter().map(|f| f.1).collect();
+        let samples: Vec<u32> = samples.iter().map(|s| s.1).collect();
+        let mut vertices: Vec<u32> = faces.iter().flat_map(|&f| self.faces[f as usize]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+
+        // A border that no living face uses has gone already, and its points with it.
+        let vertex = |v: u32| vertices.partition_point(|&u| u < v) as u32;
+        let is_used = |v: u32| vertices.binary_search(&v).is_ok();
+        let border = border.iter().map(|b| b.1);
+        let border: Vec<u32> = border
+            .filter(|&b| is_used(self.start_of_border_point[b as usize]))
+            .collect();
+
+        let mut samples_of = Lists::new(faces.len(), samples.len());
+        for (i, &sample) in (0..).zip(&samples) {
+            let face = self.face_of_sample[sample as usize];
+            samples_of.push(faces.partition_point(|&f| f < face) as u32, i);
+        }
+        let mut border_points_of = Lists::new(vertices.len(), border.len());
+        for (i, &point) in (0..).zip(&border) {
+            border_points_of.push(vertex(self.start_of_border_point[point as usize]), i);
+        }
+
+        let of_vertices = || vertices.iter().map(|&v| v as usize);
+        let middle = of_vertices().map(|v| self.positions[v].as_dvec3()).sum::<DVec3>();
+        let patch = Patch {
+            positions: of_vertices().map(|v| self.positions[v]).collect(),
+            colors: of_vertices().map(|v| self.colors[v]).collect(),
+            freedom: vertices.iter().map(|&v| freedom(v)).collect(),
+            on_border: vec![false; vertices.len()],
+            nearest_vertex: of_vertices().map(|v| self.nearest_vertex[v]).collect(),
+            faces: faces.iter().map(|&f| self.faces[f as usize].map(vertex)).collect(),
+            is_alive: vec![true; faces.len()],
+            alive: faces.len(),
+            corners: Lists::new(vertices.len(), 3 * faces.len()),
+            quadrics: vec![Quadric::default(); vertices.len()],
+            samples: samples.iter().map(|&s| self.samples[s as usize]).collect(),
+            samples_of,
+            border_points: border.iter().map(|&b| self.border_points[b as usize]).collect(),
+            border_points_of,
+            origin: middle / vertices.len().max(1) as f64,
+            color_scale_m: self.color_scale_m,
+        };
+        Piece { faces, vertices, samples, border, patch }
+    }
+
+    fn take_over(&mut self, piece: &Piece) {
+        let patch = &piece.patch;
+        for (i, &v) in piece.vertices.iter().enumerate() {
+            if patch.freedom[i] != Freedom::Frozen {
+                self.positions[v as usize] = patch.positions[i];
+                self.colors[v as usize] = patch.colors[i];
+                self.nearest_vertex[v as usize] = patch.nearest_vertex[i];
+            }
+            for point in patch.border_points_of.of(i as u32) {
+                self.start_of_border_point[piece.border[point as usize] as usize] = v;
+            }
+        }
+        for (i, &f) in piece.faces.iter().enumerate() {
+            self.is_alive[f as usize] &= patch.is_alive[i];
+            // Only the owner of a face changes it.
+            self.faces[f as usize] = patch.faces[i].map(|v| piece.vertices[v as usize]);
+            for sample in patch.samples_of.of(i as u32) {
+                self.face_of_sample[piece.samples[sample as usize] as usize] = f;
+            }
+        }
+    }
+}
+
+/// The part of a list, sorted by cell, that belongs to one.
+fn of_cell(pairs: &[(u32, u32)], cell: u32) -> &[(u32, u32)] {
+    let begin = pairs.partition_point(|p| p.0 < cell);
+    let end = pairs.partition_point(|p| p.0 <= cell);
+    &pairs[begin..end]
+}
+
+/// A piece of the mesh with the numbers that its parts have in the whole.
+struct Piece {
+    faces: Vec<u32>,
+    vertices: Vec<u32>,
+    samples: Vec<u32>,
+    border: Vec<u32>,
+    patch: Patch,
+}
