@@ -50,7 +50,7 @@ impl BareScene {
     /// [`Error::Input`](crate::Error::Input) or [`Error::File`](crate::Error::File) if the scene cannot be
     /// exported.
     pub fn open(scene: impl Into<SceneSource>, ctx: &Context) -> Result<Self> {
-        let mut area = Inputs::open_bare(scene.into())?;
+        let mut area = Inputs::open_bare(scene.into().fused(ctx)?)?;
         let file = area.take_mesh()?;
         area.tell_mesh(ctx, &file);
         let mesh_files = file.sources.into_iter().map(|source| source.path).collect();

@@ -132,6 +132,7 @@ mod context;
 pub mod error;
 pub mod event;
 pub mod export;
+pub mod fuse;
 pub mod info;
 pub mod options;
 pub mod pack;

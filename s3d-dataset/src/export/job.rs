@@ -120,6 +120,9 @@ impl<'a> Job<'a> {
         let placing = options.placing();
         let lenient = options.lenient;
 
+        // A raw scan becomes a scene first.
+        let scenes = scenes.iter().map(|scene| scene.clone().fused(ctx));
+        let scenes = &scenes.collect::<Result<Vec<SceneSource>>>()?;
         let inputs = match plan {
             Some(plan) => Inputs::open_planned(scenes, placing, lenient, plan.table()?)?,
             None => Inputs::open(scenes, placing, lenient)?,

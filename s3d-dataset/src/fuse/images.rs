@@ -5,7 +5,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::parallel::map_in_order;
 use glam::{DAffine3, DMat3, DVec3, Vec3, dvec2};
-use s3d_fusion::{FusionOptions, RangeImage, RangeKind, SensorNoise, Tile};
+use s3d_fusion::{RangeImage, RangeKind, SensorNoise};
 use s3d_geom::{Pose, Raster};
 use s3d_io::camera::{Distortion, Optics};
 use s3d_io::mesh::UpAxis;
@@ -100,7 +100,8 @@ impl Images {
             self.inputs.push((path.clone(), scan.form()));
             match scan {
                 RawScan::Pictures(DepthPictures { pictures, .. }) => {
-                    self.pictures.extend(pictures.into_iter().step_by(options.every.get() as usize));
+                    self.pictures
+                        .extend(pictures.into_iter().step_by(options.every.get() as usize));
                 }
                 RawScan::Scans(scans) => {
                     scans.require_origins()?;
@@ -133,7 +134,11 @@ impl Images {
 
     /// What they are called in messages.
     pub(super) fn unit(&self) -> &'static str {
-        if self.scans.is_empty() { "depth pictures" } else { "laser scans" }
+        if self.scans.is_empty() {
+            "depth pictures"
+        } else {
+            "laser scans"
+        }
     }
 
     /// The line that tells the offset, if there is one.
@@ -206,9 +211,7 @@ impl Images {
         let confidence = picture.read_confidence()?;
         let most_m = self.range_m.unwrap_or(PICTURE_RANGE_M) as f32;
         for (i, depth_m) in depth.pixels_mut().iter_mut().enumerate() {
-            let is_sure = confidence
-                .as_ref()
-                .is_none_or(|of| of.pixels()[i] >= LEAST_CONFIDENCE);
+            let is_sure = confidence.as_ref().is_none_or(|of| of.pixels()[i] >= LEAST_CONFIDENCE);
             if !is_sure || *depth_m > most_m {
                 *depth_m = f32::NAN;
             }
@@ -220,14 +223,9 @@ impl Images {
         let colors = picture.read_colors(&depth)?;
         let noise = SensorNoise::STRUCTURED_LIGHT;
         let unfit = |e: s3d_fusion::FusionError| Error::unfit(picture.path(), e.to_string());
-        let image = RangeImage::from_depth(
-            picture.pose,
-            picture.lens.clone(),
-            RangeKind::Depth,
-            depth,
-            noise,
-        )
-        .map_err(unfit)?;
+        let image =
+            RangeImage::from_depth(picture.pose, picture.lens.clone(), RangeKind::Depth, depth, noise)
+                .map_err(unfit)?;
         match colors {
             None => Ok(Some(image)),
             Some(colors) => {
@@ -247,16 +245,20 @@ impl Images {
     ) -> Result<Option<Seen>> {
         let most_m = self.range_m.unwrap_or(SCAN_RANGE_M);
         let noise = SensorNoise::LASER;
-        let unfit = |e: s3d_fusion::FusionError| {
-            Error::unfit(&info.path, format!("scan {}: {e}", info.name))
-        };
+        let unfit = |e: s3d_fusion::FusionError| Error::unfit(&info.path, format!("scan {}: {e}", info.name));
         if let Some(grid) = scans.read_grid(number)? {
             let is_near = |offset: &Vec3| f64::from(offset.length()) <= most_m;
             let points: Vec<Vec3> = grid
                 .offsets_m
                 .pixels()
                 .iter()
-                .map(|offset| if is_near(offset) { (grid.origin_m + offset.as_dvec3()).as_vec3() } else { Vec3::NAN })
+                .map(|offset| {
+                    if is_near(offset) {
+                        (grid.origin_m + offset.as_dvec3()).as_vec3()
+                    } else {
+                        Vec3::NAN
+                    }
+                })
                 .collect();
             let colors = match (&grid.colors, &grid.intensities) {
                 (Some(colors), _) => colors.pixels().to_vec(),
@@ -293,38 +295,39 @@ impl Images {
         }
         if rays.colors.len() != rays.points.len() {
             let has_intensities = intensities.len() == rays.points.len();
-            rays.colors = if has_intensities { greys(&intensities) } else { Vec::new() };
+            rays.colors = if has_intensities {
+                greys(&intensities)
+            } else {
+                Vec::new()
+            };
         }
 
         match info.origin_m.filter(|_| rays.origins.is_empty()) {
             Some(origin_m) => {
                 let pose = pose_of(info, origin_m);
-                let image = RangeImage::from_points(pose, &rays.points, &rays.colors, noise).map_err(unfit)?;
+                let image =
+                    RangeImage::from_points(pose, &rays.points, &rays.colors, noise).map_err(unfit)?;
                 Ok(Some(Seen::Image(image)))
             }
             None => Ok(Some(Seen::Rays(rays))),
         }
     }
 
-    /// The box of blocks that holds all that was measured.
-    pub(super) fn tile(&self, options: &FusionOptions, ctx: &Context) -> Result<Tile> {
+    /// The lowest and highest coordinates of all that was measured, metres.
+    pub(super) fn bounds(&self, ctx: &Context) -> Result<[DVec3; 2]> {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.each(ctx, |seen, _| {
-            match seen {
-                Seen::Image(image) => {
-                    if let Some([low, high]) = image.bounds() {
-                        (min, max) = (min.min(low), max.max(high));
-                    }
-                }
+            let [low, high] = match seen {
+                Seen::Image(image) => image.bounds().unwrap_or([min, max]),
                 Seen::Rays(rays) => {
-                    for point in rays.points {
-                        (min, max) = (min.min(point.as_dvec3()), max.max(point.as_dvec3()));
-                    }
+                    let points = rays.points.iter().map(|point| point.as_dvec3());
+                    points.fold([min, max], |[low, high], point| [low.min(point), high.max(point)])
                 }
-            }
+            };
+            (min, max) = (min.min(low), max.max(high));
             Ok(true)
         })?;
-        Ok(Tile::around([min, max], options))
+        Ok([min, max])
     }
 }
 
@@ -344,7 +347,13 @@ fn greys(intensities: &[f32]) -> Vec<[u8; 3]> {
         *known.select_nth_unstable_by(at, f32::total_cmp).1
     });
     let span = (light - dark).max(f32::MIN_POSITIVE);
-    let grey = |i: &f32| if i.is_finite() { ((i - dark) / span).clamp(0.0, 1.0) * 255.0 } else { 0.0 };
+    let grey = |i: &f32| {
+        if i.is_finite() {
+            ((i - dark) / span).clamp(0.0, 1.0) * 255.0
+        } else {
+            0.0
+        }
+    };
     intensities.iter().map(|i| [grey(i) as u8; 3]).collect()
 }
 

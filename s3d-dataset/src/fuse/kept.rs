@@ -53,7 +53,10 @@ impl InputState {
         let mut bytes = 0;
         for file in &files {
             let found = fs::metadata(file).map_err(|e| FileError::io(file, "read", e))?;
-            let since = found.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+            let since = found
+                .modified()
+                .ok()
+                .and_then(|time| time.duration_since(UNIX_EPOCH).ok());
             let name = file.strip_prefix(path).unwrap_or(file).display();
             text.push_str(&format!("{name}\n{} {}\n", found.len(), since.unwrap_or_default().as_nanos()));
             bytes += found.len();
@@ -82,7 +85,11 @@ fn list(path: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
 /// # Errors
 /// Those of [`fuse_folder`].
 pub(crate) fn fused_scene(path: &Path, ctx: &Context) -> Result<Option<PathBuf>> {
-    let file = if path.is_dir() { path.join("scene.toml") } else { path.to_owned() };
+    let file = if path.is_dir() {
+        path.join("scene.toml")
+    } else {
+        path.to_owned()
+    };
     let is_toml = file
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));

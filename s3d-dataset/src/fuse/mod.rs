@@ -10,6 +10,7 @@ mod kept;
 mod options;
 mod scene_text;
 mod surface;
+mod tiles;
 
 pub(crate) use kept::fused_scene;
 pub use options::FuseOptions;
@@ -18,6 +19,7 @@ use crate::context::Context;
 use crate::error::{Error, Result, UsageError};
 use crate::store::new_folder::FolderKind;
 use crate::store::{NewFile, NewFolder};
+use glam::DVec3;
 use images::Images;
 use kept::Record;
 use s3d_io::fs::{write_bytes, write_json};
@@ -95,6 +97,11 @@ fn fuse_folder(
 
     write(&folder.path().join("mesh.ply"), &made, &images, false)?;
     let scene = scene_text::scene(&images, output)?;
+    if images.offset_m != DVec3::ZERO {
+        // Where the readers of meshes look for it.
+        let [x, y, z] = images.offset_m.to_array();
+        write_bytes(&folder.path().join("offset.xyz"), format!("{x:?} {y:?} {z:?}\n").as_bytes())?;
+    }
     if let Some(locations) = &scene.locations {
         write_bytes(&folder.path().join(scene_text::LOCATIONS), locations.as_bytes())?;
     }
@@ -115,6 +122,10 @@ fn write(path: &Path, made: &Made, images: &Images, is_glb: bool) -> Result<()> 
         columns: if made.closed.is_empty() { &[] } else { &closed },
         comments: &comments,
     };
-    if is_glb { write_glb_mesh(path, &mesh) } else { write_ply_mesh(path, &mesh) }?;
+    if is_glb {
+        write_glb_mesh(path, &mesh)
+    } else {
+        write_ply_mesh(path, &mesh)
+    }?;
     Ok(())
 }

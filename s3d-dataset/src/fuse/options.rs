@@ -56,12 +56,16 @@ pub struct FuseOptions {
     pub depth_unit_m: Option<f64>,
     /// Focal lengths and principal point of the depth camera in pixels, for pictures whose files do not tell
     /// them: fx,fy,cx,cy
-    #[cfg_attr(feature = "clap", arg(long, value_name = "FX,FY,CX,CY", value_delimiter = ',',
-        allow_negative_numbers = true))]
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "FX,FY,CX,CY", value_delimiter = ',', allow_negative_numbers = true)
+    )]
     pub intrinsics: Vec<f64>,
     /// Where the scanner stood, for points whose file does not tell it: x,y,z in metres
-    #[cfg_attr(feature = "clap", arg(long = "origin", value_name = "X,Y,Z", value_delimiter = ',',
-        allow_negative_numbers = true))]
+    #[cfg_attr(
+        feature = "clap",
+        arg(long = "origin", value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)
+    )]
     pub origin_m: Vec<f64>,
     /// The path of a mobile scanner, for points with times: lines of t x y z, or a CSV that names them
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]

@@ -22,8 +22,9 @@ pub(super) struct SceneText {
 
 /// Returns the scene file of a fused mesh in `folder`.
 pub(super) fn scene(images: &Images, folder: &Path) -> Result<SceneText> {
-    let mut toml = "# Fused from a raw scan by s3d fuse.\narea = 1\n[mesh]\npath = \"mesh.ply\"\nup = \"z\"\n"
-        .to_owned();
+    let mut toml =
+        "# Fused from a raw scan by s3d fuse.\narea = 1\n[mesh]\npath = \"mesh.ply\"\nup = \"z\"\n"
+            .to_owned();
     // Several inputs are several lists.
     let only = match images.inputs() {
         [(path, form)] => Some((path.as_path(), *form)),
@@ -33,7 +34,11 @@ pub(super) fn scene(images: &Images, folder: &Path) -> Result<SceneText> {
         .map(|(path, _)| relative(path, folder))
         .transpose()?
         .unwrap_or_default();
-    let up = if images.up() == Some(UpAxis::Y) { "up = \"y\"\n" } else { "" };
+    let up = if images.up() == Some(UpAxis::Y) {
+        "up = \"y\"\n"
+    } else {
+        ""
+    };
     let row = |table: &str| format!("[{table}]\npath = {:?}\n{up}", place.display().to_string());
 
     match only {
@@ -44,7 +49,7 @@ pub(super) fn scene(images: &Images, folder: &Path) -> Result<SceneText> {
         }
         Some((path, RawForm::E57)) => {
             toml += &row("cameras");
-            if E57Pictures::open(path, &DAffine3::IDENTITY).is_ok_and(|pictures| pictures.has_any()) {
+            if E57Pictures::open(path, &DAffine3::IDENTITY).is_ok() {
                 toml += "[rgb]\nsource = \"e57\"\n";
             }
         }

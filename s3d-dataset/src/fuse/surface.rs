@@ -1,13 +1,13 @@
 //! The surface of a raw scan: gathered in a grid, simplified, and closed where that was asked for.
 
 use super::images::{Images, Seen};
-use super::{FuseOptions, Fused};
+use super::{FuseOptions, Fused, tiles};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use glam::Vec3;
 use s3d_fusion::{
-    CloseOptions, DecimateOptions, FusedMesh, Fusion, FusionError, FusionOptions, MeshColumns, SensorNoise, Surface, Tile,
-    close_holes, decimate,
+    CloseOptions, DecimateOptions, FusedMesh, Fusion, FusionError, FusionOptions, MeshColumns, SensorNoise,
+    Surface, close_holes, decimate,
 };
 use std::path::Path;
 
@@ -100,7 +100,7 @@ fn area(made: &Made) -> f64 {
 fn gather(images: &Images, options: &FuseOptions, ctx: &Context) -> Result<FusedMesh> {
     let of = |e: FusionError| Error::unfit(images.path(), e.to_string());
     let fusion_options = FusionOptions { cell_m: options.cell_m, ..FusionOptions::default() };
-    let least_piece_m2 = fusion_options.least_piece_m2();
+    let least_piece_m2 = fusion_options.least_piece_cells * options.cell_m * options.cell_m;
 
     let whole = Fusion::new(fusion_options.clone()).map_err(of)?;
     let most_bytes = (options.memory_gib * f64::from(1 << 30)) as u64;
@@ -108,17 +108,19 @@ fn gather(images: &Images, options: &FuseOptions, ctx: &Context) -> Result<Fused
         return whole.mesh().map_err(of);
     }
 
-    let mut tiles = images.tile(&fusion_options, ctx)?.halves().to_vec();
+    let mut tiles = vec![tiles::around(images.bounds(ctx)?, options.cell_m)];
     ctx.info(format_args!("the grid takes more than {} GiB: it is fused in tiles", options.memory_gib));
     let mut surfaces = Vec::new();
     while let Some(tile) = tiles.pop() {
         let grid = Fusion::within(fusion_options.clone(), tile).map_err(of)?;
         match fill(grid, images, most_bytes, ctx)? {
             Some(grid) => surfaces.push(grid.surface()),
-            None if tile.is_single() => {
-                return Err(Error::unfit(images.path(), "one block does not fit into the memory that is allowed"));
-            }
-            None => tiles.extend(tile.halves()),
+            None => match tiles::halves(tile) {
+                Some(halves) => tiles.extend(halves),
+                None => {
+                    return Err(Error::unfit(images.path(), "one block takes more than the memory allowed"));
+                }
+            },
         }
     }
     let surface = Surface::join(surfaces).map_err(of)?;

@@ -146,7 +146,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     let placing = ExportOptions { place_cameras, see, ..ExportOptions::default() }
         .canonical()?
         .placing();
-    let inputs = Inputs::open(&[scene.into()], placing, lenient)?;
+    let inputs = Inputs::open(&[scene.into().fused(ctx)?], placing, lenient)?;
     let area = &inputs.areas[0];
     let file = area.read_mesh()?;
     let mesh = &file.mesh;

@@ -1,5 +1,6 @@
 //! An area that is not read from files.
 
+use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::export::input::area::AreaInput;
 use crate::export::input::cameras::Cameras;
@@ -7,6 +8,7 @@ use crate::export::input::mesh::{MeshFrame, MeshSource};
 use crate::export::input::numbering::number;
 use crate::export::input::photographs::Photographs;
 use crate::export::input::scene::Opened;
+use crate::fuse::fused_scene;
 use crate::options::placing::Placing;
 use crate::record::request::InputRecord;
 use s3d_geom::{MeshParts, PointCloud, TriMesh, Wrap};
@@ -68,6 +70,15 @@ impl<P: Into<PathBuf>> From<P> for SceneSource {
 }
 
 impl SceneSource {
+    /// Returns what is read instead of a raw scan: the scene of its fused mesh, which is made if it is not there.
+    /// Other sources stay as they are.
+    pub(crate) fn fused(self, ctx: &Context) -> Result<Self> {
+        match &self {
+            Self::Path(path) => Ok(fused_scene(path, ctx)?.map_or(self, Self::Path)),
+            Self::Meshes { .. } | Self::Memory(_) => Ok(self),
+        }
+    }
+
     /// Makes a source of each path, and a single one of all meshes among them.
     pub fn list(
         paths: impl IntoIterator<Item = PathBuf>,
