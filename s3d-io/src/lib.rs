@@ -15,6 +15,7 @@
 //! | [`image`] | the images of a data set, PNG and OpenEXR |
 //! | [`dataset`] | the rest of a data set: names, poses, labels, instances, splits |
 //! | [`package`] | WebDataset, COLMAP, nerfstudio, COCO, Parquet, from the images of a data set |
+//! | [`raw`] | raw scans: depth pictures with poses, laser scans |
 //! | [`scene`] | `scene.toml`; published areas as scenes |
 //! | [`fs`] | files that are whole, synced and checked by checksums; JSON |
 //!
@@ -199,6 +200,7 @@
 //! | `las`, `e57`, `npy`, `pcd`, `text`, `kitti`, `scannet`, `mat`, `ply` | annotated points of each |
 //! | `labels` | files that label faces: HM3D, Replica, 3RScan, ScanNet++, Matterport3D, `scan.labels` |
 //! | `camera` | lists of cameras; the scanner's pictures |
+//! | `raw` | raw scans: depth pictures with poses, laser scans of each format that is built in |
 //! | `png`, `exr` | the images of a data set |
 //! | `dataset` | the rest of a data set: poses, labels, instances, splits, lists, conventions |
 //! | `toml` | scenes: `scene.toml`, published areas |
@@ -243,6 +245,8 @@ pub mod mesh;
     feature = "parquet"
 ))]
 pub mod package;
+#[cfg(feature = "raw")]
+pub mod raw;
 #[cfg(feature = "toml")]
 pub mod scene;
 

@@ -9,11 +9,10 @@ use crate::camera::picture::{check_picture, read_picture};
 use crate::camera::table::ScanLocation;
 use crate::error::{Error, Result};
 use crate::fs::encoding::text_of;
-use crate::fs::open::read_file;
+use crate::fs::open::{list_folder, read_file};
 use glam::{DMat3, DVec2, DVec3};
 use s3d_geom::{Lens, Pose, Raster};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The largest error of a rotation matrix, and of a last row that should be 0 0 0 1. It allows for eight
@@ -86,7 +85,7 @@ impl PictureFolder {
     pub fn open(path: &Path) -> Result<Self> {
         let mut files = BTreeMap::new();
         let mut folders = Vec::new();
-        for entry in list(path)? {
+        for entry in list_folder(path)? {
             if entry.is_dir() {
                 folders.push(entry);
             } else {
@@ -95,7 +94,7 @@ impl PictureFolder {
         }
 
         for folder in folders {
-            list(&folder)?
+            list_folder(&folder)?
                 .into_iter()
                 .filter(|e| !e.is_dir())
                 .for_each(|e| remember(&mut files, e));
@@ -108,13 +107,19 @@ impl PictureFolder {
         &self.path
     }
 
+    /// Returns the names of all files, in lower case, sorted.
+    #[cfg(feature = "raw")]
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.keys().map(String::as_str)
+    }
+
     /// Returns the path of a file; the case of `name` does not matter.
-    fn find(&self, name: &str) -> Option<&PathBuf> {
+    pub(crate) fn find(&self, name: &str) -> Option<&PathBuf> {
         self.files.get(&name.to_ascii_lowercase())
     }
 
     /// Returns the path of a picture, from its name without the extension.
-    fn picture(&self, stem: &str) -> Option<PathBuf> {
+    pub(crate) fn picture(&self, stem: &str) -> Option<PathBuf> {
         ["jpg", "jpeg", "png"]
             .iter()
             .find_map(|e| self.find(&format!("{stem}.{e}")))
@@ -208,15 +213,6 @@ impl PictureFolder {
         }
         Ok(captures)
     }
-}
-
-fn list(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = fs::read_dir(folder).map_err(|e| Error::io(folder, "read", e))?;
-    let mut paths = entries
-        .map(|entry| entry.map(|e| e.path()).map_err(|e| Error::io(folder, "read", e)))
-        .collect::<Result<Vec<_>>>()?;
-    paths.sort();
-    Ok(paths)
 }
 
 fn remember(files: &mut BTreeMap<String, PathBuf>, path: PathBuf) {
@@ -335,7 +331,14 @@ pub(crate) fn read_known_pose(path: &Path) -> Result<Option<Pose>> {
 pub(crate) fn pose_of_matrix(m: &[f64; 16]) -> std::result::Result<Pose, (usize, String)> {
     let last = [m[12], m[13], m[14], m[15] - 1.0];
     if last.iter().any(|v| v.abs() > ROTATION_ERROR) {
-        return Err((12, format!("the last row is {} {} {} {}, not 0 0 0 1", m[12], m[13], m[14], m[15])));
+        let is_transposed = [m[3], m[7], m[11]] == [0.0; 3];
+        let hint = if is_transposed {
+            ": the matrix is transposed"
+        } else {
+            ""
+        };
+        let row = format!("{} {} {} {}", m[12], m[13], m[14], m[15]);
+        return Err((12, format!("the last row is {row}, not 0 0 0 1{hint}")));
     }
 
     let rows = [[m[0], m[1], m[2]], [m[4], m[5], m[6]], [m[8], m[9], m[10]]].map(DVec3::from_array);

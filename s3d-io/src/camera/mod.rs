@@ -42,18 +42,18 @@
 
 #[cfg(feature = "e57")]
 mod e57;
-mod located;
-mod locations;
+pub(crate) mod located;
+pub(crate) mod locations;
 mod matterport;
 mod narrow;
-mod numbered;
+pub(crate) mod numbered;
 mod other_kind;
 mod picture;
 mod picture_file;
 mod posed;
 mod posed_list;
 pub(crate) mod poses;
-mod programs;
+pub(crate) mod programs;
 mod table;
 
 #[cfg(feature = "e57")]

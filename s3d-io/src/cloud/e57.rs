@@ -1,11 +1,12 @@
 //! Annotated points of E57 files: several scans, each with its pose. Source: ASTM E2807.
 
 use crate::bounds::Bounds;
-use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::Columns;
+use crate::cloud::table::measured::{Measured, Told};
 use crate::cloud::table::records::{Color, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
+use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use crate::fs::source::{Bytes, Source};
 use e57::{E57Reader, PointCloud, RawValues, Record, RecordDataType, RecordName, RecordValue};
@@ -17,12 +18,20 @@ use std::path::Path;
 /// An `.e57` file.
 pub(crate) struct E57Cloud<'a> {
     source: Source,
-    options: &'a AnnotationOptions,
+    wanted: Wanted<'a>,
+    /// The number of the only scan that is read, from 0.
+    only: Option<usize>,
 }
 
 impl<'a> E57Cloud<'a> {
-    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
-        Self { source, options }
+    pub(crate) fn new(source: Source, wanted: Wanted<'a>) -> Self {
+        Self { source, wanted, only: None }
+    }
+
+    /// Returns one scan of the file, by its number from 0.
+    #[cfg(feature = "raw")]
+    pub(crate) fn scan(source: Source, wanted: Wanted<'a>, number: usize) -> Self {
+        Self { source, wanted, only: Some(number) }
     }
 
     fn error(&self, error: &e57::Error) -> Error {
@@ -64,6 +73,8 @@ struct Scan<'a> {
     invalid: Option<usize>,
     /// The column that marks points without a colour.
     colorless: Option<usize>,
+    /// The columns of the row and the column in the scanner's grid, and their least numbers.
+    grid: Option<[(usize, i64); 2]>,
     /// The smallest and the largest value of each colour.
     limits: [(f64, f64); 3],
     rotation: DQuat,
@@ -103,13 +114,13 @@ fn name_of(name: &RecordName, bare: bool) -> String {
 }
 
 impl<'a> Scan<'a> {
-    fn new(path: &Path, options: &AnnotationOptions, cloud: &'a PointCloud) -> Result<Self> {
+    fn new(path: &Path, wanted: Wanted<'_>, cloud: &'a PointCloud) -> Result<Self> {
         let prototype = &cloud.prototype[..];
         let is_spherical = !cloud.has_cartesian();
         if is_spherical && !cloud.has_spherical() {
             return Err(Error::format(path, "has a scan without coordinates"));
         }
-        let columns = columns_of(path, options, prototype, is_spherical)?;
+        let columns = columns_of(path, wanted, prototype, is_spherical)?;
         let limits = columns
             .color
             .map_or([(0.0, 255.0); 3], |channels| color_limits(cloud, channels));
@@ -138,6 +149,7 @@ impl<'a> Scan<'a> {
                 },
             ),
             colorless: attribute_index(prototype, &RecordName::IsColorInvalid),
+            grid: grid_columns(cloud),
             limits,
             rotation: rotation.normalize(),
             translation,
@@ -195,13 +207,41 @@ impl<'a> Scan<'a> {
         Row {
             position: self.position(values),
             color: self.color(values),
-            class: self.value(values, columns.class),
+            class: columns.class.map_or(Value::None, |i| self.value(values, i)),
             instance: columns.instance.map_or(Value::None, |i| self.value(values, i)),
             room: match (columns.room, &self.room, room) {
                 (Some(i), _, _) => self.value(values, i),
                 (None, Some(name), None) => Value::Name(name),
                 _ => Value::None,
             },
+            measured: self.measured(values),
+        }
+    }
+
+    fn measured(&self, values: &RawValues) -> Measured {
+        let number = |column: Option<usize>| column.map(|i| self.float(values, i));
+        let cell = self.grid.and_then(|[row, column]| {
+            let index = |(i, least): (usize, i64)| match values.get(i) {
+                Some(RecordValue::Integer(n)) => u32::try_from(n.checked_sub(least)?).ok(),
+                _ => None,
+            };
+            Some([index(row)?, index(column)?])
+        });
+        Measured {
+            intensity: number(self.columns.intensity).map_or(f32::NAN, |v| v as f32),
+            time_s: number(self.columns.time).unwrap_or(f64::NAN),
+            cell,
+        }
+    }
+
+    fn told(&self, points: u64) -> Told {
+        Told {
+            points: Some(points),
+            has_colors: self.columns.color.is_some(),
+            // The scan states their range.
+            are_bytes: true,
+            has_intensity: self.columns.intensity.is_some(),
+            has_times: self.columns.time.is_some(),
         }
     }
 
@@ -221,20 +261,44 @@ impl<'a> Scan<'a> {
     }
 }
 
+/// Returns the places of the row and the column of a point's grid among its values, and the least number of
+/// each. Returns `None` if the scan does not state how large its grid is.
+fn grid_columns(cloud: &PointCloud) -> Option<[(usize, i64); 2]> {
+    let bounds = cloud.index_bounds.as_ref()?;
+    let row = attribute_index(&cloud.prototype, &RecordName::RowIndex)?;
+    let column = attribute_index(&cloud.prototype, &RecordName::ColumnIndex)?;
+    Some([(row, bounds.row_min?), (column, bounds.column_min?)])
+}
+
+/// Returns the rows and columns of a scan's grid, if its points have indices of one.
+#[cfg(feature = "raw")]
+pub(crate) fn grid_of(cloud: &PointCloud) -> Option<[u32; 2]> {
+    grid_columns(cloud)?;
+    let bounds = cloud.index_bounds.as_ref()?;
+    let side = |least: i64, most: i64| u32::try_from(most.checked_sub(least)?.checked_add(1)?).ok();
+    let rows = side(bounds.row_min?, bounds.row_max?)?;
+    let columns = side(bounds.column_min?, bounds.column_max?)?;
+    (rows > 1 && columns > 1).then_some([rows, columns])
+}
+
+/// Returns whether the points of a scan have colours, and whether they have intensities.
+#[cfg(feature = "raw")]
+pub(crate) fn has_color_and_intensity(cloud: &PointCloud) -> [bool; 2] {
+    [RecordName::ColorRed, RecordName::Intensity]
+        .map(|name| attribute_index(&cloud.prototype, &name).is_some())
+}
+
 /// The place of an attribute among the values of a point.
 fn attribute_index(prototype: &[Record], name: &RecordName) -> Option<usize> {
     prototype.iter().position(|r| r.name == *name)
 }
 
 /// Chooses the columns. Users name an attribute with its prefix (`ext:label`) or without.
-fn columns_of(
-    path: &Path,
-    options: &AnnotationOptions,
-    prototype: &[Record],
-    is_spherical: bool,
-) -> Result<Columns> {
-    let asked = [&options.class_column, &options.instance_column, &options.room_column];
-    let with_prefix = asked.into_iter().flatten().any(|a| a.contains(':'));
+fn columns_of(path: &Path, wanted: Wanted<'_>, prototype: &[Record], is_spherical: bool) -> Result<Columns> {
+    let with_prefix = wanted.annotations().is_some_and(|options| {
+        let asked = [&options.class_column, &options.instance_column, &options.room_column];
+        asked.into_iter().flatten().any(|a| a.contains(':'))
+    });
     let mut names: Vec<String> = prototype.iter().map(|r| name_of(&r.name, !with_prefix)).collect();
     if is_spherical {
         for (record, name) in prototype.iter().zip(&mut names) {
@@ -248,7 +312,7 @@ fn columns_of(
         }
     }
 
-    Columns::choose(path, &names, options).map_err(|e| match e {
+    Columns::choose(path, &names, wanted).map_err(|e| match e {
         Error::Format { message, .. } if message.contains("no column of classes") => Error::format(
             path,
             format!(
@@ -321,8 +385,11 @@ impl Cloud for E57Cloud<'_> {
         let mut invalid = 0u64;
         let mut empty = 0u64;
         // Some programs write a scan without points in a way that cannot be read.
-        for (i, cloud) in scans.iter().enumerate().filter(|(_, scan)| scan.records > 0) {
-            let scan = Scan::new(path, self.options, cloud).map_err(|e| match e {
+        let is_read =
+            |(i, scan): &(usize, &PointCloud)| scan.records > 0 && self.only.is_none_or(|only| only == *i);
+        let room = self.wanted.annotations().and_then(|options| options.room);
+        for (i, cloud) in scans.iter().enumerate().filter(is_read) {
+            let scan = Scan::new(path, self.wanted, cloud).map_err(|e| match e {
                 Error::Format { message, .. } if scans.len() > 1 => {
                     Error::format(path, format!("scan {} of {}: {message}", i + 1, scans.len()))
                 }
@@ -338,6 +405,7 @@ impl Cloud for E57Cloud<'_> {
 
             let mut points = guarded(path, || reader.pointcloud_raw(cloud))?.map_err(|e| self.error(&e))?;
             let mut several_empty = None;
+            reading.told = scan.told(cloud.records);
             while let Some(values) = guarded(path, || points.next())? {
                 let values = values
                     .map_err(|e| Error::format(path, format!("cannot be read after point {number}: {e}")))?;
@@ -358,7 +426,7 @@ impl Cloud for E57Cloud<'_> {
                         continue;
                     }
                 }
-                reading.push(number, &scan.row(&values, self.options.room))?;
+                reading.push(number, &scan.row(&values, room))?;
             }
         }
 
@@ -421,7 +489,7 @@ fn bits_of(kind: &RecordDataType) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::annotations::Annotations;
+    use crate::cloud::annotations::{AnnotationOptions, Annotations};
     use e57::{E57Writer, Quaternion, Transform, Translation};
     use std::f64::consts::{FRAC_PI_2, TAU};
 

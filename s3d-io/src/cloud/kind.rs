@@ -2,6 +2,7 @@
 
 use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::table::cloud::Cloud;
+use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use crate::fs::source::Source;
 use std::io::Read;
@@ -37,7 +38,7 @@ pub(crate) fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Res
         #[cfg(not(feature = "scannet"))]
         return Err(Error::not_built_in(path, "scannet"));
     }
-    table(Source::file(path), options)
+    table(Source::file(path), options.into())
 }
 
 /// Opens a table of points in one file.
@@ -53,7 +54,7 @@ pub(crate) fn open_cloud<'a>(path: &Path, options: &'a AnnotationOptions) -> Res
     )),
     allow(unused_variables)
 )]
-pub(crate) fn table(source: Source, options: &AnnotationOptions) -> Result<Box<dyn Cloud + '_>> {
+pub(crate) fn table(source: Source, wanted: Wanted<'_>) -> Result<Box<dyn Cloud + '_>> {
     let head = head_of(&source)?;
     let path = source.name().to_owned();
     let ending = path
@@ -70,23 +71,25 @@ pub(crate) fn table(source: Source, options: &AnnotationOptions) -> Result<Box<d
 
     match kind {
         #[cfg(feature = "ply")]
-        "ply" => Ok(Box::new(crate::cloud::ply::read::PlyCloud::new(source, options))),
+        "ply" => Ok(Box::new(crate::cloud::ply::read::PlyCloud::new(source, wanted))),
         #[cfg(feature = "npy")]
-        "npy" | "npz" => Ok(Box::new(crate::cloud::npy::read::NpyCloud::new(source, kind == "npz", options))),
+        "npy" | "npz" => Ok(Box::new(crate::cloud::npy::read::NpyCloud::new(source, kind == "npz", wanted))),
         #[cfg(feature = "las")]
-        "las" => Ok(Box::new(crate::cloud::las::read::LasCloud::new(source, options))),
+        "las" => Ok(Box::new(crate::cloud::las::read::LasCloud::new(source, wanted))),
         #[cfg(feature = "e57")]
-        "e57" => Ok(Box::new(crate::cloud::e57::E57Cloud::new(source, options))),
+        "e57" => Ok(Box::new(crate::cloud::e57::E57Cloud::new(source, wanted))),
         #[cfg(feature = "pcd")]
-        "pcd" => Ok(Box::new(crate::cloud::pcd::read::PcdCloud::new(source, options))),
+        "pcd" => Ok(Box::new(crate::cloud::pcd::read::PcdCloud::new(source, wanted))),
         #[cfg(feature = "text")]
-        "text" => Ok(Box::new(crate::cloud::text::read::TextCloud::new(source, options))),
+        "text" => Ok(Box::new(crate::cloud::text::read::TextCloud::new(source, wanted))),
         #[cfg(feature = "text")]
         _ if is_unknown(kind) && crate::cloud::text::is_rows(&head) => {
-            Ok(Box::new(crate::cloud::text::read::TextCloud::new(source, options)))
+            Ok(Box::new(crate::cloud::text::read::TextCloud::new(source, wanted)))
         }
         #[cfg(feature = "kitti")]
-        "kitti" => Ok(Box::new(crate::cloud::kitti::KittiCloud::open(&source, options)?)),
+        "kitti" if let Some(options) = wanted.annotations() => {
+            Ok(Box::new(crate::cloud::kitti::KittiCloud::open(&source, options)?))
+        }
         _ => match feature_of(kind) {
             Some(feature) => Err(Error::not_built_in(&path, feature)),
             None => Err(unknown(&path, &head)),
@@ -122,7 +125,7 @@ fn head_of(source: &Source) -> Result<Vec<u8>> {
 }
 
 /// The kind of cloud that begins with these bytes, if they tell.
-fn kind_of_content(head: &[u8]) -> Option<&'static str> {
+pub(crate) fn kind_of_content(head: &[u8]) -> Option<&'static str> {
     let begins = [
         (&b"ply\n"[..], "ply"),
         (b"ply\r", "ply"),

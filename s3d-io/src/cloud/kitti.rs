@@ -89,7 +89,8 @@ impl<'a> KittiCloud<'a> {
         ];
         let fields =
             fields.map(|(name, at, kind)| Field { name: name.to_owned(), at, kind, big_endian: false });
-        let mut table = Table::new(&self.path, fields.to_vec(), POINT.saturating_add(LABEL), self.options)?;
+        let mut table =
+            Table::new(&self.path, fields.to_vec(), POINT.saturating_add(LABEL), self.options.into())?;
         table.no_instance = Some(0);
         Ok(table)
     }

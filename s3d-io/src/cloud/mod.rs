@@ -43,9 +43,9 @@
 
 pub(crate) mod annotations;
 #[cfg(feature = "e57")]
-mod e57;
+pub(crate) mod e57;
 pub(crate) mod frame_gap;
-mod kind;
+pub(crate) mod kind;
 #[cfg(feature = "kitti")]
 mod kitti;
 #[cfg(feature = "labels")]
@@ -66,13 +66,13 @@ pub(crate) mod passes;
 #[cfg(feature = "pcd")]
 mod pcd;
 #[cfg(feature = "ply")]
-mod ply;
+pub(crate) mod ply;
 mod s3dis;
 #[cfg(feature = "scannet")]
 mod scannet;
-mod table;
+pub(crate) mod table;
 #[cfg(feature = "text")]
-mod text;
+pub(crate) mod text;
 #[cfg(any(feature = "mesh", feature = "scannet"))]
 mod words;
 

@@ -177,7 +177,7 @@ impl Annotations {
         if is_mat(name) {
             return Self::mat(source, options);
         }
-        read_tables(&[&*table(source, options)?], options)
+        read_tables(&[&*table(source, options.into())?], options)
     }
 
     #[cfg(feature = "mat")]

@@ -3,6 +3,7 @@
 
 use crate::cloud::ply::read::{color_of, open_vertices};
 use crate::cloud::table::cloud::{Cloud, ColorRange};
+use crate::cloud::table::measured::Measured;
 use crate::cloud::table::records::Color;
 use crate::cloud::table::rows::{Reading, Row, Tag, Value};
 use crate::cloud::words::class_of_word;
@@ -250,6 +251,7 @@ impl Cloud for ScannetCloud {
                     class: Value::Name(group.label.trim()),
                     instance: group.object().map_or(Value::None, Value::Whole),
                     room: Value::None,
+                    measured: Measured::default(),
                 };
                 reading.push(vertex + 1, &point)?;
             }

@@ -3,7 +3,7 @@
 
 use crate::error::{Error, Result};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Returns the content of a regular file. Links are followed.
 ///
@@ -30,6 +30,19 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>> {
 pub fn open_file(path: &Path) -> Result<fs::File> {
     must_be_regular(path)?;
     fs::File::open(path).map_err(|e| Error::io(path, "read", e))
+}
+
+/// Returns the files and folders in a folder, sorted by name.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read.
+pub(crate) fn list_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+    let failed = |e| Error::io(folder, "read the folder", e);
+    let entries = fs::read_dir(folder).map_err(failed)?;
+    let paths = entries.map(|entry| entry.map(|entry| entry.path()).map_err(failed));
+    let mut paths = paths.collect::<Result<Vec<_>>>()?;
+    paths.sort();
+    Ok(paths)
 }
 
 /// Refuses a path that exists and is not a regular file, without opening it.

@@ -66,8 +66,6 @@ pub(crate) fn read(
     bytes: &[u8],
     images: Option<&Path>,
 ) -> Result<(Vec<PosedCamera>, usize, Vec<PathBuf>)> {
-    let poses = read_poses(path, bytes)?;
-    let mut read = vec![path.to_owned()];
     let folder = match images {
         Some(folder) => Some(folder.to_owned()),
         None => PICTURES
@@ -75,14 +73,27 @@ pub(crate) fn read(
             .map(|name| path.with_file_name(name))
             .find(|folder| folder.is_dir()),
     };
-    let Some(folder) = folder else { return Ok((unpictured(poses), 0, read)) };
+    match folder {
+        Some(folder) => read_pictures(path, bytes, &folder, &intrinsics_of(&folder)),
+        None => Ok((unpictured(read_poses(path, bytes)?), 0, vec![path.to_owned()])),
+    }
+}
 
-    let pictures = timed_files(&folder, &["png", "jpg"])?;
+/// Reads the cameras of the pictures in a folder like [`read`], with the intrinsics in another folder.
+pub(crate) fn read_pictures(
+    path: &Path,
+    bytes: &[u8],
+    folder: &Path,
+    intrinsics: &Path,
+) -> Result<(Vec<PosedCamera>, usize, Vec<PathBuf>)> {
+    let poses = read_poses(path, bytes)?;
+    let mut read = vec![path.to_owned()];
+    let pictures = timed_files(folder, &["png", "jpg"])?;
     if pictures.is_empty() {
         let message = "holds no picture that is named by its time, as VIDEO_6845.806.png is";
-        return Err(Error::unsupported(&folder, message));
+        return Err(Error::unsupported(folder, message));
     }
-    let intrinsics = timed_files(&intrinsics_of(&folder), &["pincam"])?;
+    let intrinsics = timed_files(intrinsics, &["pincam"])?;
     let mut cameras = Vec::with_capacity(pictures.len());
     let mut untracked = 0;
 

@@ -11,7 +11,7 @@ use s3d_geom::Pose;
 use s3d_geom::glam::{DVec2, DVec3, dvec2};
 use serde::Deserialize;
 use std::f64::consts::PI;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const IDENTITY: [[f64; 4]; 4] =
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
@@ -24,6 +24,8 @@ struct Document {
     /// The rotation and shift that were applied to the cameras, followed by `applied_scale`.
     applied_transform: Option<Vec<Vec<f64>>>,
     applied_scale: Option<f64>,
+    /// How many units of the world a step of the numbers in depth pictures is.
+    depth_unit_scale_factor: Option<f64>,
     /// The offset that had been subtracted from the mesh's coordinates when its images were rendered.
     world_offset_m: Option<[f64; 3]>,
 }
@@ -33,6 +35,7 @@ struct FrameEntry {
     file_path: String,
     transform_matrix: Vec<Vec<f64>>,
     mask_path: Option<String>,
+    depth_file_path: Option<String>,
     /// ScanNet++ marks blurred pictures, and those whose pose failed.
     #[serde(default)]
     is_bad: bool,
@@ -77,13 +80,37 @@ pub(crate) fn read(path: &Path) -> Result<Vec<PosedCamera>> {
 /// Reads the cameras of a `transforms.json`, and how many more are marked as bad. Their poses are in the
 /// frame before its `applied_transform`.
 pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, usize)> {
+    let DepthFrames { frames, bad, .. } = read_depth(path)?;
+    Ok((frames.into_iter().map(|(camera, _)| camera).collect(), bad))
+}
+
+/// The frames of a list, with their depth.
+pub(crate) struct DepthFrames {
+    /// Each camera, and its depth picture if the list names one.
+    pub(crate) frames: Vec<(PosedCamera, Option<PathBuf>)>,
+    /// The number of frames that are marked as bad.
+    pub(crate) bad: usize,
+    /// How many metres a step of the numbers in depth pictures is, if the list says it.
+    #[cfg_attr(not(feature = "raw"), allow(dead_code))]
+    pub(crate) unit: Option<f64>,
+}
+
+/// Reads like [`read_posed`], with the depth of the frames.
+pub(crate) fn read_depth(path: &Path) -> Result<DepthFrames> {
     let document: Document = read_json(path)?;
     let applied = Applied::new(&document, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut cameras = Vec::with_capacity(document.frames.len());
+    let unit = document.depth_unit_scale_factor;
+    if let Some(unit) = unit.filter(|unit| !(*unit > 0.0 && unit.is_finite())) {
+        return Err(Error::format(path, format!("depth_unit_scale_factor: {unit} is no scale")));
+    }
+    let unit = unit.map(|unit| unit / applied.scale);
+
+    let mut frames = Vec::with_capacity(document.frames.len());
     let mut bad = 0;
     for (i, frame) in document.frames.into_iter().enumerate() {
-        let FrameEntry { file_path: name, transform_matrix, mask_path, is_bad, camera } = frame;
+        let FrameEntry { file_path: name, transform_matrix, mask_path, depth_file_path, is_bad, camera } =
+            frame;
         if is_bad {
             bad += 1;
             continue;
@@ -99,9 +126,10 @@ pub(crate) fn read_posed(path: &Path) -> Result<(Vec<PosedCamera>, usize)> {
 
         let picture = Some(folder.join(&name).into());
         let mask = mask_path.map(|mask| folder.join(mask));
-        cameras.push(PosedCamera { name, pose, size, optics, picture, mask, line: 0 });
+        let depth = depth_file_path.map(|depth| folder.join(depth));
+        frames.push((PosedCamera { name, pose, size, optics, picture, mask, line: 0 }, depth));
     }
-    Ok((cameras, bad))
+    Ok(DepthFrames { frames, bad, unit })
 }
 
 fn at_frame(path: &Path, i: usize, name: &str, message: &str) -> Error {

@@ -63,7 +63,7 @@ pub(crate) fn read(scan: &Path, files: NumberedFiles) -> Result<(Vec<PosedCamera
 }
 
 /// Reads the optics from the file of an intrinsic matrix K.
-fn optics(path: &Path) -> Result<Optics> {
+pub(crate) fn optics(path: &Path) -> Result<Optics> {
     let numbers: Vec<f64> = numbers(&read_file(path)?, path)?
         .into_iter()
         .map(|(_, number)| number)

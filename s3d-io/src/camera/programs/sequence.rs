@@ -41,12 +41,7 @@ pub(crate) fn read(files: NumberedFiles) -> Result<(Vec<PosedCamera>, usize, Vec
     let mut size = None;
     let mut optics = None;
     let mut read = Vec::new();
-    let info = files.first().and_then(|(_, pose)| {
-        INFO.iter()
-            .map(|name| pose.with_file_name(name))
-            .find(|path| path.is_file())
-    });
-    if let Some(info) = info {
+    if let Some(info) = info_of(&files) {
         let told = Info::read(&info)?;
         size = told.size;
         optics = told.optics;
@@ -84,21 +79,33 @@ pub(crate) fn read(files: NumberedFiles) -> Result<(Vec<PosedCamera>, usize, Vec
     Ok((cameras, untracked, read))
 }
 
-/// What `_info.txt` tells of the pictures.
+/// Returns the file of intrinsics beside the poses that [`find`] found, if there is one.
+pub(crate) fn info_of(files: &NumberedFiles) -> Option<PathBuf> {
+    let (_, pose) = files.first()?;
+    INFO.iter()
+        .map(|name| pose.with_file_name(name))
+        .find(|path| path.is_file())
+}
+
+/// What `_info.txt` tells of the pictures of both cameras.
 #[derive(Default)]
-struct Info {
+pub(crate) struct Info {
     size: Option<[u32; 2]>,
     optics: Option<Optics>,
+    pub(crate) depth_size: Option<[u32; 2]>,
+    pub(crate) depth_optics: Option<Optics>,
+    /// The value of a depth of one metre.
+    pub(crate) depth_scale: Option<f64>,
 }
 
 impl Info {
     /// Reads lines `key = value`.
-    fn read(path: &Path) -> Result<Self> {
+    pub(crate) fn read(path: &Path) -> Result<Self> {
         let bytes = read_file(path)?;
         let text = text_of(&bytes, path)?;
-        let mut width = None;
-        let mut height = None;
-        let mut optics = None;
+        let mut info = Self::default();
+        // Widths and heights: of colour, of depth.
+        let mut sides = [[None; 2]; 2];
 
         for (line, text) in (1u64..).zip(text.split(|&b| b == b'\n')) {
             let text = String::from_utf8_lossy(text);
@@ -108,22 +115,36 @@ impl Info {
             let not_whole = || fault(format!("{} is no number of pixels", quote(value.as_bytes())));
             let side = || value.parse::<u32>().ok().filter(|side| *side > 0).ok_or_else(not_whole);
             match key.trim() {
-                "m_colorWidth" => width = Some(side()?),
-                "m_colorHeight" => height = Some(side()?),
-                "m_calibrationColorIntrinsic" => {
-                    let numbers: Option<Vec<f64>> = value
-                        .split_ascii_whitespace()
-                        .map(|word| word.parse().ok().filter(|v: &f64| v.is_finite()))
-                        .collect();
-                    optics = Some(optics_of_matrix(&numbers.unwrap_or_default()).map_err(fault)?);
+                "m_colorWidth" => sides[0][0] = Some(side()?),
+                "m_colorHeight" => sides[0][1] = Some(side()?),
+                "m_depthWidth" => sides[1][0] = Some(side()?),
+                "m_depthHeight" => sides[1][1] = Some(side()?),
+                "m_depthShift" => {
+                    let scale = value
+                        .parse()
+                        .ok()
+                        .filter(|scale: &f64| *scale > 0.0 && scale.is_finite());
+                    let no_scale = || fault(format!("{} is no scale of depth", quote(value.as_bytes())));
+                    info.depth_scale = Some(scale.ok_or_else(no_scale)?);
                 }
+                "m_calibrationColorIntrinsic" => info.optics = Some(optics_of(value).map_err(fault)?),
+                "m_calibrationDepthIntrinsic" => info.depth_optics = Some(optics_of(value).map_err(fault)?),
                 _ => {}
             }
         }
 
-        let size = width.zip(height).map(|(width, height)| [width, height]);
-        Ok(Self { size, optics })
+        let [color, depth] = sides.map(|[width, height]| Some([width?, height?]));
+        Ok(Self { size: color, depth_size: depth, ..info })
     }
+}
+
+/// Returns the optics of the numbers of a matrix. The error is a sentence.
+fn optics_of(numbers: &str) -> std::result::Result<Optics, String> {
+    let numbers: Option<Vec<f64>> = numbers
+        .split_ascii_whitespace()
+        .map(|word| word.parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect();
+    optics_of_matrix(&numbers.unwrap_or_default())
 }
 
 #[cfg(test)]

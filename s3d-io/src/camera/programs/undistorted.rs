@@ -22,14 +22,8 @@ const FIRST: [&[u8]; 5] =
     [b"dataset", b"n_images", b"depth_directory", b"color_directory", b"intrinsics_matrix"];
 
 /// The commands that say nothing about the photographs.
-const OTHERS: [&str; 6] = [
-    "depth_directory",
-    "texture_directory",
-    "depth_intrinsics",
-    "depth_intrinsics_matrix",
-    "rectangle",
-    "mesh",
-];
+const OTHERS: [&str; 5] =
+    ["texture_directory", "depth_intrinsics", "depth_intrinsics_matrix", "rectangle", "mesh"];
 
 /// The folder of the photographs, where no line says it.
 const PICTURES: &str = "undistorted_color_images";
@@ -50,8 +44,17 @@ pub(crate) fn find(dir: &Path) -> Option<PathBuf> {
     list.is_file().then_some(list)
 }
 
+/// The folder of the depth pictures, where no line says it.
+const DEPTHS: &str = "undistorted_depth_images";
+
 /// Reads the cameras of a list, in its order.
 pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
+    let depths = read_depth(path, bytes)?.into_iter();
+    Ok(depths.map(|(camera, _)| camera).collect())
+}
+
+/// Reads the cameras of a list like [`read`], each with its depth picture. The file may not exist.
+pub(crate) fn read_depth(path: &Path, bytes: &[u8]) -> Result<Vec<(PosedCamera, PathBuf)>> {
     let mut list = List::default();
     for (line, text) in (1u64..).zip(bytes.split(|&b| b == b'\n')) {
         let text = text.trim_ascii();
@@ -67,16 +70,25 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<PosedCamera>> {
         let message = format!("tells of {told} images, and {} are listed", list.cameras.len());
         return Err(Error::line(path, line, message));
     }
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let named = Path::new(list.folder.as_deref().unwrap_or(PICTURES));
-    // The folder is named from the folder of the house, in which the list has a folder of its own.
-    let folders = [folder.join("..").join(named), folder.join(named)];
-    let [beside, _] = &folders;
-    let folder = folders.iter().find(|folder| folder.is_dir()).unwrap_or(beside);
+    let colors = folder_of(path, list.folder.as_deref().unwrap_or(PICTURES));
+    let depths = folder_of(path, list.depth_folder.as_deref().unwrap_or(DEPTHS));
     for camera in &mut list.cameras {
-        camera.picture = Some(folder.join(&camera.name).into());
+        camera.picture = Some(colors.join(&camera.name).into());
     }
-    Ok(list.cameras)
+    let names = list.depths.into_iter().map(|name| depths.join(name));
+    Ok(list.cameras.into_iter().zip(names).collect())
+}
+
+/// Returns the folder that a list calls `named`. It is named from the folder of the house, in which the list
+/// has a folder of its own.
+fn folder_of(list: &Path, named: &str) -> PathBuf {
+    let folder = list.parent().unwrap_or(Path::new(""));
+    let beside = folder.join("..").join(named);
+    let within = folder.join(named);
+    match !beside.is_dir() && within.is_dir() {
+        true => within,
+        false => beside,
+    }
 }
 
 /// What a list says so far.
@@ -85,8 +97,12 @@ struct List {
     cameras: Vec<PosedCamera>,
     names: HashSet<String>,
     optics: Option<Optics>,
+    /// The names of the depth pictures, one a camera.
+    depths: Vec<String>,
     /// The folder of the photographs.
     folder: Option<String>,
+    /// The folder of the depth pictures.
+    depth_folder: Option<String>,
     /// The number of images, and its line.
     told: Option<(u64, u64)>,
 }
@@ -111,6 +127,7 @@ impl List {
                     .map_err(|_| format!("{} is no number of images", quote(word.as_bytes())))?;
                 self.told = Some((count, line));
             }
+            "depth_directory" => self.depth_folder = words.next().map(str::to_owned),
             "color_directory" | "image_directory" => self.folder = words.next().map(str::to_owned),
             "intrinsics_matrix" | "color_intrinsics_matrix" => {
                 let [width, height] = SIZE.map(f64::from);
@@ -136,7 +153,7 @@ impl List {
         mut words: impl Iterator<Item = &'w str>,
         line: u64,
     ) -> std::result::Result<(), String> {
-        let (Some(_depth), Some(name)) = (words.next(), words.next()) else {
+        let (Some(depth), Some(name)) = (words.next(), words.next()) else {
             return Err("names no pictures: a line is scan DEPTH COLOUR and sixteen numbers".into());
         };
         if self.optics.is_none() {
@@ -153,6 +170,7 @@ impl List {
         let camera =
             PosedCamera { size: Some(SIZE), optics: self.optics, line, ..PosedCamera::new(name, pose) };
         self.cameras.push(camera);
+        self.depths.push(depth.to_owned());
         Ok(())
     }
 }

@@ -9,8 +9,10 @@ use crate::bounds::Bounds;
 use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::{CLASSES, INSTANCES};
+use crate::cloud::table::measured::{Measured, Told};
 use crate::cloud::table::records::{Color, Field, Kind, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
+use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use crate::fs::source::Source;
 use crate::guarded::guarded;
@@ -31,7 +33,7 @@ const WITHHELD: u8 = 0b100;
 /// A `.las` or `.laz` file.
 pub(crate) struct LasCloud<'a> {
     source: Source,
-    options: &'a AnnotationOptions,
+    wanted: Wanted<'a>,
 }
 
 /// The fields of a point's record.
@@ -41,29 +43,33 @@ struct Fields {
     transforms: las::Vector<las::Transform>,
     /// `None`: the points have no colours.
     color: Option<[Field; 3]>,
-    class: Dimension,
+    /// `None` if no annotations are wanted.
+    class: Option<Dimension>,
     instance: Option<Dimension>,
     room: Option<Dimension>,
+    intensity: Field,
+    /// `None`: the points have no times.
+    time: Option<Field>,
 }
 
 impl Fields {
-    fn choose(path: &Path, header: &las::Header, options: &AnnotationOptions) -> Result<Self> {
+    fn choose(path: &Path, header: &las::Header, wanted: Wanted<'_>) -> Result<Self> {
         let format = header.point_format();
-        let all = dimensions(header);
-        // Extra dimensions made for labels come before the standard's.
-        let class = find_dimension(path, &all, "class", options.class_column.as_ref(), &CLASSES)?;
-        let usual: Vec<&str> = INSTANCES.into_iter().chain(["point_source_id"]).collect();
-        let instance = find_dimension(path, &all, "instance", options.instance_column.as_ref(), &usual)?;
-        let room = find_dimension(path, &all, "rooms", options.room_column.as_ref(), &[])?;
-
+        let [mut class, mut instance, mut room] = [const { None }; 3];
+        if let Some(options) = wanted.annotations() {
+            [class, instance, room] = labels(path, header, options)?;
+        }
+        let time_at = if format.is_extended { 22 } else { 20 };
         Ok(Self {
             is_extended: format.is_extended,
             position: [0, 4, 8].map(|at| field("coordinate", at, Kind::I32)),
             transforms: *header.transforms(),
             color: color_at(format).map(|at| at.map(|at| field("colour", at, Kind::U16))),
-            class: class.unwrap_or_else(|| Dimension::classification(format)),
+            class,
             instance,
             room,
+            intensity: field("intensity", 12, Kind::U16),
+            time: format.has_gps_time.then(|| field("time", time_at, Kind::F64)),
         })
     }
 
@@ -82,6 +88,15 @@ impl Fields {
         )
     }
 
+    fn measured(&self, record: &[u8]) -> Measured {
+        Measured {
+            #[expect(clippy::cast_possible_truncation, reason = "16 bits are exact")]
+            intensity: self.intensity.float(record) as f32,
+            time_s: self.time.as_ref().map_or(f64::NAN, |time| time.float(record)),
+            cell: None,
+        }
+    }
+
     /// The colour of a point, black if it has none. Returns `None` if it is beyond the range.
     fn color(&self, record: &[u8], range: ColorRange) -> Option<[u8; 3]> {
         let Some([r, g, b]) = &self.color else { return Some([0; 3]) };
@@ -90,6 +105,18 @@ impl Fields {
             Color::Wider | Color::Beyond(_) => None,
         }
     }
+}
+
+/// Returns the dimensions of classes, instances and rooms.
+fn labels(path: &Path, header: &las::Header, options: &AnnotationOptions) -> Result<[Option<Dimension>; 3]> {
+    let all = dimensions(header);
+    // Extra dimensions made for labels come before the standard's.
+    let class = find_dimension(path, &all, "class", options.class_column.as_ref(), &CLASSES)?;
+    let usual: Vec<&str> = INSTANCES.into_iter().chain(["point_source_id"]).collect();
+    let instance = find_dimension(path, &all, "instance", options.instance_column.as_ref(), &usual)?;
+    let room = find_dimension(path, &all, "rooms", options.room_column.as_ref(), &[])?;
+    let class = class.unwrap_or_else(|| Dimension::classification(header.point_format()));
+    Ok([Some(class), instance, room])
 }
 
 fn field(name: &str, at: usize, kind: Kind) -> Field {
@@ -107,8 +134,8 @@ fn color_at(format: &Format) -> Option<[usize; 3]> {
 }
 
 impl<'a> LasCloud<'a> {
-    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
-        Self { source, options }
+    pub(crate) fn new(source: Source, wanted: Wanted<'a>) -> Self {
+        Self { source, wanted }
     }
 
     fn error(&self, done: u64, error: &las::Error) -> Error {
@@ -152,11 +179,18 @@ impl Cloud for LasCloud<'_> {
         let path = self.source.name();
         let mut reader = self.open(&mut reading.notes)?;
         let header = reader.header().clone();
-        let fields = Fields::choose(path, &header, self.options)?;
+        let fields = Fields::choose(path, &header, self.wanted)?;
         let [min, max] = [header.bounds().min, header.bounds().max].map(|p| dvec3(p.x, p.y, p.z));
         reading.claims(Bounds { min, max });
 
         let count = header.number_of_points();
+        reading.told = Told {
+            points: Some(count),
+            has_colors: fields.color.is_some(),
+            are_bytes: false,
+            has_intensity: true,
+            has_times: fields.time.is_some(),
+        };
         let mut data = las::PointDataBuilder::new().for_header(&header).build();
         let at_once = BATCH_BYTES
             .checked_div(u64::from(header.point_format().len()))
@@ -179,14 +213,16 @@ impl Cloud for LasCloud<'_> {
                     withheld = withheld.saturating_add(1);
                     continue;
                 }
-                cut = cut.saturating_add(u64::from(fields.class.is_cut(record)));
+                let is_cut = fields.class.as_ref().is_some_and(|class| class.is_cut(record));
+                cut = cut.saturating_add(u64::from(is_cut));
                 let Some(color) = fields.color(record, colors) else { return Ok(false) };
                 let row = Row {
                     position: fields.position(record),
                     color,
-                    class: fields.class.value(record),
+                    class: fields.class.as_ref().map_or(Value::None, |d| d.value(record)),
                     instance: fields.instance.as_ref().map_or(Value::None, |d| d.value(record)),
                     room: fields.room.as_ref().map_or(Value::None, |d| d.value(record)),
+                    measured: fields.measured(record),
                 };
                 reading.push(done, &row)?;
             }
@@ -199,7 +235,9 @@ impl Cloud for LasCloud<'_> {
                 .push(format!("{shown}: {withheld} points are withheld (deleted), left out"));
         }
         // Whoever gives 31 a meaning knows of it.
-        if cut > 0 && !self.options.classes.contains_key("31") {
+        let is_known =
+            |wanted: Wanted<'_>| wanted.annotations().is_some_and(|o| o.classes.contains_key("31"));
+        if cut > 0 && !is_known(self.wanted) {
             reading.notes.push(format!(
                 "{shown}: {cut} points have the class 31, the largest in this point format: larger classes \
                  may have been cut to it. Save as LAS 1.4 with a point format of 6 to 10, or classes as an \

@@ -121,6 +121,6 @@ impl Cloud for NpyFolder<'_> {
                 self.dir.display()
             ));
         }
-        read_columns(&self.dir, arrays, self.options, colors, reading)
+        read_columns(&self.dir, arrays, self.options.into(), colors, reading)
     }
 }

@@ -2,13 +2,13 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::npy::array::zipped;
 use crate::cloud::npy::header::NpyHeader;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::meaning::{plain_numbers, s3dis_number};
 use crate::cloud::table::records::{Field, Part, Table};
 use crate::cloud::table::rows::{Reading, Tag};
+use crate::cloud::table::wanted::{Wanted, columns_like, usual_names};
 use crate::error::{Error, Result};
 use crate::fs::source::{Bytes, Source};
 use s3d_label::Class;
@@ -24,14 +24,14 @@ const PLAIN: [&str; 8] = ["x", "y", "z", "r", "g", "b", "class", "instance"];
 pub(crate) struct NpyCloud<'a> {
     source: Source,
     is_npz: bool,
-    options: &'a AnnotationOptions,
+    wanted: Wanted<'a>,
     /// Whether class numbers are S3DIS's: in a plain array whose columns and classes are not named.
     s3dis_numbers: Cell<bool>,
 }
 
 impl<'a> NpyCloud<'a> {
-    pub(crate) fn new(source: Source, is_npz: bool, options: &'a AnnotationOptions) -> Self {
-        Self { source, is_npz, options, s3dis_numbers: Cell::new(false) }
+    pub(crate) fn new(source: Source, is_npz: bool, wanted: Wanted<'a>) -> Self {
+        Self { source, is_npz, wanted, s3dis_numbers: Cell::new(false) }
     }
 
     fn file(&self) -> Result<BufReader<Bytes>> {
@@ -55,8 +55,11 @@ impl<'a> NpyCloud<'a> {
     ) -> Result<Table> {
         if !is_structured {
             self.name_plain(&mut fields)?;
-            if self.options.columns.is_empty() && self.options.classes.is_empty() {
-                let taxonomy = &self.options.taxonomy;
+            if let Some(options) = self.wanted.annotations()
+                && options.columns.is_empty()
+                && options.classes.is_empty()
+            {
+                let taxonomy = &options.taxonomy;
                 self.s3dis_numbers.set(taxonomy.is_s3dis());
                 let path = self.source.name().display();
                 let numbers = plain_numbers(taxonomy);
@@ -66,16 +69,20 @@ impl<'a> NpyCloud<'a> {
                 ));
             }
         }
-        Table::new(self.source.name(), fields, stride, self.options)
+        Table::new(self.source.name(), fields, stride, self.wanted)
     }
 
     /// Names the columns of a plain array.
     fn name_plain(&self, fields: &mut [Field]) -> Result<()> {
-        let usual = PLAIN.map(str::to_owned);
-        let named = &self.options.columns;
+        let named = self.wanted.columns();
+        let usual = match self.wanted {
+            Wanted::Annotations(_) if matches!(fields.len(), 7 | 8) => PLAIN.map(str::to_owned).into(),
+            Wanted::Annotations(_) => Vec::new(),
+            Wanted::Measurements(_) => usual_names(fields.len()).unwrap_or_default(),
+        };
         let names = match fields.len() {
-            7 | 8 if named.is_empty() => &usual[..],
-            n if n == named.len() => &named[..],
+            _ if named.is_empty() && !usual.is_empty() => &usual[..],
+            n if n == named.len() => named,
             n => {
                 let said = match named.len() {
                     0 => "they have no names: say what they are".to_owned(),
@@ -84,8 +91,9 @@ impl<'a> NpyCloud<'a> {
                 return Err(Error::format(
                     self.source.name(),
                     format!(
-                        "has {n} columns, and {said}, as in columns = [\"x\", \"y\", \"z\", \"r\", \"g\", \
-                         \"b\", \"class\", \"instance\"] in [annotations]"
+                        "has {n} columns, and {said}, as in columns = [{}]{}",
+                        columns_like(self.wanted),
+                        self.wanted.place_of_columns()
                     ),
                 ));
             }
@@ -123,7 +131,7 @@ impl<'a> NpyCloud<'a> {
             let table = self.table(fields, header.stride, header.is_structured, reading)?;
             return table.read(self.source.name(), member, header.rows, colors, reading);
         }
-        read_columns(self.source.name(), arrays, self.options, colors, reading)
+        read_columns(self.source.name(), arrays, self.wanted, colors, reading)
     }
 
     /// The names of an archive's arrays. Few archives have more than a dozen.
@@ -149,7 +157,7 @@ impl<'a> NpyCloud<'a> {
 pub(super) fn read_columns<R: Read>(
     path: &Path,
     mut arrays: Vec<(String, NpyHeader, R)>,
-    options: &AnnotationOptions,
+    wanted: Wanted<'_>,
     colors: ColorRange,
     reading: &mut Reading<'_>,
 ) -> Result<bool> {
@@ -172,7 +180,7 @@ pub(super) fn read_columns<R: Read>(
         parts.push(Part { path: path.to_owned(), source, at: stride, stride: header.stride });
         stride = header.stride.saturating_add(stride);
     }
-    let table = Table::new(path, fields, stride, options)?;
+    let table = Table::new(path, fields, stride, wanted)?;
     table.read_parts(path, &mut parts, rows, colors, reading)
 }
 

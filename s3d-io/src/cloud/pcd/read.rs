@@ -2,12 +2,12 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::pcd::header::{Data, PcdField, PcdHeader};
 use crate::cloud::pcd::lzf::Lzf;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::records::{Field, Kind, Part, Table};
 use crate::cloud::table::rows::Reading;
+use crate::cloud::table::wanted::Wanted;
 use crate::cloud::table::words::{Lines, Parsed, Separator, WordTable, is_packed};
 use crate::error::{Error, Result};
 use crate::fs::source::{Bytes, Source};
@@ -22,7 +22,7 @@ const MOST_EXPANSION: u64 = 88;
 /// A `.pcd` file.
 pub(crate) struct PcdCloud<'a> {
     source: Source,
-    options: &'a AnnotationOptions,
+    wanted: Wanted<'a>,
 }
 
 /// The points of a file behind its header.
@@ -35,8 +35,8 @@ struct Body<'h> {
 }
 
 impl<'a> PcdCloud<'a> {
-    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
-        Self { source, options }
+    pub(crate) fn new(source: Source, wanted: Wanted<'a>) -> Self {
+        Self { source, wanted }
     }
 
     /// Reads points as text. `lines` is behind the header.
@@ -55,7 +55,8 @@ impl<'a> PcdCloud<'a> {
             floats.extend((0..field.count).map(|_| field.kind.is_float()));
         }
         let is_float = |column: usize| floats.get(column).copied().unwrap_or(false);
-        let table = WordTable::new(path, &names, Separator::Blanks, is_float, self.options)?;
+        let table = WordTable::new(path, &names, Separator::Blanks, is_float, self.wanted)?;
+        reading.told = table.told(Some(header.points));
 
         let mut done = 0u64;
         let mut holes = 0u64;
@@ -188,7 +189,7 @@ impl<'a> PcdCloud<'a> {
     }
 
     fn table(&self, fields: Vec<Field>, stride: usize) -> Result<Table> {
-        let mut table = Table::new(self.source.name(), fields, stride, self.options)?;
+        let mut table = Table::new(self.source.name(), fields, stride, self.wanted)?;
         table.holes = Some(Cell::new(0));
         Ok(table)
     }
@@ -234,10 +235,8 @@ fn push_columns(fields: &mut Vec<Field>, field: &PcdField, at: usize) {
 
 /// Where the columns that are read start in a record.
 fn wanted_bytes(table: &Table) -> BTreeSet<usize> {
-    let columns = &table.columns;
-    let others = [Some(columns.class), columns.instance, columns.room];
-    let all = columns.position.into_iter().chain(columns.color.into_iter().flatten());
-    all.chain(others.into_iter().flatten())
+    let columns = table.columns.all();
+    columns
         .filter_map(|i| table.fields.get(i))
         .map(|field| field.at)
         .collect()

@@ -1,15 +1,16 @@
 //! Annotated points in PLY files: the element `vertex`, with properties for class and instance.
 
-use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::Columns;
+use crate::cloud::table::measured::{Measured, Told};
 use crate::cloud::table::records::{Color, color};
 use crate::cloud::table::rows::{Reading, Row, Value};
+use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use crate::fs::source::Source;
 use crate::mesh::ply::batch::PlyBatch;
 use crate::mesh::ply::elements::PlyReader;
-use crate::mesh::ply::header::PlyElement;
+use crate::mesh::ply::header::{PlyElement, PlyType};
 use s3d_geom::glam::dvec3;
 use std::cell::Cell;
 use std::path::Path;
@@ -17,13 +18,13 @@ use std::path::Path;
 /// A `.ply` file.
 pub(crate) struct PlyCloud<'a> {
     source: Source,
-    options: &'a AnnotationOptions,
+    wanted: Wanted<'a>,
     has_faces: Cell<bool>,
 }
 
 impl<'a> PlyCloud<'a> {
-    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
-        Self { source, options, has_faces: Cell::new(false) }
+    pub(crate) fn new(source: Source, wanted: Wanted<'a>) -> Self {
+        Self { source, wanted, has_faces: Cell::new(false) }
     }
 }
 
@@ -80,15 +81,17 @@ impl Cloud for PlyCloud<'_> {
             .iter()
             .map(|p| if p.is_list() { String::new() } else { p.name.clone() })
             .collect();
-        let columns = Columns::choose(path, &names, self.options)?;
-        let others = [Some(columns.class), columns.instance, columns.room];
-        reader.want(
-            columns
-                .position
-                .into_iter()
-                .chain(columns.color.into_iter().flatten())
-                .chain(others.into_iter().flatten()),
-        );
+        let columns = Columns::choose(path, &names, self.wanted)?;
+        reader.want(columns.all());
+        reading.told = Told {
+            points: Some(element.count),
+            has_colors: columns.color.is_some(),
+            are_bytes: columns
+                .color
+                .is_some_and(|[r, ..]| element.properties[r].kind == PlyType::U8),
+            has_intensity: columns.intensity.is_some(),
+            has_times: columns.time.is_some(),
+        };
 
         let mut batch = PlyBatch::default();
         while reader.read_batch(&mut batch)? {
@@ -110,9 +113,14 @@ impl Cloud for PlyCloud<'_> {
                 let point = Row {
                     position: dvec3(x[row], y[row], z[row]),
                     color: rgb,
-                    class: value(Some(columns.class)),
+                    class: value(columns.class),
                     instance: value(columns.instance),
                     room: value(columns.room),
+                    measured: Measured {
+                        intensity: columns.intensity.map_or(f32::NAN, |p| batch.scalars(p)[row] as f32),
+                        time_s: columns.time.map_or(f64::NAN, |p| batch.scalars(p)[row]),
+                        cell: None,
+                    },
                 };
                 match batch.lines.get(row) {
                     Some(line) => reading.push_line(*line, &point)?,

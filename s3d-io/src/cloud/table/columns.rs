@@ -1,6 +1,6 @@
 //! Finds the columns of a table of points by name. Every program has names of its own.
 
-use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -65,14 +65,34 @@ pub(crate) const INSTANCES: [&str; 21] = [
     "track_id",
 ];
 
+/// Names of columns of intensity. `scalar_…` is CloudCompare's.
+const INTENSITIES: [&str; 6] =
+    ["intensity", "scalar_intensity", "intensities", "reflectance", "reflectivity", "i"];
+/// Names of columns of the time of a point.
+const TIMES: [&str; 9] = [
+    "gps_time",
+    "gpstime",
+    "time",
+    "timestamp",
+    "time_s",
+    "t",
+    "scalar_gpstime",
+    "scalar_gps_time",
+    "scalar_time",
+];
+
 /// The columns of a table, as indices: where each thing is in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Columns {
     pub(crate) position: [usize; 3],
     pub(crate) color: Option<[usize; 3]>,
-    pub(crate) class: usize,
+    /// `None` if no annotations are wanted.
+    pub(crate) class: Option<usize>,
     pub(crate) instance: Option<usize>,
     pub(crate) room: Option<usize>,
+    /// These are `None` if annotations are wanted.
+    pub(crate) intensity: Option<usize>,
+    pub(crate) time: Option<usize>,
 }
 
 impl Columns {
@@ -81,10 +101,21 @@ impl Columns {
     ///
     /// # Errors
     /// [`Error::Format`], with the names of all columns, if a needed or named column is missing.
-    pub(crate) fn choose(path: &Path, names: &[String], options: &AnnotationOptions) -> Result<Self> {
+    pub(crate) fn choose(path: &Path, names: &[String], wanted: Wanted<'_>) -> Result<Self> {
         let position = find_three(names, &POSITIONS, &POSITION_ARRAYS).ok_or_else(|| {
             Error::format(path, format!("has no columns of coordinates, such as x y z; {}", listed(names)))
         })?;
+        let color = find_three(names, &COLORS, &COLOR_ARRAYS);
+        let options = match wanted {
+            Wanted::Annotations(options) => options,
+            Wanted::Measurements(_) => {
+                let [class, instance, room] = [None; 3];
+                let intensity = find_usual(names, &INTENSITIES);
+                let time = find_usual(names, &TIMES);
+                return Ok(Self { position, color, class, instance, room, intensity, time });
+            }
+        };
+
         let class = match &options.class_column {
             Some(name) => find_named(path, names, "class", name)?,
             None => find_usual(names, &CLASSES).ok_or_else(|| {
@@ -108,8 +139,18 @@ impl Columns {
             .map(|name| find_named(path, names, "rooms", name))
             .transpose()?;
 
-        let color = find_three(names, &COLORS, &COLOR_ARRAYS);
-        Ok(Self { position, color, class, instance, room })
+        let class = Some(class);
+        Ok(Self { position, color, class, instance, room, intensity: None, time: None })
+    }
+
+    /// Returns all columns that are read.
+    pub(crate) fn all(&self) -> impl Iterator<Item = usize> {
+        let others = [self.class, self.instance, self.room, self.intensity, self.time];
+        let colors = self.color.into_iter().flatten();
+        self.position
+            .into_iter()
+            .chain(colors)
+            .chain(others.into_iter().flatten())
     }
 }
 
@@ -153,10 +194,11 @@ fn find(names: &[String], name: &str) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::annotations::AnnotationOptions;
 
     fn choose(names: &str, options: &AnnotationOptions) -> Result<Columns> {
         let names: Vec<String> = names.split(' ').map(str::to_owned).collect();
-        Columns::choose(Path::new("a.ply"), &names, options)
+        Columns::choose(Path::new("a.ply"), &names, options.into())
     }
 
     fn found(names: &str) -> Columns {
@@ -167,13 +209,21 @@ mod tests {
     fn usual_names_are_found() {
         let full = found("Z Y X label red green blue instance_id");
         assert_eq!((full.position, full.color), ([2, 1, 0], Some([4, 5, 6])));
-        assert_eq!((full.class, full.instance, full.room), (3, Some(7), None));
+        assert_eq!((full.class, full.instance, full.room), (Some(3), Some(7), None));
         let arrays = found("coord[0] coord[1] coord[2] color[0] color[1] color[2] segment");
         assert_eq!((arrays.position, arrays.color), ([0, 1, 2], Some([3, 4, 5])));
-        assert_eq!((arrays.class, arrays.instance), (6, None));
+        assert_eq!((arrays.class, arrays.instance), (Some(6), None));
         assert_eq!(found("x y z sem inst label").instance, Some(4));
-        assert_eq!(found("x y z class label").class, 3);
-        assert_eq!(found("x y z Label label").class, 4);
+        assert_eq!(found("x y z class label").class, Some(3));
+        assert_eq!(found("x y z Label label").class, Some(4));
+    }
+
+    #[test]
+    fn measurements_need_no_class() {
+        let names = ["x", "y", "z", "Scalar_Intensity", "GpsTime", "label"].map(str::to_owned);
+        let found = Columns::choose(Path::new("a.ply"), &names, Wanted::Measurements(&[])).unwrap();
+        assert_eq!((found.class, found.intensity, found.time), (None, Some(3), Some(4)));
+        assert_eq!(found.all().collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
     }
 
     #[test]
@@ -185,7 +235,7 @@ mod tests {
             ..AnnotationOptions::default()
         };
         let found = choose("x y z label instance kind part place", &options).unwrap();
-        assert_eq!((found.class, found.instance, found.room), (5, Some(6), Some(7)));
+        assert_eq!((found.class, found.instance, found.room), (Some(5), Some(6), Some(7)));
         for (names, words) in [
             (
                 "x y z label instance part place",

@@ -4,10 +4,12 @@ pub(crate) mod cloud;
 pub(crate) mod columns;
 mod gathered;
 pub(crate) mod meaning;
+pub(crate) mod measured;
 mod points;
 pub(crate) mod read;
 pub(crate) mod records;
 pub(crate) mod rows;
 mod store;
+pub(crate) mod wanted;
 #[cfg(any(feature = "pcd", feature = "text"))]
 pub(crate) mod words;

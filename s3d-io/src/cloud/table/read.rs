@@ -185,6 +185,7 @@ mod tests {
     use super::*;
     use crate::cloud::on_fault::OnFault;
     use crate::cloud::table::gathered::MAX_GROUPS;
+    use crate::cloud::table::measured::Measured;
     use crate::cloud::table::rows::{Row, Value};
     use proptest::prelude::*;
     use s3d_geom::PointCloud;
@@ -227,6 +228,7 @@ mod tests {
                     class: Value::Whole(*class),
                     instance: Value::Float(*instance as f64),
                     room: if *room == 0 { Value::None } else { Value::Whole(*room) },
+                    measured: Measured::default(),
                 };
                 reading.push(i as u64 + 1, &row)?;
             }
@@ -349,6 +351,7 @@ mod tests {
                     class: Value::Whole(1),
                     instance: Value::None,
                     room: Value::None,
+                    measured: Measured::default(),
                 };
                 reading.push(1, &good)?;
                 reading.push(2, &Row { position: DVec3::new(0.0, f64::NAN, 0.0), ..good })?;
@@ -404,6 +407,7 @@ mod tests {
                     class: Value::Float(0.5),
                     instance: Value::None,
                     room: Value::None,
+                    measured: Measured::default(),
                 };
                 reading.push(1, &row)?;
                 Ok(true)

@@ -2,10 +2,11 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::table::cloud::ColorRange;
 use crate::cloud::table::columns::Columns;
+use crate::cloud::table::measured::{Measured, Told};
 use crate::cloud::table::rows::{Reading, Row, Value};
+use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use s3d_geom::glam::dvec3;
 use std::cell::Cell;
@@ -220,16 +221,13 @@ impl Table {
     /// # Errors
     /// [`Error::Format`] if columns are missing, a coordinate or colour is a text, records are too long, or a
     /// field reaches beyond them.
-    pub(crate) fn new(
-        path: &Path,
-        fields: Vec<Field>,
-        stride: usize,
-        options: &AnnotationOptions,
-    ) -> Result<Self> {
+    pub(crate) fn new(path: &Path, fields: Vec<Field>, stride: usize, wanted: Wanted<'_>) -> Result<Self> {
         let names: Vec<String> = fields.iter().map(|f| f.name.clone()).collect();
-        let columns = Columns::choose(path, &names, options)?;
+        let columns = Columns::choose(path, &names, wanted)?;
 
+        let measured = [columns.intensity, columns.time].into_iter().flatten();
         let numbers = columns.position.into_iter().chain(columns.color.into_iter().flatten());
+        let numbers = numbers.chain(measured);
         if let Some(text) = numbers.filter_map(|i| fields.get(i)).find(|f| f.kind.is_text()) {
             return Err(Error::format(path, format!("the column {} holds texts, not numbers", text.name)));
         }
@@ -291,12 +289,40 @@ impl Table {
         let row = Row {
             position: dvec3(x, y, z),
             color: rgb,
-            class: self.fields[columns.class].value(record, class),
+            class: columns
+                .class
+                .map_or(Value::None, |i| self.fields[i].value(record, class)),
             instance: if is_none { Value::None } else { instance },
             room: columns.room.map_or(Value::None, |i| self.fields[i].value(record, room)),
+            measured: self.measured(record),
         };
         reading.push(number, &row)?;
         Ok(true)
+    }
+
+    /// Returns what the scanner told of a point.
+    fn measured(&self, record: &[u8]) -> Measured {
+        let number = |column: Option<usize>| Some(self.fields.get(column?)?.float(record));
+        Measured {
+            #[expect(clippy::cast_possible_truncation, reason = "intensities are coarse")]
+            intensity: number(self.columns.intensity).map_or(f32::NAN, |v| v as f32),
+            time_s: number(self.columns.time).unwrap_or(f64::NAN),
+            cell: None,
+        }
+    }
+
+    /// Returns what the table tells of its points.
+    fn told(&self, points: u64) -> Told {
+        let color = self.columns.color.map(|[first, ..]| first);
+        Told {
+            points: Some(points),
+            has_colors: color.is_some(),
+            are_bytes: color
+                .and_then(|i| self.fields.get(i))
+                .is_some_and(|field| field.kind == Kind::U8),
+            has_intensity: self.columns.intensity.is_some(),
+            has_times: self.columns.time.is_some(),
+        }
     }
 
     /// Hands on `count` records. Returns `false` if a colour is beyond the narrow range.
@@ -311,6 +337,7 @@ impl Table {
         colors: ColorRange,
         reading: &mut Reading<'_>,
     ) -> Result<bool> {
+        reading.told = self.told(count);
         let mut texts = Default::default();
         let mut done = 0;
         let mut block = Vec::new();
@@ -342,6 +369,7 @@ impl Table {
         colors: ColorRange,
         reading: &mut Reading<'_>,
     ) -> Result<bool> {
+        reading.told = self.told(count);
         // Records have up to 64 KiB, so a block has a few MiB at most.
         let mut done = 0;
         let mut block = Vec::new();
@@ -415,6 +443,7 @@ pub(crate) fn fill(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::annotations::AnnotationOptions;
 
     fn field(kind: Kind, big_endian: bool) -> Field {
         Field { name: "a".to_owned(), at: 1, kind, big_endian }
@@ -470,7 +499,12 @@ mod tests {
             big_endian: false,
         });
         let table = |stride| {
-            Table::new(Path::new("a.npy"), fields.clone().collect(), stride, &AnnotationOptions::default())
+            Table::new(
+                Path::new("a.npy"),
+                fields.clone().collect(),
+                stride,
+                (&AnnotationOptions::default()).into(),
+            )
         };
         assert_eq!(table(16).unwrap().stride, 16);
         let message = table(15).unwrap_err().to_string();

@@ -5,6 +5,7 @@ use crate::bounds::Bounds;
 use crate::cloud::annotations::{AnnotationOptions, Skipped};
 use crate::cloud::frame_gap::FrameWatch;
 use crate::cloud::on_fault::OnFault;
+use crate::cloud::table::measured::{Measured, ScanBlock, Told};
 use crate::error::{Error, Result};
 use s3d_geom::glam::{DVec3, Vec3};
 use std::collections::HashMap;
@@ -163,10 +164,28 @@ pub(crate) struct Row<'a> {
     pub(crate) class: Value<'a>,
     pub(crate) instance: Value<'a>,
     pub(crate) room: Value<'a>,
+    pub(crate) measured: Measured,
 }
 
 /// The function that takes a batch of rows.
 pub(crate) type Sink<'a> = dyn FnMut(&Rows) -> Result<()> + 'a;
+
+/// The function that takes a block of measurements, which it may change.
+pub(crate) type BlockSink<'a> = dyn FnMut(&mut ScanBlock) -> Result<()> + 'a;
+
+/// Who takes the rows.
+enum Taker<'a> {
+    /// Rows with their labels.
+    Labels {
+        /// The index of the room for rows that name none.
+        room: u32,
+        tags: &'a mut CloudTags,
+        rows: Rows,
+        sink: &'a mut Sink<'a>,
+    },
+    /// What a scanner measured.
+    Measurements { block: ScanBlock, sink: &'a mut BlockSink<'a> },
+}
 
 /// Reads one file: takes rows, checks them and hands them on in batches.
 pub(crate) struct Reading<'a> {
@@ -174,11 +193,9 @@ pub(crate) struct Reading<'a> {
     on_fault: OnFault,
     offset_m: DVec3,
     watch: Option<FrameWatch>,
-    /// The index of the room for rows that name none.
-    room: u32,
-    tags: &'a mut CloudTags,
-    rows: Rows,
-    sink: &'a mut Sink<'a>,
+    taker: Taker<'a>,
+    /// What the file tells of its points. Readers set it before the first row.
+    pub(crate) told: Told,
     pub(crate) skipped: Skipped,
     /// The largest coordinate, in metres.
     pub(crate) farthest_m: f64,
@@ -202,10 +219,26 @@ impl<'a> Reading<'a> {
             on_fault: options.on_fault,
             offset_m: options.offset_m,
             watch: options.mesh_bounds.map(|mesh| FrameWatch::new(mesh, options.offset_m)),
-            room,
-            tags,
-            rows: Rows::default(),
-            sink,
+            taker: Taker::Labels { room, tags, rows: Rows::default(), sink },
+            told: Told::default(),
+            skipped: Skipped::default(),
+            farthest_m: 0.0,
+            has_points: false,
+            has_instances: false,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Returns a reading whose blocks of measurements `sink` takes.
+    #[cfg(feature = "raw")]
+    pub(crate) fn of_measurements(path: &Path, on_fault: OnFault, sink: &'a mut BlockSink<'a>) -> Self {
+        Self {
+            path: path.to_owned(),
+            on_fault,
+            offset_m: DVec3::ZERO,
+            watch: None,
+            taker: Taker::Measurements { block: ScanBlock::default(), sink },
+            told: Told::default(),
             skipped: Skipped::default(),
             farthest_m: 0.0,
             has_points: false,
@@ -232,7 +265,11 @@ impl<'a> Reading<'a> {
         if let Err(why) = self.take(row) {
             return self.fault(error(&self.path, why));
         }
-        if self.rows.len() >= BATCH { self.flush() } else { Ok(()) }
+        let taken = match &self.taker {
+            Taker::Labels { rows, .. } => rows.len(),
+            Taker::Measurements { block, .. } => block.len(),
+        };
+        if taken >= BATCH { self.flush() } else { Ok(()) }
     }
 
     /// Counts a faulty row, or stops at it.
@@ -256,11 +293,19 @@ impl<'a> Reading<'a> {
             return Err(format!("a coordinate of {farthest:e} m is too large"));
         }
 
+        let (room, tags, rows) = match &mut self.taker {
+            Taker::Labels { room, tags, rows, .. } => (*room, tags, rows),
+            Taker::Measurements { block, .. } => {
+                self.has_points = true;
+                measure(block, row, &self.told);
+                return Ok(());
+            }
+        };
         let class = match row.class {
-            Value::Name(name) => self.tags.classes.name(name),
+            Value::Name(name) => tags.classes.name(name),
             value => {
                 let number = value.whole().map_err(|e| format!("class: {e}"))?;
-                self.tags.classes.number(number)
+                tags.classes.number(number)
             }
         };
         let class = class.ok_or_else(|| too_many("classes"))?;
@@ -269,11 +314,11 @@ impl<'a> Reading<'a> {
             value => value.whole().map_err(|e| format!("instance: {e}"))?.max(NO_INSTANCE),
         };
         let room = match row.room {
-            Value::None => self.room,
-            Value::Name(name) => self.tags.rooms.name(name).ok_or_else(|| too_many("rooms"))?,
+            Value::None => room,
+            Value::Name(name) => tags.rooms.name(name).ok_or_else(|| too_many("rooms"))?,
             value => {
                 let number = value.whole().map_err(|e| format!("room: {e}"))?;
-                self.tags.rooms.number(number).ok_or_else(|| too_many("rooms"))?
+                tags.rooms.number(number).ok_or_else(|| too_many("rooms"))?
             }
         };
 
@@ -283,11 +328,11 @@ impl<'a> Reading<'a> {
         if let Some(watch) = &mut self.watch {
             watch.see(row.position);
         }
-        self.rows.positions.push(position.as_vec3());
-        self.rows.colors.push(row.color);
-        self.rows.classes.push(class);
-        self.rows.instances.push(instance);
-        self.rows.rooms.push(room);
+        rows.positions.push(position.as_vec3());
+        rows.colors.push(row.color);
+        rows.classes.push(class);
+        rows.instances.push(instance);
+        rows.rooms.push(room);
         Ok(())
     }
 
@@ -307,15 +352,37 @@ impl<'a> Reading<'a> {
 
     /// Hands on the rows so far.
     pub(crate) fn flush(&mut self) -> Result<()> {
-        if self.rows.len() > 0 {
-            if let Some(watch) = &mut self.watch {
-                watch.after_block(&self.path)?;
+        match &mut self.taker {
+            Taker::Labels { rows, sink, .. } if rows.len() > 0 => {
+                if let Some(watch) = &mut self.watch {
+                    watch.after_block(&self.path)?;
+                }
+                sink(rows)?;
+                rows.clear();
             }
-            (self.sink)(&self.rows)?;
-            self.rows.clear();
+            Taker::Measurements { block, sink } if !block.is_empty() => {
+                sink(block)?;
+                block.clear();
+            }
+            _ => {}
         }
         Ok(())
     }
+}
+
+/// Adds a row to a block of measurements.
+fn measure(block: &mut ScanBlock, row: &Row<'_>, told: &Told) {
+    block.positions_m.push(row.position);
+    if told.has_colors {
+        block.colors.push(row.color);
+    }
+    if told.has_intensity {
+        block.intensities.push(row.measured.intensity);
+    }
+    if told.has_times {
+        block.times_s.push(row.measured.time_s);
+    }
+    block.cells.extend(row.measured.cell);
 }
 
 fn too_many(what: &str) -> String {

@@ -2,11 +2,12 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::table::cloud::ColorRange;
 use crate::cloud::table::columns::Columns;
+use crate::cloud::table::measured::{Measured, Told};
 use crate::cloud::table::records::{Color, color};
 use crate::cloud::table::rows::{Row, Value};
+use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use s3d_geom::glam::dvec3;
@@ -15,8 +16,8 @@ use std::path::{Path, PathBuf};
 
 /// The longest line.
 const LONGEST_LINE: u64 = 1 << 16;
-/// The places of a row: three coordinates, three colours, class, instance, room.
-const PLACES: usize = 9;
+/// The places of a row: three coordinates, three colours, class, instance, room, intensity, time.
+const PLACES: usize = 11;
 
 /// The lines of a file, one at a time.
 pub(crate) struct Lines<B> {
@@ -29,7 +30,12 @@ pub(crate) struct Lines<B> {
 
 impl<B: BufRead> Lines<B> {
     pub(crate) fn new(path: &Path, file: B) -> Self {
-        Self { path: path.to_owned(), file, line: Vec::new(), number: 0, bytes: 0 }
+        Self::resumed(path, file, 0)
+    }
+
+    /// Returns the lines of a file that is open behind this many of its lines.
+    pub(crate) fn resumed(path: &Path, file: B, lines: u64) -> Self {
+        Self { path: path.to_owned(), file, line: Vec::new(), number: lines, bytes: 0 }
     }
 
     /// Reads the next line, and returns it without white space around it. Returns `None` at the end.
@@ -169,9 +175,9 @@ impl WordTable {
         names: &[String],
         separator: Separator,
         has_fraction: impl Fn(usize) -> bool,
-        options: &AnnotationOptions,
+        wanted: Wanted<'_>,
     ) -> Result<Self> {
-        let columns = Columns::choose(path, names, options)?;
+        let columns = Columns::choose(path, names, wanted)?;
         let color = match columns.color {
             Some(channels) => WordColor::Three(channels, channels.into_iter().any(has_fraction)),
             None => names
@@ -186,13 +192,26 @@ impl WordTable {
         };
 
         let places = columns.position.into_iter().map(Some).chain(of_color).chain([
-            Some(columns.class),
+            columns.class,
             columns.instance,
             columns.room,
+            columns.intensity,
+            columns.time,
         ]);
         let mut wanted: Vec<(usize, usize)> = places.zip(0..).filter_map(|(c, at)| Some((c?, at))).collect();
         wanted.sort_unstable();
         Ok(Self { width: names.len(), wanted, columns, color, separator })
+    }
+
+    /// Returns what the table tells of its points.
+    pub(crate) fn told(&self, points: Option<u64>) -> Told {
+        Told {
+            points,
+            has_colors: self.color != WordColor::None,
+            are_bytes: matches!(self.color, WordColor::Packed(_)),
+            has_intensity: self.columns.intensity.is_some(),
+            has_times: self.columns.time.is_some(),
+        }
     }
 
     /// Parses a line.
@@ -223,7 +242,7 @@ impl WordTable {
         row: &[&'l [u8]; PLACES],
         colors: ColorRange,
     ) -> std::result::Result<Parsed<'l>, String> {
-        let [x, y, z, r, g, b, class, instance, room] = *row;
+        let [x, y, z, r, g, b, class, instance, room, intensity, time] = *row;
         let coordinate = |word| {
             let value = self.separator.number(unquoted(word));
             value.ok_or_else(|| format!("the coordinate {} is no number", quote(word)))
@@ -251,12 +270,21 @@ impl WordTable {
         Ok(Parsed::Row(Row {
             position,
             color: rgb,
-            class: self.value(class)?,
+            class: self.columns.class.map_or(Ok(Value::None), |_| self.value(class))?,
             instance: self
                 .columns
                 .instance
                 .map_or(Ok(Value::None), |_| self.value(instance))?,
             room: self.columns.room.map_or(Ok(Value::None), |_| self.value(room))?,
+            measured: Measured {
+                #[expect(clippy::cast_possible_truncation, reason = "intensities are coarse")]
+                intensity: self
+                    .separator
+                    .number(unquoted(intensity))
+                    .map_or(f32::NAN, |v| v as f32),
+                time_s: self.separator.number(unquoted(time)).unwrap_or(f64::NAN),
+                cell: None,
+            },
         }))
     }
 
@@ -313,6 +341,7 @@ fn packed_word(word: &[u8]) -> Option<[u8; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::annotations::AnnotationOptions;
 
     fn words(separator: Separator, line: &str) -> Vec<String> {
         let words = separator.words(line.as_bytes());
@@ -356,7 +385,7 @@ mod tests {
         let names = ["x", "y", "z", "r", "g", "b", "class", "instance"].map(str::to_owned);
         let options = AnnotationOptions::default();
         let comma = Separator::One(b',');
-        let table = WordTable::new(Path::new("a.csv"), &names, comma, |_| false, &options).unwrap();
+        let table = WordTable::new(Path::new("a.csv"), &names, comma, |_| false, (&options).into()).unwrap();
         let line = b"1,2.5,-3,4,5,6,\"chair\",2.000,";
         let Parsed::Row(row) = table.parse(line, ColorRange::Narrow) else { panic!("a row") };
         assert_eq!(row.position, dvec3(1.0, 2.5, -3.0));

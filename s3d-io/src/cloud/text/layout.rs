@@ -3,7 +3,7 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::annotations::AnnotationOptions;
+use crate::cloud::table::wanted::{Wanted, columns_like};
 use crate::cloud::table::words::{Lines, Separator, WordTable, unquoted};
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
@@ -112,34 +112,35 @@ impl Layout {
     pub(super) fn table(
         &self,
         path: &Path,
-        options: &AnnotationOptions,
+        wanted: Wanted<'_>,
         usual: impl Fn(usize) -> Option<Vec<String>>,
     ) -> Result<WordTable> {
         let width = self.floats.len();
         let names = match &self.names {
-            _ if !options.columns.is_empty() => {
-                if options.columns.len() != width {
+            _ if !wanted.columns().is_empty() => {
+                if wanted.columns().len() != width {
                     let message = format!(
-                        "has {width} columns, and {} are named (columns in [annotations]): {}",
-                        options.columns.len(),
+                        "has {width} columns, and {} are named (columns{}): {}",
+                        wanted.columns().len(),
+                        wanted.place_of_columns(),
                         self.first_text
                     );
                     return Err(Error::line(path, self.first, message));
                 }
-                options.columns.clone()
+                wanted.columns().to_vec()
             }
             Some((line, names)) if names.len() != width => {
                 let message = format!(
-                    "has {width} columns, and line {line} names {}, {}: name them with columns in \
-                     [annotations]: {}",
+                    "has {width} columns, and line {line} names {}, {}: name them with columns{}: {}",
                     names.len(),
                     names.join(" "),
+                    wanted.place_of_columns(),
                     self.first_text
                 );
                 return Err(Error::line(path, self.first, message));
             }
             Some((_, names)) => names.clone(),
-            None => usual(width).ok_or_else(|| self.unnamed(path))?,
+            None => usual(width).ok_or_else(|| self.unnamed(path, wanted))?,
         };
 
         // `Rf Gf Bf` are floats by their names, even if the first points are black.
@@ -147,16 +148,17 @@ impl Layout {
             let by_name = names.get(column).is_some_and(|name| name.eq_ignore_ascii_case("rf"));
             by_name || self.floats.get(column).copied().unwrap_or(false)
         };
-        WordTable::new(path, &names, self.separator, is_float, options)
+        WordTable::new(path, &names, self.separator, is_float, wanted)
     }
 
-    fn unnamed(&self, path: &Path) -> Error {
+    fn unnamed(&self, path: &Path, wanted: Wanted<'_>) -> Error {
         let width = self.floats.len();
         let message = format!(
             "is an ASCII cloud without names of columns: it has {width}, as in {}. Say what they are, as in \
-             columns = [\"x\", \"y\", \"z\", \"r\", \"g\", \"b\", \"class\", \"instance\"] in [annotations], \
-             or write them into its first line",
-            self.first_text
+             columns = [{}]{}, or write them into its first line",
+            self.first_text,
+            columns_like(wanted),
+            wanted.place_of_columns()
         );
         Error::line(path, self.first, message)
     }

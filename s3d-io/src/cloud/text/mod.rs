@@ -3,7 +3,8 @@
 //! in "Leica Cyclone: PTX and PTS file formats".
 
 mod layout;
-mod ptx;
+#[cfg_attr(not(feature = "raw"), allow(dead_code))]
+pub(crate) mod ptx;
 pub(crate) mod read;
 
 pub(crate) use layout::is_rows;

@@ -2,12 +2,13 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::table::cloud::ColorRange;
+use crate::cloud::table::measured::Measured;
 use crate::cloud::table::rows::{Reading, Row};
+use crate::cloud::table::wanted::{Wanted, usual_names};
 use crate::cloud::table::words::{Lines, Parsed};
 use crate::cloud::text::layout::Layout;
-use crate::cloud::text::read::{TextFile, scanner_names};
+use crate::cloud::text::read::TextFile;
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
 use crate::fs::text::words;
@@ -15,10 +16,26 @@ use s3d_geom::glam::{DAffine3, DVec3};
 use std::path::Path;
 
 /// A scan's header.
-struct Scan {
+#[derive(Clone, Debug)]
+pub(crate) struct Scan {
+    pub(crate) columns: u64,
+    pub(crate) rows: u64,
+    /// Where the header says that the scanner was, in the file's frame.
+    pub(crate) scanner: DVec3,
+    /// From the scan to the file's frame.
+    pub(crate) pose: DAffine3,
+    /// `columns` × `rows`.
     points: u64,
-    /// World from scan.
-    pose: DAffine3,
+}
+
+/// A scan of a file: its header, and where it begins.
+#[derive(Clone, Debug)]
+pub(crate) struct ScanPlace {
+    pub(crate) scan: Scan,
+    /// The number of words in the line of its first point; 0 if it has none.
+    pub(crate) width: usize,
+    /// The bytes and the lines before its header.
+    before: (u64, u64),
 }
 
 impl Scan {
@@ -34,10 +51,12 @@ impl Scan {
         };
         next(path, lines)?;
         let rows = count(path, lines)?;
-        for _ in 0..4 {
+        let mut place = [[0.0; 3]; 4];
+        for row in &mut place {
             next(path, lines)?;
-            numbers::<3>(path, lines)?;
+            *row = numbers(path, lines)?;
         }
+        let [scanner, ..] = place.map(DVec3::from_array);
 
         let mut matrix = [DVec3::ZERO; 4];
         for row in &mut matrix {
@@ -49,7 +68,17 @@ impl Scan {
         let points = columns
             .checked_mul(rows)
             .ok_or_else(|| Error::line(path, lines.number(), format!("claims {columns} × {rows} points")))?;
-        Ok(Some(Self { points, pose: DAffine3::from_cols(x, y, z, shift) }))
+        let pose = DAffine3::from_cols(x, y, z, shift);
+        Ok(Some(Self { columns, rows, scanner, pose, points }))
+    }
+}
+
+impl Scan {
+    /// Returns the row and column of the point with a number. A scan is written column by column.
+    fn cell(&self, number: u64) -> Option<[u32; 2]> {
+        let row = number.checked_rem(self.rows)?;
+        let column = number.checked_div(self.rows)?;
+        Some([u32::try_from(row).ok()?, u32::try_from(column).ok()?])
     }
 }
 
@@ -84,11 +113,50 @@ fn numbers<const N: usize>(path: &Path, lines: &Lines<TextFile>) -> Result<[f64;
     })
 }
 
-/// Reads all scans of a file. Points at 0 0 0 are rays without a return, and left out.
+/// Lists the scans of a file. All its lines are passed over, but no point is parsed.
+#[cfg(feature = "raw")]
+pub(crate) fn list(path: &Path, lines: &mut Lines<TextFile>) -> Result<Vec<ScanPlace>> {
+    let mut places = Vec::new();
+    loop {
+        let before = (lines.bytes(), lines.number());
+        let Some(scan) = Scan::read(path, lines)? else { return Ok(places) };
+        let mut width = 0;
+        let mut done = 0u64;
+        while done < scan.points {
+            if lines.next()?.is_none() {
+                return Err(cut_short(path, done, &scan));
+            }
+            if lines.line().is_empty() {
+                continue;
+            }
+            if done == 0 {
+                width = words(lines.line()).count();
+            }
+            done = done.saturating_add(1);
+        }
+        places.push(ScanPlace { scan, width, before });
+    }
+}
+
+#[cfg(feature = "raw")]
+impl ScanPlace {
+    /// Returns the bytes and the lines before the scan's header.
+    pub(crate) fn before(&self) -> (u64, u64) {
+        self.before
+    }
+}
+
+fn cut_short(path: &Path, done: u64, scan: &Scan) -> Error {
+    Error::format(path, format!("ends after {done} of {} points of a scan: it is cut short", scan.points))
+}
+
+/// Reads the scans of a file, at most so many. Points at 0 0 0 are rays without a return, and left out.
+/// `open` opens the file at the header of a scan.
 pub(super) fn read_ptx(
     path: &Path,
     open: impl Fn() -> Result<Lines<TextFile>>,
-    options: &AnnotationOptions,
+    wanted: Wanted<'_>,
+    most: Option<u64>,
     colors: ColorRange,
     reading: &mut Reading<'_>,
 ) -> Result<bool> {
@@ -97,30 +165,35 @@ pub(super) fn read_ptx(
         return Err(Error::format(path, "holds no scan"));
     }
     let layout = Layout::find(path, &mut lines, false)?;
-    let table = layout.table(path, options, scanner_names)?;
+    let table = layout.table(path, wanted, usual_names)?;
 
     let mut lines = open()?;
     let mut points = 0u64;
     let mut empty = 0u64;
-    while let Some(scan) = Scan::read(path, &mut lines)? {
+    let mut scans = 0u64;
+    while most.is_none_or(|most| scans < most)
+        && let Some(scan) = Scan::read(path, &mut lines)?
+    {
+        scans = scans.saturating_add(1);
+        reading.told = table.told(Some(scan.points));
         let mut done = 0u64;
         while done < scan.points {
             if lines.next()?.is_none() {
-                let message =
-                    format!("ends after {done} of {} points of a scan: it is cut short", scan.points);
-                return Err(Error::format(path, message));
+                return Err(cut_short(path, done, &scan));
             }
             let line = lines.line();
             if line.is_empty() {
                 continue;
             }
 
+            let cell = scan.cell(done);
             done = done.saturating_add(1);
             match table.parse(line, colors) {
                 Parsed::Row(row) if row.position == DVec3::ZERO => empty = empty.saturating_add(1),
                 Parsed::Row(row) => {
                     let position = scan.pose.transform_point3(row.position);
-                    reading.push_line(lines.number(), &Row { position, ..row })?;
+                    let measured = Measured { cell, ..row.measured };
+                    reading.push_line(lines.number(), &Row { position, measured, ..row })?;
                 }
                 Parsed::Wider => return Ok(false),
                 Parsed::Fault(why) => reading.fault(Error::line(path, lines.number(), why))?,

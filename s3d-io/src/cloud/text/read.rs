@@ -2,62 +2,53 @@
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
-use crate::cloud::annotations::AnnotationOptions;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::rows::Reading;
+use crate::cloud::table::wanted::{Wanted, usual_names};
 use crate::cloud::table::words::{Lines, Parsed};
 use crate::cloud::text::layout::{Layout, count_of, is_comment};
 use crate::cloud::text::ptx::read_ptx;
 use crate::error::{Error, Result};
 use crate::fs::encoding::Utf8Reader;
 use crate::fs::source::{Bytes, Source};
-use std::io::BufReader;
+use std::io::{BufReader, Seek, SeekFrom};
 use std::path::Path;
 
 /// A file of text: `.asc`, `.xyz`, `.txt`, `.csv`, `.pts` or `.ptx`.
 pub(crate) struct TextCloud<'a> {
     source: Source,
-    options: &'a AnnotationOptions,
+    wanted: Wanted<'a>,
+    is_ptx: bool,
+    /// The only scan of a PTX file that is read: the bytes and lines before it.
+    only: Option<(u64, u64)>,
 }
 
 /// The file, as UTF-8.
-pub(super) type TextFile = BufReader<Utf8Reader<Bytes>>;
-
-/// The names of the columns of a PTS or PTX file, by their number.
-pub(super) fn scanner_names(width: usize) -> Option<Vec<String>> {
-    let names = match width {
-        3 => "x y z",
-        4 => "x y z intensity",
-        6 => "x y z r g b",
-        7 => "x y z intensity r g b",
-        _ => return None,
-    };
-    Some(names.split(' ').map(str::to_owned).collect())
-}
+pub(crate) type TextFile = BufReader<Utf8Reader<Bytes>>;
 
 impl<'a> TextCloud<'a> {
-    pub(crate) fn new(source: Source, options: &'a AnnotationOptions) -> Self {
-        Self { source, options }
+    pub(crate) fn new(source: Source, wanted: Wanted<'a>) -> Self {
+        let is_ptx = has_ending(&source, "ptx");
+        Self { source, wanted, is_ptx, only: None }
     }
 
-    fn ends_with(&self, ending: &str) -> bool {
-        self.source
-            .name()
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case(ending))
+    /// Returns one scan of a PTX file.
+    #[cfg(feature = "raw")]
+    pub(crate) fn ptx_scan(source: Source, wanted: Wanted<'a>, before: (u64, u64)) -> Self {
+        Self { source, wanted, is_ptx: true, only: Some(before) }
     }
 
     fn lines(&self) -> Result<Lines<TextFile>> {
-        let (file, _) = self.source.open()?;
-        let file = BufReader::with_capacity(1 << 18, Utf8Reader::new(file));
-        Ok(Lines::new(self.source.name(), file))
+        lines_from(&self.source, self.only.unwrap_or_default())
     }
 
     fn read_rows(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
         let path = self.source.name();
         let layout = Layout::find(path, &mut self.lines()?, true)?;
-        let is_pts = self.ends_with("pts");
-        let table = layout.table(path, self.options, |width| scanner_names(width).filter(|_| is_pts))?;
+        // Scanners' programs write these columns, and annotated points have others.
+        let is_usual = has_ending(&self.source, "pts") || self.wanted.annotations().is_none();
+        let table = layout.table(path, self.wanted, |width| usual_names(width).filter(|_| is_usual))?;
+        reading.told = table.told(layout.count);
 
         let mut lines = self.lines()?;
         // The points that the last count states, and how many of them came.
@@ -103,14 +94,32 @@ impl<'a> TextCloud<'a> {
     }
 }
 
+fn has_ending(source: &Source, ending: &str) -> bool {
+    source
+        .name()
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
+/// Opens a text after this many bytes and lines, in UTF-8 unless it is opened at its start.
+pub(crate) fn lines_from(source: &Source, (bytes, lines): (u64, u64)) -> Result<Lines<TextFile>> {
+    let (mut file, _) = source.open()?;
+    if bytes > 0 {
+        file.seek(SeekFrom::Start(bytes))
+            .map_err(|e| Error::io(source.name(), "read", e))?;
+    }
+    let file = BufReader::with_capacity(1 << 18, Utf8Reader::new(file));
+    Ok(Lines::resumed(source.name(), file, lines))
+}
+
 impl Cloud for TextCloud<'_> {
     fn path(&self) -> &Path {
         self.source.name()
     }
 
     fn read(&self, colors: ColorRange, reading: &mut Reading<'_>) -> Result<bool> {
-        if self.ends_with("ptx") {
-            read_ptx(self.source.name(), || self.lines(), self.options, colors, reading)
+        if self.is_ptx {
+            read_ptx(self.source.name(), || self.lines(), self.wanted, self.only.map(|_| 1), colors, reading)
         } else {
             self.read_rows(colors, reading)
         }
