@@ -9,7 +9,9 @@ use s3d_fusion::{RangeImage, RangeKind, SensorNoise};
 use s3d_geom::{Pose, Raster};
 use s3d_io::camera::{Distortion, Optics};
 use s3d_io::mesh::UpAxis;
-use s3d_io::raw::{DepthPicture, DepthPictures, LaserScans, RawForm, RawOptions, RawScan, ScanInfo};
+use s3d_io::raw::{
+    ColorPicture, DepthPicture, DepthPictures, LaserScans, RawForm, RawOptions, RawScan, ScanInfo,
+};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -127,6 +129,11 @@ impl Images {
         self.up
     }
 
+    /// The photographs that were taken together with depth pictures.
+    pub(super) fn colors(&self) -> impl Iterator<Item = &ColorPicture> {
+        self.pictures.iter().filter_map(|picture| picture.color.as_ref())
+    }
+
     /// The number of pictures and scans.
     pub(super) fn len(&self) -> usize {
         self.pictures.len() + self.scans.iter().map(|scans| scans.scans().len()).sum::<usize>()
@@ -146,6 +153,12 @@ impl Images {
         let [x, y, z] = self.offset_m.to_array();
         let line = format!("offset_m {x:?} {y:?} {z:?}: add it for the scan's own coordinates");
         (self.offset_m != DVec3::ZERO).then_some(line)
+    }
+
+    /// The mean of the upward axes of depth cameras; `None` if there are none.
+    pub(super) fn mean_up(&self) -> Option<DVec3> {
+        let sum: DVec3 = self.pictures.iter().map(|picture| picture.pose.up()).sum();
+        (!self.pictures.is_empty()).then(|| sum / self.pictures.len() as f64)
     }
 
     /// The places that sensors stood at, metres.

@@ -7,6 +7,7 @@
 
 mod images;
 mod kept;
+mod level;
 mod options;
 mod scene_text;
 mod surface;
@@ -96,14 +97,14 @@ fn fuse_folder(
     let made = surface(&images, options, ctx)?;
 
     write(&folder.path().join("mesh.ply"), &made, &images, false)?;
-    let scene = scene_text::scene(&images, output)?;
+    let scene = scene_text::scene(&images, made.turn, output)?;
     if images.offset_m != DVec3::ZERO {
         // Where the readers of meshes look for it.
         let [x, y, z] = images.offset_m.to_array();
         write_bytes(&folder.path().join("offset.xyz"), format!("{x:?} {y:?} {z:?}\n").as_bytes())?;
     }
-    if let Some(locations) = &scene.locations {
-        write_bytes(&folder.path().join(scene_text::LOCATIONS), locations.as_bytes())?;
+    for (name, list) in &scene.lists {
+        write_bytes(&folder.path().join(name), list.as_bytes())?;
     }
     write_bytes(&folder.path().join("scene.toml"), scene.toml.as_bytes())?;
     write_json(&folder.path().join(FUSED.about), &record)?;

@@ -2,76 +2,111 @@
 
 use super::images::Images;
 use crate::error::Result;
-use glam::DAffine3;
+use glam::{DAffine3, DMat3};
+use s3d_geom::PhotoLens;
 use s3d_io::Error as FileError;
-use s3d_io::camera::{E57Pictures, read_posed_cameras};
+use s3d_io::camera::E57Pictures;
 use s3d_io::mesh::UpAxis;
 use s3d_io::raw::RawForm;
+use serde_json::json;
 use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
-/// The list of places beside a fused mesh.
-pub(super) const LOCATIONS: &str = "locations.csv";
+/// The list of the scanner's places beside a fused mesh.
+const LOCATIONS: &str = "locations.csv";
+
+/// The list of photographs beside a fused mesh.
+const PHOTOGRAPHS: &str = "photographs.json";
 
 /// What an export needs beside the mesh.
 pub(super) struct SceneText {
     pub(super) toml: String,
-    /// The list of the scanner's places, if no file of the scan tells them to an export.
-    pub(super) locations: Option<String>,
+    /// The lists that it names: the name and content of each.
+    pub(super) lists: Vec<(&'static str, String)>,
 }
 
-/// Returns the scene file of a fused mesh in `folder`.
-pub(super) fn scene(images: &Images, folder: &Path) -> Result<SceneText> {
+/// Returns the scene file of a fused mesh in `folder`. `turn` leads from the world of the images to the mesh's.
+pub(super) fn scene(images: &Images, turn: Option<DMat3>, folder: &Path) -> Result<SceneText> {
     let mut toml =
         "# Fused from a raw scan by s3d fuse.\narea = 1\n[mesh]\npath = \"mesh.ply\"\nup = \"z\"\n"
             .to_owned();
+    let mut lists = Vec::new();
     // Several inputs are several lists.
     let only = match images.inputs() {
-        [(path, form)] => Some((path.as_path(), *form)),
+        [(path, form)] => Some((path.as_path(), *form, relative(path, folder)?.display().to_string())),
         _ => None,
     };
-    let place = only
-        .map(|(path, _)| relative(path, folder))
-        .transpose()?
-        .unwrap_or_default();
-    let up = if images.up() == Some(UpAxis::Y) {
-        "up = \"y\"\n"
-    } else {
-        ""
+    let up = match images.up() {
+        Some(UpAxis::Y) => "up = \"y\"\n",
+        Some(UpAxis::Z) | None => "",
     };
-    let row = |table: &str| format!("[{table}]\npath = {:?}\n{up}", place.display().to_string());
 
     match only {
-        Some((_, RawForm::Matterport)) => {
-            toml += &row("cameras");
-            toml += "[rgb]\nsource = \"captures\"\n";
-            let _ = writeln!(toml, "path = {:?}", place.display().to_string());
+        Some((_, RawForm::Matterport, path)) => {
+            let _ = write!(
+                toml,
+                "[cameras]\npath = {path:?}\n{up}[rgb]\nsource = \"captures\"\npath = {path:?}\n"
+            );
         }
-        Some((path, RawForm::E57)) => {
-            toml += &row("cameras");
-            if E57Pictures::open(path, &DAffine3::IDENTITY).is_ok() {
+        Some((_, RawForm::Recording, path)) => {
+            let _ = write!(toml, "[frames]\npath = {path:?}\n{up}");
+        }
+        Some((file, RawForm::E57, path)) => {
+            let _ = write!(toml, "[cameras]\npath = {path:?}\n{up}");
+            if E57Pictures::open(file, &DAffine3::IDENTITY).is_ok() {
                 toml += "[rgb]\nsource = \"e57\"\n";
             }
         }
-        Some((path, form)) if form.is_pictures() && has_photographs(path) => toml += &row("frames"),
         _ => {
-            let locations = images.place_table();
-            if locations.is_some() {
-                let _ = write!(toml, "[cameras]\npath = {LOCATIONS:?}\n");
+            if let Some(json) = photographs(images, turn.unwrap_or_default(), folder)? {
+                let _ = write!(toml, "[frames]\npath = {PHOTOGRAPHS:?}\n");
+                lists.push((PHOTOGRAPHS, json));
             }
-            return Ok(SceneText { toml, locations });
+            if let Some(table) = images.place_table() {
+                let _ = write!(toml, "[cameras]\npath = {LOCATIONS:?}\n");
+                lists.push((LOCATIONS, table));
+            }
         }
     }
-    Ok(SceneText { toml, locations: None })
+    Ok(SceneText { toml, lists })
 }
 
-/// Whether all cameras of a list have photographs that are there.
-fn has_photographs(list: &Path) -> bool {
-    let is_there = |path: &Path| path.is_file();
-    read_posed_cameras(list, &DAffine3::IDENTITY).is_ok_and(|found| {
-        let mut pictures = found.cameras.iter().map(|camera| camera.picture.as_ref());
-        pictures.all(|picture| picture.is_some_and(|picture| is_there(&picture.path)))
-    })
+/// Lists the photographs that were taken together with depth pictures, in the form of nerfstudio's
+/// `transforms.json`. Returns `None` if there are none.
+fn photographs(images: &Images, turn: DMat3, folder: &Path) -> Result<Option<String>> {
+    let mut frames = Vec::new();
+    for color in images.colors() {
+        let lens = color.lens()?;
+        let [w, h] = lens.size();
+        let (focal_px, center_px) = (lens.focal_px(), lens.center_px());
+        let axes = turn * color.pose.world_from_camera;
+        let place = turn * color.pose.location;
+        let row = |k: usize| {
+            let [x, y, z] = axes.row(k).to_array();
+            [x, y, z, place[k]]
+        };
+        let mut frame = json!({
+            "file_path": relative(&color.picture.path, folder)?,
+            "transform_matrix": [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]],
+            "w": w, "h": h,
+            "fl_x": focal_px.x, "fl_y": focal_px.y, "cx": center_px.x, "cy": center_px.y,
+        });
+        let distortion: Vec<(&str, f64)> = match &lens {
+            PhotoLens::Straight(lens) => ["k1", "k2", "p1", "p2", "k3"]
+                .into_iter()
+                .zip(lens.distortion())
+                .collect(),
+            PhotoLens::Fisheye(lens) => {
+                frame["camera_model"] = json!("OPENCV_FISHEYE");
+                ["k1", "k2", "k3", "k4"].into_iter().zip(lens.distortion()).collect()
+            }
+        };
+        for (key, value) in distortion.into_iter().filter(|(_, value)| *value != 0.0) {
+            frame[key] = json!(value);
+        }
+        frames.push(frame);
+    }
+    Ok((!frames.is_empty()).then(|| format!("{:#}\n", json!({ "frames": frames }))))
 }
 
 /// Returns the path of a file or folder from a folder that may not exist yet.

@@ -1,13 +1,13 @@
 //! The surface of a raw scan: gathered in a grid, simplified, and closed where that was asked for.
 
 use super::images::{Images, Seen};
-use super::{FuseOptions, Fused, tiles};
+use super::{FuseOptions, Fused, level, tiles};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use glam::Vec3;
+use glam::{DMat3, DVec3, Vec3};
 use s3d_fusion::{
-    CloseOptions, DecimateOptions, FusedMesh, Fusion, FusionError, FusionOptions, MeshColumns, SensorNoise,
-    Surface, close_holes, decimate,
+    DecimateOptions, FusedMesh, Fusion, FusionError, FusionOptions, MeshColumns, SensorNoise, Surface,
+    decimate,
 };
 use std::path::Path;
 
@@ -21,6 +21,8 @@ pub(super) struct Made {
     pub(super) colors: Vec<[u8; 3]>,
     /// 1 for each face that closes a hole; empty if nothing was to be closed.
     pub(super) closed: Vec<i32>,
+    /// From the world of the scan to that of the mesh, if the scan was not upright.
+    pub(super) turn: Option<DMat3>,
     about: Fused,
 }
 
@@ -48,7 +50,7 @@ pub(super) fn surface(images: &Images, options: &FuseOptions, ctx: &Context) -> 
     let fused_faces = fused.faces.len();
     let about = Fused { images: images.len(), fused_faces, faces: fused_faces, max_error_m: 0.0, closed: 0 };
     let FusedMesh { positions, faces, colors, .. } = fused;
-    let mut made = Made { positions, faces, colors, closed: Vec::new(), about };
+    let mut made = Made { positions, faces, colors, closed: Vec::new(), turn: None, about };
 
     if options.max_error_m > 0.0 {
         ctx.check()?;
@@ -65,16 +67,18 @@ pub(super) fn surface(images: &Images, options: &FuseOptions, ctx: &Context) -> 
         task.add(1);
     }
 
-    if let Some(close_m) = options.close_m {
-        ctx.check()?;
-        let columns = MeshColumns { positions: &made.positions, faces: &made.faces, colors: &made.colors };
-        let limits = CloseOptions { max_m: close_m as f32, ..CloseOptions::default() };
-        let closed = close_holes(&columns, &limits).map_err(|e| unfit(&e))?;
-        made.closed = closed.is_new.iter().map(|is_new| i32::from(*is_new)).collect();
-        (made.positions, made.faces, made.colors) = (closed.positions, closed.faces, closed.colors);
-        made.about.closed = closed.holes;
-    }
     made.about.faces = made.faces.len();
+
+    made.turn = level::turn(images, &made);
+    if let Some(turn) = made.turn {
+        let up = (turn.transpose() * DVec3::Z)
+            .to_array()
+            .map(|v| (v * 1e3).round() / 1e3);
+        ctx.info(format_args!("up is {up:?} in the world of the scan: the mesh is turned to Z-up"));
+        made.positions
+            .iter_mut()
+            .for_each(|p| *p = (turn * p.as_dvec3()).as_vec3());
+    }
 
     let area_m2 = area(&made);
     if area_m2 < LEAST_ROOM_M2 {
