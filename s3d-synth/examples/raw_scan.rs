@@ -14,7 +14,7 @@
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 use s3d_geom::{Pose, TriMesh};
-use s3d_io::mesh::{ReadOptions, UpAxis, read_mesh};
+use s3d_io::mesh::{UpAxis, read_mesh};
 use s3d_synth::building::ScanLocation;
 use s3d_synth::device::{DepthCamera, LaserScanner, ScanTarget, turntable_poses};
 use s3d_synth::truth::{MeshScores, Truth, TruthOptions, View};
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let locations = &scene.locations[..job.locations.min(scene.locations.len())];
 
     if let Some(path) = &job.score {
-        let mesh = read_mesh(path, UpAxis::Z, &ReadOptions::default())?.mesh;
+        let mesh = read_mesh(path, UpAxis::Z)?.mesh;
         println!("{}", json(&job.score(&target, locations, &mesh)?));
         return Ok(());
     }
@@ -155,7 +155,7 @@ fn scene(name: &str, seed: u64) -> Result<AnnotatedScene, Box<dyn Error>> {
         "demo" => Building::demo(),
         "two-storeys" => Building::two_storeys(),
         area if area.starts_with("area_") => {
-            Building::generate(&BuildingOptions::area(area[5..].parse()?, seed))?
+            Building::generate(&BuildingOptions::area(area[5..].parse()?, seed)?)?
         }
         rooms => Building::generate(&BuildingOptions::drawn(rooms.parse()?, seed))?,
     };

@@ -13,7 +13,7 @@ fn room() -> AnnotatedScene {
     let mut parts = primitives::cuboid(Vec3::ZERO, vec3(4.0, 3.0, 2.5));
     parts.flip();
     let mesh = TriMesh::new(parts).unwrap();
-    let room = Room { kind: RoomType::OFFICE, number: 1 };
+    let room = Room { room_type: RoomType::OFFICE, number: 1 };
     AnnotatedScene {
         instance_of_face: vec![0; mesh.faces().len()],
         instances: vec![Instance { class: Class::WALL, number: 1, room }],
