@@ -2,25 +2,29 @@
 
     cargo build --release -p s3d-synth --example raw_scan
     RAW=target/release/examples/raw_scan
-    $RAW tum SCAN-freiburg1 --locations 2
-    python3 bench/fusion/peers.py SCAN-freiburg1 -o MESHES --score "$RAW tum SCAN-freiburg1 --locations 2 --score"
+    $RAW tum freiburg1 --locations 2
+    python3 bench/fusion/peers.py freiburg1 -o MESHES --score "$RAW tum freiburg1 --locations 2 --score"
 
-Needs Linux, numpy and open3d. SCAN is a sequence of the TUM RGB-D benchmark, or a folder of Matterport's raw captures,
-as the example `raw_scan` of s3d-synth writes them.
+Needs Linux, numpy and open3d. The first argument is a sequence of the TUM RGB-D benchmark, or a folder of
+Matterport's raw captures, as the example `raw_scan` of s3d-synth writes them. A name with "freiburg1" tells
+readers the lens.
 
-Every method runs in a process of its own with `--threads` threads. Told are the seconds from the first picture to the
-mesh in memory without the reading of files, the seconds of the whole process, and its peak memory. The mesh is written
-as MESHES/METHOD.ply. `--score` is a command that gets the path of a mesh as its last word and prints JSON, which is told
-too. To compare s3d, give its mesh to the same command.
+Every method runs in a process of its own with `--threads` threads. Told are the seconds from the first
+picture to the mesh in memory without the reading of files, the seconds of the whole process, and its peak
+memory. The mesh is written as MESHES/METHOD.ply. `--score` is a command that gets the path of a mesh as its
+last word and prints JSON, which is told too.
+
+To compare s3d: `/usr/bin/time -v s3d fuse freiburg1 -o ours.ply --threads 2`, then `$RAW tum freiburg1
+--locations 2 --score ours.ply`. Threads, cell and range must be the same.
 
 | method | |
 |---|---|
 | `scalable` | `ScalableTSDFVolume`: cells of `--cell`, truncation 4 cells |
 | `blocks` | `VoxelBlockGrid` on the CPU: the same, and cells with `--weight` observations alone |
-| `poisson10`, `poisson11` | points of all pictures, one a cell, normals towards the camera; screened Poisson of that depth; faces of the most thinly covered 5 % of vertices left out |
+| `poisson10`, `poisson11` | one point a cell, normals towards the camera; screened Poisson of that depth |
 
-Depths beyond `--range` metres are left out. The pixel conventions differ: Open3D counts from the middle of the first pixel, Matterport's
-intrinsics from its corner.
+Poisson's vertices with the least density, 5 %, are left out. So are depths beyond `--range` metres for all
+methods. Open3D counts pixels from the middle of the first one, and Matterport's intrinsics from its corner.
 """
 
 import argparse
@@ -42,8 +46,12 @@ def tum(folder):
     """Pictures of a sequence: colour, depth, lens, camera → world, units a metre."""
     import numpy as np
 
-    rows = lambda name: [l.split() for l in (folder / name).read_text().splitlines() if l and not l.startswith("#")]
-    for (_, color), (_, depth), pose in zip(rows("rgb.txt"), rows("depth.txt"), rows("groundtruth.txt"), strict=True):
+    def rows(name):
+        lines = (folder / name).read_text().splitlines()
+        return [line.split() for line in lines if line and not line.startswith("#")]
+
+    lists = (rows(name) for name in ("rgb.txt", "depth.txt", "groundtruth.txt"))
+    for (_, color), (_, depth), pose in zip(*lists, strict=True):
         x, y, z, qx, qy, qz, qw = map(float, pose[1:])
         turn = [
             [1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw)],
@@ -185,7 +193,8 @@ def measured(command, threads):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    text = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=text)
     parser.add_argument("scan", type=Path)
     parser.add_argument("-o", "--out", type=Path, required=True)
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
@@ -205,7 +214,8 @@ def main():
         for option in ("cell", "range", "weight", "threads"):
             command += [f"--{option}", str(getattr(args, option))]
         line, seconds, megabytes = measured(command, args.threads)
-        told = {"method": method, **json.loads(line), "process_seconds": round(seconds, 1), "peak_mb": round(megabytes)}
+        process = {"process_seconds": round(seconds, 1), "peak_mb": round(megabytes)}
+        told = {"method": method, **json.loads(line), **process}
         if args.score:
             words = [*args.score.split(), str(args.out / f"{method}.ply")]
             told["scores"] = json.loads(measured(words, args.threads)[0])

@@ -4,11 +4,11 @@
 //!
 //! | option | |
 //! |---|---|
-//! | `--scene demo\|two-storeys\|area_N\|ROOMS` | the built-in scene (default), the house, a generated area, or a building of so many rooms |
+//! | `--scene NAME` | `demo` (default), `two-storeys`, a generated `area_N`, or a building of so many rooms |
 //! | `--seed N` | of the device, and of generated buildings (1) |
 //! | `--locations N` | only the first N scan locations |
 //! | `--pictures N` | poses a location of a hand-held camera (60) |
-//! | `--scale F` | the size of pictures and of a scanner's grid beside the devices' own (1; 0.5 for Matterport) |
+//! | `--scale F` | the size of pictures and grids beside the devices' own (1; 0.5 for Matterport) |
 //! | `--score MESH.ply` | writes nothing; prints how the mesh agrees with the scene, as a line of JSON |
 //! | `--truth` | writes the scene's mesh beside, as `truth.obj` |
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
@@ -23,8 +23,8 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-const USAGE: &str = "usage: raw_scan matterport|tum|scannet|ptx|e57 DIR [--scene NAME] [--seed N] [--locations N] \
-                     [--pictures N] [--scale F] [--score MESH.ply] [--truth]";
+const USAGE: &str = "usage: raw_scan matterport|tum|scannet|ptx|e57 DIR [--scene NAME] [--seed N] \
+                     [--locations N] [--pictures N] [--scale F] [--score MESH.ply] [--truth]";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let job = Job::parse()?;

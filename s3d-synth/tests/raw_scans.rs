@@ -8,10 +8,10 @@ use s3d_io::image::read_gray16;
 use s3d_synth::device::{DepthCamera, LaserScanner, ScanTarget, turntable_poses};
 use s3d_synth::{AnnotatedScene, Building, ScanError};
 use std::fs;
+use std::sync::LazyLock;
 
-fn scene() -> AnnotatedScene {
-    Building { texture_scale: 0.05, ..Building::demo() }.build().unwrap()
-}
+static SCENE: LazyLock<AnnotatedScene> =
+    LazyLock::new(|| Building { texture_scale: 0.05, ..Building::demo() }.build().unwrap());
 
 fn assert_same(a: &Pose, b: &Pose) {
     assert!(a.location.abs_diff_eq(b.location, 1e-5), "{a:?} {b:?}");
@@ -20,8 +20,8 @@ fn assert_same(a: &Pose, b: &Pose) {
 
 #[test]
 fn matterport_captures_are_read_back() {
-    let scene = scene();
-    let target = ScanTarget::new(&scene);
+    let scene = &*SCENE;
+    let target = ScanTarget::new(scene);
     let folder = tempfile::tempdir().unwrap();
     let camera = DepthCamera::turntable().scaled(0.04);
     let locations = &scene.locations[1..2];
@@ -54,8 +54,8 @@ fn matterport_captures_are_read_back() {
 
 #[test]
 fn sequences_have_the_poses_that_they_were_taken_from() {
-    let scene = scene();
-    let target = ScanTarget::new(&scene);
+    let scene = &*SCENE;
+    let target = ScanTarget::new(scene);
     let poses = target.hand_held_poses(&scene.locations[0], 4);
     let camera = DepthCamera::default().scaled(0.1);
     let measured = target.depth_picture(&poses[3], &DepthCamera { unit_m: 0.001, ..camera.clone() }, 3);
@@ -114,8 +114,8 @@ fn scanner() -> LaserScanner {
 
 #[test]
 fn an_e57_has_grids_poses_and_panoramas() {
-    let scene = scene();
-    let target = ScanTarget::new(&scene);
+    let scene = &*SCENE;
+    let target = ScanTarget::new(scene);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.e57");
     let locations = &scene.locations[..2];
@@ -157,8 +157,8 @@ fn an_e57_has_grids_poses_and_panoramas() {
 
 #[test]
 fn a_ptx_has_its_grid_column_by_column() {
-    let scene = scene();
-    let target = ScanTarget::new(&scene);
+    let scene = &*SCENE;
+    let target = ScanTarget::new(scene);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.ptx");
     let location = &scene.locations[2];
@@ -193,8 +193,8 @@ fn a_ptx_has_its_grid_column_by_column() {
 
 #[test]
 fn a_cancelled_scan_leaves_no_file() {
-    let scene = scene();
-    let target = ScanTarget::new(&scene);
+    let scene = &*SCENE;
+    let target = ScanTarget::new(scene);
     let folder = tempfile::tempdir().unwrap();
     let mut asked = 0;
     let mut once = || {

@@ -8,13 +8,14 @@ use rayon::prelude::*;
 use s3d_geom::glam::{DVec2, DVec3, Vec3, dvec2};
 use s3d_geom::{Lens, NO_INDEX, Pose, Raster};
 
-/// A camera that sees a pattern of dots, which a projector beside it throws, and takes the depth of a pixel from
-/// the disparity of the dots.
+/// A camera that sees a pattern of dots, which a projector beside it throws, and takes the depth of a pixel
+/// from the disparity of the dots.
 ///
-/// The `Default` has the figures of the first Kinect: a baseline of 7.5 cm, disparities in eighths of a pixel
-/// that are off by a sixteenth (Khoshelham and Oude Elberink 2012, "Accuracy and resolution of Kinect depth data
-/// for indoor mapping applications": 1.4 mm at 1 m and 3.6 cm at 5 m, steps of 2.8 mm and 7 cm). Its lens is the
-/// one that the TUM RGB-D benchmark recommends, and its depths are in fifths of a millimetre as there.
+/// The `Default` has the figures of the first Kinect: a baseline of 7.5 cm, disparities in eighths of a
+/// pixel that are off by a sixteenth (Khoshelham and Oude Elberink 2012, "Accuracy and resolution of Kinect
+/// depth data for indoor mapping applications": 1.4 mm at 1 m and 3.6 cm at 5 m, steps of 2.8 mm and 7 cm).
+/// Its lens is the one that the TUM RGB-D benchmark recommends, and its depths are in fifths of a millimetre
+/// as there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthCamera {
     /// The lens of both pictures.
@@ -30,8 +31,8 @@ pub struct DepthCamera {
     /// The deviation of disparities, pixels: 0 to 2.
     pub disparity_noise_px: f32,
     /// Neighbours within so many pixels of the picture share the noise, because disparities come from blocks
-    /// of dots: 1 to 100. A block of the first Kinect has 9 × 9 pixels (Konolige and Mihelich 2011, "Technical
-    /// description of Kinect calibration"), and half of that is its reach.
+    /// of dots: 1 to 100. A block of the first Kinect has 9 × 9 pixels (Konolige and Mihelich 2011,
+    /// "Technical description of Kinect calibration"), and half of that is its reach.
     pub correlation_px: f32,
     /// The number of measurements whose mean is taken: 1 to 100.
     pub frames: u32,
@@ -104,14 +105,14 @@ const DOWN: u32 = 1;
 const SIGNAL: u32 = 2;
 const FRAMES: u32 = 3;
 
-/// A ray to the projector begins this far from its point, as a share of the way, so that the point's own surface
-/// does not block it.
+/// A ray to the projector begins this far from its point, as a share of the way, so that the point's own
+/// surface does not block it.
 const SLACK: f32 = 0.003;
 
 impl DepthCamera {
-    /// The cameras of a turntable: three sensors like the default, in pictures of Matterport's size and unit.
-    /// They stand still, so a depth is the mean of 16 measurements. Depths end at 4.5 m, which the maker states
-    /// for its Pro cameras.
+    /// The cameras of a turntable: three sensors like the default, in pictures of Matterport's size and
+    /// unit. They stand still, so a depth is the mean of 16 measurements. Depths end at 4.5 m, which the
+    /// maker states for its Pro cameras.
     pub fn turntable() -> Self {
         Self {
             lens: pinhole(TURNTABLE),
@@ -242,7 +243,7 @@ impl ScanTarget<'_> {
         let met = self.meet(shot.origin, ray, with, 0.0)?;
 
         let [nearest, farthest] = camera.range_m;
-        let least = camera.least_signal * (1.0 + 0.3 * chance.normal(x, y, SIGNAL));
+        let least = camera.least_signal * (1.0 + 0.25 * chance.normal(x, y, SIGNAL));
         let is_bright = met.signal() >= least && met.cosine >= camera.least_cosine && !met.is_glass;
         if !is_bright || !(nearest..=farthest).contains(&met.distance) {
             return None;

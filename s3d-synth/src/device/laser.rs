@@ -10,11 +10,12 @@ use s3d_geom::Raster;
 use s3d_geom::glam::{DQuat, DVec3, Vec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// A laser scanner that turns about the vertical axis of its tripod, while its mirror turns about a level one.
+/// A laser scanner that turns about the vertical axis of its tripod, while its mirror turns about a level
+/// one.
 ///
-/// The `Default` has the figures of the data sheet of Leica's BLK360 (first generation): 360° × 300° of view,
-/// ranges of 0.6 m to 60 m that are off by 4 mm at 10 m and 7 mm at 20 m, angles off by 40″, a beam of 2.25 mm
-/// that widens by 0.4 mrad. Its grid is coarser: 0.15°, which is 1 cm at 4 m.
+/// The `Default` has the figures of the data sheet of Leica's BLK360 (first generation): 360° × 300° of
+/// view, ranges of 0.6 m to 60 m that are off by 4 mm at 10 m and 7 mm at 20 m, angles off by 40″, a beam
+/// of 2.25 mm that widens by 0.4 mrad. Its grid is coarser: 0.15°, which is 1 cm at 4 m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaserScanner {
     /// The columns of a full turn: 4 to 40,000.
@@ -69,8 +70,8 @@ impl Default for LaserScanner {
     }
 }
 
-/// What a laser scanner measured from one place, on its grid. Columns are azimuths and rows are elevations: see
-/// [`LaserScan::direction`].
+/// What a laser scanner measured from one place, on its grid. Columns are azimuths and rows are elevations:
+/// see [`LaserScan::direction`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaserScan {
     /// Where the scanner stood: world metres.
@@ -131,8 +132,8 @@ impl LaserScan {
         [self.ranges.width(), self.ranges.height()]
     }
 
-    /// Returns the direction of a grid point in the scanner's axes, a unit vector. Column 0 is next to +x, and
-    /// azimuths grow towards +y. Row 0 is next to the highest elevation.
+    /// Returns the direction of a grid point in the scanner's axes, a unit vector. Column 0 is next to +x,
+    /// and azimuths grow towards +y. Row 0 is next to the highest elevation.
     pub fn direction(&self, column: u32, row: u32) -> DVec3 {
         direction(self.size(), self.elevation_rad, [column, row].map(f64::from))
     }
@@ -184,8 +185,8 @@ impl ScanTarget<'_> {
     /// have the same seed.
     ///
     /// A range is too short or too long by a random share of the noise, and its ray is not quite in the
-    /// direction of its grid point. Nothing comes back from dark and glancing surfaces, from most of glass, and
-    /// from outside of the range.
+    /// direction of its grid point. Nothing comes back from dark and glancing surfaces, from most of glass,
+    /// and from outside of the range.
     ///
     /// ```
     /// use s3d_synth::Building;
@@ -275,7 +276,7 @@ impl ScanTarget<'_> {
 
         let range = weighted / light;
         let far = (range / NEAR_M).max(1.0);
-        let least = scanner.least_signal * far * far * (1.0 + 0.3 * chance.normal(column, row, SIGNAL));
+        let least = scanner.least_signal * far * far * (1.0 + 0.25 * chance.normal(column, row, SIGNAL));
         let [shortest, longest] = scanner.range_m;
         if !(light > 0.0 && light >= least && (shortest..=longest).contains(&range)) {
             return None;

@@ -2,8 +2,8 @@
 //!
 //! [`ScanTarget`] is a scene with a tree for rays. [`ScanTarget::laser_scan`] returns what a spherical laser
 //! scanner on its tripod measures, and [`ScanTarget::depth_picture`] what a structured-light camera does.
-//! [`turntable_poses`] and [`ScanTarget::hand_held_poses`] say where cameras stand. All of it is plain data. It
-//! depends on the seed and the number of the scan or picture, and not on threads.
+//! [`turntable_poses`] and [`ScanTarget::hand_held_poses`] say where cameras stand. All of it is plain data.
+//! It depends on the seed and the number of the scan or picture, and not on threads.
 //!
 //! ```
 //! use s3d_synth::Building;

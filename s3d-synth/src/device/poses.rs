@@ -23,9 +23,10 @@ const TILTS_DEG: [f64; 3] = [33.0, 0.0, -33.0];
 const AXIS_M: f64 = 0.04;
 const HEIGHTS_M: [f64; 3] = [0.05, 0.0, -0.05];
 
-/// Returns the 18 pictures of a scan location: three cameras above each other, at six stops of a turn. The level
-/// camera's first stop looks along the heading of the location; later ones are turned by 60° to the right.
-/// Source: the documentation of Matterport3D (three sensors that look up, level and down, stops at 60°).
+/// Returns the 18 pictures of a scan location: three cameras above each other, at six stops of a turn. The
+/// level camera's first stop looks along the heading of the location; later ones are turned by 60° to the
+/// right. Source: the documentation of Matterport3D (three sensors that look up, level and down, stops at
+/// 60°).
 pub fn turntable_poses(location: &ScanLocation) -> [TurntableStop; 18] {
     std::array::from_fn(|k| {
         let (camera, yaw) = (k / 6, k % 6);
@@ -41,24 +42,31 @@ pub fn turntable_poses(location: &ScanLocation) -> [TurntableStop; 18] {
 const CIRCLE_M: f64 = 0.7;
 const CLEARANCE_M: f64 = 0.5;
 
+/// The number of directions in which the room for the circle is measured.
+const DIRECTIONS: u32 = 36;
+
 impl ScanTarget<'_> {
-    /// Returns the path of a hand-held camera about a scan location: `count` poses on two rounds of a circle of
-    /// up to 0.7 m that stays 0.5 m away from things. In the first round the camera looks outwards, in the
-    /// second across the circle and farther down. It sways, as in a hand.
+    /// Returns the path of a hand-held camera about a scan location: `count` poses on two rounds of a circle.
+    /// Its radius is 0.7 m, or less where things at its height would be nearer than 0.5 m. In the first round
+    /// the camera looks outwards, in the second across the circle and farther down. It sways, as in a hand.
     pub fn hand_held_poses(&self, location: &ScanLocation, count: u32) -> Vec<Pose> {
         let middle = location.position;
+        // Headings are 0 along +Y and grow to the left.
+        let toward = |angle: f64| dvec3(-libm::sin(angle), libm::cos(angle), 0.0);
+        let free = (0..DIRECTIONS).filter_map(|k| {
+            let direction = toward(TAU * f64::from(k) / f64::from(DIRECTIONS));
+            self.range(middle.as_vec3(), direction.as_vec3())
+        });
+        let free = f64::from(free.fold(f32::INFINITY, f32::min));
+        let radius = (free - CLEARANCE_M).clamp(0.0, CIRCLE_M);
+
         let pose = |k: u32| {
-            let along = 2.0 * f64::from(k) / f64::from(count);
-            let angle = TAU * along;
-            let is_outwards = along < 1.0;
-
-            // Headings are 0 along +Y and grow to the left.
-            let outwards = dvec3(-libm::sin(angle), libm::cos(angle), 0.0);
-            let free = self.range(middle.as_vec3(), outwards.as_vec3());
-            let free = free.map_or(f64::INFINITY, f64::from) - CLEARANCE_M;
+            let rounds = 2.0 * f64::from(k) / f64::from(count);
+            let angle = TAU * rounds;
             let rise = 0.12 * libm::sin(3.0 * angle);
-            let place = middle + outwards * free.clamp(0.0, CIRCLE_M) + DVec3::Z * rise;
+            let place = middle + toward(angle) * radius + DVec3::Z * rise;
 
+            let is_outwards = rounds < 1.0;
             let heading = if is_outwards { angle } else { angle + PI };
             let pitch = if is_outwards { -0.1 } else { -0.35 } + 0.3 * libm::sin(5.0 * angle);
             let sway = 0.1 * libm::sin(7.0 * angle);

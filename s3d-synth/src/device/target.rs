@@ -72,8 +72,8 @@ impl<'s> ScanTarget<'s> {
         self.scene
     }
 
-    /// Returns how far away the surface is along a ray, as a multiple of `direction`, without noise. `None` if
-    /// the ray leaves the scene.
+    /// Returns how far away the surface is along a ray, as a multiple of `direction`, without noise. `None`
+    /// if the ray leaves the scene.
     pub fn range(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
         self.tree.first(origin, direction, f32::INFINITY).map(|(_, t)| t)
     }

@@ -78,9 +78,10 @@ impl ScanTarget<'_> {
 
     /// Writes pictures of a hand-held camera as a sequence of the TUM RGB-D benchmark: `rgb/` and `depth/`
     /// (PNG, 5,000 units a metre, 0 for none), the lists `rgb.txt` and `depth.txt`, and `groundtruth.txt`.
-    /// There are 30 pictures a second, and both pictures of a pose have the same time. Files of the benchmark
-    /// do not say which lens they were taken with: the default one of [`DepthCamera`] has the focal length and
-    /// the middle that its page recommends. Picture k has the number k. `go_on` is asked before each.
+    /// There are 30 pictures a second, and both pictures of a pose have the same time. Files of the
+    /// benchmark do not say which lens they were taken with: the default one of [`DepthCamera`] has the
+    /// focal length and the middle that its page recommends. Picture k has the number k. `go_on` is asked
+    /// before each.
     ///
     /// # Errors
     /// Like [`ScanTarget::write_matterport`].
@@ -122,9 +123,9 @@ impl ScanTarget<'_> {
         Ok(())
     }
 
-    /// Writes pictures of a hand-held camera as ScanNet's tools export a scan: `color/0.jpg` …, `depth/0.png` …
-    /// (millimetres, 0 for none), `pose/0.txt` … (camera → world, OpenCV's axes) and `intrinsic/`. Picture k
-    /// has the number k. `go_on` is asked before each.
+    /// Writes pictures of a hand-held camera as ScanNet's tools export a scan: `color/0.jpg` …,
+    /// `depth/0.png` … (millimetres, 0 for none), `pose/0.txt` … (camera → world, OpenCV's axes) and
+    /// `intrinsic/`. Picture k has the number k. `go_on` is asked before each.
     ///
     /// # Errors
     /// Like [`ScanTarget::write_matterport`].

@@ -60,11 +60,11 @@ impl ScanTarget<'_> {
         Ok(())
     }
 
-    /// Scans from some locations and writes one E57 file. Each scan has its pose, its grid (`rowIndex` from the
-    /// highest elevation, `columnIndex`), colours, intensities, and states of points that did not come back. If
-    /// `panorama_px` is above 0, each scan has a spherical picture of that width (`images2D`), as a JPEG file.
-    /// A scan's guid is the uuid of its location. The scan of location k has the number k. `go_on` is asked
-    /// before each.
+    /// Scans from some locations and writes one E57 file. Each scan has its pose, its grid (`rowIndex` from
+    /// the highest elevation, `columnIndex`), colours, intensities, and states of points that did not come
+    /// back. If `panorama_px` is above 0, each scan has a spherical picture of that width (`images2D`), as a
+    /// JPEG file. A scan's guid is the uuid of its location. The scan of location k has the number k.
+    /// `go_on` is asked before each.
     ///
     /// # Errors
     /// Like [`ScanTarget::write_ptx`].
@@ -159,8 +159,8 @@ impl ScanTarget<'_> {
     }
 }
 
-/// Returns the ten lines above a scan: columns, rows, the scanner's place and axes, and the matrix scanner →
-/// world for points that are rows.
+/// Returns the ten lines above a scan: columns, rows, the scanner's place and axes, and the matrix scanner
+/// → world for points that are rows.
 fn ptx_header(scan: &LaserScan) -> String {
     let [columns, rows] = scan.size();
     let p = scan.origin;

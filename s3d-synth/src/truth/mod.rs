@@ -1,10 +1,11 @@
 //! How well a mesh agrees with the scene that was scanned.
 //!
-//! [`Truth`] holds samples of the surface of a scene, and which of them the devices saw from their [`View`]s.
-//! [`Truth::score`] compares a mesh with it. Distances are from samples of one surface to the faces of the other,
-//! both ways. Precision, recall and F-score are defined by Knapitsch, Park, Zhou and Koltun 2017 ("Tanks and
-//! Temples: benchmarking large-scale scene reconstruction"), normal consistency by Mescheder et al. 2019
-//! ("Occupancy networks"). What no device saw does not count against a mesh that lacks it.
+//! [`Truth`] holds samples of the surface of a scene, and which of them the devices saw from their
+//! [`View`]s. [`Truth::score`] compares a mesh with it. Distances are from samples of one surface to the
+//! faces of the other, both ways. Precision, recall and F-score are defined by Knapitsch, Park, Zhou and
+//! Koltun 2017 ("Tanks and Temples: benchmarking large-scale scene reconstruction"), normal consistency by
+//! Mescheder et al. 2019 ("Occupancy networks"). What no device saw does not count against a mesh that lacks
+//! it.
 //!
 //! ```
 //! use s3d_synth::Building;

@@ -53,8 +53,8 @@ impl View {
         }
     }
 
-    /// Whether a place of a surface is in the field of view, within the range, and not too aslant. Surfaces are
-    /// seen from their fronts alone.
+    /// Whether a place of a surface is in the field of view, within the range, and not too aslant. Surfaces
+    /// are seen from their fronts alone.
     pub(super) fn may_see(&self, place: Vec3, normal: Vec3) -> bool {
         let way = place - self.origin;
         let length = way.length();
