@@ -32,17 +32,18 @@
 
 pub mod building;
 mod construct;
+pub mod device;
 mod error;
 #[cfg(feature = "files")]
 mod files;
 mod generate;
 pub mod look;
+mod rays;
 mod scan;
 mod scene;
 pub mod scenes;
 mod sight;
-#[cfg(feature = "files")]
-mod whole;
+pub mod truth;
 
 pub use building::{Building, BuildingError};
 pub use error::RangeError;

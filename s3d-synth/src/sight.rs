@@ -1,14 +1,12 @@
 //! What a scanner sees of a scene from where it stood.
 
-use crate::look::{Pattern, hash};
+use crate::look::hash;
+use crate::rays::{RayTree, glass_faces};
 use crate::{AnnotatedScene, BuildingError, Instance, RangeError};
-use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris};
-use obvhs::{BvhBuildParams, ray::Ray, triangle::Triangle};
 use rayon::prelude::*;
-use s3d_geom::glam::{Vec2, Vec3, Vec3A};
+use s3d_geom::glam::{Vec2, Vec3};
 use s3d_geom::{MeshParts, NO_INDEX, TriMesh};
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 /// How a scanner sees.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,9 +53,7 @@ const SLACK_M: f32 = 0.004;
 /// A scene, seen from its locations.
 pub(crate) struct Sight {
     options: SightOptions,
-    bvh: Bvh2,
-    /// The triangles in the order of the tree.
-    triangles: Vec<Triangle>,
+    tree: RayTree,
     locations: Vec<Vec3>,
     /// The least sine of the angle between a ray and a surface.
     least_sine: f32,
@@ -69,32 +65,12 @@ pub(crate) struct Memory(Vec<u32>);
 
 impl Sight {
     pub(crate) fn new(scene: &AnnotatedScene, options: &SightOptions) -> Self {
-        let mesh = &scene.mesh;
-        let faces = 0..mesh.faces().len() as u32;
-        let all: Vec<Triangle> = faces
-            .clone()
-            .map(|face| {
-                let [v0, v1, v2] = mesh.triangle(face).map(Vec3A::from);
-                Triangle { v0, v1, v2 }
-            })
-            .collect();
-
-        let bvh = build_bvh2_from_tris(&all, BvhBuildParams::medium_build(), &mut Duration::default());
-        let triangles = bvh.primitive_indices.iter().map(|&i| all[i as usize]).collect();
-
-        let glass = Pattern::Sky.name();
-        let is_glass = |face| {
-            let material = mesh.material_of(face).and_then(|m| mesh.materials().get(m as usize));
-            material.is_some_and(|m| m.name.starts_with(glass))
-        };
-
         Self {
             options: options.clone(),
-            bvh,
-            triangles,
+            tree: RayTree::new(&scene.mesh),
             locations: scene.locations.iter().map(|l| l.position.as_vec3()).collect(),
             least_sine: Vec2::from_angle(options.grazing_deg.to_radians()).y,
-            is_glass: faces.map(is_glass).collect(),
+            is_glass: glass_faces(&scene.mesh),
         }
     }
 
@@ -120,22 +96,7 @@ impl Sight {
         let origin = self.locations[location];
         let direction = p - origin;
         let end = 1.0 - SLACK_M / direction.length();
-        let ray = Ray::new(origin.into(), direction.into(), 0.0, end);
-        let hider = &mut memory.0[location];
-        if self
-            .triangles
-            .get(*hider as usize)
-            .is_some_and(|t| t.intersect(&ray) < end)
-        {
-            return false;
-        }
-        self.bvh.ray_traverse_miss(ray, |ray, k| {
-            let t = self.triangles[k].intersect(ray);
-            if t < end {
-                *hider = k as u32;
-            }
-            t
-        })
+        self.tree.is_free(origin, direction, end, &mut memory.0[location])
     }
 
     /// Returns the location that sees the point `p` of a face best, or `None` if the point does not come

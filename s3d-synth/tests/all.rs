@@ -6,6 +6,9 @@ mod common;
 mod any_options;
 mod areas;
 mod demo;
+mod devices;
 mod errors;
 mod generated;
+#[cfg(feature = "files")]
+mod raw_scans;
 mod two_storeys;

@@ -88,6 +88,11 @@ impl FisheyeLens {
         self.center_px
     }
 
+    /// Returns k₁ k₂ k₃ k₄.
+    pub fn distortion(&self) -> [f64; 4] {
+        self.distortion
+    }
+
     /// Projects a direction of any length, in OpenCV's axes, to the plane of the picture, in pixels. Returns
     /// `None` if the direction is zero, not finite, or so far off the axis that the polynomial folds back.
     pub fn project(&self, direction: DVec3) -> Option<DVec2> {

@@ -1,5 +1,9 @@
 //! A scene as files, as a scanner and an annotator would have left them.
 
+mod depth_pictures;
+mod laser_scans;
+mod whole;
+
 use crate::{AnnotatedScene, ScanError, ScanOptions};
 use s3d_geom::glam::DQuat;
 use s3d_io::cloud::S3disAreaWriter;
