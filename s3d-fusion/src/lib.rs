@@ -10,6 +10,11 @@
 
 mod columns;
 mod decimate;
+mod register;
 
 pub use columns::{ColumnsError, MeshColumns};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
+pub use register::{
+    Motion, OpenMotion, PairResidual, RefinedPoses, RegisterError, RegisterOptions, Residual, ScanPoints,
+    pair_residuals, refine_poses,
+};
