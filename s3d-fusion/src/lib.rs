@@ -8,10 +8,12 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod close;
 mod columns;
 mod decimate;
 mod register;
 
+pub use close::{CloseError, CloseOptions, ClosedHoles, OpenLoops, close_holes};
 pub use columns::{ColumnsError, MeshColumns};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
 pub use register::{

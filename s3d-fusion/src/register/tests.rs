@@ -52,7 +52,7 @@ fn scan(mesh: &TriMesh, place: DVec3, seed: u64, sees: impl Fn(Vec3) -> bool) ->
 /// A pose off by up to 5 cm and 1°.
 fn shaken(pose: &DAffine3, seed: u64) -> DAffine3 {
     let turn = DQuat::from_axis_angle(vector(seed).normalize(), noise(seed + 9) * 1f64.to_radians());
-    let shift = 0.05 * vector(seed + 5).normalize() * noise(seed + 77);
+    let shift = (0.035 + 0.015 * noise(seed + 77)) * vector(seed + 5).normalize();
     DAffine3::from_rotation_translation(turn, shift + pose.translation) * DAffine3::from_mat3(pose.matrix3)
 }
 
@@ -121,9 +121,9 @@ fn a_pair_that_is_off_is_told_with_its_motion() {
 /// Floor, ceiling and two walls along X, without ends.
 fn corridor(seed: u64) -> ScanPoints {
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
-    for i in 0..60_000 {
+    for i in 0..20_000 {
         let number = seed * 100_000 + i;
-        let [x, s] = [noise(7 * number + 1) as f32 * 6.0, noise(7 * number + 2) as f32];
+        let [x, s] = [noise(7 * number + 1) as f32 * 3.0, noise(7 * number + 2) as f32];
         let (p, n) = match i % 4 {
             0 => (vec3(x, s, 0.0), Vec3::Z),
             1 => (vec3(x, s, 2.5), -Vec3::Z),
@@ -163,7 +163,7 @@ fn the_slide_along_a_bare_corridor_is_left_alone() {
     let with_end = scans.map(|mut scan| {
         for i in 0..500u64 {
             scan.positions
-                .push(vec3(6.2, noise(i) as f32, 1.25 + 1.2 * noise(i + 999) as f32));
+                .push(vec3(3.1, noise(i) as f32, 1.25 + 1.2 * noise(i + 999) as f32));
             scan.normals.push(-Vec3::X);
         }
         scan
@@ -191,7 +191,7 @@ fn the_grid_finds_what_measuring_all_points_finds() {
     let reach = Reach { along_m: 0.2, across_m: 0.15, cosine: 0.9 };
     let grid = Grid::new(&points, 0.25);
     for i in 0..300 {
-        let p = dvec3(6.5 * noise(i), 1.2 * noise(i + 1000), 1.25 + 1.5 * noise(i + 2000));
+        let p = dvec3(3.2 * noise(i), 1.2 * noise(i + 1000), 1.25 + 1.5 * noise(i + 2000));
         let n = [DVec3::Z, -DVec3::Z, DVec3::Y, -DVec3::Y][i as usize % 4];
         let mut best = (f64::INFINITY, None);
         for (j, (q, m)) in (0..).zip(points.positions.iter().zip(&points.normals)) {
