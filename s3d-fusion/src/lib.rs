@@ -8,6 +8,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod close;
 mod columns;
 mod decimate;
 mod error;
@@ -16,7 +17,9 @@ mod fusion;
 mod grid;
 mod noise;
 mod range_image;
+mod register;
 
+pub use close::{CloseError, CloseOptions, ClosedHoles, OpenLoops, close_holes};
 pub use columns::{ColumnsError, MeshColumns};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
 pub use error::FusionError;
@@ -24,3 +27,7 @@ pub use extract::{FusedMesh, Surface};
 pub use fusion::{Fusion, FusionOptions, Tile};
 pub use noise::SensorNoise;
 pub use range_image::{RangeImage, RangeKind};
+pub use register::{
+    Motion, OpenMotion, PairResidual, RefinedPoses, RegisterError, RegisterOptions, Residual, ScanPoints,
+    pair_residuals, refine_poses,
+};

@@ -6,8 +6,8 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3, Vec3};
 use s3d_fusion::{
-    DecimateOptions, FusedMesh, Fusion, FusionError, FusionOptions, MeshColumns, SensorNoise, Surface,
-    decimate,
+    CloseOptions, DecimateOptions, FusedMesh, Fusion, FusionError, FusionOptions, MeshColumns, SensorNoise,
+    Surface, close_holes, decimate,
 };
 use std::path::Path;
 
@@ -29,16 +29,13 @@ pub(super) struct Made {
 impl Made {
     /// Says what was made.
     pub(super) fn told(self, ctx: &Context, output: &Path) -> Fused {
-        let Fused { images, fused_faces, faces, max_error_m, closed } = self.about;
+        let Fused { images, fused_faces, faces, max_error_m, .. } = self.about;
         ctx.info(format_args!(
             "{}: {faces} faces of {fused_faces}, which lie within {:.1} mm of them, from {images} {}",
             output.display(),
             max_error_m * 1e3,
             if images == 1 { "image" } else { "images" },
         ));
-        if !self.closed.is_empty() {
-            ctx.info(format_args!("{closed} holes were closed along their plane"));
-        }
         self.about
     }
 }
@@ -67,6 +64,23 @@ pub(super) fn surface(images: &Images, options: &FuseOptions, ctx: &Context) -> 
         task.add(1);
     }
 
+    if let Some(close_m) = options.close_m {
+        ctx.check()?;
+        let columns = MeshColumns { positions: &made.positions, faces: &made.faces, colors: &made.colors };
+        let limits = CloseOptions { max_m: close_m as f32, ..CloseOptions::default() };
+        let closed = close_holes(&columns, &limits).map_err(|e| unfit(&e))?;
+        ctx.info(format_args!(
+            "{} holes of {:.2} m² were closed along their plane",
+            closed.closed, closed.area_m2
+        ));
+        made.closed = closed
+            .is_closing
+            .iter()
+            .map(|is_closing| i32::from(*is_closing))
+            .collect();
+        made.faces = closed.faces;
+        made.about.closed = closed.closed;
+    }
     made.about.faces = made.faces.len();
 
     made.turn = level::turn(images, &made);

@@ -7,7 +7,7 @@
 //!
 //! The quadrics say which edge goes next and where its vertex goes. They say nothing about distances: sums
 //! over many faces grow with the noise of the faces' directions. So the old surface is sampled (vertices,
-//! middles of edges, middles of faces), each sample belongs to a face, and a collapse is done only if all
+//! middles of edges and faces, more in large faces), each sample belongs to a face, and a collapse is done only if all
 //! samples around it are within the bound of a face that stays.
 //!
 //! # What the bound means
@@ -32,8 +32,10 @@ use whole::Whole;
 /// How a mesh is decimated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecimateOptions {
-    /// No vertex, middle of an edge or middle of a face of the old surface is farther from the new one than
-    /// this, metres. The points of a border are as near to the border.
+    /// No point of the old surface is farther from the new one than this, metres. That is measured at samples:
+    /// vertices, middles of edges and of faces, and every six bounds in larger faces as far as twelve samples
+    /// a face allow. Samples use 90 % of the bound, and the rest is for what lies between. The points of a
+    /// border are as near to the border.
     pub max_error_m: f32,
     /// The number of faces at which to stop; the bound holds nevertheless. `None` goes on as far as the
     /// bound allows.
@@ -96,7 +98,7 @@ const FACES_A_PIECE: f64 = 40_000.0;
 const SLACK: f64 = 3.0;
 
 /// The share of the bound that samples may use. The rest is for what lies between samples.
-const SHARE: f32 = 0.95;
+const SHARE: f32 = 0.9;
 
 /// Collapses edges while the old surface stays within the bound of the new one.
 ///
@@ -132,14 +134,20 @@ pub fn decimate(mesh: &MeshColumns<'_>, options: &DecimateOptions) -> Result<Dec
         return Err(DecimateError::Option { what, value });
     }
 
-    let mut whole = Whole::new(mesh, options.color_weight_m / 255.0);
+    let whole = decimate_in_pieces(mesh, options, FACES_A_PIECE);
+    Ok(compact(&whole, !mesh.colors.is_empty()))
+}
+
+/// Decimates pieces of about so many faces, then the whole.
+fn decimate_in_pieces(mesh: &MeshColumns<'_>, options: &DecimateOptions, faces_a_piece: f64) -> Whole {
+    let mut whole = Whole::new(mesh, options.max_error_m, options.color_weight_m / 255.0);
     let faces = whole.alive();
     let target = options.target_faces.unwrap_or(0);
     let limits =
         |faces| Limits { distance_m: SHARE * options.max_error_m, color: options.max_color_error, faces };
 
-    if faces as f64 > 2.0 * FACES_A_PIECE {
-        let cell_m = (whole.area() * FACES_A_PIECE / faces as f64).sqrt().max(1e-3);
+    if faces as f64 > 2.0 * faces_a_piece {
+        let cell_m = (whole.area() * faces_a_piece / faces as f64).sqrt().max(1e-3);
         whole.by_cubes(cell_m, |piece| {
             let share = target as f64 * piece.alive as f64 / faces as f64;
             collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
@@ -148,7 +156,7 @@ pub fn decimate(mesh: &MeshColumns<'_>, options: &DecimateOptions) -> Result<Dec
     if whole.alive() > target {
         whole.at_once(|all| collapse_edges(all, &limits(target)));
     }
-    Ok(compact(&whole, !mesh.colors.is_empty()))
+    whole
 }
 
 /// The faces that are alive, and the vertices that they use.

@@ -24,8 +24,9 @@ pub(super) struct Whole {
 }
 
 impl Whole {
-    /// Takes the samples of a mesh: its vertices, the middles of its edges, and the middles of its faces.
-    pub(super) fn new(mesh: &MeshColumns<'_>, color_scale_m: f64) -> Self {
+    /// Takes the samples of a mesh: its vertices, the middles of its edges and of its faces, and more within
+    /// faces that are large beside the bound.
+    pub(super) fn new(mesh: &MeshColumns<'_>, max_error_m: f32, color_scale_m: f64) -> Self {
         let has_colors = !mesh.colors.is_empty();
         let color_scale_m = if has_colors { color_scale_m } else { 0.0 };
         let is_face = |f: &[u32; 3]| f[0] != f[1] && f[1] != f[2] && f[2] != f[0];
@@ -44,35 +45,51 @@ impl Whole {
 
         let mut samples = Vec::new();
         let mut face_of_sample = Vec::new();
-        let mut take = |corners: &[u32], face: u32| {
-            let share = 1.0 / corners.len() as f32;
-            let at = corners.iter().map(|&v| mesh.positions[v as usize] * share).sum();
-            let sums = corners.iter().fold([0u32; 3], |sum, &v| {
-                let color = color(v);
-                [0, 1, 2].map(|i| sum[i] + u32::from(color[i]))
-            });
-            samples.push(Sample { at, color: sums.map(|s| (s / corners.len() as u32) as u8) });
+        let mut take = |corners: [u32; 3], weights: [u32; 3], face: u32| {
+            let sum = weights.iter().sum::<u32>();
+            let of_sum = corners.into_iter().zip(weights);
+            let at = of_sum
+                .clone()
+                .map(|(v, w)| mesh.positions[v as usize] * (w as f32 / sum as f32))
+                .sum();
+            let channel =
+                |i: usize| of_sum.clone().map(|(v, w)| u32::from(color(v)[i]) * w).sum::<u32>() / sum;
+            samples.push(Sample { at, color: [0, 1, 2].map(|i| channel(i) as u8) });
             face_of_sample.push(face);
         };
 
+        let step_m = step_m(mesh, max_error_m);
         let mut is_taken = vec![false; mesh.positions.len()];
-        for (face, corners) in (0..).zip(mesh.faces).filter(|(_, f)| is_face(f)) {
-            take(corners, face);
-            for &v in corners {
+        for (face, &corners) in (0..).zip(mesh.faces).filter(|(_, f)| is_face(f)) {
+            for (i, &v) in corners.iter().enumerate() {
                 if !std::mem::replace(&mut is_taken[v as usize], true) {
-                    take(&[v], face);
+                    take(corners, [0, 1, 2].map(|at| u32::from(at == i)), face);
+                }
+            }
+            let steps = steps(mesh, &corners, step_m);
+            if steps <= 2 {
+                take(corners, [1; 3], face);
+                continue;
+            }
+            for i in 0..steps {
+                for j in 0..=steps - i {
+                    let weights = [i, j, steps - i - j];
+                    if weights.iter().all(|&w| w < steps) {
+                        take(corners, weights, face);
+                    }
                 }
             }
         }
         let (mut border_points, mut start_of_border_point) = (Vec::new(), Vec::new());
         for sides in edges.chunk_by(|a, b| a.0 == b.0) {
             let ([low, high], face, ascends) = sides[0];
-            take(&[low, high], face);
+            take([low, high, low], [1, 1, 0], face);
             if sides.len() == 1 {
-                let start = if ascends { low } else { high };
-                let [p, q] = [low, high].map(|v| mesh.positions[v as usize]);
-                border_points.extend([mesh.positions[start as usize], p.midpoint(q)]);
-                start_of_border_point.extend([start; 2]);
+                let (start, end) = if ascends { (low, high) } else { (high, low) };
+                let [p, q] = [start, end].map(|v| mesh.positions[v as usize]);
+                let steps = steps(mesh, &[start, end, end], step_m).max(2);
+                border_points.extend((0..steps).map(|i| p.lerp(q, i as f32 / steps as f32)));
+                start_of_border_point.extend((0..steps).map(|_| start));
             }
         }
 
@@ -276,6 +293,38 @@ impl Whole {
             }
         }
     }
+}
+
+/// The largest distance between samples, in bounds of the error.
+const BOUNDS_A_STEP: f32 = 6.0;
+
+/// The largest number of samples that large faces have, on the mean of all faces.
+const MOST_SAMPLES: usize = 12;
+
+/// The largest number of parts of an edge.
+const MOST_STEPS: f32 = 64.0;
+
+/// The distance between samples: so large that their number is bounded by the number of faces.
+fn step_m(mesh: &MeshColumns<'_>, max_error_m: f32) -> f32 {
+    let mut step_m = (BOUNDS_A_STEP * max_error_m).max(1e-6);
+    let count = |step_m| -> usize {
+        let squares = mesh.faces.iter().map(|f| steps(mesh, f, step_m) as usize);
+        squares.filter(|&n| n > 2).map(|n| n * n / 2).sum()
+    };
+    while count(step_m) > MOST_SAMPLES * mesh.faces.len() + 1_000_000 {
+        step_m *= 1.5;
+    }
+    step_m
+}
+
+/// The number of parts that the longest edge of a face is cut into.
+fn steps(mesh: &MeshColumns<'_>, corners: &[u32; 3], step_m: f32) -> u32 {
+    let [a, b, c] = corners.map(|v| mesh.positions[v as usize]);
+    let longest = a
+        .distance_squared(b)
+        .max(b.distance_squared(c))
+        .max(c.distance_squared(a));
+    (longest.sqrt() / step_m).min(MOST_STEPS).ceil() as u32
 }
 
 /// The part of a list, sorted by cell, that belongs to one.
