@@ -97,7 +97,7 @@ pub fn start(name: &str) {
 
     // A pixel of a compressed image may take an eighth of a bit. A byte of deflated numbers inflates to a
     // thousand.
-    let per_byte = if matches!(name, "texture" | "gltf" | "png" | "exr") {
+    let per_byte = if matches!(name, "texture" | "gltf" | "png" | "exr" | "depth") {
         32 << 10
     } else {
         4 << 10

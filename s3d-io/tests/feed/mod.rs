@@ -5,6 +5,8 @@
 //! as an export would. It does not matter whether they can be read. Reading must end, without a panic, in
 //! memory that the file's size warrants, and an error must name a file.
 
+mod raw;
+
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DAffine3;
 use s3d_io::Result;
@@ -49,6 +51,8 @@ pub(crate) const FEEDS: &[(&str, Feed)] = &[
     ("mat", mat),
     ("png", png),
     ("exr", exr),
+    ("depth", raw::depth),
+    ("raw_scan", raw::raw_scan),
 ];
 
 /// Two triangles of two objects, with columns of vertices and of faces.

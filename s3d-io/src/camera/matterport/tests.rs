@@ -1,6 +1,7 @@
 use super::*;
 use crate::image::png::write_rgb8;
 use glam::dvec3;
+use std::fs;
 
 const UUID: &str = "0c5a7d1e93b84f62a1d7e0f4b2683c95";
 

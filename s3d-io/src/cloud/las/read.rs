@@ -190,6 +190,7 @@ impl Cloud for LasCloud<'_> {
             are_bytes: false,
             has_intensity: true,
             has_times: fields.time.is_some(),
+            has_grid: false,
         };
         let mut data = las::PointDataBuilder::new().for_header(&header).build();
         let at_once = BATCH_BYTES

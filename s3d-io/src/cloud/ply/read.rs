@@ -91,6 +91,7 @@ impl Cloud for PlyCloud<'_> {
                 .is_some_and(|[r, ..]| element.properties[r].kind == PlyType::U8),
             has_intensity: columns.intensity.is_some(),
             has_times: columns.time.is_some(),
+            has_grid: false,
         };
 
         let mut batch = PlyBatch::default();

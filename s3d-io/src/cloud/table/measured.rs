@@ -28,7 +28,8 @@ pub struct ScanBlock {
     pub colors: Vec<[u8; 3]>,
     /// How much came back, in the file's own unit; empty if the scan does not tell. NaN: unknown.
     pub intensities: Vec<f32>,
-    /// Row and column of each point in the scanner's grid, from 0; empty if there is no grid.
+    /// Row and column of each point in the scanner's grid, from 0; empty if there is no grid. The largest
+    /// numbers stand for a point beside it.
     pub cells: Vec<[u32; 2]>,
     /// When each point was measured, in seconds of the file's own clock; empty if the scan does not tell.
     pub times_s: Vec<f64>,
@@ -68,4 +69,6 @@ pub(crate) struct Told {
     pub(crate) are_bytes: bool,
     pub(crate) has_intensity: bool,
     pub(crate) has_times: bool,
+    /// Whether points have cells of a grid.
+    pub(crate) has_grid: bool,
 }

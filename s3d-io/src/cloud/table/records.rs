@@ -322,6 +322,7 @@ impl Table {
                 .is_some_and(|field| field.kind == Kind::U8),
             has_intensity: self.columns.intensity.is_some(),
             has_times: self.columns.time.is_some(),
+            has_grid: false,
         }
     }
 

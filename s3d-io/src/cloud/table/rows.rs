@@ -370,6 +370,9 @@ impl<'a> Reading<'a> {
     }
 }
 
+/// Stands for a point beside the scanner's grid.
+const NO_CELL: [u32; 2] = [u32::MAX; 2];
+
 /// Adds a row to a block of measurements.
 fn measure(block: &mut ScanBlock, row: &Row<'_>, told: &Told) {
     block.positions_m.push(row.position);
@@ -382,7 +385,9 @@ fn measure(block: &mut ScanBlock, row: &Row<'_>, told: &Told) {
     if told.has_times {
         block.times_s.push(row.measured.time_s);
     }
-    block.cells.extend(row.measured.cell);
+    if told.has_grid {
+        block.cells.push(row.measured.cell.unwrap_or(NO_CELL));
+    }
 }
 
 fn too_many(what: &str) -> String {

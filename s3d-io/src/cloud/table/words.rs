@@ -211,6 +211,7 @@ impl WordTable {
             are_bytes: matches!(self.color, WordColor::Packed(_)),
             has_intensity: self.columns.intensity.is_some(),
             has_times: self.columns.time.is_some(),
+            has_grid: false,
         }
     }
 

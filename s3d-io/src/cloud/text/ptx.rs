@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::table::cloud::ColorRange;
-use crate::cloud::table::measured::Measured;
+use crate::cloud::table::measured::{Measured, Told};
 use crate::cloud::table::rows::{Reading, Row};
 use crate::cloud::table::wanted::{Wanted, usual_names};
 use crate::cloud::table::words::{Lines, Parsed};
@@ -175,7 +175,7 @@ pub(super) fn read_ptx(
         && let Some(scan) = Scan::read(path, &mut lines)?
     {
         scans = scans.saturating_add(1);
-        reading.told = table.told(Some(scan.points));
+        reading.told = Told { has_grid: true, ..table.told(Some(scan.points)) };
         let mut done = 0u64;
         while done < scan.points {
             if lines.next()?.is_none() {

@@ -21,6 +21,8 @@ pub(super) struct Listed {
     /// The number of poses without a depth picture.
     pub(super) unpictured: usize,
     pub(super) warnings: Vec<String>,
+    /// What is assumed of the lens, since no file tells it: a sentence.
+    pub(super) assumed_lens: Option<String>,
     /// The files that were read.
     pub(super) files: Vec<PathBuf>,
     /// The file or folder that messages name.
@@ -56,6 +58,7 @@ impl Listed {
             untracked: 0,
             unpictured: 0,
             warnings: Vec::new(),
+            assumed_lens: None,
             files: Vec::new(),
             named,
         }
@@ -76,6 +79,7 @@ impl Listed {
         }
 
         let mut warnings = self.warnings;
+        warnings.extend(self.assumed_lens.filter(|_| options.depth_optics.is_none()));
         if self.untracked > 0 {
             let count = self.untracked;
             let all = count + self.entries.len();

@@ -2,7 +2,7 @@
 
 use crate::camera::locations::moved;
 use crate::camera::programs::e57::{open, rotation_of};
-use crate::cloud::e57::{grid_of, has_color_and_intensity};
+use crate::cloud::e57::grid::{grid_of, has_color_and_intensity};
 use crate::error::{Error, Result};
 use crate::guarded::guarded;
 use crate::raw::laser::ScanInfo;

@@ -44,14 +44,12 @@ impl LaserScans {
         let mut offsets_m = Raster::filled(columns, rows, Vec3::NAN);
         let mut colors = info.has_colors.then(|| Raster::filled(columns, rows, [0; 3]));
         let mut intensities = info.has_intensity.then(|| Raster::filled(columns, rows, f32::NAN));
+        let mut beside = 0u64;
         self.read(scan, |block| {
             for (i, (position, [row, column])) in block.positions_m.iter().zip(&block.cells).enumerate() {
                 if *row >= rows || *column >= columns {
-                    let message = format!(
-                        "{}: a point has row {row} and column {column}, and the grid {rows} and {columns}",
-                        info.name
-                    );
-                    return Err(Error::format(&info.path, message));
+                    beside += 1;
+                    continue;
                 }
                 let cell = *row as usize * columns as usize + *column as usize;
                 let offset = (*position - origin_m).as_vec3();
@@ -64,8 +62,12 @@ impl LaserScans {
                 set(colors.as_mut(), cell, block.colors.get(i));
                 set(intensities.as_mut(), cell, block.intensities.get(i));
             }
-            Ok(())
+            Ok::<(), Error>(())
         })?;
+        if beside > 0 {
+            let message = format!("{}: {beside} points lie beside its grid of {rows} × {columns}", info.name);
+            return Err(Error::format(&info.path, message));
+        }
         Ok(Some(ScanGrid { origin_m, offsets_m, colors, intensities }))
     }
 }

@@ -70,7 +70,7 @@ pub(super) fn list(dir: &Path, form: RawForm) -> Result<Listed> {
     }
 
     if form == RawForm::SevenScenes {
-        listed.warnings.push(format!(
+        listed.assumed_lens = Some(format!(
             "{}: has no file of intrinsics, and is taken for a sequence of 7-Scenes: focal lengths of \
              {SEVEN_SCENES_FOCAL_PX} px and the centre of 640 × 480 pixels, as its documentation has them",
             dir.display()
@@ -101,7 +101,7 @@ fn list_sequence(folder: &Path, before: &str, listed: &mut Listed) -> Result<()>
         found += 1;
         let entry = match (&info, is_seven_scenes) {
             (Some(info), _) => of_info(color, depth, info),
-            (None, true) => of_seven_scenes(color, depth),
+            (None, true) => of_seven_scenes(color, depth)?,
             (None, false) => super::in_millimetres(color, depth),
         };
         let name = format!("{before}{}", entry.camera.name);
@@ -134,20 +134,23 @@ fn of_info(color: PosedCamera, depth: PathBuf, info: &Info) -> Entry {
 }
 
 /// Returns the entry of a frame of 7-Scenes. Its colour pictures are not aligned with the depth, but nearly.
-fn of_seven_scenes(color: PosedCamera, depth: PathBuf) -> Entry {
+/// Pictures of another size are another sensor's, whose lens is not known.
+fn of_seven_scenes(color: PosedCamera, depth: PathBuf) -> Result<Entry> {
+    let place = DepthPlace::File(depth);
+    let size = place.size()?;
     let [width, height] = SEVEN_SCENES.map(f64::from);
-    let optics = Optics::Pinhole {
+    let optics = (size == SEVEN_SCENES).then(|| Optics::Pinhole {
         focal_px: DVec2::splat(SEVEN_SCENES_FOCAL_PX),
         center_px: Some(0.5 * dvec2(width, height)),
         distortion: Distortion::None,
-    };
-    let color = PosedCamera { size: Some(SEVEN_SCENES), optics: Some(optics), ..color };
-    Entry {
+    });
+    let color = PosedCamera { size: Some(size), optics, ..color };
+    Ok(Entry {
         camera: color.clone(),
-        place: DepthPlace::File(depth),
+        place,
         unit_m: super::MILLIMETRE,
         missing: Some(SEVEN_SCENES_MISSING),
         confidence: None,
         color: Some(color),
-    }
+    })
 }

@@ -1,5 +1,8 @@
 //! Annotated points of E57 files: several scans, each with its pose. Source: ASTM E2807.
 
+#[cfg_attr(not(feature = "raw"), allow(dead_code))]
+pub(crate) mod grid;
+
 use crate::bounds::Bounds;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
 use crate::cloud::table::columns::Columns;
@@ -10,6 +13,7 @@ use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use crate::fs::source::{Bytes, Source};
 use e57::{E57Reader, PointCloud, RawValues, Record, RecordDataType, RecordName, RecordValue};
+use grid::{attribute_index, grid_columns};
 use s3d_geom::glam::{DQuat, DVec3, dvec3};
 use s3d_label::Room;
 use std::io::BufReader;
@@ -149,7 +153,11 @@ impl<'a> Scan<'a> {
                 },
             ),
             colorless: attribute_index(prototype, &RecordName::IsColorInvalid),
-            grid: grid_columns(cloud),
+            grid: if wanted.annotations().is_none() {
+                grid_columns(cloud)
+            } else {
+                None
+            },
             limits,
             rotation: rotation.normalize(),
             translation,
@@ -242,6 +250,7 @@ impl<'a> Scan<'a> {
             are_bytes: true,
             has_intensity: self.columns.intensity.is_some(),
             has_times: self.columns.time.is_some(),
+            has_grid: self.grid.is_some(),
         }
     }
 
@@ -259,38 +268,6 @@ impl<'a> Scan<'a> {
             Color::Wider | Color::Beyond(_) => [0; 3],
         }
     }
-}
-
-/// Returns the places of the row and the column of a point's grid among its values, and the least number of
-/// each. Returns `None` if the scan does not state how large its grid is.
-fn grid_columns(cloud: &PointCloud) -> Option<[(usize, i64); 2]> {
-    let bounds = cloud.index_bounds.as_ref()?;
-    let row = attribute_index(&cloud.prototype, &RecordName::RowIndex)?;
-    let column = attribute_index(&cloud.prototype, &RecordName::ColumnIndex)?;
-    Some([(row, bounds.row_min?), (column, bounds.column_min?)])
-}
-
-/// Returns the rows and columns of a scan's grid, if its points have indices of one.
-#[cfg(feature = "raw")]
-pub(crate) fn grid_of(cloud: &PointCloud) -> Option<[u32; 2]> {
-    grid_columns(cloud)?;
-    let bounds = cloud.index_bounds.as_ref()?;
-    let side = |least: i64, most: i64| u32::try_from(most.checked_sub(least)?.checked_add(1)?).ok();
-    let rows = side(bounds.row_min?, bounds.row_max?)?;
-    let columns = side(bounds.column_min?, bounds.column_max?)?;
-    (rows > 1 && columns > 1).then_some([rows, columns])
-}
-
-/// Returns whether the points of a scan have colours, and whether they have intensities.
-#[cfg(feature = "raw")]
-pub(crate) fn has_color_and_intensity(cloud: &PointCloud) -> [bool; 2] {
-    [RecordName::ColorRed, RecordName::Intensity]
-        .map(|name| attribute_index(&cloud.prototype, &name).is_some())
-}
-
-/// The place of an attribute among the values of a point.
-fn attribute_index(prototype: &[Record], name: &RecordName) -> Option<usize> {
-    prototype.iter().position(|r| r.name == *name)
 }
 
 /// Chooses the columns. Users name an attribute with its prefix (`ext:label`) or without.
