@@ -15,6 +15,7 @@ mod determinism;
 mod errors;
 mod eval;
 mod frames;
+mod fuse;
 mod kill;
 mod label_folder;
 mod large;

@@ -9,6 +9,8 @@ use common::{files, s3d_ok, text, write_scan};
 use s3d_annotate::labelling::{Action, FaceRuns, LabelFolder};
 use s3d_dataset::{BareScene, Context};
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
@@ -18,7 +20,7 @@ use tempfile::TempDir;
 
 /// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
 /// shards). A new command that writes needs a line here.
-const COMMANDS: [&str; 33] = [
+const COMMANDS: [&str; 35] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -38,6 +40,8 @@ const COMMANDS: [&str; 33] = [
     "sample scan/room.obj -o new.ply --points 200000",
     "sample scan/room.obj -o old.ply --points 200000 --overwrite",
     "segments scan/room.obj -o new.segs.json",
+    "fuse scan/points.xyz -o new --origin 2,1.5,1.25 --cell 0.03",
+    "fuse scan/points.xyz -o old.ply --origin 2,1.5,1.25 --cell 0.03 --overwrite",
     "label scan/room.obj -o labels --write ply",
     "label scan/room.obj -o labels --write scannet --to new",
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o new",
@@ -60,6 +64,23 @@ type Files = BTreeMap<PathBuf, Vec<u8>>;
 struct Template {
     dir: TempDir,
     files: Files,
+}
+
+/// What a scanner in the middle of the room of 4 × 3 × 2.5 m measures: a line x y z for each direction.
+fn scanned_room() -> String {
+    let mut text = String::new();
+    for (i, j) in (0..240).flat_map(|i| (1..120).map(move |j| (i, j))) {
+        let (azimuth, polar) = (f64::from(i) * PI / 120.0, f64::from(j) * PI / 120.0);
+        let direction = [polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos()];
+        let range = [2.0, 1.5, 1.25]
+            .iter()
+            .zip(direction)
+            .map(|(half, d): (&f64, f64)| half / d.abs())
+            .fold(f64::INFINITY, f64::min);
+        let [x, y, z] = direction.map(|d| d * range);
+        let _ = writeln!(text, "{:.4} {:.4} {:.4}", 2.0 + x, 1.5 + y, 1.25 + z);
+    }
+    text
 }
 
 impl Template {
@@ -95,6 +116,7 @@ impl Template {
             "area = 1\n[mesh]\npath = \"room.obj\"\n[frames]\npath = \"../views/transforms.json\"\n";
         fs::write(at("scan/photographs.toml"), photographs).unwrap();
         fs::write(at("boxes.json"), "[]").unwrap();
+        fs::write(at("scan/points.xyz"), scanned_room()).unwrap();
         label(&at("scan/room.obj"), &at("labels"));
         let files = files(&at(""));
         Self { dir, files }

@@ -56,6 +56,8 @@ pub(super) struct Images {
     /// What is subtracted from the coordinates of the scan, metres.
     pub(super) offset_m: DVec3,
     range_m: Option<f64>,
+    /// How each laser scan is moved; empty if they stay where they are.
+    motions: Vec<DAffine3>,
 }
 
 impl Images {
@@ -69,6 +71,7 @@ impl Images {
             up: options.up,
             offset_m: DVec3::ZERO,
             range_m: options.range_m,
+            motions: Vec::new(),
         };
         images.read(inputs, &raw, options)?;
 
@@ -112,6 +115,16 @@ impl Images {
             }
         }
         Ok(())
+    }
+
+    /// Moves each laser scan.
+    pub(super) fn move_scans(&mut self, motions: Vec<DAffine3>) {
+        self.motions = motions;
+    }
+
+    /// Whether laser scans are elsewhere than their files say.
+    pub(super) fn are_moved(&self) -> bool {
+        !self.motions.is_empty()
     }
 
     /// The first input, for messages.
@@ -174,13 +187,20 @@ impl Images {
             .chain(of_paths)
     }
 
+    /// The names of the laser scans.
+    pub(super) fn scan_names(&self) -> Vec<String> {
+        let scans = self.scans.iter().flat_map(LaserScans::scans);
+        scans.map(|scan| scan.name.clone()).collect()
+    }
+
     /// A table of the places of laser scans, as lists of scan locations are: a location for each scan.
     pub(super) fn place_table(&self) -> Option<String> {
         let mut text = "uuid,x,y,z,qx,qy,qz,qw\n".to_owned();
         let mut any = false;
-        for scan in self.scans.iter().flat_map(LaserScans::scans) {
+        for (number, scan) in self.scans.iter().flat_map(LaserScans::scans).enumerate() {
             let Some(origin_m) = scan.origin_m else { continue };
-            let [x, y, z] = origin_m.to_array();
+            let motion = self.motions.get(number).copied().unwrap_or_default();
+            let [x, y, z] = motion.transform_point3(origin_m).to_array();
             let uuid = s3d_io::camera::uuid_from_name(&format!("{} {x} {y} {z}", scan.name));
             let _ = writeln!(text, "{uuid},{x:?},{y:?},{z:?},0,0,0,1");
             any = true;
@@ -207,10 +227,16 @@ impl Images {
             }
         }
 
+        let mut motions = self.motions.iter();
         for scans in &self.scans {
             for (number, scan) in scans.scans().iter().enumerate() {
                 ctx.check()?;
+                let motion = motions.next();
                 let Some(seen) = self.scan(scans, number, scan, ctx)? else { continue };
+                let seen = match (seen, motion) {
+                    (Seen::Image(image), Some(motion)) => Seen::Image(image.moved(motion)),
+                    (seen, _) => seen,
+                };
                 if !each(seen, &scan.path)? {
                     return Ok(());
                 }

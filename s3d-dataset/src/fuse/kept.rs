@@ -3,14 +3,15 @@
 use super::{FUSED, FuseOptions, fuse_folder};
 use crate::context::Context;
 use crate::error::Result;
+use rayon::prelude::*;
 use s3d_io::Error as FileError;
-use s3d_io::fs::{Checksum, read_json};
+use s3d_io::fs::{Checksum, checksum_of_file, read_json};
 use s3d_io::raw::RawScan;
 use s3d_io::scene::{FuseSource, find_scene, read_scene};
 use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
 
 /// What a kept mesh was made from. It is written beside the mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,11 +25,12 @@ pub(super) struct Record {
 /// The state of an input: a file, or all files of a folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct InputState {
-    path: PathBuf,
+    /// The name of the file or folder.
+    name: String,
     files: u64,
     bytes: u64,
-    /// A checksum of the names, sizes and times of the files.
-    state: String,
+    /// A checksum of the names and contents of the files.
+    checksum: String,
 }
 
 impl Record {
@@ -49,20 +51,21 @@ impl InputState {
         list(path, &mut files)?;
         files.sort();
 
+        let sums = files
+            .par_iter()
+            .map(|file| Ok(checksum_of_file(file)?))
+            .collect::<Result<Vec<_>>>()?;
         let mut text = String::new();
-        let mut bytes = 0;
-        for file in &files {
-            let found = fs::metadata(file).map_err(|e| FileError::io(file, "read", e))?;
-            let since = found
-                .modified()
-                .ok()
-                .and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        for (file, (_, sum)) in files.iter().zip(&sums) {
             let name = file.strip_prefix(path).unwrap_or(file).display();
-            text.push_str(&format!("{name}\n{} {}\n", found.len(), since.unwrap_or_default().as_nanos()));
-            bytes += found.len();
+            let _ = writeln!(text, "{name} {sum}");
         }
-        let state = Checksum::of(text.as_bytes()).to_string();
-        Ok(Self { path: path.to_owned(), files: files.len() as u64, bytes, state })
+        Ok(Self {
+            name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            files: files.len() as u64,
+            bytes: sums.iter().map(|(bytes, _)| bytes).sum(),
+            checksum: Checksum::of(text.as_bytes()).to_string(),
+        })
     }
 }
 

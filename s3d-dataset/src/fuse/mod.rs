@@ -5,6 +5,7 @@
 //! names what else the scan brings (`scene_text`), and a record of what it was made from (`kept`). Exports of
 //! a raw scan keep such a folder beside it.
 
+mod fit;
 mod images;
 mod kept;
 mod level;
@@ -20,6 +21,7 @@ use crate::context::Context;
 use crate::error::{Error, Result, UsageError};
 use crate::store::new_folder::FolderKind;
 use crate::store::{NewFile, NewFolder};
+use fit::fit;
 use glam::DVec3;
 use images::Images;
 use kept::Record;
@@ -73,12 +75,21 @@ pub fn fuse(
     }
 
     NewFile::check_free(output, overwrite)?;
-    let images = Images::open(inputs, options, ctx)?;
+    let images = open(inputs, options, ctx)?;
     let made = surface(&images, options, ctx)?;
     let file = NewFile::begin(ctx, output, overwrite)?;
     write(file.path(), &made, &images, is_glb)?;
     file.finish()?;
     Ok(made.told(ctx, output))
+}
+
+/// Opens a raw scan, and brings its laser scans onto each other if that was asked for.
+fn open(inputs: &[PathBuf], options: &FuseOptions, ctx: &Context) -> Result<Images> {
+    let mut images = Images::open(inputs, options, ctx)?;
+    if let Some(motions) = fit(&images, options.refine_poses, ctx)? {
+        images.move_scans(motions);
+    }
+    Ok(images)
 }
 
 /// Fuses a raw scan to a folder.
@@ -93,7 +104,7 @@ fn fuse_folder(
     // What the files are now is what the mesh is made of.
     let record = Record::of(inputs, options)?;
     let folder = NewFolder::begin(ctx, output, first, FUSED, overwrite)?;
-    let images = Images::open(inputs, options, ctx)?;
+    let images = open(inputs, options, ctx)?;
     let made = surface(&images, options, ctx)?;
 
     write(&folder.path().join("mesh.ply"), &made, &images, false)?;

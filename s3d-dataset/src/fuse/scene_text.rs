@@ -51,7 +51,8 @@ pub(super) fn scene(images: &Images, turn: Option<DMat3>, folder: &Path) -> Resu
         Some((_, RawForm::Recording, path)) => {
             let _ = write!(toml, "[frames]\npath = {path:?}\n{up}");
         }
-        Some((file, RawForm::E57, path)) => {
+        // The file does not know of the motions.
+        Some((file, RawForm::E57, path)) if !images.are_moved() => {
             let _ = write!(toml, "[cameras]\npath = {path:?}\n{up}");
             if E57Pictures::open(file, &DAffine3::IDENTITY).is_ok() {
                 toml += "[rgb]\nsource = \"e57\"\n";

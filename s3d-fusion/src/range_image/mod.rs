@@ -1,9 +1,10 @@
 //! What one sensor saw from one place: a raster of ranges, and how its pixels become rays.
 
 mod angles;
-mod bounds;
+
 mod points;
 mod surfels;
+mod world;
 
 use crate::{FusionError, SensorNoise};
 pub(crate) use angles::{AngleGrid, angles_of};

@@ -1,0 +1,149 @@
+//! Raw scans become meshes and data sets: the built-in scene, scanned by simulated devices.
+
+use crate::common;
+use common::{files, s3d_fails, s3d_ok, text};
+use s3d_geom::glam::{DVec3, Vec3};
+use s3d_io::dataset::{Domain, Layout, dataset_images, read_pose};
+use s3d_io::image::read_xyz;
+use s3d_synth::device::{DepthCamera, LaserScanner, ScanTarget};
+use s3d_synth::{AnnotatedScene, Building};
+use std::fs;
+use std::path::Path;
+
+/// A quarter of the pixels of a real turntable, on each side.
+const SCALE: f64 = 0.25;
+
+fn scene(building: Building) -> AnnotatedScene {
+    Building { texture_scale: 0.1, ..building }.build().unwrap()
+}
+
+/// The share of pixels of a data set's images that lie within `within_m` of the scene that was scanned, along
+/// their rays.
+fn agreement(out: &Path, target: &ScanTarget<'_>, within_m: f64) -> f64 {
+    let layout = Layout::new(out);
+    let (mut near, mut all) = (0, 0);
+    for image in dataset_images(&layout, 1).unwrap() {
+        let path = |domain: Domain| image.path(&layout, domain);
+        let origin = DVec3::from_array(read_pose(&path(Domain::Pose)).unwrap().camera_location);
+        let points = read_xyz(&path(Domain::GlobalXyz)).unwrap();
+        let rays = points
+            .pixels()
+            .iter()
+            .map(|xyz| Vec3::from_array(*xyz).as_dvec3() - origin);
+        for ray in rays.filter(|ray| ray.is_finite() && *ray != -origin) {
+            let truth = target.range(origin.as_vec3(), ray.normalize().as_vec3());
+            all += 1;
+            near +=
+                usize::from(truth.is_some_and(|range| (f64::from(range) - ray.length()).abs() <= within_m));
+        }
+    }
+    assert!(all > 10_000, "{all} pixels");
+    near as f64 / all as f64
+}
+
+/// What an export of a fused scan is made with.
+const EXPORT: [&str; 11] = [
+    "--views",
+    "4",
+    "--size",
+    "96",
+    "--pano-width",
+    "256",
+    "--points-per-m2",
+    "40",
+    "--xyz",
+    "float",
+    "--threads=2",
+];
+
+#[test]
+fn raw_captures_become_a_data_set() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene(Building::demo());
+    let target = ScanTarget::new(&scene);
+    let raw = dir.path().join("raw");
+    let camera = DepthCamera::turntable().scaled(SCALE);
+    target
+        .write_matterport(&raw, &scene.locations[..1], &camera, || true)
+        .unwrap();
+
+    let [out, again] = ["out", "again"].map(|name| dir.path().join(name));
+    let log = s3d_ok(&[&["export", text(&raw), "-o", text(&out)], &EXPORT[..]].concat());
+    assert!(
+        log.contains("18 depth pictures") && log.contains("colours from captures of 1 location"),
+        "{log}"
+    );
+    s3d_ok(&["verify", text(&out)]);
+    // The far walls are measured with a noise of 2 cm.
+    let share = agreement(&out, &target, 0.02);
+    assert!(share > 0.95, "{share}");
+
+    // The mesh is kept, and made again when the scan changes.
+    let log = s3d_ok(&[&["export", text(&raw), "-o", text(&again)], &EXPORT[..]].concat());
+    assert!(log.contains("fused earlier") && files(&out) == files(&again), "{log}");
+    let depths = raw.join("matterport_depth_images");
+    let first = fs::read_dir(&depths).unwrap().map(|e| e.unwrap().path()).min().unwrap();
+    fs::remove_file(first).unwrap();
+    let log = s3d_ok(&["info", text(&raw)]);
+    assert!(!log.contains("fused earlier") && log.contains("17 depth pictures"), "{log}");
+}
+
+#[test]
+fn threads_and_tiles_do_not_change_a_mesh() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = scene(Building::two_storeys());
+    let target = ScanTarget::new(&scene);
+    // A scan on each storey.
+    let highest = |a: &&_, b: &&_| height(a).total_cmp(&height(b));
+    let upper = scene.locations.iter().max_by(highest).unwrap();
+    let lower = scene.locations.iter().min_by(highest).unwrap();
+    assert!(height(upper) > height(lower) + 2.0);
+    let file = dir.path().join("scan.ptx");
+    let scanner = LaserScanner { columns: 500, rows: 220, ..LaserScanner::default() };
+    target
+        .write_ptx(&file, &[lower.clone(), upper.clone()], &scanner, || true)
+        .unwrap();
+
+    let fuse = |name: &str, more: &[&str]| {
+        let mesh = dir.path().join(name);
+        let log = s3d_ok(&[&["fuse", text(&file), "-o", text(&mesh), "--cell", "0.03"], more].concat());
+        (fs::read(mesh).unwrap(), log)
+    };
+    let (one, _) = fuse("one.ply", &["--threads", "1"]);
+    let (three, _) = fuse("three.ply", &["--threads", "3"]);
+    let (tiles, log) = fuse("tiles.ply", &["--memory", "0.01"]);
+    assert!(log.contains("fused in tiles"), "{log}");
+    assert!(one == three && one == tiles, "{} {} {} bytes", one.len(), three.len(), tiles.len());
+
+    // A folder names the places of the scanner, so an export has a location on each storey.
+    let folder = dir.path().join("fused");
+    s3d_ok(&["fuse", text(&file), "-o", text(&folder), "--cell", "0.03", "--close", "0.3"]);
+    let told = String::from_utf8(common::s3d(&["info", text(&folder.join("scene.toml"))]).stdout).unwrap();
+    assert!(told.contains("2 scan locations") && told.contains("2 storeys"), "{told}");
+}
+
+fn height(location: &s3d_synth::building::ScanLocation) -> f32 {
+    location.position.z
+}
+
+#[test]
+fn what_cannot_be_fused_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    fs::write(at("hall.xyz"), "2 0 1\n0 3 1\n0 3 2\n").unwrap();
+    fs::write(at("notes.md"), "no scan").unwrap();
+    fs::write(at("there.ply"), "mine").unwrap();
+    let [hall, notes, there] =
+        ["hall.xyz", "notes.md", "there.ply"].map(|name| at(name).display().to_string());
+    let [gone, mesh, obj] = ["gone.e57", "m.ply", "m.obj"].map(|name| at(name).display().to_string());
+
+    s3d_fails(&["fuse", &hall, "-o", &mesh], 1, &["hall.xyz", "where the scanner stood"]);
+    s3d_fails(&["fuse", &hall, "-o", &mesh, "--origin", "1,2"], 1, &["scanner's place has 2 numbers"]);
+    s3d_fails(&["fuse", &notes, "-o", &mesh], 1, &["notes.md", "no raw scan"]);
+    s3d_fails(&["fuse", &gone, "-o", &mesh], 1, &["gone.e57"]);
+    s3d_fails(&["fuse", &hall, "-o", &obj], 2, &["m.obj", ".ply or a .glb"]);
+    s3d_fails(&["fuse", &hall, "-o", &there, "--origin", "0,0,1"], 2, &["there.ply", "--overwrite"]);
+    s3d_fails(&["fuse", &hall, "-o", &mesh, "--cell", "0"], 2, &["--cell"]);
+    assert_eq!(fs::read(at("there.ply")).unwrap(), b"mine");
+    assert!(!at("m.ply").exists());
+}

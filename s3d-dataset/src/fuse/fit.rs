@@ -1,0 +1,86 @@
+//! Whether laser scans lie on each other, and motions that bring them there.
+
+use super::images::{Images, Seen};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use glam::DAffine3;
+use s3d_fusion::{RegisterOptions, ScanPoints, pair_residuals, refine_poses};
+
+/// Comparing more scans than these would take longer than fusing them.
+const MOST_SCANS: usize = 100;
+
+/// Two scans are off if a motion lessens their distance by this much, metres, and by half.
+const OFF_M: f64 = 0.005;
+
+/// Compares laser scans pair by pair and says which are off. Returns a motion for each scan if poses are to be
+/// refined.
+///
+/// # Errors
+/// [`Error::Input`] if poses are to be refined, and the scans are no laser scans from fixed places.
+pub(super) fn fit(images: &Images, refine: bool, ctx: &Context) -> Result<Option<Vec<DAffine3>>> {
+    let names = images.scan_names();
+    if names.len() != images.len() || names.len() < 2 || names.len() > MOST_SCANS {
+        if refine {
+            let why = format!("poses are refined of 2 to {MOST_SCANS} laser scans, and of nothing else");
+            return Err(Error::unfit(images.path(), why));
+        }
+        return Ok(None);
+    }
+
+    let options = RegisterOptions::default();
+    let task = ctx.progress("comparing", images.unit(), names.len() as u64);
+    let mut scans = Vec::new();
+    images.each(ctx, |seen, _| {
+        if let Seen::Image(image) = seen {
+            let (points, normals) = image.surface_points(options.cell_m as f32);
+            scans.push(ScanPoints::sampled(&points, &normals, options.cell_m));
+        }
+        task.add(1);
+        Ok(true)
+    })?;
+    if scans.len() != names.len() {
+        let why = "some scans have no fixed place, or nothing in range: their poses are not compared";
+        ctx.info(format_args!("{}: {why}", images.path().display()));
+        return Ok(None);
+    }
+
+    let unfit = |e: s3d_fusion::RegisterError| Error::unfit(images.path(), e.to_string());
+    let poses = vec![DAffine3::IDENTITY; scans.len()];
+    let pairs = pair_residuals(&scans, &poses, &options).map_err(unfit)?;
+    for pair in &pairs {
+        let [a, b] = pair.scans.map(|scan| &names[scan]);
+        let [before_mm, after_mm] = [&pair.before, &pair.after].map(|of| of.median_m * 1e3);
+        let told = format!(
+            "scans {a} and {b}: half of {} points are within {before_mm:.1} mm",
+            pair.before.correspondences
+        );
+        let is_off = before_mm - after_mm > OFF_M * 1e3 && after_mm < before_mm / 2.0;
+        match (is_off, refine) {
+            (true, false) => ctx.warn(format_args!(
+                "{told}, and {after_mm:.1} mm if one moves by {:.1} cm: their poses do not fit; they can be refined",
+                pair.motion.translation.length() * 1e2
+            )),
+            _ => ctx.info(told),
+        }
+    }
+    if !refine {
+        return Ok(None);
+    }
+
+    let refined = refine_poses(&scans, &poses, &options).map_err(unfit)?;
+    for (name, motion) in names.iter().zip(&refined.motions) {
+        ctx.info(format_args!(
+            "scan {name} moved by {:.1} mm and {:.3}°",
+            motion.translation.length() * 1e3,
+            motion.rotation.length().to_degrees()
+        ));
+    }
+    for open in &refined.open {
+        let moving: Vec<&str> = open.motions.iter().map(|(scan, _)| names[*scan].as_str()).collect();
+        ctx.warn(format_args!(
+            "a motion of {} changes no distance, as along a bare corridor: nothing was done along it",
+            moving.join(", ")
+        ));
+    }
+    Ok(Some(refined.poses))
+}
