@@ -3,7 +3,7 @@
 use super::pyramid::Pyramid;
 use super::view::View;
 use super::walk::blocks_along;
-use super::{Scale, Tile};
+use super::{Scale, Tile, chance};
 use crate::FusionError;
 use crate::grid::block::Block;
 use crate::grid::{CHUNK, Grid, NONE, Place, SIDE, block_in, chunk_of, key, place_of};
@@ -176,9 +176,9 @@ impl Adding<'_> {
         let middle = DVec3::from_array(first.map(f64::from)) * self.scale.block() + half;
         let Some(extent) = view.extent(middle, half * 3.0_f64.sqrt()) else { return Seen::No };
         let [nearest, farthest] = pyramid.ranges(&extent);
-        if extent.near > farthest + self.scale.most_along() as f32 {
+        if extent.near > farthest + self.scale.most_before() as f32 {
             Seen::No
-        } else if extent.is_within && extent.far + (self.scale.most_along() as f32) < nearest {
+        } else if extent.is_within && extent.far + (self.scale.most_before() as f32) < nearest {
             Seen::Free
         } else {
             Seen::Mixed
@@ -209,7 +209,7 @@ impl Adding<'_> {
     }
 
     /// Adds the image to each voxel of a block.
-    fn update(&self, view: &View<'_>, surfels: &[Surfel], place: Place, block: &mut Block) {
+    pub(super) fn update(&self, view: &View<'_>, surfels: &[Surfel], place: Place, block: &mut Block) {
         let cell = self.scale.cell;
         let corner = DVec3::from_array(place.map(f64::from)) * self.scale.block();
         let first = (view.turn * (corner - view.location)).as_vec3();
@@ -236,16 +236,16 @@ impl Adding<'_> {
         let scale = &self.scale;
         let before = s.range - range;
         let front = scale.front as f32;
-        let most = scale.most_along() as f32;
-        if s.weight == 0.0 || before < -most {
+        let most = scale.most_before() as f32;
+        if s.weight == 0.0 {
             return;
         }
 
         let distance = s.normal.dot(point) + s.offset;
+        if distance > front && before > front {
+            block.pass(voxel, s.nearest - range > front);
+        }
         if distance > front || before > most {
-            if before > front {
-                block.pass(voxel, s.nearest - range > front);
-            }
             return;
         }
         let Some(weight) = scale.weight(distance, before, s.sigma_m) else { return };
@@ -257,12 +257,4 @@ impl Adding<'_> {
             block.mix_color(voxel, *color, share, chance(voxel as u32, self.number));
         }
     }
-}
-
-/// Returns a number from 0 to 1 that looks random.
-#[inline]
-pub(super) fn chance(voxel: u32, number: u32) -> f32 {
-    let mixed = (voxel ^ number.wrapping_mul(0x9e37_79b9)).wrapping_mul(0x85eb_ca6b);
-    let mixed = (mixed ^ mixed >> 15).wrapping_mul(0xc2b2_ae35);
-    (mixed >> 9) as f32 / (1 << 23) as f32
 }

@@ -1,7 +1,11 @@
 //! Ranges are gathered in a grid of signed distances.
 
 mod images;
+mod normals;
 mod pyramid;
+mod rays;
+#[cfg(test)]
+mod reference;
 mod view;
 mod walk;
 
@@ -9,6 +13,7 @@ use crate::extract::{FusedMesh, Surface};
 use crate::grid::{FARTHEST, Grid, Place, SIDE};
 use crate::{FusionError, RangeImage, SensorNoise};
 use images::Adding;
+use rays::AddingRays;
 use s3d_geom::glam::{DVec3, Vec3};
 
 /// How ranges are fused.
@@ -71,16 +76,29 @@ impl Scale {
         (2.0 * self.cell as f32 + 2.0 * sigma_m).min(self.front as f32)
     }
 
-    /// How far before and behind a hit, along the ray, distances are gathered at most.
-    fn most_along(&self) -> f64 {
+    /// How far before a hit, along the ray, distances are gathered at most. A ray that meets a plane aslant is near it
+    /// for long.
+    fn most_before(&self) -> f64 {
         4.0 * self.front
+    }
+
+    /// How far behind a hit, along the ray, distances are gathered at most. A ray that meets a body aslant soon leaves
+    /// it again.
+    fn most_behind(&self, sigma_m: f32) -> f32 {
+        3.0 * self.behind(sigma_m)
     }
 
     /// How far before and behind a hit, along its ray, distances are gathered if the ray meets the surface at this
     /// cosine.
     fn along_ray(&self, cosine: f32, sigma_m: f32) -> [f64; 2] {
-        let lengths = [self.front, f64::from(self.behind(sigma_m))];
-        lengths.map(|length| (length / f64::from(cosine)).min(self.most_along()))
+        let cosine = f64::from(cosine);
+        let behind = f64::from(self.behind(sigma_m)) / cosine;
+        [(self.front / cosine).min(self.most_before()), behind.min(self.most_behind(sigma_m).into())]
+    }
+
+    /// The weight of a ray by its noise and the angle at which it meets the surface: 1 for a millimetre at a right angle.
+    fn weight_of(sigma_m: f32, cosine: f32) -> f32 {
+        cosine * (0.001 / sigma_m) * (0.001 / sigma_m)
     }
 
     /// The weight of a distance to the plane of a hit; `None` if it counts nothing. `before` is how far before the hit
@@ -92,7 +110,7 @@ impl Scale {
     fn weight(&self, distance: f32, before: f32, sigma_m: f32) -> Option<f32> {
         let cell = self.cell as f32;
         let behind = self.behind(sigma_m);
-        if distance <= -behind {
+        if distance <= -behind || before < -3.0 * behind {
             return None;
         }
         let near = before / (1.5 * cell);
@@ -163,12 +181,21 @@ impl Fusion {
     /// [`FusionError::Count`], [`FusionError::Noise`], [`FusionError::TooFar`].
     pub fn add_rays(
         &mut self,
-        _origins: &[Vec3],
-        _points: &[Vec3],
-        _colors: &[[u8; 3]],
-        _noise: SensorNoise,
+        origins: &[Vec3],
+        points: &[Vec3],
+        colors: &[[u8; 3]],
+        noise: SensorNoise,
     ) -> Result<(), FusionError> {
-        todo!()
+        let columns = [("origins", origins.len()), ("colours", colors.len())];
+        for (what, found) in columns.into_iter().filter(|(what, n)| *what == "origins" || *n > 0) {
+            if found != points.len() {
+                return Err(FusionError::Count { what, found, points: points.len() });
+            }
+        }
+        let noise = noise.check()?;
+        let (scale, tile, number) = (self.scale, self.tile, self.added);
+        self.added += 1;
+        AddingRays { origins, points, colors, noise, scale, tile, number }.add_to(&mut self.grid)
     }
 
     /// Returns the number of bytes that blocks and their directory take.
@@ -195,4 +222,12 @@ impl Fusion {
         let cell_m2 = self.options.cell_m * self.options.cell_m;
         self.surface().into_mesh(self.options.least_piece_cells * cell_m2)
     }
+}
+
+/// Returns a number from 0 to 1 that looks random.
+#[inline]
+fn chance(voxel: u32, number: u32) -> f32 {
+    let mixed = (voxel ^ number.wrapping_mul(0x9e37_79b9)).wrapping_mul(0x85eb_ca6b);
+    let mixed = (mixed ^ mixed >> 15).wrapping_mul(0xc2b2_ae35);
+    (mixed >> 9) as f32 / (1 << 23) as f32
 }

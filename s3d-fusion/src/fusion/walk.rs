@@ -1,6 +1,6 @@
 //! The cubes that a segment crosses.
 
-use crate::grid::Place;
+use crate::grid::{Place, SIDE};
 use s3d_geom::glam::DVec3;
 
 /// Calls `visit` with each unit cube that a segment crosses, from its start to its end. Source: Amanatides and Woo 1987,
@@ -33,6 +33,48 @@ pub(super) fn blocks_along([start, end]: [DVec3; 2], mut visit: impl FnMut(Place
         at[k] += step[k];
         next[k] += each[k];
         visit(at);
+    }
+}
+
+/// Calls `visit` with the voxels beside a segment, slice by slice along its main axis, as far as the slices are in a
+/// block that starts at `first`. With `around` = 0 it is the nearest voxel of each slice, with the share 1. With 1 they
+/// are the four around the segment, with shares that add up to 1.
+pub(super) fn slices_along(
+    [start, end]: [DVec3; 2],
+    first: Place,
+    around: i32,
+    mut visit: impl FnMut(Place, f32),
+) {
+    let way = end - start;
+    let size = way.abs();
+    let main = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let others = [(main + 1) % 3, (main + 2) % 3];
+    let (low, high) = (start[main].min(end[main]), start[main].max(end[main]));
+    let from = (low.ceil() as i32).max(first[main]);
+    let to = (high.ceil() as i32).min(first[main] + SIDE);
+
+    for slice in from..to {
+        let at = start + way * ((f64::from(slice) - start[main]) / way[main]);
+        let mut voxel = [slice; 3];
+        if around == 0 {
+            others.iter().for_each(|k| voxel[*k] = at[*k].round() as i32);
+            visit(voxel, 1.0);
+            continue;
+        }
+        let low = others.map(|k| at[k].floor());
+        let off = [0, 1].map(|k| (at[others[k]] - low[k]) as f32);
+        for corner in 0..4 {
+            let step = [corner & 1, corner >> 1];
+            (0..2).for_each(|k| voxel[others[k]] = low[k] as i32 + step[k]);
+            let share = |k: usize| if step[k] == 1 { off[k] } else { 1.0 - off[k] };
+            visit(voxel, share(0) * share(1));
+        }
     }
 }
 

@@ -71,6 +71,12 @@ impl Grid {
         *slot as usize
     }
 
+    /// Returns the index of a block, if it exists.
+    pub(crate) fn index_of(&self, place: Place) -> Option<u32> {
+        let chunk = self.chunk(chunk_of(place))?;
+        Some(chunk.blocks[slot_of(place)]).filter(|block| *block != NONE)
+    }
+
     /// Returns a block and how many images saw through all of it, if it exists.
     pub(crate) fn block(&self, place: Place) -> Option<(&Block, u16)> {
         let chunk = self.chunk(chunk_of(place))?;

@@ -54,6 +54,12 @@ impl Shape {
     }
 }
 
+/// The walls, floor and ceiling of a cube about the origin.
+pub(crate) fn room(half: f64) -> Vec<Shape> {
+    let walls = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
+    walls.map(|w| Shape::Plane(w * half, -w)).to_vec()
+}
+
 /// The distance of a point to the surface of several shapes.
 pub(crate) fn distance(shapes: &[Shape], p: Vec3) -> f64 {
     shapes
