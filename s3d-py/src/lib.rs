@@ -12,6 +12,7 @@ mod dataset;
 mod detect;
 mod error;
 mod export;
+mod fuse;
 mod mesh;
 mod points;
 mod scene;
@@ -36,6 +37,8 @@ mod native {
     use super::detect::Detector;
     #[pymodule_export]
     use super::export::{export, export_option_names, uuid_of_name};
+    #[pymodule_export]
+    use super::fuse::fuse;
     #[pymodule_export]
     use super::mesh::Mesh;
     #[pymodule_export]

@@ -1,7 +1,6 @@
 //! What one sensor saw from one place: a raster of ranges, and how its pixels become rays.
 
 mod angles;
-
 mod points;
 mod surfels;
 mod world;

@@ -40,6 +40,7 @@ from ._errors import (
     UsageError,
 )
 from ._export import Area, ExportOptions, Labels, SceneLike, export
+from ._fuse import Fused, fuse
 from ._mesh import Mesh, MeshLike, as_mesh, read_mesh
 from ._native import __version__
 from ._points import (
@@ -85,6 +86,7 @@ __all__ = [
     "FileError",
     "FormatError",
     "FoundBox",
+    "Fused",
     "Images",
     "InputError",
     "Instance",
@@ -121,6 +123,7 @@ __all__ = [
     "evaluate",
     "export",
     "fill",
+    "fuse",
     "info",
     "intrinsics",
     "look_at",

@@ -62,6 +62,14 @@ def look_at(eye: Sequence[float], target: Sequence[float], up: Sequence[float]) 
 def sample(
     mesh: Mesh, per_m2: float, total: int | None, seed: int, threads: int | None, sink: Sink
 ) -> tuple[_F32, _U8, _U32]: ...
+def fuse(
+    inputs: Sequence[Path],
+    output: Path,
+    options: str,
+    overwrite: bool,
+    threads: int | None,
+    sink: Sink,
+) -> tuple[list[int], float]: ...
 def segments(
     mesh: Mesh,
     scale_m2: float,

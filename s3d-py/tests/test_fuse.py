@@ -1,0 +1,39 @@
+"""A raw scan to a mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import s3d_py as s3d
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    """What a scanner in the middle of a room of 4 × 3 × 2.5 m measures, as text."""
+    azimuth, polar = np.meshgrid(np.arange(360) * np.pi / 180, np.arange(1, 180) * np.pi / 180)
+    ray = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
+    ranges = (np.array([2.0, 1.5, 1.25]) / np.maximum(np.abs(ray), 1e-9)).min(-1, keepdims=True)
+    path = tmp_path / "room.xyz"
+    np.savetxt(path, (ray * ranges).reshape(-1, 3), fmt="%.5f")
+    return path
+
+
+def test_a_scan_becomes_a_mesh(scan: Path, tmp_path: Path) -> None:
+    made = s3d.fuse(scan, tmp_path / "room.ply", cell_m=0.03, origin_m=(0, 0, 0))
+    mesh = s3d.read_mesh(tmp_path / "room.ply", up="z")
+    assert made.images == 1 and made.faces == len(mesh.faces) <= made.fused_faces
+    sides = np.abs(mesh.vertices) / [2.0, 1.5, 1.25]
+    assert np.abs(sides.max(axis=1) - 1).max() < 0.02
+    assert made.max_error_m <= 0.003
+
+
+def test_bad_calls_are_told(scan: Path, tmp_path: Path) -> None:
+    with pytest.raises(s3d.Error, match="where the scanner stood"):
+        s3d.fuse([scan], tmp_path / "room.ply")
+    with pytest.raises(s3d.UsageError):
+        s3d.fuse(scan, tmp_path / "room.obj", origin_m=(0, 0, 0))
+    with pytest.raises(s3d.UsageError):
+        s3d.fuse(scan, tmp_path / "room.ply", origin_m=(0, 0, 0), up="x")
