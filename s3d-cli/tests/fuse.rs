@@ -122,7 +122,7 @@ fn threads_and_tiles_do_not_change_a_mesh() {
     assert!(told.contains("2 scan locations") && told.contains("2 storeys"), "{told}");
 }
 
-fn height(location: &s3d_synth::building::ScanLocation) -> f32 {
+fn height(location: &s3d_synth::building::ScanLocation) -> f64 {
     location.position.z
 }
 

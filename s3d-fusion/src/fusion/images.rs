@@ -5,7 +5,7 @@ use super::view::View;
 use super::walk::blocks_along;
 use super::{Scale, Tile, chance};
 use crate::FusionError;
-use crate::grid::block::Block;
+use crate::grid::block::{Block, NO_COLOR};
 use crate::grid::{CHUNK, Grid, NONE, Place, SIDE, block_in, chunk_of, key, place_of};
 use crate::range_image::{RangeImage, Surfel};
 use rayon::prelude::*;
@@ -252,6 +252,7 @@ impl Adding<'_> {
         let is_at = distance < 0.5 * scale.cell as f32;
         let share = block.observe(voxel, distance / front, weight * s.weight, is_at);
         if let Some(color) = self.image.colors().get(pixel as usize)
+            && *color != NO_COLOR
             && distance.abs() < 2.0 * scale.cell as f32
         {
             block.mix_color(voxel, *color, share, chance(voxel as u32, self.number));

@@ -20,7 +20,7 @@ pub(crate) struct Block {
 /// The distance of a voxel that was seen far before surfaces alone.
 const PASSED: i16 = i16::MAX;
 /// The colour of voxels without one.
-const NO_COLOR: [u8; 3] = [0; 3];
+pub(crate) const NO_COLOR: [u8; 3] = [0; 3];
 
 impl Default for Block {
     fn default() -> Self {

@@ -151,7 +151,7 @@ impl RangeImage {
         Ok(Self { colors, ..image })
     }
 
-    /// Adds colours, a pixel each: R G B.
+    /// Adds colours, a pixel each: R G B. Black (0, 0, 0) is no colour: it counts nothing.
     ///
     /// # Errors
     /// [`FusionError::Size`] if they have another size than the ranges.
