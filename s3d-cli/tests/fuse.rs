@@ -1,12 +1,14 @@
 //! Raw scans become meshes and data sets: the built-in scene, scanned by simulated devices.
 
 use crate::common;
-use common::{files, s3d_fails, s3d_ok, text};
+use common::{s3d_fails, s3d_ok, text};
 use s3d_geom::glam::{DVec3, Vec3};
 use s3d_io::dataset::{Domain, Layout, dataset_images, read_pose};
 use s3d_io::image::read_xyz;
 use s3d_synth::device::{DepthCamera, LaserScanner, ScanTarget};
 use s3d_synth::{AnnotatedScene, Building};
+use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -61,31 +63,69 @@ fn raw_captures_become_a_data_set() {
     let dir = tempfile::tempdir().unwrap();
     let scene = scene(Building::demo());
     let target = ScanTarget::new(&scene);
-    let raw = dir.path().join("raw");
     let camera = DepthCamera::turntable().scaled(SCALE);
+    let raw = dir.path().join("raw");
     target
         .write_matterport(&raw, &scene.locations[..1], &camera, || true)
         .unwrap();
+    let file = dir.path().join("scene.toml");
+    let toml = "area = 1\n[mesh]\nfuse = \"raw\"\ncell_m = 0.03\n[cameras]\npath = \"raw\"\n\
+                [rgb]\nsource = \"captures\"\npath = \"raw\"\n";
+    fs::write(&file, toml).unwrap();
 
-    let [out, again] = ["out", "again"].map(|name| dir.path().join(name));
-    let log = s3d_ok(&[&["export", text(&raw), "-o", text(&out)], &EXPORT[..]].concat());
+    let out = dir.path().join("out");
+    let log = s3d_ok(&[&["export", text(&file), "-o", text(&out)], &EXPORT[..]].concat());
     assert!(
         log.contains("18 depth pictures") && log.contains("colours from captures of 1 location"),
         "{log}"
     );
+    assert!(dir.path().join("scene.fused/mesh.ply").is_file());
     s3d_ok(&["verify", text(&out)]);
     // The far walls are measured with a noise of 2 cm.
     let share = agreement(&out, &target, 0.02);
     assert!(share > 0.95, "{share}");
+}
 
-    // The mesh is kept, and made again when the scan changes.
-    let log = s3d_ok(&[&["export", text(&raw), "-o", text(&again)], &EXPORT[..]].concat());
-    assert!(log.contains("fused earlier") && files(&out) == files(&again), "{log}");
-    let depths = raw.join("matterport_depth_images");
-    let first = fs::read_dir(&depths).unwrap().map(|e| e.unwrap().path()).min().unwrap();
-    fs::remove_file(first).unwrap();
-    let log = s3d_ok(&["info", text(&raw)]);
-    assert!(!log.contains("fused earlier") && log.contains("17 depth pictures"), "{log}");
+/// A closet of 1.2 × 1 × 1.2 m, scanned from its middle, as PTX.
+fn closet() -> String {
+    let [columns, rows] = [180, 90];
+    let mut text =
+        format!("{columns}\n{rows}\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+    for (i, j) in (0..columns).flat_map(|i| (0..rows).map(move |j| (i, j))) {
+        let (azimuth, polar) = (f64::from(i) * TAU / 180.0, (f64::from(j) + 0.5) * PI / 90.0);
+        let ray = DVec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), -polar.cos());
+        let point = ray * (DVec3::new(0.6, 0.5, 0.6) / ray.abs()).min_element();
+        let _ = writeln!(text, "{:.4} {:.4} {:.4} 0.5", point.x, point.y, point.z);
+    }
+    text
+}
+
+#[test]
+fn the_mesh_of_a_raw_scan_is_kept_and_made_again_when_the_scan_changes() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("closet.ptx");
+    let info = || {
+        let out = common::s3d(&["info", text(&file)]);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        [out.stdout, out.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+    };
+    fs::write(&file, closet()).unwrap();
+    let [told, log] = info();
+    assert!(told.contains("scan locations: 1") && !log.contains("fused earlier"), "{told}\n{log}");
+    let mesh = fs::read(dir.path().join("closet.fused/mesh.ply")).unwrap();
+    let [again, log] = info();
+    assert!(again == told && log.contains("fused earlier"), "{log}");
+
+    fs::write(
+        &file,
+        closet().replace("0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0", "9 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0"),
+    )
+    .unwrap();
+    let [_, log] = info();
+    assert!(!log.contains("fused earlier"), "{log}");
+    fs::write(&file, closet()).unwrap();
+    info();
+    assert_eq!(fs::read(dir.path().join("closet.fused/mesh.ply")).unwrap(), mesh);
 }
 
 #[test]
@@ -99,14 +139,14 @@ fn threads_and_tiles_do_not_change_a_mesh() {
     let lower = scene.locations.iter().min_by(highest).unwrap();
     assert!(height(upper) > height(lower) + 2.0);
     let file = dir.path().join("scan.ptx");
-    let scanner = LaserScanner { columns: 500, rows: 220, ..LaserScanner::default() };
+    let scanner = LaserScanner { columns: 360, rows: 160, ..LaserScanner::default() };
     target
         .write_ptx(&file, &[lower.clone(), upper.clone()], &scanner, || true)
         .unwrap();
 
     let fuse = |name: &str, more: &[&str]| {
         let mesh = dir.path().join(name);
-        let log = s3d_ok(&[&["fuse", text(&file), "-o", text(&mesh), "--cell", "0.03"], more].concat());
+        let log = s3d_ok(&[&["fuse", text(&file), "-o", text(&mesh), "--cell", "0.04"], more].concat());
         (fs::read(mesh).unwrap(), log)
     };
     let (one, _) = fuse("one.ply", &["--threads", "1"]);
@@ -117,9 +157,9 @@ fn threads_and_tiles_do_not_change_a_mesh() {
 
     // A folder names the places of the scanner, so an export has a location on each storey.
     let folder = dir.path().join("fused");
-    s3d_ok(&["fuse", text(&file), "-o", text(&folder), "--cell", "0.03", "--close", "0.3"]);
+    s3d_ok(&["fuse", text(&file), "-o", text(&folder), "--cell", "0.04", "--close", "0.3"]);
     let told = String::from_utf8(common::s3d(&["info", text(&folder.join("scene.toml"))]).stdout).unwrap();
-    assert!(told.contains("2 scan locations") && told.contains("2 storeys"), "{told}");
+    assert!(told.contains("scan locations: 2") && told.contains("2 storeys"), "{told}");
 }
 
 fn height(location: &s3d_synth::building::ScanLocation) -> f64 {
