@@ -6,9 +6,9 @@
 //! memory efficient polygonal simplification", 1998 (borders).
 //!
 //! The quadrics say which edge goes next and where its vertex goes. They say nothing about distances: sums
-//! over many faces grow with the noise of the faces' directions. So the old surface is sampled (vertices,
-//! middles of edges and faces, more in large faces), each sample belongs to a face, and a collapse is done only if all
-//! samples around it are within the bound of a face that stays.
+//! over many faces grow with the noise of the faces' directions. So the old surface is sampled at vertices
+//! and at the middles of edges and faces, and more densely in large faces. Each sample belongs to a face, and
+//! a collapse is done only if all samples around it are within the bound of a face that stays.
 //!
 //! # What the bound means
 //!
@@ -32,10 +32,10 @@ use whole::Whole;
 /// How a mesh is decimated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecimateOptions {
-    /// No point of the old surface is farther from the new one than this, metres. That is measured at samples:
-    /// vertices, middles of edges and of faces, and every six bounds in larger faces as far as twelve samples
-    /// a face allow. Samples use 90 % of the bound, and the rest is for what lies between. The points of a
-    /// border are as near to the border.
+    /// No point of the old surface is farther from the new one than this, metres. That is measured at
+    /// samples: vertices, the middles of edges and faces, and points every six bounds within larger faces, as
+    /// far as twelve samples a face allow. Samples use 90 % of the bound, and the rest is for what lies
+    /// between. The points of a border are as near to the border.
     pub max_error_m: f32,
     /// The number of faces at which to stop; the bound holds nevertheless. `None` goes on as far as the
     /// bound allows.

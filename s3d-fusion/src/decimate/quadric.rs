@@ -6,8 +6,8 @@
 use s3d_geom::glam::{DMat3, DVec3};
 use std::ops::AddAssign;
 
-/// The sum over faces of `area · (distance² + Σ (colour of the face at p − colour)²)` as a function of a
-/// place `p` and a colour. Colours are in metres: see [`super::DecimateOptions::color_weight_m`].
+/// The sum over faces of `area · (distance² + Σ (colour of the face at p − colour)²)`, as a function of
+/// a place `p` and a colour. Colours are in metres: see [`super::DecimateOptions::color_weight_m`].
 ///
 /// The best colour of a place follows from the place, so only the place is unknown.
 #[derive(Clone, Copy, Debug, Default)]
