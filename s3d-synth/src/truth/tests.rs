@@ -63,10 +63,12 @@ fn walls_that_are_off_are_told_by_their_distance() {
     );
     assert_eq!(scores.closed_sight, 0.0);
 
-    // Walls that come in by 6 cm hide the real ones, whose lines of sight are free up to 5 cm.
+    // Walls that come in by 6 cm hide the real ones, to which lines of sight must be free up to 5 cm.
     let scores = scored(&room(), swollen(-0.06));
     assert!(scores.closed_sight > 0.99 && scores.at[1].f_score == 0.0);
-    assert_eq!(scored(&room(), swollen(-0.04)).closed_sight, 0.0);
+    // Walls that come in by 4 cm hide only what is next to a corner.
+    let scores = scored(&room(), swollen(-0.04));
+    assert!(scores.closed_sight < 0.05, "{}", scores.closed_sight);
 }
 
 #[test]
