@@ -7,6 +7,7 @@ use crate::{AnnotatedScene, Instance};
 use s3d_geom::glam::{DVec3, Vec3, vec3};
 use s3d_geom::{MeshParts, primitives};
 use s3d_label::{Class, Room, RoomType};
+use std::f64::consts::FRAC_PI_2;
 
 /// A room of 4 m × 3 m × 2.5 m, seen from inside, with a scanner in it.
 fn room() -> AnnotatedScene {
@@ -29,7 +30,7 @@ fn room() -> AnnotatedScene {
 
 fn scored(scene: &AnnotatedScene, mesh: MeshParts) -> MeshScores {
     let target = ScanTarget::new(scene);
-    let scanner = LaserScanner { elevation_rad: [-1.5707, 1.5707], ..LaserScanner::default() };
+    let scanner = LaserScanner { elevation_rad: [-FRAC_PI_2, FRAC_PI_2], ..LaserScanner::default() };
     let views = [View::of_laser(&scene.locations[0], &scanner)];
     let truth = Truth::new(&target, &views, &TruthOptions::default()).unwrap();
     truth.score(&TriMesh::new(mesh).unwrap())
