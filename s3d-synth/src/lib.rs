@@ -6,7 +6,8 @@
 //! [`Building::build`] makes an [`AnnotatedScene`]: a mesh with light and shade in its textures. Every face
 //! belongs to an instance of one of the 13 classes. [`AnnotatedScene::scan`] draws the points of a scan, and
 //! `AnnotatedScene::write_scan` (feature `files`, on by default) writes what `s3d export` reads. Meshes for
-//! benches and tests are in [`scenes`].
+//! benches and tests are in [`scenes`]. The module [`device`] simulates scanners and depth cameras, and
+//! [`truth`] scores a mesh that was made of what they measured.
 //!
 //! ```
 //! use s3d_label::Class;

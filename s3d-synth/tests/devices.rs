@@ -313,7 +313,7 @@ fn numbers_out_of_range_are_refused() {
             .unwrap_err()
             .to_string()
     };
-    assert!(laser(LaserScanner { columns: 0, ..small() }).starts_with("the columns of a scan is 0"));
+    assert!(laser(LaserScanner { columns: 0, ..small() }).starts_with("the number of columns is 0"));
     assert!(
         laser(LaserScanner { elevation_rad: [0.5, 0.2], ..small() }).contains("the highest elevation is 0.2")
     );

@@ -125,11 +125,12 @@ impl DepthCamera {
         }
     }
 
-    /// Returns the camera with pictures of other sizes: `factor` times as wide and as high.
+    /// Returns the camera with pictures of another size: `factor` times as wide and as high, and at least one
+    /// pixel.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
-        let size =
-            [self.lens.width(), self.lens.height()].map(|side| (f64::from(side) * factor).round() as u32);
+        let size = [self.lens.width(), self.lens.height()]
+            .map(|side| (f64::from(side) * factor).round().max(1.0) as u32);
         let by = dvec2(f64::from(size[0]), f64::from(size[1]))
             / dvec2(f64::from(self.lens.width()), f64::from(self.lens.height()));
         let focal_px = self.lens.focal_px() * by;

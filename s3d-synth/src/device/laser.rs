@@ -108,8 +108,8 @@ const GLASS: u32 = 4;
 impl LaserScanner {
     pub(crate) fn check(&self) -> Result<(), RangeError> {
         let check = |value: f64, range, what: &str| RangeError::check(value, range, || what.to_owned());
-        check(self.columns.into(), [4.0, 40_000.0], "the columns of a scan")?;
-        check(self.rows.into(), [2.0, 20_000.0], "the rows of a scan")?;
+        check(self.columns.into(), [4.0, 40_000.0], "the number of columns")?;
+        check(self.rows.into(), [2.0, 20_000.0], "the number of rows")?;
         let [low, high] = self.elevation_rad;
         check(low, [-FRAC_PI_2, FRAC_PI_2], "the lowest elevation")?;
         check(high, [low + 1e-3, FRAC_PI_2], "the highest elevation")?;

@@ -17,6 +17,9 @@ use std::fmt::Write as _;
 use std::fs::{File, rename};
 use std::path::Path;
 
+/// The guid of an E57 file. It is one for all, so that the same scan gives the same bytes.
+const FILE_GUID: &str = "{53336473-796e-4468-8000-000000000057}";
+
 impl ScanTarget<'_> {
     /// Scans from some locations and writes one PTX file: for each scan a header of ten lines, then its grid
     /// column by column, from the lowest elevation to the highest. A point is `x y z intensity r g b` in the
@@ -112,7 +115,7 @@ impl ScanTarget<'_> {
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<(), ScanError> {
         let fault = |e: e57::Error| FileError::io(path, "write", std::io::Error::other(e));
-        let mut writer = E57Writer::new(file, "{5e3d5e3d-0000-4000-8000-000000000000}").map_err(fault)?;
+        let mut writer = E57Writer::new(file, FILE_GUID).map_err(fault)?;
 
         for (number, location) in (0..).zip(locations) {
             if !go_on() {

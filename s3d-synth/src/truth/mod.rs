@@ -48,7 +48,8 @@ pub struct TruthOptions {
     pub samples_per_m2: f64,
     /// The distances at which precision and recall are told, metres, above 0.
     pub distances_m: Vec<f32>,
-    /// A line of sight that ends this far before its surface must be free, metres: 0.001 to 1.
+    /// A line of sight must be free up to where it is this far from the plane of its surface, metres: 0.001
+    /// to 1.
     pub margin_m: f32,
     /// The seed of the samples.
     pub seed: u64,
@@ -182,15 +183,23 @@ impl<'s> Truth<'s> {
     fn closed_sight(&self, mesh: &TriMesh) -> f64 {
         let tree = RayTree::new(mesh);
         let margin_m = self.options.margin_m;
-        let samples: Vec<(Vec3, Vec3)> = (self.seen_from.iter().zip(&self.samples.positions))
-            .filter_map(|(from, place)| Some(((*from)?, *place)))
-            .filter(|(from, place)| from.distance(*place) > margin_m)
+        let samples: Vec<(Vec3, Vec3, f32)> = (self.seen_from.iter().zip(&self.samples.positions))
+            .zip(&self.samples.faces)
+            .filter_map(|((from, place), face)| {
+                let way = (*from)? - *place;
+                let away_m = way.dot(self.mesh.normal(*face));
+                // What is left out at the end, along the line.
+                let end_m = way.length() * margin_m / away_m;
+                (away_m > margin_m).then_some(((*from)?, *place, end_m))
+            })
             .collect();
 
         let counts = samples.par_chunks(CHUNK).map(|samples| {
             let mut hider = NO_INDEX;
-            let is_closed =
-                |(from, place): &&(Vec3, Vec3)| !is_free(&tree, *from, *place, margin_m, &mut hider);
+            let is_closed = |sample: &&(Vec3, Vec3, f32)| {
+                let (from, place, end_m) = **sample;
+                !is_free(&tree, from, place, end_m, &mut hider)
+            };
             samples.iter().filter(is_closed).count()
         });
         counts.sum::<usize>() as f64 / samples.len().max(1) as f64
