@@ -1,6 +1,7 @@
 //! The tests of this crate as one program.
 
 mod labelling;
+mod masks;
 mod outputs;
 mod person;
 mod person_oracle;

@@ -3,10 +3,10 @@
 use proptest::prelude::*;
 use s3d_annotate::labelling::{Action, FaceRuns, LabelFolder};
 use s3d_annotate::outputs::{OutputFormat, OutputOptions, write_output};
-use s3d_annotate::proposals::{Proposal, read_proposals};
+use s3d_annotate::proposals::{Proposal, Target, read_proposals};
 use s3d_annotate::segments::{SegmentOptions, segment_faces};
 use s3d_dataset::{Context, Event, Result};
-use s3d_geom::glam::{Vec3, vec3};
+use s3d_geom::glam::{DVec3, Vec3, vec3};
 use s3d_geom::primitives::{cuboid, grid};
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::cloud::NpyWriter;
@@ -34,7 +34,7 @@ fn class_and_instance(face: usize) -> [i64; 2] {
 }
 
 fn read(path: &Path, mesh: &TriMesh) -> Result<Vec<Proposal>> {
-    read_proposals(path, mesh, &Taxonomy::s3dis(), &Context::default())
+    read_proposals(path, &Target::new(mesh, &Taxonomy::s3dis()), &Context::default())
 }
 
 fn message(path: &Path, mesh: &TriMesh) -> String {
@@ -167,7 +167,7 @@ fn an_archive_may_number_instances() {
     npz(&path, &[("label", column(0)), ("instance", vec![0; mesh.positions().len()])]);
     assert!(message(&path, &mesh).contains("do not fit"));
     npz(&path, &[("label", column(0)), ("classes", vec![0])]);
-    assert!(message(&path, &mesh).contains("NAME.classes.json"));
+    assert!(message(&path, &mesh).contains("holds no texts"));
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn small_pieces_are_dropped_with_a_warning_and_nothing_left_is_an_error() {
     let classes = (0..mesh.faces().len()).map(|face| [-1, 8][usize::from(face == 7 || face > 3211)]);
     fs::write(&path, text(classes)).unwrap();
     let ctx = Context::default();
-    let found = read_proposals(&path, &mesh, &Taxonomy::s3dis(), &ctx).unwrap();
+    let found = read_proposals(&path, &Target::new(&mesh, &Taxonomy::s3dis()), &ctx).unwrap();
     assert_eq!((shown(&found), ctx.warnings()), (vec!["chair [3212..3224] net.txt".to_owned()], 1));
 
     let none = (0..mesh.faces().len()).map(|face| [-1, 255, -100][face % 3]);
@@ -237,12 +237,17 @@ fn lists_that_do_not_fit_are_told() {
 
 /// The points of the room, with a class and, if wanted, an instance each.
 fn cloud(mesh: &TriMesh, points_per_m2: f64, with_instances: bool) -> String {
+    cloud_at(mesh, points_per_m2, with_instances, 0.0)
+}
+
+/// The same points at another x, metres.
+fn cloud_at(mesh: &TriMesh, points_per_m2: f64, with_instances: bool, x: f64) -> String {
     let sampler = SurfaceSampler::new(mesh, Density::PerM2(points_per_m2), 1);
     let mut points = PointCloud::default();
     sampler.sample(0..sampler.len(), &mut points);
     let mut ply = format!("ply\nformat ascii 1.0\nelement vertex {}\n", points.len() + 1);
     let instance = if with_instances { "property int instance\n" } else { "" };
-    ply += "property float x\nproperty float y\nproperty float z\nproperty int label\n";
+    ply += "property double x\nproperty double y\nproperty double z\nproperty int label\n";
     writeln!(ply, "{instance}end_header").unwrap();
     for (place, face) in points.positions.iter().zip(&points.faces) {
         let [class, number] = class_and_instance(*face as usize);
@@ -252,10 +257,10 @@ fn cloud(mesh: &TriMesh, points_per_m2: f64, with_instances: bool) -> String {
             String::new()
         };
         // The output of a network is somewhat off the surface.
-        writeln!(ply, "{} {} {} {class} {number}", place.x, place.y, place.z + 0.002).unwrap();
+        writeln!(ply, "{} {} {} {class} {number}", f64::from(place.x) + x, place.y, place.z + 0.002).unwrap();
     }
     let last = if with_instances { "1 7 4" } else { "1 7" };
-    writeln!(ply, "2 2 {last}").unwrap();
+    writeln!(ply, "{} 2 {last}", 2.0 + x).unwrap();
     ply
 }
 
@@ -274,7 +279,7 @@ fn points_vote_for_faces() {
                 list.lock().unwrap().push((*text).to_owned());
             }
         });
-        let found = read_proposals(&path, &mesh, &Taxonomy::s3dis(), &ctx).unwrap();
+        let found = read_proposals(&path, &Target::new(&mesh, &Taxonomy::s3dis()), &ctx).unwrap();
         // One point lies a metre above the floor.
         let heard = heard.lock().unwrap().join("; ");
         assert!(heard.contains("1 of its points are farther than 0.1 m"), "{heard}");
@@ -297,6 +302,22 @@ fn points_vote_for_faces() {
 }
 
 #[test]
+fn points_may_have_the_coordinates_of_the_scan() {
+    let mesh = room();
+    let taxonomy = Taxonomy::s3dis();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("net.ply");
+    let target = Target { offset_m: DVec3::X * 450_000.0, ..Target::new(&mesh, &taxonomy) };
+    for x in [450_000.0, 0.0] {
+        fs::write(&path, cloud_at(&mesh, 4000.0, false, x)).unwrap();
+        let found = read_proposals(&path, &target, &Context::default()).unwrap();
+        assert_eq!(shown(&found), room_of("net.ply"));
+    }
+    fs::write(&path, cloud_at(&mesh, 4000.0, false, 90_000.0)).unwrap();
+    assert!(read_proposals(&path, &target, &Context::default()).is_err());
+}
+
+#[test]
 fn outputs_of_labels_are_proposals_again() {
     let mesh = room();
     let dir = tempfile::tempdir().unwrap();
@@ -316,6 +337,10 @@ fn outputs_of_labels_are_proposals_again() {
         let options = OutputOptions::default();
         write_output(format, &labels, &mesh, &segments, &to, &options, &Context::default()).unwrap()
     };
+    // The archive by itself has the names of its classes.
+    let archive: Vec<_> = read(&path.join("labels.npz"), &mesh).unwrap();
+    let archive = archive.iter().map(|p| (&p.class[..], p.faces.len()));
+    assert!(archive.eq([("floor", 3200), ("table", 12), ("table", 12)]));
     for place in [
         path.clone(),
         write(OutputFormat::Ply),

@@ -6,10 +6,11 @@ use crate::export::SceneSource;
 use crate::export::input::Inputs;
 use crate::export::input::area::AreaInput;
 use crate::export::input::cameras::Cameras;
+use crate::export::input::masks::named_like;
 use crate::export::input::photographs::{Photograph, Taken};
 use crate::place::{PlaceOptions, place_cameras};
-use glam::DVec3;
-use s3d_geom::{Camera, Pose, Raster, TriMesh};
+use glam::{DVec2, DVec3, dvec2};
+use s3d_geom::{Camera, CameraError, Pose, Raster, TriMesh};
 use s3d_io::camera::ScanLocation;
 use s3d_io::mesh::{LengthUnit, UpAxis};
 use s3d_label::Taxonomy;
@@ -41,6 +42,55 @@ pub struct BarePanorama {
     pub name: String,
     /// Where it was taken, world metres.
     pub location: DVec3,
+}
+
+/// A photograph of a scene, with its place and its lens.
+#[derive(Clone, Copy, Debug)]
+pub struct BarePhotograph<'s>(&'s Photograph);
+
+impl BarePhotograph<'_> {
+    /// Returns what its list calls it.
+    pub fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// Returns its width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.0.taken.size()
+    }
+
+    /// Returns the camera that takes it without the distortion of its lens, or upright if it is a panorama.
+    /// The image is about `width` pixels wide.
+    ///
+    /// # Errors
+    /// Those of [`Camera::pinhole`].
+    pub fn camera(&self, width: u32) -> std::result::Result<Camera, CameraError> {
+        self.0.taken.camera(self.0.camera.pose, width)
+    }
+
+    /// Returns where it shows a direction in the world, of any length: shares of its width and height, 0 to
+    /// 1, from the top left. `None` if it does not show it.
+    pub fn place(&self, direction: DVec3) -> Option<DVec2> {
+        let place = match &self.0.taken {
+            Taken::Lens(lens) => {
+                let [width, height] = lens.size();
+                let pixel = lens.pixel(self.0.camera.pose.opencv_from_world() * direction)?;
+                pixel / dvec2(f64::from(width), f64::from(height))
+            }
+            Taken::Panorama { pose, .. } => {
+                let v = pose.opencv_from_world() * direction;
+                let turn = libm::atan2(v.x, v.z) / std::f64::consts::TAU;
+                dvec2(turn, libm::atan2(v.y, libm::hypot(v.x, v.z)) / std::f64::consts::PI) + 0.5
+            }
+        };
+        Some(place)
+    }
+
+    /// Returns the files in `folder` that may be an image of its pixels, such as a mask: those of its name,
+    /// with the ending kept, exchanged for `.png`, or followed by it.
+    pub fn named_in(&self, folder: &Path) -> Vec<PathBuf> {
+        named_like(folder, &self.0.name, Some(&self.0.picture.path), None)
+    }
 }
 
 impl BareScene {
@@ -102,6 +152,11 @@ impl BareScene {
                 place_cameras(&Scene::new(self.mesh()), &options, ctx)
             }
         }
+    }
+
+    /// Returns the photographs with poses that the scene lists, in the order of the list.
+    pub fn photographs(&self) -> impl Iterator<Item = BarePhotograph<'_>> {
+        self.area.photographs.all.iter().map(BarePhotograph)
     }
 
     /// Returns the photographs that are panoramas. Their order is that of [`BareScene::panorama`].

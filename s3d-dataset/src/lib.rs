@@ -152,7 +152,7 @@ mod useful;
 pub mod verify;
 pub mod xyz;
 
-pub use bare::{BarePanorama, BareScene};
+pub use bare::{BarePanorama, BarePhotograph, BareScene};
 pub use compare::compare;
 pub use context::{Cancel, Context, Observer, Progress};
 pub use error::{Error, Result};

@@ -31,6 +31,9 @@ const CLASS: [&str; 10] = [
 const INSTANCE: [&str; 6] =
     ["instance", "instances", "instance_id", "instance_label", "ins_label", "object_id"];
 
+/// The array of an archive that holds the names of the classes.
+const NAMES: &str = "classes";
+
 /// The arrays of an archive that hold places: then it is a table of points.
 const PLACE: [&str; 7] = ["xyz", "coord", "coords", "points", "position", "positions", "x"];
 
@@ -39,6 +42,8 @@ pub(super) struct List {
     element: LabelElement,
     class: Vec<i64>,
     instance: Option<Vec<i64>>,
+    /// The names of the classes, if the file has them.
+    classes: Option<Vec<String>>,
 }
 
 impl List {
@@ -46,7 +51,7 @@ impl List {
     ///
     /// # Errors
     /// [`FileError`] with the place for numbers that are not whole, and for a list of another length.
-    pub(super) fn read(path: &Path, mesh: &TriMesh, names: &ClassNames<'_>) -> Result<Option<Self>> {
+    pub(super) fn read(path: &Path, mesh: &TriMesh) -> Result<Option<Self>> {
         if path.is_dir() {
             return Ok(None);
         }
@@ -55,7 +60,7 @@ impl List {
         let read = opened.take(1 << 16).read_to_end(&mut head);
         read.map_err(|e| FileError::io(path, "read", e))?;
         if head.starts_with(b"PK\x03\x04") {
-            return Self::of_archive(path, mesh, names);
+            return Self::of_archive(path, mesh);
         }
         // Tables of named columns and of several dimensions are no lists.
         if !is_number_list(path) {
@@ -63,10 +68,10 @@ impl List {
         }
         let class = read_number_list(path)?;
         let element = element(path, class.len() as u64, mesh)?;
-        Ok(Some(Self { element, class, instance: None }))
+        Ok(Some(Self { element, class, instance: None, classes: None }))
     }
 
-    fn of_archive(path: &Path, mesh: &TriMesh, classes: &ClassNames<'_>) -> Result<Option<Self>> {
+    fn of_archive(path: &Path, mesh: &TriMesh) -> Result<Option<Self>> {
         let mut archive = NpzArchive::open(path)?;
         let names = archive.names().to_vec();
         let has = |known: &[&str]| {
@@ -77,14 +82,10 @@ impl List {
         if has(&PLACE).is_some() {
             return Ok(None);
         }
-        if has(&["classes"]).is_some() && !classes.are_said() {
-            let message = "has names in its array classes, which is not read: write them as a list into \
-                           NAME.classes.json beside it; of a folder of labels, name the folder";
-            return Err(FileError::format(path, message));
-        }
         let instance = has(&INSTANCE);
         let class = has(&CLASS).or_else(|| {
-            let mut others = names.iter().filter(|name| Some(*name) != instance.as_ref());
+            let is_other = |name: &&String| Some(*name) != instance.as_ref() && *name != NAMES;
+            let mut others = names.iter().filter(is_other);
             let first = others.next().cloned();
             first.filter(|_| others.next().is_none())
         });
@@ -117,7 +118,8 @@ impl List {
                 Some(numbers)
             }
         };
-        Ok(Some(Self { element, class, instance }))
+        let classes = has(&[NAMES]).map(|name| archive.texts(&name)).transpose()?;
+        Ok(Some(Self { element, class, instance, classes }))
     }
 
     /// Returns what each face belongs to.
@@ -130,6 +132,17 @@ impl List {
         mesh: &TriMesh,
         names: &ClassNames<'_>,
     ) -> Result<Vec<Option<Key>>> {
+        // Names beside the file go before those in it.
+        let own = match &self.classes {
+            Some(words) if !names.are_said() => {
+                let words = (0..)
+                    .zip(words)
+                    .map(|(n, word): (u32, _)| (n.to_string(), Some(word.clone())));
+                Some(ClassNames::of_words(words.collect(), path.join(NAMES), names.taxonomy)?)
+            }
+            _ => None,
+        };
+        let names = own.as_ref().unwrap_or(names);
         let mut meanings: HashMap<i64, _> = HashMap::new();
         let mut keys: Vec<Key> = Vec::new();
         let mut known: HashMap<Key, i64> = HashMap::new();

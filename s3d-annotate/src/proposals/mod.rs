@@ -10,6 +10,7 @@
 //! | `.npz` | such an array `class` (or `label`, `semantic`, …), and perhaps a second one, `instance` |
 //! | points with labels | PLY, LAS, E57, PCD, NPY tables …: all that [`Annotations::open`] reads |
 //! | a labelled mesh, a scan of ScanNet, a folder of labels | likewise; other meshes label by place |
+//! | a folder of PNG images | numbers, 8 or 16 bits or a palette: [masks of photographs](self#masks) |
 //!
 //! The length of a list says whether it is about the faces or the vertices of the mesh. A face takes what
 //! most of its corners have. Whole numbers may be written as floats.
@@ -18,9 +19,10 @@
 //!
 //! A number is the place of a class in the taxonomy, from 0: for S3DIS 0 is ceiling and 12 is clutter.
 //! Negative numbers and 255 are no class. The numbers of a data set (NYU40's from 1) and words that the
-//! taxonomy does not know need names: `NAME.classes.json` or `classes.json` beside the file. It is a list,
-//! `["wall", "chair", null]`, or an object, `{"4": "wall", "shelves": "bookcase", "9": ""}`; `null` and `""`
-//! are no class.
+//! taxonomy does not know need names: `NAME.classes.json` or `classes.json` beside the file, or in the
+//! folder. It is a list, `["wall", "chair", null]`, or an object, `{"4": "wall", "shelves": "bookcase",
+//! "9": ""}`; `null` and `""` are no class. Instead, there may be `classes.csv` with lines `4,wall`, or an
+//! archive may have an array `classes` of names, the first for number 0.
 //!
 //! # Instances
 //!
@@ -32,22 +34,36 @@
 //! # Points
 //!
 //! Each point votes for its nearest face, if it is within 10 cm. A face takes the proposal with most votes. A
-//! face without a vote takes that of the labelled surface around it, if it is within 5 cm.
+//! face without a vote takes that of the labelled surface around it, if it is within 5 cm. Points may have
+//! the coordinates of a scan from which an offset was subtracted, or those without it.
 //!
-//! # What is not read
+//! # Masks
 //!
-//! Masks of photographs, and the names of classes in an archive.
+//! An image of the folder has the name of a photograph of the scene's `[frames]`, with `.png` instead of the
+//! ending or behind it; or it is named as a view of a data set, whose pose file is in the folder `pose`
+//! beside: `dataset/area_1/data/prediction/camera_…_domain_prediction.png`. It may be smaller than the
+//! photograph or view, and has the same shape. The mesh is cast from the camera, exactly, with its lens. Each
+//! pixel votes for the face that it sees, and a face takes what has most pixels in all images. 65,535 is no
+//! class, like 255; 0 is none either if there are names and none is for 0.
+//!
+//! Numbers are classes. They are instances if the image has a list of names of its own beside it,
+//! `NAME.json` or `NAME.csv`, or if `classes.json` gives a range of numbers one name: `"500-599": "chair"`.
+//! Each image numbers its own instances. A mask is joined to an instance of earlier images if more than half
+//! of what the image sees of this instance lies in the mask, by area. What an image shows as two things stays
+//! two.
 //!
 //! [`Annotations::open`]: s3d_io::cloud::Annotations::open
 
 mod list;
+mod masks;
 mod names;
 mod points;
 
 use crate::labelling::FaceRuns;
 use list::List;
 use names::ClassNames;
-use s3d_dataset::{Context, Result};
+use s3d_dataset::{BarePhotograph, BareScene, Context, Result};
+use s3d_geom::glam::DVec3;
 use s3d_geom::{TriMesh, face_patches};
 use s3d_io::Error as FileError;
 use s3d_label::{Class, Taxonomy};
@@ -68,6 +84,33 @@ pub struct Proposal {
     pub source: String,
 }
 
+/// What proposals are for.
+#[derive(Clone, Debug)]
+pub struct Target<'a> {
+    /// The mesh whose faces they are.
+    pub mesh: &'a TriMesh,
+    /// The classes that they may have.
+    pub taxonomy: &'a Taxonomy,
+    /// The offset that was subtracted from the scan's own coordinates, metres.
+    pub offset_m: DVec3,
+    /// The photographs that masks may be of.
+    pub photographs: Vec<BarePhotograph<'a>>,
+}
+
+impl<'a> Target<'a> {
+    /// A mesh in its own coordinates, without photographs.
+    pub fn new(mesh: &'a TriMesh, taxonomy: &'a Taxonomy) -> Self {
+        Self { mesh, taxonomy, offset_m: DVec3::ZERO, photographs: Vec::new() }
+    }
+}
+
+impl<'a> From<&'a BareScene> for Target<'a> {
+    fn from(scene: &'a BareScene) -> Self {
+        let photographs = scene.photographs().collect();
+        Self { offset_m: scene.offset_m(), photographs, ..Self::new(scene.mesh(), scene.taxonomy()) }
+    }
+}
+
 /// A class of the file, and its instance if it is known to be one.
 type Key = (Class, Option<i64>);
 
@@ -75,7 +118,7 @@ type Key = (Class, Option<i64>);
 /// instances or first faces.
 ///
 /// ```
-/// use s3d_annotate::proposals::read_proposals;
+/// use s3d_annotate::proposals::{Target, read_proposals};
 /// use s3d_dataset::Context;
 /// use s3d_geom::{TriMesh, glam::Vec3, primitives::grid};
 /// use s3d_label::Taxonomy;
@@ -86,7 +129,8 @@ type Key = (Class, Option<i64>);
 /// let path = folder.path().join("prediction.txt");
 /// std::fs::write(&path, "1\n1\n1\n1\n-1\n-1\n1\n1\n")?;
 ///
-/// let found = read_proposals(&path, &mesh, &Taxonomy::s3dis(), &Context::default())?;
+/// let taxonomy = Taxonomy::s3dis();
+/// let found = read_proposals(&path, &Target::new(&mesh, &taxonomy), &Context::default())?;
 /// let floors: Vec<_> = found.iter().map(|p| (&p.class[..], p.faces.runs()[0].clone())).collect();
 /// assert_eq!(floors, [("floor", 0..4), ("floor", 6..8)]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -96,16 +140,15 @@ type Key = (Class, Option<i64>);
 /// [`Error::File`](s3d_dataset::Error::File) with the place if the file cannot be read, has another number of
 /// entries than the mesh has faces or vertices, has numbers or words without a meaning, or labels no face.
 /// [`Error::Cancelled`](s3d_dataset::Error::Cancelled).
-pub fn read_proposals(
-    path: &Path,
-    mesh: &TriMesh,
-    taxonomy: &Taxonomy,
-    ctx: &Context,
-) -> Result<Vec<Proposal>> {
-    let names = ClassNames::beside(path, taxonomy)?;
-    let key_of_face = match List::read(path, mesh, &names)? {
-        Some(list) => list.keys(path, mesh, &names)?,
-        None => points::keys(path, mesh, &names, ctx)?,
+pub fn read_proposals(path: &Path, target: &Target<'_>, ctx: &Context) -> Result<Vec<Proposal>> {
+    let mesh = target.mesh;
+    let names = ClassNames::beside(path, target.taxonomy)?;
+    let key_of_face = if let Some(list) = List::read(path, mesh)? {
+        list.keys(path, mesh, &names)?
+    } else if let Some(keys) = masks::keys(path, target, &names, ctx)? {
+        keys
+    } else {
+        points::keys(path, target, &names, ctx)?
     };
     ctx.check()?;
     let found = grouped(path, mesh, &key_of_face, ctx);

@@ -1,9 +1,10 @@
 //! Points with labels, and everything else that is read as annotations: they vote for faces.
 
-use super::Key;
 use super::names::ClassNames;
+use super::{Key, Target};
 use s3d_dataset::error::InputError;
 use s3d_dataset::{Context, Result};
+use s3d_geom::glam::DVec3;
 use s3d_geom::{NearestFaces, PointCloud, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotatedInstance, AnnotatedMesh, AnnotationOptions, Annotations};
@@ -24,11 +25,17 @@ const FILL_M: f64 = 0.05;
 /// The errors of the reader of its kind, and for points that are not finite.
 pub(super) fn keys(
     path: &Path,
-    mesh: &TriMesh,
+    target: &Target<'_>,
     names: &ClassNames<'_>,
     ctx: &Context,
 ) -> Result<Vec<Option<Key>>> {
-    let annotations = open(path, mesh, names)?;
+    let mesh = target.mesh;
+    // Points may have the coordinates of the scan, or those of a data set of it.
+    let opened = open(path, mesh, names, target.offset_m);
+    let annotations = match opened {
+        Err(_) if target.offset_m != DVec3::ZERO => open(path, mesh, names, DVec3::ZERO).or(opened),
+        opened => opened,
+    }?;
     // Advice about columns in a scene's file is of no use here.
     let warnings = annotations
         .warnings
@@ -75,7 +82,7 @@ pub(super) fn keys(
 }
 
 /// Opens the annotations.
-fn open(path: &Path, mesh: &TriMesh, names: &ClassNames<'_>) -> Result<Annotations> {
+fn open(path: &Path, mesh: &TriMesh, names: &ClassNames<'_>, offset_m: DVec3) -> Result<Annotations> {
     // Points whose file names no room are in any one. The folders of a tree name theirs.
     let room = names.taxonomy.room_types().first().map(|kind| format!("{kind}_1"));
     let room = room
@@ -85,6 +92,7 @@ fn open(path: &Path, mesh: &TriMesh, names: &ClassNames<'_>) -> Result<Annotatio
         taxonomy: names.taxonomy.clone(),
         classes: names.classes.clone(),
         room,
+        offset_m,
         mesh_bounds: Some(mesh.aabb()),
         ..AnnotationOptions::default()
     };

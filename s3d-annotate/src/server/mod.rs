@@ -22,7 +22,7 @@ pub use options::LabelOptions;
 
 use crate::labelling::{CarriedOver, Error as LabelError, LabelFolder, carry_over};
 use crate::outputs::write_output;
-use crate::proposals::read_proposals;
+use crate::proposals::{Target, read_proposals};
 use crate::segments::segment_faces;
 use crate::workbench::Workbench;
 use connections::Bounded;
@@ -63,7 +63,7 @@ pub fn label(
     let folder = options.output.clone().unwrap_or_else(|| usual_folder(scene.path()));
     let mut proposals = Vec::new();
     for path in &options.proposals {
-        proposals.extend(read_proposals(path, scene.mesh(), scene.taxonomy(), ctx)?);
+        proposals.extend(read_proposals(path, &Target::from(&scene), ctx)?);
     }
     if let [old_scene, old_labels] = &options.carry_over[..] {
         carry(Path::new(old_scene), old_labels, &scene, &folder, ctx)?;

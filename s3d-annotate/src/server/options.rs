@@ -12,7 +12,7 @@ pub struct LabelOptions {
     #[cfg_attr(feature = "clap", arg(short, long, value_name = "scan.labels"))]
     pub output: Option<PathBuf>,
     /// Labels of a network or of somebody else, as proposals: NPY, NPZ or TXT with a class for each face or
-    /// vertex, or points with labels. May be given several times.
+    /// vertex, points with labels, or a folder of masks of photographs. May be given several times.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub proposals: Vec<PathBuf>,
     /// Begin with the labels of an earlier mesh of the same place, which are carried over by votes.

@@ -48,6 +48,7 @@ pub(crate) const FEEDS: &[(&str, Feed)] = &[
     ("kitti", kitti),
     ("scannet", scannet),
     ("label_files", label_files),
+    ("saved_labels", saved_labels),
     ("mat", mat),
     ("png", png),
     ("exr", exr),
@@ -501,6 +502,17 @@ fn file_list(dir: &Path, data: &[u8]) {
         let again = dir.join("again.csv");
         write_file_list(&again, &records).expect("what was read can be written");
         assert!(fs::read(again).is_ok_and(|written| written == data));
+    }
+}
+
+/// The archive of a folder of labels, and the texts of all its arrays.
+fn saved_labels(dir: &Path, data: &[u8]) {
+    let path = file(dir, LABELS_FILE, data);
+    check(dir, SavedLabels::read(dir));
+    if let Some(mut archive) = check(dir, NpzArchive::open(&path)) {
+        for name in archive.names().to_vec() {
+            check(dir, archive.texts(&name));
+        }
     }
 }
 

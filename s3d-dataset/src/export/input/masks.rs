@@ -86,7 +86,10 @@ pub(super) fn find_masks(
         .iter()
         .map(|camera| {
             let expected = match (&source.masks, &camera.mask) {
-                (Some(folder), named) => named_like(folder, camera, named.as_deref()),
+                (Some(folder), named) => {
+                    let picture = camera.picture.as_ref().map(|picture| picture.path.as_path());
+                    named_like(folder, &camera.name, picture, named.as_deref())
+                }
                 (None, Some(path)) => vec![path.clone()],
                 (None, None) => return None,
             };
@@ -113,10 +116,15 @@ pub(super) fn find_masks(
 
 /// Returns the places of a photograph's mask in a folder: by its own name, or by the photograph's name with
 /// its ending exchanged or kept. No name leads out of the folder, or a photograph would be its own mask.
-fn named_like(folder: &Path, camera: &PosedCamera, named: Option<&Path>) -> Vec<PathBuf> {
-    let parts = Path::new(&camera.name).components();
+pub(crate) fn named_like(
+    folder: &Path,
+    name: &str,
+    picture: Option<&Path>,
+    named: Option<&Path>,
+) -> Vec<PathBuf> {
+    let parts = Path::new(name).components();
     let name: PathBuf = parts.filter(|part| matches!(part, Component::Normal(_))).collect();
-    let photo = camera.picture.as_ref().map_or(&name, |picture| &picture.path);
+    let photo = picture.unwrap_or(&name);
     let mut names: Vec<PathBuf> = named.and_then(Path::file_name).map(PathBuf::from).into_iter().collect();
     for photo in [name.as_path(), Path::new(photo.file_name().unwrap_or_default())] {
         let mut longer = photo.as_os_str().to_owned();
@@ -129,21 +137,11 @@ fn named_like(folder: &Path, camera: &PosedCamera, named: Option<&Path>) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
-    use s3d_geom::Pose;
 
     /// Returns the places of the mask of a photograph that the list calls so.
     fn places(name: &str, named: Option<&str>) -> Vec<String> {
-        let camera = PosedCamera {
-            name: name.to_owned(),
-            pose: Pose::level(DVec3::ZERO, 0.0),
-            size: None,
-            optics: None,
-            picture: Some(PathBuf::from("scan").join(name).into()),
-            mask: None,
-            line: 0,
-        };
-        let found = named_like(Path::new("masks"), &camera, named.map(Path::new));
+        let picture = PathBuf::from("scan").join(name);
+        let found = named_like(Path::new("masks"), name, Some(&picture), named.map(Path::new));
         found
             .iter()
             .map(|path| path.to_string_lossy().replace('\\', "/"))

@@ -3,7 +3,8 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::npy::header::{Elements, parse, read_text};
-use crate::cloud::table::records::{Kind, fill, rows_of_block};
+use crate::cloud::table::records::{Field, Kind, fill, rows_of_block};
+use crate::cloud::table::rows::Value;
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
 use std::fs::File;
@@ -244,6 +245,45 @@ impl NpzArchive {
         let file = self.zip.by_name(&member).map_err(|e| zipped(&self.path, e))?;
         NpyArray::new(file, &path)
     }
+
+    /// Reads one of its arrays whose elements are texts, of numpy's types `U` and `S`: in the order of the
+    /// file, whatever its shape.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if the archive has no array of this name, or it ends too early;
+    /// [`Error::Unsupported`] if its elements are no texts.
+    pub fn texts(&mut self, name: &str) -> Result<Vec<String>> {
+        let member = format!("{name}.npy");
+        let path = self.path.join(&member);
+        let mut file = self.zip.by_name(&member).map_err(|e| zipped(&self.path, e))?;
+        let header = parse(&read_text(&path, &mut file)?).map_err(|why| why.of(&path))?;
+        let field = match header.elements {
+            Elements::Plain(stored) => stored.kind.filter(|kind| kind.is_text()).map(|kind| Field {
+                name: String::new(),
+                at: 0,
+                kind,
+                big_endian: stored.big_endian,
+            }),
+            Elements::Structure(_) => None,
+        };
+        let field = field.ok_or_else(|| Error::unsupported(&path, "holds no texts"))?;
+
+        let size = field.kind.size();
+        let (mut texts, mut block, mut text) = (Vec::new(), Vec::new(), String::new());
+        while let Some(n) = rows_of_block(header.count, texts.len() as u64, size) {
+            block.resize(n.saturating_mul(size), 0);
+            fill(&path, &mut file, &mut block, texts.len() as u64, header.count, size)?;
+            texts.extend(
+                block
+                    .chunks_exact(size)
+                    .map(|record| match field.value(record, &mut text) {
+                        Value::Name(text) => text.to_owned(),
+                        _ => String::new(),
+                    }),
+            );
+        }
+        Ok(texts)
+    }
 }
 
 pub(super) fn zipped(path: &Path, error: ZipError) -> Error {
@@ -350,6 +390,30 @@ mod tests {
     }
 
     #[test]
+    fn texts_of_an_archive_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("room.npz");
+        let utf32: Vec<u8> = "tür\0wand".chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
+        let mut zip = ZipWriter::new(File::create(&path).unwrap());
+        for (name, data) in [
+            ("unicode.npy", npy("<U4", "(2,)", "False", &utf32)),
+            ("bytes.npy", npy("|S4", "(2,)", "False", b"bed\0sofa")),
+            ("short.npy", npy("|S4", "(9999999999,)", "False", b"bed\0sofa")),
+            ("none.npy", npy("<U0", "(3,)", "False", b"")),
+        ] {
+            zip.start_file(name, SimpleFileOptions::default()).unwrap();
+            zip.write_all(&data).unwrap();
+        }
+        zip.finish().unwrap();
+
+        let mut archive = NpzArchive::open(&path).unwrap();
+        assert_eq!(archive.texts("unicode").unwrap(), ["tür", "wand"]);
+        assert_eq!(archive.texts("bytes").unwrap(), ["bed", "sofa"]);
+        assert!(archive.texts("short").unwrap_err().to_string().contains("cut short"));
+        assert!(archive.texts("none").unwrap().is_empty());
+    }
+
+    #[test]
     fn arrays_of_an_archive_have_names() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("room.npz");
@@ -365,6 +429,14 @@ mod tests {
         let mut out = Vec::new();
         assert_eq!(archive.array("scores").unwrap().read_integers(&mut out).unwrap(), 2);
         assert_eq!(out, [1, 2]);
+
+        assert!(
+            archive
+                .texts("scores")
+                .unwrap_err()
+                .to_string()
+                .contains("holds no texts")
+        );
 
         let message = archive.array("masks").err().unwrap().to_string();
         assert!(message.contains("room.npz"), "{message}");
