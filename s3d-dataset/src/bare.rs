@@ -127,8 +127,8 @@ impl BareScene {
         &self.mesh_files
     }
 
-    /// Returns the axis of the mesh files that points up, and their unit if it was said or guessed; `None` for
-    /// a mesh that is not read from files of meshes.
+    /// Returns the axis of the mesh files that points up, and their unit if it was said or guessed; `None`
+    /// for a mesh that is not read from files of meshes.
     pub fn mesh_axes(&self) -> Option<(UpAxis, Option<LengthUnit>)> {
         self.area.mesh_axes()
     }

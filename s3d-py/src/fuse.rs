@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use s3d_dataset::fuse::{FuseOptions, Fused, fuse as fused};
 use std::path::PathBuf;
 
-/// Fuses a raw scan. `options` is JSON. Returns the numbers of images, fused faces, faces and closed holes, and
-/// the largest error in metres.
+/// Fuses a raw scan. `options` is JSON. Returns the numbers of images, fused faces, faces and closed holes,
+/// and the largest error in metres.
 #[pyfunction]
 pub(crate) fn fuse(
     py: Python<'_>,

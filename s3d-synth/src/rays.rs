@@ -38,8 +38,8 @@ impl RayTree {
         (hit.t < end).then_some((face, hit.t))
     }
 
-    /// Whether nothing is along a ray before `end`. `hider` is the triangle that hid the last ray, in the order
-    /// of the tree. It is tried first, and replaced by the one that hides this ray.
+    /// Whether nothing is along a ray before `end`. `hider` is the triangle that hid the last ray, in the
+    /// order of the tree. It is tried first, and replaced by the one that hides this ray.
     pub(crate) fn is_free(&self, origin: Vec3, direction: Vec3, end: f32, hider: &mut u32) -> bool {
         let ray = Ray::new(origin.into(), direction.into(), 0.0, end);
         let last = self.triangles.get(*hider as usize);

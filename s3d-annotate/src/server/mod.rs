@@ -1,9 +1,9 @@
 //! The page to label on, and its small server.
 //!
-//! [`label`] opens a scene and serves the page on 127.0.0.1 until it is cancelled. Each gesture is on the disk
-//! when the page is told so. The address has a random token, requests must name the server's own host and
-//! origin, and no other interface is ever listened on. The work itself is that of the other modules: handlers
-//! call them, and add nothing.
+//! [`label`] opens a scene and serves the page on 127.0.0.1 until it is cancelled. Each gesture is on the
+//! disk when the page is told so. The address has a random token, requests must name the server's own host
+//! and origin, and no other interface is ever listened on. The work itself is that of the other modules:
+//! handlers call them, and add nothing.
 //!
 //! What is written when: [`LabelFolder`] appends each event to `events.jsonl`
 //! at once; `labels.npz` and `rooms.json` follow when nobody has changed the labels for ten seconds, on

@@ -9,9 +9,9 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct FuseArgs {
-    /// Depth pictures with poses (folders of Matterport, ScanNet, ARKitScenes, 3RScan, TUM, 7-Scenes, Polycam;
-    /// .sens; transforms.json with depth), or laser scans (E57, PTX; LAS, PLY, PCD or text with --origin or
-    /// --trajectory).
+    /// Depth pictures with poses (folders of Matterport, ScanNet, ARKitScenes, 3RScan, TUM, 7-Scenes,
+    /// Polycam; .sens; transforms.json with depth), or laser scans (E57, PTX; LAS, PLY, PCD or text with
+    /// --origin or --trajectory).
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
     /// The mesh (.ply or .glb), or a folder for it and a scene.toml that `s3d export` takes.

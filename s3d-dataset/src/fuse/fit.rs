@@ -12,8 +12,8 @@ const MOST_SCANS: usize = 100;
 /// Two scans are off if a motion lessens their distance by this much, metres, and by half.
 const OFF_M: f64 = 0.005;
 
-/// Compares laser scans pair by pair and says which are off. Returns a motion for each scan if poses are to be
-/// refined.
+/// Compares laser scans pair by pair and says which are off. Returns a motion for each scan if poses are to
+/// be refined.
 ///
 /// # Errors
 /// [`Error::Input`] if poses are to be refined, and the scans are no laser scans from fixed places.

@@ -12,11 +12,11 @@ const LEAST_MEAN: f64 = 0.4;
 /// The axis is refined by surfaces that face it within these angles, degrees: floors, tables, ceilings.
 const WITHIN_DEG: [f64; 4] = [25.0, 15.0, 8.0, 4.0];
 
-/// Returns the turn that makes a mesh Z-up, from the world of its scan. Returns `None` if the form of the scan
-/// is upright, or if the caller said which axis is.
+/// Returns the turn that makes a mesh Z-up, from the world of its scan. Returns `None` if the form of the
+/// scan is upright, or if the caller said which axis is.
 ///
-/// The world of 7-Scenes is that of its first camera. People hold cameras upright, so the mean of their upward
-/// axes is near the vertical, and the surfaces that face it tell it exactly.
+/// The world of 7-Scenes is that of its first camera. People hold cameras upright, so the mean of their
+/// upward axes is near the vertical, and the surfaces that face it tell it exactly.
 pub(super) fn turn(images: &Images, made: &Made) -> Option<DMat3> {
     let is_tilted = images.inputs().iter().any(|(_, form)| *form == RawForm::SevenScenes);
     if !is_tilted || images.up().is_some() {

@@ -55,8 +55,8 @@ pub struct Fused {
 /// that an export takes: it names the scan's photographs and places too.
 ///
 /// # Errors
-/// [`Error::File`] and [`Error::Input`] for a raw scan that cannot be used. [`Error::Usage`] if `output` exists
-/// and is not to be replaced. [`Error::Cancelled`].
+/// [`Error::File`] and [`Error::Input`] for a raw scan that cannot be used. [`Error::Usage`] if `output`
+/// exists and is not to be replaced. [`Error::Cancelled`].
 pub fn fuse(
     inputs: &[PathBuf],
     output: &Path,

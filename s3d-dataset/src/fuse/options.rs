@@ -49,8 +49,8 @@ pub struct FuseOptions {
     #[cfg_attr(feature = "clap", arg(long, value_name = "y|z", value_parser = words::parsed::<UpAxis>))]
     #[serde(skip_serializing_if = "Option::is_none", with = "axis")]
     pub up: Option<UpAxis>,
-    /// How many metres a step of the numbers in depth pictures is, such as 0.001 [default: as the program that
-    /// wrote them has it]
+    /// How many metres a step of the numbers in depth pictures is, such as 0.001 [default: as the program
+    /// that wrote them has it]
     #[cfg_attr(feature = "clap", arg(long = "depth-unit", value_name = "METRES",
         value_parser = words::positive))]
     pub depth_unit_m: Option<f64>,

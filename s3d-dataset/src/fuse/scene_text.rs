@@ -25,7 +25,8 @@ pub(super) struct SceneText {
     pub(super) lists: Vec<(&'static str, String)>,
 }
 
-/// Returns the scene file of a fused mesh in `folder`. `turn` leads from the world of the images to the mesh's.
+/// Returns the scene file of a fused mesh in `folder`. `turn` leads from the world of the images to the
+/// mesh's.
 pub(super) fn scene(images: &Images, turn: Option<DMat3>, folder: &Path) -> Result<SceneText> {
     let mut toml =
         "# Fused from a raw scan by s3d fuse.\narea = 1\n[mesh]\npath = \"mesh.ply\"\nup = \"z\"\n"

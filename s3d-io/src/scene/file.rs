@@ -27,7 +27,8 @@ pub struct SceneFile {
     pub world_from_published: DAffine3,
     /// The files of the textured mesh, at least one. Several are joined in this order.
     pub mesh: Vec<PathBuf>,
-    /// The raw scan that the mesh is fused from. `mesh` is then its [`FuseSource::mesh`], which need not exist.
+    /// The raw scan that the mesh is fused from. `mesh` is then its [`FuseSource::mesh`], which need not
+    /// exist.
     pub fuse: Option<FuseSource>,
     /// The axis of the mesh that points up. The default is +Y, which glTF defines and the published OBJ files
     /// use.

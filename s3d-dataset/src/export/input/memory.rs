@@ -70,8 +70,8 @@ impl<P: Into<PathBuf>> From<P> for SceneSource {
 }
 
 impl SceneSource {
-    /// Returns what is read instead of a raw scan: the scene of its fused mesh, which is made if it is not there.
-    /// Other sources stay as they are.
+    /// Returns what is read instead of a raw scan: the scene of its fused mesh, which is made if it is not
+    /// there. Other sources stay as they are.
     pub(crate) fn fused(self, ctx: &Context) -> Result<Self> {
         match &self {
             Self::Path(path) => Ok(fused_scene(path, ctx)?.map_or(self, Self::Path)),
