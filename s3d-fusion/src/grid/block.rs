@@ -49,7 +49,8 @@ impl Block {
                 Voxel::Unknown
             };
         }
-        let is_carved = self.distance[i] < 0 && i32::from(self.votes[i]) < i32::from(free);
+        // As many saw through it as saw it. What is behind a surface was seen at least once.
+        let is_carved = self.distance[i] < 0 && i32::from(self.votes[i]) <= i32::from(free);
         if is_carved {
             Voxel::Unknown
         } else {
