@@ -160,9 +160,10 @@ impl Adding<'_> {
         let middle = DVec3::from_array(first.map(f64::from)) * self.scale.block() + half;
         let Some(extent) = view.extent(middle, half * 3.0_f64.sqrt()) else { return Seen::No };
         let [nearest, farthest] = pyramid.ranges(&extent);
-        if extent.near > farthest + self.scale.most_before() as f32 {
+        let behind = self.scale.most_behind(self.image.noise().sigma_m(farthest));
+        if extent.near > farthest + behind {
             Seen::No
-        } else if extent.is_within && extent.far + (self.scale.most_before() as f32) < nearest {
+        } else if extent.is_within && extent.far + (self.scale.front as f32) < nearest {
             Seen::Free
         } else {
             Seen::Mixed
@@ -203,10 +204,9 @@ impl Adding<'_> {
         for k in 0..SIDE * SIDE {
             let start = first + up * (k % SIDE) as f32 + out * (k / SIDE) as f32;
             let mut points = [[0.0; 8]; 3];
-            for axis in 0..3 {
-                for i in 0..8 {
-                    points[axis][i] = start[axis] + right[axis] * i as f32;
-                }
+            for (axis, numbers) in points.iter_mut().enumerate() {
+                let numbers = numbers.iter_mut().enumerate();
+                numbers.for_each(|(i, k)| *k = start[axis] + right[axis] * i as f32);
             }
             let (pixels, ranges) = view.pixels(&points);
             for i in 0..8 {
@@ -224,16 +224,15 @@ impl Adding<'_> {
         let scale = &self.scale;
         let before = s.range - range;
         let front = scale.front as f32;
-        let most = scale.most_before() as f32;
         if s.weight == 0.0 {
             return;
         }
 
         let distance = s.normal.dot(point) + s.offset;
-        if distance > front && before > front {
-            block.pass(voxel, s.nearest - range > front);
+        if before > front {
+            block.pass(voxel, distance > front, s.nearest - range > front);
         }
-        if distance > front || before > most {
+        if distance > front || before > scale.most_before() as f32 {
             return;
         }
         let Some(weight) = scale.weight(distance, before, s.sigma_m) else { return };

@@ -79,7 +79,7 @@ impl Scale {
     /// How far before a hit, along the ray, distances are gathered at most. A ray that meets a plane aslant is near it
     /// for long.
     fn most_before(&self) -> f64 {
-        4.0 * self.front
+        2.0 * self.front
     }
 
     /// How far behind a hit, along the ray, distances are gathered at most. A ray that meets a body aslant soon leaves

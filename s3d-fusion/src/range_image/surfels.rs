@@ -64,17 +64,20 @@ impl RangeImage {
     }
 }
 
-/// Numbers of eight pixels side by side.
-type Lanes = [f32; 8];
+/// Pixels that are worked on at a time: as many as a vector register of any processor holds.
+const LANES: usize = 4;
+
+/// Numbers of pixels side by side.
+type Lanes = [f32; LANES];
 
 #[inline(always)]
 fn load(plane: &[f32], at: usize) -> Lanes {
-    let mut lanes = [0.0; 8];
-    lanes.copy_from_slice(&plane[at..at + 8]);
+    let mut lanes = [0.0; LANES];
+    lanes.copy_from_slice(&plane[at..at + LANES]);
     lanes
 }
 
-/// The coordinates of the neighbours of eight pixels, each about an axis of its own.
+/// The coordinates of the neighbours of some pixels, each about an axis of its own.
 trait Frame {
     /// Makes the frames of pixels from what the band holds of them.
     fn of(pixels: &[Lanes; 3]) -> Self;
@@ -110,8 +113,8 @@ struct Round {
 
 impl Frame for Round {
     fn of(pixels: &[Lanes; 3]) -> Self {
-        let mut axes = [[[0.0; 8]; 3]; 3];
-        for lane in 0..8 {
+        let mut axes = [[[0.0; LANES]; 3]; 3];
+        for lane in 0..LANES {
             let forward = Vec3::new(pixels[0][lane], pixels[1][lane], pixels[2][lane]).normalize();
             let is_level = forward.x * forward.x + forward.z * forward.z > 1e-6;
             let flat = if is_level { forward } else { Vec3::Z };
@@ -125,18 +128,18 @@ impl Frame for Round {
 
     #[inline(always)]
     fn uvq(&self, pixels: [Lanes; 3]) -> [Lanes; 3] {
-        let mut uvq = [[0.0; 8]; 3];
+        let mut uvq = [[0.0; LANES]; 3];
         for (k, [x, y, z]) in self.axes.iter().enumerate() {
-            for lane in 0..8 {
+            for lane in 0..LANES {
                 uvq[k][lane] =
                     x[lane] * pixels[0][lane] + y[lane] * pixels[1][lane] + z[lane] * pixels[2][lane];
             }
         }
-        for lane in 0..8 {
-            let q = 1.0 / uvq[2][lane];
-            uvq[0][lane] *= q;
-            uvq[1][lane] *= q;
-            uvq[2][lane] = q;
+        let [u, v, q] = &mut uvq;
+        for ((u, v), q) in u.iter_mut().zip(v).zip(q) {
+            *q = 1.0 / *q;
+            *u *= *q;
+            *v *= *q;
         }
         uvq
     }
@@ -167,8 +170,8 @@ impl<'a> Band<'a> {
     fn new(image: &'a RangeImage, first: usize, cell_m: f32) -> Self {
         let (width, height) = (image.width() as usize, image.height() as usize);
         let margin = MARGIN as usize;
-        // Eight more, since pixels are taken eight at a time.
-        let row = width.next_multiple_of(8) + 2 * margin;
+        // A few more, since pixels are taken some at a time.
+        let row = width.next_multiple_of(LANES) + 2 * margin;
         let len = row * (BAND + 2 * margin);
         let nothing = || vec![f32::NAN; len];
         let mut band = Self {
@@ -205,9 +208,9 @@ impl<'a> Band<'a> {
 
         // All but the outermost two rows and columns, whose neighbours are not all here.
         for y in 2..BAND + 2 * margin - 2 {
-            for x in (2..row - 2).step_by(8).map(|x| x.min(row - 10)) {
+            for x in (2..row - 2).step_by(LANES).map(|x| x.min(row - 2 - LANES)) {
                 let lanes = band.taken(y * row + x);
-                taken[y * row + x..][..8].copy_from_slice(&lanes);
+                taken[y * row + x..][..LANES].copy_from_slice(&lanes);
             }
         }
         for plane in &mut band.planes {
@@ -229,27 +232,27 @@ impl<'a> Band<'a> {
     fn taken(&self, at: usize) -> Lanes {
         let range = self.range(at, [0, 0], 0);
         let noise = self.image.noise;
-        let (mut slack, mut spacing) = ([0.0; 8], [0.0; 8]);
-        for lane in 0..8 {
+        let (mut slack, mut spacing) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
             slack[lane] = 4.0 * noise.sigma_m(range[lane]);
             spacing[lane] = range[lane] * self.pixel_rad;
         }
 
         // A pixel of a surface has two neighbours that are no step away.
-        let mut beside = [0.0_f32; 8];
+        let mut beside = [0.0_f32; LANES];
         for step in AROUND {
             let other = self.range(at, step, 1);
-            for lane in 0..8 {
+            for lane in 0..LANES {
                 let is_near = (other[lane] - range[lane]).abs() <= slack[lane] + 10.0 * spacing[lane];
                 beside[lane] += if is_near { 1.0 } else { 0.0 };
             }
         }
 
         // A mixed pixel is far behind one neighbour and far before the opposite one, and these go on less steeply.
-        let mut mixed = [0.0_f32; 8];
+        let mut mixed = [0.0_f32; LANES];
         for step in [[1, 0], [0, 1], [1, 1], [1, -1]] {
             let [a2, a, b, b2] = [-2, -1, 1, 2].map(|k| self.range(at, step, k));
-            for lane in 0..8 {
+            for lane in 0..LANES {
                 let (before, behind) = (range[lane] - a[lane], b[lane] - range[lane]);
                 let least = slack[lane] + 2.0 * spacing[lane];
                 let is_step = (before.abs() > least) & (behind.abs() > least) & (before * behind > 0.0);
@@ -259,8 +262,8 @@ impl<'a> Band<'a> {
             }
         }
 
-        let mut taken = [f32::NAN; 8];
-        for lane in 0..8 {
+        let mut taken = [f32::NAN; LANES];
+        for lane in 0..LANES {
             if (beside[lane] >= 2.0) & (mixed[lane] == 0.0) {
                 taken[lane] = 1.0;
             }
@@ -270,8 +273,8 @@ impl<'a> Band<'a> {
 
     fn fit<F: Frame>(&self, out: &mut [Surfel]) {
         for (y, out) in out.chunks_exact_mut(self.width).enumerate() {
-            for (x, out) in out.chunks_mut(8).enumerate() {
-                let at = (y + MARGIN as usize) * self.row + MARGIN as usize + 8 * x;
+            for (x, out) in out.chunks_mut(LANES).enumerate() {
+                let at = (y + MARGIN as usize) * self.row + MARGIN as usize + LANES * x;
                 if load(&self.planes[2], at).iter().any(|q| !q.is_nan()) {
                     self.fit_lanes::<F>(at, out);
                 }
@@ -289,15 +292,15 @@ impl<'a> Band<'a> {
         let center = self.pixels(at);
         let frame = F::of(&center);
         let [u0, v0, q0] = frame.uvq(center);
-        let (mut sigma, mut spacing) = ([0.0; 8], [0.0; 8]);
-        for lane in 0..8 {
+        let (mut sigma, mut spacing) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
             sigma[lane] = self.image.noise.sigma_m(range[lane]);
             spacing[lane] = range[lane] * self.pixel_rad;
         }
 
-        // The window is as wide as the noise needs, or as half a cell if that is more: the same for all eight.
+        // The window is as wide as the noise needs, or as half a cell if that is more: the same for all lanes.
         let mut stride = 1;
-        for lane in (0..8).filter(|lane| !q0[*lane].is_nan()) {
+        for lane in (0..LANES).filter(|lane| !q0[*lane].is_nan()) {
             let cells = self.cell_m / spacing[lane];
             let for_noise = (sigma[lane] / spacing[lane] + 1.0).min(1.25 * cells);
             stride = stride.max((for_noise.max(0.4 * cells) as i32).clamp(1, MOST_STRIDE));
@@ -308,16 +311,16 @@ impl<'a> Band<'a> {
             let side = |steps: isize| {
                 let [u, v, q] = frame.uvq(self.pixels(at.wrapping_add_signed(steps * step as isize)));
                 let (here, there) = if along == 0 { (u0, u) } else { (v0, v) };
-                let mut grows = [0.0; 8];
-                for lane in 0..8 {
+                let mut grows = [0.0; LANES];
+                for lane in 0..LANES {
                     grows[lane] = (q[lane] - q0[lane]) / (there[lane] - here[lane]);
                 }
                 grows
             };
             let far = 2 * stride as isize;
             let [a, b, a1, b1] = [side(-far), side(far), side(-1), side(1)];
-            let mut grows = [0.0; 8];
-            for lane in 0..8 {
+            let mut grows = [0.0; LANES];
+            for lane in 0..LANES {
                 let a = if a[lane].is_finite() { a[lane] } else { a1[lane] };
                 let b = if b[lane].is_finite() { b[lane] } else { b1[lane] };
                 // NaN is neither less nor more.
@@ -328,8 +331,8 @@ impl<'a> Band<'a> {
         };
         let (gu, gv) = (grows(1, 0), grows(self.row, 1));
 
-        let (mut tolerance, mut more) = ([0.0; 8], [0.0; 8]);
-        for lane in 0..8 {
+        let (mut tolerance, mut more) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
             let per_range = q0[lane] / range[lane];
             tolerance[lane] = per_range * 6.0 * sigma[lane];
             more[lane] = per_range * 0.5 * spacing[lane] * stride as f32;
@@ -340,8 +343,8 @@ impl<'a> Band<'a> {
                 let step = (dy * stride) as isize * self.row as isize + (dx * stride) as isize;
                 let [u, v, q] = frame.uvq(self.pixels(at.wrapping_add_signed(step)));
                 let steps = dx.abs().max(dy.abs());
-                let mut near = [[0.0; 8]; 4];
-                for lane in 0..8 {
+                let mut near = [[0.0; LANES]; 4];
+                for lane in 0..LANES {
                     let (u, v, q) = (u[lane] - u0[lane], v[lane] - v0[lane], q[lane] - q0[lane]);
                     let off = (q - gu[lane] * u - gv[lane] * v).abs();
                     let is_near = off <= tolerance[lane] + more[lane] * steps as f32;
@@ -360,7 +363,7 @@ impl<'a> Band<'a> {
         let mut nearest = range;
         for step in AROUND {
             let other = self.range(at, step, 1);
-            for lane in 0..8 {
+            for lane in 0..LANES {
                 let least = if other[lane] < nearest[lane] {
                     other[lane]
                 } else {
@@ -410,7 +413,7 @@ impl Fit {
     /// Adds 1, u, v and q, or zeros.
     #[inline(always)]
     fn add(&mut self, [one, u, v, q]: &[Lanes; 4]) {
-        for lane in 0..8 {
+        for lane in 0..LANES {
             self.sums[0][lane] += one[lane];
             self.sums[1][lane] += u[lane];
             self.sums[2][lane] += v[lane];
