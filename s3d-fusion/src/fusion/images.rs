@@ -10,7 +10,6 @@ use crate::grid::{CHUNK, Grid, NONE, Place, SIDE, block_in, chunk_of, key, place
 use crate::range_image::{RangeImage, Surfel};
 use rayon::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3};
-use std::collections::BTreeSet;
 
 /// An image that is being added.
 pub(super) struct Adding<'a> {
@@ -42,9 +41,12 @@ impl Adding<'_> {
     pub(super) fn add_to(&self, grid: &mut Grid) -> Result<(), FusionError> {
         let view = View::new(self.image);
         let surfels = self.image.surfels(self.scale.cell as f32);
-        let Some(bounds) = self.bounds(&view, &surfels)? else { return Ok(()) };
-
-        for block in self.touched(&view, &surfels) {
+        let (touched, low, high) = self.touched(&view, &surfels);
+        if touched.is_empty() && low.x > high.x {
+            return Ok(());
+        }
+        let bounds = self.bounds(&view, low, high)?;
+        for block in touched {
             grid.block_at(place_of(block));
         }
 
@@ -77,61 +79,40 @@ impl Adding<'_> {
     }
 
     /// Returns the first and the last block of a box around the sensor and all hits.
-    fn bounds(&self, view: &View<'_>, surfels: &[Surfel]) -> Result<Option<[Place; 2]>, FusionError> {
-        let identity = || ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        let turn = view.turn.transpose().as_mat3();
-        let (low, high) = surfels
-            .par_chunks(1 << 14)
-            .enumerate()
-            .map(|(chunk, surfels)| {
-                let taken = surfels.iter().enumerate().filter(|(_, s)| s.weight > 0.0);
-                taken.fold(identity(), |(low, high), (i, s)| {
-                    let p = turn * self.image.ray(chunk << 14 | i, s);
-                    ([0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k])))
-                })
-            })
-            .reduce(identity, |a, b| {
-                ([0, 1, 2].map(|k| a.0[k].min(b.0[k])), [0, 1, 2].map(|k| a.1[k].max(b.1[k])))
-            });
-        if low[0] > high[0] {
-            return Ok(None);
-        }
-
-        let reach = self.scale.front + self.scale.cell * f64::from(SIDE);
-        let corner = |off: [f32; 3], reach: f64| {
-            let off = DVec3::from_array(off.map(f64::from));
-            let point = view.location
-                + if reach < 0.0 {
-                    off.min(DVec3::ZERO)
-                } else {
-                    off.max(DVec3::ZERO)
-                };
+    fn bounds(&self, view: &View<'_>, low: Vec3, high: Vec3) -> Result<[Place; 2], FusionError> {
+        let reach = self.scale.front + self.scale.block();
+        let block = |off: DVec3| {
+            let point = view.location + off;
             self.scale
-                .block_of(point + reach)
+                .block_of(point)
                 .ok_or(FusionError::TooFar { point, cell_m: self.scale.cell })
         };
-        Ok(Some([corner(low, -reach)?, corner(high, reach)?]))
+        let (low, high) = (low.as_dvec3().min(DVec3::ZERO), high.as_dvec3().max(DVec3::ZERO));
+        Ok([block(low - reach)?, block(high + reach)?])
     }
 
-    /// Returns the keys of the blocks near hits, in order.
-    fn touched(&self, view: &View<'_>, surfels: &[Surfel]) -> BTreeSet<u64> {
+    /// Returns the keys of the blocks near hits, in order, and the box of all hits from the sensor.
+    fn touched(&self, view: &View<'_>, surfels: &[Surfel]) -> (Vec<u64>, Vec3, Vec3) {
         let width = view.size[0] as usize;
         let turn = view.turn.transpose();
-        let rows = surfels.par_chunks(width * 8).enumerate().map(|(band, surfels)| {
+        let bands = surfels.par_chunks(width * 8).enumerate().map(|(band, surfels)| {
             let mut found: Vec<u64> = Vec::new();
             let mut last = None;
+            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
             for (i, s) in surfels.iter().enumerate().filter(|(_, s)| s.weight > 0.0) {
-                let ray = self.image.ray(band * width * 8 + i, s);
-                let length = ray.length();
-                let cosine = -s.normal.dot(ray) / length;
-                let along = turn * ray.as_dvec3() / f64::from(length);
-                let hit = view.location + along * f64::from(length);
+                let ray = turn * (self.image.ray_of(band * width * 8 + i) * s.range).as_dvec3();
+                (low, high) = (low.min(ray.as_vec3()), high.max(ray.as_vec3()));
+                let along = ray / ray.length();
+                let cosine = -s.normal.dot((view.turn * along).as_vec3());
                 let [front, behind] = self.scale.along_ray(cosine, s.sigma_m);
+                let hit = view.location + ray;
                 let ends = [hit - along * front, hit + along * behind];
-                let [a, b] = ends.map(|end| self.scale.block_of(end));
-                let [Some(a), Some(b)] = [a, b] else { continue };
-                // The neighbour's ray was in the same single block.
-                if last == Some((a, b)) && a == b {
+                let [Some(a), Some(b)] = [self.scale.block_of(ends[0]), self.scale.block_of(ends[1])] else {
+                    continue;
+                };
+                // The ray before went the only way from the one to the other.
+                let apart: u32 = (0..3).map(|k| a[k].abs_diff(b[k])).sum();
+                if last == Some((a, b)) && apart <= 1 {
                     continue;
                 }
                 last = Some((a, b));
@@ -140,16 +121,19 @@ impl Adding<'_> {
                         found.push(key(block));
                     }
                 });
-                if found.len() > 1 << 14 {
-                    found.sort_unstable();
-                    found.dedup();
-                }
             }
             found.sort_unstable();
             found.dedup();
-            found
+            (found, low, high)
         });
-        rows.collect::<Vec<_>>().into_iter().flatten().collect()
+
+        let bands: Vec<(Vec<u64>, Vec3, Vec3)> = bands.collect();
+        let low = bands.iter().fold(Vec3::INFINITY, |low, band| low.min(band.1));
+        let high = bands.iter().fold(Vec3::NEG_INFINITY, |high, band| high.max(band.2));
+        let mut found: Vec<u64> = bands.into_iter().flat_map(|band| band.0).collect();
+        found.sort_unstable();
+        found.dedup();
+        (found, low, high)
     }
 
     /// Returns what the image does to a chunk, or `None` if it does nothing.
@@ -176,9 +160,10 @@ impl Adding<'_> {
         let middle = DVec3::from_array(first.map(f64::from)) * self.scale.block() + half;
         let Some(extent) = view.extent(middle, half * 3.0_f64.sqrt()) else { return Seen::No };
         let [nearest, farthest] = pyramid.ranges(&extent);
-        if extent.near > farthest + self.scale.most_before() as f32 {
+        let behind = self.scale.most_behind(self.image.noise().sigma_m(farthest));
+        if extent.near > farthest + behind {
             Seen::No
-        } else if extent.is_within && extent.far + (self.scale.most_before() as f32) < nearest {
+        } else if extent.is_within && extent.far + (self.scale.front as f32) < nearest {
             Seen::Free
         } else {
             Seen::Mixed
@@ -218,8 +203,11 @@ impl Adding<'_> {
 
         for k in 0..SIDE * SIDE {
             let start = first + up * (k % SIDE) as f32 + out * (k / SIDE) as f32;
-            let points: [[f32; 8]; 3] =
-                std::array::from_fn(|axis| std::array::from_fn(|i| start[axis] + right[axis] * i as f32));
+            let mut points = [[0.0; 8]; 3];
+            for (axis, numbers) in points.iter_mut().enumerate() {
+                let numbers = numbers.iter_mut().enumerate();
+                numbers.for_each(|(i, k)| *k = start[axis] + right[axis] * i as f32);
+            }
             let (pixels, ranges) = view.pixels(&points);
             for i in 0..8 {
                 let Some(surfel) = surfels.get(pixels[i] as usize) else { continue };
@@ -236,16 +224,15 @@ impl Adding<'_> {
         let scale = &self.scale;
         let before = s.range - range;
         let front = scale.front as f32;
-        let most = scale.most_before() as f32;
         if s.weight == 0.0 {
             return;
         }
 
         let distance = s.normal.dot(point) + s.offset;
-        if distance > front && before > front {
-            block.pass(voxel, s.nearest - range > front);
+        if before > front {
+            block.pass(voxel, distance > front, s.nearest - range > front);
         }
-        if distance > front || before > most {
+        if distance > front || before > scale.most_before() as f32 {
             return;
         }
         let Some(weight) = scale.weight(distance, before, s.sigma_m) else { return };

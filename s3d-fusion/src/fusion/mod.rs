@@ -65,9 +65,9 @@ impl Scale {
 
     /// The block of a point; `None` if it is too far away.
     fn block_of(&self, point: DVec3) -> Option<Place> {
-        let place = (point / self.block()).floor();
+        let place = point / self.block();
         let is_near = place.abs().max_element() < f64::from(FARTHEST - 8);
-        is_near.then(|| place.as_ivec3().to_array())
+        is_near.then(|| walk::floor(place))
     }
 
     /// How far behind a surface its distance is gathered. The corners of a cell that the surface crosses are at most √3
@@ -79,7 +79,7 @@ impl Scale {
     /// How far before a hit, along the ray, distances are gathered at most. A ray that meets a plane aslant is near it
     /// for long.
     fn most_before(&self) -> f64 {
-        4.0 * self.front
+        2.0 * self.front
     }
 
     /// How far behind a hit, along the ray, distances are gathered at most. A ray that meets a body aslant soon leaves

@@ -152,7 +152,7 @@ impl AddingRays<'_> {
         if clear > 0.0 {
             slices_along(ends(0.0, clear), first, 0, |voxel, _| {
                 if let Some(i) = inner(voxel) {
-                    block.pass(i, true);
+                    block.pass(i, true, true);
                 }
             });
         }

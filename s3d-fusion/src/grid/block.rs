@@ -49,7 +49,8 @@ impl Block {
                 Voxel::Unknown
             };
         }
-        let is_carved = self.distance[i] < 0 && i32::from(self.votes[i]) < i32::from(free);
+        // As many saw through it as saw it. What is behind a surface was seen at least once.
+        let is_carved = self.distance[i] < 0 && i32::from(self.votes[i]) <= i32::from(free);
         if is_carved {
             Voxel::Unknown
         } else {
@@ -62,10 +63,10 @@ impl Block {
         self.colors.as_ref().map(|c| c[i]).filter(|c| *c != NO_COLOR)
     }
 
-    /// Notes that a ray passed a voxel far before its hit. `counts`: certainly, also beside the ray.
+    /// Notes that a ray passed a voxel. `is_far`: far before all that it hit. `counts`: certainly, also beside the ray.
     #[inline]
-    pub(crate) fn pass(&mut self, i: usize, counts: bool) {
-        if self.weight[i] == 0 {
+    pub(crate) fn pass(&mut self, i: usize, is_far: bool, counts: bool) {
+        if is_far && self.weight[i] == 0 {
             self.distance[i] = PASSED;
         }
         if counts {

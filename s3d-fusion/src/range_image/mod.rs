@@ -203,16 +203,23 @@ impl RangeImage {
         &self.directions
     }
 
-    /// Returns the point that a pixel shows, in OpenCV's axes of the sensor, on the plane fitted to it.
-    pub(crate) fn ray(&self, pixel: usize, surfel: &Surfel) -> Vec3 {
-        let [x, y] = [pixel % self.width() as usize, pixel / self.width() as usize];
+    /// Returns the ray of the middle of a pixel, in OpenCV's axes of the sensor: it is as long as one metre of range.
+    #[inline]
+    pub(crate) fn ray_of(&self, pixel: usize) -> Vec3 {
+        let width = self.width() as usize;
+        let [x, y] = [pixel % width, pixel / width];
         match &self.directions {
             Directions::Lens(lens) => {
                 let middle = dvec2(x as f64 + 0.5, y as f64 + 0.5);
-                lens.direction(middle)
-                    .map_or(Vec3::NAN, |d| (d / d.z).as_vec3() * surfel.range)
+                if let PhotoLens::Straight(straight) = lens
+                    && straight.distortion() == [0.0; 5]
+                {
+                    let flat = (middle - straight.center_px()) / straight.focal_px();
+                    return flat.as_vec2().extend(1.0);
+                }
+                lens.direction(middle).map_or(Vec3::NAN, |d| (d / d.z).as_vec3())
             }
-            Directions::Angles(grid) => grid.direction([x as u32, y as u32]).as_vec3() * surfel.range,
+            Directions::Angles(grid) => grid.direction([x as u32, y as u32]).as_vec3(),
         }
     }
 

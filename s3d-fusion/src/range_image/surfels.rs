@@ -6,7 +6,7 @@
 
 use super::{Directions, RangeImage};
 use rayon::prelude::*;
-use s3d_geom::glam::{DVec3, Vec3, dvec2};
+use s3d_geom::glam::{DVec3, Vec3};
 
 /// The plane that a pixel sees, in OpenCV's axes of the sensor: a point x is normal·x + offset in front of it.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ const BAND: usize = 16;
 /// The pixels of a window are −2·t … 2·t for a stride t, at most this.
 const MOST_STRIDE: i32 = 4;
 /// Rows around a band that its windows and the tests of their pixels reach.
-const MARGIN: i32 = 2 * MOST_STRIDE + 2;
+const MARGIN: i32 = 2 * MOST_STRIDE + 8;
 /// Pixels are dropped whose ray meets the surface at a smaller cosine than this.
 const LEAST_COSINE: f32 = 0.05;
 /// The noise at which a pixel has the weight 1.
@@ -64,295 +64,383 @@ impl RangeImage {
     }
 }
 
-/// The coordinates of a pixel's neighbours about an axis.
+/// Pixels that are worked on at a time: as many as a vector register of any processor holds.
+const LANES: usize = 4;
+
+/// Numbers of pixels side by side.
+type Lanes = [f32; LANES];
+
+#[inline(always)]
+fn load(plane: &[f32], at: usize) -> Lanes {
+    let mut lanes = [0.0; LANES];
+    lanes.copy_from_slice(&plane[at..at + LANES]);
+    lanes
+}
+
+/// The coordinates of the neighbours of some pixels, each about an axis of its own.
 trait Frame {
-    /// Makes the frame of a pixel from what the band holds of it.
-    fn of(pixel: [f32; 3]) -> Self;
-    /// Returns u, v and q of a neighbour from what the band holds of it.
-    fn uvq(&self, pixel: [f32; 3]) -> [f32; 3];
+    /// Makes the frames of pixels from what the band holds of them.
+    fn of(pixels: &[Lanes; 3]) -> Self;
+    /// Returns u, v and q of a neighbour of each pixel from what the band holds of it.
+    fn uvq(&self, pixels: [Lanes; 3]) -> [Lanes; 3];
     /// Returns a vector in the axes of the sensor.
-    fn vector(&self, uvq: Vec3) -> Vec3;
+    fn vector(&self, lane: usize, uvq: Vec3) -> Vec3;
 }
 
 /// The frame of a lens. The band holds u, v and q.
 struct Flat;
 
 impl Frame for Flat {
-    fn of(_: [f32; 3]) -> Self {
+    fn of(_: &[Lanes; 3]) -> Self {
         Self
     }
 
     #[inline(always)]
-    fn uvq(&self, pixel: [f32; 3]) -> [f32; 3] {
-        pixel
+    fn uvq(&self, pixels: [Lanes; 3]) -> [Lanes; 3] {
+        pixels
     }
 
-    fn vector(&self, uvq: Vec3) -> Vec3 {
+    #[inline(always)]
+    fn vector(&self, _: usize, uvq: Vec3) -> Vec3 {
         uvq
     }
 }
 
-/// The frame of a pixel in a grid of angles. The band holds the point.
+/// The frames of pixels in a grid of angles: right, down and forward as columns. The band holds points.
 struct Round {
-    right: Vec3,
-    down: Vec3,
-    forward: Vec3,
+    axes: [[Lanes; 3]; 3],
 }
 
 impl Frame for Round {
-    fn of(pixel: [f32; 3]) -> Self {
-        let forward = Vec3::from_array(pixel).normalize();
-        let flat = if forward.x * forward.x + forward.z * forward.z > 1e-6 {
-            forward
-        } else {
-            Vec3::Z
-        };
-        let right = Vec3::new(flat.z, 0.0, -flat.x).normalize();
-        Self { right, down: forward.cross(right), forward }
+    fn of(pixels: &[Lanes; 3]) -> Self {
+        let mut axes = [[[0.0; LANES]; 3]; 3];
+        for lane in 0..LANES {
+            let forward = Vec3::new(pixels[0][lane], pixels[1][lane], pixels[2][lane]).normalize();
+            let is_level = forward.x * forward.x + forward.z * forward.z > 1e-6;
+            let flat = if is_level { forward } else { Vec3::Z };
+            let right = Vec3::new(flat.z, 0.0, -flat.x).normalize();
+            for (axis, v) in axes.iter_mut().zip([right, forward.cross(right), forward]) {
+                (axis[0][lane], axis[1][lane], axis[2][lane]) = (v.x, v.y, v.z);
+            }
+        }
+        Self { axes }
     }
 
     #[inline(always)]
-    fn uvq(&self, pixel: [f32; 3]) -> [f32; 3] {
-        let p = Vec3::from_array(pixel);
-        let q = p.dot(self.forward).recip();
-        [p.dot(self.right) * q, p.dot(self.down) * q, q]
+    fn uvq(&self, pixels: [Lanes; 3]) -> [Lanes; 3] {
+        let mut uvq = [[0.0; LANES]; 3];
+        for (k, [x, y, z]) in self.axes.iter().enumerate() {
+            for lane in 0..LANES {
+                uvq[k][lane] =
+                    x[lane] * pixels[0][lane] + y[lane] * pixels[1][lane] + z[lane] * pixels[2][lane];
+            }
+        }
+        let [u, v, q] = &mut uvq;
+        for ((u, v), q) in u.iter_mut().zip(v).zip(q) {
+            *q = 1.0 / *q;
+            *u *= *q;
+            *v *= *q;
+        }
+        uvq
     }
 
-    fn vector(&self, uvq: Vec3) -> Vec3 {
-        self.right * uvq.x + self.down * uvq.y + self.forward * uvq.z
+    fn vector(&self, lane: usize, uvq: Vec3) -> Vec3 {
+        let axis = |k: usize| Vec3::from_array([0, 1, 2].map(|i| self.axes[k][i][lane]));
+        axis(0) * uvq.x + axis(1) * uvq.y + axis(2) * uvq.z
     }
 }
 
-/// Some rows of an image, with rows around them.
+/// Some rows of an image, with rows and columns around them: NaN outside of the image, and where nothing was measured.
 struct Band<'a> {
     image: &'a RangeImage,
-    /// The first row to fit, and the first row that is held.
-    first: usize,
-    held_from: usize,
-    width: i32,
-    height: i32,
-    around: bool,
-    ranges: &'a [f32],
-    /// What a [`Frame`] needs of each pixel.
-    pixels: Vec<[f32; 3]>,
-    /// Whether a pixel is taken.
-    taken: Vec<bool>,
+    width: usize,
+    /// The length of a row.
+    row: usize,
+    ranges: Vec<f32>,
+    /// What a [`Frame`] needs of each pixel, NaN if the pixel is not taken.
+    planes: [Vec<f32>; 3],
     pixel_rad: f32,
     cell_m: f32,
 }
 
+/// The eight neighbours of a pixel.
+const AROUND: [[i32; 2]; 8] = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]];
+
 impl<'a> Band<'a> {
     fn new(image: &'a RangeImage, first: usize, cell_m: f32) -> Self {
-        let (width, rows) = (image.width() as usize, image.height() as usize);
-        let held_from = first.saturating_sub(MARGIN as usize);
-        let held_to = rows.min(first + BAND + MARGIN as usize);
-        let around = matches!(&image.directions, Directions::Angles(grid) if grid.is_around());
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        let margin = MARGIN as usize;
+        // A few more, since pixels are taken some at a time.
+        let row = width.next_multiple_of(LANES) + 2 * margin;
+        let len = row * (BAND + 2 * margin);
+        let nothing = || vec![f32::NAN; len];
         let mut band = Self {
             image,
-            first,
-            held_from,
-            width: width as i32,
-            height: (held_to - held_from) as i32,
-            around,
-            ranges: &image.ranges.pixels()[held_from * width..held_to * width],
-            pixels: image.frames(held_from, held_to),
-            taken: Vec::new(),
+            width,
+            row,
+            ranges: nothing(),
+            planes: [nothing(), nothing(), nothing()],
             pixel_rad: image.pixel_rad() as f32,
             cell_m,
         };
-        let at = |i: usize| (i as i32 % band.width, i as i32 / band.width);
-        band.taken = (0..band.ranges.len()).map(|i| band.is_taken(at(i))).collect();
+
+        let (from, to) = (first.saturating_sub(margin), height.min(first + BAND + margin));
+        let frames = image.frames(from, to);
+        let around = matches!(&image.directions, Directions::Angles(grid) if grid.is_around());
+        let mut taken = nothing();
+        for y in from..to {
+            let start = (y + margin - first) * row;
+            let source = &image.ranges.pixels()[y * width..][..width];
+            band.ranges[start + margin..][..width].copy_from_slice(source);
+            for (x, uvq) in frames[(y - from) * width..][..width].iter().enumerate() {
+                (0..3).for_each(|k| band.planes[k][start + margin + x] = uvq[k]);
+            }
+            if around {
+                let planes = std::iter::once(&mut band.ranges).chain(&mut band.planes);
+                for plane in planes {
+                    for k in 0..margin {
+                        plane[start + k] = plane[start + margin + (width * margin + k - margin) % width];
+                        plane[start + margin + width + k] = plane[start + margin + k % width];
+                    }
+                }
+            }
+        }
+
+        // All but the outermost two rows and columns, whose neighbours are not all here.
+        for y in 2..BAND + 2 * margin - 2 {
+            for x in (2..row - 2).step_by(LANES).map(|x| x.min(row - 2 - LANES)) {
+                let lanes = band.taken(y * row + x);
+                taken[y * row + x..][..LANES].copy_from_slice(&lanes);
+            }
+        }
+        for plane in &mut band.planes {
+            plane
+                .iter_mut()
+                .zip(&taken)
+                .for_each(|(number, taken)| *number *= taken);
+        }
         band
     }
 
-    /// The index of a pixel in the band; row 0 is `held_from`.
     #[inline(always)]
-    fn index(&self, x: i32, y: i32) -> Option<usize> {
-        let x = if self.around { x.rem_euclid(self.width) } else { x };
-        let is_within = x >= 0 && x < self.width && y >= 0 && y < self.height;
-        is_within.then(|| (y * self.width + x) as usize)
+    fn range(&self, at: usize, [dx, dy]: [i32; 2], k: i32) -> Lanes {
+        let step = (k * dy) as isize * self.row as isize + (k * dx) as isize;
+        load(&self.ranges, at.wrapping_add_signed(step))
     }
 
-    /// The range of a pixel, NaN if there is none.
-    #[inline(always)]
-    fn range(&self, x: i32, y: i32) -> f32 {
-        self.index(x, y).map_or(f32::NAN, |i| self.ranges[i])
-    }
-
-    /// Whether a pixel is neither alone nor between a surface and another one behind it.
-    fn is_taken(&self, (x, y): (i32, i32)) -> bool {
-        let range = self.range(x, y);
-        if range.is_nan() {
-            return false;
+    /// Returns 1 for pixels that are neither alone nor between a surface and another one behind it, or else NaN.
+    fn taken(&self, at: usize) -> Lanes {
+        let range = self.range(at, [0, 0], 0);
+        let noise = self.image.noise;
+        let (mut slack, mut spacing) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            slack[lane] = 4.0 * noise.sigma_m(range[lane]);
+            spacing[lane] = range[lane] * self.pixel_rad;
         }
-        let noise = 4.0 * self.image.noise.sigma_m(range);
-        let spacing = range * self.pixel_rad;
 
         // A pixel of a surface has two neighbours that are no step away.
-        let step = noise + 10.0 * spacing;
-        let mut beside = 0;
-        for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1)] {
-            beside += u32::from((self.range(x + dx, y + dy) - range).abs() <= step);
-        }
-        if beside < 2 {
-            return false;
+        let mut beside = [0.0_f32; LANES];
+        for step in AROUND {
+            let other = self.range(at, step, 1);
+            for lane in 0..LANES {
+                let is_near = (other[lane] - range[lane]).abs() <= slack[lane] + 10.0 * spacing[lane];
+                beside[lane] += if is_near { 1.0 } else { 0.0 };
+            }
         }
 
         // A mixed pixel is far behind one neighbour and far before the opposite one, and these go on less steeply.
-        let step = noise + 2.0 * spacing;
-        let is_mixed = |(dx, dy): (i32, i32)| {
-            let before = range - self.range(x - dx, y - dy);
-            let behind = self.range(x + dx, y + dy) - range;
-            if !(before.abs() > step && behind.abs() > step && before * behind > 0.0) {
-                return false;
+        let mut mixed = [0.0_f32; LANES];
+        for step in [[1, 0], [0, 1], [1, 1], [1, -1]] {
+            let [a2, a, b, b2] = [-2, -1, 1, 2].map(|k| self.range(at, step, k));
+            for lane in 0..LANES {
+                let (before, behind) = (range[lane] - a[lane], b[lane] - range[lane]);
+                let least = slack[lane] + 2.0 * spacing[lane];
+                let is_step = (before.abs() > least) & (behind.abs() > least) & (before * behind > 0.0);
+                let goes_on = ((a[lane] - a2[lane]).abs() > 0.4 * before.abs())
+                    | ((b2[lane] - b[lane]).abs() > 0.4 * behind.abs());
+                mixed[lane] += if is_step & !goes_on { 1.0 } else { 0.0 };
             }
-            let goes_on = |k: i32, jump: f32| {
-                let outer = self.range(x + 2 * k * dx, y + 2 * k * dy) - self.range(x + k * dx, y + k * dy);
-                outer.abs() > 0.4 * jump.abs()
-            };
-            !goes_on(-1, before) && !goes_on(1, behind)
-        };
-        ![(1, 0), (0, 1), (1, 1), (1, -1)].into_iter().any(is_mixed)
+        }
+
+        let mut taken = [f32::NAN; LANES];
+        for lane in 0..LANES {
+            if (beside[lane] >= 2.0) & (mixed[lane] == 0.0) {
+                taken[lane] = 1.0;
+            }
+        }
+        taken
     }
 
     fn fit<F: Frame>(&self, out: &mut [Surfel]) {
-        let width = self.width as usize;
-        for (i, surfel) in out.iter_mut().enumerate() {
-            let (x, y) = ((i % width) as i32, (self.first - self.held_from + i / width) as i32);
-            let at = y as usize * width + x as usize;
-            if self.taken[at] {
-                *surfel = self.surfel::<F>(x, y, at);
+        for (y, out) in out.chunks_exact_mut(self.width).enumerate() {
+            for (x, out) in out.chunks_mut(LANES).enumerate() {
+                let at = (y + MARGIN as usize) * self.row + MARGIN as usize + LANES * x;
+                if load(&self.planes[2], at).iter().any(|q| !q.is_nan()) {
+                    self.fit_lanes::<F>(at, out);
+                }
             }
         }
     }
 
-    fn surfel<F: Frame>(&self, x: i32, y: i32, at: usize) -> Surfel {
-        let range = self.ranges[at];
-        let sigma_m = self.image.noise.sigma_m(range);
-        let spacing = range * self.pixel_rad;
-        let frame = F::of(self.pixels[at]);
-        let [u0, v0, q0] = frame.uvq(self.pixels[at]);
+    #[inline(always)]
+    fn pixels(&self, at: usize) -> [Lanes; 3] {
+        [load(&self.planes[0], at), load(&self.planes[1], at), load(&self.planes[2], at)]
+    }
 
-        // The window is as wide as the noise needs, or as half a cell if that is more.
-        let for_noise = (0.94 * sigma_m / spacing).ceil().min(1.25 * self.cell_m / spacing);
-        let for_cell = 0.4 * self.cell_m / spacing;
-        let stride = (for_noise.max(for_cell) as i32).clamp(1, MOST_STRIDE);
-
-        // How q grows to the right and downwards: on the side where it grows less, since a step may be on the other.
-        let per_range = q0 / range;
-        let tolerance = per_range * 6.0 * sigma_m;
-        let grows = |dx: i32, dy: i32, along: usize| {
-            let side = |k: i32| {
-                let i = self.index(x + k * dx, y + k * dy).filter(|i| self.taken[*i])?;
-                let uvq = frame.uvq(self.pixels[i]);
-                let off = uvq[along] - [u0, v0][along];
-                Some((uvq[2] - q0) / off).filter(|g| g.is_finite())
-            };
-            match (side(-2 * stride).or_else(|| side(-1)), side(2 * stride).or_else(|| side(1))) {
-                (Some(a), Some(b)) => {
-                    if a.abs() < b.abs() {
-                        a
-                    } else {
-                        b
-                    }
-                }
-                (a, b) => a.or(b).unwrap_or(0.0),
-            }
-        };
-        let (gu, gv) = (grows(1, 0, 0), grows(0, 1, 1));
-
-        let mut fit = Fit::default();
-        let mut inner = Fit::default();
-        for dy in -2..=2 {
-            for dx in -2..=2_i32 {
-                let Some(i) = self.index(x + dx * stride, y + dy * stride).filter(|i| self.taken[*i]) else {
-                    continue;
-                };
-                let [u, v, q] = frame.uvq(self.pixels[i]);
-                let (u, v, q) = (u - u0, v - v0, q - q0);
-                let steps = (dx.abs().max(dy.abs()) * stride) as f32;
-                let allowed = tolerance + per_range * 0.5 * spacing * steps;
-                if (q - gu * u - gv * v).abs() > allowed {
-                    continue;
-                }
-                fit.add(u, v, q);
-                if dx.abs() <= 1 && dy.abs() <= 1 {
-                    inner.add(u, v, q);
-                }
-            }
+    fn fit_lanes<F: Frame>(&self, at: usize, out: &mut [Surfel]) {
+        let range = load(&self.ranges, at);
+        let center = self.pixels(at);
+        let frame = F::of(&center);
+        let [u0, v0, q0] = frame.uvq(center);
+        let (mut sigma, mut spacing) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            sigma[lane] = self.image.noise.sigma_m(range[lane]);
+            spacing[lane] = range[lane] * self.pixel_rad;
         }
 
-        // The slope comes from the window, the place from its middle.
-        let (b, c) = fit.slope().unwrap_or_else(|| {
-            // A thread, or a point in the air: it faces the sensor.
-            let m = Vec3::new(u0, v0, 1.0) * (q0 / (u0 * u0 + v0 * v0 + 1.0));
-            (m.x, m.y)
-        });
-        let place = inner.mean(b, c);
-        let q = if place.is_finite() { q0 + place } else { q0 };
-        let inverse = frame.vector(Vec3::new(b, c, q - b * u0 - c * v0));
-        let offset = inverse.length().recip();
-        let normal = -inverse * offset;
-        let ray = frame.vector(Vec3::new(u0, v0, 1.0)).normalize();
-        let cosine = -normal.dot(ray);
-        if cosine.is_nan() || cosine < LEAST_COSINE {
-            return Surfel::NONE;
+        // The window is as wide as the noise needs, or as half a cell if that is more: the same for all lanes.
+        let mut stride = 1;
+        for lane in (0..LANES).filter(|lane| !q0[*lane].is_nan()) {
+            let cells = self.cell_m / spacing[lane];
+            let for_noise = (sigma[lane] / spacing[lane] + 1.0).min(1.25 * cells);
+            stride = stride.max((for_noise.max(0.4 * cells) as i32).clamp(1, MOST_STRIDE));
+        }
+
+        // How q grows to the right and downwards: on the side where it grows less, since a step may be on the other.
+        let grows = |step: usize, along: usize| {
+            let side = |steps: isize| {
+                let [u, v, q] = frame.uvq(self.pixels(at.wrapping_add_signed(steps * step as isize)));
+                let (here, there) = if along == 0 { (u0, u) } else { (v0, v) };
+                let mut grows = [0.0; LANES];
+                for lane in 0..LANES {
+                    grows[lane] = (q[lane] - q0[lane]) / (there[lane] - here[lane]);
+                }
+                grows
+            };
+            let far = 2 * stride as isize;
+            let [a, b, a1, b1] = [side(-far), side(far), side(-1), side(1)];
+            let mut grows = [0.0; LANES];
+            for lane in 0..LANES {
+                let a = if a[lane].is_finite() { a[lane] } else { a1[lane] };
+                let b = if b[lane].is_finite() { b[lane] } else { b1[lane] };
+                // NaN is neither less nor more.
+                let least = if a.abs() <= b.abs() || !b.is_finite() { a } else { b };
+                grows[lane] = if least.is_finite() { least } else { 0.0 };
+            }
+            grows
+        };
+        let (gu, gv) = (grows(1, 0), grows(self.row, 1));
+
+        let (mut tolerance, mut more) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let per_range = q0[lane] / range[lane];
+            tolerance[lane] = per_range * 6.0 * sigma[lane];
+            more[lane] = per_range * 0.5 * spacing[lane] * stride as f32;
+        }
+        let (mut fit, mut inner) = (Fit::default(), Fit::default());
+        for dy in -2..=2_i32 {
+            for dx in -2..=2_i32 {
+                let step = (dy * stride) as isize * self.row as isize + (dx * stride) as isize;
+                let [u, v, q] = frame.uvq(self.pixels(at.wrapping_add_signed(step)));
+                let steps = dx.abs().max(dy.abs());
+                let mut near = [[0.0; LANES]; 4];
+                for lane in 0..LANES {
+                    let (u, v, q) = (u[lane] - u0[lane], v[lane] - v0[lane], q[lane] - q0[lane]);
+                    let off = (q - gu[lane] * u - gv[lane] * v).abs();
+                    let is_near = off <= tolerance[lane] + more[lane] * steps as f32;
+                    near[0][lane] = if is_near { 1.0 } else { 0.0 };
+                    near[1][lane] = if is_near { u } else { 0.0 };
+                    near[2][lane] = if is_near { v } else { 0.0 };
+                    near[3][lane] = if is_near { q } else { 0.0 };
+                }
+                fit.add(&near);
+                if steps <= 1 {
+                    inner.add(&near);
+                }
+            }
         }
 
         let mut nearest = range;
-        for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1)] {
-            let other = self.range(x + dx, y + dy);
-            nearest = if other.is_nan() { 0.0 } else { nearest.min(other) };
+        for step in AROUND {
+            let other = self.range(at, step, 1);
+            for lane in 0..LANES {
+                let least = if other[lane] < nearest[lane] {
+                    other[lane]
+                } else {
+                    nearest[lane]
+                };
+                nearest[lane] = if other[lane].is_nan() { 0.0 } else { least };
+            }
         }
-        let relative = UNIT_SIGMA_M / sigma_m;
-        Surfel { normal, offset, range, weight: relative * relative * cosine, sigma_m, nearest }
+
+        for (lane, surfel) in out.iter_mut().enumerate().filter(|(lane, _)| !q0[*lane].is_nan()) {
+            let center = Vec3::new(u0[lane], v0[lane], 1.0);
+            // The slope comes from the window, the place from its middle. A thread, or a point in the air, faces the
+            // sensor.
+            let (b, c) = fit.slope(lane).unwrap_or_else(|| {
+                let m = center * (q0[lane] / center.length_squared());
+                (m.x, m.y)
+            });
+            let q = q0[lane] + inner.mean(lane, b, c);
+            let inverse = frame.vector(lane, Vec3::new(b, c, q - b * center.x - c * center.y));
+            let offset = inverse.length().recip();
+            let normal = -inverse * offset;
+            let cosine = -normal.dot(frame.vector(lane, center).normalize());
+            if cosine.is_nan() || cosine < LEAST_COSINE {
+                continue;
+            }
+            let relative = UNIT_SIGMA_M / sigma[lane];
+            *surfel = Surfel {
+                normal,
+                offset,
+                range: range[lane],
+                weight: relative * relative * cosine,
+                sigma_m: sigma[lane],
+                nearest: nearest[lane],
+            };
+        }
     }
 }
 
-/// Sums of a least-squares fit q = a + b·u + c·v.
+/// Sums of least-squares fits q = a + b·u + c·v.
 #[derive(Default)]
 struct Fit {
-    n: f32,
-    u: f32,
-    v: f32,
-    q: f32,
-    uu: f32,
-    uv: f32,
-    vv: f32,
-    uq: f32,
-    vq: f32,
+    /// n, u, v, q, uu, uv, vv, uq and vq.
+    sums: [Lanes; 9],
 }
 
 impl Fit {
+    /// Adds 1, u, v and q, or zeros.
     #[inline(always)]
-    fn add(&mut self, u: f32, v: f32, q: f32) {
-        self.n += 1.0;
-        self.u += u;
-        self.v += v;
-        self.q += q;
-        self.uu += u * u;
-        self.uv += u * v;
-        self.vv += v * v;
-        self.uq += u * q;
-        self.vq += v * q;
+    fn add(&mut self, [one, u, v, q]: &[Lanes; 4]) {
+        for lane in 0..LANES {
+            self.sums[0][lane] += one[lane];
+            self.sums[1][lane] += u[lane];
+            self.sums[2][lane] += v[lane];
+            self.sums[3][lane] += q[lane];
+            self.sums[4][lane] += u[lane] * u[lane];
+            self.sums[5][lane] += u[lane] * v[lane];
+            self.sums[6][lane] += v[lane] * v[lane];
+            self.sums[7][lane] += u[lane] * q[lane];
+            self.sums[8][lane] += v[lane] * q[lane];
+        }
     }
 
     /// Returns b and c, or `None` if the places lie in a line.
-    fn slope(&self) -> Option<(f32, f32)> {
-        let k = self.n.recip();
-        let uu = self.uu - self.u * self.u * k;
-        let uv = self.uv - self.u * self.v * k;
-        let vv = self.vv - self.v * self.v * k;
-        let uq = self.uq - self.u * self.q * k;
-        let vq = self.vq - self.v * self.q * k;
+    fn slope(&self, lane: usize) -> Option<(f32, f32)> {
+        let [n, u, v, q, uu, uv, vv, uq, vq] = std::array::from_fn(|k| self.sums[k][lane]);
+        let k = n.recip();
+        let (uu, uv, vv) = (uu - u * u * k, uv - u * v * k, vv - v * v * k);
+        let (uq, vq) = (uq - u * q * k, vq - v * q * k);
         let det = uu * vv - uv * uv;
-        (det > 0.02 * uu * vv && self.n >= 4.0)
-            .then(|| ((uq * vv - vq * uv) / det, (vq * uu - uq * uv) / det))
+        let is_plane = det > 0.02 * uu * vv && n >= 4.0;
+        is_plane.then(|| ((uq * vv - vq * uv) / det, (vq * uu - uq * uv) / det))
     }
 
     /// Returns the a that fits best with the given b and c.
-    fn mean(&self, b: f32, c: f32) -> f32 {
-        (self.q - b * self.u - c * self.v) / self.n
+    fn mean(&self, lane: usize, b: f32, c: f32) -> f32 {
+        let [n, u, v, q] = std::array::from_fn(|k| self.sums[k][lane]);
+        (q - b * u - c * v) / n
     }
 }
 
@@ -362,12 +450,13 @@ impl RangeImage {
         let width = self.width() as usize;
         let ranges = &self.ranges.pixels()[from_row * width..to_row * width];
         match &self.directions {
-            Directions::Lens(lens) => {
+            Directions::Lens(_) => {
                 let uvq = |(i, range): (usize, &f32)| {
-                    let pixel = dvec2((i % width) as f64 + 0.5, (from_row + i / width) as f64 + 0.5);
-                    match lens.direction(pixel).filter(|_| range.is_finite()) {
-                        Some(d) => [(d.x / d.z) as f32, (d.y / d.z) as f32, range.recip()],
-                        None => [f32::NAN; 3],
+                    let ray = self.ray_of(from_row * width + i);
+                    if range.is_nan() {
+                        [f32::NAN; 3]
+                    } else {
+                        [ray.x, ray.y, range.recip()]
                     }
                 };
                 ranges.iter().enumerate().map(uvq).collect()
