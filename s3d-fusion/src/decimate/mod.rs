@@ -172,14 +172,12 @@ fn compact(whole: &Whole, with_colors: bool) -> Decimated {
         .face_of
         .iter()
         .for_each(|&f| whole.faces[f as usize].iter().for_each(|&v| number[v as usize] = 0));
-    for v in 0..whole.positions.len() {
-        if number[v] == 0 {
-            number[v] = small.positions.len() as u32;
-            small.positions.push(whole.positions[v]);
-            small.vertex_of.push(whole.nearest_vertex[v]);
-            if with_colors {
-                small.colors.push(whole.colors[v].to_array().map(|c| c.round() as u8));
-            }
+    for (v, number) in number.iter_mut().enumerate().filter(|(_, number)| **number == 0) {
+        *number = small.positions.len() as u32;
+        small.positions.push(whole.positions[v]);
+        small.vertex_of.push(whole.nearest_vertex[v]);
+        if with_colors {
+            small.colors.push(whole.colors[v].to_array().map(|c| c.round() as u8));
         }
     }
     let faces = small.face_of.iter();
