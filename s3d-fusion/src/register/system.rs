@@ -77,8 +77,9 @@ impl System {
 
         for i in 0..2 {
             let Some(first) = arms[i].place else { continue };
-            for a in 0..6 {
-                self.right[6 * first + a] -= weight * signs[i] * rows[i][3][a] * residual;
+            let right = &mut self.right[6 * first..6 * first + 6];
+            for (sum, part) in right.iter_mut().zip(rows[i][3]) {
+                *sum -= weight * signs[i] * part * residual;
             }
             for j in 0..2 {
                 let Some(second) = arms[j].place else { continue };
