@@ -6,7 +6,7 @@ use s3d_io::Error;
 use s3d_io::cloud::OnFault;
 use s3d_io::raw::{RawOptions, RawScan, Trajectory};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const POSE: &[u8] = b"1 0 0 1\n0 0 1 2\n0 -1 0 3\n0 0 0 1\n";
 const FRAMES: &[u8] = br#"{"w": 4, "h": 3, "fl_x": 4, "fl_y": 4, "frames": [{"file_path": "a.png",
@@ -97,7 +97,7 @@ pub(super) fn raw_scan(dir: &Path, data: &[u8]) {
     }
 }
 
-fn scans(dir: &Path, path: &PathBuf, options: &RawOptions) {
+fn scans(dir: &Path, path: &Path, options: &RawOptions) {
     let Some(RawScan::Scans(found)) = check(dir, RawScan::open(path, options)) else { return };
     for (number, info) in found.scans().iter().enumerate() {
         let read = found.read(number, |block| {
