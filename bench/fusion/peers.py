@@ -10,9 +10,9 @@ Matterport's raw captures, as the example `raw_scan` of s3d-synth writes them. A
 readers the lens.
 
 Every method runs in a process of its own with `--threads` threads. Told are the seconds from the first
-picture to the mesh in memory without the reading of files, the seconds of the whole process, and its peak
-memory. The mesh is written as MESHES/METHOD.ply. `--score` is a command that gets the path of a mesh as its
-last word and prints JSON, which is told too.
+picture to the mesh in memory without the reading of files, the seconds and processor seconds of the whole
+process, and its peak memory. The mesh is written as MESHES/METHOD.ply. `--score` is a command that gets the
+path of a mesh as its last word and prints JSON, which is told too.
 
 To compare s3d: `/usr/bin/time -v s3d fuse freiburg1 -o ours.ply --threads 2`, then `$RAW tum freiburg1
 --locations 2 --score ours.ply`. Threads, cell and range must be the same.
@@ -22,6 +22,9 @@ To compare s3d: `/usr/bin/time -v s3d fuse freiburg1 -o ours.ply --threads 2`, t
 | `scalable` | `ScalableTSDFVolume`: cells of `--cell`, truncation 4 cells |
 | `blocks` | `VoxelBlockGrid` on the CPU: the same, and cells with `--weight` observations alone |
 | `poisson10`, `poisson11` | one point a cell, normals towards the camera; screened Poisson of that depth |
+
+Open3D 0.20.0 returns a `ScalableTSDFVolume` without faces, even of a plane wall: try another version. A mesh
+without faces is told and not scored.
 
 Poisson's vertices with the least density, 5 %, are left out. So are depths beyond `--range` metres for all
 methods. Open3D counts pixels from the middle of the first one, and Matterport's intrinsics from its corner.
@@ -178,7 +181,7 @@ def one(args):
 
 
 def measured(command, threads):
-    """Runs a command: its last line, seconds and peak memory in MB."""
+    """Runs a command: its last line, and what the process took."""
     environment = {**os.environ, "OMP_NUM_THREADS": str(threads)}
     began = time.perf_counter()
     with tempfile.TemporaryFile("w+") as output:
@@ -189,7 +192,12 @@ def measured(command, threads):
             raise SystemExit(f"{' '.join(command)} failed")
         output.seek(0)
         line = output.read().strip().splitlines()[-1]
-    return line, time.perf_counter() - began, usage.ru_maxrss * 1024 / 1e6
+    taken = {
+        "process_seconds": round(time.perf_counter() - began, 1),
+        "processor_seconds": round(usage.ru_utime + usage.ru_stime, 1),
+        "peak_mb": round(usage.ru_maxrss * 1024 / 1e6),
+    }
+    return json.loads(line), taken
 
 
 def main():
@@ -213,12 +221,11 @@ def main():
         command = [sys.executable, __file__, str(args.scan), "-o", str(args.out), "--one", method]
         for option in ("cell", "range", "weight", "threads"):
             command += [f"--{option}", str(getattr(args, option))]
-        line, seconds, megabytes = measured(command, args.threads)
-        process = {"process_seconds": round(seconds, 1), "peak_mb": round(megabytes)}
-        told = {"method": method, **json.loads(line), **process}
-        if args.score:
+        said, taken = measured(command, args.threads)
+        told = {"method": method, **said, **taken}
+        if args.score and told["faces"]:
             words = [*args.score.split(), str(args.out / f"{method}.ply")]
-            told["scores"] = json.loads(measured(words, args.threads)[0])
+            told["scores"] = measured(words, args.threads)[0]
         print(json.dumps(told), flush=True)
 
 

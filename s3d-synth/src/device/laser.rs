@@ -257,7 +257,7 @@ impl ScanTarget<'_> {
         let hits_glass = chance.unit(column, row, GLASS) < scanner.glass;
 
         // The beam, by the light of its parts.
-        let [right, up] = [ray.any_orthonormal_pair().0, ray.any_orthonormal_pair().1].map(|v| v.as_vec3());
+        let (right, up) = ray.as_vec3().any_orthonormal_pair();
         let mut middle: Option<Met> = None;
         let mut light = 0.0;
         let mut weighted = 0.0;
@@ -265,6 +265,7 @@ impl ScanTarget<'_> {
             let aside = right * x + up * y;
             let from = origin.as_vec3() + aside * scanner.beam_m;
             let along: Vec3 = ray.as_vec3() + aside * scanner.beam_rad;
+
             let Some(met) = self.meet(from, along, with, time) else { continue };
             if met.is_glass && !hits_glass {
                 continue;
