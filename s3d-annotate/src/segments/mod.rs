@@ -6,17 +6,20 @@
 //! rooms. [`segment_file`] writes what ScanNet's and Matterport3D's tools read.
 
 mod borders;
+mod face_index;
 mod file;
 mod forest;
 mod grow;
+mod lists;
 mod looks;
 mod touch;
 mod tree;
 
+pub use face_index::FaceIndex;
 pub use file::{SegmentFileOptions, segment_file};
 pub use tree::MergeTree;
 
-pub(crate) use looks::mean_colors;
+pub(crate) use lists::Lists;
 
 use borders::borders;
 use looks::Looks;
