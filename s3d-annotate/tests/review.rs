@@ -2,7 +2,7 @@
 
 use s3d_annotate::labelling::{Action, Event, FaceRuns, Room, RoomPart, State};
 use s3d_annotate::review::{Check, CheckKind, Review, Surroundings};
-use s3d_annotate::segments::{SegmentOptions, Segments, segment_faces};
+use s3d_annotate::segments::{FaceIndex, SegmentOptions, Segments, segment_faces};
 use s3d_geom::NearestFaces;
 use s3d_geom::glam::Vec3;
 use s3d_label::Class;
@@ -21,7 +21,8 @@ impl Scene {
     fn new(building: &Building) -> Self {
         let truth = building.build().unwrap();
         let segments = segment_faces(&truth.mesh, &SegmentOptions::default());
-        let surroundings = Surroundings::new(&truth.mesh, &segments);
+        let surroundings =
+            Surroundings::new(&truth.mesh, &segments, FaceIndex::new(&truth.mesh, &segments).into());
         let state = State::of_mesh(&truth.mesh);
         Self { truth, segments, surroundings, state }
     }
@@ -296,7 +297,8 @@ fn reviews_do_not_depend_on_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let Scene { truth, segments, state, .. } = &scene;
-            let surroundings = &Surroundings::new(&truth.mesh, segments);
+            let surroundings =
+                &Surroundings::new(&truth.mesh, segments, FaceIndex::new(&truth.mesh, segments).into());
             let review = Review { mesh: &truth.mesh, segments, surroundings, state };
             (review.next_doubt(&[]), review.checks())
         })

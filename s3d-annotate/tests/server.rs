@@ -220,6 +220,12 @@ fn every_address_of_the_page_answers() {
     assert_eq!(server.json("doubt.json?not=99")["doubt"]["face"], 0);
     assert!(server.json("checks.json")["checks"].is_array());
     assert!(server.json("similar.json?instance=1")["patches"].is_array());
+    let cut =
+        |face: u32| format!(r#"{{"at":{{"face":{face},"node":0}},"by":{{"color":{{"tolerance":0.1}}}}}}"#);
+    let (status, told) = server.post("cut", &cut(0));
+    assert_eq!((status, &told["faces"]), (200, &serde_json::json!([0, 2])));
+    assert_eq!(server.post("cut", &cut(99)).0, 422);
+    assert_eq!(server.post("cut", "{}").0, 400);
     // The structure takes its time.
     let structure = (0..600).find_map(|_| match server.get("structure.json") {
         (200, body) => Some(body),

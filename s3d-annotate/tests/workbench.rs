@@ -101,8 +101,12 @@ fn a_colour_cuts_out_what_hangs_together_and_a_brush_what_it_saw_of_the_patch() 
     let (_folder, mut bench) = bench(wall_and_box());
     let black = Patch { face: WALL - 1, node: patch(&bench, 0).node };
     let by = Knife::Color { tolerance: 0.3 };
+    // What it would take is told before, and changes nothing.
+    let told = bench.cut(black, &by).unwrap();
+    assert!(bench.labels().state().instances().is_empty());
     perform(&mut bench, Gesture::Cut { at: black, by, class: Some("board".into()) }).unwrap();
     assert_is_part(&bench, 1, [2.1, 4.0], [0.0, 3.0]);
+    assert_eq!(bench.labels().state().faces_of(1), told);
 
     // Faces of the box and of the board are not of the patch.
     let by = Knife::Faces(FaceRuns::of_range(0..WALL + 12));

@@ -15,6 +15,7 @@ use std::ops::Range;
 ///
 /// let faces: FaceRuns = [5, 3, 4, 9, 3].into_iter().collect();
 /// assert_eq!((faces.len(), faces.end()), (4, 10));
+/// assert!(faces.contains(9) && !faces.contains(6));
 /// assert_eq!(faces.iter().collect::<Vec<_>>(), [3, 4, 5, 9]);
 /// assert_eq!(serde_json::to_string(&faces)?, "[3,3,3,1]");
 /// assert_eq!(serde_json::from_str::<FaceRuns>("[3,3,3,1]")?, faces);
@@ -45,6 +46,12 @@ impl FaceRuns {
     /// Returns the face behind the last one, or 0 without faces.
     pub fn end(&self) -> u32 {
         self.runs.last().map_or(0, |run| run.end)
+    }
+
+    /// Returns whether a face is in the set.
+    pub fn contains(&self, face: u32) -> bool {
+        let run = self.runs.partition_point(|run| run.end <= face);
+        self.runs.get(run).is_some_and(|run| run.start <= face)
     }
 
     /// Returns the runs, ascending.

@@ -7,7 +7,7 @@
 //! ```
 //! use s3d_annotate::labelling::State;
 //! use s3d_annotate::review::{Review, Surroundings};
-//! use s3d_annotate::segments::{SegmentOptions, segment_faces};
+//! use s3d_annotate::segments::{FaceIndex, SegmentOptions, segment_faces};
 //! use s3d_geom::{TriMesh, glam::{Vec3, vec3}, primitives::{cuboid, grid}};
 //!
 //! // A chest on a floor. The floor is the largest patch, and is seen from above.
@@ -15,7 +15,8 @@
 //! parts.append(cuboid(vec3(1.0, 1.0, 0.0), vec3(1.8, 1.5, 0.6)));
 //! let mesh = TriMesh::new(parts)?;
 //! let segments = segment_faces(&mesh, &SegmentOptions::default());
-//! let surroundings = Surroundings::new(&mesh, &segments);
+//! let index = FaceIndex::new(&mesh, &segments);
+//! let surroundings = Surroundings::new(&mesh, &segments, index.into());
 //! let state = State::of_mesh(&mesh);
 //!
 //! let review = Review { mesh: &mesh, segments: &segments, surroundings: &surroundings, state: &state };

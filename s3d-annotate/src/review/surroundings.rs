@@ -2,11 +2,10 @@
 
 use super::cells::Cells;
 use super::descriptor::{Descriptor, Sums};
-use crate::segments::{Segments, mean_colors};
-use rayon::prelude::*;
+use crate::segments::{FaceIndex, Segments};
 use s3d_geom::TriMesh;
-use s3d_geom::glam::Vec3;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A surface that faces straight up has at least this much of its normal along z.
 const LEVEL: f32 = 0.9;
@@ -21,38 +20,30 @@ const LEAST_FLOOR: f64 = 0.3;
 const STEP_M: f32 = 0.1;
 
 /// What is measured once of a mesh and its segments: where there is surface, the floors, and the size, shape
-/// and colour of each node of the tree. It takes about 100 bytes a face, and 300,000 faces take less than a
+/// and colour of each node of the tree. It takes about 60 bytes a face, and 300,000 faces take less than a
 /// second.
 #[derive(Clone, Debug)]
 pub struct Surroundings {
     pub(super) cells: Cells,
-    /// The mean colour of each face in Oklab.
-    colors: Vec<Vec3>,
+    index: Arc<FaceIndex>,
     pub(super) of_node: Vec<Sums>,
     /// The heights of the floors, ascending, world metres.
     floors_m: Vec<f32>,
-    /// The faces, segment by segment, ascending in each.
-    faces: Vec<u32>,
-    /// Where the faces of each segment begin, and where the last ones end.
-    starts: Vec<u32>,
 }
 
 impl Surroundings {
-    /// Measures a mesh.
+    /// Measures a mesh. `index` is that of the mesh and the segments.
     ///
     /// # Panics
     /// If the segments are of another mesh.
-    pub fn new(mesh: &TriMesh, segments: &Segments) -> Self {
+    pub fn new(mesh: &TriMesh, segments: &Segments, index: Arc<FaceIndex>) -> Self {
         assert_eq!(segments.segment_of_face.len(), mesh.faces().len(), "each face has a segment");
-        let colors = mean_colors(mesh);
         let origin = mesh.aabb().min;
         let tree = &segments.tree;
 
-        let mut starts = vec![0u32; tree.leaf_count() as usize + 1];
         let mut of_node = vec![Sums::default(); tree.leaf_count() as usize];
         for (face, segment) in (0u32..).zip(&segments.segment_of_face) {
-            of_node[*segment as usize].add(&Sums::of_face(mesh, face, colors[face as usize], origin));
-            starts[*segment as usize + 1] += 1;
+            of_node[*segment as usize].add(&Sums::of_face(mesh, face, index.color(face), origin));
         }
         for node in tree.leaf_count()..tree.node_count() {
             let mut sums = Sums::default();
@@ -61,30 +52,14 @@ impl Surroundings {
             }
             of_node.push(sums);
         }
-
-        for segment in 1..starts.len() {
-            starts[segment] += starts[segment - 1];
-        }
-        let mut faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
-        faces.par_sort_by_key(|face| segments.segment_of_face[*face as usize]);
-        Self { cells: Cells::new(mesh), colors, of_node, floors_m: floors(mesh), faces, starts }
-    }
-
-    /// The faces of a segment, ascending.
-    pub(super) fn faces_of(&self, segment: u32) -> &[u32] {
-        let [start, end] = [0, 1].map(|i| self.starts[segment as usize + i] as usize);
-        &self.faces[start..end]
+        Self { cells: Cells::new(mesh), index, of_node, floors_m: floors(mesh) }
     }
 
     /// The faces of a node that have no label.
     pub(super) fn open_faces(&self, segments: &Segments, node: u32, instance_of_face: &[u32]) -> Vec<u32> {
-        let of_node = segments
-            .tree
-            .segments_of(node)
-            .iter()
-            .flat_map(|segment| self.faces_of(*segment));
-        let mut open: Vec<u32> = of_node
-            .copied()
+        let mut open: Vec<u32> = self
+            .index
+            .faces_of_node(&segments.tree, node)
             .filter(|face| instance_of_face[*face as usize] == 0)
             .collect();
         open.sort_unstable();
@@ -101,7 +76,7 @@ impl Surroundings {
         let origin = mesh.aabb().min;
         let mut sums = Sums::default();
         for face in faces {
-            sums.add(&Sums::of_face(mesh, face, self.colors[face as usize], origin));
+            sums.add(&Sums::of_face(mesh, face, self.index.color(face), origin));
         }
         sums
     }
@@ -111,7 +86,7 @@ impl Surroundings {
         let origin = mesh.aabb().min;
         let mut sums: BTreeMap<u32, Sums> = BTreeMap::new();
         for (face, &instance) in (0u32..).zip(instance_of_face).filter(|(_, instance)| **instance != 0) {
-            let of_face = Sums::of_face(mesh, face, self.colors[face as usize], origin);
+            let of_face = Sums::of_face(mesh, face, self.index.color(face), origin);
             sums.entry(instance).or_default().add(&of_face);
         }
         sums

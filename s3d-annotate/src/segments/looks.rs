@@ -23,15 +23,9 @@ pub(super) struct Looks {
 
 impl Looks {
     pub(super) fn new(mesh: &TriMesh, borders: &[Border]) -> Self {
-        let faces = 0..mesh.faces().len() as u32;
-        let area_m2: Vec<f64> = faces.clone().into_par_iter().map(|face| mesh.area(face)).collect();
-        let color = mean_colors(mesh);
-
-        let mut normal: Vec<Vec3> = faces.into_par_iter().map(|face| mesh.normal(face)).collect();
-        for _ in 0..ROUNDS {
-            normal = smoothed(&normal, &area_m2, borders);
-        }
-        Self { area_m2, normal, color }
+        let area_m2 = areas(mesh);
+        let normal = smooth_normals(mesh, &area_m2, borders);
+        Self { area_m2, normal, color: mean_colors(mesh) }
     }
 
     /// Returns how much two faces differ across the edge between them, from 0.
@@ -51,8 +45,24 @@ impl Looks {
     }
 }
 
+/// Returns the area of each face, m².
+pub(super) fn areas(mesh: &TriMesh) -> Vec<f64> {
+    let faces = (0..mesh.faces().len() as u32).into_par_iter();
+    faces.map(|face| mesh.area(face)).collect()
+}
+
+/// Returns the unit normal of each face, with noise smoothed and edges kept.
+pub(super) fn smooth_normals(mesh: &TriMesh, area_m2: &[f64], borders: &[Border]) -> Vec<Vec3> {
+    let faces = (0..mesh.faces().len() as u32).into_par_iter();
+    let mut normal: Vec<Vec3> = faces.map(|face| mesh.normal(face)).collect();
+    for _ in 0..ROUNDS {
+        normal = smoothed(&normal, area_m2, borders);
+    }
+    normal
+}
+
 /// Returns the mean colour of each face in Oklab.
-pub(crate) fn mean_colors(mesh: &TriMesh) -> Vec<Vec3> {
+pub(super) fn mean_colors(mesh: &TriMesh) -> Vec<Vec3> {
     let faces = (0..mesh.faces().len() as u32).into_par_iter();
     faces.map(|face| oklab(mean_color(mesh, face))).collect()
 }

@@ -6,17 +6,20 @@
 //! rooms. [`segment_file`] writes what ScanNet's and Matterport3D's tools read.
 
 mod borders;
+mod face_index;
 mod file;
 mod forest;
 mod grow;
+mod lists;
 mod looks;
 mod touch;
 mod tree;
 
+pub use face_index::FaceIndex;
 pub use file::{SegmentFileOptions, segment_file};
 pub use tree::MergeTree;
 
-pub(crate) use looks::mean_colors;
+pub(crate) use lists::Lists;
 
 use borders::borders;
 use looks::Looks;
@@ -24,6 +27,7 @@ use rayon::prelude::*;
 #[cfg(feature = "clap")]
 use s3d_dataset::options::words;
 use s3d_geom::TriMesh;
+use s3d_geom::glam::Vec3;
 use std::collections::BTreeMap;
 use tree::{Region, Seam, merge};
 
@@ -67,6 +71,14 @@ pub struct Segments {
 /// Returns the pairs of faces that share an edge.
 pub(crate) fn borders_of(mesh: &TriMesh) -> Vec<[u32; 2]> {
     borders(mesh).iter().map(|border| border.faces).collect()
+}
+
+/// Returns the pairs of faces that share an edge, and the unit normals of the faces, in which noise is
+/// smoothed and edges stay.
+pub(crate) fn smoothed(mesh: &TriMesh) -> (Vec<[u32; 2]>, Vec<Vec3>) {
+    let borders = borders(mesh);
+    let normals = looks::smooth_normals(mesh, &looks::areas(mesh), &borders);
+    (borders.iter().map(|border| border.faces).collect(), normals)
 }
 
 /// Cuts a mesh into segments, and joins these to a tree.

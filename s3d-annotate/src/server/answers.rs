@@ -105,6 +105,14 @@ pub(super) struct Wish {
     pub(super) gesture: crate::workbench::Gesture,
 }
 
+/// A wish of the page: the faces that a cut would take.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CutWish {
+    pub(super) at: crate::workbench::Patch,
+    pub(super) by: crate::workbench::Knife,
+}
+
 /// A wish of the page: the labels for another program.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,12 +1,12 @@
 //! What the server answers with: library calls on one scene. No request is known here.
 
 use super::answers::{InstanceOf, RoomOf, StateOf};
-use crate::labelling::{Error, State};
+use crate::labelling::{Error, FaceRuns, State};
 use crate::outputs::{OutputFormat, OutputOptions, write_output};
 use crate::proposals;
 use crate::review::{Review, Surroundings};
 use crate::structure::find_structure;
-use crate::workbench::{Change, Gesture, Proposal, Proposals, Workbench};
+use crate::workbench::{Change, Gesture, Knife, Patch, Proposal, Proposals, Workbench};
 use rayon::prelude::*;
 use s3d_dataset::{BareScene, Context, Result as DatasetResult};
 use s3d_geom::{Camera, TriMesh};
@@ -120,8 +120,10 @@ impl Desk {
 
     fn surroundings(&self) -> &Surroundings {
         self.surroundings.get_or_init(|| {
-            let segments = Arc::clone(self.bench().segments());
-            Surroundings::new(self.mesh(), &segments)
+            let bench = self.bench();
+            let (segments, index) = (Arc::clone(bench.segments()), Arc::clone(bench.face_index()));
+            drop(bench);
+            Surroundings::new(self.mesh(), &segments, index)
         })
     }
 
@@ -146,6 +148,11 @@ impl Desk {
         let state = self.state_of(&bench);
         *self.changed() = Some(Instant::now());
         Ok((change, state))
+    }
+
+    /// Returns the faces that a cut would take: see [`Workbench::cut`].
+    pub(super) fn cut(&self, at: Patch, by: &Knife) -> Result<FaceRuns, Error> {
+        Ok(self.bench().cut(at, by)?)
     }
 
     pub(super) fn state(&self) -> StateOf {

@@ -1,7 +1,7 @@
 //! Addresses, and the calls that they mean.
 
 use super::answers::{
-    DoneOf, MaterialOf, PhotographOf, ProposalsOf, RefusalOf, SceneOf, SurfaceOf, Wish, WriteWish,
+    CutWish, DoneOf, MaterialOf, PhotographOf, ProposalsOf, RefusalOf, SceneOf, SurfaceOf, Wish, WriteWish,
 };
 use super::desk::Desk;
 use super::guard::{Guard, MOST_BYTES, guarded};
@@ -91,6 +91,7 @@ pub(super) fn routes(desk: Arc<Desk>, token: &str, guard: Guard) -> Router {
         .route(&at("similar.json"), get(similar))
         .route(&at("checks.json"), get(|desk| with(desk, checks)))
         .route(&at("gesture"), post(gesture))
+        .route(&at("cut"), post(cut))
         .route(&at("save"), post(|desk| with(desk, save)))
         .route(&at("write"), post(write))
         .fallback(|| async { Refusal::missing("such address") })
@@ -275,6 +276,14 @@ async fn gesture(desk: State<Arc<Desk>>, body: Bytes) -> Response {
         let Wish { revision, gesture } = wish(&body)?;
         let (change, state) = desk.perform(revision, &gesture)?;
         json(&DoneOf { state, changed: change.faces })
+    })
+    .await
+}
+
+async fn cut(desk: State<Arc<Desk>>, body: Bytes) -> Response {
+    with(desk, move |desk| {
+        let CutWish { at, by } = wish(&body)?;
+        json(&json!({ "faces": desk.cut(at, &by)? }))
     })
     .await
 }

@@ -8,7 +8,7 @@
 //! much free space begins. In each `storey`, a wall is what fills the height between doors and the ceiling:
 //! that is so above doors too, and furniture does not reach there. `rooms` cuts the free space between walls
 //! at narrow passages. `planes` finds the planes of each room, and `surfaces` takes those that bound it.
-//! `outline` draws the room with few corners, on its walls.
+//! `outline` draws the room with few corners, on its walls. `rims` adds the faces of rounded corners.
 //!
 //! Doors, windows and boards in the plane of a wall are proposed as the wall, to be cut out. Columns and
 //! beams are not proposed. A hall over two storeys is a room of the lower one without a ceiling.
@@ -16,6 +16,7 @@
 mod distance;
 mod outline;
 mod planes;
+mod rims;
 mod rooms;
 mod scan;
 mod storey;
@@ -23,8 +24,10 @@ mod storeys;
 mod surfaces;
 
 use crate::labelling::{FaceRuns, Room, RoomPart};
+use crate::segments::smoothed;
 use distance::{distances, spread};
 use planes::Plane;
+use rims::{Sheet, rims};
 use s3d_geom::TriMesh;
 use scan::{Facet, Grid, Scan};
 use serde::Serialize;
@@ -81,21 +84,50 @@ pub struct Surface {
 /// # Ok::<(), s3d_geom::MeshError>(())
 /// ```
 pub fn find_structure(mesh: &TriMesh) -> Structure {
-    let Some(scan) = Scan::new(mesh) else { return Structure::default() };
+    let (borders, normals) = smoothed(mesh);
+    let Some(scan) = Scan::new(mesh, &normals) else { return Structure::default() };
     let mut floors = storeys::floors(&scan);
     let fronts = Fronts::find(&scan, &mut floors);
 
     let mut found = Structure::default();
     let mut is_taken = vec![false; scan.facets.len()];
+    let mut sheets = Vec::new();
     let mut ceiling_below_m = f64::NEG_INFINITY;
     for (place, &floor_m) in floors.iter().enumerate() {
         let below = place.checked_sub(1).map(|below| floors[below]);
         let above = floors.get(place + 1).copied();
         let storey = Storey::new(&scan, floor_m, below, above, fronts);
         let finder = Finder { mesh, scan: &scan, storey: &storey, fronts, above, ceiling_below_m };
-        ceiling_below_m = finder.find(&mut is_taken, &mut found);
+        ceiling_below_m = finder.find(&mut is_taken, &mut found, &mut sheets);
     }
+    add_rims(mesh, &scan, &borders, &sheets, &mut found.surfaces);
     found
+}
+
+/// Adds what the planes leave out between surfaces and within them. `borders` are the pairs of faces that
+/// share an edge, `sheets` the planes of each surface.
+fn add_rims(
+    mesh: &TriMesh,
+    scan: &Scan,
+    borders: &[[u32; 2]],
+    sheets: &[Vec<Sheet>],
+    surfaces: &mut [Surface],
+) {
+    let mut surface_of = vec![None; scan.facets.len()];
+    for (number, surface) in (0u32..).zip(&*surfaces) {
+        surface
+            .faces
+            .iter()
+            .for_each(|face| surface_of[face as usize] = Some(number));
+    }
+    let mut more: Vec<Vec<u32>> = vec![Vec::new(); surfaces.len()];
+    for (face, surface) in rims(mesh, borders, &surface_of, sheets) {
+        more[surface as usize].push(face);
+    }
+    for (surface, more) in surfaces.iter_mut().zip(more) {
+        surface.area_m2 += more.iter().map(|face| scan.facet(*face).area_m2).sum::<f64>();
+        surface.faces = surface.faces.iter().chain(more).collect();
+    }
 }
 
 /// Finds the structure of a storey.
@@ -111,8 +143,9 @@ struct Finder<'a> {
 }
 
 impl Finder<'_> {
-    /// Adds the rooms and surfaces of the storey, and returns its highest ceiling, metres.
-    fn find(&self, is_taken: &mut [bool], found: &mut Structure) -> f64 {
+    /// Adds the rooms and surfaces of the storey, with the planes of each surface, and returns its highest
+    /// ceiling, metres.
+    fn find(&self, is_taken: &mut [bool], found: &mut Structure, sheets: &mut Vec<Vec<Sheet>>) -> f64 {
         let grid = &self.scan.grid;
         let (room_of_cell, count) = rooms::rooms(self.scan, self.storey);
         let [mut rim_of_cell, mut near_of_cell] = [room_of_cell.clone(), room_of_cell.clone()];
@@ -170,6 +203,7 @@ impl Finder<'_> {
                 if !faces.is_empty() {
                     let area_m2 = faces.iter().map(|face| self.scan.facet(face).area_m2).sum();
                     found.surfaces.push(Surface { class, faces, room: index, area_m2 });
+                    sheets.push(planes.iter().map(Sheet::of).collect());
                 }
             };
             add("floor", &place.floor(faces));

@@ -1,7 +1,7 @@
 //! A mesh as columns of samples over a grid of the plan.
 
 use s3d_geom::TriMesh;
-use s3d_geom::glam::{DVec2, DVec3, dvec2};
+use s3d_geom::glam::{DVec2, DVec3, Vec3, dvec2};
 
 /// The edge of the cells of the plan, metres. Larger scans have larger cells.
 const STEP_M: f64 = 0.05;
@@ -80,21 +80,17 @@ impl Grid {
 /// A face as a piece of a plane.
 #[derive(Clone, Copy)]
 pub(super) struct Facet {
-    /// The unit normal, from the winding.
+    /// The unit normal, on the side that the winding says.
     pub(super) normal: DVec3,
     pub(super) middle: DVec3,
     pub(super) area_m2: f64,
 }
 
 impl Facet {
-    fn new(corners: [DVec3; 3]) -> Self {
+    fn new(corners: [DVec3; 3], normal: DVec3) -> Self {
         let [a, b, c] = corners;
-        let doubled = (b - a).cross(c - a);
-        Self {
-            normal: doubled.normalize_or_zero(),
-            middle: (a + b + c) / 3.0,
-            area_m2: 0.5 * doubled.length(),
-        }
+        let area_m2 = 0.5 * (b - a).cross(c - a).length();
+        Self { normal, middle: (a + b + c) / 3.0, area_m2 }
     }
 
     /// Returns the height of its plane at a place, no farther than 10 cm from that of its middle, so that
@@ -130,8 +126,9 @@ pub(super) struct Scan {
 }
 
 impl Scan {
-    /// Samples a mesh. `None` if its size asks for cells so large that no door fits into them.
-    pub(super) fn new(mesh: &TriMesh) -> Option<Self> {
+    /// Samples a mesh. `normals` are the unit normals of its faces, in which noise is smoothed. `None` if its
+    /// size asks for cells so large that no door fits into them.
+    pub(super) fn new(mesh: &TriMesh, normals: &[Vec3]) -> Option<Self> {
         let bounds = mesh.aabb();
         let [low, high] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3().truncate());
         let size = high - low;
@@ -154,7 +151,10 @@ impl Scan {
         let cells = (size / step_m + 2.0 * RIM).floor() + 1.0;
         let grid =
             Grid { low: low - RIM * step_m, step_m, width: cells.x as usize, height: cells.y as usize };
-        let facets = faces.clone().map(|face| Facet::new(corners_of(face))).collect();
+        let facets = faces.clone().zip(normals);
+        let facets = facets
+            .map(|(face, normal)| Facet::new(corners_of(face), normal.as_dvec3()))
+            .collect();
 
         // Count the samples of each column, then put them there.
         let mut first = vec![0u32; grid.cells() + 1];

@@ -1,11 +1,11 @@
 //! Which faces of a patch a knife cuts out.
 
 use super::gesture::Knife;
-use super::surface::Surface;
 use crate::labelling::{FaceRuns, Fault};
+use crate::segments::{FaceIndex, Lists};
 use s3d_geom::TriMesh;
 use s3d_geom::glam::{Vec2, Vec3};
-use std::collections::BTreeSet;
+use std::collections::HashSet;
 
 /// A box cuts through the surface so far on both sides, metres.
 const DEPTH_M: f32 = 0.15;
@@ -13,13 +13,15 @@ const DEPTH_M: f32 = 0.15;
 /// The sine of the angle between two lines that make no plane.
 const THIN: f32 = 1e-4;
 
-/// Returns the faces of a patch that are cut out. `face` is the one that the pointer is on.
+/// Returns the faces of a patch that are cut out. `face` is the one that the pointer is on. `neighbours` has
+/// the faces with which each face shares an edge.
 ///
 /// # Errors
 /// [`Fault::CutShape`] if the points of the knife make no plane.
 pub(super) fn cut_out(
     mesh: &TriMesh,
-    surface: &Surface,
+    index: &FaceIndex,
+    neighbours: &Lists,
     patch: &FaceRuns,
     face: u32,
     knife: &Knife,
@@ -45,11 +47,8 @@ pub(super) fn cut_out(
                 height_m.abs() <= DEPTH_M && is_inside(&outline, at)
             }))
         }
-        Knife::Color { tolerance } => Ok(of_color(surface, patch, face, *tolerance)),
-        Knife::Faces(faces) => {
-            let chosen: BTreeSet<u32> = faces.iter().collect();
-            Ok(among(&|face| chosen.contains(&face)))
-        }
+        Knife::Color { tolerance } => Ok(of_color(index, neighbours, patch, face, *tolerance)),
+        Knife::Faces(faces) => Ok(among(&|face| faces.contains(face))),
     }
 }
 
@@ -96,16 +95,17 @@ fn is_inside(outline: &[Vec2], at: Vec2) -> bool {
 }
 
 /// The faces of a patch that hang together with `face` and have about its colour.
-fn of_color(surface: &Surface, patch: &FaceRuns, face: u32, tolerance: f32) -> FaceRuns {
-    let wanted = surface.color(face);
-    let is_like = |other: u32| surface.color(other).distance(wanted) <= tolerance;
-    let mut left: BTreeSet<u32> = patch.iter().filter(|face| is_like(*face)).collect();
+fn of_color(index: &FaceIndex, neighbours: &Lists, patch: &FaceRuns, face: u32, tolerance: f32) -> FaceRuns {
+    let wanted = index.color(face);
+    let is_like = |other: u32| patch.contains(other) && index.color(other).distance(wanted) <= tolerance;
 
-    let mut found: Vec<u32> = Vec::from_iter(left.take(&face));
+    let mut found: Vec<u32> = Vec::from_iter(is_like(face).then_some(face));
+    let mut is_seen: HashSet<u32> = found.iter().copied().collect();
     let mut next = 0;
     while let Some(&from) = found.get(next) {
         next += 1;
-        found.extend(surface.neighbours(from).iter().filter(|face| left.remove(face)));
+        let around = neighbours.list(from).iter().copied();
+        found.extend(around.filter(|other| is_like(*other) && is_seen.insert(*other)));
     }
     found.into_iter().collect()
 }

@@ -28,25 +28,25 @@
 
 mod gesture;
 mod knife;
-mod surface;
 
 pub use gesture::{Gesture, Knife, Patch, Selection};
 
 use crate::labelling::{Action, Error, FaceRuns, Fault, LabelFolder, Room, State};
-use crate::segments::Segments;
+use crate::segments::{FaceIndex, Lists, Segments, borders_of};
 use s3d_geom::TriMesh;
 use s3d_label::Taxonomy;
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
-use surface::Surface;
 
 /// A mesh with its segments and its labels, open for work.
 #[derive(Debug)]
 pub struct Workbench {
     mesh: Arc<TriMesh>,
     segments: Arc<Segments>,
-    surface: Surface,
+    index: Arc<FaceIndex>,
+    /// The faces with which each face shares an edge.
+    neighbours: Lists,
     labels: LabelFolder,
     proposals: Proposals,
 }
@@ -98,10 +98,12 @@ impl Workbench {
         taxonomy: &Taxonomy,
     ) -> Result<Self, Error> {
         let segments = segments.into();
-        assert_eq!(segments.segment_of_face.len(), mesh.faces().len(), "each face has a segment");
+        let index = Arc::new(FaceIndex::new(&mesh, &segments));
         let labels = LabelFolder::open(folder, &mesh, taxonomy)?;
-        let surface = Surface::new(&mesh, &segments);
-        Ok(Self { mesh, segments, surface, labels, proposals: Proposals::default() })
+        let borders = borders_of(&mesh);
+        let both = borders.iter().flat_map(|&[a, b]| [(a, b), (b, a)]);
+        let neighbours = Lists::of(mesh.faces().len(), both);
+        Ok(Self { mesh, segments, index, neighbours, labels, proposals: Proposals::default() })
     }
 
     /// Returns the mesh.
@@ -112,6 +114,11 @@ impl Workbench {
     /// Returns its segments.
     pub fn segments(&self) -> &Arc<Segments> {
         &self.segments
+    }
+
+    /// Returns the colours of its faces, and the faces of its segments.
+    pub fn face_index(&self) -> &Arc<FaceIndex> {
+        &self.index
     }
 
     /// Returns its labels.
@@ -143,14 +150,17 @@ impl Workbench {
 
         let instance_of = self.labels.state().instance_of_face();
         let own = instance_of[face as usize];
-        let faces = tree
-            .segments_of(node)
-            .iter()
-            .flat_map(|segment| self.surface.faces_of(*segment));
-        Ok(faces
-            .copied()
-            .filter(|face| instance_of[*face as usize] == own)
-            .collect())
+        let faces = self.index.faces_of_node(tree, node);
+        Ok(faces.filter(|face| instance_of[*face as usize] == own).collect())
+    }
+
+    /// Returns the faces that a [`Gesture::Cut`] would take. Nothing is changed.
+    ///
+    /// # Errors
+    /// [`Fault`]s for a patch that does not exist and a knife without a plane.
+    pub fn cut(&self, at: Patch, by: &Knife) -> Result<FaceRuns, Fault> {
+        let patch = self.patch(at)?;
+        knife::cut_out(&self.mesh, &self.index, &self.neighbours, &patch, at.face, by)
     }
 
     /// Does what a gesture says, and returns what has changed. By then, it is on the disk. `revision` and
@@ -194,8 +204,7 @@ impl Workbench {
             }
             Gesture::Erase { what } => Action::Erase { faces: self.selected(what)? },
             Gesture::Cut { at, by, class } => {
-                let patch = self.patch(*at)?;
-                let faces = knife::cut_out(&self.mesh, &self.surface, &patch, at.face, by)?;
+                let faces = self.cut(*at, by)?;
                 match class {
                     Some(class) => Action::Paint { faces, instance: next, class: Some(class.clone()) },
                     None => {

@@ -96,12 +96,12 @@ export class Proposals {
       if (number > 0) {
         let color = known.get(number);
         if (!color) known.set(number, (color = look.ofInstance(work.instance(number)?.class ?? "", number)));
-        table.color(face, color, "labelled");
+        table.color(face, color, "labelled", number);
         continue;
       }
       const surface = this.surfaces[this.surfaceAt[face] ?? -1];
-      if (surface) table.color(face, look.of(surface.class), "proposed");
-      else table.color(face, [0, 0, 0], "none");
+      if (surface) table.color(face, look.of(surface.class), "proposed", 0);
+      else table.color(face, [0, 0, 0], "none", 0);
     }
   }
 

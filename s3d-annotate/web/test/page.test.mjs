@@ -165,6 +165,87 @@ async function elsewhereUndo() {
   await settled(page);
 }
 
+test("a cut by colour is shown before it is made, and the wheel changes it", async () => {
+  const at = await find(page, large);
+  for (let k = 0; k < 3; k++) await page.keyboard.press("s");
+  const lit = async (act) => {
+    const answer = page.waitForResponse("**/cut");
+    await act();
+    const { faces } = await (await answer).json();
+    return faces.reduce((sum, run, i) => sum + (i % 2 ? run : 0), 0);
+  };
+  const few = await lit(() => page.mouse.move(at.x + 1, at.y));
+  const many = await lit(() => page.mouse.wheel(0, -2000));
+  assert.ok(many >= few && few > 0, `${few} ${many}`);
+  await drawn(page);
+  const shown = await page.screenshot();
+  await page.mouse.move(5, 450);
+  await drawn(page);
+  assert.notDeepEqual(await page.screenshot(), shown);
+  assert.deepEqual((await state(page)).instances, []);
+  await page.mouse.click(at.x + 1, at.y);
+  await settled(page);
+  const [cut] = (await state(page)).instances;
+  assert.equal(cut.faces, many);
+  assert.deepEqual(opened.faults, []);
+});
+
+test("Shift and the brush add to an object, across the borders of others", async () => {
+  const first = await find(page, small);
+  await page.mouse.click(first.x, first.y);
+  await settled(page);
+  const [{ number }] = (await state(page)).instances;
+  const before = (await facesOf(number)).length;
+  for (let k = 0; k < 4; k++) await page.keyboard.press("s");
+  await drag(
+    page,
+    [
+      [first.x, first.y],
+      [first.x + 80, first.y + 30],
+    ],
+    ["Shift"],
+  );
+  assert.equal((await state(page)).instances.length, 1);
+  assert.ok((await facesOf(number)).length > before);
+  assert.deepEqual(opened.faults, []);
+});
+
+test("a line is drawn where two objects meet, and none within one", async () => {
+  const pixels = async () => {
+    const file = (await page.locator("canvas").screenshot()).toString("base64");
+    return page.evaluate(async (data) => {
+      const image = new Image();
+      image.src = `data:image/png;base64,${data}`;
+      await image.decode();
+      const sheet = new OffscreenCanvas(image.width, image.height).getContext("2d");
+      sheet.drawImage(image, 0, 0);
+      const { data: bytes } = sheet.getImageData(0, 0, image.width, image.height);
+      let dark = 0;
+      for (let k = 0; k < bytes.length; k += 4) if (bytes[k] + bytes[k + 1] + bytes[k + 2] < 210) dark++;
+      return dark;
+    }, file);
+  };
+  // All floors and walls of the scene, first as objects of their own, then as one.
+  const { surfaces } = await page.evaluate(async () => (await fetch("structure.json")).json());
+  const some = surfaces.flatMap(({ class: name }, i) => (["floor", "wall"].includes(name) ? [i] : []));
+  assert.equal(await elsewhere(page, { accept: { surfaces: some, rooms: [] } }), 200);
+  await page.reload();
+  await page.waitForSelector("body[data-loaded][data-proposed]");
+  await page.keyboard.press("v");
+  await page.mouse.move(5, 450);
+  await drawn(page);
+  const apart = await pixels();
+  const [into, ...instances] = (await state(page)).instances.map((it) => it.number);
+  assert.equal(await elsewhere(page, { join: { into, instances } }), 200);
+  await page.reload();
+  await page.waitForSelector("body[data-loaded][data-proposed]");
+  await page.keyboard.press("v");
+  await page.mouse.move(5, 450);
+  await drawn(page);
+  const joined = await pixels();
+  assert.ok(apart > joined + 300, `${apart} ${joined}`);
+});
+
 test("two objects are joined, one gets another class, and one is erased", async () => {
   const first = await find(page, small);
   const second = await find(page, (it) => small(it) && it.node !== first.node);

@@ -26,6 +26,7 @@ export class Pointer {
     canvas.addEventListener("pointerleave", () => {
       this.isOver = false;
       if (!this.painting.isOpen) desk.hover.clear();
+      if (!this.cutting) cuts.leave();
     });
     canvas.addEventListener("wheel", (event) => this.wheel(event), { capture: true, passive: false });
     window.addEventListener("keydown", (event) => this.held.add(event.code));
@@ -81,7 +82,7 @@ export class Pointer {
     view.canvas.setPointerCapture(event.pointerId);
     if (this.cuts.way !== null) {
       this.cutting = true;
-      this.cuts.down(x, y);
+      this.cuts.down(x, y, event.shiftKey);
       return;
     }
     hover.clear();

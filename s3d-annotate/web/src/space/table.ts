@@ -1,4 +1,4 @@
-// What is drawn on each face: two textures, of which only the rows that change are uploaded.
+// What is drawn on each face: three textures, of which only the rows that change are uploaded.
 
 import { DataTexture, NearestFilter, RGBAFormat, RedFormat } from "three";
 
@@ -47,22 +47,31 @@ class Column {
 export class FaceTable {
   private readonly colors: Column;
   private readonly lights: Column;
+  /** The number of the object in 24 bits, and 255 if there is one. */
+  private readonly objects: Column;
   /** The faces of each light. */
   private readonly lit = new Map<Light, Uint32Array>();
 
   constructor(faces: number) {
     this.colors = new Column(faces, 4);
     this.lights = new Column(faces, 1);
+    this.objects = new Column(faces, 4);
   }
 
-  get textures(): { colors: DataTexture; lights: DataTexture } {
-    return { colors: this.colors.texture, lights: this.lights.texture };
+  get textures(): { colors: DataTexture; lights: DataTexture; objects: DataTexture } {
+    const { colors, lights, objects } = this;
+    return { colors: colors.texture, lights: lights.texture, objects: objects.texture };
   }
 
-  /** Gives a face a colour. */
-  color(face: number, [r, g, b]: readonly number[], kind: keyof typeof KINDS): void {
+  /** Gives a face a colour, and the number of its object, 0 without one. */
+  color(face: number, [r, g, b]: readonly number[], kind: keyof typeof KINDS, object: number): void {
     this.colors.bytes.set([r ?? 0, g ?? 0, b ?? 0, KINDS[kind]], 4 * face);
     this.colors.changed(face);
+    const { bytes } = this.objects;
+    const number = [object & 255, (object >> 8) & 255, (object >> 16) & 255, object > 0 ? 255 : 0];
+    if (number.every((byte, k) => bytes[4 * face + k] === byte)) return;
+    bytes.set(number, 4 * face);
+    this.objects.changed(face);
   }
 
   /** Lights up some faces, and no others in this light. */
@@ -103,5 +112,6 @@ export class FaceTable {
   flush(): void {
     this.colors.flush();
     this.lights.flush();
+    this.objects.flush();
   }
 }

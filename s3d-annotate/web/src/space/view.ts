@@ -7,6 +7,7 @@ import { type Hit, Surface } from "../../../../s3d-report/web/src/space/surface.
 import { type Mesh, groupsOf, partOf, stepOf } from "../mesh/mesh.js";
 import type { Frame, Place, Point, Scene } from "../scene.js";
 import { readImage } from "../server.js";
+import { Borders } from "./borders.js";
 import { LabelPaint, SHOWS, type Show } from "./paint.js";
 import { backdrop, readPhotograph } from "./photo.js";
 import type { FaceTable } from "./table.js";
@@ -24,6 +25,7 @@ export class View {
   readonly surface: Surface;
   private readonly renderer: WebGLRenderer;
   private readonly drawing = new Drawing();
+  private readonly borders: Borders;
   private readonly sky;
   private pending = false;
   private shown: Show = "both";
@@ -47,6 +49,7 @@ export class View {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.paint = new LabelPaint(scene, table);
+    this.borders = new Borders(table.textures.objects, this.paint.section, this.paint.ratio);
     this.surface = new Surface(this.paint);
     this.sky = backdrop(this.paint);
     this.drawing.add(this.sky, this.surface.group);
@@ -244,6 +247,7 @@ export class View {
     this.renderer.setPixelRatio(ratio);
     this.paint.ratio.value = ratio;
     this.renderer.setSize(width, height, false);
+    this.borders.resize(this.canvas.width, this.canvas.height);
     this.eye.resize(width, height, this.covered());
     this.paintNow();
   }
@@ -261,7 +265,15 @@ export class View {
   private paintNow(): void {
     const start = performance.now();
     this.table.flush();
-    this.renderer.render(this.drawing, this.eye.camera);
+    const { renderer, drawing, eye, borders } = this;
+    const isBordered = this.shown === "both" || this.shown === "labels";
+    if (isBordered) {
+      this.sky.visible = false;
+      borders.take(renderer, drawing, eye.camera);
+      this.sky.visible = this.photograph !== null;
+    }
+    renderer.render(drawing, eye.camera);
+    if (isBordered) borders.draw(renderer);
     this.longest = Math.max(this.longest, performance.now() - start);
     this.drawn();
   }

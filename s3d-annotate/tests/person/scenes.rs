@@ -7,7 +7,7 @@ use s3d_io::cloud::{AnnotationTree, read_points};
 use s3d_io::mesh::{UpAxis, read_mesh};
 use s3d_label::RoomType;
 use s3d_synth::{AnnotatedScene, Building, BuildingOptions, RoomOptions};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 /// A mesh, and what each of its faces is.
@@ -16,6 +16,8 @@ pub(crate) struct Known {
     pub(crate) mesh: TriMesh,
     /// The thing of each face, from 1; 0 for a face of which nothing is known.
     pub(crate) thing_of_face: Vec<u32>,
+    /// The other things of faces that lie over a border between things. Nobody can label such a face rightly.
+    pub(crate) also: BTreeMap<u32, Vec<u32>>,
     /// The class of each thing; that of 0 is empty.
     pub(crate) classes: Vec<String>,
 }
@@ -74,9 +76,21 @@ pub(crate) fn copy_room() -> Option<Known> {
             .max_by_key(|(thing, count)| (**count, u32::MAX - **thing))
             .map_or(0, |(thing, _)| *thing)
     };
-    let thing_of_face = votes.iter().map(most).collect();
+    let thing_of_face: Vec<u32> = votes.iter().map(most).collect();
+    let also = (0u32..).zip(&votes).filter_map(|(face, votes)| {
+        let most = thing_of_face[face as usize];
+        // One point in ten may be noise.
+        let least = votes.values().sum::<u32>().div_ceil(10);
+        let others = votes
+            .iter()
+            .filter(|(thing, count)| **thing != most && **count >= least);
+        let mut others: Vec<u32> = others.map(|(thing, _)| *thing).collect();
+        others.sort_unstable();
+        (!others.is_empty()).then_some((face, others))
+    });
+    let also = also.collect();
     drop(nearest);
-    Some(Known { name: "copyroom".to_owned(), mesh, thing_of_face, classes })
+    Some(Known { name: "copyroom".to_owned(), mesh, thing_of_face, also, classes })
 }
 
 impl Known {
@@ -86,6 +100,7 @@ impl Known {
             name: name.to_owned(),
             mesh: scene.mesh.clone(),
             thing_of_face: scene.instance_of_face.iter().map(|instance| instance + 1).collect(),
+            also: BTreeMap::new(),
             classes: std::iter::once(String::new()).chain(classes).collect(),
         }
     }
@@ -213,7 +228,6 @@ impl Known {
             }
         }
 
-        let mut middles: Vec<Vec3> = Vec::new();
         nearest.nearest_many(&positions, &mut found);
         let colors: Vec<[u8; 3]> = found
             .iter()
@@ -225,18 +239,37 @@ impl Known {
             .collect();
         let scanned = TriMesh::new(MeshParts { positions, faces, colors, ..MeshParts::default() })
             .expect("the surface of a mesh");
-        middles.extend(
-            (0..scanned.faces().len() as u32).map(|face| scanned.triangle(face).iter().sum::<Vec3>() / 3.0),
-        );
-        nearest.nearest_many(&middles, &mut found);
-        let thing_of_face = found
+        // What is nearest to the middle of a face, and to its corners.
+        let mut samples: Vec<Vec3> = Vec::new();
+        for face in 0..scanned.faces().len() as u32 {
+            let corners = scanned.triangle(face);
+            let middle = corners.iter().sum::<Vec3>() / 3.0;
+            samples.push(middle);
+            samples.extend(corners.map(|corner| middle.lerp(corner, 0.9)));
+        }
+        nearest.nearest_many(&samples, &mut found);
+        let things: Vec<u32> = found
             .iter()
             .map(|near| self.thing_of_face[near.face as usize])
             .collect();
+        let mut also = BTreeMap::new();
+        for (face, of_face) in (0u32..).zip(things.chunks_exact(4)) {
+            let mut others: Vec<u32> = of_face[1..]
+                .iter()
+                .copied()
+                .filter(|thing| *thing != of_face[0])
+                .collect();
+            others.sort_unstable();
+            others.dedup();
+            if !others.is_empty() {
+                also.insert(face, others);
+            }
+        }
         Self {
             name: format!("{}, scanned", self.name),
             mesh: scanned,
-            thing_of_face,
+            thing_of_face: things.chunks_exact(4).map(|of_face| of_face[0]).collect(),
+            also,
             classes: self.classes.clone(),
         }
     }

@@ -3,22 +3,26 @@
 //! Each gesture is one stroke. The person always makes the one that puts the largest area right, within what
 //! a hand can do:
 //!
-//! - A drag goes over at most [`MOST_PATCHES`] patches within [`REACH_M`] of the first. As on the page, it has
-//!   one level of the tree for all of them, and stays on faces of one instance or of none.
+//! - A drag goes over at most [`MOST_PATCHES`] patches within [`REACH_M`] of the first. As on the page, it
+//!   has one level of the tree for all of them. A new object takes faces of one instance or of none; Shift
+//!   adds faces of any other.
 //! - A box is a rectangle of four clicks around the largest side of a thing.
-//! - A brush is a straight swath with round ends, of one of three widths, over faces of one instance or none.
+//! - A cut by colour has one of three tolerances.
+//! - A brush is drawn over at most [`STROKE_M`] within [`REACH_M`] of its beginning, with one of three
+//!   widths. It takes faces as a drag does.
 //! - "More like it" labels all patches that the review proposes for a thing, with one stroke, and one more
 //!   for each patch that has to be taken out first.
 //! - The structure of a room is accepted with one stroke, as found by the crate itself. A proposal that is
 //!   not one thing stays wrong until it is put right by strokes. Pieces of one thing are joined by strokes.
 
-use super::person_scenes::Known;
-use super::person_sitting::Sitting;
-use s3d_annotate::labelling::FaceRuns;
+mod cuts;
+
+use super::scenes::Known;
+use super::sitting::Sitting;
 use s3d_annotate::review::{Review, Surroundings};
 use s3d_annotate::segments::{SegmentOptions, segment_faces};
 use s3d_annotate::structure::find_structure;
-use s3d_annotate::workbench::{Gesture, Knife, Patch, Proposal, Proposals, Selection, Workbench};
+use s3d_annotate::workbench::{Gesture, Patch, Proposal, Proposals, Selection, Workbench};
 use s3d_geom::glam::Vec3;
 use s3d_label::Taxonomy;
 use std::collections::{BTreeMap, HashMap};
@@ -34,12 +38,25 @@ const REACH_M: f32 = 3.0;
 /// The levels of the tree that the person tries: costs of nodes.
 const LEVELS: [f32; 14] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 4.5, 7.0];
 
-/// Half the widths of brushes, and the longest half of a swath, metres.
+/// Half the widths of brushes, metres.
 const BRUSHES_M: [f32; 3] = [0.04, 0.1, 0.25];
-const SWATH_M: f32 = 0.6;
+
+/// The longest stroke of a brush, and the longest way between what it is drawn over, metres.
+const STROKE_M: f32 = 6.0;
+const HOP_M: f32 = 0.5;
+
+/// The tolerances of cuts by colour.
+const TOLERANCES: [f32; 3] = [0.03, 0.06, 0.12];
 
 /// A box cuts within this of its plane, metres, as the workbench says.
 const BOX_M: f32 = 0.15;
+
+/// The edge of the cells in which faces are looked for, metres.
+const CELL_M: f32 = 0.25;
+
+fn cell(place: Vec3) -> [i32; 3] {
+    (place / CELL_M).floor().as_ivec3().to_array()
+}
 
 /// A gesture that the person could make.
 struct Idea {
@@ -74,6 +91,8 @@ struct Person<'a> {
     cuts: Vec<Vec<u32>>,
     /// A place on each segment.
     segment_middles: Vec<Vec3>,
+    /// The faces whose middles are in each cell of [`CELL_M`].
+    cells: HashMap<[i32; 3], Vec<u32>>,
     sitting: Sitting,
 }
 
@@ -81,7 +100,7 @@ struct Person<'a> {
 pub(crate) fn label(scene: &Known, folder: &Path, share: f64, most: usize) -> Sitting {
     let mut person = Person::new(scene, folder);
     person.accept_structure();
-    while person.right() < share && person.sitting.right.len() <= most {
+    while person.right()[0] < share && person.sitting.right.len() <= most {
         let Some(idea) = person.best_idea() else { break };
         person.perform(idea);
     }
@@ -93,10 +112,10 @@ impl<'a> Person<'a> {
     fn new(scene: &'a Known, folder: &Path) -> Self {
         let mesh = Arc::new(scene.mesh.clone());
         let segments = Arc::new(segment_faces(&mesh, &SegmentOptions::default()));
-        let surroundings = Surroundings::new(&mesh, &segments);
         let structure = find_structure(&mesh);
         let mut bench = Workbench::open(folder, Arc::clone(&mesh), Arc::clone(&segments), &Taxonomy::s3dis())
             .expect("a new folder");
+        let surroundings = Surroundings::new(&mesh, &segments, Arc::clone(bench.face_index()));
         let surfaces = structure.surfaces.into_iter().map(|surface| Proposal {
             class: surface.class.to_owned(),
             faces: surface.faces,
@@ -121,6 +140,10 @@ impl<'a> Person<'a> {
         for (face, segment) in segments.segment_of_face.iter().enumerate() {
             segment_middles[*segment as usize] = middles[face];
         }
+        let mut cells: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
+        for (face, middle) in (0u32..).zip(&middles) {
+            cells.entry(cell(*middle)).or_default().push(face);
+        }
         let mut person = Self {
             scene,
             bench,
@@ -131,15 +154,20 @@ impl<'a> Person<'a> {
             instance_of: vec![0; scene.classes.len()],
             cuts: LEVELS.iter().map(|cost| tree.nodes_at(*cost)).collect(),
             segment_middles,
+            cells,
             sitting: Sitting {
                 things: scene.things(),
                 right: vec![0.0],
+                either: vec![0.0],
+                mixed: 0.0,
                 kinds: BTreeMap::new(),
                 purity_before: 0.0,
                 purity_after: 0.0,
             },
         };
         person.sitting.purity_before = person.purity();
+        let mixed_m2: f64 = scene.also.keys().map(|face| person.areas[*face as usize]).sum();
+        person.sitting.mixed = mixed_m2 / total_m2;
         person
     }
 
@@ -151,15 +179,21 @@ impl<'a> Person<'a> {
         thing != 0 && instance != 0 && self.instance_of[thing as usize] == instance
     }
 
-    /// The share of the surface that has the right instance.
-    fn right(&self) -> f64 {
-        let of_face = self.of_face();
-        let is_right = |face: &usize| self.is_right(self.scene.thing_of_face[*face], of_face[*face]);
-        (0..of_face.len())
-            .filter(is_right)
-            .map(|face| self.areas[face])
-            .sum::<f64>()
-            / self.total_m2
+    /// The share of the surface that has the right instance; and the share if a face that lies over a border
+    /// is right with the instance of any of its things.
+    fn right(&self) -> [f64; 2] {
+        let (mut right_m2, mut either_m2) = (0.0, 0.0);
+        for (face, (&thing, &instance)) in (0u32..).zip(self.scene.thing_of_face.iter().zip(self.of_face())) {
+            let area_m2 = self.areas[face as usize];
+            let also = self.scene.also.get(&face).filter(|_| thing != 0);
+            if self.is_right(thing, instance) {
+                right_m2 += area_m2;
+                either_m2 += area_m2;
+            } else if also.is_some_and(|also| also.iter().any(|other| self.is_right(*other, instance))) {
+                either_m2 += area_m2;
+            }
+        }
+        [right_m2, either_m2].map(|area_m2| area_m2 / self.total_m2)
     }
 
     fn shares(&self) -> Shares {
@@ -212,8 +246,9 @@ impl<'a> Person<'a> {
         if idea.kind == "accept" {
             self.meet(first);
         }
-        let right = self.right();
+        let [right, either] = self.right();
         self.sitting.right.extend(vec![right; idea.strokes]);
+        self.sitting.either.extend(vec![either; idea.strokes]);
         *self.sitting.kinds.entry(idea.kind).or_default() += idea.strokes;
     }
 
@@ -260,6 +295,7 @@ impl<'a> Person<'a> {
         for (thing, _) in left.into_iter().take(8) {
             ideas.extend(self.boxes(thing));
             ideas.extend(self.swaths(thing));
+            ideas.extend(self.colors(thing));
         }
         ideas.extend(self.more_like());
         let best = ideas
@@ -270,6 +306,7 @@ impl<'a> Person<'a> {
 
     /// The drag over patches that gains most, at the level that is best for its thing.
     fn drag(&self, shares: &Shares) -> Option<Idea> {
+        // The drag of each thing: what it gains, and its nodes and instances.
         let mut best: BTreeMap<u32, (f64, Vec<(u32, u32)>)> = BTreeMap::new();
         for cut in &self.cuts {
             // What each patch of this level has: the area of each thing.
@@ -280,7 +317,7 @@ impl<'a> Person<'a> {
                     .or_default()
                     .push((*thing, *area));
             }
-            let mut drags: BTreeMap<(u32, u32), Vec<(f64, u32)>> = BTreeMap::new();
+            let mut drags: BTreeMap<(u32, Option<u32>), Vec<(f64, u32, u32)>> = BTreeMap::new();
             for ((node, instance), has) in patches {
                 let mut of_thing: BTreeMap<u32, f64> = BTreeMap::new();
                 has.iter()
@@ -297,22 +334,24 @@ impl<'a> Person<'a> {
                     // What is spoilt counts, and what is swallowed counts half.
                     let gain = area - right_m2 - 0.5 * (all_m2 - area - right_m2);
                     if gain > 0.0 {
-                        drags.entry((thing, instance)).or_default().push((gain, node));
+                        let stays_on = (self.instance_of[thing as usize] == 0).then_some(instance);
+                        let touched = drags.entry((thing, stays_on)).or_default();
+                        touched.push((gain, node, instance));
                     }
                 }
             }
-            for ((thing, instance), mut touched) in drags {
-                touched.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            for ((thing, _), mut touched) in drags {
+                touched.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
                 let place = |node: u32| {
                     let segments = self.bench.segments().tree.segments_of(node);
                     self.segment_middles[segments[0] as usize]
                 };
                 let first = place(touched[0].1);
-                touched.retain(|(_, node)| place(*node).distance(first) <= REACH_M);
+                touched.retain(|(_, node, _)| place(*node).distance(first) <= REACH_M);
                 touched.truncate(MOST_PATCHES);
-                let gain: f64 = touched.iter().map(|(gain, _)| gain).sum();
+                let gain: f64 = touched.iter().map(|(gain, ..)| gain).sum();
                 if best.get(&thing).is_none_or(|(before, _)| gain > *before) {
-                    let nodes = touched.iter().map(|(_, node)| (*node, instance));
+                    let nodes = touched.iter().map(|(_, node, instance)| (*node, *instance));
                     best.insert(thing, (gain, nodes.collect()));
                 }
             }
@@ -401,127 +440,6 @@ impl<'a> Person<'a> {
                 }
             })
             .sum()
-    }
-
-    /// A box around what is left of a thing that has no instance yet, on the plane of its largest face.
-    fn boxes(&self, thing: u32) -> Option<Idea> {
-        if self.instance_of[thing as usize] != 0 {
-            return None;
-        }
-        let left = self.left_of(thing);
-        let mesh = self.bench.mesh();
-        // The direction that most of it faces.
-        let mut toward: BTreeMap<[i32; 3], f64> = BTreeMap::new();
-        for face in &left {
-            let direction = (mesh.normal(*face) * 2.0).round().as_ivec3().to_array();
-            *toward.entry(direction).or_default() += self.areas[*face as usize];
-        }
-        let direction = toward.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
-        let side: Vec<u32> = left
-            .iter()
-            .copied()
-            .filter(|face| (mesh.normal(*face) * 2.0).round().as_ivec3().to_array() == direction)
-            .collect();
-        let normal = side
-            .iter()
-            .map(|face| mesh.normal(*face) * self.areas[*face as usize] as f32);
-        let normal = normal.sum::<Vec3>().try_normalize()?;
-        let across = if normal.z.abs() > 0.8 { Vec3::X } else { Vec3::Z };
-        let u = (across - normal * normal.dot(across)).normalize();
-        let v = normal.cross(u);
-        let project = |point: Vec3| [u.dot(point), v.dot(point), normal.dot(point)];
-        let (mut low, mut high, mut height, mut area) = ([f32::MAX; 2], [f32::MIN; 2], 0.0, 0.0);
-        for face in &side {
-            for corner in mesh.triangle(*face) {
-                let at = project(corner);
-                for i in 0..2 {
-                    low[i] = low[i].min(at[i]);
-                    high[i] = high[i].max(at[i]);
-                }
-            }
-            let weight = self.areas[*face as usize] as f32;
-            height += weight * project(self.middles[*face as usize])[2];
-            area += weight;
-        }
-        height /= area;
-
-        // The patch is that of the instance that has most of it, up to the root of the tree.
-        let of_face = self.of_face();
-        let mut of_instance: BTreeMap<u32, f64> = BTreeMap::new();
-        for face in &side {
-            *of_instance.entry(of_face[*face as usize]).or_default() += self.areas[*face as usize];
-        }
-        let instance = of_instance.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
-        let face = *side.iter().find(|face| of_face[**face as usize] == instance)?;
-        let segment = self.bench.segments().segment_of_face[face as usize];
-        let corner = |a: f32, b: f32| u * a + v * b + normal * height;
-        let [[a, b], [c, d]] = [low, high];
-        let corners = [corner(a, b), corner(c, b), corner(c, d), corner(a, d)];
-        let is_inside = |face: u32| {
-            let at = project(self.middles[face as usize]);
-            (0..2).all(|i| at[i] > low[i] && at[i] < high[i]) && (at[2] - height).abs() <= BOX_M
-        };
-        let segments = self.bench.segments();
-        let of_instance = (0..of_face.len() as u32).filter(|face| of_face[*face as usize] == instance);
-        let inside: Vec<u32> = of_instance.filter(|face| is_inside(*face)).collect();
-        let mut best: Option<Idea> = None;
-        for cut in &self.cuts {
-            let at = Patch { face, node: cut[segment as usize] };
-            let is_in_node =
-                |face: &u32| segments.tree.has(at.node, segments.segment_of_face[*face as usize]);
-            let gain_m2 = self.gain(thing, inside.iter().copied().filter(is_in_node));
-            if gain_m2 > best.as_ref().map_or(0.0, |idea| idea.gain_m2) {
-                let class = Some(self.scene.classes[thing as usize].clone());
-                let gesture = Gesture::Cut { at, by: Knife::Box { corners }, class };
-                best = Some(Idea { kind: "box", gesture, gain_m2, strokes: 1, makes: vec![thing] });
-            }
-        }
-        best
-    }
-
-    /// A swath of the brush over what is left of a thing.
-    fn swaths(&self, thing: u32) -> Option<Idea> {
-        let left = self.left_of(thing);
-        let largest = |a: &&u32, b: &&u32| self.areas[**a as usize].total_cmp(&self.areas[**b as usize]);
-        let seeds = [left.get(left.len() / 2), left.iter().max_by(largest), left.first()];
-        let of_face = self.of_face();
-        let mut best: Option<Idea> = None;
-        for &seed in seeds.into_iter().flatten() {
-            let center = self.middles[seed as usize];
-            let near: Vec<Vec3> = left
-                .iter()
-                .map(|face| self.middles[*face as usize])
-                .filter(|at| at.distance(center) < SWATH_M)
-                .collect();
-            let farthest = near
-                .iter()
-                .max_by(|a, b| a.distance(center).total_cmp(&b.distance(center)))?;
-            let opposite = near
-                .iter()
-                .max_by(|a, b| a.distance(*farthest).total_cmp(&b.distance(*farthest)))?;
-            let around: Vec<u32> = (0..of_face.len() as u32)
-                .filter(|face| of_face[*face as usize] == of_face[seed as usize])
-                .filter(|face| self.middles[*face as usize].distance(center) < 2.0 * SWATH_M)
-                .collect();
-            for ends in [[*farthest, *opposite], [center, center]] {
-                for radius_m in BRUSHES_M {
-                    let along = ends[1] - ends[0];
-                    let is_under = |face: &u32| {
-                        let at = self.middles[*face as usize];
-                        let t = along.dot(at - ends[0]) / along.length_squared().max(1e-12);
-                        at.distance(ends[0] + along * t.clamp(0.0, 1.0)) <= radius_m
-                    };
-                    let under: Vec<u32> = around.iter().copied().filter(is_under).collect();
-                    let gain_m2 = self.gain(thing, under.iter().copied());
-                    if gain_m2 > best.as_ref().map_or(0.0, |idea| idea.gain_m2) {
-                        let faces: FaceRuns = under.into_iter().collect();
-                        let what = Selection { faces, ..Selection::default() };
-                        best = Some(self.paint("brush", thing, what, gain_m2));
-                    }
-                }
-            }
-        }
-        best
     }
 
     /// "More like it" for a thing that is done.
