@@ -68,12 +68,12 @@ pub fn write_ply_mesh(path: &Path, mesh: &MeshOut<'_>) -> Result<u64> {
             }
             colors.next().map_or(Ok(()), |color| w.write_all(color))?;
         }
-        for (i, face) in mesh.faces.iter().enumerate() {
+        let mut columns: Vec<_> = mesh.columns.iter().map(|column| column.values.iter()).collect();
+        for face in mesh.faces {
             w.write_all(&[3])?;
             face.iter().try_for_each(|corner| w.write_all(&corner.to_le_bytes()))?;
-            mesh.columns
-                .iter()
-                .try_for_each(|column| w.write_all(&column.values[i].to_le_bytes()))?;
+            let mut numbers = columns.iter_mut().filter_map(Iterator::next);
+            numbers.try_for_each(|number| w.write_all(&number.to_le_bytes()))?;
         }
         Ok(())
     })
@@ -129,7 +129,7 @@ pub fn write_glb_mesh(path: &Path, mesh: &MeshOut<'_>) -> Result<u64> {
         }
         w.write_all(b"JSON")?;
         w.write_all(json.as_bytes())?;
-        w.write_all(&b"   "[..padded - json.len()])?;
+        w.write_all(" ".repeat(padded - json.len()).as_bytes())?;
         w.write_all(&bin_bytes?.to_le_bytes())?;
         w.write_all(b"BIN\0")?;
 
@@ -158,15 +158,18 @@ fn glb_json(mesh: &MeshOut<'_>) -> (String, usize) {
     let min = points().fold(Vec3::INFINITY, Vec3::min).to_array();
     let max = points().fold(Vec3::NEG_INFINITY, Vec3::max).to_array();
 
-    let mut attributes = serde_json::json!({ "POSITION": 0 });
+    let attributes = if mesh.colors.is_empty() {
+        serde_json::json!({ "POSITION": 0 })
+    } else {
+        serde_json::json!({ "POSITION": 0, "COLOR_0": 1 })
+    };
     let mut views = vec![serde_json::json!({ "buffer": 0, "byteLength": positions, "target": 34962 })];
     let mut accessors = vec![serde_json::json!({
         "bufferView": 0, "componentType": 5126, "count": vertices, "type": "VEC3", "min": min, "max": max
     })];
     if !mesh.colors.is_empty() {
-        attributes["COLOR_0"] = accessors.len().into();
         accessors.push(serde_json::json!({
-            "bufferView": views.len(), "componentType": 5123, "normalized": true, "count": vertices, "type": "VEC4"
+            "bufferView": 1, "componentType": 5123, "normalized": true, "count": vertices, "type": "VEC4"
         }));
         views.push(serde_json::json!({
             "buffer": 0, "byteOffset": positions, "byteLength": colors, "target": 34962
