@@ -90,8 +90,8 @@ pub enum FusionError {
         to: [i32; 3],
     },
     /// A measured point is too far from the origin of the world for cells of this size.
-    #[error("a point at ({}, {}, {}) is too far from the origin for cells of {cell_m} m: subtract an offset from \
-             poses and points", .point.x, .point.y, .point.z)]
+    #[error("a point at ({}, {}, {}) is too far from the origin for cells of {cell_m} m: subtract an offset \
+             from poses and points", .point.x, .point.y, .point.z)]
     TooFar {
         /// The point, in world metres.
         point: DVec3,

@@ -1,21 +1,23 @@
-//! Raw scans to meshes: depth pictures with poses, and laser scans whose scanner's place is known, are fused to a mesh
-//! with colours. Values in, values out: no files.
+//! Raw scans to meshes: depth pictures with poses, and laser scans whose scanner's place is known, are fused
+//! to a mesh with colours. Values in, values out: no files.
 //!
 //! # What was seen
 //!
-//! A [`RangeImage`] is what one sensor saw from one place: a pose, how pixels become rays, ranges, a [`SensorNoise`],
-//! and colours if there are any. It is made of
+//! A [`RangeImage`] is what one sensor saw from one place: a pose, how pixels become rays, ranges, a
+//! [`SensorNoise`], and colours if there are any. It is made of
 //!
 //! - a depth picture with its lens: [`RangeImage::from_depth`],
 //! - a laser scan with rows and columns: [`RangeImage::from_scan`],
 //! - points without a grid, but with the scanner's place: [`RangeImage::from_points`].
 //!
-//! Mobile scanners measure from another place with each ray: [`Fusion::add_rays`] takes an origin for each point.
+//! Mobile scanners measure from another place with each ray: [`Fusion::add_rays`] takes an origin for each
+//! point.
 //!
 //! # A grid of distances
 //!
-//! A [`Fusion`] gathers signed distances in voxels near surfaces, image by image. What a ray passes is free: who walked
-//! through a scan vanishes where as many images look through. Then [`Fusion::mesh`] finds the surface.
+//! A [`Fusion`] gathers signed distances in voxels near surfaces, image by image. What a ray passes is free:
+//! who walked through a scan vanishes where as many images look through. Then [`Fusion::mesh`] finds the
+//! surface.
 //!
 //! ```
 //! use s3d_fusion::{Fusion, FusionOptions, RangeImage, RangeKind, SensorNoise};
@@ -43,31 +45,34 @@
 //!
 //! # More than fits into memory
 //!
-//! A grid can be limited to a [`Tile`]: a box of blocks. A caller goes over tiles, adds to each the images that see it,
-//! keeps its [`Surface`], and joins all of them. The mesh is the same as without tiles.
+//! A grid can be limited to a [`Tile`]: a box of blocks. A caller goes over tiles, adds to each the images
+//! that see it, keeps its [`Surface`], and joins all of them. The mesh is the same as without tiles.
 //!
 //! # How it works
 //!
-//! **Planes.** A plane is fitted to each pixel by its neighbours on the same surface. The distance of a voxel is that to
-//! the plane, not that along the ray, so planes come out exactly at any angle. Pixels between a surface and another one
-//! behind it are dropped, and so are pixels without neighbours: a beam that hits an edge measures a mixture.
+//! **Planes.** A plane is fitted to each pixel by its neighbours on the same surface. The distance of a voxel
+//! is that to the plane, not that along the ray, so planes come out exactly at any angle. Pixels between a
+//! surface and another one behind it are dropped, and so are pixels without neighbours: a beam that hits an
+//! edge measures a mixture.
 //!
-//! **Weights.** An observation weighs by the inverse square of its noise, by the cosine at which the ray meets the
-//! surface, and less far from the hit: the nearest surface decides in corners. Distances are gathered up to
-//! [`FusionOptions::truncation_cells`] before a surface, and two cells and two sigma behind it. So a board of three
-//! cells keeps both sides.
+//! **Weights.** An observation weighs by the inverse square of its noise, by the cosine at which the ray
+//! meets the surface, and less far from the hit: the nearest surface decides in corners. Distances are
+//! gathered up to [`FusionOptions::truncation_cells`] before a surface, and two cells and two sigma behind
+//! it. So a board of three cells keeps both sides.
 //!
-//! **Free space.** A voxel behind a surface is given up if as many images saw through it, the pixels around included, as
-//! saw it. Images also count what they see through block by block, where no voxels exist yet: a person is removed also
-//! if the empty room was seen before.
+//! **Free space.** A voxel behind a surface is given up if as many images saw through it, the pixels around
+//! included, as saw it. Images also count what they see through block by block, where no voxels exist yet. So
+//! a person is removed also if the empty room was seen before. Near what is behind (within about three
+//! blocks, as feet are near the floor), the images that are added after the person count alone.
 //!
 //! **Mesh.** Marching cubes, over cells whose corners were all seen, and one of them just before the surface.
 //!
-//! **Memory.** A voxel takes 6 bytes, and 3 more with colours; a block of 8 × 8 × 8 has a directory entry of 6 bytes
-//! besides. The same images in the same order give the same bytes, for any number of threads and tiles.
+//! **Memory.** A voxel takes 6 bytes, and 3 more with colours. The directory adds 0.05 bytes a voxel. The
+//! same images in the same order give the same bytes, for any number of threads and tiles.
 //!
-//! The method is that of Curless and Levoy 1996, "A Volumetric Method for Building Complex Models from Range Images", on
-//! the sparse blocks of Nießner and others 2013, "Real-time 3D Reconstruction at Scale using Voxel Hashing".
+//! The method is that of Curless and Levoy 1996, "A Volumetric Method for Building Complex Models from Range
+//! Images", on the sparse blocks of Nießner and others 2013, "Real-time 3D Reconstruction at Scale using
+//! Voxel Hashing".
 
 // Only a caller's mistake panics, and a section "Panics" names it. Loops take their indices from checked
 // columns.

@@ -2,8 +2,8 @@
 
 use crate::FusionError;
 
-/// The noise of a sensor's ranges: sigma = `constant_m` + `per_m`·r + `per_m2`·r² at the range r, for a surface
-/// that the ray meets at a right angle.
+/// The noise of a sensor's ranges: sigma = `constant_m` + `per_m`·r + `per_m2`·r² at the range r, for a
+/// surface that the ray meets at a right angle.
 ///
 /// ```
 /// use s3d_fusion::SensorNoise;
@@ -26,8 +26,8 @@ impl SensorNoise {
     /// A terrestrial laser scanner: 1.5 mm, and 0.1 mm more each metre. Makers state 1 to 3 mm at 10 m.
     pub const LASER: Self = Self { constant_m: 0.0015, per_m: 0.0001, per_m2: 0.0 };
 
-    /// A depth camera with structured light: 1 mm near, 5 mm at 2 m, 17 mm at 4 m. Source: the order of the figures
-    /// of Khoshelham and Elberink 2012, "Accuracy and Resolution of Kinect Depth Data".
+    /// A depth camera with structured light: 1 mm near, 5 mm at 2 m, 17 mm at 4 m. Source: the order of the
+    /// figures of Khoshelham and Elberink 2012, "Accuracy and Resolution of Kinect Depth Data".
     pub const STRUCTURED_LIGHT: Self = Self { constant_m: 0.001, per_m: 0.0, per_m2: 0.001 };
 
     /// Returns the standard deviation of a range of `range_m`, metres.

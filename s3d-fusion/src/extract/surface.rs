@@ -58,8 +58,8 @@ impl Surface {
         Self::of_parts(cell_m, parts)
     }
 
-    /// Joins the surfaces of the tiles of a grid. The order of tiles does not matter, and the result is the surface of
-    /// a grid without tiles.
+    /// Joins the surfaces of the tiles of a grid. The order of tiles does not matter, and the result is the
+    /// surface of a grid without tiles.
     ///
     /// # Errors
     /// [`FusionError::OtherCells`]; [`FusionError::NoSurface`] without tiles.
@@ -107,8 +107,8 @@ impl Surface {
         Self { cell_m, vertices, faces }
     }
 
-    /// Returns the mesh without pieces of less surface than `least_piece_m2`. A piece is what hangs together by edges
-    /// and vertices.
+    /// Returns the mesh without pieces of less surface than `least_piece_m2`. A piece is what hangs together
+    /// by edges and vertices.
     ///
     /// # Errors
     /// [`FusionError::NoSurface`] if nothing is left.
@@ -190,9 +190,9 @@ impl<'a> Samples<'a> {
         part
     }
 
-    /// Returns the corners behind the surface, as bits, if the surface crosses the cell and all is known: each corner
-    /// was seen, and one at least was seen just before a surface. Where rays only passed beside a surface, its end is
-    /// not known.
+    /// Returns the corners behind the surface, as bits, if the surface crosses the cell and all is known:
+    /// each corner was seen, and one at least was seen just before a surface. Where rays only passed beside a
+    /// surface, its end is not known.
     fn behind(&self, corners: [usize; 8]) -> Option<u8> {
         let mut behind = 0;
         let mut is_before = false;

@@ -1,10 +1,11 @@
 //! Which triangles part the corners of a cell: the cases of marching cubes, made by rule.
 //!
-//! Each side of a cell joins the edges that the surface crosses by lines, seen from the corners of that side alone. So
-//! both cells of a side draw the same lines, and the surface has no cracks. Where two opposite corners of a side are in
-//! front, each is cut off, and what is behind stays in one piece. The lines of all sides close to loops, and loops are
-//! cut into triangles whose new edges do not lie in a side of the cell, so an edge has two faces. Source: the rule of
-//! Montani, Scateni and Scopigno 1994, "A modified look-up table for implicit disambiguation of Marching Cubes".
+//! Each side of a cell joins the edges that the surface crosses by lines, seen from the corners of that side
+//! alone. So both cells of a side draw the same lines, and the surface has no cracks. Where two opposite
+//! corners of a side are in front, each is cut off, and what is behind stays in one piece. The lines of all
+//! sides close to loops, and loops are cut into triangles whose new edges do not lie in a side of the cell,
+//! so an edge has two faces. Source: the rule of Montani, Scateni and Scopigno 1994, "A modified look-up
+//! table for implicit disambiguation of Marching Cubes".
 
 use std::sync::LazyLock;
 

@@ -43,7 +43,8 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Whether the grid of a tile needs a block: it is in the tile, or its voxels are corners of cells of the tile.
+    /// Whether the grid of a tile needs a block: it is in the tile, or its voxels are corners of cells of the
+    /// tile.
     fn holds(&self, block: Place) -> bool {
         (0..3).all(|k| (self.from[k]..=self.to[k]).contains(&block[k]))
     }
@@ -70,42 +71,43 @@ impl Scale {
         is_near.then(|| walk::floor(place))
     }
 
-    /// How far behind a surface its distance is gathered. The corners of a cell that the surface crosses are at most √3
-    /// cells behind it, and noise must not make a side.
+    /// How far behind a surface its distance is gathered. The corners of a cell that the surface crosses are
+    /// at most √3 cells behind it, and noise must not make a side.
     fn behind(&self, sigma_m: f32) -> f32 {
         (2.0 * self.cell as f32 + 2.0 * sigma_m).min(self.front as f32)
     }
 
-    /// How far before a hit, along the ray, distances are gathered at most. A ray that meets a plane aslant is near it
-    /// for long.
+    /// How far before a hit, along the ray, distances are gathered at most. A ray that meets a plane aslant
+    /// is near it for long.
     fn most_before(&self) -> f64 {
         2.0 * self.front
     }
 
-    /// How far behind a hit, along the ray, distances are gathered at most. A ray that meets a body aslant soon leaves
-    /// it again.
+    /// How far behind a hit, along the ray, distances are gathered at most. A ray that meets a body aslant
+    /// soon leaves it again.
     fn most_behind(&self, sigma_m: f32) -> f32 {
         3.0 * self.behind(sigma_m)
     }
 
-    /// How far before and behind a hit, along its ray, distances are gathered if the ray meets the surface at this
-    /// cosine.
+    /// How far before and behind a hit, along its ray, distances are gathered if the ray meets the surface at
+    /// this cosine.
     fn along_ray(&self, cosine: f32, sigma_m: f32) -> [f64; 2] {
         let cosine = f64::from(cosine);
         let behind = f64::from(self.behind(sigma_m)) / cosine;
         [(self.front / cosine).min(self.most_before()), behind.min(self.most_behind(sigma_m).into())]
     }
 
-    /// The weight of a ray by its noise and the angle at which it meets the surface: 1 for a millimetre at a right angle.
+    /// The weight of a ray by its noise and the angle at which it meets the surface: 1 for a millimetre at a
+    /// right angle.
     fn weight_of(sigma_m: f32, cosine: f32) -> f32 {
         cosine * (0.001 / sigma_m) * (0.001 / sigma_m)
     }
 
-    /// The weight of a distance to the plane of a hit; `None` if it counts nothing. `before` is how far before the hit
-    /// the voxel is along its ray.
+    /// The weight of a distance to the plane of a hit; `None` if it counts nothing. `before` is how far
+    /// before the hit the voxel is along its ray.
     ///
-    /// Near the hit it is 1. It falls with the distance from the hit, so the nearest surface decides in corners, and it
-    /// ends behind the surface, so both sides of thin things stay apart.
+    /// Near the hit it is 1. It falls with the distance from the hit, so the nearest surface decides in
+    /// corners, and it ends behind the surface, so both sides of thin things stay apart.
     #[inline(always)]
     fn weight(&self, distance: f32, before: f32, sigma_m: f32) -> Option<f32> {
         let cell = self.cell as f32;
@@ -151,7 +153,8 @@ impl Fusion {
         Ok(Self { options, scale, tile: None, grid: Grid::default(), added: 0 })
     }
 
-    /// Makes an empty grid that is limited to a box of blocks. [`Surface::join`] makes one surface of many tiles.
+    /// Makes an empty grid that is limited to a box of blocks. [`Surface::join`] makes one surface of many
+    /// tiles.
     ///
     /// # Errors
     /// [`FusionError::Option`], [`FusionError::Tile`].
@@ -174,8 +177,8 @@ impl Fusion {
         adding.add_to(&mut self.grid)
     }
 
-    /// Adds rays with an origin each, as mobile scanners measure them, in world metres. `colors` is empty or has one
-    /// entry a point.
+    /// Adds rays with an origin each, as mobile scanners measure them, in world metres. `colors` is empty or
+    /// has one entry a point.
     ///
     /// # Errors
     /// [`FusionError::Count`], [`FusionError::Noise`], [`FusionError::TooFar`].

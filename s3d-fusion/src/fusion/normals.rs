@@ -6,8 +6,8 @@ use s3d_geom::glam::{DMat3, DVec3, Vec3};
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 
-/// The normals of small cubes of points. Points that were seen from different sides are kept apart, so that both sides
-/// of a thin board have a normal.
+/// The normals of small cubes of points. Points that were seen from different sides are kept apart, so that
+/// both sides of a thin board have a normal.
 pub(super) struct Normals {
     cube_m: f64,
     normals: HashMap<u64, DVec3, BuildHasherDefault<Mix>>,
@@ -68,7 +68,8 @@ impl Normals {
         Self { cube_m, normals: normals.into_iter().collect() }
     }
 
-    /// Returns the normal of a point, towards where its ray came from. Without enough points around, it is the ray.
+    /// Returns the normal of a point, towards where its ray came from. Without enough points around, it is
+    /// the ray.
     pub(super) fn at(&self, point: DVec3, along: DVec3) -> DVec3 {
         let normal = self.normals.get(&key(cube_of(point, self.cube_m), side_of(along)));
         let normal = normal.copied().unwrap_or(-along);

@@ -11,7 +11,8 @@ pub(crate) struct Pyramid {
 struct Level {
     width: usize,
     height: usize,
-    /// The nearest range around all pixels of the square, 0 if one is missing; the largest range, 0 if all are.
+    /// The nearest range around all pixels of the square, 0 if one is missing; the largest range, 0 if all
+    /// are.
     ranges: Vec<[f32; 2]>,
 }
 
@@ -46,7 +47,8 @@ impl Pyramid {
         Self { levels }
     }
 
-    /// Returns a lower bound of the nearest range of the pixels, 0 if one is missing, and an upper bound of the largest.
+    /// Returns a lower bound of the nearest range of the pixels, 0 if one is missing, and an upper bound of
+    /// the largest.
     pub(crate) fn ranges(&self, extent: &Extent) -> [f32; 2] {
         let size = [0, 1].map(|k| extent.to[k] - extent.from[k]);
         let larger = size[0].max(size[1]) >> FIRST;

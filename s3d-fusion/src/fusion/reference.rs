@@ -69,7 +69,8 @@ fn the_sparse_grid_is_the_dense_one() {
         for i in 0..VOXELS {
             let expected = plain.voxel(i, 0);
             match sparse {
-                // Blocks are made when a ray comes near: what earlier images saw of them from afar is not kept.
+                // Blocks are made when a ray comes near: what earlier images saw of them from afar is not
+                // kept.
                 Some((block, free)) => match (block.voxel(i, free), expected) {
                     (Voxel::Distance(a), Voxel::Distance(b)) => {
                         assert!((a - b).abs() < 0.2, "{place:?} {i}: {a} {b}");

@@ -54,8 +54,8 @@ impl<'a> View<'a> {
         Self { location: pose.location, turn: pose.opencv_from_world(), size, projection }
     }
 
-    /// Returns the pixels and the ranges of points in the axes of the sensor; `u32::MAX` for points outside of the
-    /// image.
+    /// Returns the pixels and the ranges of points in the axes of the sensor; `u32::MAX` for points outside
+    /// of the image.
     #[inline]
     pub(crate) fn pixels(&self, points: &[[f32; 8]; 3]) -> ([u32; 8], [f32; 8]) {
         let [x, y, z] = points;
@@ -176,7 +176,8 @@ impl<'a> View<'a> {
         Some([[0, 1].map(|k| bounds[0][k] - more(k)), [0, 1].map(|k| bounds[1][k] + more(k))])
     }
 
-    /// Returns the columns and rows of the angles that a ball takes, or `None` if they are not one range of each.
+    /// Returns the columns and rows of the angles that a ball takes, or `None` if they are not one range of
+    /// each.
     fn angle_bounds(&self, grid: &AngleGrid, at: DVec3, radius: f64) -> Option<[[f64; 2]; 2]> {
         let [azimuth, elevation] = angles_of(at);
         let half = libm::asin(radius / at.length());

@@ -12,8 +12,8 @@ pub(super) fn floor(point: DVec3) -> Place {
     })
 }
 
-/// Calls `visit` with each unit cube that a segment crosses, from its start to its end. Source: Amanatides and Woo 1987,
-/// "A Fast Voxel Traversal Algorithm for Ray Tracing".
+/// Calls `visit` with each unit cube that a segment crosses, from its start to its end. Source: Amanatides
+/// and Woo 1987, "A Fast Voxel Traversal Algorithm for Ray Tracing".
 pub(super) fn blocks_along([start, end]: [DVec3; 2], mut visit: impl FnMut(Place)) {
     let mut at = floor(start);
     let last = floor(end);
@@ -45,9 +45,9 @@ pub(super) fn blocks_along([start, end]: [DVec3; 2], mut visit: impl FnMut(Place
     }
 }
 
-/// Calls `visit` with the voxels beside a segment, slice by slice along its main axis, as far as the slices are in a
-/// block that starts at `first`. With `around` = 0 it is the nearest voxel of each slice, with the share 1. With 1 they
-/// are the four around the segment, with shares that add up to 1.
+/// Calls `visit` with the voxels beside a segment, slice by slice along its main axis, as far as the slices
+/// are in a block that starts at `first`. With `around` = 0 it is the nearest voxel of each slice, with the
+/// share 1. With 1 they are the four around the segment, with shares that add up to 1.
 pub(super) fn slices_along(
     [start, end]: [DVec3; 2],
     first: Place,

@@ -5,11 +5,11 @@ use super::VOXELS;
 /// The voxels of a block as columns. Voxel (i, j, k) is at (k·8 + j)·8 + i.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
-    /// The mean signed distance as a share of the truncation, ±32767. [`PASSED`] in voxels of no weight that a ray
-    /// passed.
+    /// The mean signed distance as a share of the truncation, ±32767. [`PASSED`] in voxels of no weight that
+    /// a ray passed.
     distance: [i16; VOXELS],
-    /// The sum of weights: the upper half of a 32-bit float. Observations of the same weight count up to the 256th, and
-    /// later ones replace older ones.
+    /// The sum of weights: the upper half of a 32-bit float. Observations of the same weight count up to the
+    /// 256th, and later ones replace older ones.
     weight: [u16; VOXELS],
     /// How many images saw the voxel at or behind a surface, less those that saw through it.
     votes: [i16; VOXELS],
@@ -63,7 +63,8 @@ impl Block {
         self.colors.as_ref().map(|c| c[i]).filter(|c| *c != NO_COLOR)
     }
 
-    /// Notes that a ray passed a voxel. `is_far`: far before all that it hit. `counts`: certainly, also beside the ray.
+    /// Notes that a ray passed a voxel. `is_far`: far before all that it hit. `counts`: certainly, also
+    /// beside the ray.
     #[inline]
     pub(crate) fn pass(&mut self, i: usize, is_far: bool, counts: bool) {
         if is_far && self.weight[i] == 0 {
@@ -74,8 +75,8 @@ impl Block {
         }
     }
 
-    /// Adds a distance, as a share of the truncation, to the mean of a voxel. `is_at`: the voxel is at the surface or
-    /// behind it. Returns the share that the distance has in the mean.
+    /// Adds a distance, as a share of the truncation, to the mean of a voxel. `is_at`: the voxel is at the
+    /// surface or behind it. Returns the share that the distance has in the mean.
     #[inline]
     pub(crate) fn observe(&mut self, i: usize, distance: f32, weight: f32, is_at: bool) -> f32 {
         let old = f32::from_bits(u32::from(self.weight[i]) << 16);
@@ -91,8 +92,8 @@ impl Block {
         share
     }
 
-    /// Moves the colour of a voxel by a share towards another one. `chance`, from 0 to 1, decides how parts of a level
-    /// are rounded, so that small shares add up.
+    /// Moves the colour of a voxel by a share towards another one. `chance`, from 0 to 1, decides how parts
+    /// of a level are rounded, so that small shares add up.
     #[inline]
     pub(crate) fn mix_color(&mut self, i: usize, color: [u8; 3], share: f32, chance: f32) {
         let colors = self.colors.get_or_insert_with(|| Box::new([NO_COLOR; VOXELS]));

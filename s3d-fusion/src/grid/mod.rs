@@ -1,7 +1,7 @@
 //! A sparse grid of blocks of 8 × 8 × 8 voxels, in chunks of 4 × 4 × 4 blocks.
 //!
-//! A chunk is the directory of its blocks, and counts the images that saw through a block, whether it exists or not. So
-//! what was empty before somebody walked in is known.
+//! A chunk is the directory of its blocks, and counts the images that saw through a block, whether it exists
+//! or not. So what was empty before somebody walked in is known.
 
 pub(crate) mod block;
 

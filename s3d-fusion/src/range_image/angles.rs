@@ -3,8 +3,8 @@
 use s3d_geom::glam::{DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// A grid of directions in OpenCV's axes (x right, y down, z forward). Azimuths are angles to the right of z, and
-/// elevations are angles downwards from the horizon.
+/// A grid of directions in OpenCV's axes (x right, y down, z forward). Azimuths are angles to the right of z,
+/// and elevations are angles downwards from the horizon.
 #[derive(Clone, Debug)]
 pub(crate) struct AngleGrid {
     /// The azimuth of each column, radians, and what finds the column of an azimuth.
@@ -29,7 +29,8 @@ const NONE: u32 = u32::MAX;
 const BINS: f64 = 8.0;
 /// Most bins of an axis.
 const MOST_BINS: f64 = 1e6;
-/// How far from its column's or row's angle a point of a scan on a grid may be, in steps, for nine of ten points.
+/// How far from its column's or row's angle a point of a scan on a grid may be, in steps, for nine of ten
+/// points.
 const MOST_OFF: f64 = 0.75;
 
 impl AngleGrid {
@@ -44,8 +45,8 @@ impl AngleGrid {
         }
     }
 
-    /// Returns the grid of a scan with columns and rows of points about the scanner, row by row, NaN where nothing was
-    /// measured. Returns `None` if the columns or rows do not have one angle each.
+    /// Returns the grid of a scan with columns and rows of points about the scanner, row by row, NaN where
+    /// nothing was measured. Returns `None` if the columns or rows do not have one angle each.
     pub(crate) fn of_scan([columns, rows]: [u32; 2], points: &[DVec3]) -> Option<Self> {
         let mut along = vec![DVec2::ZERO; columns as usize];
         let mut down = vec![DVec2::ZERO; rows as usize];
@@ -65,7 +66,8 @@ impl AngleGrid {
         grid.holds(points).then_some(grid)
     }
 
-    /// Returns true if nine of ten points, of some thousands, are in the column and row that they are said to be in.
+    /// Returns true if nine of ten points, of some thousands, are in the column and row that they are said to
+    /// be in.
     fn holds(&self, points: &[DVec3]) -> bool {
         let width = self.columns.angles_rad.len();
         let stride = (points.len() / 20_000).max(1) | 1;
@@ -187,8 +189,9 @@ impl Axis {
         Self { angles_rad, step_rad, bins, first_rad: from }
     }
 
-    /// Makes an axis whose angles are the directions of sums of vectors. Sums that are zero get an angle between their
-    /// neighbours' angles. Returns `None` if fewer than two are known, or neighbours do not differ by about one step.
+    /// Makes an axis whose angles are the directions of sums of vectors. Sums that are zero get an angle
+    /// between their neighbours' angles. Returns `None` if fewer than two are known, or neighbours do not
+    /// differ by about one step.
     fn of_sums(sums: &[DVec2], span: [f64; 2]) -> Option<Self> {
         let known = sums.iter().enumerate().filter(|(_, v)| **v != DVec2::ZERO);
         let known: Vec<(usize, f64)> = known.map(|(i, v)| (i, libm::atan2(v.y, v.x))).collect();

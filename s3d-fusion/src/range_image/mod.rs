@@ -53,7 +53,8 @@ impl RangeImage {
     ///
     /// # Errors
     /// [`FusionError::Size`] if the lens has another size, [`FusionError::NothingMeasured`],
-    /// [`FusionError::NegativeRange`], [`FusionError::NotMetres`], [`FusionError::Pose`], [`FusionError::Noise`].
+    /// [`FusionError::NegativeRange`], [`FusionError::NotMetres`], [`FusionError::Pose`],
+    /// [`FusionError::Noise`].
     pub fn from_depth(
         pose: Pose,
         lens: PhotoLens,
@@ -79,14 +80,16 @@ impl RangeImage {
         Self::checked(pose, Directions::Lens(lens), ranges, Vec::new(), noise)
     }
 
-    /// Makes an image from a laser scan on a grid: `columns` × `rows` points in world metres, row by row, NaN where
-    /// nothing was measured. A column has one azimuth about the upright axis of `pose`, and a row one elevation.
+    /// Makes an image from a laser scan on a grid: `columns` × `rows` points in world metres, row by row,
+    /// NaN where nothing was measured. A column has one azimuth about the upright axis of `pose`, and a row
+    /// one elevation.
     ///
     /// Scans whose columns or rows do not have one angle are taken as points without a grid
     /// ([`RangeImage::from_points`]).
     ///
     /// # Errors
-    /// Those of [`RangeImage::from_points`]; [`FusionError::Size`] if there are not `columns` × `rows` points.
+    /// Those of [`RangeImage::from_points`]; [`FusionError::Size`] if there are not `columns` × `rows`
+    /// points.
     pub fn from_scan(
         pose: Pose,
         [columns, rows]: [u32; 2],
@@ -115,13 +118,14 @@ impl RangeImage {
         Ok(Self { colors: colors.to_vec(), ..image })
     }
 
-    /// Makes an image from points without a grid, in world metres, that a scanner at the place of `pose` measured. They
-    /// are sorted into a grid of angles about the upright axis of `pose`, at the scan's own angular resolution. Where
-    /// several points come to a pixel, the nearest stays. `colors` is empty or has one entry a point.
+    /// Makes an image from points without a grid, in world metres, that a scanner at the place of `pose`
+    /// measured. They are sorted into a grid of angles about the upright axis of `pose`, at the scan's own
+    /// angular resolution. Where several points come to a pixel, the nearest stays. `colors` is empty or has
+    /// one entry a point.
     ///
     /// # Errors
-    /// [`FusionError::Count`], [`FusionError::NothingMeasured`], [`FusionError::NotMetres`], [`FusionError::Pose`],
-    /// [`FusionError::Noise`].
+    /// [`FusionError::Count`], [`FusionError::NothingMeasured`], [`FusionError::NotMetres`],
+    /// [`FusionError::Pose`], [`FusionError::Noise`].
     pub fn from_points(
         pose: Pose,
         points: &[Vec3],
@@ -203,7 +207,8 @@ impl RangeImage {
         &self.directions
     }
 
-    /// Returns the ray of the middle of a pixel, in OpenCV's axes of the sensor: it is as long as one metre of range.
+    /// Returns the ray of the middle of a pixel, in OpenCV's axes of the sensor: it is as long as one metre
+    /// of range.
     #[inline]
     pub(crate) fn ray_of(&self, pixel: usize) -> Vec3 {
         let width = self.width() as usize;
@@ -238,8 +243,8 @@ impl RangeImage {
         self.ranges.height()
     }
 
-    /// Returns the ranges in metres: z-depths if the image has a lens, distances if it is a laser scan. NaN where
-    /// nothing was measured.
+    /// Returns the ranges in metres: z-depths if the image has a lens, distances if it is a laser scan. NaN
+    /// where nothing was measured.
     pub fn ranges(&self) -> &Raster<f32> {
         &self.ranges
     }

@@ -26,13 +26,14 @@ pub(crate) fn local(pose: &Pose, points: &[Vec3]) -> Vec<DVec3> {
         .collect()
 }
 
-/// The side of a pixel is this many times the distance of neighbouring points, so that most pixels have a point.
+/// The side of a pixel is this many times the distance of neighbouring points, so that most pixels have a
+/// point.
 const PIXEL_PER_SPACING: f64 = 1.2;
 /// Points of a patch of directions by which the density of points is measured.
 const POINTS_PER_PATCH: f64 = 64.0;
 
-/// Sorts points about the scanner into a grid of directions as fine as the points are dense. Returns `None` if no point
-/// is finite.
+/// Sorts points about the scanner into a grid of directions as fine as the points are dense. Returns `None`
+/// if no point is finite.
 pub(crate) fn binned(points: &[DVec3]) -> Option<Binned> {
     let angles: Vec<Option<[f64; 2]>> = points
         .par_iter()
@@ -78,7 +79,8 @@ pub(crate) fn binned(points: &[DVec3]) -> Option<Binned> {
     Some(Binned { grid, ranges, offsets, point_of_pixel })
 }
 
-/// Returns the angle between neighbouring points: the inverse root of the median density, over patches of equal size.
+/// Returns the angle between neighbouring points: the inverse root of the median density, over patches of
+/// equal size.
 fn spacing_rad(angles: &[Option<[f64; 2]>], measured: usize) -> f64 {
     let side = (4.0 * PI * POINTS_PER_PATCH / measured as f64).sqrt().clamp(0.002, 0.5);
     let rows = (PI / side).ceil();

@@ -1,14 +1,16 @@
 //! A plane for each pixel, fitted to the pixels around it that lie on the same surface.
 //!
-//! In gnomonic coordinates (u, v) about any axis, the inverse of the depth along that axis is a linear function on a
-//! plane: q = a + b·u + c·v. So a fit of three numbers is exact on planes at any angle, for lenses and for grids of
-//! angles alike. The axis is the optical axis of a lens, and the ray of the pixel in a grid of angles.
+//! In gnomonic coordinates (u, v) about any axis, the inverse of the depth along that axis is a linear
+//! function on a plane: q = a + b·u + c·v. So a fit of three numbers is exact on planes at any angle, for
+//! lenses and for grids of angles alike. The axis is the optical axis of a lens, and the ray of the pixel in
+//! a grid of angles.
 
 use super::{Directions, RangeImage};
 use rayon::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3};
 
-/// The plane that a pixel sees, in OpenCV's axes of the sensor: a point x is normal·x + offset in front of it.
+/// The plane that a pixel sees, in OpenCV's axes of the sensor: a point x is normal·x + offset in front of
+/// it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surfel {
     pub(crate) normal: Vec3,
@@ -40,8 +42,8 @@ const LEAST_COSINE: f32 = 0.05;
 const UNIT_SIGMA_M: f32 = 0.001;
 
 impl RangeImage {
-    /// Fits a plane to each pixel. `cell_m` is the size of what can be told apart later: windows are not larger without
-    /// need.
+    /// Fits a plane to each pixel. `cell_m` is the size of what can be told apart later: windows are not
+    /// larger without need.
     pub(crate) fn surfels(&self, cell_m: f32) -> Vec<Surfel> {
         let width = self.width() as usize;
         let mut surfels = vec![Surfel::NONE; self.ranges.len()];
@@ -150,7 +152,8 @@ impl Frame for Round {
     }
 }
 
-/// Some rows of an image, with rows and columns around them: NaN outside of the image, and where nothing was measured.
+/// Some rows of an image, with rows and columns around them: NaN outside of the image, and where nothing was
+/// measured.
 struct Band<'a> {
     image: &'a RangeImage,
     width: usize,
@@ -228,7 +231,8 @@ impl<'a> Band<'a> {
         load(&self.ranges, at.wrapping_add_signed(step))
     }
 
-    /// Returns 1 for pixels that are neither alone nor between a surface and another one behind it, or else NaN.
+    /// Returns 1 for pixels that are neither alone nor between a surface and another one behind it, or else
+    /// NaN.
     fn taken(&self, at: usize) -> Lanes {
         let range = self.range(at, [0, 0], 0);
         let noise = self.image.noise;
@@ -248,7 +252,8 @@ impl<'a> Band<'a> {
             }
         }
 
-        // A mixed pixel is far behind one neighbour and far before the opposite one, and these go on less steeply.
+        // A mixed pixel is far behind one neighbour and far before the opposite one, and these go on less
+        // steeply.
         let mut mixed = [0.0_f32; LANES];
         for step in [[1, 0], [0, 1], [1, 1], [1, -1]] {
             let [a2, a, b, b2] = [-2, -1, 1, 2].map(|k| self.range(at, step, k));
@@ -298,7 +303,8 @@ impl<'a> Band<'a> {
             spacing[lane] = range[lane] * self.pixel_rad;
         }
 
-        // The window is as wide as the noise needs, or as half a cell if that is more: the same for all lanes.
+        // The window is as wide as the noise needs, or as half a cell if that is more: the same for all
+        // lanes.
         let mut stride = 1;
         for lane in (0..LANES).filter(|lane| !q0[*lane].is_nan()) {
             let cells = self.cell_m / spacing[lane];
@@ -306,7 +312,8 @@ impl<'a> Band<'a> {
             stride = stride.max((for_noise.max(0.4 * cells) as i32).clamp(1, MOST_STRIDE));
         }
 
-        // How q grows to the right and downwards: on the side where it grows less, since a step may be on the other.
+        // How q grows to the right and downwards: on the side where it grows less, since a step may be on the
+        // other.
         let grows = |step: usize, along: usize| {
             let side = |steps: isize| {
                 let [u, v, q] = frame.uvq(self.pixels(at.wrapping_add_signed(steps * step as isize)));
@@ -375,8 +382,8 @@ impl<'a> Band<'a> {
 
         for (lane, surfel) in out.iter_mut().enumerate().filter(|(lane, _)| !q0[*lane].is_nan()) {
             let center = Vec3::new(u0[lane], v0[lane], 1.0);
-            // The slope comes from the window, the place from its middle. A thread, or a point in the air, faces the
-            // sensor.
+            // The slope comes from the window, the place from its middle. A thread, or a point in the air,
+            // faces the sensor.
             let (b, c) = fit.slope(lane).unwrap_or_else(|| {
                 let m = center * (q0[lane] / center.length_squared());
                 (m.x, m.y)
