@@ -309,8 +309,8 @@ pub fn parse_capture_pose(bytes: &[u8], name: &Path) -> Result<Pose> {
         .map_err(|(number, message)| Error::line(name, lines.get(number).copied().unwrap_or(1), message))
 }
 
-/// Reads a pose like [`read_capture_pose`]. Returns `None` if it holds an infinity or NaN: programs mark poses
-/// so that they do not know.
+/// Reads a pose like [`read_capture_pose`]. Returns `None` if it holds an infinity or NaN: programs mark
+/// poses so that they do not know.
 pub(crate) fn read_known_pose(path: &Path) -> Result<Option<Pose>> {
     let bytes = read_file(path)?;
     let text = text_of(&bytes, path)?;

@@ -146,7 +146,8 @@ impl Entry {
     }
 }
 
-/// Returns the lens of a depth camera for pictures of this size. The error is a sentence that says what to do.
+/// Returns the lens of a depth camera for pictures of this size. The error is a sentence that says what to
+/// do.
 fn lens_of(camera: &PosedCamera, size: [u32; 2]) -> std::result::Result<PhotoLens, String> {
     use crate::camera::IntrinsicsError::{NoOptics, OtherSize};
     camera.photo_lens(size).map_err(|e| match e {

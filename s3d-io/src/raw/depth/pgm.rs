@@ -1,6 +1,6 @@
-//! Gray pictures of up to 16 bits in the binary form of PGM, which 3RScan has for depth. Source: Netpbm, "pgm",
-//! form P5: words of a header, one white space, then rows from the top, two bytes a pixel if the largest value
-//! is above 255, the higher byte first.
+//! Gray pictures of up to 16 bits in the binary form of PGM, which 3RScan has for depth. Source: Netpbm,
+//! "pgm", form P5: words of a header, one white space, then rows from the top, two bytes a pixel if the
+//! largest value is above 255, the higher byte first.
 
 use crate::error::{Error, Result};
 use s3d_geom::Raster;

@@ -1,7 +1,7 @@
 //! Depth of TUM's RGB-D benchmark: `depth.txt` and `rgb.txt` with lines `timestamp filename`, poses in
-//! `groundtruth.txt`, 5,000 steps a metre, depth aligned with the colour camera. Sources: the benchmark's pages
-//! "File Formats" and "Intrinsic Camera Calibration", and its `associate.py`, which pairs what is at most 0.02
-//! s apart.
+//! `groundtruth.txt`, 5,000 steps a metre, depth aligned with the colour camera. Sources: the benchmark's
+//! pages "File Formats" and "Intrinsic Camera Calibration", and its `associate.py`, which pairs what is at
+//! most 0.02 s apart.
 
 use crate::camera::programs::tum;
 use crate::camera::{Distortion, Optics, PosedCamera};
