@@ -16,7 +16,8 @@
 //! | Polycam | `keyframes/depth`, `keyframes/corrected_cameras` |
 //! | nerfstudio | a `transforms.json` with `depth_file_path` |
 //! | laser scans that tell the scanner's place | `.e57`, `.ptx` |
-//! | points of a laser scanner | `.las`, `.laz`, `.ply`, `.pcd`, `.npy`, text, with [`RawOptions::origin_m`] |
+//! | points of a laser scanner | `.las`, `.laz`, `.ply`, `.pcd`, `.npy`, text, with [`RawOptions::origin_m`]
+//! |
 //! | several of them | a list with lines `file,x,y,z`, or a folder |
 //! | points of a mobile scanner | with times, and [`RawOptions::trajectory`] |
 //!

@@ -1,8 +1,8 @@
 //! Depth of sequences whose frames are files side by side: 3RScan, BundleFusion and 7-Scenes.
 //!
-//! - 3RScan has `frame-000000.depth.pgm` and `_info.txt`, BundleFusion `frame-000000.depth.png` and `info.txt`.
-//!   The pose is the colour camera's, with which the depth is aligned. Sources: WaldJohannaU/3RScan, FAQ.md;
-//!   Dai et al., "BundleFusion", the page of its data.
+//! - 3RScan has `frame-000000.depth.pgm` and `_info.txt`, BundleFusion `frame-000000.depth.png` and
+//!   `info.txt`. The pose is the colour camera's, with which the depth is aligned. Sources:
+//!   WaldJohannaU/3RScan, FAQ.md; Dai et al., "BundleFusion", the page of its data.
 //! - 7-Scenes has `frame-000000.depth.png` in millimetres, 65,535 where nothing was measured, and no
 //!   intrinsics. Its documentation says that neither camera was calibrated, and that KinectFusion ran with
 //!   focal lengths of 585 px and the principal point (320, 240). Source: Microsoft Research, "RGB-D Dataset
@@ -43,7 +43,8 @@ pub(super) fn form_of(dir: &Path) -> Result<Option<RawForm>> {
     Ok(None)
 }
 
-/// Returns the folders of sequences: `dir`, or the folders `seq-01`… in it, which have one frame in 7-Scenes.
+/// Returns the folders of sequences: `dir`, or the folders `seq-01`… in it, which have one frame in
+/// 7-Scenes.
 fn folders(dir: &Path) -> Result<Vec<PathBuf>> {
     if find(dir)?.is_some() {
         return Ok(vec![dir.to_owned()]);
