@@ -62,8 +62,8 @@
 //!
 //! **Free space.** A voxel behind a surface is given up if as many images saw through it, the pixels around
 //! included, as saw it. Images also count what they see through block by block, where no voxels exist yet. So
-//! a person is removed also if the empty room was seen before. Near what is behind (within about three
-//! blocks, as feet are near the floor), the images that are added after the person count alone.
+//! a person is removed also if the empty room was seen before. Near what is behind (within about five
+//! blocks along a ray, as feet are near the floor), the images that are added after the person count alone.
 //!
 //! **Mesh.** Marching cubes, over cells whose corners were all seen, and one of them just before the surface.
 //!

@@ -64,11 +64,12 @@ fn who_walks_through_one_image_of_three_vanishes() {
             fusion.add(&picture(shapes, *pose, lens(200, 160, 150.0))).unwrap();
         }
         let mesh = fusion.mesh().unwrap();
-        // Whoever comes last may leave feet: images before saw the floor
-        // not far behind them, where no blocks were.
-        let low = if when == 2 { -1.0 } else { -2.0 };
-        let is_left = |p: &&Vec3| distance(&empty, **p) > 0.15 && p.z > low;
-        assert_eq!(mesh.positions.iter().filter(is_left).count(), 0, "the person came with image {when}");
+        // Whoever comes last may leave feet: images before saw the floor some blocks behind them, where no
+        // voxels were. A block is 24 cm here, and the person 1.8 m.
+        let left = mesh.positions.iter().filter(|p| distance(&empty, **p) > 0.15);
+        let highest = left.map(|p| p.z).fold(f32::NEG_INFINITY, f32::max);
+        let allowed = if when == 2 { -0.8 } else { f32::NEG_INFINITY };
+        assert!(highest <= allowed, "the person came with image {when}: left up to {highest}");
         // The room behind is there.
         assert!(
             mesh.positions

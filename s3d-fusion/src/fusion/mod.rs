@@ -21,7 +21,7 @@ use s3d_geom::glam::{DVec3, Vec3};
 pub struct FusionOptions {
     /// The size of a cell of the grid, metres: 0.001 to 1.
     pub cell_m: f64,
-    /// How far before a surface its distance is gathered, in cells: 2 to 16.
+    /// How far before a surface its distance is gathered, in cells: 2.5 to 16.
     pub truncation_cells: f64,
     /// Pieces of the mesh that have less surface than this many faces of cells are left out: 0 to 1,000,000.
     pub least_piece_cells: f64,
