@@ -41,8 +41,8 @@ fn images(to: &Path, number: usize, entry: &Value) -> (Raster<[u8; 3]>, Raster<[
     (image, mask)
 }
 
-/// A pixel whose centre is this near to where something ends may be on either side of it, metres: numbers of an
-/// entry are rounded to half of that. With 8 mm, the centres of a whole row lie on the end of a floor.
+/// A pixel whose centre is this near to where something ends may be on either side of it, metres: numbers of
+/// an entry are rounded to half of that. With 8 mm, the centres of a whole row lie on the end of a floor.
 const ROUNDING_M: f64 = 1e-4;
 
 /// Holds a ground against rays from above, at every 7th pixel of every 7th row. The mask of a pixel is what a

@@ -57,7 +57,7 @@ pub(super) fn fit(images: &Images, refine: bool, ctx: &Context) -> Result<Option
         let is_off = before_mm - after_mm > OFF_M * 1e3 && after_mm < before_mm / 2.0;
         match (is_off, refine) {
             (true, false) => ctx.warn(format_args!(
-                "{told}, and {after_mm:.1} mm if one moves by {:.1} cm: their poses do not fit; they can be refined",
+                "{told}, and {after_mm:.1} mm if one moves by {:.1} cm: their poses are off, and can be refined",
                 pair.motion.translation.length() * 1e2
             )),
             _ => ctx.info(told),

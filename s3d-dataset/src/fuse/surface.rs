@@ -14,6 +14,9 @@ use std::path::Path;
 /// A mesh of less surface than this is no room, square metres.
 const LEAST_ROOM_M2: f64 = 4.0;
 
+/// Colours of a mesh are those of its vertices: posters and books need enough of them. In steps of 1/255.
+const MOST_COLOR_ERROR: f32 = 10.0;
+
 /// A mesh that was made of a raw scan.
 pub(super) struct Made {
     pub(super) positions: Vec<Vec3>,
@@ -56,6 +59,7 @@ pub(super) fn surface(images: &Images, options: &FuseOptions, ctx: &Context) -> 
         let limits = DecimateOptions {
             max_error_m: options.max_error_m as f32,
             target_faces: options.faces.map(|faces| faces as usize),
+            max_color_error: MOST_COLOR_ERROR,
             ..DecimateOptions::default()
         };
         let small = decimate(&columns, &limits).map_err(|e| unfit(&e))?;

@@ -5,8 +5,8 @@ use s3d_geom::Pose;
 use s3d_geom::glam::{DAffine3, DVec3, Vec3, dvec2};
 
 impl RangeImage {
-    /// Returns the corners of the smallest box along the axes of the world that holds all points that were measured,
-    /// metres; `None` if nothing was.
+    /// Returns the corners of the smallest box along the axes of the world that holds all points that were
+    /// measured, metres; `None` if nothing was.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for (i, range) in self
@@ -22,8 +22,8 @@ impl RangeImage {
         (min.x <= max.x).then_some([min, max])
     }
 
-    /// Returns the points of the pixels that lie on a surface, with its unit normals towards the sensor: world metres.
-    /// `cell_m` is the size of what can be told apart later.
+    /// Returns the points of the pixels that lie on a surface, with its unit normals towards the sensor:
+    /// world metres. `cell_m` is the size of what can be told apart later.
     pub fn surface_points(&self, cell_m: f32) -> (Vec<Vec3>, Vec<Vec3>) {
         let world_from_sensor = self.pose.opencv_from_world().transpose();
         let (mut points, mut normals) = (Vec::new(), Vec::new());
@@ -42,8 +42,8 @@ impl RangeImage {
         (points, normals)
     }
 
-    /// Returns the image as if the sensor had stood elsewhere: `motion`, which is rigid, leads from the world to the
-    /// world.
+    /// Returns the image as if the sensor had stood elsewhere: `motion`, which is rigid, leads from the world
+    /// to the world.
     pub fn moved(self, motion: &DAffine3) -> Self {
         let location = motion.transform_point3(self.pose.location);
         let pose = Pose { location, world_from_camera: motion.matrix3 * self.pose.world_from_camera };
