@@ -6,9 +6,11 @@ use s3d_annotate::outputs::{OutputFormat, OutputOptions, write_output};
 use s3d_annotate::proposals::{Proposal, Target, read_proposals};
 use s3d_annotate::segments::{SegmentOptions, segment_faces};
 use s3d_dataset::{Context, Event, Result};
+use s3d_detect::surfel::surfels_of;
+use s3d_detect::{Area, CLASSES, Element, Model, ParsedArea, SpaceSource, TrainOptions};
 use s3d_geom::glam::{DVec3, Vec3, vec3};
 use s3d_geom::primitives::{cuboid, grid};
-use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
+use s3d_geom::{Aabb, Density, PointCloud, SurfaceSampler, TriMesh};
 use s3d_io::cloud::NpyWriter;
 use s3d_label::Taxonomy;
 use std::fmt::Write;
@@ -354,6 +356,54 @@ fn outputs_of_labels_are_proposals_again() {
             .collect();
         assert_eq!(found, room_of("").map(|line| line.trim().to_owned()), "{place:?}");
     }
+}
+
+/// A floor of 4 × 3 m with a sofa, in colours.
+fn furnished(sofa: Vec3) -> TriMesh {
+    let mut parts = grid(Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 3.0, [40, 30]);
+    let floor = parts.positions.len();
+    parts.append(cuboid(sofa, sofa + vec3(1.6, 0.8, 0.7)));
+    let colors =
+        (0..parts.positions.len()).map(|v| [[180, 170, 160], [150, 40, 40]][usize::from(v >= floor)]);
+    let colors = colors.collect();
+    TriMesh::new(parts).unwrap().with_vertex_colors(colors)
+}
+
+#[test]
+fn a_detector_proposes_what_it_finds() {
+    let seen = furnished(vec3(1.0, 1.2, 0.0));
+    let mut points = PointCloud::default();
+    let sampler = SurfaceSampler::new(&seen, Density::PerM2(4000.0), 0);
+    sampler.sample(0..sampler.len(), &mut points);
+    let bbox = Aabb { min: vec3(1.0, 1.2, 0.0), max: vec3(2.6, 2.0, 0.7) };
+    let class = CLASSES.iter().position(|class| class.name() == "sofa").unwrap();
+    let area = Area {
+        number: 1,
+        surfels: surfels_of(&points, 0),
+        rooms: vec!["office_1".to_owned()],
+        elements: vec![Element { class, room: 0, bbox }],
+    };
+    let area = ParsedArea::new(area, SpaceSource::Parsed);
+    let spaces: Vec<_> = area.spaces.iter().collect();
+    let model = Model::train(&spaces, &TrainOptions::default(), &Context::default()).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("sofas.json");
+    model.save(&path).unwrap();
+
+    let mesh = furnished(vec3(2.0, 0.5, 0.0));
+    let found = read(&path, &mesh).unwrap();
+    let sofas: Vec<_> = found.iter().filter(|proposal| proposal.class == "sofa").collect();
+    let best = sofas.first().expect("a sofa");
+    assert!(best.source.starts_with("sofas.json, instance"), "{}", best.source);
+    let of_sofa = best.faces.iter().filter(|face| *face >= 2400).count();
+    assert!(of_sofa >= 10 && 2 * of_sofa > best.faces.len() as usize, "{:?}", best.faces.runs());
+
+    // The file of another version is refused, by name.
+    let text = fs::read_to_string(&path).unwrap();
+    let at = text.find("\"version\"").unwrap();
+    let (head, rest) = text.split_at(at);
+    fs::write(&path, format!("{head}{}", rest.replacen('2', "9", 1))).unwrap();
+    assert!(message(&path, &mesh).contains("version 9"));
 }
 
 /// The first bytes of kinds of files.

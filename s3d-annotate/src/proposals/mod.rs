@@ -10,6 +10,7 @@
 //! | `.npz` | such an array `class` (or `label`, `semantic`, …), and perhaps a second one, `instance` |
 //! | points with labels | PLY, LAS, E57, PCD, NPY tables …: all that [`Annotations::open`] reads |
 //! | a labelled mesh, a scan of ScanNet, a folder of labels | likewise; other meshes label by place |
+//! | a model of `s3d_detect::Model::save` | the elements that it finds on the mesh |
 //! | a folder of PNG images | numbers, 8 or 16 bits or a palette: [masks of photographs](self#masks) |
 //!
 //! The length of a list says whether it is about the faces or the vertices of the mesh. A face takes what
@@ -54,6 +55,7 @@
 //!
 //! [`Annotations::open`]: s3d_io::cloud::Annotations::open
 
+mod detected;
 mod list;
 mod masks;
 mod names;
@@ -143,7 +145,9 @@ type Key = (Class, Option<i64>);
 pub fn read_proposals(path: &Path, target: &Target<'_>, ctx: &Context) -> Result<Vec<Proposal>> {
     let mesh = target.mesh;
     let names = ClassNames::beside(path, target.taxonomy)?;
-    let key_of_face = if let Some(list) = List::read(path, mesh)? {
+    let key_of_face = if detected::is_model(path)? {
+        detected::keys(path, target, ctx)?
+    } else if let Some(list) = List::read(path, mesh)? {
         list.keys(path, mesh, &names)?
     } else if let Some(keys) = masks::keys(path, target, &names, ctx)? {
         keys
