@@ -146,18 +146,18 @@ fn threads_and_tiles_do_not_change_a_mesh() {
 
     let fuse = |name: &str, more: &[&str]| {
         let mesh = dir.path().join(name);
-        let log = s3d_ok(&[&["fuse", text(&file), "-o", text(&mesh), "--cell", "0.04"], more].concat());
+        let log = s3d_ok(&[&["fuse", text(&file), "-o", text(&mesh), "--cell", "0.08"], more].concat());
         (fs::read(mesh).unwrap(), log)
     };
     let (one, _) = fuse("one.ply", &["--threads", "1"]);
     let (three, _) = fuse("three.ply", &["--threads", "3"]);
-    let (tiles, log) = fuse("tiles.ply", &["--memory", "0.01"]);
+    let (tiles, log) = fuse("tiles.ply", &["--memory", "0.002"]);
     assert!(log.contains("fused in tiles"), "{log}");
     assert!(one == three && one == tiles, "{} {} {} bytes", one.len(), three.len(), tiles.len());
 
     // A folder names the places of the scanner, so an export has a location on each storey.
     let folder = dir.path().join("fused");
-    s3d_ok(&["fuse", text(&file), "-o", text(&folder), "--cell", "0.04", "--close", "0.3"]);
+    s3d_ok(&["fuse", text(&file), "-o", text(&folder), "--cell", "0.08", "--close", "0.3"]);
     let told = String::from_utf8(common::s3d(&["info", text(&folder.join("scene.toml"))]).stdout).unwrap();
     assert!(told.contains("scan locations: 2") && told.contains("2 storeys"), "{told}");
 }

@@ -34,7 +34,7 @@ const DARK_AND_LIGHT: [f64; 2] = [0.02, 0.98];
 /// What a sensor saw, ready to be fused.
 pub(super) enum Seen {
     /// From one place.
-    Image(RangeImage),
+    Image(Box<RangeImage>),
     /// From a place a point.
     Rays(Rays),
 }
@@ -220,7 +220,7 @@ impl Images {
             for (image, picture) in read.into_iter().zip(some) {
                 // A picture may have seen nothing within its range.
                 if let Some(image) = image
-                    && !each(Seen::Image(image), picture.path())?
+                    && !each(Seen::Image(Box::new(image)), picture.path())?
                 {
                     return Ok(());
                 }
@@ -234,7 +234,7 @@ impl Images {
                 let motion = motions.next();
                 let Some(seen) = self.scan(scans, number, scan, ctx)? else { continue };
                 let seen = match (seen, motion) {
-                    (Seen::Image(image), Some(motion)) => Seen::Image(image.moved(motion)),
+                    (Seen::Image(image), Some(motion)) => Seen::Image(Box::new(image.moved(motion))),
                     (seen, _) => seen,
                 };
                 if !each(seen, &scan.path)? {
@@ -262,9 +262,8 @@ impl Images {
         let colors = picture.read_colors(&depth)?;
         let noise = SensorNoise::STRUCTURED_LIGHT;
         let unfit = |e: s3d_fusion::FusionError| Error::unfit(picture.path(), e.to_string());
-        let image =
-            RangeImage::from_depth(picture.pose, picture.lens.clone(), RangeKind::Depth, depth, noise)
-                .map_err(unfit)?;
+        let image = RangeImage::from_depth(picture.pose, picture.lens, RangeKind::Depth, depth, noise)
+            .map_err(unfit)?;
         match colors {
             None => Ok(Some(image)),
             Some(colors) => {
@@ -307,7 +306,7 @@ impl Images {
             let pose = pose_of(info, grid.origin_m);
             let size = [grid.offsets_m.width(), grid.offsets_m.height()];
             let image = RangeImage::from_scan(pose, size, &points, &colors, noise).map_err(unfit)?;
-            return Ok(Some(Seen::Image(image)));
+            return Ok(Some(Seen::Image(Box::new(image))));
         }
 
         let mut rays = Rays::default();
@@ -346,7 +345,7 @@ impl Images {
                 let pose = pose_of(info, origin_m);
                 let image =
                     RangeImage::from_points(pose, &rays.points, &rays.colors, noise).map_err(unfit)?;
-                Ok(Some(Seen::Image(image)))
+                Ok(Some(Seen::Image(Box::new(image))))
             }
             None => Ok(Some(Seen::Rays(rays))),
         }

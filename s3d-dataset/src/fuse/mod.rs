@@ -64,9 +64,13 @@ pub fn fuse(
     overwrite: bool,
     ctx: &Context,
 ) -> Result<Fused> {
-    let ending = output.extension().map(|ending| ending.to_ascii_lowercase());
-    let is_glb = ending.as_ref().is_some_and(|ending| ending == "glb");
-    if !is_glb && !ending.as_ref().is_some_and(|ending| ending == "ply") {
+    let is = |ending: &str| {
+        output
+            .extension()
+            .is_some_and(|found| found.eq_ignore_ascii_case(ending))
+    };
+    let is_glb = is("glb");
+    if !is_glb && !is("ply") {
         if output.extension().is_some() && !output.is_dir() {
             let why = "a fused mesh is a .ply or a .glb; a name without an ending is a folder";
             return Err(UsageError::WrongEnding { path: output.to_owned(), why }.into());

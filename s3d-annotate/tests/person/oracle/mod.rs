@@ -317,7 +317,8 @@ impl<'a> Person<'a> {
                     .or_default()
                     .push((*thing, *area));
             }
-            let mut drags: BTreeMap<(u32, Option<u32>), Vec<(f64, u32, u32)>> = BTreeMap::new();
+            type Strokes = Vec<(f64, u32, u32)>;
+            let mut drags: BTreeMap<(u32, Option<u32>), Strokes> = BTreeMap::new();
             for ((node, instance), has) in patches {
                 let mut of_thing: BTreeMap<u32, f64> = BTreeMap::new();
                 has.iter()

@@ -66,7 +66,10 @@ mod of_e57 {
         }
     }
 
-    fn write(path: &Path, scans: &[(Vec<Record>, Option<Transform>, Vec<Vec<RecordValue>>)]) {
+    /// The records, the pose and the points of a scan.
+    type WrittenScan = (Vec<Record>, Option<Transform>, Vec<Vec<RecordValue>>);
+
+    fn write(path: &Path, scans: &[WrittenScan]) {
         let mut writer = E57Writer::from_file(path, "file").unwrap();
         for (number, (prototype, pose, points)) in scans.iter().enumerate() {
             let mut scan = writer
