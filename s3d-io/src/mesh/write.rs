@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::fs::write_whole;
 use s3d_geom::glam::Vec3;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 /// A mesh to be written: columns in world metres, Z-up.
@@ -80,7 +80,7 @@ pub fn write_ply_mesh(path: &Path, mesh: &MeshOut<'_>) -> Result<u64> {
 }
 
 #[cfg(feature = "ply")]
-fn write_ply_header(w: &mut dyn Write, mesh: &MeshOut<'_>) -> io::Result<()> {
+fn write_ply_header(w: &mut dyn io::Write, mesh: &MeshOut<'_>) -> io::Result<()> {
     writeln!(w, "ply\nformat binary_little_endian 1.0")?;
     for comment in mesh.comments {
         let line: String = comment

@@ -1,5 +1,8 @@
 //! What a scanner measured: points with their intensities, times and cells of its grid, in blocks.
 
+// The feature `raw` publishes it.
+#![cfg_attr(not(feature = "raw"), allow(unreachable_pub))]
+
 use s3d_geom::glam::DVec3;
 
 /// What is known of a point beside its place and colour.
