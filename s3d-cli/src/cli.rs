@@ -1,11 +1,9 @@
 //! The command line as a whole.
 
+use crate::commands::meshes::{fuse, render, sample, segments};
 use crate::commands::scores::{detect, eval};
 use crate::commands::shards::{merge, plan};
-use crate::commands::{
-    compare, demo, export, fuse, info, label, pack, profile, render, report, sample, segments, stats, verify,
-    xyz,
-};
+use crate::commands::{compare, demo, export, info, label, pack, profile, report, stats, verify, xyz};
 use crate::console::LogFormat;
 use crate::failure::Outcome;
 use clap::{Parser, Subcommand};

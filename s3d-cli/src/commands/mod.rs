@@ -3,16 +3,13 @@
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod export;
-pub(crate) mod fuse;
 pub(crate) mod info;
 pub(crate) mod label;
+pub(crate) mod meshes;
 pub(crate) mod pack;
 pub(crate) mod profile;
-pub(crate) mod render;
 pub(crate) mod report;
-pub(crate) mod sample;
 pub(crate) mod scores;
-pub(crate) mod segments;
 pub(crate) mod shards;
 pub(crate) mod stats;
 pub(crate) mod verify;

@@ -59,10 +59,10 @@ use crate::error::{Error, Result};
 use std::path::Path;
 
 /// What is read, for messages.
-const FORMS: &str = "raw scans are depth pictures with poses (captures of a Matterport, ScanNet, ARKitScenes, \
-                     3RScan, 7-Scenes, TUM's RGB-D benchmark, Polycam's keyframes, a transforms.json with \
-                     depth_file_path) and laser scans (E57, PTX; LAS, PLY, PCD, NPY or text with the scanner's \
-                     place; a list of files with places)";
+const FORMS: &str = "raw scans are depth pictures with poses (captures of a Matterport, ScanNet, \
+                     ARKitScenes, 3RScan, 7-Scenes, TUM's RGB-D benchmark, Polycam's keyframes, a \
+                     transforms.json with depth_file_path) and laser scans (E57, PTX; LAS, PLY, PCD, NPY or \
+                     text with the scanner's place; a list of files with places)";
 
 /// A raw scan.
 #[derive(Debug)]

@@ -193,7 +193,7 @@ fn pose_at(poses: &[TimedPose], time_s: f64) -> Option<(Pose, u64)> {
 }
 
 /// Returns the item nearest to a time, if it is at most `within_s` away. The items are sorted by time.
-fn nearest<T>(items: &[T], time_s: f64, time_of: impl Fn(&T) -> f64, within_s: f64) -> Option<&T> {
+pub(crate) fn nearest<T>(items: &[T], time_s: f64, time_of: impl Fn(&T) -> f64, within_s: f64) -> Option<&T> {
     let next = items.partition_point(|item| time_of(item) < time_s);
     let around = [next.checked_sub(1).and_then(|last| items.get(last)), items.get(next)];
     let distance = |item: &T| (time_of(item) - time_s).abs();

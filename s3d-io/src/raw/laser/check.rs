@@ -32,8 +32,8 @@ pub(super) fn look(found: &mut LaserScans) -> Result<()> {
 
         if let Some(trajectory) = trajectory {
             if !told.has_times {
-                let message = "has no times, so the trajectory does not tell where the scanner was: export the \
-                               points with their GPS time";
+                let message = "has no times, so the trajectory does not tell where the scanner was: export \
+                               the points with their GPS time";
                 return Err(Error::format(&scan.path, message));
             }
             scan.origin_m = None;
@@ -68,8 +68,8 @@ fn check(scan: &ScanInfo, mut ranges_m: Vec<f64>) -> Result<()> {
     let is_far = median_m > FARTHEST_M;
     let scale = if is_far { 0.001 } else { 1000.0 };
     let message = format!(
-        "{}: half of the first points are {} than {median_m:.4} m from the scanner: is its place in the frame \
-         of the points, and are these metres? With a scale of {scale}, it would be {:.2} m",
+        "{}: half of the first points are {} than {median_m:.4} m from the scanner: is its place in the \
+         frame of the points, and are these metres? With a scale of {scale}, it would be {:.2} m",
         scan.name,
         if is_far { "farther" } else { "nearer" },
         median_m * scale

@@ -78,8 +78,8 @@ impl LaserScans {
         {
             let [first, last] = trajectory.times_s();
             let message = format!(
-                "its points were measured from {} s to {} s, and the trajectory goes from {first} s to {last} s: \
-                 bring both to the same clock",
+                "its points were measured from {} s to {} s, and the trajectory goes from {first} s to \
+                 {last} s: bring both to the same clock",
                 times.first, times.last
             );
             return Err(Error::format(&scan.path, message));

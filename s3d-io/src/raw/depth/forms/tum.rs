@@ -3,6 +3,7 @@
 //! pages "File Formats" and "Intrinsic Camera Calibration", and its `associate.py`, which pairs what is at
 //! most 0.02 s apart.
 
+use crate::camera::programs::arkit::nearest;
 use crate::camera::programs::tum;
 use crate::camera::{Distortion, Optics, PosedCamera};
 use crate::error::{Error, Result};
@@ -73,7 +74,7 @@ pub(super) fn list(dir: &Path) -> Result<Listed> {
     };
     let optics = lens_of(dir);
     for depth in depths {
-        let pose = nearest(&cameras, depth.time_s, time_of);
+        let pose = nearest(&cameras, depth.time_s, time_of, SAME_S);
         let Some(pose) = pose.map(|camera| camera.pose) else {
             listed.untracked += 1;
             continue;
@@ -85,7 +86,7 @@ pub(super) fn list(dir: &Path) -> Result<Listed> {
             .to_string_lossy()
             .into_owned();
         let camera = PosedCamera { size: optics.map(|_| SIZE), optics, ..PosedCamera::new(name, pose) };
-        let color = nearest(&colors, depth.time_s, |color| color.time_s);
+        let color = nearest(&colors, depth.time_s, |color| color.time_s, SAME_S);
         let color =
             color.map(|color| PosedCamera { picture: Some(color.path.clone().into()), ..camera.clone() });
         listed.entries.push(Entry {
@@ -114,18 +115,6 @@ fn lens_of(dir: &Path) -> Option<Optics> {
         center_px: Some(dvec2(*cx, *cy) + DVec2::splat(HALF_PX)),
         distortion: Distortion::None,
     })
-}
-
-/// Returns the item nearest to a time, if it is near enough. The items are sorted by time.
-fn nearest<T>(items: &[T], time_s: f64, time_of: impl Fn(&T) -> f64) -> Option<&T> {
-    let next = items.partition_point(|item| time_of(item) < time_s);
-    let around = [next.checked_sub(1).and_then(|last| items.get(last)), items.get(next)];
-    let distance = |item: &T| (time_of(item) - time_s).abs();
-    around
-        .into_iter()
-        .flatten()
-        .filter(|item| distance(item) <= SAME_S)
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// Reads a list of pictures, sorted by time.

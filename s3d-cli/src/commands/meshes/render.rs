@@ -1,7 +1,7 @@
 //! `s3d render`: views of a mesh, without any annotation.
 
-use super::on_threads;
 use crate::args::{MeshArgs, Threads};
+use crate::commands::on_threads;
 use crate::failure::{Failure, Outcome};
 use crate::values::{field_of_view, finite, intrinsics, parsed, point};
 use clap::{Args, value_parser};

@@ -1,7 +1,7 @@
 //! `s3d segments`: a mesh to the segments of its faces or vertices.
 
-use super::on_threads;
 use crate::args::Threads;
+use crate::commands::on_threads;
 use crate::failure::Outcome;
 use clap::Args;
 use s3d_annotate::segments::{SegmentFileOptions, segment_file};

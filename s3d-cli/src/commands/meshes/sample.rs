@@ -1,7 +1,7 @@
 //! `s3d sample`: a mesh to a dense coloured point cloud.
 
-use super::on_threads;
 use crate::args::{MeshArgs, Threads};
+use crate::commands::on_threads;
 use crate::failure::Outcome;
 use crate::values::positive;
 use clap::Args;

@@ -1,7 +1,7 @@
 //! `s3d fuse`: a raw scan to a mesh.
 
-use super::on_threads;
 use crate::args::Threads;
+use crate::commands::on_threads;
 use crate::failure::Outcome;
 use clap::Args;
 use s3d_dataset::fuse::{FuseOptions, fuse};
