@@ -1,11 +1,11 @@
 """Runs the lines of docs/recipes.md, in a folder as the recipes expect it: they must work as printed."""
 
 import json
-import os
 import re
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from conftest import ROOT
@@ -76,17 +76,41 @@ def test_packages(s3d, beside, heading):
     assert (beside / made).exists()
 
 
-def test_a_cloud_without_a_mesh(s3d, demo, tmp_path, monkeypatch):
-    o3d = pytest.importorskip("open3d")
+def test_a_laser_scan_without_a_mesh(s3d, demo, tmp_path, monkeypatch):
     np = pytest.importorskip("numpy")
+    o3d = pytest.importorskip("open3d")
+    pye57 = pytest.importorskip("pye57")
     monkeypatch.chdir(tmp_path)
-    s3d("sample", demo / "scan/rgb.obj", "-o", "whole.ply", "--points-per-m2", "2000")
-    room = next(r for r in json.loads((demo / "area_1/3d/rooms.json").read_text()) if r["room"] == "office_1")
-    outline = np.concatenate([np.array(p["outer"]) for p in room["outline"]])
-    cloud = o3d.io.read_point_cloud("whole.ply")
-    low, high = [*outline.min(0) - 0.05, -1], [*outline.max(0) + 0.05, 5]
-    o3d.io.write_point_cloud("scan.ply", cloud.crop(o3d.geometry.AxisAlignedBoundingBox(low, high)))
-    run(s3d, "A cloud without a mesh", tmp_path)
-    told = s3d("info", "mesh.ply", "--up", "z").stdout
+    pose = next((demo / "area_1/pano/pose").glob("camera_*_office_1_frame_*.json"))
+    standing = np.array(json.loads(pose.read_text())["camera_location"])
+
+    # A scanner turns once around: a pixel for each half degree, up to 60 degrees below the horizon.
+    column, row = np.meshgrid(np.arange(720), np.arange(300))
+    azimuth, elevation = np.deg2rad(column * 0.5).ravel(), np.deg2rad(90 - row * 0.5).ravel()
+    across = np.cos(elevation)
+    rays = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)], axis=1)
+    building = o3d.t.geometry.RaycastingScene()
+    mesh = o3d.io.read_triangle_mesh(str(demo / "scan/rgb.obj"))
+    building.add_triangles(o3d.t.geometry.TriangleMesh.from_legacy(mesh))
+    wanted = np.concatenate([np.broadcast_to(standing, rays.shape), rays], axis=1).astype(np.float32)
+    distance = building.cast_rays(o3d.core.Tensor(wanted))["t_hit"].numpy()
+
+    met = np.isfinite(distance)
+    points = rays[met] * distance[met, None]
+    scan = {f"cartesian{axis}": points[:, k] for k, axis in enumerate("XYZ")}
+    scan |= {"rowIndex": row.ravel()[met], "columnIndex": column.ravel()[met]}
+    scan |= {f"color{name}": np.full(met.sum(), 128, np.uint8) for name in ["Red", "Green", "Blue"]}
+    with pye57.E57("scan.e57", mode="w") as file:
+        file.write_scan_raw(scan, name="office", translation=standing)
+
+    small = ["--views", "2", "--size", "64", "--pano-width", "128", "--points-per-m2", "50"]
+    run(lambda *words: s3d(*words, *(small if words[0] == "export" else [])), "A laser scan without a mesh", tmp_path)
+    told = s3d("info", "scan/scene.toml").stdout
     assert "1 storey: " in told and "office" not in told, told
-    assert os.path.getsize("mesh.ply") > 100_000
+
+    fused = o3d.io.read_triangle_mesh("scan/mesh.ply")
+    corners = o3d.core.Tensor(np.asarray(fused.vertices, dtype=np.float32))
+    off = building.compute_distance(corners).numpy()
+    assert np.quantile(off, 0.95) < 0.02, np.quantile(off, [0.5, 0.95, 1])
+    [pose] = Path("dataset/area_1/pano/pose").iterdir()
+    assert np.allclose(json.loads(pose.read_text())["camera_location"], standing, atol=1e-3)
