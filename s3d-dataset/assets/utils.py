@@ -113,6 +113,23 @@ def read_semantic(path):
     return np.where(index == 0x0D0D0D, -1, index)
 
 
+def decode_mask(mask):
+    """COCO's compressed run lengths as (H, W) of bool."""
+    runs, number, place = [], 0, 0
+    for byte in mask["counts"].encode():
+        bits = byte - 48
+        number |= (bits & 31) << place
+        place += 5
+        if bits & 32:
+            continue
+        if bits & 16:
+            number -= 1 << place
+        runs.append(number + (runs[-2] if len(runs) > 2 else 0))
+        number, place = 0, 0
+    height, width = mask["size"]
+    return np.repeat(np.arange(len(runs)) % 2 == 1, runs).reshape(width, height).T
+
+
 def read_semantic_class(path):
     """Places of classes in the taxonomy (H, W): -1 where nothing was seen, or what was seen has no class. The file is a PNG
     with a palette, which readers of colours turn into the classes' colours."""
@@ -312,6 +329,10 @@ class Dataset:
     def pose(self, image):
         return read_json(self.path(image, "pose"))
 
+    def objects(self, image):
+        """The instances with a pixel in an image: a dict for each, whose "amodal_mask" decode_mask reads."""
+        return read_json(self.path(image, "objects"))["objects"]
+
     def world_points(self, image):
         """Points in the world from depth and pose."""
         convert = world_from_panorama if image.kind == "pano" else world_from_view
@@ -363,6 +384,16 @@ def check_image(data, image, fail):
     if {"semantic", "semantic_class"} <= there:
         if (data.semantic_class(image) != data.class_of_label[data.semantic(image)]).any():
             fail(f"{image.stem}: classes that are not those of the labels")
+    if {"objects", "semantic"} <= there:
+        index = data.semantic(image)
+        objects = data.objects(image)
+        if [thing["label_index"] for thing in objects] != [label for label in np.unique(index) if label > 0]:
+            fail(f"{image.stem}: objects that are not those of the labels")
+        for thing in objects:
+            visible = index == thing["label_index"]
+            amodal = decode_mask(thing["amodal_mask"])
+            if visible.sum() != thing["visible_pixels"] or (visible & ~amodal).any():
+                fail(f"{image.stem}: {thing['label']} has other pixels than its label")
     if "normal" in there and {"depth", "pose"} <= there:
         points, normals = data.world_points(image), data.world_normals(image)
         rays = points - np.array(data.pose(image)["camera_location"])

@@ -123,6 +123,7 @@ fn write_with_instances(root: &Path, detected: &Detected) {
             bbox,
             voxel_occupancy: vec![0; 216],
             points_per_voxel: vec![0; 216],
+            surface: None,
         });
     let path = Layout::new(root).instances_json(5);
     let (bytes, sum) = checksum_of_file(&path).unwrap();

@@ -13,7 +13,8 @@
 //!
 //! # Rooms and instances
 //!
-//! [`FootprintBuilder`] measures the floor of a room, and [`Voxels`] fills the box of an instance.
+//! [`FootprintBuilder`] measures the floor of a room. [`Voxels`] fills the box of an instance, and
+//! [`OrientedBox`] is a box that turns with it.
 //! [`Polygon`] and [`triangulate_face`] cut polygons into triangles.
 //!
 //! # Example
@@ -62,6 +63,7 @@ mod cloud;
 mod mesh;
 #[cfg(feature = "nearest")]
 mod nearest;
+mod oriented_box;
 mod outline;
 mod patches;
 pub mod primitives;
@@ -88,6 +90,7 @@ pub use mesh::{
 };
 #[cfg(feature = "nearest")]
 pub use nearest::{Nearest, NearestFaces, nearest_brute_force};
+pub use oriented_box::{OrientedBox, main_normals};
 pub use outline::{
     Footprint, FootprintBuilder, FootprintOptions, Polygon, PolygonError, dominant_wall_direction_deg,
     triangulate_face,

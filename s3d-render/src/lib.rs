@@ -62,6 +62,11 @@
 //! [`image_from_above`] needs no camera: it sees a mesh straight from above, cut at two heights, as a plan
 //! does.
 //!
+//! # Objects
+//!
+//! [`SeenObjects`] finds the objects of an image: the visible pixels of each, those that it would have if it
+//! stood alone, and what hides it. An object is a number a face.
+//!
 //! # Colours from pictures
 //!
 //! A [`CubeMap`] holds the pictures taken at a place. It is made from a sky box, a panorama or overlapping
@@ -84,6 +89,7 @@
 mod edge_samples;
 mod from_above;
 mod hits;
+mod objects;
 mod picture;
 mod raster;
 mod ray;
@@ -94,6 +100,7 @@ mod simd;
 pub use edge_samples::sample_edges;
 pub use from_above::{FromAbove, GroundGrid, image_from_above};
 pub use hits::{Hits, NO_FACE};
+pub use objects::{Beyond, Mask, NO_OBJECT, ObjectMeshes, ObjectScenes, PixelBox, SeenObject, SeenObjects};
 pub use picture::cube_map::CubeMap;
 pub use picture::cube_sources::SkyBoxTurn;
 pub use picture::level_panorama::level_panorama;

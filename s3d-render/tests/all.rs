@@ -9,3 +9,4 @@ mod colors;
 mod exact;
 mod images;
 mod modalities;
+mod objects;

@@ -222,7 +222,8 @@ impl ImageComparer<'_> {
                             *camera.insert(found)
                         }
                     };
-                    if domain == Domain::Pose {
+                    // Objects follow from the camera, the mesh and the labels, which are compared.
+                    if domain.pixels().is_none() {
                         continue;
                     }
                     self.domain(domain, camera, a, b, &mut outcome.pairs)?

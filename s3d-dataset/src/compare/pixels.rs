@@ -114,7 +114,8 @@ pub(crate) fn compare(
             Domain::Normal => Sums::of(a, b, |a, b| a == b, normal_angle),
             Domain::Rgb => colors(a, b),
             // These modalities have no colours.
-            Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz | Domain::Pose => return Ok(None),
+            Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz => return Ok(None),
+            Domain::Pose | Domain::Objects => return Ok(None),
         },
         (Pixels::Depth(a), Pixels::Depth(b)) => {
             let units_per_m = meaning.depth_units.per_m();

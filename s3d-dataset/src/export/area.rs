@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::event::UnitKind;
 use crate::export::common::{Common, PreparedMesh};
+use crate::export::images::objects::{InstanceFinder, instance_meshes};
 use crate::export::images::photographs::{self, WrittenPhotograph};
 use crate::export::images::{ImageJob, WrittenLocation, write_images};
 use crate::export::input::area::AreaInput;
@@ -19,11 +20,13 @@ use crate::stage::Stage;
 use crate::survey::annotated::Annotated;
 use crate::survey::candidate::Candidate;
 use crate::survey::labelled_area::LabelledArea;
+use crate::survey::surface_boxes::boxes_of_faces;
 use glam::DVec3;
 use s3d_io::dataset::{Domain, SourceFaces};
 use s3d_io::fs::create_dir;
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{MeshFile, TextureOut};
+use s3d_label::LabelId;
 use s3d_render::MipMaps;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -146,6 +149,16 @@ pub(crate) fn render_area(
         class_of_face.extend(label_of_face.iter().map(|label| classes[*label as usize]));
     }
     let palette = palette(common.table.taxonomy());
+    let instances = if options.modalities.contains(&Domain::Objects) {
+        let meshes = instance_meshes(&file.mesh, &label_of_face);
+        Some((meshes, boxes_of_faces(&file.mesh, &label_of_face)))
+    } else {
+        None
+    };
+    let label_of = |index| common.table.get(LabelId(index)).copied();
+    let instances = instances
+        .as_ref()
+        .map(|(meshes, boxes)| InstanceFinder::new(meshes, &label_of_face, boxes, &label_of));
     let is_filled = filled_faces(annotated);
 
     // What is rendered.
@@ -189,6 +202,7 @@ pub(crate) fn render_area(
             compression: options.compression,
             conventions: options.conventions(),
         },
+        instances: instances.as_ref(),
         pictures,
         locations,
         rooms: location_rooms,

@@ -63,7 +63,7 @@ pub(crate) struct Channels<'a> {
     pub(crate) conventions: Conventions,
 }
 
-/// A domain that is an image: every domain but the pose.
+/// A domain that is an image: every domain but the pose and the objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Image {
     Rgb,
@@ -76,7 +76,7 @@ pub(crate) enum Image {
 }
 
 impl Image {
-    /// The image of a domain; `None` for the pose.
+    /// The image of a domain; `None` for the pose and the objects.
     pub(crate) fn of(domain: Domain) -> Option<Self> {
         Some(match domain {
             Domain::Rgb => Self::Rgb,
@@ -86,7 +86,7 @@ impl Image {
             Domain::SemanticPretty => Self::SemanticPretty,
             Domain::SemanticClass => Self::SemanticClass,
             Domain::GlobalXyz => Self::GlobalXyz,
-            Domain::Pose => return None,
+            Domain::Pose | Domain::Objects => return None,
         })
     }
 

@@ -100,7 +100,7 @@ pub struct ExportOptions {
         value_parser = clap::value_parser!(u32).range(1..=64)))]
     pub entropy_stride: u32,
     /// The images to write, such as rgb,depth,pose. There is also semantic_class, a PNG whose palette has a
-    /// colour for each class [default: rgb, depth, normal, semantic, semantic_pretty, global_xyz, pose]
+    /// colour for each class, and objects, a JSON with amodal masks, occlusion and boxes [default: rgb, depth, normal, semantic, semantic_pretty, global_xyz, pose]
     #[serde(with = "by_names")]
     #[cfg_attr(feature = "clap", arg(display_order = 16, long, value_name = "LIST", value_delimiter = ',',
         default_values_t = Domain::PUBLISHED, hide_default_value = true,

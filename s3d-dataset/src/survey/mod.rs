@@ -8,4 +8,5 @@ pub(crate) mod outlook;
 pub(crate) mod room_names;
 pub(crate) mod rooms_around;
 pub(crate) mod strays;
+pub(crate) mod surface_boxes;
 pub(crate) mod surface_seen;

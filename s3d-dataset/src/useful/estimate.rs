@@ -34,6 +34,7 @@ fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
         Domain::GlobalXyz if xyz == XyzType::Float => 1.2,
         Domain::GlobalXyz => 0.5,
         Domain::Pose => 0.001,
+        Domain::Objects => 0.03,
     }
 }
 

@@ -4,11 +4,13 @@ use super::labels::Labels;
 use super::report::{OfFile, Report, Topic};
 use crate::record::manifest::Manifest;
 use crate::record::tables::NumberRecord;
+use crate::survey::surface_boxes::BoxesOfFaces;
 use s3d_io::dataset::{
-    InstanceArrays, InstanceEntry, Layout, read_instance_arrays, read_instance_members, read_instances,
+    InstanceArrays, InstanceEntry, Layout, SurfaceBoxes, read_instance_arrays, read_instance_members,
+    read_instances,
 };
 use s3d_io::fs::read_json;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 const INSTANCES: (Topic, &str) = (Topic::Instances, "tables of instances");
@@ -88,6 +90,27 @@ pub(crate) fn check(
 
     numbers(layout, area, labels, report);
     entries
+}
+
+/// Checks the boxes of the faces of each instance, `boxes` by label index. A data set of an earlier version has
+/// none.
+pub(crate) fn check_surfaces(
+    path: &Path,
+    entries: &[InstanceEntry],
+    boxes: &BTreeMap<u32, BoxesOfFaces>,
+    report: &Report,
+) {
+    if entries.iter().all(|entry| entry.surface.is_none()) {
+        return;
+    }
+    let checks = report.of(INSTANCES, path);
+    for entry in entries {
+        let expected = boxes.get(&entry.label_index);
+        let expected = expected.map(|of| SurfaceBoxes::new(of.bbox, &of.upright, &of.oriented));
+        checks.check(entry.surface == expected, || {
+            format!("{}: its boxes under \"surface\" are not those of its faces", entry.label)
+        });
+    }
 }
 
 /// Checks that a label has this index.

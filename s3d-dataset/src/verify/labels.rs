@@ -5,7 +5,7 @@ use crate::export::modality::NO_CLASS;
 use crate::record::manifest::Manifest;
 use s3d_io::dataset::{Layout, read_labels};
 use s3d_io::image::pretty_color;
-use s3d_label::{NULL_NAME, Taxonomy};
+use s3d_label::{Label, NULL_NAME, Taxonomy};
 use std::collections::HashMap;
 
 const ORDER: (Topic, &str) = (Topic::Labels, "the label table");
@@ -33,6 +33,12 @@ impl Labels {
             pretty: vec![pretty_color(0)],
             classes: vec![NO_CLASS],
         }
+    }
+
+    /// Returns the label of an index. Returns `None` for the null label, and for a name that is none.
+    pub(crate) fn label(&self, index: u32) -> Option<Label> {
+        let name = self.names.get(index as usize)?;
+        self.taxonomy.parse_name(name).ok()?
     }
 
     /// Reads and checks `semantic_labels.json`.

@@ -26,10 +26,12 @@ mod votes;
 
 use crate::context::Context;
 use crate::error::{Result, TemporaryError, UsageError};
+use crate::export::images::objects::{InstanceFinder, instance_meshes};
 use crate::export::modality::{Channels, NO_CLASS};
 use crate::parallel::for_each_in_order;
 use crate::record::manifest::Manifest;
 use crate::store::lock::Lock;
+use crate::survey::surface_boxes::boxes_of_faces;
 use files::Files;
 use images::picture_colors;
 use images::{ImageCheck, Mismatch, Reference, Scratch, UnlabelledPixels};
@@ -222,6 +224,21 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
         report.note(format!("area {area}: images were not held against the mesh: they have no poses"));
     }
 
+    let wants_objects = domains.contains(&Domain::Objects) && mesh.all_in_table;
+    let meshes = if wants_objects {
+        Some(instance_meshes(&mesh.file.mesh, &mesh.label_of_face))
+    } else {
+        None
+    };
+    let boxes = boxes_of_faces(&mesh.file.mesh, &mesh.label_of_face);
+    if let Some(instances) = &instances {
+        instances::check_surfaces(&layout.instances_json(area), instances, &boxes, report);
+    }
+    let label_of = |index| labels.label(index);
+    let finder = meshes
+        .as_ref()
+        .map(|meshes| InstanceFinder::new(meshes, &mesh.label_of_face, &boxes, &label_of));
+
     let reference = Reference {
         layout,
         manifest,
@@ -242,6 +259,7 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
             conventions: manifest.conventions(),
         },
         rgb_from_mesh: source == "texture",
+        instances: finder.as_ref(),
         report,
     };
     check_images(common, area, images, Some((&reference, mesh, labels)))
@@ -415,7 +433,7 @@ fn diagnose_mismatches(
         let files = image
             .domains
             .iter()
-            .filter(|d| **d != Domain::Pose && (rgb_from_mesh || **d != Domain::Rgb));
+            .filter(|d| d.pixels().is_some() && (rgb_from_mesh || **d != Domain::Rgb));
         if let Some(Some(first)) = guesses.first()
             && guesses.len() == files.count()
             && guesses.iter().all(|g| g.as_ref() == Some(first))

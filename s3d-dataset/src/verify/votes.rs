@@ -361,6 +361,7 @@ mod tests {
             bbox: [x + 0.415, 0.1, 0.1, x + 0.5, 0.3, 0.4],
             voxel_occupancy: Vec::new(),
             points_per_voxel: Vec::new(),
+            surface: None,
         };
         let told = |instances: &[InstanceEntry]| {
             let report = Report::new(&Layout::new("out"));

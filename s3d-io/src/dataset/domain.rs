@@ -4,7 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// What a file shows: a modality, which the data set calls a domain. All of them are images except the pose.
+/// What a file shows: a modality, which the data set calls a domain. All of them are images except the pose
+/// and the objects.
 /// `TABLE` below says what there is to say about each; CONTRIBUTING.md lists what else a new one needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Domain {
@@ -25,6 +26,9 @@ pub enum Domain {
     GlobalXyz,
     /// The camera.
     Pose,
+    /// The instances in the image: their amodal masks, what hides them, their boxes. It is not in the
+    /// published data set.
+    Objects,
 }
 
 /// The error for a word that names no domain.
@@ -80,12 +84,13 @@ const TABLE: &[Row] = &[
     Row::labels(Domain::SemanticClass, "semantic_class", PixelKind::Palette8, [255, 0, 0]),
     Row::image(Domain::GlobalXyz, "global_xyz", PixelKind::Xyz, [0; 3]),
     Row { pixels: None, ..Row::image(Domain::Pose, "pose", PixelKind::Rgb8, [0; 3]) },
+    Row { pixels: None, ..Row::labels(Domain::Objects, "objects", PixelKind::Rgb8, [0; 3]) },
 ];
 
 /// Returns the domains of the table. A variant without a row of its own does not compile.
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
 const fn domains() -> [Domain; TABLE.len()] {
-    assert!(Domain::Pose as usize + 1 == TABLE.len(), "each variant has a row, and the pose is the last");
+    assert!(Domain::Objects as usize + 1 == TABLE.len(), "each variant has a row");
     let mut all = [Domain::Pose; TABLE.len()];
     let mut i = 0;
     while i < TABLE.len() {
@@ -133,7 +138,8 @@ impl Domain {
         self.row().suffix
     }
 
-    /// Returns the kind of the domain's pixels. `None` for the pose, which is not an image.
+    /// Returns the kind of the domain's pixels. `None` for the pose and the objects, which are not
+    /// images.
     pub fn pixels(self) -> Option<PixelKind> {
         self.row().pixels
     }
@@ -186,8 +192,7 @@ mod tests {
             assert_eq!(domain.to_string().parse(), Ok(domain));
         }
         let message = "normals".parse::<Domain>().unwrap_err().to_string();
-        let all =
-            "there are rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz and pose";
+        let all = "there are rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose and objects";
         assert_eq!(message, format!("no modality is called \"normals\"; {all}"));
     }
 }

@@ -10,6 +10,7 @@
 //! - [`read_taxonomy_json`], [`write_taxonomy_json`]: `taxonomy.json`, if the classes are not S3DIS's.
 //! - [`InstanceWriter`]: boxes and voxels of instances, `instances.json` and `instances.npz`. They are read
 //!   by [`read_instances`] and [`read_instance_arrays`].
+//! - [`ObjectsFile`]: the objects of an image, with what hides them.
 //! - [`Split`]: folds of areas; [`write_image_list`]: lists of images.
 //! - [`FileRecord`]: `files.csv`, the sizes and checksums of all files.
 //! - [`Conventions`]: `conventions.json`, the meaning of the numbers.
@@ -41,6 +42,8 @@ mod instances;
 mod labels;
 pub(crate) mod layout;
 #[cfg(feature = "dataset")]
+pub(crate) mod objects;
+#[cfg(feature = "dataset")]
 mod point_boxes;
 #[cfg(feature = "dataset")]
 pub(crate) mod pose;
@@ -69,12 +72,17 @@ pub use images::{
 };
 #[cfg(feature = "dataset")]
 pub use instances::{
-    InstanceArrays, InstanceEntry, InstanceRecord, InstanceWriter, read_instance_arrays,
-    read_instance_arrays_from, read_instance_members, read_instance_members_from, read_instances,
+    FreeBox, InstanceArrays, InstanceEntry, InstanceRecord, InstanceWriter, SurfaceBoxes, UprightBox,
+    read_instance_arrays, read_instance_arrays_from, read_instance_members, read_instance_members_from,
+    read_instances,
 };
 #[cfg(feature = "dataset")]
 pub use labels::{MAX_LABELS_OF_LOADERS, PADDED_LABELS, pad_labels, read_labels, write_labels};
 pub use layout::{Frame, ImageName, Layout, PROFILES, image_stem, is_valid_room, is_valid_uuid};
+#[cfg(feature = "dataset")]
+pub use objects::{
+    BeyondFrame, BoxAngles, BoxCorners, Corner, Hider, ImageObject, ObjectsFile, RunLengths, read_objects,
+};
 #[cfg(feature = "dataset")]
 pub use point_boxes::{PointBox, read_point_boxes, write_point_boxes};
 #[cfg(feature = "dataset")]

@@ -5,9 +5,9 @@
     reason = "a writer: it counts the rows and labels of images that were read, and checked, before"
 )]
 
+use crate::dataset::objects::RunLengths;
 use crate::error::Result;
 use crate::fs::atomic::write_whole;
-use crate::package::coco_instances::CocoMask;
 use s3d_geom::Raster;
 use s3d_label::{Class, LabelId, LabelTable, Taxonomy};
 use serde::Serialize;
@@ -201,7 +201,7 @@ pub struct CocoImage {
     /// The segments of the image.
     pub segments: Vec<CocoSegment>,
     /// The masks of its instances, by segment number.
-    pub masks: BTreeMap<u32, CocoMask>,
+    pub masks: BTreeMap<u32, RunLengths>,
 }
 
 /// Writes a panoptic annotation file (`info`, `images`, `annotations`, `categories`) and returns its size in

@@ -1,36 +1,25 @@
 //! Writes COCO's instance annotations: a box and a mask for each thing in an image. `pycocotools` reads
 //! these, but no panoptic annotations.
 
+use crate::dataset::objects::RunLengths;
 use crate::error::Result;
 use crate::fs::atomic::write_whole;
 use crate::package::coco::{CocoCategory, CocoImage, CocoSegment};
 use s3d_geom::Raster;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
-
-/// The pixels of a segment as COCO's compressed run lengths. The fields are named as in the file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct CocoMask {
-    /// The height and width of the image.
-    pub size: [u32; 2],
-    /// How many pixels lie outside the segment, then how many inside, and so on, column by column; encoded as
-    /// text.
-    pub counts: String,
-}
 
 /// Makes the masks of the segments with `wanted` numbers, from a panoptic image (see
 /// [`coco_panoptic`](crate::package::coco_panoptic)).
-pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> BTreeMap<u32, CocoMask> {
+pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> BTreeMap<u32, RunLengths> {
     let width = panoptic.width();
     let height = panoptic.height();
-    // For each segment its runs so far, and the end of the last run inside it.
-    let mut runs: BTreeMap<u32, (Vec<u32>, u32)> = BTreeMap::new();
-    let mut add = |id: u32, start: u32, end: u32| {
-        if id != 0 && start < end && wanted(id) {
-            let (counts, last) = runs.entry(id).or_default();
-            counts.extend([start - *last, end - start]);
-            *last = end;
+    let mut stretches: BTreeMap<u32, Vec<Range<u64>>> = BTreeMap::new();
+    let mut add = |id: u32, stretch: Range<u64>| {
+        if id != 0 && !stretch.is_empty() && wanted(id) {
+            stretches.entry(id).or_default().push(stretch);
         }
     };
 
@@ -42,44 +31,20 @@ pub fn coco_masks(panoptic: &Raster<[u8; 3]>, wanted: impl Fn(u32) -> bool) -> B
             let [r, g, b] = panoptic.at(x, y);
             let id = u32::from_le_bytes([r, g, b, 0]);
             if id != current {
-                add(current, start, at);
+                add(current, start..at);
                 start = at;
                 current = id;
             }
             at += 1;
         }
     }
-    add(current, start, at);
+    add(current, start..at);
 
-    runs.into_iter()
-        .map(|(id, (mut counts, end))| {
-            if end < at {
-                counts.push(at - end);
-            }
-            (id, CocoMask { size: [height, width], counts: text_of(&counts) })
-        })
+    let encode = |stretches: Vec<_>| RunLengths::encode([width, height], &stretches);
+    stretches
+        .into_iter()
+        .map(|(id, stretches)| (id, encode(stretches)))
         .collect()
-}
-
-/// Encodes run lengths as text. Each length from the fourth on is replaced by its difference from the length
-/// two before. A number is split into groups of five bits, the lowest first. A sixth bit says that another
-/// group follows, and adding 48 makes the group a letter. The last group carries the sign.
-fn text_of(counts: &[u32]) -> String {
-    let mut text = String::new();
-    let earlier = [None; 3].into_iter().chain(counts.iter().skip(1).map(Some));
-    for (count, before) in counts.iter().zip(earlier) {
-        let mut rest = i64::from(*count) - before.map_or(0, |before| i64::from(*before));
-        loop {
-            let group = (rest & 31) as u8;
-            rest >>= 5;
-            let is_last = rest == if group & 16 == 0 { 0 } else { -1 };
-            text.push(char::from(48 + group + if is_last { 0 } else { 32 }));
-            if is_last {
-                break;
-            }
-        }
-    }
-    text
 }
 
 /// Writes an instance annotation file (`info`, `images`, `annotations`, `categories`). It has the segments
@@ -114,7 +79,7 @@ pub fn write_coco_instances(
         bbox: [u32; 4],
         area: u64,
         iscrowd: u8,
-        segmentation: &'a CocoMask,
+        segmentation: &'a RunLengths,
     }
 
     #[derive(Serialize)]
@@ -159,34 +124,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Decodes the run lengths of a text.
-    fn counts_of(text: &str) -> Vec<u32> {
-        let mut counts: Vec<i64> = Vec::new();
-        let mut value = 0i64;
-        let mut shift = 0;
-        for letter in text.bytes().map(|b| b - 48) {
-            value |= i64::from(letter & 31) << shift;
-            shift += 5;
-            if letter & 32 == 0 {
-                if letter & 16 != 0 {
-                    value |= -1 << shift;
-                }
-                let before = counts.len().checked_sub(2).filter(|i| *i > 0).map_or(0, |i| counts[i]);
-                counts.push(value + before);
-                value = 0;
-                shift = 0;
-            }
-        }
-        counts.into_iter().map(|count| u32::try_from(count).unwrap()).collect()
-    }
-
-    #[test]
-    fn text_is_that_of_pycocotools() {
-        assert_eq!(text_of(&[1, 3, 2]), "132");
-        assert_eq!(text_of(&[200, 3, 5, 90, 1, 17, 500]), "X635g2LgMc?");
-        assert_eq!(text_of(&[5050, 1, 4949]), "jm41ej4");
-    }
-
     proptest! {
         #[test]
         fn masks_are_the_pixels_of_their_segments(
@@ -204,10 +141,10 @@ mod tests {
             prop_assert!(!masks.contains_key(&0) && !masks.contains_key(&three));
             for (id, mask) in &masks {
                 prop_assert_eq!(mask.size, [height, width]);
-                let counts = counts_of(&mask.counts);
-                let set = (0..).zip(&counts).flat_map(|(i, n)| vec![i % 2 == 1; *n as usize]);
+                let pixels: Vec<u64> = mask.decode().unwrap().into_iter().flatten().collect();
                 let expected = (0..width).flat_map(|x| (0..height).map(move |y| (x, y)));
-                prop_assert!(set.eq(expected.map(|(x, y)| id_of(x, y) == *id)));
+                let expected = (0u64..).zip(expected).filter(|(_, (x, y))| id_of(*x, *y) == *id);
+                prop_assert!(pixels.into_iter().eq(expected.map(|(pixel, _)| pixel)));
             }
             let there = (0..width).any(|x| (0..height).any(|y| id_of(x, y) == 1 + (7 << 16)));
             prop_assert_eq!(masks.contains_key(&(1 + (7 << 16))), there);

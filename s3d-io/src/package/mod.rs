@@ -41,7 +41,7 @@ pub use coco::{
     CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_panoptic, write_coco,
 };
 #[cfg(feature = "coco")]
-pub use coco_instances::{CocoMask, coco_masks, write_coco_instances};
+pub use coco_instances::{coco_masks, write_coco_instances};
 #[cfg(feature = "colmap")]
 pub use colmap::{ColmapImage, ColmapModel};
 #[cfg(feature = "nerfstudio")]

@@ -215,6 +215,13 @@ class View:
         return json.loads(self._dataset._native.file(self.index, "pose"))  # type: ignore[no-any-return]
 
     @property
+    def objects(self) -> list[dict[str, Any]]:
+        """The instances with a pixel in the image, under the keys of the file: amodal masks, what hides them,
+        distances and boxes. The data set needs the modality "objects".
+        """
+        return json.loads(self._dataset._native.file(self.index, "objects"))["objects"]  # type: ignore[no-any-return]
+
+    @property
     def rgb(self) -> npt.NDArray[np.uint8]:
         """(H, W, 3), sRGB."""
         return self["rgb"]

@@ -76,7 +76,8 @@ class ExportOptions(TypedDict, total=False):
     entropy_stride: int
     """The score of a candidate view counts the classes of every n-th pixel along both axes; default 4."""
     modalities: list[str]
-    """The images to write: rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose.
+    """What to write of an image:
+    rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose, objects.
     """
     keep_all: bool
     """Writes every candidate view."""

@@ -1,6 +1,7 @@
 //! Casts the pixels of a camera: the face that each one sees, and its depth.
 
 use crate::hits::{Hits, NO_FACE};
+use crate::objects::PixelBox;
 use crate::raster::panorama::Panorama;
 use crate::raster::pinhole::Pinhole;
 use crate::raster::window::{Scratch, VisibilityKernel, Window};
@@ -76,10 +77,33 @@ impl<'s, 'm> Caster<'s, 'm> {
     pub fn cast_into(&mut self, camera: &Camera, stride: u32, hits: &mut Hits) {
         let columns = samples(camera.width, stride);
         let rows = samples(camera.height, stride);
-        hits.resize(columns, rows);
-        let columns = columns as usize;
-        let rows = rows as usize;
-        if columns == 0 || rows == 0 {
+        let all = PixelBox { x: 0, y: 0, width: columns, height: rows };
+        if is_coarse_panorama(camera, stride) && !all.is_empty() {
+            *hits = cast_ray_by_ray(self.scene, camera, stride);
+            return;
+        }
+        self.cast_samples(camera, stride, all, hits);
+    }
+
+    /// Casts the pixels of a part of the image, and overwrites `hits`, which get the size of the part. Each
+    /// hit is the same as that of the whole image.
+    ///
+    /// # Panics
+    /// If the part reaches beyond the image.
+    pub fn cast_part_into(&mut self, camera: &Camera, part: PixelBox, hits: &mut Hits) {
+        let fits = part.columns().end <= camera.width && part.rows().end <= camera.height;
+        assert!(fits, "{part:?} of an image of {} × {}", camera.width, camera.height);
+        if is_coarse_panorama(camera, 1) && !part.is_empty() {
+            *hits = cast_part_ray_by_ray(self.scene, camera, part);
+            return;
+        }
+        self.cast_samples(camera, 1, part, hits);
+    }
+
+    /// Casts the samples of a part, which is counted in samples.
+    fn cast_samples(&mut self, camera: &Camera, stride: u32, part: PixelBox, hits: &mut Hits) {
+        hits.resize(part.width, part.height);
+        if part.is_empty() {
             return;
         }
 
@@ -89,22 +113,18 @@ impl<'s, 'm> Caster<'s, 'm> {
             return;
         }
 
-        // A coarse panorama is cast ray by ray.
-        let step_rad = TAU / f64::from(camera.width) * f64::from(stride);
-        if camera.is_panorama() && step_rad > Panorama::WIDEST_STEP_RAD {
-            *hits = cast_ray_by_ray(self.scene, camera, stride);
-            return;
-        }
-
         // The windows of a panorama are about square, so that few clusters lie in several windows, and each
         // window is far from the azimuth opposite to its middle. Views are no faster with squares than with
         // strips.
+        let all_columns = samples(camera.width, stride) as usize;
         let across = if camera.is_panorama() {
-            columns.div_ceil(WINDOW.isqrt()).max(4)
+            all_columns.div_ceil(WINDOW.isqrt()).max(4)
         } else {
-            columns.div_ceil(MAX_SIDE)
+            all_columns.div_ceil(MAX_SIDE)
         };
-        let max_columns = columns.div_ceil(across);
+        let columns = part.width as usize;
+        let rows = part.height as usize;
+        let max_columns = all_columns.div_ceil(across).min(columns);
         // All windows have the same height but the last.
         let windows = (rows * max_columns).div_ceil(WINDOW);
         let max_rows = rows.div_ceil(windows).min(MAX_SIDE);
@@ -114,13 +134,20 @@ impl<'s, 'm> Caster<'s, 'm> {
             for column in (0..columns).step_by(max_columns) {
                 let width = max_columns.min(columns - column);
                 let height = max_rows.min(rows - row);
-                let window = Window { camera, rays, stride, column, row, width, height };
                 let first = row * columns + column;
+                let [column, row] = [column + part.x as usize, row + part.y as usize];
+                let window = Window { camera, rays, stride, column, row, width, height };
                 let out = (&mut hits.face.pixels_mut()[first..], &mut hits.depth.pixels_mut()[first..]);
                 cast_window(level(), self.scene, &window, &mut self.scratch, out, columns);
             }
         }
     }
+}
+
+/// Returns whether the samples of a camera are so far apart that they are cast ray by ray.
+fn is_coarse_panorama(camera: &Camera, stride: u32) -> bool {
+    let step_rad = TAU / f64::from(camera.width) * f64::from(stride);
+    camera.is_panorama() && step_rad > Panorama::WIDEST_STEP_RAD && camera.pose.location.is_finite()
 }
 
 /// Casts a window with the instructions of `level`. `out` begins at the first pixel of the window; its rows
@@ -167,15 +194,23 @@ pub fn cast_strided(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits {
 /// # Panics
 /// If `stride` is 0.
 pub fn cast_ray_by_ray(scene: &Scene<'_>, camera: &Camera, stride: u32) -> Hits {
-    let columns = strided(camera.width, stride);
-    let rows = strided(camera.height, stride);
+    cast_rays(scene, camera, &strided(camera.width, stride), &strided(camera.height, stride))
+}
+
+/// Casts the pixels of a part of an image, one exact ray at a time.
+fn cast_part_ray_by_ray(scene: &Scene<'_>, camera: &Camera, part: PixelBox) -> Hits {
+    cast_rays(scene, camera, &part.columns().collect::<Vec<_>>(), &part.rows().collect::<Vec<_>>())
+}
+
+/// Casts the rays through the centres of some columns and rows, one exact ray at a time.
+fn cast_rays(scene: &Scene<'_>, camera: &Camera, columns: &[u32], rows: &[u32]) -> Hits {
     let mut caster = RayCaster::new(scene, camera.pose.location);
     let rays = camera.rays();
 
     let mut faces = Vec::new();
     let mut depths = Vec::new();
-    for &j in &rows {
-        for &i in &columns {
+    for &j in rows {
+        for &i in columns {
             let hit = caster.cast(rays.at(i, j));
             faces.push(hit.map_or(NO_FACE, |h| h.face));
             depths.push(hit.map_or(f32::INFINITY, |h| h.t as f32));

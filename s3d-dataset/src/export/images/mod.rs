@@ -1,10 +1,12 @@
 //! The images of an area. Each view is cast once, every modality is made from the same hits, and each file is
 //! written whole.
 
+pub(crate) mod objects;
 pub(crate) mod photographs;
 
 use crate::context::{Context, Progress};
 use crate::error::Result;
+use crate::export::images::objects::InstanceFinder;
 use crate::export::images::photographs::{WrittenPhotograph, write_photograph};
 use crate::export::input::pictures::Pictures;
 use crate::export::location::room_name;
@@ -27,6 +29,8 @@ pub(crate) struct ImageJob<'a> {
     pub(crate) layout: &'a Layout,
     pub(crate) area: u32,
     pub(crate) channels: Channels<'a>,
+    /// Finds the objects of images, if they are asked for.
+    pub(crate) instances: Option<&'a InstanceFinder<'a>>,
     /// The source of colours; `None` takes them from the mesh.
     pub(crate) pictures: Option<&'a Pictures>,
     pub(crate) locations: &'a [ScanLocation],
@@ -247,6 +251,13 @@ impl ImageWriter<'_> {
         Ok(FileRecord::of_bytes(layout.root(), &path, bytes)?)
     }
 
+    /// Writes the objects of an image from its hits, if they are asked for.
+    pub(crate) fn write_objects(&self, hits: &Hits, camera: &Camera) -> Result<Option<FileRecord>> {
+        let Some(instances) = self.job.instances else { return Ok(None) };
+        let objects = instances.find(hits, camera).to_json();
+        Ok(Some(self.write(Domain::Objects, &objects)?))
+    }
+
     pub(crate) fn write_pose(&self, camera: &Camera, scan: &Pose) -> Result<FileRecord> {
         let room = format!("{}_{}", self.room, self.job.area);
         let mut pose = PoseFile::new(camera, scan, self.uuid, &room, self.frame);
@@ -264,13 +275,14 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
 
     // Poses alone need no rays.
-    if !images.is_empty() {
+    if !images.is_empty() || job.instances.is_some() {
         caster.cast_into(&shot.camera, 1, hits);
         written.files = job
             .channels
             .encode(&images, hits, &shot.camera, buffers, |image, file| {
                 writer.write(image.domain(), &file)
             })?;
+        written.files.extend(writer.write_objects(hits, &shot.camera)?);
     }
 
     if job.modalities.contains(&Domain::Pose) {

@@ -20,12 +20,14 @@ use crate::stage::Stage;
 use crate::summary::Unlabelled;
 use crate::survey::annotated::Annotated;
 use crate::survey::labelled_area::LabelledArea;
+use crate::survey::surface_boxes::boxes_of_faces;
 use crate::useful::{Finding, judge, mesh_findings, size_findings};
 use s3d_geom::{NearestFaces, TriMesh};
-use s3d_io::dataset::{Domain, FileRecord, InstanceRecord, InstanceWriter, Layout};
+use s3d_io::dataset::{Domain, FileRecord, InstanceRecord, InstanceWriter, Layout, SurfaceBoxes};
 use s3d_io::fs::create_dir;
 use s3d_io::mesh::MeshFile;
 use s3d_label::{Disputes, FaceLabels, LabelTable};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -184,7 +186,7 @@ impl Surveyor for ExportSurveyor<'_, '_> {
     }
 
     fn labels(&mut self, annotated: &Annotated, votes: &FaceLabels) -> Result<()> {
-        if let Some(files) = &self.files {
+        if let Some(files) = &mut self.files {
             files.write_votes(annotated, votes)?;
         }
         tell_labels(self.ctx, annotated, self.started);
@@ -246,8 +248,11 @@ impl<'a> LabelFiles<'a> {
         Ok(instances.push(&record, points)?)
     }
 
-    fn write_votes(&self, annotated: &Annotated, votes: &FaceLabels) -> Result<()> {
+    fn write_votes(&mut self, annotated: &Annotated, votes: &FaceLabels) -> Result<()> {
         let Self { layout, area, mesh, table, .. } = *self;
+        if let Some(instances) = &mut self.instances {
+            instances.set_surfaces(&surfaces(mesh, annotated));
+        }
         let disputes = Disputes::of(mesh, votes, table);
         tables::write_votes(layout, area, annotated, &disputes, table)?;
         tables::write_face_votes(layout, area, &annotated.label_of_face, votes)
@@ -263,6 +268,15 @@ impl<'a> LabelFiles<'a> {
         tables::write_instance_numbers(layout, area, &labelled.names)?;
         listing::records(ctx, layout, &label_files(layout, area))
     }
+}
+
+/// Returns the boxes of the faces of each label, as they are written.
+fn surfaces(mesh: &TriMesh, annotated: &Annotated) -> BTreeMap<u32, SurfaceBoxes> {
+    let label_of_face: Vec<u32> = annotated.label_of_face.iter().map(|label| label.0).collect();
+    boxes_of_faces(mesh, &label_of_face)
+        .into_iter()
+        .map(|(label, boxes)| (label, SurfaceBoxes::new(boxes.bbox, &boxes.upright, &boxes.oriented)))
+        .collect()
 }
 
 /// The label files of an area, if it has labels.

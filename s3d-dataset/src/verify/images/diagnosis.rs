@@ -204,7 +204,8 @@ fn near(domain: Domain, found: [f64; 3], expected: [f64; 3]) -> bool {
             Domain::Normal => 2.0,
             Domain::Rgb => 14.0,
             Domain::GlobalXyz => 2e-4 + 1e-3 * expected.abs(),
-            Domain::Semantic | Domain::SemanticPretty | Domain::SemanticClass | Domain::Pose => 0.0,
+            Domain::Semantic | Domain::SemanticPretty | Domain::SemanticClass => 0.0,
+            Domain::Pose | Domain::Objects => 0.0,
         };
         (found - expected).abs() <= within
     })

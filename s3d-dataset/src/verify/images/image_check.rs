@@ -47,6 +47,11 @@ impl ImageCheck<'_> {
             channels.draw_together(&drawn, &memory.hits, &pose.camera, &mut memory.buffers);
         }
 
+        if self.domains.contains(&Domain::Objects) && image.has(Domain::Objects) {
+            let camera = pose.as_ref().filter(|_| cast).map(|pose| &pose.camera);
+            self.check_objects(image, size, camera, &memory.hits);
+        }
+
         let mut reader = std::mem::take(&mut memory.reader);
         let mut files = ImageFiles {
             check: self,
@@ -61,7 +66,7 @@ impl ImageCheck<'_> {
             semantic: None,
         };
 
-        for &domain in self.domains.iter().filter(|d| **d != Domain::Pose && image.has(**d)) {
+        for &domain in self.domains.iter().filter(|d| d.pixels().is_some() && image.has(**d)) {
             let path = image.path(self.layout, domain);
             let Some(opened) = self.open(domain, &path, &mut reader) else { continue };
             let fits = report.check(opened.size() == size, SIZES, &path, || {

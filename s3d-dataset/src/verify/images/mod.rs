@@ -3,11 +3,13 @@
 pub(crate) mod diagnosis;
 mod image_check;
 mod image_files;
+mod objects;
 pub(crate) mod picture_colors;
 pub(crate) mod pixels;
 pub(crate) mod rays;
 mod shade;
 
+use crate::export::images::objects::InstanceFinder;
 use crate::export::modality::{Channels, ImageBuffers};
 use crate::record::manifest::Manifest;
 use crate::verify::files::Files;
@@ -34,6 +36,8 @@ pub(crate) struct Reference<'a> {
     pub(crate) channels: Channels<'a>,
     /// Whether RGB comes from the mesh.
     pub(crate) rgb_from_mesh: bool,
+    /// Finds the objects of images, if the data set has them.
+    pub(crate) instances: Option<&'a InstanceFinder<'a>>,
     pub(crate) report: &'a Report,
 }
 

@@ -58,7 +58,7 @@ impl<'a> Shade<'a> {
                 )
                 .map(f64::from)
             }
-            Domain::Pose => [0.0; 3],
+            Domain::Pose | Domain::Objects => [0.0; 3],
         }
     }
 }

@@ -8,11 +8,13 @@
 use crate::cloud::npy::npz::{NpzWriter, bytes};
 use crate::cloud::passes::PointPasses;
 use crate::dataset::instances::members::VoxelMembers;
+use crate::dataset::instances::surface::SurfaceBoxes;
 use crate::error::{Error, Result};
 use crate::fs::atomic::AtomicFile;
 use crate::fs::json::read_json;
 use s3d_geom::{Aabb, VoxelGrid, Voxels};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -54,6 +56,10 @@ pub struct InstanceEntry {
     pub voxel_occupancy: Vec<u8>,
     /// 216 numbers of points.
     pub points_per_voxel: Vec<u32>,
+    /// The boxes of the faces that carry the label. `None`, and no key in the file, if no face does, or the
+    /// file was written before version 0.2.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceBoxes>,
 }
 
 /// Writes `instances.json` and `instances.npz` of an area, instance by instance, each whole or not at all.
@@ -153,8 +159,16 @@ impl<J: Write, N: Write + Seek> InstanceWriter<J, N> {
             bbox: instance.bbox.to_array(),
             voxel_occupancy: points_per_voxel.iter().map(|&n| u8::from(n > 0)).collect(),
             points_per_voxel,
+            surface: None,
         });
         Ok(())
+    }
+
+    /// Says which boxes the faces of each label have, by label index. Labels of no instance are left out.
+    pub fn set_surfaces(&mut self, surfaces: &BTreeMap<u32, SurfaceBoxes>) {
+        for entry in &mut self.entries {
+            entry.surface = surfaces.get(&entry.label_index).copied();
+        }
     }
 
     /// Appends indices of points.
@@ -509,6 +523,7 @@ mod tests {
             bbox: [0.0; 6],
             voxel_occupancy: vec![0; CELLS],
             points_per_voxel: vec![0; CELLS],
+            surface: None,
         }
     }
 

@@ -83,7 +83,7 @@ pub(crate) fn write_photograph(
     let mut seen = 0.0;
 
     // Poses alone need no photograph.
-    if !images.is_empty() {
+    if !images.is_empty() || job.instances.is_some() {
         let picture = photograph.read()?;
         agreement = Agreement::of(&picture, photograph, job.channels.scene, job.channels.textures);
         let colors = photograph.colors(&picture, camera);
@@ -93,6 +93,7 @@ pub(crate) fn write_photograph(
         let channels = Channels { pictures: Some(PictureColors::Photograph(&colors)), ..job.channels };
         files = channels
             .encode(&images, hits, camera, buffers, |image, file| writer.write(image.domain(), &file))?;
+        files.extend(writer.write_objects(hits, camera)?);
 
         let pixels = count(job, &images, hits, buffers);
         let black = colors.pixels().iter().filter(|color| **color == [0; 3]).count();

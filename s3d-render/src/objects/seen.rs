@@ -1,0 +1,360 @@
+//! The objects of an image.
+
+use super::{NO_OBJECT, ObjectScenes, bounds};
+use crate::hits::{Hits, NO_FACE};
+use crate::raster::visibility::Caster;
+use crate::scene::Scene;
+use glam::{DVec2, dvec2};
+use s3d_geom::{Camera, Projection, Rays};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A rectangle of pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PixelBox {
+    /// The first column.
+    pub x: u32,
+    /// The first row.
+    pub y: u32,
+    /// The number of columns.
+    pub width: u32,
+    /// The number of rows.
+    pub height: u32,
+}
+
+impl PixelBox {
+    /// Returns the columns.
+    pub fn columns(&self) -> Range<u32> {
+        self.x..self.x + self.width
+    }
+
+    /// Returns the rows.
+    pub fn rows(&self) -> Range<u32> {
+        self.y..self.y + self.height
+    }
+
+    /// Returns whether the box has no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.width == 0 || self.height == 0
+    }
+
+    /// Returns the part of the box whose pixels lie between two points of the image, in whole or in part.
+    pub(super) fn between(&self, low: DVec2, high: DVec2) -> Option<Self> {
+        let least = dvec2(f64::from(self.x), f64::from(self.y));
+        let most = least + dvec2(f64::from(self.width), f64::from(self.height));
+        let low = low.floor().clamp(least, most);
+        let high = high.ceil().clamp(least, most);
+        let size = high - low;
+        let found = Self { x: low.x as u32, y: low.y as u32, width: size.x as u32, height: size.y as u32 };
+        (size.min_element() > 0.0).then_some(found)
+    }
+
+    /// Widens the box by a pixel.
+    fn add(bounds: &mut Option<Self>, x: u32, y: u32) {
+        let old = bounds.unwrap_or(Self { x, y, width: 1, height: 1 });
+        let left = old.x.min(x);
+        let top = old.y.min(y);
+        let width = (old.x + old.width).max(x + 1) - left;
+        let height = (old.y + old.height).max(y + 1) - top;
+        *bounds = Some(Self { x: left, y: top, width, height });
+    }
+}
+
+/// Some pixels of an image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mask {
+    /// The size of the image.
+    pub size: [u32; 2],
+    /// Stretches of pixels in the order of columns: pixel (x, y) has the number x · height + y. They are
+    /// sorted, and between two of them is a pixel at least.
+    pub stretches: Vec<Range<u64>>,
+}
+
+impl Mask {
+    /// Returns the number of pixels.
+    pub fn len(&self) -> u64 {
+        self.stretches.iter().map(|stretch| stretch.end - stretch.start).sum()
+    }
+
+    /// Returns whether there is no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.stretches.is_empty()
+    }
+
+    /// Appends a pixel that lies behind all others.
+    fn push(&mut self, pixel: u64) {
+        match self.stretches.last_mut() {
+            Some(last) if last.end == pixel => last.end += 1,
+            _ => self.stretches.push(pixel..pixel + 1),
+        }
+    }
+}
+
+/// What an image shows of an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeenObject {
+    /// The object.
+    pub object: u32,
+    /// The number of its visible pixels, at least 1.
+    pub visible_px: u64,
+    /// The smallest rectangle of its visible pixels. In a panorama it may go on beyond the right border: then
+    /// column x stands for column x − width of the image.
+    pub visible_box: PixelBox,
+    /// The distance between the camera and its nearest visible pixel, metres.
+    pub nearest_m: f32,
+    /// The median distance of its visible pixels, the lower one of two, metres.
+    pub median_m: f32,
+    /// The pixels that it would have if it stood alone: the amodal mask. All visible pixels are among them.
+    pub mask: Mask,
+    /// The smallest rectangle of those pixels, in a panorama as for `visible_box`.
+    pub mask_box: PixelBox,
+    /// The objects in front of it, and the number of its pixels that each hides; the most first.
+    /// [`NO_OBJECT`] stands for surfaces that belong to none.
+    pub hidden_by: Vec<(u32, u64)>,
+    /// What a pinhole camera's image cuts off; `None` in a panorama.
+    pub beyond: Option<Beyond>,
+}
+
+impl SeenObject {
+    /// Returns the share of the object's pixels in the image that other objects hide, from 0 to below 1.
+    pub fn occlusion(&self) -> f64 {
+        1.0 - self.visible_px as f64 / self.mask.len() as f64
+    }
+}
+
+/// How far an object goes on beyond the borders of an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beyond {
+    /// The least and the largest projection of its corners in pixels, within the image or not. `None` if it
+    /// reaches to the side of the camera or behind it.
+    pub bounds: Option<[DVec2; 2]>,
+    /// The share of the object that lies outside of the image, from 0 to below 1. It is that of the samples
+    /// of a grid over an image three times as wide and as high: what lies further out does not count.
+    pub truncation: f64,
+}
+
+/// The most samples of the grid by which [`Beyond::truncation`] is measured.
+const SAMPLES: f64 = 65_536.0;
+
+/// Finds the objects in image after image, and keeps its memory between them.
+#[derive(Debug)]
+pub struct SeenObjects<'s, 'm> {
+    scenes: &'s ObjectScenes<'m>,
+    object_of_face: &'s [u32],
+    /// The hits of an object that is drawn alone.
+    alone: Hits,
+}
+
+impl<'s, 'm> SeenObjects<'s, 'm> {
+    /// Returns a finder of objects. Face f of the mesh belongs to object `object_of_face[f]`.
+    pub fn new(scenes: &'s ObjectScenes<'m>, object_of_face: &'s [u32]) -> Self {
+        Self { scenes, object_of_face, alone: Hits::default() }
+    }
+
+    /// Returns the objects that an image shows, sorted. `hits` are those of `camera`, of every pixel.
+    ///
+    /// # Panics
+    /// If `hits` are of another size, or of another mesh.
+    pub fn find(&mut self, hits: &Hits, camera: &Camera) -> Vec<SeenObject> {
+        let size = (camera.width, camera.height);
+        assert_eq!((hits.face.width(), hits.face.height()), size, "hits of the camera");
+        let visible = self.visible(hits, camera);
+        visible
+            .into_iter()
+            .map(|(object, visible)| self.seen(object, visible, hits, camera))
+            .collect()
+    }
+
+    /// Gathers the visible pixels of each object.
+    fn visible(&self, hits: &Hits, camera: &Camera) -> BTreeMap<u32, Visible> {
+        let rays = camera.rays();
+        let mut objects: BTreeMap<u32, Visible> = BTreeMap::new();
+        for y in 0..camera.height {
+            // Neighbours mostly show the same object.
+            let mut x = 0;
+            while x < camera.width {
+                let object = self.object_at(hits, x, y);
+                let end = (x + 1..camera.width).find(|other| self.object_at(hits, *other, y) != object);
+                let end = end.unwrap_or(camera.width);
+                if object != NO_OBJECT {
+                    objects.entry(object).or_default().add(hits, &rays, x..end, y);
+                }
+                x = end;
+            }
+        }
+        objects
+    }
+
+    /// Returns the object that a pixel shows.
+    fn object_at(&self, hits: &Hits, x: u32, y: u32) -> u32 {
+        match hits.face.at(x, y) {
+            NO_FACE => NO_OBJECT,
+            face => self.object_of_face[face as usize],
+        }
+    }
+
+    /// Draws an object alone, and says what is seen of it.
+    fn seen(&mut self, object: u32, mut visible: Visible, hits: &Hits, camera: &Camera) -> SeenObject {
+        let height = u64::from(camera.height);
+        let mut mask = Mask { size: [camera.width, camera.height], stretches: Vec::new() };
+        let mut columns = Columns::default();
+        let mut hidden_by: BTreeMap<u32, u64> = BTreeMap::new();
+        let mut beyond = None;
+
+        if let Some(scene) = self.scenes.get(object) {
+            let mut parts = bounds::parts(camera, &scene.mesh().aabb());
+            parts.sort_by_key(|part| part.x);
+            let mut caster = Caster::new(scene);
+            let mut alone = std::mem::take(&mut self.alone);
+            for part in parts {
+                caster.cast_part_into(camera, part, &mut alone);
+                for x in part.columns() {
+                    for y in part.rows() {
+                        if alone.face.at(x - part.x, y - part.y) == NO_FACE {
+                            continue;
+                        }
+                        mask.push(u64::from(x) * height + u64::from(y));
+                        columns.add(x, y);
+                        let shown = self.object_at(hits, x, y);
+                        if shown != object {
+                            *hidden_by.entry(shown).or_default() += 1;
+                        }
+                    }
+                }
+            }
+            self.alone = alone;
+            beyond = (!camera.is_panorama()).then(|| beyond_frame(scene, camera));
+        }
+
+        let mut hidden_by: Vec<(u32, u64)> = hidden_by.into_iter().collect();
+        hidden_by.sort_by_key(|(object, pixels)| (std::cmp::Reverse(*pixels), *object));
+        SeenObject {
+            object,
+            visible_px: visible.distances.len() as u64,
+            visible_box: visible.columns.bounds(camera),
+            nearest_m: visible.distances.iter().copied().fold(f32::INFINITY, f32::min),
+            median_m: visible.median(),
+            mask_box: columns.bounds(camera),
+            mask,
+            hidden_by,
+            beyond,
+        }
+    }
+}
+
+/// The visible pixels of an object.
+#[derive(Default)]
+struct Visible {
+    /// The distance of each pixel, metres.
+    distances: Vec<f32>,
+    columns: Columns,
+}
+
+impl Visible {
+    /// Adds pixels of a row.
+    fn add(&mut self, hits: &Hits, rays: &Rays, columns: Range<u32>, y: u32) {
+        for x in columns {
+            let depth = f64::from(hits.depth.at(x, y));
+            self.distances.push((depth * rays.at(x, y).length()) as f32);
+            self.columns.add(x, y);
+        }
+    }
+
+    /// Returns the median distance.
+    fn median(&mut self) -> f32 {
+        let middle = self.distances.len().saturating_sub(1) / 2;
+        match self.distances.get_mut(middle) {
+            Some(_) => *self.distances.select_nth_unstable_by(middle, f32::total_cmp).1,
+            None => f32::INFINITY,
+        }
+    }
+}
+
+/// The pixels of an object by column.
+#[derive(Default)]
+struct Columns {
+    /// Whether a column has a pixel.
+    is_used: Vec<bool>,
+    /// The smallest rectangle of all pixels.
+    bounds: Option<PixelBox>,
+}
+
+impl Columns {
+    fn add(&mut self, x: u32, y: u32) {
+        let column = x as usize;
+        if self.is_used.len() <= column {
+            self.is_used.resize(column + 1, false);
+        }
+        self.is_used[column] = true;
+        PixelBox::add(&mut self.bounds, x, y);
+    }
+
+    /// Returns the smallest rectangle. A panorama's leaves out its widest gap: it may go on beyond the right
+    /// border.
+    fn bounds(&self, camera: &Camera) -> PixelBox {
+        let Some(bounds) = self.bounds else { return PixelBox::default() };
+        if !camera.is_panorama() {
+            return bounds;
+        }
+
+        let used: Vec<u32> = bounds.columns().filter(|x| self.is_used[*x as usize]).collect();
+        // The gap around the border of the image is the first candidate.
+        let around = camera.width - bounds.width;
+        let gaps = used.array_windows().map(|[a, b]| (b - a - 1, *b));
+        match gaps.rev().max_by_key(|(gap, _)| *gap) {
+            Some((gap, first)) if gap > around => PixelBox { x: first, width: camera.width - gap, ..bounds },
+            _ => bounds,
+        }
+    }
+}
+
+/// Measures how far an object goes on beyond the image of a pinhole camera.
+fn beyond_frame(scene: &Scene<'_>, camera: &Camera) -> Beyond {
+    let mesh = scene.mesh();
+    let frame = dvec2(f64::from(camera.width), f64::from(camera.height));
+    let corners = mesh.positions().iter().map(|corner| corner.as_dvec3());
+    let bounds = bounds::projected(camera, corners);
+    if let Some([low, high]) = bounds
+        && low.min_element() >= 0.0
+        && high.cmple(frame).all()
+    {
+        return Beyond { bounds, truncation: 0.0 };
+    }
+
+    // The part of the wide image that the object may cover, and a grid over it.
+    let [low, high] = bounds.unwrap_or([-frame, 2.0 * frame]);
+    let low = low.max(-frame);
+    let size = high.min(2.0 * frame) - low;
+    let step = (size.element_product() / SAMPLES).sqrt().max(1.0);
+    let count = (size / step).ceil().max(DVec2::ONE);
+    let grid = Camera {
+        pose: camera.pose,
+        projection: Projection::Pinhole {
+            focal_px: camera.focal_px() / step,
+            center_px: (camera.center_px() - low) / step,
+        },
+        width: count.x as u32,
+        height: count.y as u32,
+    };
+
+    let alone = Caster::new(scene).cast(&grid);
+    let mut all = 0u64;
+    let mut inside = 0u64;
+    for y in 0..grid.height {
+        for x in 0..grid.width {
+            if alone.face.at(x, y) == NO_FACE {
+                continue;
+            }
+            let at = low + dvec2(f64::from(x) + 0.5, f64::from(y) + 0.5) * step;
+            all += 1;
+            inside += u64::from(at.min_element() >= 0.0 && at.cmplt(frame).all());
+        }
+    }
+    // What is too small for the grid is in the image, since a pixel shows it.
+    let truncation = if inside == 0 {
+        0.0
+    } else {
+        1.0 - inside as f64 / all as f64
+    };
+    Beyond { bounds, truncation }
+}
