@@ -3,7 +3,7 @@
 use crate::commands::meshes::{fuse, render, sample, segments};
 use crate::commands::scores::{detect, eval};
 use crate::commands::shards::{merge, plan};
-use crate::commands::{compare, demo, export, info, label, pack, profile, report, stats, verify, xyz};
+use crate::commands::{additions, compare, demo, export, info, label, pack, report, stats, verify};
 use crate::console::LogFormat;
 use crate::failure::Outcome;
 use clap::{Parser, Subcommand};
@@ -169,7 +169,10 @@ pub(crate) enum Command {
              hits themselves.",
         )
     )]
-    Xyz(xyz::XyzArgs),
+    Xyz(additions::XyzArgs),
+    /// Find the images of a data set that see the same surface: overlaps, angles, scales and distances, in
+    /// area_N/pairs.npz.
+    Pairs(additions::PairsArgs),
     /// Write the files that point cloud loaders read, from an existing data set.
     #[command(
         after_help = concat!(
@@ -178,7 +181,7 @@ pub(crate) enum Command {
             "Each loader's files are in dataset/profiles/NAME.",
         )
     )]
-    Profile(profile::ProfileArgs),
+    Profile(additions::ProfileArgs),
     /// Write a page that shows a data set: panoramas, views, plan, numbers, warnings. It opens from the disk.
     #[command(
         after_help = concat!(
@@ -256,6 +259,7 @@ impl Command {
             | Self::Segments(_)
             | Self::Pack(_)
             | Self::Xyz(_)
+            | Self::Pairs(_)
             | Self::Profile(_)
             | Self::Report(_)
             | Self::Label(_)
@@ -280,8 +284,9 @@ impl Command {
             Self::Render(args) => render::run(args),
             Self::Info(args) => info::run(args),
             Self::Pack(args) => pack::run(args),
-            Self::Xyz(args) => xyz::run(args),
-            Self::Profile(args) => profile::run(args),
+            Self::Xyz(args) => additions::xyz(args),
+            Self::Pairs(args) => additions::pairs(args),
+            Self::Profile(args) => additions::profile(args),
             Self::Report(args) => report::run(args),
             Self::Stats(args) => stats::run(&args),
             Self::Verify(args) => verify::run(args),

@@ -10,7 +10,7 @@
 //! | [`info`](mod@info) | tells what a scene holds and what looks wrong, before it is exported |
 //! | [`verify`](mod@verify) | reads a data set back, every pixel of it |
 //! | [`compare`](mod@compare), [`statistics`](mod@statistics) | say how two data sets differ; count one |
-//! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz) | write what trainers and loaders read |
+//! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz), [`pairs`](mod@pairs) | write what trainers and loaders read |
 //! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: locations, pictures, points |
 //! | [`store`], [`parallel`] | for crates that write results of their own beside a data set |
 //! | [`error`], [`event`], [`summary`] | what a call answers, and what it tells on its way |
@@ -136,6 +136,7 @@ pub mod fuse;
 pub mod info;
 pub mod options;
 pub mod pack;
+pub mod pairs;
 pub mod parallel;
 pub mod place;
 pub mod profile;
@@ -163,6 +164,7 @@ pub use export::shard::merge::merge;
 pub use info::info;
 pub use options::ExportOptions;
 pub use pack::pack;
+pub use pairs::{PairsOptions, pairs};
 pub use place::place_cameras;
 pub use profile::profile;
 pub use record::data_set::DataSet;

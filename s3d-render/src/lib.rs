@@ -67,6 +67,11 @@
 //! [`SeenObjects`] finds the objects of an image: the visible pixels of each, those that it would have if it
 //! stood alone, and what hides it. An object is a number a face.
 //!
+//! # Pairs of images
+//!
+//! [`view_pairs`] tells which images see the same surface: the share of each that the other sees, by exact
+//! rays, with angles, scales and distances.
+//!
 //! # Colours from pictures
 //!
 //! A [`CubeMap`] holds the pictures taken at a place. It is made from a sky box, a panorama or overlapping
@@ -90,6 +95,7 @@ mod edge_samples;
 mod from_above;
 mod hits;
 mod objects;
+mod pairs;
 mod picture;
 mod raster;
 mod ray;
@@ -101,6 +107,7 @@ pub use edge_samples::sample_edges;
 pub use from_above::{FromAbove, GroundGrid, image_from_above};
 pub use hits::{Hits, NO_FACE};
 pub use objects::{Beyond, Mask, NO_OBJECT, ObjectMeshes, ObjectScenes, PixelBox, SeenObject, SeenObjects};
+pub use pairs::{PairFinder, PairOptions, ViewPair, view_pairs};
 pub use picture::cube_map::CubeMap;
 pub use picture::cube_sources::SkyBoxTurn;
 pub use picture::level_panorama::level_panorama;

@@ -10,3 +10,4 @@ mod exact;
 mod images;
 mod modalities;
 mod objects;
+mod pairs;

@@ -1,5 +1,6 @@
 //! One file a subcommand: its words, and the call that they mean.
 
+pub(crate) mod additions;
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod export;
@@ -7,13 +8,11 @@ pub(crate) mod info;
 pub(crate) mod label;
 pub(crate) mod meshes;
 pub(crate) mod pack;
-pub(crate) mod profile;
 pub(crate) mod report;
 pub(crate) mod scores;
 pub(crate) mod shards;
 pub(crate) mod stats;
 pub(crate) mod verify;
-pub(crate) mod xyz;
 
 use crate::args::Threads;
 use crate::console;

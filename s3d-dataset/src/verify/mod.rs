@@ -14,6 +14,7 @@ pub(crate) mod images;
 mod instances;
 mod labels;
 mod mesh;
+mod pairs;
 mod photographs;
 mod points;
 mod pose;
@@ -356,6 +357,7 @@ fn check_images(
 
     let view_colors = view_colors.into_inner().unwrap_or_else(PoisonError::into_inner);
     picture_colors::check(ctx, layout, images, &cameras, &view_colors, report)?;
+    pairs::check(layout, area, images, &cameras, report);
 
     let Some((reference, ..)) = reference else { return Ok(()) };
     if manifest.is_labelled() {

@@ -34,17 +34,17 @@ pub struct OrientedBox {
 }
 
 /// Directions that are tried as the axis of a smallest box, beside those that the caller names.
-const TRIED: usize = 128;
+const TRIED: usize = 96;
 
 /// How many of the tried directions are refined.
 const REFINED: usize = 8;
 
-/// The first step of the refinement, and the smallest one.
+/// The first step of the refinement, and the smallest one; each is a third of the one before.
 const STEPS_RAD: [f64; 2] = [0.1, 1e-5];
 
 /// The directions in which outermost points are sought. Orientations are compared by these points alone; the
 /// box that is returned holds all points.
-const OUTERMOST: usize = 256;
+const OUTERMOST: usize = 96;
 
 impl OrientedBox {
     /// Returns the box of the least volume among those that stand upright: their third axis is +Z. The first
@@ -284,12 +284,12 @@ impl<'a> Trial<'a> {
         let [mut step_rad, smallest_rad] = STEPS_RAD;
         while step_rad > smallest_rad {
             let (x, y) = normal.any_orthonormal_pair();
-            let turned = [x, -x, y, -y, x + y, x - y, y - x, -x - y]
-                .map(|side| (normal + side.normalize() * step_rad).normalize())
+            let turned = [x, -x, y, -y]
+                .map(|side| (normal + side * step_rad).normalize())
                 .map(|axis| (self.cost(axis), axis));
             match turned.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some(better) if better.0 < cost => (cost, normal) = better,
-                _ => step_rad /= 2.0,
+                _ => step_rad /= 3.0,
             }
         }
         (cost, normal)

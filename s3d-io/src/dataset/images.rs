@@ -28,6 +28,11 @@ pub struct DatasetImage {
 }
 
 impl DatasetImage {
+    /// Returns the name by which `pairs.npz` calls the image: its folder, and its name without the domain.
+    pub fn pair_name(&self) -> String {
+        format!("{}/{}", self.frame.folder(), self.stem())
+    }
+
     /// Returns the name without the domain: `camera_{uuid}_{room}_frame_{frame}`. It is unique in an area.
     pub fn stem(&self) -> String {
         image_stem(&self.uuid, &self.room, self.frame)

@@ -304,6 +304,11 @@ impl Layout {
         self.area_dir(area).join("views.json")
     }
 
+    /// `area_1/pairs.npz`: the images that see the same surface, if `s3d pairs` was called.
+    pub fn pairs_npz(&self, area: u32) -> PathBuf {
+        self.area_dir(area).join("pairs.npz")
+    }
+
     /// `area_1/frames.json`: every photograph that became a view.
     pub fn frames_json(&self, area: u32) -> PathBuf {
         self.area_dir(area).join("frames.json")

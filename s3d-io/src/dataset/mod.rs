@@ -11,6 +11,7 @@
 //! - [`InstanceWriter`]: boxes and voxels of instances, `instances.json` and `instances.npz`. They are read
 //!   by [`read_instances`] and [`read_instance_arrays`].
 //! - [`ObjectsFile`]: the objects of an image, with what hides them.
+//! - [`PairColumns`]: `pairs.npz`, the images that see the same surface.
 //! - [`Split`]: folds of areas; [`write_image_list`]: lists of images.
 //! - [`FileRecord`]: `files.csv`, the sizes and checksums of all files.
 //! - [`Conventions`]: `conventions.json`, the meaning of the numbers.
@@ -43,6 +44,8 @@ mod labels;
 pub(crate) mod layout;
 #[cfg(feature = "dataset")]
 pub(crate) mod objects;
+#[cfg(feature = "dataset")]
+mod pairs;
 #[cfg(feature = "dataset")]
 mod point_boxes;
 #[cfg(feature = "dataset")]
@@ -83,6 +86,8 @@ pub use layout::{Frame, ImageName, Layout, PROFILES, image_stem, is_valid_room, 
 pub use objects::{
     BeyondFrame, BoxAngles, BoxCorners, Corner, Hider, ImageObject, ObjectsFile, RunLengths, read_objects,
 };
+#[cfg(feature = "dataset")]
+pub use pairs::{PairColumns, read_pairs, write_pairs};
 #[cfg(feature = "dataset")]
 pub use point_boxes::{PointBox, read_point_boxes, write_point_boxes};
 #[cfg(feature = "dataset")]

@@ -43,6 +43,7 @@ from ._export import Area, ExportOptions, Labels, SceneLike, export
 from ._fuse import Fused, fuse
 from ._mesh import Mesh, MeshLike, as_mesh, read_mesh
 from ._native import __version__
+from ._pairs import Pairs
 from ._points import (
     AnnotatedPoints,
     PointCloud,
@@ -97,6 +98,7 @@ __all__ = [
     "MeshError",
     "MeshLike",
     "MissingFileError",
+    "Pairs",
     "PointCloud",
     "PointsLike",
     "PoseLike",

@@ -19,6 +19,7 @@ from . import _native
 from ._camera import Matrix
 from ._errors import UsageError
 from ._mesh import Mesh
+from ._pairs import Pairs, read_pairs
 from ._progress import Progress, sink
 from ._results import (
     Comparison,
@@ -626,6 +627,15 @@ class DataSet(Sequence[View]):
         """Returns every candidate view of an area, or of all areas, whether it was kept or dropped."""
         areas = self.areas if area is None else [area]
         return [Candidate(*entry) for number in areas for entry in self._native.candidates(number)]
+
+    def pairs(self, area: int | None = None) -> Pairs:
+        """Returns the images of an area that see the same surface, which `s3d pairs` found. `UsageError` if it
+        was not called yet.
+        """
+        path = Path(self.root) / f"area_{self._area(area)}" / "pairs.npz"
+        if not path.exists():
+            raise UsageError(f"{path}: there are no pairs yet: call s3d pairs {self.root}")
+        return read_pairs(path)
 
     def _area(self, area: int | None) -> int:
         if area is not None:

@@ -3,9 +3,10 @@
 use super::{NO_OBJECT, ObjectScenes, bounds};
 use crate::hits::{Hits, NO_FACE};
 use crate::raster::visibility::Caster;
-use crate::scene::Scene;
+use crate::raster::window::Scratch;
 use glam::{DVec2, dvec2};
-use s3d_geom::{Camera, Projection, Rays};
+use s3d_geom::{Camera, Projection, Raster, Rays};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -49,14 +50,15 @@ impl PixelBox {
         (size.min_element() > 0.0).then_some(found)
     }
 
-    /// Widens the box by a pixel.
-    fn add(bounds: &mut Option<Self>, x: u32, y: u32) {
-        let old = bounds.unwrap_or(Self { x, y, width: 1, height: 1 });
-        let left = old.x.min(x);
-        let top = old.y.min(y);
-        let width = (old.x + old.width).max(x + 1) - left;
-        let height = (old.y + old.height).max(y + 1) - top;
-        *bounds = Some(Self { x: left, y: top, width, height });
+    /// Widens a box by some pixels.
+    fn add(bounds: &mut Option<Self>, columns: &Range<u32>, rows: &Range<u32>) {
+        let (old_columns, old_rows) =
+            bounds.map_or((columns.clone(), rows.clone()), |old| (old.columns(), old.rows()));
+        let x = old_columns.start.min(columns.start);
+        let y = old_rows.start.min(rows.start);
+        let width = old_columns.end.max(columns.end) - x;
+        let height = old_rows.end.max(rows.end) - y;
+        *bounds = Some(Self { x, y, width, height });
     }
 }
 
@@ -81,11 +83,11 @@ impl Mask {
         self.stretches.is_empty()
     }
 
-    /// Appends a pixel that lies behind all others.
-    fn push(&mut self, pixel: u64) {
+    /// Appends pixels that lie behind all others.
+    fn push(&mut self, pixels: Range<u64>) {
         match self.stretches.last_mut() {
-            Some(last) if last.end == pixel => last.end += 1,
-            _ => self.stretches.push(pixel..pixel + 1),
+            Some(last) if last.end == pixels.start => last.end = pixels.end,
+            _ => self.stretches.push(pixels),
         }
     }
 }
@@ -136,19 +138,22 @@ pub struct Beyond {
 /// The most samples of the grid by which [`Beyond::truncation`] is measured.
 const SAMPLES: f64 = 65_536.0;
 
-/// Finds the objects in image after image, and keeps its memory between them.
-#[derive(Debug)]
+/// Finds the objects in image after image, and keeps its memory between them. Each thread should hold one.
 pub struct SeenObjects<'s, 'm> {
     scenes: &'s ObjectScenes<'m>,
     object_of_face: &'s [u32],
-    /// The hits of an object that is drawn alone.
+    /// The object that each pixel of the image shows.
+    shown: Raster<u32>,
+    /// The hits of an object that is drawn alone, and the memory of casting them.
     alone: Hits,
+    scratch: Scratch,
 }
 
 impl<'s, 'm> SeenObjects<'s, 'm> {
     /// Returns a finder of objects. Face f of the mesh belongs to object `object_of_face[f]`.
     pub fn new(scenes: &'s ObjectScenes<'m>, object_of_face: &'s [u32]) -> Self {
-        Self { scenes, object_of_face, alone: Hits::default() }
+        let shown = Raster::filled(0, 0, NO_OBJECT);
+        Self { scenes, object_of_face, shown, alone: Hits::default(), scratch: Scratch::default() }
     }
 
     /// Returns the objects that an image shows, sorted. `hits` are those of `camera`, of every pixel.
@@ -158,10 +163,19 @@ impl<'s, 'm> SeenObjects<'s, 'm> {
     pub fn find(&mut self, hits: &Hits, camera: &Camera) -> Vec<SeenObject> {
         let size = (camera.width, camera.height);
         assert_eq!((hits.face.width(), hits.face.height()), size, "hits of the camera");
+        let object_of = |face: &u32| match *face {
+            NO_FACE => NO_OBJECT,
+            face => self.object_of_face[face as usize],
+        };
+        let mut shown = std::mem::replace(&mut self.shown, Raster::filled(0, 0, NO_OBJECT)).into_vec();
+        shown.clear();
+        shown.extend(hits.face.pixels().iter().map(object_of));
+        self.shown = Raster::from_vec(size.0, size.1, shown);
+
         let visible = self.visible(hits, camera);
         visible
             .into_iter()
-            .map(|(object, visible)| self.seen(object, visible, hits, camera))
+            .map(|(object, visible)| self.seen(object, visible, camera))
             .collect()
     }
 
@@ -172,12 +186,10 @@ impl<'s, 'm> SeenObjects<'s, 'm> {
         for y in 0..camera.height {
             // Neighbours mostly show the same object.
             let mut x = 0;
-            while x < camera.width {
-                let object = self.object_at(hits, x, y);
-                let end = (x + 1..camera.width).find(|other| self.object_at(hits, *other, y) != object);
-                let end = end.unwrap_or(camera.width);
-                if object != NO_OBJECT {
-                    objects.entry(object).or_default().add(hits, &rays, x..end, y);
+            for same in self.shown.row(y).chunk_by(|a, b| a == b) {
+                let end = x + same.len() as u32;
+                if let Some(object) = same.first().filter(|object| **object != NO_OBJECT) {
+                    objects.entry(*object).or_default().add(hits, &rays, x..end, y);
                 }
                 x = end;
             }
@@ -185,49 +197,28 @@ impl<'s, 'm> SeenObjects<'s, 'm> {
         objects
     }
 
-    /// Returns the object that a pixel shows.
-    fn object_at(&self, hits: &Hits, x: u32, y: u32) -> u32 {
-        match hits.face.at(x, y) {
-            NO_FACE => NO_OBJECT,
-            face => self.object_of_face[face as usize],
-        }
-    }
-
     /// Draws an object alone, and says what is seen of it.
-    fn seen(&mut self, object: u32, mut visible: Visible, hits: &Hits, camera: &Camera) -> SeenObject {
-        let height = u64::from(camera.height);
+    fn seen(&mut self, object: u32, mut visible: Visible, camera: &Camera) -> SeenObject {
         let mut mask = Mask { size: [camera.width, camera.height], stretches: Vec::new() };
         let mut columns = Columns::default();
         let mut hidden_by: BTreeMap<u32, u64> = BTreeMap::new();
         let mut beyond = None;
 
         if let Some(scene) = self.scenes.get(object) {
+            let mut caster = Caster::reusing(scene, std::mem::take(&mut self.scratch));
             let mut parts = bounds::parts(camera, &scene.mesh().aabb());
             parts.sort_by_key(|part| part.x);
-            let mut caster = Caster::new(scene);
-            let mut alone = std::mem::take(&mut self.alone);
             for part in parts {
-                caster.cast_part_into(camera, part, &mut alone);
-                for x in part.columns() {
-                    for y in part.rows() {
-                        if alone.face.at(x - part.x, y - part.y) == NO_FACE {
-                            continue;
-                        }
-                        mask.push(u64::from(x) * height + u64::from(y));
-                        columns.add(x, y);
-                        let shown = self.object_at(hits, x, y);
-                        if shown != object {
-                            *hidden_by.entry(shown).or_default() += 1;
-                        }
-                    }
-                }
+                caster.cast_part_into(camera, part, &mut self.alone);
+                add_part(&self.alone, part, &mut mask, &mut columns);
+                self.count_hiders(object, part, &mut hidden_by);
             }
-            self.alone = alone;
-            beyond = (!camera.is_panorama()).then(|| beyond_frame(scene, camera));
+            beyond = (!camera.is_panorama()).then(|| beyond_frame(&mut caster, camera, &mut self.alone));
+            self.scratch = caster.into_scratch();
         }
 
         let mut hidden_by: Vec<(u32, u64)> = hidden_by.into_iter().collect();
-        hidden_by.sort_by_key(|(object, pixels)| (std::cmp::Reverse(*pixels), *object));
+        hidden_by.sort_by_key(|(object, pixels)| (Reverse(*pixels), *object));
         SeenObject {
             object,
             visible_px: visible.distances.len() as u64,
@@ -238,6 +229,64 @@ impl<'s, 'm> SeenObjects<'s, 'm> {
             mask,
             hidden_by,
             beyond,
+        }
+    }
+
+    /// Counts what is shown where an object would be, in the part of the image that `alone` covers.
+    fn count_hiders(&self, object: u32, part: PixelBox, hidden_by: &mut BTreeMap<u32, u64>) {
+        for (row, y) in part.rows().enumerate() {
+            let shown = &self.shown.row(y)[part.x as usize..];
+            let pairs = shown.iter().zip(self.alone.face.row(row as u32));
+            let mut hiders = pairs
+                .filter(|(shown, face)| **face != NO_FACE && **shown != object)
+                .peekable();
+            // Neighbours mostly show the same object.
+            while let Some((hider, _)) = hiders.next() {
+                let mut pixels = 1;
+                while hiders.next_if(|(other, _)| *other == hider).is_some() {
+                    pixels += 1;
+                }
+                *hidden_by.entry(*hider).or_default() += pixels;
+            }
+        }
+    }
+}
+
+/// How many columns are turned into a mask's order at once: a bit each.
+const STRIPE: usize = u64::BITS as usize;
+
+/// Appends the pixels of a part of the image in which something is hit. Masks are ordered by columns and hits
+/// by rows, so a stripe of columns is turned at once.
+fn add_part(hits: &Hits, part: PixelBox, mask: &mut Mask, columns: &mut Columns) {
+    let height = u64::from(mask.size[1]);
+    let mut stripe: Vec<u64> = Vec::with_capacity(part.height as usize);
+    for first in (0..part.width as usize).step_by(STRIPE) {
+        stripe.clear();
+        let mut any = 0;
+        for row in 0..part.height {
+            let faces = hits.face.row(row).iter().skip(first).take(STRIPE);
+            let bits = faces
+                .enumerate()
+                .fold(0, |bits, (k, face)| bits | u64::from(*face != NO_FACE) << k);
+            stripe.push(bits);
+            any |= bits;
+        }
+
+        for column in 0..STRIPE {
+            if any >> column & 1 == 0 {
+                continue;
+            }
+            let x = part.x + (first + column) as u32;
+            let mut y = part.y;
+            for same in stripe.chunk_by(|a, b| (a ^ b) >> column & 1 == 0) {
+                let end = y + same.len() as u32;
+                if same[0] >> column & 1 == 1 {
+                    let start = u64::from(x) * height;
+                    mask.push(start + u64::from(y)..start + u64::from(end));
+                    columns.add(x..x + 1, y..end);
+                }
+                y = end;
+            }
         }
     }
 }
@@ -253,11 +302,11 @@ struct Visible {
 impl Visible {
     /// Adds pixels of a row.
     fn add(&mut self, hits: &Hits, rays: &Rays, columns: Range<u32>, y: u32) {
-        for x in columns {
+        self.columns.add(columns.clone(), y..y + 1);
+        self.distances.extend(columns.map(|x| {
             let depth = f64::from(hits.depth.at(x, y));
-            self.distances.push((depth * rays.at(x, y).length()) as f32);
-            self.columns.add(x, y);
-        }
+            (depth * rays.at(x, y).length()) as f32
+        }));
     }
 
     /// Returns the median distance.
@@ -280,13 +329,13 @@ struct Columns {
 }
 
 impl Columns {
-    fn add(&mut self, x: u32, y: u32) {
-        let column = x as usize;
-        if self.is_used.len() <= column {
-            self.is_used.resize(column + 1, false);
+    fn add(&mut self, columns: Range<u32>, rows: Range<u32>) {
+        PixelBox::add(&mut self.bounds, &columns, &rows);
+        let columns = columns.start as usize..columns.end as usize;
+        if self.is_used.len() < columns.end {
+            self.is_used.resize(columns.end, false);
         }
-        self.is_used[column] = true;
-        PixelBox::add(&mut self.bounds, x, y);
+        self.is_used[columns].fill(true);
     }
 
     /// Returns the smallest rectangle. A panorama's leaves out its widest gap: it may go on beyond the right
@@ -309,8 +358,8 @@ impl Columns {
 }
 
 /// Measures how far an object goes on beyond the image of a pinhole camera.
-fn beyond_frame(scene: &Scene<'_>, camera: &Camera) -> Beyond {
-    let mesh = scene.mesh();
+fn beyond_frame(caster: &mut Caster<'_, '_>, camera: &Camera, alone: &mut Hits) -> Beyond {
+    let mesh = caster.scene().mesh();
     let frame = dvec2(f64::from(camera.width), f64::from(camera.height));
     let corners = mesh.positions().iter().map(|corner| corner.as_dvec3());
     let bounds = bounds::projected(camera, corners);
@@ -337,7 +386,7 @@ fn beyond_frame(scene: &Scene<'_>, camera: &Camera) -> Beyond {
         height: count.y as u32,
     };
 
-    let alone = Caster::new(scene).cast(&grid);
+    caster.cast_into(&grid, 1, alone);
     let mut all = 0u64;
     let mut inside = 0u64;
     for y in 0..grid.height {

@@ -48,6 +48,16 @@ impl<'s, 'm> Caster<'s, 'm> {
         Self { scene, scratch: Scratch::default() }
     }
 
+    /// Returns a caster for a scene that uses the memory of another one.
+    pub(crate) fn reusing(scene: &'s Scene<'m>, scratch: Scratch) -> Self {
+        Self { scene, scratch }
+    }
+
+    /// Returns the memory, for another scene.
+    pub(crate) fn into_scratch(self) -> Scratch {
+        self.scratch
+    }
+
     /// Returns the scene.
     pub fn scene(&self) -> &'s Scene<'m> {
         self.scene

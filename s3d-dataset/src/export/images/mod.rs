@@ -19,7 +19,7 @@ use s3d_io::camera::ScanLocation;
 use s3d_io::dataset::{Domain, FileRecord, Frame, Layout, PoseFile};
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_label::Room;
-use s3d_render::{Caster, Hits, NO_FACE, Scene};
+use s3d_render::{Caster, Hits, NO_FACE, SeenObjects};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -148,7 +148,7 @@ fn write_shots(
     for_each_in_order(
         ctx,
         &items,
-        || Memory::new(job.channels.scene),
+        || Memory::new(job),
         |memory, item| match item {
             WorkItem::Assets(assets) => assets(),
             WorkItem::Photograph(shot) => {
@@ -204,11 +204,18 @@ pub(crate) struct Memory<'s> {
     pub(crate) caster: Caster<'s, 's>,
     pub(crate) hits: Hits,
     pub(crate) buffers: ImageBuffers,
+    /// Finds objects, if they are asked for.
+    pub(crate) objects: Option<SeenObjects<'s, 's>>,
 }
 
 impl<'s> Memory<'s> {
-    fn new(scene: &'s Scene<'s>) -> Self {
-        Self { caster: Caster::new(scene), hits: Hits::default(), buffers: ImageBuffers::default() }
+    fn new(job: &ImageJob<'s>) -> Self {
+        Self {
+            caster: Caster::new(job.channels.scene),
+            hits: Hits::default(),
+            buffers: ImageBuffers::default(),
+            objects: job.instances.map(InstanceFinder::memory),
+        }
     }
 }
 
@@ -252,9 +259,14 @@ impl ImageWriter<'_> {
     }
 
     /// Writes the objects of an image from its hits, if they are asked for.
-    pub(crate) fn write_objects(&self, hits: &Hits, camera: &Camera) -> Result<Option<FileRecord>> {
-        let Some(instances) = self.job.instances else { return Ok(None) };
-        let objects = instances.find(hits, camera).to_json();
+    pub(crate) fn write_objects(
+        &self,
+        memory: &mut Option<SeenObjects<'_, '_>>,
+        hits: &Hits,
+        camera: &Camera,
+    ) -> Result<Option<FileRecord>> {
+        let (Some(instances), Some(memory)) = (self.job.instances, memory) else { return Ok(None) };
+        let objects = instances.find(memory, hits, camera).to_json();
         Ok(Some(self.write(Domain::Objects, &objects)?))
     }
 
@@ -267,7 +279,7 @@ impl ImageWriter<'_> {
 }
 
 fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Result<WrittenShot> {
-    let Memory { caster, hits, buffers } = memory;
+    let Memory { caster, hits, buffers, objects } = memory;
     let scan = &job.locations[shot.location];
     let room = room_name(job.rooms[shot.location]);
     let writer = ImageWriter { job, uuid: &scan.uuid, room: &room, frame: shot.frame };
@@ -282,7 +294,7 @@ fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Resul
             .encode(&images, hits, &shot.camera, buffers, |image, file| {
                 writer.write(image.domain(), &file)
             })?;
-        written.files.extend(writer.write_objects(hits, &shot.camera)?);
+        written.files.extend(writer.write_objects(objects, hits, &shot.camera)?);
     }
 
     if job.modalities.contains(&Domain::Pose) {

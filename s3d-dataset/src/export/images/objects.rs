@@ -48,9 +48,14 @@ impl<'a> InstanceFinder<'a> {
         Self { scenes: ObjectScenes::new(meshes), object_of_face, boxes, label_of }
     }
 
+    /// Returns what a thread needs to find objects.
+    pub(crate) fn memory(&self) -> SeenObjects<'_, 'a> {
+        SeenObjects::new(&self.scenes, &self.object_of_face)
+    }
+
     /// Returns the objects of an image. `hits` are those of every pixel of `camera`.
-    pub(crate) fn find(&self, hits: &Hits, camera: &Camera) -> ObjectsFile {
-        let seen = SeenObjects::new(&self.scenes, &self.object_of_face).find(hits, camera);
+    pub(crate) fn find(&self, memory: &mut SeenObjects<'_, '_>, hits: &Hits, camera: &Camera) -> ObjectsFile {
+        let seen = memory.find(hits, camera);
         let objects = seen.iter().filter_map(|seen| {
             let label = (self.label_of)(seen.object)?;
             let boxes = self.boxes.get(&seen.object)?;

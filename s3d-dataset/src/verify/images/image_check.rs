@@ -49,7 +49,7 @@ impl ImageCheck<'_> {
 
         if self.domains.contains(&Domain::Objects) && image.has(Domain::Objects) {
             let camera = pose.as_ref().filter(|_| cast).map(|pose| &pose.camera);
-            self.check_objects(image, size, camera, &memory.hits);
+            self.check_objects(image, size, camera, memory);
         }
 
         let mut reader = std::mem::take(&mut memory.reader);

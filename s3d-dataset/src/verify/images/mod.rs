@@ -23,7 +23,7 @@ use crate::verify::views::Views;
 use s3d_geom::Camera;
 use s3d_io::dataset::{Domain, Layout};
 use s3d_io::image::PngReader;
-use s3d_render::{Caster, Hits};
+use s3d_render::{Caster, Hits, SeenObjects};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
@@ -87,6 +87,8 @@ pub(crate) struct Scratch<'s> {
     hits: Hits,
     buffers: ImageBuffers,
     reader: PngReader,
+    /// Finds objects, if the data set has them.
+    objects: Option<SeenObjects<'s, 's>>,
 }
 
 impl<'s> Scratch<'s> {
@@ -96,6 +98,7 @@ impl<'s> Scratch<'s> {
             hits: Hits::default(),
             buffers: ImageBuffers::default(),
             reader: PngReader::default(),
+            objects: reference.and_then(|s| s.instances).map(InstanceFinder::memory),
         }
     }
 }

@@ -1,10 +1,9 @@
 //! Checks the objects of an image against what the mesh shows.
 
-use super::ImageCheck;
+use super::{ImageCheck, Scratch};
 use crate::verify::report::Topic;
 use s3d_geom::Camera;
 use s3d_io::dataset::{BoxCorners, Corner, DatasetImage, Domain, ImageObject, ObjectsFile, read_objects};
-use s3d_render::Hits;
 
 const OBJECTS: (Topic, &str) = (Topic::Rays, "objects");
 
@@ -13,13 +12,13 @@ const OBJECTS: (Topic, &str) = (Topic::Rays, "objects");
 const OFF: f64 = 1e-3;
 
 impl ImageCheck<'_> {
-    /// Checks the file of an image's objects. `hits` are those of `camera`, if there is one.
+    /// Checks the file of an image's objects. The memory has the hits of `camera`, if there is one.
     pub(super) fn check_objects(
         &self,
         image: &DatasetImage,
         size: (u32, u32),
         camera: Option<&Camera>,
-        hits: &Hits,
+        memory: &mut Scratch<'_>,
     ) {
         let path = image.path(self.layout, Domain::Objects);
         self.files.check(&path, self.report);
@@ -33,8 +32,8 @@ impl ImageCheck<'_> {
         });
 
         let instances = self.reference.and_then(|reference| reference.instances);
-        if let (Some(camera), Some(instances)) = (camera, instances) {
-            let expected = instances.find(hits, camera);
+        if let (Some(camera), Some(instances), Some(objects)) = (camera, instances, &mut memory.objects) {
+            let expected = instances.find(objects, &memory.hits, camera);
             let fault = fault(&found, &expected);
             checks.check(fault.is_none(), || fault.unwrap_or_default());
         }

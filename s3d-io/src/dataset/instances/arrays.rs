@@ -78,7 +78,7 @@ pub fn read_instance_arrays_from(reader: impl Read + Seek, name: &Path) -> Resul
 }
 
 /// Returns the text of a fixed width, UTF-32, that ends at a zero.
-fn text_of_units(units: &[u32]) -> String {
+pub(crate) fn text_of_units(units: &[u32]) -> String {
     units
         .iter()
         .take_while(|u| **u != 0)

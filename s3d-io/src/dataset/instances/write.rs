@@ -285,7 +285,7 @@ fn write_arrays<N: Write + Seek>(file: N, entries: &[InstanceEntry], spool: File
 }
 
 /// Returns a text as `width` units of UTF-32, padded with zeros.
-fn padded_units(text: &str, width: usize) -> Vec<u32> {
+pub(crate) fn padded_units(text: &str, width: usize) -> Vec<u32> {
     let mut units: Vec<u32> = text.chars().map(u32::from).collect();
     units.resize(width, 0);
     units

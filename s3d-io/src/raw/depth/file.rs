@@ -106,9 +106,10 @@ impl DepthFile {
             None => self.place.floats()?,
         };
         let unit_m = self.unit_m;
-        Ok(numbers.map(|number| match number > 0.0 && number.is_finite() {
-            true => (f64::from(number) * unit_m) as f32,
-            false => f32::NAN,
+        // A number may be too small or too large for metres of 32 bits.
+        Ok(numbers.map(|number| match (f64::from(number) * unit_m) as f32 {
+            metres if metres > 0.0 && metres.is_finite() => metres,
+            _ => f32::NAN,
         }))
     }
 }

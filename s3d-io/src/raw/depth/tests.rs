@@ -348,6 +348,16 @@ fn sequences_of_tum_are_paired_by_time() {
 }
 
 #[test]
+fn a_list_of_tum_names_pictures_of_its_own_folder() {
+    let (_scan, folder) = tum("freiburg1_desk", [640, 480]);
+    for foreign in ["/etc/passwd", "../other/1.png", "depth/../../1.png"] {
+        fs::write(folder.join("depth.txt"), format!("100.005 {foreign}\n")).unwrap();
+        let message = open(&folder, &RawOptions::default()).unwrap_err().to_string();
+        assert!(message.contains("depth.txt") && message.contains("is outside"), "{message}");
+    }
+}
+
+#[test]
 fn without_intrinsics_an_error_says_what_to_give() {
     use crate::camera::{Distortion, Optics};
     let (_scan, folder) = tum("desk", [8, 6]);

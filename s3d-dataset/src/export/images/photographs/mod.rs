@@ -68,7 +68,7 @@ pub(crate) fn write_photograph(
     memory: &mut Memory<'_>,
 ) -> Result<WrittenPhotograph> {
     let started = Instant::now();
-    let Memory { caster, hits, buffers } = memory;
+    let Memory { caster, hits, buffers, objects } = memory;
     let Shot { photograph, room } = shot;
     let Photograph { name, uuid, taken, camera, .. } = photograph;
     let room = room_name(*room);
@@ -93,7 +93,7 @@ pub(crate) fn write_photograph(
         let channels = Channels { pictures: Some(PictureColors::Photograph(&colors)), ..job.channels };
         files = channels
             .encode(&images, hits, camera, buffers, |image, file| writer.write(image.domain(), &file))?;
-        files.extend(writer.write_objects(hits, camera)?);
+        files.extend(writer.write_objects(objects, hits, camera)?);
 
         let pixels = count(job, &images, hits, buffers);
         let black = colors.pixels().iter().filter(|color| **color == [0; 3]).count();

@@ -14,7 +14,7 @@ use crate::raw::depth::file::DepthPlace;
 use crate::raw::depth::list::{Entry, Listed};
 use crate::raw::form::RawForm;
 use s3d_geom::glam::{DVec2, dvec2};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The lists of a sequence.
 const DEPTHS: &str = "depth.txt";
@@ -117,6 +117,12 @@ fn lens_of(dir: &Path) -> Option<Optics> {
     })
 }
 
+/// Returns whether a path stays below the folder that it starts from.
+fn is_below(file: &str) -> bool {
+    let mut parts = Path::new(file).components();
+    parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+}
+
 /// Reads a list of pictures, sorted by time.
 fn read_list(path: &Path) -> Result<Vec<Timed>> {
     let bytes = read_file(path)?;
@@ -133,10 +139,15 @@ fn read_list(path: &Path) -> Result<Vec<Timed>> {
             .and_then(|text| text.split_once([' ', '\t']));
         let timed = words.and_then(|(time, file)| {
             let time_s = time.parse().ok().filter(|time: &f64| time.is_finite())?;
-            Some(Timed { time_s, path: folder.join(file.trim()) })
+            Some((time_s, file.trim()))
         });
         let fault = || Error::line(path, line, format!("{}: a line is timestamp filename", quote(text)));
-        list.push(timed.ok_or_else(fault)?);
+        let (time_s, file) = timed.ok_or_else(fault)?;
+        if !is_below(file) {
+            let message = format!("{file}: is outside of the recording: put the picture into its folder");
+            return Err(Error::line(path, line, message));
+        }
+        list.push(Timed { time_s, path: folder.join(file) });
     }
     list.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     Ok(list)
