@@ -1,6 +1,6 @@
 //! Which pixels a box can cover.
 
-use super::PixelBox;
+use crate::pixel_box::PixelBox;
 use glam::{DVec2, DVec3, dvec2, dvec3};
 use s3d_geom::{Aabb, Camera, Pose};
 use std::f64::consts::{PI, TAU};

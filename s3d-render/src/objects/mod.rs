@@ -4,7 +4,7 @@
 mod bounds;
 mod seen;
 
-pub use seen::{Beyond, Mask, PixelBox, SeenObject, SeenObjects};
+pub use seen::{Beyond, Mask, SeenObject, SeenObjects};
 
 use crate::scene::Scene;
 use glam::Vec3;

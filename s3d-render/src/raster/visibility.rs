@@ -1,7 +1,7 @@
 //! Casts the pixels of a camera: the face that each one sees, and its depth.
 
 use crate::hits::{Hits, NO_FACE};
-use crate::objects::PixelBox;
+use crate::pixel_box::PixelBox;
 use crate::raster::panorama::Panorama;
 use crate::raster::pinhole::Pinhole;
 use crate::raster::window::{Scratch, VisibilityKernel, Window};
