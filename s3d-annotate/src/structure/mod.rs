@@ -11,9 +11,10 @@
 //! `outline` draws the room with few corners, on its walls. `rims` adds the faces of rounded corners.
 //!
 //! Doors, windows and boards in the plane of a wall are proposed as the wall, to be cut out. Columns and
-//! beams are not proposed. A hall over two storeys is a room of the lower one without a ceiling.
+//! beams are not proposed. `halls` are rooms of a storey that go on through those above it.
 
 mod distance;
+mod halls;
 mod outline;
 mod planes;
 mod rims;
@@ -26,6 +27,7 @@ mod surfaces;
 use crate::labelling::{FaceRuns, Room, RoomPart};
 use crate::segments::smoothed;
 use distance::{distances, spread};
+use halls::Halls;
 use planes::Plane;
 use rims::{Sheet, rims};
 use s3d_geom::TriMesh;
@@ -93,11 +95,10 @@ pub fn find_structure(mesh: &TriMesh) -> Structure {
     let mut is_taken = vec![false; scan.facets.len()];
     let mut sheets = Vec::new();
     let mut ceiling_below_m = f64::NEG_INFINITY;
-    for (place, &floor_m) in floors.iter().enumerate() {
-        let below = place.checked_sub(1).map(|below| floors[below]);
-        let above = floors.get(place + 1).copied();
-        let storey = Storey::new(&scan, floor_m, below, above, fronts);
-        let finder = Finder { mesh, scan: &scan, storey: &storey, fronts, above, ceiling_below_m };
+    for place in 0..floors.len() {
+        let storey = Storey::new(&scan, &floors, place..place + 1, fronts);
+        let finder =
+            Finder { mesh, scan: &scan, storey: &storey, floors: &floors, place, fronts, ceiling_below_m };
         ceiling_below_m = finder.find(&mut is_taken, &mut found, &mut sheets);
     }
     add_rims(mesh, &scan, &borders, &sheets, &mut found.surfaces);
@@ -135,16 +136,18 @@ struct Finder<'a> {
     mesh: &'a TriMesh,
     scan: &'a Scan,
     storey: &'a Storey,
+    /// The heights of all floors, ascending, metres.
+    floors: &'a [f64],
+    /// The place of the storey among them.
+    place: usize,
     fronts: Fronts,
-    /// The floor of the next storey, metres.
-    above: Option<f64>,
     /// The highest ceiling of the storeys below, metres.
     ceiling_below_m: f64,
 }
 
 impl Finder<'_> {
     /// Adds the rooms and surfaces of the storey, with the planes of each surface, and returns its highest
-    /// ceiling, metres.
+    /// ceiling below the next storey, metres.
     fn find(&self, is_taken: &mut [bool], found: &mut Structure, sheets: &mut Vec<Vec<Sheet>>) -> f64 {
         let grid = &self.scan.grid;
         let (room_of_cell, count) = rooms::rooms(self.scan, self.storey);
@@ -152,13 +155,20 @@ impl Finder<'_> {
         spread(grid, &mut rim_of_cell, 2);
         spread(grid, &mut near_of_cell, (WALL_M / grid.step_m) as usize);
         let depth = distances(grid, |cell| room_of_cell[cell] == 0);
+        let halls =
+            Halls::find(self.scan, self.floors, self.place, self.storey, self.fronts, &room_of_cell, count);
 
-        // The faces and the cells near each room.
+        // The faces and the cells near each room. Above the storey, other rooms may be as near as a hall.
         let mut faces_of = vec![Vec::new(); count as usize + 1];
         for (face, facet) in (0u32..).zip(&self.scan.facets) {
-            if facet.middle.z >= self.storey.low_m && facet.middle.z <= self.storey.high_m {
-                let room = self.room_of(facet, &rim_of_cell, &near_of_cell);
-                faces_of[room as usize].push(face);
+            let z = facet.middle.z;
+            if z >= self.storey.low_m && z <= halls.high_m().max(self.storey.high_m) {
+                let is_above = z > self.storey.high_m;
+                let near_of_cell = if is_above { &rim_of_cell } else { &near_of_cell };
+                let room = self.room_of(facet, &rim_of_cell, near_of_cell);
+                if !is_above || halls.of(room).is_some_and(|hall| z <= hall.high_m) {
+                    faces_of[room as usize].push(face);
+                }
             }
         }
         let mut cells_of = vec![Vec::new(); count as usize + 1];
@@ -174,6 +184,7 @@ impl Finder<'_> {
                 mesh: self.mesh,
                 scan: self.scan,
                 storey: self.storey,
+                hall: halls.of(room),
                 fronts: self.fronts,
                 room_of_cell: &room_of_cell,
                 rim_of_cell: &rim_of_cell,
@@ -188,7 +199,11 @@ impl Finder<'_> {
             if outlines.is_empty() {
                 continue;
             }
-            bounds.push((found.rooms.len(), self.heights(cells)));
+            bounds.push((
+                found.rooms.len(),
+                room,
+                self.heights(halls.of(room).unwrap_or(self.storey), cells),
+            ));
             let index = Some(found.rooms.len());
             let parts = outlines
                 .into_iter()
@@ -212,24 +227,25 @@ impl Finder<'_> {
         }
 
         // Storeys meet in the middle of the slab if it is thin.
+        let is_hall = |room: u32| halls.of(room).is_some();
         let highest = bounds
             .iter()
-            .fold(f64::NEG_INFINITY, |highest, (_, [_, top])| highest.max(*top));
+            .filter(|(_, room, _)| !is_hall(*room))
+            .fold(f64::NEG_INFINITY, |highest, (.., [_, top])| highest.max(*top));
         let low = self.storey.floor_m - BEYOND_M.min(0.5 * (self.storey.floor_m - self.ceiling_below_m));
-        let high = self
-            .above
-            .map_or(f64::INFINITY, |above| above - BEYOND_M.min(0.5 * (above - highest)));
-        for (room, [bottom, top]) in bounds {
+        for (index, room, [bottom, top]) in bounds {
             let bottom = (bottom - BEYOND_M).min(self.storey.floor_m - BEYOND_M);
+            let highest = if is_hall(room) { top } else { highest };
+            let above = halls.of(room).unwrap_or(self.storey).above_m;
             let heights = [
                 if self.ceiling_below_m.is_finite() {
                     bottom.max(low)
                 } else {
                     bottom
                 },
-                (top + BEYOND_M).min(high),
+                (top + BEYOND_M).min(above - BEYOND_M.min(0.5 * (above - highest))),
             ];
-            found.rooms[room]
+            found.rooms[index]
                 .parts
                 .iter_mut()
                 .for_each(|part| part.heights = heights);
@@ -261,21 +277,17 @@ impl Finder<'_> {
     }
 
     /// Returns the heights of the floor and of the highest ceiling of a room, metres.
-    fn heights(&self, cells: &[usize]) -> [f64; 2] {
+    fn heights(&self, storey: &Storey, cells: &[usize]) -> [f64; 2] {
         let mut tops: Vec<f32> = cells
             .iter()
-            .map(|cell| self.storey.ceiling_m[*cell])
+            .map(|cell| storey.ceiling_m[*cell])
             .filter(|top| top.is_finite())
             .collect();
         tops.sort_unstable_by(f32::total_cmp);
         // A few columns see through a hole.
         let top = tops.get(tops.len() * 99 / 100).map(|top| f64::from(*top));
-        let floor_m = self.storey.floor_m;
-        [
-            floor_m,
-            top.unwrap_or(floor_m + USUAL_M)
-                .min(self.above.unwrap_or(f64::INFINITY)),
-        ]
+        let floor_m = storey.floor_m;
+        [floor_m, top.unwrap_or(floor_m + USUAL_M).min(storey.above_m)]
     }
 }
 

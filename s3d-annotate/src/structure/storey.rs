@@ -2,6 +2,7 @@
 
 use super::distance::distances;
 use super::scan::{OVERHEAD, Scan};
+use std::ops::Range;
 
 /// Ceilings are at least so far above the floor, metres.
 const LOWEST_CEILING_M: f64 = 1.7;
@@ -47,6 +48,8 @@ pub(super) struct Storey {
     pub(super) low_m: f64,
     /// The height below which all of it lies, metres; infinite for the last storey.
     pub(super) high_m: f64,
+    /// The height of the next floor, metres; infinite for the last storey.
+    pub(super) above_m: f64,
     /// The height of the ceiling, of the nearest one, or of the tops of walls in a scan without ceilings,
     /// metres. Not a number if nothing is high enough.
     pub(super) ceiling_m: Vec<f32>,
@@ -108,19 +111,17 @@ impl Fronts {
 }
 
 impl Storey {
-    /// Looks at the storey of a floor. `below` and `above` are the floors of the neighbouring storeys.
-    pub(super) fn new(
-        scan: &Scan,
-        floor_m: f64,
-        below: Option<f64>,
-        above: Option<f64>,
-        fronts: Fronts,
-    ) -> Self {
+    /// Looks at the storey of a floor, or at several as if they were one. `floors` are the heights of all
+    /// floors, ascending, metres, and `places` the floors in the storey.
+    pub(super) fn new(scan: &Scan, floors: &[f64], places: Range<usize>, fronts: Fronts) -> Self {
         let cells = scan.grid.cells();
+        let floor_m = floors[places.start];
+        let above_m = floors.get(places.end).copied().unwrap_or(f64::INFINITY);
         let mut storey = Self {
             floor_m,
-            low_m: floor_m - if below.is_some() { 0.08 } else { 0.6 },
-            high_m: above.map_or(f64::INFINITY, |above| above - 0.05),
+            low_m: floor_m - if places.start > 0 { 0.08 } else { 0.6 },
+            high_m: above_m - 0.05,
+            above_m,
             ceiling_m: vec![f32::NAN; cells],
             top_m: vec![f32::NAN; cells],
             has_floor: vec![false; cells],

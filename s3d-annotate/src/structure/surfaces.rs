@@ -36,6 +36,8 @@ pub(super) struct Place<'a> {
     pub(super) mesh: &'a TriMesh,
     pub(super) scan: &'a Scan,
     pub(super) storey: &'a Storey,
+    /// For a hall, all storeys that it goes through as one.
+    pub(super) hall: Option<&'a Storey>,
     pub(super) fronts: Fronts,
     /// The room of each cell, from 1, or 0.
     pub(super) room_of_cell: &'a [u32],
@@ -63,23 +65,34 @@ impl Place<'_> {
         let mut is_first = true;
         found.retain(|plane| {
             let is_step = self.height(plane) < main_m + STEP_M && plane.area_m2 >= LEAST_STEP_M2;
-            std::mem::take(&mut is_first) || (is_step && self.is_outermost(plane, -1.0))
+            std::mem::take(&mut is_first) || (is_step && self.is_outermost(self.storey, plane, -1.0))
         });
         found
     }
 
     /// Returns the planes of the ceiling among some faces. Ceilings may have steps and slopes. The outermost
     /// surface is the ceiling: lamps and beams hang below it.
+    ///
+    /// A hall has one above its own storey, and may have another under a gallery.
     pub(super) fn ceiling(&self, faces: &[u32]) -> Vec<Plane> {
-        let is_candidate = |face: &u32| {
-            let facet = self.scan.facet(*face);
-            let cell = self.scan.grid.cell(facet.middle.truncate());
-            let is_high = facet.middle.z > self.storey.floor_m + 1.7 && !self.storey.is_recess(cell);
-            is_high && facet.normal.z.abs() >= OVERHEAD && self.fronts.look(-facet.normal.z)
-        };
-        let mut found = self.level_planes(faces, is_candidate);
-        found.retain(|plane| self.is_outermost(plane, 1.0));
-        found
+        let mut all = Vec::new();
+        let mut low_m = self.storey.floor_m + 1.7;
+        for storey in std::iter::once(self.storey).chain(self.hall) {
+            let is_candidate = |face: &u32| {
+                let facet = self.scan.facet(*face);
+                let cell = self.scan.grid.cell(facet.middle.truncate());
+                let is_high = facet.middle.z > low_m && facet.middle.z <= storey.high_m;
+                is_high
+                    && !storey.is_recess(cell)
+                    && facet.normal.z.abs() >= OVERHEAD
+                    && self.fronts.look(-facet.normal.z)
+            };
+            let mut found = self.level_planes(faces, is_candidate);
+            found.retain(|plane| self.is_outermost(storey, plane, 1.0));
+            all.extend(found);
+            low_m = storey.high_m;
+        }
+        all
     }
 
     fn level_planes(&self, faces: &[u32], is_candidate: impl Fn(&u32) -> bool) -> Vec<Plane> {
@@ -95,7 +108,7 @@ impl Place<'_> {
     }
 
     /// Returns whether a plane is the highest (`side` 1) or lowest (−1) surface of most of its columns.
-    fn is_outermost(&self, plane: &Plane, side: f64) -> bool {
+    fn is_outermost(&self, storey: &Storey, plane: &Plane, side: f64) -> bool {
         let reach_m = plane.tolerance_m + 0.005;
         let mut outermost_m2 = 0.0;
         for face in &plane.faces {
@@ -106,8 +119,8 @@ impl Place<'_> {
             let is_beyond = self.scan.column(cell).iter().any(|sample| {
                 let other = self.scan.facet(sample.face);
                 let z = f64::from(sample.z);
-                z >= self.storey.low_m
-                    && z <= self.storey.high_m
+                z >= storey.low_m
+                    && z <= storey.high_m
                     && other.normal.z.abs() >= OVERHEAD
                     && self.fronts.look(-side * other.normal.z)
                     && side * (other.height_at(middle) - height) > reach_m
@@ -123,7 +136,8 @@ impl Place<'_> {
         let candidates: Vec<u32> = faces.iter().copied().filter(|face| self.is_at_rim(*face)).collect();
         let has_sides = self.fronts != Fronts::Mixed;
         let mut found = planes(&self.scan.facets, &candidates, LEAST_WALL_M2, has_sides);
-        found.retain(|plane| self.reaches_up(plane));
+        let storeys = || std::iter::once(self.storey).chain(self.hall);
+        found.retain(|plane| storeys().any(|storey| self.reaches_up(storey, plane)));
         found
     }
 
@@ -152,18 +166,18 @@ impl Place<'_> {
 
     /// Returns whether a wall reaches up to the ceiling over some of its length. Doors, cupboards and the
     /// sides of beams do not.
-    fn reaches_up(&self, plane: &Plane) -> bool {
+    fn reaches_up(&self, storey: &Storey, plane: &Plane) -> bool {
         let along = plane.normal.cross(DVec3::Z).normalize_or_zero();
         let low_of = |ceiling_m: f64| {
             let top = ceiling_m - SQUARE_M;
-            (top, (top - 0.8).max(self.storey.floor_m + 1.8).min(top - 0.4))
+            (top, (top - 0.8).max(storey.floor_m + 1.8).min(top - 0.4))
         };
         let mut columns: BTreeMap<i64, Column> = BTreeMap::new();
         for face in &plane.faces {
             let corners = self.mesh.triangle(*face).map(|corner| corner.as_dvec3());
             for_samples(corners, self.scan.grid.step_m, |point| {
                 let cell = self.scan.grid.cell(point.truncate());
-                let (top, low) = low_of(f64::from(self.storey.ceiling_m[cell]));
+                let (top, low) = low_of(f64::from(storey.ceiling_m[cell]));
                 if point.z >= low && point.z < top {
                     let along_m = point.dot(along);
                     let column = columns.entry((along_m / SQUARE_M).floor() as i64).or_default();

@@ -194,7 +194,33 @@ fn a_hall_over_two_storeys_is_a_room_of_the_lower_one() {
     let bottom = |room: &Room| (10.0 * room.parts[0].heights[0]).round();
     // The mesh stands at 1.2 m.
     assert_eq!(found.rooms.iter().map(bottom).collect::<Vec<_>>(), [11.0, 11.0, 39.0]);
-    assert_eq!(counts(&found), [3, 2, 12]);
+    assert_eq!(counts(&found), [3, 3, 12]);
+
+    // What is proposed for the hall goes up to its ceiling.
+    let is_hall = |room: &Room| room.parts[0].heights[0] < 1.2 && room.parts[0].heights[1] > 1.2 + 5.2;
+    let hall = found.rooms.iter().position(is_hall);
+    assert!(hall.is_some(), "{found:#?}");
+    let area_m2 = |class: &str| -> f64 {
+        let of_hall = found.surfaces.iter().filter(|s| s.room == hall && s.class == class);
+        of_hall.map(|surface| surface.area_m2).sum()
+    };
+    assert!((area_m2("wall") - 2.0 * (4.8 + 5.0) * 5.3).abs() < 1.0, "{}", area_m2("wall"));
+    assert!((area_m2("ceiling") - 4.8 * 5.0).abs() < 0.5, "{}", area_m2("ceiling"));
+}
+
+#[test]
+fn a_lost_ceiling_makes_no_hall() {
+    let mut shapes = Shapes::default();
+    shapes
+        .walls([0.0, 0.0], [4.0, 5.0], [0.0, 2.5])
+        .ceiling([0.0, 0.0], [4.0, 5.0], 2.5)
+        .walls([0.0, 0.0], [4.0, 5.0], [2.8, 5.3])
+        .ceiling([0.0, 0.0], [4.0, 5.0], 5.3)
+        .walls([4.2, 0.0], [9.0, 5.0], [0.0, 2.5]);
+    let found = find_structure(&shapes.turned(30.0));
+    assert_eq!(counts(&found), [3, 2, 12], "{found:#?}");
+    let lower = found.rooms.iter().filter(|room| room.parts[0].heights[0] < 1.2);
+    assert!(lower.count() == 2 && found.rooms[..2].iter().all(|room| room.parts[0].heights[1] < 4.1));
 }
 
 #[test]
