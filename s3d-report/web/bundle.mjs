@@ -10,7 +10,6 @@ const target = ["chrome111", "firefox113", "safari16.4"];
 /** The pages: that of `s3d report`, and that of `s3d label`, which shares sources and packages with it. */
 const PAGES = {
   report: {
-    boot: "src/boot.ts",
     program: "src/main.ts",
     styles: ["base.css", "style.css", "present.css"],
     markup: "page.html",
@@ -22,7 +21,7 @@ const PAGES = {
   },
 };
 const [name, output] = process.argv.slice(2);
-const { boot, program, styles, markup } = PAGES[name];
+const { program, styles, markup } = PAGES[name];
 
 // The font's Latin letters. Those of other scripts are the system's.
 const FONT = "@fontsource-variable/ibm-plex-sans";
@@ -49,34 +48,26 @@ for (const dependency of [...Object.keys((await json("package.json")).dependenci
   licences.push({ name: dependency, version, text });
 }
 
-const bundled = async (entry) => {
-  const js = await build({
-    entryPoints: [here(entry).pathname],
-    bundle: true,
-    format: "iife",
-    minify: true,
-    write: false,
-    legalComments: "inline",
-    charset: "ascii",
-    // Sources outside this folder find their packages here.
-    nodePaths: [here("node_modules").pathname],
-    define: { LICENCES: JSON.stringify(licences) },
-    target,
-  });
-  return js.outputFiles[0].text.trim();
-};
-const ofStyle = css.code.trim();
-const ofProgram = await bundled(program);
-const ofBoot = boot ? await bundled(boot) : "";
+const js = await build({
+  entryPoints: [here(program).pathname],
+  bundle: true,
+  format: "iife",
+  minify: true,
+  write: false,
+  legalComments: "inline",
+  charset: "ascii",
+  // Sources outside this folder find their packages here.
+  nodePaths: [here("node_modules").pathname],
+  define: { LICENCES: JSON.stringify(licences) },
+  target,
+});
+const [ofStyle, ofProgram] = [css.code.trim(), js.outputFiles[0].text.trim()];
 
-// The page runs this program, what starts it, and no other: the policy names both by their hashes.
+// The page runs this program and no other: the policy names it by its hash.
 const hash = (text) => `sha256-${createHash("sha256").update(text).digest("base64")}`;
 const page = (await readFile(here(markup), "utf8"))
   .replace("STYLE_HASH", hash(ofStyle))
-  .replace("BOOT_HASH", hash(ofBoot))
   .replace("SCRIPT_HASH", hash(ofProgram))
-  // The last one first, since what is put in may hold such a word.
-  .replace("SCRIPT", () => ofProgram)
-  .replace("BOOT", () => ofBoot)
-  .replace("STYLE", () => ofStyle);
+  .replace("STYLE", () => ofStyle)
+  .replace("SCRIPT", () => ofProgram);
 await writeFile(output, page);

@@ -2,10 +2,9 @@
 
 import type { Index } from "../data.js";
 import { h } from "../dom.js";
-import { type ActOf, actOf, shortcutsOf } from "../keys.js";
 import { type Thing, matches, thingsOf } from "./search.js";
 
-/** The field for the header. */
+/** The field for the header. Ctrl-K, ⌘K and `/` go to it. */
 export function findField(index: Index): HTMLElement {
   const list = h("ul", { id: "found", role: "listbox", "aria-label": "Found", hidden: true });
   const field = h("input", {
@@ -17,7 +16,7 @@ export function findField(index: Index): HTMLElement {
     "aria-controls": list.id,
     "aria-expanded": "false",
     "aria-autocomplete": "list",
-    "aria-keyshortcuts": shortcutsOf("page", "find"),
+    "aria-keyshortcuts": "Control+K Meta+K /",
     autocomplete: "off",
     spellcheck: "false",
   });
@@ -72,24 +71,25 @@ export function findField(index: Index): HTMLElement {
   field.addEventListener("focus", show);
   field.addEventListener("blur", close);
   field.addEventListener("keydown", (event) => {
-    const steps: Record<ActOf<"find">, () => void> = {
-      next: () => (list.hidden ? show() : point(at + 1)),
-      previous: () => (list.hidden ? show() : point(at - 1)),
-      take: () => (list.hidden ? undefined : go(found[at])),
-      close: () => {
+    const steps: Record<string, () => void> = {
+      ArrowDown: () => (list.hidden ? show() : point(at + 1)),
+      ArrowUp: () => (list.hidden ? show() : point(at - 1)),
+      Enter: () => (list.hidden ? undefined : go(found[at])),
+      Escape: () => {
         if (list.hidden) field.value = "";
         close();
       },
     };
-    const act = actOf("find", event);
-    if (!act) return;
+    const step = steps[event.key];
+    if (!step) return;
     event.preventDefault();
-    steps[act]();
+    step();
   });
   document.addEventListener("keydown", (event) => {
     const isTyping = (event.target as Element).matches?.("input, select, textarea") ?? false;
-    const isLetter = !event.ctrlKey && !event.metaKey;
-    if (actOf("page", event) !== "find" || (isTyping && isLetter)) return;
+    const isShortcut = (event.ctrlKey || event.metaKey) && !event.altKey && event.key.toLowerCase() === "k";
+    const isSlash = event.key === "/" && !isTyping && !event.ctrlKey && !event.metaKey && !event.altKey;
+    if (!isShortcut && !isSlash) return;
     event.preventDefault();
     field.focus();
     field.select();
