@@ -43,7 +43,8 @@ class Pairs:
         images without a pair, 1 on the diagonal.
         """
         whole = np.eye(len(self.images), dtype=np.float32)
-        rows = np.repeat(np.arange(len(self.images)), np.diff(self.start.astype(np.int64)))
+        start = self.start.astype(np.int64)
+        rows = np.repeat(np.arange(len(self.images)), start[1:] - start[:-1])
         whole[rows, self.other] = self.overlap
         return whole
 

@@ -116,11 +116,14 @@ mod tests {
     #[test]
     fn texts_are_those_of_pycocotools() {
         // pycocotools 2.0.11, mask.encode of images of 5 × 4 and 2,000 × 1,000.
-        let text = |stretches: &[Range<u64>]| RunLengths::encode([5, 4], stretches).counts;
+        let text = |ends: &[[u64; 2]]| {
+            let stretches: Vec<Range<u64>> = ends.iter().map(|[start, end]| *start..*end).collect();
+            RunLengths::encode([5, 4], &stretches).counts
+        };
         assert_eq!(text(&[]), "d0");
-        assert_eq!(text(&[0..20]), "0d0");
-        assert_eq!(text(&[3..6, 9..15]), "33332");
-        assert_eq!(text(&[0..1, 2..3, 9..12]), "0110522");
+        assert_eq!(text(&[[0, 20]]), "0d0");
+        assert_eq!(text(&[[3, 6], [9, 15]]), "33332");
+        assert_eq!(text(&[[0, 1], [2, 3], [9, 12]]), "0110522");
         let large = RunLengths::encode([2000, 1000], &[100..1500, 3000..900_000, 900_005..900_006]);
         assert_eq!(large.counts, "T3h[1l^1`cZk0YaNiPdTOeVbQ1");
     }
