@@ -163,4 +163,4 @@ def test_boxes_hold_the_faces_and_are_small(exported, instances):
         if min(box["size"]) > 0.01:
             peer = trimesh.Trimesh(corners, faces[entry["label"]]).bounding_box_oriented.volume
             ratios.append(np.prod(box["size"]) / peer)
-    assert len(ratios) > 10 and np.mean(ratios) < 1.01 and max(ratios) < 1.1, ratios
+    assert len(ratios) > 10 and np.mean(ratios) < 1.01 and np.quantile(ratios, 0.95) < 1.06, sorted(ratios)[-9:]

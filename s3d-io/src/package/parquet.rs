@@ -367,7 +367,10 @@ mod tests {
         let bytes = write_image_index(&path, &Class::S3DIS, &rows).unwrap();
         assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
         let table = read(&path);
-        assert_eq!((table.0.len(), table.1.len()), (7 + 8 + 2 + 1 + 2 + 3 + 2 + 3 + 13 + 2 + 3 + 1, 3));
+        assert_eq!(
+            (table.0.len(), table.1.len()),
+            (7 + Domain::ALL.len() + 2 + 1 + 2 + 3 + 2 + 3 + 13 + 2 + 3 + 1, 3)
+        );
 
         for (i, row) in rows.iter().enumerate() {
             assert_eq!(*field(&table, i, "area"), Field::Int(row.area as i32));
