@@ -10,7 +10,8 @@
 //! | [`info`](mod@info) | tells what a scene holds and what looks wrong, before it is exported |
 //! | [`verify`](mod@verify) | reads a data set back, every pixel of it |
 //! | [`compare`](mod@compare), [`statistics`](mod@statistics) | say how two data sets differ; count one |
-//! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz), [`pairs`](mod@pairs) | write what trainers and loaders read |
+//! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz) | write what trainers and loaders read |
+//! | [`pairs`](mod@pairs) | finds the images that see the same surface |
 //! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: locations, pictures, points |
 //! | [`store`], [`parallel`] | for crates that write results of their own beside a data set |
 //! | [`error`], [`event`], [`summary`] | what a call answers, and what it tells on its way |

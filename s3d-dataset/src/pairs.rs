@@ -19,7 +19,7 @@ use std::path::PathBuf;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct PairsOptions {
-    /// Leave out pairs of which neither image shows at least this share of the other's surface.
+    /// Leave out a pair unless one of its images sees at least this share of the other's points.
     #[cfg_attr(feature = "clap", arg(long, value_name = "SHARE", default_value_t = 0.05))]
     pub min_overlap: f64,
     /// Ask for about as many pixels of an image, on a grid.

@@ -39,8 +39,8 @@ pub struct ViewPair {
     /// The median angle at those points between the directions to both cameras, degrees. NaN without such a
     /// point.
     pub angle_deg: f32,
-    /// The median of the size of a pixel there in this image by that in the other one: above 1, the other image
-    /// is finer. NaN without such a point.
+    /// The median ratio of the size of a pixel there in this image to its size in the other one. Above 1, the
+    /// other image is finer. NaN without such a point.
     pub scale: f32,
     /// The distance between both cameras, metres.
     pub distance_m: f32,
@@ -74,8 +74,8 @@ pub fn view_pairs(scene: &Scene<'_>, cameras: &[Camera], options: &PairOptions) 
 
 /// Finds pairs image by image, so that the caller can tell of progress, or end.
 ///
-/// An image's points are those of a grid of its pixels. A point is seen from another camera if an exact ray to
-/// it is free. Images of one place share these rays, and only places that see surface near to the points are
+/// An image's points are those of a grid of its pixels. A point is seen from another camera if an exact ray
+/// to it is free. Images of one place share these rays, and only places that see surface near to the points are
 /// asked, so time grows with the images that see the same rooms, and not with the square of all.
 pub struct PairFinder<'s, 'm> {
     scene: &'s Scene<'m>,

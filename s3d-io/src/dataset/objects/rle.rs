@@ -1,9 +1,9 @@
 //! The run lengths by which COCO writes masks.
 //!
-//! Pixels are counted column by column. Runs of pixels outside and inside of the mask take turns, the first is
-//! outside. In the text each run is a number of 5 bits a character, the lowest first: bit 5 says that more
-//! follow, bit 4 of the last is its sign, and 48 is added. From the fourth on, runs are differences to the run
-//! two before. Source: cocodataset/cocoapi, `common/maskApi.c`, `rleToString` and `rleFrString`.
+//! Pixels are counted column by column. Runs of pixels outside and inside of the mask take turns, the first
+//! is outside. In the text each run is a number of 5 bits a character, the lowest first: bit 5 says that
+//! more follow, bit 4 of the last is its sign, and 48 is added. From the fourth on, runs are differences to
+//! the run two before. Source: cocodataset/cocoapi, `common/maskApi.c`, `rleToString` and `rleFrString`.
 
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -130,7 +130,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn masks_are_read_back(width in 1u32..50, height in 1u32..50, ends in prop::collection::btree_set(0u64..2500, 0..40)) {
+        fn masks_are_read_back(
+            width in 1u32..50,
+            height in 1u32..50,
+            ends in prop::collection::btree_set(0u64..2500, 0..40),
+        ) {
             let pixels = u64::from(width) * u64::from(height);
             let ends: Vec<u64> = ends.into_iter().filter(|end| *end <= pixels).collect();
             let stretches: Vec<Range<u64>> = ends.as_chunks::<2>().0.iter().map(|[a, b]| *a..*b).collect();
