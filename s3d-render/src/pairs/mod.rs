@@ -75,8 +75,8 @@ pub fn view_pairs(scene: &Scene<'_>, cameras: &[Camera], options: &PairOptions) 
 /// Finds pairs image by image, so that the caller can tell of progress, or end.
 ///
 /// An image's points are those of a grid of its pixels. A point is seen from another camera if an exact ray
-/// to it is free. Images of one place share these rays, and only places that see surface near to the points are
-/// asked, so time grows with the images that see the same rooms, and not with the square of all.
+/// to it is free. Images of one place share these rays, and only places that see surface near to the points
+/// are asked, so time grows with the images that see the same rooms, and not with the square of all.
 pub struct PairFinder<'s, 'm> {
     scene: &'s Scene<'m>,
     cameras: &'s [Camera],
