@@ -179,14 +179,21 @@ fn a_corridor_around_a_core_is_a_room_of_several_parts() {
     assert_eq!(walls(0) + walls(1), 8);
 }
 
-#[test]
-fn a_hall_over_two_storeys_is_a_room_of_the_lower_one() {
+/// Two rooms of 4 m × 5 m and 2.5 m high, in two storeys.
+fn two_rooms_one_above_the_other() -> Shapes {
     let mut shapes = Shapes::default();
     shapes
         .walls([0.0, 0.0], [4.0, 5.0], [0.0, 2.5])
         .ceiling([0.0, 0.0], [4.0, 5.0], 2.5)
         .walls([0.0, 0.0], [4.0, 5.0], [2.8, 5.3])
-        .ceiling([0.0, 0.0], [4.0, 5.0], 5.3)
+        .ceiling([0.0, 0.0], [4.0, 5.0], 5.3);
+    shapes
+}
+
+#[test]
+fn a_hall_over_two_storeys_is_a_room_of_the_lower_one() {
+    let mut shapes = two_rooms_one_above_the_other();
+    shapes
         .walls([4.2, 0.0], [9.0, 5.0], [0.0, 5.3])
         .ceiling([4.2, 0.0], [9.0, 5.0], 5.3);
     let found = find_structure(&shapes.turned(30.0));
@@ -210,13 +217,8 @@ fn a_hall_over_two_storeys_is_a_room_of_the_lower_one() {
 
 #[test]
 fn a_lost_ceiling_makes_no_hall() {
-    let mut shapes = Shapes::default();
-    shapes
-        .walls([0.0, 0.0], [4.0, 5.0], [0.0, 2.5])
-        .ceiling([0.0, 0.0], [4.0, 5.0], 2.5)
-        .walls([0.0, 0.0], [4.0, 5.0], [2.8, 5.3])
-        .ceiling([0.0, 0.0], [4.0, 5.0], 5.3)
-        .walls([4.2, 0.0], [9.0, 5.0], [0.0, 2.5]);
+    let mut shapes = two_rooms_one_above_the_other();
+    shapes.walls([4.2, 0.0], [9.0, 5.0], [0.0, 2.5]);
     let found = find_structure(&shapes.turned(30.0));
     assert_eq!(counts(&found), [3, 2, 12], "{found:#?}");
     let lower = found.rooms.iter().filter(|room| room.parts[0].heights[0] < 1.2);
