@@ -89,7 +89,9 @@ fn make(ctx: &Context, data: &DataSet, options: &PairsOptions, call: &str) -> Re
         return Err(UsageError::Exists { path: path.clone(), note: None }.into());
     }
 
-    let change = Change::begin(layout, &[])?;
+    let areas = data.manifest.area_numbers.iter();
+    let folders: Vec<PathBuf> = areas.map(|area| layout.area_dir(*area)).collect();
+    let change = Change::begin(layout, &folders)?;
     let staged = change.staged();
     let mut changed = Vec::new();
     for area in &data.manifest.area_numbers {
