@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import shutil
 import subprocess
 import sys
 
@@ -63,6 +64,27 @@ def rays_of_view(pose, height, width):
 def test_the_reader_of_the_data_set_holds_them_against_the_labels(exported):
     done = subprocess.run([sys.executable, "-W", "error", exported / "assets/utils.py", exported], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_verify_finds_each_planted_change(s3d, exported, tmp_path):
+    s3d("verify", exported)
+    copy = tmp_path / "dataset"
+    shutil.copytree(exported, copy)
+    image = sorted((copy / "area_1/data/objects").iterdir())[3]
+    whole = json.loads(image.read_text())
+    thing = max(range(len(whole["objects"])), key=lambda k: whole["objects"][k]["occlusion"])
+    for key, value, told in [
+        ("visible_pixels", 1, "the number of visible pixels"),
+        ("occlusion", 0.999, "the occlusion"),
+        ("amodal_mask", {"size": [120, 120], "counts": "0"}, "the amodal mask"),
+        ("hidden_by", [], "what hides it"),
+        ("median_m", 99.0, "the median distance"),
+    ]:
+        changed = json.loads(json.dumps(whole))
+        changed["objects"][thing][key] = value
+        image.write_text(json.dumps(changed))
+        found = s3d("verify", copy, code=1)
+        assert f"{told} is not what the mesh shows" in found.stdout + found.stderr, found.stdout
 
 
 def test_masks_are_those_of_rays_at_each_instance(exported, utils, instances):

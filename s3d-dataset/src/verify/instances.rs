@@ -92,8 +92,8 @@ pub(crate) fn check(
     entries
 }
 
-/// Checks the boxes of the faces of each instance, `boxes` by label index. A data set of an earlier version has
-/// none.
+/// Checks the boxes of the faces of each instance, `boxes` by label index. A data set of an earlier version
+/// has none.
 pub(crate) fn check_surfaces(
     path: &Path,
     entries: &[InstanceEntry],

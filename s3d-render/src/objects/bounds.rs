@@ -5,14 +5,15 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 use s3d_geom::{Aabb, Camera, Pose};
 use std::f64::consts::{PI, TAU};
 
-/// What is this near to the plane of a pinhole camera, in metres, is projected too far away to be of use.
+/// Points nearer than this to the plane of a pinhole camera, metres, are not projected: they would lie far
+/// outside of the image.
 const NEAREST_M: f64 = 1e-3;
 
-/// The part of a panorama by which boxes are widened: rounding errors are far smaller.
+/// Boxes in a panorama are widened by this many pixels. Rounding errors are far smaller.
 const SLACK_PX: f64 = 1e-6;
 
 /// Returns the corners of a box.
-pub(super) fn corners(bounds: &Aabb) -> [DVec3; 8] {
+fn corners(bounds: &Aabb) -> [DVec3; 8] {
     let ends = [bounds.min.as_dvec3(), bounds.max.as_dvec3()];
     std::array::from_fn(|k| dvec3(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z))
 }
@@ -75,7 +76,8 @@ fn rows(bounds: &Aabb, eye: DVec3) -> [f64; 2] {
     let high = bounds.max.as_dvec3() - eye;
     let nearest = dvec2(beside(low.x, high.x), beside(low.y, high.y)).length();
     let farthest = dvec2(low.x.abs().max(high.x.abs()), low.y.abs().max(high.y.abs())).length();
-    // Of what is above the eye, the nearest is highest; of what is below it, the farthest.
+    // Above the eye, what is nearest appears highest, and what is farthest lowest; below it, the other way
+    // round.
     let across_low = if low.z < 0.0 { nearest } else { farthest };
     let across_high = if high.z > 0.0 { nearest } else { farthest };
     [libm::atan2(low.z, across_low), libm::atan2(high.z, across_high)]

@@ -7,8 +7,9 @@ use s3d_io::dataset::{BoxCorners, Corner, DatasetImage, Domain, ImageObject, Obj
 
 const OBJECTS: (Topic, &str) = (Topic::Rays, "objects");
 
-/// How far numbers of pixels, shares and angles may be off. The camera of a pose file differs in its last
-/// bits from the one that the image was made with, and files have four digits behind the point.
+/// How far shares, angles, distances and projected corners may be off, absolutely or relative to their size.
+/// The camera of a pose file differs in its last bits from the one that the image was made with, and files
+/// have four digits behind the point. Numbers and masks of pixels are compared exactly.
 const OFF: f64 = 1e-3;
 
 impl ImageCheck<'_> {
