@@ -10,6 +10,7 @@ const target = ["chrome111", "firefox113", "safari16.4"];
 /** The pages: that of `s3d report`, and that of `s3d label`, which shares sources and packages with it. */
 const PAGES = {
   report: {
+    boot: "src/boot.ts",
     program: "src/main.ts",
     styles: ["base.css", "style.css", "present.css"],
     markup: "page.html",
@@ -21,7 +22,7 @@ const PAGES = {
   },
 };
 const [name, output] = process.argv.slice(2);
-const { program, styles, markup } = PAGES[name];
+const { boot, program, styles, markup } = PAGES[name];
 
 // The font's Latin letters. Those of other scripts are the system's.
 const FONT = "@fontsource-variable/ibm-plex-sans";
@@ -48,26 +49,34 @@ for (const dependency of [...Object.keys((await json("package.json")).dependenci
   licences.push({ name: dependency, version, text });
 }
 
-const js = await build({
-  entryPoints: [here(program).pathname],
-  bundle: true,
-  format: "iife",
-  minify: true,
-  write: false,
-  legalComments: "inline",
-  charset: "ascii",
-  // Sources outside this folder find their packages here.
-  nodePaths: [here("node_modules").pathname],
-  define: { LICENCES: JSON.stringify(licences) },
-  target,
-});
-const [ofStyle, ofProgram] = [css.code.trim(), js.outputFiles[0].text.trim()];
+const bundled = async (entry) => {
+  const js = await build({
+    entryPoints: [here(entry).pathname],
+    bundle: true,
+    format: "iife",
+    minify: true,
+    write: false,
+    legalComments: "inline",
+    charset: "ascii",
+    // Sources outside this folder find their packages here.
+    nodePaths: [here("node_modules").pathname],
+    define: { LICENCES: JSON.stringify(licences) },
+    target,
+  });
+  return js.outputFiles[0].text.trim();
+};
+const ofStyle = css.code.trim();
+const ofProgram = await bundled(program);
+const ofBoot = boot ? await bundled(boot) : "";
 
-// The page runs this program and no other: the policy names it by its hash.
+// The page runs this program, what starts it, and no other: the policy names both by their hashes.
 const hash = (text) => `sha256-${createHash("sha256").update(text).digest("base64")}`;
 const page = (await readFile(here(markup), "utf8"))
   .replace("STYLE_HASH", hash(ofStyle))
+  .replace("BOOT_HASH", hash(ofBoot))
   .replace("SCRIPT_HASH", hash(ofProgram))
-  .replace("STYLE", () => ofStyle)
-  .replace("SCRIPT", () => ofProgram);
+  // The last one first, since what is put in may hold such a word.
+  .replace("SCRIPT", () => ofProgram)
+  .replace("BOOT", () => ofBoot)
+  .replace("STYLE", () => ofStyle);
 await writeFile(output, page);

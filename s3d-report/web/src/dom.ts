@@ -184,3 +184,7 @@ export function roomWords(room: string): string {
 /** `conferenceRoom_1` in words, as a name. */
 export const roomName = (room: string): string =>
   room === "" || room === "unknown_1" ? "unknown room" : named(roomWords(room));
+
+/** Whether a click opens a link here, not in another tab or window. */
+export const isPlain = (event: MouseEvent): boolean =>
+  event.button === 0 && !event.ctrlKey && !event.metaKey && !event.shiftKey && !event.altKey;

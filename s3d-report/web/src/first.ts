@@ -5,6 +5,22 @@ import { h, named, s } from "./dom.js";
 import { boxOf } from "./outline.js";
 import { link, parseRoute } from "./route/route.js";
 
+/** What is on the page when the program starts. */
+export interface Begun {
+  /** What is shown first; null if its file cannot be read. */
+  first: First | null;
+  /** The tabs, if they are shown. */
+  header: HTMLElement | null;
+  /** The place of the pages. */
+  place: HTMLElement;
+}
+
+declare global {
+  interface Window {
+    s3dBegun?: Begun;
+  }
+}
+
 const NAMES = {
   overview: "Overview",
   pano: "Panoramas",
@@ -69,9 +85,14 @@ function outlined(rings: [number, number][][]): SVGElement {
   return s("svg", { class: "plan", viewBox: `0 0 ${box.w} ${box.h}`, "aria-hidden": "true" }, rooms);
 }
 
-/** Waits until what is on the page has been painted; not long if the page is hidden. */
+/** The longest wait for the first paint, ms: the browser may paint nothing, or not tell it. */
+const PATIENCE = 1500;
+
+/** Waits until the browser has painted what is on the page; not at all if the page is hidden. */
 export const painted = (): Promise<void> =>
   new Promise((done) => {
-    window.setTimeout(done, document.hidden ? 0 : 250);
-    requestAnimationFrame(() => window.setTimeout(done));
+    window.setTimeout(done, document.hidden ? 0 : PATIENCE);
+    new PerformanceObserver((list) => {
+      if (list.getEntriesByName("first-contentful-paint").length > 0) done();
+    }).observe({ type: "paint", buffered: true });
   });

@@ -2,8 +2,9 @@
 
 import { comparePage } from "./compare/page.js";
 import { FORM, type First, type Index, type Parts, load } from "./data.js";
-import { append, count, h, tamed } from "./dom.js";
-import { headerOf, painted, sketch, tabsOf } from "./first.js";
+import { append, count, h, isPlain, tamed } from "./dom.js";
+import { headerOf, tabsOf } from "./first.js";
+import { hintsButton } from "./hints.js";
 import { comeBack, leave, pointTabs, remember } from "./route/memory.js";
 import { findField } from "./overview/find.js";
 import { overviewPage } from "./overview/page.js";
@@ -77,7 +78,7 @@ async function open(index: Index): Promise<Page> {
 function presentLink(): HTMLElement {
   const to = h("a", { class: "present-link", href: link("present") }, "Present");
   to.addEventListener("click", (event) => {
-    if (!event.ctrlKey && !event.metaKey && !event.shiftKey && event.button === 0) fillScreen();
+    if (isPlain(event)) fillScreen();
   });
   return to;
 }
@@ -87,17 +88,10 @@ function failure(words: string): HTMLElement {
 }
 
 async function start(): Promise<void> {
-  const place = h("div", { id: "place" });
-  const shell = document.querySelectorAll("body > :not(script)");
-  // A folder without this file is damaged, and the index tells more of that.
-  const first = await load<First>("first").catch(() => null);
-  const sketched = first && sketch(first, place);
-  if (sketched) {
-    shell.forEach((element) => element.remove());
-    document.body.prepend(sketched, place);
-    await painted();
-    performance.mark("sketched");
-  }
+  performance.mark("started");
+  const begun = window.s3dBegun;
+  if (!begun) throw new Error("The page is damaged: make the report again");
+  const { first, header: sketched, place } = begun;
 
   const index = await load<Index>("index");
   performance.mark("read");
@@ -124,10 +118,9 @@ async function start(): Promise<void> {
   const header = isSame(first) && sketched ? sketched : headerOf(index.data_set.name, parts);
   if (damage.count > 0) header.querySelector('a[data-page="notes"]')?.append(badge);
   const present = isPresentable(index) ? presentLink() : null;
-  append(header, [present, findField(index)]);
+  append(header, [present, findField(index), hintsButton()]);
   if (header !== sketched) {
-    sketched?.remove();
-    shell.forEach((element) => element.remove());
+    document.querySelectorAll("body > :not(script)").forEach((element) => element.remove());
     document.body.prepend(header, place);
   }
   const nav = header.querySelector("nav") ?? header;

@@ -113,6 +113,16 @@ test("the plan is saved as SVG and as PNG", { skip: noFiles }, async () => {
   await page.getByLabel("Mesh from above").uncheck();
   const plain = (await saved(/Save SVG/)).bytes.toString();
   assert.ok(!/href|<mask|<image/.test(plain) && plain.length < text.length / 5);
+  // Its letters are the page's, and the file has their font in it.
+  assert.equal(plain.match(/@font-face/g).length, 1);
+  const alone = await page.context().newPage();
+  await alone.goto(`data:image/svg+xml,${encodeURIComponent(plain)}`);
+  const fonts = await alone.evaluate(async () => {
+    await document.fonts.ready;
+    return [...document.fonts].map(({ family, status }) => [family.replaceAll('"', ""), status]);
+  });
+  assert.deepEqual(fonts, [["IBM Plex Sans", "loaded"]]);
+  await alone.close();
   const bare = PNG.sync.read((await saved(/Save PNG/)).bytes);
   assert.ok(many(png) > 5 * many(bare), `${many(png)} colours with the ground, ${many(bare)} without`);
   assert.deepEqual(faults, []);

@@ -1,7 +1,7 @@
 // The plan: rooms from above, storey by storey. A drag over a room splits it; two that are chosen can be joined.
 
 import { append, choice, h, named, s } from "../../../../s3d-report/web/src/dom.js";
-import { boxOf, middleOf } from "../../../../s3d-report/web/src/outline.js";
+import { boxOf, innermost } from "../../../../s3d-report/web/src/outline.js";
 import type { Desk } from "../desk.js";
 import { metres2, words } from "../look.js";
 import type { Point, RoomShape } from "../scene.js";
@@ -129,7 +129,7 @@ export class Plan {
     const largest = room.is.parts.reduce((a, b) =>
       areaOf({ ...room.is, parts: [a] }) >= areaOf({ ...room.is, parts: [b] }) ? a : b,
     );
-    const [x, y] = middleOf(largest.outline);
+    const [x, y] = innermost([largest.outline]);
     const size = 15 * scale;
     const lines = [
       s("tspan", { x, y: -y }, named(name)),

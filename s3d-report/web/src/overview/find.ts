@@ -2,9 +2,10 @@
 
 import type { Index } from "../data.js";
 import { h } from "../dom.js";
+import { type ActOf, actOf, shortcutsOf } from "../keys.js";
 import { type Thing, matches, thingsOf } from "./search.js";
 
-/** The field for the header. Ctrl-K, ⌘K and `/` go to it. */
+/** The field for the header. */
 export function findField(index: Index): HTMLElement {
   const list = h("ul", { id: "found", role: "listbox", "aria-label": "Found", hidden: true });
   const field = h("input", {
@@ -16,7 +17,7 @@ export function findField(index: Index): HTMLElement {
     "aria-controls": list.id,
     "aria-expanded": "false",
     "aria-autocomplete": "list",
-    "aria-keyshortcuts": "Control+K Meta+K /",
+    "aria-keyshortcuts": shortcutsOf("page", "find"),
     autocomplete: "off",
     spellcheck: "false",
   });
@@ -71,25 +72,24 @@ export function findField(index: Index): HTMLElement {
   field.addEventListener("focus", show);
   field.addEventListener("blur", close);
   field.addEventListener("keydown", (event) => {
-    const steps: Record<string, () => void> = {
-      ArrowDown: () => (list.hidden ? show() : point(at + 1)),
-      ArrowUp: () => (list.hidden ? show() : point(at - 1)),
-      Enter: () => (list.hidden ? undefined : go(found[at])),
-      Escape: () => {
+    const steps: Record<ActOf<"find">, () => void> = {
+      next: () => (list.hidden ? show() : point(at + 1)),
+      previous: () => (list.hidden ? show() : point(at - 1)),
+      take: () => (list.hidden ? undefined : go(found[at])),
+      close: () => {
         if (list.hidden) field.value = "";
         close();
       },
     };
-    const step = steps[event.key];
-    if (!step) return;
+    const act = actOf("find", event);
+    if (!act) return;
     event.preventDefault();
-    step();
+    steps[act]();
   });
   document.addEventListener("keydown", (event) => {
     const isTyping = (event.target as Element).matches?.("input, select, textarea") ?? false;
-    const isShortcut = (event.ctrlKey || event.metaKey) && !event.altKey && event.key.toLowerCase() === "k";
-    const isSlash = event.key === "/" && !isTyping && !event.ctrlKey && !event.metaKey && !event.altKey;
-    if (!isShortcut && !isSlash) return;
+    const isLetter = !event.ctrlKey && !event.metaKey;
+    if (actOf("page", event) !== "find" || (isTyping && isLetter)) return;
     event.preventDefault();
     field.focus();
     field.select();

@@ -49,6 +49,29 @@ function plain(element: Element): Element | null {
   return copy;
 }
 
+/** The characters of a rule `U+0-FF, U+131`. */
+const rangesOf = (words: string): [number, number][] =>
+  words.split(",").map((range) => {
+    const [from = "", to = from] = range.trim().replace(/^U\+/i, "").split("-");
+    return [Number.parseInt(from, 16), Number.parseInt(to, 16)];
+  });
+
+/** The page's font, as far as a text has its letters: a file of its own has no other. */
+function fontOf(text: string): string {
+  const has = (words: string): boolean =>
+    rangesOf(words).some(([from, to]) =>
+      [...text].some((letter) => {
+        const code = letter.codePointAt(0) ?? 0;
+        return code >= from && code <= to;
+      }),
+    );
+  const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]);
+  return rules
+    .filter((rule) => rule instanceof CSSFontFaceRule && has(rule.style.getPropertyValue("unicode-range")))
+    .map((rule) => rule.cssText)
+    .join("");
+}
+
 /** The text of a drawing that stands on the page, and its shape: height by width. */
 export function svgOf(drawing: SVGSVGElement): { text: string; shape: number } {
   const { x, y, width, height } = drawing.viewBox.baseVal;
@@ -63,6 +86,12 @@ export function svgOf(drawing: SVGSVGElement): { text: string; shape: number } {
   ["x", "y", "width", "height"].forEach((name, i) => paper.setAttribute(name, String(box[i])));
   paper.setAttribute("fill", getComputedStyle(drawing.parentElement ?? drawing).backgroundColor);
   append(root, [paper, ...[...drawing.children].map(plain)]);
+  const font = fontOf(root.textContent ?? "");
+  if (font !== "") {
+    const style = document.createElementNS(SVG, "style");
+    style.textContent = font;
+    root.prepend(style);
+  }
   return { text: new XMLSerializer().serializeToString(root), shape: h_ / w };
 }
 

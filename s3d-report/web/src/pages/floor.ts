@@ -4,7 +4,7 @@ import { css, depthRamp } from "../colors.js";
 import type { ChangeMark } from "../compare/marks.js";
 import type { Index, Location, Rgb, View } from "../data.js";
 import { append, flat, metres2, named, percent, roomName, roomOf, s, several } from "../dom.js";
-import { type Box, boxOf, middleOf, sizeOf } from "../outline.js";
+import { type Box, boxOf, innermost, sizeOf } from "../outline.js";
 import { type GroundLayer, cornersOf, groundLayer } from "./ground.js";
 import { patchLink } from "../route/places.js";
 import { link } from "../route/route.js";
@@ -289,7 +289,7 @@ function names(
     const name = roomName(room.name);
     // A letter is about one hundredth of the plan wide; pointing at a room shows its name in any case.
     if (Math.min(flat(name).length, 24) * unit > 1.6 * box.w || box.h < 2 * unit) continue;
-    const [x, y] = at(...middleOf(largest));
+    const [x, y] = at(...innermost(room.outline));
     // Beside the middle, or above or below it, if a location is there.
     const taken = ([right, down]: [number, number]): boolean =>
       stands.some(([location]) => {

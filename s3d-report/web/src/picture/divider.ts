@@ -1,6 +1,7 @@
 // The line between two pictures of the same place, which is dragged, or moved by keys.
 
 import { h } from "../dom.js";
+import { type ActOf, actOf } from "../keys.js";
 
 export interface Divider {
   line: HTMLElement;
@@ -25,17 +26,11 @@ export function divider(label: string, frame: () => Element, moved: (share: numb
   );
   const move = (to: number): void => moved(Math.min(1, Math.max(0, to)));
   line.addEventListener("keydown", (event) => {
-    const steps: Record<string, number> = {
-      ArrowLeft: -0.02,
-      ArrowDown: -0.02,
-      ArrowRight: 0.02,
-      ArrowUp: 0.02,
-    };
-    const ends: Record<string, number> = { Home: 0, End: 1 };
-    const to = ends[event.key] ?? (event.key in steps ? at + (steps[event.key] ?? 0) : null);
-    if (to === null) return;
+    const places: Record<ActOf<"line">, number> = { left: at - 0.02, right: at + 0.02, start: 0, end: 1 };
+    const act = actOf("line", event);
+    if (!act) return;
     event.preventDefault();
-    move(to);
+    move(places[act]);
   });
   line.addEventListener("pointerdown", (down) => {
     down.preventDefault();

@@ -3,6 +3,7 @@
 
 import type { Rgb } from "../data.js";
 import { h, s } from "../dom.js";
+import { Corners, type Measured } from "./measure.js";
 
 /** A point of the screen as x·w, y·w and w; w is not positive for points behind. */
 export type Projected = [number, number, number];
@@ -45,41 +46,52 @@ function inside(
 
 const screen = ([x, y, w]: Projected): [number, number] => [x / w, y / w];
 
+/** A click this close to the first corner closes an outline, CSS pixels. */
+const CLOSE = 12;
+
 export class Marks {
-  /** At most two ends. */
-  private ends: Rgb[] = [];
+  private readonly corners = new Corners();
   private pin: Rgb | null = null;
-  private readonly halo = s("line", { class: "measure-halo" });
-  private readonly line = s("line", { class: "measure" });
-  private readonly dots = [0, 1].map(() => s("circle", { class: "measure-end", r: 5 }));
+  private readonly fill = s("polygon", { class: "measure-fill" });
+  private readonly halos = s("g", { class: "measure-halo" });
+  private readonly lines = s("g", { class: "measure" });
+  private readonly dots = s("g", {});
   private readonly picture = s(
     "svg",
     { class: "marks", "aria-hidden": "true" },
-    this.halo,
-    this.line,
-    ...this.dots,
+    this.fill,
+    this.halos,
+    this.lines,
+    this.dots,
   );
-  private readonly distance = h("span", { class: "chip", role: "status" });
+  private readonly told = h("span", { class: "chip", role: "status" });
   private readonly place = h("span", { class: "pin", "aria-hidden": "true" });
   private readonly link = h("a", { class: "chip corner", hidden: true }, "Show in 3D");
-  readonly elements: Element[] = [this.picture, this.distance, this.place, this.link];
+  readonly elements: Element[] = [this.picture, this.told, this.place, this.link];
+  /** Where the first corner was drawn last. */
+  private first: [number, number] | null = null;
 
-  /** The distance between the two ends, metres. */
-  get length(): number | null {
-    const [a, b] = this.ends;
-    return a && b ? Math.hypot(...a.map((c, axis) => c - (b[axis] ?? 0))) : null;
+  /** What the next clicks measure. */
+  set measured(what: Measured) {
+    this.corners.what = what;
   }
 
-  /** Handles a click while measuring: the first end, the second, or the first of the next line. */
-  measure(point: Rgb): void {
-    this.ends = this.ends.length === 1 ? [...this.ends, point] : [point];
-    const { length } = this;
-    this.distance.textContent = length === null ? "" : `${length.toFixed(3)} m`;
+  /** Handles a click while measuring, at a point of the world and of the canvas. */
+  measure(point: Rgb, at: [number, number]): void {
+    const { first } = this;
+    this.corners.add(point, first !== null && Math.hypot(at[0] - first[0], at[1] - first[1]) < CLOSE);
+    this.told.textContent = this.corners.words;
+  }
+
+  /** Takes back the last corner. */
+  undo(): void {
+    this.corners.undo();
+    this.told.textContent = this.corners.words;
   }
 
   endMeasure(): void {
-    this.ends = [];
-    this.distance.textContent = "";
+    this.corners.clear();
+    this.told.textContent = "";
   }
 
   /** Marks the point that was clicked, with a link to it in 3D. */
@@ -100,32 +112,48 @@ export class Marks {
       return at && at[2] >= NEAR ? screen(at) : null;
     };
     put(this.place, onScreen(this.pin));
-    this.dots.forEach((dot, i) => {
-      const at = onScreen(this.ends[i] ?? null);
-      dot.setAttribute("visibility", at ? "visible" : "hidden");
-      if (at) dot.setAttribute("transform", `translate(${at[0]} ${at[1]})`);
-    });
-    const [a, b] = this.ends.map(project);
-    const ends = a && b ? clipped(a, b) : null;
-    const [from, to] = ends ? [screen(ends[0]), screen(ends[1])] : [null, null];
-    const part = from && to ? inside(from, to, width, height) : null;
-    for (const line of [this.halo, this.line]) {
-      line.setAttribute("visibility", part ? "visible" : "hidden");
-      if (!from || !to || !part) continue;
-      const at = (t: number): [number, number] => [
-        from[0] + t * (to[0] - from[0]),
-        from[1] + t * (to[1] - from[1]),
-      ];
-      const [[x1, y1], [x2, y2]] = [at(part[0]), at(part[1])];
-      for (const [name, value] of Object.entries({ x1, y1, x2, y2 }))
-        line.setAttribute(name, value.toFixed(2));
-    }
-    const middle = part && (part[0] + part[1]) / 2;
-    put(
-      this.distance,
-      from && to && middle !== null
-        ? [from[0] + middle * (to[0] - from[0]), from[1] + middle * (to[1] - from[1])]
-        : null,
+    const { points, edges, isClosed, middle } = this.corners;
+    this.first = onScreen(points[0] ?? null);
+    const dots = points.flatMap((point) => (onScreen(point) ? [point] : []));
+    this.dots.replaceChildren(
+      ...points.flatMap((point) => {
+        const at = onScreen(point);
+        return at
+          ? [s("circle", { class: "measure-end", r: 5, transform: `translate(${at.join(" ")})` })]
+          : [];
+      }),
     );
+    // Behind the camera there is no outline to fill.
+    const isWhole = isClosed && dots.length === points.length;
+    const ring = isWhole ? points.map((point) => (onScreen(point) ?? []).join(",")).join(" ") : "";
+    this.fill.setAttribute("points", ring);
+
+    const parts = edges.flatMap(([from, to]) => {
+      const [a, b] = [project(from), project(to)];
+      const ends = a && b ? clipped(a, b) : null;
+      if (!ends) return [];
+      const [start, end] = [screen(ends[0]), screen(ends[1])];
+      const part = inside(start, end, width, height);
+      const at = (t: number): [number, number] => [
+        start[0] + t * (end[0] - start[0]),
+        start[1] + t * (end[1] - start[1]),
+      ];
+      return part ? [[at(part[0]), at(part[1])] as const] : [];
+    });
+    for (const lines of [this.halos, this.lines])
+      lines.replaceChildren(
+        ...parts.map(([[x1, y1], [x2, y2]]) =>
+          s(
+            "line",
+            Object.fromEntries(Object.entries({ x1, y1, x2, y2 }).map(([k, c]) => [k, c.toFixed(2)])),
+          ),
+        ),
+      );
+    // The words of a line are in the middle of the part that is seen.
+    const [line] = parts;
+    const between: [number, number] | null = line
+      ? [(line[0][0] + line[1][0]) / 2, (line[0][1] + line[1][1]) / 2]
+      : null;
+    put(this.told, isClosed ? onScreen(middle) : between);
   }
 }

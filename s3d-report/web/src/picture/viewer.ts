@@ -3,6 +3,7 @@
 import type { Index, Picture, Rgb } from "../data.js";
 import { type Divider, divider } from "./divider.js";
 import { append, choice, flat, h } from "../dom.js";
+import { type ActOf, actOf } from "../keys.js";
 import { type FaceVotes, loadFaceVotes } from "./faces.js";
 import { type Gaze, clampGaze, focal, panoramaAt } from "./geometry.js";
 import {
@@ -136,7 +137,7 @@ export class Viewer {
   private readonly marks = new Marks();
   private readonly measuring: HTMLButtonElement;
   private readonly escape = (event: KeyboardEvent): void => {
-    if (event.key === "Escape") this.endMarks();
+    if (actOf("picture", event) === "stop") this.endMarks();
   };
   private readonly modalities: Modality[];
   private numbers: Numbers = { width: 0, height: 0, depth: null, label: null, face: null };
@@ -288,7 +289,7 @@ export class Viewer {
     const { area, position } = this.options;
     const point = this.spotAt(x, y, this.canvas.getBoundingClientRect())?.spot.point;
     if (!point) return;
-    if (this.measuring.getAttribute("aria-pressed") === "true") this.marks.measure(point);
+    if (this.measuring.getAttribute("aria-pressed") === "true") this.marks.measure(point, [x, y]);
     else if (this.index.meshes.some((mesh) => mesh.area === area))
       this.marks.pinAt(point, spaceLink(area, point, position, this.others ? "changed" : null));
     this.draw();
@@ -356,20 +357,19 @@ export class Viewer {
 
   private key(event: KeyboardEvent): void {
     const gaze = this.look.gaze;
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key === "Enter") this.mark(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
-    if (!gaze) return;
+    const act = actOf("picture", event);
+    if (act === "take") this.mark(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
+    if (!act || !gaze) return;
     const step = gaze.fov / 12;
-    const moves: Record<string, Partial<Gaze>> = {
-      ArrowLeft: { lon: gaze.lon - step },
-      ArrowRight: { lon: gaze.lon + step },
-      ArrowUp: { lat: gaze.lat + step },
-      ArrowDown: { lat: gaze.lat - step },
-      "+": { fov: gaze.fov / 1.2 },
-      "=": { fov: gaze.fov / 1.2 },
-      "-": { fov: gaze.fov * 1.2 },
+    const moves: Partial<Record<ActOf<"picture">, Partial<Gaze>>> = {
+      left: { lon: gaze.lon - step },
+      right: { lon: gaze.lon + step },
+      up: { lat: gaze.lat + step },
+      down: { lat: gaze.lat - step },
+      nearer: { fov: gaze.fov / 1.2 },
+      farther: { fov: gaze.fov * 1.2 },
     };
-    const move = moves[event.key];
+    const move = moves[act];
     if (!move) return;
     event.preventDefault();
     this.lookAt({ ...gaze, ...move });

@@ -2,6 +2,7 @@
 
 import type { Index } from "../data.js";
 import { append, flat, h, named, s, say } from "../dom.js";
+import { type ActOf, actOf } from "../keys.js";
 import { key } from "../picture/readout.js";
 import { lastBefore } from "../route/memory.js";
 import { type Page, type Route, link, numberOf, replaceRoute } from "../route/route.js";
@@ -292,26 +293,22 @@ class Presentation {
   }
 
   private readonly key = (event: KeyboardEvent): void => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const onButton = (event.target as Element).closest?.("button, a") != null;
-    const acts: Record<string, () => void> = {
-      " ": () => this.play(!this.playing),
-      ArrowRight: () => this.step(1),
-      PageDown: () => this.step(1),
-      ArrowLeft: () => this.step(-1),
-      PageUp: () => this.step(-1),
-      Home: () => void this.go(0, 1),
-      End: () => void this.go(this.steps.length - 1, -1),
-      f: () => this.toggleScreen(),
-      F: () => this.toggleScreen(),
-      Escape: () => this.leave(),
+    const acts: Record<ActOf<"present">, () => void> = {
+      hold: () => this.play(!this.playing),
+      next: () => this.step(1),
+      previous: () => this.step(-1),
+      first: () => void this.go(0, 1),
+      last: () => void this.go(this.steps.length - 1, -1),
+      fill: () => this.toggleScreen(),
+      leave: () => this.leave(),
     };
-    const act = acts[event.key];
+    const act = actOf("present", event);
     // A button that has the focus is pressed by Space itself.
-    if (!act || (event.key === " " && onButton)) return;
+    if (!act || (act === "hold" && onButton)) return;
     event.preventDefault();
     this.wake();
-    act();
+    acts[act]();
   };
 
   private isLeavingScreen = false;

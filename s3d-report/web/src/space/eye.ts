@@ -3,12 +3,13 @@
 import { type MOUSE, PerspectiveCamera, type TOUCH, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Mesh, Rgb } from "../data.js";
+import { type ActOf, actOf } from "../keys.js";
 import type { Projected } from "../picture/marks.js";
 
 /** The vertical angle of view, degrees. */
 export const FOV = 50;
 /** The duration of a flight, ms. */
-const FLIGHT = 700;
+const FLIGHT = 600;
 const NEAREST = 0.05;
 /** The duration of a slow turn, ms. */
 const TURN = 100_000;
@@ -48,6 +49,8 @@ export class Eye {
   private readonly controls: OrbitControls;
   private readonly size: number;
   private flight = 0;
+  /** What follows the flight, if it is not ended before. */
+  private landed: (() => void) | null = null;
   private isTurning = false;
   /** Whether the user has chosen the viewpoint. */
   touched = false;
@@ -118,20 +121,33 @@ export class Eye {
     this.put(new Vector3(...at), new Vector3(...from));
   }
 
-  /** Flies to a viewpoint; moves at once for users who want no motion. */
-  fly(to: Stand): void {
+  /** Whether a flight leads away from here. */
+  get isLeaving(): boolean {
+    return this.landed !== null;
+  }
+
+  /**
+   * Flies to a viewpoint; moves at once for users who want no motion. `landed` is called there, unless the
+   * user or another flight ends this one before.
+   */
+  fly(to: Stand, landed: (() => void) | null = null): void {
     this.land();
     if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
-      this.set(to);
+      if (!landed) this.set(to);
+      landed?.();
       return;
     }
+    this.landed = landed;
     const [at, from] = [this.controls.target.clone(), this.camera.position.clone()];
     const [toAt, toFrom] = [new Vector3(...to.at), new Vector3(...to.from)];
     const start = performance.now();
     const step = (now: number): void => {
       const t = Math.min(1, Math.max(0, now - start) / FLIGHT);
       if (t === 1) {
-        this.set(to);
+        // The viewpoint that is left is not told as one that the user chose.
+        if (landed) this.put(toAt, toFrom);
+        else this.set(to);
+        landed?.();
         return;
       }
       const share = t * t * (3 - 2 * t);
@@ -235,6 +251,7 @@ export class Eye {
   /** Ends a flight or a turn. */
   land(): void {
     cancelAnimationFrame(this.flight);
+    this.landed = null;
     if (this.isTurning) this.turned(false);
     this.isTurning = false;
   }
@@ -257,15 +274,15 @@ export class Eye {
   }
 
   private key(event: KeyboardEvent): void {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const turns: Record<string, [number, number]> = {
-      ArrowLeft: [-1, 0],
-      ArrowRight: [1, 0],
-      ArrowUp: [0, 1],
-      ArrowDown: [0, -1],
+    const turns: Partial<Record<ActOf<"space">, [number, number]>> = {
+      left: [-1, 0],
+      right: [1, 0],
+      up: [0, 1],
+      down: [0, -1],
     };
-    const zooms: Record<string, number> = { "+": 1 / 1.2, "=": 1 / 1.2, "-": 1.2 };
-    const [turn, zoom] = [turns[event.key], zooms[event.key]];
+    const zooms: Partial<Record<ActOf<"space">, number>> = { nearer: 1 / 1.2, farther: 1.2 };
+    const act = actOf("space", event);
+    const [turn, zoom] = act ? [turns[act], zooms[act]] : [];
     if (!turn && !zoom) return;
     event.preventDefault();
     this.touched = true;

@@ -1,12 +1,12 @@
 // The layer over the canvas: names of rooms, and scan locations to enter.
 
 import { Vector3 } from "three";
-import type { Index, Mesh, Rgb } from "../data.js";
-import { h, roomName } from "../dom.js";
+import type { Index, Location, Mesh, Rgb } from "../data.js";
+import { h, isPlain, roomName } from "../dom.js";
 import { link } from "../route/route.js";
 import type { Eye } from "./eye.js";
 import type { Box } from "./files.js";
-import { floorOf, middleOf } from "./lines.js";
+import { floorOf, placeOfName } from "./lines.js";
 import { type Look, slabIn } from "./look.js";
 import type { Surface } from "./surface.js";
 
@@ -33,14 +33,22 @@ export class Labels {
     private readonly index: Index,
     private readonly mesh: Mesh,
     private readonly overlay: HTMLElement,
+    enter: (location: Location, href: string) => void,
   ) {
     for (const location of index.locations) {
       if (location.area !== mesh.area || !location.position) continue;
       const name = `${roomName(location.room)} · ${location.uuid.slice(0, 8)}`;
       const words = h("span", { class: "walk-name" }, name);
+      const href = link("pano", [location.area, location.uuid]);
       const element = location.pano
-        ? h("a", { href: link("pano", [location.area, location.uuid]), "aria-label": `Enter ${name}` }, words)
+        ? h("a", { href, "aria-label": `Enter ${name}` }, words)
         : h("span", {}, words);
+      if (location.pano)
+        element.addEventListener("click", (event) => {
+          if (!isPlain(event)) return;
+          event.preventDefault();
+          enter(location, href);
+        });
       element.classList.add("walk", "small");
       element.hidden = true;
       this.locations.push({ element, at: location.position });
@@ -53,7 +61,7 @@ export class Labels {
     const rooms = this.index.rooms.filter((room) => room.area === this.mesh.area);
     this.rooms = rooms.map((room) => {
       const element = h("span", { class: "room-name" }, roomName(room.name));
-      return { element, at: middleOf(room, floorOf(this.index, this.mesh, boxes, room)) };
+      return { element, at: placeOfName(room, floorOf(this.index, this.mesh, boxes, room)) };
     });
     this.overlay.prepend(...this.rooms.map(({ element }) => element));
   }

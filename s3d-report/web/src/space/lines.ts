@@ -13,6 +13,7 @@ import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 import type { Index, Mesh, Rgb, Room, View } from "../data.js";
 import { roomOf } from "../dom.js";
+import { innermost } from "../outline.js";
 import type { Box } from "./files.js";
 
 /** The height of an outline above its floor, and the length of a frustum, metres. */
@@ -48,17 +49,8 @@ export function floorOf(index: Index, mesh: Mesh, boxes: Box[], room: Room): num
   return floor?.top ?? room.floor ?? room.heights?.[0] ?? mesh.min[2];
 }
 
-/** The place for a room's name: the middle of the box of its largest ring. */
-export function middleOf(room: Room, floor: number): Rgb {
-  let best: [number, Rgb] = [-1, [0, 0, floor]];
-  for (const ring of room.outline) {
-    const [xs, ys] = [ring.map(([x]) => x), ring.map(([, y]) => y)];
-    const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-    const size = (x1 - x0) * (y1 - y0);
-    if (size > best[0]) best = [size, [(x0 + x1) / 2, (y0 + y1) / 2, floor]];
-  }
-  return best[1];
-}
+/** The place for a room's name. */
+export const placeOfName = (room: Room, floor: number): Rgb => [...innermost(room.outline), floor];
 
 /** The outline of a patch, from pairs of ends; nothing hides it. */
 export function borderLines(points: number[]): Object3D {

@@ -2,7 +2,9 @@
 
 import type { Index, Mesh } from "../data.js";
 import { append, choice, count, h, named, several } from "../dom.js";
+import { actOf } from "../keys.js";
 import type { Modality } from "../picture/gl.js";
+import type { Measured } from "../picture/measure.js";
 import { legendOf } from "../picture/readout.js";
 import {
   type Against,
@@ -129,7 +131,7 @@ function pageOf(index: Index, mesh: Mesh, look: Look, against: Against | null): 
   });
   const above = h("button", { type: "button", title: "See all of what is shown" }, "From above");
   above.addEventListener("click", () => view.lookFromAbove());
-  append(bar, [colors.length > 1 && show, measureButton(view), above]);
+  append(bar, [colors.length > 1 && show, ...measureButtons(view), above]);
   const hint =
     "Drag to turn, scroll to zoom, double-click to go closer, point at something to know what it is.";
   view.readout.append(h("span", { class: "quiet" }, hint));
@@ -191,18 +193,28 @@ function switches(index: Index, view: SpaceView): HTMLElement[] {
   });
 }
 
-function measureButton(view: SpaceView): HTMLButtonElement {
-  const button = h("button", { type: "button", "aria-pressed": "false" }, "Measure");
-  const turn = (on: boolean): void => {
-    button.setAttribute("aria-pressed", String(on));
-    view.measure(on);
+/** Buttons that measure distances and areas. One of them is on at most. */
+function measureButtons(view: SpaceView): HTMLButtonElement[] {
+  const made = (["distance", "area"] as const).map((what) => {
+    const words = what === "distance" ? "Measure" : "Area";
+    const title = what === "distance" ? "Distance of two points" : "Area of an outline: click its corners";
+    return { what, button: h("button", { type: "button", "aria-pressed": "false", title }, words) };
+  });
+  const turn = (to: Measured | null): void => {
+    for (const { what, button } of made) button.setAttribute("aria-pressed", String(what === to));
+    view.measure(to);
   };
-  button.addEventListener("click", () => turn(button.getAttribute("aria-pressed") !== "true"));
-  for (const element of [button, view.canvas])
-    element.addEventListener("keydown", (event) => {
-      if ((event as KeyboardEvent).key === "Escape") turn(false);
+  for (const { what, button } of made)
+    button.addEventListener("click", () => {
+      turn(button.getAttribute("aria-pressed") === "true" ? null : what);
     });
-  return button;
+  for (const element of [...made.map(({ button }) => button), view.canvas])
+    element.addEventListener("keydown", (event) => {
+      const act = actOf("space", event as KeyboardEvent);
+      if (act === "stop") turn(null);
+      if (act === "undo") view.undoCorner();
+    });
+  return made.map(({ button }) => button);
 }
 
 function boxChoice(index: Index, view: SpaceView): HTMLElement | null {

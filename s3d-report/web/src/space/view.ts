@@ -1,12 +1,14 @@
 // A mesh on a canvas, drawn when something changes, with a readout for the pointer.
 
 import { ColorManagement, Group, LinearSRGBColorSpace, Plane, Scene, Vector3, WebGLRenderer } from "three";
-import type { Index, Mesh, Rgb, Votes } from "../data.js";
+import type { Index, Location, Mesh, Rgb, Votes } from "../data.js";
 import { type Against, type FaceChanges, groupOf, loadChanges } from "../compare/data.js";
 import { tellBoth } from "../compare/words.js";
 import { append, h, roomOf } from "../dom.js";
+import { actOf } from "../keys.js";
 import { type FaceVotes, SURE, loadFaceVotes } from "../picture/faces.js";
 import { Marks } from "../picture/marks.js";
+import type { Measured } from "../picture/measure.js";
 import { tell } from "../picture/readout.js";
 import { type Slab, WHOLE, fullest, slabOf, storeysOf } from "../storeys.js";
 import { Eye, type Sides, type Stand } from "./eye.js";
@@ -85,7 +87,7 @@ export class SpaceView {
   private readonly labels: Labels;
   private readonly resized = new ResizeObserver(() => this.resize());
   private votes: FaceVotes | null = null;
-  private measuring = false;
+  private measuring: Measured | null = null;
   private loaded = false;
   /** Whether the outlines of rooms are shown, until all of the mesh is there. */
   private sketched = false;
@@ -119,7 +121,7 @@ export class SpaceView {
     this.storey = options.storey === undefined ? fullest(this.storeys.all) : options.storey;
     this.eye = new Eye(this.canvas, mesh, () => this.changed());
     this.canvas.setAttribute("aria-label", `Area ${mesh.area} in 3D; arrow keys turn, plus and minus zoom`);
-    this.labels = new Labels(index, mesh, this.overlay);
+    this.labels = new Labels(index, mesh, this.overlay, (location, href) => this.enter(location, href));
     // The pin has a link to 3D, which is left out here.
     append(
       this.overlay,
@@ -217,10 +219,17 @@ export class SpaceView {
     this.paintNow();
   }
 
-  /** Starts or ends measuring. */
-  measure(on: boolean): void {
-    this.measuring = on;
-    if (!on) this.marks.endMeasure();
+  /** Starts to measure distances or areas; with null this ends. */
+  measure(what: Measured | null): void {
+    this.measuring = what;
+    this.marks.endMeasure();
+    if (what) this.marks.measured = what;
+    this.draw();
+  }
+
+  /** Takes back the last corner of what is measured. */
+  undoCorner(): void {
+    this.marks.undo();
     this.draw();
   }
 
@@ -427,7 +436,7 @@ export class SpaceView {
       this.eye.fly({ at: hit.point, from: back });
     });
     canvas.addEventListener("keydown", (event) => {
-      if (event.key === "Enter") this.click(this.readAt(0.5, 0.5));
+      if (actOf("space", event) === "take") this.click(this.readAt(0.5, 0.5));
     });
     for (const event of ["pointerleave", "blur"]) canvas.addEventListener(event, () => this.light(null));
     canvas.addEventListener("keyup", () => this.readAt(0.5, 0.5));
@@ -438,7 +447,9 @@ export class SpaceView {
 
   private click(hit: Hit | null): void {
     if (!hit || !this.measuring) return;
-    this.marks.measure(hit.point);
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const [x, y, w] = this.eye.screen(hit.point, width, height);
+    this.marks.measure(hit.point, [x / w, y / w]);
     this.draw();
   }
 
@@ -493,8 +504,22 @@ export class SpaceView {
     this.paintNow();
   }
 
+  /** Flies to a scan location, and opens its panorama. The flight ends in the direction that it shows. */
+  private enter(location: Location, href: string): void {
+    const open = (): void => {
+      window.location.hash = href;
+    };
+    const { position: from, azimuth_rad: middle, look_deg: look } = location;
+    if (!from) return open();
+    const { at: nowAt, from: nowFrom } = this.eye.stand;
+    const straight = Math.atan2(nowAt[1] - nowFrom[1], nowAt[0] - nowFrom[0]);
+    const azimuth = middle === null ? straight : middle - ((look ?? 0) * Math.PI) / 180;
+    const at: Rgb = [from[0] + Math.cos(azimuth), from[1] + Math.sin(azimuth), from[2]];
+    this.eye.fly({ at, from }, open);
+  }
+
   private changed(): void {
-    if (this.loaded && this.canvas.isConnected) this.options.changed();
+    if (this.loaded && this.canvas.isConnected && !this.eye.isLeaving) this.options.changed();
     this.draw();
   }
 
