@@ -1,13 +1,13 @@
-"""Meshes from depth pictures by Open3D: two grids of truncated signed distances, and screened Poisson.
+"""Meshes from raw scans by Open3D: two grids of truncated signed distances, and screened Poisson.
 
     cargo build --release -p s3d-synth --example raw_scan
     RAW=target/release/examples/raw_scan
     $RAW tum freiburg1 --locations 2
     python3 bench/fusion/peers.py freiburg1 -o MESHES --score "$RAW tum freiburg1 --locations 2 --score"
 
-Needs Linux, numpy and open3d. The first argument is a sequence of the TUM RGB-D benchmark, or a folder of
-Matterport's raw captures, as the example `raw_scan` of s3d-synth writes them. A name with "freiburg1" tells
-readers the lens.
+Needs Linux, numpy and open3d. The first argument is a sequence of the TUM RGB-D benchmark, a folder of
+Matterport's raw captures, or a folder with `scan.ptx`, as the example `raw_scan` of s3d-synth writes them. A
+name with "freiburg1" tells readers the lens.
 
 Every method runs in a process of its own with `--threads` threads. Told are the seconds from the first
 picture to the mesh in memory without the reading of files, the seconds and processor seconds of the whole
@@ -15,16 +15,20 @@ process, and its peak memory. The mesh is written as MESHES/METHOD.ply. `--score
 path of a mesh as its last word and prints JSON, which is told too.
 
 To compare s3d: `/usr/bin/time -v s3d fuse freiburg1 -o ours.ply --threads 2`, then `$RAW tum freiburg1
---locations 2 --score ours.ply`. Threads, cell and range must be the same.
+--locations 2 --score ours.ply`. Threads, cell and range must be the same. `scenes.py` beside this file does
+so for several scenes and devices.
 
 | method | |
 |---|---|
 | `scalable` | `ScalableTSDFVolume`: cells of `--cell`, truncation 4 cells |
-| `blocks` | `VoxelBlockGrid` on the CPU: the same, and cells with `--weight` observations alone |
-| `poisson10`, `poisson11` | one point a cell, normals towards the camera; screened Poisson of that depth |
+| `blocks` | `VoxelBlockGrid` on the CPU: the same, and corners of cells with more than `--weight` observations alone |
+| `poisson10`, `poisson11` | one point a cell, normals towards the sensor; screened Poisson of that depth |
 
-Open3D 0.20.0 returns a `ScalableTSDFVolume` without faces, even of a plane wall: try another version. A mesh
-without faces is told and not scored.
+Open3D's `ScalableTSDFVolume` has no faces in version 0.20.0, even of a plane wall, and has them in 0.19.0. A
+mesh without faces is told and not scored.
+
+Both grids take depth pictures alone. So a laser scan becomes the six sides of a cube about the scanner, with
+pixels as wide as the step of the scan, and ranges between its rays.
 
 Poisson's vertices with the least density, 5 %, are left out. So are depths beyond `--range` metres for all
 methods. Open3D counts pixels from the middle of the first one, and Matterport's intrinsics from its corner.
@@ -46,7 +50,7 @@ TUM_LENS = (640, 480, 525.0, 525.0, 319.5, 239.5)
 
 
 def tum(folder):
-    """Pictures of a sequence: colour, depth, lens, camera → world, units a metre."""
+    """Pictures of a sequence: colour, depth in metres, lens, camera → world."""
     import numpy as np
 
     def rows(name):
@@ -63,7 +67,7 @@ def tum(folder):
         ]
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = turn, (x, y, z)
-        yield folder / color, folder / depth, TUM_LENS, matrix, 5000.0
+        yield image(folder / color), image(folder / depth, 5000.0), TUM_LENS, matrix
 
 
 def matterport(folder):
@@ -77,11 +81,111 @@ def matterport(folder):
         w, h, fx, fy, cx, cy, *_ = map(float, numbers)
         lens = (int(w), int(h), fx, fy, cx - 0.5, cy - 0.5)
         of = f"{camera}_{yaw}"
-        yield find(f"{uuid}_i{of}.jpg"), find(f"{uuid}_d{of}.png"), lens, np.loadtxt(path), 4000.0
+        color, depth = (find(f"{uuid}_{kind}{of}.{end}") for kind, end in (("i", "jpg"), ("d", "png")))
+        yield image(color), image(depth, 4000.0), lens, np.loadtxt(path)
+
+
+def image(path, units=None):
+    """The pixels of a picture; as metres if there are so many units in one."""
+    import numpy as np
+    import open3d as o3d
+
+    pixels = np.asarray(o3d.io.read_image(str(path)))
+    return pixels if units is None else (pixels / units).astype(np.float32)
+
+
+def scans(file):
+    """Scans of a PTX file: points by column and row, NaN where nothing came back, colours, scanner → world."""
+    import numpy as np
+
+    with open(file) as lines:
+        while first := lines.readline().strip():
+            columns, rows = int(first), int(lines.readline())
+            header = [[float(v) for v in lines.readline().split()] for _ in range(8)]
+            table = np.loadtxt(lines, max_rows=columns * rows, dtype=np.float32)
+            table = table.reshape(columns, rows, -1)
+            points = table[..., :3]
+            points[(points == 0).all(-1)] = np.nan
+            yield points, table[..., 4:7].astype(np.uint8), np.array(header[4:]).T
+
+
+def cube_sides(file):
+    """Pictures of the sides of a cube about each place of a scanner, like `tum`."""
+    import numpy as np
+
+    for points, colors, matrix in scans(file):
+        columns, rows, _ = points.shape
+        ranges = np.linalg.norm(points, axis=-1)
+        # Angles of columns and rows, and the fractional column and row of any angle.
+        azimuth = np.unwrap(np.nanmedian(np.arctan2(points[..., 1], points[..., 0]), axis=1))
+        elevation = np.nanmedian(np.arcsin(points[..., 2] / ranges), axis=0)
+        step = abs(elevation[-1] - elevation[0]) / (rows - 1)
+        side = 2 * round(np.pi / 4 / step)
+        y, x = np.mgrid[0:side, 0:side]
+        flat = (np.stack([x, y], -1) - (side - 1) / 2) / (side / 2)
+
+        # Forward and down of each side; OpenCV's axes are right, down and forward.
+        up, down = np.array([0, 0, 1]), np.array([0, 0, -1])
+        turns = [np.array([np.cos(a), np.sin(a), 0]) for a in (0, np.pi / 2, np.pi, -np.pi / 2)]
+        for forward, below in [(f, down) for f in turns] + [(up, turns[0]), (down, -turns[0])]:
+            right = np.cross(below, forward)
+            rays = forward + flat[..., :1] * right + flat[..., 1:] * below
+            length = np.linalg.norm(rays, axis=-1)
+            turned = (np.arctan2(rays[..., 1], rays[..., 0]) - azimuth[0]) * np.sign(azimuth[1] - azimuth[0])
+            c = turned % (2 * np.pi) / (2 * np.pi) * columns
+            tilt = np.arcsin(rays[..., 2] / length)
+            r = (tilt - elevation[0]) / (elevation[-1] - elevation[0]) * (rows - 1)
+            is_seen = (r > -0.5) & (r < rows - 0.5)
+            r = np.clip(r, 0, rows - 1)
+
+            # Between four rays if they are on one surface, else the nearest.
+            c0, r0 = np.floor(c).astype(int), np.minimum(np.floor(r).astype(int), rows - 2)
+            u, v = c - c0, r - r0
+            four = np.stack([ranges[(c0 + i) % columns, r0 + j] for i in (0, 1) for j in (0, 1)])
+            shares = np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v])
+            nearest = ranges[np.rint(c).astype(int) % columns, np.rint(r).astype(int)]
+            is_one = four.max(0) - four.min(0) < 4 * step * four.min(0)
+            found = np.where(is_one, (four * shares).sum(0), nearest)
+            depth = np.where(is_seen, np.nan_to_num(found / length), 0).astype(np.float32)
+            color = np.ascontiguousarray(colors[np.rint(c).astype(int) % columns, np.rint(r).astype(int)])
+
+            pose = np.eye(4)
+            pose[:3, :3] = np.stack([right, below, forward], axis=1)
+            lens = (side, side, side / 2, side / 2, (side - 1) / 2, (side - 1) / 2)
+            yield color, depth, lens, matrix @ pose
 
 
 def pictures(folder):
+    if (folder / "scan.ptx").exists():
+        return cube_sides(folder / "scan.ptx")
     return tum(folder) if (folder / "depth.txt").exists() else matterport(folder)
+
+
+def clouds(folder, reach):
+    """Points with colours of each place of a sensor, and the place. Beyond `reach` metres they are left out."""
+    import numpy as np
+    import open3d as o3d
+
+    if (folder / "scan.ptx").exists():
+        for points, colors, matrix in scans(folder / "scan.ptx"):
+            is_point = np.linalg.norm(points, axis=-1) < reach
+            cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points[is_point].astype(float)))
+            cloud.colors = o3d.utility.Vector3dVector(colors[is_point] / 255)
+            yield cloud.transform(matrix), matrix[:3, 3]
+        return
+    for color, depth, lens, matrix in pictures(folder):
+        lens = o3d.camera.PinholeCameraIntrinsic(*lens)
+        cloud = o3d.geometry.PointCloud.create_from_rgbd_image(
+            rgbd(color, depth, reach), lens, np.linalg.inv(matrix))
+        yield cloud, matrix[:3, 3]
+
+
+def rgbd(color, depth, reach):
+    import open3d as o3d
+
+    return o3d.geometry.RGBDImage.create_from_color_and_depth(
+        o3d.geometry.Image(color), o3d.geometry.Image(depth), depth_scale=1.0, depth_trunc=reach,
+        convert_rgb_to_intensity=False)
 
 
 class Clock:
@@ -103,12 +207,10 @@ def scalable(args, clock):
 
     color_type = o3d.pipelines.integration.TSDFVolumeColorType.RGB8
     volume = o3d.pipelines.integration.ScalableTSDFVolume(args.cell, 4 * args.cell, color_type)
-    for color, depth, lens, matrix, scale in pictures(args.scan):
-        color, depth = o3d.io.read_image(str(color)), o3d.io.read_image(str(depth))
+    for color, depth, lens, matrix in pictures(args.scan):
         with clock:
-            image = o3d.geometry.RGBDImage.create_from_color_and_depth(
-                color, depth, depth_scale=scale, depth_trunc=args.range, convert_rgb_to_intensity=False)
-            volume.integrate(image, o3d.camera.PinholeCameraIntrinsic(*lens), np.linalg.inv(matrix))
+            lens = o3d.camera.PinholeCameraIntrinsic(*lens)
+            volume.integrate(rgbd(color, depth, args.range), lens, np.linalg.inv(matrix))
     with clock:
         return volume.extract_triangle_mesh()
 
@@ -121,17 +223,17 @@ def blocks(args, clock):
     device = core.Device("CPU:0")
     grid = o3d.t.geometry.VoxelBlockGrid(
         attr_names=("tsdf", "weight", "color"),
-        attr_dtypes=(core.float32, core.uint16, core.uint16),
+        attr_dtypes=(core.float32, core.float32, core.float32),
         attr_channels=((1), (1), (3)),
         voxel_size=args.cell, block_resolution=16, block_count=20_000, device=device)
-    for color, depth, lens, matrix, scale in pictures(args.scan):
-        color, depth = o3d.t.io.read_image(str(color)), o3d.t.io.read_image(str(depth))
+    for color, depth, lens, matrix in pictures(args.scan):
+        color, depth = (o3d.t.geometry.Image(pixels) for pixels in ((color / 255).astype(np.float32), depth))
         _, _, fx, fy, cx, cy = lens
         with clock:
             intrinsic = core.Tensor([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], core.float64)
             extrinsic = core.Tensor(np.linalg.inv(matrix), core.float64)
-            found = grid.compute_unique_block_coordinates(depth, intrinsic, extrinsic, scale, args.range, 4.0)
-            grid.integrate(found, depth, color, intrinsic, intrinsic, extrinsic, scale, args.range, 4.0)
+            found = grid.compute_unique_block_coordinates(depth, intrinsic, extrinsic, 1.0, args.range, 4.0)
+            grid.integrate(found, depth, color, intrinsic, intrinsic, extrinsic, 1.0, args.range, 4.0)
     with clock:
         return grid.extract_triangle_mesh(weight_threshold=args.weight).to_legacy()
 
@@ -141,18 +243,13 @@ def poisson(args, clock, octree):
     import open3d as o3d
 
     cloud = o3d.geometry.PointCloud()
-    for color, depth, lens, matrix, scale in pictures(args.scan):
-        color, depth = o3d.io.read_image(str(color)), o3d.io.read_image(str(depth))
+    for piece, place in clouds(args.scan, args.range):
         with clock:
-            image = o3d.geometry.RGBDImage.create_from_color_and_depth(
-                color, depth, depth_scale=scale, depth_trunc=args.range, convert_rgb_to_intensity=False)
-            lens = o3d.camera.PinholeCameraIntrinsic(*lens)
-            piece = o3d.geometry.PointCloud.create_from_rgbd_image(image, lens, np.linalg.inv(matrix))
             piece = piece.voxel_down_sample(args.cell)
             if len(piece.points) < 30:
                 continue
             piece.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(radius=6 * args.cell, max_nn=40))
-            piece.orient_normals_towards_camera_location(matrix[:3, 3])
+            piece.orient_normals_towards_camera_location(place)
             cloud += piece
             # Few pictures at a time, so that memory does not grow with their number.
             if len(cloud.points) > 4_000_000:
@@ -180,8 +277,8 @@ def one(args):
     print(json.dumps({"seconds": round(clock.seconds, 2), "faces": len(mesh.triangles)}))
 
 
-def measured(command, threads):
-    """Runs a command: its last line, and what the process took."""
+def measured(command, threads, prints_json=True):
+    """Runs a command: the JSON in its last line, and what the process took."""
     environment = {**os.environ, "OMP_NUM_THREADS": str(threads)}
     began = time.perf_counter()
     with tempfile.TemporaryFile("w+") as output:
@@ -191,7 +288,7 @@ def measured(command, threads):
         if child.returncode:
             raise SystemExit(f"{' '.join(command)} failed")
         output.seek(0)
-        line = output.read().strip().splitlines()[-1]
+        line = output.read().strip().splitlines()[-1] if prints_json else "null"
     taken = {
         "process_seconds": round(time.perf_counter() - began, 1),
         "processor_seconds": round(usage.ru_utime + usage.ru_stime, 1),

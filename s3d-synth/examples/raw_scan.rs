@@ -4,21 +4,29 @@
 //!
 //! | option | |
 //! |---|---|
-//! | `--scene NAME` | `demo` (default), `two-storeys`, a generated `area_N`, or a building of so many rooms |
+//! | `--scene NAME` | what is scanned: see below (`demo`) |
 //! | `--seed N` | of the device, and of generated buildings (1) |
 //! | `--locations N` | only the first N scan locations |
 //! | `--pictures N` | poses a location of a hand-held camera (60) |
 //! | `--scale F` | the size of pictures and grids beside the devices' own (1; 0.5 for Matterport) |
 //! | `--score MESH.ply` | writes nothing; prints how the mesh agrees with the scene, as a line of JSON |
-//! | `--truth` | writes the scene's mesh beside, as `truth.obj` |
+//! | `--truth` | writes the scene's mesh beside, as `rgb.obj` |
+//!
+//! A scene is `demo`, its `office` alone, `two-storeys`, a generated `area_N`, a building of so many rooms, or
+//! the `.obj` (Y-up) of a mesh with `cameras.csv` beside it.
+//!
+//! Of a score, `doors` is the share of the doors' seen surface that lies within 1 cm of the mesh, and `legs`
+//! the share of what stands under tables.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 use s3d_geom::{Pose, TriMesh};
+use s3d_io::camera::read_cameras;
 use s3d_io::mesh::{UpAxis, read_mesh};
+use s3d_label::{Class, Room, RoomType};
 use s3d_synth::building::ScanLocation;
 use s3d_synth::device::{DepthCamera, LaserScanner, ScanTarget, turntable_poses};
 use s3d_synth::truth::{MeshScores, Truth, TruthOptions, View};
-use s3d_synth::{AnnotatedScene, Building, BuildingOptions};
+use s3d_synth::{AnnotatedScene, Building, BuildingOptions, Instance};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -28,13 +36,14 @@ const USAGE: &str = "usage: raw_scan matterport|tum|scannet|ptx|e57 DIR [--scene
 
 fn main() -> Result<(), Box<dyn Error>> {
     let job = Job::parse()?;
-    let scene = scene(&job.scene, job.seed)?;
+    let scene = named_scene(&job.scene, job.seed)?;
     let target = ScanTarget::new(&scene);
     let locations = &scene.locations[..job.locations.min(scene.locations.len())];
 
     if let Some(path) = &job.score {
         let mesh = read_mesh(path, UpAxis::Z)?.mesh;
-        println!("{}", json(&job.score(&target, locations, &mesh)?));
+        let truth = Truth::new(&target, &job.views(&target, locations), &TruthOptions::default())?;
+        println!("{}", json(&truth.score(&mesh), kept(&scene, &truth, &mesh)));
         return Ok(());
     }
 
@@ -128,14 +137,9 @@ impl Job {
         Ok(())
     }
 
-    fn score(
-        &self,
-        target: &ScanTarget<'_>,
-        locations: &[ScanLocation],
-        mesh: &TriMesh,
-    ) -> Result<MeshScores, Box<dyn Error>> {
+    fn views(&self, target: &ScanTarget<'_>, locations: &[ScanLocation]) -> Vec<View> {
         let camera = self.camera();
-        let views: Vec<View> = match &*self.form {
+        match &*self.form {
             "ptx" | "e57" => locations.iter().map(|l| View::of_laser(l, &self.scanner())).collect(),
             "matterport" => {
                 let stops = locations.iter().flat_map(turntable_poses);
@@ -145,14 +149,20 @@ impl Job {
                 let poses = self.path(target, locations);
                 poses.iter().map(|pose| View::of_camera(pose, &camera)).collect()
             }
-        };
-        Ok(Truth::new(target, &views, &TruthOptions::default())?.score(mesh))
+        }
     }
 }
 
-fn scene(name: &str, seed: u64) -> Result<AnnotatedScene, Box<dyn Error>> {
+fn named_scene(name: &str, seed: u64) -> Result<AnnotatedScene, Box<dyn Error>> {
+    if name.ends_with(".obj") {
+        return scanned(Path::new(name));
+    }
     let building = match name {
         "demo" => Building::demo(),
+        "office" => {
+            let demo = Building::demo();
+            Building { rooms: demo.rooms[..1].to_vec(), locations: demo.locations[..1].to_vec(), ..demo }
+        }
         "two-storeys" => Building::two_storeys(),
         area if area.starts_with("area_") => {
             Building::generate(&BuildingOptions::area(area[5..].parse()?, seed)?)?
@@ -162,17 +172,79 @@ fn scene(name: &str, seed: u64) -> Result<AnnotatedScene, Box<dyn Error>> {
     Ok(building.build()?)
 }
 
-fn json(scores: &MeshScores) -> String {
+/// A mesh that was scanned before, as a scene of one wall.
+fn scanned(mesh: &Path) -> Result<AnnotatedScene, Box<dyn Error>> {
+    let cameras = read_cameras(&mesh.with_file_name("cameras.csv"))?;
+    let locations = cameras.into_iter().map(|camera| {
+        let forward = camera.pose.forward();
+        // Headings are 0 along +Y and grow to the left.
+        let yaw_rad = f64::atan2(-forward.x, forward.y);
+        ScanLocation { uuid: camera.uuid, position: camera.pose.location, yaw_rad }
+    });
+    let mesh = read_mesh(mesh, UpAxis::Y)?.mesh;
+    let room = Room { room_type: RoomType::OFFICE, number: 1 };
+    Ok(AnnotatedScene {
+        instance_of_face: vec![0; mesh.faces().len()],
+        instances: vec![Instance { class: Class::WALL, number: 1, room }],
+        mesh,
+        locations: locations.collect(),
+        title: "A mesh".to_owned(),
+    })
+}
+
+/// What stands under a table ends at this share of its height.
+const TOP: f32 = 0.85;
+
+/// Surfaces are upright below this slope of their normals.
+const UPRIGHT: f32 = 0.5;
+
+/// A distance at which a surface is kept, metres.
+const KEPT_M: f32 = 0.01;
+
+/// Returns the shares of doors, and of what stands under tables, that were seen and are near a mesh. NaN if
+/// the scene has none.
+fn kept(scene: &AnnotatedScene, truth: &Truth<'_>, mesh: &TriMesh) -> [f64; 2] {
+    let mut heights = vec![[f32::INFINITY, f32::NEG_INFINITY]; scene.instances.len()];
+    for (face, instance) in (0..).zip(&scene.instance_of_face) {
+        let [low, high] = &mut heights[*instance as usize];
+        for corner in scene.mesh.triangle(face) {
+            (*low, *high) = (low.min(corner.z), high.max(corner.z));
+        }
+    }
+
+    let samples = truth.samples();
+    let mut counts = [[0_usize; 2]; 2];
+    let measured = samples.positions.iter().zip(&samples.faces).zip(truth.distances(mesh));
+    for (((place, face), distance_m), _) in measured.zip(truth.seen()).filter(|(_, seen)| *seen) {
+        let instance = scene.instance_of_face[*face as usize] as usize;
+        let [low, high] = heights[instance];
+        let is_leg = || scene.mesh.normal(*face).z.abs() < UPRIGHT && place.z < low + TOP * (high - low);
+        let kind = match scene.instances[instance].class {
+            Class::DOOR => 0,
+            Class::TABLE if is_leg() => 1,
+            _ => continue,
+        };
+        counts[kind][0] += usize::from(distance_m < KEPT_M);
+        counts[kind][1] += 1;
+    }
+    counts.map(|[kept, seen]| kept as f64 / seen as f64)
+}
+
+fn json(scores: &MeshScores, kept: [f64; 2]) -> String {
     let at = scores.at.iter().map(|at| {
         let millimetres = at.distance_m * 1000.0;
         let (p, r, f) = (at.precision, at.recall, at.f_score);
         format!("\"{millimetres:.0} mm\": {{\"precision\": {p:.4}, \"recall\": {r:.4}, \"f_score\": {f:.4}}}")
     });
+    let [doors, legs] = kept.map(|share| match share.is_nan() {
+        true => "null".to_owned(),
+        false => format!("{share:.4}"),
+    });
     let (accuracy, completeness) = (&scores.accuracy, &scores.completeness);
     format!(
         "{{{}, \"accuracy_mean_mm\": {:.2}, \"accuracy_median_mm\": {:.2}, \"completeness_mean_mm\": {:.2}, \
          \"completeness_median_mm\": {:.2}, \"normal_consistency\": {:.4}, \"flipped\": {:.4}, \
-         \"closed_sight\": {:.4}, \"seen_share\": {:.4}}}",
+         \"closed_sight\": {:.4}, \"seen_share\": {:.4}, \"doors\": {doors}, \"legs\": {legs}}}",
         at.collect::<Vec<_>>().join(", "),
         accuracy.mean_m * 1000.0,
         accuracy.median_m * 1000.0,
