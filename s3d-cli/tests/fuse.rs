@@ -2,11 +2,17 @@
 
 use crate::common;
 use common::{s3d_fails, s3d_ok, text};
-use s3d_geom::glam::{DVec3, Vec3};
-use s3d_io::dataset::{Domain, Layout, dataset_images, read_pose};
+use e57::{E57Reader, E57Writer, ImageFormat, Projection, Quaternion, Transform, Translation};
+use s3d_geom::glam::{DAffine3, DQuat, DVec3, Vec3};
+use s3d_io::camera::{E57Pictures, read_cameras};
+use s3d_io::dataset::{Domain, Layout, dataset_images, read_face_votes, read_labels, read_pose};
 use s3d_io::image::read_xyz;
+use s3d_io::mesh::{UpAxis, read_mesh};
+use s3d_label::Class;
+use s3d_synth::building::ScanLocation;
 use s3d_synth::device::{DepthCamera, LaserScanner, ScanTarget};
-use s3d_synth::{AnnotatedScene, Building};
+use s3d_synth::truth::{Truth, TruthOptions};
+use s3d_synth::{AnnotatedScene, Building, ScanOptions};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::fs;
@@ -162,7 +168,7 @@ fn threads_and_tiles_do_not_change_a_mesh() {
     assert!(told.contains("scan locations: 2") && told.contains("2 storeys"), "{told}");
 }
 
-fn height(location: &s3d_synth::building::ScanLocation) -> f64 {
+fn height(location: &ScanLocation) -> f64 {
     location.position.z
 }
 
@@ -186,4 +192,159 @@ fn what_cannot_be_fused_is_told() {
     s3d_fails(&["fuse", &hall, "-o", &mesh, "--cell", "0"], 2, &["--cell"]);
     assert_eq!(fs::read(at("there.ply")).unwrap(), b"mine");
     assert!(!at("m.ply").exists());
+}
+
+/// The office of the built-in scene, with a second scan location.
+fn office() -> AnnotatedScene {
+    let demo = Building::demo();
+    let mut scene =
+        scene(Building { rooms: demo.rooms[..1].to_vec(), locations: demo.locations[..1].to_vec(), ..demo });
+    let first = scene.locations[0].clone();
+    let position = first.position + DVec3::new(-1.6, -0.8, -0.1);
+    let yaw_rad = first.yaw_rad + 1.0;
+    scene.locations.push(ScanLocation {
+        uuid: "5b3e8a76d0f1492c8e47a92b6c1d05f3".to_owned(),
+        position,
+        yaw_rad,
+    });
+    scene
+}
+
+/// A step of the scanner is 0.5°, and of its panoramas 0.7°.
+fn write_e57(target: &ScanTarget<'_>, path: &Path) {
+    let scanner = LaserScanner { columns: 720, rows: 300, ..LaserScanner::default() };
+    target
+        .write_e57(path, &target.scene().locations, &scanner, 512, || true)
+        .unwrap();
+}
+
+#[test]
+fn an_e57_with_panoramas_becomes_a_data_set() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = office();
+    let target = ScanTarget::new(&scene);
+    write_e57(&target, &dir.path().join("scan.e57"));
+    let file = dir.path().join("scene.toml");
+    let toml = "rgb = \"e57\"\narea = 1\n[mesh]\nfuse = \"scan.e57\"\ncell_m = 0.02\n\
+                [cameras]\npath = \"scan.e57\"\n";
+    fs::write(&file, toml).unwrap();
+
+    let out = dir.path().join("out");
+    let log = s3d_ok(&[&["export", text(&file), "-o", text(&out)], &EXPORT[..]].concat());
+    assert!(log.contains("2 laser scans") && log.contains("colours from images of 2 locations"), "{log}");
+    s3d_ok(&["verify", text(&out)]);
+    let share = agreement(&out, &target, 0.01);
+    assert!(share > 0.95, "{share}");
+}
+
+/// Copies an E57 file with the last scan, and its picture, moved by `motion`.
+fn copy_with_a_motion(from: &Path, to: &Path, motion: &DAffine3) {
+    let mut reader = E57Reader::from_file(from).unwrap();
+    let mut writer = E57Writer::from_file(to, "{0}").unwrap();
+    let (scans, images) = (reader.pointclouds(), reader.images());
+    let last = scans.last().unwrap().guid.clone();
+    let moved = |transform: &Transform| {
+        let (q, t) = (&transform.rotation, &transform.translation);
+        let turn = DQuat::from_mat3(&motion.matrix3) * DQuat::from_xyzw(q.x, q.y, q.z, q.w);
+        let turn = if turn.w < 0.0 { -turn } else { turn };
+        let at = motion.transform_point3(DVec3::new(t.x, t.y, t.z));
+        Transform {
+            rotation: Quaternion { w: turn.w, x: turn.x, y: turn.y, z: turn.z },
+            translation: Translation { x: at.x, y: at.y, z: at.z },
+        }
+    };
+    let placed = |transform: &Option<Transform>, is_last: bool| {
+        let transform = transform.as_ref().unwrap();
+        if is_last { moved(transform) } else { transform.clone() }
+    };
+
+    for scan in &scans {
+        let points: Vec<_> = reader.pointcloud_raw(scan).unwrap().map(Result::unwrap).collect();
+        let mut copy = writer
+            .add_pointcloud(scan.guid.as_deref().unwrap(), scan.prototype.clone())
+            .unwrap();
+        copy.set_name(scan.name.clone());
+        copy.set_transform(Some(placed(&scan.transform, scan.guid == last)));
+        points.into_iter().for_each(|point| copy.add_point(point).unwrap());
+        copy.finalize().unwrap();
+    }
+    for image in &images {
+        let Some(Projection::Spherical(sphere)) = &image.projection else { panic!("a panorama") };
+        let mut bytes = Vec::new();
+        reader.blob(&sphere.blob.data, &mut bytes).unwrap();
+        let mut copy = writer.add_image(image.guid.as_deref().unwrap()).unwrap();
+        copy.set_pointcloud_guid(image.pointcloud_guid.as_deref().unwrap());
+        copy.set_transform(placed(&image.transform, image.pointcloud_guid == last));
+        copy.add_spherical(ImageFormat::Jpeg, &mut bytes.as_slice(), sphere.properties.clone(), None)
+            .unwrap();
+        copy.finalize().unwrap();
+    }
+    writer.finalize().unwrap();
+}
+
+#[test]
+fn panoramas_move_with_their_scans() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let scene = office();
+    let target = ScanTarget::new(&scene);
+    write_e57(&target, &at("right.e57"));
+    // The second scan is off by 5 cm and half a degree.
+    let off = DAffine3::from_translation(DVec3::new(0.04, -0.03, 0.01));
+    let turn = DAffine3::from_rotation_z(0.5_f64.to_radians());
+    let middle = DAffine3::from_translation(scene.locations[1].position);
+    copy_with_a_motion(&at("right.e57"), &at("scan.e57"), &(off * middle * turn * middle.inverse()));
+
+    let folder = at("fused");
+    let scan = at("scan.e57");
+    let fuse = ["fuse", text(&scan), "-o", text(&folder), "--cell", "0.03", "--refine-poses"];
+    let log = s3d_ok(&fuse);
+    assert!(log.contains("moved by"), "{log}");
+    let listed = read_cameras(&folder.join("locations.csv")).unwrap();
+    // Either scan may have moved, so the places count from each other.
+    let apart = listed[1].pose.location - listed[0].pose.location;
+    let truth = scene.locations[1].position - scene.locations[0].position;
+    let error_m = apart.length() - truth.length();
+    assert!(error_m.abs() < 0.005, "{error_m}: {apart} {truth}");
+    assert_eq!([&listed[0].uuid, &listed[1].uuid], [&scene.locations[0].uuid, &scene.locations[1].uuid]);
+
+    let motions = read_cameras(&folder.join("motions.csv")).unwrap();
+    let pictures = E57Pictures::open(&at("scan.e57"), &DAffine3::IDENTITY).unwrap();
+    assert_eq!(motions.len(), pictures.of_locations(&listed).pictures.iter().flatten().count());
+    let scene_file = folder.join("scene.toml");
+    let out = at("out");
+    let log = s3d_ok(&[&["export", text(&scene_file), "-o", text(&out)], &EXPORT[..]].concat());
+    assert!(log.contains("colours from images of 2 locations"), "{log}");
+    s3d_ok(&["verify", text(&out)]);
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    assert!(manifest.contains("motions.csv"), "{manifest}");
+}
+
+#[test]
+fn labelled_points_vote_onto_a_fused_mesh() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = office();
+    let target = ScanTarget::new(&scene);
+    let options = ScanOptions { points_per_m2: 3000.0, ..ScanOptions::default() };
+    scene.write_scan(dir.path(), &options, || true).unwrap();
+    let scanner = LaserScanner { columns: 1200, rows: 500, ..LaserScanner::default() };
+    target
+        .write_ptx(&dir.path().join("scan.ptx"), &scene.locations, &scanner, || true)
+        .unwrap();
+    let file = dir.path().join("fused.toml");
+    let toml = "area = 1\n[mesh]\nfuse = \"scan.ptx\"\ncell_m = 0.02\n[annotations]\npath = \"Area_1\"\n\
+                [cameras]\npath = \"cameras.csv\"\n";
+    fs::write(&file, toml).unwrap();
+    let out = dir.path().join("out");
+    s3d_ok(&[&["export", text(&file), "-o", text(&out)], &EXPORT[..]].concat());
+
+    let layout = Layout::new(&out);
+    let names = read_labels(&layout.labels_json()).unwrap();
+    let votes = read_face_votes(&layout.votes_npz(1)).unwrap();
+    let class = |label: &u32| names[*label as usize].split('_').next().unwrap().parse::<Class>().ok();
+    let classes: Vec<Option<Class>> = votes.label.iter().map(class).collect();
+    let mesh = read_mesh(&layout.rgb_obj(1), UpAxis::Y).unwrap().mesh;
+    let truth = Truth::new(&target, &[], &TruthOptions::default()).unwrap();
+    let scores = truth.score_labels(&mesh, &classes);
+    assert!(scores.mean_iou > 0.85 && scores.accuracy > 0.95, "{scores:?}");
 }

@@ -1,10 +1,10 @@
-//! Whether laser scans lie on each other, and motions that bring them there.
+//! Whether scans and depth pictures lie on each other, and motions that bring laser scans there.
 
 use super::images::{Images, Seen};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use glam::DAffine3;
-use s3d_fusion::{RegisterOptions, ScanPoints, pair_residuals, refine_poses};
+use s3d_fusion::{PairResidual, RegisterOptions, ScanPoints, pair_residuals, refine_poses};
 
 /// Comparing more scans than these would take longer than fusing them.
 const MOST_SCANS: usize = 100;
@@ -12,13 +12,31 @@ const MOST_SCANS: usize = 100;
 /// Two scans are off if a motion lessens their distance by this much, metres, and by half.
 const OFF_M: f64 = 0.005;
 
+/// So many depth pictures are compared, evenly spread over all.
+const PICTURES: usize = 16;
+
+/// Steps of a motion that tells whether a pair of depth pictures is off.
+const PICTURE_STEPS: usize = 4;
+
+/// Two depth pictures are off if a motion lessens their distance by this much, metres, and by half. Their
+/// noise is larger than that of laser scans.
+const PICTURES_OFF_M: f64 = 0.02;
+
+/// The share of pairs of depth pictures that may be off before it is a warning. A person who walks by makes
+/// some.
+const MOST_OFF: f64 = 0.25;
+
 /// Compares laser scans pair by pair and says which are off. Returns a motion for each scan if poses are to
-/// be refined.
+/// be refined. Of depth pictures, some are compared.
 ///
 /// # Errors
 /// [`Error::Input`] if poses are to be refined, and the scans are no laser scans from fixed places.
 pub(super) fn fit(images: &Images, refine: bool, ctx: &Context) -> Result<Option<Vec<DAffine3>>> {
     let names = images.scan_names();
+    if names.is_empty() && !refine {
+        compare_pictures(images, ctx)?;
+        return Ok(None);
+    }
     if names.len() != images.len() || names.len() < 2 || names.len() > MOST_SCANS {
         if refine {
             let why = format!("poses are refined of 2 to {MOST_SCANS} laser scans, and of nothing else");
@@ -83,4 +101,47 @@ pub(super) fn fit(images: &Images, refine: bool, ctx: &Context) -> Result<Option
         ));
     }
     Ok(Some(refined.poses))
+}
+
+/// Says how far the surfaces of some depth pictures are apart, and warns if their poses seem to be off.
+fn compare_pictures(images: &Images, ctx: &Context) -> Result<()> {
+    let options = RegisterOptions { iterations: PICTURE_STEPS, ..RegisterOptions::default() };
+    let mut names = Vec::new();
+    let mut scans = Vec::new();
+    for (name, image) in images.some_pictures(PICTURES, ctx)? {
+        let (points, normals) = image.surface_points(options.cell_m as f32);
+        scans.push(ScanPoints::sampled(&points, &normals, options.cell_m));
+        names.push(name);
+    }
+
+    let unfit = |e: s3d_fusion::RegisterError| Error::unfit(images.path(), e.to_string());
+    let poses = vec![DAffine3::IDENTITY; scans.len()];
+    let mut pairs = pair_residuals(&scans, &poses, &options).map_err(unfit)?;
+    pairs.sort_by(|a, b| a.before.median_m.total_cmp(&b.before.median_m));
+    let Some(worst) = pairs.last() else { return Ok(()) };
+
+    let [a, b] = worst.scans.map(|scan| &names[scan]);
+    let told = format!(
+        "{} of {} depth pictures compared, of which {} pairs overlap: half of the points of a pair are within \
+         {:.1} mm, and within {:.1} mm of {a} and {b}, the worst pair",
+        scans.len(),
+        images.len(),
+        pairs.len(),
+        pairs[pairs.len() / 2].before.median_m * 1e3,
+        worst.before.median_m * 1e3,
+    );
+    let is_off = |pair: &&PairResidual| {
+        let [before_m, after_m] = [&pair.before, &pair.after].map(|of| of.median_m);
+        before_m - after_m > PICTURES_OFF_M && after_m < before_m / 2.0
+    };
+    let off = pairs.iter().filter(is_off).count();
+    if off as f64 > MOST_OFF * pairs.len() as f64 {
+        ctx.warn(format_args!(
+            "{told}. {off} pairs would fit much better if one picture moved: the poses are off, or another \
+             camera's"
+        ));
+    } else {
+        ctx.info(told);
+    }
+    Ok(())
 }

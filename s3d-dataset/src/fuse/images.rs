@@ -4,15 +4,14 @@ use super::FuseOptions;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::parallel::map_in_order;
-use glam::{DAffine3, DMat3, DVec3, Vec3, dvec2};
+use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3, dvec2};
 use s3d_fusion::{RangeImage, RangeKind, SensorNoise};
 use s3d_geom::{Pose, Raster};
-use s3d_io::camera::{Distortion, Optics};
+use s3d_io::camera::{Distortion, Optics, uuid_from_name};
 use s3d_io::mesh::UpAxis;
 use s3d_io::raw::{
     ColorPicture, DepthPicture, DepthPictures, LaserScans, RawForm, RawOptions, RawScan, ScanInfo,
 };
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Depth pictures count up to this range by default, metres: noise grows with its square.
@@ -124,7 +123,7 @@ impl Images {
 
     /// Whether laser scans are elsewhere than their files say.
     pub(super) fn are_moved(&self) -> bool {
-        !self.motions.is_empty()
+        !self.motions.is_empty() || self.offset_m != DVec3::ZERO
     }
 
     /// The first input, for messages.
@@ -193,19 +192,45 @@ impl Images {
         scans.map(|scan| scan.name.clone()).collect()
     }
 
-    /// A table of the places of laser scans, as lists of scan locations are: a location for each scan.
-    pub(super) fn place_table(&self) -> Option<String> {
-        let mut text = "uuid,x,y,z,qx,qy,qz,qw\n".to_owned();
-        let mut any = false;
-        for (number, scan) in self.scans.iter().flat_map(LaserScans::scans).enumerate() {
-            let Some(origin_m) = scan.origin_m else { continue };
+    /// The laser scans that have a place, with their motions.
+    fn placed(&self) -> impl Iterator<Item = (&ScanInfo, DVec3, DAffine3)> {
+        let scans = self.scans.iter().flat_map(LaserScans::scans).enumerate();
+        scans.filter_map(|(number, scan)| {
             let motion = self.motions.get(number).copied().unwrap_or_default();
-            let [x, y, z] = motion.transform_point3(origin_m).to_array();
-            let uuid = s3d_io::camera::uuid_from_name(&format!("{} {x} {y} {z}", scan.name));
-            let _ = writeln!(text, "{uuid},{x:?},{y:?},{z:?},0,0,0,1");
-            any = true;
-        }
-        any.then_some(text)
+            scan.origin_m
+                .map(|origin_m| (scan, motion.transform_point3(origin_m), motion))
+        })
+    }
+
+    /// A table of the places of laser scans, as lists of scan locations are: a location for each scan, level
+    /// and with the heading of the scanner's +Y. `None` if no scan has a place.
+    pub(super) fn place_table(&self) -> Option<String> {
+        let rows: Vec<_> = self.placed().collect();
+        let row = |(scan, place, motion): &(&ScanInfo, DVec3, DAffine3)| {
+            let [x, y, z] = place.to_array();
+            let uuid = scan.uuid.clone();
+            let uuid = uuid.unwrap_or_else(|| uuid_from_name(&format!("{} {x} {y} {z}", scan.name)));
+            let ahead = motion.matrix3 * scan.pose.map_or(DVec3::Y, |pose| pose.forward());
+            // Headings are 0 along +Y and grow to the left.
+            let heading = DQuat::from_rotation_z(libm::atan2(-ahead.x, ahead.y));
+            table_row(&uuid, *place, heading)
+        };
+        (!rows.is_empty()).then(|| TABLE.to_owned() + &rows.iter().map(row).collect::<String>())
+    }
+
+    /// A table of how the scans of an E57 file are moved, from the frame of the file to the world of the
+    /// mesh: a motion for each scan location.
+    pub(super) fn motion_table(&self) -> String {
+        let turn = self.up.map_or(DMat3::IDENTITY, UpAxis::rotation);
+        let world_from_file = DAffine3::from_translation(-self.offset_m) * DAffine3::from_mat3(turn);
+        let row = |(scan, _, motion): (&ScanInfo, DVec3, DAffine3)| {
+            let moved = motion * world_from_file;
+            let rotation = DQuat::from_mat3(&moved.matrix3);
+            scan.uuid
+                .as_ref()
+                .map(|uuid| table_row(uuid, moved.translation, rotation))
+        };
+        TABLE.to_owned() + &self.placed().filter_map(row).collect::<String>()
     }
 
     /// Hands on what sensors saw, in the order of the files, until `each` returns false. Pictures are read on
@@ -243,6 +268,21 @@ impl Images {
             }
         }
         Ok(())
+    }
+
+    /// Reads some depth pictures, evenly spread over all, with the names of their files.
+    pub(super) fn some_pictures(&self, count: usize, ctx: &Context) -> Result<Vec<(String, RangeImage)>> {
+        let step = self.pictures.len().div_ceil(count).max(1);
+        let chosen: Vec<&DepthPicture> = self.pictures.iter().step_by(step).collect();
+        let read = map_in_order(ctx, &chosen, || (), |(), picture| self.picture(picture))?;
+        let name = |picture: &DepthPicture| {
+            let name = picture.path().file_name().unwrap_or_default();
+            name.to_string_lossy().into_owned()
+        };
+        let named = read.into_iter().zip(chosen);
+        Ok(named
+            .filter_map(|(image, picture)| image.map(|image| (name(picture), image)))
+            .collect())
     }
 
     fn picture(&self, picture: &DepthPicture) -> Result<Option<RangeImage>> {
@@ -367,6 +407,15 @@ impl Images {
         })?;
         Ok([min, max])
     }
+}
+
+/// The names of the columns of tables of places and motions.
+const TABLE: &str = "uuid,x,y,z,qx,qy,qz,qw\n";
+
+/// A line of a table of places or motions.
+fn table_row(uuid: &str, at: DVec3, turn: DQuat) -> String {
+    let ([x, y, z], [qx, qy, qz, qw]) = (at.to_array(), turn.normalize().to_array());
+    format!("{uuid},{x:?},{y:?},{z:?},{qx:?},{qy:?},{qz:?},{qw:?}\n")
 }
 
 /// How a scanner stood: upright, unless its file tells it.

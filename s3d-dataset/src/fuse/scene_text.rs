@@ -15,6 +15,9 @@ use std::path::{Component, Path, PathBuf};
 /// The list of the scanner's places beside a fused mesh.
 const LOCATIONS: &str = "locations.csv";
 
+/// How the scans of an E57 file are moved, beside a fused mesh.
+const MOTIONS: &str = "motions.csv";
+
 /// The list of photographs beside a fused mesh.
 const PHOTOGRAPHS: &str = "photographs.json";
 
@@ -52,11 +55,25 @@ pub(super) fn scene(images: &Images, turn: Option<DMat3>, folder: &Path) -> Resu
         Some((_, RawForm::Recording, path)) => {
             let _ = write!(toml, "[frames]\npath = {path:?}\n{up}");
         }
-        // The file does not know of the motions.
-        Some((file, RawForm::E57, path)) if !images.are_moved() => {
-            let _ = write!(toml, "[cameras]\npath = {path:?}\n{up}");
-            if E57Pictures::open(file, &DAffine3::IDENTITY).is_ok() {
-                toml += "[rgb]\nsource = \"e57\"\n";
+        Some((file, RawForm::E57, path)) => {
+            let has_pictures = E57Pictures::open(file, &DAffine3::IDENTITY).is_ok();
+            // The file does not know how its scans were moved.
+            match images.place_table().filter(|_| images.are_moved()) {
+                None => {
+                    let _ = write!(toml, "[cameras]\npath = {path:?}\n{up}");
+                    if has_pictures {
+                        toml += "[rgb]\nsource = \"e57\"\n";
+                    }
+                }
+                Some(table) => {
+                    let _ = write!(toml, "[cameras]\npath = {LOCATIONS:?}\n");
+                    lists.push((LOCATIONS, table));
+                    if has_pictures {
+                        let of_file = format!("path = {path:?}\nmotions = {MOTIONS:?}\n");
+                        toml += &format!("[rgb]\nsource = \"e57\"\n{of_file}");
+                        lists.push((MOTIONS, images.motion_table()));
+                    }
+                }
             }
         }
         _ => {

@@ -304,6 +304,9 @@ fn picture_source(
         }
     };
 
+    let motions = source.motions.take();
+    source.motions = motions.map(|path| folder.file("rgb.motions", &path)).transpose()?;
+
     if let Some(CameraSource::Listed { path, world_from_file }) = &scene.cameras
         && *path == source.path
     {

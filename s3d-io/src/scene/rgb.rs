@@ -17,6 +17,9 @@ pub struct PictureSource {
     /// [`PictureKind::E57`]: the transform from the frame of the file to the world, a rotation, a shift and a
     /// scale. It is the transform of `[cameras]` if the scan locations are of the same file.
     pub world_from_file: DAffine3,
+    /// [`PictureKind::E57`]: a table of motions, `uuid,x,y,z,qx,qy,qz,qw` a line: the pictures of the location
+    /// with this uuid are turned by the quaternion and then shifted, as a scan whose pose was refined is.
+    pub motions: Option<PathBuf>,
     /// How the pictures become colours.
     pub options: PictureOptions,
 }
@@ -121,6 +124,7 @@ pub(crate) struct RgbEntry(RgbTable);
 struct RgbTable {
     source: Source,
     path: Option<PathBuf>,
+    motions: Option<PathBuf>,
     size: Option<u32>,
     unseen: Option<UnseenColor>,
     parallax: Option<bool>,
@@ -184,7 +188,8 @@ impl RgbEntry {
     /// Returns the source of pictures, with the path as it is written; `None` for the mesh's texture. The
     /// error is a sentence.
     pub(crate) fn pictures(self) -> Result<Option<PictureSource>, String> {
-        let RgbTable { source, path, size, unseen, parallax, gains, yaw_deg, caps } = self.0;
+        let RgbTable { source, path, motions, size, unseen, parallax, gains, yaw_deg, caps } = self.0;
+        check_key(motions.is_some(), "motions", source, &[Source::E57])?;
         check_key(parallax.is_some(), "parallax", source, &[Source::Captures, Source::E57])?;
         check_key(gains.is_some(), "gains", source, &[Source::Captures, Source::E57])?;
         check_key(yaw_deg.is_some(), "yaw_deg", source, &[Source::Panorama])?;
@@ -221,7 +226,7 @@ impl RgbEntry {
         };
 
         let path = path.unwrap_or_else(|| kind.name().into());
-        Ok(Some(PictureSource { kind, path, world_from_file: DAffine3::IDENTITY, options }))
+        Ok(Some(PictureSource { kind, path, world_from_file: DAffine3::IDENTITY, motions, options }))
     }
 }
 

@@ -132,8 +132,10 @@ fn pictures_of(rgb: &str) -> Option<PictureSource> {
 #[test]
 fn colours_come_from_the_texture_or_from_pictures() {
     let world_from_file = DAffine3::IDENTITY;
-    let source =
-        |kind, path: &str, options| Some(PictureSource { kind, path: path.into(), world_from_file, options });
+    let source = |kind, path: &str, options| {
+        let path = path.into();
+        Some(PictureSource { kind, path, world_from_file, motions: None, options })
+    };
     let options = PictureOptions::default();
     for texture in ["", "rgb = \"texture\"", "[rgb]\nsource = \"texture\""] {
         assert_eq!(pictures_of(texture), None);

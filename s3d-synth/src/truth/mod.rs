@@ -25,15 +25,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod labels;
 mod scores;
 mod view;
 
+pub use labels::LabelScores;
 pub use scores::{DistanceScores, MeshScores, NormalScores, ScoresAt};
 pub use view::{Field, View};
 
-use crate::RangeError;
 use crate::device::ScanTarget;
 use crate::rays::RayTree;
+use crate::{AnnotatedScene, RangeError};
 use rayon::prelude::*;
 use s3d_geom::glam::Vec3;
 use s3d_geom::{Density, NO_INDEX, Nearest, NearestFaces, PointCloud, SurfaceSampler, TriMesh};
@@ -63,6 +65,7 @@ impl Default for TruthOptions {
 
 /// Samples of the surface of a scene, and from where each was seen.
 pub struct Truth<'s> {
+    scene: &'s AnnotatedScene,
     mesh: &'s TriMesh,
     nearest: NearestFaces<'s>,
     samples: PointCloud,
@@ -125,7 +128,7 @@ impl<'s> Truth<'s> {
             });
 
         let nearest = NearestFaces::new(mesh);
-        Ok(Self { mesh, nearest, samples, seen_from, options: options.clone() })
+        Ok(Self { scene: target.scene(), mesh, nearest, samples, seen_from, options: options.clone() })
     }
 
     /// Returns the samples of the truth: positions in world metres, colours, and faces of the scene.

@@ -282,6 +282,7 @@ pub(super) fn files_of(scene: &SceneFile) -> Vec<PathBuf> {
     {
         files.push(pictures.path.clone());
     }
+    files.extend(scene.pictures.iter().filter_map(|pictures| pictures.motions.clone()));
     files.extend(scene.taxonomy_file.clone());
     files
 }

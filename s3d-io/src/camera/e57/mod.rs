@@ -10,9 +10,8 @@ mod owners;
 #[cfg(test)]
 mod tests;
 
-use crate::camera::located::{uuid_from_name, uuid_in};
 use crate::camera::locations::moved;
-use crate::camera::programs::e57::{E57File, open, rotation_of, scan_name};
+use crate::camera::programs::e57::{E57File, open, rotation_of, scan_uuid};
 use crate::camera::table::FARTHEST_M;
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
@@ -86,10 +85,8 @@ impl E57Pictures {
 
         let mut uuids = BTreeMap::new();
         for (number, scan) in scans.iter().enumerate() {
-            let name = scan_name(number, scan);
-            let uuid = uuid_in(&name).unwrap_or_else(|| uuid_from_name(&name));
             if let Some(key) = scan.guid.as_deref().and_then(key_of) {
-                uuids.entry(key).or_insert(uuid);
+                uuids.entry(key).or_insert_with(|| scan_uuid(number, scan));
             }
         }
 
@@ -120,6 +117,19 @@ impl E57Pictures {
     pub fn subtract(&mut self, offset_m: DVec3) {
         for picture in &mut self.pictures {
             picture.pose.location -= offset_m;
+        }
+    }
+
+    /// Moves the pictures of locations: `motions` holds the motion of each, or `None` for a location that
+    /// stays.
+    pub fn move_pictures(&mut self, owners: &E57Owners, motions: &[Option<DAffine3>]) {
+        for (numbers, motion) in owners.pictures.iter().zip(motions) {
+            let Some(motion) = motion else { continue };
+            for number in numbers {
+                if let Some(picture) = self.pictures.get_mut(*number) {
+                    picture.pose = moved(&picture.pose, motion);
+                }
+            }
         }
     }
 

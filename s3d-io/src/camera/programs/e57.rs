@@ -1,7 +1,7 @@
 //! The places of the scans of an E57 file. Source: ASTM E2807, "pose": from the frame of a scan to the frame
 //! of the file.
 
-use crate::camera::located::rotation;
+use crate::camera::located::{rotation, uuid_from_name, uuid_in};
 use crate::camera::posed::PosedCamera;
 use crate::error::{Error, Result};
 use crate::fs::open::open_file;
@@ -46,6 +46,12 @@ pub(crate) fn scan_name(number: usize, scan: &PointCloud) -> String {
         return guid.to_lowercase();
     }
     scan.name.clone().unwrap_or_else(|| format!("scan_{number}"))
+}
+
+/// Returns the uuid of the scan location of a scan.
+pub(crate) fn scan_uuid(number: usize, scan: &PointCloud) -> String {
+    let name = scan_name(number, scan);
+    uuid_in(&name).unwrap_or_else(|| uuid_from_name(&name))
 }
 
 /// Returns the rotation of a pose. Returns `None` if the four numbers are none.

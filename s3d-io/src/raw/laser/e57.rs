@@ -1,7 +1,7 @@
 //! The scans of an E57 file: their places, grids, and what their points have. Source: ASTM E2807, "data3D".
 
 use crate::camera::locations::moved;
-use crate::camera::programs::e57::{open, rotation_of};
+use crate::camera::programs::e57::{open, rotation_of, scan_uuid};
 use crate::cloud::e57::grid::{grid_of, has_color_and_intensity};
 use crate::error::{Error, Result};
 use crate::guarded::guarded;
@@ -42,6 +42,7 @@ pub(super) fn list(path: &Path, options: &RawOptions) -> Result<Listed> {
         let info = ScanInfo {
             name,
             path: path.to_owned(),
+            uuid: Some(scan_uuid(number, cloud)),
             origin_m: pose.map(|pose| pose.location),
             pose,
             grid: grid_of(cloud),

@@ -141,6 +141,7 @@ fn list_ptx(path: &Path, _: &RawOptions) -> Result<Listed> {
 /// Returns the scan that a table of points is.
 fn table(path: &Path) -> (ScanInfo, ScanSource) {
     let info = ScanInfo {
+        uuid: None,
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         path: path.to_owned(),
         origin_m: None,

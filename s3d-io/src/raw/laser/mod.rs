@@ -55,6 +55,9 @@ pub struct ScanInfo {
     pub name: String,
     /// The file.
     pub path: PathBuf,
+    /// The uuid of the scan location of an E57 scan, as
+    /// [`read_scan_locations`](crate::camera::read_scan_locations) and the pictures of the file have it.
+    pub uuid: Option<String>,
     /// Where the scanner stood, in the world (metres, +Z up). `None`: the file does not tell it, or the
     /// scanner moved and each point has a place of its own.
     pub origin_m: Option<DVec3>,

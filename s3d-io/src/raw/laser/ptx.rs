@@ -68,6 +68,7 @@ pub(super) fn list(path: &Path, options: &RawOptions) -> Result<Listed> {
         let grid = u32::try_from(rows).ok().zip(u32::try_from(columns).ok());
         let (bytes, lines) = place.before();
         let info = ScanInfo {
+            uuid: None,
             name,
             path: path.to_owned(),
             origin_m: Some(options.world_from_file.transform_point3(origin)),

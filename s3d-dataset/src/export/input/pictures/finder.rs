@@ -2,9 +2,12 @@
 
 use crate::error::Result;
 use crate::export::input::area::AreaInput;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
+use s3d_geom::Pose;
 use s3d_io::Error as FileError;
-use s3d_io::camera::{CaptureFile, E57Owners, E57Pictures, PictureFolder, check_picture};
+use s3d_io::camera::{
+    CaptureFile, E57Owners, E57Pictures, PictureFolder, ScanLocation, check_picture, read_cameras,
+};
 use s3d_io::scene::{PictureKind, PictureSource};
 use std::path::{Path, PathBuf};
 
@@ -39,6 +42,10 @@ impl PictureFinder {
                 let mut pictures = E57Pictures::open(&source.path, &source.world_from_file)?;
                 pictures.subtract(area.frame.offset_m);
                 let owners = pictures.of_locations(area.cameras.listed());
+                if let Some(table) = &source.motions {
+                    let motions = motions(table, area.cameras.listed())?;
+                    pictures.move_pictures(&owners, &motions);
+                }
                 Self::E57 { pictures, owners }
             }
         })
@@ -104,6 +111,19 @@ impl PictureFinder {
             Self::E57 { pictures, .. } => Some(pictures),
         }
     }
+}
+
+/// Returns the motion of each location that a table names.
+fn motions(table: &Path, locations: &[ScanLocation]) -> Result<Vec<Option<DAffine3>>> {
+    let listed = read_cameras(table)?;
+    // A table of locations holds the rotations of scanners.
+    let still = Pose::level(DVec3::ZERO, 0.0).world_from_camera.transpose();
+    let motion = |of: &ScanLocation| {
+        let turn = of.pose.world_from_camera * still;
+        DAffine3 { matrix3: turn, translation: of.pose.location }
+    };
+    let of = |location: &ScanLocation| listed.iter().find(|moved| moved.uuid == location.uuid).map(motion);
+    Ok(locations.iter().map(of).collect())
 }
 
 impl LocationPictures {
