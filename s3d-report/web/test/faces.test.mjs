@@ -193,16 +193,15 @@ test("votes that are missing or damaged are told, and the rest is shown", async 
 });
 
 /** The positions of the measuring line's ends, in pixels of the canvas; null if they are not shown. */
+/** Where the ends on the screen are drawn. */
 const endsOf = async (page) => {
   await drawn(page);
   return page.evaluate(() =>
     [...document.querySelectorAll(".measure-end")].map((end) =>
-      end.getAttribute("visibility") === "visible"
-        ? end
-            .getAttribute("transform")
-            .match(/[-\d.]+/g)
-            .map(Number)
-        : null,
+      end
+        .getAttribute("transform")
+        .match(/[-\d.]+/g)
+        .map(Number),
     ),
   );
 };
@@ -249,6 +248,7 @@ test("a line measures what lies between two clicks, and stays there", async () =
   // pixels.
   const coarse = ((2 * Math.PI) / faces.width) * f * 2.2;
   let ends = await endsOf(page);
+  assert.equal(ends.length, 2);
   ends.forEach((end, i) => end.forEach((c, k) => near(c, places[i][k], coarse, "an end")));
   // After a drag the line is still at its points.
   const mid = [box.x + box.width * 0.5, box.y + box.height * 0.3];
@@ -258,6 +258,7 @@ test("a line measures what lies between two clicks, and stays there", async () =
   await page.mouse.up();
   const query = await queryOf(page);
   ends = await endsOf(page);
+  assert.equal(ends.length, 2);
   const azimuth = index.locations[at].azimuth_rad - query.lon * degrees;
   const [c, s, cl, sl] = [Math.cos(azimuth), Math.sin(azimuth)].concat(
     Math.cos(query.lat * degrees),
@@ -272,7 +273,7 @@ test("a line measures what lies between two clicks, and stays there", async () =
   });
   assert.equal(await button.getAttribute("aria-pressed"), "true");
   await page.keyboard.press("Escape");
-  assert.deepEqual(await endsOf(page), [null, null]);
+  assert.deepEqual(await endsOf(page), []);
   assert.equal(await button.getAttribute("aria-pressed"), "false");
   assert.equal(await page.locator(".chip[role=status]").textContent(), "");
   assert.deepEqual(faults, []);
@@ -305,7 +306,9 @@ test("in a view, too, a line measures, and a click leads to its place in 3D", as
   const length = Math.hypot(...points[0].map((c, k) => c - points[1][k]));
   near(Number.parseFloat(await page.locator(".chip[role=status]").textContent()), length, 0.002, "length");
   const coarse = (1.2 * box.width) / readPicture(report, "views_0")[0].size[0];
-  (await endsOf(page)).forEach((end, i) => end.forEach((c, k) => near(c, places[i][k], coarse, "an end")));
+  const ends = await endsOf(page);
+  assert.equal(ends.length, 2);
+  ends.forEach((end, i) => end.forEach((c, k) => near(c, places[i][k], coarse, "an end")));
   // The keyboard marks the middle.
   await page.keyboard.press("Escape");
   await page.locator(".viewer canvas").focus();
