@@ -14,6 +14,8 @@ const RADIUS_M: f32 = 0.15;
 const BLOCK: usize = 4;
 /// The samples on each side of a block, along rows and columns.
 const REACH: i32 = 2;
+/// The samples along a side.
+const SIDE: usize = 2 * REACH as usize + 1;
 
 /// Writes how much a surface is a corner into an existing image: 255 · √(27 det C), rounded. C is the mean of
 /// n nᵀ over the unit normals n of the surface that is seen within 0.15 m of the pixel's point. Its
@@ -105,39 +107,47 @@ impl Samples {
         Self { columns: columns as i32, rows: rows as i32, samples, wraps: camera.is_panorama() }
     }
 
-    /// Returns the sample of a block. Blocks beyond a border are those at it.
-    fn at(&self, column: i32, row: i32) -> &Sample {
-        let column = if self.wraps {
-            column.rem_euclid(self.columns)
+    /// Returns the column of a sample. Columns beyond a border are the one at it.
+    fn column(&self, column: i32) -> usize {
+        if self.wraps {
+            column.rem_euclid(self.columns) as usize
         } else {
-            column.clamp(0, self.columns - 1)
-        };
-        &self.samples[(row.clamp(0, self.rows - 1) * self.columns + column) as usize]
+            column.clamp(0, self.columns - 1) as usize
+        }
+    }
+
+    /// Returns the first sample of a row, likewise.
+    fn row(&self, row: i32) -> usize {
+        (row.clamp(0, self.rows - 1) * self.columns) as usize
     }
 
     /// Returns how much the surface at a block is a corner, 0 to 1.
     fn interest(&self, column: i32, row: i32, pixels_per_m: f32) -> f32 {
-        let middle = *self.at(column, row);
+        let middle = self.samples[self.row(row) + self.column(column)];
         if middle.depth == f32::INFINITY {
             return 0.0;
         }
         let blocks = RADIUS_M * pixels_per_m / (middle.depth * BLOCK as f32);
         let step = ((blocks / REACH as f32 + 0.5) as i32).max(1);
 
+        let columns: [usize; SIDE] = std::array::from_fn(|n| self.column(column + (n as i32 - REACH) * step));
+
         // The sum of n nᵀ: xx, yy, zz, xy, xz, yz.
         let mut sums = [0f32; 6];
         let mut count = 0f32;
         let mut is_plane = true;
         for dy in -REACH..=REACH {
-            for dx in -REACH..=REACH {
-                let sample = self.at(column + dx * step, row + dy * step);
+            let start = self.row(row + dy * step);
+            for column in columns {
+                let sample = &self.samples[start + column];
                 if (sample.point - middle.point).length_squared() > RADIUS_M * RADIUS_M {
                     continue;
                 }
                 let Vec3 { x, y, z } = sample.normal;
                 is_plane &= sample.normal == middle.normal;
-                let products = [x * x, y * y, z * z, x * y, x * z, y * z];
-                sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+                let [xx, yy, zz, xy, xz, yz] = &mut sums;
+                (*xx, *yy, *zz) = (*xx + x * x, *yy + y * y, *zz + z * z);
+                (*xy, *xz, *yz) = (*xy + x * y, *xz + x * z, *yz + y * z);
                 count += 1.0;
             }
         }

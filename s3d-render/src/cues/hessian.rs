@@ -4,8 +4,6 @@ use super::gray::PaddedGray;
 use crate::shade::channels::fit;
 use s3d_geom::Raster;
 
-/// The third of each filter's width, pixels: the filters are 9, 15, 21 and 27 pixels wide.
-const LOBES: [usize; 4] = [3, 5, 7, 9];
 /// The pixels on each side that a response depends on.
 const MARGIN: usize = 14;
 /// The weight of the mixed derivative, which makes up for boxes in the place of Gaussians.
@@ -29,9 +27,12 @@ pub fn keypoint_image_into(gray: &Raster<u8>, wraps: bool, out: &mut Raster<u8>)
     let mut responses = vec![0f32; width.div_ceil(2)];
     for (pair, rows) in out.pixels_mut().chunks_mut(2 * width).enumerate() {
         responses.fill(0.0);
-        for lobe in LOBES {
-            sums.determinants(2 * pair + MARGIN, lobe, &mut responses);
-        }
+        // The filters are 9, 15, 21 and 27 pixels wide.
+        let at = 2 * pair + MARGIN;
+        sums.determinants::<3>(at, &mut responses);
+        sums.determinants::<5>(at, &mut responses);
+        sums.determinants::<7>(at, &mut responses);
+        sums.determinants::<9>(at, &mut responses);
 
         let (row, copy) = rows.split_at_mut(width);
         for (pixels, response) in row.chunks_mut(2).zip(&responses) {
@@ -64,36 +65,59 @@ impl BoxSums {
         Self { line, sums }
     }
 
-    /// Raises the responses of every second pixel of a row to the determinants of a filter. `row` counts the
-    /// margin.
-    fn determinants(&self, row: usize, lobe: usize, responses: &mut [f32]) {
-        let width = 3 * lobe;
-        let half = width / 2;
+    /// Raises the responses of every second pixel of a row to the determinants of the filter whose third is
+    /// `LOBE` pixels wide. `row` counts the margin.
+    fn determinants<const LOBE: usize>(&self, row: usize, responses: &mut [f32]) {
+        let width = 3 * LOBE;
+        let (half, third) = (width / 2, LOBE / 2);
         let line = |row: usize| &self.sums[row * self.line..(row + 1) * self.line];
-        // Bands of rows, and places in a line from the left end of the filter on.
+        // Bands of rows.
         let (top, bottom) = (line(row - half), line(row + half + 1));
-        let (high, low) = (line(row + 1 - lobe), line(row + lobe));
-        let (third_high, third_low) = (line(row - lobe / 2), line(row + lobe / 2 + 1));
-        let (upper, lower) = (line(row - lobe), line(row + lobe + 1));
+        let (high, low) = (line(row + 1 - LOBE), line(row + LOBE));
+        let (third_high, third_low) = (line(row - third), line(row + third + 1));
+        let (upper, lower) = (line(row - LOBE), line(row + LOBE + 1));
         let (at, after) = (line(row), line(row + 1));
         let scale = 1.0 / (255.0 * (width * width) as f32);
 
         for (n, response) in responses.iter_mut().enumerate() {
-            let x = 2 * n + MARGIN;
-            let sum = |top: &[u32], bottom: &[u32], left: usize, right: usize| {
-                let right = bottom[right].wrapping_sub(top[right]);
-                right.wrapping_sub(bottom[left].wrapping_sub(top[left])) as i32
-            };
-            let (left, right) = (x - half, x + half + 1);
-            let xx = sum(high, low, left, right) - 3 * sum(high, low, x - lobe / 2, x + lobe / 2 + 1);
-            let (left_tall, right_tall) = (x + 1 - lobe, x + lobe);
-            let yy = sum(top, bottom, left_tall, right_tall)
-                - 3 * sum(third_high, third_low, left_tall, right_tall);
-            let xy = sum(upper, at, x - lobe, x) + sum(after, lower, x + 1, x + lobe + 1)
-                - sum(upper, at, x + 1, x + lobe + 1)
-                - sum(after, lower, x - lobe, x);
-            let [xx, yy, xy] = [xx, yy, xy].map(|sum| sum as f32 * scale);
+            // Windows of a known length need no checks of their places.
+            let [top, bottom] = [window(top, n), window(bottom, n)];
+            let [high, low] = [window(high, n), window(low, n)];
+            let [third_high, third_low] = [window(third_high, n), window(third_low, n)];
+            let [upper, lower, at, after] =
+                [window(upper, n), window(lower, n), window(at, n), window(after, n)];
+            let (x, tall) = (MARGIN, (MARGIN + 1 - LOBE, MARGIN + LOBE));
+
+            let xx = sum(high, low, x - half, x + half + 1).wrapping_sub(3u32.wrapping_mul(sum(
+                high,
+                low,
+                x - third,
+                x + third + 1,
+            )));
+            let yy = sum(top, bottom, tall.0, tall.1)
+                .wrapping_sub(3u32.wrapping_mul(sum(third_high, third_low, tall.0, tall.1)));
+            let xy = sum(upper, at, x - LOBE, x)
+                .wrapping_add(sum(after, lower, x + 1, x + LOBE + 1))
+                .wrapping_sub(sum(upper, at, x + 1, x + LOBE + 1))
+                .wrapping_sub(sum(after, lower, x - LOBE, x));
+            let (xx, yy, xy) = (xx as i32 as f32 * scale, yy as i32 as f32 * scale, xy as i32 as f32 * scale);
             *response = response.max(xx * yy - MIXED * xy * xy);
         }
     }
+}
+
+/// The places of a line that a response depends on.
+const SPAN: usize = 2 * MARGIN + 1;
+
+/// Returns the places around a response.
+#[inline(always)]
+fn window(line: &[u32], response: usize) -> &[u32; SPAN] {
+    line[2 * response..].first_chunk().unwrap_or(&[0; SPAN])
+}
+
+/// Returns the sum of the levels of a box.
+#[inline(always)]
+fn sum(top: &[u32; SPAN], bottom: &[u32; SPAN], left: usize, right: usize) -> u32 {
+    let right = bottom[right].wrapping_sub(top[right]);
+    right.wrapping_sub(bottom[left].wrapping_sub(top[left]))
 }

@@ -13,8 +13,6 @@ const SCALE: f64 = 300.0;
 const FEWEST: f64 = 50.0;
 /// The largest difference of neighbours.
 const MOST: u16 = 511;
-/// Stands for no edge.
-const NONE: u16 = u16::MAX;
 
 /// Writes segments of similar colour into an existing image: their numbers from 1, in the order of their
 /// first pixels. After 65,535 numbers start again. 0 where nothing is seen.
@@ -30,14 +28,11 @@ pub fn color_segment_image_into(colors: &Raster<[u8; 3]>, hits: &Hits, wraps: bo
     assert!((colors.width(), colors.height()) == (width, height), "colours and hits have one size");
     let grid = Grid::new(hits, wraps);
     let colors = blurred(&halved(colors), wraps);
+    let colors = colors.pixels();
     let difference = |a: usize, b: usize| {
-        let [from, to] = [a, b].map(|node| colors.pixels()[node]);
-        let square: i32 = from
-            .iter()
-            .zip(to)
-            .map(|(from, to)| (i32::from(*from) - i32::from(to)).pow(2))
-            .sum();
-        ((square as f32).sqrt() + 0.5) as u16
+        let (from, to) = (&colors[a], &colors[b]);
+        let [r, g, b] = [0, 1, 2].map(|k| i32::from(from[k]) - i32::from(to[k]));
+        (((r * r + g * g + b * b) as f32).sqrt() + 0.5) as u16
     };
     grid.segment(difference, hits, out);
 }
@@ -138,28 +133,6 @@ impl Grid {
         Self { width, height, wraps, pixel }
     }
 
-    /// Returns the node on the right of a node.
-    fn right(&self, node: usize) -> Option<usize> {
-        if (node + 1) % self.width != 0 {
-            Some(node + 1)
-        } else {
-            // Two columns are neighbours once.
-            (self.wraps && self.width > 2).then_some(node + 1 - self.width)
-        }
-    }
-
-    /// Returns the node that an edge leads to. Edges have twice the number of their node, and one more if
-    /// they lead down.
-    fn other(&self, edge: usize) -> Option<usize> {
-        let node = edge / 2;
-        if edge % 2 == 0 {
-            self.right(node)
-        } else {
-            let below = node + self.width;
-            (below < self.width * self.height).then_some(below)
-        }
-    }
-
     /// Segments the nodes by the difference of neighbours, and writes the numbers of segments.
     fn segment(&self, mut difference: impl FnMut(usize, usize) -> u16, hits: &Hits, out: &mut Raster<u16>) {
         fit(out, &hits.face, 0);
@@ -167,33 +140,29 @@ impl Grid {
             return;
         }
 
-        // Differences are small numbers: counting sorts the edges.
-        let mut differences = vec![NONE; 2 * self.pixel.len()];
-        let mut starts = vec![0u32; usize::from(MOST) + 2];
-        for (edge, to) in differences.iter_mut().enumerate() {
-            let node = edge / 2;
-            let Some(other) = self.other(edge) else { continue };
+        let mut edges = Vec::with_capacity(2 * self.pixel.len());
+        let mut add = |node: usize, other: usize| {
             if self.pixel[node] != u32::MAX && self.pixel[other] != u32::MAX {
-                *to = difference(node, other).min(MOST);
-                starts[usize::from(*to) + 1] += 1;
+                edges.push((node as u32, other as u32, difference(node, other).min(MOST)));
+            }
+        };
+        for y in 0..self.height {
+            let start = y * self.width;
+            for node in start..start + self.width {
+                if node + 1 < start + self.width {
+                    add(node, node + 1);
+                } else if self.wraps && self.width > 2 {
+                    // Two columns are neighbours once.
+                    add(node, start);
+                }
+                if y + 1 < self.height {
+                    add(node, node + self.width);
+                }
             }
         }
-        for k in 1..starts.len() {
-            starts[k] += starts[k - 1];
-        }
-        let mut order = vec![0u32; starts.last().map_or(0, |count| *count as usize)];
-        for (edge, difference) in differences.iter().enumerate().filter(|(_, d)| **d != NONE) {
-            let place = &mut starts[usize::from(*difference)];
-            order[*place as usize] = edge as u32;
-            *place += 1;
-        }
 
-        let edges = order.iter().map(|edge| {
-            let node = *edge / 2;
-            let other = self.other(*edge as usize).unwrap_or(node as usize);
-            ([node, other as u32], f32::from(differences[*edge as usize]))
-        });
-        let mut sets = segment_graph(vec![1.0; self.pixel.len()], edges, SCALE, FEWEST);
+        let order = ascending(&edges);
+        let mut sets = segment_graph(vec![1.0; self.pixel.len()], order.iter().copied(), SCALE, FEWEST);
 
         let mut number_of_root = vec![0u16; self.pixel.len()];
         let mut last = 0u16;
@@ -226,6 +195,25 @@ impl Grid {
             }
         }
     }
+}
+
+/// Returns edges from the smallest difference on; equal ones in their order. Differences are small numbers, so
+/// counting sorts them.
+fn ascending(edges: &[(u32, u32, u16)]) -> Vec<([u32; 2], f32)> {
+    let mut starts = vec![0u32; usize::from(MOST) + 2];
+    for (_, _, difference) in edges {
+        starts[usize::from(*difference) + 1] += 1;
+    }
+    for k in 1..starts.len() {
+        starts[k] += starts[k - 1];
+    }
+    let mut order = vec![([0; 2], 0.0); edges.len()];
+    for (node, other, difference) in edges {
+        let place = &mut starts[usize::from(*difference)];
+        order[*place as usize] = ([*node, *other], f32::from(*difference));
+        *place += 1;
+    }
+    order
 }
 
 /// The differences of surfaces.
