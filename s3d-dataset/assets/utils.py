@@ -74,7 +74,7 @@ def rotation(angles):
 
 
 def read_png(path):
-    """An 8-bit RGB image (H, W, 3) or a 16-bit gray one (H, W)."""
+    """An 8-bit RGB image (H, W, 3) or a gray one (H, W) of 8 or 16 bits."""
     try:
         from PIL import Image as Pillow
 
@@ -323,6 +323,51 @@ class Dataset:
     def semantic_class(self, image):
         return read_semantic_class(self.path(image, "semantic_class"))
 
+    def depth_euclidean(self, image):
+        """Distances from the camera in metres, NaN where missing."""
+        return read_depth(self.path(image, "depth_euclidean"), self.conventions["depth"]["units_per_m"])
+
+    def reshading(self, image):
+        """Light from 0 to 1, NaN where nothing is seen."""
+        pixels = read_png(self.path(image, "reshading"))
+        return np.where(pixels == 0, np.nan, pixels / 255)
+
+    def principal_curvature(self, image):
+        """The larger and the smaller principal curvature (H, W, 2) in 1/m, NaN where nothing is seen."""
+        pixels = read_png(self.path(image, "principal_curvature"))
+        curvatures = (pixels[..., :2].astype(np.float64) - 127) / 127 / 0.03
+        return np.where((pixels == 255).all(axis=-1)[..., None], np.nan, curvatures)
+
+    def edge_occlusion(self, image):
+        return read_png(self.path(image, "edge_occlusion")) > 0
+
+    def edge_texture(self, image):
+        return read_png(self.path(image, "edge_texture")) / (255 * 4)
+
+    def keypoints2d(self, image):
+        return (read_png(self.path(image, "keypoints2d")) / 2048) ** 2
+
+    def keypoints3d(self, image):
+        return (read_png(self.path(image, "keypoints3d")) / 255) ** 2 / 27
+
+    def segment_unsup2d(self, image):
+        """Numbers of segments of similar colour, from 1; 0 where nothing is seen."""
+        return read_png(self.path(image, "segment_unsup2d"))
+
+    def segment_unsup25d(self, image):
+        """Numbers of segments of surfaces, from 1; 0 where nothing is seen."""
+        return read_png(self.path(image, "segment_unsup25d"))
+
+    def mask_valid(self, image):
+        return read_png(self.path(image, "mask_valid")) > 0
+
+    def edge_instance(self, image):
+        return read_png(self.path(image, "edge_instance")) > 0
+
+    def boundary_distance(self, image):
+        """Distances to the nearest border in pixels, at most 1023.97; NaN where nothing is seen."""
+        return read_depth(self.path(image, "boundary_distance"), 64)
+
     def xyz(self, image):
         return read_xyz(self.path(image, "global_xyz"))
 
@@ -384,6 +429,17 @@ def check_image(data, image, fail):
     if {"semantic", "semantic_class"} <= there:
         if (data.semantic_class(image) != data.class_of_label[data.semantic(image)]).any():
             fail(f"{image.stem}: classes that are not those of the labels")
+    if "mask_valid" in there:
+        mask = data.mask_valid(image)
+        if seen is not None and (seen & ~mask).any():
+            fail(f"{image.stem}: depth where the mask has nothing")
+        for folder in {"reshading", "segment_unsup2d", "segment_unsup25d"} & there:
+            if ((read_png(data.path(image, folder)) > 0) != mask).any():
+                fail(f"{image.stem}: {folder} disagrees with the mask")
+    if {"edge_instance", "boundary_distance", "mask_valid"} <= there:
+        zero = data.boundary_distance(image) == 0
+        if (zero != (data.edge_instance(image) & mask)).any():
+            fail(f"{image.stem}: borders are not at a distance of 0")
     if {"objects", "semantic"} <= there:
         index = data.semantic(image)
         objects = data.objects(image)

@@ -4,6 +4,7 @@
 mod common;
 
 mod changed;
+mod cues;
 mod fill;
 mod library;
 mod storeys;

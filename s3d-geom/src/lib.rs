@@ -60,6 +60,7 @@
 mod aabb;
 mod camera;
 mod cloud;
+mod disjoint_sets;
 mod mesh;
 #[cfg(feature = "nearest")]
 mod nearest;
@@ -83,6 +84,7 @@ pub use camera::{
     SphericalLens, euler_from_rotation, rotation_from_euler,
 };
 pub use cloud::PointCloud;
+pub use disjoint_sets::{DisjointSets, segment_graph};
 pub use glam;
 pub use mesh::{
     DEFAULT_COLOR, FaceColor, Material, MeshError, MeshParts, MeshReport, NO_INDEX, Texture, TriMesh, Wrap,

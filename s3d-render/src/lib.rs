@@ -62,6 +62,14 @@
 //! [`image_from_above`] needs no camera: it sees a mesh straight from above, cut at two heights, as a plan
 //! does.
 //!
+//! # Cues
+//!
+//! Further images follow from hits ([`euclidean_depth_image_into`], [`mask_image_into`],
+//! [`reshading_image_into`], [`curvature_image_into`], [`occlusion_edge_image_into`], [`corner_image_into`],
+//! [`surface_segment_image_into`]), from colours ([`texture_edge_image_into`], [`keypoint_image_into`],
+//! [`color_segment_image_into`]) and from a number a face ([`border_image_into`],
+//! [`border_distance_image_into`]).
+//!
 //! # Objects
 //!
 //! [`SeenObjects`] finds the objects of an image: the visible pixels of each, those that it would have if it
@@ -91,6 +99,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod cues;
 mod edge_samples;
 mod from_above;
 mod hits;
@@ -104,6 +113,19 @@ mod scene;
 mod shade;
 mod simd;
 
+pub use cues::borders::border_image_into;
+pub use cues::boundary_distance::{BORDER_UNITS, MISSING_DISTANCE, border_distance_image_into};
+pub use cues::corners::corner_image_into;
+pub use cues::curvature::{
+    CURVATURE_RADIUS_M, MISSING_CURVATURE, SMALLEST_RADIUS_M, curvature_image_into, face_curvatures,
+};
+pub use cues::distance::{euclidean_depth_image_into, mask_image_into};
+pub use cues::gray::gray_image;
+pub use cues::hessian::keypoint_image_into;
+pub use cues::occlusion::occlusion_edge_image_into;
+pub use cues::reshading::reshading_image_into;
+pub use cues::segments::{color_segment_image_into, surface_segment_image_into};
+pub use cues::texture_edges::texture_edge_image_into;
 pub use edge_samples::sample_edges;
 pub use from_above::{FromAbove, GroundGrid, image_from_above};
 pub use hits::{Hits, NO_FACE};

@@ -6,6 +6,7 @@ mod common;
 mod room;
 
 mod colors;
+mod cues;
 mod exact;
 mod images;
 mod modalities;

@@ -8,7 +8,6 @@
 mod borders;
 mod face_index;
 mod file;
-mod forest;
 mod grow;
 mod lists;
 mod looks;

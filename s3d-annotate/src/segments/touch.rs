@@ -1,10 +1,9 @@
 //! Where separate pieces of a mesh touch.
 
 use super::borders::Border;
-use super::forest::Forest;
 use rayon::prelude::*;
-use s3d_geom::TriMesh;
 use s3d_geom::glam::Vec3;
+use s3d_geom::{DisjointSets, TriMesh};
 
 /// The edge of the cells in which pieces meet, in metres.
 const CELL_M: f32 = 0.04;
@@ -75,7 +74,7 @@ pub(super) fn touches(mesh: &TriMesh, borders: &[Border], segment_of_face: &[u32
 
 /// Returns the piece of each face, and the number of pieces. The faces of a piece are joined by edges.
 fn pieces(mesh: &TriMesh, borders: &[Border]) -> (Vec<u32>, usize) {
-    let mut sets = Forest::new(mesh.faces().len());
+    let mut sets = DisjointSets::new(mesh.faces().len());
     for border in borders {
         let [a, b] = border.faces.map(|face| sets.root(face));
         sets.join(a, b);

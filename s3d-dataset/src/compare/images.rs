@@ -349,7 +349,7 @@ impl ImageComparer<'_> {
     fn has_same_form(&self, domain: Domain) -> bool {
         let [a, b] = [&self.sides.a, &self.sides.b].map(|data| data.options());
         match domain {
-            Domain::Depth => a.depth_units == b.depth_units,
+            Domain::Depth | Domain::DepthEuclidean => a.depth_units == b.depth_units,
             Domain::Normal => a.normal_axes == b.normal_axes,
             _ => true,
         }

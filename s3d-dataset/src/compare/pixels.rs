@@ -7,7 +7,7 @@ use crate::verify::images::pixels::Pixels;
 use s3d_geom::Raster;
 use s3d_io::dataset::{DepthUnits, Domain};
 use s3d_label::Taxonomy;
-use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
+use s3d_render::{BORDER_UNITS, MISSING_DEPTH, MISSING_DISTANCE, MISSING_INDEX, MISSING_NORMAL};
 
 /// The colour of pixels that see nothing in pretty images.
 const MISSING_COLOR: [u8; 3] = [0; 3];
@@ -95,6 +95,11 @@ impl Sums {
     }
 }
 
+/// Returns whether the values of a modality are numbers of segments, which have no distance.
+fn is_number(domain: Domain) -> bool {
+    matches!(domain, Domain::SegmentUnsup2d | Domain::SegmentUnsup25d)
+}
+
 /// Compares two images of a modality, and adds differing labels to `pairs`. Returns `None` if the sizes
 /// differ. An error says which side's image is wrong, and why.
 pub(crate) fn compare(
@@ -112,11 +117,21 @@ pub(crate) fn compare(
             Domain::Semantic => labels(a, b, meaning, pairs)?,
             Domain::SemanticPretty => label_colors(a, b, meaning),
             Domain::Normal => Sums::of(a, b, |a, b| a == b, normal_angle),
-            Domain::Rgb => colors(a, b),
-            // These modalities have no colours.
-            Domain::Depth | Domain::SemanticClass | Domain::GlobalXyz => return Ok(None),
-            Domain::Pose | Domain::Objects => return Ok(None),
+            Domain::Rgb | Domain::PrincipalCurvature => colors(a, b),
+            // The other modalities have no colours.
+            _ => return Ok(None),
         },
+        (Pixels::Depth(a), Pixels::Depth(b)) if is_number(domain) => {
+            Sums::of(a, b, |a, b| a == b, |_, _| None)
+        }
+        (Pixels::Depth(a), Pixels::Depth(b)) if domain == Domain::BoundaryDistance => {
+            let distance = |a: u16, b: u16| Some(f64::from(a.abs_diff(b)) / BORDER_UNITS);
+            let is_seen = |value: u16| value != MISSING_DISTANCE;
+            Sums::of(a, b, |a, b| a == b, |a, b| distance(a, b).filter(|_| is_seen(a) && is_seen(b)))
+        }
+        (Pixels::Gray(a), Pixels::Gray(b)) => {
+            Sums::of(a, b, |a, b| a == b, |a, b| Some(f64::from(a.abs_diff(b))))
+        }
         (Pixels::Depth(a), Pixels::Depth(b)) => {
             let units_per_m = meaning.depth_units.per_m();
             Sums::of(
@@ -135,7 +150,12 @@ pub(crate) fn compare(
         }
         // All images of a modality have the same kind of pixels, and half floats were converted.
         (
-            Pixels::Color(_) | Pixels::Depth(_) | Pixels::Class(..) | Pixels::Xyz(_) | Pixels::XyzHalf(_),
+            Pixels::Color(_)
+            | Pixels::Depth(_)
+            | Pixels::Gray(_)
+            | Pixels::Class(..)
+            | Pixels::Xyz(_)
+            | Pixels::XyzHalf(_),
             _,
         ) => {
             return Ok(None);

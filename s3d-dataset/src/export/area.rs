@@ -27,7 +27,7 @@ use s3d_io::fs::create_dir;
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{MeshFile, TextureOut};
 use s3d_label::LabelId;
-use s3d_render::MipMaps;
+use s3d_render::{MipMaps, face_curvatures};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -148,6 +148,10 @@ pub(crate) fn render_area(
         let classes = classes_of_labels(common.table);
         class_of_face.extend(label_of_face.iter().map(|label| classes[*label as usize]));
     }
+    let mut curvature_of_face = Vec::new();
+    if options.modalities.contains(&Domain::PrincipalCurvature) {
+        curvature_of_face = face_curvatures(&file.mesh);
+    }
     let palette = palette(common.table.taxonomy());
     let instances = if options.modalities.contains(&Domain::Objects) {
         let meshes = instance_meshes(&file.mesh, &label_of_face);
@@ -198,6 +202,7 @@ pub(crate) fn render_area(
             label_of_face: &label_of_face,
             pretty_of_face: &pretty_of_face,
             class_of_face: &class_of_face,
+            curvature_of_face: &curvature_of_face,
             palette: &palette,
             compression: options.compression,
             conventions: options.conventions(),

@@ -8,6 +8,7 @@
 
 pub(crate) mod area;
 pub(crate) mod common;
+pub(crate) mod cues;
 pub(crate) mod finish;
 pub(crate) mod images;
 pub(crate) mod input;

@@ -1,13 +1,15 @@
 //! From hits to the bytes of image files, in two steps. `draw` makes the images: some of them together in one
 //! walk over the hits (`together`), the others one after another. `file` encodes each.
 
+use crate::export::cues::CueBuffers;
 use crate::export::picture_colors::PictureColors;
 use half::f16;
 use rayon::prelude::*;
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::{Conventions, DepthUnits, Domain, XyzType};
 use s3d_io::image::{
-    Compression, Content, encode_gray16, encode_palette8, encode_rgb8, encode_xyz_float, encode_xyz_half,
+    Compression, Content, encode_gray16, encode_levels8, encode_palette8, encode_rgb8, encode_xyz_float,
+    encode_xyz_half,
 };
 use s3d_label::{LabelId, LabelTable, MAX_CLASSES, Taxonomy};
 use s3d_render::{
@@ -54,6 +56,8 @@ pub(crate) struct Channels<'a> {
     pub(crate) pretty_of_face: &'a [[u8; 3]],
     /// The index of each face's class in the taxonomy, or [`NO_CLASS`]; may be empty without such images.
     pub(crate) class_of_face: &'a [u8],
+    /// The principal curvatures of each face; may be empty without such images.
+    pub(crate) curvature_of_face: &'a [[f32; 2]],
     /// The colours of `semantic_class` images, [`NO_CLASS`]'s last.
     pub(crate) palette: &'a [[u8; 3]],
     /// How much time the compression of the files may take.
@@ -73,6 +77,8 @@ pub(crate) enum Image {
     SemanticPretty,
     SemanticClass,
     GlobalXyz,
+    /// A cue: see [`crate::export::cues`].
+    Cue(Domain),
 }
 
 impl Image {
@@ -87,6 +93,7 @@ impl Image {
             Domain::SemanticClass => Self::SemanticClass,
             Domain::GlobalXyz => Self::GlobalXyz,
             Domain::Pose | Domain::Objects => return None,
+            cue => Self::Cue(cue),
         })
     }
 
@@ -100,17 +107,21 @@ impl Image {
             Self::SemanticPretty => Domain::SemanticPretty,
             Self::SemanticClass => Domain::SemanticClass,
             Self::GlobalXyz => Domain::GlobalXyz,
+            Self::Cue(domain) => domain,
         }
     }
 }
 
 /// The memory for the images of a view, used for one view after another.
 pub(crate) struct ImageBuffers {
-    images: ViewImages,
+    pub(crate) images: ViewImages,
     class: Raster<u8>,
     xyz_float: Raster<[f32; 3]>,
     /// Which of `images` belong to the current view.
     made: Modalities,
+    pub(crate) cues: CueBuffers,
+    /// Whether the colours of `images` are those of the current view.
+    pub(crate) has_colors: bool,
     /// The number of pixels of the last semantic image whose face has no label.
     pub(crate) unlabelled: u64,
 }
@@ -119,13 +130,36 @@ impl ImageBuffers {
     /// Larger images give their memory back. A view's memory may stay; a panorama's, eight times as large and
     /// rarer, should not.
     const MAX_PIXELS: usize = 1 << 22;
+
+    /// Gives memory back. Colours stay if `keeps_colors` says so.
+    fn shrink(&mut self, keeps_colors: bool) {
+        let old = std::mem::take(self);
+        if keeps_colors {
+            self.images.rgb = old.images.rgb;
+            self.has_colors = old.has_colors;
+        }
+    }
+
+    /// Takes over the colours of the current view, which its cues are then made from.
+    pub(crate) fn give_colors(&mut self, colors: Raster<[u8; 3]>) {
+        self.images.rgb = colors;
+        self.has_colors = true;
+    }
 }
 
 impl Default for ImageBuffers {
     fn default() -> Self {
         let xyz_float = Raster::filled(0, 0, [0.0; 3]);
         let class = Raster::filled(0, 0, 0);
-        Self { images: ViewImages::default(), class, xyz_float, made: Modalities::default(), unlabelled: 0 }
+        Self {
+            images: ViewImages::default(),
+            class,
+            xyz_float,
+            made: Modalities::default(),
+            cues: CueBuffers::default(),
+            has_colors: false,
+            unlabelled: 0,
+        }
     }
 }
 
@@ -134,6 +168,7 @@ impl Default for ImageBuffers {
 pub(crate) enum Drawn<'a> {
     Color(&'a Raster<[u8; 3]>),
     Depth(&'a Raster<u16>),
+    Gray(&'a Raster<u8>),
     Class(&'a Raster<u8>),
     Xyz(&'a Raster<[f32; 3]>),
     XyzHalf(&'a Raster<[f16; 3]>),
@@ -159,14 +194,15 @@ impl Channels<'_> {
 
         let mut done = Vec::new();
         let mut unlabelled = 0;
-        for &image in images {
+        for (at, &image) in images.iter().enumerate() {
             self.draw(image, hits, camera, buffers);
             if image == Image::Semantic {
                 unlabelled = null_pixels(buffers.images.faces.index.pixels());
             }
             if large {
                 done.push(each(image, self.file(image, buffers))?);
-                *buffers = ImageBuffers::default();
+                let later = images.get(at + 1..).unwrap_or_default();
+                buffers.shrink(later.iter().any(|image| image.domain().is_of_colors()));
             }
         }
 
@@ -192,6 +228,8 @@ impl Channels<'_> {
         buffers: &mut ImageBuffers,
     ) {
         let large = hits.face.len() > ImageBuffers::MAX_PIXELS;
+        buffers.cues.begin();
+        buffers.has_colors = false;
         buffers.made = if large {
             Modalities::default()
         } else {
@@ -229,7 +267,11 @@ impl Channels<'_> {
 
     /// Draws an image, unless it is made already.
     pub(crate) fn draw(&self, image: Image, hits: &Hits, camera: &Camera, buffers: &mut ImageBuffers) {
+        if let Image::Cue(domain) = image {
+            return self.draw_cue(domain, hits, camera, buffers);
+        }
         let Conventions { depth_units, normal_axes, xyz: xyz_type } = self.conventions;
+        buffers.has_colors |= image == Image::Rgb;
         let made = buffers.made;
         let ViewImages { rgb, depth, faces, xyz } = &mut buffers.images;
 
@@ -275,7 +317,7 @@ impl Channels<'_> {
             Image::GlobalXyz if xyz_type == XyzType::Float => {
                 xyz_image_into(hits, camera, &mut buffers.xyz_float);
             }
-            Image::GlobalXyz => xyz_image_half_into(hits, camera, xyz),
+            Image::GlobalXyz | Image::Cue(_) => xyz_image_half_into(hits, camera, xyz),
         }
     }
 
@@ -297,11 +339,17 @@ impl Channels<'_> {
             Image::SemanticClass => Drawn::Class(&buffers.class),
             Image::GlobalXyz if self.conventions.xyz == XyzType::Float => Drawn::Xyz(&buffers.xyz_float),
             Image::GlobalXyz => Drawn::XyzHalf(xyz),
+            Image::Cue(domain) => buffers.cues.drawn(domain).unwrap_or(Drawn::Class(&buffers.class)),
         }
     }
 
     /// Encodes an image that was drawn.
     fn file(&self, image: Image, buffers: &ImageBuffers) -> Vec<u8> {
+        if let Image::Cue(domain) = image
+            && let Some(file) = self.cue_file(domain, self.drawn(image, buffers))
+        {
+            return file;
+        }
         let compression = self.compression;
         let content = match image {
             Image::Normal => Content::Normals,
@@ -312,6 +360,7 @@ impl Channels<'_> {
         match self.drawn(image, buffers) {
             Drawn::Color(colors) => encode_rgb8(colors, content, compression),
             Drawn::Depth(depth) => encode_gray16(depth, compression),
+            Drawn::Gray(levels) => encode_levels8(levels, compression),
             Drawn::Class(class) => encode_palette8(class, self.palette, compression),
             Drawn::Xyz(points) => encode_xyz_float(points, compression),
             Drawn::XyzHalf(points) => encode_xyz_half(points, compression),
@@ -340,7 +389,7 @@ pub(crate) fn null_pixels(pixels: &[[u8; 3]]) -> u64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
+    use s3d_render::{MISSING_CURVATURE, MISSING_DEPTH, MISSING_DISTANCE, MISSING_INDEX, MISSING_NORMAL};
 
     /// What is drawn where nothing is seen is what the format says.
     #[test]
@@ -353,6 +402,8 @@ mod tests {
         assert_eq!(Domain::Normal.missing(), MISSING_NORMAL.map(u16::from));
         assert_eq!(Domain::Semantic.missing(), MISSING_INDEX.map(u16::from));
         assert_eq!(Domain::SemanticClass.missing(), [u16::from(NO_CLASS), 0, 0]);
+        assert_eq!(Domain::PrincipalCurvature.missing(), MISSING_CURVATURE.map(u16::from));
+        assert_eq!(Domain::BoundaryDistance.missing(), [MISSING_DISTANCE, 0, 0]);
     }
 
     proptest! {

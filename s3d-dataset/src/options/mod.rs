@@ -100,7 +100,10 @@ pub struct ExportOptions {
         value_parser = clap::value_parser!(u32).range(1..=64)))]
     pub entropy_stride: u32,
     /// The images to write, such as rgb,depth,pose. There is also semantic_class, a PNG whose palette has a
-    /// colour for each class, and objects, a JSON with amodal masks, occlusion and boxes [default: rgb, depth, normal, semantic, semantic_pretty, global_xyz, pose]
+    /// colour for each class, and objects, a JSON with amodal masks, occlusion and boxes. Trainers of many
+    /// tasks find depth_euclidean, reshading, principal_curvature, edge_occlusion, edge_texture, keypoints2d,
+    /// keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, edge_instance and boundary_distance
+    /// [default: rgb, depth, normal, semantic, semantic_pretty, global_xyz, pose]
     #[serde(with = "by_names")]
     #[cfg_attr(feature = "clap", arg(display_order = 16, long, value_name = "LIST", value_delimiter = ',',
         default_values_t = Domain::PUBLISHED, hide_default_value = true,

@@ -1,7 +1,7 @@
 //! Renders the views of a list of cameras. The mesh is loaded once, and all threads share the cameras.
 
 use super::frame_names::frame_names;
-use super::view::{RenderOptions, channels, face_image, faces_fit, images};
+use super::view::{RenderOptions, channels, curvatures, face_image, faces_fit, images};
 use crate::condition::Condition;
 use crate::context::Context;
 use crate::error::{Error, Overwriting, Result, UsageError};
@@ -242,13 +242,14 @@ fn write_images(
     let path_of =
         |image: Image, stem: &str| folder_of(image).join(format!("{stem}.{}", image.domain().extension()));
     let faces = faces_fit(ctx, mesh.faces().len()).then(|| folder.join("faces"));
-    let images = images();
+    let images = images(options)?;
     let folders: Vec<PathBuf> = images.iter().copied().map(folder_of).chain(faces.clone()).collect();
     folders.iter().try_for_each(|folder| create_dir(folder))?;
 
     let scene = Scene::new(mesh);
     let textures = MipMaps::new(mesh);
-    let channels = channels(&scene, &textures, options);
+    let curvatures = curvatures(mesh, options);
+    let channels = channels(&scene, &textures, &curvatures, options);
     let progress = ctx.progress("rendering", "views", frames.len() as u64);
     let blind = AtomicU64::new(0);
     let memory = || (Caster::new(&scene), Hits::default(), ImageBuffers::default());

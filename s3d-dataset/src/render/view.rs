@@ -1,17 +1,17 @@
 //! Renders one view of a mesh.
 
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Result, UsageError};
 use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::store::refuse_existing;
 use crate::store::staging::Staging;
 use glam::DVec3;
-use s3d_geom::Camera;
+use s3d_geom::{Camera, TriMesh};
 use s3d_io::dataset::{Conventions, Domain};
 use s3d_io::fs::{create_dir, write_bytes, write_json};
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::{LengthUnit, MeshOptions, MeshOrigin, UpAxis};
-use s3d_render::{Hits, MipMaps, NO_FACE, Normals, Scene, cast, coverage};
+use s3d_render::{Hits, MipMaps, NO_FACE, Normals, Scene, cast, coverage, face_curvatures};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -48,6 +48,9 @@ pub struct RenderOptions {
     pub normals: Normals,
     /// See [`ExportOptions::rgb_samples`](crate::ExportOptions::rgb_samples).
     pub rgb_samples: u32,
+    /// The images to write. Images of labels cannot be made of a mesh alone, and the camera has a file of its
+    /// own.
+    pub modalities: Vec<Domain>,
     /// The time that compressing image files may take.
     pub compression: Compression,
     /// Replace existing images.
@@ -61,22 +64,36 @@ impl Default for RenderOptions {
             units: None,
             normals: Normals::Flat,
             rgb_samples: 1,
+            modalities: vec![Domain::Rgb, Domain::Depth, Domain::Normal, Domain::GlobalXyz],
             compression: Compression::default(),
             overwrite: false,
         }
     }
 }
 
-/// The images of a view that need no annotation, without the image of faces.
-pub(super) fn images() -> Vec<Image> {
-    let domains = Domain::ALL.into_iter().filter(|domain| !domain.is_semantic());
-    domains.filter_map(Image::of).collect()
+/// The images of a view that are asked for, in their own order, without the image of faces.
+///
+/// # Errors
+/// [`Error::Usage`](crate::Error::Usage) if one of them needs labels or is no image.
+pub(super) fn images(options: &RenderOptions) -> Result<Vec<Image>> {
+    let mut domains = options.modalities.clone();
+    domains.sort();
+    domains.dedup();
+    let image_of = |domain: Domain| {
+        let image = Image::of(domain).filter(|_| !domain.is_semantic());
+        image.ok_or_else(|| {
+            let why = format!("{domain} is no image of a mesh without labels");
+            UsageError::InvalidValue { option: "modalities", value: domain.to_string(), why }.into()
+        })
+    };
+    domains.into_iter().map(image_of).collect()
 }
 
 /// The inputs of these images.
 pub(super) fn channels<'a>(
     scene: &'a Scene<'a>,
     textures: &'a MipMaps,
+    curvature_of_face: &'a [[f32; 2]],
     options: &RenderOptions,
 ) -> Channels<'a> {
     Channels {
@@ -88,9 +105,19 @@ pub(super) fn channels<'a>(
         label_of_face: &[],
         pretty_of_face: &[],
         class_of_face: &[],
+        curvature_of_face,
         palette: &[],
         compression: options.compression,
         conventions: Conventions::default(),
+    }
+}
+
+/// The curvatures of the faces, if they are asked for.
+pub(super) fn curvatures(mesh: &TriMesh, options: &RenderOptions) -> Vec<[f32; 2]> {
+    if options.modalities.contains(&Domain::PrincipalCurvature) {
+        face_curvatures(mesh)
+    } else {
+        Vec::new()
     }
 }
 
@@ -102,12 +129,14 @@ pub(super) fn faces_fit(ctx: &Context, faces: usize) -> bool {
     faces < FACES_IN_COLORS
 }
 
-/// Renders what a camera sees of a mesh, in every modality that needs no annotation. Writes `rgb.png`,
-/// `depth.png`, `normals.png`, `global_xyz.exr`, `faces.png` and `camera.json` into the folder `output`.
+/// Renders what a camera sees of a mesh. Writes the images of [`RenderOptions::modalities`], `rgb.png`,
+/// `depth.png`, `normals.png` and `global_xyz.exr` by default, and `faces.png` and `camera.json` into the
+/// folder `output`.
 /// Faces are indices as R·65536 + G·256 + B, or (255, 255, 255) where nothing is seen.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if one of the files exists and may not be replaced;
+/// [`Error::Usage`](crate::Error::Usage) if one of the files exists and may not be replaced, or if a modality
+/// needs labels;
 /// [`Error::File`](crate::Error::File).
 pub fn render(
     mesh: &Path,
@@ -116,10 +145,11 @@ pub fn render(
     options: &RenderOptions,
     ctx: &Context,
 ) -> Result<()> {
+    let images = images(options)?;
     // Several files make one result: all of them appear or none.
     let whole = Path::new("render");
     if !Staging::is_left(output, whole) {
-        refuse_files(output, options.overwrite)?;
+        refuse_files(output, &images, options.overwrite)?;
     }
 
     let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
@@ -151,12 +181,13 @@ pub fn render(
         ));
     }
 
-    let channels = channels(&scene, &textures, options);
+    let curvatures = curvatures(&file.mesh, options);
+    let channels = channels(&scene, &textures, &curvatures, options);
     create_dir(output)?;
     let staging = Staging::begin(ctx, output, whole)?;
-    refuse_files(output, options.overwrite || staging.was_placing())?;
+    refuse_files(output, &images, options.overwrite || staging.was_placing())?;
     let folder = staging.path();
-    channels.encode(&images(), &hits, camera, &mut ImageBuffers::default(), |image, file| {
+    channels.encode(&images, &hits, camera, &mut ImageBuffers::default(), |image, file| {
         write_bytes(&folder.join(name_of(image)), &file).map(drop)
     })?;
     if faces_fit(ctx, file.mesh.faces().len()) {
@@ -204,10 +235,10 @@ pub(super) fn face_image(hits: &Hits, compression: Compression) -> Vec<u8> {
 }
 
 /// Refuses a folder that holds a file of a view, unless it may be replaced.
-fn refuse_files(output: &Path, overwrite: bool) -> Result<()> {
-    images()
-        .into_iter()
-        .map(name_of)
+fn refuse_files(output: &Path, images: &[Image], overwrite: bool) -> Result<()> {
+    images
+        .iter()
+        .map(|image| name_of(*image))
         .chain(["faces.png", "camera.json"].map(str::to_owned))
         .try_for_each(|name| refuse_existing(&output.join(name), overwrite))
 }

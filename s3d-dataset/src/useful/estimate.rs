@@ -35,6 +35,14 @@ fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
         Domain::GlobalXyz => 0.5,
         Domain::Pose => 0.001,
         Domain::Objects => 0.03,
+        Domain::DepthEuclidean => 0.3,
+        Domain::Reshading => 0.15,
+        Domain::PrincipalCurvature => 0.1,
+        Domain::EdgeTexture => 0.4,
+        Domain::Keypoints2d => 0.15,
+        Domain::SegmentUnsup2d | Domain::SegmentUnsup25d | Domain::Keypoints3d => 0.03,
+        Domain::EdgeOcclusion | Domain::EdgeInstance | Domain::MaskValid => 0.005,
+        Domain::BoundaryDistance => 0.6,
     }
 }
 

@@ -45,7 +45,7 @@ use s3d_geom::Camera;
 use s3d_io::dataset::{DatasetImage, Domain, Layout, dataset_images};
 use s3d_io::fs::{Checksum, checksum_of_file};
 use s3d_io::image::{Compression, pretty_color};
-use s3d_render::{MipMaps, Scene};
+use s3d_render::{MipMaps, Scene, face_curvatures};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -202,6 +202,11 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
         class_of_face.push(labels.classes.get(*label as usize).copied().unwrap_or(NO_CLASS));
     }
 
+    let mut curvature_of_face = Vec::new();
+    if manifest.domains().contains(&Domain::PrincipalCurvature) {
+        curvature_of_face = face_curvatures(&mesh.file.mesh);
+    }
+
     // Colours that were not drawn from the mesh cannot be compared.
     let source = manifest.area(area).map_or("texture", |a| a.rgb.as_str());
     let domains = manifest.domains();
@@ -254,6 +259,7 @@ fn check_area(common: &Common<'_>, area: u32, images: &[DatasetImage]) -> Result
             label_of_face: &mesh.label_of_face,
             pretty_of_face: &pretty_of_face,
             class_of_face: &class_of_face,
+            curvature_of_face: &curvature_of_face,
             palette: &[],
             // Nothing is written.
             compression: Compression::default(),

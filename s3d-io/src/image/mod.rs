@@ -6,9 +6,12 @@
 //!
 //! | kind | samples | of a data set |
 //! |---|---|---|
-//! | [`encode_rgb8`] | 3 × 8 bits | `rgb`, `normal`, `semantic`, `semantic_pretty` |
+//! | [`encode_rgb8`] | 3 × 8 bits | `rgb`, `normal`, `semantic`, `semantic_pretty`, `principal_curvature` |
 //! | [`encode_palette8`] | 8 bits and a palette | `semantic_class` |
-//! | [`encode_gray16`] | 16 bits | `depth` |
+//! | [`encode_gray16`] | 16 bits | `depth`, `depth_euclidean`, `boundary_distance` |
+//! | [`encode_numbers16`] | 16 bits, numbers of patches | `segment_unsup2d`, `segment_unsup25d` |
+//! | [`encode_gray8`] | 8 bits, masks | `mask_valid`, `edge_occlusion`, `edge_instance` |
+//! | [`encode_levels8`] | 8 bits, shades | `reshading`, `edge_texture`, `keypoints2d`, `keypoints3d` |
 //! | [`encode_xyz_half`], [`encode_xyz_float`] | 3 × 16 or 32 bits, floats | `global_xyz` |
 //!
 //! [`Compression`] chooses between time and size, and [`Content`] says what the image shows. The bytes depend
@@ -43,8 +46,8 @@ pub use self::exr::{
 #[cfg(feature = "png")]
 pub use self::png::{
     Content, PngLines, PngReader, decode_gray16, decode_palette8, decode_rgb8, encode_gray8, encode_gray16,
-    encode_palette8, encode_rgb8, read_gray16, read_numbers8, read_palette8, read_rgb8, write_gray16,
-    write_rgb8,
+    encode_levels8, encode_numbers16, encode_palette8, encode_rgb8, read_gray16, read_numbers8,
+    read_palette8, read_rgb8, write_gray16, write_rgb8,
 };
 pub use compression::{Compression, UnknownCompression};
 pub use s3d_label::pretty_color;

@@ -341,7 +341,7 @@ pub fn coverage(hits: &Hits) -> f64 {
 }
 
 /// Makes an image with one value a face. `values` is called for eight faces at a time.
-fn by_face(
+pub(crate) fn by_face(
     scene: Option<&Scene<'_>>,
     hits: &Hits,
     missing: [u8; 3],

@@ -10,6 +10,7 @@ use s3d_dataset::options::Condition;
 use s3d_dataset::render::{PosesOptions, RenderOptions};
 use s3d_geom::{Camera, Pose};
 use s3d_io::camera::{Distortion, GivenIntrinsics, Optics};
+use s3d_io::dataset::Domain;
 use s3d_io::image::Compression;
 use s3d_io::mesh::UpAxis;
 use s3d_render::Normals;
@@ -68,6 +69,10 @@ pub(crate) struct RenderArgs {
     /// Take N colour samples in a pixel where surfaces end or turn. All other images keep one sample.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=64))]
     pub(crate) rgb_samples: u32,
+    /// The images to write: any of `s3d export` that need no labels.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rgb,depth,normal,global_xyz",
+        value_parser = parsed::<Domain>)]
+    pub(crate) modalities: Vec<Domain>,
     /// Compression of the image files: fast, balanced (about as small as files by libpng and OpenEXR) or
     /// small (slowest). The pixels are the same.
     #[arg(long, default_value_t, value_parser = parsed::<Compression>, value_name = "fast|balanced|small")]
@@ -92,6 +97,7 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
             Normals::Flat
         },
         rgb_samples: args.rgb_samples,
+        modalities: args.modalities,
         compression: args.compression,
         overwrite: args.overwrite,
     };

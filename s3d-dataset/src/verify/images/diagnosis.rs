@@ -4,6 +4,7 @@
 //! A suspect says what a pixel would show if the fault were that one. It is named if it explains nearly all
 //! pixels that differ, and nearly all others.
 
+use crate::export::modality::Image;
 use crate::verify::images::pixels::Pixels;
 use crate::verify::images::shade::Shade;
 use crate::verify::images::{Mismatch, Reference};
@@ -83,6 +84,10 @@ pub(crate) fn diagnose(
     others: &[(usize, Camera)],
     mismatch: &Mismatch,
 ) -> Option<String> {
+    // A cue depends on more than one ray of a pixel.
+    if matches!(Image::of(mismatch.domain), Some(Image::Cue(_))) {
+        return None;
+    }
     let image = &images[mismatch.image];
     let pixels = Pixels::read(mismatch.domain, &image.path(reference.layout, mismatch.domain)).ok()?;
     let shade = Shade::new(reference, mismatch.domain);
@@ -205,7 +210,7 @@ fn near(domain: Domain, found: [f64; 3], expected: [f64; 3]) -> bool {
             Domain::Rgb => 14.0,
             Domain::GlobalXyz => 2e-4 + 1e-3 * expected.abs(),
             Domain::Semantic | Domain::SemanticPretty | Domain::SemanticClass => 0.0,
-            Domain::Pose | Domain::Objects => 0.0,
+            _ => 0.0,
         };
         (found - expected).abs() <= within
     })

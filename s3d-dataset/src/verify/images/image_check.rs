@@ -142,6 +142,7 @@ impl ImageCheck<'_> {
         match domain {
             Domain::Rgb => reference.rgb_from_mesh && of.is_none(),
             Domain::GlobalXyz => !self.manifest.is_xyz_from_depth(),
+            domain if domain.is_of_colors() => reference.rgb_from_mesh && of.is_none(),
             _ => true,
         }
     }

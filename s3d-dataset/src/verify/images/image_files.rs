@@ -57,14 +57,20 @@ impl ImageFiles<'_> {
     ) {
         // A photograph may show things that the mesh lacks, and the other way round.
         if let Some(record) = self.photograph.filter(|_| domain == Domain::Rgb) {
-            return self.photograph(record, &opened.into_pixels(), path, memory);
+            let pixels = opened.into_pixels();
+            self.photograph(record, &pixels, path, memory);
+            if let Pixels::Color(colors) = pixels {
+                memory.buffers.give_colors(colors);
+            }
+            return;
         }
 
         let Some(pixels) = self.unlike_mesh(domain, opened, memory) else {
             // The mesh's own images have these properties, so the files need no check.
             match (domain, &self.seen) {
                 (Domain::GlobalXyz, _) => self.check.report.checked(1),
-                (Domain::Depth, None) => {}
+                (Domain::Depth | Domain::DepthEuclidean, None) => {}
+                (domain, _) if !domain.shows_what_is_missing() => {}
                 (_, None) => self.seen = Some((domain, None)),
                 (_, Some(_)) => self.check.report.checked(1),
             }
@@ -88,7 +94,12 @@ impl ImageFiles<'_> {
                 self.unlabelled(Some(&indices), memory);
                 self.semantic = Some(indices);
             }
-            (Domain::Rgb, Pixels::Color(colors)) => self.keep_colors(&colors),
+            (Domain::Rgb, Pixels::Color(colors)) => {
+                self.keep_colors(&colors);
+                if self.check.reference.is_some_and(|reference| !reference.rgb_from_mesh) {
+                    memory.buffers.give_colors(colors);
+                }
+            }
             (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path, memory),
             (Domain::SemanticClass, Pixels::Class(places, palette)) => {
                 self.classes(&places, &palette, path, memory);
@@ -148,13 +159,14 @@ impl ImageFiles<'_> {
 
     /// Checks that modalities agree on the pixels that see nothing. Depth is also missing where it is too
     /// large, and coordinates made from depth are missing with it: [`Self::coordinates`] compares those two.
-    /// Class images cannot tell nothing from no class.
+    /// Class images cannot tell nothing from no class, nor edges and keypoints nothing from none.
     fn nothing(&mut self, domain: Domain, pixels: &Pixels, path: &Path, hits: &Hits) {
-        if matches!(domain, Domain::GlobalXyz | Domain::SemanticClass) {
+        if !domain.shows_what_is_missing() {
             return;
         }
+        let may_be_too_far = matches!(domain, Domain::Depth | Domain::DepthEuclidean);
         let Some((other, expected)) = &self.seen else {
-            if domain != Domain::Depth {
+            if !may_be_too_far {
                 self.seen = Some((domain, Some(pixels.missing(domain))));
             }
             return;
@@ -166,7 +178,7 @@ impl ImageFiles<'_> {
             None => hits.face.pixels().iter().map(|face| *face == NO_FACE).collect(),
         };
         // A missing depth may also be one that is too far.
-        let wrong = |(m, e): (&bool, &bool)| if domain == Domain::Depth { *e && !*m } else { m != e };
+        let wrong = |(m, e): (&bool, &bool)| if may_be_too_far { *e && !*m } else { m != e };
 
         let mut pairs = missing.iter().zip(&expected);
         let first = if missing == expected {
@@ -363,6 +375,11 @@ impl ImageFiles<'_> {
 
         let of_depth;
         let expected = if self.check.is_of_mesh(reference, domain, self.photograph) {
+            let Scratch { hits, buffers, .. } = memory;
+            reference.channels.draw(image, hits, &pose.camera, buffers);
+            reference.channels.drawn(image, buffers)
+        } else if domain.is_of_colors() && memory.buffers.has_colors {
+            // The colours are those of the file.
             let Scratch { hits, buffers, .. } = memory;
             reference.channels.draw(image, hits, &pose.camera, buffers);
             reference.channels.drawn(image, buffers)

@@ -14,7 +14,10 @@ use std::path::Path;
 pub(crate) enum Pixels {
     /// 8-bit RGB.
     Color(Raster<[u8; 3]>),
+    /// 16-bit gray.
     Depth(Raster<u16>),
+    /// 8-bit gray.
+    Gray(Raster<u8>),
     /// Places in a palette, and the palette.
     Class(Raster<u8>, Vec<[u8; 3]>),
     Xyz(Raster<[f32; 3]>),
@@ -26,6 +29,7 @@ pub(crate) enum Pixels {
 pub(crate) enum Opened<'r> {
     Color(PngLines<'r, 3>),
     Depth(PngLines<'r, 2>),
+    Gray(PngLines<'r, 1>),
     Pixels(Pixels),
 }
 
@@ -37,6 +41,7 @@ impl<'r> Opened<'r> {
     pub(crate) fn new(domain: Domain, bytes: &[u8], path: &Path, reader: &'r mut PngReader) -> Result<Self> {
         Ok(match domain.pixels() {
             Some(PixelKind::Rgb8) => Self::Color(reader.rgb8(bytes, path)?),
+            Some(PixelKind::Gray8) => Self::Gray(reader.gray8(bytes, path)?),
             Some(PixelKind::Gray16) => Self::Depth(reader.gray16(bytes, path)?),
             Some(PixelKind::Palette8) => {
                 let (places, palette) = decode_palette8(bytes, path)?;
@@ -55,6 +60,7 @@ impl<'r> Opened<'r> {
         match self {
             Self::Color(lines) => (lines.width(), lines.height()),
             Self::Depth(lines) => (lines.width(), lines.height()),
+            Self::Gray(lines) => (lines.width(), lines.height()),
             Self::Pixels(pixels) => pixels.size(),
         }
     }
@@ -65,6 +71,7 @@ impl<'r> Opened<'r> {
         match (self, drawn) {
             (Self::Color(lines), Drawn::Color(image)) => lines.are_of(image),
             (Self::Depth(lines), Drawn::Depth(image)) => lines.are_of(image),
+            (Self::Gray(lines), Drawn::Gray(image)) => lines.are_of(image),
             (Self::Pixels(Pixels::XyzHalf(points)), Drawn::XyzHalf(image)) => {
                 let [a, b] = [points, image].map(|points| points.pixels().as_flattened().reinterpret_cast());
                 (points.width(), points.height()) == (image.width(), image.height()) && a == b
@@ -77,6 +84,7 @@ impl<'r> Opened<'r> {
         match self {
             Self::Color(lines) => Pixels::Color(lines.into_raster()),
             Self::Depth(lines) => Pixels::Depth(lines.into_raster()),
+            Self::Gray(lines) => Pixels::Gray(lines.into_raster()),
             Self::Pixels(pixels) => pixels,
         }
     }
@@ -100,6 +108,7 @@ impl Pixels {
         match self {
             Self::Color(image) => Drawn::Color(image),
             Self::Depth(image) => Drawn::Depth(image),
+            Self::Gray(image) => Drawn::Gray(image),
             Self::Class(image, _) => Drawn::Class(image),
             Self::Xyz(image) => Drawn::Xyz(image),
             Self::XyzHalf(image) => Drawn::XyzHalf(image),
@@ -119,6 +128,7 @@ impl Pixels {
         match self {
             Self::Color(r) => (r.width(), r.height()),
             Self::Depth(r) => (r.width(), r.height()),
+            Self::Gray(r) => (r.width(), r.height()),
             Self::Class(r, _) => (r.width(), r.height()),
             Self::Xyz(r) => (r.width(), r.height()),
             Self::XyzHalf(r) => (r.width(), r.height()),
@@ -130,7 +140,7 @@ impl Pixels {
         match self {
             Self::Color(r) => r.at(x, y).map(f64::from),
             Self::Depth(r) => [f64::from(r.at(x, y)), 0.0, 0.0],
-            Self::Class(r, _) => [f64::from(r.at(x, y)), 0.0, 0.0],
+            Self::Gray(r) | Self::Class(r, _) => [f64::from(r.at(x, y)), 0.0, 0.0],
             Self::Xyz(r) => r.at(x, y).map(f64::from),
             Self::XyzHalf(r) => r.at(x, y).map(f64::from),
         }
@@ -142,7 +152,9 @@ impl Pixels {
         match self {
             Self::Color(r) => equal_to(r.pixels(), missing.map(|value| value as u8)),
             Self::Depth(r) => r.pixels().iter().map(|p| *p == missing[0]).collect(),
-            Self::Class(r, _) => r.pixels().iter().map(|p| u16::from(*p) == missing[0]).collect(),
+            Self::Gray(r) | Self::Class(r, _) => {
+                r.pixels().iter().map(|p| u16::from(*p) == missing[0]).collect()
+            }
             Self::Xyz(r) => r.pixels().iter().map(|p| *p == [0.0; 3]).collect(),
             Self::XyzHalf(r) => r.pixels().iter().map(|p| *p == [f16::ZERO; 3]).collect(),
         }

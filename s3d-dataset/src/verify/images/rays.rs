@@ -45,6 +45,13 @@ pub(super) fn difference(
         (Pixels::Depth(found), Drawn::Depth(expected)) => {
             Difference::of(found, expected, |a, b| a == b, |d| d.to_string(), |d| d.to_string())
         }
+        (Pixels::Gray(found), Drawn::Gray(expected)) => Difference::of(
+            found,
+            expected,
+            |a, b| a == b,
+            |level| level.to_string(),
+            |level| level.to_string(),
+        ),
         (Pixels::Xyz(found), Drawn::Xyz(expected)) => {
             Difference::of(found, expected, |a, b| a == b, point, point)
         }
@@ -58,7 +65,12 @@ pub(super) fn difference(
             Difference::of(found, expected, |a, b| a == b, |p| point(to_f32(p)), |p| point(to_f32(p)))
         }
         (
-            Pixels::Color(_) | Pixels::Depth(_) | Pixels::Class(..) | Pixels::Xyz(_) | Pixels::XyzHalf(_),
+            Pixels::Color(_)
+            | Pixels::Depth(_)
+            | Pixels::Gray(_)
+            | Pixels::Class(..)
+            | Pixels::Xyz(_)
+            | Pixels::XyzHalf(_),
             _,
         ) => {
             unreachable!("{} is read as what is drawn of it", image.domain())

@@ -58,7 +58,8 @@ impl<'a> Shade<'a> {
                 )
                 .map(f64::from)
             }
-            Domain::Pose | Domain::Objects => [0.0; 3],
+            // Cues depend on more than one ray, and are not guessed at.
+            _ => [0.0; 3],
         }
     }
 }

@@ -60,6 +60,23 @@ pub fn encode_gray8(image: &Raster<u8>) -> Vec<u8> {
     encode(image.width(), image.height(), format, image.pixels(), &[(Filter::Up, search)])
 }
 
+/// Encodes an image of shades as an 8-bit gray PNG file.
+///
+/// # Panics
+/// If the image has no pixel.
+pub fn encode_levels8(image: &Raster<u8>, compression: Compression) -> Vec<u8> {
+    let line = 1 + image.width() as usize;
+    let small = Search::thorough(line, 1);
+    let balanced = Search { sample: 1, ..Search::photo(line) };
+    let plans: &[(Filter, Search)] = match compression {
+        Compression::Fast => &[(Filter::Up, Search { nice: 16, patience: 3, ..balanced })],
+        Compression::Balanced => &[(Filter::Up, balanced)],
+        Compression::Small => &[(Filter::Up, small), (Filter::Paeth, small)],
+    };
+    let format = Format { color: ColorType::Grayscale, depth: BitDepth::Eight, pixel: 1, palette: &[] };
+    encode(image.width(), image.height(), format, image.pixels(), plans)
+}
+
 /// Encodes an image of palette indices as an 8-bit PNG file with its palette.
 ///
 /// # Panics
@@ -83,14 +100,6 @@ pub fn encode_palette8(image: &Raster<u8>, palette: &[[u8; 3]], compression: Com
 /// # Panics
 /// If the image has no pixel.
 pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
-    let mut bytes = vec![0; 2 * image.len()];
-    bytes
-        .as_chunks_mut()
-        .0
-        .iter_mut()
-        .zip(image.pixels())
-        .for_each(|(pair, v)| *pair = v.to_be_bytes());
-
     let line = 1 + 2 * image.width() as usize;
     let balanced = Search::depth(line);
     let small = Search { hash_bytes: 6, ..Search::thorough(line, 2) };
@@ -98,6 +107,31 @@ pub fn encode_gray16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
         Compression::Fast | Compression::Balanced => &[(Filter::Paeth, balanced)],
         Compression::Small => &[(Filter::Paeth, small), (Filter::Paeth, balanced)],
     };
+    encode_16(image, plans)
+}
+
+/// Encodes an image as a 16-bit gray PNG file, tuned for images that are constant on patches, such as numbers
+/// of segments.
+///
+/// # Panics
+/// If the image has no pixel.
+pub fn encode_numbers16(image: &Raster<u16>, compression: Compression) -> Vec<u8> {
+    let line = 1 + 2 * image.width() as usize;
+    let plans: &[(Filter, Search)] = match compression {
+        Compression::Fast | Compression::Balanced => &[(Filter::Up, Search::patches(line))],
+        Compression::Small => &[(Filter::Up, Search::thorough(line, 2))],
+    };
+    encode_16(image, plans)
+}
+
+fn encode_16(image: &Raster<u16>, plans: &[(Filter, Search)]) -> Vec<u8> {
+    let mut bytes = vec![0; 2 * image.len()];
+    bytes
+        .as_chunks_mut()
+        .0
+        .iter_mut()
+        .zip(image.pixels())
+        .for_each(|(pair, v)| *pair = v.to_be_bytes());
     let format = Format { color: ColorType::Grayscale, depth: BitDepth::Sixteen, pixel: 2, palette: &[] };
     encode(image.width(), image.height(), format, &bytes, plans)
 }

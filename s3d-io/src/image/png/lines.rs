@@ -67,6 +67,14 @@ impl PngReader {
         self.lines(bytes, name, ColorType::Grayscale, BitDepth::Sixteen)
     }
 
+    /// Reads like [`Self::rgb8`], an 8-bit gray image.
+    ///
+    /// # Errors
+    /// Like [`Self::rgb8`].
+    pub fn gray8(&mut self, bytes: &[u8], name: &Path) -> Result<PngLines<'_, 1>> {
+        self.lines(bytes, name, ColorType::Grayscale, BitDepth::Eight)
+    }
+
     fn lines<const N: usize>(
         &mut self,
         bytes: &[u8],
@@ -196,6 +204,31 @@ impl PngLines<'_, 3> {
             && lines.all(|(filtered, line)| {
                 let above = std::mem::replace(&mut above, line);
                 is_filtered(filtered, line.as_flattened(), above.as_flattened(), 3)
+            })
+    }
+}
+
+impl PngLines<'_, 1> {
+    /// Returns the whole image.
+    pub fn into_raster(self) -> Raster<u8> {
+        let width = self.width;
+        let height = self.height;
+        let mut pixels = Vec::with_capacity(width as usize * height as usize);
+        self.for_each(|line| pixels.extend_from_slice(line.as_flattened()));
+        Raster::from_vec(width, height, pixels)
+    }
+
+    /// Compares like [`PngLines::<3>::are_of`].
+    pub fn are_of(&self, image: &Raster<u8>) -> bool {
+        let fits = (self.width, self.height) == (image.width(), image.height());
+        let top = vec![0; image.width() as usize];
+        let mut above = top.as_slice();
+        let mut lines = self.lines.chunks_exact(self.width as usize + 1).zip(image.rows());
+        self.is_filtered
+            && fits
+            && lines.all(|(filtered, line)| {
+                let above = std::mem::replace(&mut above, line);
+                is_filtered(filtered, line, above, 1)
             })
     }
 }

@@ -12,6 +12,7 @@ pub use self::decode::{
     decode_gray16, decode_palette8, decode_rgb8, read_gray16, read_numbers8, read_palette8, read_rgb8,
 };
 pub use self::encode::{
-    Content, encode_gray8, encode_gray16, encode_palette8, encode_rgb8, write_gray16, write_rgb8,
+    Content, encode_gray8, encode_gray16, encode_levels8, encode_numbers16, encode_palette8, encode_rgb8,
+    write_gray16, write_rgb8,
 };
 pub use self::lines::{PngLines, PngReader};
