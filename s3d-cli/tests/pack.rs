@@ -35,7 +35,18 @@ fn dataset() -> &'static Path {
     out
 }
 
-const KINDS: [&str; 5] = ["webdataset", "colmap", "nerfstudio", "coco", "parquet"];
+const KINDS: [&str; 10] = [
+    "webdataset",
+    "colmap",
+    "nerfstudio",
+    "coco",
+    "parquet",
+    "huggingface",
+    "dust3r",
+    "wai",
+    "vggt",
+    "pointcept",
+];
 
 /// Packs into `dir`, and returns all files written, by path.
 fn pack(dir: &Path, kind: &str, more: &[&str]) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -227,6 +238,44 @@ fn coco_has_a_panoptic_image_for_each_image() {
 }
 
 #[test]
+fn areas_are_scenes_splits_and_sequences() {
+    let dir = tempfile::tempdir().unwrap();
+    let has = |package: &BTreeMap<PathBuf, Vec<u8>>, path: &str| {
+        assert!(package.contains_key(Path::new(path)), "{path}: {:?}", package.keys());
+    };
+    let made = |kind: &str| pack(&dir.path().join(kind), kind, &[]);
+
+    let package = made("huggingface");
+    for area in [1, 2] {
+        for config in ["views", "panoramas"] {
+            has(&package, &format!("data/{config}/area_{area}-00000-of-00001.parquet"));
+        }
+    }
+    let card = String::from_utf8(package[Path::new("README.md")].clone()).unwrap();
+    assert!(card.contains("  - split: area_2\n    path: data/views/area_2-*.parquet\n"), "{card}");
+
+    let (dust3r, wai, vggt) = (made("dust3r"), made("wai"), made("vggt"));
+    for area in [1, 2] {
+        has(&wai, &format!("area_{area}/scene_meta.json"));
+        for name in image_names(area, "data") {
+            let stem = name.strip_suffix("_domain_rgb.png").unwrap();
+            has(&dust3r, &format!("area_{area}/images/{stem}.jpg"));
+            has(&dust3r, &format!("area_{area}/depth/{stem}.png"));
+            has(&wai, &format!("area_{area}/rendered_depth/{stem}.exr"));
+            has(&vggt, &format!("area_{area}/depths/{stem}.png"));
+        }
+    }
+
+    let pointcept = made("pointcept");
+    for area in [1, 2] {
+        let rooms = fs::read_dir(dataset().join(format!("s3dis/Area_{area}"))).unwrap();
+        for room in rooms.map(|room| room.unwrap()).filter(|room| room.path().is_dir()) {
+            has(&pointcept, &format!("Area_{area}/{}/coord.npy", room.file_name().to_str().unwrap()));
+        }
+    }
+}
+
+#[test]
 fn wrong_calls_are_told() {
     let dir = tempfile::tempdir().unwrap();
     let (out, place) = (text(dataset()), dir.path().join("package"));
@@ -238,6 +287,8 @@ fn wrong_calls_are_told() {
     call(&["--to", "colmap", "--areas", "4"], &["--areas 4", "there are 1, 2"]);
     call(&["--to", "parquet", "--points", "3"], &["--points belongs to colmap and nerfstudio only"]);
     call(&["--to", "colmap", "--images", "panoramas"], &["--images panoramas", "for nerfstudio"]);
+    call(&["--to", "pointcept", "--images", "views"], &["--images belongs to webdataset and colmap and"]);
+    call(&["--to", "huggingface", "--modalities", "pose"], &["--modalities pose", "k, rt, x, y and z"]);
     for kind in KINDS {
         let inside = dataset().join("area_1/packed");
         s3d_fails(&["pack", out, "--to", kind, "-o", text(&inside)], 2, &["in one another"]);
@@ -292,7 +343,7 @@ fn a_damaged_data_set_is_told_by_the_file() {
         s3d_fails(&["pack", text(&out), "--to", kind, "-o", text(&place)], 1, parts);
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is left of a package that failed");
     };
-    for kind in KINDS {
+    for kind in KINDS.iter().filter(|kind| **kind != "pointcept") {
         fails(kind, &[&of_depth, "missing"]);
     }
     fs::copy(dataset().join(&of_depth), out.join(&of_depth)).unwrap();
@@ -313,7 +364,7 @@ fn a_damaged_data_set_is_told_by_the_file() {
 
     fs::write(out.join(&of_pose), "{\n}").unwrap();
     list_files(&out);
-    for kind in ["colmap", "nerfstudio", "parquet"] {
+    for kind in ["colmap", "nerfstudio", "parquet", "huggingface", "dust3r", "wai", "vggt"] {
         fails(kind, &[&of_pose, "missing field"]);
     }
     fs::copy(dataset().join(&of_pose), out.join(&of_pose)).unwrap();

@@ -125,7 +125,9 @@ fn what_needs_labels_says_so_before_work_begins() {
     let package = scan.dir.path().join("package");
     s3d_fails(&["pack", text(&out), "--to", "coco", "-o", text(&package)], 1, &["COCO needs labels"]);
     assert!(!package.exists() && files(&out) == before);
-    for kind in ["webdataset", "nerfstudio", "colmap"] {
+    s3d_fails(&["pack", text(&out), "--to", "pointcept", "-o", text(&package)], 1, &["need labels"]);
+    assert!(!package.exists() && files(&out) == before);
+    for kind in ["webdataset", "nerfstudio", "colmap", "huggingface", "dust3r", "wai", "vggt"] {
         let package = scan.dir.path().join(kind);
         s3d_ok(&["pack", text(&out), "--to", kind, "-o", text(&package)]);
     }

@@ -95,7 +95,7 @@ fn make(ctx: &Context, data: &DataSet, options: &PairsOptions, call: &str) -> Re
     let staged = change.staged();
     let mut changed = Vec::new();
     for area in &data.manifest.area_numbers {
-        let found = of_area(ctx, data, *area, options)?;
+        let found = of_images(ctx, data, *area, &data.images(*area), options)?;
         let path = staged.pairs_npz(*area);
         create_dir(&staged.area_dir(*area))?;
         write_pairs(&path, &found)?;
@@ -112,9 +112,14 @@ fn make(ctx: &Context, data: &DataSet, options: &PairsOptions, call: &str) -> Re
     change.commit(call, &[])
 }
 
-/// Finds the pairs of an area.
-fn of_area(ctx: &Context, data: &DataSet, area: u32, options: &PairsOptions) -> Result<PairColumns> {
-    let images = data.images(area);
+/// Finds the pairs of images of an area.
+pub(crate) fn of_images(
+    ctx: &Context,
+    data: &DataSet,
+    area: u32,
+    images: &[DatasetImage],
+    options: &PairsOptions,
+) -> Result<PairColumns> {
     let cameras = images.iter().map(|image| {
         ctx.check()?;
         camera_of(data, image)
@@ -141,7 +146,7 @@ fn of_area(ctx: &Context, data: &DataSet, area: u32, options: &PairsOptions) -> 
             Ok(seen)
         },
     )?;
-    Ok(columns(&images, &finder.pairs(seen)))
+    Ok(columns(images, &finder.pairs(seen)))
 }
 
 /// Returns the camera of an image.

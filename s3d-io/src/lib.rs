@@ -204,7 +204,7 @@
 //! | `png`, `exr` | the images of a data set |
 //! | `dataset` | the rest of a data set: poses, labels, instances, splits, lists, conventions |
 //! | `toml` | scenes: `scene.toml`, published areas |
-//! | `webdataset`, `colmap`, `nerfstudio`, `coco`, `parquet` | packages |
+//! | `webdataset`, `colmap`, `nerfstudio`, `coco`, `parquet`, `huggingface`, `multiview` | packages |
 //! | `mesh`, `texture`, `json`, `write` | none: the common code of other features |
 
 // Without some formats, not all of their common code is used.
@@ -242,7 +242,8 @@ pub mod mesh;
     feature = "colmap",
     feature = "nerfstudio",
     feature = "coco",
-    feature = "parquet"
+    feature = "parquet",
+    feature = "multiview"
 ))]
 pub mod package;
 #[cfg(feature = "raw")]

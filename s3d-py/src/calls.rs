@@ -8,7 +8,7 @@ use s3d_dataset::compare::CompareOptions;
 use s3d_dataset::export::SceneSource;
 use s3d_dataset::info::InfoOptions;
 use s3d_dataset::options::Profile;
-use s3d_dataset::pack::{ClassList, PackOptions, PackageArguments};
+use s3d_dataset::pack::{ClassList, PackOptions, PackageArguments, PackageKind};
 use s3d_dataset::profile::ProfileOptions;
 use s3d_dataset::verify::VerifyOptions;
 use s3d_dataset::xyz::XyzOptions;
@@ -243,7 +243,7 @@ pub(crate) fn pack(
     threads: Option<usize>,
     sink: Py<PyAny>,
 ) -> PyResult<PathBuf> {
-    let kind = parsed("kind", kind, "webdataset, colmap, nerfstudio, coco, parquet")?;
+    let kind = parsed("kind", kind, &PackageKind::WORDS.replace('|', ", "))?;
     let stuff = how.stuff.map(|classes| match &*classes {
         [] => "none".to_owned(),
         classes => classes.join(","),

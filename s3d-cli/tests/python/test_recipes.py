@@ -55,6 +55,13 @@ def test_tables(s3d, beside):
     assert "office_1" in run(s3d, "pandas and DuckDB", beside)
 
 
+def test_hugging_face(s3d, beside, monkeypatch):
+    pytest.importorskip("datasets")
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    monkeypatch.setenv("HF_HOME", str(beside / "cache"))
+    assert "office_1 (96, 96) [[" in run(s3d, "Hugging Face", beside)
+
+
 def test_numpy_alone(s3d, beside):
     pytest.importorskip("OpenEXR")
     run(s3d, "numpy alone", beside)

@@ -33,7 +33,7 @@ pub(super) fn pack(
     options: &CocoOptions,
 ) -> Result<Vec<String>> {
     let Some(table) = source.labels()? else {
-        let dataset = source.layout.root().to_owned();
+        let dataset = source.data.layout.root().to_owned();
         return Err(InputError::WithoutLabels { dataset, needs: "COCO needs" }.into());
     };
     source.require(Domain::Rgb, "COCO")?;
@@ -59,7 +59,7 @@ pub(super) fn pack(
         &numbered,
         || (),
         |(), (id, image)| {
-            let path = image.path(&source.layout, Domain::Semantic);
+            let path = image.path(&source.data.layout, Domain::Semantic);
             let mut semantic = source.rgb8(image, Domain::Semantic)?;
             // Pixels outside of the photograph teach nothing.
             if source.photograph(image).is_some_and(|p| p.masked > 0.0) {
@@ -71,7 +71,7 @@ pub(super) fn pack(
             }
 
             let (panoptic, segments) = coco_panoptic(&semantic, &table, &stuff).map_err(|e| {
-                FileError::format(&path, format!("{e} in {}", source.layout.labels_json().display()))
+                FileError::format(&path, format!("{e} in {}", source.data.layout.labels_json().display()))
             })?;
             let file_name = image.relative_path(Domain::Rgb);
             write_bytes(&folder.join(&file_name), &encode_rgb8(&panoptic, Content::Labels, compression))?;

@@ -63,9 +63,9 @@ pub(super) fn pack(
         let images = if options.copy_images {
             format!("area_{area}/images")
         } else {
-            let folder = source.layout.image_dir(area, first.frame, Domain::Rgb);
+            let folder = source.data.layout.image_dir(area, first.frame, Domain::Rgb);
             let below = folder
-                .strip_prefix(source.layout.root())
+                .strip_prefix(source.data.layout.root())
                 .unwrap_or(&folder)
                 .display()
                 .to_string();

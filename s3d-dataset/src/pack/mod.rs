@@ -3,9 +3,12 @@
 mod coco;
 mod colmap;
 mod destination;
+mod huggingface;
+mod multiview;
 mod nerfstudio;
 mod options;
 mod parquet;
+mod pointcept;
 mod source;
 mod webdataset;
 
@@ -18,8 +21,8 @@ use crate::store::new_folder::{beside, check_apart};
 use crate::store::parent_of;
 use destination::{About, Destination};
 pub use options::{
-    ClassList, CocoOptions, ColmapOptions, DepthFiles, NerfstudioOptions, PackOptions, Package,
-    PackageArguments, PackageKind, PackedImages, ParquetOptions, ShardPrefix, WebdatasetOptions,
+    ClassList, CocoOptions, ColmapOptions, DepthFiles, HuggingfaceOptions, NerfstudioOptions, PackOptions,
+    Package, PackageArguments, PackageKind, PackedImages, ParquetOptions, ShardPrefix, WebdatasetOptions,
 };
 use s3d_geom::PointCloud;
 use s3d_io::fs::create_dir;
@@ -64,16 +67,22 @@ pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Cont
             into_folder(&|folder| nerfstudio::pack(ctx, &source, folder, nerfstudio))?;
         }
         Package::Coco(coco) => into_folder(&|folder| coco::pack(ctx, &source, folder, coco))?,
+        Package::Huggingface(huggingface) => {
+            into_folder(&|folder| huggingface::pack(ctx, &source, folder, huggingface))?;
+        }
+        Package::Dust3r => into_folder(&|folder| multiview::dust3r::pack(ctx, &source, folder))?,
+        Package::Wai => into_folder(&|folder| multiview::wai::pack(ctx, &source, folder))?,
+        Package::Vggt => into_folder(&|folder| multiview::vggt::pack(ctx, &source, folder))?,
+        Package::Pointcept => into_folder(&|folder| pointcept::pack(ctx, &source, folder))?,
         Package::Parquet(_) => pack_table(ctx, &source, dataset, &place, options.overwrite)?,
     }
 
-    ctx.info(format_args!(
-        "{}: {} images for {} in {:.1} s",
-        place.display(),
-        source.images.len(),
-        kind,
-        started.elapsed().as_secs_f64()
-    ));
+    let seconds = started.elapsed().as_secs_f64();
+    let what = match source.images.len() {
+        0 => "points".to_owned(),
+        images => format!("{images} images"),
+    };
+    ctx.info(format_args!("{}: {what} for {kind} in {seconds:.1} s", place.display()));
     Ok(place)
 }
 

@@ -4,7 +4,7 @@
 use super::area_points;
 use super::destination::{Destination, relative_path};
 use super::options::{DepthFiles, NerfstudioOptions};
-use super::source::Source;
+use super::source::{Source, millimetres};
 use crate::context::{Context, Progress};
 use crate::error::Result;
 use crate::parallel::map_in_order;
@@ -162,7 +162,7 @@ impl<'a> Job<'a> {
         }
 
         let place = absolute(destination.place())?.join(below);
-        let root = absolute(source.layout.root())?;
+        let root = absolute(source.data.layout.root())?;
         Ok(Self { source, folder, place, root, depth, masks: false, options })
     }
 
@@ -176,9 +176,11 @@ impl<'a> Job<'a> {
             NerfstudioCamera::Equirectangular => {
                 if size.0 != 2 * size.1 {
                     let message = format!("a panorama of {} × {}, not twice as wide as high", size.0, size.1);
-                    return Err(
-                        FileError::format(&image.path(&self.source.layout, Domain::Rgb), message).into()
-                    );
+                    return Err(FileError::format(
+                        &image.path(&self.source.data.layout, Domain::Rgb),
+                        message,
+                    )
+                    .into());
                 }
                 NerfstudioFrame::equirectangular(rgb, &pose, size)
             }
@@ -230,30 +232,4 @@ impl<'a> Job<'a> {
 
 fn absolute(path: &Path) -> Result<PathBuf, FileError> {
     resolved(path).map_err(|e| FileError::io(path, "look for", e))
-}
-
-/// Depth in millimetres, rounded; 0 if missing or beyond 65.535 m.
-fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
-    let mut converted = depth.clone();
-    for depth in converted.pixels_mut() {
-        let mm = (f64::from(*depth) * (1000.0 / units_per_m)).round();
-        *depth = if *depth == MISSING_DEPTH || mm > f64::from(u16::MAX) {
-            0
-        } else {
-            mm as u16
-        };
-    }
-    converted
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn depth_in_millimetres() {
-        let depth = Raster::from_vec(3, 2, vec![0, 512, 1, 65_535, 33_553, 33_555]);
-        assert_eq!(millimetres(&depth, 512.0).pixels(), [0, 1000, 2, 0, 65_533, 0]);
-        assert_eq!(millimetres(&depth, 1000.0).pixels(), [0, 512, 1, 0, 33_553, 33_555]);
-    }
 }

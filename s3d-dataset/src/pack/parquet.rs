@@ -22,30 +22,53 @@ type Views = BTreeMap<(String, u32), ViewRecord>;
 
 /// Writes the table to the file `place`.
 pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
-    let mut views: BTreeMap<u32, Views> = BTreeMap::new();
-    for &area in &source.areas {
-        let kept = source.views(area)?.into_iter().filter_map(|v| {
-            let number = v.frame_num?;
-            Some(((v.camera_uuid.clone(), number), v))
-        });
-        views.insert(area, kept.collect());
-    }
-
-    let table = source.labels()?;
+    let about = Rows::new(source)?;
     let progress = ctx.progress("packing", "images", source.images.len() as u64);
     let rows = map_in_order(
         ctx,
         &source.images,
-        || vec![0u64; table.as_ref().map_or(0, LabelTable::len)],
+        || about.no_counts(),
         |counts, image| {
-            let row = row(source, image, &views[&image.area], table.as_ref(), counts)?;
+            let row = about.row(image, counts)?;
             progress.add(1);
             Ok(row)
         },
     )?;
 
-    write_image_index(place, source.taxonomy.classes(), &rows)?;
+    write_image_index(place, source.data.taxonomy.classes(), &rows)?;
     Ok(())
+}
+
+/// What the rows of images are made of.
+pub(super) struct Rows<'a> {
+    source: &'a Source,
+    views: BTreeMap<u32, Views>,
+    table: Option<LabelTable>,
+}
+
+impl<'a> Rows<'a> {
+    /// Reads the views and the labels of a data set.
+    pub(super) fn new(source: &'a Source) -> Result<Self> {
+        let mut views: BTreeMap<u32, Views> = BTreeMap::new();
+        for &area in &source.areas {
+            let kept = source.views(area)?.into_iter().filter_map(|v| {
+                let number = v.frame_num?;
+                Some(((v.camera_uuid.clone(), number), v))
+            });
+            views.insert(area, kept.collect());
+        }
+        Ok(Self { source, views, table: source.labels()? })
+    }
+
+    /// Returns a zero for each label.
+    pub(super) fn no_counts(&self) -> Vec<u64> {
+        vec![0; self.table.as_ref().map_or(0, LabelTable::len)]
+    }
+
+    /// Returns the row of an image. `counts` is from [`no_counts`](Self::no_counts), and is left as it was.
+    pub(super) fn row(&self, image: &DatasetImage, counts: &mut [u64]) -> Result<ImageRow> {
+        row(self.source, image, &self.views[&image.area], self.table.as_ref(), counts)
+    }
 }
 
 /// The row of an image. `counts` has an entry for each label, all 0, and is left so.
@@ -56,11 +79,11 @@ fn row(
     table: Option<&LabelTable>,
     counts: &mut [u64],
 ) -> Result<ImageRow> {
-    let path = |domain| image.path(&source.layout, domain);
+    let path = |domain| image.path(&source.data.layout, domain);
 
     // Reading the data set accepts any word for a room's type. Only the words of the taxonomy and the one for
     // unknown rooms are valid here.
-    let (room_type, room_number) = match source.taxonomy.room(&image.room) {
+    let (room_type, room_number) = match source.data.taxonomy.room(&image.room) {
         Ok(room) => (room.room_type.name(), room.number),
         Err(_) if table.is_none() && image.room == UNKNOWN_ROOM => ("unknown", 1),
         Err(e) => {
@@ -75,7 +98,7 @@ fn row(
         room_type: room_type.to_owned(),
         room_number,
         files: Domain::ALL.map(|d| image.has(d).then(|| image.relative_path(d))),
-        size: image.size(&source.layout)?.map(|(w, h)| [w, h]),
+        size: image.size(&source.data.layout)?.map(|(w, h)| [w, h]),
         photograph: source.photograph(image).map(|p| p.name.clone()),
         ..ImageRow::default()
     };
@@ -121,7 +144,7 @@ fn row(
         let semantic = source.rgb8(image, Domain::Semantic)?;
         row.coverage = Some(share(&semantic, |p| *p != MISSING));
         let known = semantic_row(&semantic, table, counts).map_err(|index| {
-            let labels = source.layout.labels_json();
+            let labels = source.data.layout.labels_json();
             let message =
                 format!("a pixel has label {index}, but {} holds {} labels", labels.display(), table.len());
             FileError::format(&path(Domain::Semantic), message)

@@ -3,7 +3,7 @@
 use super::options::PackedImages;
 use crate::context::Context;
 use crate::error::{InputError, Result, UsageError};
-use crate::record::data_set::{DataSet, Listed};
+use crate::record::data_set::DataSet;
 use s3d_geom::{PointCloud, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
@@ -12,16 +12,14 @@ use s3d_io::dataset::{
 };
 use s3d_io::fs::write_bytes;
 use s3d_io::image::{decode_gray16, decode_rgb8};
-use s3d_label::{LabelTable, Taxonomy};
+use s3d_label::LabelTable;
+use s3d_render::MISSING_DEPTH;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// A data set or a part of it. Everything read from it is checked against its list of files.
 pub(crate) struct Source {
-    pub(crate) layout: Layout,
-    files: Listed,
-    /// The classes and the types of rooms.
-    pub(crate) taxonomy: Taxonomy,
+    pub(crate) data: DataSet,
     /// The areas that are packed.
     pub(crate) areas: Vec<u32>,
     /// The images that are packed, of all these areas.
@@ -37,8 +35,13 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// Opens the complete data set in `root`.
-    pub(crate) fn open(ctx: &Context, root: &Path, areas: &[u32], which: PackedImages) -> Result<Self> {
+    /// Opens the complete data set in `root`. `which` are the images to pack, `None` for none.
+    pub(crate) fn open(
+        ctx: &Context,
+        root: &Path,
+        areas: &[u32],
+        which: Option<PackedImages>,
+    ) -> Result<Self> {
         let data = DataSet::open_in(&Layout::new(root))?;
         let mut photographs = BTreeMap::new();
         for &area in &data.manifest.area_numbers {
@@ -46,7 +49,7 @@ impl Source {
             photographs.extend(of_area.map(|record| ((area, record.camera_uuid.clone()), record)));
         }
 
-        let DataSet { layout, manifest, files, taxonomy, .. } = data;
+        let DataSet { layout, manifest, files, .. } = &data;
         let there = &manifest.area_numbers;
         if let Some(area) = areas.iter().find(|a| !there.contains(a)) {
             let there: Vec<String> = there.iter().map(u32::to_string).collect();
@@ -70,15 +73,18 @@ impl Source {
         areas.sort_unstable();
 
         let mut images: Vec<DatasetImage> =
-            areas.iter().flat_map(|area| files.images(&layout, *area)).collect();
+            areas.iter().flat_map(|area| files.images(layout, *area)).collect();
         images.retain(|image| match which {
-            PackedImages::Views => image.frame != Frame::Panorama,
-            PackedImages::Panoramas => image.frame == Frame::Panorama,
-            PackedImages::All => true,
+            Some(PackedImages::Views) => image.frame != Frame::Panorama,
+            Some(PackedImages::Panoramas) => image.frame == Frame::Panorama,
+            Some(PackedImages::All) => true,
+            None => false,
         });
 
-        check_images_complete(&layout, &images)?;
-        if images.is_empty() {
+        check_images_complete(layout, &images)?;
+        if let Some(which) = which
+            && images.is_empty()
+        {
             let what = if which == PackedImages::All {
                 "images".to_owned()
             } else {
@@ -89,7 +95,7 @@ impl Source {
 
         let needed: BTreeSet<PathBuf> = images
             .iter()
-            .flat_map(|image| image.domains.iter().map(|domain| image.path(&layout, *domain)))
+            .flat_map(|image| image.domains.iter().map(|domain| image.path(layout, *domain)))
             .collect();
         files.require(ctx, |path| needed.contains(path))?;
 
@@ -97,17 +103,7 @@ impl Source {
         let offsets = manifest.request().world_offsets();
         let is_labelled = manifest.is_labelled();
 
-        Ok(Self {
-            layout,
-            files,
-            taxonomy,
-            areas,
-            images,
-            depth_units_per_m,
-            offsets,
-            is_labelled,
-            photographs,
-        })
+        Ok(Self { data, areas, images, depth_units_per_m, offsets, is_labelled, photographs })
     }
 
     /// A sentence on the coordinates of each area whose scan has another frame.
@@ -136,7 +132,7 @@ impl Source {
         match self.images.iter().find(|image| !image.has(domain)) {
             None => Ok(()),
             Some(image) => Err(FileError::format(
-                &image.path(&self.layout, domain),
+                &image.path(&self.data.layout, domain),
                 format!("missing: {whom} needs {domain}; export with this modality"),
             )
             .into()),
@@ -150,7 +146,7 @@ impl Source {
 
     /// The pose of an image.
     pub(crate) fn pose(&self, image: &DatasetImage) -> Result<PoseFile> {
-        Ok(read_pose(self.files.checked(&image.path(&self.layout, Domain::Pose))?)?)
+        Ok(read_pose(self.data.files.checked(&image.path(&self.data.layout, Domain::Pose))?)?)
     }
 
     /// The size of an image in pixels.
@@ -158,18 +154,18 @@ impl Source {
     /// # Panics
     /// If the image has no PNG file.
     pub(crate) fn size(&self, image: &DatasetImage) -> Result<(u32, u32)> {
-        let size = image.size(&self.layout)?;
+        let size = image.size(&self.data.layout)?;
         Ok(size.expect("packages that ask for a size require an image"))
     }
 
     /// The bytes of a file of an image.
     pub(crate) fn bytes(&self, image: &DatasetImage, domain: Domain) -> Result<Vec<u8>> {
-        Ok(self.files.read_bytes(&image.path(&self.layout, domain))?)
+        Ok(self.data.files.read_bytes(&image.path(&self.data.layout, domain))?)
     }
 
     /// The number of bytes of a file of an image.
     pub(crate) fn byte_count(&self, image: &DatasetImage, domain: Domain) -> Result<u64> {
-        Ok(self.files.bytes(&image.path(&self.layout, domain))?)
+        Ok(self.data.files.bytes(&image.path(&self.data.layout, domain))?)
     }
 
     /// Copies a file of an image.
@@ -179,34 +175,39 @@ impl Source {
 
     /// The pixels of a file of an image, 8-bit RGB.
     pub(crate) fn rgb8(&self, image: &DatasetImage, domain: Domain) -> Result<Raster<[u8; 3]>> {
-        Ok(decode_rgb8(&self.bytes(image, domain)?, &image.path(&self.layout, domain))?)
+        Ok(decode_rgb8(&self.bytes(image, domain)?, &image.path(&self.data.layout, domain))?)
     }
 
     /// The depth of an image.
     pub(crate) fn depth(&self, image: &DatasetImage) -> Result<Raster<u16>> {
-        Ok(decode_gray16(&self.bytes(image, Domain::Depth)?, &image.path(&self.layout, Domain::Depth))?)
+        Ok(decode_gray16(&self.bytes(image, Domain::Depth)?, &image.path(&self.data.layout, Domain::Depth))?)
     }
 
     /// The candidate views of an area.
     pub(crate) fn views(&self, area: u32) -> Result<Vec<ViewRecord>> {
-        Ok(read_views(self.files.checked(&self.layout.views_json(area))?)?)
+        Ok(read_views(self.data.files.checked(&self.data.layout.views_json(area))?)?)
     }
 
     /// Points of an area's cloud, at most `most`.
     pub(crate) fn points(&self, area: u32, most: usize) -> Result<PointCloud> {
         // Only a small part of a large cloud is read.
-        Ok(s3d_io::cloud::read_point_sample(self.files.sized(&self.layout.point_cloud(area))?, most)?)
+        Ok(s3d_io::cloud::read_point_sample(
+            self.data.files.sized(&self.data.layout.point_cloud(area))?,
+            most,
+        )?)
     }
 
     /// The files that say what the numbers in images mean, by name: the conventions, the label table if there
     /// are labels, and the taxonomy unless it is S3DIS's.
     pub(crate) fn tables(&self) -> Result<Vec<(&'static str, Vec<u8>)>> {
-        let mut tables = vec![("conventions.json", self.files.read_bytes(&self.layout.conventions())?)];
+        let mut tables =
+            vec![("conventions.json", self.data.files.read_bytes(&self.data.layout.conventions())?)];
         if self.is_labelled {
-            tables.push(("semantic_labels.json", self.files.read_bytes(&self.layout.labels_json())?));
+            tables
+                .push(("semantic_labels.json", self.data.files.read_bytes(&self.data.layout.labels_json())?));
         }
-        if !self.taxonomy.is_s3dis() {
-            tables.push(("taxonomy.json", self.files.read_bytes(&self.layout.taxonomy_json())?));
+        if !self.data.taxonomy.is_s3dis() {
+            tables.push(("taxonomy.json", self.data.files.read_bytes(&self.data.layout.taxonomy_json())?));
         }
         Ok(tables)
     }
@@ -216,10 +217,37 @@ impl Source {
         if !self.is_labelled {
             return Ok(None);
         }
-        let path = self.layout.labels_json();
+        let path = self.data.layout.labels_json();
         let table = self
+            .data
             .taxonomy
-            .table_from_names(&read_labels(self.files.checked(&path)?)?);
+            .table_from_names(&read_labels(self.data.files.checked(&path)?)?);
         Ok(Some(table.map_err(|e| FileError::format(&path, e.to_string()))?))
+    }
+}
+
+/// Depth in millimetres, rounded; 0 if missing or beyond 65.535 m.
+pub(crate) fn millimetres(depth: &Raster<u16>, units_per_m: f64) -> Raster<u16> {
+    let mut converted = depth.clone();
+    for depth in converted.pixels_mut() {
+        let mm = (f64::from(*depth) * (1000.0 / units_per_m)).round();
+        *depth = if *depth == MISSING_DEPTH || mm > f64::from(u16::MAX) {
+            0
+        } else {
+            mm as u16
+        };
+    }
+    converted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_in_millimetres() {
+        let depth = Raster::from_vec(3, 2, vec![0, 512, 1, 65_535, 33_553, 33_555]);
+        assert_eq!(millimetres(&depth, 512.0).pixels(), [0, 1000, 2, 0, 65_533, 0]);
+        assert_eq!(millimetres(&depth, 1000.0).pixels(), [0, 512, 1, 0, 33_553, 33_555]);
     }
 }

@@ -74,7 +74,7 @@ pub(crate) fn rooms_of(layout: &Layout, taxonomy: &Taxonomy, area: u32) -> Resul
 }
 
 /// Reads the points of a file, and hands them out piece by piece.
-pub(super) fn for_each_piece(
+pub(crate) fn for_each_piece(
     source: &Source<'_>,
     path: &Path,
     mut each: impl FnMut(&PointCloud) -> Result<()>,
@@ -90,7 +90,7 @@ pub(super) fn for_each_piece(
 }
 
 /// Returns the number of points of an instance, and their smallest coordinates.
-pub(super) fn count_and_min(source: &Source<'_>, path: &Path) -> Result<(u64, [f64; 3])> {
+pub(crate) fn count_and_min(source: &Source<'_>, path: &Path) -> Result<(u64, [f64; 3])> {
     let mut count = 0;
     let mut min = [f64::INFINITY; 3];
     for_each_piece(source, path, |piece| {

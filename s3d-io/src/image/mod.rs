@@ -13,6 +13,8 @@
 //! | [`encode_gray8`] | 8 bits, masks | `mask_valid`, `edge_occlusion`, `edge_instance` |
 //! | [`encode_levels8`] | 8 bits, shades | `reshading`, `edge_texture`, `keypoints2d`, `keypoints3d` |
 //! | [`encode_xyz_half`], [`encode_xyz_float`] | 3 × 16 or 32 bits, floats | `global_xyz` |
+//! | [`encode_depth_float`] | 32 bits, floats | none: packages have it |
+//! | [`encode_jpeg`] | 3 × 8 bits, with loss | none: packages have it |
 //!
 //! [`Compression`] chooses between time and size, and [`Content`] says what the image shows. The bytes depend
 //! on nothing else, and are the same on every machine. Source: [`crate::formats`], "What is written".
@@ -28,6 +30,8 @@
 //! ```
 
 pub(crate) mod compression;
+#[cfg(feature = "exr")]
+mod depth_exr;
 #[cfg(feature = "exr")]
 mod exr;
 pub(crate) mod find;
@@ -50,6 +54,10 @@ pub use self::png::{
     read_palette8, read_rgb8, write_gray16, write_rgb8,
 };
 pub use compression::{Compression, UnknownCompression};
+#[cfg(feature = "exr")]
+pub use depth_exr::encode_depth_float;
+#[cfg(feature = "texture")]
+pub use jpeg::encode_jpeg;
 pub use s3d_label::pretty_color;
 #[cfg(feature = "texture")]
 pub use texture::TextureFile;

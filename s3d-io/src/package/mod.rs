@@ -7,6 +7,10 @@
 //! | nerfstudio | `transforms.json`: [`write_nerfstudio`] |
 //! | COCO | panoptic annotations: [`coco_panoptic`], [`write_coco`] |
 //! | Parquet | a table of all images: [`write_image_index`] |
+//! | DUSt3R, MUSt3R | scenes, images and pairs: [`write_dust3r`] |
+//! | WAI (MapAnything) | a scene's cameras, and who sees what: [`write_wai_scene`], [`write_wai_covisibility`] |
+//! | VGGT | annotation files: [`write_vggt_annotations`] |
+//! | Hugging Face | Parquet files with the images inside, and what describes them: [`ImageTable`], [`write_huggingface_card`], [`write_croissant`] |
 //!
 //! The same input gives the same bytes. [`dataset_images`](crate::dataset::dataset_images) lists the images;
 //! this module reads none of them.
@@ -27,10 +31,18 @@ mod coco;
 mod coco_instances;
 #[cfg(feature = "colmap")]
 mod colmap;
+#[cfg(feature = "multiview")]
+mod dust3r;
+#[cfg(feature = "huggingface")]
+mod huggingface;
 #[cfg(feature = "nerfstudio")]
 mod nerfstudio;
 #[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(feature = "multiview")]
+mod vggt;
+#[cfg(feature = "multiview")]
+mod wai;
 #[cfg(feature = "webdataset")]
 mod webdataset;
 
@@ -44,8 +56,18 @@ pub use coco::{
 pub use coco_instances::{coco_masks, write_coco_instances};
 #[cfg(feature = "colmap")]
 pub use colmap::{ColmapImage, ColmapModel};
+#[cfg(feature = "multiview")]
+pub use dust3r::{Dust3rImage, Dust3rScene, write_dust3r};
+#[cfg(feature = "huggingface")]
+pub use huggingface::{
+    HuggingfaceConfig, HuggingfaceSet, ImageRecord, ImageTable, write_croissant, write_huggingface_card,
+};
 #[cfg(feature = "nerfstudio")]
 pub use nerfstudio::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
+#[cfg(feature = "multiview")]
+pub use vggt::{VggtImage, write_vggt_annotations};
+#[cfg(feature = "multiview")]
+pub use wai::{WaiFrame, write_wai_covisibility, write_wai_scene};
 #[cfg(feature = "webdataset")]
 pub use webdataset::{
     ShardEntry, ShardLimits, TarWriter, plan_shards, sample_key, sample_member, write_shard_index,

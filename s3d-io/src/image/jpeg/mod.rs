@@ -1,9 +1,13 @@
-//! Finds JPEG files that are cut off or damaged. The decoder draws something in any case, without an error.
+//! Writes JPEG files, and finds those that are cut off or damaged. The decoder draws something in any case,
+//! without an error.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 mod bits;
+mod encode;
 mod scans;
+
+pub use encode::encode_jpeg;
 
 use crate::image::jpeg::scans::{Damage, damage};
 use memchr::memchr;

@@ -2,21 +2,17 @@
 
 #![expect(clippy::indexing_slicing, reason = "a writer: its columns are its own")]
 
+pub(crate) mod columns;
+pub(crate) mod table;
+
 use crate::dataset::domain::Domain;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::fs::atomic::AtomicFile;
-use parquet::basic::Compression;
-use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
-use parquet::errors::ParquetError;
-use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
-use parquet::schema::parser::parse_message_type;
+use columns::{Column, Named, columns, text};
 use s3d_label::Class;
-use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
-use std::sync::Arc;
+use table::TableWriter;
 
 /// The number of rows in a row group, of which one is in memory as columns at a time.
 const GROUP: usize = 1 << 16;
@@ -76,96 +72,6 @@ pub struct SemanticRow {
     pub instances: u32,
 }
 
-/// The values of a column for some rows.
-enum Column {
-    Int(Vec<Option<i32>>),
-    Float(Vec<Option<f64>>),
-    Text(Vec<Option<ByteArray>>),
-    List(Vec<Option<Vec<f64>>>),
-}
-
-/// Returns the columns of some rows: the name, whether it is never null, and the values.
-fn columns(classes: &[Class], rows: &[ImageRow], with_photographs: bool) -> Vec<(String, bool, Column)> {
-    let mut all = Vec::new();
-    macro_rules! column {
-        ($name:expr, $required:expr, $kind:ident, $value:expr) => {
-            all.push(($name, $required, Column::$kind(rows.iter().map($value).collect())))
-        };
-    }
-
-    column!("area".to_owned(), true, Int, |r| Some(int(r.area)));
-    column!("camera_uuid".to_owned(), true, Text, |r| Some(text(&r.camera_uuid)));
-    column!("room".to_owned(), true, Text, |r| Some(text(&r.room)));
-    column!("room_type".to_owned(), true, Text, |r| Some(text(&r.room_type)));
-    column!("room_number".to_owned(), true, Int, |r| Some(int(r.room_number)));
-    column!("kind".to_owned(), true, Text, |r| {
-        Some(text(if r.frame_num.is_some() { "view" } else { "panorama" }))
-    });
-    column!("frame_num".to_owned(), false, Int, |r| r.frame_num.map(int));
-
-    for (i, domain) in Domain::ALL.into_iter().enumerate() {
-        column!(domain.folder().to_owned(), false, Text, |r| r.files[i].as_deref().map(text));
-    }
-    for (i, name) in ["width", "height"].into_iter().enumerate() {
-        column!(name.to_owned(), false, Int, |r| r.size.map(|s| int(s[i])));
-    }
-
-    column!("fov_rad".to_owned(), false, Float, |r| r.fov_rad);
-    for (i, name) in ["yaw_rad", "pitch_rad"].into_iter().enumerate() {
-        column!(name.to_owned(), false, Float, |r| r.yaw_pitch_rad.map(|v| v[i]));
-    }
-    for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
-        column!(name.to_owned(), false, Float, |r| r.location.map(|v| v[i]));
-    }
-    column!("k".to_owned(), false, List, |r| r.k.map(|m| m.to_vec()));
-    column!("rt".to_owned(), false, List, |r| r.rt.map(|m| m.to_vec()));
-    column!("selection_entropy".to_owned(), false, Float, |r| r.selection_entropy);
-    column!("entropy".to_owned(), false, Float, |r| r.semantic.as_ref().map(|s| s.entropy));
-    column!("coverage".to_owned(), false, Float, |r| r.coverage);
-
-    for class in classes {
-        column!(format!("share_{class}"), false, Float, |r| {
-            r.semantic.as_ref().and_then(|s| s.shares.get(class.index()).copied())
-        });
-    }
-    column!("share_unlabelled".to_owned(), false, Float, |r| r.semantic.as_ref().map(|s| s.unlabelled));
-    column!("instances".to_owned(), false, Int, |r| r.semantic.as_ref().map(|s| int(s.instances)));
-    for (i, name) in ["depth_min_m", "depth_mean_m", "depth_max_m"].into_iter().enumerate() {
-        column!(name.to_owned(), false, Float, |r| r.depth_m.map(|v| v[i]));
-    }
-    if with_photographs {
-        column!("photograph".to_owned(), false, Text, |r| r.photograph.as_deref().map(text));
-    }
-    all
-}
-
-fn text(text: &str) -> ByteArray {
-    ByteArray::from(text.as_bytes().to_vec())
-}
-
-fn int(value: u32) -> i32 {
-    value as i32
-}
-
-/// Returns the schema in Parquet's notation.
-fn schema(columns: &[(String, bool, Column)]) -> String {
-    let mut text = String::from("message images {\n");
-    for (name, required, column) in columns {
-        let repetition = if *required { "required" } else { "optional" };
-        let _ = match column {
-            Column::Int(_) => writeln!(text, "{repetition} int32 {name};"),
-            Column::Float(_) => writeln!(text, "{repetition} double {name};"),
-            Column::Text(_) => writeln!(text, "{repetition} binary {name} (STRING);"),
-            Column::List(_) => writeln!(
-                text,
-                "{repetition} group {name} (LIST) {{ repeated group list {{ required double element; }} }}"
-            ),
-        };
-    }
-    text.push('}');
-    text
-}
-
 /// Writes the table of images, a row for each image in the given order, and returns the size of the file in
 /// bytes.
 ///
@@ -194,101 +100,32 @@ pub fn write_image_index_to(
     classes: &[Class],
     rows: &[ImageRow],
 ) -> Result<()> {
-    let path = name;
-    let failed = |e| write_error(path, e);
-
     let about =
         "A row an image. Paths are below the data set's folder; metres, radians, nats; shares of all pixels.";
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::SNAPPY)
-        .set_created_by(concat!("s3d version ", env!("CARGO_PKG_VERSION")).to_owned())
-        .set_key_value_metadata(Some(vec![KeyValue::new("description".to_owned(), about.to_owned())]))
-        .build();
-
     let with_photographs = rows.iter().any(|r| r.photograph.is_some());
-    let schema = parse_message_type(&schema(&columns(classes, &[], with_photographs))).map_err(failed)?;
-    let mut writer =
-        SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
-
-    for rows in rows.chunks(GROUP) {
-        let mut group = writer.next_row_group().map_err(failed)?;
-        for (_, required, column) in columns(classes, rows, with_photographs) {
-            let fewer = || failed(ParquetError::General("the schema has fewer columns".to_owned()));
-            let mut out = group.next_column().map_err(failed)?.ok_or_else(fewer)?;
-            write_column(&mut out, required, column).map_err(failed)?;
-            out.close().map_err(failed)?;
-        }
-        group.close().map_err(failed)?;
-    }
-    writer.close().map_err(failed)?;
-    Ok(())
-}
-
-fn write_error(path: &Path, e: ParquetError) -> Error {
-    let e = match e {
-        ParquetError::External(e) => match e.downcast::<std::io::Error>() {
-            Ok(e) => *e,
-            Err(e) => std::io::Error::other(e),
-        },
-        e => std::io::Error::other(e),
+    let of_rows = |rows: &[ImageRow]| {
+        let rows: Vec<&ImageRow> = rows.iter().collect();
+        columns(classes, &rows, with_photographs, paths(&rows))
     };
-    Error::io(path, "write", e)
-}
 
-/// Writes the values of a column, and the definition levels that tell nulls from values.
-fn write_column(
-    out: &mut SerializedColumnWriter<'_>,
-    required: bool,
-    column: Column,
-) -> std::result::Result<(), ParquetError> {
-    let levels = |levels: &Vec<i16>| (!required).then(|| levels.clone());
-
-    match column {
-        Column::Int(values) => {
-            let (there, values) = split(values);
-            out.typed::<Int32Type>()
-                .write_batch(&values, levels(&there).as_deref(), None)?;
-        }
-        Column::Float(values) => {
-            let (there, values) = split(values);
-            out.typed::<DoubleType>()
-                .write_batch(&values, levels(&there).as_deref(), None)?;
-        }
-        Column::Text(values) => {
-            let (there, values) = split(values);
-            out.typed::<ByteArrayType>()
-                .write_batch(&values, levels(&there).as_deref(), None)?;
-        }
-        Column::List(lists) => {
-            // The definition level is 0 for null, 1 for an empty list and 2 for an element. The repetition
-            // level 0 begins a list.
-            let mut definition = Vec::new();
-            let mut repetition = Vec::new();
-            let mut values = Vec::new();
-
-            for list in lists {
-                let list_definition = i16::from(list.is_some());
-                let list = list.unwrap_or_default();
-                definition.extend(if list.is_empty() {
-                    vec![list_definition]
-                } else {
-                    vec![2; list.len()]
-                });
-                repetition.extend((0..list.len().max(1)).map(|i| i16::from(i > 0)));
-                values.extend(list);
-            }
-
-            out.typed::<DoubleType>()
-                .write_batch(&values, Some(&definition), Some(&repetition))?;
-        }
+    let about = [("description", about.to_owned())];
+    let mut table = TableWriter::begin(file, name, &of_rows(&[]), &about)?;
+    for rows in rows.chunks(GROUP) {
+        table.group(of_rows(rows))?;
     }
-    Ok(())
+    table.finish().map(drop)
 }
 
-/// Splits off the values that are not null. The level of a value is 1 and the level of a null is 0.
-fn split<T>(values: Vec<Option<T>>) -> (Vec<i16>, Vec<T>) {
-    let levels = values.iter().map(|v| i16::from(v.is_some())).collect();
-    (levels, values.into_iter().flatten().collect())
+/// Returns the columns of the paths of files, one for each modality.
+fn paths(rows: &[&ImageRow]) -> Vec<Named> {
+    let of = |i: usize| rows.iter().map(|r| r.files[i].as_deref().map(text)).collect();
+    let all = Domain::ALL.into_iter().enumerate();
+    all.map(|(i, domain)| Named {
+        name: domain.folder().to_owned(),
+        required: false,
+        values: Column::Text(of(i)),
+    })
+    .collect()
 }
 
 #[cfg(test)]
