@@ -9,6 +9,7 @@ mod nerfstudio;
 mod options;
 mod parquet;
 mod pointcept;
+mod scene_graph;
 mod source;
 mod webdataset;
 
@@ -22,7 +23,8 @@ use crate::store::parent_of;
 use destination::{About, Destination};
 pub use options::{
     ClassList, CocoOptions, ColmapOptions, DepthFiles, HuggingfaceOptions, NerfstudioOptions, PackOptions,
-    Package, PackageArguments, PackageKind, PackedImages, ParquetOptions, ShardPrefix, WebdatasetOptions,
+    Package, PackageArguments, PackageKind, PackedImages, ParquetOptions, SceneGraphOptions, ShardPrefix,
+    WebdatasetOptions,
 };
 use s3d_geom::PointCloud;
 use s3d_io::fs::create_dir;
@@ -74,6 +76,7 @@ pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Cont
         Package::Wai => into_folder(&|folder| multiview::wai::pack(ctx, &source, folder))?,
         Package::Vggt => into_folder(&|folder| multiview::vggt::pack(ctx, &source, folder))?,
         Package::Pointcept => into_folder(&|folder| pointcept::pack(ctx, &source, folder))?,
+        Package::SceneGraph(_) => into_folder(&|folder| scene_graph::pack(ctx, &source, folder))?,
         Package::Parquet(_) => pack_table(ctx, &source, dataset, &place, options.overwrite)?,
     }
 

@@ -7,8 +7,8 @@ use crate::record::data_set::DataSet;
 use s3d_geom::{PointCloud, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    DatasetImage, Domain, Frame, Layout, PhotographRecord, PoseFile, ViewRecord, WorldOffsets,
-    check_images_complete, read_labels, read_pose, read_views,
+    DatasetImage, Domain, Frame, Layout, ObjectsFile, PhotographRecord, PoseFile, ViewRecord, WorldOffsets,
+    check_images_complete, read_labels, read_objects, read_pose, read_views,
 };
 use s3d_io::fs::write_bytes;
 use s3d_io::image::{decode_gray16, decode_rgb8};
@@ -181,6 +181,12 @@ impl Source {
     /// The depth of an image.
     pub(crate) fn depth(&self, image: &DatasetImage) -> Result<Raster<u16>> {
         Ok(decode_gray16(&self.bytes(image, Domain::Depth)?, &image.path(&self.data.layout, Domain::Depth))?)
+    }
+
+    /// The objects of an image.
+    pub(crate) fn objects(&self, image: &DatasetImage) -> Result<ObjectsFile> {
+        let path = image.path(&self.data.layout, Domain::Objects);
+        Ok(read_objects(self.data.files.checked(&path)?)?)
     }
 
     /// The candidate views of an area.

@@ -85,8 +85,7 @@ fn frame(view: &View<'_>) -> WaiFrame {
 fn scene_list(scenes: &[String]) -> Vec<u8> {
     const HEAD: usize = 128;
     let longest = scenes.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(1);
-    let about =
-        format!("{{'descr': '<U{longest}', 'fortran_order': False, 'shape': ({},), }}", scenes.len());
+    let about = format!("{{'descr': '<U{longest}', 'fortran_order': False, 'shape': ({},), }}", scenes.len());
 
     let mut file = b"\x93NUMPY\x01\x00".to_vec();
     file.extend((HEAD as u16 - 10).to_le_bytes());

@@ -4,7 +4,7 @@ use super::kind::{DepthFiles, Holds, PackageKind, PackedImages};
 use super::names::{ClassList, ShardPrefix};
 use super::{
     CocoOptions, ColmapOptions, HuggingfaceOptions, NerfstudioOptions, Package, ParquetOptions,
-    WebdatasetOptions,
+    SceneGraphOptions, WebdatasetOptions,
 };
 use crate::error::{Result, UsageError};
 #[cfg(feature = "clap")]
@@ -103,6 +103,7 @@ impl PackageArguments {
             PackageKind::Wai => Package::Wai,
             PackageKind::Vggt => Package::Vggt,
             PackageKind::Pointcept => Package::Pointcept,
+            PackageKind::SceneGraph => Package::SceneGraph(SceneGraphOptions { images }),
         })
     }
 

@@ -26,6 +26,8 @@ pub enum PackageKind {
     Vggt,
     /// [`Package::Pointcept`](super::Package::Pointcept).
     Pointcept,
+    /// [`Package::SceneGraph`](super::Package::SceneGraph).
+    SceneGraph,
 }
 
 /// The images that a kind of package can hold.
@@ -61,6 +63,7 @@ const TABLE: &[Row] = &[
     row(PackageKind::Wai, "wai", "WAI", Holds::Views),
     row(PackageKind::Vggt, "vggt", "VGGT", Holds::Views),
     row(PackageKind::Pointcept, "pointcept", "Pointcept", Holds::Nothing),
+    row(PackageKind::SceneGraph, "scene-graph", "a scene graph", Holds::Images),
 ];
 
 const fn row(kind: PackageKind, name: &'static str, title: &'static str, holds: Holds) -> Row {
@@ -69,7 +72,8 @@ const fn row(kind: PackageKind, name: &'static str, title: &'static str, holds: 
 
 impl PackageKind {
     /// The words of all kinds, for a help text.
-    pub const WORDS: &str = "webdataset|colmap|nerfstudio|coco|parquet|huggingface|dust3r|wai|vggt|pointcept";
+    pub const WORDS: &str =
+        "webdataset|colmap|nerfstudio|coco|parquet|huggingface|dust3r|wai|vggt|pointcept|scene-graph";
 
     /// The row of the kind. Each has one: a test asks.
     fn row(self) -> &'static Row {

@@ -48,6 +48,8 @@ pub enum Package {
     Vggt,
     /// The points of each room as a folder of Pointcept's NPY arrays.
     Pointcept,
+    /// The building, rooms, objects and cameras of each area, and what is between them.
+    SceneGraph(SceneGraphOptions),
 }
 
 /// Options of [`Package::Webdataset`].
@@ -125,6 +127,13 @@ pub struct HuggingfaceOptions {
     pub modalities: Option<Vec<Domain>>,
 }
 
+/// Options of [`Package::SceneGraph`].
+#[derive(Clone, Debug, Default)]
+pub struct SceneGraphOptions {
+    /// The images that are its cameras.
+    pub images: PackedImages,
+}
+
 impl Package {
     /// The kind of the package.
     pub fn kind(&self) -> PackageKind {
@@ -139,6 +148,7 @@ impl Package {
             Self::Wai => PackageKind::Wai,
             Self::Vggt => PackageKind::Vggt,
             Self::Pointcept => PackageKind::Pointcept,
+            Self::SceneGraph(_) => PackageKind::SceneGraph,
         }
     }
 
@@ -152,6 +162,7 @@ impl Package {
             Self::Parquet(options) => Some(options.images),
             Self::Huggingface(options) => Some(options.images),
             Self::Pointcept => None,
+            Self::SceneGraph(options) => Some(options.images),
         }
     }
 }

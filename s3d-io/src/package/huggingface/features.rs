@@ -32,7 +32,7 @@ pub(super) fn kind_of(domain: Domain) -> Option<Kind> {
     match (domain, domain.pixels()) {
         (Domain::Objects, _) => Some(Kind::Text),
         (_, Some(PixelKind::Gray16)) => Some(Kind::Depth),
-        (_, Some(PixelKind::Rgb8 | PixelKind::Palette8)) => Some(Kind::Image),
+        (_, Some(PixelKind::Rgb8 | PixelKind::Gray8 | PixelKind::Palette8)) => Some(Kind::Image),
         _ => None,
     }
 }
@@ -106,6 +106,28 @@ fn meaning_of_modality(domain: Domain, units_per_m: f64) -> String {
             "JSON: the instances of the image with amodal masks, occlusion and boxes.".to_owned()
         }
         Domain::GlobalXyz | Domain::Pose => format!("The file of {domain}."),
+        Domain::DepthEuclidean => format!(
+            "The distance from the camera in units of 1/{units_per_m} m, decoded as 32-bit floats. 65535 where \
+             nothing was seen or farther."
+        ),
+        Domain::BoundaryDistance => {
+            "The distance to the nearest border between instances in 64ths of a pixel. \
+            65535 where nothing was seen."
+                .to_owned()
+        }
+        Domain::SegmentUnsup2d | Domain::SegmentUnsup25d => {
+            "The number of a segment, from 1. 0 where nothing was seen.".to_owned()
+        }
+        Domain::Reshading
+        | Domain::PrincipalCurvature
+        | Domain::EdgeOcclusion
+        | Domain::EdgeTexture
+        | Domain::Keypoints2d
+        | Domain::Keypoints3d
+        | Domain::MaskValid
+        | Domain::EdgeInstance => {
+            format!("{domain} is in conventions.json: what its values mean, and which one sees nothing.")
+        }
     }
 }
 
