@@ -131,7 +131,7 @@ def test_cameras_see_what_their_images_show(made):
 def test_what_is_not_known_is_null(s3d, demo, tmp_path):
     package = tmp_path / "graph"
     done = s3d("pack", demo, "--to", "scene-graph", "-o", package)
-    assert "--modalities objects" in done.stderr
+    assert "need the modality objects" in done.stderr
     relations = json.loads((package / "area_1.json").read_text())["relations"]
     assert relations["orders"] is None and relations["occlusions"] is None
     assert len(relations["adjacent_rooms"]) == 3

@@ -37,10 +37,7 @@ pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) ->
 
     let mut notes = vec!["an area a file; lengths in metres in the world of the data set".to_owned()];
     if !source.has(Domain::Objects) {
-        notes.push(
-            "orders and occlusions are null: export with --modalities objects, among others, to have them"
-                .to_owned(),
-        );
+        notes.push("orders and occlusions are null: they need the modality objects".to_owned());
     }
     Ok(notes)
 }

@@ -26,7 +26,7 @@ pub(super) struct BuildingNode {
 
 #[derive(Debug, Serialize)]
 pub(super) struct RoomNode {
-    /// The name, such as `office_3`.
+    /// The name, such as "office_3".
     pub(super) id: String,
     #[serde(rename = "type")]
     pub(super) kind: String,
@@ -41,7 +41,7 @@ pub(super) struct RoomNode {
 
 #[derive(Debug, Serialize)]
 pub(super) struct ObjectNode {
-    /// The label, such as `chair_3_office_1_1`.
+    /// the label, such as "chair_3_office_1_1".
     pub(super) id: String,
     /// The index in `semantic_labels.json`.
     pub(super) label_index: u32,
