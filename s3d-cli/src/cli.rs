@@ -145,8 +145,8 @@ pub(crate) enum Command {
     /// Print what a scene holds, and what looks wrong in it.
     #[command(after_help = "Examples:\n  s3d info scan/scene.toml\n  s3d info scan.glb")]
     Info(info::InfoArgs),
-    /// Package a data set for a trainer: as WebDataset or Parquet, or for Hugging Face, COLMAP, nerfstudio, COCO,
-    /// DUSt3R, MapAnything, VGGT or Pointcept.
+    /// Package a data set for a trainer: as WebDataset or Parquet, or for Hugging Face, COLMAP, nerfstudio,
+    /// COCO, DUSt3R, MapAnything, VGGT or Pointcept, or as a scene graph.
     #[command(
         after_help = concat!(
             "Examples:\n",

@@ -12,8 +12,8 @@
 //! | `--score MESH.ply` | writes nothing; prints how the mesh agrees with the scene, as a line of JSON |
 //! | `--truth` | writes the scene's mesh beside, as `rgb.obj` |
 //!
-//! A scene is `demo`, its `office` alone, `two-storeys`, a generated `area_N`, a building of so many rooms, or
-//! the `.obj` (Y-up) of a mesh with `cameras.csv` beside it.
+//! A scene is `demo`, its `office` alone, `two-storeys`, a generated `area_N`, a building of so many rooms,
+//! or the `.obj` (Y-up) of a mesh with `cameras.csv` beside it.
 //!
 //! Of a score, `doors` is the share of the doors' seen surface that lies within 1 cm of the mesh, and `legs`
 //! the share of what stands under tables.

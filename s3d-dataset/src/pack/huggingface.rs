@@ -18,8 +18,8 @@ use std::path::Path;
 /// The largest file: the Hub's own conversions split at 500 MB.
 const FILE: ShardLimits = ShardLimits { max_bytes: 500_000_000, max_samples: 10_000 };
 
-/// The largest row group, which is in memory at once here and at readers: `datasets` writes images in groups of
-/// 100 rows.
+/// The largest row group, which is in memory at once here and at readers: `datasets` writes images in groups
+/// of 100 rows.
 const GROUP: ShardLimits = ShardLimits { max_bytes: 64_000_000, max_samples: 100 };
 
 /// Writes the folder. Returns notes on how to use it.

@@ -1,5 +1,5 @@
-//! `s3d pack --to pointcept`: the rooms as Pointcept's own preprocessing of S3DIS leaves them, a folder of NPY
-//! arrays each.
+//! `s3d pack --to pointcept`: the rooms as Pointcept's own preprocessing of S3DIS leaves them, a folder of
+//! NPY arrays each.
 //!
 //! Source: `Pointcept/Pointcept` at d74c646, `pointcept/datasets/preprocessing/s3dis/preprocess_s3dis.py` and
 //! `pointcept/datasets/defaults.py`.
@@ -67,8 +67,8 @@ pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) ->
     ])
 }
 
-/// Returns the rooms of an area that have points. Instances are in the order of their files' names, which is the
-/// order of Pointcept's numbers.
+/// Returns the rooms of an area that have points. Instances are in the order of their files' names, which is
+/// the order of Pointcept's numbers.
 fn rooms_of(source: &Source, area: u32) -> Result<Vec<RoomFiles>> {
     let folder = source.data.layout.s3dis_area_dir(area);
     let is_instance = |path: &PathBuf| path.parent().is_some_and(|parent| parent.ends_with("Annotations"));
@@ -84,8 +84,8 @@ fn rooms_of(source: &Source, area: u32) -> Result<Vec<RoomFiles>> {
     Ok(rooms)
 }
 
-/// Writes the arrays of a room: N × 3 coordinates (`<f4`, metres), colours (`|u1`) and normals (`<f4`, those of
-/// the nearest faces), N × 1 classes and instances (`<i2`).
+/// Writes the arrays of a room: N × 3 coordinates (`<f4`, metres), colours (`|u1`) and normals (`<f4`, those
+/// of the nearest faces), N × 1 classes and instances (`<i2`).
 fn write_room(
     tree: &profile::Source<'_>,
     faces: &NearestFaces<'_>,

@@ -7,8 +7,8 @@ use exr::prelude::{Blocks, Compression, SmallVec, WritableImage};
 use s3d_geom::Raster;
 use std::io::Cursor;
 
-/// Encodes depth as an OpenEXR file of 32-bit floats. Its one channel is Y, which readers of gray images look for.
-/// Scan lines run from the top; the compression is ZIP.
+/// Encodes depth as an OpenEXR file of 32-bit floats. Its one channel is Y, which readers of gray images look
+/// for. Scan lines run from the top; the compression is ZIP.
 ///
 /// # Panics
 /// If the image has no pixel.

@@ -18,7 +18,8 @@ pub struct WaiFrame {
     pub name: String,
     /// The path of its colours below the scene's folder.
     pub image: String,
-    /// The path of its depth below the scene's folder: OpenEXR, metres along the optical axis, 0 where missing.
+    /// The path of its depth below the scene's folder: OpenEXR, metres along the optical axis, 0 where
+    /// missing.
     pub depth: String,
     /// Width and height in pixels.
     pub size: (u32, u32),
@@ -69,10 +70,11 @@ fn frame(frame: &WaiFrame) -> Value {
     })
 }
 
-/// Writes the covisibility of `count` images to `folder`, a row of floats for each image: the share of its points
-/// that each image sees. `overlaps` are the entries that are not 0, sorted: two images and the share. An image sees
-/// all of its own points. Returns the size of the file in bytes. Its name is `pairwise_covisibility--NxN.npy`,
-/// from which the loader takes the size, and its numbers begin at byte 128, where the loader looks for them.
+/// Writes the covisibility of `count` images to `folder`, a row of floats for each image: the share of its
+/// points that each image sees. `overlaps` are the entries that are not 0, sorted: two images and the share.
+/// An image sees all of its own points. Returns the size of the file in bytes. Its name is
+/// `pairwise_covisibility--NxN.npy`, from which the loader takes the size, and its numbers begin at byte 128,
+/// where the loader looks for them.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).

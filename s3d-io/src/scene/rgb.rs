@@ -17,8 +17,9 @@ pub struct PictureSource {
     /// [`PictureKind::E57`]: the transform from the frame of the file to the world, a rotation, a shift and a
     /// scale. It is the transform of `[cameras]` if the scan locations are of the same file.
     pub world_from_file: DAffine3,
-    /// [`PictureKind::E57`]: a table of motions, `uuid,x,y,z,qx,qy,qz,qw` a line: the pictures of the location
-    /// with this uuid are turned by the quaternion and then shifted, as a scan whose pose was refined is.
+    /// [`PictureKind::E57`]: a table of motions, `uuid,x,y,z,qx,qy,qz,qw` a line: the pictures of the
+    /// location with this uuid are turned by the quaternion and then shifted, as a scan whose pose was
+    /// refined is.
     pub motions: Option<PathBuf>,
     /// How the pictures become colours.
     pub options: PictureOptions,

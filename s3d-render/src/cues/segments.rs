@@ -197,8 +197,8 @@ impl Grid {
     }
 }
 
-/// Returns edges from the smallest difference on; equal ones in their order. Differences are small numbers, so
-/// counting sorts them.
+/// Returns edges from the smallest difference on; equal ones in their order. Differences are small numbers,
+/// so counting sorts them.
 fn ascending(edges: &[(u32, u32, u16)]) -> Vec<([u32; 2], f32)> {
     let mut starts = vec![0u32; usize::from(MOST) + 2];
     for (_, _, difference) in edges {

@@ -20,8 +20,8 @@ pub struct LabelScores {
 
 impl Truth<'_> {
     /// Compares labels of a mesh's faces with the classes of the scene. Samples of the mesh within 5 cm of
-    /// the scene count, and the nearest face of the scene has the right class. A face without a label, `None`,
-    /// is wrong.
+    /// the scene count, and the nearest face of the scene has the right class. A face without a label,
+    /// `None`, is wrong.
     ///
     /// ```
     /// use s3d_synth::Building;

@@ -64,8 +64,8 @@ pub(in crate::pack) fn pack(
     ])
 }
 
-/// Returns each pair once, with the smaller share of both directions. A direction that was left out counts as 0
-/// and leaves out the pair.
+/// Returns each pair once, with the smaller share of both directions. A direction that was left out counts as
+/// 0 and leaves out the pair.
 fn both_ways(overlaps: &[(usize, usize, f32)]) -> Vec<(usize, usize, f32)> {
     let mut pairs = Vec::new();
     for &(a, b, share) in overlaps.iter().filter(|(a, b, _)| a < b) {

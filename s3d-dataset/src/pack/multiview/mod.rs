@@ -1,5 +1,5 @@
-//! Packages for trainers of networks that see several views of a scene at once: pinhole views with depth, poses
-//! and how much each sees of what another sees.
+//! Packages for trainers of networks that see several views of a scene at once: pinhole views with depth,
+//! poses and how much each sees of what another sees.
 
 pub(super) mod dust3r;
 pub(super) mod vggt;
@@ -107,8 +107,8 @@ fn known_depth(source: &Source, view: &View<'_>) -> Result<Raster<Option<u16>>> 
 /// share. Both directions are there, sorted by the first view and then the other.
 type Overlaps = Vec<(usize, usize, f32)>;
 
-/// Returns the overlaps of the views of an area: from `pairs.npz` if the data set has it, or else from the mesh,
-/// as `s3d pairs` finds them.
+/// Returns the overlaps of the views of an area: from `pairs.npz` if the data set has it, or else from the
+/// mesh, as `s3d pairs` finds them.
 fn overlaps(ctx: &Context, source: &Source, area: u32, views: &[View<'_>]) -> Result<Overlaps> {
     let path = source.data.layout.pairs_npz(area);
     let pairs = if source.data.files.record(&path).is_ok() {

@@ -4,8 +4,8 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use s3d_geom::Raster;
 
-/// Encodes 8-bit RGB as a JPEG file of this quality, from 1 to 100. The colours change a little: use PNG where
-/// they are numbers.
+/// Encodes 8-bit RGB as a JPEG file of this quality, from 1 to 100. The colours change a little: use PNG
+/// where they are numbers.
 ///
 /// # Panics
 /// If the image has no pixel, or a side of more than 65,535.

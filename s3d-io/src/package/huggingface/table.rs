@@ -17,7 +17,8 @@ use std::path::Path;
 pub struct ImageRecord {
     /// What a table of images tells of it.
     pub row: ImageRow,
-    /// The bytes of its files, one for each modality of [`HuggingfaceSet::domains`]; `None` where it has none.
+    /// The bytes of its files, one for each modality of [`HuggingfaceSet::domains`]; `None` where it has
+    /// none.
     pub files: Vec<Option<Vec<u8>>>,
 }
 
