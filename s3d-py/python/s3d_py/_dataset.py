@@ -729,9 +729,9 @@ class DataSet(Sequence[View]):
         progress: Progress = None,
     ) -> Path:
         """Packs the data set for a trainer, and returns the path of the package. `kind` is "webdataset",
-        "colmap", "nerfstudio", "coco", "parquet", "huggingface", "dust3r", "wai", "vggt", "pointcept" or "scene-graph". `to` is the folder of the package, or its file for
-        Parquet; beside the data set by default. `s3d pack --help` explains the other arguments. An empty
-        `stuff` means none.
+        "colmap", "nerfstudio", "coco", "parquet", "huggingface", "dust3r", "wai", "vggt", "pointcept" or
+        "scene-graph". `to` is the folder of the package, or its file for Parquet; beside the data set by
+        default. `s3d pack --help` explains the other arguments. An empty `stuff` means none.
         """
         how = SimpleNamespace(
             output=_path(to),
