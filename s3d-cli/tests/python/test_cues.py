@@ -17,11 +17,12 @@ CUES = (
 def data(s3d, tmp_path_factory):
     out = tmp_path_factory.mktemp("cues") / "out"
     small = ["--views", "2", "--size", "96", "--pano-width", "192", "--points-per-m2", "50"]
-    s3d("demo", "-o", str(out), *small, "--xyz", "float", "--modalities", "rgb,depth,normal,semantic,global_xyz,pose," + CUES)
+    others = "rgb,depth,normal,semantic,global_xyz,pose,"
+    s3d("demo", "-o", str(out), *small, "--xyz", "float", "--modalities", others + CUES)
     spec = importlib.util.spec_from_file_location("utils_of_cues", out / "assets" / "utils.py")
     utils = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(utils)
-    return utils, utils.DataSet(out)
+    return utils, utils.Dataset(out)
 
 
 def images(data, most=12):
