@@ -1,4 +1,4 @@
-"""Cues from the published files, counted again with numpy and scipy: what the images of a small building say of one another."""
+"""Cues counted again from the files of a small building, with numpy and scipy."""
 
 import importlib.util
 
@@ -16,12 +16,13 @@ CUES = (
 @pytest.fixture(scope="module")
 def data(s3d, tmp_path_factory):
     out = tmp_path_factory.mktemp("cues") / "out"
-    words = ["demo", "-o", str(out), "--views", "2", "--size", "96", "--pano-width", "192", "--points-per-m2", "50"]
-    s3d(*words, "--xyz", "float", "--modalities", "rgb,depth,normal,semantic,global_xyz,pose," + CUES)
+    small = ["--views", "2", "--size", "96", "--pano-width", "192", "--points-per-m2", "50"]
+    others = "rgb,depth,normal,semantic,global_xyz,pose,"
+    s3d("demo", "-o", str(out), *small, "--xyz", "float", "--modalities", others + CUES)
     spec = importlib.util.spec_from_file_location("utils_of_cues", out / "assets" / "utils.py")
     utils = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(utils)
-    return utils, utils.DataSet(out)
+    return utils, utils.Dataset(out)
 
 
 def images(data, most=12):

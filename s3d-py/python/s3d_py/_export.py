@@ -77,7 +77,9 @@ class ExportOptions(TypedDict, total=False):
     """The score of a candidate view counts the classes of every n-th pixel along both axes; default 4."""
     modalities: list[str]
     """What to write of an image:
-    rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose, objects, depth_euclidean, reshading, principal_curvature, edge_occlusion, edge_texture, keypoints2d, keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, edge_instance, boundary_distance.
+    rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose, objects,
+    depth_euclidean, reshading, principal_curvature, edge_occlusion, edge_texture, keypoints2d,
+    keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, edge_instance, boundary_distance.
     """
     keep_all: bool
     """Writes every candidate view."""

@@ -16,7 +16,7 @@ const MIXED: f32 = 0.81;
 /// [`gray_image`](crate::gray_image) of the colours, and `wraps` says that its first column is a neighbour of
 /// its last.
 ///
-/// Source: Bay, Ess, Tuytelaars and Van Gool, "Speeded-Up Robust Features (SURF)", CVIU 110(3), 2008.
+/// Source: Bay et al., "Speeded-Up Robust Features (SURF)", CVIU 110(3), 2008.
 pub fn keypoint_image_into(gray: &Raster<u8>, wraps: bool, out: &mut Raster<u8>) {
     fit(out, gray, 0);
     if gray.is_empty() {
