@@ -67,7 +67,7 @@ pub use nerfstudio::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
 #[cfg(feature = "multiview")]
 pub use vggt::{VggtImage, write_vggt_annotations};
 #[cfg(feature = "multiview")]
-pub use wai::{WaiFrame, write_wai_covisibility, write_wai_scene};
+pub use wai::{WaiFrame, write_wai_covisibility, write_wai_scene, write_wai_scene_list};
 #[cfg(feature = "webdataset")]
 pub use webdataset::{
     ShardEntry, ShardLimits, TarWriter, plan_shards, sample_key, sample_member, write_shard_index,

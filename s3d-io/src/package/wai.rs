@@ -6,7 +6,9 @@
 #![expect(clippy::indexing_slicing, reason = "a writer: its rows are its own")]
 
 use crate::cloud::npy::NpyWriter;
+use crate::cloud::npy::write::npy_header;
 use crate::error::Result;
+use crate::fs::atomic::write_bytes;
 use crate::fs::json::write_json;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -95,6 +97,20 @@ pub fn write_wai_covisibility(folder: &Path, count: usize, overlaps: &[(usize, u
         array.put(&bytes)?;
     }
     array.finish()
+}
+
+/// Writes a list of scenes, an array of texts. Returns its size in bytes.
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io).
+pub fn write_wai_scene_list(path: &Path, scenes: &[String]) -> Result<u64> {
+    let longest = scenes.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(1);
+    let mut file = npy_header(&format!("<U{longest}"), &[scenes.len() as u64]);
+    for name in scenes {
+        let units = name.chars().map(u32::from).chain(std::iter::repeat(0)).take(longest);
+        file.extend(units.flat_map(u32::to_le_bytes));
+    }
+    write_bytes(path, &file)
 }
 
 #[cfg(test)]

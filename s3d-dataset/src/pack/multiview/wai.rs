@@ -10,7 +10,7 @@ use crate::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::encode_depth_float;
-use s3d_io::package::{WaiFrame, write_wai_covisibility, write_wai_scene};
+use s3d_io::package::{WaiFrame, write_wai_covisibility, write_wai_scene, write_wai_scene_list};
 
 /// The splits for which MapAnything's ScanNet++ loader asks for a list of scenes.
 const SPLITS: [&str; 3] = ["train", "val", "test"];
@@ -58,7 +58,7 @@ pub(in crate::pack) fn pack(
     for split in SPLITS {
         let folder = destination.path().join("metadata").join(split);
         create_dir(&folder)?;
-        write_bytes(&folder.join(format!("scannetppv2_scene_list_{split}.npy")), &scene_list(&scenes))?;
+        write_wai_scene_list(&folder.join(format!("scannetppv2_scene_list_{split}.npy")), &scenes)?;
     }
     Ok(vec![
         "ScanNetPPWAI(ROOT=FOLDER, dataset_metadata_dir=FOLDER/metadata, split=\"train\", …) of MapAnything reads \
@@ -79,20 +79,4 @@ fn frame(view: &View<'_>) -> WaiFrame {
         intrinsics: view.k_from_pixel_centres(),
         world_from_camera: view.world_from_camera(),
     }
-}
-
-/// Returns a list of scenes as an NPY file of texts, version 1.0 of numpy's format.
-fn scene_list(scenes: &[String]) -> Vec<u8> {
-    const HEAD: usize = 128;
-    let longest = scenes.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(1);
-    let about = format!("{{'descr': '<U{longest}', 'fortran_order': False, 'shape': ({},), }}", scenes.len());
-
-    let mut file = b"\x93NUMPY\x01\x00".to_vec();
-    file.extend((HEAD as u16 - 10).to_le_bytes());
-    file.extend(format!("{about:<width$}\n", width = HEAD - 11).bytes());
-    for name in scenes {
-        let units = name.chars().map(u32::from).chain(std::iter::repeat(0)).take(longest);
-        file.extend(units.flat_map(u32::to_le_bytes));
-    }
-    file
 }

@@ -91,12 +91,17 @@ fn field(config: &str, files: &str, feature: &Feature) -> Value {
         Kind::Text => "sc:Text",
         Kind::Image | Kind::Depth => "sc:ImageObject",
     };
-    let mut source = json!({"fileSet": {"@id": files}, "extract": {"column": name}});
-    if data_type == "sc:ImageObject" {
-        source["transform"] = json!({"jsonPath": "bytes"});
-    }
-
-    let mut field = json!({
+    let transform = match kind {
+        Kind::Image | Kind::Depth => json!({"transform": {"jsonPath": "bytes"}}),
+        _ => json!({}),
+    };
+    let source = joined(json!({"fileSet": {"@id": files}, "extract": {"column": name}}), transform);
+    let repeated = if *kind == Kind::Floats {
+        json!({"repeated": true})
+    } else {
+        json!({})
+    };
+    let field = json!({
         "@type": "cr:Field",
         "@id": format!("{config}/{name}"),
         "name": name,
@@ -104,10 +109,18 @@ fn field(config: &str, files: &str, feature: &Feature) -> Value {
         "dataType": data_type,
         "source": source,
     });
-    if *kind == Kind::Floats {
-        field["repeated"] = json!(true);
+    joined(field, repeated)
+}
+
+/// Returns an object with the members of another one, too.
+fn joined(one: Value, other: Value) -> Value {
+    match (one, other) {
+        (Value::Object(mut all), Value::Object(more)) => {
+            all.extend(more);
+            Value::Object(all)
+        }
+        (one, _) => one,
     }
-    field
 }
 
 /// Returns what the words of the file mean.
