@@ -268,7 +268,7 @@ proptest! {
         let mut state = seed | 1;
         let borders = Raster::from_vec(width, height, (0..width * height).map(|_| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            if (state >> 33) as usize % share == 0 { 255 } else { 0 }
+            if ((state >> 33) as usize).is_multiple_of(share) { 255 } else { 0 }
         }).collect());
         let found = made(|out| border_distance_image_into(&borders, wraps, out));
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {

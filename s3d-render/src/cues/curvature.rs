@@ -182,7 +182,7 @@ fn add_edge(mesh: &TriMesh, [from, to]: [Vec3; 2], faces: [u32; 2], pieces: &mut
     // Convex edges turn the normal about the edge, as the first face goes along it.
     let sine = left.cross(right).dot(direction);
     let turn = libm::atan2(sine, left.dot(right));
-    if !(turn.abs() > SMALLEST_TURN) {
+    if turn.is_nan() || turn.abs() <= SMALLEST_TURN {
         return;
     }
 

@@ -97,7 +97,7 @@ pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
             Normals::Flat
         },
         rgb_samples: args.rgb_samples,
-        modalities: args.modalities,
+        modalities: args.modalities.clone(),
         compression: args.compression,
         overwrite: args.overwrite,
     };
