@@ -83,7 +83,7 @@ pub struct SemanticRow {
 /// `depth_min_m`, `depth_mean_m`, `depth_max_m`; and `photograph`, if any image has one. See [`ImageRow`].
 ///
 /// # Errors
-/// [`Error::Io`].
+/// [`Error::Io`](crate::Error::Io).
 pub fn write_image_index(path: &Path, classes: &[Class], rows: &[ImageRow]) -> Result<u64> {
     let mut file = AtomicFile::create(path)?;
     write_image_index_to(&mut file, path, classes, rows)?;
@@ -93,7 +93,7 @@ pub fn write_image_index(path: &Path, classes: &[Class], rows: &[ImageRow]) -> R
 /// Writes like [`write_image_index`], to any writer. Errors name the file by `name`.
 ///
 /// # Errors
-/// [`Error::Io`].
+/// [`Error::Io`](crate::Error::Io).
 pub fn write_image_index_to(
     file: impl Write + Send,
     name: &Path,
