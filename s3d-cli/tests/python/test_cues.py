@@ -14,11 +14,12 @@ CUES = (
 
 
 @pytest.fixture(scope="module")
-def data(s3d, tmp_path_factory):
+def data(s3d, demo, tmp_path_factory):
     out = tmp_path_factory.mktemp("cues") / "out"
     small = ["--views", "2", "--size", "96", "--pano-width", "192", "--points-per-m2", "50"]
     others = "rgb,depth,normal,semantic,global_xyz,pose,"
-    s3d("demo", "-o", str(out), *small, "--xyz", "float", "--modalities", others + CUES)
+    what = ["--xyz", "float", "--modalities", others + CUES]
+    s3d("export", demo / "scan/scene.toml", "-o", out, *small, *what)
     spec = importlib.util.spec_from_file_location("utils_of_cues", out / "assets" / "utils.py")
     utils = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(utils)

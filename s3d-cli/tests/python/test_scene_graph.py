@@ -25,6 +25,10 @@ def labelled_faces(path):
     return np.stack([x, -z, y], axis=1)[np.array(faces)], np.array(labels)
 
 
+def lower_median(values):
+    return np.sort(values)[(len(values) - 1) // 2]
+
+
 @pytest.fixture(scope="module")
 def made(s3d, demo, tmp_path_factory):
     """A data set with objects, and its graph."""
@@ -44,7 +48,8 @@ def test_nodes_are_those_of_the_meshes(made):
 
     objects = {o["id"]: o for o in graph["objects"]}
     assert graph["building"]["objects"] == len(objects)
-    assert {label for label in labels if label in objects} == {o["id"] for o in objects.values() if o["faces"]}
+    with_faces = {o["id"] for o in objects.values() if o["faces"]}
+    assert {label for label in labels if label in objects} == with_faces
     for name, found in objects.items():
         own = labels == name
         assert names[found["label_index"]] == name and found["faces"] == own.sum(), name
@@ -65,7 +70,8 @@ def test_nodes_are_those_of_the_meshes(made):
         of_class = {kind: corners[np.isin(labels, [o["id"] for o in objects.values()
                     if (o["class"], o["room"]) == (kind, name)])] for kind in ["floor", "ceiling"]}
         if len(of_class["floor"]):
-            assert of_class["floor"][..., 2].min() - 1e-4 <= room["floor_z"] <= of_class["floor"][..., 2].max() + 1e-4
+            heights = of_class["floor"][..., 2]
+            assert heights.min() - 1e-4 <= room["floor_z"] <= heights.max() + 1e-4
         if room["volume_m3"] is not None:
             assert room["volume_m3"] == pytest.approx(
                 room["floor_area_m2"] * (room["ceiling_z"] - room["floor_z"]))
@@ -107,7 +113,8 @@ def test_cameras_see_what_their_images_show(made):
 
         # From near to far, and from left to right.
         distances = np.linalg.norm(data.world_points(image) - np.array(pose["camera_location"]), axis=2)
-        far = [np.median(distances[labels == index_of[name]]) for name in orders[camera["id"]]["near_to_far"]]
+        far = [lower_median(distances[labels == index_of[name]])
+               for name in orders[camera["id"]]["near_to_far"]]
         assert len(far) == len(shown) and all(np.diff(far) > -0.02)
         to_the_right = orders[camera["id"]]["left_to_right"]
         if camera["kind"] == "panorama":
