@@ -307,7 +307,8 @@ proptest! {
 
             let response = 2048.0 * plain_response(&level, x / 2 * 2, y / 2 * 2).max(0.0).sqrt();
             let found = f64::from(keypoints.at(x as u32, y as u32));
-            prop_assert!((found - response.min(255.0)).abs() < 0.6, "({}, {}): {} for {}", x, y, found, response);
+            let is_near = (found - response.min(255.0)).abs() < 0.6;
+            prop_assert!(is_near, "({}, {}): {} for {}", x, y, found, response);
         }
     }
 }

@@ -41,6 +41,11 @@ def shifted(values, dx, dy, wraps):
     return np.roll(values, (-dy, -dx), (0, 1)), there
 
 
+def neighbours(values, wraps):
+    """The four neighbours of each pixel, as `shifted` gives them."""
+    return [shifted(values, dx, dy, wraps) for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+
+
 def test_distances_are_those_of_the_coordinates(data):
     _, data = data
     step = 0.5 / data.conventions["depth"]["units_per_m"]
@@ -82,8 +87,7 @@ def test_borders_of_instances(data):
     for image in images(data):
         labels, wraps = data.semantic(image), image.kind == "pano"
         border = np.zeros(labels.shape, bool)
-        for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-            other, there = shifted(labels, dx, dy, wraps)
+        for other, there in neighbours(labels, wraps):
             border |= there & (labels != other) & (labels >= 0) & (other >= 0)
         assert np.array_equal(border, data.edge_instance(image))
         count += border.sum()
@@ -125,8 +129,7 @@ def test_occluders_are_in_front(data):
     for image in images(data):
         depth, wraps = data.depth(image), image.kind == "pano"
         farther = np.zeros(depth.shape, bool)
-        for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-            other, there = shifted(depth, dx, dy, wraps)
+        for other, there in neighbours(depth, wraps):
             farther |= there & (other - depth > 0.006)
         edge = data.edge_occlusion(image)
         assert not (edge & ~farther).any()

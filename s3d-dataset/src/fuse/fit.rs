@@ -75,7 +75,8 @@ pub(super) fn fit(images: &Images, refine: bool, ctx: &Context) -> Result<Option
         let is_off = before_mm - after_mm > OFF_M * 1e3 && after_mm < before_mm / 2.0;
         match (is_off, refine) {
             (true, false) => ctx.warn(format_args!(
-                "{told}, and {after_mm:.1} mm if one moves by {:.1} cm: their poses are off, and can be refined",
+                "{told}, and {after_mm:.1} mm if one moves by {:.1} cm: their poses are off, and can be \
+                 refined",
                 pair.motion.translation.length() * 1e2
             )),
             _ => ctx.info(told),
@@ -122,8 +123,8 @@ fn compare_pictures(images: &Images, ctx: &Context) -> Result<()> {
 
     let [a, b] = worst.scans.map(|scan| &names[scan]);
     let told = format!(
-        "{} of {} depth pictures compared, of which {} pairs overlap: half of the points of a pair are within \
-         {:.1} mm, and within {:.1} mm of {a} and {b}, the worst pair",
+        "{} of {} depth pictures compared, of which {} pairs overlap: half of the points of a pair are \
+         within {:.1} mm, and within {:.1} mm of {a} and {b}, the worst pair",
         scans.len(),
         images.len(),
         pairs.len(),

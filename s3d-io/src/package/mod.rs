@@ -8,9 +8,9 @@
 //! | COCO | panoptic annotations: [`coco_panoptic`], [`write_coco`] |
 //! | Parquet | a table of all images: [`write_image_index`] |
 //! | DUSt3R, MUSt3R | scenes, images and pairs: [`write_dust3r`] |
-//! | WAI (MapAnything) | a scene's cameras, and who sees what: [`write_wai_scene`], [`write_wai_covisibility`] |
+//! | WAI (MapAnything) | cameras, and who sees what: [`write_wai_scene`], [`write_wai_covisibility`] |
 //! | VGGT | annotation files: [`write_vggt_annotations`] |
-//! | Hugging Face | Parquet files with the images inside, and what describes them: [`ImageTable`], [`write_huggingface_card`], [`write_croissant`] |
+//! | Hugging Face | tables with the images inside: [`ImageTable`]; what describes them: [`write_croissant`] |
 //!
 //! The same input gives the same bytes. [`dataset_images`](crate::dataset::dataset_images) lists the images;
 //! this module reads none of them.

@@ -17,13 +17,13 @@ const REACH: i32 = 2;
 /// The samples along a side.
 const SIDE: usize = 2 * REACH as usize + 1;
 
-/// Writes how much a surface is a corner into an existing image: 255 · √(27 det C), rounded. C is the mean of
-/// n nᵀ over the unit normals n of the surface that is seen within 0.15 m of the pixel's point. Its
+/// Writes how much a surface is a corner into an existing image: 255 · √(27 det C), rounded. C is the mean
+/// of n nᵀ over the unit normals n of the surface that is seen within 0.15 m of the pixel's point. Its
 /// determinant is 0 on planes and at straight edges, and 1/27 where normals point in all directions alike. 0
 /// where nothing is seen.
 ///
-/// 5 × 5 samples of the image are spread over the sphere, at least four pixels apart. A block of 4 × 4 pixels
-/// has one value, of the pixel at its middle.
+/// 5 × 5 samples of the image are spread over the sphere, at least four pixels apart. A block of 4 × 4
+/// pixels has one value, of the pixel at its middle.
 ///
 /// The measure is Noble's ("Finding Corners", Image and Vision Computing 6(2), 1988) of normals, as in
 /// `HarrisKeypoint3D` of the Point Cloud Library. The radius is half the support size for rooms of the

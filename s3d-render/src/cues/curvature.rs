@@ -25,13 +25,13 @@ const SMALLEST_TURN: f64 = 1e-5;
 /// Returns the principal curvatures at the middle of each face, the larger first, in 1/m. Positive is convex,
 /// seen from the side from which the corners of a face go counterclockwise.
 ///
-/// The tensor is the sum of β · l · w · e eᵀ over the pieces of the edges near a face. β is the signed angle
-/// between the normals of the two faces of an edge, e its unit vector, l the length of a piece of at most
-/// 2.5 cm, and w = 1 − d²/r² for a piece whose middle is at a distance d < r = 5 cm from the middle of the
-/// face. It is divided by the integral of w over a plane, π r² / 2. In the plane of the face, its eigenvalues
-/// are the principal curvatures. Edges count if they belong to two faces that are wound alike, and if their
-/// normal is on the side of the face's: so the back of a thin board has no part in its front. Corners with
-/// equal coordinates are one.
+/// The tensor is the sum of β · l · w · e eᵀ over the pieces of the edges near a face. β is the signed
+/// angle between the normals of the two faces of an edge, e its unit vector, l the length of a piece of at
+/// most 2.5 cm, and w = 1 − d²/r² for a piece whose middle is at a distance d < r = 5 cm from the middle
+/// of the face. It is divided by the integral of w over a plane, π r² / 2. In the plane of the face, its
+/// eigenvalues are the principal curvatures. Edges count if they belong to two faces that are wound alike,
+/// and if their normal is on the side of the face's: so the back of a thin board has no part in its front.
+/// Corners with equal coordinates are one.
 ///
 /// It is the normal cycle of Cohen-Steiner and Morvan ("Restricted Delaunay Triangulations and Normal Cycle",
 /// SoCG 2003) with a smooth weight in place of a ball.

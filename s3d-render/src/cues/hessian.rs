@@ -9,12 +9,12 @@ const MARGIN: usize = 14;
 /// The weight of the mixed derivative, which makes up for boxes in the place of Gaussians.
 const MIXED: f32 = 0.81;
 
-/// Writes the response of a detector of blobs into an existing image: min(255, 2,048 · √max(0, D)), rounded.
-/// D is the largest determinant of the Hessian, Dxx · Dyy − (0.9 · Dxy)², over the four filters of SURF's
-/// first octave, of levels from 0 to 1. Second derivatives are sums over boxes, divided by the area of the
-/// filter. Each 2 × 2 pixels have the response of the first of them, which is SURF's sampling. `gray` is
-/// [`gray_image`](crate::gray_image) of the colours, and `wraps` says that its first column is a neighbour of
-/// its last.
+/// Writes the response of a detector of blobs into an existing image: min(255, 2,048 · √max(0, D)),
+/// rounded. D is the largest determinant of the Hessian, Dxx · Dyy − (0.9 · Dxy)², over the four filters
+/// of SURF's first octave, of levels from 0 to 1. Second derivatives are sums over boxes, divided by the area
+/// of the filter. Each 2 × 2 pixels have the response of the first of them, which is SURF's sampling. `gray`
+/// is [`gray_image`](crate::gray_image) of the colours, and `wraps` says that its first column is a neighbour
+/// of its last.
 ///
 /// Source: Bay et al., "Speeded-Up Robust Features (SURF)", CVIU 110(3), 2008.
 pub fn keypoint_image_into(gray: &Raster<u8>, wraps: bool, out: &mut Raster<u8>) {

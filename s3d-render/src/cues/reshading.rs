@@ -13,8 +13,8 @@ const ENERGY: f64 = 2.5;
 const HALF_LIFE: f64 = 8.0;
 
 /// Writes what a lamp at the camera shows of white Lambertian surfaces into an existing image: 255 · min(1,
-/// 2.5 · cos θ · 8 / (8 + d²)), rounded, and at least 1. θ is the angle between the normal of the face and
-/// the ray, and d the distance in metres. 0 where nothing is seen.
+/// 2.5 · cos θ · 8 / (8 + d²)), rounded, and at least 1. θ is the angle between the normal of the face
+/// and the ray, and d the distance in metres. 0 where nothing is seen.
 ///
 /// The lamp is the one of the annotator of Omnidata: energy 2.5, half-life distance 8, falloff
 /// `INVERSE_SQUARE`, which in the renderer it uses, Blender 2.7, is 8 / (8 + d²).

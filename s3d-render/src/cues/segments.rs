@@ -17,9 +17,9 @@ const MOST: u16 = 511;
 /// Writes segments of similar colour into an existing image: their numbers from 1, in the order of their
 /// first pixels. After 65,535 numbers start again. 0 where nothing is seen.
 ///
-/// The method is Felzenszwalb and Huttenlocher's (see [`segment_graph`]) on the mean colours of 2 × 2 pixels,
-/// blurred by (1, 2, 1) / 4 in both directions. A node is next to four others, and the difference is the
-/// Euclidean distance of their colours. The scale is 300, and a segment has at least 50 nodes if it can.
+/// The method is Felzenszwalb and Huttenlocher's (see [`segment_graph`]) on the mean colours of 2 × 2
+/// pixels, blurred by (1, 2, 1) / 4 in both directions. A node is next to four others, and the difference is
+/// the Euclidean distance of their colours. The scale is 300, and a segment has at least 50 nodes if it can.
 ///
 /// # Panics
 /// If `colors` and the hits differ in size.
@@ -41,9 +41,9 @@ pub fn color_segment_image_into(colors: &Raster<[u8; 3]>, hits: &Hits, wraps: bo
 /// seen.
 ///
 /// The method is the same as for [`color_segment_image_into`]. A node is what the first of 2 × 2 pixels sees
-/// that sees something. The difference of two nodes is 128 · |n − n′| + 255 · g, at most 511: n and n′ are
-/// their unit normals towards the camera, and g is the larger distance of a point from the plane of the
-/// other, in twentieths of its depth. So neither the floor nor a ceiling falls apart with distance.
+/// that sees something. The difference of two nodes is 128 · |n − n′| + 255 · g, at most 511: n and
+/// n′ are their unit normals towards the camera, and g is the larger distance of a point from the plane of
+/// the other, in twentieths of its depth. So neither the floor nor a ceiling falls apart with distance.
 ///
 /// # Panics
 /// If the hits are not of the camera's size.

@@ -12,9 +12,9 @@ const MARGIN: usize = 5;
 /// standard deviation is √2 pixels. `gray` is [`gray_image`](crate::gray_image) of the colours, and `wraps`
 /// says that its first column is a neighbour of its last.
 ///
-/// A magnitude is √((h² + v²) / 2), where h and v are the differences of the two neighbours along rows and
-/// columns, smoothed by (1, 2, 1) / 4 across. It is the filter of Canny's detector before its thinning ("A
-/// Computational Approach to Edge Detection", PAMI 8(6), 1986), as in the annotator of Omnidata.
+/// A magnitude is √((h² + v²) / 2), where h and v are the differences of the two neighbours along rows
+/// and columns, smoothed by (1, 2, 1) / 4 across. It is the filter of Canny's detector before its thinning
+/// ("A Computational Approach to Edge Detection", PAMI 8(6), 1986), as in the annotator of Omnidata.
 pub fn texture_edge_image_into(gray: &Raster<u8>, wraps: bool, out: &mut Raster<u8>) {
     fit(out, gray, 0);
     if gray.is_empty() {

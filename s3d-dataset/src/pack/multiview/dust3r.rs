@@ -1,12 +1,11 @@
 //! `s3d pack --to dust3r`: what the ScanNet++ loaders of DUSt3R and MUSt3R read.
 
-use super::{QUALITY, View, depth_mm, overlaps, require, views_of};
+use super::{QUALITY, View, depth_mm, overlaps, require, views_of, write_each};
 use crate::context::Context;
 use crate::error::{InputError, Result};
 use crate::pack::destination::Destination;
 use crate::pack::options::PackageKind;
 use crate::pack::source::Source;
-use crate::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::{Compression, encode_gray16, encode_jpeg};
@@ -34,20 +33,14 @@ pub(in crate::pack) fn pack(
         for below in ["images", "depth"] {
             create_dir(&folder.join(below))?;
         }
-        let images = map_in_order(
-            ctx,
-            &views,
-            || (),
-            |(), view| {
-                let stem = view.image.stem();
-                let color = source.rgb8(view.image, Domain::Rgb)?;
-                write_bytes(&folder.join(format!("images/{stem}.jpg")), &encode_jpeg(&color, QUALITY))?;
-                let depth = encode_gray16(&depth_mm(source, view)?, Compression::default());
-                write_bytes(&folder.join(format!("depth/{stem}.png")), &depth)?;
-                progress.add(1);
-                Ok(image(view, stem))
-            },
-        )?;
+        let images = write_each(ctx, &views, &progress, |view| {
+            let stem = view.image.stem();
+            let color = source.rgb8(view.image, Domain::Rgb)?;
+            write_bytes(&folder.join(format!("images/{stem}.jpg")), &encode_jpeg(&color, QUALITY))?;
+            let depth = encode_gray16(&depth_mm(source, view)?, Compression::default());
+            write_bytes(&folder.join(format!("depth/{stem}.png")), &depth)?;
+            Ok(image(view, stem))
+        })?;
         scenes.push(Dust3rScene { name, images, pairs });
     }
 
@@ -57,8 +50,8 @@ pub(in crate::pack) fn pack(
     }
     write_dust3r(&destination.path().join("all_metadata.npz"), &scenes)?;
     Ok(vec![
-        "dust3r.datasets.scannetpp.ScanNetpp(split='train', ROOT=FOLDER, resolution=224) reads it; a scene is an \
-         area"
+        "dust3r.datasets.scannetpp.ScanNetpp(split='train', ROOT=FOLDER, resolution=224) reads it; a scene \
+         is an area"
             .to_owned(),
         "depth is in millimetres, 0 where missing; the centre of the first pixel is (0, 0)".to_owned(),
     ])

@@ -5,11 +5,12 @@ pub(super) mod dust3r;
 pub(super) mod vggt;
 pub(super) mod wai;
 
-use crate::context::Context;
+use crate::context::{Context, Progress};
 use crate::error::Result;
 use crate::pack::options::PackageKind;
 use crate::pack::source::Source;
 use crate::pairs::{PairsOptions, of_images};
+use crate::parallel::map_in_order;
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, PairColumns, read_pairs};
@@ -64,6 +65,25 @@ fn views_of(source: &Source, area: u32) -> Result<Vec<View<'_>>> {
         Ok(View { image, size: source.size(image)?, k, camera_from_world })
     };
     source.of_area(area).into_iter().map(of).collect()
+}
+
+/// Writes the files of views on all threads. Returns what `write` makes of each, in their order.
+fn write_each<T: Send + Sync>(
+    ctx: &Context,
+    views: &[View<'_>],
+    progress: &Progress<'_>,
+    write: impl Fn(&View<'_>) -> Result<T> + Sync,
+) -> Result<Vec<T>> {
+    map_in_order(
+        ctx,
+        views,
+        || (),
+        |(), view| {
+            let made = write(view)?;
+            progress.add(1);
+            Ok(made)
+        },
+    )
 }
 
 /// Returns the depth of a view in metres, 0 where it is missing or the view's photograph has no colour.

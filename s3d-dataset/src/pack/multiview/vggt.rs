@@ -1,12 +1,11 @@
 //! `s3d pack --to vggt`: images, depth and annotation files of VGGT's training code.
 
-use super::{View, depth_mm, require, views_of};
+use super::{View, depth_mm, require, views_of, write_each};
 use crate::context::Context;
 use crate::error::Result;
 use crate::pack::destination::Destination;
 use crate::pack::options::PackageKind;
 use crate::pack::source::Source;
-use crate::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::{Compression, encode_gray16};
@@ -31,19 +30,13 @@ pub(in crate::pack) fn pack(
         for below in ["images", "depths"] {
             create_dir(&folder.join(below))?;
         }
-        let images = map_in_order(
-            ctx,
-            &views,
-            || (),
-            |(), view| {
-                let image = image(view);
-                source.copy(view.image, Domain::Rgb, &destination.path().join(&image.filepath))?;
-                let depth = encode_gray16(&depth_mm(source, view)?, Compression::default());
-                write_bytes(&destination.path().join(&image.depthpath), &depth)?;
-                progress.add(1);
-                Ok(image)
-            },
-        )?;
+        let images = write_each(ctx, &views, &progress, |view| {
+            let image = image(view);
+            source.copy(view.image, Domain::Rgb, &destination.path().join(&image.filepath))?;
+            let depth = encode_gray16(&depth_mm(source, view)?, Compression::default());
+            write_bytes(&destination.path().join(&image.depthpath), &depth)?;
+            Ok(image)
+        })?;
         for (view, image) in views.iter().zip(images) {
             let name = format!("area_{area}_{}", view.image.room);
             sequences.entry(name).or_default().push(image);
@@ -57,8 +50,8 @@ pub(in crate::pack) fn pack(
     }
     let short = sequences.values().filter(|images| images.len() < LEAST).count();
     let mut notes = vec![
-        "ScanNetDataset(SCANNET_DIR=FOLDER, SCANNET_ANNOTATION_DIR=FOLDER/annotations, …) of VGGT reads it; a \
-         sequence is the views of a room, and train.jgz and test.jgz both have all of them"
+        "ScanNetDataset(SCANNET_DIR=FOLDER, SCANNET_ANNOTATION_DIR=FOLDER/annotations, …) of VGGT reads it; \
+         a sequence is the views of a room, and train.jgz and test.jgz both have all of them"
             .to_owned(),
         "depth is in millimetres, 0 where missing; the centre of the first pixel is (0.5, 0.5)".to_owned(),
     ];

@@ -1,12 +1,11 @@
 //! `s3d pack --to wai`: scenes in MapAnything's WAI format.
 
-use super::{View, depth_m, overlaps, require, views_of};
+use super::{View, depth_m, overlaps, require, views_of, write_each};
 use crate::context::Context;
 use crate::error::Result;
 use crate::pack::destination::Destination;
 use crate::pack::options::PackageKind;
 use crate::pack::source::Source;
-use crate::parallel::map_in_order;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::{create_dir, write_bytes};
 use s3d_io::image::encode_depth_float;
@@ -37,18 +36,12 @@ pub(in crate::pack) fn pack(
         for below in [&folder.join("images"), &folder.join("rendered_depth"), &covisibility] {
             create_dir(below)?;
         }
-        let frames = map_in_order(
-            ctx,
-            &views,
-            || (),
-            |(), view| {
-                let frame = frame(view);
-                source.copy(view.image, Domain::Rgb, &folder.join(&frame.image))?;
-                write_bytes(&folder.join(&frame.depth), &encode_depth_float(&depth_m(source, view)?))?;
-                progress.add(1);
-                Ok(frame)
-            },
-        )?;
+        let frames = write_each(ctx, &views, &progress, |view| {
+            let frame = frame(view);
+            source.copy(view.image, Domain::Rgb, &folder.join(&frame.image))?;
+            write_bytes(&folder.join(&frame.depth), &encode_depth_float(&depth_m(source, view)?))?;
+            Ok(frame)
+        })?;
 
         write_wai_covisibility(&covisibility, views.len(), &overlaps(ctx, source, area, &views)?)?;
         write_wai_scene(&folder.join("scene_meta.json"), &name, &frames)?;
@@ -61,8 +54,8 @@ pub(in crate::pack) fn pack(
         write_wai_scene_list(&folder.join(format!("scannetppv2_scene_list_{split}.npy")), &scenes)?;
     }
     Ok(vec![
-        "ScanNetPPWAI(ROOT=FOLDER, dataset_metadata_dir=FOLDER/metadata, split=\"train\", …) of MapAnything reads \
-         it; a scene is an area, and each split lists all scenes"
+        "ScanNetPPWAI(ROOT=FOLDER, dataset_metadata_dir=FOLDER/metadata, split=\"train\", …) of MapAnything \
+         reads it; a scene is an area, and each split lists all scenes"
             .to_owned(),
         "rendered_depth is in metres, 0 where missing; the centre of the first pixel is (0, 0)".to_owned(),
     ])

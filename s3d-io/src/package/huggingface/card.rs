@@ -64,8 +64,8 @@ fn card(set: &HuggingfaceSet<'_>) -> String {
     // The page.
     let _ = write!(text, "---\n\n# {}\n\n", set.name);
     text.push_str(
-        "Images of indoor scans that are registered to each other and to the scans: a row an image. `s3d pack` \
-         wrote them. The licence is the one of the scans: name it in the head of this card.\n\n\
+        "Images of indoor scans that are registered to each other and to the scans: a row an image. \
+         `s3d pack` wrote them. The licence is the one of the scans: name it in the head of this card.\n\n\
          | configuration | split | images |\n|---|---|---|\n",
     );
     for config in &set.configs {
