@@ -38,17 +38,14 @@ impl CueBuffers {
         self.numbers.entry(domain).or_insert_with(|| Raster::filled(0, 0, 0))
     }
 
-    /// Returns a cue that was drawn. `None` if it was not.
-    pub(crate) fn drawn(&self, domain: Domain) -> Option<Drawn<'_>> {
-        let bytes = self.bytes.get(&domain).map(Drawn::Gray);
-        let numbers = || self.numbers.get(&domain).map(Drawn::Depth);
-        let colors = || {
-            self.curvature
-                .as_ref()
-                .filter(|_| domain == Domain::PrincipalCurvature)
-                .map(Drawn::Color)
-        };
-        bytes.or_else(numbers).or_else(colors)
+    /// Returns a cue that was drawn.
+    pub(crate) fn drawn(&self, domain: Domain) -> Drawn<'_> {
+        match (self.bytes.get(&domain), self.numbers.get(&domain), &self.curvature) {
+            (Some(bytes), ..) => Drawn::Gray(bytes),
+            (_, Some(numbers), _) => Drawn::Depth(numbers),
+            (.., Some(curvature)) if domain == Domain::PrincipalCurvature => Drawn::Color(curvature),
+            _ => unreachable!("{domain} was drawn"),
+        }
     }
 }
 

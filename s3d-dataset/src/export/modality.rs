@@ -317,7 +317,8 @@ impl Channels<'_> {
             Image::GlobalXyz if xyz_type == XyzType::Float => {
                 xyz_image_into(hits, camera, &mut buffers.xyz_float);
             }
-            Image::GlobalXyz | Image::Cue(_) => xyz_image_half_into(hits, camera, xyz),
+            Image::GlobalXyz => xyz_image_half_into(hits, camera, xyz),
+            Image::Cue(_) => unreachable!("cues are drawn above"),
         }
     }
 
@@ -339,7 +340,7 @@ impl Channels<'_> {
             Image::SemanticClass => Drawn::Class(&buffers.class),
             Image::GlobalXyz if self.conventions.xyz == XyzType::Float => Drawn::Xyz(&buffers.xyz_float),
             Image::GlobalXyz => Drawn::XyzHalf(xyz),
-            Image::Cue(domain) => buffers.cues.drawn(domain).unwrap_or(Drawn::Class(&buffers.class)),
+            Image::Cue(domain) => buffers.cues.drawn(domain),
         }
     }
 

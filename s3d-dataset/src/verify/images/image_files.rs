@@ -374,12 +374,9 @@ impl ImageFiles<'_> {
         };
 
         let of_depth;
-        let expected = if self.check.is_of_mesh(reference, domain, self.photograph) {
-            let Scratch { hits, buffers, .. } = memory;
-            reference.channels.draw(image, hits, &pose.camera, buffers);
-            reference.channels.drawn(image, buffers)
-        } else if domain.is_of_colors() && memory.buffers.has_colors {
-            // The colours are those of the file.
+        // Cues of colours follow from the colours of the file, if the mesh does not have them.
+        let is_of_file = domain.is_of_colors() && memory.buffers.has_colors;
+        let expected = if is_of_file || self.check.is_of_mesh(reference, domain, self.photograph) {
             let Scratch { hits, buffers, .. } = memory;
             reference.channels.draw(image, hits, &pose.camera, buffers);
             reference.channels.drawn(image, buffers)
