@@ -16,7 +16,10 @@ use s3d_synth::{AnnotatedScene, Building, ScanOptions};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::Duration;
 
 /// A quarter of the pixels of a real turntable, on each side.
 const SCALE: f64 = 0.25;
@@ -166,6 +169,47 @@ fn threads_and_tiles_do_not_change_a_mesh() {
     s3d_ok(&["fuse", text(&file), "-o", text(&folder), "--cell", "0.08", "--close", "0.3"]);
     let told = String::from_utf8(common::s3d(&["info", text(&folder.join("scene.toml"))]).stdout).unwrap();
     assert!(told.contains("scan locations: 2") && told.contains("2 storeys"), "{told}");
+}
+
+#[test]
+fn a_killed_fuse_goes_on_with_its_tiles() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("closet.ptx");
+    fs::write(&file, closet()).unwrap();
+    let [whole, killed] = ["whole.ply", "killed.ply"].map(|name| dir.path().join(name).display().to_string());
+    let call = |mesh| ["fuse", text(&file), "-o", mesh, "--memory", "0.001"];
+    s3d_ok(&call(&whole));
+
+    let working = || {
+        let entries = fs::read_dir(&dir).unwrap().map(|entry| entry.unwrap().path());
+        entries
+            .filter(|path| path.file_name().unwrap().to_string_lossy().starts_with(".s3d"))
+            .collect::<Vec<_>>()
+    };
+    let has_tile = || {
+        let kept = working()
+            .into_iter()
+            .filter_map(|path| fs::read_dir(path.join("kept")).ok());
+        kept.flatten()
+            .any(|file| file.is_ok_and(|file| file.path().extension().is_some_and(|e| e == "tile")))
+    };
+    let mut child = Command::new(env!("CARGO_BIN_EXE_s3d"))
+        .args(call(&killed))
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !has_tile() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before a tile was kept");
+        thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    assert!(!child.wait().unwrap().success());
+    assert!(!fs::exists(&killed).unwrap() && has_tile());
+
+    let log = s3d_ok(&call(&killed));
+    assert!(log.contains("its finished tiles are kept"), "{log}");
+    assert!(fs::read(&killed).unwrap() == fs::read(&whole).unwrap());
+    assert_eq!(working(), Vec::<PathBuf>::new());
 }
 
 fn height(location: &ScanLocation) -> f64 {

@@ -1,13 +1,16 @@
 //! A raw scan becomes a mesh, and the scene file that an export takes.
 //!
 //! [`fuse`] reads depth pictures or laser scans (`images`), gathers them in a grid, in tiles if that does not
-//! fit into the memory, and simplifies the surface (`surface`). A folder holds the mesh, a scene file that
-//! names what else the scan brings (`scene_text`), and a record of what it was made from (`kept`). Exports of
-//! a raw scan keep such a folder beside it.
+//! fit into the memory (`gather`), and simplifies the surface (`surface`). Finished tiles are kept until the
+//! output is in its place, so the same call goes on after a kill (`kept_tiles`). A folder holds the mesh, a
+//! scene file that names what else the scan brings (`scene_text`), and a record of what it was made from
+//! (`kept`). Exports of a raw scan keep such a folder beside it.
 
 mod fit;
+mod gather;
 mod images;
 mod kept;
+mod kept_tiles;
 mod level;
 mod options;
 mod scene_text;
@@ -22,6 +25,7 @@ use crate::error::{Error, Result, UsageError};
 use crate::store::new_folder::FolderKind;
 use crate::store::{NewFile, NewFolder};
 use fit::fit;
+use gather::Keeping;
 use glam::DVec3;
 use images::Images;
 use kept::Record;
@@ -56,7 +60,8 @@ pub struct Fused {
 ///
 /// # Errors
 /// [`Error::File`] and [`Error::Input`] for a raw scan that cannot be used. [`Error::Usage`] if `output`
-/// exists and is not to be replaced. [`Error::Cancelled`].
+/// exists and is not to be replaced. [`Error::Cancelled`]: what is finished of a scan in tiles stays beside
+/// `output`, and the same call goes on with it.
 pub fn fuse(
     inputs: &[PathBuf],
     output: &Path,
@@ -80,8 +85,9 @@ pub fn fuse(
 
     NewFile::check_free(output, overwrite)?;
     let images = open(inputs, options, ctx)?;
-    let made = surface(&images, options, ctx)?;
     let file = NewFile::begin(ctx, output, overwrite)?;
+    let keeping = Keeping { folder: &file.kept(), inputs };
+    let made = surface(&images, options, &keeping, ctx)?;
     write(file.path(), &made, &images, is_glb)?;
     file.finish()?;
     Ok(made.told(ctx, output))
@@ -109,7 +115,8 @@ fn fuse_folder(
     let record = Record::of(inputs, options)?;
     let folder = NewFolder::begin(ctx, output, first, FUSED, overwrite)?;
     let images = open(inputs, options, ctx)?;
-    let made = surface(&images, options, ctx)?;
+    let keeping = Keeping { folder: &folder.kept(), inputs };
+    let made = surface(&images, options, &keeping, ctx)?;
 
     write(&folder.path().join("mesh.ply"), &made, &images, false)?;
     let scene = scene_text::scene(&images, made.turn, output)?;

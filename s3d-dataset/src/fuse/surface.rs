@@ -1,14 +1,12 @@
 //! The surface of a raw scan: gathered in a grid, simplified, and closed where that was asked for.
 
-use super::images::{Images, Seen};
-use super::{FuseOptions, Fused, level, tiles};
+use super::gather::{Keeping, gather};
+use super::images::Images;
+use super::{FuseOptions, Fused, level};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3, Vec3};
-use s3d_fusion::{
-    CloseOptions, DecimateOptions, FusedMesh, Fusion, FusionError, FusionOptions, MeshColumns, SensorNoise,
-    Surface, close_holes, decimate,
-};
+use s3d_fusion::{CloseOptions, DecimateOptions, FusedMesh, MeshColumns, close_holes, decimate};
 use std::path::Path;
 
 /// A mesh of less surface than this is no room, square metres.
@@ -44,9 +42,14 @@ impl Made {
 }
 
 /// Makes the mesh of images.
-pub(super) fn surface(images: &Images, options: &FuseOptions, ctx: &Context) -> Result<Made> {
+pub(super) fn surface(
+    images: &Images,
+    options: &FuseOptions,
+    keeping: &Keeping<'_>,
+    ctx: &Context,
+) -> Result<Made> {
     let unfit = |e: &dyn std::fmt::Display| Error::unfit(images.path(), e.to_string());
-    let fused = gather(images, options, ctx)?;
+    let fused = gather(images, options, keeping, ctx)?;
     let fused_faces = fused.faces.len();
     let about = Fused { images: images.len(), fused_faces, faces: fused_faces, max_error_m: 0.0, closed: 0 };
     let FusedMesh { positions, faces, colors, .. } = fused;
@@ -65,6 +68,14 @@ pub(super) fn surface(images: &Images, options: &FuseOptions, ctx: &Context) -> 
         let small = decimate(&columns, &limits).map_err(|e| unfit(&e))?;
         (made.positions, made.faces, made.colors) = (small.positions, small.faces, small.colors);
         made.about.max_error_m = small.max_error_m;
+        if small.max_error_m > options.max_error_m {
+            ctx.warn(format_args!(
+                "{}: the simplified surface lies up to {:.1} mm from the fused one, and {:.1} mm are allowed",
+                images.path().display(),
+                small.max_error_m * 1e3,
+                options.max_error_m * 1e3
+            ));
+        }
         task.add(1);
     }
 
@@ -116,52 +127,4 @@ fn area(made: &Made) -> f64 {
         (b - a).cross(c - a).length()
     };
     made.faces.iter().map(twice).sum::<f64>() / 2.0
-}
-
-/// Gathers all images in one grid, or in the grids of tiles if one does not fit.
-fn gather(images: &Images, options: &FuseOptions, ctx: &Context) -> Result<FusedMesh> {
-    let of = |e: FusionError| Error::unfit(images.path(), e.to_string());
-    let fusion_options = FusionOptions { cell_m: options.cell_m, ..FusionOptions::default() };
-    let least_piece_m2 = fusion_options.least_piece_cells * options.cell_m * options.cell_m;
-
-    let whole = Fusion::new(fusion_options.clone()).map_err(of)?;
-    let most_bytes = (options.memory_gib * f64::from(1 << 30)) as u64;
-    if let Some(whole) = fill(whole, images, most_bytes, ctx)? {
-        return whole.mesh().map_err(of);
-    }
-
-    let mut tiles = vec![tiles::around(images.bounds(ctx)?, options.cell_m)];
-    ctx.info(format_args!("the grid takes more than {} GiB: it is fused in tiles", options.memory_gib));
-    let mut surfaces = Vec::new();
-    while let Some(tile) = tiles.pop() {
-        let grid = Fusion::within(fusion_options.clone(), tile).map_err(of)?;
-        match fill(grid, images, most_bytes, ctx)? {
-            Some(grid) => surfaces.push(grid.surface()),
-            None => match tiles::halves(tile) {
-                Some(halves) => tiles.extend(halves),
-                None => {
-                    return Err(Error::unfit(images.path(), "one block takes more than the memory allowed"));
-                }
-            },
-        }
-    }
-    let surface = Surface::join(surfaces).map_err(of)?;
-    surface.into_mesh(least_piece_m2).map_err(of)
-}
-
-/// Adds all images to a grid. Returns `None` if it becomes too large.
-fn fill(mut grid: Fusion, images: &Images, most_bytes: u64, ctx: &Context) -> Result<Option<Fusion>> {
-    let task = ctx.progress("fusing", images.unit(), images.len() as u64);
-    let mut fits = true;
-    images.each(ctx, |seen, of| {
-        let added = match seen {
-            Seen::Image(image) => grid.add(&image),
-            Seen::Rays(rays) => grid.add_rays(&rays.origins, &rays.points, &rays.colors, SensorNoise::LASER),
-        };
-        added.map_err(|e| Error::unfit(of, e.to_string()))?;
-        task.add(1);
-        fits = grid.bytes() <= most_bytes;
-        Ok(fits)
-    })?;
-    Ok(fits.then_some(grid))
 }

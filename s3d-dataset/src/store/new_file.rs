@@ -55,6 +55,12 @@ impl NewFile {
         &self.path
     }
 
+    /// Returns the path of a folder for parts that the same call goes on with after a kill or a failure. It
+    /// need not exist, and is removed when the file is in its place.
+    pub fn kept(&self) -> PathBuf {
+        self.staging.kept()
+    }
+
     /// Returns whether a process was killed while it moved the same file into place. Then what it had moved
     /// before may be replaced.
     pub fn was_placing(&self) -> bool {

@@ -101,6 +101,12 @@ impl NewFolder {
         self.staging.path()
     }
 
+    /// Returns the path of a folder for parts that the same call goes on with after a kill or a failure. It
+    /// need not exist, and is removed when the folder is in its place.
+    pub fn kept(&self) -> PathBuf {
+        self.staging.kept()
+    }
+
     /// Returns the final place of the folder.
     pub fn place(&self) -> &Path {
         &self.place

@@ -35,6 +35,11 @@ fn placing_in(folder: &Path) -> PathBuf {
     folder.join("placing")
 }
 
+/// Returns the folder of parts that outlast a kill.
+fn kept_in(folder: &Path) -> PathBuf {
+    folder.join("kept")
+}
+
 /// Returns the folder for what will be called `name` in `parent`. Its name has a fixed length, since `name`
 /// may be as long as the system allows.
 fn folder_of(parent: &Path, name: &Path) -> PathBuf {
@@ -101,6 +106,11 @@ impl Staging {
         &self.new
     }
 
+    /// The folder for parts that the next process goes on with if this one is killed or fails.
+    pub(crate) fn kept(&self) -> PathBuf {
+        kept_in(&self.folder)
+    }
+
     /// Moves the whole folder into place. If `replaced`, everything in the place is removed; otherwise only
     /// an empty folder is.
     pub(crate) fn place_folder(self, place: &Path, replaced: bool) -> Result<()> {
@@ -163,14 +173,14 @@ impl Staging {
 
     /// Removes everything but the lock.
     fn clear(&self) -> Result<()> {
-        let paths = [self.new.clone(), old_in(&self.folder), placing_in(&self.folder)];
+        let paths = [self.new.clone(), self.kept(), old_in(&self.folder), placing_in(&self.folder)];
         paths.iter().try_for_each(|path| remove(path))
     }
 }
 
 impl Drop for Staging {
-    /// Leaves nothing behind, unless some files are in place and others not, or the replaced thing could not
-    /// be restored.
+    /// Leaves nothing behind, unless some files are in place and others not, the replaced thing could not be
+    /// restored, or parts are kept for the next process.
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.new);
         if let Some(lock) = self.lock.take() {
@@ -223,6 +233,23 @@ mod tests {
         staging.place_folder(&place, true).unwrap();
         assert_eq!(fs::read_to_string(place.join("file")).unwrap(), "2");
         assert!(!Staging::is_left(dir.path(), Path::new("thing")));
+    }
+
+    #[test]
+    fn kept_parts_outlast_a_kill_and_a_failure_but_not_the_end() {
+        let dir = tempfile::tempdir().unwrap();
+        let part = begin(dir.path()).kept().join("part");
+        let staging = begin(dir.path());
+        fs::create_dir(staging.kept()).unwrap();
+        fs::write(&part, "1").unwrap();
+        killed(staging);
+        drop(begin(dir.path()));
+
+        let staging = begin(dir.path());
+        assert_eq!(fs::read_to_string(&part).unwrap(), "1");
+        fs::write(staging.path().join("thing"), "new").unwrap();
+        staging.place_files(dir.path()).unwrap();
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
     #[test]

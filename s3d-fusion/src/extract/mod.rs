@@ -1,5 +1,6 @@
 //! The mesh of the zero level of a grid, by marching cubes.
 
+mod bytes;
 mod mesh;
 mod surface;
 mod table;

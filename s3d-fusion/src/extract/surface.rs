@@ -11,18 +11,18 @@ use s3d_geom::glam::Vec3;
 /// The surface of a grid or tile. [`Surface::join`] makes one of many, and [`Surface::into_mesh`] its mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
-    cell_m: f64,
+    pub(super) cell_m: f64,
     /// Sorted by their keys, each once.
-    vertices: Vec<Vertex>,
+    pub(super) vertices: Vec<Vertex>,
     /// The cell and the vertices of each face, sorted by cells.
-    faces: Vec<(u64, [u32; 3])>,
+    pub(super) faces: Vec<(u64, [u32; 3])>,
 }
 
 /// Where the surface crosses an edge between two voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Vertex {
     /// The lower voxel and the axis.
-    key: u64,
+    pub(super) key: u64,
     pub(super) position: Vec3,
     /// Black: unknown.
     pub(super) color: [u8; 3],
