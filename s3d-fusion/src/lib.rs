@@ -89,6 +89,7 @@ mod extract;
 mod fusion;
 mod grid;
 mod noise;
+mod origin;
 mod range_image;
 mod register;
 
@@ -99,6 +100,7 @@ pub use error::FusionError;
 pub use extract::{FusedMesh, Surface};
 pub use fusion::{Fusion, FusionOptions, Tile};
 pub use noise::SensorNoise;
+pub use origin::{FoundOrigin, OriginError, find_origin};
 pub use range_image::{RangeImage, RangeKind};
 pub use register::{
     Motion, OpenMotion, PairResidual, RefinedPoses, RegisterError, RegisterOptions, Residual, ScanPoints,

@@ -2,6 +2,7 @@
 
 mod common;
 mod errors;
+mod origins;
 mod same_bytes;
 mod scans;
 mod scenes;

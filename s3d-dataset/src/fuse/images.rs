@@ -1,6 +1,7 @@
 //! The images of a raw scan, as fusion takes them.
 
 use super::FuseOptions;
+use super::places::find_places;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::parallel::map_in_order;
@@ -72,7 +73,7 @@ impl Images {
             range_m: options.range_m,
             motions: Vec::new(),
         };
-        images.read(inputs, &raw, options)?;
+        images.read(inputs, &raw, options, ctx)?;
 
         // Scans in UTM are opened again, near the origin.
         let first_m = images.places().next().unwrap_or_default();
@@ -80,7 +81,7 @@ impl Images {
             images.offset_m = (first_m / 100.0).round() * 100.0;
             let world_from_file = DAffine3::from_translation(-images.offset_m) * raw.world_from_file;
             (images.inputs, images.pictures, images.scans) = (Vec::new(), Vec::new(), Vec::new());
-            images.read(inputs, &RawOptions { world_from_file, ..raw }, options)?;
+            images.read(inputs, &RawOptions { world_from_file, ..raw }, options, ctx)?;
             let offset = images.offset_m.to_array();
             ctx.info(format_args!("offset_m = {offset:?} is subtracted from the coordinates of the scan"));
         }
@@ -98,7 +99,13 @@ impl Images {
         Ok(images)
     }
 
-    fn read(&mut self, inputs: &[PathBuf], raw: &RawOptions, options: &FuseOptions) -> Result<()> {
+    fn read(
+        &mut self,
+        inputs: &[PathBuf],
+        raw: &RawOptions,
+        options: &FuseOptions,
+        ctx: &Context,
+    ) -> Result<()> {
         for path in inputs {
             let scan = RawScan::open(path, raw)?;
             self.inputs.push((path.clone(), scan.form()));
@@ -107,8 +114,8 @@ impl Images {
                     self.pictures
                         .extend(pictures.into_iter().step_by(options.every.get() as usize));
                 }
-                RawScan::Scans(scans) => {
-                    scans.require_origins()?;
+                RawScan::Scans(mut scans) => {
+                    find_places(&mut scans, ctx)?;
                     self.scans.push(scans);
                 }
             }

@@ -13,6 +13,7 @@ mod kept;
 mod kept_tiles;
 mod level;
 mod options;
+mod places;
 mod scene_text;
 mod surface;
 mod tiles;

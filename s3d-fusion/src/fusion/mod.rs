@@ -229,7 +229,7 @@ impl Fusion {
 
 /// Returns a number from 0 to 1 that looks random.
 #[inline]
-fn chance(voxel: u32, number: u32) -> f32 {
+pub(crate) fn chance(voxel: u32, number: u32) -> f32 {
     let mixed = (voxel ^ number.wrapping_mul(0x9e37_79b9)).wrapping_mul(0x85eb_ca6b);
     let mixed = (mixed ^ mixed >> 15).wrapping_mul(0xc2b2_ae35);
     (mixed >> 9) as f32 / (1 << 23) as f32

@@ -104,6 +104,13 @@ impl LaserScans {
         Err(Error::format(&first.path, message))
     }
 
+    /// Says where the scanner stood during a scan, in the world, metres: for files that do not tell it.
+    pub fn place(&mut self, scan: usize, origin_m: DVec3) {
+        if let Some(scan) = self.scans.get_mut(scan) {
+            scan.origin_m = Some(origin_m);
+        }
+    }
+
     fn scan(&self, number: usize) -> Result<(&ScanInfo, &ScanSource)> {
         let found = self.scans.get(number).zip(self.sources.get(number));
         let path = self.scans.first().map_or(Path::new(""), |scan| scan.path.as_path());
