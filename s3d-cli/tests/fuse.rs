@@ -254,6 +254,56 @@ fn office() -> AnnotatedScene {
     scene
 }
 
+#[test]
+fn points_tell_where_their_scanner_stood_unless_they_are_of_two_scans() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let scene = office();
+    let target = ScanTarget::new(&scene);
+    let scanner = LaserScanner { columns: 720, rows: 300, ..LaserScanner::default() };
+    let lines = |location: &ScanLocation| {
+        let scan = target.laser_scan(location, &scanner, 0).unwrap();
+        let pixels = (0..scanner.rows).flat_map(|row| (0..scanner.columns).map(move |column| (column, row)));
+        // In UTM: a scan is moved near the origin.
+        let points = pixels
+            .filter_map(|(column, row)| scan.world_point(column, row))
+            .map(|p| p + DVec3::new(4e5, 5e6, 0.0));
+        points.fold(String::new(), |mut text, p| {
+            let _ = writeln!(text, "{:.3} {:.3} {:.3}", p.x, p.y, p.z);
+            text
+        })
+    };
+    let [first, second] = [0, 1].map(|number| lines(&scene.locations[number]));
+    fs::write(at("one.xyz"), &first).unwrap();
+    fs::write(at("two.xyz"), first + &second).unwrap();
+    let [one, two, fused] = ["one.xyz", "two.xyz", "one_fused"].map(|name| at(name).display().to_string());
+
+    let log = s3d_ok(&["fuse", &one, "-o", &fused, "--cell", "0.03"]);
+    let place = scene.locations[0].position;
+    let told: Vec<&str> = log
+        .lines()
+        .filter(|line| line.contains("By its points it was at"))
+        .collect();
+    assert!(told.len() == 1 && told[0].contains("WARN"), "{log}");
+    let cameras = fs::read_to_string(at("one_fused/locations.csv")).unwrap();
+    let numbers: Vec<f64> = cameras
+        .lines()
+        .nth(1)
+        .unwrap()
+        .split(',')
+        .skip(1)
+        .map(|n| n.parse().unwrap())
+        .collect();
+    let offset = fs::read_to_string(at("one_fused/offset.xyz")).unwrap();
+    let offset: Vec<f64> = offset.split_whitespace().map(|n| n.parse().unwrap()).collect();
+    let found = DVec3::from_slice(&numbers[..3]) + DVec3::from_slice(&offset) - DVec3::new(4e5, 5e6, 0.0);
+    assert!(found.distance(place) < 0.05, "{found} is not {place}");
+
+    let words = ["two.xyz", "where the scanner stood", "of several scans", "origin"];
+    s3d_fails(&["fuse", &two, "-o", text(&at("two.ply"))], 1, &words);
+    assert!(!at("two.ply").exists());
+}
+
 /// A step of the scanner is 0.5°, and of its panoramas 0.7°.
 fn write_e57(target: &ScanTarget<'_>, path: &Path) {
     let scanner = LaserScanner { columns: 720, rows: 300, ..LaserScanner::default() };

@@ -9,9 +9,9 @@
 
 use crate::fusion::chance;
 use rayon::prelude::*;
-use s3d_geom::glam::{DVec3, Vec3, dvec3};
+use s3d_geom::glam::{DVec3, Vec3};
 use std::cmp::Reverse;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use thiserror::Error;
 
@@ -20,8 +20,8 @@ use thiserror::Error;
 pub struct FoundOrigin {
     /// The place, in the frame of the points, metres.
     pub origin: DVec3,
-    /// How much the number of points differs between directions: the median deviation as a share of the
-    /// median, 0 for the same everywhere.
+    /// How much the number of points differs between directions: the mean deviation from the median, as a
+    /// share of it, in the three quarters of the directions where it differs least. 0: the same everywhere.
     pub unevenness: f64,
     /// The share of the points that lie behind others.
     pub hidden: f64,
@@ -50,8 +50,9 @@ pub enum OriginError {
 
 /// The fewest points.
 const LEAST_POINTS: usize = 20_000;
-/// Points of the coarse search and of the fine one, and points a cell of directions.
-const COARSE: (usize, f64) = (16_000, 40.0);
+/// Points of the coarse search, on the way from there and near the end, and points a cell of directions.
+const COARSE: (usize, f64) = (4_000, 25.0);
+const MIDDLE: (usize, f64) = (16_000, 50.0);
 const FINE: (usize, f64) = (100_000, 100.0);
 
 /// The side of the cubes of which the fullest is looked for, and the number of them, metres.
@@ -61,13 +62,17 @@ const CUBES: usize = 3;
 const SIDEWAYS_M: f64 = 2.4;
 const UPWARDS_M: f64 = 6.0;
 const STEP_M: f64 = 0.4;
-/// The last step, metres.
-const LAST_STEP_M: f64 = 0.002;
+/// The first and last steps from there, and those near the end, metres.
+const MIDDLE_STEPS_M: [f64; 2] = [0.2, 0.025];
+const FINE_STEPS_M: [f64; 2] = [0.05, 0.002];
 /// So many of the coarse places are followed.
 const FOLLOWED: usize = 4;
 
-/// By chance alone, the numbers of [`FINE`] differ by 0.07.
-const MOST_UNEVEN: f64 = 0.13;
+/// By chance alone, the numbers of [`FINE`] differ by 0.03.
+const MOST_UNEVEN: f64 = 0.06;
+/// The share of the cells that count. In the others less comes back, as beside a window, or where the view of
+/// the scanner ends.
+const COUNTED: f64 = 0.75;
 /// More of the points lie behind others only if they are of several scans.
 const MOST_HIDDEN: f64 = 0.1;
 /// A point is behind another one if it is farther by this share.
@@ -76,8 +81,8 @@ const BEHIND: f64 = 1.2;
 const PER_SIGHT: f64 = 4.0;
 
 /// Finds where a scanner stood that turned by equal steps about the upright axis, as terrestrial scanners do.
-/// `points` are all points of one scan, in metres, Z-up, in any order. What is not finite is passed over. The
-/// place comes out within a few centimetres.
+/// `points` are all points of one scan, in metres, Z-up, in any order. What is not finite is passed over. Its
+/// height comes out within 5 cm, and the rest within 1 cm.
 ///
 /// # Errors
 /// [`OriginError`].
@@ -96,10 +101,14 @@ pub fn find_origin(points: &[Vec3]) -> Result<FoundOrigin, OriginError> {
     places.sort_by(|a, b| a.0.total_cmp(&b.0));
     places.truncate(FOLLOWED);
 
-    let fine = Sky::new(&points, FINE);
-    let ends: Vec<(f64, DVec3)> = places.par_iter().map(|(_, place)| descent(&fine, *place)).collect();
+    let [middle, fine] = [MIDDLE, FINE].map(|of| Sky::new(&points, of));
+    let ends: Vec<(f64, DVec3)> = places
+        .par_iter()
+        .map(|(_, place)| descent(&middle, *place, MIDDLE_STEPS_M))
+        .collect();
     let end = ends.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    let (unevenness, origin) = end.unwrap_or((f64::INFINITY, DVec3::ZERO));
+    let start = end.map_or(DVec3::ZERO, |(_, place)| place);
+    let (unevenness, origin) = descent(&fine, start, FINE_STEPS_M);
     let best = FoundOrigin { origin, unevenness, hidden: fine.hidden(origin) };
     if best.unevenness <= MOST_UNEVEN && best.hidden <= MOST_HIDDEN {
         Ok(best)
@@ -123,32 +132,35 @@ fn candidates(points: &[Vec3]) -> Vec<DVec3> {
     cubes.sort_unstable();
 
     let (low, high) = (low.as_dvec3(), high.as_dvec3());
-    let steps = |reach_m: f64| {
-        let count = (reach_m / STEP_M).round() as i32;
-        move || (-count..=count).map(|k| f64::from(k) * STEP_M)
-    };
-    let (sideways, upwards) = (steps(SIDEWAYS_M), steps(UPWARDS_M));
-    let mut places = Vec::new();
+    let [sideways, upwards] = [SIDEWAYS_M, UPWARDS_M].map(|reach_m| (reach_m / STEP_M).round() as i32);
+    let mut places: BTreeSet<[i32; 3]> = BTreeSet::new();
     for (_, cube) in cubes.iter().take(CUBES) {
         let middle = (DVec3::from_array(cube.map(f64::from)) + 0.5) * f64::from(CUBE_M);
-        for (x, y) in sideways().flat_map(|x| sideways().map(move |y| (x, y))) {
-            let all = upwards().map(|z| middle + dvec3(x, y, z));
-            places.extend(all.filter(|place| place.cmpgt(low).all() && place.cmplt(high).all()));
+        let [x, y, z] = (middle / STEP_M).round().as_ivec3().to_array();
+        for i in -sideways..=sideways {
+            for j in -sideways..=sideways {
+                places.extend((-upwards..=upwards).map(|k| [x + i, y + j, z + k]));
+            }
         }
     }
+    let places = places
+        .into_iter()
+        .map(|place| DVec3::from_array(place.map(f64::from)) * STEP_M);
     places
+        .filter(|place| place.cmpgt(low).all() && place.cmplt(high).all())
+        .collect()
 }
 
-/// Goes downhill from a place in ever smaller steps. Returns the unevenness at the end, and the end.
-fn descent(sky: &Sky, start: DVec3) -> (f64, DVec3) {
+/// Goes downhill from a place, in steps from the first length to the last. Returns the unevenness at the end,
+/// and the end.
+fn descent(sky: &Sky, start: DVec3, [mut step_m, last_m]: [f64; 2]) -> (f64, DVec3) {
     let mut best = (sky.unevenness(start), start);
-    let mut step_m = STEP_M / 2.0;
-    while step_m >= LAST_STEP_M {
+    while step_m >= last_m {
         let around = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
         let next = around
             .map(|axis| best.1 + axis * step_m)
+            .into_par_iter()
             .map(|place| (sky.unevenness(place), place))
-            .into_iter()
             .min_by(|a, b| a.0.total_cmp(&b.0));
         match next {
             Some(next) if next.0 < best.0 => best = next,
@@ -165,7 +177,7 @@ struct Sky {
 }
 
 impl Sky {
-    /// Takes about `count` points. Which they are looks random: every k-th point of a file would be a pattern.
+    /// Takes about `count` points. Which they are looks random: every k-th point would be a pattern.
     fn new(points: &[Vec3], (count, per_cell): (usize, f64)) -> Self {
         let share = count as f64 / points.len() as f64;
         let is_taken = |i: usize| f64::from(chance(i as u32, 0)) <= share;
@@ -173,54 +185,62 @@ impl Sky {
         Self { points: taken.map(|(_, point)| *point).collect(), per_cell }
     }
 
-    /// Calls `visit` with the cell of each point, and its range. There are twice as many columns of cells as
-    /// rows. Returns the number of cells.
-    fn cells(&self, place: DVec3, per_cell: f64, mut visit: impl FnMut(usize, f64)) -> usize {
-        let rows = (self.points.len() as f64 / per_cell / 2.0).sqrt().ceil().max(2.0);
-        let columns = 2.0 * rows;
-        for point in &self.points {
+    /// Returns the columns and rows of cells for so many points a cell.
+    fn size(&self, per_cell: f64) -> [usize; 2] {
+        let rows = (self.points.len() as f64 / per_cell / 2.0).sqrt().ceil().max(2.0) as usize;
+        [2 * rows, rows]
+    }
+
+    /// Returns where points are seen from a place, in columns and rows of cells, and their ranges.
+    fn seen(&self, place: DVec3, size: [usize; 2]) -> impl Iterator<Item = ([f64; 2], f64)> {
+        let [columns, rows] = size.map(|n| n as f64);
+        self.points.iter().map(move |point| {
             let off = point.as_dvec3() - place;
             let azimuth = libm::atan2(off.y, off.x);
             let elevation = libm::atan2(off.z, libm::hypot(off.x, off.y));
-            let column = ((azimuth / TAU + 0.5) * columns).min(columns - 1.0);
-            let row = ((elevation / PI + 0.5) * rows).min(rows - 1.0);
-            visit(row as usize * columns as usize + column as usize, off.length());
-        }
-        (rows * columns) as usize
+            ([(azimuth / TAU + 0.5) * columns, (elevation / PI + 0.5) * rows], off.length())
+        })
     }
 
     fn unevenness(&self, place: DVec3) -> f64 {
-        let mut counts: Vec<u32> = Vec::new();
-        self.cells(place, self.per_cell, |cell, _| {
-            if counts.len() <= cell {
-                counts.resize(cell + 1, 0);
-            }
-            counts[cell] += 1;
-        });
+        // A point counts in the four cells around it. The steps of the scanner would make a pattern with the
+        // borders of cells otherwise.
+        let size = self.size(self.per_cell);
+        let [columns, rows] = size;
+        let mut counts = vec![0.0; columns * rows];
+        for ([x, y], _) in self.seen(place, size) {
+            let [(x, right), (y, up)] = [x, y].map(|at| ((at + 0.5) as usize, (at + 0.5).fract()));
+            let x = [x + columns - 1, x].map(|x| x % columns);
+            let y = [y.max(1) - 1, y.min(rows - 1)];
+            counts[y[0] * columns + x[0]] += (1.0 - right) * (1.0 - up);
+            counts[y[0] * columns + x[1]] += right * (1.0 - up);
+            counts[y[1] * columns + x[0]] += (1.0 - right) * up;
+            counts[y[1] * columns + x[1]] += right * up;
+        }
+
         // Directions in which nothing comes back, as through the tripod and to the sky, tell nothing.
-        counts.retain(|count| *count > 0);
-        let mut numbers: Vec<f64> = counts.into_iter().map(f64::from).collect();
-        let middle = median(&mut numbers);
-        numbers.iter_mut().for_each(|n| *n = (*n - middle).abs());
-        median(&mut numbers) / middle.max(1.0)
+        counts.retain(|count| *count > 0.0);
+        let at = counts.len() / 2;
+        let Some(middle) = (!counts.is_empty()).then(|| *counts.select_nth_unstable_by(at, f64::total_cmp).1)
+        else {
+            return 1.0;
+        };
+        counts
+            .iter_mut()
+            .for_each(|count| *count = (*count / middle - 1.0).abs());
+        counts.sort_unstable_by(f64::total_cmp);
+        counts.truncate(((counts.len() as f64 * COUNTED) as usize).max(1));
+        counts.iter().sum::<f64>() / counts.len() as f64
     }
 
     fn hidden(&self, place: DVec3) -> f64 {
-        let mut seen: Vec<(usize, f64)> = Vec::with_capacity(self.points.len());
-        let count = self.cells(place, PER_SIGHT, |cell, range| seen.push((cell, range)));
-        let mut nearest = vec![f64::INFINITY; count];
+        let size = self.size(PER_SIGHT);
+        let cell = |[x, y]: [f64; 2]| (y as usize).min(size[1] - 1) * size[0] + (x as usize).min(size[0] - 1);
+        let seen: Vec<(usize, f64)> = self.seen(place, size).map(|(at, range)| (cell(at), range)).collect();
+        let mut nearest = vec![f64::INFINITY; size[0] * size[1]];
         seen.iter()
             .for_each(|(cell, range)| nearest[*cell] = nearest[*cell].min(*range));
         let behind = seen.iter().filter(|(cell, range)| *range > BEHIND * nearest[*cell]);
         behind.count() as f64 / seen.len().max(1) as f64
     }
-}
-
-/// The middle one of some numbers, 0 of none.
-fn median(numbers: &mut [f64]) -> f64 {
-    if numbers.is_empty() {
-        return 0.0;
-    }
-    let at = numbers.len() / 2;
-    *numbers.select_nth_unstable_by(at, f64::total_cmp).1
 }

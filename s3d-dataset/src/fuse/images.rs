@@ -52,6 +52,8 @@ pub(super) struct Images {
     inputs: Vec<(PathBuf, RawForm)>,
     pictures: Vec<DepthPicture>,
     scans: Vec<LaserScans>,
+    /// Places of scanners that only the points tell: a sentence each.
+    doubts: Vec<String>,
     up: Option<UpAxis>,
     /// What is subtracted from the coordinates of the scan, metres.
     pub(super) offset_m: DVec3,
@@ -68,6 +70,7 @@ impl Images {
             inputs: Vec::new(),
             pictures: Vec::new(),
             scans: Vec::new(),
+            doubts: Vec::new(),
             up: options.up,
             offset_m: DVec3::ZERO,
             range_m: options.range_m,
@@ -81,6 +84,7 @@ impl Images {
             images.offset_m = (first_m / 100.0).round() * 100.0;
             let world_from_file = DAffine3::from_translation(-images.offset_m) * raw.world_from_file;
             (images.inputs, images.pictures, images.scans) = (Vec::new(), Vec::new(), Vec::new());
+            images.doubts.clear();
             images.read(inputs, &RawOptions { world_from_file, ..raw }, options, ctx)?;
             let offset = images.offset_m.to_array();
             ctx.info(format_args!("offset_m = {offset:?} is subtracted from the coordinates of the scan"));
@@ -90,6 +94,7 @@ impl Images {
             ctx.info(format_args!("{}: {form}", path.display()));
         }
         ctx.warn_each(images.scans.iter().flat_map(|scans| &scans.warnings));
+        ctx.warn_each(&images.doubts);
         let count = images.len();
         ctx.info(format_args!("{count} {}", images.unit()));
         if count == 1 {
@@ -115,7 +120,7 @@ impl Images {
                         .extend(pictures.into_iter().step_by(options.every.get() as usize));
                 }
                 RawScan::Scans(mut scans) => {
-                    find_places(&mut scans, ctx)?;
+                    self.doubts.extend(find_places(&mut scans, ctx)?);
                     self.scans.push(scans);
                 }
             }

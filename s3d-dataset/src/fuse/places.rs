@@ -9,12 +9,13 @@ use s3d_io::raw::LaserScans;
 /// Of larger scans some points are kept, which look random.
 const MOST_POINTS: usize = 4_000_000;
 
-/// Finds the scanner's place for each scan without one, and says so.
+/// Finds the scanner's place for each scan without one. Returns a sentence about each.
 ///
 /// # Errors
 /// [`Error::Input`] if the points of a scan do not tell it.
-pub(super) fn find_places(scans: &mut LaserScans, ctx: &Context) -> Result<()> {
-    let Err(missing) = scans.require_origins() else { return Ok(()) };
+pub(super) fn find_places(scans: &mut LaserScans, ctx: &Context) -> Result<Vec<String>> {
+    let Err(missing) = scans.require_origins() else { return Ok(Vec::new()) };
+    let mut told = Vec::new();
     for number in 0..scans.scans().len() {
         let info = scans.scans()[number].clone();
         if info.origin_m.is_some() {
@@ -25,16 +26,16 @@ pub(super) fn find_places(scans: &mut LaserScans, ctx: &Context) -> Result<()> {
             .map_err(|why| Error::unfit(&info.path, format!("{missing}. Its points were tried: {why}")))?;
         let origin_m = corner + found.origin;
         let [x, y, z] = origin_m.to_array();
-        ctx.warn(format_args!(
-            "{}: scan {} does not tell where the scanner stood. By its points it was at {x:.2}, {y:.2}, {z:.2}: \
-             {:.1} % of them lie behind others from there. If that is wrong, give the place",
+        told.push(format!(
+            "{}: scan {} does not tell where the scanner stood. By its points it was at {x:.2}, {y:.2}, \
+             {z:.2}: {:.1} % of them lie behind others from there. If that is wrong, give the place",
             info.path.display(),
             info.name,
             found.hidden * 100.0
         ));
         scans.place(number, origin_m);
     }
-    Ok(())
+    Ok(told)
 }
 
 /// Reads some points of a scan. They are relative to the first, since positions are numbers of 32 bits.

@@ -54,7 +54,8 @@ export function launch() {
  * `faults` collects errors, and requests that leave the folder. With `waits` false it need not be complete.
  */
 export async function open(browser, folder, hash, options = {}) {
-  const { width = 1440, height = 900, touch = false, motion = false, dark = false, waits = true } = options;
+  // Half the pixels of a usual screen, which take half the time to draw without a graphics card.
+  const { width = 1024, height = 640, touch = false, motion = false, dark = false, waits = true } = options;
   // Without motion the overview does not turn, which would keep a processor busy.
   const still = isFirefox || motion ? {} : { reducedMotion: "reduce" };
   const colorScheme = dark ? "dark" : "light";
