@@ -95,6 +95,9 @@ pub enum DecimateError {
 /// Pieces of about this many faces are decimated on their own, then what lies between them.
 const FACES_A_PIECE: f64 = 40_000.0;
 
+/// Where the pieces of each round begin, in pieces.
+const SHIFTS: [f64; 3] = [0.0, 1.0 / 3.0, 2.0 / 3.0];
+
 /// Pieces stop at this multiple of the target, so that the last round chooses among all edges.
 const SLACK: f64 = 3.0;
 
@@ -149,10 +152,17 @@ fn decimate_in_pieces(mesh: &MeshColumns<'_>, options: &DecimateOptions, faces_a
 
     if faces as f64 > 2.0 * faces_a_piece {
         let cell_m = (whole.area() * faces_a_piece / faces as f64).sqrt().max(1e-3);
-        whole.by_cubes(cell_m, |piece| {
-            let share = target as f64 * piece.alive as f64 / faces as f64;
-            collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
-        });
+        // What lies between the pieces of one round is within those of the next.
+        let rounds = if target == 0 { &SHIFTS[..] } else { &SHIFTS[..1] };
+        for shift in rounds {
+            whole.by_cubes(cell_m, *shift, |piece| {
+                let share = target as f64 * piece.alive as f64 / faces as f64;
+                collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
+            });
+        }
+        if target == 0 {
+            return whole;
+        }
     }
     if whole.alive() > target {
         whole.at_once(|all| collapse_edges(all, &limits(target)));
