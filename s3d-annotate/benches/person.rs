@@ -1,7 +1,7 @@
 //! The strokes that a simulated person needs until 90, 95 and 99 % of the surface has the right instance, and
 //! the purity of patches before and after the work. Of faces that lie over a border of things it tells the
-//! share, and the strokes to 99 % if such a face is right with any of its things. It counts strokes, and not
-//! time. Arguments: words of the names of scenes; none: all.
+//! share, and the strokes to 99 % if such a face is right with any of its things, or else how much is right
+//! so in the end. It counts strokes, and not time. Arguments: words of the names of scenes; none: all.
 
 #![allow(clippy::print_stdout, reason = "the table is its result")]
 
@@ -65,7 +65,10 @@ fn row(scene: &Known, sitting: &Sitting) -> String {
         strokes(0.95),
         strokes(0.99),
         sitting.mixed,
-        shown(sitting.strokes_to_either(0.99)),
+        match sitting.strokes_to_either(0.99) {
+            Some(strokes) => strokes.to_string(),
+            None => format!("– ({:.3})", sitting.either.last().copied().unwrap_or_default()),
+        },
         sitting.right.last().copied().unwrap_or_default(),
         sitting.right.len() - 1,
         kinds.join(", "),

@@ -111,7 +111,8 @@ const SHARE: f32 = 0.9;
 /// Faces that name a vertex twice are dropped, and so are vertices that no face uses.
 ///
 /// The same mesh gives the same bytes for any number of threads: cubes of a size that depends on the mesh
-/// alone are decimated in parallel, then the whole.
+/// alone are decimated in parallel, in three rounds whose cubes begin elsewhere. With a target, it is one
+/// round, and then the whole.
 ///
 /// ```
 /// use s3d_fusion::{DecimateOptions, MeshColumns, decimate};
@@ -142,7 +143,7 @@ pub fn decimate(mesh: &MeshColumns<'_>, options: &DecimateOptions) -> Result<Dec
     Ok(compact(&whole, !mesh.colors.is_empty()))
 }
 
-/// Decimates pieces of about so many faces, then the whole.
+/// Decimates pieces of about so many faces, in rounds. With a target, then the whole.
 fn decimate_in_pieces(mesh: &MeshColumns<'_>, options: &DecimateOptions, faces_a_piece: f64) -> Whole {
     let mut whole = Whole::new(mesh, options.max_error_m, options.color_weight_m / 255.0);
     let faces = whole.alive();

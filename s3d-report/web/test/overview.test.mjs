@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { PNG } from "pngjs";
-import { drawn, go, launch, open, ready } from "./lib/browser.mjs";
+import { USUAL, drawn, go, launch, open, ready } from "./lib/browser.mjs";
 import { bare, index, queryOf, report, withCopy } from "./lib/common.mjs";
 import { UP, house } from "./lib/house.mjs";
 
@@ -37,7 +37,7 @@ function differs(a, b, from = 0, to = 1) {
 }
 
 test("the overview opens first, and its line, classes and views do what they say", async () => {
-  const { page, faults, close } = await open(browser, report, "");
+  const { page, faults, close } = await open(browser, report, "", USUAL);
   await loaded(page);
   assert.equal(await page.locator("nav a[aria-current]").textContent(), "Overview");
   assert.equal(await page.locator("h1").textContent(), index.data_set.name);

@@ -10,8 +10,8 @@ const SEEN = "s3d-label-card";
  */
 export async function open(browser, url, options = {}) {
   const {
-    width = 1120,
-    height = 760,
+    width = 960,
+    height = 640,
     dark = false,
     card = false,
     hash = "",

@@ -49,12 +49,14 @@ export function launch() {
     : chromium.launch({ executablePath, args: QUIET });
 }
 
+/** A usual screen. Pages are smaller elsewhere: without a graphics card, half the pixels take half the time. */
+export const USUAL = { width: 1440, height: 900 };
+
 /**
  * Opens a report (a folder or one file) from the disk, for a user who wants no motion unless `motion`.
  * `faults` collects errors, and requests that leave the folder. With `waits` false it need not be complete.
  */
 export async function open(browser, folder, hash, options = {}) {
-  // Half the pixels of a usual screen, which take half the time to draw without a graphics card.
   const { width = 1024, height = 640, touch = false, motion = false, dark = false, waits = true } = options;
   // Without motion the overview does not turn, which would keep a processor busy.
   const still = isFirefox || motion ? {} : { reducedMotion: "reduce" };

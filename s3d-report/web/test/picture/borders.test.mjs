@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { PNG } from "pngjs";
-import { go, launch, open, readout } from "../lib/browser.mjs";
+import { USUAL, go, launch, open, readout } from "../lib/browser.mjs";
 import { dataset, index, near, readPicture, report, stemOf, withCopy } from "../lib/common.mjs";
 import { readPng } from "../lib/images.mjs";
 
@@ -56,6 +56,7 @@ async function withLabels(right, use) {
         browser,
         folder,
         `#/view/${picture}?left=class&right=${right}&split=${right === "class" ? 1 : 0}`,
+        USUAL,
       );
       const box = await page.locator(".viewer canvas").boundingBox();
       const shot = async () => {

@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { PNG } from "pngjs";
-import { isFirefox, launch, open } from "../lib/browser.mjs";
+import { USUAL, isFirefox, launch, open } from "../lib/browser.mjs";
 import { index, report, withCopy } from "../lib/common.mjs";
 import { writeLarge } from "../lib/large.mjs";
 
@@ -42,7 +42,7 @@ async function withSlow(key, hash, use, from = report) {
       );
     },
     async (folder) => {
-      const opened = open(browser, folder, hash, { waits: false });
+      const opened = open(browser, folder, hash, { ...USUAL, waits: false });
       const { page, faults, close } = await opened;
       await page.waitForFunction(() => "goOn" in window);
       await use(page);
@@ -119,6 +119,7 @@ test("a panorama and a view are small at first, and look in the same direction",
     browser,
     report,
     `#/pano/${area}/${uuid}?lon=75&lat=-10&fov=80&left=rgb&right=rgb&split=1`,
+    USUAL,
   );
   await page.waitForSelector(".viewer[data-sharp]");
   shots.push(PNG.sync.read(await page.locator(".viewer .frame").screenshot()));
