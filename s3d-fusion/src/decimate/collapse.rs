@@ -335,8 +335,8 @@ impl Collapser<'_> {
             for number in patch.samples_of.of(face) {
                 let sample = patch.samples[number as usize];
 
-                // A face above or below which it lies: its own if that is near enough, or else the nearest. If
-                // there is none, it lies at an edge.
+                // A face above or below which it lies: its own if that is near enough, or else the nearest.
+                // If there is none, it lies at an edge.
                 let off = sample.at - merge.place;
                 let mut best = (f32::INFINITY, [0.0; 3], own);
                 if let Some(frame) = star.frames.get(own as usize) {

@@ -52,8 +52,8 @@ impl Frame {
         Self { weights, normal: across * inverse.sqrt() }
     }
 
-    /// The squared distance of a place from the triangle, and the weights of the corners at the nearest place.
-    /// `off` leads there from the first corner. `None` if the nearest place is on the rim.
+    /// The squared distance of a place from the triangle, and the weights of the corners at the nearest
+    /// place. `off` leads there from the first corner. `None` if the nearest place is on the rim.
     #[inline]
     pub(super) fn above(&self, off: Vec3) -> Option<(f32, [f32; 3])> {
         let [v, w] = self.weights.map(|gradient| gradient.dot(off));
