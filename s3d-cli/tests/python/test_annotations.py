@@ -93,8 +93,7 @@ ORDER = ("instances.npz",)
 def test_las_a_room(export, points, reference, tmp_path, version, form, suffix):
     laspy = pytest.importorskip("laspy")
     paths = []
-    rooms, counts = np.unique(points["room"], return_counts=True)
-    for room in rooms:
+    for room in np.unique(points["room"]):
         mask = points["room"] == room
         header = laspy.LasHeader(version=version, point_format=form)
         # Coordinates as in the tree, which has a tenth of a millimetre or better.
@@ -143,7 +142,8 @@ def test_ply_with_a_column_of_rooms(export, points, reference, tmp_path, text):
     plyfile = pytest.importorskip("plyfile")
     # The rooms have several types, so each becomes a cloud of its own.
     paths = []
-    for room in np.unique(points["room"]):
+    rooms, counts = np.unique(points["room"], return_counts=True)
+    for room in rooms:
         mask = points["room"] == room
         kinds = [(a, "f8") for a in "xyz"] + [(c, "u1") for c in ("red", "green", "blue")] + [("label", "i4"), ("instance", "i4")]
         rows = np.empty(mask.sum(), kinds)
