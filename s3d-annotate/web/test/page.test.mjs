@@ -13,7 +13,7 @@ before(async () => {
 after(() => browser?.close());
 beforeEach(async () => {
   server = await serve();
-  opened = await open(browser, server.url);
+  opened = await open(browser, server.url, { width: 1120, height: 760 });
   page = opened.page;
 });
 afterEach(async () => {
