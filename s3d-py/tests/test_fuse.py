@@ -33,8 +33,10 @@ def test_a_scan_becomes_a_mesh(scan: Path, tmp_path: Path) -> None:
 
 
 def test_bad_calls_are_told(scan: Path, tmp_path: Path) -> None:
+    few = tmp_path / "few.xyz"
+    few.write_text("2 0 1\n0 3 1\n0 3 2\n")
     with pytest.raises(s3d.Error, match="where the scanner stood"):
-        s3d.fuse([scan], tmp_path / "room.ply")
+        s3d.fuse([few], tmp_path / "room.ply")
     with pytest.raises(s3d.UsageError):
         s3d.fuse(scan, tmp_path / "room.obj", origin_m=(0, 0, 0))
     with pytest.raises(s3d.UsageError):

@@ -8,7 +8,8 @@
 //! much free space begins. In each `storey`, a wall is what fills the height between doors and the ceiling:
 //! that is so above doors too, and furniture does not reach there. `rooms` cuts the free space between walls
 //! at narrow passages. `planes` finds the planes of each room, and `surfaces` takes those that bound it.
-//! `outline` draws the room with few corners, on its walls. `rims` adds the faces of rounded corners.
+//! `outline` draws the room with few corners, on its walls. `rims` adds the faces of rounded corners, and
+//! those that noise has turned.
 //!
 //! Doors, windows and boards in the plane of a wall are proposed as the wall, to be cut out. Columns and
 //! beams are not proposed. `halls` are rooms of a storey that go on through those above it.
@@ -101,7 +102,7 @@ pub fn find_structure(mesh: &TriMesh) -> Structure {
             Finder { mesh, scan: &scan, storey: &storey, floors: &floors, place, fronts, ceiling_below_m };
         ceiling_below_m = finder.find(&mut is_taken, &mut found, &mut sheets);
     }
-    add_rims(mesh, &scan, &borders, &sheets, &mut found.surfaces);
+    add_rims(mesh, &scan, fronts, &borders, &sheets, &mut found.surfaces);
     found
 }
 
@@ -110,6 +111,7 @@ pub fn find_structure(mesh: &TriMesh) -> Structure {
 fn add_rims(
     mesh: &TriMesh,
     scan: &Scan,
+    fronts: Fronts,
     borders: &[[u32; 2]],
     sheets: &[Vec<Sheet>],
     surfaces: &mut [Surface],
@@ -122,7 +124,8 @@ fn add_rims(
             .for_each(|face| surface_of[face as usize] = Some(number));
     }
     let mut more: Vec<Vec<u32>> = vec![Vec::new(); surfaces.len()];
-    for (face, surface) in rims(mesh, borders, &surface_of, sheets) {
+    let has_sides = fronts != Fronts::Mixed;
+    for (face, surface) in rims(mesh, &scan.facets, has_sides, borders, &surface_of, sheets) {
         more[surface as usize].push(face);
     }
     for (surface, more) in surfaces.iter_mut().zip(more) {

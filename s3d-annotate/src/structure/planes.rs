@@ -126,9 +126,8 @@ fn fitted(facets: &[Facet], seed: &[u32], all: impl Iterator<Item = u32>, has_si
     for _ in 0..6 {
         let is_on = |face: &u32| {
             let facet = &facets[*face as usize];
-            let alike = facet.normal.dot(normal);
-            let alike = if has_sides { alike } else { alike.abs() };
-            alike >= ALIKE && (facet.middle.dot(normal) - offset_m).abs() <= reach_m
+            is_alike(facet.normal, normal, has_sides)
+                && (facet.middle.dot(normal) - offset_m).abs() <= reach_m
         };
         on = all.iter().copied().filter(is_on).collect();
         if on.is_empty() {
@@ -144,6 +143,13 @@ fn fitted(facets: &[Facet], seed: &[u32], all: impl Iterator<Item = u32>, has_si
         area_m2: on.iter().map(|face| facets[*face as usize].area_m2).sum(),
         faces: on,
     }
+}
+
+/// Returns whether a face with this normal may be on a plane. Of either winding unless `has_sides`.
+pub(super) fn is_alike(face: DVec3, plane: DVec3, has_sides: bool) -> bool {
+    let cosine = face.dot(plane);
+    let cosine = if has_sides { cosine } else { cosine.abs() };
+    cosine >= ALIKE
 }
 
 /// The offset of each face along a normal, and its area, ascending.

@@ -1,10 +1,15 @@
-//! The faces that planes leave out: in the creases between surfaces, and specks within one.
+//! The faces that planes leave out: those that noise has turned, those in the creases between surfaces, and
+//! specks within one.
+//!
+//! Where a plane lies on the grid of a reconstruction, noise decides on which side of each corner of the grid
+//! it is. One face in five is folded there. It lies in the plane, but its normal does not say so.
 //!
 //! Scanners round corners. The faces there turn between two planes and belong to neither, over a length of
 //! three times the outline of a room. Each of them is given to the surface that it is nearest to. A few faces
 //! of noise within a surface belong to it.
 
-use super::planes::Plane;
+use super::planes::{Plane, is_alike};
+use super::scan::Facet;
 use crate::segments::Lists;
 use s3d_geom::TriMesh;
 use s3d_geom::glam::DVec3;
@@ -23,11 +28,13 @@ const SPECK_M2: f64 = 0.01;
 pub(super) struct Sheet {
     normal: DVec3,
     offset_m: f64,
+    /// The largest distance of the middles of its faces from it, metres.
+    tolerance_m: f64,
 }
 
 impl Sheet {
     pub(super) fn of(plane: &Plane) -> Self {
-        Self { normal: plane.normal, offset_m: plane.offset_m }
+        Self { normal: plane.normal, offset_m: plane.offset_m, tolerance_m: plane.tolerance_m }
     }
 
     fn distance_m(&self, place: DVec3) -> f64 {
@@ -35,18 +42,22 @@ impl Sheet {
     }
 }
 
-/// Returns the faces in creases and the specks, with the surface that each belongs to, ascending by face.
-/// `borders` are the pairs of faces that share an edge. `surface_of` has the surface of each face, if it has
-/// one, and `sheets` the planes of each surface.
+/// Returns the turned faces, the faces in creases and the specks, with the surface that each belongs to,
+/// ascending by face. `borders` are the pairs of faces that share an edge. `surface_of` has the surface of
+/// each face, if it has one, and `sheets` the planes of each surface. Fronts of faces tell nothing unless
+/// `has_sides`.
 pub(super) fn rims(
     mesh: &TriMesh,
+    facets: &[Facet],
+    has_sides: bool,
     borders: &[[u32; 2]],
     surface_of: &[Option<u32>],
     sheets: &[Vec<Sheet>],
 ) -> Vec<(u32, u32)> {
     let both = borders.iter().flat_map(|&[a, b]| [(a, b), (b, a)]);
-    let mut rims =
-        Rims { mesh, neighbours: Lists::of(surface_of.len(), both), surface_of: surface_of.to_vec(), sheets };
+    let neighbours = Lists::of(surface_of.len(), both);
+    let mut rims = Rims { mesh, facets, has_sides, neighbours, surface_of: surface_of.to_vec(), sheets };
+    rims.turned();
     rims.creases();
     rims.specks();
 
@@ -57,6 +68,8 @@ pub(super) fn rims(
 
 struct Rims<'a> {
     mesh: &'a TriMesh,
+    facets: &'a [Facet],
+    has_sides: bool,
     neighbours: Lists,
     surface_of: Vec<Option<u32>>,
     sheets: &'a [Vec<Sheet>],
@@ -75,6 +88,47 @@ impl Rims<'_> {
             .iter()
             .filter(|sheet| corners.iter().all(|corner| sheet.distance_m(*corner) <= REACH_M));
         near.map(|sheet| sheet.distance_m(middle)).min_by(f64::total_cmp)
+    }
+
+    /// Returns the distance of a face from the plane of a surface that it lies in, metres. `None` if it does
+    /// not lie in one, or its normal says that it does: then something else keeps it from the surface.
+    fn turned_in(&self, face: u32, surface: u32) -> Option<f64> {
+        let facet = &self.facets[face as usize];
+        let corners = self.mesh.triangle(face).map(|corner| corner.as_dvec3());
+        let lies_in = self.sheets[surface as usize].iter().filter(|sheet| {
+            // The corners of a face are rougher than its middle.
+            let corner_m = (2.0 * sheet.tolerance_m).min(REACH_M);
+            !is_alike(facet.normal, sheet.normal, self.has_sides)
+                && sheet.distance_m(facet.middle) <= sheet.tolerance_m
+                && corners.iter().all(|corner| sheet.distance_m(*corner) <= corner_m)
+        });
+        lies_in
+            .map(|sheet| sheet.distance_m(facet.middle))
+            .min_by(f64::total_cmp)
+    }
+
+    /// Gives turned faces to the surface beside them whose plane they lie in, ring by ring.
+    fn turned(&mut self) {
+        let mut ring: Vec<u32> = (0..self.surface_of.len() as u32)
+            .filter(|face| self.of(*face).is_some())
+            .collect();
+        while !ring.is_empty() {
+            let mut more: Vec<(u32, f64, u32)> = Vec::new();
+            for face in ring {
+                let Some(surface) = self.of(face) else { continue };
+                let free = self
+                    .neighbours
+                    .list(face)
+                    .iter()
+                    .filter(|next| self.of(**next).is_none());
+                more.extend(free.filter_map(|next| Some((*next, self.turned_in(*next, surface)?, surface))));
+            }
+            more.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+            more.dedup_by_key(|(face, ..)| *face);
+            ring = more.iter().map(|(face, ..)| *face).collect();
+            more.into_iter()
+                .for_each(|(face, _, surface)| self.surface_of[face as usize] = Some(surface));
+        }
     }
 
     /// Gives the faces in creases to the surface that they are nearest to.
