@@ -32,15 +32,15 @@ pub struct FoundOrigin {
 #[non_exhaustive]
 pub enum OriginError {
     /// There are fewer points than tell anything.
-    #[error("{points} points do not tell it: it takes {LEAST_POINTS}")]
+    #[error("there are {points}, and it takes {LEAST_POINTS}")]
     FewPoints {
         /// The number of finite points.
         points: usize,
     },
     /// From no place are the points spread evenly over all directions.
     #[error(
-        "the points do not tell it, since from no place they are spread evenly: they are of several scans, \
-         thinned, or of a scanner that moved"
+        "from no place are they spread evenly over all directions, so they are of several scans, thinned, or \
+         of a scanner that moved"
     )]
     Uneven {
         /// The place that came closest.

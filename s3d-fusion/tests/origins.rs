@@ -6,7 +6,7 @@ use s3d_synth::device::{LaserScanner, ScanTarget};
 use s3d_synth::{AnnotatedScene, Building, BuildingOptions};
 use std::collections::BTreeSet;
 
-/// The points of a scan at each location of a building, from the corner of its box, in no order.
+/// The place of each scan location of a building, and the points of a scan there, in no order.
 fn scans(building: Building) -> Vec<(DVec3, Vec<Vec3>)> {
     let scene: AnnotatedScene = Building { texture_scale: 0.1, ..building }.build().unwrap();
     let target = ScanTarget::new(&scene);

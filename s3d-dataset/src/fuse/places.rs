@@ -22,8 +22,10 @@ pub(super) fn find_places(scans: &mut LaserScans, ctx: &Context) -> Result<Vec<S
             continue;
         }
         let (corner, points) = some_points(scans, number, ctx)?;
-        let found = find_origin(&points)
-            .map_err(|why| Error::unfit(&info.path, format!("{missing}. Its points were tried: {why}")))?;
+        let found = find_origin(&points).map_err(|why| {
+            let missing = missing.message();
+            Error::unfit(&info.path, format!("{missing}. Its points do not tell it either: {why}"))
+        })?;
         let origin_m = corner + found.origin;
         let [x, y, z] = origin_m.to_array();
         told.push(format!(

@@ -36,33 +36,6 @@ pub(super) fn to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> (f32, [f32; 3]) {
     ((ap - weights[1] * ab - weights[2] * ac).length_squared(), weights)
 }
 
-/// What tells quickly whether a place is above or below a triangle, and how far.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
-    /// What the weights of the second and third corner grow by with a step from the first corner.
-    weights: [Vec3; 2],
-    normal: Vec3,
-}
-
-impl Frame {
-    /// The frame of a triangle, whose sides have the cross product `across`, not 0.
-    pub(super) fn new([a, b, c]: [Vec3; 3], across: Vec3) -> Self {
-        let inverse = across.length_squared().recip();
-        let weights = [(c - a).cross(across) * inverse, across.cross(b - a) * inverse];
-        Self { weights, normal: across * inverse.sqrt() }
-    }
-
-    /// The squared distance of a place from the triangle, and the weights of the corners at the nearest
-    /// place. `off` leads there from the first corner. `None` if the nearest place is on the rim.
-    #[inline]
-    pub(super) fn above(&self, off: Vec3) -> Option<(f32, [f32; 3])> {
-        let [v, w] = self.weights.map(|gradient| gradient.dot(off));
-        let distance = self.normal.dot(off);
-        let is_above = v > 0.0 && w > 0.0 && v + w < 1.0;
-        is_above.then_some((distance * distance, [1.0 - v - w, v, w]))
-    }
-}
-
 /// The squared distance of `p` to a segment.
 pub(super) fn to_segment(p: Vec3, [a, b]: [Vec3; 2]) -> f32 {
     let (ab, ap) = (b - a, p - a);
@@ -92,14 +65,6 @@ mod tests {
             let (squared, weights) = to_triangle(p, corners);
             let truth = nearest_brute_force(&mesh, p);
             assert!((squared.sqrt() - truth.distance_m).abs() < 1e-5, "{p}");
-            let frame = Frame::new(corners, (corners[1] - corners[0]).cross(corners[2] - corners[0]));
-            match frame.above(p - corners[0]) {
-                Some(above) => {
-                    assert!((above.0 - squared).abs() < 1e-4, "{p}");
-                    assert!(above.1.iter().zip(weights).all(|(a, b)| (a - b).abs() < 1e-4), "{p}");
-                }
-                None => assert!(weights.iter().any(|weight| *weight < 1e-5), "{p}"),
-            }
             let place: Vec3 = corners.iter().zip(weights).map(|(c, w)| *c * w).sum();
             assert!(place.distance(truth.point) < 1e-4, "{p}");
         }

@@ -270,10 +270,10 @@ mod tests {
             assert_eq!(domain.to_string().parse(), Ok(domain));
         }
         let message = "normals".parse::<Domain>().unwrap_err().to_string();
-        let all = "there are rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose, \
-                   objects, depth_euclidean, reshading, principal_curvature, edge_occlusion, edge_texture, \
-                   keypoints2d, keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, edge_instance and \
-                   boundary_distance";
+        let all = "there are rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, \
+                   pose, objects, depth_euclidean, reshading, principal_curvature, edge_occlusion, \
+                   edge_texture, keypoints2d, keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, \
+                   edge_instance and boundary_distance";
         assert_eq!(message, format!("no modality is called \"normals\"; {all}"));
     }
 }

@@ -72,7 +72,8 @@ pub(super) fn list(path: &Path, options: &RawOptions) -> Result<Listed> {
         && rest.iter().all(|place| place.distance(*first) < 1e-3)
     {
         warnings.push(format!(
-            "{}: all {} scans are told to be taken at one place, {first}: were their poses lost in an export?",
+            "{}: all {} scans are told to be taken at one place, {first}: were their poses lost in an \
+             export?",
             path.display(),
             places.len()
         ));

@@ -65,7 +65,8 @@ impl LaserScans {
             Ok::<(), Error>(())
         })?;
         if beside > 0 {
-            let message = format!("{}: {beside} points lie beside its grid of {rows} × {columns}", info.name);
+            let name = &info.name;
+            let message = format!("{name}: {beside} points lie beside its grid of {rows} × {columns}");
             return Err(Error::format(&info.path, message));
         }
         Ok(Some(ScanGrid { origin_m, offsets_m, colors, intensities }))
