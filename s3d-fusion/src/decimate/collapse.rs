@@ -1,6 +1,6 @@
 //! Collapses edges of a piece of a mesh, the cheapest first, as long as the old surface stays near.
 
-use super::distance::{to_segment, to_triangle};
+use super::distance::{Frame, to_segment, to_triangle};
 use super::patch::{Freedom, NONE, Patch};
 use s3d_geom::glam::Vec3;
 use std::cmp::Ordering;
@@ -85,6 +85,8 @@ struct Star {
     kept: Vec<(u32, u32, u32)>,
     /// The places that the corners of `kept` will have.
     triangles: Vec<[Vec3; 3]>,
+    /// The same, to find quickly what lies above or below them.
+    frames: Vec<Frame>,
     /// The faces on both sides of the edge, which go.
     shared: Vec<u32>,
     opposite: Vec<u32>,
@@ -254,6 +256,7 @@ impl Collapser<'_> {
     /// Whether no face turns over or becomes a line, and the place is near the surface as it is.
     fn keeps_sides(&self, merge: &Merge, star: &mut Star) -> bool {
         star.triangles.clear();
+        star.frames.clear();
         for &(corner, a, b) in &star.kept {
             let [a, b] = [a, b].map(|v| self.patch.positions[v as usize]);
             let [p, q, r] = self.patch.triangle(corner / 3);
@@ -267,6 +270,7 @@ impl Collapser<'_> {
                 return false;
             }
             star.triangles.push([merge.place, a, b]);
+            star.frames.push(Frame::new([merge.place, a, b]));
         }
 
         let limit = self.limits.distance_m * self.limits.distance_m;
@@ -331,14 +335,25 @@ impl Collapser<'_> {
             for number in patch.samples_of.of(face) {
                 let sample = patch.samples[number as usize];
 
-                // Within the sample's own face is near enough; elsewhere the nearest face is looked for.
+                // A face above or below which it lies: its own if that is near enough, or else the nearest.
+                // If there is none, it lies at an edge.
                 let mut best = (f32::INFINITY, [0.0; 3], own);
-                if let Some(triangle) = star.triangles.get(own as usize) {
-                    let (squared, weights) = to_triangle(sample.at, *triangle);
-                    best = (squared, weights, own);
+                if let Some(frame) = star.frames.get(own as usize) {
+                    best = frame
+                        .above(sample.at)
+                        .map_or(best, |(squared, weights)| (squared, weights, own));
                 }
-                if best.0 > limit || best.1.contains(&0.0) {
-                    for (i, triangle) in (0..).zip(&star.triangles).filter(|(i, _)| *i != own) {
+                if best.0 > limit {
+                    for (i, frame) in (0..).zip(&star.frames) {
+                        if let Some((squared, weights)) =
+                            frame.above(sample.at).filter(|(squared, _)| *squared < best.0)
+                        {
+                            best = (squared, weights, i);
+                        }
+                    }
+                }
+                if best.0 > limit {
+                    for (i, triangle) in (0..).zip(&star.triangles) {
                         let (squared, weights) = to_triangle(sample.at, *triangle);
                         if squared < best.0 {
                             best = (squared, weights, i);

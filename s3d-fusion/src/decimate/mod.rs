@@ -95,6 +95,9 @@ pub enum DecimateError {
 /// Pieces of about this many faces are decimated on their own, then what lies between them.
 const FACES_A_PIECE: f64 = 40_000.0;
 
+/// Where the pieces of each round begin, in pieces.
+const SHIFTS: [f64; 3] = [0.0, 1.0 / 3.0, 2.0 / 3.0];
+
 /// Pieces stop at this multiple of the target, so that the last round chooses among all edges.
 const SLACK: f64 = 3.0;
 
@@ -108,7 +111,8 @@ const SHARE: f32 = 0.9;
 /// Faces that name a vertex twice are dropped, and so are vertices that no face uses.
 ///
 /// The same mesh gives the same bytes for any number of threads: cubes of a size that depends on the mesh
-/// alone are decimated in parallel, then the whole.
+/// alone are decimated in parallel, in three rounds whose cubes begin elsewhere. With a target, it is one
+/// round, and then the whole.
 ///
 /// ```
 /// use s3d_fusion::{DecimateOptions, MeshColumns, decimate};
@@ -139,7 +143,7 @@ pub fn decimate(mesh: &MeshColumns<'_>, options: &DecimateOptions) -> Result<Dec
     Ok(compact(&whole, !mesh.colors.is_empty()))
 }
 
-/// Decimates pieces of about so many faces, then the whole.
+/// Decimates pieces of about so many faces, in rounds. With a target, then the whole.
 fn decimate_in_pieces(mesh: &MeshColumns<'_>, options: &DecimateOptions, faces_a_piece: f64) -> Whole {
     let mut whole = Whole::new(mesh, options.max_error_m, options.color_weight_m / 255.0);
     let faces = whole.alive();
@@ -149,10 +153,17 @@ fn decimate_in_pieces(mesh: &MeshColumns<'_>, options: &DecimateOptions, faces_a
 
     if faces as f64 > 2.0 * faces_a_piece {
         let cell_m = (whole.area() * faces_a_piece / faces as f64).sqrt().max(1e-3);
-        whole.by_cubes(cell_m, |piece| {
-            let share = target as f64 * piece.alive as f64 / faces as f64;
-            collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
-        });
+        // What lies between the pieces of one round is within those of the next.
+        let rounds = if target == 0 { &SHIFTS[..] } else { &SHIFTS[..1] };
+        for shift in rounds {
+            whole.by_cubes(cell_m, *shift, |piece| {
+                let share = target as f64 * piece.alive as f64 / faces as f64;
+                collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
+            });
+        }
+        if target == 0 {
+            return whole;
+        }
     }
     if whole.alive() > target {
         whole.at_once(|all| collapse_edges(all, &limits(target)));

@@ -140,10 +140,11 @@ impl Whole {
         [worst.sqrt(), (sum / self.samples.len().max(1) as f64).sqrt()]
     }
 
-    /// Cuts the mesh into pieces: the vertices in a cube of the edge `cell_m` are one. `work` changes each
-    /// piece, in parallel, and what it did is taken over. Pieces share no face that may change.
-    pub(super) fn by_cubes(&mut self, cell_m: f64, work: impl Fn(&mut Patch) + Sync) {
-        let cell = |p: &Vec3| (p.as_dvec3() / cell_m).floor().as_ivec3().to_array();
+    /// Cuts the mesh into pieces: the vertices in a cube of the edge `cell_m` are one. All cubes are moved by
+    /// the share `shift` of an edge along each axis. `work` changes each piece, in parallel, and what it did
+    /// is taken over. Pieces share no face that may change.
+    pub(super) fn by_cubes(&mut self, cell_m: f64, shift: f64, work: impl Fn(&mut Patch) + Sync) {
+        let cell = |p: &Vec3| (p.as_dvec3() / cell_m + shift).floor().as_ivec3().to_array();
         let cells: Vec<[i32; 3]> = self.positions.par_iter().map(cell).collect();
         let mut numbers = cells.clone();
         numbers.par_sort_unstable();
@@ -189,7 +190,8 @@ impl Whole {
             .map(|(i, &f)| (owner[f as usize], i))
             .filter(|(cell, _)| *cell != NONE)
             .collect();
-        samples.par_sort_unstable();
+        // The samples of a face lie side by side in memory.
+        samples.par_sort_unstable_by_key(|&(cell, i)| (cell, self.face_of_sample[i as usize], i));
         let starts = (0..).zip(&self.start_of_border_point);
         let mut border: Vec<(u32, u32)> = starts.map(|(i, &v)| (cell_of[v as usize], i)).collect();
         border.par_sort_unstable();
