@@ -227,6 +227,9 @@ def blocks(args, clock):
         attr_channels=((1), (1), (3)),
         voxel_size=args.cell, block_resolution=16, block_count=20_000, device=device)
     for color, depth, lens, matrix in pictures(args.scan):
+        # A picture of nothing is an error to it.
+        if not ((depth > 0) & (depth < args.range)).any():
+            continue
         color, depth = (o3d.t.geometry.Image(pixels) for pixels in ((color / 255).astype(np.float32), depth))
         _, _, fx, fy, cx, cy = lens
         with clock:

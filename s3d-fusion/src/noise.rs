@@ -31,7 +31,7 @@ impl SensorNoise {
     pub const STRUCTURED_LIGHT: Self = Self { constant_m: 0.001, per_m: 0.0, per_m2: 0.001 };
 
     /// Returns the standard deviation of a range of `range_m`, metres.
-    #[inline]
+    #[inline(always)]
     pub fn sigma_m(&self, range_m: f32) -> f32 {
         self.constant_m + range_m * (self.per_m + range_m * self.per_m2)
     }

@@ -6,7 +6,7 @@ use super::kept_tiles::KeptTiles;
 use super::{FuseOptions, tiles};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use s3d_fusion::{FusedMesh, Fusion, FusionError, FusionOptions, SensorNoise, Surface};
+use s3d_fusion::{FusedMesh, Fusion, FusionError, SensorNoise, Surface};
 use std::path::{Path, PathBuf};
 
 /// Where finished tiles are kept, and what they are made of.
@@ -25,7 +25,7 @@ pub(super) fn gather(
 ) -> Result<FusedMesh> {
     let of = |e: FusionError| Error::unfit(images.path(), e.to_string());
     let too_small = || Error::unfit(images.path(), "one block takes more than the memory allowed");
-    let fusion_options = FusionOptions { cell_m: options.cell_m, ..FusionOptions::default() };
+    let fusion_options = images.fusion_options(options.cell_m);
     let least_piece_m2 = fusion_options.least_piece_cells * options.cell_m * options.cell_m;
     let most_bytes = (options.memory_gib * f64::from(1 << 30)) as u64;
     let made_of = || Record::of(keeping.inputs, options);

@@ -6,7 +6,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::parallel::map_in_order;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3, dvec2};
-use s3d_fusion::{RangeImage, RangeKind, SensorNoise};
+use s3d_fusion::{FusionOptions, RangeImage, RangeKind, SensorNoise};
 use s3d_geom::{Pose, Raster};
 use s3d_io::camera::{Distortion, Optics, uuid_from_name};
 use s3d_io::mesh::UpAxis;
@@ -17,6 +17,11 @@ use std::path::{Path, PathBuf};
 
 /// Depth pictures count up to this range by default, metres: noise grows with its square.
 const PICTURE_RANGE_M: f64 = 5.0;
+
+/// Pieces of the mesh of laser scans with less surface than this many faces of cells are left out. The wires
+/// and rods that one scan sees are pieces of few cells. People who walk through depth pictures leave larger
+/// ones.
+const SCAN_PIECE_CELLS: f64 = 5.0;
 
 /// Laser scans count up to this range by default, metres. What is farther is seen through windows.
 const SCAN_RANGE_M: f64 = 60.0;
@@ -183,6 +188,15 @@ impl Images {
     pub(super) fn mean_up(&self) -> Option<DVec3> {
         let sum: DVec3 = self.pictures.iter().map(|picture| picture.pose.up()).sum();
         (!self.pictures.is_empty()).then(|| sum / self.pictures.len() as f64)
+    }
+
+    /// How they are fused with cells of this size.
+    pub(super) fn fusion_options(&self, cell_m: f64) -> FusionOptions {
+        let mut options = FusionOptions { cell_m, ..FusionOptions::default() };
+        if self.pictures.is_empty() {
+            options.least_piece_cells = SCAN_PIECE_CELLS;
+        }
+        options
     }
 
     /// The places that sensors stood at, metres.

@@ -2,14 +2,15 @@
 
 use super::pyramid::Pyramid;
 use super::view::View;
-use super::walk::blocks_along;
+use super::walk::{self, blocks_along};
 use super::{Scale, Tile, chance};
 use crate::FusionError;
 use crate::grid::block::{Block, NO_COLOR};
-use crate::grid::{CHUNK, Grid, NONE, Place, SIDE, block_in, chunk_of, key, place_of};
+use crate::grid::{CHUNK, FARTHEST, Grid, NONE, Place, SIDE, block_in, chunk_of, key, place_of};
 use crate::range_image::{RangeImage, Surfel};
 use rayon::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3};
+use s3d_simd::{dispatch, level};
 
 /// An image that is being added.
 pub(super) struct Adding<'a> {
@@ -41,6 +42,7 @@ impl Adding<'_> {
     pub(super) fn add_to(&self, grid: &mut Grid) -> Result<(), FusionError> {
         let view = View::new(self.image);
         let surfels = self.image.surfels(self.scale.cell as f32);
+        self.block(view.location)?;
         let (touched, low, high) = self.touched(&view, &surfels);
         if touched.is_empty() && low.x > high.x {
             return Ok(());
@@ -74,49 +76,57 @@ impl Adding<'_> {
             .zip(places.par_iter())
             .zip(work.par_iter())
             .filter(|(_, has_work)| **has_work)
-            .for_each(|((block, place), _)| self.update(&view, &surfels, *place, block));
+            .for_each(|((block, place), _)| {
+                dispatch!(level(), _simd => self.update(&view, &surfels, *place, block));
+            });
         Ok(())
     }
 
     /// Returns the first and the last block of a box around the sensor and all hits.
     fn bounds(&self, view: &View<'_>, low: Vec3, high: Vec3) -> Result<[Place; 2], FusionError> {
         let reach = self.scale.front + self.scale.block();
-        let block = |off: DVec3| {
-            let point = view.location + off;
-            self.scale
-                .block_of(point)
-                .ok_or(FusionError::TooFar { point, cell_m: self.scale.cell })
-        };
         let (low, high) = (low.as_dvec3().min(DVec3::ZERO), high.as_dvec3().max(DVec3::ZERO));
-        Ok([block(low - reach)?, block(high + reach)?])
+        Ok([self.block(view.location + low - reach)?, self.block(view.location + high + reach)?])
+    }
+
+    fn block(&self, point: DVec3) -> Result<Place, FusionError> {
+        let too_far = FusionError::TooFar { point, cell_m: self.scale.cell };
+        self.scale.block_of(point).ok_or(too_far)
     }
 
     /// Returns the keys of the blocks near hits, in order, and the box of all hits from the sensor.
     fn touched(&self, view: &View<'_>, surfels: &[Surfel]) -> (Vec<u64>, Vec3, Vec3) {
         let width = view.size[0] as usize;
-        let turn = view.turn.transpose();
+        // In blocks from the block of the sensor, so that single precision is enough.
+        let per_block = self.scale.block().recip();
+        let sensor = walk::floor(view.location * per_block);
+        let start = (view.location * per_block - DVec3::from_array(sensor.map(f64::from))).as_vec3();
+        let turn = view.turn.transpose().as_mat3();
+        let reach = (FARTHEST - 8) as f32;
+
         let bands = surfels.par_chunks(width * 8).enumerate().map(|(band, surfels)| {
             let mut found: Vec<u64> = Vec::new();
             let mut last = None;
             let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
             for (i, s) in surfels.iter().enumerate().filter(|(_, s)| s.weight > 0.0) {
-                let ray = turn * (self.image.ray_of(band * width * 8 + i) * s.range).as_dvec3();
-                (low, high) = (low.min(ray.as_vec3()), high.max(ray.as_vec3()));
-                let along = ray / ray.length();
-                let cosine = -s.normal.dot((view.turn * along).as_vec3());
-                let [front, behind] = self.scale.along_ray(cosine, s.sigma_m);
-                let hit = view.location + ray;
-                let ends = [hit - along * front, hit + along * behind];
-                let [Some(a), Some(b)] = [self.scale.block_of(ends[0]), self.scale.block_of(ends[1])] else {
-                    continue;
-                };
-                // The ray before went the only way from the one to the other.
-                let apart: u32 = (0..3).map(|k| a[k].abs_diff(b[k])).sum();
-                if last == Some((a, b)) && apart <= 1 {
+                let ray = self.image.ray_of(band * width * 8 + i) * s.range;
+                let hit = turn * ray;
+                (low, high) = (low.min(hit), high.max(hit));
+                let length = ray.dot(ray).sqrt();
+                let [front, behind] = self.scale.along_ray(-s.normal.dot(ray) / length, s.sigma_m);
+                let at = |off: f64| start + hit * ((1.0 + off as f32 / length) * per_block as f32);
+                let ends = [at(-front), at(behind)];
+                if ends.iter().any(|end| end.abs().max_element() >= reach) {
                     continue;
                 }
-                last = Some((a, b));
-                blocks_along(ends.map(|end| end / self.scale.block()), |block| {
+                // The ray before went the same way.
+                let way = walk::Way::new(ends);
+                if way.is_short() && last == Some(way) {
+                    continue;
+                }
+                last = Some(way);
+                blocks_along(ends.map(Vec3::as_dvec3), |from_sensor| {
+                    let block = [0, 1, 2].map(|k| sensor[k] + from_sensor[k]);
                     if self.tile.is_none_or(|t| t.holds(block)) {
                         found.push(key(block));
                     }
@@ -194,6 +204,7 @@ impl Adding<'_> {
     }
 
     /// Adds the image to each voxel of a block.
+    #[inline(always)]
     pub(super) fn update(&self, view: &View<'_>, surfels: &[Surfel], place: Place, block: &mut Block) {
         let cell = self.scale.cell;
         let corner = DVec3::from_array(place.map(f64::from)) * self.scale.block();

@@ -80,7 +80,7 @@ impl Scale {
     /// How far before a hit, along the ray, distances are gathered at most. A ray that meets a plane aslant
     /// is near it for long.
     fn most_before(&self) -> f64 {
-        2.0 * self.front
+        4.0 * self.front
     }
 
     /// How far behind a hit, along the ray, distances are gathered at most. A ray that meets a body aslant

@@ -56,7 +56,7 @@ impl<'a> View<'a> {
 
     /// Returns the pixels and the ranges of points in the axes of the sensor; `u32::MAX` for points outside
     /// of the image.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn pixels(&self, points: &[[f32; 8]; 3]) -> ([u32; 8], [f32; 8]) {
         let [x, y, z] = points;
         let mut pixels = [u32::MAX; 8];
@@ -90,7 +90,7 @@ impl<'a> View<'a> {
                 let mut ranges = [0.0; 8];
                 for k in 0..8 {
                     let point = Vec3::new(x[k], y[k], z[k]);
-                    ranges[k] = point.length();
+                    ranges[k] = point.dot(point).sqrt();
                     let [azimuth, elevation] = angles_of(point.as_dvec3());
                     if let Some([column, row]) = grid.pixel(azimuth, elevation) {
                         pixels[k] = row * self.size[0] + column;

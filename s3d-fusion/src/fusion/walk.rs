@@ -1,7 +1,7 @@
 //! The cubes that a segment crosses.
 
 use crate::grid::{Place, SIDE};
-use s3d_geom::glam::DVec3;
+use s3d_geom::glam::{DVec3, Vec3};
 
 /// Returns the largest whole numbers that are not above some numbers. Without a call, unlike the library's.
 #[inline]
@@ -10,6 +10,39 @@ pub(super) fn floor(point: DVec3) -> Place {
         let whole = k as i32;
         whole - i32::from(k < f64::from(whole))
     })
+}
+
+/// Which unit cubes a segment crosses, for comparison with other segments.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Way {
+    first: Place,
+    last: Place,
+    /// Whether the border along x comes before that along y, y before z, and x before z.
+    order: [bool; 3],
+}
+
+impl Way {
+    #[inline]
+    pub(super) fn new([start, end]: [Vec3; 2]) -> Self {
+        let floor = |point: Vec3| {
+            point.to_array().map(|k| {
+                let whole = k as i32;
+                whole - i32::from(k < whole as f32)
+            })
+        };
+        let (first, last) = (floor(start), floor(end));
+        let [x, y, z] = [0, 1, 2].map(|k| match first[k] == last[k] {
+            true => f32::INFINITY,
+            false => (first[k].max(last[k]) as f32 - start[k]) / (end[k] - start[k]),
+        });
+        Self { first, last, order: [x < y, y < z, x < z] }
+    }
+
+    /// Whether the segment crosses at most one border on each axis. Then equal ways have the same cubes.
+    #[inline]
+    pub(super) fn is_short(&self) -> bool {
+        (0..3).all(|k| self.first[k].abs_diff(self.last[k]) <= 1)
+    }
 }
 
 /// Calls `visit` with each unit cube that a segment crosses, from its start to its end. Source: Amanatides

@@ -65,7 +65,7 @@ impl Block {
 
     /// Notes that a ray passed a voxel. `is_far`: far before all that it hit. `counts`: certainly, also
     /// beside the ray.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn pass(&mut self, i: usize, is_far: bool, counts: bool) {
         if is_far && self.weight[i] == 0 {
             self.distance[i] = PASSED;
@@ -77,7 +77,7 @@ impl Block {
 
     /// Adds a distance, as a share of the truncation, to the mean of a voxel. `is_at`: the voxel is at the
     /// surface or behind it. Returns the share that the distance has in the mean.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn observe(&mut self, i: usize, distance: f32, weight: f32, is_at: bool) -> f32 {
         let old = f32::from_bits(u32::from(self.weight[i]) << 16);
         let sum = old + weight;
@@ -94,7 +94,7 @@ impl Block {
 
     /// Moves the colour of a voxel by a share towards another one. `chance`, from 0 to 1, decides how parts
     /// of a level are rounded, so that small shares add up.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn mix_color(&mut self, i: usize, color: [u8; 3], share: f32, chance: f32) {
         let colors = self.colors.get_or_insert_with(|| Box::new([NO_COLOR; VOXELS]));
         let old = colors[i];
