@@ -4,7 +4,7 @@ use crate::arrays;
 use crate::error::usage;
 use crate::mesh::Mesh;
 use crate::work::{detached, watched};
-use numpy::{PyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use s3d_geom::{Camera, NormalAxes, Pose, Raster};
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::MeshFile;
 use s3d_render::{
-    Hits, MipMaps, NO_FACE, Normals, TextureFilter, cast, cast_ray, depth_image, normal_image,
+    Hits, MipMaps, NO_FACE, Normals, TextureFilter, cast, cast_ray, correspondences, depth_image, normal_image,
     normal_vectors, rgb_image, sample_edges, xyz_image, xyz_image_half,
 };
 use self_cell::self_cell;
@@ -22,6 +22,7 @@ use std::sync::Arc;
 
 type Tree<'m> = s3d_render::Scene<'m>;
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
+type Rows<'py> = Bound<'py, PyArray2<f64>>;
 
 self_cell!(
     struct MeshAndTree {
@@ -42,6 +43,10 @@ pub(crate) struct Scene {
 /// the files of a data set store them, instead of numbers in metres.
 #[derive(FromPyObject)]
 struct Request(Vec<String>, bool, u32, bool);
+
+/// A camera: K, or none for a panorama, the pose, and width and height.
+#[derive(FromPyObject)]
+struct View(Option<[[f64; 3]; 3]>, [[f64; 4]; 4], [u32; 2]);
 
 /// An image of a view.
 enum Modality {
@@ -135,6 +140,31 @@ impl Scene {
             directions.par_iter().enumerate().with_min_len(1024).map(ray).unzip()
         })?;
         Ok((PyArray1::from_vec(py, hits.0), PyArray1::from_vec(py, hits.1)))
+    }
+
+    /// Returns places that two cameras see, each K, pose and size: x and y in both images, the places, and the
+    /// faces.
+    fn correspondences<'py>(
+        &self,
+        py: Python<'py>,
+        cameras: [View; 2],
+        count: usize,
+    ) -> PyResult<(Rows<'py>, Rows<'py>, Column<'py, i32>)> {
+        let [a, b] = cameras.map(|View(k, pose, size)| camera(k, pose, size));
+        let (a, b) = (a?, b?);
+        let found = detached(py, None, || correspondences(self.tree(), [&a, &b], count))?;
+
+        let pixels: Vec<[f64; 4]> = found
+            .iter()
+            .map(|c| [c.pixels[0].x, c.pixels[0].y, c.pixels[1].x, c.pixels[1].y])
+            .collect();
+        let points: Vec<[f64; 3]> = found.iter().map(|c| c.point.to_array()).collect();
+        let faces = found.iter().map(|c| c.face as i32).collect();
+        Ok((
+            PyArray1::from_vec(py, pixels.into_flattened()).reshape([found.len(), 4])?,
+            PyArray1::from_vec(py, points.into_flattened()).reshape([found.len(), 3])?,
+            PyArray1::from_vec(py, faces),
+        ))
     }
 
     /// Places scan locations, and returns the uuid and the matrix camera → world of each.

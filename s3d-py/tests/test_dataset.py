@@ -258,3 +258,36 @@ def test_a_page_and_packages_are_made(ds: s3d.DataSet, tmp_path: Path) -> None:
         ds.pack("coco", tmp_path / "coco")
     with pytest.raises(s3d.UsageError, match="zip"):
         ds.pack("zip", tmp_path / "zip")
+
+
+def test_correspondences_are_the_same_places(ds: s3d.DataSet) -> None:
+    views, panorama = ds.views(), ds.panoramas()[0]
+    first = next(v for v in views if len(ds.correspondences(v, panorama)) > 500)
+    found = ds.correspondences(first, panorama, 400)
+    assert len(found) == 400 and found.label is not None
+    a, b = found.pixels
+    column, row = np.floor(a).astype(int).T
+    assert (a % 1 == 0.5).all() and len(np.unique(row * 160 + column)) == 400
+    assert np.ptp(column) > 80 and np.ptp(row) > 60
+
+    # What the images of both say of the places; the files round to a centimetre.
+    assert np.abs(first.xyz[row, column] - found.xyz).max() < 0.02
+    assert (first.labels[row, column] == found.label).mean() > 0.99
+    column, row = np.floor(b).astype(int).T
+    apart = np.linalg.norm(panorama.xyz[row, column] - found.xyz, axis=1)
+    assert np.median(apart) < 0.05
+    assert (panorama.labels[row, column] == found.label).mean() > 0.9
+    # The faces lie there.
+    mesh = ds.mesh(first.area)
+    corners = mesh.positions[mesh.faces[found.face]].astype(np.float64)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    assert np.abs(((found.xyz - corners[:, 0]) * normals).sum(1)).max() < 1e-3
+
+    again = ds.correspondences(first, panorama, 400)
+    assert np.array_equal(again.xyz, found.xyz) and np.array_equal(again.pixels[1], b)
+    alone = ds.correspondences(first, first, 50)
+    assert np.allclose(alone.pixels[0], alone.pixels[1], atol=1e-4)
+    assert len(ds.correspondences(first, panorama, 0)) == 0
+    with pytest.raises(s3d.UsageError, match="count=-1"):
+        ds.correspondences(first, panorama, -1)

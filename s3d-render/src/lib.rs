@@ -78,7 +78,8 @@
 //! # Pairs of images
 //!
 //! [`view_pairs`] tells which images see the same surface: the share of each that the other sees, by exact
-//! rays, with angles, scales and distances.
+//! rays, with angles, scales and distances. [`correspondences`] returns the pixels of two images that show the
+//! same places.
 //!
 //! # Colours from pictures
 //!
@@ -130,7 +131,7 @@ pub use edge_samples::sample_edges;
 pub use from_above::{FromAbove, GroundGrid, image_from_above};
 pub use hits::{Hits, NO_FACE};
 pub use objects::{Beyond, Mask, NO_OBJECT, ObjectMeshes, ObjectScenes, SeenObject, SeenObjects};
-pub use pairs::{PairFinder, PairOptions, ViewPair, view_pairs};
+pub use pairs::{Correspondence, PairFinder, PairOptions, ViewPair, correspondences, view_pairs};
 pub use picture::cube_map::CubeMap;
 pub use picture::cube_sources::SkyBoxTurn;
 pub use picture::level_panorama::level_panorama;

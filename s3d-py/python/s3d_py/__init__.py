@@ -43,7 +43,7 @@ from ._export import Area, ExportOptions, Labels, SceneLike, export
 from ._fuse import Fused, fuse
 from ._mesh import Mesh, MeshLike, as_mesh, read_mesh
 from ._native import __version__
-from ._pairs import Pairs
+from ._pairs import Correspondences, Pairs
 from ._points import (
     AnnotatedPoints,
     PointCloud,
@@ -76,6 +76,7 @@ __all__ = [
     "CancelledError",
     "Candidate",
     "Comparison",
+    "Correspondences",
     "DataSet",
     "Detector",
     "Error",

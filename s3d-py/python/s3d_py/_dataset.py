@@ -19,7 +19,7 @@ from . import _native
 from ._camera import Matrix
 from ._errors import UsageError
 from ._mesh import Mesh
-from ._pairs import Pairs, read_pairs
+from ._pairs import Correspondences, Pairs, read_pairs
 from ._progress import Progress, sink
 from ._results import (
     Comparison,
@@ -636,6 +636,29 @@ class DataSet(Sequence[View]):
         if not path.exists():
             raise UsageError(f"{path}: there are no pairs yet: call s3d pairs {self.root}")
         return read_pairs(path)
+
+    def correspondences(self, a: View, b: View, count: int = 1000) -> Correspondences:
+        """Returns up to `count` places that two of its images show, views or panoramas of one area: they are
+        spread over all that `a` shares with `b`, and fewer if that is less. The mesh of an area is read at the
+        first call and kept.
+        """
+        if a.area != b.area:
+            raise UsageError(f"a, b: images of areas {a.area} and {b.area}: give two of one area")
+        if count < 0:
+            raise UsageError(f"count={count}: give a number that is not negative")
+        if a.area not in self._scenes:
+            votes = self.votes(a.area)
+            label = None if votes is None else votes.label.astype(np.int32)
+            self._scenes[a.area] = self.scene(a.area), label
+        scene, label = self._scenes[a.area]
+        cameras = [(view.K, view.T_world_cam, view.size) for view in (a, b)]
+        pixels, xyz, face = scene._native.correspondences(cameras, count)
+        of_face = None if label is None else label[face]
+        return Correspondences((pixels[:, :2], pixels[:, 2:]), xyz, face, of_face)
+
+    @cached_property
+    def _scenes(self) -> dict[int, tuple[Scene, npt.NDArray[np.int32] | None]]:
+        return {}
 
     def _area(self, area: int | None) -> int:
         if area is not None:

@@ -70,6 +70,24 @@ class Pairs:
         return groups
 
 
+@dataclass(frozen=True)
+class Correspondences:
+    """N places of a surface that two images show, by exact rays."""
+
+    pixels: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+    """Two arrays (N, 2), one an image: x to the right and y down in pixels, the centre of the first pixel at
+    (0.5, 0.5). Those of the first image are centres of pixels, each once."""
+    xyz: npt.NDArray[np.float64]
+    """(N, 3), world metres."""
+    face: npt.NDArray[np.int32]
+    """(N,), index of the face of `DataSet.mesh`."""
+    label: npt.NDArray[np.int32] | None
+    """(N,), index into `DataSet.labels`, 0 without a label; None if the data set has no labels."""
+
+    def __len__(self) -> int:
+        return len(self.face)
+
+
 def read_pairs(path: Path) -> Pairs:
     """Reads `pairs.npz`."""
     with np.load(path) as arrays:

@@ -1,12 +1,14 @@
 //! Pairs of images that see the same surface.
 
 mod candidates;
+mod correspondences;
 
 use crate::hits::NO_FACE;
 use crate::raster::visibility::Caster;
 use crate::ray::caster::Sight;
 use crate::scene::Scene;
 use candidates::Places;
+pub use correspondences::{Correspondence, correspondences};
 use glam::{DVec2, DVec3, dvec2};
 use rayon::prelude::*;
 use s3d_geom::Camera;
