@@ -14,8 +14,8 @@ use s3d_geom::{Camera, NormalAxes, Pose, Raster};
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::MeshFile;
 use s3d_render::{
-    Hits, MipMaps, NO_FACE, Normals, TextureFilter, cast, cast_ray, correspondences, depth_image, normal_image,
-    normal_vectors, rgb_image, sample_edges, xyz_image, xyz_image_half,
+    Hits, MipMaps, NO_FACE, Normals, TextureFilter, cast, cast_ray, correspondences, depth_image,
+    normal_image, normal_vectors, rgb_image, sample_edges, xyz_image, xyz_image_half,
 };
 use self_cell::self_cell;
 use std::sync::Arc;

@@ -279,7 +279,7 @@ def test_correspondences_are_the_same_places(ds: s3d.DataSet) -> None:
     assert (panorama.labels[row, column] == found.label).mean() > 0.9
     # The faces lie there.
     mesh = ds.mesh(first.area)
-    corners = mesh.positions[mesh.faces[found.face]].astype(np.float64)
+    corners = mesh.vertices[mesh.faces[found.face]].astype(np.float64)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     assert np.abs(((found.xyz - corners[:, 0]) * normals).sum(1)).max() < 1e-3

@@ -2,7 +2,7 @@
 
 use s3d_geom::glam::{DVec3, Vec3, dvec2, dvec3, vec3};
 use s3d_geom::{Camera, Pose, TriMesh};
-use s3d_render::{NO_FACE, PairOptions, Scene, ViewPair, cast, cast_ray, view_pairs};
+use s3d_render::{NO_FACE, PairOptions, Scene, ViewPair, cast, cast_ray, correspondences, view_pairs};
 use s3d_synth::scenes::scan_like;
 
 /// A wall of 4 m × 2 m across +Y, 2 m ahead of the origin.
@@ -51,6 +51,50 @@ fn turned_cameras_at_one_place_need_no_rays() {
     assert_eq!(pair(&pairs, 0, 1).unwrap().overlap, 1.0);
     let back = pair(&pairs, 1, 0).unwrap();
     assert!((0.4..0.7).contains(&back.overlap) && back.angle_deg < 1e-3, "{back:?}");
+}
+
+#[test]
+fn correspondences_are_what_single_rays_of_both_cameras_meet() {
+    let mesh = wall();
+    let scene = Scene::new(&mesh);
+    let cameras = [ahead(DVec3::ZERO, 1.0), ahead(dvec3(1.0, 0.0, 0.0), 2.0)];
+    let [here, there] = &cameras;
+    let found = correspondences(&scene, [here, there], 200);
+    assert_eq!(found.len(), 200);
+    assert_eq!(correspondences(&scene, [here, there], usize::MAX).len(), 50 * 100, "half of the pixels");
+    assert_eq!(correspondences(&scene, [here, there], 7), found[..7]);
+    for c in &found {
+        // The wall is 1 m to the left of the other camera, whose pixels are half as large.
+        assert!((c.pixels[1] - 2.0 * (c.pixels[0] - dvec2(50.0, 0.0))).length() < 1e-3, "{c:?}");
+        for eye in [here.pose.location, there.pose.location] {
+            let hit = cast_ray(&scene, eye, c.point - eye).unwrap();
+            assert!((hit.t - 1.0).abs() < 1e-6 && hit.face == c.face, "{c:?}");
+        }
+    }
+    // Spread over all columns and rows that both see.
+    let columns: Vec<u32> = found.iter().map(|c| c.pixels[0].x as u32).collect();
+    assert!(
+        (50..100)
+            .step_by(10)
+            .all(|from| columns.iter().filter(|x| **x / 10 == from / 10).count() > 20)
+    );
+
+    let behind = Camera::perspective(Pose::level(dvec3(0.0, 4.0, 0.0), 180f64.to_radians()), 1.0, 50, 50);
+    assert!(correspondences(&scene, [here, &behind], 10).is_empty(), "the other side is another surface");
+
+    // In an untidy scan, what lies in between hides.
+    let mesh = scan_like(4000, 5);
+    let scene = Scene::new(&mesh);
+    let bounds = mesh.aabb();
+    let middle = bounds.min.as_dvec3() + 0.5 * bounds.size().as_dvec3();
+    let eyes = [dvec3(-0.4, -0.3, 0.1), dvec3(0.5, 0.2, -0.1)];
+    let cameras = eyes.map(|off| Camera::equirectangular(Pose::level(middle + off, 0.3), 128));
+    let found = correspondences(&scene, [&cameras[0], &cameras[1]], 1000);
+    assert!(found.len() > 100, "{}", found.len());
+    for c in &found {
+        let eye = cameras[1].pose.location;
+        assert!(cast_ray(&scene, eye, c.point - eye).unwrap().t > 1.0 - 2e-3, "{c:?}");
+    }
 }
 
 /// The same for all images against all, by single rays.

@@ -651,7 +651,10 @@ class DataSet(Sequence[View]):
             label = None if votes is None else votes.label.astype(np.int32)
             self._scenes[a.area] = self.scene(a.area), label
         scene, label = self._scenes[a.area]
-        cameras = [(view.K, view.T_world_cam, view.size) for view in (a, b)]
+        cameras = [
+            (None if view.K is None else view.K.tolist(), view.T_world_cam.tolist(), view.size)
+            for view in (a, b)
+        ]
         pixels, xyz, face = scene._native.correspondences(cameras, count)
         of_face = None if label is None else label[face]
         return Correspondences((pixels[:, :2], pixels[:, 2:]), xyz, face, of_face)

@@ -59,19 +59,15 @@ pub fn correspondences(scene: &Scene<'_>, cameras: [&Camera; 2], count: usize) -
     found
 }
 
-/// Returns the numbers below `count`, each once, so that the first of them are spread over all.
+/// Returns the numbers below `count`, each once, so that the first of them are spread over all: multiples of a
+/// Fibonacci number modulo the next one leave gaps of nearly equal length.
 fn spread(count: u64) -> impl Iterator<Item = u64> {
-    let divides = |a: u64, b: u64| {
-        let (mut a, mut b) = (a, b);
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        a > 1
-    };
-    // Steps by the golden ratio leave gaps of nearly equal length.
-    let golden = (count as f64 * 0.618_033_988_749_894_9) as u64;
-    let step = (golden.max(1)..).find(|step| !divides(count, *step)).unwrap_or(1);
-    (0..count).map(move |i| (u128::from(i) * u128::from(step) % u128::from(count)) as u64)
+    let (mut step, mut modulus) = (1_u64, 1_u64);
+    while modulus < count {
+        (step, modulus) = (modulus, step + modulus);
+    }
+    let numbers = (0..modulus).map(move |i| (u128::from(i) * u128::from(step) % u128::from(modulus)) as u64);
+    numbers.filter(move |number| *number < count)
 }
 
 #[cfg(test)]
