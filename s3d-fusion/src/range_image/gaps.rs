@@ -60,7 +60,10 @@ pub(super) mod tests {
     fn single_gaps_are_bridged_within_a_surface() {
         // Every other pixel of a dark wall, a hole of 3 × 3 pixels, and the step between the walls.
         let is_hole = |x: u32, y: u32| {
-            (x < 20 && (x + y).is_multiple_of(2)) || (x.abs_diff(30) < 2 && y.abs_diff(30) < 2) || x == 39 || x == 40
+            (x < 20 && (x + y).is_multiple_of(2))
+                || (x.abs_diff(30) < 2 && y.abs_diff(30) < 2)
+                || x == 39
+                || x == 40
         };
         let (whole, holed) = (image(|_, _| false), image(is_hole));
         let ranges = holed.without_gaps();
