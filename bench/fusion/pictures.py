@@ -2,8 +2,8 @@
 
     python3 bench/fusion/pictures.py OUT -o docs/images
 
-Needs numpy and open3d. OUT is the folder of `scenes.py`. Each mesh is seen from the same place, lit from there,
-in grey, so that noise and holes are seen; what is seen from behind is red, and nothing is white.
+Needs numpy and open3d. OUT is the folder of `scenes.py`. Each mesh is seen from the same place, lit from there, in
+grey, so that noise and holes are seen; what is seen from behind is red, and nothing is white.
 """
 
 import argparse

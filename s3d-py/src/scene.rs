@@ -142,8 +142,8 @@ impl Scene {
         Ok((PyArray1::from_vec(py, hits.0), PyArray1::from_vec(py, hits.1)))
     }
 
-    /// Returns places that two cameras see, each K, pose and size: x and y in both images, the places, and the
-    /// faces.
+    /// Returns places that two cameras see, each K, pose and size: x and y in both images, the places, and
+    /// the faces.
     fn correspondences<'py>(
         &self,
         py: Python<'py>,

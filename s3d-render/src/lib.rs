@@ -78,8 +78,8 @@
 //! # Pairs of images
 //!
 //! [`view_pairs`] tells which images see the same surface: the share of each that the other sees, by exact
-//! rays, with angles, scales and distances. [`correspondences`] returns the pixels of two images that show the
-//! same places.
+//! rays, with angles, scales and distances. [`correspondences`] returns the pixels of two images that show
+//! the same places.
 //!
 //! # Colours from pictures
 //!

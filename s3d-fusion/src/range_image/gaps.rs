@@ -4,8 +4,8 @@ use super::RangeImage;
 use rayon::prelude::*;
 
 impl RangeImage {
-    /// Returns the ranges. A pixel without one gets the mean of two on opposite sides of it, if two such pairs
-    /// of its neighbours are on one surface: dark surfaces send every other ray back.
+    /// Returns the ranges. A pixel without one gets the mean of two on opposite sides of it, if two such
+    /// pairs of its neighbours are on one surface: dark surfaces send every other ray back.
     pub(super) fn without_gaps(&self) -> Vec<f32> {
         let (width, pixels) = (self.width() as usize, self.ranges.pixels());
         let pixel_rad = self.pixel_rad() as f32;

@@ -21,9 +21,9 @@ pub struct Correspondence {
 }
 
 /// Returns up to `count` places that both cameras see from the same side of a face, with nothing in between,
-/// by exact rays. They are middles of different pixels of the first image, spread over all that it shares with
-/// the second one; fewer than `count` if it shares fewer. The same input gives the same places in the same
-/// order.
+/// by exact rays. They are middles of different pixels of the first image, spread over all that it shares
+/// with the second one; fewer than `count` if it shares fewer. The same input gives the same places in the
+/// same order.
 pub fn correspondences(scene: &Scene<'_>, cameras: [&Camera; 2], count: usize) -> Vec<Correspondence> {
     let [here, there] = cameras;
     let hits = cast(scene, here);
@@ -59,8 +59,8 @@ pub fn correspondences(scene: &Scene<'_>, cameras: [&Camera; 2], count: usize) -
     found
 }
 
-/// Returns the numbers below `count`, each once, so that the first of them are spread over all: multiples of a
-/// Fibonacci number modulo the next one leave gaps of nearly equal length.
+/// Returns the numbers below `count`, each once, so that the first of them are spread over all: multiples of
+/// a Fibonacci number modulo the next one leave gaps of nearly equal length.
 fn spread(count: u64) -> impl Iterator<Item = u64> {
     let (mut step, mut modulus) = (1_u64, 1_u64);
     while modulus < count {
