@@ -153,7 +153,7 @@ fn decimate_in_pieces(mesh: &MeshColumns<'_>, options: &DecimateOptions, faces_a
 
     if faces as f64 > 2.0 * faces_a_piece {
         let cell_m = (whole.area() * faces_a_piece / faces as f64).sqrt().max(1e-3);
-        // What lies between the pieces of one round is within those of the next.
+        // What lies between the pieces of one round is within those of another, but for single corners.
         let rounds = if target == 0 { &SHIFTS[..] } else { &SHIFTS[..1] };
         for shift in rounds {
             whole.by_cubes(cell_m, *shift, |piece| {

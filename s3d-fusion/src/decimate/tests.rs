@@ -115,6 +115,18 @@ fn any_number_of_threads_gives_the_same_bytes() {
     assert!((890..=900).contains(&one.faces.len()), "{}", one.faces.len());
     assert!(one.max_error_m <= 0.003);
     assert!(edges(&one.faces).values().all(|sides| sides.iter().all(|&n| n <= 1)));
+
+    // Without a target, in rounds of pieces alone.
+    let as_far_as_it_goes = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let run = || decimate_in_pieces(&columns(&wall), &DecimateOptions::default(), 1000.0);
+        pool.install(|| compact(&run(), false))
+    };
+    let rounds = as_far_as_it_goes(1);
+    assert_eq!(rounds, as_far_as_it_goes(3));
+    assert!(rounds.faces.len() * 10 < wall.faces.len(), "{}", rounds.faces.len());
+    assert!(distance_m(&TriMesh::new(wall.clone()).unwrap(), &mesh(&rounds), 30_000) <= 0.003);
+    assert!(edges(&rounds.faces).values().all(|sides| sides.iter().all(|&n| n <= 1)));
 }
 
 #[test]

@@ -157,8 +157,8 @@ fn lens_of(camera: &PosedCamera, size: [u32; 2]) -> std::result::Result<PhotoLen
             size[0], size[1]
         ),
         OtherSize { found, told } => format!(
-            "has {} × {} pixels, and the intrinsics are for {} × {}: is it of another camera, or was it cut? \
-             Give the intrinsics of the depth camera itself",
+            "has {} × {} pixels, and the intrinsics are for {} × {}: is it of another camera, or was it \
+             cut? Give the intrinsics of the depth camera itself",
             found[0], found[1], told[0], told[1]
         ),
         e => format!("the intrinsics of its camera do not fit: {e}"),

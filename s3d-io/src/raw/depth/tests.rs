@@ -269,7 +269,8 @@ fn sequences_of_3rscan_and_bundle_fusion_are_read() {
 
     let small = sequence("pgm", Some(&INFO.replace("m_depthWidth = 8", "m_depthWidth = 16")));
     let message = small.refused();
-    assert!(message.contains("depth.pgm: has 8 × 6 pixels, and the intrinsics are for 16 × 6"), "{message}");
+    let expected = "depth.pgm: has 8 × 6 pixels, and the intrinsics are for 16 × 6";
+    assert!(message.contains(expected), "{message}");
     let wrong = sequence("pgm", Some(&INFO.replace("Shift = 1000", "Shift = 0")));
     assert!(wrong.refused().contains("_info.txt, line 5: `0` is no scale of depth"));
     let pose = sequence("pgm", Some(INFO));

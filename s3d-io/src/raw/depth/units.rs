@@ -66,8 +66,8 @@ fn check_median(picture: &DepthPicture, median_m: f64) -> Result<()> {
     let power = libm::round(libm::log10(LIKELY_M / median_m));
     let fits = unit_m * libm::pow(10.0, power);
     let message = format!(
-        "half of its depths are beyond {median_m:.4} m, if a step of its numbers is {unit_m} m: no room is so \
-         {}. With a unit of {} m, they are beyond {:.2} m",
+        "half of its depths are beyond {median_m:.4} m, if a step of its numbers is {unit_m} m: no room is \
+         so {}. With a unit of {} m, they are beyond {:.2} m",
         if median_m > FARTHEST_M { "large" } else { "small" },
         short(fits),
         median_m * fits / unit_m
