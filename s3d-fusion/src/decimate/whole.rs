@@ -6,6 +6,7 @@ use super::quadric::Quadric;
 use crate::columns::MeshColumns;
 use rayon::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3};
+use std::collections::BTreeSet;
 
 /// The whole mesh. Faces and vertices keep their numbers and are dropped at the end.
 pub(super) struct Whole {
@@ -31,18 +32,6 @@ impl Whole {
         let color_scale_m = if has_colors { color_scale_m } else { 0.0 };
         let is_face = |f: &[u32; 3]| f[0] != f[1] && f[1] != f[2] && f[2] != f[0];
         let color = |v: u32| if has_colors { mesh.colors[v as usize] } else { [0; 3] };
-        let mut edges: Vec<([u32; 2], u32, bool)> = (0..)
-            .zip(mesh.faces)
-            .filter(|(_, f)| is_face(f))
-            .flat_map(|(face, f)| {
-                [0, 1, 2].map(|i| {
-                    let (from, to) = (f[i], f[(i + 1) % 3]);
-                    ([from.min(to), from.max(to)], face, from < to)
-                })
-            })
-            .collect();
-        edges.par_sort_unstable();
-
         let mut samples = Vec::new();
         let mut face_of_sample = Vec::new();
         let mut take = |corners: [u32; 3], weights: [u32; 3], face: u32| {
@@ -81,10 +70,16 @@ impl Whole {
             }
         }
         let (mut border_points, mut start_of_border_point) = (Vec::new(), Vec::new());
-        for sides in edges.chunk_by(|a, b| a.0 == b.0) {
-            let ([low, high], face, ascends) = sides[0];
-            take([low, high, low], [1, 1, 0], face);
-            if sides.len() == 1 {
+        let sides = sides_by_vertex(mesh.positions.len(), mesh.faces, is_face);
+        for low in 0..mesh.positions.len() as u32 {
+            for sides in sides.of(low).chunk_by(|a, b| a.0 == b.0) {
+                let (high, face) = sides[0];
+                take([low, high, low], [1, 1, 0], face);
+                if sides.len() > 1 {
+                    continue;
+                }
+                let corners = mesh.faces[face as usize];
+                let ascends = (0..3).any(|i| [corners[i], corners[(i + 1) % 3]] == [low, high]);
                 let (start, end) = if ascends { (low, high) } else { (high, low) };
                 let [p, q] = [start, end].map(|v| mesh.positions[v as usize]);
                 let steps = steps(mesh, &[start, end, end], step_m).max(2);
@@ -92,6 +87,7 @@ impl Whole {
                 start_of_border_point.extend((0..steps).map(|_| start));
             }
         }
+        drop(sides);
 
         Self {
             positions: mesh.positions.to_vec(),
@@ -145,14 +141,13 @@ impl Whole {
     /// is taken over. Pieces share no face that may change.
     pub(super) fn by_cubes(&mut self, cell_m: f64, shift: f64, work: impl Fn(&mut Patch) + Sync) {
         let cell = |p: &Vec3| (p.as_dvec3() / cell_m + shift).floor().as_ivec3().to_array();
-        let cells: Vec<[i32; 3]> = self.positions.par_iter().map(cell).collect();
-        let mut numbers = cells.clone();
-        numbers.par_sort_unstable();
-        numbers.dedup();
-        let cell_of: Vec<u32> = cells
-            .par_iter()
-            .map(|c| numbers.partition_point(|n| n < c) as u32)
-            .collect();
+        let numbers: BTreeSet<[i32; 3]> = self.positions.iter().map(cell).collect();
+        let numbers: Vec<[i32; 3]> = numbers.into_iter().collect();
+        let number = |p: &Vec3| {
+            let cell = cell(p);
+            numbers.partition_point(|n| *n < cell) as u32
+        };
+        let cell_of: Vec<u32> = self.positions.par_iter().map(number).collect();
         self.by_cells(&cell_of, work);
     }
 
@@ -185,50 +180,54 @@ impl Whole {
         }
         faces.par_sort_unstable();
 
-        let mut samples: Vec<(u32, u32)> = (0..)
-            .zip(&self.face_of_sample)
-            .map(|(i, &f)| (owner[f as usize], i))
-            .filter(|(cell, _)| *cell != NONE)
-            .collect();
-        // The samples of a face lie side by side in memory.
-        samples.par_sort_unstable_by_key(|&(cell, i)| (cell, self.face_of_sample[i as usize], i));
+        let samples = Grouped::new(self.faces.len(), (0..).zip(&self.face_of_sample).map(|(i, &f)| (f, i)));
         let starts = (0..).zip(&self.start_of_border_point);
         let mut border: Vec<(u32, u32)> = starts.map(|(i, &v)| (cell_of[v as usize], i)).collect();
         border.par_sort_unstable();
 
         let groups: Vec<&[(u32, u32)]> = faces.chunk_by(|a, b| a.0 == b.0).collect();
-        let done: Vec<Piece> = groups
-            .par_iter()
-            .map(|group| {
-                let cell = group[0].0;
-                let mut piece = self.piece(group, of_cell(&samples, cell), of_cell(&border, cell), |v| {
-                    if cell_of[v as usize] == cell {
-                        freedom[v as usize]
-                    } else {
-                        Freedom::Frozen
-                    }
-                });
-                piece.patch.prepare();
-                work(&mut piece.patch);
-                piece.patch.quadrics = Vec::new();
-                piece
-            })
-            .collect();
-        for piece in &done {
-            self.take_over(piece);
+        // What other pieces see of a piece keeps its place. Its colours change when all pieces are done.
+        let mut seen_colors = Vec::new();
+        for some in groups.chunks(PIECES_A_THREAD * rayon::current_num_threads()) {
+            let done: Vec<Piece> = some
+                .par_iter()
+                .map(|group| {
+                    let cell = group[0].0;
+                    let faces: Vec<u32> = group.iter().map(|pair| pair.1).collect();
+                    let samples_of = |face: u32| {
+                        let is_own = owner[face as usize] == cell;
+                        if is_own { samples.of(face) } else { &[] }
+                    };
+                    let mut piece = self.piece(faces, samples_of, of_cell(&border, cell), |v| {
+                        if cell_of[v as usize] == cell {
+                            freedom[v as usize]
+                        } else {
+                            Freedom::Frozen
+                        }
+                    });
+                    piece.patch.prepare();
+                    work(&mut piece.patch);
+                    piece.patch.quadrics = Vec::new();
+                    piece
+                })
+                .collect();
+            for piece in &done {
+                self.take_over(piece, &mut seen_colors);
+            }
+        }
+        for (vertex, color) in seen_colors {
+            self.colors[vertex as usize] = color;
         }
     }
 
-    /// The piece of some faces, with its samples and points of the border: pairs of a cell and a number.
-    fn piece(
+    /// The piece of some faces, with their samples, and points of the border: pairs of a cell and a number.
+    fn piece<'a>(
         &self,
-        faces: &[(u32, u32)],
-        samples: &[(u32, u32)],
+        faces: Vec<u32>,
+        samples_of: impl Fn(u32) -> &'a [u32],
         border: &[(u32, u32)],
         freedom: impl Fn(u32) -> Freedom,
     ) -> Piece {
-        let faces: Vec<u32> = faces.iter().map(|f| f.1).collect();
-        let samples: Vec<u32> = samples.iter().map(|s| s.1).collect();
         let mut vertices: Vec<u32> = faces.iter().flat_map(|&f| self.faces[f as usize]).collect();
         vertices.sort_unstable();
         vertices.dedup();
@@ -241,10 +240,14 @@ impl Whole {
             .filter(|&b| is_used(self.start_of_border_point[b as usize]))
             .collect();
 
-        let mut samples_of = Lists::new(faces.len(), samples.len());
-        for (i, &sample) in (0..).zip(&samples) {
-            let face = self.face_of_sample[sample as usize];
-            samples_of.push(faces.partition_point(|&f| f < face) as u32, i);
+        // The samples of a face lie side by side in memory.
+        let samples: Vec<u32> = faces.iter().flat_map(|&f| samples_of(f)).copied().collect();
+        let mut samples_of_face = Lists::new(faces.len(), samples.len());
+        let mut numbers = 0..;
+        for (i, &face) in (0..).zip(&faces) {
+            for (_, number) in samples_of(face).iter().zip(&mut numbers) {
+                samples_of_face.push(i, number);
+            }
         }
         let mut border_points_of = Lists::new(vertices.len(), border.len());
         for (i, &point) in (0..).zip(&border) {
@@ -265,7 +268,7 @@ impl Whole {
             corners: Lists::new(vertices.len(), 3 * faces.len()),
             quadrics: vec![Quadric::default(); vertices.len()],
             samples: samples.iter().map(|&s| self.samples[s as usize]).collect(),
-            samples_of,
+            samples_of: samples_of_face,
             border_points: border.iter().map(|&b| self.border_points[b as usize]).collect(),
             border_points_of,
             origin: middle / vertices.len().max(1) as f64,
@@ -274,12 +277,17 @@ impl Whole {
         Piece { faces, vertices, samples, border, patch }
     }
 
-    fn take_over(&mut self, piece: &Piece) {
+    /// Takes a piece over, but for the colours of vertices that other pieces may see.
+    fn take_over(&mut self, piece: &Piece, seen_colors: &mut Vec<(u32, Vec3)>) {
         let patch = &piece.patch;
         for (i, &v) in piece.vertices.iter().enumerate() {
+            match patch.freedom[i] {
+                Freedom::Free => self.colors[v as usize] = patch.colors[i],
+                Freedom::Fixed => seen_colors.push((v, patch.colors[i])),
+                Freedom::Frozen => (),
+            }
             if patch.freedom[i] != Freedom::Frozen {
                 self.positions[v as usize] = patch.positions[i];
-                self.colors[v as usize] = patch.colors[i];
                 self.nearest_vertex[v as usize] = patch.nearest_vertex[i];
             }
             for point in patch.border_points_of.of(i as u32) {
@@ -294,6 +302,57 @@ impl Whole {
                 self.face_of_sample[piece.samples[sample as usize] as usize] = f;
             }
         }
+    }
+}
+
+/// How many pieces a thread takes before all of them are taken over. It decides how much memory they take.
+const PIECES_A_THREAD: usize = 8;
+
+/// The sides of faces by their lower vertex: the higher vertex and the face, sorted.
+fn sides_by_vertex(
+    vertices: usize,
+    faces: &[[u32; 3]],
+    is_face: impl Fn(&[u32; 3]) -> bool,
+) -> Grouped<(u32, u32)> {
+    let sides = (0..).zip(faces).filter(|(_, f)| is_face(f)).flat_map(|(face, f)| {
+        [0, 1, 2].map(|i| {
+            let (from, to) = (f[i], f[(i + 1) % 3]);
+            (from.min(to), (from.max(to), face))
+        })
+    });
+    let mut sides = Grouped::new(vertices, sides);
+    for group in sides.starts.windows(2) {
+        sides.members[group[0] as usize..group[1] as usize].sort_unstable();
+    }
+    sides
+}
+
+/// Members by the group that they belong to, in their order.
+struct Grouped<T> {
+    /// Where each group begins, and the end.
+    starts: Vec<u32>,
+    members: Vec<T>,
+}
+
+impl<T: Copy + Default> Grouped<T> {
+    fn new(groups: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> Self {
+        // Each start moves to the end of its group, which is the start of the next, while members come in.
+        let mut starts = vec![0; groups + 2];
+        pairs.clone().for_each(|(group, _)| starts[group as usize + 2] += 1);
+        (2..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
+        let mut members = vec![T::default(); starts[groups + 1] as usize];
+        for (group, member) in pairs {
+            let at = &mut starts[group as usize + 1];
+            members[*at as usize] = member;
+            *at += 1;
+        }
+        starts.pop();
+        Self { starts, members }
+    }
+
+    fn of(&self, group: u32) -> &[T] {
+        let [start, end] = [0, 1].map(|next| self.starts[group as usize + next] as usize);
+        &self.members[start..end]
     }
 }
 
