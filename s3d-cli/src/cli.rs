@@ -146,7 +146,8 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  s3d info scan/scene.toml\n  s3d info scan.glb")]
     Info(info::InfoArgs),
     /// Package a data set for a trainer: as WebDataset or Parquet, or for Hugging Face, COLMAP, nerfstudio,
-    /// COCO, DUSt3R, MapAnything, VGGT or Pointcept, or as a scene graph.
+    /// COCO, DUSt3R, MapAnything, VGGT, Pointcept, Concerto, habitat-sim or OpenUSD, or as a scene graph or
+    /// questions about rooms.
     #[command(
         after_help = concat!(
             "Examples:\n",

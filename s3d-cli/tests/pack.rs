@@ -35,7 +35,7 @@ fn dataset() -> &'static Path {
     out
 }
 
-const KINDS: [&str; 10] = [
+const KINDS: [&str; 14] = [
     "webdataset",
     "colmap",
     "nerfstudio",
@@ -46,6 +46,10 @@ const KINDS: [&str; 10] = [
     "wai",
     "vggt",
     "pointcept",
+    "habitat",
+    "usd",
+    "concerto",
+    "spatial-qa",
 ];
 
 /// Packs into `dir`, and returns all files written, by path.

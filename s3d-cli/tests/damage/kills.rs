@@ -20,7 +20,7 @@ use tempfile::TempDir;
 
 /// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
 /// shards). A new command that writes needs a line here.
-const COMMANDS: [&str; 43] = [
+const COMMANDS: [&str; 47] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -44,6 +44,10 @@ const COMMANDS: [&str; 43] = [
     "pack out --to vggt",
     "pack out --to pointcept",
     "pack out --to scene-graph",
+    "pack out --to habitat",
+    "pack out --to usd",
+    "pack out --to concerto",
+    "pack out --to spatial-qa",
     "sample scan/room.obj -o new.ply --points 200000",
     "sample scan/room.obj -o old.ply --points 200000 --overwrite",
     "segments scan/room.obj -o new.segs.json",

@@ -186,3 +186,38 @@ def test_boxes_hold_the_faces_and_are_small(exported, instances):
             peer = trimesh.Trimesh(corners, faces[entry["label"]]).bounding_box_oriented.volume
             ratios.append(np.prod(box["size"]) / peer)
     assert len(ratios) > 10 and np.mean(ratios) < 1.01 and np.quantile(ratios, 0.95) < 1.06, sorted(ratios)[-9:]
+
+
+def test_a_table_holds_what_the_files_hold(exported, s3d, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "objects.parquet"
+    s3d("pack", exported, "--to", "objects", "-o", path)
+    table = pandas.read_parquet(path)
+    for file, rows in table.groupby("objects"):
+        told = json.loads((exported / file).read_text())
+        assert len(rows) == len(told["objects"])
+        for (_, row), thing in zip(rows.iterrows(), told["objects"], strict=True):
+            for name in ["label", "label_index", "class", "visible_pixels", "amodal_pixels", "occlusion"]:
+                assert row[name] == thing[name], (file, name)
+            assert row["object_room"] == thing["room"]
+            assert row["amodal_mask"] == thing["amodal_mask"]["counts"]
+            assert list(row["size"]) == thing["amodal_mask"]["size"] == [told["height"], told["width"]]
+            for name in ["visible_box", "amodal_box"]:
+                assert list(row[name]) == thing[name]
+            hidden = zip(row["hidden_by"], row["hidden_pixels"], strict=True)
+            assert [{"label_index": i, "pixels": n} for i, n in hidden] == thing["hidden_by"]
+            for name in ["nearest_m", "median_m"]:
+                assert row[name] == pytest.approx(thing[name], rel=1e-6)
+            if row["kind"] == "view":
+                assert row["truncation"] == thing["beyond"]["truncation"] and row["azimuth_deg"] is None
+                box = thing["beyond"]["box"]
+                assert row["beyond_box"] is None if box is None else list(row["beyond_box"]) == box
+            else:
+                assert list(row["azimuth_deg"]) == thing["angles"]["azimuth_deg"]
+            for name in ["axis_aligned", "upright", "oriented"]:
+                corners = np.array([c or [np.nan] * 3 for c in thing["corners"][name]])
+                assert np.array_equal(row[f"corners_{name}"].reshape(8, 3), corners, equal_nan=True)
+    files = {str(p.relative_to(exported)) for p in (exported / "area_1").glob("*/objects/*.json")}
+    empty = {f for f in files if not json.loads((exported / f).read_text())["objects"]}
+    assert set(table["objects"]) == files - empty

@@ -7,6 +7,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
+UNLABELLED = "<UNK>_0_<UNK>_0_0"
+"""The material of faces without a label."""
+
 
 def labelled_faces(path):
     """Of semantic.obj the corners of each face in the world, and the label of each face."""

@@ -2,15 +2,21 @@
 
 mod coco;
 mod colmap;
+mod concerto;
 mod destination;
+mod habitat;
 mod huggingface;
 mod multiview;
+mod near_points;
 mod nerfstudio;
+mod object_table;
 mod options;
 mod parquet;
 mod pointcept;
 mod scene_graph;
 mod source;
+mod spatial_qa;
+mod usd;
 mod webdataset;
 
 use crate::context::Context;
@@ -22,9 +28,9 @@ use crate::store::new_folder::{beside, check_apart};
 use crate::store::parent_of;
 use destination::{About, Destination};
 pub use options::{
-    ClassList, CocoOptions, ColmapOptions, DepthFiles, HuggingfaceOptions, NerfstudioOptions, PackOptions,
-    Package, PackageArguments, PackageKind, PackedImages, ParquetOptions, SceneGraphOptions, ShardPrefix,
-    WebdatasetOptions,
+    ClassList, CocoOptions, ColmapOptions, DepthFiles, HuggingfaceOptions, NerfstudioOptions,
+    ObjectTableOptions, PackOptions, Package, PackageArguments, PackageKind, PackedImages, ParquetOptions,
+    SceneGraphOptions, ShardPrefix, WebdatasetOptions,
 };
 use s3d_geom::PointCloud;
 use s3d_io::fs::create_dir;
@@ -77,25 +83,41 @@ pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Cont
         Package::Vggt => into_folder(&|folder| multiview::vggt::pack(ctx, &source, folder))?,
         Package::Pointcept => into_folder(&|folder| pointcept::pack(ctx, &source, folder))?,
         Package::SceneGraph(_) => into_folder(&|folder| scene_graph::pack(ctx, &source, folder))?,
-        Package::Parquet(_) => pack_table(ctx, &source, dataset, &place, options.overwrite)?,
+        Package::Habitat => into_folder(&|folder| habitat::pack(ctx, &source, folder))?,
+        Package::Usd => into_folder(&|folder| usd::pack(ctx, &source, folder))?,
+        Package::SpatialQa => into_folder(&|folder| spatial_qa::pack(ctx, &source, folder))?,
+        Package::Concerto => into_folder(&|folder| concerto::pack(ctx, &source, folder))?,
+        Package::Parquet(_) | Package::Objects(_) => {
+            pack_table(ctx, &source, dataset, &place, kind, options.overwrite)?;
+        }
     }
 
     let seconds = started.elapsed().as_secs_f64();
     let what = match source.images.len() {
-        0 => "points".to_owned(),
+        0 => format!("{} areas", source.areas.len()),
         images => format!("{images} images"),
     };
     ctx.info(format_args!("{}: {what} for {kind} in {seconds:.1} s", place.display()));
     Ok(place)
 }
 
-/// Writes the Parquet table of all images, a file instead of a folder.
-fn pack_table(ctx: &Context, source: &Source, dataset: &Path, place: &Path, overwrite: bool) -> Result<()> {
+/// Writes a Parquet table of all images, or of their objects: a file instead of a folder.
+fn pack_table(
+    ctx: &Context,
+    source: &Source,
+    dataset: &Path,
+    place: &Path,
+    kind: PackageKind,
+    overwrite: bool,
+) -> Result<()> {
     check_apart(place, dataset)?;
     NewFile::check_free(place, overwrite)?;
     create_dir(&parent_of(place))?;
     let table = NewFile::begin(ctx, place, overwrite)?;
-    parquet::pack(ctx, source, table.path())?;
+    match kind {
+        PackageKind::Objects => object_table::pack(ctx, source, table.path()),
+        _ => parquet::pack(ctx, source, table.path()),
+    }?;
     table.finish()?;
     source.frame_notes().iter().for_each(|note| ctx.info(note));
     Ok(())
@@ -105,6 +127,7 @@ fn pack_table(ctx: &Context, source: &Source, dataset: &Path, place: &Path, over
 fn default_place(dataset: &Path, kind: PackageKind) -> Result<PathBuf> {
     match kind {
         PackageKind::Parquet => beside(dataset, "_images.parquet"),
+        PackageKind::Objects => beside(dataset, "_objects.parquet"),
         kind => beside(dataset, &format!("_{kind}")),
     }
 }

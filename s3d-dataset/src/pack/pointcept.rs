@@ -16,10 +16,38 @@ use s3d_geom::glam::Vec3;
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotationTree, InstanceFile, NpyWriter, RoomFiles, TreeOptions, s3dis_coordinate};
 use s3d_io::fs::create_dir;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Writes a folder for each room. Returns notes on how to use them.
 pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) -> Result<Vec<String>> {
+    let areas = pack_areas(ctx, source, destination, &|_| Ok(()))?;
+    let splits: Vec<String> = areas.keys().map(|area| format!("Area_{area}")).collect();
+    Ok(vec![
+        format!(
+            "S3DISDataset(data_root=FOLDER, split=SPLIT) of Pointcept has the splits {}",
+            splits.join(", ")
+        ),
+        "coord is in the world's frame, metres; segment is the place of the class in the taxonomy, from 0"
+            .to_owned(),
+    ])
+}
+
+/// A room that was written.
+pub(super) struct WrittenRoom<'a> {
+    pub(super) area: u32,
+    pub(super) name: String,
+    /// Its points, in the order of its arrays.
+    pub(super) points: &'a [Vec3],
+}
+
+/// Writes a folder for each room, and hands the room to `then`. Returns the rooms of each area that has some.
+pub(super) fn pack_areas(
+    ctx: &Context,
+    source: &Source,
+    destination: &Destination,
+    then: &(dyn Fn(&WrittenRoom<'_>) -> Result<()> + Sync),
+) -> Result<BTreeMap<u32, Vec<String>>> {
     let data = &source.data;
     if !data.manifest.is_labelled() {
         let dataset = data.layout.root().to_owned();
@@ -27,7 +55,7 @@ pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) ->
     }
 
     let tree = profile::Source { ctx, layout: &data.layout, files: &data.files, taxonomy: &data.taxonomy };
-    let mut splits = Vec::new();
+    let mut areas = BTreeMap::new();
     for &area in &source.areas {
         let rooms = rooms_of(source, area)?;
         if rooms.is_empty() {
@@ -40,31 +68,28 @@ pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) ->
             return Err(FileError::format(&data.layout.rgb_obj(area), message).into());
         };
         let faces = NearestFaces::new(&file.mesh);
-        let split = format!("Area_{area}");
         let progress = ctx.progress("packing", "rooms", rooms.len() as u64);
         for_each_in_order(
             ctx,
             &rooms,
             || (),
             |(), room| {
-                let folder = destination.path().join(&split).join(room.room.to_string());
-                write_room(&tree, &faces, room, &folder)?;
+                let name = room.room.to_string();
+                let folder = destination.path().join(format!("Area_{area}")).join(&name);
+                let points = write_room(&tree, &faces, room, &folder)?;
+                then(&WrittenRoom { area, name, points: &points })?;
                 progress.add(1);
                 Ok(())
             },
         )?;
-        splits.push(split);
+        areas.insert(area, rooms.iter().map(|room| room.room.to_string()).collect());
     }
 
-    if splits.is_empty() {
+    if areas.is_empty() {
         let what = "rooms with points".to_owned();
         return Err(InputError::NothingToPack { dataset: data.layout.root().to_owned(), what }.into());
     }
-    Ok(vec![
-        format!("S3DISDataset(data_root=FOLDER, split=…) of Pointcept has the splits {}", splits.join(", ")),
-        "coord is in the world's frame, metres; segment is the place of the class in the taxonomy, from 0"
-            .to_owned(),
-    ])
+    Ok(areas)
 }
 
 /// Returns the rooms of an area that have points. Instances are in the order of their files' names, which is
@@ -85,13 +110,13 @@ fn rooms_of(source: &Source, area: u32) -> Result<Vec<RoomFiles>> {
 }
 
 /// Writes the arrays of a room: N × 3 coordinates (`<f4`, metres), colours (`|u1`) and normals (`<f4`, those
-/// of the nearest faces), N × 1 classes and instances (`<i2`).
+/// of the nearest faces), N × 1 classes and instances (`<i2`). Returns the coordinates.
 fn write_room(
     tree: &profile::Source<'_>,
     faces: &NearestFaces<'_>,
     room: &RoomFiles,
     folder: &Path,
-) -> Result<()> {
+) -> Result<Vec<Vec3>> {
     let counts = room
         .instances
         .iter()
@@ -106,6 +131,7 @@ fn write_room(
     let mut segments = array("segment.npy", "<i2", 1)?;
     let mut instances = array("instance.npy", "<i2", 1)?;
 
+    let mut all = Vec::with_capacity(total as usize);
     let mut nearest = Vec::new();
     for (number, instance) in room.instances.iter().enumerate() {
         let class = short(instance.class.index(), instance)?;
@@ -123,6 +149,7 @@ fn write_room(
             colors.put(piece.colors.as_flattened())?;
             normals.put(&bytes_of(&of_faces))?;
             segments.put(&class.to_le_bytes().repeat(points.len()))?;
+            all.extend(&points);
             Ok(instances.put(&number.to_le_bytes().repeat(points.len()))?)
         })?;
     }
@@ -130,7 +157,7 @@ fn write_room(
     for array in [coordinates, colors, normals, segments, instances] {
         array.finish()?;
     }
-    Ok(())
+    Ok(all)
 }
 
 /// Returns a number as the arrays have it.

@@ -19,7 +19,7 @@
 //!
 //! [`write_rgb_obj`] and [`write_semantic_obj`] write the meshes of a data set into a folder; [`RgbObj`] and
 //! [`SemanticObj`] write them into any writer. [`write_ply_mesh`] and [`write_glb_mesh`] write a mesh of
-//! coloured vertices. Source: [`crate::formats`], "Meshes".
+//! coloured vertices, [`write_textured_glb`] one with its textures. Source: [`crate::formats`], "Meshes".
 //!
 //! ```
 //! use s3d_io::mesh::{UpAxis, read_mesh};
@@ -37,7 +37,11 @@
 #[cfg(feature = "mesh")]
 pub(crate) mod file;
 #[cfg(feature = "gltf")]
-mod gltf;
+mod glb;
+#[cfg(all(feature = "gltf", feature = "png"))]
+mod glb_textured;
+#[cfg(feature = "gltf")]
+pub(crate) mod gltf;
 #[cfg(feature = "mesh")]
 pub(crate) mod join;
 #[cfg(feature = "mesh")]
@@ -57,6 +61,10 @@ mod write;
 
 #[cfg(feature = "mesh")]
 pub use file::{LengthUnit, MeshFile, MeshOptions, MeshSource, UpAxis};
+#[cfg(feature = "gltf")]
+pub use glb::write_glb_mesh;
+#[cfg(all(feature = "gltf", feature = "png"))]
+pub use glb_textured::write_textured_glb;
 #[cfg(feature = "mesh")]
 pub use join::{read_meshes, read_meshes_with};
 #[cfg(feature = "mesh")]
@@ -69,8 +77,6 @@ pub use origin::MeshOrigin;
 pub use read::{MeshFormat, read_mesh, read_mesh_from, read_mesh_with};
 #[cfg(feature = "mesh")]
 pub use told_offset::ToldOffset;
-#[cfg(feature = "gltf")]
-pub use write::write_glb_mesh;
 #[cfg(feature = "ply")]
 pub use write::write_ply_mesh;
 #[cfg(any(feature = "gltf", feature = "ply"))]

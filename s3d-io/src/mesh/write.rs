@@ -1,4 +1,4 @@
-//! Meshes with colours of vertices and numbers of faces, as binary PLY and as GLB.
+//! Meshes with colours of vertices and numbers of faces, as binary PLY.
 
 use crate::error::Result;
 use crate::fs::write_whole;
@@ -31,7 +31,7 @@ pub struct FaceColumn<'a> {
 }
 
 /// The mistakes of a caller, as an error of writing.
-fn check(mesh: &MeshOut<'_>) -> io::Result<()> {
+pub(super) fn check(mesh: &MeshOut<'_>) -> io::Result<()> {
     let colors = mesh.colors.len();
     if colors != 0 && colors != mesh.positions.len() {
         let message = format!("{colors} colours for {} vertices", mesh.positions.len());
@@ -106,112 +106,10 @@ fn write_ply_header(w: &mut dyn io::Write, mesh: &MeshOut<'_>) -> io::Result<()>
     writeln!(w, "end_header")
 }
 
-/// Writes a mesh as a GLB file, Y-up as glTF has it: x, y, z become x, z, −y. Colours become light, 16 bits a
-/// channel. glTF has no columns of faces, so those are left out. The file appears whole or not at all.
-/// Returns its size in bytes. Source: glTF 2.0, "Binary glTF Layout".
-///
-/// # Errors
-/// [`Error::Io`](crate::Error::Io), also for a column that has not one entry per vertex or face, and for a
-/// mesh of more than 4 GiB, which the format cannot hold.
-#[cfg(feature = "gltf")]
-pub fn write_glb_mesh(path: &Path, mesh: &MeshOut<'_>) -> Result<u64> {
-    write_whole(path, |w| {
-        check(mesh)?;
-        let (json, bytes) = glb_json(mesh);
-        let padded = json.len().next_multiple_of(4);
-        let too_large = |_| io::Error::new(io::ErrorKind::InvalidInput, "larger than 4 GiB: write a PLY");
-        let [json_bytes, bin_bytes, all] =
-            [padded, bytes, 12 + 8 + padded + 8 + bytes].map(|n| u32::try_from(n).map_err(too_large));
-
-        w.write_all(b"glTF")?;
-        for number in [2, all?, json_bytes?] {
-            w.write_all(&number.to_le_bytes())?;
-        }
-        w.write_all(b"JSON")?;
-        w.write_all(json.as_bytes())?;
-        w.write_all(" ".repeat(padded - json.len()).as_bytes())?;
-        w.write_all(&bin_bytes?.to_le_bytes())?;
-        w.write_all(b"BIN\0")?;
-
-        for position in mesh.positions {
-            for coordinate in y_up(*position).to_array() {
-                w.write_all(&coordinate.to_le_bytes())?;
-            }
-        }
-        for color in mesh.colors {
-            for light in [light_of(color[0]), light_of(color[1]), light_of(color[2]), u16::MAX] {
-                w.write_all(&light.to_le_bytes())?;
-            }
-        }
-        let mut corners = mesh.faces.iter().flatten();
-        corners.try_for_each(|corner| w.write_all(&corner.to_le_bytes()))
-    })
-}
-
-/// The JSON of a GLB file, and the size of its binary part.
-#[cfg(feature = "gltf")]
-fn glb_json(mesh: &MeshOut<'_>) -> (String, usize) {
-    let [vertices, corners] = [mesh.positions.len(), mesh.faces.len() * 3];
-    let [positions, colors] = [vertices * 12, mesh.colors.len() * 8];
-    let bytes = positions + colors + corners * 4;
-    let points = || mesh.positions.iter().map(|p| y_up(*p));
-    let min = points().fold(Vec3::INFINITY, Vec3::min).to_array();
-    let max = points().fold(Vec3::NEG_INFINITY, Vec3::max).to_array();
-
-    let attributes = if mesh.colors.is_empty() {
-        serde_json::json!({ "POSITION": 0 })
-    } else {
-        serde_json::json!({ "POSITION": 0, "COLOR_0": 1 })
-    };
-    let mut views = vec![serde_json::json!({ "buffer": 0, "byteLength": positions, "target": 34962 })];
-    let mut accessors = vec![serde_json::json!({
-        "bufferView": 0, "componentType": 5126, "count": vertices, "type": "VEC3", "min": min, "max": max
-    })];
-    if !mesh.colors.is_empty() {
-        accessors.push(serde_json::json!({
-            "bufferView": 1, "componentType": 5123, "normalized": true, "count": vertices, "type": "VEC4"
-        }));
-        views.push(serde_json::json!({
-            "buffer": 0, "byteOffset": positions, "byteLength": colors, "target": 34962
-        }));
-    }
-    let indices = accessors.len();
-    accessors.push(serde_json::json!({
-        "bufferView": views.len(), "componentType": 5125, "count": corners, "type": "SCALAR"
-    }));
-    views.push(serde_json::json!({
-        "buffer": 0, "byteOffset": positions + colors, "byteLength": corners * 4, "target": 34963
-    }));
-
-    let document = serde_json::json!({
-        "asset": { "version": "2.0", "generator": "s3d", "extras": { "comments": mesh.comments } },
-        "scene": 0,
-        "scenes": [{ "nodes": [0] }],
-        "nodes": [{ "mesh": 0 }],
-        "meshes": [{ "primitives": [{ "attributes": attributes, "indices": indices, "material": 0 }] }],
-        "materials": [{ "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 1.0 } }],
-        "buffers": [{ "byteLength": bytes }],
-        "bufferViews": views,
-        "accessors": accessors,
-    });
-    (document.to_string(), bytes)
-}
-
-/// Turns a position from Z-up to Y-up.
-#[cfg(feature = "gltf")]
-fn y_up(p: Vec3) -> Vec3 {
-    Vec3::new(p.x, p.z, -p.y)
-}
-
-/// Decodes an sRGB byte to light in 16 bits.
-#[cfg(feature = "gltf")]
-fn light_of(byte: u8) -> u16 {
-    (f64::from(crate::mesh::gltf::linear_from_srgb(byte)) * 65535.0).round() as u16
-}
-
 #[cfg(all(test, feature = "gltf", feature = "ply"))]
 mod tests {
     use super::*;
+    use crate::mesh::glb::write_glb_mesh;
     use crate::mesh::{UpAxis, read_mesh};
 
     const POSITIONS: [Vec3; 4] =

@@ -6,10 +6,12 @@
 //! | COLMAP | cameras, images and points as a model: [`ColmapModel`] |
 //! | nerfstudio | `transforms.json`: [`write_nerfstudio`] |
 //! | COCO | panoptic annotations: [`coco_panoptic`], [`write_coco`] |
-//! | Parquet | a table of all images: [`write_image_index`] |
+//! | Parquet | a table of all images: [`write_image_index`]; of their objects: [`ObjectTable`] |
 //! | DUSt3R, MUSt3R | scenes, images and pairs: [`write_dust3r`] |
 //! | WAI (MapAnything) | cameras, and who sees what: [`write_wai_scene`], [`write_wai_covisibility`] |
 //! | VGGT | annotation files: [`write_vggt_annotations`] |
+//! | habitat-sim | scenes in the form of HM3D: [`write_habitat_scene`], [`write_habitat_config`] |
+//! | OpenUSD | objects with labels, textures and cameras: [`write_usd`] |
 //! | Hugging Face | tables with the images inside: [`ImageTable`]; what describes them: [`write_croissant`] |
 //!
 //! The same input gives the same bytes. [`dataset_images`](crate::dataset::dataset_images) lists the images;
@@ -33,12 +35,16 @@ mod coco_instances;
 mod colmap;
 #[cfg(feature = "multiview")]
 mod dust3r;
+#[cfg(feature = "habitat")]
+mod habitat;
 #[cfg(feature = "huggingface")]
 mod huggingface;
 #[cfg(feature = "nerfstudio")]
 mod nerfstudio;
 #[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(feature = "usd")]
+mod usd;
 #[cfg(feature = "multiview")]
 mod vggt;
 #[cfg(feature = "multiview")]
@@ -48,6 +54,8 @@ mod webdataset;
 
 #[cfg(feature = "parquet")]
 pub use self::parquet::{ImageRow, SemanticRow, write_image_index, write_image_index_to};
+#[cfg(all(feature = "parquet", feature = "dataset"))]
+pub use self::parquet::{ObjectRow, ObjectTable};
 #[cfg(feature = "coco")]
 pub use coco::{
     CocoCategory, CocoImage, CocoSegment, UnknownLabelIndex, coco_categories, coco_panoptic, write_coco,
@@ -58,12 +66,18 @@ pub use coco_instances::{coco_masks, write_coco_instances};
 pub use colmap::{ColmapImage, ColmapModel};
 #[cfg(feature = "multiview")]
 pub use dust3r::{Dust3rImage, Dust3rScene, write_dust3r};
+#[cfg(feature = "habitat")]
+pub use habitat::{
+    HabitatLabels, HabitatObject, MOST_HABITAT_OBJECTS, write_habitat_config, write_habitat_scene,
+};
 #[cfg(feature = "huggingface")]
 pub use huggingface::{
     HuggingfaceConfig, HuggingfaceSet, ImageRecord, ImageTable, write_croissant, write_huggingface_card,
 };
 #[cfg(feature = "nerfstudio")]
 pub use nerfstudio::{NerfstudioCamera, NerfstudioFrame, write_nerfstudio};
+#[cfg(feature = "usd")]
+pub use usd::{UsdCamera, UsdObject, write_usd};
 #[cfg(feature = "multiview")]
 pub use vggt::{VggtImage, write_vggt_annotations};
 #[cfg(feature = "multiview")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,6 +33,7 @@ from ._results import (
     verify,
 )
 from ._scene import Scene, picture
+from ._viewers import fiftyone_samples, log_to_rerun
 
 ARRAYS = ("rgb", "depth", "normal", "xyz", "labels", "classes", "instances", "pretty")
 """The arrays of a view. `View` describes each."""
@@ -755,9 +756,10 @@ class DataSet(Sequence[View]):
         progress: Progress = None,
     ) -> Path:
         """Packs the data set for a trainer, and returns the path of the package. `kind` is "webdataset",
-        "colmap", "nerfstudio", "coco", "parquet", "huggingface", "dust3r", "wai", "vggt", "pointcept" or
-        "scene-graph". `to` is the folder of the package, or its file for Parquet; beside the data set by
-        default. `s3d pack --help` explains the other arguments. An empty `stuff` means none.
+        "colmap", "nerfstudio", "coco", "parquet", "huggingface", "dust3r", "wai", "vggt", "pointcept",
+        "scene-graph", "habitat", "usd", "concerto", "objects" or "spatial-qa". `to` is the folder of the
+        package, or its file for Parquet and objects; beside the data set by default. `s3d pack --help`
+        explains the other arguments. An empty `stuff` means none.
         """
         how = SimpleNamespace(
             output=_path(to),
@@ -777,6 +779,40 @@ class DataSet(Sequence[View]):
             compression=compression,
         )
         return _native.pack(self.root, kind, how, threads, sink(progress))
+
+    def to_rerun(
+        self, views: Iterable[View] | None = None, *, mesh: bool = True, recording: Any = None
+    ) -> None:
+        """Logs the data set to Rerun: `rerun.init("scan", spawn=True)`, and then this.
+
+        - `views`: the images that the timeline "image" leads through, by their index; all by default, which
+          takes the memory of all their files. A view moves the camera of its area, with its colours, depth and
+          classes; a panorama is a picture beside the scene.
+        - `mesh`: whether the meshes are logged, too, with their textures. Boxes of instances always are.
+        - `recording`: a recording of Rerun; the active one by default.
+
+        Raises `UsageError` if rerun-sdk is not installed.
+        """
+        log_to_rerun(self, self if views is None else views, mesh, recording)
+
+    def to_fiftyone(self, views: Iterable[View] | None = None, *, name: str | None = None) -> Any:
+        """Returns a data set of FiftyOne with a sample for each of `views`, all by default, and `name`, which
+        must be free.
+
+        A sample has its image of colours, "area", "room", "location", "is_panorama", "K" (None for a
+        panorama) and "T_world_cam" as lists, "classes" as a segmentation (1 + the index in `classes`, 0 for
+        none), and "instances" as detections: the class, the index in `labels`, box, mask and
+        "instance_name". The files stay where they are.
+
+        Raises `UsageError` if fiftyone is not installed, or an image has no colours.
+        """
+        samples = fiftyone_samples(self, self if views is None else views)
+        fiftyone: Any = importlib.import_module("fiftyone")
+        made = fiftyone.Dataset(name)
+        if self.classes is not None:
+            made.default_mask_targets = {0: "no label", **dict(enumerate(self.classes, 1))}
+        made.add_samples(samples, progress=False)
+        return made
 
     def profile(self, *loaders: str, overwrite: bool = False, progress: Progress = None) -> Path:
         """Writes the files that loaders of point clouds read into `profiles/` of the data set, and returns

@@ -20,19 +20,19 @@ use std::collections::BTreeMap;
 const QUALITY: u8 = 95;
 
 /// The camera of a view.
-struct View<'a> {
-    image: &'a DatasetImage,
+pub(super) struct View<'a> {
+    pub(super) image: &'a DatasetImage,
     /// Width and height in pixels.
-    size: (u32, u32),
+    pub(super) size: (u32, u32),
     /// Focal lengths and principal point in pixels; the centre of the first pixel is (0.5, 0.5).
-    k: [[f64; 3]; 3],
+    pub(super) k: [[f64; 3]; 3],
     /// World → camera in OpenCV's axes.
-    camera_from_world: [[f64; 4]; 3],
+    pub(super) camera_from_world: [[f64; 4]; 3],
 }
 
 impl View<'_> {
     /// Returns camera → world in OpenCV's axes, with the row (0, 0, 0, 1).
-    fn world_from_camera(&self) -> [[f64; 4]; 4] {
+    pub(super) fn world_from_camera(&self) -> [[f64; 4]; 4] {
         let [x, y, z] = self.camera_from_world;
         let row = |i: usize| {
             let centre = -(x[i] * x[3] + y[i] * y[3] + z[i] * z[3]);
@@ -58,7 +58,7 @@ fn require(source: &Source, kind: PackageKind) -> Result<()> {
 }
 
 /// Returns the views of an area.
-fn views_of(source: &Source, area: u32) -> Result<Vec<View<'_>>> {
+pub(super) fn views_of(source: &Source, area: u32) -> Result<Vec<View<'_>>> {
     let of = |image| {
         let pose = source.pose(image)?;
         let (k, camera_from_world) = (pose.camera_k_matrix, pose.camera_rt_matrix);
@@ -87,7 +87,7 @@ fn write_each<T: Send + Sync>(
 }
 
 /// Returns the depth of a view in metres, 0 where it is missing or the view's photograph has no colour.
-fn depth_m(source: &Source, view: &View<'_>) -> Result<Raster<f32>> {
+pub(super) fn depth_m(source: &Source, view: &View<'_>) -> Result<Raster<f32>> {
     let depth = known_depth(source, view)?;
     let units_per_m = source.depth_units_per_m;
     Ok(depth.map(|depth| depth.map_or(0.0, |units| (f64::from(units) / units_per_m) as f32)))

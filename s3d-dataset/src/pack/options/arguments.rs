@@ -3,8 +3,8 @@
 use super::kind::{DepthFiles, Holds, PackageKind, PackedImages};
 use super::names::{ClassList, ShardPrefix};
 use super::{
-    CocoOptions, ColmapOptions, HuggingfaceOptions, NerfstudioOptions, Package, ParquetOptions,
-    SceneGraphOptions, WebdatasetOptions,
+    CocoOptions, ColmapOptions, HuggingfaceOptions, NerfstudioOptions, ObjectTableOptions, Package,
+    ParquetOptions, SceneGraphOptions, WebdatasetOptions,
 };
 use crate::error::{Result, UsageError};
 #[cfg(feature = "clap")]
@@ -104,6 +104,11 @@ impl PackageArguments {
             PackageKind::Vggt => Package::Vggt,
             PackageKind::Pointcept => Package::Pointcept,
             PackageKind::SceneGraph => Package::SceneGraph(SceneGraphOptions { images }),
+            PackageKind::Habitat => Package::Habitat,
+            PackageKind::Usd => Package::Usd,
+            PackageKind::Concerto => Package::Concerto,
+            PackageKind::Objects => Package::Objects(ObjectTableOptions { images }),
+            PackageKind::SpatialQa => Package::SpatialQa,
         })
     }
 

@@ -28,6 +28,16 @@ pub enum PackageKind {
     Pointcept,
     /// [`Package::SceneGraph`](super::Package::SceneGraph).
     SceneGraph,
+    /// [`Package::Habitat`](super::Package::Habitat).
+    Habitat,
+    /// [`Package::Usd`](super::Package::Usd).
+    Usd,
+    /// [`Package::Concerto`](super::Package::Concerto).
+    Concerto,
+    /// [`Package::Objects`](super::Package::Objects).
+    Objects,
+    /// [`Package::SpatialQa`](super::Package::SpatialQa).
+    SpatialQa,
 }
 
 /// The images that a kind of package can hold.
@@ -37,7 +47,7 @@ pub(crate) enum Holds {
     Images,
     /// Views alone: its cameras are pinholes.
     Views,
-    /// None: it has points.
+    /// None: it has points, or meshes.
     Nothing,
 }
 
@@ -64,6 +74,11 @@ const TABLE: &[Row] = &[
     row(PackageKind::Vggt, "vggt", "VGGT", Holds::Views),
     row(PackageKind::Pointcept, "pointcept", "Pointcept", Holds::Nothing),
     row(PackageKind::SceneGraph, "scene-graph", "a scene graph", Holds::Images),
+    row(PackageKind::Habitat, "habitat", "habitat-sim", Holds::Nothing),
+    row(PackageKind::Usd, "usd", "OpenUSD", Holds::Views),
+    row(PackageKind::Concerto, "concerto", "Concerto", Holds::Views),
+    row(PackageKind::Objects, "objects", "a table of objects", Holds::Images),
+    row(PackageKind::SpatialQa, "spatial-qa", "spatial questions", Holds::Views),
 ];
 
 const fn row(kind: PackageKind, name: &'static str, title: &'static str, holds: Holds) -> Row {
@@ -72,8 +87,8 @@ const fn row(kind: PackageKind, name: &'static str, title: &'static str, holds: 
 
 impl PackageKind {
     /// The words of all kinds, for a help text.
-    pub const WORDS: &str =
-        "webdataset|colmap|nerfstudio|coco|parquet|huggingface|dust3r|wai|vggt|pointcept|scene-graph";
+    pub const WORDS: &str = "webdataset|colmap|nerfstudio|coco|parquet|huggingface|dust3r|wai|vggt|pointcept|\
+                             scene-graph|habitat|usd|concerto|objects|spatial-qa";
 
     /// The row of the kind. Each has one: a test asks.
     fn row(self) -> &'static Row {

@@ -50,6 +50,16 @@ pub enum Package {
     Pointcept,
     /// The building, rooms, objects and cameras of each area, and what is between them.
     SceneGraph(SceneGraphOptions),
+    /// The meshes of each area as a scene of habitat-sim.
+    Habitat,
+    /// The objects and views of each area as a scene of OpenUSD.
+    Usd,
+    /// The rooms of [`Package::Pointcept`], their views, and which point each pixel shows.
+    Concerto,
+    /// A table of the objects of all images.
+    Objects(ObjectTableOptions),
+    /// What spatial question sets are made of, and questions with computed answers.
+    SpatialQa,
 }
 
 /// Options of [`Package::Webdataset`].
@@ -134,6 +144,13 @@ pub struct SceneGraphOptions {
     pub images: PackedImages,
 }
 
+/// Options of [`Package::Objects`].
+#[derive(Clone, Debug, Default)]
+pub struct ObjectTableOptions {
+    /// The images whose objects are packed.
+    pub images: PackedImages,
+}
+
 impl Package {
     /// The kind of the package.
     pub fn kind(&self) -> PackageKind {
@@ -149,6 +166,11 @@ impl Package {
             Self::Vggt => PackageKind::Vggt,
             Self::Pointcept => PackageKind::Pointcept,
             Self::SceneGraph(_) => PackageKind::SceneGraph,
+            Self::Habitat => PackageKind::Habitat,
+            Self::Usd => PackageKind::Usd,
+            Self::Concerto => PackageKind::Concerto,
+            Self::Objects(_) => PackageKind::Objects,
+            Self::SpatialQa => PackageKind::SpatialQa,
         }
     }
 
@@ -156,13 +178,20 @@ impl Package {
     pub(crate) fn images(&self) -> Option<PackedImages> {
         match self {
             Self::Webdataset(options) => Some(options.images),
-            Self::Colmap(_) | Self::Dust3r | Self::Wai | Self::Vggt => Some(PackedImages::Views),
+            Self::Colmap(_)
+            | Self::Dust3r
+            | Self::Wai
+            | Self::Vggt
+            | Self::Usd
+            | Self::Concerto
+            | Self::SpatialQa => Some(PackedImages::Views),
             Self::Nerfstudio(options) => Some(options.images),
             Self::Coco(options) => Some(options.images),
             Self::Parquet(options) => Some(options.images),
             Self::Huggingface(options) => Some(options.images),
-            Self::Pointcept => None,
+            Self::Pointcept | Self::Habitat => None,
             Self::SceneGraph(options) => Some(options.images),
+            Self::Objects(options) => Some(options.images),
         }
     }
 }

@@ -3,12 +3,16 @@
 #![expect(clippy::indexing_slicing, reason = "a writer: its columns are its own")]
 
 pub(crate) mod columns;
+#[cfg(feature = "dataset")]
+mod objects;
 pub(crate) mod table;
 
 use crate::dataset::domain::Domain;
 use crate::error::Result;
 use crate::fs::atomic::AtomicFile;
 use columns::{Column, Named, columns, text};
+#[cfg(feature = "dataset")]
+pub use objects::{ObjectRow, ObjectTable};
 use s3d_label::Class;
 use std::io::Write;
 use std::path::Path;
