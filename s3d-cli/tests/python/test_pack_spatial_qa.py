@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from test_scene_graph import labelled_faces
 
-trimesh = pytest.importorskip("trimesh")
+spatial = pytest.importorskip("scipy.spatial")
 
 
 @pytest.fixture(scope="module")
@@ -42,39 +42,39 @@ def class_of(label):
     return label.rsplit("_", 4)[0]
 
 
-def points_on(triangles, step=0.01):
-    """Points on edges and faces, a step apart at most."""
+def points_on(triangles, step=0.025):
+    """The corners of triangles that are halved across their longest edges until these are as long as a step."""
     points = []
-    for a, b, c in triangles:
-        n = max(int(np.ceil(max(np.linalg.norm(b - a), np.linalg.norm(c - a)) / step)), 1)
-        i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
-        i, j = i[i + j <= n, None] / n, j[i + j <= n, None] / n
-        points.append(a + i * (b - a) + j * (c - a))
-    return np.vstack(points)
+    while len(triangles):
+        lengths = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+        # The longest edge comes first.
+        places = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
+        triangles = np.take_along_axis(triangles, places[:, :, None], axis=1)
+        points.append(triangles.reshape(-1, 3))
+        triangles = triangles[lengths.max(axis=1) > step]
+        a, b, c = triangles.transpose(1, 0, 2)
+        middle = (a + b) / 2
+        triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return np.unique(np.vstack(points), axis=0)
 
 
 class Distances:
-    """Smallest distances of surfaces: from points on one to the faces of the other, to half a step."""
+    """Smallest distances of surfaces, between points on both, 2.5 cm apart at most: at 15 cm they are 2 mm off."""
 
     def __init__(self, triangles):
-        self.triangles, self.known, self.points, self.meshes = triangles, {}, {}, {}
+        self.triangles, self.known, self.trees = triangles, {}, {}
+
+    def tree(self, label):
+        if label not in self.trees:
+            self.trees[label] = spatial.cKDTree(points_on(self.triangles[label]))
+        return self.trees[label]
 
     def __call__(self, a, b):
         a, b = sorted([a, b])
         if (a, b) not in self.known:
-            for label in [a, b]:
-                if label not in self.meshes:
-                    of = self.triangles[label]
-                    self.points[label] = points_on(of)
-                    faces = np.arange(3 * len(of)).reshape(-1, 3)
-                    self.meshes[label] = trimesh.Trimesh(of.reshape(-1, 3), faces, process=False)
-            from scipy.spatial import cKDTree
-
-            near, _ = cKDTree(self.points[b]).query(self.points[a])
-            # Only what may be nearest is measured exactly.
-            chosen = self.points[a][near <= near.min() + 0.02][:2000]
-            _, distance, _ = trimesh.proximity.closest_point(self.meshes[b], chosen)
-            self.known[a, b] = distance.min()
+            few, many = sorted([self.tree(a), self.tree(b)], key=lambda tree: tree.n)
+            distances, _ = many.query(few.data)
+            self.known[a, b] = distances.min()
         return self.known[a, b]
 
 
@@ -137,12 +137,12 @@ def test_answers_are_those_of_a_recount(made, rooms):
     names = json.loads((out / "assets/semantic_labels.json").read_text())
     frames = json.loads((package / "frame_metadata.json").read_text())
     kinds = set()
-    # All of the others, and as many of the many as take a minute.
+    # The nearest of many things is asked of some: a recount takes long.
     rng = np.random.default_rng(5)
     for q in questions:
         kind, scene, labels, right = q["question_type"], q["scene_name"], q["labels"], q["ground_truth"]
         things = rooms[scene]
-        if kind.startswith("object_rel_dist") and rng.random() > 0.5:
+        if kind.startswith("object_rel_dist") and rng.random() > 0.1:
             continue
         kinds.add(kind)
         classes = [class_of(label) for label in labels]

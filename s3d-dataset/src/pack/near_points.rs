@@ -64,7 +64,11 @@ mod tests {
 
     #[test]
     fn the_nearest_is_that_of_all() {
-        let number = |n: u32| (n.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        let number = |n: u32| {
+            let mixed = (u64::from(n) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mixed = (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            (mixed >> 40) as f32 / (1 << 24) as f32
+        };
         let points: Vec<Vec3> = (0..4000)
             .map(|i| Vec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2)) - 0.5)
             .collect();
@@ -72,7 +76,7 @@ mod tests {
             let near = NearPoints::new(&points, distance_m);
             let mut found = 0;
             for i in 0..300 {
-                let place = DVec3::new(number(7 * i).into(), number(7 * i + 1).into(), 0.1) - 0.5;
+                let place = DVec3::new(number(90_000 + i).into(), number(91_000 + i).into(), 0.1) - 0.5;
                 let all = (0..).zip(&points).map(|(i, p)| (p.as_dvec3().distance(place), i));
                 let best = all
                     .min_by(|a, b| a.0.total_cmp(&b.0))

@@ -49,7 +49,7 @@ pub(crate) mod kind;
 #[cfg(feature = "kitti")]
 mod kitti;
 #[cfg(feature = "labels")]
-mod label_files;
+pub(crate) mod label_files;
 #[cfg(feature = "las")]
 mod las;
 #[cfg(feature = "mat")]

@@ -121,7 +121,8 @@ fn write_semantic_mesh(path: &Path, mesh: &TriMesh, object_of_face: &[u32]) -> R
 #[cfg(all(test, feature = "labels"))]
 mod tests {
     use super::*;
-    use crate::mesh::{MeshLabels, UpAxis, read_mesh};
+    use crate::cloud::label_files::LabelFile;
+    use crate::mesh::{MeshLabels, MeshOptions, UpAxis};
     use s3d_geom::primitives::grid;
     use std::collections::HashSet;
 
@@ -142,7 +143,8 @@ mod tests {
         let labels = HabitatLabels { objects: &objects, object_of_face: &object_of_face };
         write_habitat_scene(dir.path(), "area_1", &mesh, Some(labels)).unwrap();
 
-        let read = read_mesh(&dir.path().join("area_1.semantic.glb"), UpAxis::Y).unwrap();
+        let list = LabelFile::of(&dir.path().join("area_1.semantic.txt")).unwrap().unwrap();
+        let read = list.read(UpAxis::Y, &MeshOptions::default()).unwrap();
         assert_eq!(read.warnings, [""; 0]);
         let triangles = |mesh: &TriMesh| (0..40).map(|face| mesh.triangle(face)).collect::<Vec<_>>();
         assert_eq!(triangles(&read.mesh), triangles(&mesh));

@@ -165,7 +165,11 @@ mod tests {
 
     #[test]
     fn the_distance_is_that_of_many_points() {
-        let number = |n: u32| (n.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        let number = |n: u32| {
+            let mixed = (u64::from(n) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mixed = (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            (mixed >> 40) as f32 / (1 << 24) as f32
+        };
         let soup = |seed: u32, at: Vec3| {
             let point =
                 |i: u32| Vec3::new(number(seed + 3 * i), number(seed + 3 * i + 1), number(seed + 3 * i + 2));
@@ -176,12 +180,12 @@ mod tests {
             )
         };
         for round in 0..20 {
-            let a = soup(7 * round, Vec3::ZERO);
-            let b = soup(7 * round + 3, Vec3::new(0.6, 0.2, 0.1 * round as f32));
+            let a = soup(10_000 * round, Vec3::ZERO);
+            let b = soup(10_000 * round + 5000, Vec3::new(0.6, 0.2, 0.1 * round as f32));
             let found = surface(&a).distance_m(&surface(&b));
             // Points all over the faces of one, against the other.
             let nearest = NearestFaces::new(&b);
-            let points: Vec<Vec3> = (0..40)
+            let points: Vec<Vec3> = (0..a.faces().len() as u32)
                 .flat_map(|face| {
                     let [p, q, r] = a.triangle(face);
                     (0..=20).flat_map(move |i| {
