@@ -1,9 +1,12 @@
 //! Meshes with colours of vertices and numbers of faces, as binary PLY.
 
+#[cfg(feature = "ply")]
 use crate::error::Result;
+#[cfg(feature = "ply")]
 use crate::fs::write_whole;
 use s3d_geom::glam::Vec3;
 use std::io;
+#[cfg(feature = "ply")]
 use std::path::Path;
 
 /// A mesh to be written: columns in world metres, Z-up.
