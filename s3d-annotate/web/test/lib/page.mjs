@@ -33,7 +33,9 @@ export async function open(browser, url, options = {}) {
   page.setDefaultTimeout(60_000);
   const faults = [];
   page.on("console", (message) => {
-    if (["error", "warning"].includes(message.type())) faults.push(message.text());
+    // 503: what was asked for is not worked out yet. The page asks again, and the browser tells it as an error.
+    const isNotYet = / status of 503 /.test(message.text());
+    if (["error", "warning"].includes(message.type()) && !isNotYet) faults.push(message.text());
   });
   page.on("pageerror", (error) => faults.push(String(error)));
   page.on("request", (request) => {
