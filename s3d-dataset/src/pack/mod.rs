@@ -94,6 +94,7 @@ pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Cont
 
     let seconds = started.elapsed().as_secs_f64();
     let what = match source.images.len() {
+        0 if source.areas.len() == 1 => "an area".to_owned(),
         0 => format!("{} areas", source.areas.len()),
         images => format!("{images} images"),
     };
