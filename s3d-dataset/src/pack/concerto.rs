@@ -16,7 +16,7 @@ use s3d_geom::glam::{DMat4, DVec3};
 use s3d_io::cloud::NpyWriter;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::{create_dir, write_json};
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -36,13 +36,18 @@ pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) ->
     [Domain::Rgb, Domain::Depth, Domain::Pose]
         .into_iter()
         .try_for_each(|domain| source.require(domain, "Concerto"))?;
+    let views_of_area = |area: &u32| Ok((*area, views_of(source, *area)?));
+    let views = source
+        .areas
+        .iter()
+        .map(views_of_area)
+        .collect::<Result<BTreeMap<_, _>>>()?;
     let splits = destination.path().join("splits");
     create_dir(&splits)?;
 
     let count = AtomicUsize::new(0);
     let areas = pointcept::pack_areas(ctx, source, destination, &|room| {
-        let views = views_of(source, room.area)?;
-        let views = views.iter().filter(|view| view.image.room == room.name);
+        let views = views[&room.area].iter().filter(|view| view.image.room == room.name);
         let mut by_camera: BTreeMap<&str, Vec<&View<'_>>> = BTreeMap::new();
         views.for_each(|view| by_camera.entry(&view.image.uuid).or_default().push(view));
 
@@ -60,7 +65,7 @@ pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) ->
         return Err(InputError::NothingToPack { dataset, what }.into());
     }
     for (area, rooms) in &areas {
-        write_json(&splits.join(format!("Area_{area}.json")), &samples(source, *area, rooms)?)?;
+        write_json(&splits.join(format!("Area_{area}.json")), &samples(source, *area, rooms, &views[area]))?;
     }
 
     let names: Vec<String> = areas.keys().map(|area| format!("Area_{area}")).collect();
@@ -138,8 +143,7 @@ fn correspondences(source: &Source, view: &View<'_>, points: &NearPoints<'_>) ->
 }
 
 /// The samples of an area by name: a room, and some views of a camera in it.
-fn samples(source: &Source, area: u32, rooms: &[String]) -> Result<Map<String, serde_json::Value>> {
-    let views = views_of(source, area)?;
+fn samples(source: &Source, area: u32, rooms: &[String], views: &[View<'_>]) -> Map<String, Value> {
     let mut by_camera: BTreeMap<(&str, &str), Vec<&View<'_>>> = BTreeMap::new();
     for view in views.iter().filter(|view| rooms.contains(&view.image.room)) {
         let camera = (&*view.image.room, &*view.image.uuid);
@@ -162,7 +166,7 @@ fn samples(source: &Source, area: u32, rooms: &[String]) -> Result<Map<String, s
             samples.insert(format!("{room}_{camera}_{number}"), sample);
         }
     }
-    Ok(samples)
+    samples
 }
 
 /// The name of the colours of a view, without its ending.

@@ -33,8 +33,8 @@ pub struct Dust3rImage {
 /// Writes the archive, whole or not at all. Returns its size in bytes.
 ///
 /// For S scenes with N images and M pairs in all: `scenes` (S names), `counts` (S, the place of each scene's
-/// first image), `sceneids` (N), `images` (N names), `intrinsics` (N × 3 × 3), `trajectories` (N × 4 × 4) and
-/// `pairs` (M × 3: two images and the score).
+/// first image), `sceneids` (N), `images` (N names), `intrinsics` (N × 3 × 3), `trajectories` (N × 4 × 4)
+/// and `pairs` (M × 3: two images and the score).
 ///
 /// # Errors
 /// [`Error::Io`].

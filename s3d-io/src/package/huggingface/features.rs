@@ -107,8 +107,8 @@ fn meaning_of_modality(domain: Domain, units_per_m: f64) -> String {
         }
         Domain::GlobalXyz | Domain::Pose => format!("The file of {domain}."),
         Domain::DepthEuclidean => format!(
-            "The distance from the camera in units of 1/{units_per_m} m, decoded as 32-bit floats. 65535 where \
-             nothing was seen or farther."
+            "The distance from the camera in units of 1/{units_per_m} m, decoded as 32-bit floats. 65535 \
+             where nothing was seen or farther."
         ),
         Domain::BoundaryDistance => {
             "The distance to the nearest border between instances in 64ths of a pixel. \

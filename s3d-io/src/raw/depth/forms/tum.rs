@@ -58,8 +58,8 @@ pub(super) fn list(dir: &Path) -> Result<Listed> {
     let depths = read_list(&dir.join(DEPTHS))?;
     let poses = dir.join(POSES);
     if !poses.is_file() {
-        let message = "has depth but no groundtruth.txt, so its poses are unknown: put the path of the camera \
-                       there, lines `timestamp tx ty tz qx qy qz qw`, as programs for SLAM write it";
+        let message = "has depth but no groundtruth.txt, so its poses are unknown: put the path of the \
+                       camera there, lines `timestamp tx ty tz qx qy qz qw`, as programs for SLAM write it";
         return Err(Error::format(dir, message));
     }
     let bytes = read_file(&poses)?;
