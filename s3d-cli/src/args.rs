@@ -2,6 +2,7 @@
 
 use crate::values::parsed;
 use clap::{Args, value_parser};
+use s3d_dataset::MeshAxes;
 use s3d_dataset::export::SceneSource;
 use s3d_io::mesh::{LengthUnit, UpAxis};
 use std::path::PathBuf;
@@ -17,12 +18,14 @@ pub(crate) struct Threads {
 pub(crate) struct MeshArgs {
     /// The mesh: OBJ, glTF, GLB or PLY.
     pub(crate) mesh: PathBuf,
-    /// The axis of the file that points up.
-    #[arg(long, default_value = "y", value_parser = parsed::<UpAxis>, value_name = "y|z")]
-    pub(crate) up: UpAxis,
-    /// The unit of the file [default: what the file says, or else metres]
-    #[arg(long, value_parser = parsed::<LengthUnit>, value_name = "m|cm|mm|ft|in")]
-    pub(crate) units: Option<LengthUnit>,
+    #[command(flatten)]
+    frame: FrameArgs,
+}
+
+impl MeshArgs {
+    pub(crate) fn axes(&self) -> MeshAxes {
+        MeshAxes { up: self.frame.up, units: self.frame.units }
+    }
 }
 
 /// The scenes of a data set.

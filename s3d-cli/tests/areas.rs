@@ -1,8 +1,8 @@
 //! `s3d demo --areas`: the generated areas make a complete data set. A killed run goes on, and no other files
-//! are overwritten.
+//! are overwritten. Exports of two areas find pairs in each.
 
 use crate::common;
-use common::{s3d_fails, s3d_ok, text};
+use common::{s3d_fails, s3d_ok, text, write_scan};
 use s3d_io::dataset::{Layout, read_splits};
 use std::fs;
 
@@ -67,4 +67,36 @@ fn a_demo_of_areas_goes_on_and_writes_over_nothing_else() {
     fs::write(other.join("scan/area_1/scene.toml"), "area = 1").unwrap();
     s3d_fails(&demo, 2, &["is not the generated area 1", "another folder"]);
     s3d_fails(&["demo", "--areas", "7"], 2, &["--areas"]);
+}
+
+#[test]
+fn an_export_finds_pairs_as_the_command_does_and_keeps_those_that_are_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenes = [1, 2].map(|area| write_scan(&dir.path().join(format!("scan_{area}")), area));
+    let export = |out: &str, extra: &[&str]| -> Vec<String> {
+        let out = dir.path().join(out);
+        let scenes = scenes.each_ref().map(|scene| text(scene));
+        let words = [&["export", "-o", text(&out)], &scenes[..], &SMALL, extra].concat();
+        words.into_iter().map(str::to_owned).collect()
+    };
+    let run = |words: &[String]| s3d_ok(&words.iter().map(String::as_str).collect::<Vec<_>>());
+    let list = |out: &str| fs::read_to_string(dir.path().join(out).join("files.csv")).unwrap();
+
+    run(&export("at_once", &["--pairs"]));
+    run(&export("later", &[]));
+    let later = dir.path().join("later");
+    s3d_ok(&["pairs", text(&later)]);
+    assert_eq!(list("at_once"), list("later"));
+    assert_eq!(list("later").matches("pairs.npz").count(), 2);
+
+    // Other pairs are kept.
+    s3d_ok(&["pairs", text(&later), "--samples", "16", "--overwrite"]);
+    let other = list("later");
+    assert_ne!(other, list("at_once"));
+    run(&export("later", &["--pairs"]));
+    assert_eq!(list("later"), other);
+
+    let none = export("none", &["--pairs", "--modalities", "rgb,depth"]);
+    s3d_fails(&none.iter().map(String::as_str).collect::<Vec<_>>(), 2, &["add pose to --modalities"]);
+    assert!(!dir.path().join("none").exists());
 }

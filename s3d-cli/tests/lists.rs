@@ -41,7 +41,7 @@ fn modalities_are_listed() {
     let words = read("s3d-py/python/s3d_py/_export.py");
     let words = words.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(words.contains(&Domain::ALL.map(Domain::folder).join(", ")), "_export.py lists other modalities");
-    has_all("s3d-py/python/s3d_py/_dataset.py", named().map(folder).map(|name| format!("\"{name}\"")));
+    has_all("s3d-py/python/s3d_py/_views.py", named().map(folder).map(|name| format!("\"{name}\"")));
     // The colours of labels are only to look at.
     let read_there = images().filter(|domain| *domain != Domain::SemanticPretty);
     has_all("s3d-dataset/assets/utils.py", read_there.map(|domain| format!("(image, \"{domain}\")")));

@@ -13,6 +13,7 @@
 //! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz) | write what trainers and loaders read |
 //! | [`pairs`](mod@pairs) | finds the images that see the same surface |
 //! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: places, pictures, points |
+//! | [`mesh_axes`] | reads a mesh whose up axis and unit are not known |
 //! | [`store`], [`parallel`] | for crates that write results of their own beside a data set |
 //! | [`error`], [`event`], [`summary`] | what a call answers, and what it tells on its way |
 //!
@@ -135,6 +136,8 @@ pub mod event;
 pub mod export;
 pub mod fuse;
 pub mod info;
+mod memory;
+pub mod mesh_axes;
 pub mod options;
 pub mod pack;
 pub mod pairs;
@@ -163,6 +166,8 @@ pub use export::Export;
 pub use export::shard::make_plan::plan;
 pub use export::shard::merge::merge;
 pub use info::info;
+pub use memory::check_memory;
+pub use mesh_axes::{MeshAxes, read_mesh};
 pub use options::ExportOptions;
 pub use pack::pack;
 pub use pairs::{PairsOptions, pairs};

@@ -56,21 +56,34 @@ pub fn pairs(root: impl Into<PathBuf>, options: &PairsOptions, ctx: &Context) ->
         }
     }
 
-    let layout = &Layout::new(root.into());
+    find(&Layout::new(root.into()), options, false, ctx)
+}
+
+/// Does what [`pairs`](fn@pairs) does by default, unless the data set has pairs.
+///
+/// # Errors
+/// As [`pairs`](fn@pairs).
+pub fn missing_pairs(root: impl Into<PathBuf>, ctx: &Context) -> Result<u64> {
+    find(&Layout::new(root.into()), &PairsOptions::default(), true, ctx)
+}
+
+/// `keeps`: pairs that are there are kept.
+fn find(layout: &Layout, options: &PairsOptions, keeps: bool, ctx: &Context) -> Result<u64> {
     Manifest::require(layout)?;
     let call = format!("pairs {} {}", options.min_overlap, options.samples);
     // The lock keeps others from replacing the data set.
     Lock::during(ctx, layout, |completed| {
         let data = DataSet::open_in(layout)?;
+        let areas = data.manifest.area_numbers.iter();
+        let are_there = areas.clone().all(|area| layout.pairs_npz(*area).exists());
         if completed.as_ref() == Some(&call) {
             ctx.info(format_args!(
                 "{}: what a killed process had begun is complete",
                 layout.root().display()
             ));
-        } else {
+        } else if !(keeps && are_there) {
             make(ctx, &data, options, &call)?;
         }
-        let areas = data.manifest.area_numbers.iter();
         areas
             .map(|area| Ok(s3d_io::dataset::read_pairs(&layout.pairs_npz(*area))?.other.len() as u64 / 2))
             .sum()

@@ -2,17 +2,21 @@
 
 use crate::context::Context;
 use crate::error::Result;
+use crate::memory::check_memory;
 use crate::options::ExportOptions;
 use crate::profile::room::{TreeInstance, TreeRoom, rooms_of};
 use crate::record::data_set::DataSet;
+use crate::record::tables::NumberRecord;
 use memchr::memchr_iter;
-use s3d_geom::Camera;
+use s3d_geom::{Camera, PointCloud};
 use s3d_io::Error as FileError;
+use s3d_io::cloud::LabelledPoints;
 use s3d_io::dataset::{
-    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, PointBox, PoseFile, SourceFaces,
-    ViewRecord, read_face_votes, read_instances, read_labels, read_point_boxes, read_pose, read_source_faces,
-    read_views,
+    DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, ObjectsFile, PairColumns, PointBox,
+    PoseFile, SourceFaces, ViewRecord, read_face_votes, read_instances, read_labels, read_objects,
+    read_pairs, read_point_boxes, read_pose, read_source_faces, read_views,
 };
+use s3d_io::fs::read_json;
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_label::{LabelTable, Taxonomy};
 use serde::Serialize;
@@ -220,6 +224,48 @@ impl DataSet {
         Ok(read_instances(self.files.checked(&path)?)?)
     }
 
+    /// Returns the number in its room of each instance of an area, by its label. Numbers of labels count by
+    /// area. Returns none if the area has no labels.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn numbers_in_rooms(&self, area: u32) -> Result<BTreeMap<String, u32>> {
+        let path = self.layout().instance_numbers_json(area);
+        if !self.names(&path) {
+            return Ok(BTreeMap::new());
+        }
+        let numbers: Vec<NumberRecord> = read_json(self.files.checked(&path)?)?;
+        Ok(numbers
+            .into_iter()
+            .map(|number| (number.label, number.number_in_room))
+            .collect())
+    }
+
+    /// Returns the sampled points of an area, with the index of the label of each; 0 for none.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File); [`Error::Usage`](crate::Error::Usage) if they do not fit into
+    /// memory; [`Error::Cancelled`](crate::Error::Cancelled).
+    pub fn points(&self, area: u32, ctx: &Context) -> Result<(PointCloud, Vec<u32>)> {
+        /// The bytes of a point with its colour, its face and its label.
+        const POINT_BYTES: f64 = 23.0;
+        let mut file = LabelledPoints::open(self.files.checked(&self.layout().point_cloud(area))?)?;
+        let count = file.count();
+        check_memory(&format!("{count} points"), count as f64 * POINT_BYTES)?;
+
+        let progress = ctx.progress("reading", "points", count);
+        let (mut cloud, mut labels, mut block) = (PointCloud::default(), Vec::new(), Vec::new());
+        while file.read(1 << 16, &mut block)? {
+            ctx.check()?;
+            cloud.positions.extend(block.iter().map(|point| point.position));
+            cloud.colors.extend(block.iter().map(|point| point.color));
+            cloud.faces.extend(block.iter().map(|point| point.face));
+            labels.extend(block.iter().map(|point| point.label));
+            progress.add(block.len() as u64);
+        }
+        Ok((cloud, labels))
+    }
+
     /// Returns the boxes of the sampled points of an area: one for each file of the S3DIS tree. Returns
     /// `None` if the area has no labels, or the data set is of an earlier version.
     ///
@@ -256,6 +302,27 @@ impl DataSet {
     /// [`Error::File`](crate::Error::File).
     pub fn pose(&self, image: &DatasetImage) -> Result<PoseFile> {
         Ok(read_pose(self.files.checked(&image.path(self.layout(), Domain::Pose))?)?)
+    }
+
+    /// Returns the objects of an image.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File), also if the image has none.
+    pub fn objects(&self, image: &DatasetImage) -> Result<ObjectsFile> {
+        Ok(read_objects(self.files.checked(&image.path(self.layout(), Domain::Objects))?)?)
+    }
+
+    /// Returns the pairs of images of an area that see the same surface. Returns `None` if they were not
+    /// looked for.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn pairs(&self, area: u32) -> Result<Option<PairColumns>> {
+        let path = self.layout().pairs_npz(area);
+        if !self.names(&path) {
+            return Ok(None);
+        }
+        Ok(Some(read_pairs(self.files.checked(&path)?)?))
     }
 
     /// Returns the camera of an image from its pose and its size in pixels: a panorama, or the pinhole camera

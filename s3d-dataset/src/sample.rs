@@ -2,12 +2,13 @@
 
 use crate::context::Context;
 use crate::error::{Result, UsageError};
+use crate::mesh_axes::{MeshAxes, read_mesh};
 use crate::store::new_file::NewFile;
 use crate::useful::{PLY_POINT_BYTES, check_points, check_space};
 use glam::DVec3;
 use s3d_geom::{Density, PointCloud, SurfaceSampler};
 use s3d_io::cloud::PlyPointWriter;
-use s3d_io::mesh::{LengthUnit, MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::mesh::MeshOrigin;
 use std::path::Path;
 use std::time::Instant;
 
@@ -17,10 +18,8 @@ const CHUNK: u64 = 1 << 20;
 /// How a mesh is sampled.
 #[derive(Clone, Debug)]
 pub struct SampleOptions {
-    /// The axis of the mesh file that points up.
-    pub up: UpAxis,
-    /// The unit of the mesh file. `None`: the unit that the file states, or else metres.
-    pub units: Option<LengthUnit>,
+    /// What is known of the mesh file.
+    pub axes: MeshAxes,
     /// The number of points, in all or per m².
     pub density: Density,
     /// The seed of everything random.
@@ -31,7 +30,7 @@ pub struct SampleOptions {
 
 impl Default for SampleOptions {
     fn default() -> Self {
-        Self { up: UpAxis::Y, units: None, density: Density::PerM2(10_000.0), seed: 0, overwrite: false }
+        Self { axes: MeshAxes::default(), density: Density::PerM2(10_000.0), seed: 0, overwrite: false }
     }
 }
 
@@ -53,9 +52,7 @@ pub fn sample(mesh: &Path, output: &Path, options: &SampleOptions, ctx: &Context
     }
     NewFile::check_free(output, options.overwrite)?;
 
-    let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
-    let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
-    ctx.warn_each(&file.warnings);
+    let file = read_mesh(mesh, options.axes, MeshOrigin::Near, ctx)?;
 
     let points = match options.density {
         Density::PerM2(points_per_m2) => file.mesh.total_area() * points_per_m2,

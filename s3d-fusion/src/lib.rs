@@ -95,7 +95,7 @@ mod register;
 
 pub use close::{CloseError, CloseOptions, ClosedHoles, OpenLoops, close_holes};
 pub use columns::{ColumnsError, MeshColumns};
-pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
+pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate, decimate_while};
 pub use error::FusionError;
 pub use extract::{FusedMesh, Surface};
 pub use fusion::{Fusion, FusionOptions, Tile};

@@ -75,7 +75,7 @@ fn shards(c: &mut Criterion) {
     });
 
     let path = dir.path().join("cloud.ply");
-    let bytes = write_colored_points(&path, &cloud(2_000_000)).unwrap();
+    let bytes = write_colored_points(&path, &cloud(2_000_000), &[]).unwrap();
     group.throughput(Throughput::Bytes(bytes));
     group.bench_function("cloud, every 20th point", |b| {
         b.iter(|| read_point_sample(black_box(&path), 100_000).unwrap());

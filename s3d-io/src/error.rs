@@ -23,7 +23,7 @@ pub enum Place {
 pub enum Error {
     /// The operating system refused: the file does not exist, may not be read or written, or the disk is
     /// full.
-    #[error("{path}: cannot {action}: {source}", path = path.display())]
+    #[error("{path}: cannot {action}: {words}", path = path.display(), words = words(source))]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -59,6 +59,15 @@ pub enum Error {
         /// What is not supported, and what to do instead.
         message: String,
     },
+}
+
+/// The system's words, without the number that the standard library adds.
+fn words(error: &std::io::Error) -> String {
+    let mut words = error.to_string();
+    if let Some(at) = words.find(" (os error ") {
+        words.truncate(at);
+    }
+    words
 }
 
 fn place_suffix(place: Place) -> String {
@@ -98,7 +107,7 @@ impl Error {
     /// Returns the message without the file: "line 3: …", "cannot read: …".
     pub fn message(&self) -> String {
         match self {
-            Self::Io { action, source, .. } => format!("cannot {action}: {source}"),
+            Self::Io { action, source, .. } => format!("cannot {action}: {}", words(source)),
             Self::Format { message, place: Place::Line(line), .. } => format!("line {line}: {message}"),
             Self::Format { message, .. } | Self::Unsupported { message, .. } => message.clone(),
             Self::Mesh { source, .. } => source.to_string(),

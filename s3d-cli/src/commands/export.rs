@@ -2,11 +2,12 @@
 
 use super::on_threads;
 use crate::args::{Scenes, Threads};
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::values::parsed;
 use clap::Args;
 use s3d_dataset::export::Shard;
 use s3d_dataset::{Export, ExportOptions};
+use s3d_io::dataset::Domain;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -27,6 +28,9 @@ pub(crate) struct ExportArgs {
     /// Take labels and scores from the folder that `s3d plan` made, instead of computing them.
     #[arg(long, value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
+    /// Find the images that see the same surface, too, as `s3d pairs OUT` does.
+    #[arg(long, conflicts_with = "shard")]
+    pub(crate) pairs: bool,
     #[command(flatten)]
     pub(crate) options: ExportOptions,
     #[command(flatten)]
@@ -34,13 +38,22 @@ pub(crate) struct ExportArgs {
 }
 
 pub(crate) fn run(args: ExportArgs) -> Outcome<()> {
+    if args.pairs && !args.options.modalities.contains(&Domain::Pose) {
+        return Err(Failure::Usage("--pairs needs poses: add pose to --modalities".to_owned()));
+    }
     let output = args.output.unwrap_or_else(|| default_output(&args.scenes.scenes[0]));
     let export = Export::new(args.scenes.sources())
         .options(args.options)
         .overwrite(args.overwrite)
         .shard(args.shard)
         .plan(args.plan);
-    on_threads(args.threads, |context| export.run(output, context).map(drop))
+    on_threads(args.threads, |context| {
+        export.run(&output, context)?;
+        if args.pairs {
+            s3d_dataset::pairs::missing_pairs(&output, context)?;
+        }
+        Ok(())
+    })
 }
 
 /// The default folder of the data set: beside the scene file, named after it.
@@ -55,7 +68,6 @@ mod tests {
     use super::*;
     use clap::CommandFactory;
     use s3d_dataset::options::{Condition, Profile};
-    use s3d_io::dataset::Domain;
     use s3d_io::mesh::MeshFormat;
 
     #[test]

@@ -130,12 +130,26 @@ def test_frames_are_the_views_with_boxes_of_what_they_show(made):
                 assert box["bbox_2d"] == [columns.min(), rows.min(), columns.max(), rows.max()]
 
 
+def recognised_by_scene(out, rooms, names):
+    """By scene, the labels that have 0.5 % of the pixels of one of its views."""
+    found = {}
+    for scene in rooms:
+        room = scene.removeprefix("area_1_")
+        for file in (out / "area_1/data/semantic").glob(f"camera_*_{room}_frame_*.png"):
+            index = np.array(Image.open(file)).astype(int) @ [65536, 256, 1]
+            labels, counts = np.unique(index, return_counts=True)
+            large = labels[counts >= 0.005 * index.size]
+            found.setdefault(scene, set()).update(names[i] for i in large if i < len(names))
+    return found
+
+
 def test_answers_are_those_of_a_recount(made, rooms):
     out, package, questions = made
     assert [q["id"] for q in questions] == list(range(len(questions))) and len(questions) > 100
     distances = {scene: Distances(things) for scene, things in rooms.items()}
     names = json.loads((out / "assets/semantic_labels.json").read_text())
     frames = json.loads((package / "frame_metadata.json").read_text())
+    recognised = recognised_by_scene(out, rooms, names)
     kinds = set()
     # The nearest of many things is asked of some: a recount takes long.
     rng = np.random.default_rng(5)
@@ -147,6 +161,7 @@ def test_answers_are_those_of_a_recount(made, rooms):
         kinds.add(kind)
         classes = [class_of(label) for label in labels]
         assert all(c in q["question"] for c in classes)
+        assert set(labels) <= recognised[scene]
         if q["options"] is not None:
             letters = {option[0]: option[3:] for option in q["options"]}
             assert letters[q["mc_answer"]] == right and len(set(letters.values())) == len(letters)
@@ -166,6 +181,7 @@ def test_answers_are_those_of_a_recount(made, rooms):
             assert right == pytest.approx(round(distances[scene](*labels), 1)), (q, distances[scene](*labels))
         elif kind.startswith("object_rel_distance"):
             of = {c: [t for t in things if class_of(t) == c] for c in letters.values()}
+            assert {t for found in of.values() for t in found} <= recognised[scene]
             nearest = {c: min(distances[scene](labels[0], t) for t in of[c]) for c in of}
             ordered = sorted(nearest.values())
             assert nearest[right] == ordered[0] and ordered[1] - ordered[0] > 0.13

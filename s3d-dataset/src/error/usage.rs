@@ -154,6 +154,17 @@ pub enum UsageError {
         /// The folder.
         folder: PathBuf,
     },
+    /// There is nothing to export.
+    NoScenes,
+    /// A result would not fit into memory.
+    Memory {
+        /// What takes memory: "1000000000000 points".
+        what: String,
+        /// The number of bytes.
+        bytes: f64,
+        /// The number of bytes that are free, if that is known.
+        free: Option<f64>,
+    },
     /// A file cannot have this name.
     WrongEnding {
         /// The file.
@@ -315,6 +326,12 @@ impl UsageError {
                 "{}: no data set is there (no manifest.json): give the folder of one",
                 folder.display()
             ),
+            Self::NoScenes => "there is no scene to export: name one".to_owned(),
+            Self::Memory { what, bytes, free } => {
+                let gib = |bytes: f64| format!("{:.1} GiB", bytes / f64::from(1 << 30));
+                let free = free.map_or_else(String::new, |free| format!(", and {} are free", gib(free)));
+                format!("{what} take {} of memory{free}: ask for less", gib(*bytes))
+            }
             Self::WrongEnding { path, why } => format!("{}: {why}", path.display()),
         }
     }

@@ -29,7 +29,7 @@ pub use input::memory::{MemoryScene, SceneSource, SharedScene};
 pub use shard::assignment::Shard;
 
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Result, UsageError};
 use crate::export::plan::Plan;
 use crate::export::shard::export_shard;
 use crate::options::ExportOptions;
@@ -116,6 +116,9 @@ impl Export {
     /// [`Input`](crate::Error::Input) or [`File`](crate::Error::File) if the input is wrong;
     /// [`Cancelled`](crate::Error::Cancelled); [`Temporary`](crate::Error::Temporary).
     pub fn run(&self, output: impl Into<PathBuf>, ctx: &Context) -> Result<Option<Summary>> {
+        if self.scenes.is_empty() {
+            return Err(UsageError::NoScenes.into());
+        }
         let options = self.options.canonical()?;
         let plan = self.plan.as_deref().map(|folder| Plan::open(ctx, folder)).transpose()?;
         let target = self.target(output.into());

@@ -6,6 +6,7 @@ use super::kept_tiles::KeptTiles;
 use super::{FuseOptions, tiles};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::memory;
 use s3d_fusion::{FusedMesh, Fusion, FusionError, SensorNoise, Surface};
 use std::path::{Path, PathBuf};
 
@@ -38,7 +39,10 @@ pub(super) fn gather(
         None => {
             let whole = Fusion::new(fusion_options.clone()).map_err(of)?;
             if let Some(whole) = fill(whole, images, most_bytes, ctx)? {
-                return whole.mesh().map_err(of);
+                let surface = whole.surface();
+                drop(whole);
+                memory::give_back();
+                return surface.into_mesh(least_piece_m2).map_err(of);
             }
             let memory_gib = options.memory_gib;
             ctx.info(format_args!("the grid takes more than {memory_gib} GiB: it is fused in tiles"));
@@ -66,6 +70,7 @@ pub(super) fn gather(
         done.push(tile);
     }
 
+    memory::give_back();
     let surfaces = done.into_iter().map(|tile| {
         let surface = kept.read(tile, ctx)?;
         surface.ok_or_else(|| Error::unfit(keeping.folder, "a finished tile was changed or removed"))

@@ -6,7 +6,7 @@ use super::{FuseOptions, Fused, level};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3, Vec3};
-use s3d_fusion::{CloseOptions, DecimateOptions, FusedMesh, MeshColumns, close_holes, decimate};
+use s3d_fusion::{CloseOptions, DecimateOptions, FusedMesh, MeshColumns, close_holes, decimate_while};
 use std::path::Path;
 
 /// A mesh of less surface than this is no room, square metres.
@@ -56,8 +56,7 @@ pub(super) fn surface(
     let mut made = Made { positions, faces, colors, closed: Vec::new(), turn: None, about };
 
     if options.max_error_m > 0.0 {
-        ctx.check()?;
-        let task = ctx.progress("simplifying", "meshes", 1);
+        let task = ctx.progress("simplifying", "faces", fused_faces as u64);
         let columns = MeshColumns { positions: &made.positions, faces: &made.faces, colors: &made.colors };
         let limits = DecimateOptions {
             max_error_m: options.max_error_m as f32,
@@ -65,7 +64,16 @@ pub(super) fn surface(
             max_color_error: MOST_COLOR_ERROR,
             ..DecimateOptions::default()
         };
-        let small = decimate(&columns, &limits).map_err(|e| unfit(&e))?;
+        let mut told = 0;
+        let small = decimate_while(&columns, &limits, &mut |share| {
+            let done = (share * fused_faces as f64) as u64;
+            task.add(done - told);
+            told = done;
+            ctx.check().is_ok()
+        });
+        ctx.check()?;
+        let small = small.map_err(|e| unfit(&e))?;
+        task.add(fused_faces as u64 - told);
         (made.positions, made.faces, made.colors) = (small.positions, small.faces, small.colors);
         made.about.max_error_m = small.max_error_m;
         if small.max_error_m > options.max_error_m {
@@ -76,7 +84,6 @@ pub(super) fn surface(
                 options.max_error_m * 1e3
             ));
         }
-        task.add(1);
     }
 
     if let Some(close_m) = options.close_m {

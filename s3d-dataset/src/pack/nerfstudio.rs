@@ -87,7 +87,7 @@ fn pack_area(
     let points = area_points(source, area, options.points)?;
     let ply = (!points.is_empty()).then_some(PLY);
     if ply.is_some() {
-        write_colored_points(&job.folder.join(PLY), &points)?;
+        write_colored_points(&job.folder.join(PLY), &points, &[])?;
     }
 
     let (panoramas, views): (Vec<_>, Vec<_>) =

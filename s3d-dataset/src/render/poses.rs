@@ -7,6 +7,7 @@ use crate::context::Context;
 use crate::error::{Error, Overwriting, Result, UsageError};
 use crate::export::input::photographs::camera_error;
 use crate::export::modality::{Image, ImageBuffers};
+use crate::mesh_axes::read_mesh;
 use crate::parallel::for_each_in_order;
 use crate::store::parent_of;
 use crate::store::staging::Staging;
@@ -16,7 +17,7 @@ use s3d_geom::{Aabb, Camera};
 use s3d_io::Error as FileError;
 use s3d_io::camera::{GivenIntrinsics, IntrinsicsError, PosedCamera, PosedCameras, read_posed_cameras};
 use s3d_io::fs::{create_dir, read_json, write_bytes, write_json};
-use s3d_io::mesh::{MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::mesh::{MeshOrigin, UpAxis};
 use s3d_io::package::NerfstudioFrame;
 use s3d_render::{Caster, Hits, MipMaps, NO_FACE, Scene};
 use serde::{Deserialize, Serialize};
@@ -121,10 +122,7 @@ pub fn render_poses(
     let mut frames = frames(poses, &cameras, &options.intrinsics)?;
     tell_of_list(ctx, &cameras, untracked);
 
-    let near =
-        MeshOptions { origin: MeshOrigin::Near, units: options.render.units, ..MeshOptions::default() };
-    let file = s3d_io::mesh::read_mesh_with(mesh, options.render.up, &near)?;
-    ctx.warn_each(&file.warnings);
+    let file = read_mesh(mesh, options.render.axes, MeshOrigin::Near, ctx)?;
     // Images are in the frame of the mesh, so cameras have its offset subtracted too.
     frames
         .iter_mut()

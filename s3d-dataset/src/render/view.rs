@@ -3,6 +3,8 @@
 use crate::context::Context;
 use crate::error::{Result, UsageError};
 use crate::export::modality::{Channels, Image, ImageBuffers};
+use crate::memory::check_memory;
+use crate::mesh_axes::{MeshAxes, read_mesh};
 use crate::store::refuse_existing;
 use crate::store::staging::Staging;
 use glam::DVec3;
@@ -10,7 +12,7 @@ use s3d_geom::{Camera, TriMesh};
 use s3d_io::dataset::{Conventions, Domain};
 use s3d_io::fs::{create_dir, write_bytes, write_json};
 use s3d_io::image::{Compression, Content, encode_rgb8};
-use s3d_io::mesh::{LengthUnit, MeshOptions, MeshOrigin, UpAxis};
+use s3d_io::mesh::MeshOrigin;
 use s3d_render::{Hits, MipMaps, NO_FACE, Normals, Scene, cast, coverage, face_curvatures};
 use serde::Serialize;
 use std::path::Path;
@@ -18,6 +20,9 @@ use std::time::Instant;
 
 /// The number of colours for faces. (255, 255, 255) is not one: it means that nothing is seen.
 const FACES_IN_COLORS: usize = 0xff_ffff;
+
+/// The bytes that a pixel takes at most while images are made, one after the other, and encoded.
+const PIXEL_BYTES: f64 = 32.0;
 
 /// The content of `camera.json`, enough to place the images in the world.
 #[derive(Serialize)]
@@ -40,10 +45,8 @@ struct View {
 /// The options of [`render`].
 #[derive(Clone, Debug)]
 pub struct RenderOptions {
-    /// The axis of the mesh's file that points up.
-    pub up: UpAxis,
-    /// The unit of the mesh's file. `None` uses the unit that the file names, or metres.
-    pub units: Option<LengthUnit>,
+    /// What is known of the mesh's file.
+    pub axes: MeshAxes,
     /// Normals of faces, or interpolated from the mesh's own if it has any.
     pub normals: Normals,
     /// See [`ExportOptions::rgb_samples`](crate::ExportOptions::rgb_samples).
@@ -60,8 +63,7 @@ pub struct RenderOptions {
 impl Default for RenderOptions {
     fn default() -> Self {
         Self {
-            up: UpAxis::Y,
-            units: None,
+            axes: MeshAxes::default(),
             normals: Normals::Flat,
             rgb_samples: 1,
             modalities: vec![Domain::Rgb, Domain::Depth, Domain::Normal, Domain::GlobalXyz],
@@ -146,14 +148,16 @@ pub fn render(
     ctx: &Context,
 ) -> Result<()> {
     let images = images(options)?;
+    let [width, height] = [camera.width, camera.height];
+    let pixels = f64::from(width) * f64::from(height);
+    check_memory(&format!("images of {width} × {height} pixels"), pixels * PIXEL_BYTES)?;
     // Several files make one result: all of them appear or none.
     let whole = Path::new("render");
     if !Staging::is_left(output, whole) {
         refuse_files(output, &images, options.overwrite)?;
     }
 
-    let near = MeshOptions { origin: MeshOrigin::Near, units: options.units, ..MeshOptions::default() };
-    let file = s3d_io::mesh::read_mesh_with(mesh, options.up, &near)?;
+    let file = read_mesh(mesh, options.axes, MeshOrigin::Near, ctx)?;
     // Images are in the frame of the mesh, so the camera has its offset subtracted too.
     let mut camera = *camera;
     camera.pose.location -= file.offset_m;
@@ -165,7 +169,6 @@ pub fn render(
              camera's, which camera.json tells"
         ));
     }
-    file.warnings.iter().for_each(|w| ctx.warn(w));
 
     let scene = Scene::new(&file.mesh);
     let textures = MipMaps::new(&file.mesh);

@@ -25,6 +25,7 @@ mod whole;
 
 use crate::columns::{ColumnsError, MeshColumns};
 use collapse::{Limits, collapse_edges};
+use patch::Patch;
 use s3d_geom::glam::Vec3;
 use thiserror::Error;
 use whole::Whole;
@@ -90,6 +91,9 @@ pub enum DecimateError {
         /// Its value.
         value: f64,
     },
+    /// The caller of [`decimate_while`] ended it.
+    #[error("ended before all was simplified")]
+    Stopped,
 }
 
 /// Pieces of about this many faces are decimated on their own, then what lies between them.
@@ -129,6 +133,19 @@ const SHARE: f32 = 0.9;
 /// # Errors
 /// [`DecimateError`] for columns that are not a mesh, and options that are negative or not a number.
 pub fn decimate(mesh: &MeshColumns<'_>, options: &DecimateOptions) -> Result<Decimated, DecimateError> {
+    decimate_while(mesh, options, &mut |_| true)
+}
+
+/// Does what [`decimate`] does, and tells `go_on` now and then the share of its work that is done, 0 to 1. It
+/// ends when `go_on` returns false.
+///
+/// # Errors
+/// As [`decimate`], and [`DecimateError::Stopped`].
+pub fn decimate_while(
+    mesh: &MeshColumns<'_>,
+    options: &DecimateOptions,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Result<Decimated, DecimateError> {
     mesh.check()?;
     let numbers = [
         ("the largest error", f64::from(options.max_error_m)),
@@ -139,12 +156,18 @@ pub fn decimate(mesh: &MeshColumns<'_>, options: &DecimateOptions) -> Result<Dec
         return Err(DecimateError::Option { what, value });
     }
 
-    let whole = decimate_in_pieces(mesh, options, FACES_A_PIECE);
+    let whole = decimate_in_pieces(mesh, options, FACES_A_PIECE, go_on).ok_or(DecimateError::Stopped)?;
     Ok(compact(&whole, !mesh.colors.is_empty()))
 }
 
-/// Decimates pieces of about so many faces, in rounds. With a target, then the whole.
-fn decimate_in_pieces(mesh: &MeshColumns<'_>, options: &DecimateOptions, faces_a_piece: f64) -> Whole {
+/// Decimates pieces of about so many faces, in rounds. With a target, then the whole. `None` if `go_on` says
+/// no.
+fn decimate_in_pieces(
+    mesh: &MeshColumns<'_>,
+    options: &DecimateOptions,
+    faces_a_piece: f64,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Option<Whole> {
     let mut whole = Whole::new(mesh, options.max_error_m, options.color_weight_m / 255.0);
     let faces = whole.alive();
     let target = options.target_faces.unwrap_or(0);
@@ -155,20 +178,22 @@ fn decimate_in_pieces(mesh: &MeshColumns<'_>, options: &DecimateOptions, faces_a
         let cell_m = (whole.area() * faces_a_piece / faces as f64).sqrt().max(1e-3);
         // What lies between the pieces of one round is within those of another, but for single corners.
         let rounds = if target == 0 { &SHIFTS[..] } else { &SHIFTS[..1] };
-        for shift in rounds {
-            whole.by_cubes(cell_m, *shift, |piece| {
+        for (round, shift) in (0..).zip(rounds) {
+            let work = |piece: &mut Patch| {
                 let share = target as f64 * piece.alive as f64 / faces as f64;
                 collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
-            });
+            };
+            let mut go_on = |done| go_on((f64::from(round) + done) / rounds.len() as f64);
+            whole.by_cubes(cell_m, *shift, work, &mut go_on)?;
         }
         if target == 0 {
-            return whole;
+            return Some(whole);
         }
     }
     if whole.alive() > target {
         whole.at_once(|all| collapse_edges(all, &limits(target)));
     }
-    whole
+    Some(whole)
 }
 
 /// The faces that are alive, and the vertices that they use.

@@ -108,7 +108,8 @@ fn any_number_of_threads_gives_the_same_bytes() {
     let options = DecimateOptions { target_faces: Some(900), ..DecimateOptions::default() };
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| compact(&decimate_in_pieces(&columns(&wall), &options, 1000.0), false))
+        let run = || decimate_in_pieces(&columns(&wall), &options, 1000.0, &mut |_| true).unwrap();
+        pool.install(|| compact(&run(), false))
     };
     let one = on(1);
     assert_eq!(one, on(3));
@@ -119,7 +120,8 @@ fn any_number_of_threads_gives_the_same_bytes() {
     // Without a target, in rounds of pieces alone.
     let as_far_as_it_goes = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let run = || decimate_in_pieces(&columns(&wall), &DecimateOptions::default(), 1000.0);
+        let options = DecimateOptions::default();
+        let run = || decimate_in_pieces(&columns(&wall), &options, 1000.0, &mut |_| true).unwrap();
         pool.install(|| compact(&run(), false))
     };
     let rounds = as_far_as_it_goes(1);
@@ -284,4 +286,24 @@ fn bad_columns_and_options_are_refused() {
     let options = DecimateOptions { max_error_m: 0.0, ..DecimateOptions::default() };
     let same = decimate(&MeshColumns { faces: &faces, ..columns(&parts) }, &options).unwrap();
     assert_eq!((same.faces.len(), same.positions.len(), same.face_of), (1, 3, vec![0]));
+}
+
+#[test]
+fn it_tells_how_far_it_is_and_ends_when_told() {
+    let wall = wall(70, 0.002);
+    let in_pieces = |most: f64| {
+        let mut told = Vec::new();
+        let whole = decimate_in_pieces(&columns(&wall), &DecimateOptions::default(), 100.0, &mut |share| {
+            told.push(share);
+            share <= most
+        });
+        (whole.is_some(), told)
+    };
+    let (is_done, told) = in_pieces(1.0);
+    assert!(is_done && told.len() > 3 && told[0] == 0.0);
+    assert!(told.is_sorted() && told.iter().all(|share| (0.0..1.0).contains(share)));
+
+    let (is_done, told) = in_pieces(0.3);
+    assert!(!is_done && told.last().is_some_and(|share| *share > 0.3));
+    assert!(told[..told.len() - 1].iter().all(|share| *share <= 0.3));
 }

@@ -1,7 +1,7 @@
 //! The whole mesh while it is decimated, and its pieces.
 
 use super::distance::to_triangle;
-use super::patch::{Freedom, Lists, NONE, Patch, Sample};
+use super::patch::{Freedom, Lists, Patch, Sample};
 use super::quadric::Quadric;
 use crate::columns::MeshColumns;
 use rayon::prelude::*;
@@ -139,7 +139,13 @@ impl Whole {
     /// Cuts the mesh into pieces: the vertices in a cube of the edge `cell_m` are one. All cubes are moved by
     /// the share `shift` of an edge along each axis. `work` changes each piece, in parallel, and what it did
     /// is taken over. Pieces share no face that may change.
-    pub(super) fn by_cubes(&mut self, cell_m: f64, shift: f64, work: impl Fn(&mut Patch) + Sync) {
+    pub(super) fn by_cubes(
+        &mut self,
+        cell_m: f64,
+        shift: f64,
+        work: impl Fn(&mut Patch) + Sync,
+        go_on: &mut dyn FnMut(f64) -> bool,
+    ) -> Option<()> {
         let cell = |p: &Vec3| (p.as_dvec3() / cell_m + shift).floor().as_ivec3().to_array();
         let numbers: BTreeSet<[i32; 3]> = self.positions.iter().map(cell).collect();
         let numbers: Vec<[i32; 3]> = numbers.into_iter().collect();
@@ -148,56 +154,62 @@ impl Whole {
             numbers.partition_point(|n| *n < cell) as u32
         };
         let cell_of: Vec<u32> = self.positions.par_iter().map(number).collect();
-        self.by_cells(&cell_of, work);
+        self.by_cells(&cell_of, numbers.len(), work, go_on)
     }
 
     /// `work` changes the whole mesh as one piece.
     pub(super) fn at_once(&mut self, work: impl Fn(&mut Patch) + Sync) {
-        self.by_cells(&vec![0; self.positions.len()], work);
+        self.by_cells(&vec![0; self.positions.len()], 1, work, &mut |_| true);
     }
 
-    fn by_cells(&mut self, cell_of: &[u32], work: impl Fn(&mut Patch) + Sync) {
-        let alive = || (0..).zip(&self.faces).filter(|(i, _)| self.is_alive[*i as usize]);
-
+    /// Tells `go_on` the share that is done; `None` if it says no.
+    fn by_cells(
+        &mut self,
+        cell_of: &[u32],
+        cells: usize,
+        work: impl Fn(&mut Patch) + Sync,
+        go_on: &mut dyn FnMut(f64) -> bool,
+    ) -> Option<()> {
         // A face is known to the cell of each of its corners; a cell owns it if all are there.
-        let mut faces: Vec<(u32, u32)> = Vec::with_capacity(self.faces.len());
-        let mut owner = vec![NONE; self.faces.len()];
+        let alive = || (0..).zip(&self.faces).filter(|(i, _)| self.is_alive[*i as usize]);
+        let cells_of = |corners: &[u32; 3]| corners.map(|v| cell_of[v as usize]);
+        let faces = Grouped::new(
+            cells,
+            alive().flat_map(|(face, corners)| {
+                let [a, b, c] = cells_of(corners);
+                let each = [Some(a), Some(b).filter(|b| *b != a), Some(c).filter(|c| *c != a && *c != b)];
+                each.into_iter().flatten().map(move |cell| (cell, face))
+            }),
+        );
         let mut freedom = vec![Freedom::Free; self.positions.len()];
-        for (face, corners) in alive() {
-            let [a, b, c] = corners.map(|v| cell_of[v as usize]);
-            faces.push((a, face));
-            if b != a {
-                faces.push((b, face));
-            }
-            if c != a && c != b {
-                faces.push((c, face));
-            }
-            if a == b && b == c {
-                owner[face as usize] = a;
-            } else {
+        for (_, corners) in alive() {
+            let [a, b, c] = cells_of(corners);
+            if a != b || b != c {
                 corners.iter().for_each(|&v| freedom[v as usize] = Freedom::Fixed);
             }
         }
-        faces.par_sort_unstable();
 
         let samples = Grouped::new(self.faces.len(), (0..).zip(&self.face_of_sample).map(|(i, &f)| (f, i)));
         let starts = (0..).zip(&self.start_of_border_point);
         let mut border: Vec<(u32, u32)> = starts.map(|(i, &v)| (cell_of[v as usize], i)).collect();
         border.par_sort_unstable();
 
-        let groups: Vec<&[(u32, u32)]> = faces.chunk_by(|a, b| a.0 == b.0).collect();
         // What other pieces see of a piece keeps its place. Its colours change when all pieces are done.
         let mut seen_colors = Vec::new();
-        for some in groups.chunks(PIECES_A_THREAD * rayon::current_num_threads()) {
+        let cells: Vec<u32> = (0..cells as u32).filter(|cell| !faces.of(*cell).is_empty()).collect();
+        let a_batch = PIECES_A_THREAD * rayon::current_num_threads();
+        for (i, some) in cells.chunks(a_batch).enumerate() {
+            if !go_on((i * a_batch) as f64 / cells.len() as f64) {
+                return None;
+            }
             let done: Vec<Piece> = some
                 .par_iter()
-                .map(|group| {
-                    let cell = group[0].0;
-                    let faces: Vec<u32> = group.iter().map(|pair| pair.1).collect();
+                .map(|&cell| {
                     let samples_of = |face: u32| {
-                        let is_own = owner[face as usize] == cell;
+                        let is_own = cells_of(&self.faces[face as usize]) == [cell; 3];
                         if is_own { samples.of(face) } else { &[] }
                     };
+                    let faces = faces.of(cell).to_vec();
                     let mut piece = self.piece(faces, samples_of, of_cell(&border, cell), |v| {
                         if cell_of[v as usize] == cell {
                             freedom[v as usize]
@@ -218,6 +230,7 @@ impl Whole {
         for (vertex, color) in seen_colors {
             self.colors[vertex as usize] = color;
         }
+        Some(())
     }
 
     /// The piece of some faces, with their samples, and points of the border: pairs of a cell and a number.

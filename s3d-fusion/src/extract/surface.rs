@@ -7,6 +7,7 @@ use crate::grid::block::Voxel;
 use crate::grid::{Grid, Place, SIDE};
 use rayon::prelude::*;
 use s3d_geom::glam::Vec3;
+use std::ops::Range;
 
 /// The surface of a grid or tile. [`Surface::join`] makes one of many, and [`Surface::into_mesh`] its mesh.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,14 +49,57 @@ impl Surface {
         let holds = |place: &Place| {
             tile.is_none_or(|[from, to]| (0..3).all(|k| (from[k]..to[k]).contains(&place[k])))
         };
-        let parts = grid
-            .places
-            .par_iter()
-            .filter(|place| holds(place))
-            .map(|place| Samples::of(grid, *place, (cell_m / front_m) as f32).part(cell_m))
-            .filter(|part| !part.faces.is_empty())
-            .collect();
-        Self::of_parts(cell_m, parts)
+        let mut places: Vec<Place> = grid.places.iter().copied().filter(holds).collect();
+        places.par_sort_unstable_by_key(|[_, _, z]| *z);
+
+        // Layer by layer, so that little is held twice beside the grid.
+        let mut whole = Self { cell_m, vertices: Vec::new(), faces: Vec::new() };
+        let mut last_layer = 0..0;
+        for layer in places.chunk_by(|a, b| a[2] == b[2]) {
+            let parts = layer
+                .par_iter()
+                .map(|place| Samples::of(grid, *place, (cell_m / front_m) as f32).part(cell_m))
+                .filter(|part| !part.faces.is_empty())
+                .collect();
+            let start = whole.faces.len();
+            whole.append(Self::of_parts(cell_m, parts), last_layer, layer[0][2]);
+            last_layer = start..whole.faces.len();
+        }
+        whole
+    }
+
+    /// Appends the next layer of blocks, whose place on z is given. `last_layer`: the faces of the layer
+    /// before, which alone can share vertices with it.
+    fn append(&mut self, next: Self, last_layer: Range<usize>, layer: i32) {
+        // What both can have is in the lowest plane of the new layer.
+        let of_plane = |vertices: &[Vertex], above: i32| {
+            let least = z_bits(layer * SIDE + above);
+            vertices.partition_point(|v| v.key < least)
+        };
+        let tail_start = of_plane(&self.vertices, 0);
+        let (head, rest) = next.vertices.split_at(of_plane(&next.vertices, 1));
+        let tail = self.vertices.split_off(tail_start);
+
+        let mut plane = [&tail, head].concat();
+        plane.par_sort_unstable_by_key(|v| v.key);
+        plane.dedup_by_key(|v| v.key);
+        let numbers = |vertices: &[Vertex]| -> Vec<u32> {
+            let number = |v: &Vertex| (tail_start + plane.partition_point(|p| p.key < v.key)) as u32;
+            vertices.par_iter().map(number).collect()
+        };
+        let (of_tail, of_head) = (numbers(&tail), numbers(head));
+        self.vertices.extend(plane);
+        for v in self.faces[last_layer].iter_mut().flat_map(|(_, face)| face) {
+            if *v as usize >= tail_start {
+                *v = of_tail[*v as usize - tail_start];
+            }
+        }
+
+        let shift = self.vertices.len() - head.len();
+        self.vertices.extend_from_slice(rest);
+        let new_of = |v: u32| of_head.get(v as usize).map_or_else(|| v + shift as u32, |v| *v);
+        self.faces
+            .extend(next.faces.into_iter().map(|(cell, face)| (cell, face.map(new_of))));
     }
 
     /// Joins the surfaces of the tiles of a grid. The order of tiles does not matter, and the result is the
@@ -208,9 +252,8 @@ impl<'a> Samples<'a> {
 
     /// A voxel of the block and an axis as one number, by z, y and x.
     fn key(&self, voxel: [usize; 3], axis: usize) -> u64 {
-        let [x, y, z] =
-            [0, 1, 2].map(|k| (i64::from(self.place[k] * SIDE) + voxel[k] as i64 + (1 << 19)) as u64);
-        (z << 40 | y << 20 | x) << 2 | axis as u64
+        let [x, y, z] = [0, 1, 2].map(|k| self.place[k] * SIDE + voxel[k] as i32);
+        z_bits(z) | (bits(y) << 20 | bits(x)) << 2 | axis as u64
     }
 
     fn vertex(&self, low: [usize; 3], axis: usize, ends: [usize; 2], cell_m: f64) -> Vertex {
@@ -239,6 +282,16 @@ impl<'a> Samples<'a> {
         let [x, y, z] = voxel.map(|k| k % side);
         self.grid.block(place)?.0.color((z * side + y) * side + x)
     }
+}
+
+/// The coordinate of a voxel in a key: 20 bits.
+fn bits(coordinate: i32) -> u64 {
+    (i64::from(coordinate) + (1 << 19)) as u64
+}
+
+/// The least key of the voxels of a plane.
+fn z_bits(z: i32) -> u64 {
+    bits(z) << 42
 }
 
 fn sample([x, y, z]: [usize; 3]) -> usize {

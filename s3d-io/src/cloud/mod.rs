@@ -86,6 +86,8 @@ pub use label_files::numbers::{is_number_list, read_number_list, read_whole_numb
 pub use label_files::saved::{EVENTS_FILE, LABELS_FILE, SavedLabels, mesh_checksum};
 #[cfg(feature = "labels")]
 pub use label_files::transfer::labels_by_place;
+#[cfg(feature = "las")]
+pub use las::write_las_points;
 #[cfg(feature = "mat")]
 pub use mat::{MatArea, MatObject, MatRoom, MatWriter};
 #[cfg(feature = "npy")]

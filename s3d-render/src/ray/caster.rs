@@ -76,8 +76,20 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
+    pub(super) fn clear(&mut self) {
+        self.t_min = None;
+        self.candidates.clear();
+    }
+
     pub(crate) fn meet(&mut self, mesh: &TriMesh, face: u32, origin: DVec3, direction: DVec3) {
-        let Some(cone) = Cone::new(mesh, face, origin).filter(|c| c.contains(direction)) else { return };
+        let corners = mesh.triangle(face).map(|p| p.as_dvec3());
+        self.meet_corners(face, corners, origin, direction);
+    }
+
+    /// Meets a face whose corners in the world are at hand.
+    pub(super) fn meet_corners(&mut self, face: u32, corners: [DVec3; 3], origin: DVec3, direction: DVec3) {
+        let cone = Cone::of_corners(corners, origin).filter(|cone| cone.contains(direction));
+        let Some(cone) = cone else { return };
         let t = cone.distance(direction);
         if t <= self.reach() {
             self.t_min = Some(self.t_min.map_or(t, |t_min| t_min.min(t)));
@@ -86,7 +98,7 @@ impl Nearest {
     }
 
     /// Returns the largest `t` that may still win: beyond it, no index helps.
-    fn reach(&self) -> f64 {
+    pub(super) fn reach(&self) -> f64 {
         self.t_min.map_or(f64::INFINITY, |t| t * (1.0 + TIE))
     }
 
@@ -168,8 +180,7 @@ impl<'s, 'm> RayCaster<'s, 'm> {
         let mesh = self.scene.mesh();
         let tree = self.scene.tree();
         let inverse = inverse(direction);
-        self.nearest.t_min = None;
-        self.nearest.candidates.clear();
+        self.nearest.clear();
         self.stack.clear();
         self.stack.extend(self.enter(0, inverse).map(|t| (t, 0)));
 

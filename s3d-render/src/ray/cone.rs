@@ -30,7 +30,11 @@ impl Cone {
     /// Returns the cone of a face. Returns `None` if the origin lies exactly in the plane of the face: the
     /// face has no width from there, and a ray at its rim hits its neighbours.
     pub(crate) fn new(mesh: &TriMesh, face: u32, origin: DVec3) -> Option<Self> {
-        let world = mesh.triangle(face).map(|p| p.as_dvec3());
+        Self::of_corners(mesh.triangle(face).map(|p| p.as_dvec3()), origin)
+    }
+
+    /// Returns the cone of a face with these corners in the world, as [`Cone::new`] does.
+    pub(crate) fn of_corners(world: [DVec3; 3], origin: DVec3) -> Option<Self> {
         let [a, b, c] = world.map(|p| p - origin);
         // Differences of `f32` positions are almost exact in `f64`, so the normal of a sliver is as good as
         // any.

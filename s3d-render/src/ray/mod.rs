@@ -1,4 +1,5 @@
-//! Single rays, cast exactly: a pixel sees the face that its ray hits.
+//! Rays, cast exactly: a pixel sees the face that its ray hits.
 
 pub(crate) mod caster;
 pub(crate) mod cone;
+pub(crate) mod wide;

@@ -3,12 +3,15 @@
 mod blocks;
 pub(crate) mod clusters;
 pub(crate) mod tree;
+pub(crate) mod wide;
 
 use clusters::Clusters;
 use glam::DVec3;
 use rayon::prelude::*;
 use s3d_geom::TriMesh;
+use std::sync::OnceLock;
 use tree::{FaceTree, Top};
+use wide::WideTree;
 
 /// A mesh with a bounding volume hierarchy over its faces. It is built once, and any number of threads can
 /// render it.
@@ -29,6 +32,8 @@ pub struct Scene<'m> {
     mesh: &'m TriMesh,
     tree: FaceTree,
     clusters: Clusters,
+    /// Made at the first call that needs it.
+    wide: OnceLock<WideTree>,
     /// The largest absolute coordinate of a corner.
     extent: f64,
 }
@@ -52,7 +57,7 @@ impl<'m> Scene<'m> {
 
         let bounds = mesh.aabb();
         let extent = f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
-        Self { mesh, tree, clusters, extent }
+        Self { mesh, tree, clusters, wide: OnceLock::new(), extent }
     }
 
     /// The mesh.
@@ -62,6 +67,10 @@ impl<'m> Scene<'m> {
 
     pub(crate) fn tree(&self) -> &FaceTree {
         &self.tree
+    }
+
+    pub(crate) fn wide(&self) -> &WideTree {
+        self.wide.get_or_init(|| WideTree::new(self.mesh, &self.tree))
     }
 
     pub(crate) fn clusters(&self) -> &Clusters {

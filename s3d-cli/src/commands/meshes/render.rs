@@ -89,8 +89,7 @@ pub(crate) struct RenderArgs {
 
 pub(crate) fn run(args: RenderArgs) -> Outcome<()> {
     let options = RenderOptions {
-        up: args.mesh.up,
-        units: args.mesh.units,
+        axes: args.mesh.axes(),
         normals: if args.smooth_normals {
             Normals::Smooth
         } else {

@@ -35,8 +35,7 @@ pub(crate) struct SampleArgs {
 
 pub(crate) fn run(args: SampleArgs) -> Outcome<()> {
     let options = SampleOptions {
-        up: args.mesh.up,
-        units: args.mesh.units,
+        axes: args.mesh.axes(),
         density: args.points.map_or(Density::PerM2(args.points_per_m2), Density::Total),
         seed: args.seed,
         overwrite: args.overwrite,

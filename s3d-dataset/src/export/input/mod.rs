@@ -13,14 +13,13 @@ mod published;
 pub(crate) mod requested;
 mod scene;
 pub(crate) mod stamps;
-mod unit;
-mod up_axis;
 
 use crate::error::{InputError, Result};
 use crate::export::input::area::AreaInput;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::numbering::label_table;
 use crate::export::input::scene::Opened;
+use crate::mesh_axes::MeshAxes;
 use crate::options::placing::Placing;
 use s3d_io::Error as FileError;
 use s3d_io::cloud::{AnnotationOptions, OnFault};
@@ -102,7 +101,7 @@ impl Inputs {
                     }
                 }
                 SceneSource::Meshes { paths, up, units } => {
-                    AreaInput::of_meshes(paths, (*up, *units), asked, opened)?
+                    AreaInput::of_meshes(paths, MeshAxes { up: *up, units: *units }, asked, opened)?
                 }
                 SceneSource::Path(path) => {
                     let in_folder = path.join(SCENE);

@@ -7,15 +7,14 @@ use crate::export::input::colors::PointColors;
 use crate::export::input::mesh::{MeshFrame, MeshSource};
 use crate::export::input::numbering::number;
 use crate::export::input::photographs::Photographs;
-use crate::export::input::unit::UnitGuess;
-use crate::export::input::up_axis::UpGuess;
+use crate::mesh_axes::{self, MeshAxes, has_own_frame};
 use crate::options::placing::Placing;
 use crate::record::request::InputRecord;
 use glam::DVec3;
 use s3d_io::cloud::{AnnotatedMesh, AnnotationOptions, Annotations, OnFault};
-use s3d_io::mesh::{LengthUnit, MeshFile, MeshFormat, MeshOptions, MeshOrigin, ToldOffset, UpAxis};
+use s3d_io::mesh::{MeshFile, MeshOptions, MeshOrigin, ToldOffset, UpAxis};
 use s3d_io::scene::{CameraSource, FoundScene, MeshColors, SceneFile};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Which parts of an area are opened.
@@ -150,45 +149,27 @@ impl AreaInput {
     /// Opens an area of meshes alone. Their up axis and their unit are guessed if nobody says them.
     pub(super) fn of_meshes(
         paths: &[PathBuf],
-        (up, units): (Option<UpAxis>, Option<LengthUnit>),
+        axes: MeshAxes,
         asked: Option<Placing>,
         opened: Opened,
     ) -> Result<Self> {
         // In glTF +Y points up, and the unit is the metre.
         let first = paths.first().filter(|path| !has_own_frame(path));
-        let first = match first.filter(|_| up.is_none() || units.is_none()) {
-            Some(path) => {
-                let options = MeshOptions { origin: MeshOrigin::Near, units, ..MeshOptions::default() };
-                Some(s3d_io::mesh::read_mesh_with(path, UpAxis::Z, &options)?)
-            }
-            None => None,
-        };
-
-        let guess = first
-            .as_ref()
-            .filter(|_| up.is_none())
-            .map(|file| UpGuess::of(&file.mesh));
-        let up = up.or(guess.map(|guess| guess.up())).unwrap_or(UpAxis::Y);
-
-        let unsaid = first
-            .as_ref()
-            .filter(|file| units.is_none() && file.unit_said.is_none());
-        let unit_guess = unsaid.map(|file| UnitGuess::of(&file.mesh, up));
-        let units = units.or(unit_guess
-            .map(|guess| guess.unit())
-            .filter(|unit| *unit != LengthUnit::Metre));
-        drop(first);
+        let unsaid = first.filter(|_| axes.up.is_none() || axes.units.is_none());
+        let (mut up, mut units) = (axes.up.unwrap_or(UpAxis::Y), axes.units);
+        let (mut notes, mut warnings) = (Vec::new(), Vec::new());
+        if let Some(path) = unsaid {
+            let found = mesh_axes::find(path, axes, MeshOrigin::Near)?;
+            (up, units, notes, warnings) = (found.up, found.units, found.notes, found.warnings);
+        }
 
         let scene = SceneFile { units, ..SceneFile::of_meshes(paths.to_vec(), up) };
         let mut text = format!("area = {}\n[mesh]\nup = {:?}\n", scene.area, up.name());
         text.extend(units.map(|unit| format!("units = {:?}\n", unit.name())));
 
         let mut area = Self::open(scene, asked, opened)?;
-        area.notes.extend(guess.map(|guess| guess.sentence()));
-        area.notes.extend(unit_guess.and_then(|guess| guess.sentence()));
-        area.warnings.extend(guess.and_then(|guess| guess.doubt()));
-        area.warnings.extend(unit_guess.and_then(|guess| guess.doubt()));
-
+        area.notes.extend(notes);
+        area.warnings.extend(warnings);
         area.records.push(InputRecord::of_text("scene", &text));
         Ok(area)
     }
@@ -233,11 +214,6 @@ fn open_annotations(
     let outside_files = scene.outside_files;
     let mesh = AnnotatedMesh { file, up: scene.up, units: scene.units, outside_files };
     Ok(Annotations::open_for(&mesh, &scene.annotations, &options)?)
-}
-
-/// Whether the format of a mesh file says which axis points up and what its unit is.
-fn has_own_frame(path: &Path) -> bool {
-    MeshFormat::of(path).is_some_and(|format| format.defines_frame)
 }
 
 /// Opens the photographs that a scene file names.

@@ -5,7 +5,7 @@ use s3d_geom::glam::DVec2;
 use s3d_io::fs::Checksum;
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The most questions of a kind about a room.
 const MOST: usize = 20;
@@ -17,7 +17,7 @@ const ROUNDING_MARGIN: f64 = 0.02;
 const ANGLE_MARGIN_DEG: f64 = 10.0;
 /// Who stands at a thing and looks at another one has this much room between them, metres.
 const LEAST_AWAY_M: f64 = 0.6;
-/// A class appears in the first view that shows it at all, if one of its things has this share of its pixels.
+/// A thing is recognised in a view if it has this share of its pixels.
 const LEAST_SHARE: f64 = 0.005;
 
 /// A question with its answer.
@@ -38,12 +38,18 @@ pub(super) struct Question {
     labels: Vec<String>,
 }
 
-/// Asks about a room. `shown` has what each of its views shows.
+/// Asks about a room. `shown` has what each of its views shows. Classes of which a thing is recognised in no
+/// view are left out, and so are rooms without a view.
 pub(super) fn ask(scene: &Scene<'_>, shown: &[BTreeMap<u32, Shown>]) -> Vec<Question> {
+    if shown.is_empty() {
+        return Vec::new();
+    }
+    let recognised: BTreeSet<u32> = shown.iter().flat_map(recognised).collect();
     let mut by_class: BTreeMap<&str, Vec<&Thing>> = BTreeMap::new();
     for thing in &scene.things {
         by_class.entry(&thing.class).or_default().push(thing);
     }
+    by_class.retain(|_, things| things.iter().all(|thing| recognised.contains(&thing.index)));
     let asking = Asking { scene, by_class, shown };
     [
         asking.counts(),
@@ -228,15 +234,10 @@ impl Asking<'_> {
     fn appearance(&self) -> Vec<Question> {
         let mut first: Vec<(usize, &str)> = Vec::new();
         for (class, things) in &self.by_class {
-            let pixels = |shown: &BTreeMap<u32, Shown>| {
-                let of_things = things.iter().filter_map(|thing| shown.get(&thing.index));
-                of_things.map(|shown| shown.pixels).max().unwrap_or(0)
-            };
-            let Some(at) = self.shown.iter().position(|shown| pixels(shown) > 0) else { continue };
-            let total: u64 = self.shown[at].values().map(|shown| shown.pixels).sum();
-            if pixels(&self.shown[at]) as f64 >= LEAST_SHARE * total as f64 {
-                first.push((at, class));
-            }
+            let has = |label: &u32| things.iter().any(|thing| thing.index == *label);
+            let at = self.shown.iter().position(|shown| shown.keys().any(has));
+            let at = at.filter(|at| recognised(&self.shown[*at]).any(|label| has(&label)));
+            first.extend(at.map(|at| (at, *class)));
         }
         first.sort_unstable();
         first.dedup_by_key(|(at, _)| *at);
@@ -325,6 +326,16 @@ fn angles(at: &Thing, ahead: &Thing, of: &Thing) -> Option<Vec<f64>> {
     let angle = |point: DVec2| look.angle_to(point - stand).to_degrees().rem_euclid(360.0);
     let points = std::iter::once(of.middle()).chain(of.corners());
     (is_away(ahead) && is_away(of)).then(|| points.map(angle).collect())
+}
+
+/// The labels that are recognised in a view.
+fn recognised(shown: &BTreeMap<u32, Shown>) -> impl Iterator<Item = u32> + '_ {
+    let total: u64 = shown.values().map(|shown| shown.pixels).sum();
+    let is_large = move |shown: &Shown| shown.pixels as f64 >= LEAST_SHARE * total as f64;
+    shown
+        .iter()
+        .filter(move |(_, shown)| is_large(shown))
+        .map(|(label, _)| *label)
 }
 
 /// A number rounded, if it is farther than `margin` from where it would be rounded otherwise.

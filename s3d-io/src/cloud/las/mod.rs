@@ -4,6 +4,9 @@ mod bounded;
 mod claims;
 mod dimensions;
 pub(crate) mod read;
+mod write;
+
+pub use write::write_las_points;
 
 /// Returns the bytes of a number that stands `at` bytes into a record, if the record reaches so far.
 fn number_at<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {

@@ -97,22 +97,20 @@ fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
     middle.and_then(|i| u64::try_from(i).ok()).unwrap_or(0)
 }
 
-/// Writes a cloud as a binary little-endian PLY file of positions (float) and colours (uchar; black if it has
-/// none), which viewers and Gaussian splatting read. The file appears whole or not at all. Returns its size
-/// in bytes.
+/// Writes a cloud as a binary little-endian PLY file of positions (float), colours (uchar; black if it has
+/// none), and labels (int) if there are any. Viewers and Gaussian splatting read it. The file appears whole
+/// or not at all. Returns its size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`].
 ///
 /// # Panics
-/// If the cloud has colours, but not one a point.
-pub fn write_colored_points(path: &Path, cloud: &PointCloud) -> Result<u64> {
+/// If the cloud has colours, or there are labels, but not one a point.
+pub fn write_colored_points(path: &Path, cloud: &PointCloud, labels: &[i32]) -> Result<u64> {
     let n = cloud.len();
-    assert!(
-        cloud.colors.is_empty() || cloud.colors.len() == n,
-        "{} colours for {n} points",
-        cloud.colors.len()
-    );
+    for (what, found) in [("colours", cloud.colors.len()), ("labels", labels.len())] {
+        assert!(found == 0 || found == n, "{found} {what} for {n} points");
+    }
     let mut file = AtomicFile::create(path)?;
     let header = format!(
         "ply\n\
@@ -124,7 +122,8 @@ pub fn write_colored_points(path: &Path, cloud: &PointCloud) -> Result<u64> {
          property uchar red\n\
          property uchar green\n\
          property uchar blue\n\
-         end_header\n"
+         {}end_header\n",
+        if labels.is_empty() { "" } else { "property int label\n" }
     );
     file.put(header.as_bytes())?;
 
@@ -135,6 +134,9 @@ pub fn write_colored_points(path: &Path, cloud: &PointCloud) -> Result<u64> {
         }
         point[12..].copy_from_slice(cloud.colors.get(i).unwrap_or(&[0; 3]));
         file.put(&point)?;
+        if let Some(label) = labels.get(i) {
+            file.put(&label.to_le_bytes())?;
+        }
     }
     file.commit()
 }
@@ -274,7 +276,7 @@ mod tests {
     fn a_sample_comes_back_from_a_file_of_its_own() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("cloud.ply");
-        let bytes = write_colored_points(&path, &cloud(300)).unwrap();
+        let bytes = write_colored_points(&path, &cloud(300), &[]).unwrap();
         assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
         assert_eq!(read_point_sample(&path, 300).unwrap(), cloud(300));
     }

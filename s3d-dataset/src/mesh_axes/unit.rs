@@ -3,7 +3,7 @@
 use crate::useful::Headroom;
 use glam::DVec3;
 use s3d_geom::TriMesh;
-use s3d_io::mesh::{LengthUnit, UpAxis};
+use s3d_io::mesh::LengthUnit;
 use s3d_render::Scene;
 
 /// The usual heights of rooms, metres.
@@ -17,9 +17,8 @@ pub(super) struct UnitGuess {
 }
 
 impl UnitGuess {
-    /// Guesses from a mesh in the unit of its file.
-    pub(super) fn of(mesh: &TriMesh, up: UpAxis) -> Self {
-        let up = up.rotation().transpose() * DVec3::Z;
+    /// Guesses from a mesh in the unit of its file; `up` is what points up.
+    pub(super) fn of(mesh: &TriMesh, up: DVec3) -> Self {
         Self { height: Headroom::of(&Scene::new(mesh), up).of_rooms() }
     }
 
@@ -77,18 +76,18 @@ mod tests {
             (1000.0, LengthUnit::Millimetre),
             (1.0 / 0.0254, LengthUnit::Inch),
         ] {
-            let guess = UnitGuess::of(&scaled(factor), UpAxis::Z);
+            let guess = UnitGuess::of(&scaled(factor), DVec3::Z);
             assert_eq!(guess.unit(), unit, "{guess:?}");
             assert_eq!(guess.sentence().is_some(), unit != LengthUnit::Metre);
             assert!(guess.doubt().is_none());
         }
-        let feet = UnitGuess::of(&scaled(1.0 / 0.3048), UpAxis::Z);
+        let feet = UnitGuess::of(&scaled(1.0 / 0.3048), DVec3::Z);
         assert_eq!((feet.unit(), feet.sentence()), (LengthUnit::Metre, None));
         assert!(feet.doubt().unwrap().contains("units = ft"));
         // A building on its side has neither floors nor ceilings, only tops and undersides of things.
-        let side = UnitGuess::of(&scaled(1.0), UpAxis::Y);
+        let side = UnitGuess::of(&scaled(1.0), DVec3::Y);
         assert_eq!(side.unit(), LengthUnit::Metre);
         let open = TriMesh::from_faces(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
-        assert_eq!(UnitGuess::of(&open, UpAxis::Z), UnitGuess { height: None });
+        assert_eq!(UnitGuess::of(&open, DVec3::Z), UnitGuess { height: None });
     }
 }
