@@ -1,9 +1,9 @@
 //! Writes another data set beside the shown one: the differences, and its pictures where they differ.
 
 use crate::areas;
-use crate::content::{Content, Shown};
+use crate::content::Content;
 use crate::faults::{Fault, Faults};
-use crate::index::{ClassEntry, LabelEntry, folder_name};
+use crate::index::{ClassEntry, LabelEntry, Shown, folder_name};
 use crate::options::ReportOptions;
 use crate::pixels::{Images, Widths};
 use crate::script::Scripts;

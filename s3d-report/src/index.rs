@@ -18,6 +18,26 @@ pub(crate) fn folder_name(folder: &Path) -> String {
     canonical.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// The place where a report shows an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Shown {
+    /// The panorama of the location with this index.
+    #[serde(rename = "pano")]
+    Panorama(usize),
+    /// The picture with this number.
+    Picture(usize),
+}
+
+impl Shown {
+    /// Returns the index of the location, or the number of the picture.
+    pub(crate) fn number(self) -> usize {
+        match self {
+            Self::Panorama(number) | Self::Picture(number) => number,
+        }
+    }
+}
+
 /// `data/index.js`.
 #[derive(Serialize)]
 pub(crate) struct Index {
@@ -33,6 +53,9 @@ pub(crate) struct Index {
     pub(crate) meshes: Vec<MeshEntry>,
     /// The grounds of plans, each with a file `data/ground_N.js`, where N is its index.
     pub(crate) grounds: Vec<GroundEntry>,
+    /// The areas with pairs of images: those with a file `data/graph_A.js`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) pairs: Vec<u32>,
     /// The number of files `data/scores_N.js`.
     pub(crate) scores: usize,
     /// The name of the folder of the other data set, if there is `compare.js`.
@@ -188,6 +211,9 @@ pub(crate) struct ViewEntry {
     pub(crate) forward: Option<[f64; 3]>,
     pub(crate) up: Option<[f64; 3]>,
     pub(crate) seen: Option<Shares>,
+    /// The number of its objects, which are in `data/objects_{N / views_per_file}.js` like its picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) objects: Option<usize>,
 }
 
 /// The mesh of an area, and its files.

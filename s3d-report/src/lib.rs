@@ -35,6 +35,7 @@ mod options;
 mod pixels;
 mod poster;
 mod raster;
+mod relations;
 mod scores;
 mod script;
 mod selection;

@@ -10,7 +10,7 @@ use jpeg_encoder::EncodingError;
 use s3d_dataset::{DataSet, Result};
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{DatasetImage, Domain};
+use s3d_io::dataset::{DatasetImage, Domain, Frame};
 use s3d_io::image::{Content, PngLines, PngReader};
 use s3d_label::{LabelId, LabelTable};
 use s3d_render::{MISSING_DEPTH, MISSING_INDEX, MISSING_NORMAL};
@@ -99,6 +99,8 @@ pub(crate) struct Images {
     sharp: Option<Raster<[u8; 3]>>,
     normal: Option<Raster<[u8; 3]>>,
     label: Option<Raster<[u8; 3]>>,
+    /// Every pixel of the labels, for a view with objects.
+    pub(crate) whole_label: Option<Raster<[u8; 3]>>,
     depth: Option<Raster<u16>>,
 }
 
@@ -120,13 +122,17 @@ impl Images {
             .map(|colors| colors.image);
 
         let mut label = None;
+        let mut whole_label = None;
         let mut counted = None;
-        if let Some(Labels { image, counts, path }) = files.labels(widths.lossless, table)? {
+        let is_whole = image.has(Domain::Objects) && image.frame != Frame::Panorama;
+        if let Some(Labels { image, whole, counts, path }) = files.labels(widths.lossless, is_whole, table)? {
             label = Some(image);
+            whole_label = whole;
             if let (Some(table), Some(counts)) = (table, counts) {
                 let root = data.layout().root();
                 counted = files.faults.keep(root, counts.by_class(table, &path))?;
                 label = label.filter(|_| counted.is_some());
+                whole_label = whole_label.filter(|_| counted.is_some());
             }
         }
 
@@ -150,7 +156,7 @@ impl Images {
             .as_ref()
             .and_then(|depth| median_depth(depth, data.options().depth_units.per_m()));
         let seen = Shares { depth_m, ..shares(size, counted, missing) };
-        Ok(Some(Self { size, seen, widths, rgb, sharp, normal, label, depth }))
+        Ok(Some(Self { size, seen, widths, rgb, sharp, normal, label, whole_label, depth }))
     }
 
     /// Returns the shown images, and a small one for a grid. `face` returns the face of each pixel of an
@@ -273,18 +279,20 @@ impl Files<'_> {
         Ok(taken.map(|(colors, _)| colors))
     }
 
-    /// Reads labels, and counts their pixels.
-    fn labels(&mut self, width: u32, table: Option<&LabelTable>) -> Result<Option<Labels>> {
+    /// Reads labels, and counts their pixels. All pixels are kept, too, if `is_whole`.
+    fn labels(&mut self, width: u32, is_whole: bool, table: Option<&LabelTable>) -> Result<Option<Labels>> {
         let taken = self.take(Domain::Semantic, PngReader::rgb8, |size, lines| {
             let mut nearest = Nearest::new(size, shown_size(size, width));
+            let mut whole = is_whole.then(|| Nearest::new(size, size));
             let mut counts = table.map(|table| LabelCounts::new(table.len()));
             lines.for_each(|line| {
                 nearest.line(line, |pixel| pixel);
+                whole.iter_mut().for_each(|whole| whole.line(line, |pixel| pixel));
                 counts.iter_mut().for_each(|counts| counts.add(line));
             });
-            (nearest.finish(), counts)
+            (nearest.finish(), whole.map(Nearest::finish), counts)
         })?;
-        Ok(taken.map(|((image, counts), path)| Labels { image, counts, path }))
+        Ok(taken.map(|((image, whole, counts), path)| Labels { image, whole, counts, path }))
     }
 
     /// Reads depth, and the number of missing pixels of the file if `counts`.
@@ -310,6 +318,7 @@ impl Files<'_> {
 /// Labels, the counts of their pixels, and their file.
 struct Labels {
     image: Raster<[u8; 3]>,
+    whole: Option<Raster<[u8; 3]>>,
     counts: Option<LabelCounts>,
     path: PathBuf,
 }

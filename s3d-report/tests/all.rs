@@ -8,3 +8,4 @@ mod contract;
 mod ground;
 mod meshes;
 mod poster;
+mod relations;

@@ -12,7 +12,7 @@ const PAGES = {
   report: {
     boot: "src/boot.ts",
     program: "src/main.ts",
-    styles: ["base.css", "style.css", "present.css"],
+    styles: ["base.css", "style.css", "relations.css", "present.css"],
     markup: "page.html",
   },
   label: {

@@ -73,6 +73,7 @@ impl Content<'_> {
             views,
             meshes: made.meshes.clone(),
             grounds: made.grounds.clone(),
+            pairs: made.pairs.clone(),
             scores: 0,
             against: None,
             views_per_file: VIEWS_PER_FILE,
@@ -157,6 +158,7 @@ impl Content<'_> {
                 forward: of_photograph.map(|located| located.forward),
                 up: of_photograph.map(|located| located.up),
                 seen: made.seen.clone(),
+                objects: made.objects,
                 ..ViewEntry::default()
             };
 

@@ -1,12 +1,13 @@
 //! The content of a data set, and its way into the files of a report, on all threads.
 
 mod entries;
+mod pairs;
 mod pictures;
 
 pub(crate) use pictures::ReadImage;
 
 use crate::faults::Faults;
-use crate::index::{GroundEntry, MeshEntry, RoomEntry, Surface};
+use crate::index::{GroundEntry, MeshEntry, RoomEntry, Shown, Surface};
 use s3d_dataset::{DataSet, Result};
 use s3d_io::dataset::{DatasetImage, Frame, PhotographRecord, ViewRecord};
 use s3d_label::LabelTable;
@@ -34,15 +35,6 @@ pub(crate) struct Content<'a> {
     candidates: Vec<(u32, ViewRecord)>,
 }
 
-/// The place where a report shows an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Shown {
-    /// The panorama of the location with this index.
-    Panorama(usize),
-    /// The picture with this number.
-    Picture(usize),
-}
-
 /// All images and meshes that were written.
 #[derive(Default)]
 pub(crate) struct Written {
@@ -59,6 +51,8 @@ pub(crate) struct Written {
     surfaces: Vec<(usize, Surface)>,
     /// The rooms of all areas.
     rooms: Vec<RoomEntry>,
+    /// The areas with pairs of images.
+    pairs: Vec<u32>,
 }
 
 impl<'a> Content<'a> {

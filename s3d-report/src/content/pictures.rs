@@ -9,6 +9,7 @@ use crate::mesh;
 use crate::options::ReportOptions;
 use crate::pixels::{Images, Made, Picture, Shares, Widths, nothing_left};
 use crate::raster::reduce::nearest;
+use crate::relations::{ObjectEntry, objects};
 use crate::script::Scripts;
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::{Context, Progress, Result};
@@ -40,6 +41,10 @@ pub(crate) struct ReadImage {
     pub(crate) seen: Option<Shares>,
     /// The first direction of view in a panorama.
     pub(super) look_deg: Option<f64>,
+    /// The number of objects of a view.
+    pub(super) objects: Option<usize>,
+    /// The camera of an image that is shown.
+    pub(super) camera: Option<Camera>,
 }
 
 /// The texts for the files of an image.
@@ -47,6 +52,7 @@ struct Texts {
     picture: ViewPicture,
     thumb: Option<String>,
     sharp: Option<String>,
+    objects: Option<Vec<ObjectEntry>>,
 }
 
 /// A pinhole camera, by which the page computes rays.
@@ -75,6 +81,11 @@ enum Job<'a> {
 struct Tools<'s, 'm> {
     reader: PngReader,
     caster: Option<Caster<'s, 'm>>,
+}
+
+/// Whether pictures show the faces of a mesh.
+fn is_in_pictures(mesh: &TriMesh) -> bool {
+    mesh.faces().len() < FACES_OF_PICTURES
 }
 
 /// Returns the face of each pixel of a reduced image. Its pixels are the nearest pixels of the camera.
@@ -138,7 +149,15 @@ impl Content<'_> {
                 written.surfaces.extend(surfaces);
                 written.bytes += bytes;
             }
-            self.write_pictures(ctx, options, (area, mesh), (scripts, &progress), (faults, &mut written))?;
+            let pairs = self.pairs(area, faults)?;
+            let scene = mesh
+                .filter(|mesh| pairs.is_some() || is_in_pictures(mesh))
+                .map(Scene::new);
+            let scene = scene.as_ref();
+            self.write_pictures(ctx, options, (area, scene), (scripts, &progress), (faults, &mut written))?;
+            if let Some(pairs) = pairs {
+                self.write_pairs(ctx, (area, scene), &pairs, scripts, &mut written)?;
+            }
             if let Some(mesh) = mesh {
                 self.write_ground(ctx, (area, mesh), scripts, &mut written)?;
             }
@@ -182,31 +201,29 @@ impl Content<'_> {
         &self,
         ctx: &Context,
         options: &ReportOptions,
-        (area, mesh): (u32, Option<&TriMesh>),
+        (area, scene): (u32, Option<&Scene<'_>>),
         (scripts, progress): (&Scripts, &Progress<'_>),
         (faults, written): (&mut Faults, &mut Written),
     ) -> Result<()> {
         let panoramas = self.panoramas.iter().filter(|(_, image)| image.area == area);
         let mut jobs: Vec<Job<'_>> = panoramas.map(|(i, image)| Job::Panorama(*i, image)).collect();
 
-        let first = self.views.partition_point(|view| view.area < area);
-        let of_area = self.views.get(first..).unwrap_or_default();
-        let of_area = of_area
-            .get(..of_area.partition_point(|view| view.area == area))
-            .unwrap_or_default();
-        let first = self.pictures.get(first).map_or(0, |picture| picture / THUMBS_PER_FILE);
+        let of_area = self.views_of(area);
+        let first = self
+            .pictures
+            .get(of_area.start)
+            .map_or(0, |picture| picture / THUMBS_PER_FILE);
+        let of_area = self.views.get(of_area).unwrap_or_default();
         let chunks = of_area.chunks(THUMBS_PER_FILE).enumerate();
         jobs.extend(chunks.map(|(i, images)| Job::Views(first + i, images)));
 
         let of_panorama = options.of_panoramas();
         let of_view = options.of_views();
-        let scene = mesh
-            .filter(|mesh| mesh.faces().len() < FACES_OF_PICTURES)
-            .map(Scene::new);
+        let scene = scene.filter(|scene| is_in_pictures(scene.mesh()));
         let results = map_in_order(
             ctx,
             &jobs,
-            || Tools { reader: PngReader::default(), caster: scene.as_ref().map(Caster::new) },
+            || Tools { reader: PngReader::default(), caster: scene.map(Caster::new) },
             |tools, job| {
                 let mut faults = Faults::default();
                 let mut made = Vec::new();
@@ -216,7 +233,7 @@ impl Content<'_> {
                 match job {
                     Job::Panorama(i, image) => {
                         let (one, texts) = self.make(image, of_panorama, tools, &mut faults)?;
-                        if let Some(Texts { picture, thumb, sharp }) = texts {
+                        if let Some(Texts { picture, thumb, sharp, .. }) = texts {
                             bytes += scripts.write(&format!("pano_{i}"), &picture.picture)?;
                             if let Some(sharp) = sharp {
                                 bytes += scripts.write(&format!("sharp_{i}"), &sharp)?;
@@ -230,18 +247,24 @@ impl Content<'_> {
                         let mut thumbs = Vec::with_capacity(images.len());
                         for (k, some) in images.chunks(VIEWS_PER_FILE).enumerate() {
                             let mut pictures = Vec::with_capacity(some.len());
+                            let mut objects = Vec::with_capacity(some.len());
                             for image in some {
                                 ctx.check()?;
                                 let (one, texts) = self.make(image, of_view, tools, &mut faults)?;
                                 made.push(one);
-                                let (picture, thumb) =
-                                    texts.map(|texts| (texts.picture, texts.thumb)).unzip();
+                                let (picture, thumb, of_image) = texts.map_or((None, None, None), |texts| {
+                                    (Some(texts.picture), texts.thumb, texts.objects)
+                                });
                                 pictures.push(picture);
-                                thumbs.push(thumb.flatten());
+                                thumbs.push(thumb);
+                                objects.push(of_image);
                                 progress.add(1);
                             }
                             let file = chunk * (THUMBS_PER_FILE / VIEWS_PER_FILE) + k;
                             bytes += scripts.write(&format!("views_{file}"), &pictures)?;
+                            if objects.iter().any(Option::is_some) {
+                                bytes += scripts.write(&format!("objects_{file}"), &objects)?;
+                            }
                         }
                         bytes += scripts.write(&format!("thumbs_{chunk}"), &thumbs)?;
                     }
@@ -293,21 +316,48 @@ impl Content<'_> {
         let located = pose.as_ref().map(|pose| Located::new(pose, size));
 
         let Some(images) = images else {
-            return Ok((ReadImage { located, seen: None, look_deg: None }, None));
+            let nothing = ReadImage { located, seen: None, look_deg: None, objects: None, camera: None };
+            return Ok((nothing, None));
         };
+        let objects = self.objects(image, &images, faults)?;
         let Made { picture, thumb, sharp } = images
             .picture(|size| Some(faces(caster.as_mut()?, camera.as_ref()?, size)))
             .map_err(|e| FileError::format(&image.path(self.data.layout(), Domain::Rgb), e.to_string()))?;
-        let pinhole = camera.filter(|_| image.frame != Frame::Panorama).map(|camera| {
-            let [[fx, _, cx], [_, fy, cy], _] = camera.k_matrix();
-            Pinhole { k: [fx, fy, cx, cy], rt: camera.pose.rt_matrix() }
-        });
+        let pinhole = camera
+            .as_ref()
+            .filter(|_| image.frame != Frame::Panorama)
+            .map(|camera| {
+                let [[fx, _, cx], [_, fy, cy], _] = camera.k_matrix();
+                Pinhole { k: [fx, fy, cx, cy], rt: camera.pose.rt_matrix() }
+            });
         let units_per_m = self.data.options().depth_units.per_m();
         let look_deg = match image.frame {
             Frame::Panorama => images.first_look(self.table.as_ref(), units_per_m),
             Frame::View(_) => None,
         };
-        let read = ReadImage { located, seen: Some(images.seen), look_deg };
-        Ok((read, Some(Texts { picture: ViewPicture { picture, camera: pinhole }, thumb, sharp })))
+        let (seen, count) = (Some(images.seen), objects.as_ref().map(Vec::len));
+        let read = ReadImage { located, seen, look_deg, objects: count, camera };
+        let picture = ViewPicture { picture, camera: pinhole };
+        Ok((read, Some(Texts { picture, thumb, sharp, objects })))
+    }
+
+    /// Returns the objects of a view. `None` if it has none, or if their file is wrong, which becomes a
+    /// fault.
+    fn objects(
+        &self,
+        image: &DatasetImage,
+        images: &Images,
+        faults: &mut Faults,
+    ) -> Result<Option<Vec<ObjectEntry>>> {
+        let Some(table) = &self.table else { return Ok(None) };
+        if image.frame == Frame::Panorama || !image.has(Domain::Objects) {
+            return Ok(None);
+        }
+        let read = self.data.objects(image).and_then(|file| {
+            let path = image.path(self.data.layout(), Domain::Objects);
+            objects(&file, images.size, table.len(), images.whole_label.as_ref())
+                .map_err(|message| FileError::format(&path, message).into())
+        });
+        faults.keep(self.data.layout().root(), read)
     }
 }

@@ -49,6 +49,8 @@ export interface View {
   forward?: Rgb | null;
   up?: Rgb | null;
   seen: Seen | null;
+  /** The number of its objects, which are in `objects_N`; missing without any. */
+  objects?: number;
 }
 
 export interface Room {
@@ -230,6 +232,8 @@ export interface Index {
   meshes: Mesh[];
   /** Each with a file `ground_N`; missing in older reports. */
   grounds?: Ground[];
+  /** The areas with pairs of images, each with a file `graph_A`; missing without any. */
+  pairs?: number[];
   /** The number of files `scores_N`. */
   scores: number;
   /** The name of the data set that the report was made against. */
@@ -292,6 +296,8 @@ const KEPT: Record<string, number> = {
   sharp: 2,
   other: 4,
   views: 6,
+  objects: 4,
+  pairs: 4,
   thumbs: 40,
   mesh: 0,
   textures: 0,

@@ -53,6 +53,14 @@ const GROUPS = {
       stop: act("End measuring, and remove the mark", "Escape"),
     },
   },
+  objects: {
+    title: "Objects of a view",
+    gestures: [["Point at an object, or at its line of the list", "See its outline, and what hides it"]],
+    acts: {
+      next: act("Go to the next object", "ArrowDown"),
+      previous: act("Go to the object before", "ArrowUp"),
+    },
+  },
   space: {
     title: "3D and overview",
     gestures: [
@@ -79,7 +87,7 @@ const GROUPS = {
   plan: {
     title: "Plan",
     gestures: [
-      ["Point", "See the kept views of a scan location"],
+      ["Point", "See the kept views of a scan location, and what shares surface with it"],
       ["Click a room or scan location", "Open its panorama"],
     ],
     acts: {},

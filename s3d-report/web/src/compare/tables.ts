@@ -2,7 +2,8 @@
 
 import type { Index } from "../data.js";
 import { count, h, named, percent, several, table } from "../dom.js";
-import { inPanorama, nameOf as nameOfView } from "../pages/view.js";
+import { nameOf as nameOfView } from "../pages/names.js";
+import { inPanorama } from "../pages/view.js";
 import { imageLink } from "../route/places.js";
 import { link } from "../route/route.js";
 import {

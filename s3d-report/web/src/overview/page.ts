@@ -4,7 +4,7 @@
 import { type Index, type Mesh, loadThumb } from "../data.js";
 import { divider } from "../picture/divider.js";
 import { append, choice, h, named, percent } from "../dom.js";
-import { nameOf } from "../pages/view.js";
+import { nameOf } from "../pages/names.js";
 import { key } from "../picture/readout.js";
 import { type Page, type Route, link, replaceRoute } from "../route/route.js";
 import { storeyButtons } from "../space/levels.js";

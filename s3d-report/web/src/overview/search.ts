@@ -2,7 +2,8 @@
 
 import type { Index } from "../data.js";
 import { roomName, roomOf } from "../dom.js";
-import { inPanorama, nameOf } from "../pages/view.js";
+import { nameOf } from "../pages/names.js";
+import { inPanorama } from "../pages/view.js";
 import { link, spaceLink } from "../route/route.js";
 import { boxOf } from "../outline.js";
 import { floorOf } from "../storeys.js";

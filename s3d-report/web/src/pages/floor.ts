@@ -7,6 +7,7 @@ import { append, flat, metres2, named, percent, roomName, roomOf, s, several } f
 import { type Box, boxOf, innermost, sizeOf } from "../outline.js";
 import { type GroundLayer, cornersOf, groundLayer } from "./ground.js";
 import { patchLink } from "../route/places.js";
+import { type GraphLayer, graphLayer, placeKey } from "../relations/graph.js";
 import { link } from "../route/route.js";
 
 export interface FloorOptions {
@@ -20,6 +21,8 @@ export interface FloorOptions {
   hasHeight?: (z: number, room: string) => boolean;
   /** The index of the ground, if there is one. */
   ground?: number | null;
+  /** Whether there is a graph of places whose images share surface. */
+  hasGraph?: boolean;
   /** Changes of labels against another data set. */
   changes?: ChangeMark[];
   /** Called with words for the location under the pointer or with the focus; with null when there is none. */
@@ -32,6 +35,7 @@ export interface Plan {
   /** Turns the wedge of the current location: heading from +X towards +Y, and angle of view. */
   look: (azimuth_rad: number, fov_rad: number) => void;
   ground: GroundLayer | null;
+  graph: GraphLayer | null;
 }
 
 /** Alternative positions for a room's name, in hundredths of the plan's size. */
@@ -135,14 +139,22 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
   const wedge = s("path", { class: "wedge" });
   const cones = s("g", { class: "cones" });
   element.append(wedge, cones);
+  const placed = new Map<string, [number, number]>();
+  for (const [{ position }, location] of stands)
+    placed.set(placeKey({ location }), at(position?.[0] ?? 0, position?.[1] ?? 0));
+  for (const { picture, position } of photographs)
+    if (picture !== null) placed.set(placeKey({ picture }), at(position[0], position[1]));
+  const graph = options.hasGraph ? graphLayer(area, unit, (key) => placed.get(key) ?? null) : null;
+  if (graph) element.append(graph.element);
   const sector = (x: number, y: number, reach: number, azimuth: number, fov: number): string => {
     const [a, b] = [azimuth + fov / 2, azimuth - fov / 2];
     const tip = (angle: number): string => `${x + reach * Math.cos(angle)},${y - reach * Math.sin(angle)}`;
     return `M${x},${y}L${tip(a)}A${reach},${reach} 0 ${fov > Math.PI ? 1 : 0} 1 ${tip(b)}Z`;
   };
-  /** Shows cones and words for the element under the pointer or with the focus. */
+  /** Shows cones, words and lines of the graph for the element under the pointer or with the focus. */
   const reveal = (
     target: Element,
+    key: string,
     place: [number, number],
     headings: () => [number, number][],
     words: () => string,
@@ -156,9 +168,11 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
         }),
       );
       cones.replaceChildren(...drawn);
-      told(words());
+      graph?.near(key);
+      told([words(), graph?.words(key)].filter(Boolean).join(", "));
     };
     const hide = (): void => {
+      graph?.near(null);
       cones.replaceChildren();
       told(null);
     };
@@ -184,7 +198,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
     const level = forward && Math.hypot(forward[0], forward[1]) > 0.1;
     const heading = (): [number, number][] =>
       level && fov !== null ? [[Math.atan2(forward[1], forward[0]), fov * RADIANS]] : [];
-    reveal(to, place, heading, () => name);
+    reveal(to, placeKey({ picture: view.picture }), place, heading, () => name);
     element.append(to);
   }
   const crowd = Math.min(1, Math.max(0.35, 8 / Math.sqrt(stands.length)));
@@ -212,7 +226,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
     if (!small) {
       const headings = (): [number, number][] => conesAt(index, i);
       const words = (): string => `${title}, ${several(headings().length, "kept view")}`;
-      reveal(target, place, headings, words);
+      reveal(target, placeKey({ location: i }), place, headings, words);
     }
     element.append(target);
   }
@@ -228,7 +242,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
     const [x, y] = at(current.position[0], current.position[1]);
     wedge.setAttribute("d", sector(x, y, (small ? 16 : 9) * unit, azimuth, fov));
   };
-  return { element, look, ground };
+  return { element, look, ground, graph };
 }
 
 /** Disputed patches, each a link to a place that shows it. */

@@ -5,6 +5,7 @@ import { type ChangeMark, changeMarks } from "../compare/marks.js";
 import type { Index } from "../data.js";
 import { append, h, metres2, named, say, several } from "../dom.js";
 import { storeysOf } from "../storeys.js";
+import { type GraphLayer, shown as shownGraph } from "../relations/graph.js";
 import { type Route, replaceRoute } from "../route/route.js";
 import { saves } from "./export.js";
 import { plan } from "./floor.js";
@@ -13,8 +14,15 @@ import { type GroundLayer, groundOf, pixelWords, shown } from "./ground.js";
 /** A plan on the page, and what lies under it. */
 interface Sheet {
   element: SVGSVGElement;
-  ground: GroundLayer;
+  ground: GroundLayer | null;
+  graph: GraphLayer | null;
 }
+
+/** The part of an address with what lies under plans and on them. */
+const layersQuery = (): Record<string, string> => ({
+  ...(shown.ground ? {} : { ground: "none" }),
+  ...(shownGraph.graph ? { graph: "on" } : {}),
+});
 
 function areaPlan(index: Index, area: number, changes: ChangeMark[], sheets: Sheet[]): HTMLElement {
   const section = h("section", { class: "area-plan" }, h("h2", {}, `Area ${area}`));
@@ -51,13 +59,14 @@ function areaPlan(index: Index, area: number, changes: ChangeMark[], sheets: She
       ground,
       hasRoom: (room) => ofRoom(room) === storey,
       hasHeight: on,
+      hasGraph: index.pairs?.includes(area) ?? false,
       changes,
       told: (now) => {
         say(told, now ?? summary);
       },
     });
     const { element } = drawn;
-    if (drawn.ground) sheets.push({ element, ground: drawn.ground });
+    sheets.push({ element, ground: drawn.ground, graph: drawn.graph });
     if (all.length > 1) element.setAttribute("aria-label", `Plan of area ${area}: ${name}`);
     append(section, [
       all.length > 1 && h("h3", {}, name),
@@ -92,7 +101,8 @@ function legend(index: Index, changes: ChangeMark[]): HTMLElement {
 }
 
 /** A switch for the ground of all plans, which are loaded when they come into sight. */
-function groundSwitch(sheets: Sheet[], fault: (words: string) => void): HTMLElement | null {
+function groundSwitch(all: Sheet[], fault: (words: string) => void): HTMLElement | null {
+  const sheets = all.filter(({ ground }) => ground !== null);
   if (sheets.length === 0) return null;
   const seen = new IntersectionObserver(
     (entries) => {
@@ -100,7 +110,7 @@ function groundSwitch(sheets: Sheet[], fault: (words: string) => void): HTMLElem
         const sheet = sheets.find(({ element }) => element === target);
         if (!isIntersecting || !sheet || !shown.ground) continue;
         seen.unobserve(target);
-        sheet.ground.fill().catch((e: unknown) => fault(e instanceof Error ? e.message : String(e)));
+        sheet.ground?.fill().catch((e: unknown) => fault(e instanceof Error ? e.message : String(e)));
       }
     },
     { rootMargin: "300px" },
@@ -117,14 +127,46 @@ function groundSwitch(sheets: Sheet[], fault: (words: string) => void): HTMLElem
   box.addEventListener("change", () => {
     shown.ground = box.checked;
     put();
-    replaceRoute("plan", [], shown.ground ? {} : { ground: "none" });
+    replaceRoute("plan", [], layersQuery());
   });
   return h("label", { class: "tool" }, box, "Mesh from above");
+}
+
+/** A switch for the graphs of all plans, with what its lines mean. */
+function graphSwitch(sheets: Sheet[], fault: (words: string) => void): HTMLElement[] {
+  const graphs = sheets.flatMap(({ element, graph }) => (graph ? [{ element, graph }] : []));
+  if (graphs.length === 0) return [];
+  const told = h("p", { class: "quiet", hidden: true });
+  const put = async (): Promise<void> => {
+    for (const { element } of graphs) element.classList.toggle("with-graph", shownGraph.graph);
+    told.hidden = !shownGraph.graph;
+    if (!shownGraph.graph) return;
+    // The storeys of an area have one graph.
+    const filled = new Set(await Promise.all(graphs.map(({ graph }) => graph.fill())));
+    const leftOut = [...filled].reduce((sum, graph) => sum + graph.left_out, 0);
+    const words = "The thicker a line, the more its two places share: the best of all pairs of their images.";
+    const less =
+      leftOut > 0 &&
+      ` ${several(leftOut, "weak line")} among many at a place ${leftOut === 1 ? "is" : "are"} left out.`;
+    say(told, [words, less].filter(Boolean).join(""));
+  };
+  const start = (): void => {
+    put().catch((e: unknown) => fault(e instanceof Error ? e.message : String(e)));
+  };
+  start();
+  const box = h("input", { type: "checkbox", checked: shownGraph.graph });
+  box.addEventListener("change", () => {
+    shownGraph.graph = box.checked;
+    start();
+    replaceRoute("plan", [], layersQuery());
+  });
+  return [h("label", { class: "tool" }, box, "Shared surface"), told];
 }
 
 export async function planPage(index: Index, route: Route): Promise<HTMLElement> {
   const asked = route.query.get("ground");
   if (asked !== null) shown.ground = asked !== "none";
+  if (route.query.has("graph")) shownGraph.graph = route.query.get("graph") === "on";
   let trouble = "";
   const marks = await changeMarks(index).catch((e: unknown) => {
     trouble = e instanceof Error ? e.message : String(e);
@@ -139,7 +181,10 @@ export async function planPage(index: Index, route: Route): Promise<HTMLElement>
   );
   const sheets: Sheet[] = [];
   const plans = index.areas.map(({ area }) => areaPlan(index, area, marks.get(area) ?? [], sheets));
-  const ground = groundSwitch(sheets, (words) => page.prepend(h("p", { role: "alert" }, words)));
-  append(page, [ground, ...plans]);
+  const fault = (words: string): void => page.prepend(h("p", { role: "alert" }, words));
+  const [graph, told] = graphSwitch(sheets, fault);
+  const ground = groundSwitch(sheets, fault);
+  const switches = graph ? h("div", { class: "tools" }, ground, graph) : ground;
+  append(page, [switches, told, ...plans]);
   return page;
 }

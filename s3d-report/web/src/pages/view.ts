@@ -5,8 +5,13 @@ import { append, count, h, named, percent, roomName, several } from "../dom.js";
 import { viewPoint, viewScreen } from "../picture/geometry.js";
 import { placeOf } from "../picture/gl.js";
 import { image as decodedImage } from "../picture/images.js";
+import { loadObjects, loadPartners } from "../relations/data.js";
+import { matchPage } from "../relations/match.js";
+import { objectsQuery, objectsView, shown } from "../relations/objects.js";
+import { partnerCards } from "../relations/partners.js";
 import { type Route, type Sight, link, replaceRoute } from "../route/route.js";
-import { Viewer, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
+import { type Look, Viewer, lookFrom, modalitiesOf, queryOf } from "../picture/viewer.js";
+import { nameOf } from "./names.js";
 
 /** A sentence that says why a view was kept or dropped. */
 export function reasonOf(view: View): string {
@@ -26,14 +31,6 @@ export function reasonOf(view: View): string {
     case "lowest":
       return `Dropped: ${place}, among the lowest 15 %.`;
   }
-}
-
-/** The name of a view. */
-export function nameOf(index: Index, view: View): string {
-  if (view.photograph !== null) return named(view.photograph);
-  const uuid = view.location === null ? "" : (index.locations[view.location]?.uuid.slice(0, 8) ?? "");
-  const number = view.frame === null ? `dropped view ${view.candidate ?? "?"}` : `view ${view.frame}`;
-  return `${roomName(view.room)} · ${uuid} · ${number}`;
 }
 
 /** The link to the panorama of a view's location, turned in the direction of the view. */
@@ -78,7 +75,7 @@ function facts(index: Index, view: View): HTMLElement {
 /** What is shown of a view while its file is read: its small image. Null if there is none. */
 export async function viewSight(index: Index, route: Route): Promise<Sight | null> {
   const view = index.views.find((v) => v.picture === Number(route.path[0] ?? ""));
-  if (!view || view.picture === null) return null;
+  if (!view || view.picture === null || route.path.length > 1) return null;
   const url = await loadThumb(index, view.picture);
   if (url === null) return null;
   const image = await decodedImage(url);
@@ -95,7 +92,10 @@ export async function viewPage(
 ): Promise<{ element: HTMLElement; close: () => void }> {
   const at = Number(route.path[0] ?? "");
   const view = index.views.find((v) => v.picture === at);
-  if (!view || view.picture === null) {
+  const [, kind, number] = route.path;
+  const match = view && kind !== undefined ? await matchPage(index, view, kind, Number(number)) : null;
+  if (match) return match;
+  if (!view || view.picture === null || kind !== undefined) {
     const page = h("main", { class: "page" }, h("h1", {}, "View"), h("p", {}, "There is no such view."));
     return { element: page, close: () => {} };
   }
@@ -128,6 +128,22 @@ export async function viewPage(
   }
   const location = view.location === null ? undefined : index.locations[view.location];
   const look = lookFrom(route.query, modalitiesOf(index, view.area, picture), null);
+  if (route.query.has("objects")) shown.objects = route.query.get("objects") === "on";
+  const changed = (now: Look): void => {
+    const query = { ...queryOf(now), ...(view.objects ? objectsQuery() : {}) };
+    pointSteps({ ...queryOf(now), ...objectsQuery() });
+    replaceRoute("view", [at], query);
+  };
+  const objects = view.objects
+    ? objectsView({
+        index,
+        size: picture.of,
+        room: view.room,
+        objects: async () => (await loadObjects(index, at)) ?? [],
+        light: (label) => viewer.light(label),
+        changed: () => changed(look),
+      })
+    : null;
   const viewer = await Viewer.open(index, picture, look, {
     title: nameOf(index, view),
     area: view.area,
@@ -139,14 +155,22 @@ export async function viewPage(
       const [left, top, w, h_] = placeOf(picture.of, width, height);
       return at && [at[0] * w + left * at[2], at[1] * h_ + top * at[2], at[2]];
     },
-    changed: (now) => {
-      pointSteps(queryOf(now));
-      replaceRoute("view", [at], queryOf(now));
-    },
+    changed,
+    tools: [objects?.button],
+    pointed: (label) => objects?.point(label),
   });
-  pointSteps(queryOf(look));
+  pointSteps({ ...queryOf(look), ...objectsQuery() });
   viewer.element.classList.add("flat");
   viewer.element.style.setProperty("--shape", String(picture.of[0] / picture.of[1]));
+  if (objects) {
+    viewer.overlay.prepend(objects.overlay);
+    aside.prepend(objects.list);
+  }
   append(body, [viewer.element, aside]);
+  const partners = await loadPartners(index, view.area, at).catch((e: unknown) => {
+    append(element, [h("p", { role: "alert" }, e instanceof Error ? e.message : String(e))]);
+    return [];
+  });
+  append(element, [partnerCards(index, view, partners)]);
   return { element, close: () => viewer.close() };
 }

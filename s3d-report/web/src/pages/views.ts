@@ -6,7 +6,8 @@ import { append, choice, count, h, named, percent, roomName, several } from "../
 import { type Page, type Route, link, replaceRoute } from "../route/route.js";
 import { type Range, brush } from "./brush.js";
 import { WIDTH, canDraw, drawDropped } from "./dropped.js";
-import { inPanorama, nameOf, reasonOf } from "./view.js";
+import { nameOf } from "./names.js";
+import { inPanorama, reasonOf } from "./view.js";
 
 /** A property to sort and filter by: a number, or nothing where a view has none. */
 interface Property {

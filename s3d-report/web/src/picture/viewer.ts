@@ -68,6 +68,10 @@ export interface ViewerOptions {
   screen: (point: Rgb, gaze: Gaze | null, width: number, height: number) => Projected | null;
   /** Another picture of the same camera, shown right of the line in the same modality. */
   other?: OtherSide;
+  /** More switches beside those of the images. */
+  tools?: (HTMLElement | undefined)[];
+  /** Called when the pointer comes to another instance; with null when it is on none. */
+  pointed?: (label: number | null) => void;
   /** Called when the look has changed. */
   changed: (look: Look) => void;
   /** Called after each drawing, with the size of the canvas in CSS pixels. */
@@ -258,7 +262,9 @@ export class Viewer {
       pick("Right of the line", "right"),
     ];
     const one = [pick("What of both is shown", "left", "right")];
-    append(this.bar, [...(this.others ? one : two), this.numbers.depth && this.measuring]);
+    const { tools = [] } = this.options;
+    this.bar.classList.toggle("with-tools", tools.some(Boolean));
+    append(this.bar, [...(this.others ? one : two), this.numbers.depth && this.measuring, ...tools]);
   }
 
   /** Loads the votes of the area's faces once; until then the readout has none. */
@@ -347,7 +353,7 @@ export class Viewer {
       },
       { passive: false },
     );
-    for (const event of ["pointerleave", "blur"]) canvas.addEventListener(event, () => this.light(null));
+    for (const event of ["pointerleave", "blur"]) canvas.addEventListener(event, () => this.point(null));
     canvas.addEventListener("keydown", (event) => this.key(event));
     // Only focus by the keyboard counts; a touch gives the focus too, but has a place of its own.
     canvas.addEventListener("focus", () => {
@@ -477,11 +483,17 @@ export class Viewer {
   }
 
   /** Lights up the pixels of an instance; none with null. */
-  private light(label: number | null): void {
+  light(label: number | null): void {
     const lit = this.others || !label ? null : label;
     if (lit === this.lit) return;
     this.lit = lit;
     this.draw();
+  }
+
+  /** Handles that the pointer is on an instance; on none with null. */
+  private point(label: number | null): void {
+    this.light(label);
+    this.options.pointed?.(label || null);
   }
 
   /** Shows the values at a point of the canvas. */
@@ -490,7 +502,7 @@ export class Viewer {
     this.readout.replaceChildren();
     delete this.readout.dataset["pixel"];
     const found = this.spotAt(x, y, box);
-    this.light(found?.spot.label ?? null);
+    this.point(found?.spot.label ?? null);
     if (!found) return;
     const { room } = this.options;
     const { spot } = found;

@@ -16,7 +16,7 @@ export const json = (path, folder = dataset) => JSON.parse(readFileSync(join(fol
 const { paletteOf } = await bundled("palette.ts");
 export const index = readIndex(report);
 
-function readIndex(folder) {
+export function readIndex(folder) {
   const script = readFileSync(join(folder, "data/index.js"), "utf8");
   return coloured(
     JSON.parse(JSON.parse(script.slice('s3dReport("index",'.length, script.lastIndexOf(");")))),

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
-const style = ["base.css", "style.css", "present.css", "../../s3d-annotate/web/label.css"]
+const style = ["base.css", "style.css", "relations.css", "present.css", "../../s3d-annotate/web/label.css"]
   .map((name) => readFileSync(new URL(`../../${name}`, import.meta.url), "utf8"))
   .join("\n");
 
