@@ -24,7 +24,7 @@ if not Path("s3d-demo").exists():
 # %%
 scan = "s3d-demo/scan/rgb.obj"
 print(s3d.info(scan))
-mesh = s3d.read_mesh(scan, up="y")
+mesh = s3d.read_mesh(scan)
 print(mesh, *mesh.warnings, sep="\n")
 
 # %% [markdown]

@@ -16,7 +16,7 @@ import s3d_py as s3d
 if not Path("s3d-demo").exists():
     small = ["--views", "24", "--size", "320", "--pano-width", "1024"]
     subprocess.run([sys.executable, "-m", "s3d_py", "demo", "-o", "s3d-demo", *small], check=True)
-mesh = s3d.read_mesh("s3d-demo/scan/rgb.obj", up="y")
+mesh = s3d.read_mesh("s3d-demo/scan/rgb.obj")
 points = s3d.read_points("s3d-demo/scan/Area_1")
 print(mesh, points, sep="\n")
 
@@ -53,6 +53,7 @@ image = scene.panorama(place, width=1024, modalities=["face"])
 of_face = np.where(labelled, np.nan_to_num(votes.share), 0.0)
 shown = np.where(image.face >= 0, of_face[image.face], 0.0)
 print(f"a pixel's face was won by {shown[shown > 0].mean():.1%} of its votes on average")
+s3d.Picture(np.repeat((255 * shown).astype(np.uint8)[..., None], 3, axis=2))
 
 # %% [markdown]
 # ## Fewer points

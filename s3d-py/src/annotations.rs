@@ -3,12 +3,12 @@
 use crate::arrays;
 use crate::error::{exception, usage};
 use crate::work::watched;
-use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use s3d_dataset::Error;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
-use s3d_io::cloud::{AnnotationOptions, Annotations, OnFault, write_colored_points};
+use s3d_io::cloud::{AnnotationOptions, Annotations, OnFault, write_colored_points, write_las_points};
 use s3d_label::Taxonomy;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -112,20 +112,30 @@ pub(crate) fn read_points<'py>(
     ))
 }
 
-/// Writes coloured points as PLY, whole or not at all.
+/// Writes points with their colours and labels as LAS or PLY, whole or not at all.
 #[pyfunction]
 pub(crate) fn write_points(
     py: Python<'_>,
     path: PathBuf,
     xyz: PyReadonlyArray2<'_, f32>,
-    rgb: PyReadonlyArray2<'_, u8>,
+    rgb: Option<PyReadonlyArray2<'_, u8>>,
+    labels: Option<PyReadonlyArray1<'_, i32>>,
+    is_las: bool,
 ) -> PyResult<()> {
     let positions = arrays::points("xyz", &xyz)?;
-    let colors = arrays::from_rows("rgb", &rgb)?;
-    if colors.len() != positions.len() {
-        return Err(usage(format!("{} colours for {} points: one for each", colors.len(), positions.len())));
+    let colors = rgb.map(|rgb| arrays::from_rows("rgb", &rgb)).transpose()?;
+    let labels = labels.map(|labels| labels.to_vec()).transpose();
+    let labels = labels.map_err(|e| usage(format!("labels: {e}")))?;
+    let counts = [("colours", colors.as_ref().map(Vec::len)), ("labels", labels.as_ref().map(Vec::len))];
+    for (what, found) in counts.into_iter().filter_map(|(what, found)| Some((what, found?))) {
+        if found != positions.len() {
+            return Err(usage(format!("{found} {what} for {} points: one for each", positions.len())));
+        }
     }
-    let cloud = PointCloud { positions, colors, ..PointCloud::default() };
-    let written = py.detach(|| write_colored_points(&path, &cloud));
+
+    let cloud = PointCloud { positions, colors: colors.unwrap_or_default(), ..PointCloud::default() };
+    let labels = labels.unwrap_or_default();
+    let write = if is_las { write_las_points } else { write_colored_points };
+    let written = py.detach(|| write(&path, &cloud, &labels));
     written.map(|_| ()).map_err(|e| exception(&Error::from(e)))
 }

@@ -12,7 +12,7 @@ use s3d_dataset::{Error, Result};
 use s3d_geom::glam::Vec3;
 use s3d_geom::{NormalAxes, Raster};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{DatasetImage, Domain, Frame};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, InstanceEntry as InstanceRecord};
 use s3d_io::image::{decode_gray16, decode_rgb8, decode_xyz};
 use s3d_label::{LabelId, LabelTable};
 use std::path::PathBuf;
@@ -41,8 +41,16 @@ type ImageEntry = (u32, String, String, Option<u32>, Vec<&'static str>);
 /// Name, index of the class, number of the instance, room, area.
 type LabelEntry = (String, i16, u32, String, u32);
 
-/// Label, its index, class, room, points, box.
-type InstanceEntry = (String, u32, String, String, u64, [f32; 6]);
+/// Label, its index, class, room, number in the room, points, box.
+type InstanceEntry = (String, u32, String, String, u32, u64, [f32; 6]);
+
+/// Positions, colours, labels and faces of points.
+type PointColumns<'py> = (
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<u8>>,
+    Bound<'py, PyArray1<i32>>,
+    Bound<'py, PyArray1<i32>>,
+);
 
 /// Scan location, number of the candidate, yaw, pitch, angle of view, entropy, number of the view.
 type ViewEntry = (String, u32, f64, f64, f64, f64, Option<u32>);
@@ -153,10 +161,26 @@ impl DataSet {
     fn instances(&self, area: u32) -> PyResult<Vec<InstanceEntry>> {
         self.check_area(area)?;
         let entries = self.data.instances(area).map_err(|e| exception(&e))?;
-        Ok(entries
-            .into_iter()
-            .map(|i| (i.label, i.label_index, i.class, i.room, i.points, i.bbox))
-            .collect())
+        let numbers = self.data.numbers_in_rooms(area).map_err(|e| exception(&e))?;
+        let entry = |i: InstanceRecord| {
+            let number = numbers.get(&i.label).copied().unwrap_or_default();
+            (i.label, i.label_index, i.class, i.room, number, i.points, i.bbox)
+        };
+        Ok(entries.into_iter().map(entry).collect())
+    }
+
+    /// The sampled points of an area.
+    fn cloud<'py>(&self, py: Python<'py>, area: u32, sink: Py<PyAny>) -> PyResult<PointColumns<'py>> {
+        self.check_area(area)?;
+        let (cloud, labels) = watched(py, None, &sink, |ctx| self.data.points(area, ctx))?;
+        let labels = labels.into_iter().map(|label| label as i32).collect();
+        let faces = cloud.faces.into_iter().map(|face| face as i32).collect();
+        Ok((
+            arrays::rows::<f32, 3>(py, bytemuck::cast_vec(cloud.positions))?,
+            arrays::rows(py, cloud.colors)?,
+            PyArray1::from_vec(py, labels),
+            PyArray1::from_vec(py, faces),
+        ))
     }
 
     /// Every candidate view of an area, kept or dropped.
@@ -199,6 +223,13 @@ impl DataSet {
         self.check_area(area)?;
         let source = py.detach(|| self.data.source_faces(area)).map_err(|e| exception(&e))?;
         Ok(source.map(|s| (s.files, PyArray1::from_vec(py, s.file), PyArray1::from_vec(py, s.face))))
+    }
+
+    /// The bytes of a file of the data set, named from its folder.
+    fn read<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyBytes>> {
+        let path = self.data.layout().root().join(name);
+        let bytes = py.detach(|| self.data.read(&path)).map_err(|e| exception(&e))?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     /// The path of a file of an image, whether it exists or not.

@@ -4,9 +4,10 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use s3d_dataset::Error;
-use s3d_dataset::error::OptionNames;
+use s3d_dataset::error::{OptionNames, UsageError};
 use s3d_io::{Error as FileError, Place};
 use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 /// The options of calls as arguments of the Python package.
 struct Arguments;
@@ -37,7 +38,13 @@ pub(crate) fn usage(message: impl Into<String>) -> PyErr {
 
 /// The exception that an error is. Options are named as arguments.
 pub(crate) fn exception(error: &Error) -> PyErr {
+    if let Some(folder) = without_data_set(error) {
+        let path = folder.to_string_lossy().into_owned();
+        let error = UsageError::NoDataSet { folder }.message(&Arguments);
+        return raise("NoDataSetError", &error, Some((path, None)));
+    }
     let class = match error {
+        Error::Usage(UsageError::Memory { .. }) => "TooLargeError",
         Error::Usage(_) => "UsageError",
         Error::Input(_) => "InputError",
         Error::Temporary(_) => "TemporaryError",
@@ -46,6 +53,17 @@ pub(crate) fn exception(error: &Error) -> PyErr {
         _ => "Error",
     };
     raise(class, &error.message(&Arguments), None)
+}
+
+/// The folder that was to hold a data set, and holds none.
+fn without_data_set(error: &Error) -> Option<PathBuf> {
+    match error {
+        Error::Usage(UsageError::NoDataSet { folder }) => Some(folder.clone()),
+        Error::File(file) if file.path().ends_with("manifest.json") && !file.path().exists() => {
+            file.path().parent().map(Path::to_owned)
+        }
+        _ => None,
+    }
 }
 
 fn of_file(error: &FileError) -> PyErr {

@@ -1,7 +1,7 @@
 //! Scenes to data sets.
 
 use crate::error::{exception, usage};
-use crate::mesh::{Mesh, parsed};
+use crate::mesh::{Mesh, axes, parsed};
 use crate::work::watched;
 use numpy::{PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -47,6 +47,7 @@ pub(crate) fn export(
     output: PathBuf,
     options: &str,
     allow: Vec<String>,
+    up_and_units: (Option<String>, Option<String>),
     overwrite: bool,
     threads: Option<usize>,
     sink: Py<PyAny>,
@@ -59,7 +60,10 @@ pub(crate) fn export(
         .map(|word| parsed("allow", word, &conditions))
         .collect::<PyResult<_>>()?;
     let sources = match scenes {
-        Scenes::Paths(paths) => SceneSource::list(paths, None, None),
+        Scenes::Paths(paths) => {
+            let axes = axes(up_and_units.0.as_deref(), up_and_units.1.as_deref())?;
+            SceneSource::list(paths, axes.up, axes.units)
+        }
         Scenes::Areas(areas) => areas.iter().map(source).collect::<PyResult<_>>()?,
     };
 

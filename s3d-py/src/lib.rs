@@ -15,6 +15,7 @@ mod export;
 mod fuse;
 mod mesh;
 mod points;
+mod poses;
 mod scene;
 mod segments;
 mod work;
@@ -42,7 +43,11 @@ mod native {
     #[pymodule_export]
     use super::mesh::Mesh;
     #[pymodule_export]
+    use super::mesh::edit::{merged, save_mesh, transformed, with_faces};
+    #[pymodule_export]
     use super::points::{fill, sample, vote};
+    #[pymodule_export]
+    use super::poses::read_poses;
     #[pymodule_export]
     use super::scene::{Scene, encode_png, look_at};
     #[pymodule_export]

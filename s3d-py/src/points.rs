@@ -6,12 +6,16 @@ use crate::mesh::Mesh;
 use crate::work::watched;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use s3d_dataset::check_memory;
 use s3d_dataset::error::InputError;
 use s3d_geom::{Density, NearestFaces, PointCloud, SurfaceSampler};
 use s3d_label::{FaceVotes, LabelId, Labeler, MAX_LABELS, VoteError, VoteOptions, fill_labels};
 
 /// The number of points that are drawn or vote between two checks for cancelling.
 const CHUNK: usize = 1 << 20;
+
+/// The bytes of a point with its colour and its face.
+const POINT_BYTES: f64 = 19.0;
 
 type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
@@ -36,8 +40,12 @@ pub(crate) fn sample<'py>(
 
     let cloud = watched(py, threads, &sink, |ctx| {
         let sampler = SurfaceSampler::new(mesh.mesh(), density, seed);
+        check_memory(&format!("{} points", sampler.len()), sampler.len() as f64 * POINT_BYTES)?;
         let progress = ctx.progress("sampling", "points", sampler.len());
         let mut cloud = PointCloud::default();
+        cloud.positions.reserve_exact(sampler.len() as usize);
+        cloud.colors.reserve_exact(sampler.len() as usize);
+        cloud.faces.reserve_exact(sampler.len() as usize);
         let mut part = PointCloud::default();
         for start in (0..sampler.len()).step_by(CHUNK) {
             ctx.check()?;

@@ -1,20 +1,19 @@
 //! `_native.Scene`: what cameras and rays see of a mesh.
 
 use crate::arrays;
-use crate::error::usage;
+use crate::error::{exception, usage};
 use crate::mesh::Mesh;
 use crate::work::{detached, watched};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use rayon::prelude::*;
 use s3d_dataset::place::PlaceOptions;
-use s3d_dataset::place_cameras;
+use s3d_dataset::{check_memory, place_cameras};
 use s3d_geom::{Camera, NormalAxes, Pose, Raster};
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::MeshFile;
 use s3d_render::{
-    Hits, MipMaps, NO_FACE, Normals, TextureFilter, cast, cast_ray, correspondences, depth_image,
+    Hits, MipMaps, NO_FACE, Normals, TextureFilter, cast, cast_rays, correspondences, depth_image,
     normal_image, normal_vectors, rgb_image, sample_edges, xyz_image, xyz_image_half,
 };
 use self_cell::self_cell;
@@ -89,6 +88,11 @@ impl Scene {
             return Err(usage(format!("rgb_samples={rgb_samples}: must be from 1 to 64")));
         }
 
+        let pixels = f64::from(camera.width) * f64::from(camera.height);
+        let what = format!("images of {} × {} pixels", camera.width, camera.height);
+        check_memory(&what, pixels * (HIT_BYTES + modalities.iter().map(|word| bytes_of(word)).sum::<f64>()))
+            .map_err(|e| exception(&e))?;
+
         let images = py.detach(|| {
             let mut hits = cast(self.tree(), &camera);
             // Depth and faces take the hits themselves, so they are made last.
@@ -125,19 +129,16 @@ impl Scene {
                 directions.len()
             )));
         }
-        let Some(&first) = origins.first() else { return Err(usage("origins: there are none")) };
+        if origins.is_empty() {
+            return Err(usage("origins: there are none"));
+        }
 
         let hits: (Vec<f64>, Vec<i32>) = detached(py, threads, || {
-            let ray = |(k, direction): (usize, &_)| {
-                let origin = if origins.len() == 1 {
-                    first
-                } else {
-                    origins.get(k).copied().unwrap_or(first)
-                };
-                cast_ray(self.tree(), origin, *direction)
-                    .map_or((f64::NAN, -1), |hit| (hit.t, hit.face as i32))
-            };
-            directions.par_iter().enumerate().with_min_len(1024).map(ray).unzip()
+            let found = cast_rays(self.tree(), &origins, &directions);
+            let found = found.into_iter();
+            found
+                .map(|hit| hit.map_or((f64::NAN, -1), |hit| (hit.t, hit.face as i32)))
+                .unzip()
         })?;
         Ok((PyArray1::from_vec(py, hits.0), PyArray1::from_vec(py, hits.1)))
     }
@@ -187,6 +188,18 @@ impl Scene {
 }
 
 const MODALITIES: [&str; 5] = ["rgb", "depth", "normal", "xyz", "face"];
+
+/// The bytes of a pixel's hit: its face and its depth.
+const HIT_BYTES: f64 = 8.0;
+
+/// The bytes of a pixel of an image, at most.
+fn bytes_of(modality: &str) -> f64 {
+    match modality {
+        "rgb" => 3.0,
+        "depth" | "face" => 4.0,
+        _ => 12.0,
+    }
+}
 
 impl Scene {
     fn tree(&self) -> &Tree<'_> {

@@ -21,7 +21,7 @@ def ds(demo: Path) -> s3d.DataSet:
     return s3d.open(demo)
 
 
-def stored(view: s3d.View, modality: str) -> npt.NDArray[Any]:
+def stored(view: s3d.Image, modality: str) -> npt.NDArray[Any]:
     """Returns the pixels of a PNG file, decoded by Pillow."""
     pillow = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
     return np.array(pillow.open(view.path(modality)))
@@ -167,7 +167,8 @@ def test_threads_and_pickles_read_the_same(ds: s3d.DataSet) -> None:
         depths = list(pool.map(depth, list(range(8)) * 4))
     assert all(np.array_equal(depths[k], depths[k % 8], equal_nan=True) for k in range(32))
     loaded = ds[2].load()
-    assert set(loaded._arrays) >= {"rgb", "depth", "normal", "xyz", "labels", "classes"}  # pyright: ignore[reportPrivateUsage]
+    kept = loaded._loaded  # pyright: ignore[reportPrivateUsage]
+    assert set(kept) >= {"rgb", "depth", "normal", "xyz", "labels", "classes"}
 
 
 def test_torch_takes_it(ds: s3d.DataSet) -> None:

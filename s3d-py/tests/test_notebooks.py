@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
-NEEDS = {"segmentation": ["sklearn", "PIL"]}
+NEEDS = {"segmentation": ["sklearn", "PIL"], "rendered": ["sklearn"]}
 
 
 @pytest.fixture(scope="module")
@@ -33,5 +33,5 @@ def test_a_notebook(notebook: str, folder: Path) -> None:
     assert len(run.stdout.splitlines()) >= 3
 
 
-def test_there_are_five() -> None:
-    assert len(list(NOTEBOOKS.glob("*.py"))) == 5
+def test_there_are_six() -> None:
+    assert len(list(NOTEBOOKS.glob("*.py"))) == 6

@@ -92,3 +92,8 @@ def test_ctrl_c_ends_the_command_as_it_does_the_binary(tmp_path: Path) -> None:
     assert process.returncode == 75, told
     # The command that a message recommends is the one that was called, not Python's.
     assert "stopped by SIGINT; go on with: s3d demo -o demo" in told and "Traceback" not in told
+
+
+def test_the_licences_are_whole() -> None:
+    texts = [str(file.read_text()) for file in importlib.metadata.files("s3d-py") or () if "LICENSE" in file.name]
+    assert len(texts) == 2 and min(map(len, texts)) > 900

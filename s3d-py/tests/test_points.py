@@ -133,7 +133,7 @@ def test_annotated_points_are_those_of_the_files(demo: Path) -> None:
         class_name, number = path.stem.rsplit("_", 1)
         name = f"{class_name}_{number}_{path.parents[1].name}"
         rows = np.loadtxt(path)
-        of_instance = points.label == points.names.index(name)
+        of_instance = points.label == points.names.index(s3d.NameInRoom(name))
         assert np.allclose(points.xyz[of_instance], rows[:, :3], atol=1e-6)
         assert np.array_equal(points.rgb[of_instance], rows[:, 3:6])
     # A data set has the points by room as well.

@@ -42,7 +42,7 @@ def test_what_a_function_raises_ends_work(room: s3d.Mesh) -> None:
         raise KeyError("a fault of the caller's")
 
     with pytest.raises(KeyError, match="a fault of the caller's"):
-        s3d.sample(room, points=10**9, progress=fail)
+        s3d.sample(room, points=10**8, progress=fail)
 
 
 def test_bars_are_drawn_where_tqdm_is(room: s3d.Mesh, capsys: pytest.CaptureFixture[str]) -> None:
@@ -58,7 +58,8 @@ def test_warnings_come_to_the_log(tmp_path: Path, caplog: pytest.LogCaptureFixtu
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\nf 1 2 3\n")
     with caplog.at_level(logging.DEBUG, "s3d_py"):
         s3d.read_mesh(path)
-    assert [(r.name, r.levelno) for r in caplog.records] == [("s3d_py", logging.WARNING)]
+    warnings = [record for record in caplog.records if record.levelno >= logging.WARNING]
+    assert [(record.name, record.levelno) for record in warnings] == [("s3d_py", logging.WARNING)]
     assert "same corners" in caplog.text
 
 

@@ -18,11 +18,10 @@ from ._dataset import (
     FaceVotes,
     Instance,
     Label,
+    Outline,
     Room,
     SourceFaces,
-    TorchDataset,
-    View,
-    Views,
+    Split,
     open,
 )
 from ._detector import Detector, FoundBox, save_boxes
@@ -35,17 +34,21 @@ from ._errors import (
     InputError,
     MeshError,
     MissingFileError,
+    NoDataSetError,
     TemporaryError,
+    TooLargeError,
     UnsupportedError,
     UsageError,
 )
 from ._export import Area, ExportOptions, Labels, SceneLike, export
 from ._fuse import Fused, fuse
 from ._mesh import Mesh, MeshLike, as_mesh, read_mesh
+from ._names import NameInArea, NameInRoom
 from ._native import __version__
 from ._pairs import Correspondences, Pairs
 from ._points import (
     AnnotatedPoints,
+    LabelledPoints,
     PointCloud,
     PointsLike,
     Votes,
@@ -55,7 +58,9 @@ from ._points import (
     save_points,
     vote,
 )
+from ._poses import CameraPose, read_poses, save_poses
 from ._progress import Progress, Task
+from ._rendered import Augment, Camera, FreeSpace, Nearby, Paper, RenderedStream, RenderedViews, Sampler
 from ._results import (
     Comparison,
     Evaluation,
@@ -69,10 +74,15 @@ from ._results import (
 )
 from ._scene import Images, Rays, Scene
 from ._segments import Segments, segments
+from ._views import Image, Panorama, Picture, TorchDataset, View, Views
+from ._walk import walk
 
 __all__ = [
     "AnnotatedPoints",
     "Area",
+    "Augment",
+    "Camera",
+    "CameraPose",
     "CancelledError",
     "Candidate",
     "Comparison",
@@ -88,31 +98,47 @@ __all__ = [
     "FileError",
     "FormatError",
     "FoundBox",
+    "FreeSpace",
     "Fused",
+    "Image",
     "Images",
     "InputError",
     "Instance",
     "Label",
+    "LabelledPoints",
     "Labels",
     "Location",
     "Mesh",
     "MeshError",
     "MeshLike",
     "MissingFileError",
+    "NameInArea",
+    "NameInRoom",
+    "Nearby",
+    "NoDataSetError",
+    "Outline",
     "Pairs",
+    "Panorama",
+    "Paper",
+    "Picture",
     "PointCloud",
     "PointsLike",
     "PoseLike",
     "Progress",
     "Rays",
+    "RenderedStream",
+    "RenderedViews",
     "Room",
+    "Sampler",
     "Scene",
     "SceneLike",
     "Segments",
     "SourceFaces",
+    "Split",
     "Statistics",
     "Task",
     "TemporaryError",
+    "TooLargeError",
     "TorchDataset",
     "UnsupportedError",
     "UsageError",
@@ -133,10 +159,13 @@ __all__ = [
     "open",
     "read_mesh",
     "read_points",
+    "read_poses",
     "sample",
     "save_boxes",
     "save_points",
+    "save_poses",
     "segments",
     "verify",
     "vote",
+    "walk",
 ]

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import importlib
+import io
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, overload
+from typing import Any, Union, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._camera import Matrix
 from ._errors import UsageError
 from ._mesh import Mesh
+from ._names import NameInArea
+from ._packages import package
 from ._pairs import Correspondences, Pairs, read_pairs
+from ._points import LabelledPoints
 from ._progress import Progress, sink
 from ._results import (
     Comparison,
@@ -32,19 +34,9 @@ from ._results import (
     root_of,
     verify,
 )
-from ._scene import Scene, picture
+from ._scene import Scene
 from ._viewers import fiftyone_samples, log_to_rerun
-
-ARRAYS = ("rgb", "depth", "normal", "xyz", "labels", "classes", "instances", "pretty")
-"""The arrays of a view. `View` describes each."""
-
-_FILE_OF = {
-    "labels": "semantic",
-    "classes": "semantic",
-    "instances": "semantic",
-    "pretty": "semantic_pretty",
-    "xyz": "global_xyz",
-}
+from ._views import Image, Panorama, Picture, TorchDataset, View, Views, image_at
 
 
 @dataclass(frozen=True)
@@ -53,7 +45,7 @@ class Label:
 
     index: int
     """The index that pixels of `View.labels` have."""
-    name: str
+    name: NameInArea
     """Class, number, room, area: "chair_3_office_5_1"."""
     class_name: str | None
     """The class; None for the entry that stands for no label."""
@@ -82,16 +74,36 @@ class Room:
 class Instance:
     """An instance of an area, with the bounding box of its points."""
 
-    label: str
+    label: NameInArea
     """The name in the table of labels."""
     index: int
     """The index in the table of labels."""
     class_name: str
     room: str
+    number_in_room: int
+    """The number among the instances of its class in the room, from 1, as in `AnnotatedPoints.names`."""
     points: int
     """The number of annotated points."""
     bounds: list[float]
     """xmin, ymin, zmin, xmax, ymax, zmax, in world metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A part of the floor of a room, seen from above: counter-clockwise, its holes clockwise."""
+
+    outer: npt.NDArray[np.float64]
+    """(N, 2), world x and y, metres."""
+    holes: list[npt.NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Split:
+    """A fold: areas to train on, and areas of another building to test on."""
+
+    fold: int
+    train_areas: list[int]
+    test_areas: list[int]
 
 
 @dataclass(frozen=True)
@@ -150,262 +162,7 @@ class SourceFaces:
         return f"SourceFaces({len(self.face):,} faces of {', '.join(self.files)})"
 
 
-class View:
-    """A perspective view or panorama of a data set. Its modalities are registered pixel to pixel.
-
-    The first access to a modality reads its file and compares it with its checksum; the view keeps the array.
-    Arrays are read-only: to change one, copy it. Getters raise `UsageError` for a modality without a file,
-    and `FileError` for a damaged file.
-    """
-
-    def __init__(self, dataset: DataSet, index: int) -> None:
-        self._dataset, self.index = dataset, index
-        self.area, self.location, self.room, self.frame, self.files = dataset._images[index]
-        self._arrays: dict[str, npt.NDArray[Any]] = {}
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return View, (self._dataset, self.index)
-
-    index: int
-    """The index in the data set: `dataset[view.index]` is the same image."""
-    area: int
-    location: str
-    """The name of the scan location, 32 hexadecimal digits."""
-    room: str
-    """Type and number: "office_5"."""
-    frame: int | None
-    """The number of the view at its location; None for a panorama."""
-    files: Sequence[str]
-    """The modalities that have a file, by the names of their folders."""
-
-    @property
-    def is_panorama(self) -> bool:
-        """Whether the image is a panorama; otherwise it is a perspective view."""
-        return self.frame is None
-
-    @property
-    def name(self) -> str:
-        """The beginning of the names of its files, unique in its area."""
-        frame = "equirectangular" if self.frame is None else self.frame
-        return f"camera_{self.location}_{self.room}_frame_{frame}"
-
-    @cached_property
-    def size(self) -> tuple[int, int]:
-        """Width and height, pixels."""
-        return self._dataset._native.size(self.index)
-
-    @cached_property
-    def _camera(self) -> tuple[Matrix, Matrix]:
-        K, T = self._dataset._native.camera(self.index)
-        return np.array(K), np.array(T)
-
-    @property
-    def K(self) -> Matrix | None:
-        """Intrinsics, 3 × 3, pixels; the centre of the first pixel is at (0.5, 0.5). None for a panorama."""
-        return None if self.is_panorama else self._camera[0]
-
-    @property
-    def T_world_cam(self) -> Matrix:
-        """Camera → world, 4 × 4, OpenCV's axes (x right, y down, z forward), metres. The middle column of a
-        panorama looks along z, projected to the horizon; its rows are level whatever the tilt of the pose.
-        """
-        return self._camera[1]
-
-    @cached_property
-    def pose(self) -> dict[str, Any]:
-        """The content of the pose file, under the published keys."""
-        return json.loads(self._dataset._native.file(self.index, "pose"))  # type: ignore[no-any-return]
-
-    @property
-    def objects(self) -> list[dict[str, Any]]:
-        """The instances with a pixel in the image, under the keys of the file: amodal masks, what hides them,
-        distances and boxes. The data set needs the modality "objects".
-        """
-        return json.loads(self._dataset._native.file(self.index, "objects"))["objects"]  # type: ignore[no-any-return]
-
-    @property
-    def rgb(self) -> npt.NDArray[np.uint8]:
-        """(H, W, 3), sRGB."""
-        return self["rgb"]
-
-    @property
-    def depth(self) -> npt.NDArray[np.float32]:
-        """(H, W), metres: along z in a view, along the ray in a panorama. NaN where nothing is seen, or where
-        the depth is larger than the file can hold.
-        """
-        return self["depth"]
-
-    @property
-    def normal(self) -> npt.NDArray[np.float32]:
-        """(H, W, 3), unit vectors, exact to 0.5°. A view has the camera's axes, x right, y down, z forward,
-        whatever axes the file has; a panorama has (X, −Z, Y) of the world. NaN where nothing is seen.
-        """
-        return self["normal"]
-
-    @property
-    def xyz(self) -> npt.NDArray[np.float32]:
-        """(H, W, 3), world metres as stored (half precision: centimetres). NaN where nothing is seen.
-        `points` computes the coordinates from depth instead.
-        """
-        return self["xyz"]
-
-    @property
-    def labels(self) -> npt.NDArray[np.int32]:
-        """(H, W), index into `DataSet.labels`; 0 without a label, −1 where nothing is seen."""
-        return self["labels"]
-
-    @property
-    def classes(self) -> npt.NDArray[np.int16]:
-        """(H, W), index into `DataSet.classes`; −1 without a label and where nothing is seen."""
-        return self["classes"]
-
-    @property
-    def instances(self) -> npt.NDArray[np.int32]:
-        """(H, W), index of the instance in `DataSet.labels`; −1 without a label and where nothing is seen."""
-        return self["instances"]
-
-    @property
-    def pretty(self) -> npt.NDArray[np.uint8]:
-        """(H, W, 3), one colour for each instance, to look at."""
-        return self["pretty"]
-
-    def points(self) -> npt.NDArray[np.float32]:
-        """Returns world metres, (H, W, 3), from depth and pose. NaN where depth is missing."""
-        return self._dataset._native.points(self.index)
-
-    @cached_property
-    def shares(self) -> dict[str, float]:
-        """The share of the pixels of each class that occurs in the image."""
-        found = self._dataset._class_shares([self.index])[0]
-        return {name: share for name, share in zip(self._dataset.classes or (), found) if share > 0}
-
-    def path(self, modality: str) -> Path:
-        """Returns the path of the file of a modality, which is a word of `files` or of `ARRAYS`."""
-        return self._dataset._native.path(self.index, _FILE_OF.get(modality, modality))
-
-    def load(self, *modalities: str) -> View:
-        """Reads these modalities at the same time, each on its own thread; without names, all that exist."""
-        wanted = modalities or tuple(name for name in ARRAYS if _FILE_OF.get(name, name) in self.files)
-        with ThreadPoolExecutor(max(len(wanted), 1)) as pool:
-            for _ in pool.map(self.__getitem__, wanted):
-                pass
-        return self
-
-    def __getitem__(self, modality: str) -> npt.NDArray[Any]:
-        """`view["depth"]` is `view.depth`."""
-        array = self._arrays.get(modality)
-        if array is None:
-            array = self._read(modality)
-            array.flags.writeable = False
-            self._arrays[modality] = array
-        return array
-
-    def _read(self, modality: str) -> npt.NDArray[Any]:
-        file, native = _FILE_OF.get(modality, modality), self._dataset._native
-        if modality not in ARRAYS:
-            raise UsageError(f"{modality!r}: must be one of {', '.join(ARRAYS)}")
-        if file not in self.files:
-            raise UsageError(f"{self.name} has no {file}: it has {', '.join(self.files)}")
-        if modality == "rgb" or modality == "pretty":
-            return native.rgb(self.index, modality == "pretty")
-        if modality == "depth":
-            return native.depth(self.index)
-        if modality == "normal":
-            return native.normal(self.index)
-        if modality == "xyz":
-            return native.xyz(self.index)
-        if modality == "classes":
-            return native.class_(self.index)
-        if modality == "labels":
-            return native.label(self.index)
-        labels = self.labels
-        return np.where(labels > 0, labels, np.int32(-1))
-
-    def __repr__(self) -> str:
-        what = "panorama" if self.is_panorama else f"view {self.frame}"
-        return (
-            f"View({what} of {self.location[:8]}… in {self.room}, area {self.area}: {', '.join(self.files)})"
-        )
-
-    def _repr_png_(self) -> bytes:
-        """The first of its images, for notebooks."""
-        if "rgb" in self.files:
-            return _native.encode_png(np.ascontiguousarray(self.rgb))
-        for name in ("pretty", "normal", "depth"):
-            if _FILE_OF.get(name, name) in self.files:
-                shown = self[name] if name == "pretty" else picture(name, self[name])
-                return _native.encode_png(np.ascontiguousarray(shown))
-        raise UsageError(f"{self.name} has no image to show")
-
-
-class Views(Sequence[View]):
-    """Images of a data set, in its order. Every access makes a new `View`: a loop keeps one in memory."""
-
-    def __init__(self, dataset: DataSet, indices: Sequence[int]) -> None:
-        self.dataset, self.indices = dataset, list(indices)
-
-    def __len__(self) -> int:
-        return len(self.indices)
-
-    @overload
-    def __getitem__(self, index: int) -> View: ...
-    @overload
-    def __getitem__(self, index: slice) -> Views: ...
-    def __getitem__(self, index: int | slice) -> View | Views:
-        if isinstance(index, slice):
-            return Views(self.dataset, self.indices[index])
-        return View(self.dataset, self.indices[index])
-
-    def __iter__(self) -> Iterator[View]:
-        return (View(self.dataset, index) for index in self.indices)
-
-    def torch(
-        self, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None = None
-    ) -> TorchDataset:
-        """Returns these images as a data set for torch: see `DataSet.torch`."""
-        return TorchDataset(self, modalities, transform)
-
-    def __repr__(self) -> str:
-        panoramas = sum(self.dataset._images[index][3] is None for index in self.indices)
-        return f"Views({len(self) - panoramas} views, {panoramas} panoramas)"
-
-
-class TorchDataset:
-    """A map-style data set for `torch.utils.data.DataLoader`, with any number of workers."""
-
-    def __init__(
-        self, views: Views, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None
-    ) -> None:
-        others = [word for word in modalities if word not in (*ARRAYS, "K", "T_world_cam", "points")]
-        if others or not modalities:
-            raise UsageError(
-                f"modalities={list(modalities)}: some of {', '.join(ARRAYS)}, points, K, T_world_cam"
-            )
-        self.views, self.modalities, self.transform = views, tuple(modalities), transform
-
-    def __len__(self) -> int:
-        return len(self.views)
-
-    def __getitem__(self, index: int) -> Any:
-        torch: Any = importlib.import_module("torch")
-        view = self.views[index]
-        sample: dict[str, Any] = {"index": view.index}
-        for word in self.modalities:
-            if word in ("K", "T_world_cam"):
-                matrix = view.K if word == "K" else view.T_world_cam
-                if matrix is None:
-                    raise UsageError(f"{view.name} is a panorama, which has no K")
-                sample[word] = torch.from_numpy(matrix.copy())
-                continue
-            array = view.points() if word == "points" else view[word]
-            if array.ndim == 3:
-                array = array.transpose(2, 0, 1)
-            wide = word in ("labels", "classes", "instances")
-            sample[word] = torch.from_numpy(array.astype(np.int64) if wide else array.copy())
-        return sample if self.transform is None else self.transform(sample)
-
-
-class DataSet(Sequence[View]):
+class DataSet(Sequence[Union[View, Panorama]]):
     """A complete data set: all its images, by area, location and number. Everything read is checked against
     its list of files. Threads may share it. It can be pickled; the copy opens the same folder.
     """
@@ -414,6 +171,8 @@ class DataSet(Sequence[View]):
         """Raises `FileError` if there is no data set, its export did not finish, or a table is damaged."""
         self._native = _native.DataSet.open(Path(folder))
         self._images = self._native.images
+        # The image that was read last, and its arrays.
+        self._last: tuple[int, dict[str, npt.NDArray[Any]]] = -1, {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return DataSet, (self.root,)
@@ -460,7 +219,7 @@ class DataSet(Sequence[View]):
         """The table of labels. Pixels of `View.labels` are indices into it. Empty without labels."""
         names = self.classes or []
         return [
-            Label(index, name, names[of_class] if of_class >= 0 else None, instance, room, area)
+            Label(index, NameInArea(name), names[of_class] if of_class >= 0 else None, instance, room, area)
             for index, (name, of_class, instance, room, area) in enumerate(self._native.labels)
         ]
 
@@ -484,23 +243,23 @@ class DataSet(Sequence[View]):
         return len(self._images)
 
     @overload
-    def __getitem__(self, index: int | str) -> View: ...
+    def __getitem__(self, index: int | str) -> View | Panorama: ...
     @overload
-    def __getitem__(self, index: slice) -> Views: ...
-    def __getitem__(self, index: int | str | slice) -> View | Views:
+    def __getitem__(self, index: slice) -> Views[View | Panorama]: ...
+    def __getitem__(self, index: int | str | slice) -> View | Panorama | Views[View | Panorama]:
         """Returns an image by its index or its `View.name`, or several images by a slice."""
         if isinstance(index, str):
             found = self._by_name.get(index)
             if found is None:
                 raise KeyError(f"no image is called {index!r}")
-            return View(self, found)
+            return image_at(self, found)
         everything = range(len(self._images))
         if isinstance(index, slice):
             return Views(self, everything[index])
-        return View(self, everything[index])
+        return image_at(self, everything[index])
 
-    def __iter__(self) -> Iterator[View]:
-        return iter(Views(self, range(len(self))))
+    def __iter__(self) -> Iterator[View | Panorama]:
+        return (image_at(self, index) for index in range(len(self)))
 
     @cached_property
     def _by_name(self) -> dict[str, int]:
@@ -510,42 +269,46 @@ class DataSet(Sequence[View]):
         self,
         *,
         area: int | None = None,
-        room: str | None = None,
+        room: str | Sequence[str] | None = None,
         location: str | None = None,
         min_share: Mapping[str, float] | None = None,
+        where: Callable[[View], bool] | None = None,
         progress: Progress = None,
-    ) -> Views:
-        """Returns its perspective views, all or a selection: an area, a room ("office_5"), a scan location
-        (its name or its beginning), and views in which each class of `min_share` has at least its share
-        of the pixels. For `min_share` the images of labels are read once; shares are kept.
+    ) -> Views[View]:
+        """Returns its perspective views, all or a selection: an area, a room ("office_5") or several, a scan
+        location (its name or its beginning), views in which each class of `min_share` has at least its share of
+        the pixels, and views for which `where` is true. For `min_share` the images of labels are read once;
+        shares are kept.
         """
-        return self._select(False, area, room, location, min_share, progress)
+        return self._select(False, area, room, location, min_share, where, progress)
 
     def panoramas(
         self,
         *,
         area: int | None = None,
-        room: str | None = None,
+        room: str | Sequence[str] | None = None,
         location: str | None = None,
         min_share: Mapping[str, float] | None = None,
+        where: Callable[[Panorama], bool] | None = None,
         progress: Progress = None,
-    ) -> Views:
+    ) -> Views[Panorama]:
         """Returns its panoramas, selected like `views`."""
-        return self._select(True, area, room, location, min_share, progress)
+        return self._select(True, area, room, location, min_share, where, progress)
 
     def _select(
         self,
         panoramas: bool,
         area: int | None,
-        room: str | None,
+        room: str | Sequence[str] | None,
         location: str | None,
         min_share: Mapping[str, float] | None,
+        where: Callable[[Any], bool] | None,
         progress: Progress,
-    ) -> Views:
-        for what, value, all_of in (
-            ("area", area, self.areas),
-            ("room", room, [name.name for name in self.rooms]),
-        ):
+    ) -> Views[Any]:
+        rooms = None if room is None else {room} if isinstance(room, str) else set(room)
+        asked = [("room", name) for name in sorted(rooms or ())]
+        for what, value in [("area", area), *asked]:
+            all_of = self.areas if what == "area" else [one.name for one in self.rooms]
             if value is not None and value not in all_of:
                 raise UsageError(
                     f"{what}={value!r}: the data set has {', '.join(map(str, dict.fromkeys(all_of)))}"
@@ -557,7 +320,7 @@ class DataSet(Sequence[View]):
             for index, (of_area, of_location, of_room, frame, _) in enumerate(self._images)
             if (frame is None) == panoramas
             and area in (None, of_area)
-            and room in (None, of_room)
+            and (rooms is None or of_room in rooms)
             and (location is None or of_location.startswith(location))
         ]
         if min_share:
@@ -575,6 +338,8 @@ class DataSet(Sequence[View]):
                 for index, found in zip(indices, shares)
                 if all(found[place] >= share for place, share in wanted)
             ]
+        if where is not None:
+            indices = [index for index in indices if where(image_at(self, index))]
         return Views(self, indices)
 
     @cached_property
@@ -601,6 +366,26 @@ class DataSet(Sequence[View]):
         """
         return self.views().torch(modalities, transform)
 
+    def show(self, image: Image, modality: str = "rgb") -> Picture:
+        """Returns a modality of an image in colours, which notebooks show: see `View.picture`."""
+        return image.picture(modality)
+
+    def to_pandas(self) -> Any:
+        """Returns a pandas data frame with a row for each image: its `name`, `area`, `room`, `location` and `frame`
+        (missing for a panorama), whether it `is_panorama`, and of a view the `yaw`, `pitch`, `fov` (radians) and
+        `entropy` (nats) of its candidate. The index is that of the data set. No image is read.
+        """
+        drawn = {(number, c.location, c.frame): c for number in self.areas for c in self.candidates(number)}
+        table = []
+        for image in self:
+            row = {"name": image.name, "area": image.area, "room": image.room, "location": image.location}
+            candidate = drawn.get((image.area, image.location, image.frame)) if image.frame is not None else None
+            for column in ("yaw", "pitch", "fov", "entropy"):
+                row[column] = None if candidate is None else getattr(candidate, column)
+            table.append({**row, "frame": image.frame, "is_panorama": image.is_panorama})
+        frame = package("pandas", "pandas").DataFrame(table, index=range(len(table)))
+        return frame.astype({"frame": "Int64"})
+
     def mesh(self, area: int | None = None, *, progress: Progress = None) -> Mesh:
         """Returns the coloured mesh of an area, in the frame of its images and the face order of its file."""
         return Mesh._of(self._native.mesh(self._area(area), sink(progress)))
@@ -608,6 +393,11 @@ class DataSet(Sequence[View]):
     def scene(self, area: int | None = None) -> Scene:
         """Returns the mesh of an area as a scene to render."""
         return Scene(self.mesh(area))
+
+    def points(self, area: int | None = None, *, progress: Progress = None) -> LabelledPoints:
+        """Returns the sampled points of an area, those of `3d/pointcloud.ply`, with indices into `labels`."""
+        xyz, rgb, label, face = self._native.cloud(self._area(area), sink(progress))
+        return LabelledPoints(xyz, rgb, face, label)
 
     def votes(self, area: int | None = None) -> FaceVotes | None:
         """Returns the votes of points for each face of `mesh(area)`; None without labels."""
@@ -622,7 +412,32 @@ class DataSet(Sequence[View]):
     def instances(self, area: int | None = None) -> list[Instance]:
         """Returns the instances of an area, or of all areas, with their boxes. Empty without labels."""
         areas = self.areas if area is None else [area]
-        return [Instance(*entry) for number in areas for entry in self._native.instances(number)]
+        found = (entry for number in areas for entry in self._native.instances(number))
+        return [Instance(NameInArea(entry[0]), *entry[1:]) for entry in found]
+
+    def outlines(self, area: int | None = None) -> dict[str, list[Outline]]:
+        """Returns the outlines of the floors of an area's rooms, by their names. Empty without labels."""
+        name = f"area_{self._area(area)}/3d/rooms.json"
+        found = json.loads(self._native.read(name)) if self.classes else []
+        return {
+            room["room"]: [
+                Outline(np.array(part["outer"]), [np.array(hole) for hole in part["holes"]])
+                for part in room["outline"]
+            ]
+            for room in found
+        }
+
+    def voxels(self, area: int | None = None) -> dict[str, npt.NDArray[Any]]:
+        """Returns the arrays of `3d/instances.npz` of an area: 6 × 6 × 6 voxels of each instance with their points.
+        """
+        with np.load(io.BytesIO(self._native.read(f"area_{self._area(area)}/3d/instances.npz"))) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+
+    @property
+    def splits(self) -> list[Split]:
+        """The folds that its areas allow, as published. Empty for a single area."""
+        folds = json.loads(self._native.read("splits.json"))["folds"]
+        return [Split(fold["fold"], fold["train_areas"], fold["test_areas"]) for fold in folds]
 
     def candidates(self, area: int | None = None) -> list[Candidate]:
         """Returns every candidate view of an area, or of all areas, whether it was kept or dropped."""
@@ -638,7 +453,7 @@ class DataSet(Sequence[View]):
             raise UsageError(f"{path}: there are no pairs yet: call s3d pairs {self.root}")
         return read_pairs(path)
 
-    def correspondences(self, a: View, b: View, count: int = 1000) -> Correspondences:
+    def correspondences(self, a: Image, b: Image, count: int = 1000) -> Correspondences:
         """Returns up to `count` places that two of its images show, views or panoramas of one area: they are
         spread over all that `a` shares with `b`, and fewer if that is less. The mesh of an area is read at the
         first call and kept.
@@ -781,7 +596,7 @@ class DataSet(Sequence[View]):
         return _native.pack(self.root, kind, how, threads, sink(progress))
 
     def to_rerun(
-        self, views: Iterable[View] | None = None, *, mesh: bool = True, recording: Any = None
+        self, views: Iterable[Image] | None = None, *, mesh: bool = True, recording: Any = None
     ) -> None:
         """Logs the data set to Rerun: `rerun.init("scan", spawn=True)`, and then this.
 
@@ -795,7 +610,7 @@ class DataSet(Sequence[View]):
         """
         log_to_rerun(self, self if views is None else views, mesh, recording)
 
-    def to_fiftyone(self, views: Iterable[View] | None = None, *, name: str | None = None) -> Any:
+    def to_fiftyone(self, views: Iterable[Image] | None = None, *, name: str | None = None) -> Any:
         """Returns a data set of FiftyOne with a sample for each of `views`, all by default, and `name`, which
         must be free.
 

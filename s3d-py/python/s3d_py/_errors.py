@@ -11,6 +11,10 @@ class UsageError(Error, ValueError):
     """The call is not possible: arguments are out of range or exclude each other, or a folder is in use."""
 
 
+class TooLargeError(UsageError, MemoryError):
+    """The result of a call would not fit into memory."""
+
+
 class InputError(Error, ValueError):
     """The input does not fit together: annotations, mesh, cameras."""
 
@@ -53,6 +57,10 @@ class FileAccessError(FileError, OSError):
 
 class MissingFileError(FileAccessError, FileNotFoundError):
     """There is no such file."""
+
+
+class NoDataSetError(UsageError, MissingFileError):
+    """There is no data set in a folder."""
 
 
 class FormatError(FileError, ValueError):

@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from . import _native
 from ._camera import Location, PoseLike, pose_of
+from ._checks import whole
 from ._errors import UsageError
-from ._mesh import Mesh, MeshLike, as_mesh
+from ._mesh import Mesh, MeshLike, as_mesh, read_mesh
 from ._progress import Progress, sink
 
 if TYPE_CHECKING:
@@ -115,6 +116,8 @@ def export(
     *,
     locations: Sequence[PoseLike] = (),
     labels: Labels | None = None,
+    up: str | None = None,
+    units: str | None = None,
     allow: Sequence[str] = (),
     overwrite: bool = False,
     threads: int | None = None,
@@ -127,6 +130,7 @@ def export(
     - `scene`: scene files, areas in memory, or a mesh. Several scenes make a data set of several areas;
       several files of meshes make one area.
     - `locations`, `labels`: for a single mesh in memory, as in `Area`.
+    - `up`, `units`: of the files of meshes, as in `read_mesh`.
     - `allow`: conditions of usefulness that need not be met. An error that stops an export names its
       condition.
     - `overwrite`: replace an earlier data set, or the unfinished one of another call. Other files stay.
@@ -141,12 +145,19 @@ def export(
     """
     scenes = list(scene) if isinstance(scene, (list, tuple)) else [scene]
     paths = [fspath(one) for one in scenes if isinstance(one, (str, PathLike))]
+    if not scenes:
+        raise UsageError("scene: there is none: name one")
+    meshes_in_memory = [one for one in scenes if not isinstance(one, (str, PathLike))]
+    if meshes_in_memory and (up is not None or units is not None):
+        raise UsageError("up, units: of the files of meshes; give what is in memory Z up, in metres")
     given: list[str] | list[_Area]
     if paths and labels is None and not len(locations):
         if len(paths) < len(scenes):
             raise UsageError("scene: either all paths, or none: read meshes by read_mesh")
         given = paths
     else:
+        if isinstance(scenes[0], (str, PathLike)):
+            scenes[0] = read_mesh(scenes[0], up=up, units=units)
         areas = [
             one if isinstance(one, Area) else Area(one, locations=locations, labels=labels) for one in scenes
         ]
@@ -156,7 +167,7 @@ def export(
             )
         given = [_Area(area) for area in areas]
     summary = _native.export(
-        given, fspath(output), json.dumps(options), list(allow), overwrite, threads, sink(progress)
+        given, fspath(output), json.dumps(options), list(allow), (up, units), overwrite, threads, sink(progress)
     )
     return None if summary is None else json.loads(summary)
 
@@ -175,7 +186,7 @@ class _Area:
 def _places(labels: Labels) -> tuple[list[str], npt.NDArray[np.int32]]:
     """Returns the different names, and the index of each face's name among them."""
     if isinstance(labels, tuple) and len(labels) == 2 and not isinstance(labels[1], str):
-        return [str(name) for name in labels[0]], np.asarray(labels[1]).astype(np.int32)
+        return [str(name) for name in labels[0]], whole("labels", labels[1], np.int32)
     names, places = np.unique(np.asarray(labels, np.str_), return_inverse=True)
     none = int(names.size > 0 and names[0] == "")
     return names[none:].tolist(), (places - none).astype(np.int32)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Union
 
@@ -12,8 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._checks import colors_of, number, rows, whole
 from ._errors import UsageError
-from ._mesh import Mesh, MeshLike, as_mesh, colors_of, rows
+from ._files import replaced
+from ._mesh import Mesh, MeshLike, as_mesh
+from ._names import NameInRoom
 from ._progress import Progress, sink
 
 
@@ -32,13 +36,23 @@ class PointCloud:
         return len(self.xyz)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes positions and colours as a binary PLY file, completely or not at all. An existing file is
-        replaced.
-        """
+        """Writes positions and colours: see `save_points`."""
         save_points(path, self.xyz, self.rgb)
 
     def __repr__(self) -> str:
         return f"PointCloud({len(self):,} points)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LabelledPoints(PointCloud):
+    """The sampled points of an area of a data set."""
+
+    label: npt.NDArray[np.int32]
+    """(N,), index into `DataSet.labels`; 0 without a label."""
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes positions, colours and labels: see `save_points`."""
+        save_points(path, self.xyz, self.rgb, self.label)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,7 +65,7 @@ class AnnotatedPoints:
     """(N, 3), sRGB; black where the files have no colours."""
     label: npt.NDArray[np.int32]
     """(N,), index into `names` for each point."""
-    names: list[str]
+    names: list[NameInRoom]
     """The instances, in the form that `export` takes: class, number of the instance in the room, type and
     number of the room: "chair_1_office_2".
     """
@@ -154,14 +168,41 @@ def read_points(
         lenient=lenient,
     )
     files = [paths] if isinstance(paths, (str, PathLike)) else list(paths)
-    return AnnotatedPoints(*_native.read_points([fspath(path) for path in files], how, sink(progress)))
+    xyz, rgb, label, names = _native.read_points([fspath(path) for path in files], how, sink(progress))
+    return AnnotatedPoints(xyz, rgb, label, [NameInRoom(name) for name in names])
 
 
-def save_points(path: str | PathLike[str], xyz: npt.ArrayLike, rgb: npt.ArrayLike) -> None:
-    """Writes N points as a binary PLY file, completely or not at all. An existing file is replaced. `xyz` is
-    (N, 3), metres; `rgb` is (N, 3), sRGB, uint8, or floats from 0 to 1.
+def save_points(
+    path: str | PathLike[str],
+    xyz: npt.ArrayLike,
+    rgb: npt.ArrayLike | None = None,
+    labels: npt.ArrayLike | None = None,
+) -> None:
+    """Writes N points, completely or not at all. An existing file is replaced. The ending of the path tells the
+    form: `.ply` (binary), `.las` (1.4, steps of 0.1 mm, labels as the extra dimension `label`), or `.npz`
+    (`xyz`, `rgb`, `label`).
+
+    - `xyz`: (N, 3), metres.
+    - `rgb`: (N, 3), sRGB, whole numbers from 0 to 255 or floats from 0 to 1; black if None.
+    - `labels`: (N,), whole numbers of 32 bits.
     """
-    _native.write_points(fspath(path), rows("xyz", xyz, 3, np.float32), colors_of(rgb, "rgb"))
+    ending = Path(path).suffix.lower()
+    if ending not in (".ply", ".las", ".npz"):
+        raise UsageError(f"{fspath(path)}: points are written as .ply, .las or .npz")
+    positions = rows("xyz", xyz, 3, np.float32)
+    colors = None if rgb is None else colors_of(rgb, "rgb")
+    column = None if labels is None else whole("labels", labels, np.int32)
+    for what, of_points in (("colours", colors), ("labels", column)):
+        if of_points is not None and len(of_points) != len(positions):
+            raise UsageError(f"{len(of_points)} {what} for {len(positions)} points: one for each")
+    if column is not None and column.ndim != 1:
+        raise UsageError(f"labels: an array (N,), not of shape {column.shape}")
+    if ending != ".npz":
+        _native.write_points(fspath(path), positions, colors, column, ending == ".las")
+        return
+    arrays: dict[str, Any] = {"xyz": positions, "rgb": colors, "label": column}
+    with replaced(Path(path)) as file:
+        np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
 
 
 def sample(
@@ -175,11 +216,12 @@ def sample(
 ) -> PointCloud:
     """Samples points evenly over a mesh, in the order of its faces, with the mesh's colours. Their number
     follows from the density `points_per_m2`, or is `points`. The same mesh, density and seed give the same
-    bits. Each point takes 19 bytes of memory.
+    bits. Each point takes 19 bytes of memory: `TooLargeError` (a `MemoryError`) if that is more than is free.
     """
     native = as_mesh(mesh)._native
-    if points is not None and points < 0:
-        raise UsageError(f"points={points}: must be at least 0")
+    if points is not None:
+        points = number("points", points, 0)
+    seed = number("seed", seed, 0)
     xyz, rgb, face = _native.sample(native, points_per_m2, points, seed, threads, sink(progress))
     return PointCloud(xyz, rgb, face.view(np.int32))
 
@@ -214,7 +256,7 @@ def fill(mesh: MeshLike, labels: npt.ArrayLike, within: float) -> npt.NDArray[np
     """Returns the labels (F,) of faces. A face with −1 gets the label of the labelled surface next to it,
     within `within` metres along the surface and not around an edge of more than 45°.
     """
-    return _native.fill(as_mesh(mesh)._native, np.ascontiguousarray(labels, np.int64), within)
+    return _native.fill(as_mesh(mesh)._native, whole("labels", labels, np.int64), within)
 
 
 def _positions(points: Any) -> npt.ArrayLike:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._camera import Location, Matrix, PoseLike, matrix, pose_of
+from ._checks import number
 from ._errors import UsageError
 from ._mesh import Mesh, MeshLike, as_mesh
 from ._progress import Progress, sink
@@ -153,6 +154,9 @@ class Scene:
         self.mesh: Mesh = as_mesh(mesh)
         self._native = _native.Scene(self.mesh._native)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scene, (self.mesh,)
+
     def __repr__(self) -> str:
         return f"Scene({self.mesh!r})"
 
@@ -176,7 +180,8 @@ class Scene:
           bend.
         - `smooth_normals`: interpolate the normals of the mesh's vertices, if it has any.
 
-        Raises `UsageError` for an invalid matrix, and says what is wrong with it.
+        Raises `UsageError` for an invalid matrix, and says what is wrong with it; `TooLargeError` (a
+        `MemoryError`) if the images would not fit into memory.
         """
         return self._images(
             matrix("K", K, (3, 3)), T_world_cam, size, modalities, rgb_samples, smooth_normals
@@ -316,11 +321,13 @@ class Scene:
         smooth_normals: bool,
         stored: bool,
     ) -> dict[str, npt.NDArray[Any]]:
-        words = list(dict.fromkeys(modalities))
+        words = list(dict.fromkeys([modalities] if isinstance(modalities, str) else modalities))
         if not words:
             raise UsageError(f"modalities: name some of {', '.join(MODALITIES)}")
         width, height = size
-        request = (words, smooth_normals, rgb_samples, stored)
+        if not all(isinstance(side, (int, np.integer)) and side > 0 for side in size):
+            raise UsageError(f"size=({width}, {height}): width and height must be whole numbers from 1")
+        request = (words, bool(smooth_normals), number("rgb_samples", rgb_samples, 1, 64), stored)
         k = None if K is None else K.tolist()
         made = self._native.render(k, T.tolist(), (int(width), int(height)), request)
         return {word: made[word] for word in words}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -10,20 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ._errors import UsageError
+from ._packages import package
 
 if TYPE_CHECKING:
-    from ._dataset import DataSet, View
+    from ._dataset import DataSet
+    from ._views import Image
 
 
-def package(name: str, install: str) -> Any:
-    """Imports a package that users install themselves."""
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise UsageError(f"{name} cannot be imported ({error}): pip install {install}") from None
-
-
-def log_to_rerun(data: DataSet, views: Iterable[View], mesh: bool, recording: Any) -> None:
+def log_to_rerun(data: DataSet, views: Iterable[Image], mesh: bool, recording: Any) -> None:
     rr = package("rerun", "rerun-sdk")
 
     def log(path: str, what: Any, *, static: bool = False) -> None:
@@ -95,13 +88,13 @@ def _log_instances(rr: Any, log: Any, data: DataSet, area: int) -> None:
         log(f"world/area_{area}/instances/{name}", boxes, static=True)
 
 
-def fiftyone_samples(data: DataSet, views: Iterable[View]) -> list[Any]:
+def fiftyone_samples(data: DataSet, views: Iterable[Image]) -> list[Any]:
     """The samples of `DataSet.to_fiftyone`."""
     fo = package("fiftyone", "fiftyone")
     return [_sample(fo, data, view) for view in views]
 
 
-def _sample(fo: Any, data: DataSet, view: View) -> Any:
+def _sample(fo: Any, data: DataSet, view: Image) -> Any:
     if "rgb" not in view.files:
         raise UsageError(f"{view.name} has no rgb: samples of FiftyOne are images")
     fields: dict[str, Any] = {

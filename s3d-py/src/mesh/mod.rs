@@ -1,20 +1,24 @@
 //! `_native.Mesh`: a mesh that scenes, arrays and exports share.
 
+pub(crate) mod edit;
+
 use crate::arrays;
 use crate::error::{exception, usage};
 use crate::work::{detached, watched};
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use s3d_dataset::{MeshAxes, read_mesh};
 use s3d_geom::glam::Vec2;
-use s3d_geom::{Material, MeshParts, NO_INDEX, Raster, Texture, TriMesh, Wrap};
+use s3d_geom::{DEFAULT_COLOR, Material, MeshParts, NO_INDEX, Raster, Texture, TriMesh, Wrap};
 use s3d_io::Error as FileError;
-use s3d_io::mesh::{LengthUnit, MeshFile, MeshLabels, MeshOptions, MeshOrigin, UpAxis, read_mesh_with};
+use s3d_io::mesh::{MeshFile, MeshLabels, MeshOrigin};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// The name of a mesh of arrays, for messages.
-const IN_MEMORY: &str = "mesh in memory";
+pub(crate) const IN_MEMORY: &str = "mesh in memory";
 
 /// A mesh from a file or from arrays. It never changes.
 #[pyclass(frozen)]
@@ -28,6 +32,15 @@ pub(crate) fn parsed<T: std::str::FromStr>(what: &str, word: &str, choices: &str
         .map_err(|_| usage(format!("{what}={word:?}: must be one of {choices}")))
 }
 
+/// What the caller says of the file of a mesh.
+pub(crate) fn axes(up: Option<&str>, units: Option<&str>) -> PyResult<MeshAxes> {
+    let up = up.map(|word| parsed("up", word, "y, z")).transpose()?;
+    let units = units
+        .map(|word| parsed("units", word, "m, cm, mm, ft, in"))
+        .transpose()?;
+    Ok(MeshAxes { up, units })
+}
+
 type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 
 #[pymethods]
@@ -37,22 +50,14 @@ impl Mesh {
     fn read(
         py: Python<'_>,
         path: PathBuf,
-        up: &str,
+        up: Option<&str>,
         units: Option<&str>,
         near: bool,
         sink: Py<PyAny>,
     ) -> PyResult<Self> {
-        let up: UpAxis = parsed("up", up, "y, z")?;
-        let units = units
-            .map(|word| parsed::<LengthUnit>("units", word, "m, cm, mm, ft, in"))
-            .transpose()?;
+        let axes = axes(up, units)?;
         let origin = if near { MeshOrigin::Near } else { MeshOrigin::OfFile };
-        let options = MeshOptions { origin, units, ..MeshOptions::default() };
-        let file = watched(py, None, &sink, |ctx| {
-            let file = read_mesh_with(&path, up, &options)?;
-            file.warnings.iter().for_each(|warning| ctx.warn(warning));
-            Ok(file)
-        })?;
+        let file = watched(py, None, &sink, |ctx| read_mesh(&path, axes, origin, ctx))?;
         Ok(Self { file: Arc::new(file) })
     }
 
@@ -64,6 +69,7 @@ impl Mesh {
         vertices: PyReadonlyArray2<'_, f32>,
         faces: PyReadonlyArray2<'_, u32>,
         vertex_colors: Option<PyReadonlyArray2<'_, u8>>,
+        face_colors: Option<PyReadonlyArray2<'_, u8>>,
         uv: Option<PyReadonlyArray2<'_, f32>>,
         face_uv: Option<PyReadonlyArray2<'_, u32>>,
         textures: Vec<PyReadonlyArray3<'_, u8>>,
@@ -76,11 +82,20 @@ impl Mesh {
             .transpose()?;
         let uvs = uv.map(|uv| arrays::from_rows::<f32, 2>("uv", &uv)).transpose()?;
         let textures = textures.iter().enumerate().map(texture).collect::<PyResult<Vec<_>>>()?;
-        let face_materials = match texture_of_face {
+        let mut face_materials = match texture_of_face {
             Some(of_face) => of_face.to_vec().map_err(|e| usage(format!("texture_of_face: {e}")))?,
             None if textures.is_empty() => Vec::new(),
             None => vec![0; faces.len()],
         };
+        let mut materials: Vec<Material> = (0..textures.len() as u32).map(material).collect();
+        if let Some(colors) = face_colors {
+            let colors = arrays::from_rows::<u8, 3>("face_colors", &colors)?;
+            if colors.len() != faces.len() {
+                return Err(usage(format!("{} face_colors for {} faces", colors.len(), faces.len())));
+            }
+            face_materials.resize(faces.len(), NO_INDEX);
+            color_faces(&mut face_materials, &mut materials, &colors);
+        }
 
         let parts = MeshParts {
             positions: arrays::points("vertices", &vertices)?,
@@ -95,7 +110,7 @@ impl Mesh {
                 .unwrap_or_default(),
             face_normals: if normals.is_some() { faces.clone() } else { Vec::new() },
             normals: normals.unwrap_or_default(),
-            materials: (0..textures.len() as u32).map(material).collect(),
+            materials,
             face_materials,
             textures,
             faces,
@@ -152,6 +167,19 @@ impl Mesh {
             material.and_then(|m| m.texture).unwrap_or(NO_INDEX)
         };
         PyArray1::from_iter(py, (0..self.mesh().faces().len() as u32).map(texture))
+    }
+
+    /// The colour of the material of each face; `None` if no face has one.
+    #[getter]
+    fn material_colors<'py>(&self, py: Python<'py>) -> PyResult<Option<Rows<'py, u8>>> {
+        let materials = self.mesh().materials();
+        let of = |face: u32| self.mesh().material_of(face).and_then(|m| materials.get(m as usize));
+        let faces = 0..self.mesh().faces().len() as u32;
+        if materials.is_empty() || !faces.clone().any(|face| of(face).is_some()) {
+            return Ok(None);
+        }
+        let colors = faces.map(|face| of(face).map_or(DEFAULT_COLOR, |m| m.color));
+        arrays::rows(py, colors.collect()).map(Some)
     }
 
     /// The names and pixels of the textures.
@@ -247,7 +275,19 @@ pub(crate) fn raster(what: &str, array: &PyReadonlyArray3<'_, u8>) -> PyResult<R
     }
 }
 
+/// Gives faces without a material one of their colour.
+fn color_faces(face_materials: &mut [u32], materials: &mut Vec<Material>, colors: &[[u8; 3]]) {
+    let mut of_color: BTreeMap<[u8; 3], u32> = BTreeMap::new();
+    for (of_face, color) in face_materials.iter_mut().zip(colors).filter(|(of, _)| **of == NO_INDEX) {
+        *of_face = *of_color.entry(*color).or_insert_with(|| {
+            let [r, g, b] = *color;
+            materials.push(Material { name: format!("color_{r}_{g}_{b}"), color: *color, texture: None });
+            materials.len() as u32 - 1
+        });
+    }
+}
+
 fn material(number: u32) -> Material {
     let name = format!("material_{number}");
-    Material { name, color: s3d_geom::DEFAULT_COLOR, texture: Some(number) }
+    Material { name, color: DEFAULT_COLOR, texture: Some(number) }
 }
