@@ -1,29 +1,10 @@
 //! Values to arrays of NumPy, and back.
 
-use crate::error::{fault, usage};
-use crate::mesh::Mesh;
-use numpy::ndarray::ArrayView2;
+use crate::error::usage;
 use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use s3d_geom::Raster;
 use s3d_geom::glam::{DMat3, DVec3, Vec3};
-use s3d_geom::{Raster, TriMesh};
-
-/// Returns rows of a mesh as a read-only array, without a copy.
-pub(crate) fn view<'py, T: Element, const N: usize>(
-    mesh: &Bound<'py, Mesh>,
-    rows: impl for<'m> FnOnce(&'m TriMesh) -> &'m [[T; N]],
-) -> PyResult<Bound<'py, PyArray2<T>>> {
-    let rows = rows(mesh.get().mesh());
-    let shaped = ArrayView2::from_shape((rows.len(), N), rows.as_flattened());
-    let shaped = shaped.map_err(|e| fault(e.to_string()))?;
-    // SAFETY: the rows belong to the mesh. Its class is frozen, so they are neither written nor moved while
-    // the object lives, and the array keeps the object alive.
-    #[allow(unsafe_code)]
-    let array = unsafe { PyArray2::borrow_from_array(&shaped, mesh.clone().into_any()) };
-    // By NumPy's own flag: a borrow would panic while a call on another thread reads the same rows.
-    array.getattr("flags")?.setattr("writeable", false)?;
-    Ok(array)
-}
 
 /// Turns rows into an array n × N, without a copy.
 pub(crate) fn rows<T: Element, const N: usize>(

@@ -22,9 +22,9 @@ TRIANGLE: dict[str, Any] = dict(vertices=np.eye(3), faces=[[0, 1, 2]])
 
 @pytest.fixture(scope="module")
 def lying(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A room with Z up, 4 × 3 × 2.5 m, as files whose axes and units differ."""
+    """A room with Z up, 6 × 5 × 2.5 m, as files whose axes and units differ."""
     folder = tmp_path_factory.mktemp("axes")
-    room = box()
+    room = box((6.0, 5.0, 2.5))
     lying = room.vertices[:, [0, 2, 1]] * [1, 1, -1]
     forms: dict[str, Any] = {"z": room.vertices, "y": lying, "mm": room.vertices * 1000}
     for name, vertices in forms.items():
@@ -42,9 +42,9 @@ def test_every_door_finds_the_same_up_axis_and_unit(lying: dict[str, Path]) -> N
             s3d.vote(path, [[2, 1.5, 0]], [3]).mesh,
         ]
         for mesh in doors:
-            assert np.allclose(mesh.bounds[1] - mesh.bounds[0], [4, 3, 2.5], atol=1e-5), path
+            assert np.allclose(mesh.bounds[1] - mesh.bounds[0], [6, 5, 2.5], atol=1e-5), path
         cloud = s3d.sample(path, points=4000)
-        assert np.allclose(np.ptp(cloud.xyz, 0), [4, 3, 2.5], atol=0.1)
+        assert np.allclose(np.ptp(cloud.xyz, 0), [6, 5, 2.5], atol=0.1)
 
 
 def test_an_axis_is_told_and_a_wish_that_contradicts_is_warned_of(
@@ -56,7 +56,7 @@ def test_an_axis_is_told_and_a_wish_that_contradicts_is_warned_of(
     assert not any(record.levelno >= logging.WARNING for record in caplog.records)
     caplog.clear()
     on_its_side = s3d.read_mesh(lying["z"], up="y")
-    assert np.allclose(np.ptp(on_its_side.vertices, 0), [4, 2.5, 3])
+    assert np.allclose(np.ptp(on_its_side.vertices, 0), [6, 2.5, 5])
     warnings = [r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING]
     assert len(warnings) == 1 and "z.obj" in warnings[0] and "on its side" in warnings[0]
 
@@ -75,7 +75,7 @@ def test_exports_of_a_mesh_take_axes_with_and_without_locations(lying: dict[str,
         out = tmp_path / f"{name}_{len(list(tmp_path.iterdir()))}"
         s3d.export(lying[name], out, allow=["coverage", "colour"], **options, **small)
         size = np.ptp(s3d.open(out).mesh().vertices, 0)
-        assert np.allclose(size, [4, 3, 2.5], atol=1e-4), (name, options, size)
+        assert np.allclose(size, [6, 5, 2.5], atol=1e-4), (name, options, size)
     with pytest.raises(s3d.UsageError, match="up, units"):
         s3d.export(box(), tmp_path / "memory", up="z")
 

@@ -34,6 +34,12 @@ def barycentric(triangles, points):
     return np.stack([1 - s - t, s, t], axis=1), np.linalg.norm(w - s[:, None] * u - t[:, None] * v, axis=1)
 
 
+def warnings_of(done):
+    """The warnings, but for that of boxes whose walls have more surface than their floors."""
+    lines = done.stderr.splitlines()
+    return [line for line in lines if "WARN" in line and "is to point up" not in line]
+
+
 def check(s3d, path, vertices, faces, tmp_path, vertex_colors=None, face_colors=None):
     """Compares the sampled points of the file at `path` with the mesh in it."""
     vertices, faces = np.asarray(vertices, np.float64), np.asarray(faces)
@@ -90,7 +96,7 @@ def test_plyfile_polygons_colours_and_labels_in_every_encoding(s3d, tmp_path, te
     path = tmp_path / "box.ply"
     plyfile.PlyData(elements, text=text, byte_order=order, comments=["a box"]).write(str(path))
     done = check(s3d, path, vertices, triangles, tmp_path, vertex_colors=colors)
-    assert "WARN" not in done.stderr
+    assert warnings_of(done) == []
 
 
 def test_plyfile_float_colours_and_a_texture_named_by_a_comment(s3d, tmp_path):
@@ -116,7 +122,7 @@ def test_plyfile_float_colours_and_a_texture_named_by_a_comment(s3d, tmp_path):
                            comments=["TextureFile six colours.png"])
     data.write(str(path))
     done = check(s3d, path, vertices, triangles, tmp_path, face_colors=np.repeat(colors[::4], 2, axis=0))
-    assert "WARN" not in done.stderr
+    assert warnings_of(done) == []
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "binary"])
@@ -128,7 +134,7 @@ def test_trimesh_ply(s3d, tmp_path, encoding):
     path = tmp_path / "sphere.ply"
     mesh.export(path, encoding=encoding, vertex_normal=True)
     done = check(s3d, path, mesh.vertices, mesh.faces, tmp_path, vertex_colors=mesh.visual.vertex_colors[:, :3])
-    assert "WARN" not in done.stderr
+    assert warnings_of(done) == []
 
 
 @pytest.mark.parametrize("ending, ascii", [("ply", True), ("ply", False), ("obj", True), ("glb", False), ("gltf", True)])

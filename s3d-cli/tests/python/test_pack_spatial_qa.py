@@ -15,7 +15,7 @@ spatial = pytest.importorskip("scipy.spatial")
 @pytest.fixture(scope="module")
 def made(s3d, demo, tmp_path_factory):
     out = tmp_path_factory.mktemp("questions") / "dataset"
-    small = ["--views", "8", "--size", "160", "--pano-width", "128", "--points-per-m2", "100"]
+    small = ["--views", "16", "--size", "160", "--pano-width", "128", "--points-per-m2", "100"]
     s3d("export", demo / "scan/scene.toml", "-o", out, *small)
     s3d("pack", out, "--to", "spatial-qa")
     package = out.with_name("dataset_spatial-qa")

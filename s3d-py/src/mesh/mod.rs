@@ -3,9 +3,10 @@
 pub(crate) mod edit;
 
 use crate::arrays;
-use crate::error::{exception, usage};
+use crate::error::{exception, fault, usage};
 use crate::work::{detached, watched};
-use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::ndarray::ArrayView2;
+use numpy::{Element, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use s3d_dataset::{MeshAxes, read_mesh};
@@ -127,35 +128,31 @@ impl Mesh {
 
     #[getter]
     fn vertices<'py>(slf: &Bound<'py, Self>) -> PyResult<Rows<'py, f32>> {
-        arrays::view(slf, |mesh| bytemuck::cast_slice::<_, [f32; 3]>(mesh.positions()))
+        view(slf, |mesh| bytemuck::cast_slice::<_, [f32; 3]>(mesh.positions()))
     }
 
     #[getter]
     fn faces<'py>(slf: &Bound<'py, Self>) -> PyResult<Rows<'py, u32>> {
-        arrays::view(slf, TriMesh::faces)
+        view(slf, TriMesh::faces)
     }
 
     #[getter]
     fn vertex_colors<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Rows<'py, u8>>> {
         let is_there = !slf.get().mesh().parts().colors.is_empty();
-        is_there
-            .then(|| arrays::view(slf, |mesh| &mesh.parts().colors))
-            .transpose()
+        is_there.then(|| view(slf, |mesh| &mesh.parts().colors)).transpose()
     }
 
     #[getter]
     fn uv<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Rows<'py, f32>>> {
         let is_there = !slf.get().mesh().parts().uvs.is_empty();
-        let uvs = || arrays::view(slf, |mesh| bytemuck::cast_slice::<_, [f32; 2]>(&mesh.parts().uvs));
+        let uvs = || view(slf, |mesh| bytemuck::cast_slice::<_, [f32; 2]>(&mesh.parts().uvs));
         is_there.then(uvs).transpose()
     }
 
     #[getter]
     fn face_uv<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Rows<'py, u32>>> {
         let is_there = !slf.get().mesh().parts().face_uvs.is_empty();
-        is_there
-            .then(|| arrays::view(slf, |mesh| &mesh.parts().face_uvs))
-            .transpose()
+        is_there.then(|| view(slf, |mesh| &mesh.parts().face_uvs)).transpose()
     }
 
     /// The texture of each face, 2³² − 1 for none.
@@ -187,7 +184,7 @@ impl Mesh {
     fn textures<'py>(slf: &Bound<'py, Self>) -> PyResult<Vec<(String, Bound<'py, PyArray3<u8>>)>> {
         let mut shown = Vec::new();
         for (number, texture) in slf.get().mesh().textures().iter().enumerate() {
-            let rows = arrays::view(slf, |mesh| {
+            let rows = view(slf, |mesh| {
                 mesh.textures()
                     .get(number)
                     .map_or(&[], |texture| texture.image.pixels())
@@ -256,6 +253,23 @@ impl Mesh {
     pub(crate) fn mesh(&self) -> &TriMesh {
         &self.file.mesh
     }
+}
+
+/// Returns rows of a mesh as a read-only array, without a copy.
+fn view<'py, T: Element, const N: usize>(
+    mesh: &Bound<'py, Mesh>,
+    rows: impl for<'m> FnOnce(&'m TriMesh) -> &'m [[T; N]],
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let rows = rows(mesh.get().mesh());
+    let shaped = ArrayView2::from_shape((rows.len(), N), rows.as_flattened());
+    let shaped = shaped.map_err(|e| fault(e.to_string()))?;
+    // SAFETY: the rows belong to the mesh. Its class is frozen, so they are neither written nor moved while
+    // the object lives, and the array keeps the object alive.
+    #[allow(unsafe_code)]
+    let array = unsafe { PyArray2::borrow_from_array(&shaped, mesh.clone().into_any()) };
+    // By NumPy's own flag: a borrow would panic while a call on another thread reads the same rows.
+    array.getattr("flags")?.setattr("writeable", false)?;
+    Ok(array)
 }
 
 fn texture((number, array): (usize, &PyReadonlyArray3<'_, u8>)) -> PyResult<Texture> {
