@@ -133,13 +133,18 @@ impl Scene {
             return Err(usage("origins: there are none"));
         }
 
-        let hits: (Vec<f64>, Vec<i32>) = detached(py, threads, || {
-            let found = cast_rays(self.tree(), &origins, &directions);
-            let found = found.into_iter();
+        let call = || {
+            let found = cast_rays(self.tree(), &origins, &directions).into_iter();
             found
                 .map(|hit| hit.map_or((f64::NAN, -1), |hit| (hit.t, hit.face as i32)))
                 .unzip()
-        })?;
+        };
+        // Few rays take less time than the start of a thread.
+        let hits: (Vec<f64>, Vec<i32>) = if directions.len() <= FEW_RAYS {
+            py.detach(call)
+        } else {
+            detached(py, threads, call)?
+        };
         Ok((PyArray1::from_vec(py, hits.0), PyArray1::from_vec(py, hits.1)))
     }
 
@@ -188,6 +193,9 @@ impl Scene {
 }
 
 const MODALITIES: [&str; 5] = ["rgb", "depth", "normal", "xyz", "face"];
+
+/// So many rays are cast on the calling thread.
+const FEW_RAYS: usize = 1024;
 
 /// The bytes of a pixel's hit: its face and its depth.
 const HIT_BYTES: f64 = 8.0;

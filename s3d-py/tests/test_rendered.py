@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import pickle
+import sys
+import types
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +91,23 @@ def test_a_stream_has_each_index_once_over_all_ranks(ds: s3d.DataSet) -> None:
     assert _same(found[5], views[5])
     with pytest.raises(s3d.UsageError, match="rank=3"):
         views.stream(3, 3)
+
+
+def test_torch_finds_its_own_classes(ds: s3d.DataSet, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A stand-in, for torch is large: its loaders tell streams by their class.
+    classes: dict[str, Any] = {"Dataset": type("Dataset", (), {}), "IterableDataset": type("Iterable", (), {})}
+    data = types.SimpleNamespace(**classes, get_worker_info=lambda: types.SimpleNamespace(id=1, num_workers=2))
+    monkeypatch.setitem(sys.modules, "torch.utils.data", data)
+    views = s3d.RenderedViews(ds, size=(16, 16), modalities=["depth"])
+    for made, kind, base in [
+        (views.stream(1, 3), s3d.RenderedStream, classes["IterableDataset"]),
+        (ds.torch(["depth"]), s3d.TorchDataset, classes["Dataset"]),
+    ]:
+        copy = pickle.loads(pickle.dumps(made))
+        assert all(isinstance(one, kind) and isinstance(one, base) for one in (made, copy))
+    # The second worker of two, in the second rank of three.
+    stream = iter(views.stream(1, 3))
+    assert [next(stream)["index"] for _ in range(3)] == [3, 9, 15]
 
 
 def test_paper_views_have_the_distributions_of_the_paper(ds: s3d.DataSet) -> None:

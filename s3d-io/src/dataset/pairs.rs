@@ -24,8 +24,8 @@ pub struct PairColumns {
     pub other: Vec<u32>,
     /// The share of image i's points that the other image sees, too, M.
     pub overlap: Vec<f32>,
-    /// The median angle at those points between the directions to both cameras, degrees, M. NaN without such a
-    /// point.
+    /// The median angle at those points between the directions to both cameras, degrees, M. NaN without such
+    /// a point.
     pub angle_deg: Vec<f32>,
     /// The median size of a pixel there in image i by that in the other image, M. NaN without such a point.
     pub scale: Vec<f32>,

@@ -16,6 +16,7 @@ from ._checks import number, whole
 from ._dataset import DataSet
 from ._errors import InputError, UsageError
 from ._mesh import MeshLike
+from ._packages import for_torch
 from ._scene import MODALITIES, Scene
 
 _OF_LABELS = ("labels", "classes")
@@ -310,12 +311,7 @@ class RenderedStream:
 
     @staticmethod
     def _of(views: RenderedViews, rank: int, ranks: int) -> RenderedStream:
-        try:
-            base = importlib.import_module("torch.utils.data").IterableDataset
-        except ImportError:
-            return RenderedStream(views, rank, ranks)
-        both = type("RenderedStream", (RenderedStream, base), {"__module__": __name__})
-        return both(views, rank, ranks)  # type: ignore[no-any-return]
+        return for_torch(RenderedStream, "IterableDataset")(views, rank, ranks)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return RenderedStream._of, (self.views, self.rank, self.ranks)

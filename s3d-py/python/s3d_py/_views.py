@@ -18,6 +18,7 @@ from ._camera import Matrix
 from ._checks import rows
 from ._errors import UsageError
 from ._files import replaced
+from ._packages import for_torch
 from ._scene import picture
 
 if TYPE_CHECKING:
@@ -379,12 +380,7 @@ class TorchDataset:
     def _of(
         views: Views[Image], modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None
     ) -> TorchDataset:
-        try:
-            base = importlib.import_module("torch.utils.data").Dataset
-        except ImportError:
-            return TorchDataset(views, modalities, transform)
-        both = type("TorchDataset", (TorchDataset, base), {"__module__": __name__})
-        return both(views, modalities, transform)  # type: ignore[no-any-return]
+        return for_torch(TorchDataset, "Dataset")(views, modalities, transform)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return TorchDataset._of, (self.views, self.modalities, self.transform)

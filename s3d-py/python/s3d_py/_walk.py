@@ -68,17 +68,22 @@ def _places(scene: Scene, rng: np.random.Generator, height: float, clear: float)
 def _ways(scene: Scene, places: Matrix, clear: float) -> list[list[tuple[int, float]]]:
     """Of each place the others that are near, and their distances, where nothing is between."""
     ways: list[list[tuple[int, float]]] = [[] for _ in places]
-    flat = np.linalg.norm(places[:, None] - places[None], axis=2)
-    first, second = np.nonzero(np.triu(flat < _NEAR_M, 1))
+    # Row by row: all distances at once would take memory.
+    near = [
+        i + 1 + np.flatnonzero(np.linalg.norm(places[i + 1 :] - place, axis=1) < _NEAR_M)
+        for i, place in enumerate(places)
+    ]
+    first, second = np.repeat(np.arange(len(places)), [len(others) for others in near]), np.concatenate(near)
     offset = places[second] - places[first]
+    length = np.linalg.norm(offset, axis=1)
     across = np.cross(offset, [0.0, 0.0, 1.0])
     across *= 0.5 * clear / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
     free = np.abs(offset[:, 2]) < 0.3
     for side in (-1.0, 0.0, 1.0):
         free &= ~(scene.cast(places[first] + side * across, offset, threads=1).t < 1.0)
-    for a, b in zip(first[free].tolist(), second[free].tolist()):
-        ways[a].append((b, float(flat[a, b])))
-        ways[b].append((a, float(flat[a, b])))
+    for a, b, metres in zip(first[free].tolist(), second[free].tolist(), length[free].tolist()):
+        ways[a].append((b, metres))
+        ways[b].append((a, metres))
     return ways
 
 

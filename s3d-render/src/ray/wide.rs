@@ -18,9 +18,9 @@ const PADDING: f32 = 4e-7;
 /// Rays of a task.
 const CHUNK: usize = 1024;
 
-/// Returns the first hit of each ray, as [`cast_ray`] does: of the rays from `origins`, one for all or one for
-/// each, along `directions`. Rays are cast on the threads of the current rayon pool. The first call for a
-/// scene builds a tree, which takes about 110 bytes a face.
+/// Returns the first hit of each ray, as [`cast_ray`] does. Rays start at `origins`, one for all or one for
+/// each, and go along `directions`. Up to 1,024 rays are cast on the calling thread, and more on the threads
+/// of the current rayon pool. The first call for a scene builds a tree.
 ///
 /// ```
 /// use s3d_geom::{TriMesh, glam::{DVec3, vec3}};
@@ -44,32 +44,28 @@ pub fn cast_rays(scene: &Scene<'_>, origins: &[DVec3], directions: &[DVec3]) -> 
         directions.len()
     );
     let tree = scene.wide();
-    let mut hits = vec![None; directions.len()];
-    hits.par_chunks_mut(CHUNK)
-        .zip(directions.par_chunks(CHUNK))
-        .enumerate()
-        .for_each(|(chunk, (hits, directions))| {
-            let origin = |i: usize| {
-                if origins.len() == 1 {
-                    origins[0]
-                } else {
-                    origins[chunk * CHUNK + i]
-                }
-            };
-            let mut search =
-                Search { scene, tree, nearest: Nearest::default(), stack: Vec::with_capacity(64) };
-            dispatch!(level(), _simd => {
-                for (i, (hit, direction)) in hits.iter_mut().zip(directions).enumerate() {
-                    *hit = search.cast(origin(i), *direction);
-                }
-            });
+    let cast_chunk = |(chunk, hits): (usize, &mut [Option<Hit>])| {
+        let mut search = Search { scene, tree, nearest: Nearest::default(), stack: Vec::with_capacity(64) };
+        dispatch!(level(), _simd => {
+            for (i, hit) in (chunk * CHUNK..).zip(hits) {
+                let origin = origins[if origins.len() == 1 { 0 } else { i }];
+                *hit = search.cast(origin, directions[i]);
+            }
         });
+    };
+    let mut hits = vec![None; directions.len()];
+    if hits.len() <= CHUNK {
+        cast_chunk((0, &mut hits));
+    } else {
+        hits.par_chunks_mut(CHUNK).enumerate().for_each(cast_chunk);
+    }
     hits
 }
 
 /// A ray in single precision, with margins on the safe side.
 struct Bounds {
-    /// The origin, moved against the ray for the sides where it enters, and with it for those where it leaves.
+    /// The origin, moved forwards for the sides where the ray enters a box, so that it enters earlier, and
+    /// backwards for those where it leaves.
     enter_from: [f32; 3],
     leave_from: [f32; 3],
     inverse: [f32; 3],

@@ -46,6 +46,9 @@ impl Node {
     }
 }
 
+/// The most faces of a leaf: few, since testing a face costs more than testing a box.
+pub(crate) const MOST_FACES: usize = 4;
+
 /// A tree over faces. The boxes are exact unions of `f32` corners; every test against them allows for its own
 /// rounding.
 #[derive(Debug)]
@@ -64,8 +67,7 @@ impl FaceTree {
             .map(|&face| Aabb::from_points(&mesh.triangle(face).map(Into::into)))
             .collect();
 
-        // Leaves are small, since testing a face costs more than testing a box.
-        let bvh = build(&boxes, 4);
+        let bvh = build(&boxes, MOST_FACES as u32);
 
         Self {
             nodes: bvh

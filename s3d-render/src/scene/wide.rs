@@ -1,18 +1,19 @@
 //! A tree whose nodes have eight children, for many rays. Source: Wald, Benthin and Boulos 2008, "Getting rid
 //! of packets".
 
-use super::tree::{Content, FaceTree, Node};
+use super::tree::{Content, FaceTree, MOST_FACES, Node};
 use s3d_geom::TriMesh;
 use s3d_simd::prefetch;
 
 /// The children of a node.
 pub(crate) const WIDE: usize = 8;
-/// The faces of a block.
-pub(crate) const BLOCK: usize = 4;
+/// The faces of a block, which holds a leaf.
+pub(crate) const BLOCK: usize = MOST_FACES;
 /// No child, and no face.
 pub(crate) const NONE: u32 = u32::MAX;
 /// The bit of a child that is a block of faces.
 pub(crate) const IS_BLOCK: u32 = 1 << 31;
+
 /// The boxes of the children of a node, by axis.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
@@ -68,9 +69,8 @@ impl WideTree {
                     }
                     Content::Leaf { first, count } => {
                         let faces = &tree.faces[first as usize..first as usize + count as usize];
-                        wide.blocks
-                            .extend(faces.chunks(BLOCK).map(|faces| Block::new(mesh, faces)));
-                        IS_BLOCK | (wide.blocks.len() - faces.len().div_ceil(BLOCK)) as u32
+                        wide.blocks.push(Block::new(mesh, faces));
+                        IS_BLOCK | (wide.blocks.len() - 1) as u32
                     }
                 };
                 wide.nodes[at].set(slot, node, child);
@@ -78,9 +78,7 @@ impl WideTree {
         }
         wide
     }
-}
 
-impl WideTree {
     /// Asks for a child's memory before it is needed.
     #[inline(always)]
     pub(crate) fn prefetch(&self, child: u32) {
@@ -120,7 +118,7 @@ impl WideNode {
 
 impl Block {
     fn new(mesh: &TriMesh, faces: &[u32]) -> Self {
-        // What is left of a block is far from every ray, and named by no face.
+        // Lanes without a face keep zeros, and are told by their number.
         let mut block = Self { corners: [[[0.0; BLOCK]; 3]; 3], faces: [NONE; BLOCK] };
         for (lane, face) in faces.iter().enumerate() {
             block.faces[lane] = *face;

@@ -185,6 +185,12 @@ export function roomWords(room: string): string {
 export const roomName = (room: string): string =>
   room === "" || room === "unknown_1" ? "unknown room" : named(roomWords(room));
 
+/** Calls `show` when the pointer or the focus comes to an element, and `hide` when it leaves. */
+export function pointed(element: Element, show: () => void, hide: () => void): void {
+  for (const event of ["pointerenter", "focus"]) element.addEventListener(event, show);
+  for (const event of ["pointerleave", "blur"]) element.addEventListener(event, hide);
+}
+
 /** Whether a click opens a link here, not in another tab or window. */
 export const isPlain = (event: MouseEvent): boolean =>
   event.button === 0 && !event.ctrlKey && !event.metaKey && !event.shiftKey && !event.altKey;

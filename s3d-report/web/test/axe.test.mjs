@@ -6,7 +6,7 @@ import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { go, isFirefox, launch, open } from "./lib/browser.mjs";
-import { index, report } from "./lib/common.mjs";
+import { axeFinds, index, report } from "./lib/common.mjs";
 
 let browser;
 before(async () => {
@@ -47,9 +47,7 @@ for (const [scheme, width] of [
     for (const hash of PAGES) {
       await go(page, hash);
       if (hash.startsWith("#/space")) await page.waitForSelector("main[data-loaded=all]");
-      const { violations } = await page.evaluate(() => window.axe.run());
-      for (const { id, help, nodes } of violations)
-        found.push(`${hash} ${id} (${help}): ${nodes.length} times, ${nodes[0].html.slice(0, 160)}`);
+      found.push(...(await axeFinds(page, hash)));
     }
     assert.deepEqual(found, []);
     assert.deepEqual(faults, []);

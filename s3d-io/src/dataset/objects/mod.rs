@@ -87,8 +87,8 @@ pub struct BeyondFrame {
 /// The box of an instance in a panorama, by angles at the camera, degrees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BoxAngles {
-    /// The azimuths of the left and of the right side, counter-clockwise from +X. The right one is the smaller
-    /// one; the left one is in (−180, 180].
+    /// The azimuths of the left and of the right side, counter-clockwise from +X. The right one is the
+    /// smaller one; the left one is in (−180, 180].
     pub azimuth_deg: [f64; 2],
     /// The elevations of the lower and of the upper side above the horizon.
     pub elevation_deg: [f64; 2],

@@ -3,7 +3,7 @@
 import { css, depthRamp } from "../colors.js";
 import type { ChangeMark } from "../compare/marks.js";
 import type { Index, Location, Rgb, View } from "../data.js";
-import { append, flat, metres2, named, percent, roomName, roomOf, s, several } from "../dom.js";
+import { append, flat, metres2, named, percent, pointed, roomName, roomOf, s, several } from "../dom.js";
 import { type Box, boxOf, innermost, sizeOf } from "../outline.js";
 import { type GroundLayer, cornersOf, groundLayer } from "./ground.js";
 import { patchLink } from "../route/places.js";
@@ -176,13 +176,7 @@ export function plan(index: Index, area: number, options: FloorOptions = {}): Pl
       cones.replaceChildren();
       told(null);
     };
-    for (const [event, call] of [
-      ["pointerenter", show],
-      ["focus", show],
-      ["pointerleave", hide],
-      ["blur", hide],
-    ] as const)
-      target.addEventListener(event, call);
+    pointed(target, show, hide);
   };
   for (const view of photographs) {
     const place = at(view.position[0], view.position[1]);

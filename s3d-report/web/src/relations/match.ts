@@ -2,7 +2,7 @@
 
 import { css, oklch } from "../colors.js";
 import { type Index, type Picture, type View, load, loadPicture } from "../data.js";
-import { append, h, percent, s, say, several } from "../dom.js";
+import { append, h, percent, pointed, s, say, several } from "../dom.js";
 import { nameOf } from "../pages/names.js";
 import { type Page, link } from "../route/route.js";
 import { type Partner, loadPartners } from "./data.js";
@@ -96,13 +96,7 @@ function draw(
       match.classList.remove("is-chosen");
       told(null);
     };
-    for (const [event, call] of [
-      ["pointerenter", show],
-      ["focus", show],
-      ["pointerleave", hide],
-      ["blur", hide],
-    ] as const)
-      match.addEventListener(event, call);
+    pointed(match, show, hide);
     drawing.append(match);
   });
   return drawing;

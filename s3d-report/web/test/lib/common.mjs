@@ -186,3 +186,11 @@ export async function withCopy(change, use, from = report) {
     rmSync(made, { recursive: true });
   }
 }
+
+/** What axe, which the page has loaded, finds on it: a line for each kind of fault. */
+export async function axeFinds(page, hash) {
+  const { violations } = await page.evaluate(() => window.axe.run());
+  return violations.map(
+    ({ id, help, nodes }) => `${hash} ${id} (${help}): ${nodes.length} times, ${nodes[0].html.slice(0, 160)}`,
+  );
+}

@@ -8,6 +8,7 @@ import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { drawn, go, isFirefox, launch, open, ready } from "../lib/browser.mjs";
 import {
+  axeFinds,
   bare,
   json,
   near,
@@ -347,9 +348,7 @@ test("axe finds nothing in these pages", { skip: isFirefox && "axe is run in Chr
     await go(page, hash);
     await page.waitForSelector(needed);
     if (needed === ".object-rows button") await page.locator(needed).nth(2).focus();
-    const { violations } = await page.evaluate(() => window.axe.run());
-    for (const { id, help, nodes } of violations)
-      found.push(`${hash} ${id} (${help}): ${nodes.length} times, ${nodes[0].html.slice(0, 160)}`);
+    found.push(...(await axeFinds(page, hash)));
   }
   assert.deepEqual(found, []);
   assert.deepEqual(faults, []);
