@@ -88,6 +88,7 @@ mod error;
 mod extract;
 mod fusion;
 mod grid;
+mod lanes;
 mod noise;
 mod origin;
 mod range_image;

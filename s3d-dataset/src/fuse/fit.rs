@@ -5,6 +5,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use glam::DAffine3;
 use s3d_fusion::{PairResidual, RegisterOptions, ScanPoints, pair_residuals, refine_poses};
+use std::num::NonZeroU32;
 
 /// Comparing more scans than these would take longer than fusing them.
 const MOST_SCANS: usize = 100;
@@ -17,6 +18,12 @@ const PICTURES: usize = 16;
 
 /// Steps of a motion that tells whether a pair of depth pictures is off.
 const PICTURE_STEPS: usize = 4;
+
+/// So many points of a depth picture are compared with each other picture, at most.
+const PICTURE_POINTS: usize = 800;
+
+/// Of the rows and columns of a depth picture, each third is compared: a cube holds a dozen points of them.
+const PICTURE_STRIDE: NonZeroU32 = NonZeroU32::new(3).unwrap();
 
 /// Two depth pictures are off if a motion lessens their distance by this much, metres, and by half. Their
 /// noise is larger than that of laser scans.
@@ -50,7 +57,7 @@ pub(super) fn fit(images: &Images, refine: bool, ctx: &Context) -> Result<Option
     let mut scans = Vec::new();
     images.each(ctx, |seen, _| {
         if let Seen::Image(image) = seen {
-            let (points, normals) = image.surface_points(options.cell_m as f32);
+            let (points, normals) = image.surface_points(options.cell_m as f32, NonZeroU32::MIN);
             scans.push(ScanPoints::sampled(&points, &normals, options.cell_m));
         }
         task.add(1);
@@ -106,11 +113,16 @@ pub(super) fn fit(images: &Images, refine: bool, ctx: &Context) -> Result<Option
 
 /// Says how far the surfaces of some depth pictures are apart, and warns if their poses seem to be off.
 fn compare_pictures(images: &Images, ctx: &Context) -> Result<()> {
-    let options = RegisterOptions { iterations: PICTURE_STEPS, ..RegisterOptions::default() };
+    let options = RegisterOptions {
+        iterations: PICTURE_STEPS,
+        most_points: PICTURE_POINTS,
+        min_correspondences: PICTURE_POINTS / 8,
+        ..RegisterOptions::default()
+    };
     let mut names = Vec::new();
     let mut scans = Vec::new();
     for (name, image) in images.some_pictures(PICTURES, ctx)? {
-        let (points, normals) = image.surface_points(options.cell_m as f32);
+        let (points, normals) = image.surface_points(options.cell_m as f32, PICTURE_STRIDE);
         scans.push(ScanPoints::sampled(&points, &normals, options.cell_m));
         names.push(name);
     }

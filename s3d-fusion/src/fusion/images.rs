@@ -1,12 +1,13 @@
 //! An image is added to the grid.
 
 use super::pyramid::Pyramid;
+use super::touched::Touched;
 use super::view::View;
-use super::walk::{self, blocks_along};
 use super::{Scale, Tile, chance};
 use crate::FusionError;
-use crate::grid::block::{Block, NO_COLOR};
-use crate::grid::{CHUNK, FARTHEST, Grid, NONE, Place, SIDE, block_in, chunk_of, key, place_of};
+use crate::grid::block::{Block, NO_COLOR, Row};
+use crate::grid::{CHUNK, Grid, NONE, Place, SIDE, block_in, chunk_of, place_of};
+use crate::lanes::{LANES, Lanes};
 use crate::range_image::{RangeImage, Surfel};
 use rayon::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3};
@@ -43,8 +44,8 @@ impl Adding<'_> {
         let view = View::new(self.image);
         let surfels = self.image.surfels(self.scale.cell as f32);
         self.block(view.location)?;
-        let (touched, low, high) = self.touched(&view, &surfels);
-        if touched.is_empty() && low.x > high.x {
+        let Touched { blocks: touched, low, high } = self.touched(&view, &surfels);
+        if low == high {
             return Ok(());
         }
         let bounds = self.bounds(&view, low, high)?;
@@ -85,65 +86,13 @@ impl Adding<'_> {
     /// Returns the first and the last block of a box around the sensor and all hits.
     fn bounds(&self, view: &View<'_>, low: Vec3, high: Vec3) -> Result<[Place; 2], FusionError> {
         let reach = self.scale.front + self.scale.block();
-        let (low, high) = (low.as_dvec3().min(DVec3::ZERO), high.as_dvec3().max(DVec3::ZERO));
+        let (low, high) = (low.as_dvec3(), high.as_dvec3());
         Ok([self.block(view.location + low - reach)?, self.block(view.location + high + reach)?])
     }
 
     fn block(&self, point: DVec3) -> Result<Place, FusionError> {
         let too_far = FusionError::TooFar { point, cell_m: self.scale.cell };
         self.scale.block_of(point).ok_or(too_far)
-    }
-
-    /// Returns the keys of the blocks near hits, in order, and the box of all hits from the sensor.
-    fn touched(&self, view: &View<'_>, surfels: &[Surfel]) -> (Vec<u64>, Vec3, Vec3) {
-        let width = view.size[0] as usize;
-        // In blocks from the block of the sensor, so that single precision is enough.
-        let per_block = self.scale.block().recip();
-        let sensor = walk::floor(view.location * per_block);
-        let start = (view.location * per_block - DVec3::from_array(sensor.map(f64::from))).as_vec3();
-        let turn = view.turn.transpose().as_mat3();
-        let reach = (FARTHEST - 8) as f32;
-
-        let bands = surfels.par_chunks(width * 8).enumerate().map(|(band, surfels)| {
-            let mut found: Vec<u64> = Vec::new();
-            let mut last = None;
-            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-            for (i, s) in surfels.iter().enumerate().filter(|(_, s)| s.weight > 0.0) {
-                let ray = self.image.ray_of(band * width * 8 + i) * s.range;
-                let hit = turn * ray;
-                (low, high) = (low.min(hit), high.max(hit));
-                let length = ray.dot(ray).sqrt();
-                let [front, behind] = self.scale.along_ray(-s.normal.dot(ray) / length, s.sigma_m);
-                let at = |off: f64| start + hit * ((1.0 + off as f32 / length) * per_block as f32);
-                let ends = [at(-front), at(behind)];
-                if ends.iter().any(|end| end.abs().max_element() >= reach) {
-                    continue;
-                }
-                // The ray before went the same way.
-                let way = walk::Way::new(ends);
-                if way.is_short() && last == Some(way) {
-                    continue;
-                }
-                last = Some(way);
-                blocks_along(ends.map(Vec3::as_dvec3), |from_sensor| {
-                    let block = [0, 1, 2].map(|k| sensor[k] + from_sensor[k]);
-                    if self.tile.is_none_or(|t| t.holds(block)) {
-                        found.push(key(block));
-                    }
-                });
-            }
-            found.sort_unstable();
-            found.dedup();
-            (found, low, high)
-        });
-
-        let bands: Vec<(Vec<u64>, Vec3, Vec3)> = bands.collect();
-        let low = bands.iter().fold(Vec3::INFINITY, |low, band| low.min(band.1));
-        let high = bands.iter().fold(Vec3::NEG_INFINITY, |high, band| high.max(band.2));
-        let mut found: Vec<u64> = bands.into_iter().flat_map(|band| band.0).collect();
-        found.sort_unstable();
-        found.dedup();
-        (found, low, high)
     }
 
     /// Returns what the image does to a chunk, or `None` if it does nothing.
@@ -220,40 +169,74 @@ impl Adding<'_> {
                 numbers.for_each(|(i, k)| *k = start[axis] + right[axis] * i as f32);
             }
             let (pixels, ranges) = view.pixels(&points);
-            for i in 0..8 {
-                let Some(surfel) = surfels.get(pixels[i] as usize) else { continue };
-                let point = Vec3::new(points[0][i], points[1][i], points[2][i]);
-                let voxel = (k * SIDE) as usize + i;
-                self.update_voxel(block, voxel, surfel, point, ranges[i], pixels[i]);
+            if pixels != [u32::MAX; 8] {
+                self.update_row(block, k as usize * 8, surfels, &pixels, &ranges, &points);
             }
         }
     }
 
-    /// Adds what a pixel says of a voxel. `point` is the voxel in the axes of the sensor.
+    /// Adds what pixels say of eight voxels from `first`. `points` are the voxels in the axes of the sensor.
     #[inline(always)]
-    fn update_voxel(&self, block: &mut Block, voxel: usize, s: &Surfel, point: Vec3, range: f32, pixel: u32) {
+    fn update_row(
+        &self,
+        block: &mut Block,
+        first: usize,
+        surfels: &[Surfel],
+        pixels: &[u32; LANES],
+        ranges: &Lanes,
+        points: &[Lanes; 3],
+    ) {
         let scale = &self.scale;
-        let before = s.range - range;
-        let front = scale.front as f32;
-        if s.weight == 0.0 {
-            return;
+        let (front, cell) = (scale.front as f32, scale.cell as f32);
+        let [mut x, mut y, mut z, mut offset] = [[0.0; LANES]; 4];
+        let [mut hit, mut trust, mut sigma, mut nearest] = [[0.0; LANES]; 4];
+        for lane in 0..LANES {
+            let s = surfels.get(pixels[lane] as usize).unwrap_or(&Surfel::NONE);
+            (x[lane], y[lane], z[lane], offset[lane]) = (s.normal.x, s.normal.y, s.normal.z, s.offset);
+            (hit[lane], trust[lane], sigma[lane], nearest[lane]) = (s.range, s.weight, s.sigma_m, s.nearest);
         }
 
-        let distance = s.normal.dot(point) + s.offset;
-        if before > front {
-            block.pass(voxel, distance > front, s.nearest - range > front);
+        let mut row = Row {
+            distance: [0.0; LANES],
+            weight: [0.0; LANES],
+            is_at: [0.0; LANES],
+            is_far: [0.0; LANES],
+            is_through: [0.0; LANES],
+        };
+        let (mut is_touched, mut is_colored) = ([false; LANES], [false; LANES]);
+        for lane in 0..LANES {
+            let [px, py, pz] = [0, 1, 2].map(|axis: usize| points[axis][lane]);
+            let distance = (x[lane] * px + y[lane] * py + z[lane] * pz) + offset[lane];
+            let before = hit[lane] - ranges[lane];
+            let is_seen = trust[lane] > 0.0;
+            let is_before = is_seen & (before > front);
+            row.is_far[lane] = f32::from(is_before & (distance > front));
+            row.is_through[lane] = f32::from(is_before & (nearest[lane] - ranges[lane] > front));
+
+            let counts = is_seen & (distance <= front) & (before <= scale.most_before());
+            let weight = f32::from(counts) * scale.weight(distance, before, sigma[lane]) * trust[lane];
+            row.distance[lane] = distance / front;
+            row.weight[lane] = weight;
+            row.is_at[lane] = f32::from((weight > 0.0) & (distance < 0.5 * cell));
+            is_touched[lane] = row.weight[lane] + row.is_far[lane] + row.is_through[lane] > 0.0;
+            is_colored[lane] = (weight > 0.0) & (distance.abs() < 2.0 * cell);
         }
-        if distance > front || before > scale.most_before() as f32 {
+
+        if is_touched == [false; LANES] {
             return;
         }
-        let Some(weight) = scale.weight(distance, before, s.sigma_m) else { return };
-        let is_at = distance < 0.5 * scale.cell as f32;
-        let share = block.observe(voxel, distance / front, weight * s.weight, is_at);
-        if let Some(color) = self.image.colors().get(pixel as usize)
-            && *color != NO_COLOR
-            && distance.abs() < 2.0 * scale.cell as f32
-        {
-            block.mix_color(voxel, *color, share, chance(voxel as u32, self.number));
+        let shares = block.observe_row(first, &row);
+        if is_colored == [false; LANES] {
+            return;
+        }
+        for lane in 0..LANES {
+            if is_colored[lane]
+                && let Some(color) = self.image.colors().get(pixels[lane] as usize)
+                && *color != NO_COLOR
+            {
+                let voxel = first + lane;
+                block.mix_color(voxel, *color, shares[lane], chance(voxel as u32, self.number));
+            }
         }
     }
 }

@@ -6,6 +6,7 @@ mod pyramid;
 mod rays;
 #[cfg(test)]
 mod reference;
+mod touched;
 mod view;
 mod walk;
 
@@ -73,28 +74,32 @@ impl Scale {
 
     /// How far behind a surface its distance is gathered. The corners of a cell that the surface crosses are
     /// at most √3 cells behind it, and noise must not make a side.
+    #[inline(always)]
     fn behind(&self, sigma_m: f32) -> f32 {
         (2.0 * self.cell as f32 + 2.0 * sigma_m).min(self.front as f32)
     }
 
     /// How far before a hit, along the ray, distances are gathered at most. A ray that meets a plane aslant
     /// is near it for long.
-    fn most_before(&self) -> f64 {
-        4.0 * self.front
+    #[inline(always)]
+    fn most_before(&self) -> f32 {
+        4.0 * self.front as f32
     }
 
     /// How far behind a hit, along the ray, distances are gathered at most. A ray that meets a body aslant
     /// soon leaves it again.
+    #[inline(always)]
     fn most_behind(&self, sigma_m: f32) -> f32 {
         3.0 * self.behind(sigma_m)
     }
 
     /// How far before and behind a hit, along its ray, distances are gathered if the ray meets the surface at
     /// this cosine.
-    fn along_ray(&self, cosine: f32, sigma_m: f32) -> [f64; 2] {
-        let cosine = f64::from(cosine);
-        let behind = f64::from(self.behind(sigma_m)) / cosine;
-        [(self.front / cosine).min(self.most_before()), behind.min(self.most_behind(sigma_m).into())]
+    #[inline(always)]
+    fn along_ray(&self, cosine: f32, sigma_m: f32) -> [f32; 2] {
+        let front = self.front as f32 / cosine;
+        let behind = self.behind(sigma_m) / cosine;
+        [front.min(self.most_before()), behind.min(self.most_behind(sigma_m))]
     }
 
     /// The weight of a ray by its noise and the angle at which it meets the surface: 1 for a millimetre at a
@@ -103,22 +108,20 @@ impl Scale {
         cosine * (0.001 / sigma_m) * (0.001 / sigma_m)
     }
 
-    /// The weight of a distance to the plane of a hit; `None` if it counts nothing. `before` is how far
-    /// before the hit the voxel is along its ray.
+    /// The weight of a distance to the plane of a hit; 0 if it counts nothing. `before` is how far before the
+    /// hit the voxel is along its ray.
     ///
     /// Near the hit it is 1. It falls with the distance from the hit, so the nearest surface decides in
     /// corners, and it ends behind the surface, so both sides of thin things stay apart.
     #[inline(always)]
-    fn weight(&self, distance: f32, before: f32, sigma_m: f32) -> Option<f32> {
+    fn weight(&self, distance: f32, before: f32, sigma_m: f32) -> f32 {
         let cell = self.cell as f32;
         let behind = self.behind(sigma_m);
-        if distance <= -behind || before < -3.0 * behind {
-            return None;
-        }
+        let counts = f32::from((distance > -behind) & (before >= -3.0 * behind));
         let near = before / (1.5 * cell);
         let side = (distance + behind) / (behind - 0.5 * cell - sigma_m).max(0.5 * cell);
         let side = side.min(1.0);
-        Some(side * side / (1.0 + near * near))
+        counts * (side * side / (1.0 + near * near))
     }
 }
 

@@ -51,7 +51,8 @@ impl Pyramid {
     /// the largest.
     pub(crate) fn ranges(&self, extent: &Extent) -> [f32; 2] {
         let size = [0, 1].map(|k| extent.to[k] - extent.from[k]);
-        let larger = size[0].max(size[1]) >> FIRST;
+        // At most 5 × 5 squares: larger ones would mix in what is beside.
+        let larger = size[0].max(size[1]) >> (FIRST + 2);
         let level = ((u32::BITS - larger.leading_zeros()) as usize).min(self.levels.len() - 1);
         let squares = &self.levels[level];
         let [from, to] =

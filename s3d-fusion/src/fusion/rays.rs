@@ -88,7 +88,7 @@ impl AddingRays<'_> {
         let normal = normals.at(hit, along);
         let cosine = (-normal.dot(along)) as f32;
         let sigma_m = self.noise.sigma_m(range as f32);
-        let reach = self.scale.along_ray(cosine, sigma_m);
+        let reach = self.scale.along_ray(cosine, sigma_m).map(f64::from);
         let weight = Scale::weight_of(sigma_m, cosine);
         let color = self.colors.get(i).copied();
         Shot { origin, hit, along, range, normal, reach, sigma_m, weight, color }
@@ -166,7 +166,9 @@ impl AddingRays<'_> {
             let front = self.scale.front as f32;
             let before = -off.dot(shot.along) as f32;
             let weight = self.scale.weight(distance, before, shot.sigma_m);
-            let Some(weight) = weight.filter(|w| distance < front && w * share > 0.0) else { return };
+            if distance >= front || weight * share <= 0.0 {
+                return;
+            }
             let is_at = distance < 0.5 * cell as f32;
             let share = block.observe(i, distance / front, weight * share * shot.weight, is_at);
             if let Some(color) = shot.color.filter(|_| distance.abs() < 2.0 * cell as f32) {

@@ -1,5 +1,6 @@
 //! Which pixels of an image see a voxel, or a box of voxels.
 
+use crate::lanes::floor;
 use crate::range_image::{AngleGrid, Directions, RangeImage, angles_of};
 use s3d_geom::PhotoLens;
 use s3d_geom::glam::{DMat3, DVec3, Vec3};
@@ -68,9 +69,8 @@ impl<'a> View<'a> {
                     let u = focal[0] * x[k] * inverse + center[0];
                     let v = focal[1] * y[k] * inverse + center[1];
                     let is_seen = z[k] > 0.0 && u >= 0.0 && v >= 0.0 && u < width && v < height;
-                    // Within the image, so the numbers are small.
                     let (u, v) = if is_seen { (u, v) } else { (0.0, 0.0) };
-                    let pixel = v as i32 as u32 * self.size[0] + u as i32 as u32;
+                    let pixel = floor(v) as u32 * self.size[0] + floor(u) as u32;
                     pixels[k] = if is_seen { pixel } else { u32::MAX };
                 }
                 (pixels, *z)

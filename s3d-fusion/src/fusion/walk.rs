@@ -1,7 +1,8 @@
 //! The cubes that a segment crosses.
 
 use crate::grid::{Place, SIDE};
-use s3d_geom::glam::{DVec3, Vec3};
+use crate::lanes::{LANES, Lanes, floor as floor_lane};
+use s3d_geom::glam::DVec3;
 
 /// Returns the largest whole numbers that are not above some numbers. Without a call, unlike the library's.
 #[inline]
@@ -12,36 +13,62 @@ pub(super) fn floor(point: DVec3) -> Place {
     })
 }
 
-/// Which unit cubes a segment crosses, for comparison with other segments.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) struct Way {
-    first: Place,
-    last: Place,
-    /// Whether the border along x comes before that along y, y before z, and x before z.
-    order: [bool; 3],
+/// Which unit cubes segments cross, for comparison with other segments.
+pub(super) struct Ways {
+    /// The first cube of each segment.
+    first: [[i32; LANES]; 3],
+    /// The step to the last cube, and the order of the borders between; [`LONG`] if a step is above 1.
+    steps: [i32; LANES],
 }
 
-impl Way {
-    #[inline]
-    pub(super) fn new([start, end]: [Vec3; 2]) -> Self {
-        let floor = |point: Vec3| {
-            point.to_array().map(|k| {
-                let whole = k as i32;
-                whole - i32::from(k < whole as f32)
-            })
+/// The steps of a segment that crosses several borders on an axis.
+const LONG: i32 = -1;
+
+impl Ways {
+    /// Makes the ways of segments from the first ends to the second ones.
+    #[inline(always)]
+    pub(super) fn of([start, end]: &[[Lanes; 3]; 2]) -> Self {
+        let (mut first, mut step) = ([[0; LANES]; 3], [[0; LANES]; 3]);
+        let mut border = [[0.0; LANES]; 3];
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let (a, b) = (start[axis][lane], end[axis][lane]);
+                let cubes = [floor_lane(a), floor_lane(b)];
+                first[axis][lane] = cubes[0];
+                step[axis][lane] = cubes[1] - cubes[0];
+                border[axis][lane] = (cubes[0].max(cubes[1]) as f32 - a) / (b - a);
+            }
+        }
+
+        // Which of two borders comes first, if there are two.
+        let [x, y, z] = border;
+        let order = |a: f32, b: f32, steps: [i32; 2]| {
+            i32::from(a < b) & i32::from(steps[0] != 0) & i32::from(steps[1] != 0)
         };
-        let (first, last) = (floor(start), floor(end));
-        let [x, y, z] = [0, 1, 2].map(|k| match first[k] == last[k] {
-            true => f32::INFINITY,
-            false => (first[k].max(last[k]) as f32 - start[k]) / (end[k] - start[k]),
-        });
-        Self { first, last, order: [x < y, y < z, x < z] }
+        let mut steps = [0; LANES];
+        for lane in 0..LANES {
+            let [i, j, k] = [step[0][lane], step[1][lane], step[2][lane]];
+            let orders = order(x[lane], y[lane], [i, j])
+                | order(y[lane], z[lane], [j, k]) << 1
+                | order(x[lane], z[lane], [i, k]) << 2;
+            let short = (i + 1) | (j + 1) << 2 | (k + 1) << 4 | orders << 6;
+            let is_long = (i.abs() | j.abs() | k.abs()) > 1;
+            steps[lane] = short | -i32::from(is_long);
+        }
+        Self { first, steps }
     }
 
-    /// Whether the segment crosses at most one border on each axis. Then equal ways have the same cubes.
-    #[inline]
-    pub(super) fn is_short(&self) -> bool {
-        (0..3).all(|k| self.first[k].abs_diff(self.last[k]) <= 1)
+    /// Returns the way of a segment as numbers. If a way is short, segments of equal ways cross the same cubes.
+    #[inline(always)]
+    pub(super) fn lane(&self, lane: usize) -> [i32; 4] {
+        let [x, y, z] = self.first;
+        [x[lane], y[lane], z[lane], self.steps[lane]]
+    }
+
+    /// Whether a segment crosses at most one border on each axis.
+    #[inline(always)]
+    pub(super) fn is_short(way: [i32; 4]) -> bool {
+        way[3] != LONG
     }
 }
 
@@ -124,6 +151,34 @@ pub(super) fn slices_along(
 mod tests {
     use super::*;
     use s3d_geom::glam::dvec3;
+
+    #[test]
+    fn segments_of_equal_short_ways_cross_the_same_cubes() {
+        let mut state = 3_u64;
+        let mut number = |most: f32| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            ((state >> 40) as f32 / (1 << 24) as f32 - 0.5) * 2.0 * most
+        };
+        let mut cubes_of = std::collections::BTreeMap::new();
+        let (mut short, mut again) = (0, 0);
+        for _ in 0..20_000 {
+            let start = [0; 3].map(|_: i32| [0; LANES].map(|_: i32| number(1.5)));
+            let end = start.map(|axis| axis.map(|from| from + number(1.2)));
+            let ways = Ways::of(&[start, end]);
+            for lane in (0..LANES).filter(|lane| Ways::is_short(ways.lane(*lane))) {
+                let at =
+                    |ends: &[Lanes; 3]| DVec3::from_array([0, 1, 2].map(|k: usize| ends[k][lane].into()));
+                let mut cubes = Vec::new();
+                blocks_along([at(&start), at(&end)], |cube| cubes.push(cube));
+                short += 1;
+                if let Some(known) = cubes_of.insert(ways.lane(lane), cubes.clone()) {
+                    again += 1;
+                    assert_eq!(known, cubes, "{:?}", ways.lane(lane));
+                }
+            }
+        }
+        assert!(short > 100_000 && again > 50_000, "{short} {again}");
+    }
 
     #[test]
     fn all_cubes_of_a_segment_and_no_other() {

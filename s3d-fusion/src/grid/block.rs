@@ -1,6 +1,7 @@
 //! A block of voxels: 6 bytes each, and 3 more with colours.
 
 use super::VOXELS;
+use crate::lanes::{LANES, Lanes, floor};
 
 /// The voxels of a block as columns. Voxel (i, j, k) is at (k·8 + j)·8 + i.
 #[derive(Clone, Debug)]
@@ -21,6 +22,20 @@ pub(crate) struct Block {
 const PASSED: i16 = i16::MAX;
 /// The colour of voxels without one.
 pub(crate) const NO_COLOR: [u8; 3] = [0; 3];
+
+/// What an image says of eight voxels side by side. Answers are 1 or 0.
+pub(crate) struct Row {
+    /// The signed distance as a share of the truncation.
+    pub(crate) distance: Lanes,
+    /// 0 where no distance was observed.
+    pub(crate) weight: Lanes,
+    /// Whether the voxel is at the surface or behind it; 0 where no distance was observed.
+    pub(crate) is_at: Lanes,
+    /// Whether a ray passed far before all that it hit.
+    pub(crate) is_far: Lanes,
+    /// Whether a ray passed certainly, also beside the ray.
+    pub(crate) is_through: Lanes,
+}
 
 impl Default for Block {
     fn default() -> Self {
@@ -84,12 +99,45 @@ impl Block {
         let share = weight / sum;
         let mean = if old > 0.0 { f32::from(self.distance[i]) } else { 0.0 };
         let mean = mean + (distance * 32767.0 - mean) * share;
-        // Rounded to the nearest number, without a call.
-        self.distance[i] = ((mean.clamp(-32766.0, 32766.0) + 32768.5) as i32 - 32768) as i16;
+        self.distance[i] = floor(mean.clamp(-32766.0, 32766.0) + 0.5) as i16;
         // Rounded to the nearest half.
         self.weight[i] = ((sum.to_bits() + 0x8000) >> 16) as u16;
         self.votes[i] = self.votes[i].saturating_add(i16::from(is_at));
         share
+    }
+
+    /// Does for eight voxels from `first` what [`Block::pass`] and then [`Block::observe`] do for one. Returns
+    /// the shares that the distances have in the means.
+    #[inline(always)]
+    pub(crate) fn observe_row(&mut self, first: usize, row: &Row) -> Lanes {
+        let mut shares = [0.0; LANES];
+        let mut next = [[0; LANES]; 2];
+        for lane in 0..LANES {
+            let old = f32::from_bits(u32::from(self.weight[first + lane]) << 16);
+            let distance = f32::from(self.distance[first + lane]);
+            let (weight, is_new) = (row.weight[lane], old == 0.0);
+            let sum = old + weight;
+            let share = weight / if is_new & (weight == 0.0) { 1.0 } else { sum };
+            let mean = if is_new { 0.0 } else { distance };
+            let mean = mean + (row.distance[lane] * 32767.0 - mean) * share;
+            let mean = mean.clamp(-32766.0, 32766.0);
+            let unseen = if is_new & (row.is_far[lane] > 0.0) {
+                f32::from(PASSED)
+            } else {
+                distance
+            };
+            let distance = if weight > 0.0 { mean } else { unseen };
+            shares[lane] = share;
+            next[0][lane] = floor(distance + 0.5);
+            next[1][lane] = (sum.to_bits() + 0x8000 >> 16) as i32;
+        }
+        for lane in 0..LANES {
+            let votes = (f32::from(self.votes[first + lane]) - row.is_through[lane]).max(i16::MIN.into());
+            self.votes[first + lane] = (votes + row.is_at[lane]).min(i16::MAX.into()) as i16;
+            self.distance[first + lane] = next[0][lane] as i16;
+            self.weight[first + lane] = next[1][lane] as u16;
+        }
+        shares
     }
 
     /// Moves the colour of a voxel by a share towards another one. `chance`, from 0 to 1, decides how parts
@@ -112,5 +160,50 @@ impl Block {
     /// Returns the number of bytes that the block takes.
     pub(crate) fn bytes(&self) -> usize {
         size_of::<Self>() + self.colors.as_ref().map_or(0, |c| size_of_val(&**c))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_is_eight_voxels() {
+        let mut state = 7_u32;
+        let mut below = |most: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % most
+        };
+        let (mut rows, mut single) = (Block::default(), Block::default());
+        for _ in 0..20_000 {
+            let first = 8 * below(3) as usize;
+            let mut row = Row {
+                distance: [0.0; LANES],
+                weight: [0.0; LANES],
+                is_at: [0.0; LANES],
+                is_far: [0.0; LANES],
+                is_through: [0.0; LANES],
+            };
+            let mut expected = [0.0; LANES];
+            for lane in 0..LANES {
+                let i = first + lane;
+                let (is_far, is_through) = (below(5) == 0, below(5) == 0);
+                row.is_far[lane] = f32::from(is_far);
+                row.is_through[lane] = f32::from(is_through);
+                if is_far || is_through {
+                    single.pass(i, is_far, is_through);
+                }
+                if below(3) > 0 {
+                    row.distance[lane] = below(4001) as f32 / 2000.0 - 1.0;
+                    row.weight[lane] = (1 + below(1000)) as f32 / 300.0;
+                    let is_at = row.distance[lane] < 0.1;
+                    row.is_at[lane] = f32::from(is_at);
+                    expected[lane] = single.observe(i, row.distance[lane], row.weight[lane], is_at);
+                }
+            }
+            assert_eq!(rows.observe_row(first, &row), expected);
+        }
+        assert_eq!((rows.distance, rows.weight, rows.votes), (single.distance, single.weight, single.votes));
+        assert!(rows.distance.contains(&PASSED) || rows.weight[0] > 0);
     }
 }

@@ -107,9 +107,9 @@ impl AngleGrid {
             .collect()
     }
 
-    /// Returns the sines and cosines of the elevations of all rows.
-    pub(crate) fn row_rays(&self) -> Vec<[f64; 2]> {
-        self.rows.angles_rad.iter().map(|a| libm::sincos(*a).into()).collect()
+    /// Returns the sine and cosine of the elevation of a row.
+    pub(crate) fn row_ray(&self, row: usize) -> [f64; 2] {
+        libm::sincos(self.rows.angles_rad[row]).into()
     }
 
     /// Returns the unit direction of the middle of a pixel.

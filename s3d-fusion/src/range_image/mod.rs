@@ -3,11 +3,13 @@
 mod angles;
 mod gaps;
 mod points;
+mod rays;
 mod surfels;
 mod world;
 
 use crate::{FusionError, SensorNoise};
 pub(crate) use angles::{AngleGrid, angles_of};
+pub(crate) use rays::Rays;
 use s3d_geom::glam::{DVec3, Vec3, dvec2};
 use s3d_geom::{PhotoLens, Pose, Raster};
 pub(crate) use surfels::Surfel;
@@ -206,27 +208,6 @@ impl RangeImage {
     /// Returns how pixels become rays.
     pub(crate) fn directions(&self) -> &Directions {
         &self.directions
-    }
-
-    /// Returns the ray of the middle of a pixel, in OpenCV's axes of the sensor: it is as long as one metre
-    /// of range.
-    #[inline]
-    pub(crate) fn ray_of(&self, pixel: usize) -> Vec3 {
-        let width = self.width() as usize;
-        let [x, y] = [pixel % width, pixel / width];
-        match &self.directions {
-            Directions::Lens(lens) => {
-                let middle = dvec2(x as f64 + 0.5, y as f64 + 0.5);
-                if let PhotoLens::Straight(straight) = lens
-                    && straight.distortion() == [0.0; 5]
-                {
-                    let flat = (middle - straight.center_px()) / straight.focal_px();
-                    return flat.as_vec2().extend(1.0);
-                }
-                lens.direction(middle).map_or(Vec3::NAN, |d| (d / d.z).as_vec3())
-            }
-            Directions::Angles(grid) => grid.direction([x as u32, y as u32]).as_vec3(),
-        }
     }
 
     /// Returns the place and rotation of the sensor.

@@ -6,6 +6,7 @@
 //! a grid of angles.
 
 use super::{Directions, RangeImage};
+use crate::lanes::{LANES, Lanes};
 use rayon::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3};
 use s3d_simd::{ProvenLevel, dispatch, level};
@@ -13,6 +14,7 @@ use s3d_simd::{ProvenLevel, dispatch, level};
 /// The plane that a pixel sees, in OpenCV's axes of the sensor: a point x is normal·x + offset in front of
 /// it.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(32))] // In one line of the cache.
 pub(crate) struct Surfel {
     pub(crate) normal: Vec3,
     pub(crate) offset: f32,
@@ -27,7 +29,7 @@ pub(crate) struct Surfel {
 }
 
 impl Surfel {
-    const NONE: Self =
+    pub(crate) const NONE: Self =
         Self { normal: Vec3::ZERO, offset: 0.0, range: 0.0, weight: 0.0, sigma_m: 0.0, nearest: 0.0 };
 }
 
@@ -62,7 +64,6 @@ impl RangeImage {
             .for_each(|(band, out)| {
                 let mut band = Band::new(self, &ranges, band * BAND, cell_m);
                 dispatch!(level, _simd => {
-                    band.drop_pixels();
                     match &self.directions {
                         Directions::Lens(_) => band.fit::<Flat>(out),
                         Directions::Angles(_) => band.fit::<Round>(out),
@@ -93,11 +94,10 @@ fn unit(v: Vec3) -> Vec3 {
     v * length(v).recip()
 }
 
-/// Pixels that are worked on at a time: as many as a vector register of AVX2 holds.
-const LANES: usize = 8;
-
-/// Numbers of pixels side by side.
-type Lanes = [f32; LANES];
+/// The q of a pixel that is not taken. Not NaN: sums leave pixels out by the factor 0.
+const FAR_Q: f32 = 1e30;
+/// Numbers above this come from [`FAR_Q`].
+const MOST_Q: f32 = 1e20;
 
 #[inline(always)]
 fn load(plane: &[f32], at: usize) -> Lanes {
@@ -108,18 +108,22 @@ fn load(plane: &[f32], at: usize) -> Lanes {
 
 /// The coordinates of the neighbours of some pixels, each about an axis of its own.
 trait Frame {
+    /// What the band holds of a pixel that is not taken: its q is [`FAR_Q`].
+    const NONE: [f32; 3];
     /// Makes the frames of pixels from what the band holds of them.
     fn of(pixels: &[Lanes; 3]) -> Self;
     /// Returns u, v and q of a neighbour of each pixel from what the band holds of it.
     fn uvq(&self, pixels: [Lanes; 3]) -> [Lanes; 3];
-    /// Returns a vector in the axes of the sensor.
-    fn vector(&self, lane: usize, uvq: Vec3) -> Vec3;
+    /// Returns vectors in the axes of the sensor.
+    fn vectors(&self, uvq: [Lanes; 3]) -> [Lanes; 3];
 }
 
 /// The frame of a lens. The band holds u, v and q.
 struct Flat;
 
 impl Frame for Flat {
+    const NONE: [f32; 3] = [0.0, 0.0, FAR_Q];
+
     #[inline(always)]
     fn of(_: &[Lanes; 3]) -> Self {
         Self
@@ -131,7 +135,7 @@ impl Frame for Flat {
     }
 
     #[inline(always)]
-    fn vector(&self, _: usize, uvq: Vec3) -> Vec3 {
+    fn vectors(&self, uvq: [Lanes; 3]) -> [Lanes; 3] {
         uvq
     }
 }
@@ -142,6 +146,8 @@ struct Round {
 }
 
 impl Frame for Round {
+    const NONE: [f32; 3] = [0.0; 3];
+
     #[inline(always)]
     fn of(pixels: &[Lanes; 3]) -> Self {
         let mut axes = [[[0.0; LANES]; 3]; 3];
@@ -168,7 +174,7 @@ impl Frame for Round {
         }
         let [u, v, q] = &mut uvq;
         for ((u, v), q) in u.iter_mut().zip(v).zip(q) {
-            *q = 1.0 / *q;
+            *q = 1.0 / if *q > 1.0 / FAR_Q { *q } else { 1.0 / FAR_Q };
             *u *= *q;
             *v *= *q;
         }
@@ -176,9 +182,16 @@ impl Frame for Round {
     }
 
     #[inline(always)]
-    fn vector(&self, lane: usize, uvq: Vec3) -> Vec3 {
-        let axis = |k: usize| Vec3::from_array([0, 1, 2].map(|i| self.axes[k][i][lane]));
-        axis(0) * uvq.x + axis(1) * uvq.y + axis(2) * uvq.z
+    fn vectors(&self, [u, v, q]: [Lanes; 3]) -> [Lanes; 3] {
+        let [right, down, forward] = &self.axes;
+        let mut vectors = [[0.0; LANES]; 3];
+        for (axis, numbers) in vectors.iter_mut().enumerate() {
+            for lane in 0..LANES {
+                numbers[lane] =
+                    right[axis][lane] * u[lane] + down[axis][lane] * v[lane] + forward[axis][lane] * q[lane];
+            }
+        }
+        vectors
     }
 }
 
@@ -190,7 +203,7 @@ struct Band<'a> {
     /// The length of a row.
     row: usize,
     ranges: Vec<f32>,
-    /// What a [`Frame`] needs of each pixel, NaN if the pixel is not taken.
+    /// What a [`Frame`] needs of each pixel.
     planes: [Vec<f32>; 3],
     pixel_rad: f32,
     cell_m: f32,
@@ -206,13 +219,16 @@ impl<'a> Band<'a> {
         // A few more, since pixels are taken some at a time.
         let row = width.next_multiple_of(LANES) + 2 * margin;
         let len = row * (BAND + 2 * margin);
-        let nothing = || vec![f32::NAN; len];
+        let none = match &image.directions {
+            Directions::Lens(_) => Flat::NONE,
+            Directions::Angles(_) => Round::NONE,
+        };
         let mut band = Self {
             image,
             width,
             row,
-            ranges: nothing(),
-            planes: [nothing(), nothing(), nothing()],
+            ranges: vec![f32::NAN; len],
+            planes: none.map(|number| vec![number; len]),
             pixel_rad: image.pixel_rad() as f32,
             cell_m,
         };
@@ -240,22 +256,20 @@ impl<'a> Band<'a> {
         band
     }
 
-    /// Drops the pixels that are not taken, and the outermost two rows and columns, whose neighbours are not
-    /// all here.
+    /// Drops the pixels that are not taken.
     #[inline(always)]
-    fn drop_pixels(&mut self) {
-        let mut taken = vec![f32::NAN; self.ranges.len()];
+    fn drop_pixels<F: Frame>(&mut self) {
+        // Windows do not reach the outermost rows and columns, whose neighbours are not here.
         for y in 2..BAND + 2 * MARGIN as usize - 2 {
             for x in (2..self.row - 2).step_by(LANES).map(|x| x.min(self.row - 2 - LANES)) {
-                let lanes = self.taken(y * self.row + x);
-                taken[y * self.row + x..][..LANES].copy_from_slice(&lanes);
+                let taken = self.taken(y * self.row + x);
+                for (plane, none) in self.planes.iter_mut().zip(F::NONE) {
+                    let plane = &mut plane[y * self.row + x..][..LANES];
+                    for lane in 0..LANES {
+                        plane[lane] = if taken[lane] > 0.0 { plane[lane] } else { none };
+                    }
+                }
             }
-        }
-        for plane in &mut self.planes {
-            plane
-                .iter_mut()
-                .zip(&taken)
-                .for_each(|(number, taken)| *number *= taken);
         }
     }
 
@@ -265,8 +279,7 @@ impl<'a> Band<'a> {
         load(&self.ranges, at.wrapping_add_signed(step))
     }
 
-    /// Returns 1 for pixels that are neither alone nor between a surface and another one behind it, or else
-    /// NaN.
+    /// Returns 1 for pixels that are neither alone nor between a surface and another one behind it, or else 0.
     #[inline(always)]
     fn taken(&self, at: usize) -> Lanes {
         let range = self.range(at, [0, 0], 0);
@@ -302,21 +315,20 @@ impl<'a> Band<'a> {
             }
         }
 
-        let mut taken = [f32::NAN; LANES];
+        let mut taken = [0.0; LANES];
         for lane in 0..LANES {
-            if (beside[lane] >= 1.0) & (mixed[lane] == 0.0) {
-                taken[lane] = 1.0;
-            }
+            taken[lane] = f32::from((beside[lane] >= 1.0) & (mixed[lane] == 0.0));
         }
         taken
     }
 
     #[inline(always)]
-    fn fit<F: Frame>(&self, out: &mut [Surfel]) {
+    fn fit<F: Frame>(&mut self, out: &mut [Surfel]) {
+        self.drop_pixels::<F>();
         for (y, out) in out.chunks_exact_mut(self.width).enumerate() {
             for (x, out) in out.chunks_mut(LANES).enumerate() {
                 let at = (y + MARGIN as usize) * self.row + MARGIN as usize + LANES * x;
-                if load(&self.planes[2], at).iter().any(|q| !q.is_nan()) {
+                if load(&self.ranges, at).iter().any(|range| !range.is_nan()) {
                     self.fit_lanes::<F>(at, out);
                 }
             }
@@ -351,34 +363,28 @@ impl<'a> Band<'a> {
         let [a, b, a1, b1] = sides;
         let mut grows = [0.0; LANES];
         for lane in 0..LANES {
-            let a = if a[lane].is_finite() { a[lane] } else { a1[lane] };
-            let b = if b[lane].is_finite() { b[lane] } else { b1[lane] };
-            // NaN is neither less nor more.
-            let least = if a.abs() <= b.abs() || !b.is_finite() { a } else { b };
-            grows[lane] = if least.is_finite() { least } else { 0.0 };
+            let a = if a[lane].abs() < MOST_Q { a[lane] } else { a1[lane] };
+            let b = if b[lane].abs() < MOST_Q { b[lane] } else { b1[lane] };
+            let least = if a.abs() <= b.abs() { a } else { b };
+            grows[lane] = if least.abs() < MOST_Q { least } else { 0.0 };
         }
         grows
     }
 
-    /// Returns 1, and u, v and q from the middle, of the pixels that are `steps` strides away; 0 for those on
+    /// Adds the pixels that are `steps` strides away to fits, about u, v and q of the middle, without those on
     /// another surface.
     #[inline(always)]
-    fn near<F: Frame>(&self, frame: &F, window: &Window, steps: [i32; 2]) -> [Lanes; 4] {
+    fn gather<F: Frame>(&self, frame: &F, window: &Window, steps: [i32; 2], fit: &mut Fit) {
         let Window { at, stride, from: [u0, v0, q0], grows: [gu, gv], tolerance, more } = window;
         let [dx, dy] = steps.map(|k| (k * stride) as isize);
         let [u, v, q] = frame.uvq(self.pixels(at.wrapping_add_signed(dy * self.row as isize + dx)));
         let steps = steps[0].abs().max(steps[1].abs()) as f32;
-        let mut near = [[0.0; LANES]; 4];
         for lane in 0..LANES {
             let (u, v, q) = (u[lane] - u0[lane], v[lane] - v0[lane], q[lane] - q0[lane]);
             let off = (q - gu[lane] * u - gv[lane] * v).abs();
-            let is_near = off <= tolerance[lane] + more[lane] * steps;
-            near[0][lane] = if is_near { 1.0 } else { 0.0 };
-            near[1][lane] = if is_near { u } else { 0.0 };
-            near[2][lane] = if is_near { v } else { 0.0 };
-            near[3][lane] = if is_near { q } else { 0.0 };
+            let is_near = f32::from(off <= tolerance[lane] + more[lane] * steps);
+            fit.add(lane, is_near, [is_near * u, is_near * v, is_near * q]);
         }
-        near
     }
 
     #[inline(always)]
@@ -396,10 +402,11 @@ impl<'a> Band<'a> {
         // The window is as wide as the noise needs, or as half a cell if that is more: the same for all
         // lanes.
         let mut stride = 1;
-        for lane in (0..LANES).filter(|lane| !q0[*lane].is_nan()) {
+        for lane in 0..LANES {
             let cells = self.cell_m / spacing[lane];
             let for_noise = (sigma[lane] / spacing[lane] + 1.0).min(1.25 * cells);
-            stride = stride.max((for_noise.max(0.4 * cells) as i32).clamp(1, MOST_STRIDE));
+            let wanted = for_noise.max(0.4 * cells) as i32;
+            stride = stride.max(if q0[lane] < MOST_Q { wanted.min(MOST_STRIDE) } else { 1 });
         }
 
         // How q grows to the right and downwards.
@@ -420,13 +427,13 @@ impl<'a> Band<'a> {
         let mut inner = Fit::default();
         for dy in -1..=1 {
             for dx in -1..=1 {
-                inner.add(&self.near(&frame, &window, [dx, dy]));
+                self.gather(&frame, &window, [dx, dy], &mut inner);
             }
         }
         let mut fit = inner;
         for dy in -2..=2_i32 {
             for dx in (-2..=2_i32).filter(|dx| dx.abs().max(dy.abs()) == 2) {
-                fit.add(&self.near(&frame, &window, [dx, dy]));
+                self.gather(&frame, &window, [dx, dy], &mut fit);
             }
         }
 
@@ -443,28 +450,45 @@ impl<'a> Band<'a> {
             }
         }
 
-        for (lane, surfel) in out.iter_mut().enumerate().filter(|(lane, _)| !q0[*lane].is_nan()) {
-            let center = Vec3::new(u0[lane], v0[lane], 1.0);
-            // The slope comes from the window, the place from its middle. A thread, or a point in the air,
-            // faces the sensor.
-            let (b, c) = fit.slope(lane).unwrap_or_else(|| {
-                let m = center * (q0[lane] / center.length_squared());
-                (m.x, m.y)
-            });
-            let q = q0[lane] + inner.mean(lane, b, c);
-            let inverse = frame.vector(lane, Vec3::new(b, c, q - b * center.x - c * center.y));
-            let offset = length(inverse).recip();
-            let normal = -inverse * offset;
-            let cosine = -normal.dot(unit(frame.vector(lane, center)));
-            if cosine.is_nan() || cosine < LEAST_COSINE {
-                continue;
-            }
+        // The slope comes from the window, the place from its middle. A thread, or a point in the air, faces
+        // the sensor.
+        let [mut b, mut c] = [u0, v0];
+        for lane in 0..LANES {
+            let facing = q0[lane] / (u0[lane] * u0[lane] + v0[lane] * v0[lane] + 1.0);
+            (b[lane], c[lane]) = (u0[lane] * facing, v0[lane] * facing);
+        }
+        fit.slopes(&mut b, &mut c);
+        let mut q = inner.means(&b, &c);
+        for lane in 0..LANES {
+            q[lane] = (q0[lane] + q[lane]) - b[lane] * u0[lane] - c[lane] * v0[lane];
+        }
+
+        let inverse = frame.vectors([b, c, q]);
+        let ray = frame.vectors([u0, v0, [1.0; LANES]]);
+        let mut normal = inverse;
+        let (mut offset, mut cosine, mut weight) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let dot = |a: &[Lanes; 3], b: &[Lanes; 3], lane: usize| {
+            a[0][lane] * b[0][lane] + a[1][lane] * b[1][lane] + a[2][lane] * b[2][lane]
+        };
+        for lane in 0..LANES {
+            offset[lane] = 1.0 / dot(&inverse, &inverse, lane).sqrt();
+            (0..3).for_each(|k| normal[k][lane] = -inverse[k][lane] * offset[lane]);
+            let inv = 1.0 / dot(&ray, &ray, lane).sqrt();
+            cosine[lane] = -(normal[0][lane] * (ray[0][lane] * inv)
+                + normal[1][lane] * (ray[1][lane] * inv)
+                + normal[2][lane] * (ray[2][lane] * inv));
             let relative = UNIT_SIGMA_M / sigma[lane];
-            *surfel = Surfel {
-                normal,
-                offset,
+            weight[lane] = relative * relative * cosine[lane];
+        }
+
+        // NaN is no cosine.
+        let is_seen = |lane: &usize| q0[*lane] < MOST_Q && cosine[*lane] >= LEAST_COSINE;
+        for lane in (0..out.len()).filter(is_seen) {
+            out[lane] = Surfel {
+                normal: Vec3::new(normal[0][lane], normal[1][lane], normal[2][lane]),
+                offset: offset[lane],
                 range: range[lane],
-                weight: relative * relative * cosine,
+                weight: weight[lane],
                 sigma_m: sigma[lane],
                 nearest: nearest[lane],
             };
@@ -494,68 +518,75 @@ struct Fit {
 }
 
 impl Fit {
-    /// Adds 1, u, v and q, or zeros.
+    /// Adds 1, u, v and q of a pixel, or zeros.
     #[inline(always)]
-    fn add(&mut self, [one, u, v, q]: &[Lanes; 4]) {
-        for lane in 0..LANES {
-            self.sums[0][lane] += one[lane];
-            self.sums[1][lane] += u[lane];
-            self.sums[2][lane] += v[lane];
-            self.sums[3][lane] += q[lane];
-            self.sums[4][lane] += u[lane] * u[lane];
-            self.sums[5][lane] += u[lane] * v[lane];
-            self.sums[6][lane] += v[lane] * v[lane];
-            self.sums[7][lane] += u[lane] * q[lane];
-            self.sums[8][lane] += v[lane] * q[lane];
+    fn add(&mut self, lane: usize, one: f32, [u, v, q]: [f32; 3]) {
+        let products = [one, u, v, q, u * u, u * v, v * v, u * q, v * q];
+        for (sum, product) in self.sums.iter_mut().zip(products) {
+            sum[lane] += product;
         }
     }
 
-    /// Returns b and c, or `None` if the places lie in a line.
+    /// Changes b and c to those of the fits, except where the places lie in a line.
     #[inline(always)]
-    fn slope(&self, lane: usize) -> Option<(f32, f32)> {
-        let [n, u, v, q, uu, uv, vv, uq, vq] = std::array::from_fn(|k| self.sums[k][lane]);
-        let k = n.recip();
-        let (uu, uv, vv) = (uu - u * u * k, uv - u * v * k, vv - v * v * k);
-        let (uq, vq) = (uq - u * q * k, vq - v * q * k);
-        let det = uu * vv - uv * uv;
-        let is_plane = det > 0.02 * uu * vv && n >= 4.0;
-        is_plane.then(|| ((uq * vv - vq * uv) / det, (vq * uu - uq * uv) / det))
+    fn slopes(&self, b: &mut Lanes, c: &mut Lanes) {
+        for lane in 0..LANES {
+            let [n, u, v, q, uu, uv, vv, uq, vq] = std::array::from_fn(|k| self.sums[k][lane]);
+            let k = 1.0 / n;
+            let (uu, uv, vv) = (uu - u * u * k, uv - u * v * k, vv - v * v * k);
+            let (uq, vq) = (uq - u * q * k, vq - v * q * k);
+            let det = uu * vv - uv * uv;
+            let is_plane = (det > 0.02 * uu * vv) & (n >= 4.0);
+            let slope = [(uq * vv - vq * uv) / det, (vq * uu - uq * uv) / det];
+            b[lane] = if is_plane { slope[0] } else { b[lane] };
+            c[lane] = if is_plane { slope[1] } else { c[lane] };
+        }
     }
 
-    /// Returns the a that fits best with the given b and c.
+    /// Returns the a that fit best with the given b and c.
     #[inline(always)]
-    fn mean(&self, lane: usize, b: f32, c: f32) -> f32 {
-        let [n, u, v, q] = std::array::from_fn(|k| self.sums[k][lane]);
-        (q - b * u - c * v) / n
+    fn means(&self, b: &Lanes, c: &Lanes) -> Lanes {
+        let mut means = [0.0; LANES];
+        for lane in 0..LANES {
+            let [n, u, v, q] = std::array::from_fn(|k| self.sums[k][lane]);
+            means[lane] = (q - b[lane] * u - c[lane] * v) / n;
+        }
+        means
     }
 }
 
 impl RangeImage {
-    /// Returns what a [`Frame`] needs of each pixel of some rows, which have these ranges; NaN where nothing
-    /// was measured.
+    /// Returns what a [`Frame`] needs of each pixel of some rows, which have these ranges.
     fn frames(&self, ranges: &[f32], from_row: usize) -> Vec<[f32; 3]> {
         let width = self.width() as usize;
         match &self.directions {
             Directions::Lens(_) => {
-                let uvq = |(i, range): (usize, &f32)| {
-                    let ray = self.ray_of(from_row * width + i);
-                    if range.is_nan() {
-                        [f32::NAN; 3]
-                    } else {
-                        [ray.x, ray.y, range.recip()]
-                    }
-                };
-                ranges.iter().enumerate().map(uvq).collect()
+                let (rays, mut row) = (self.rays(), [const { Vec::new() }; 3]);
+                let mut frames = Vec::with_capacity(ranges.len());
+                for (y, ranges) in ranges.chunks(width).enumerate() {
+                    rays.row(from_row + y, &mut row);
+                    let [u, v, _] = &row;
+                    let uvq = |((range, u), v): ((&f32, &f32), &f32)| {
+                        if range.is_nan() {
+                            Flat::NONE
+                        } else {
+                            [*u, *v, range.recip()]
+                        }
+                    };
+                    frames.extend(ranges.iter().zip(u).zip(v).map(uvq));
+                }
+                frames
             }
             Directions::Angles(grid) => {
-                let (columns, rows) = (grid.column_rays(), grid.row_rays());
+                let columns = grid.column_rays();
+                let rows: Vec<_> = (0..ranges.len() / width).map(|y| grid.row_ray(from_row + y)).collect();
                 let steps = grid.steps_rad();
                 let point = |(i, range): (usize, &f32)| {
                     if range.is_nan() {
-                        return [f32::NAN; 3];
+                        return Round::NONE;
                     }
                     let [sin_x, cos_x] = columns[i % width];
-                    let [sin_y, cos_y] = rows[from_row + i / width];
+                    let [sin_y, cos_y] = rows[i / width];
                     let middle = DVec3::new(cos_y * sin_x, sin_y, cos_y * cos_x);
                     let ray = match self.offsets.get(from_row * width + i) {
                         Some(off) => {

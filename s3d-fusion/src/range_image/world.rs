@@ -3,6 +3,7 @@
 use super::{Directions, RangeImage};
 use s3d_geom::Pose;
 use s3d_geom::glam::{DAffine3, DVec3, Vec3, dvec2};
+use std::num::NonZeroU32;
 
 impl RangeImage {
     /// Returns the corners of the smallest box along the axes of the world that holds all points that were
@@ -23,16 +24,17 @@ impl RangeImage {
     }
 
     /// Returns the points of the pixels that lie on a surface, with its unit normals towards the sensor:
-    /// world metres. `cell_m` is the size of what can be told apart later.
-    pub fn surface_points(&self, cell_m: f32) -> (Vec<Vec3>, Vec<Vec3>) {
+    /// world metres. `cell_m` is the size of what can be told apart later. Of rows and columns, each `every`-th
+    /// is taken.
+    pub fn surface_points(&self, cell_m: f32, every: NonZeroU32) -> (Vec<Vec3>, Vec<Vec3>) {
         let world_from_sensor = self.pose.opencv_from_world().transpose();
         let (mut points, mut normals) = (Vec::new(), Vec::new());
-        for (i, surfel) in self
-            .surfels(cell_m)
-            .iter()
-            .enumerate()
-            .filter(|(_, surfel)| surfel.weight > 0.0)
-        {
+        let (width, every) = (self.width() as usize, every.get() as usize);
+        let surfels = self.surfels(cell_m);
+        let taken = surfels.iter().enumerate().filter(|(i, surfel)| {
+            surfel.weight > 0.0 && (i % width).is_multiple_of(every) && (i / width).is_multiple_of(every)
+        });
+        for (i, surfel) in taken {
             let Some(point) = self.point(i, surfel.range) else { continue };
             let ray = point - self.pose.location;
             let normal = (world_from_sensor * surfel.normal.as_dvec3()).normalize_or_zero();
@@ -81,7 +83,7 @@ mod tests {
         let [min, max] = wall.bounds().unwrap();
         assert!(min.abs_diff_eq(DVec3::new(-0.95, 5.0, 0.05), 1e-5), "{min}");
         assert!(max.abs_diff_eq(DVec3::new(2.95, 5.0, 2.95), 1e-5), "{max}");
-        let (points, normals) = wall.surface_points(0.01);
+        let (points, normals) = wall.surface_points(0.01, NonZeroU32::MIN);
         assert!(points.len() > 1000 && points.iter().all(|p| (p.y - 5.0).abs() < 1e-5));
         assert!(normals.iter().all(|n| n.abs_diff_eq(-Vec3::Y, 1e-4)));
 

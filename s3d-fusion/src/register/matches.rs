@@ -49,7 +49,9 @@ impl<'a> Scans<'a> {
             cosine: libm::cos(self.options.max_angle_rad),
         };
         let points = (0..).zip(self.points[a].positions.iter().zip(&self.points[a].normals));
+        let every = self.points[a].positions.len().div_ceil(self.options.most_points.max(1));
         points
+            .step_by(every.max(1))
             .filter_map(|(from, (p, n))| {
                 let p = b_from_a.transform_point3(p.as_dvec3());
                 let n = b_from_a.transform_vector3(n.as_dvec3());

@@ -33,6 +33,8 @@ pub struct RegisterOptions {
     pub max_distance_m: f64,
     /// The largest angle between the normals of points that belong together, radians.
     pub max_angle_rad: f64,
+    /// Partners are looked up for so many points of a scan at most, evenly spread over all.
+    pub most_points: usize,
     /// Two scans overlap if so many of their points belong together.
     pub min_correspondences: usize,
     /// A motion is left alone if less than this share of it is along normals: the mean of the squared
@@ -48,6 +50,7 @@ impl Default for RegisterOptions {
             cell_m: 0.05,
             max_distance_m: 0.25,
             max_angle_rad: 0.5,
+            most_points: usize::MAX,
             min_correspondences: 200,
             least_share: 0.01,
             iterations: 40,

@@ -131,6 +131,9 @@ impl Lens {
         let [k1, k2, p1, p2, k3] = self.distortion;
         let goal = (pixel - self.center_px) / self.focal_px;
         let mut at = goal;
+        if self.distortion == [0.0; 5] {
+            return (at.length_squared() <= self.last_r2).then(|| at.extend(1.0));
+        }
 
         for _ in 0..50 {
             let error = self.bent(at.x, at.y) - goal;

@@ -30,6 +30,13 @@ impl DepthPicture {
         let image = color.picture.read()?;
         let lens = color.lens_for([image.width(), image.height()])?;
 
+        // Pictures that are registered to each other show the same in the same pixels.
+        if lens == self.lens && color.pose == self.pose {
+            let pairs = depth.pixels().iter().zip(image.pixels());
+            let colors = pairs.map(|(depth_m, color)| depth_m.is_finite().then_some(*color));
+            return Ok(Some(Raster::from_vec(depth.width(), depth.height(), colors.collect())));
+        }
+
         // A depth pixel covers several pixels of a larger colour picture.
         let ratio = lens.focal_px() / self.lens.focal_px();
         let side = (libm::round(ratio.max_element()) as u32).clamp(1, MOST_MEAN);

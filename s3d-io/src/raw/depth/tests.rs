@@ -88,6 +88,22 @@ fn has_colors(found: &DepthPictures) {
     assert!(rest.iter().all(|color| *color == Some([200, 100, 50])), "{colors:?}");
 }
 
+#[test]
+fn registered_pictures_are_looked_up_as_others_are() {
+    let scan = matterport();
+    let image = Raster::from_vec(8, 6, (0..48).map(|i| [i, 5 * i, 255 - i]).collect());
+    let path = scan.at(&format!("matterport_color_images/{UUID}_i1_0.png"));
+    write_rgb8(&path, &image, Content::Photo, Compression::Fast).unwrap();
+    let mut picture = scan.open_with(&RawOptions::default()).unwrap().pictures[0].clone();
+    let depth = picture.read_depth().unwrap();
+
+    let registered = picture.read_colors(&depth).unwrap().unwrap();
+    picture.color.as_mut().unwrap().pose.location.x += 1e-9;
+    let others = picture.read_colors(&depth).unwrap().unwrap();
+    assert_eq!(registered.pixels(), others.pixels());
+    assert_eq!(registered.pixels()[9], Some([9, 45, 246]));
+}
+
 fn focal(found: &DepthPictures) -> [f64; 4] {
     let lens = &found.pictures[0].lens;
     [lens.focal_px().x, lens.focal_px().y, lens.center_px().x, lens.center_px().y]

@@ -1,0 +1,177 @@
+//! Which blocks an image is gathered in: those near its hits.
+
+use super::images::Adding;
+use super::view::View;
+use super::walk::{self, Ways, blocks_along};
+use crate::grid::{FARTHEST, key};
+use crate::lanes::{LANES, Lanes};
+use crate::range_image::{Rays, Surfel};
+use rayon::prelude::*;
+use s3d_geom::glam::{DVec3, Mat3, Vec3};
+use s3d_simd::{dispatch, level};
+
+/// The blocks near hits.
+pub(super) struct Touched {
+    /// The keys of the blocks, in order.
+    pub(super) blocks: Vec<u64>,
+    /// A box around the sensor and all hits, from the sensor, metres.
+    pub(super) low: Vec3,
+    pub(super) high: Vec3,
+}
+
+/// Rows of an image that are worked on at a time.
+const ROWS: usize = 8;
+/// The number of ways that are remembered.
+const RECENT: usize = 256;
+
+impl Adding<'_> {
+    pub(super) fn touched(&self, view: &View<'_>, surfels: &[Surfel]) -> Touched {
+        let width = view.size[0] as usize;
+        let near = Near::new(self, view);
+        let rays = self.image.rays();
+        let bands: Vec<Touched> = surfels
+            .par_chunks(width * ROWS)
+            .enumerate()
+            .map(|(band, surfels)| dispatch!(level(), _simd => near.band(&rays, band * ROWS, surfels)))
+            .collect();
+
+        let low = bands.iter().fold(Vec3::ZERO, |low, band| low.min(band.low));
+        let high = bands.iter().fold(Vec3::ZERO, |high, band| high.max(band.high));
+        let mut blocks: Vec<u64> = bands.into_iter().flat_map(|band| band.blocks).collect();
+        blocks.sort_unstable();
+        blocks.dedup();
+        Touched { blocks, low, high }
+    }
+}
+
+/// From pixels to blocks. Blocks are counted from the sensor's, so that single precision is enough.
+struct Near<'a> {
+    adding: &'a Adding<'a>,
+    width: usize,
+    /// From OpenCV's axes of the sensor to the world.
+    turn: Mat3,
+    /// The block of the sensor, and where the sensor is in it, in blocks.
+    sensor: [i32; 3],
+    start: Vec3,
+    per_block: f32,
+}
+
+impl<'a> Near<'a> {
+    fn new(adding: &'a Adding<'a>, view: &View<'_>) -> Self {
+        let per_block = adding.scale.block().recip();
+        let sensor = walk::floor(view.location * per_block);
+        let start = view.location * per_block - DVec3::from_array(sensor.map(f64::from));
+        Self {
+            adding,
+            width: view.size[0] as usize,
+            turn: view.turn.transpose().as_mat3(),
+            sensor,
+            start: start.as_vec3(),
+            per_block: per_block as f32,
+        }
+    }
+
+    /// Returns the blocks of some rows.
+    #[inline(always)]
+    fn band(&self, rays: &Rays<'_>, first: usize, surfels: &[Surfel]) -> Touched {
+        let mut blocks = Vec::new();
+        let (mut low, mut high) = ([[0.0_f32; LANES]; 3], [[0.0_f32; LANES]; 3]);
+        let mut recent = [[i32::MIN; 4]; RECENT];
+        let mut row_rays = [const { Vec::new() }; 3];
+        for (row, surfels) in surfels.chunks(self.width).enumerate() {
+            rays.row(first + row, &mut row_rays);
+            for x in (0..self.width).step_by(LANES) {
+                let surfels = &surfels[x..self.width.min(x + LANES)];
+                let hits = self.hits(&row_rays, x, surfels);
+                for axis in 0..3 {
+                    for lane in 0..LANES {
+                        let at = if hits.is_seen[lane] { hits.at[axis][lane] } else { 0.0 };
+                        low[axis][lane] = low[axis][lane].min(at);
+                        high[axis][lane] = high[axis][lane].max(at);
+                    }
+                }
+                self.walk(&hits, &mut recent, &mut blocks);
+            }
+        }
+        blocks.sort_unstable();
+        blocks.dedup();
+        let low = low.map(|low| low.into_iter().fold(0.0, f32::min));
+        let high = high.map(|high| high.into_iter().fold(0.0, f32::max));
+        Touched { blocks, low: low.into(), high: high.into() }
+    }
+
+    /// Returns what the pixels from `x` on see, and where their distances are gathered.
+    #[inline(always)]
+    fn hits(&self, rays: &[Vec<f32>; 3], x: usize, surfels: &[Surfel]) -> Hits {
+        let mut ray = [[0.0; LANES]; 3];
+        for (ray, row) in ray.iter_mut().zip(rays) {
+            ray[..surfels.len()].copy_from_slice(&row[x..x + surfels.len()]);
+        }
+        let [mut nx, mut ny, mut nz, mut range, mut sigma] = [[0.0; LANES]; 5];
+        let mut is_seen = [false; LANES];
+        for (lane, s) in surfels.iter().enumerate() {
+            (nx[lane], ny[lane], nz[lane]) = (s.normal.x, s.normal.y, s.normal.z);
+            (range[lane], sigma[lane], is_seen[lane]) = (s.range, s.sigma_m, s.weight > 0.0);
+        }
+
+        let mut hits = Hits { is_seen, at: [[0.0; LANES]; 3], ends: [[[0.0; LANES]; 3]; 2] };
+        let columns = [self.turn.x_axis, self.turn.y_axis, self.turn.z_axis].map(|axis| axis.to_array());
+        for lane in 0..LANES {
+            let [x, y, z] = [ray[0][lane], ray[1][lane], ray[2][lane]].map(|k| k * range[lane]);
+            let length = (x * x + y * y + z * z).sqrt();
+            let cosine = -(nx[lane] * x + ny[lane] * y + nz[lane] * z) / length;
+            let [front, behind] = self.adding.scale.along_ray(cosine, sigma[lane]);
+            let ends = [-front, behind].map(|off| (1.0 + off / length) * self.per_block);
+            for axis in 0..3 {
+                let at = columns[0][axis] * x + columns[1][axis] * y + columns[2][axis] * z;
+                hits.at[axis][lane] = at;
+                (0..2).for_each(|k| hits.ends[k][axis][lane] = self.start[axis] + at * ends[k]);
+            }
+        }
+        hits
+    }
+
+    /// Adds the blocks of rays, but not of rays that go a way of late.
+    #[inline(always)]
+    fn walk(&self, hits: &Hits, recent: &mut [[i32; 4]; RECENT], blocks: &mut Vec<u64>) {
+        let ways = Ways::of(&hits.ends);
+        for lane in (0..LANES).filter(|lane| hits.is_seen[*lane]) {
+            let way = ways.lane(lane);
+            let mixed = way
+                .iter()
+                .fold(0, |mixed, k| (mixed ^ *k as u32).wrapping_mul(0x9e37_79b9));
+            let known = &mut recent[(mixed >> 24) as usize];
+            if *known == way {
+                continue;
+            }
+            let ends = [0, 1].map(|end: usize| {
+                let [x, y, z] = &hits.ends[end];
+                Vec3::new(x[lane], y[lane], z[lane]).as_dvec3()
+            });
+            if ends
+                .iter()
+                .any(|end| !(end.abs().max_element() < f64::from(FARTHEST - 8)))
+            {
+                continue;
+            }
+            if Ways::is_short(way) {
+                *known = way;
+            }
+            blocks_along(ends, |from_sensor| {
+                let block = [0, 1, 2].map(|k| self.sensor[k] + from_sensor[k]);
+                if self.adding.tile.is_none_or(|tile| tile.holds(block)) {
+                    blocks.push(key(block));
+                }
+            });
+        }
+    }
+}
+
+/// What pixels side by side see.
+struct Hits {
+    is_seen: [bool; LANES],
+    /// From the sensor, along the axes of the world, metres.
+    at: [Lanes; 3],
+    /// Where distances are gathered from and to, in blocks.
+    ends: [[Lanes; 3]; 2],
+}
