@@ -235,6 +235,7 @@ mod tests {
             "only",
             "normals",
             "rgb_samples",
+            "semantic_glb",
             "xyz",
             "normal_axes",
             "depth_units",

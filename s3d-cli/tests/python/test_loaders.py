@@ -484,7 +484,7 @@ def test_schemas_hold(request, name):
     # Every key must be described, so that the schema does not miss a new one.
     assert set(manifest) <= set(schema["manifest"]["properties"])
     options = schema["manifest"]["properties"]["options"]["properties"]
-    assert set(manifest["options"]) == set(options) - {"fill", "trim_strays", "rgb_samples"}
+    assert set(manifest["options"]) == set(options) - {"fill", "trim_strays", "rgb_samples", "semantic_glb"}
     area = schema["manifest"]["properties"]["areas"]["items"]["properties"]
     # An area whose scan lies near the origin has no offset, one whose locations are listed does not place them, and here are
     # no photographs; nothing is warned of.

@@ -51,6 +51,12 @@ fn write_area_assets(
     write_colored_mesh(&mesh_dir, file, options.compression)?;
     if area.is_labelled {
         s3d_io::mesh::write_semantic_obj(&mesh_dir, &file.mesh, &label_of_face, &table.names())?;
+        if options.semantic_glb {
+            let path = layout.semantic_glb(number);
+            s3d_io::mesh::write_labelled_glb(&path, &file.mesh, &label_of_face, table)?;
+        }
+    } else if options.semantic_glb {
+        ctx.warn(format_args!("area {number} has no labels: there is no semantic.glb"));
     }
     if let Some(source) = source_faces(area, file) {
         s3d_io::dataset::write_source_faces(&layout.source_faces_npz(number), &source)?;

@@ -127,6 +127,11 @@ pub struct ExportOptions {
     #[cfg_attr(feature = "clap", arg(display_order = 20, long, value_name = "N", default_value_t = 1,
         value_parser = clap::value_parser!(u32).range(1..=64)))]
     pub rgb_samples: u32,
+    /// Write 3d/semantic.glb for each area: the mesh with its textures, and the labels of its faces as features
+    /// (EXT_mesh_features, EXT_structural_metadata), which viewers such as CesiumJS pick and colour.
+    #[serde(skip_serializing_if = "is_false")]
+    #[cfg_attr(feature = "clap", arg(display_order = 24, long))]
+    pub semantic_glb: bool,
     /// Compression of the image files: fast, balanced (about as small as files by libpng and OpenEXR) or
     /// small (slowest). The pixels are the same.
     #[serde(with = "by_name")]
@@ -191,6 +196,7 @@ impl Default for ExportOptions {
             only: Vec::new(),
             normals: Normals::Flat,
             rgb_samples: 1,
+            semantic_glb: false,
             compression: Compression::default(),
             xyz: XyzType::default(),
             normal_axes: NormalAxes::default(),
@@ -208,6 +214,10 @@ fn is_positive(value: f64) -> bool {
 
 fn is_one(samples: &u32) -> bool {
     *samples == 1
+}
+
+fn is_false(wanted: &bool) -> bool {
+    !wanted
 }
 
 fn is_zero(seed: &u64) -> bool {

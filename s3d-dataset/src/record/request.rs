@@ -172,6 +172,7 @@ impl Request {
             only: _,
             normals: _,
             rgb_samples: _,
+            semantic_glb: _,
             compression: _,
             xyz: _,
             normal_axes: _,

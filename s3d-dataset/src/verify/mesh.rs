@@ -8,7 +8,7 @@ use crate::summary::Surface;
 use s3d_geom::TriMesh;
 use s3d_io::dataset::{InstanceEntry, Layout, read_source_faces};
 use s3d_io::fs::read_file;
-use s3d_io::mesh::{MeshFile, SemanticObj, UpAxis, read_mesh};
+use s3d_io::mesh::{MeshFile, MeshLabels, SemanticObj, UpAxis, read_mesh};
 use std::path::Path;
 
 const MESH: (Topic, &str) = (Topic::Mesh, "meshes that differ");
@@ -81,6 +81,7 @@ pub(crate) fn read_and_check(
     labelled.is_voted = votes::check(layout, area, manifest, &labelled, (labels, instances), report);
 
     check_unlabelled(layout, area, manifest, &labelled, report);
+    check_glb(&layout.semantic_glb(area), manifest, &labelled, report);
     Some(labelled)
 }
 
@@ -138,6 +139,31 @@ fn check_materials(path: &Path, mesh: &LabelledMesh, labels: &Labels, report: &R
     report.check(written.is_ok() && found == expected, MESH, path, || {
         "its materials are not the labels of semantic.obj in their colours".to_owned()
     });
+}
+
+/// Checks that `semantic.glb` has the faces of `rgb.obj` with their labels, in whatever order.
+fn check_glb(path: &Path, manifest: &Manifest, mesh: &LabelledMesh, report: &Report) {
+    if !manifest.options.semantic_glb || !mesh.all_in_table {
+        return;
+    }
+    let Some(file) = report.read(Topic::Mesh, path, |path| read_mesh(path, UpAxis::Y)) else { return };
+    let label = |face: usize| match &file.labels {
+        Some(MeshLabels::Objects { objects, faces, .. }) => {
+            objects.get(faces[face] as usize).map_or(0, |object| object.instance)
+        }
+        _ => 0,
+    };
+    let found = faces_with_labels(&file.mesh, label);
+    let expected = faces_with_labels(&mesh.file.mesh, |face| mesh.label_of_face[face].into());
+    report.check(found == expected, MESH, path, || "its faces or labels are not those of semantic.obj".into());
+}
+
+/// Returns the corners of each face as bits, with its label, in order.
+fn faces_with_labels(mesh: &TriMesh, label: impl Fn(usize) -> i64) -> Vec<([[u32; 3]; 3], i64)> {
+    let corners = |face: usize| mesh.triangle(face as u32).map(|p| (p + 0.0).to_array().map(f32::to_bits));
+    let mut faces: Vec<_> = (0..mesh.faces().len()).map(|face| (corners(face), label(face))).collect();
+    faces.sort_unstable();
+    faces
 }
 
 /// Checks the surface without votes and without a label that the manifest tells.

@@ -249,6 +249,11 @@ impl Layout {
         self.mesh_dir(area).join("semantic.obj")
     }
 
+    /// `area_1/3d/semantic.glb`: the textured mesh with the labels of its faces as features, on request.
+    pub fn semantic_glb(&self, area: u32) -> PathBuf {
+        self.mesh_dir(area).join("semantic.glb")
+    }
+
     /// `area_1/3d/pointcloud.ply`: all points of the area, labelled.
     pub fn point_cloud(&self, area: u32) -> PathBuf {
         self.mesh_dir(area).join("pointcloud.ply")
@@ -544,6 +549,7 @@ mod tests {
             layout.area_dir(1),
             layout.mesh_dir(1),
             layout.semantic_obj(1),
+            layout.semantic_glb(1),
             layout.point_cloud(1),
             layout.point_cloud_mat(1),
             layout.point_boxes_json(1),

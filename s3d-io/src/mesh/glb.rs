@@ -70,6 +70,12 @@ impl Glb {
         self.views.len() - 1
     }
 
+    /// Adds bytes at a multiple of 8, as tables of features need them. Returns the number of the view.
+    pub(super) fn aligned_view(&mut self, bytes: impl Iterator<Item = u8>) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
+        self.view(None, |all| all.extend(bytes))
+    }
+
     /// Adds a column of vertices. Returns its number.
     pub(super) fn column<const N: usize>(
         &mut self,

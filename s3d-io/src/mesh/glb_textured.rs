@@ -3,6 +3,7 @@
 #![expect(clippy::indexing_slicing, reason = "a writer: keys of JSON objects are its own")]
 
 use super::glb::{F32, Glb, plain};
+use super::glb_labels;
 use super::gltf::linear_from_srgb;
 use crate::error::Result;
 use crate::fs::write_whole;
@@ -10,6 +11,7 @@ use crate::image::compression::Compression;
 use crate::image::png::{Content, encode_rgb8};
 use s3d_geom::glam::{Vec2, Vec3};
 use s3d_geom::{FaceColor, NO_INDEX, Texture, TriMesh, Wrap};
+use s3d_label::LabelTable;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -32,7 +34,37 @@ enum Paint {
 /// # Errors
 /// [`Error::Io`](crate::Error::Io), also for a mesh of more than 4 GiB, which the format cannot hold.
 pub fn write_textured_glb(path: &Path, mesh: &TriMesh) -> Result<u64> {
-    let Columns { positions, uvs, colors, corners } = columns(mesh);
+    write(path, mesh, None)
+}
+
+/// Writes a mesh with its textures and the labels of its faces as a GLB file, else like
+/// [`write_textured_glb`]. `label_of_face` has indices into `table`.
+///
+/// The labels are features: each vertex has the index of its label (EXT_mesh_features, where 0 is the null
+/// feature), and row N of a property table (EXT_structural_metadata) has the name, class and room of label N
+/// as texts, and N itself as `instance`. Viewers that know neither show the textured mesh. [`read_mesh`]
+/// gives the objects back.
+///
+/// # Errors
+/// Like [`write_textured_glb`].
+///
+/// # Panics
+/// If `label_of_face` has not one entry per face.
+///
+/// [`read_mesh`]: crate::mesh::read_mesh
+pub fn write_labelled_glb(
+    path: &Path,
+    mesh: &TriMesh,
+    label_of_face: &[u32],
+    table: &LabelTable,
+) -> Result<u64> {
+    assert_eq!(label_of_face.len(), mesh.faces().len(), "one label per face");
+    write(path, mesh, Some((label_of_face, table)))
+}
+
+fn write(path: &Path, mesh: &TriMesh, labels: Option<(&[u32], &LabelTable)>) -> Result<u64> {
+    let Columns { positions, uvs, colors, labels: label_of_vertex, corners } =
+        columns(mesh, labels.map(|(of_face, _)| of_face));
     write_whole(path, |w| {
         let mut glb = Glb::default();
         let position = glb.positions(&positions);
@@ -43,6 +75,7 @@ pub fn write_textured_glb(path: &Path, mesh: &TriMesh) -> Result<u64> {
             texture_coordinates = Some(glb.column([F32, count], "VEC2", downwards.map(f32::to_le_bytes)));
         }
         let color = corners.contains_key(&Paint::Corners).then(|| glb.colors(&colors));
+        let label = labels.map(|_| glb_labels::add_ids(&mut glb, &label_of_vertex));
 
         let mut primitives = Vec::new();
         let mut materials = Vec::new();
@@ -60,14 +93,25 @@ pub fn write_textured_glb(path: &Path, mesh: &TriMesh) -> Result<u64> {
                     material["baseColorFactor"] = json!([r, g, b, 1.0]);
                 }
             }
-            let indices = glb.indices(indices);
-            primitives
-                .push(json!({ "attributes": attributes, "indices": indices, "material": materials.len() }));
+            if label.is_some() {
+                attributes[glb_labels::ATTRIBUTE] = json!(label);
+            }
+            let number = glb.indices(indices);
+            let mut primitive =
+                json!({ "attributes": attributes, "indices": number, "material": materials.len() });
+            if label.is_some() {
+                let used = indices.iter().map(|vertex| label_of_vertex[*vertex as usize]);
+                primitive["extensions"] = glb_labels::of_primitive(used);
+            }
+            primitives.push(primitive);
             materials.push(json!({ "pbrMetallicRoughness": material, "doubleSided": true }));
         }
 
         let mut rest = json!({ "materials": materials });
         add_textures(&mut glb, mesh.textures(), &mut rest);
+        if let Some((_, table)) = labels {
+            glb_labels::add_table(&mut glb, table, &mut rest);
+        }
         glb.write(w, &primitives, &[], rest)
     })
 }
@@ -80,14 +124,16 @@ struct Columns {
     uvs: Vec<Vec2>,
     /// Empty if the mesh has none.
     colors: Vec<[u8; 3]>,
+    /// Zeros if faces have none.
+    labels: Vec<u32>,
     corners: BTreeMap<Paint, Vec<u32>>,
 }
 
-/// Gives each pair of a vertex and a texture coordinate a vertex of its own.
-fn columns(mesh: &TriMesh) -> Columns {
+/// Gives each vertex with a texture coordinate and a label a vertex of its own.
+fn columns(mesh: &TriMesh, label_of_face: Option<&[u32]>) -> Columns {
     let parts = mesh.parts();
     let mut columns = Columns::default();
-    let mut numbers: HashMap<[u32; 2], u32> = HashMap::new();
+    let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
     for (face, corners) in (0..).zip(mesh.faces()) {
         let paint = match mesh.color_of(face) {
             FaceColor::Texture(texture, ..) => Paint::Texture(texture),
@@ -98,9 +144,11 @@ fn columns(mesh: &TriMesh) -> Columns {
             Paint::Texture(_) => parts.face_uvs.get(face as usize).copied(),
             _ => None,
         };
+        let label = label_of_face.map_or(0, |labels| labels[face as usize]);
         let of_paint = columns.corners.entry(paint).or_default();
         for (vertex, uv) in corners.iter().zip(uvs.unwrap_or([NO_INDEX; 3])) {
-            let number = *numbers.entry([*vertex, uv]).or_insert_with(|| {
+            let number = *numbers.entry([*vertex, uv, label]).or_insert_with(|| {
+                columns.labels.push(label);
                 columns.positions.extend(parts.positions.get(*vertex as usize));
                 columns.colors.extend(parts.colors.get(*vertex as usize));
                 columns

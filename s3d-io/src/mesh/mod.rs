@@ -39,6 +39,8 @@ pub(crate) mod file;
 #[cfg(feature = "gltf")]
 mod glb;
 #[cfg(all(feature = "gltf", feature = "png"))]
+mod glb_labels;
+#[cfg(all(feature = "gltf", feature = "png"))]
 mod glb_textured;
 #[cfg(feature = "gltf")]
 pub(crate) mod gltf;
@@ -64,7 +66,7 @@ pub use file::{LengthUnit, MeshFile, MeshOptions, MeshSource, UpAxis};
 #[cfg(feature = "gltf")]
 pub use glb::write_glb_mesh;
 #[cfg(all(feature = "gltf", feature = "png"))]
-pub use glb_textured::write_textured_glb;
+pub use glb_textured::{write_labelled_glb, write_textured_glb};
 #[cfg(feature = "mesh")]
 pub use join::{read_meshes, read_meshes_with};
 #[cfg(feature = "mesh")]

@@ -90,6 +90,8 @@ class ExportOptions(TypedDict, total=False):
     """ "flat" or "smooth"."""
     rgb_samples: int
     """The number of samples for the colour of a pixel where surfaces end or bend; default 1."""
+    semantic_glb: bool
+    """Writes the mesh of each area with its textures and labels as 3d/semantic.glb."""
     compression: str
     """ "fast", "balanced" or "small"; the pixels are the same."""
     xyz: str

@@ -153,6 +153,7 @@ mod tests {
             "only",
             "normals",
             "rgb_samples",
+            "semantic_glb",
             "compression",
             "xyz",
             "normal_axes",

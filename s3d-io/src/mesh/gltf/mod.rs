@@ -13,6 +13,6 @@ pub(crate) mod read;
 mod scene;
 mod tolerant;
 mod uri;
-mod words;
+pub(super) mod words;
 
 pub(crate) use material::linear_from_srgb;
