@@ -2,12 +2,12 @@
 
     cargo run --release -p s3d-dataset --example refined_labels -- 540 3 FOLDER
     pip install numpy scipy pydensecrf2            # or pydensecrf
-    python3 bench/refined_labels_peers.py FOLDER
+    python3 bench/refined_labels_peers.py FOLDER [N]   # every Nth image
 
-pydensecrf is the code of Krähenbühl and Koltun (2011). Its unaries are the projected labels with the certainty that its
-authors use for annotations; its kernels have the parameters of its example for images, and a narrower set. Every label
-of an image is a class of the CRF. Printed: the share of wrong pixels within 8 pixels of a true border, before and after,
-as the example prints it, and the wrong pixels of thin things.
+Each file has the result of s3d, too. pydensecrf is the code of Krähenbühl and Koltun (2011). Its unaries are the
+projected labels with the certainty that its authors use for annotations; its kernels have the parameters of its example
+for images, and narrower ones. Every label of an image is a class of the CRF. Printed: the share of wrong pixels within
+8 pixels of a true border, how many of those of `semantic` are gone, and the wrong pixels of thin things.
 """
 
 import sys
@@ -32,10 +32,10 @@ PEERS = {
 def read(path):
     data = path.read_bytes()
     width = int(np.frombuffer(data, np.uint32, 1)[0])
-    pixels = (len(data) - 4) // 11
+    pixels = (len(data) - 4) // 15
     shape = (pixels // width, width)
-    labels, truth = np.frombuffer(data, np.uint32, 2 * pixels, 4).reshape(2, *shape)
-    return labels, truth, np.frombuffer(data, np.uint8, 3 * pixels, 4 + 8 * pixels).reshape(*shape, 3)
+    images = np.frombuffer(data, np.uint32, 3 * pixels, 4).reshape(3, *shape)
+    return *images, np.frombuffer(data, np.uint8, 3 * pixels, 4 + 12 * pixels).reshape(*shape, 3)
 
 
 def near_and_thin(truth):
@@ -67,15 +67,16 @@ def refined(labels, colors, peer):
 
 
 def main():
-    paths = sorted(Path(sys.argv[1]).glob("*.labels"))
+    every = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    paths = sorted(Path(sys.argv[1]).glob("*.labels"))[::every]
     wrong = defaultdict(lambda: np.zeros(4, np.int64))
     seconds = defaultdict(float)
     for path in paths:
-        labels, truth, colors = read(path)
+        labels, truth, ours, colors = read(path)
         kind = path.stem.rsplit(" ", 1)[0]
         near, thin = near_and_thin(truth)
         counted = (labels != 0) & (labels != NONE) & (truth != NONE)
-        results = {"semantic": labels}
+        results = {"semantic": labels, "s3d": ours}
         for name, peer in PEERS.items():
             start = time.perf_counter()
             results[name] = refined(labels, colors, peer)

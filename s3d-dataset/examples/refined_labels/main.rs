@@ -64,9 +64,9 @@ fn main() -> Result<(), Error> {
             for (kind, shot, compared) in
                 [("photograph", photograph, &mut photographs), ("view", view, &mut views)]
             {
-                compared.add(&shot, &class_of);
+                let refined = compared.add(&shot, &class_of);
                 if let Some(folder) = &folder {
-                    write(&shot, &Path::new(folder).join(format!("{name} {kind} {number}")))?;
+                    write(&shot, &refined, &Path::new(folder).join(format!("{name} {kind} {number}")))?;
                 }
             }
         }
@@ -99,7 +99,7 @@ struct Compared {
 }
 
 impl Compared {
-    fn add(&mut self, shot: &Shot, class_of: &dyn Fn(u32) -> Option<u32>) {
+    fn add(&mut self, shot: &Shot, class_of: &dyn Fn(u32) -> Option<u32>) -> Vec<u32> {
         let start = Instant::now();
         let refined = refine(&shot.input());
         self.seconds += start.elapsed().as_secs_f64();
@@ -109,6 +109,7 @@ impl Compared {
             .add(width, &shot.labels, &shot.truth, &shot.colors, class_of);
         self.after
             .add(width, &refined.labels, &shot.truth, &shot.colors, class_of);
+        refined.labels
     }
 
     fn print(&self, name: &str) {
@@ -133,12 +134,12 @@ impl Compared {
     }
 }
 
-/// Writes an image for other programs: the width as 32 bits, then for all pixels the labels and the truth, 32
-/// bits each, and the colours, 3 bytes. [`NO_LABEL`] is what is not known.
-fn write(shot: &Shot, path: &Path) -> Result<(), Error> {
+/// Writes an image for other programs: the width as 32 bits, then for all pixels the labels, the truth and the
+/// refined labels, 32 bits each, and the colours, 3 bytes. [`NO_LABEL`] is what is not known.
+fn write(shot: &Shot, refined: &[u32], path: &Path) -> Result<(), Error> {
     assert_eq!(NO_LABEL, u32::MAX);
     let mut bytes = shot.width.to_le_bytes().to_vec();
-    for labels in [&shot.labels, &shot.truth] {
+    for labels in [&shot.labels[..], &shot.truth, refined] {
         bytes.extend(labels.iter().flat_map(|label| label.to_le_bytes()));
     }
     bytes.extend(shot.colors.as_flattened());
