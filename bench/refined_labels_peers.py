@@ -1,6 +1,6 @@
 """Refined labels of images whose truth is known, by dense CRFs: what `examples/refined_labels` measures of s3d.
 
-    cargo run --release -p s3d-dataset --example refined_labels -- 540 3 FOLDER
+    cargo run --release -p s3d-dataset --example refined_labels -- 540 10 FOLDER
     pip install numpy scipy pydensecrf2            # or pydensecrf
     python3 bench/refined_labels_peers.py FOLDER [N]   # every Nth image
 

@@ -1,8 +1,8 @@
 //! Measures refined labels against true ones.
 //!
 //! ```sh
-//! cargo run --release -p s3d-dataset --example refined_labels -- 540 3          # pixels, millimetres
-//! cargo run --release -p s3d-dataset --example refined_labels -- 540 3 FOLDER   # also for other programs
+//! cargo run --release -p s3d-dataset --example refined_labels -- 540 10          # pixels, millimetres
+//! cargo run --release -p s3d-dataset --example refined_labels -- 540 10 FOLDER   # also for other programs
 //! ```
 //!
 //! Buildings of s3d-synth give the truth. Simulated depth cameras scan each. `s3d_fusion` makes a mesh of what
@@ -31,7 +31,7 @@ use world::{Error, ScanPlan, Shot, World, scanned};
 fn main() -> Result<(), Error> {
     let mut arguments = std::env::args().skip(1);
     let size: u32 = arguments.next().map_or(Ok(540), |word| word.parse())?;
-    let bound_mm: f32 = arguments.next().map_or(Ok(3.0), |word| word.parse())?;
+    let bound_mm: f32 = arguments.next().map_or(Ok(10.0), |word| word.parse())?;
     let folder = arguments.next();
     let texture_scale = 0.6;
     let drawn = |rooms, storeys, seed| {
