@@ -16,6 +16,8 @@
 //! With FOLDER, colours, labels and truth of each image are written there:
 //! `bench/refined_labels_peers.py` runs other programs on them.
 
+#![expect(clippy::print_stdout, reason = "it prints what it measured")]
+
 mod scores;
 mod world;
 

@@ -162,7 +162,7 @@ fn distances(width: usize, marked: &[bool]) -> Vec<u8> {
             found[i] = found[i].min(nearest + 1);
         }
     };
-    let sides = |i: usize| [i % width > 0, i % width + 1 < width];
+    let sides = |i: usize| [!i.is_multiple_of(width), i % width + 1 < width];
     for i in 0..len {
         let [left, right] = sides(i);
         let above = i.checked_sub(width);
