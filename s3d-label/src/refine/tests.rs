@@ -113,8 +113,11 @@ fn images_may_be_small_or_empty() {
     }
 }
 
+/// A label, a colour, a depth, a normal and the size of a face.
+type DrawnPixel = (u32, [u8; 3], f32, [i8; 3], u8);
+
 /// Draws an image of a few labels and colours in patches, with holes.
-fn drawn() -> impl Strategy<Value = (usize, bool, Vec<(u32, [u8; 3], f32, [i8; 3], u8)>)> {
+fn drawn() -> impl Strategy<Value = (usize, bool, Vec<DrawnPixel>)> {
     let label = prop_oneof![8 => 1u32..4, 1 => Just(0u32), 1 => Just(NO_LABEL)];
     let level = prop_oneof![Just(40u8), Just(60), Just(200)];
     let color = prop_oneof![9 => prop::array::uniform3(level), 1 => Just([0; 3])];
