@@ -174,6 +174,10 @@ pub(crate) enum Command {
     /// Find the images of a data set that see the same surface: overlaps, angles, scales and distances, in
     /// area_N/pairs.npz.
     Pairs(additions::PairsArgs),
+    /// Move the borders of a data set's image labels to the edges of the pictures, in images of their own:
+    /// semantic_refined, and semantic_moved, which tells where.
+    #[command(after_help = "Example:\n  s3d refine dataset")]
+    Refine(additions::RefineArgs),
     /// Write the files that point cloud loaders read, from an existing data set.
     #[command(
         after_help = concat!(
@@ -261,6 +265,7 @@ impl Command {
             | Self::Pack(_)
             | Self::Xyz(_)
             | Self::Pairs(_)
+            | Self::Refine(_)
             | Self::Profile(_)
             | Self::Report(_)
             | Self::Label(_)
@@ -287,6 +292,7 @@ impl Command {
             Self::Pack(args) => pack::run(args),
             Self::Xyz(args) => additions::xyz(args),
             Self::Pairs(args) => additions::pairs(args),
+            Self::Refine(args) => additions::refine(args),
             Self::Profile(args) => additions::profile(args),
             Self::Report(args) => report::run(args),
             Self::Stats(args) => stats::run(&args),

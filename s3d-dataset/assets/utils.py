@@ -323,6 +323,14 @@ class Dataset:
     def semantic_class(self, image):
         return read_semantic_class(self.path(image, "semantic_class"))
 
+    def semantic_refined(self, image):
+        """Indices as those of `semantic`, with borders at the edges of the picture."""
+        return read_semantic(self.path(image, "semantic_refined"))
+
+    def semantic_moved(self, image):
+        """Where `semantic_refined` has another label than `semantic`."""
+        return read_png(self.path(image, "semantic_moved")) > 0
+
     def depth_euclidean(self, image):
         """Distances from the camera in metres, NaN where missing."""
         return read_depth(self.path(image, "depth_euclidean"), self.conventions["depth"]["units_per_m"])
@@ -429,6 +437,9 @@ def check_image(data, image, fail):
     if {"semantic", "semantic_class"} <= there:
         if (data.semantic_class(image) != data.class_of_label[data.semantic(image)]).any():
             fail(f"{image.stem}: classes that are not those of the labels")
+    if {"semantic", "semantic_refined", "semantic_moved"} <= there:
+        if ((data.semantic(image) != data.semantic_refined(image)) != data.semantic_moved(image)).any():
+            fail(f"{image.stem}: moved labels that are not those that differ")
     if "mask_valid" in there:
         mask = data.mask_valid(image)
         if seen is not None and (seen & ~mask).any():

@@ -7,6 +7,7 @@ mod changed;
 mod cues;
 mod fill;
 mod library;
+mod refined;
 mod storeys;
 mod strays;
 mod useful;

@@ -19,6 +19,10 @@
 //! [`VoteReport`]. [`fill_labels`] labels faces without a vote, and [`Disputes`] shows where labels are not
 //! clear.
 //!
+//! # Labels of images
+//!
+//! [`refine`](mod@refine) moves the borders between labels of an image to the edges of the picture.
+//!
 //! # Example
 //!
 //! ```
@@ -74,6 +78,7 @@ mod color;
 mod instance;
 mod label;
 mod numbering;
+pub mod refine;
 mod room;
 #[cfg(feature = "serde")]
 mod serde_names;

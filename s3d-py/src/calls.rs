@@ -10,6 +10,7 @@ use s3d_dataset::info::InfoOptions;
 use s3d_dataset::options::Profile;
 use s3d_dataset::pack::{ClassList, PackOptions, PackageArguments, PackageKind};
 use s3d_dataset::profile::ProfileOptions;
+use s3d_dataset::refine::RefineOptions;
 use s3d_dataset::verify::VerifyOptions;
 use s3d_dataset::xyz::XyzOptions;
 use s3d_eval::{EvalOptions, Folds, Protocol};
@@ -286,6 +287,19 @@ pub(crate) fn profile(
     let loaders = loaders.collect::<PyResult<Vec<_>>>()?;
     let options = ProfileOptions { overwrite };
     watched(py, None, &sink, |ctx| s3d_dataset::profile(root, &loaders, &options, ctx))
+}
+
+/// Adds images of refined labels, and returns how many.
+#[pyfunction]
+pub(crate) fn refine(
+    py: Python<'_>,
+    root: PathBuf,
+    overwrite: bool,
+    threads: Option<usize>,
+    sink: Py<PyAny>,
+) -> PyResult<usize> {
+    let options = RefineOptions { overwrite, ..RefineOptions::default() };
+    watched(py, threads, &sink, |ctx| s3d_dataset::refine(root, &options, ctx))
 }
 
 /// Makes the images of world coordinates again, and returns how many.

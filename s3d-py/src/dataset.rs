@@ -13,7 +13,7 @@ use s3d_geom::glam::Vec3;
 use s3d_geom::{NormalAxes, Raster};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, InstanceEntry as InstanceRecord};
-use s3d_io::image::{decode_gray16, decode_rgb8, decode_xyz};
+use s3d_io::image::{PngReader, decode_gray16, decode_rgb8, decode_xyz};
 use s3d_label::{LabelId, LabelTable};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -302,18 +302,40 @@ impl DataSet {
     }
 
     /// The index of each pixel's label in the table, −1 where nothing is seen.
-    fn label<'py>(&self, py: Python<'py>, image: usize) -> PyResult<Bound<'py, PyArray2<i32>>> {
+    fn label<'py>(
+        &self,
+        py: Python<'py>,
+        image: usize,
+        refined: bool,
+    ) -> PyResult<Bound<'py, PyArray2<i32>>> {
         let image = self.image(image)?;
-        let indices = py.detach(|| Ok(self.rgb8(image, Domain::Semantic)?.map(label_index)));
+        let indices = py.detach(|| Ok(self.rgb8(image, labels_of(refined))?.map(label_index)));
         arrays::image(py, indices.map_err(|e: Error| exception(&e))?)
     }
 
     /// The index of each pixel's class, −1 where there is none.
     #[pyo3(name = "class_")]
-    fn class<'py>(&self, py: Python<'py>, image: usize) -> PyResult<Bound<'py, PyArray2<i16>>> {
+    fn class<'py>(
+        &self,
+        py: Python<'py>,
+        image: usize,
+        refined: bool,
+    ) -> PyResult<Bound<'py, PyArray2<i16>>> {
         let image = self.image(image)?;
-        let classes = py.detach(|| self.classes_of_pixels(image)).map_err(|e| exception(&e))?;
-        arrays::image(py, classes)
+        let classes = py.detach(|| self.classes_of_pixels(image, labels_of(refined)));
+        arrays::image(py, classes.map_err(|e| exception(&e))?)
+    }
+
+    /// Whether each pixel's refined label is another than that of the mesh.
+    fn moved<'py>(&self, py: Python<'py>, image: usize) -> PyResult<Bound<'py, PyArray2<bool>>> {
+        let image = self.image(image)?;
+        let read = || {
+            let path = image.path(self.data.layout(), Domain::SemanticMoved);
+            let bytes = self.bytes(image, Domain::SemanticMoved)?;
+            let moved = PngReader::default().gray8(&bytes, &path)?.into_raster();
+            Ok(moved.map(|value| value > 0))
+        };
+        arrays::image(py, py.detach(read).map_err(|e: Error| exception(&e))?)
     }
 
     /// World coordinates from depth and pose, NaN where depth is missing.
@@ -361,7 +383,7 @@ impl DataSet {
                 &images,
                 || (),
                 |(), image| {
-                    let classes = self.classes_of_pixels(image)?;
+                    let classes = self.classes_of_pixels(image, Domain::Semantic)?;
                     let mut counts = vec![0u64; count];
                     let places = classes.pixels().iter().filter_map(|class| usize::try_from(*class).ok());
                     places.for_each(|place| counts[place] += 1);
@@ -412,9 +434,9 @@ impl DataSet {
         Ok(stored.map(|value| units.metres(value).map_or(f32::NAN, |metres| metres as f32)))
     }
 
-    fn classes_of_pixels(&self, image: &DatasetImage) -> Result<Raster<i16>> {
-        let path = image.path(self.data.layout(), Domain::Semantic);
-        let indices = self.rgb8(image, Domain::Semantic)?.map(label_index);
+    fn classes_of_pixels(&self, image: &DatasetImage, of: Domain) -> Result<Raster<i16>> {
+        let path = image.path(self.data.layout(), of);
+        let indices = self.rgb8(image, of)?.map(label_index);
         let beyond = indices
             .pixels()
             .iter()
@@ -439,6 +461,15 @@ pub(crate) fn domain(modality: &str) -> PyResult<Domain> {
     modality
         .parse()
         .map_err(|e: s3d_io::dataset::UnknownDomain| usage(e.to_string()))
+}
+
+/// The modality that labels are read from.
+fn labels_of(refined: bool) -> Domain {
+    if refined {
+        Domain::SemanticRefined
+    } else {
+        Domain::Semantic
+    }
 }
 
 /// The label index that a colour stands for, −1 where nothing is seen.

@@ -29,7 +29,9 @@ mod native {
     #[pymodule_export]
     use super::annotations::{read_points, write_points};
     #[pymodule_export]
-    use super::calls::{compare, evaluate, info, pack, profile, report, statistics, verify, write_xyz};
+    use super::calls::{
+        compare, evaluate, info, pack, profile, refine, report, statistics, verify, write_xyz,
+    };
     #[pymodule_export]
     use super::command_line::run_command_line;
     #[pymodule_export]

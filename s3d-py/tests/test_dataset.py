@@ -212,6 +212,23 @@ def test_what_is_damaged_is_told_with_its_file(ds: s3d.DataSet, tmp_path: Path) 
             other[0][modality]
 
 
+def test_refined_labels_are_read_when_they_are_asked_for(ds: s3d.DataSet, tmp_path: Path) -> None:
+    with pytest.raises(s3d.UsageError, match="has no semantic_refined"):
+        ds[0].refined_labels
+    copy = tmp_path / "copy"
+    shutil.copytree(ds.root, copy)
+    refined = s3d.open(copy).refine_labels()
+    assert s3d.verify(refined).ok
+    view = refined.views()[0].load()
+    assert "refined_labels" not in view._loaded
+    labels, moved = view.refined_labels, view.moved
+    assert (labels.dtype, labels.shape, moved.dtype) == (view.labels.dtype, view.labels.shape, np.dtype(bool))
+    assert np.array_equal(labels != view.labels, moved) and (view["refined_classes"] == view.classes)[~moved].all()
+    assert any(image.moved.any() for image in refined)
+    with pytest.raises(s3d.UsageError):
+        refined.refine_labels()
+
+
 def test_whole_data_sets_are_checked_compared_and_scored(ds: s3d.DataSet, tmp_path: Path) -> None:
     told: list[s3d.Task] = []
     report = ds.verify(progress=told.append)

@@ -121,6 +121,7 @@ pub use cues::curvature::{
     CURVATURE_RADIUS_M, MISSING_CURVATURE, SMALLEST_RADIUS_M, curvature_image_into, face_curvatures,
 };
 pub use cues::distance::{euclidean_depth_image_into, mask_image_into};
+pub use cues::face_sizes::face_size_image_into;
 pub use cues::gray::gray_image;
 pub use cues::hessian::keypoint_image_into;
 pub use cues::occlusion::occlusion_edge_image_into;

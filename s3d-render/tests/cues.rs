@@ -8,9 +8,9 @@ use s3d_geom::{Camera, Pose, Raster, TriMesh};
 use s3d_render::{
     BORDER_UNITS, Hits, MISSING_CURVATURE, MISSING_DISTANCE, NO_FACE, Scene, border_distance_image_into,
     border_image_into, cast, color_segment_image_into, corner_image_into, curvature_image_into,
-    euclidean_depth_image_into, face_curvatures, gray_image, keypoint_image_into, mask_image_into,
-    occlusion_edge_image_into, reshading_image_into, surface_segment_image_into, texture_edge_image_into,
-    xyz_image,
+    euclidean_depth_image_into, face_curvatures, face_size_image_into, gray_image, keypoint_image_into,
+    mask_image_into, occlusion_edge_image_into, reshading_image_into, surface_segment_image_into,
+    texture_edge_image_into, xyz_image,
 };
 use s3d_synth::scenes::scan_like;
 
@@ -437,4 +437,33 @@ fn segments_of_surfaces_are_the_walls() {
     assert_eq!(of_wall.len(), 5);
     assert_eq!(largest.iter().collect::<std::collections::BTreeSet<_>>().len(), 5);
     assert_eq!(image.pixels().iter().max(), Some(&5));
+}
+
+#[test]
+fn faces_have_the_size_of_what_they_cover() {
+    // Two halves of a square of 40 pixels: the whole faces count, also where the image ends.
+    let mesh = mesh_of(board(2.0, [-0.4, -0.4], [0.4, 0.4]));
+    let scene = Scene::new(&mesh);
+    let sizes = |camera: &Camera| {
+        let hits = cast(&scene, camera);
+        let sizes = made(|out| face_size_image_into(&scene, &hits, camera, out));
+        let seen = hits.face.pixels().iter().map(|face| *face != NO_FACE);
+        assert!(sizes.pixels().iter().map(|size| *size > 0).eq(seen));
+        sizes.at(camera.width / 2, camera.height / 2)
+    };
+    let of_half = |side: f64| (side / 2f64.sqrt()).round() as u8;
+    assert_eq!(sizes(&camera()), of_half(40.0));
+
+    // Twice as far away half as large; seen aslant, narrower by the cosine.
+    let away = Pose::level(DVec3::new(0.0, -2.0, 0.0), 0.0);
+    assert_eq!(sizes(&Camera { pose: away, ..camera() }), of_half(20.0));
+    let aside = Pose::look_at(DVec3::new(2.0, 0.0, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::Z).unwrap();
+    let aslant = 0.5f64.sqrt().sqrt() * 40.0 / 2f64.sqrt();
+    assert!(sizes(&Camera { pose: aside, ..camera() }).abs_diff(of_half(aslant)) <= 1);
+
+    // A panorama has as many pixels for a radian as the pinhole for its tangent.
+    let turn = (100.0 * std::f64::consts::TAU).round() as u32 / 2 * 2;
+    assert!(
+        sizes(&Camera::equirectangular(Pose::level(DVec3::ZERO, 0.0), turn)).abs_diff(of_half(40.0)) <= 1
+    );
 }

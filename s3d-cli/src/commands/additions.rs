@@ -1,14 +1,14 @@
-//! `s3d xyz`, `profile`, `pairs`: files that are added to an existing data set.
+//! `s3d xyz`, `profile`, `pairs`, `refine`: files that are added to an existing data set.
 
 use super::on_threads;
 use crate::args::Threads;
 use crate::failure::Outcome;
 use crate::values::{parsed, stored_xyz};
 use clap::Args;
-use s3d_dataset::PairsOptions;
 use s3d_dataset::options::Profile;
 use s3d_dataset::profile::ProfileOptions;
 use s3d_dataset::xyz::XyzOptions;
+use s3d_dataset::{PairsOptions, RefineOptions};
 use s3d_io::dataset::XyzType;
 use s3d_io::image::Compression;
 use std::path::PathBuf;
@@ -70,4 +70,19 @@ pub(crate) struct PairsArgs {
 
 pub(crate) fn pairs(args: PairsArgs) -> Outcome<()> {
     on_threads(args.threads, |context| s3d_dataset::pairs(args.output, &args.options, context).map(drop))
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RefineArgs {
+    /// The data set's folder.
+    #[arg(value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) options: RefineOptions,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+pub(crate) fn refine(args: RefineArgs) -> Outcome<()> {
+    on_threads(args.threads, |context| s3d_dataset::refine(args.output, &args.options, context).map(drop))
 }

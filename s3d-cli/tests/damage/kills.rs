@@ -20,7 +20,7 @@ use tempfile::TempDir;
 
 /// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
 /// shards). A new command that writes needs a line here.
-const COMMANDS: [&str; 47] = [
+const COMMANDS: [&str; 48] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -31,6 +31,7 @@ const COMMANDS: [&str; 47] = [
     "xyz out --type float --overwrite",
     "profile out --to pointcept,mmdet3d",
     "pairs out --samples 64",
+    "refine out",
     "profile out --to pointnet,open3d-ml --overwrite",
     "pack out --to webdataset",
     "pack out --to webdataset -o packed --overwrite",

@@ -58,11 +58,12 @@ fn copy() -> (TempDir, PathBuf) {
 }
 
 /// Every command that reads an export. Each writes into the folder that holds the export, or into the export.
-const READERS: [&[&str]; 14] = [
+const READERS: [&[&str]; 15] = [
     &["verify", "OUT"],
     &["stats", "OUT"],
     &["xyz", "OUT", "--overwrite", "--type", "float"],
     &["pairs", "OUT", "--samples", "64"],
+    &["refine", "OUT"],
     &["profile", "OUT", "--to", "pointcept"],
     &["profile", "OUT", "--to", "open3d-ml"],
     &["profile", "OUT", "--to", "mmdet3d"],

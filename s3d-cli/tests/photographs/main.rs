@@ -4,6 +4,7 @@
 mod masks;
 mod panoramas;
 mod recordings;
+mod refined;
 mod studio;
 
 use crate::common;

@@ -301,7 +301,7 @@ impl ImageComparer<'_> {
         let (Some(pixels_a), Some(pixels_b)) = (pixels_a, pixels_b) else {
             return Ok(FileVerdict::Unread);
         };
-        if domain == Domain::Semantic && self.names.is_none() {
+        if matches!(domain, Domain::Semantic | Domain::SemanticRefined) && self.names.is_none() {
             // The table that could not be read is reported elsewhere.
             return Ok(FileVerdict::Unread);
         }

@@ -115,6 +115,8 @@ pub(crate) fn compare(
     Ok(Some(match (a, b) {
         (Pixels::Color(a), Pixels::Color(b)) => match domain {
             Domain::Semantic => labels(a, b, meaning, pairs)?,
+            // The matrix of labels counts pixels once.
+            Domain::SemanticRefined => labels(a, b, meaning, &mut LabelPairs::new())?,
             Domain::SemanticPretty => label_colors(a, b, meaning),
             Domain::Normal => Sums::of(a, b, |a, b| a == b, normal_angle),
             Domain::Rgb | Domain::PrincipalCurvature => colors(a, b),

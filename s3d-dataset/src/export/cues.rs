@@ -1,6 +1,7 @@
 //! Draws the images that follow from hits, labels or colours: the cues of `s3d_render`.
 
 use crate::export::modality::{Channels, Drawn, Image, ImageBuffers};
+use crate::export::refined::{RefinedImages, refined_images};
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::Domain;
 use s3d_io::image::{Content, encode_gray8, encode_gray16, encode_levels8, encode_numbers16, encode_rgb8};
@@ -17,6 +18,8 @@ pub(crate) struct CueBuffers {
     bytes: BTreeMap<Domain, Raster<u8>>,
     numbers: BTreeMap<Domain, Raster<u16>>,
     curvature: Option<Raster<[u8; 3]>>,
+    /// Both images of labels that follow the picture.
+    refined: Option<RefinedImages>,
     /// The gray levels of the current image's colours, if they were needed.
     gray: Option<Raster<u8>>,
     /// The cues that belong to the current image.
@@ -28,6 +31,16 @@ impl CueBuffers {
     pub(crate) fn begin(&mut self) {
         self.made.clear();
         self.gray = None;
+        self.refined = None;
+    }
+
+    /// Gives memory back, but not what took longest to make and is still to be written.
+    pub(crate) fn shrink(&mut self) {
+        let refined = std::mem::take(self).refined;
+        if refined.is_some() {
+            self.made.extend([Domain::SemanticRefined, Domain::SemanticMoved]);
+        }
+        self.refined = refined;
     }
 
     fn bytes(&mut self, domain: Domain) -> &mut Raster<u8> {
@@ -40,6 +53,11 @@ impl CueBuffers {
 
     /// Returns a cue that was drawn.
     pub(crate) fn drawn(&self, domain: Domain) -> Drawn<'_> {
+        match (domain, &self.refined) {
+            (Domain::SemanticRefined, Some(refined)) => return Drawn::Color(&refined.index),
+            (Domain::SemanticMoved, Some(refined)) => return Drawn::Gray(&refined.moved),
+            _ => {}
+        }
         match (self.bytes.get(&domain), self.numbers.get(&domain), &self.curvature) {
             (Some(bytes), ..) => Drawn::Gray(bytes),
             (_, Some(numbers), _) => Drawn::Depth(numbers),
@@ -102,6 +120,12 @@ impl Channels<'_> {
         let wraps = camera.is_panorama();
         let colors = &buffers.images.rgb;
         let cues = &mut buffers.cues;
+        if matches!(domain, Domain::SemanticRefined | Domain::SemanticMoved) {
+            cues.made.extend([Domain::SemanticRefined, Domain::SemanticMoved]);
+            let refined = refined_images(self.scene, hits, camera, colors, self.label_of_face);
+            cues.refined = Some(refined);
+            return;
+        }
         if domain == Domain::SegmentUnsup2d {
             return color_segment_image_into(colors, hits, wraps, cues.numbers(domain));
         }
@@ -120,8 +144,12 @@ impl Channels<'_> {
     pub(crate) fn cue_file(&self, domain: Domain, drawn: Drawn<'_>) -> Option<Vec<u8>> {
         let compression = self.compression;
         Some(match (drawn, domain) {
-            (Drawn::Gray(mask), Domain::MaskValid | Domain::EdgeOcclusion | Domain::EdgeInstance) => {
-                encode_gray8(mask)
+            (
+                Drawn::Gray(mask),
+                Domain::MaskValid | Domain::EdgeOcclusion | Domain::EdgeInstance | Domain::SemanticMoved,
+            ) => encode_gray8(mask),
+            (Drawn::Color(labels), Domain::SemanticRefined) => {
+                encode_rgb8(labels, Content::Labels, compression)
             }
             (Drawn::Gray(levels), _) => encode_levels8(levels, compression),
             (Drawn::Depth(numbers), Domain::SegmentUnsup2d | Domain::SegmentUnsup25d) => {

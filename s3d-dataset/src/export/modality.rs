@@ -133,8 +133,10 @@ impl ImageBuffers {
 
     /// Gives memory back. Colours stay if `keeps_colors` says so.
     fn shrink(&mut self, keeps_colors: bool) {
-        let old = std::mem::take(self);
+        let mut old = std::mem::take(self);
         if keeps_colors {
+            old.cues.shrink();
+            self.cues = old.cues;
             self.images.rgb = old.images.rgb;
             self.has_colors = old.has_colors;
         }

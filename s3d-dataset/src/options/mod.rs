@@ -102,7 +102,9 @@ pub struct ExportOptions {
     /// The images to write, such as rgb,depth,pose. There is also semantic_class, a PNG whose palette has a
     /// colour for each class, and objects, a JSON with amodal masks, occlusion and boxes. Trainers of many
     /// tasks find depth_euclidean, reshading, principal_curvature, edge_occlusion, edge_texture, keypoints2d,
-    /// keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, edge_instance and boundary_distance
+    /// keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, edge_instance and boundary_distance.
+    /// semantic_refined is semantic with borders at the edges of the picture; semantic_moved is where they
+    /// differ
     /// [default: rgb, depth, normal, semantic, semantic_pretty, global_xyz, pose]
     #[serde(with = "by_names")]
     #[cfg_attr(feature = "clap", arg(display_order = 16, long, value_name = "LIST", value_delimiter = ',',

@@ -429,6 +429,13 @@ impl Manifest {
         profiles.dedup();
     }
 
+    /// Records modalities that images have beside the earlier ones.
+    pub(crate) fn add_modalities(&mut self, added: &[Domain]) {
+        let before = std::mem::replace(&mut self.options.modalities, Domain::ALL.to_vec());
+        let is_there = |domain: &Domain| before.contains(domain) || added.contains(domain);
+        self.options.modalities.retain(is_there);
+    }
+
     /// Writes the manifest as it stands, with its checksum.
     pub(crate) fn write(&self, layout: &Layout) -> Result<()> {
         let path = layout.manifest();

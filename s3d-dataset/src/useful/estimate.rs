@@ -43,6 +43,8 @@ fn pixel_bytes(domain: Domain, xyz: XyzType) -> f64 {
         Domain::SegmentUnsup2d | Domain::SegmentUnsup25d | Domain::Keypoints3d => 0.03,
         Domain::EdgeOcclusion | Domain::EdgeInstance | Domain::MaskValid => 0.005,
         Domain::BoundaryDistance => 0.6,
+        Domain::SemanticRefined => 0.03,
+        Domain::SemanticMoved => 0.01,
     }
 }
 

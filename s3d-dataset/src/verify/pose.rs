@@ -140,10 +140,7 @@ fn matrix(file: &PoseFile, checks: &OfFile<'_>) -> Option<Pose> {
         format!("the last column of camera_rt_matrix is not −R · camera_location{why}")
     });
 
-    // The rows of D·E(final)ᵀ are right, down and forward.
-    let rows = rotation.transpose();
-    let world_from_camera = DMat3::from_cols(rows.x_axis, -rows.y_axis, -rows.z_axis);
-    holds.then_some(Pose { location, world_from_camera })
+    holds.then(|| file.exact_pose())
 }
 
 /// Names the usual mistake that turns the expected rotation into this one.

@@ -256,6 +256,13 @@ impl Conventions {
             "mask_valid": { "seen": 255, "missing": 0 },
             "edge_instance": { "border": 255, "missing": 0 },
             "boundary_distance": { "units_per_px": 64, "missing": u16::MAX, "largest": u16::MAX - 1 },
+            "semantic_refined": {
+                "decode": "R * 65536 + G * 256 + B",
+                "table": "assets/semantic_labels.json",
+                "unlabelled": [0, 0, 0],
+                "missing": [13, 13, 13],
+            },
+            "semantic_moved": { "moved": 255, "as_projected": 0, "missing": 0 },
             "instances": {
                 "file": "area_{area}/3d/instances.npz",
                 "bbox": "xmin ymin zmin xmax ymax zmax, world metres",

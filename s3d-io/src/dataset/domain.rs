@@ -53,6 +53,10 @@ pub enum Domain {
     EdgeInstance,
     /// The distance to the nearest border between instances.
     BoundaryDistance,
+    /// Indices as those of `Semantic`, moved to the edges of the picture.
+    SemanticRefined,
+    /// Where `SemanticRefined` has another label than the mesh.
+    SemanticMoved,
 }
 
 /// The error for a word that names no domain.
@@ -152,12 +156,17 @@ const TABLE: &[Row] = &[
     Row::gray(Domain::MaskValid, "mask_valid"),
     Row { is_semantic: true, ..Row::response(Domain::EdgeInstance, "edge_instance") },
     Row::labels(Domain::BoundaryDistance, "boundary_distance", PixelKind::Gray16, [u16::MAX, 0, 0]),
+    Row {
+        is_of_colors: true,
+        ..Row::labels(Domain::SemanticRefined, "semantic_refined", PixelKind::Rgb8, [13; 3])
+    },
+    Row { is_semantic: true, is_of_colors: true, ..Row::response(Domain::SemanticMoved, "semantic_moved") },
 ];
 
 /// Returns the domains of the table. A variant without a row of its own does not compile.
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
 const fn domains() -> [Domain; TABLE.len()] {
-    assert!(Domain::BoundaryDistance as usize + 1 == TABLE.len(), "each variant has a row");
+    assert!(Domain::SemanticMoved as usize + 1 == TABLE.len(), "each variant has a row");
     let mut all = [Domain::Pose; TABLE.len()];
     let mut i = 0;
     while i < TABLE.len() {
@@ -273,7 +282,7 @@ mod tests {
         let all = "there are rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, \
                    pose, objects, depth_euclidean, reshading, principal_curvature, edge_occlusion, \
                    edge_texture, keypoints2d, keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, \
-                   edge_instance and boundary_distance";
+                   edge_instance, boundary_distance, semantic_refined and semantic_moved";
         assert_eq!(message, format!("no modality is called \"normals\"; {all}"));
     }
 }

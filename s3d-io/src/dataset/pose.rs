@@ -125,6 +125,15 @@ impl PoseFile {
         self.pose_of(self.final_camera_rotation)
     }
 
+    /// Returns the pose of the image's camera by the rows of `camera_rt_matrix`, which our own files hold to
+    /// the bit. Angles and matrix are not compared.
+    pub fn exact_pose(&self) -> Pose {
+        // The rows are right, down and forward.
+        let [right, down, forward] = self.camera_rt_matrix.map(|[x, y, z, _]| dvec3(x, y, z));
+        let location = DVec3::from_array(self.camera_location);
+        Pose { location, world_from_camera: DMat3::from_cols(right, -down, -forward) }
+    }
+
     /// Returns the pose of the scanner.
     pub fn original(&self) -> Pose {
         self.pose_of(self.camera_original_rotation)

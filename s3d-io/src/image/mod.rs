@@ -6,11 +6,11 @@
 //!
 //! | kind | samples | of a data set |
 //! |---|---|---|
-//! | [`encode_rgb8`] | 3 × 8 bits | `rgb`, `normal`, `semantic`, `semantic_pretty`, `principal_curvature` |
+//! | [`encode_rgb8`] | 3 × 8 bits | `rgb`, `normal`, `semantic`, `semantic_pretty`, `principal_curvature`, `semantic_refined` |
 //! | [`encode_palette8`] | 8 bits and a palette | `semantic_class` |
 //! | [`encode_gray16`] | 16 bits | `depth`, `depth_euclidean`, `boundary_distance` |
 //! | [`encode_numbers16`] | 16 bits, numbers of patches | `segment_unsup2d`, `segment_unsup25d` |
-//! | [`encode_gray8`] | 8 bits, masks | `mask_valid`, `edge_occlusion`, `edge_instance` |
+//! | [`encode_gray8`] | 8 bits, masks | `mask_valid`, `edge_occlusion`, `edge_instance`, `semantic_moved` |
 //! | [`encode_levels8`] | 8 bits, shades | `reshading`, `edge_texture`, `keypoints2d`, `keypoints3d` |
 //! | [`encode_xyz_half`], [`encode_xyz_float`] | 3 × 16 or 32 bits, floats | `global_xyz` |
 //! | [`encode_depth_float`] | 32 bits, floats | none: packages have it |

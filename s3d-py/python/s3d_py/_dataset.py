@@ -359,8 +359,8 @@ class DataSet(Sequence[Union[View, Panorama]]):
         """Returns its perspective views as a map-style data set for torch. For other images, call
         `dataset.views(room=…).torch(…)` or `dataset.panoramas().torch(…)`. The first sample imports torch.
 
-        A sample is a dict of tensors: each of `modalities` and "index". The modalities are words of `ARRAYS`,
-        as (C, H, W) or (H, W) with indices as int64 (−1 for none: `ignore_index=-1`), "points", "K" and
+        A sample is a dict of tensors: each of `modalities` and "index". The modalities are words of `ARRAYS` and
+        `REFINED`, as (C, H, W) or (H, W) with indices as int64 (−1 for none: `ignore_index=-1`), "points", "K" and
         "T_world_cam". `transform` turns a sample into the value that the loader returns. The data set can be
         pickled, so any number of workers read at the same time.
         """
@@ -635,6 +635,15 @@ class DataSet(Sequence[Union[View, Panorama]]):
         """
         _native.profile(self.root, list(loaders), overwrite, sink(progress))
         return self.root / "profiles"
+
+    def refine_labels(
+        self, *, overwrite: bool = False, threads: int | None = None, progress: Progress = None
+    ) -> DataSet:
+        """Adds labels whose borders are at the edges of the pictures, and returns the data set with the new images:
+        `view.refined_labels`, `view.refined_classes` and `view.moved`.
+        """
+        _native.refine(self.root, overwrite, threads, sink(progress))
+        return DataSet(self.root)
 
     def write_xyz(
         self,

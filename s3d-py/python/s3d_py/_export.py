@@ -80,7 +80,8 @@ class ExportOptions(TypedDict, total=False):
     """What to write of an image:
     rgb, depth, normal, semantic, semantic_pretty, semantic_class, global_xyz, pose, objects,
     depth_euclidean, reshading, principal_curvature, edge_occlusion, edge_texture, keypoints2d,
-    keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, edge_instance, boundary_distance.
+    keypoints3d, segment_unsup2d, segment_unsup25d, mask_valid, edge_instance, boundary_distance,
+    semantic_refined, semantic_moved.
     """
     keep_all: bool
     """Writes every candidate view."""

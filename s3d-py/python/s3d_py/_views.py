@@ -27,12 +27,18 @@ if TYPE_CHECKING:
 ARRAYS = ("rgb", "depth", "normal", "xyz", "labels", "classes", "instances", "pretty")
 """The arrays of a view. `View` describes each."""
 
+REFINED = ("refined_labels", "refined_classes", "moved")
+"""Arrays of labels that follow the picture: `view["refined_labels"]`. Nothing reads them unasked."""
+
 _FILE_OF = {
     "labels": "semantic",
     "classes": "semantic",
     "instances": "semantic",
     "pretty": "semantic_pretty",
     "xyz": "global_xyz",
+    "refined_labels": "semantic_refined",
+    "refined_classes": "semantic_refined",
+    "moved": "semantic_moved",
 }
 
 
@@ -180,6 +186,25 @@ class Image:
         """(H, W, 3), one colour for each instance, to look at."""
         return self["pretty"]
 
+    @property
+    def refined_labels(self) -> npt.NDArray[np.int32]:
+        """As `labels`, with borders at the edges of the picture. The data set needs the modality
+        "semantic_refined", which `s3d refine` adds.
+        """
+        return self["refined_labels"]
+
+    @property
+    def refined_classes(self) -> npt.NDArray[np.int16]:
+        """As `classes`, of `refined_labels`."""
+        return self["refined_classes"]
+
+    @property
+    def moved(self) -> npt.NDArray[np.bool_]:
+        """(H, W), where `refined_labels` has another label than `labels`. The data set needs the modality
+        "semantic_moved".
+        """
+        return self["moved"]
+
     def points(self) -> npt.NDArray[np.float32]:
         """Returns world metres, (H, W, 3), from depth and pose. NaN where depth is missing."""
         return self._dataset._native.points(self.index)
@@ -191,12 +216,12 @@ class Image:
         return {name: share for name, share in zip(self._dataset.classes or (), found) if share > 0}
 
     def path(self, modality: str) -> Path:
-        """Returns the path of the file of a modality, which is a word of `files` or of `ARRAYS`."""
+        """Returns the path of the file of a modality, which is a word of `files`, of `ARRAYS` or of `REFINED`."""
         return self._dataset._native.path(self.index, _FILE_OF.get(modality, modality))
 
     def load(self: AnImage, *modalities: str) -> AnImage:
-        """Reads these modalities at the same time, each on its own thread, and keeps them; without names, all that
-        exist.
+        """Reads these modalities at the same time, each on its own thread, and keeps them; without names, all of
+        `ARRAYS` that exist.
         """
         wanted = modalities or tuple(name for name in ARRAYS if _FILE_OF.get(name, name) in self.files)
         with ThreadPoolExecutor(max(len(wanted), 1)) as pool:
@@ -224,17 +249,17 @@ class Image:
         depth and coordinates in gray levels. Notebooks show it.
         """
         array = self[modality]
-        if modality == "classes":
+        if modality in ("classes", "refined_classes"):
             colors = np.vstack([self._dataset.class_colors, np.zeros((1, 3), np.uint8)])  # type: ignore[list-item]
             return Picture(colors[array])
-        if modality in ("labels", "instances"):
+        if modality in ("labels", "instances", "refined_labels"):
             return Picture(picture("face", np.where(array > 0, array, -1)))
         return Picture(np.ascontiguousarray(array if modality == "pretty" else picture(modality, array)))
 
     def _read(self, modality: str) -> npt.NDArray[Any]:
         file, native = _FILE_OF.get(modality, modality), self._dataset._native
-        if modality not in ARRAYS:
-            raise UsageError(f"{modality!r}: must be one of {', '.join(ARRAYS)}")
+        if modality not in ARRAYS + REFINED:
+            raise UsageError(f"{modality!r}: must be one of {', '.join(ARRAYS + REFINED)}")
         if file not in self.files:
             raise UsageError(f"{self.name} has no {file}: it has {', '.join(self.files)}")
         if modality == "rgb" or modality == "pretty":
@@ -245,10 +270,12 @@ class Image:
             return native.normal(self.index)
         if modality == "xyz":
             return native.xyz(self.index)
-        if modality == "classes":
-            return native.class_(self.index)
-        if modality == "labels":
-            return native.label(self.index)
+        if modality in ("classes", "refined_classes"):
+            return native.class_(self.index, modality == "refined_classes")
+        if modality in ("labels", "refined_labels"):
+            return native.label(self.index, modality == "refined_labels")
+        if modality == "moved":
+            return native.moved(self.index)
         labels = self.labels
         return np.where(labels > 0, labels, np.int32(-1))
 
@@ -369,10 +396,10 @@ class TorchDataset:
     def __init__(
         self, views: Views[Image], modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None
     ) -> None:
-        others = [word for word in modalities if word not in (*ARRAYS, "K", "T_world_cam", "points")]
+        others = [word for word in modalities if word not in (*ARRAYS, *REFINED, "K", "T_world_cam", "points")]
         if others or not modalities:
             raise UsageError(
-                f"modalities={list(modalities)}: some of {', '.join(ARRAYS)}, points, K, T_world_cam"
+                f"modalities={list(modalities)}: some of {', '.join(ARRAYS + REFINED)}, points, K, T_world_cam"
             )
         self.views, self.modalities, self.transform = views, tuple(modalities), transform
 
@@ -403,7 +430,7 @@ class TorchDataset:
             array = view.points() if word == "points" else view[word]
             if array.ndim == 3:
                 array = array.transpose(2, 0, 1)
-            wide = word in ("labels", "classes", "instances")
+            wide = word in ("labels", "classes", "instances", "refined_labels", "refined_classes")
             sample[word] = torch.from_numpy(array.astype(np.int64) if wide else array.copy())
         return sample if self.transform is None else self.transform(sample)
 

@@ -14,6 +14,7 @@ pub(crate) mod boundary_distance;
 pub(crate) mod corners;
 pub(crate) mod curvature;
 pub(crate) mod distance;
+pub(crate) mod face_sizes;
 pub(crate) mod gray;
 pub(crate) mod hessian;
 pub(crate) mod occlusion;

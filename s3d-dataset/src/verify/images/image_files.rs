@@ -100,6 +100,7 @@ impl ImageFiles<'_> {
                     memory.buffers.give_colors(colors);
                 }
             }
+            (Domain::SemanticRefined, Pixels::Color(indices)) => self.indices(&indices, path),
             (Domain::SemanticPretty, Pixels::Color(colors)) => self.pretty(&colors, path, memory),
             (Domain::SemanticClass, Pixels::Class(places, palette)) => {
                 self.classes(&places, &palette, path, memory);
@@ -391,7 +392,7 @@ impl ImageFiles<'_> {
         // Equal files need no reading if every other check of their pixels is known to hold.
         let is_known = !matches!(self.seen, Some((_, Some(_))))
             && match domain {
-                Domain::Semantic => reference.mesh.all_in_table,
+                Domain::Semantic | Domain::SemanticRefined => reference.mesh.all_in_table,
                 Domain::SemanticPretty => self.semantic.is_none(),
                 Domain::GlobalXyz => self.depth.is_none(),
                 Domain::SemanticClass => false,

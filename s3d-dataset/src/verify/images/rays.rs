@@ -7,7 +7,7 @@ use crate::verify::pose::CheckedPose;
 use crate::xyz;
 use half::f16;
 use s3d_geom::{Camera, Raster};
-use s3d_io::dataset::XyzType;
+use s3d_io::dataset::{Domain, XyzType};
 use s3d_render::MISSING_INDEX;
 
 /// Points from depth and pose, as `s3d xyz` makes them: from the pose that the angles give.
@@ -32,10 +32,11 @@ pub(super) fn difference(
     let labels = reference.labels;
     match (pixels, expected) {
         (Pixels::Color(found), Drawn::Color(expected)) => {
-            let text = |c: [u8; 3]| match (image, c) {
-                (Image::Semantic, MISSING_INDEX) => "nothing".to_owned(),
-                (Image::Semantic, c) => format!("{} ({})", index_of(c), labels.name_of(index_of(c))),
-                (_, c) => format!("{c:?}"),
+            let is_index = matches!(image.domain(), Domain::Semantic | Domain::SemanticRefined);
+            let text = |c: [u8; 3]| match c {
+                MISSING_INDEX if is_index => "nothing".to_owned(),
+                c if is_index => format!("{} ({})", index_of(c), labels.name_of(index_of(c))),
+                c => format!("{c:?}"),
             };
             Difference::of(found, expected, |a, b| a == b, text, text)
         }

@@ -95,6 +95,10 @@ fn meaning_of_modality(domain: Domain, units_per_m: f64) -> String {
         Domain::Normal => "Normals: 128 + 127 n in each channel. (128, 128, 128) where nothing was seen. \
             The axes are in conventions.json."
             .to_owned(),
+        Domain::SemanticRefined => "As semantic, with borders moved to the edges of the picture.".to_owned(),
+        Domain::SemanticMoved => {
+            "255 where semantic_refined has another label than semantic, 0 elsewhere.".to_owned()
+        }
         Domain::Semantic => "The index of an instance in semantic_labels.json: 65536 R + 256 G + B. \
             (13, 13, 13) where nothing was seen."
             .to_owned(),
