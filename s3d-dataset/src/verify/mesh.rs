@@ -155,13 +155,19 @@ fn check_glb(path: &Path, manifest: &Manifest, mesh: &LabelledMesh, report: &Rep
     };
     let found = faces_with_labels(&file.mesh, label);
     let expected = faces_with_labels(&mesh.file.mesh, |face| mesh.label_of_face[face].into());
-    report.check(found == expected, MESH, path, || "its faces or labels are not those of semantic.obj".into());
+    report
+        .check(found == expected, MESH, path, || "its faces or labels are not those of semantic.obj".into());
 }
 
 /// Returns the corners of each face as bits, with its label, in order.
 fn faces_with_labels(mesh: &TriMesh, label: impl Fn(usize) -> i64) -> Vec<([[u32; 3]; 3], i64)> {
-    let corners = |face: usize| mesh.triangle(face as u32).map(|p| (p + 0.0).to_array().map(f32::to_bits));
-    let mut faces: Vec<_> = (0..mesh.faces().len()).map(|face| (corners(face), label(face))).collect();
+    let corners = |face: usize| {
+        mesh.triangle(face as u32)
+            .map(|p| (p + 0.0).to_array().map(f32::to_bits))
+    };
+    let mut faces: Vec<_> = (0..mesh.faces().len())
+        .map(|face| (corners(face), label(face)))
+        .collect();
     faces.sort_unstable();
     faces
 }
