@@ -109,6 +109,16 @@ def scans(file):
             yield points, table[..., 4:7].astype(np.uint8), np.array(header[4:]).T
 
 
+def regular(angles):
+    """The angles of columns with equal steps between them, of which some may have seen nothing."""
+    import numpy as np
+
+    known = np.flatnonzero(np.isfinite(angles).any(axis=1))
+    each = np.unwrap(np.nanmedian(angles[known], axis=1))
+    step, first = np.polyfit(known, each, 1)
+    return first + step * np.arange(len(angles))
+
+
 def cube_sides(file):
     """Pictures of the sides of a cube about each place of a scanner, like `tum`."""
     import numpy as np
@@ -117,8 +127,8 @@ def cube_sides(file):
         columns, rows, _ = points.shape
         ranges = np.linalg.norm(points, axis=-1)
         # Angles of columns and rows, and the fractional column and row of any angle.
-        azimuth = np.unwrap(np.nanmedian(np.arctan2(points[..., 1], points[..., 0]), axis=1))
-        elevation = np.nanmedian(np.arcsin(points[..., 2] / ranges), axis=0)
+        azimuth = regular(np.arctan2(points[..., 1], points[..., 0]))
+        elevation = regular(np.arcsin(points[..., 2] / ranges).T)
         step = abs(elevation[-1] - elevation[0]) / (rows - 1)
         side = 2 * round(np.pi / 4 / step)
         y, x = np.mgrid[0:side, 0:side]

@@ -10,8 +10,16 @@ pub(crate) struct StatsArgs {
     /// The data set's folder.
     #[arg(value_name = "OUT")]
     pub(crate) output: PathBuf,
+    /// Print LaTeX in the layout of the paper's tables.
+    #[arg(long)]
+    pub(crate) latex: bool,
 }
 
 pub(crate) fn run(args: &StatsArgs) -> Outcome<()> {
-    print(&s3d_dataset::statistics(&args.output)?.to_markdown())
+    let statistics = s3d_dataset::statistics(&args.output)?;
+    if args.latex {
+        print(&statistics.to_latex())
+    } else {
+        print(&statistics.to_markdown())
+    }
 }

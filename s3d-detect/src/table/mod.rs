@@ -118,6 +118,53 @@ pub fn markdown(tables: &[Table]) -> String {
     out
 }
 
+/// Writes the table at IoU > .5 of several seeds as LaTeX, in the layout of the paper: the largest number of
+/// each column is bold.
+pub fn latex(tables: &[Table]) -> String {
+    let rows: Vec<(&str, Vec<String>)> = tables
+        .first()
+        .map_or(&[][..], |t| &t.rows[..])
+        .iter()
+        .map(|(name, _)| (name.as_str(), cells_of_row(tables, name, 0)))
+        .collect();
+    let number = |cell: &str| cell.split(' ').next().and_then(|mean| mean.parse::<f64>().ok());
+    let largest = |column: usize| {
+        let numbers = rows.iter().filter_map(|(_, cells)| number(&cells[column]));
+        numbers.fold(f64::NEG_INFINITY, f64::max)
+    };
+
+    let classes = CLASSES.map(|c| c.name());
+    let (structural, movable) = (STRUCTURAL + 1, CLASSES.len() - STRUCTURAL + 1);
+    let columns = [&classes[..STRUCTURAL], &["mean"], &classes[STRUCTURAL..], &["mean", "mean"]].concat();
+    let mut out = String::from("\\begin{table*}\n\t\\centering\n");
+    let elements =
+        |count: usize, of: &str| format!("\\multicolumn{{{count}}}{{|c|}}{{\\textbf{{{of} Elements}}}}");
+    let _ = writeln!(
+        out,
+        "\t\\caption{{\\textbf{{Baseline 3D Object Detection Results}}. Class specific average precision (AP) \
+         using different features.}}\n\t\\begin{{tabular}}{{r|{}|{}|c}}",
+        "c".repeat(structural),
+        "c".repeat(movable)
+    );
+    let heads = [elements(structural, "Structural"), elements(movable, "Movable")];
+    let _ = writeln!(out, "\t\t& {} & \\textbf{{overall}} \\\\", heads.join(" & "));
+    let _ = writeln!(out, "\t\t& {} \\\\", columns.join(" & "));
+    for (name, cells) in &rows {
+        let cell = |(column, cell): (usize, &String)| {
+            let text = cell.replace('±', "$\\pm$").replace('–', "--");
+            match number(cell) {
+                Some(mean) if mean == largest(column) => format!("\\textbf{{{text}}}"),
+                _ => text,
+            }
+        };
+        let cells: Vec<String> = cells.iter().enumerate().map(cell).collect();
+        let _ = writeln!(out, "\t\t{name} & {} \\\\", cells.join(" & "));
+    }
+    let _ =
+        writeln!(out, "\t\\end{{tabular}}\n\t\\label{{tab:CVPR16quantitative}}\n\\end{{table*}}\n% {NOTE}");
+    out
+}
+
 /// Returns the cells of a row at a threshold, in the order of the columns.
 fn cells_of_row(tables: &[Table], name: &str, threshold: usize) -> Vec<String> {
     let of_seeds: Vec<_> = tables.iter().filter_map(|t| t.numbers(name, threshold)).collect();
@@ -182,5 +229,22 @@ mod tests {
             text.contains("| No color | 20.00 |") && text.contains("| 20.00 ± 14.14 | 20.00 ± 14.14 |\n")
         );
         assert!(text.contains(NOTE));
+    }
+
+    #[test]
+    fn latex_has_the_layout_of_the_paper() {
+        let mut better = table_of(0.1);
+        better.rows_of_fold(vec![]);
+        let mut row = row(Some(0.05), None);
+        row.name = "Full model".to_owned();
+        better.rows_of_fold(vec![row]);
+        let text = latex(&[better]);
+        assert!(text.contains("& ceiling & floor & wall & beam & column & window & door & mean & table &"));
+        assert!(text.contains("\\multicolumn{8}{|c|}") && text.contains("\\multicolumn{6}{|c|}"));
+        // The better of two is bold, and what does not exist is a dash.
+        assert!(text.contains("No color & \\textbf{10.00} & 10.00"), "{text}");
+        assert!(text.contains("Full model & 5.00 & \\textbf{50.00}") && text.contains("& -- &"), "{text}");
+        let spread = latex(&[table_of(0.1), table_of(0.3)]);
+        assert!(spread.contains("\\textbf{20.00 $\\pm$ 14.14} \\\\\n"), "{spread}");
     }
 }

@@ -104,8 +104,11 @@ struct TableArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Print JSON.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "latex")]
     json: bool,
+    /// Print LaTeX in the layout of the paper's table.
+    #[arg(long)]
+    latex: bool,
     #[command(flatten)]
     threads: Threads,
 }
@@ -163,6 +166,8 @@ fn print_table(args: &TableArgs) -> Outcome<()> {
     })?;
     if args.json {
         print_json(&table::json(&tables))
+    } else if args.latex {
+        print(&table::latex(&tables))
     } else {
         print(&table::markdown(&tables))
     }

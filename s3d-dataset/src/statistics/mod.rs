@@ -1,5 +1,7 @@
 //! The paper's tables of statistics, counted from a data set's files.
 
+mod latex;
+
 use crate::context::Context;
 use crate::error::Result;
 use crate::record::data_set::DataSet;
