@@ -186,8 +186,7 @@ impl Adding<'_> {
         ranges: &Lanes,
         points: &[Lanes; 3],
     ) {
-        let scale = &self.scale;
-        let (front, cell) = (scale.front as f32, scale.cell as f32);
+        // What the pixels see, as columns.
         let [mut x, mut y, mut z, mut offset] = [[0.0; LANES]; 4];
         let [mut hit, mut trust, mut sigma, mut nearest] = [[0.0; LANES]; 4];
         for lane in 0..LANES {
@@ -196,13 +195,9 @@ impl Adding<'_> {
             (hit[lane], trust[lane], sigma[lane], nearest[lane]) = (s.range, s.weight, s.sigma_m, s.nearest);
         }
 
-        let mut row = Row {
-            distance: [0.0; LANES],
-            weight: [0.0; LANES],
-            is_at: [0.0; LANES],
-            is_far: [0.0; LANES],
-            is_through: [0.0; LANES],
-        };
+        let scale = &self.scale;
+        let (front, cell) = (scale.front as f32, scale.cell as f32);
+        let mut row = Row::default();
         let (mut is_touched, mut is_colored) = ([false; LANES], [false; LANES]);
         for lane in 0..LANES {
             let [px, py, pz] = [0, 1, 2].map(|axis: usize| points[axis][lane]);

@@ -24,6 +24,7 @@ const PASSED: i16 = i16::MAX;
 pub(crate) const NO_COLOR: [u8; 3] = [0; 3];
 
 /// What an image says of eight voxels side by side. Answers are 1 or 0.
+#[derive(Default)]
 pub(crate) struct Row {
     /// The signed distance as a share of the truncation.
     pub(crate) distance: Lanes,
@@ -177,13 +178,7 @@ mod tests {
         let (mut rows, mut single) = (Block::default(), Block::default());
         for _ in 0..20_000 {
             let first = 8 * below(3) as usize;
-            let mut row = Row {
-                distance: [0.0; LANES],
-                weight: [0.0; LANES],
-                is_at: [0.0; LANES],
-                is_far: [0.0; LANES],
-                is_through: [0.0; LANES],
-            };
+            let mut row = Row::default();
             let mut expected = [0.0; LANES];
             for lane in 0..LANES {
                 let i = first + lane;
