@@ -187,7 +187,7 @@ mod tests {
         tally
             .rooms_per_type
             .insert("copyRoom", RoomTypeStatistics { rooms: 2, floor_m2: 9.0 });
-        let labels = is_labelled.then(|| LabelStatistics { floor_m2: 9.0, tally, as_s3dis: None });
+        let labels = is_labelled.then_some(LabelStatistics { floor_m2: 9.0, tally, as_s3dis: None });
         AreaStatistics {
             area,
             points: 43_956_907,

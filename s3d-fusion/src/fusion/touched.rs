@@ -115,15 +115,15 @@ impl<'a> Near<'a> {
         }
 
         let mut hits = Hits { is_seen, at: [[0.0; LANES]; 3], ends: [[[0.0; LANES]; 3]; 2] };
-        let columns = [self.turn.x_axis, self.turn.y_axis, self.turn.z_axis].map(|axis| axis.to_array());
+        let rows = [0, 1, 2].map(|axis| self.turn.row(axis));
         for lane in 0..LANES {
             let [x, y, z] = [ray[0][lane], ray[1][lane], ray[2][lane]].map(|k| k * range[lane]);
             let length = (x * x + y * y + z * z).sqrt();
             let cosine = -(nx[lane] * x + ny[lane] * y + nz[lane] * z) / length;
             let [front, behind] = self.adding.scale.along_ray(cosine, sigma[lane]);
             let ends = [-front, behind].map(|off| (1.0 + off / length) * self.per_block);
-            for axis in 0..3 {
-                let at = columns[0][axis] * x + columns[1][axis] * y + columns[2][axis] * z;
+            for (axis, row) in rows.iter().enumerate() {
+                let at = row.x * x + row.y * y + row.z * z;
                 hits.at[axis][lane] = at;
                 (0..2).for_each(|k| hits.ends[k][axis][lane] = self.start[axis] + at * ends[k]);
             }
@@ -148,10 +148,8 @@ impl<'a> Near<'a> {
                 let [x, y, z] = &hits.ends[end];
                 Vec3::new(x[lane], y[lane], z[lane]).as_dvec3()
             });
-            if ends
-                .iter()
-                .any(|end| !(end.abs().max_element() < f64::from(FARTHEST - 8)))
-            {
+            let is_near = |end: &DVec3| end.abs().max_element() < f64::from(FARTHEST - 8);
+            if !ends.iter().all(is_near) {
                 continue;
             }
             if Ways::is_short(way) {

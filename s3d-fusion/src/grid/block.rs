@@ -111,8 +111,7 @@ impl Block {
     /// the shares that the distances have in the means.
     #[inline(always)]
     pub(crate) fn observe_row(&mut self, first: usize, row: &Row) -> Lanes {
-        let mut shares = [0.0; LANES];
-        let mut next = [[0; LANES]; 2];
+        let (mut shares, mut distances, mut weights) = ([0.0; LANES], [0; LANES], [0; LANES]);
         for lane in 0..LANES {
             let old = f32::from_bits(u32::from(self.weight[first + lane]) << 16);
             let distance = f32::from(self.distance[first + lane]);
@@ -129,14 +128,14 @@ impl Block {
             };
             let distance = if weight > 0.0 { mean } else { unseen };
             shares[lane] = share;
-            next[0][lane] = floor(distance + 0.5);
-            next[1][lane] = (sum.to_bits() + 0x8000 >> 16) as i32;
+            distances[lane] = floor(distance + 0.5);
+            weights[lane] = ((sum.to_bits() + 0x8000) >> 16) as i32;
         }
-        for lane in 0..LANES {
+        for (lane, (distance, weight)) in distances.into_iter().zip(weights).enumerate() {
             let votes = (f32::from(self.votes[first + lane]) - row.is_through[lane]).max(i16::MIN.into());
             self.votes[first + lane] = (votes + row.is_at[lane]).min(i16::MAX.into()) as i16;
-            self.distance[first + lane] = next[0][lane] as i16;
-            self.weight[first + lane] = next[1][lane] as u16;
+            self.distance[first + lane] = distance as i16;
+            self.weight[first + lane] = weight as u16;
         }
         shares
     }
@@ -180,7 +179,7 @@ mod tests {
             let first = 8 * below(3) as usize;
             let mut row = Row::default();
             let mut expected = [0.0; LANES];
-            for lane in 0..LANES {
+            for (lane, expected) in expected.iter_mut().enumerate() {
                 let i = first + lane;
                 let (is_far, is_through) = (below(5) == 0, below(5) == 0);
                 row.is_far[lane] = f32::from(is_far);
@@ -193,7 +192,7 @@ mod tests {
                     row.weight[lane] = (1 + below(1000)) as f32 / 300.0;
                     let is_at = row.distance[lane] < 0.1;
                     row.is_at[lane] = f32::from(is_at);
-                    expected[lane] = single.observe(i, row.distance[lane], row.weight[lane], is_at);
+                    *expected = single.observe(i, row.distance[lane], row.weight[lane], is_at);
                 }
             }
             assert_eq!(rows.observe_row(first, &row), expected);
