@@ -1,4 +1,4 @@
-"""Labels in glTF, read by the rules of EXT_mesh_features and EXT_structural_metadata, and compared with `semantic.obj`."""
+"""Labels in glTF, read by the rules of EXT_mesh_features and EXT_structural_metadata, against `semantic.obj`."""
 
 import json
 import shutil
@@ -96,7 +96,13 @@ def test_it_is_verified_and_exported_again(s3d, demo, out, tmp_path):
     assert "0 faults" in s3d("verify", out).stdout
     again, scene = tmp_path / "again", tmp_path / "scene.toml"
     mesh, cameras = out / "area_1/3d/semantic.glb", demo / "scan/cameras.csv"
-    scene.write_text(f'area = 1\n[mesh]\npath = "{mesh.as_posix()}"\n[cameras]\npath = "{cameras.as_posix()}"\n')
+    # Readers of meshes take classes and objects from features, and rooms from elsewhere.
+    tables = {
+        "mesh": f'path = "{mesh.as_posix()}"',
+        "annotations": 'mesh = true\nroom = "office_1"',
+        "cameras": f'path = "{cameras.as_posix()}"',
+    }
+    scene.write_text("area = 1\n" + "".join(f"[{name}]\n{line}\n" for name, line in tables.items()))
     s3d("export", scene, "-o", again, *SMALL)
     first, second = (labelled_faces(path / "area_1/3d/semantic.obj") for path in (out, again))
     of_class = lambda labels: sorted(name.split("_")[0] for name in labels)
