@@ -108,8 +108,8 @@ mod tests {
 
     #[test]
     fn labels_and_textures_come_back_as_they_were() {
-        let names = ["chair_1_office_5_1", "wall_2_hallway_1_1", "chair_1_office_6_1"].map(String::from);
-        let table = LabelTable::from_names(&names).unwrap();
+        let names = ["<UNK>_0_<UNK>_0_0", "chair_1_office_5_1", "chair_2_office_6_1", "wall_1_hallway_1_1"];
+        let table = LabelTable::from_names(&names.map(String::from)).unwrap();
         let mesh = mesh();
         // The faces of the texture share vertices, and have three labels and none.
         let label_of_face = [3, 1, 0, 2];
