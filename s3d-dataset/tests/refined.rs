@@ -42,7 +42,7 @@ fn refined_labels_are_nearer_to_the_truth() {
         let after = scores(&shots, &world, |shot| refine(&shot.input()).labels);
         let told = format!("{kind}: {before:?} → {after:?}");
         assert!(before.near.wrong > 1000, "{told}");
-        // The scan is coarse, so that the test is fast: most of what is wrong is not at an edge of the picture.
+        // The scan is coarse, so that the test is fast: most wrong pixels are not at an edge of the picture.
         assert!(after.near.wrong * 20 < before.near.wrong * 19, "{told}");
         assert!(after.thin.percent() <= before.thin.percent() + 0.5, "{told}");
         assert!(mean_iou(&after.trimap) > mean_iou(&before.trimap), "{told}");

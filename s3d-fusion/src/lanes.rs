@@ -9,8 +9,8 @@ pub(crate) const LANES: usize = 8;
 /// Numbers side by side.
 pub(crate) type Lanes = [f32; LANES];
 
-/// Returns the largest whole number that is not above a number from −2²² to 2²². The language's own conversion,
-/// which saturates, is done lane by lane.
+/// Returns the largest whole number that is not above a number from −2²² to 2²². The language's own
+/// conversion, which saturates, is done lane by lane.
 #[inline(always)]
 pub(crate) fn floor(number: f32) -> i32 {
     // Around here, floating-point numbers are whole, and their last bits count them.

@@ -1,4 +1,4 @@
-//! Labels that follow the picture, for views, panoramas and photographs: written by an export, or added later.
+//! Labels that follow the picture, for views, panoramas and photographs: by an export, or added later.
 
 use super::studio::{LISTED, Project, demo, photographs};
 use crate::common::{files, s3d_fails, s3d_ok, text, write_scan};

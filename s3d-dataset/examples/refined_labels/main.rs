@@ -5,9 +5,9 @@
 //! cargo run --release -p s3d-dataset --example refined_labels -- 540 10 FOLDER   # also for other programs
 //! ```
 //!
-//! Buildings of s3d-synth give the truth. Simulated depth cameras scan each. `s3d_fusion` makes a mesh of what
-//! they measured, in cells of 2 cm, and decimates it under the bound in millimetres. Scanned points vote for
-//! the labels of its faces: that is what an export has. Two kinds of images are made at each place:
+//! Buildings of s3d-synth give the truth. Simulated depth cameras scan each. `s3d_fusion` makes a mesh of
+//! what they measured, in cells of 2 cm, and decimates it under the bound in millimetres. Scanned points
+//! vote for the labels of its faces: that is what an export has. Two kinds of images are made at each place:
 //! photographs of the building itself, with a pose that is off by a milliradian, and views of the scanned
 //! mesh whose texture is displaced by half a centimetre. `semantic` is what the mesh projects, and
 //! `semantic_refined` what [`refine`] makes of it. No parameter depends on the building. They were chosen on
@@ -136,8 +136,8 @@ impl Compared {
     }
 }
 
-/// Writes an image for other programs: the width as 32 bits, then for all pixels the labels, the truth and the
-/// refined labels, 32 bits each, and the colours, 3 bytes. [`NO_LABEL`] is what is not known.
+/// Writes an image for other programs: the width as 32 bits, then for all pixels the labels, the truth and
+/// the refined labels, 32 bits each, and the colours, 3 bytes. [`NO_LABEL`] is what is not known.
 fn write(shot: &Shot, refined: &[u32], path: &Path) -> Result<(), Error> {
     assert_eq!(NO_LABEL, u32::MAX);
     let mut bytes = shot.width.to_le_bytes().to_vec();

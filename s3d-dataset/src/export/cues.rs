@@ -1,7 +1,7 @@
-//! Draws the images that follow from hits, labels or colours: the cues of `s3d_render`.
+//! Draws the images that follow from hits, labels or colours: the cues of `s3d_render`, and refined labels.
 
 use crate::export::modality::{Channels, Drawn, Image, ImageBuffers};
-use crate::export::refined::{RefinedImages, refined_images};
+use crate::survey::refined_labels::{RefinedImages, refined_images};
 use s3d_geom::{Camera, Raster};
 use s3d_io::dataset::Domain;
 use s3d_io::image::{Content, encode_gray8, encode_gray16, encode_levels8, encode_numbers16, encode_rgb8};

@@ -19,7 +19,6 @@ pub(crate) mod modality;
 pub(crate) mod picture_colors;
 pub(crate) mod plan;
 pub(crate) mod points;
-pub(crate) mod refined;
 pub(crate) mod run;
 pub(crate) mod scoring;
 pub(crate) mod shard;

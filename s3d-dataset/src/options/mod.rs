@@ -129,8 +129,8 @@ pub struct ExportOptions {
     #[cfg_attr(feature = "clap", arg(display_order = 20, long, value_name = "N", default_value_t = 1,
         value_parser = clap::value_parser!(u32).range(1..=64)))]
     pub rgb_samples: u32,
-    /// Write 3d/semantic.glb for each area: the mesh with its textures, and the labels of its faces as features
-    /// (EXT_mesh_features, EXT_structural_metadata), which viewers such as CesiumJS pick and colour.
+    /// Write 3d/semantic.glb for each area: the mesh with its textures, and the labels of its faces as
+    /// features (EXT_mesh_features, EXT_structural_metadata), which viewers such as CesiumJS pick and colour.
     #[serde(skip_serializing_if = "is_false")]
     #[cfg_attr(feature = "clap", arg(display_order = 24, long))]
     pub semantic_glb: bool,

@@ -1,8 +1,8 @@
 //! One image of a data set, refined.
 
 use crate::error::Result;
-use crate::export::refined::refined_images;
 use crate::record::data_set::DataSet;
+use crate::survey::refined_labels::refined_images;
 use s3d_geom::{Camera, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame};

@@ -54,21 +54,25 @@ impl Statistics {
                 cells: &|area| vec![area.points, area.faces],
             },
         );
-        self.latex_table(&mut text, &Table {
-            caption: "Statistics of Images (\\textbf{I}: Regular Images, \\textbf{E}: Equirectangular Images)",
-            label: "tab:2DmodalStats",
-            columns: "c|cc|c".into(),
-            head: vec![
-                "\\multirow{2}{*}{Area} & \\multicolumn{2}{c|}{\\textbf{\\# of Images per 2/2.5D Modality}} & \
+        self.latex_table(
+            &mut text,
+            &Table {
+                caption: "Statistics of Images (\\textbf{I}: Regular, \\textbf{E}: Equirectangular Images)",
+                label: "tab:2DmodalStats",
+                columns: "c|cc|c".into(),
+                head: vec![
+                    "\\multirow{2}{*}{Area} & \
+                 \\multicolumn{2}{c|}{\\textbf{\\# of Images per 2/2.5D Modality}} & \
                  \\multirow{2}{*}{\\textbf{Total}}"
-                    .into(),
-                "& Image Type \\textbf{I} & Image Type \\textbf{E} &".into(),
-            ],
-            cells: &|area| {
-                let total = MODALITIES * (area.regular_images + area.panoramas);
-                vec![area.regular_images, area.panoramas, total]
+                        .into(),
+                    "& Image Type \\textbf{I} & Image Type \\textbf{E} &".into(),
+                ],
+                cells: &|area| {
+                    let total = MODALITIES * (area.regular_images + area.panoramas);
+                    vec![area.regular_images, area.panoramas, total]
+                },
             },
-        });
+        );
         if self.areas.iter().all(|area| area.labels.is_none()) {
             return text;
         }
@@ -206,7 +210,8 @@ mod tests {
             "1 & 43,956,907 & 158,500 \\\\",
             "\\textbf{Total} & \\textbf{87,913,814} & \\textbf{317,000} \\\\",
             "1 & 10,327 & 190 & 42,068 \\\\",
-            "& ceiling & floor & wall & beam & column & window & door & chair & table & bookcase & sofa & board &",
+            "& ceiling & floor & wall & beam & column & window & door & chair & table &",
+            "& bookcase & sofa & board & \\\\",
             "2 & 0 & 0 & 0 & 0 & 0 & 0 & 0 & 1,000 & 0 & 0 & 0 & 0 & 1,000 \\\\",
             "copy room",
         ] {

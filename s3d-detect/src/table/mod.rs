@@ -141,8 +141,8 @@ pub fn latex(tables: &[Table]) -> String {
         |count: usize, of: &str| format!("\\multicolumn{{{count}}}{{|c|}}{{\\textbf{{{of} Elements}}}}");
     let _ = writeln!(
         out,
-        "\t\\caption{{\\textbf{{Baseline 3D Object Detection Results}}. Class specific average precision (AP) \
-         using different features.}}\n\t\\begin{{tabular}}{{r|{}|{}|c}}",
+        "\t\\caption{{\\textbf{{Baseline 3D Object Detection Results}}. Class specific average precision \
+         (AP) using different features.}}\n\t\\begin{{tabular}}{{r|{}|{}|c}}",
         "c".repeat(structural),
         "c".repeat(movable)
     );

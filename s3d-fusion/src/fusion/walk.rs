@@ -58,7 +58,7 @@ impl Ways {
         Self { first, steps }
     }
 
-    /// Returns the way of a segment as numbers. If a way is short, segments of equal ways cross the same cubes.
+    /// Returns the way of a segment as numbers. If it is short, segments of equal ways cross the same cubes.
     #[inline(always)]
     pub(super) fn lane(&self, lane: usize) -> [i32; 4] {
         let [x, y, z] = self.first;

@@ -107,8 +107,8 @@ impl Block {
         share
     }
 
-    /// Does for eight voxels from `first` what [`Block::pass`] and then [`Block::observe`] do for one. Returns
-    /// the shares that the distances have in the means.
+    /// Does for eight voxels from `first` on what [`Block::pass`] and then [`Block::observe`] do for one.
+    /// Returns the shares that the distances have in the means.
     #[inline(always)]
     pub(crate) fn observe_row(&mut self, first: usize, row: &Row) -> Lanes {
         let (mut shares, mut distances, mut weights) = ([0.0; LANES], [0; LANES], [0; LANES]);

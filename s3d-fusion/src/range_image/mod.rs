@@ -1,6 +1,7 @@
 //! What one sensor saw from one place: a raster of ranges, and how its pixels become rays.
 
 mod angles;
+mod frame;
 mod gaps;
 mod points;
 mod rays;

@@ -24,8 +24,8 @@ impl RangeImage {
     }
 
     /// Returns the points of the pixels that lie on a surface, with its unit normals towards the sensor:
-    /// world metres. `cell_m` is the size of what can be told apart later. Of rows and columns, each `every`-th
-    /// is taken.
+    /// world metres. `cell_m` is the size of what can be told apart later. Of rows and columns, each
+    /// `every`-th is taken.
     pub fn surface_points(&self, cell_m: f32, every: NonZeroU32) -> (Vec<Vec3>, Vec<Vec3>) {
         let world_from_sensor = self.pose.opencv_from_world().transpose();
         let (mut points, mut normals) = (Vec::new(), Vec::new());

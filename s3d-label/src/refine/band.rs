@@ -12,8 +12,8 @@ const REACH_PERCENT: u32 = 150;
 /// Steps to the next pixel of a row or column, and along a diagonal: chamfer distances of thirds of a pixel.
 pub(super) const STEPS: [u16; 2] = [3, 4];
 
-/// The advantage of the projected label at a border, and how much it grows up to the end of the band. The unit
-/// is a 64th of a doubling of the likelihood.
+/// The advantage of the projected label at a border, and how much it grows up to the end of the band. The
+/// unit is a 64th of a doubling of the likelihood.
 const ADVANTAGE: [u32; 2] = [60, 250];
 
 /// Beyond this distance from a border, pixels are decided in fours at first.
