@@ -26,6 +26,9 @@ const SCAN_PIECE_CELLS: f64 = 5.0;
 /// Laser scans count up to this range by default, metres. What is farther is seen through windows.
 const SCAN_RANGE_M: f64 = 60.0;
 
+/// So many depth pictures a thread are read while as many are fused.
+const PICTURES_AHEAD: usize = 2;
+
 /// Pixels that the sensor is less sure of are left out: 0 is low, 1 medium, 2 high.
 const LEAST_CONFIDENCE: u8 = 1;
 
@@ -264,18 +267,34 @@ impl Images {
     pub(super) fn each(
         &self,
         ctx: &Context,
-        mut each: impl FnMut(Seen, &Path) -> Result<bool>,
+        mut each: impl FnMut(Seen, &Path) -> Result<bool> + Send,
     ) -> Result<()> {
-        for some in self.pictures.chunks(rayon::current_num_threads().max(1) * 2) {
-            let read = map_in_order(ctx, some, || (), |(), picture| self.picture(picture))?;
-            for (image, picture) in read.into_iter().zip(some) {
-                // A picture may have seen nothing within its range.
-                if let Some(image) = image
-                    && !each(Seen::Image(Box::new(image)), picture.path())?
-                {
-                    return Ok(());
+        let chunks: Vec<_> = self
+            .pictures
+            .chunks(rayon::current_num_threads() * PICTURES_AHEAD)
+            .collect();
+        let read = |number: usize| {
+            let some = chunks.get(number).copied().unwrap_or_default();
+            map_in_order(ctx, some, || (), |(), picture| self.picture(picture))
+        };
+        let mut images = read(0)?;
+        for (number, some) in chunks.iter().enumerate() {
+            let mut hand_on = || -> Result<bool> {
+                for (image, picture) in images.drain(..).zip(*some) {
+                    // A picture may have seen nothing within its range.
+                    if let Some(image) = image
+                        && !each(Seen::Image(Box::new(image)), picture.path())?
+                    {
+                        return Ok(false);
+                    }
                 }
+                Ok(true)
+            };
+            let (goes_on, next) = rayon::join(&mut hand_on, || read(number + 1));
+            if !goes_on? {
+                return Ok(());
             }
+            images = next?;
         }
 
         let mut motions = self.motions.iter();

@@ -6,6 +6,7 @@ use super::{FuseOptions, Fused, level};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
 use s3d_fusion::{CloseOptions, DecimateOptions, FusedMesh, MeshColumns, close_holes, decimate_while};
 use std::path::Path;
 
@@ -133,5 +134,10 @@ fn area(made: &Made) -> f64 {
         let [a, b, c] = face.map(corner);
         (b - a).cross(c - a).length()
     };
-    made.faces.iter().map(twice).sum::<f64>() / 2.0
+    let parts: Vec<f64> = made
+        .faces
+        .par_chunks(1 << 16)
+        .map(|some| some.iter().map(twice).sum())
+        .collect();
+    parts.iter().sum::<f64>() / 2.0
 }

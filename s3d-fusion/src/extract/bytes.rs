@@ -1,6 +1,7 @@
 //! A surface as bytes, so that a caller can keep the surfaces of tiles in files.
 
-use super::surface::{Surface, Vertex};
+use super::samples::Vertex;
+use super::surface::Surface;
 use s3d_geom::glam::Vec3;
 
 /// The first bytes, with the version of what follows.

@@ -1,9 +1,13 @@
 //! The mesh without small pieces.
 
-use super::surface::Vertex;
+use super::samples::Vertex;
 use crate::FusionError;
+use rayon::prelude::*;
 use s3d_geom::glam::Vec3;
 use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, TriMesh};
+
+/// So many faces are measured at a time.
+const FACES: usize = 1 << 16;
 
 /// A mesh that was fused from ranges: world metres, Z-up. Fronts are on the side from which they were seen.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,14 +43,21 @@ impl FusedMesh {
             pieces.unite(*a, *b);
             pieces.unite(*a, *c);
         }
-        let mut area_m2 = vec![0.0; vertices.len()];
-        for face in &faces {
+        let root = pieces.roots();
+        let area = |face: &[u32; 3]| {
             let [a, b, c] = face.map(|v| vertices[v as usize].position.as_dvec3());
-            area_m2[pieces.root(face[0]) as usize] += 0.5 * (b - a).cross(c - a).length();
+            0.5 * (b - a).cross(c - a).length()
+        };
+        let mut area_m2 = vec![0.0; vertices.len()];
+        for some in faces.chunks(FACES) {
+            let areas: Vec<f64> = some.par_iter().map(area).collect();
+            for (face, area) in some.iter().zip(areas) {
+                area_m2[root[face[0] as usize] as usize] += area;
+            }
         }
 
         let count = faces.len();
-        faces.retain(|face| area_m2[pieces.root(face[0]) as usize] >= least_m2);
+        faces.retain(|face| area_m2[root[face[0] as usize] as usize] >= least_m2);
         if faces.is_empty() {
             return Err(FusionError::NoSurface);
         }
@@ -98,5 +109,15 @@ impl Pieces {
     fn unite(&mut self, a: u32, b: u32) {
         let [a, b] = [a, b].map(|v| self.root(v));
         self.parent[a.max(b) as usize] = a.min(b);
+    }
+
+    /// Returns the root of each vertex: the lowest vertex of its set.
+    fn roots(self) -> Vec<u32> {
+        let mut parent = self.parent;
+        // A parent comes before its vertex.
+        for v in 0..parent.len() {
+            parent[v] = parent[parent[v] as usize];
+        }
+        parent
     }
 }

@@ -2,6 +2,7 @@
 
 mod bytes;
 mod mesh;
+mod samples;
 mod surface;
 mod table;
 

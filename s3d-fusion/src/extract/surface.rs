@@ -1,12 +1,10 @@
 //! The zero level of a grid, before surfaces of tiles are joined.
 
 use super::mesh::FusedMesh;
-use super::table::{EDGES, TRIANGLES};
+use super::samples::{Part, Samples, Vertex, z_bits};
 use crate::FusionError;
-use crate::grid::block::Voxel;
 use crate::grid::{Grid, Place, SIDE};
 use rayon::prelude::*;
-use s3d_geom::glam::Vec3;
 use std::ops::Range;
 
 /// The surface of a grid or tile. [`Surface::join`] makes one of many, and [`Surface::into_mesh`] its mesh.
@@ -18,30 +16,6 @@ pub struct Surface {
     /// The cell and the vertices of each face, sorted by cells.
     pub(super) faces: Vec<(u64, [u32; 3])>,
 }
-
-/// Where the surface crosses an edge between two voxels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Vertex {
-    /// The lower voxel and the axis.
-    pub(super) key: u64,
-    pub(super) position: Vec3,
-    /// Black: unknown.
-    pub(super) color: [u8; 3],
-}
-
-/// What a block adds to a surface. Faces have indices into its own vertices.
-#[derive(Default)]
-struct Part {
-    vertices: Vec<Vertex>,
-    faces: Vec<(u64, [u32; 3])>,
-}
-
-/// Voxels along the side of a block with the next voxels behind it.
-const MORE: usize = SIDE as usize + 1;
-/// Voxels of such a block.
-const SAMPLES: usize = MORE * MORE * MORE;
-/// No vertex.
-const NONE: u32 = u32::MAX;
 
 impl Surface {
     /// Makes the surface of the cells whose lower corner is in the blocks of a tile, or of all cells.
@@ -131,7 +105,7 @@ impl Surface {
 
         // Vertices of the same key are equal: their voxels are.
         let all: Vec<Vertex> = parts.iter().flat_map(|part| &part.vertices).copied().collect();
-        let mut new_of = vec![NONE; all.len()];
+        let mut new_of = vec![0; all.len()];
         let mut vertices: Vec<Vertex> = Vec::new();
         for (key, i) in order {
             if vertices.last().is_none_or(|last| last.key != key) {
@@ -160,140 +134,4 @@ impl Surface {
         let faces = self.faces.into_iter().map(|(_, face)| face).collect();
         FusedMesh::of_pieces(&self.vertices, faces, least_piece_m2)
     }
-}
-
-/// The voxels of a block and the next ones behind it.
-struct Samples<'a> {
-    grid: &'a Grid,
-    place: Place,
-    values: Vec<f32>,
-    /// 0: unknown, 1: passed by rays alone, 2: has a distance.
-    states: Vec<u8>,
-}
-
-impl<'a> Samples<'a> {
-    /// `cell` is a cell as a share of the truncation.
-    fn of(grid: &'a Grid, place: Place, cell: f32) -> Self {
-        let mut samples = Self { grid, place, values: vec![0.0; SAMPLES], states: vec![0; SAMPLES] };
-        for corner in 0..8 {
-            let step = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let place = [0, 1, 2].map(|k| place[k] + step[k]);
-            let block = grid.block(place);
-            let free = block.map_or_else(|| grid.free(place), |(_, free)| free);
-            let range = |k: usize| if step[k] == 0 { 0..SIDE } else { 0..1 };
-
-            for z in range(2) {
-                for y in range(1) {
-                    for x in range(0) {
-                        let voxel = match block {
-                            Some((block, _)) => block.voxel(((z * SIDE + y) * SIDE + x) as usize, free),
-                            None if free > 0 => Voxel::Passed,
-                            None => Voxel::Unknown,
-                        };
-                        let at = [0, 1, 2].map(|k| ([x, y, z][k] + step[k] * SIDE) as usize);
-                        let i = sample([at[0], at[1], at[2]]);
-                        (samples.values[i], samples.states[i]) = match voxel {
-                            Voxel::Unknown => (0.0, 0),
-                            Voxel::Passed => (cell, 1),
-                            Voxel::Distance(distance) => (distance, 2),
-                        };
-                    }
-                }
-            }
-        }
-        samples
-    }
-
-    fn part(&self, cell_m: f64) -> Part {
-        let mut part = Part::default();
-        let mut vertex_of = vec![NONE; 3 * SAMPLES];
-        let side = SIDE as usize;
-        for i in 0..side * side * side {
-            let cell = [i % side, i / side % side, i / (side * side)];
-            let corners: [usize; 8] = std::array::from_fn(|c| {
-                sample([cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2)])
-            });
-            let Some(behind) = self.behind(corners) else { continue };
-
-            for triangle in &TRIANGLES[behind as usize] {
-                let face = triangle.map(|edge| {
-                    let [a, b] = EDGES[edge as usize];
-                    let axis = (edge / 4) as usize;
-                    let low = [0, 1, 2].map(|k| cell[k] + (a as usize >> k & 1));
-                    let slot = &mut vertex_of[3 * corners[a as usize] + axis];
-                    if *slot == NONE {
-                        *slot = part.vertices.len() as u32;
-                        let ends = [corners[a as usize], corners[b as usize]];
-                        part.vertices.push(self.vertex(low, axis, ends, cell_m));
-                    }
-                    *slot
-                });
-                part.faces.push((self.key(cell, 0), face));
-            }
-        }
-        part
-    }
-
-    /// Returns the corners behind the surface, as bits, if the surface crosses the cell and all is known:
-    /// each corner was seen, and one at least was seen just before a surface. Where rays only passed beside a
-    /// surface, its end is not known.
-    fn behind(&self, corners: [usize; 8]) -> Option<u8> {
-        let mut behind = 0;
-        let mut is_before = false;
-        for (c, i) in corners.into_iter().enumerate() {
-            match self.states[i] {
-                0 => return None,
-                2 if self.values[i] < 0.0 => behind |= 1 << c,
-                state => is_before |= state == 2,
-            }
-        }
-        (behind != 0 && is_before).then_some(behind)
-    }
-
-    /// A voxel of the block and an axis as one number, by z, y and x.
-    fn key(&self, voxel: [usize; 3], axis: usize) -> u64 {
-        let [x, y, z] = [0, 1, 2].map(|k| self.place[k] * SIDE + voxel[k] as i32);
-        z_bits(z) | (bits(y) << 20 | bits(x)) << 2 | axis as u64
-    }
-
-    fn vertex(&self, low: [usize; 3], axis: usize, ends: [usize; 2], cell_m: f64) -> Vertex {
-        let [a, b] = ends.map(|i| self.values[i]);
-        // Not in a voxel itself: vertices of several edges would be in the same place.
-        let share = (a / (a - b)).clamp(1e-3, 1.0 - 1e-3);
-        let mut position = [0, 1, 2].map(|k| f64::from(self.place[k] * SIDE) + low[k] as f64);
-        position[axis] += f64::from(share);
-
-        let mut high = low;
-        high[axis] += 1;
-        let color = match [low, high].map(|voxel| self.color(voxel)) {
-            [Some(a), Some(b)] => [0, 1, 2].map(|k| {
-                let (a, b) = (f32::from(a[k]), f32::from(b[k]));
-                (a + (b - a) * share + 0.5) as u8
-            }),
-            [a, b] => a.or(b).unwrap_or_default(),
-        };
-        let position = Vec3::from_array(position.map(|k| (k * cell_m) as f32));
-        Vertex { key: self.key(low, axis), position, color }
-    }
-
-    fn color(&self, voxel: [usize; 3]) -> Option<[u8; 3]> {
-        let side = SIDE as usize;
-        let place = [0, 1, 2].map(|k| self.place[k] + (voxel[k] / side) as i32);
-        let [x, y, z] = voxel.map(|k| k % side);
-        self.grid.block(place)?.0.color((z * side + y) * side + x)
-    }
-}
-
-/// The coordinate of a voxel in a key: 20 bits.
-fn bits(coordinate: i32) -> u64 {
-    (i64::from(coordinate) + (1 << 19)) as u64
-}
-
-/// The least key of the voxels of a plane.
-fn z_bits(z: i32) -> u64 {
-    bits(z) << 42
-}
-
-fn sample([x, y, z]: [usize; 3]) -> usize {
-    (z * MORE + y) * MORE + x
 }

@@ -55,6 +55,43 @@ pub(crate) enum Voxel {
     Distance(f32),
 }
 
+/// What is known of the voxels of a row, a bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct RowStates {
+    /// Rays passed the voxel, or it has a distance.
+    pub(crate) known: u16,
+    /// It has a distance, and is behind the surface.
+    pub(crate) behind: u16,
+    /// It has a distance, and is before the surface.
+    pub(crate) before: u16,
+}
+
+impl RowStates {
+    /// Returns the states of voxels of which the same is known, `all` as bits, and writes the distance of the
+    /// first ones. That of voxels that rays passed alone is `passed`.
+    pub(crate) fn same(voxel: Voxel, all: u16, passed: f32, values: &mut [f32]) -> Self {
+        let (value, known) = match voxel {
+            Voxel::Unknown => (passed, 0),
+            Voxel::Passed => (passed, all),
+            Voxel::Distance(distance) => (distance, all),
+        };
+        values[..all.count_ones() as usize].fill(value);
+        let (behind, before) = match voxel {
+            Voxel::Distance(distance) if distance < 0.0 => (all, 0),
+            Voxel::Distance(_) => (0, all),
+            _ => (0, 0),
+        };
+        Self { known, behind, before }
+    }
+
+    /// Adds the states of voxels from place `first` of the row on.
+    pub(crate) fn add(&mut self, other: Self, first: usize) {
+        self.known |= other.known << first;
+        self.behind |= other.behind << first;
+        self.before |= other.before << first;
+    }
+}
+
 impl Block {
     /// Returns what is known of a voxel. `free` is how many images saw through the whole block.
     pub(crate) fn voxel(&self, i: usize, free: u16) -> Voxel {
@@ -72,6 +109,25 @@ impl Block {
         } else {
             Voxel::Distance(f32::from(self.distance[i]) / 32767.0)
         }
+    }
+
+    /// Does for eight voxels from `first` on what [`Block::voxel`] does for one, and writes their distances.
+    /// That of voxels that rays passed alone is `passed`; it is any number where nothing is known.
+    #[inline]
+    pub(crate) fn row(&self, first: usize, free: u16, passed: f32, values: &mut [f32]) -> RowStates {
+        let mut states = RowStates::default();
+        for (lane, value) in values[..LANES].iter_mut().enumerate() {
+            let i = first + lane;
+            let (distance, has_distance) = (self.distance[i], self.weight[i] != 0);
+            let is_passed = !has_distance & ((free > 0) | (distance == PASSED));
+            let is_carved = (distance < 0) & (i32::from(self.votes[i]) <= i32::from(free));
+            let is_seen = has_distance & !is_carved;
+            states.known |= u16::from(is_passed | is_seen) << lane;
+            states.behind |= u16::from(is_seen & (distance < 0)) << lane;
+            states.before |= u16::from(is_seen & (distance >= 0)) << lane;
+            *value = if is_seen { f32::from(distance) / 32767.0 } else { passed };
+        }
+        states
     }
 
     /// Returns the colour of a voxel, if it has one.
@@ -198,6 +254,22 @@ mod tests {
             assert_eq!(rows.observe_row(first, &row), expected);
         }
         assert_eq!((rows.distance, rows.weight, rows.votes), (single.distance, single.weight, single.votes));
+
+        for (first, free) in [0, 8, 16]
+            .into_iter()
+            .flat_map(|first| [0, 1, 5].map(|free| (first, free)))
+        {
+            let mut values = [0.0; LANES];
+            let states = rows.row(first, free, 0.25, &mut values);
+            let mut expected = RowStates::default();
+            for (lane, value) in values.into_iter().enumerate() {
+                let mut plain = [value];
+                let voxel = rows.voxel(first + lane, free);
+                expected.add(RowStates::same(voxel, 1, 0.25, &mut plain), lane);
+                assert_eq!(plain, [value], "voxel {lane} of {first}, seen through {free} times");
+            }
+            assert_eq!(states, expected);
+        }
         assert!(rows.distance.contains(&PASSED) || rows.weight[0] > 0);
     }
 }

@@ -64,19 +64,22 @@ pub fn write_ply_mesh(path: &Path, mesh: &MeshOut<'_>) -> Result<u64> {
         check(mesh)?;
         write_ply_header(w, mesh)?;
 
+        let mut row = Vec::new();
         let mut colors = mesh.colors.iter();
         for position in mesh.positions {
-            for coordinate in position.to_array() {
-                w.write_all(&coordinate.to_le_bytes())?;
-            }
-            colors.next().map_or(Ok(()), |color| w.write_all(color))?;
+            row.clear();
+            row.extend(position.to_array().into_iter().flat_map(f32::to_le_bytes));
+            row.extend(colors.next().into_iter().flatten());
+            w.write_all(&row)?;
         }
         let mut columns: Vec<_> = mesh.columns.iter().map(|column| column.values.iter()).collect();
         for face in mesh.faces {
-            w.write_all(&[3])?;
-            face.iter().try_for_each(|corner| w.write_all(&corner.to_le_bytes()))?;
-            let mut numbers = columns.iter_mut().filter_map(Iterator::next);
-            numbers.try_for_each(|number| w.write_all(&number.to_le_bytes()))?;
+            row.clear();
+            row.push(3);
+            row.extend(face.iter().flat_map(|corner| corner.to_le_bytes()));
+            let numbers = columns.iter_mut().filter_map(Iterator::next);
+            row.extend(numbers.flat_map(|number| number.to_le_bytes()));
+            w.write_all(&row)?;
         }
         Ok(())
     })
