@@ -1,7 +1,8 @@
 //! The tables of statistics in LaTeX, in the layout of the paper.
 
+use super::comparison::{comparison, grouped};
 use super::{AreaStatistics, LabelTally, Statistics};
-use s3d_label::{Class, RoomType};
+use s3d_label::Class;
 use std::fmt::Write as _;
 
 /// The modalities that the paper counts: its total of images is four for each regular and panoramic image.
@@ -25,6 +26,21 @@ const ELEMENTS: [Class; 12] = [
 /// How many of them are structural.
 const STRUCTURAL: usize = 7;
 
+/// Types of rooms in the order of the paper, and as text says them.
+const TYPES: [[&str; 2]; 11] = [
+    ["office", "Office"],
+    ["conferenceRoom", "Conference Room"],
+    ["auditorium", "Auditorium"],
+    ["lobby", "Lobby"],
+    ["lounge", "Lounge"],
+    ["hallway", "Hallway"],
+    ["copyRoom", "Copy Room"],
+    ["pantry", "Pantry"],
+    ["openspace", "Open Space"],
+    ["storage", "Storage"],
+    ["WC", "WC"],
+];
+
 /// A table with a row for each area and one for the total.
 struct Table<'a> {
     caption: &'a str,
@@ -33,17 +49,28 @@ struct Table<'a> {
     columns: String,
     /// Rows of the head.
     head: Vec<String>,
+    /// How 0 is set.
+    zero: &'a str,
+    /// Whether the last column is bold.
+    is_total_bold: bool,
     /// The columns of an area.
     cells: &'a dyn Fn(&AreaStatistics) -> Vec<u64>,
 }
 
 impl Statistics {
-    /// Returns the tables in LaTeX, in the layout of the paper: points and faces, images, instances of the
-    /// classes, and rooms of each type, with a row for each area. They need the package `multirow`. Classes
-    /// and types are S3DIS's: those of another taxonomy count as what they are there. Clutter is left out, as
-    /// in the paper. Without labels there are the first two tables.
+    /// Returns the tables in LaTeX, in the layout of the paper: this data set's column of the comparison of
+    /// data sets; then, with a row for each area, points and faces, images, instances of the classes, and
+    /// rooms of each type. They need the packages `amssymb` and `multirow`.
+    ///
+    /// Classes and types are S3DIS's: those of another taxonomy count as what they are there, but in the
+    /// comparison, which has the data set's own. Instances of clutter are left out, as in the paper. Without
+    /// labels the tables of instances and rooms are left out. The comparison is left out of statistics that
+    /// were counted without the data set's options.
     pub fn to_latex(&self) -> String {
-        let mut text = String::from("% \\usepackage{multirow}\n");
+        let mut text = String::from("% \\usepackage{amssymb,multirow}\n");
+        if let Some(images) = &self.images {
+            comparison(&mut text, images, &self.areas);
+        }
         self.latex_table(
             &mut text,
             &Table {
@@ -51,6 +78,8 @@ impl Statistics {
                 label: "tab:3DmodalStats",
                 columns: "c|cc".into(),
                 head: vec!["Area & Number of 3D Points & Number of Mesh Faces".into()],
+                zero: "0",
+                is_total_bold: false,
                 cells: &|area| vec![area.points, area.faces],
             },
         );
@@ -67,6 +96,8 @@ impl Statistics {
                         .into(),
                     "& Image Type \\textbf{I} & Image Type \\textbf{E} &".into(),
                 ],
+                zero: "0",
+                is_total_bold: false,
                 cells: &|area| {
                     let total = MODALITIES * (area.regular_images + area.panoramas);
                     vec![area.regular_images, area.panoramas, total]
@@ -94,6 +125,8 @@ impl Statistics {
                     ),
                     format!("& {} &", names.join(" & ")),
                 ],
+                zero: "0",
+                is_total_bold: true,
                 cells: &|area| {
                     let of_class =
                         |class: &Class| tally(area).map_or(0, |t| t.instances_per_class[class.name()]);
@@ -102,18 +135,31 @@ impl Statistics {
             },
         );
 
-        let types: Vec<&str> = RoomType::S3DIS.iter().map(|of| words_of(of.name())).collect();
+        let types = TYPES.map(|[_, words]| words);
         self.latex_table(
             &mut text,
             &Table {
-                caption: "Disjoint Space Statistics",
+                caption: "Scene and Space Statistics",
                 label: "tab:sceneClassStats",
-                columns: format!("c|{}|c", "c".repeat(types.len())),
-                head: vec![format!("\\textbf{{Area}} & {} & \\textbf{{Total}}", types.join(" & "))],
+                columns: format!("c|c|{}|c", "c".repeat(types.len())),
+                head: vec![
+                    format!(
+                        "\\multirow{{2}}{{*}}{{\\textbf{{Area}}}} & \\textbf{{Sq.}} & \
+                     \\multicolumn{{{}}}{{c|}}{{\\textbf{{Number of Instances Per Scene Category}}}} & \
+                     \\multirow{{2}}{{*}}{{\\textbf{{Total}}}}",
+                        types.len()
+                    ),
+                    format!("& \\textbf{{meters}} & {} &", types.join(" & ")),
+                ],
+                zero: "-",
+                is_total_bold: true,
                 cells: &|area| {
                     let of_type =
-                        |of: &RoomType| tally(area).map_or(0, |t| t.rooms_per_type[of.name()].rooms);
-                    with_total(RoomType::S3DIS.iter().map(of_type).collect())
+                        |[name, _]: &[&str; 2]| tally(area).map_or(0, |t| t.rooms_per_type[name].rooms);
+                    let floor_m2 = area.labels.as_ref().map_or(0.0, |labels| labels.floor_m2);
+                    let mut cells = with_total(TYPES.iter().map(of_type).collect());
+                    cells.insert(0, floor_m2.round() as u64);
+                    cells
                 },
             },
         );
@@ -121,7 +167,7 @@ impl Statistics {
     }
 
     fn latex_table(&self, text: &mut String, table: &Table<'_>) {
-        let Table { caption, label, columns, head, cells } = table;
+        let Table { caption, label, columns, head, zero, is_total_bold, cells } = table;
         let _ = writeln!(text, "\n\\begin{{table*}}\n\t\\centering\n\t\\caption{{{caption}}}");
         let _ = writeln!(text, "\t\\begin{{tabular}}{{{columns}}}");
         head.iter().for_each(|row| text.push_str(&format!("\t\t{row} \\\\\n")));
@@ -132,7 +178,11 @@ impl Statistics {
             let cells = cells(area);
             totals.resize(cells.len(), 0);
             totals.iter_mut().zip(&cells).for_each(|(total, cell)| *total += cell);
-            let cells: Vec<String> = cells.into_iter().map(grouped).collect();
+            let set = |n: u64| if n == 0 { (*zero).to_owned() } else { grouped(n) };
+            let mut cells: Vec<String> = cells.into_iter().map(set).collect();
+            if let Some(total) = cells.last_mut().filter(|_| *is_total_bold) {
+                *total = format!("\\textbf{{{total}}}");
+            }
             let _ = writeln!(text, "\t\t{} & {} \\\\", area.area, cells.join(" & "));
         }
         let totals: Vec<String> = totals
@@ -155,34 +205,11 @@ fn with_total(mut cells: Vec<u64>) -> Vec<u64> {
     cells
 }
 
-/// The name of a room type as text says it.
-fn words_of(name: &str) -> &str {
-    match name {
-        "conferenceRoom" => "conference room",
-        "copyRoom" => "copy room",
-        "openspace" => "open space",
-        name => name,
-    }
-}
-
-/// A number with a comma before every three digits.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (at, digit) in digits.chars().enumerate() {
-        if at > 0 && (digits.len() - at).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::statistics::{LabelStatistics, RoomTypeStatistics};
-    use s3d_label::Taxonomy;
+    use s3d_label::{RoomType, Taxonomy};
 
     fn area(area: u32, chairs: u64, is_labelled: bool) -> AreaStatistics {
         let mut tally = LabelTally::of_none(&Class::S3DIS, &RoomType::S3DIS);
@@ -205,22 +232,25 @@ mod tests {
     #[test]
     fn rows_are_those_of_the_paper() {
         let areas = vec![area(1, 156, true), area(2, 1_000, true)];
-        let text = Statistics { areas, taxonomy: Taxonomy::default() }.to_latex();
+        let text = Statistics { areas, taxonomy: Taxonomy::default(), images: None }.to_latex();
         for row in [
             "1 & 43,956,907 & 158,500 \\\\",
             "\\textbf{Total} & \\textbf{87,913,814} & \\textbf{317,000} \\\\",
             "1 & 10,327 & 190 & 42,068 \\\\",
             "& ceiling & floor & wall & beam & column & window & door & chair & table &",
             "& bookcase & sofa & board & \\\\",
-            "2 & 0 & 0 & 0 & 0 & 0 & 0 & 0 & 1,000 & 0 & 0 & 0 & 0 & 1,000 \\\\",
-            "copy room",
+            "2 & 0 & 0 & 0 & 0 & 0 & 0 & 0 & 1,000 & 0 & 0 & 0 & 0 & \\textbf{1,000} \\\\",
+            "& Lounge & Hallway & Copy Room & Pantry &",
+            "1 & 9 & - & - & - & - & - & - & 2 & - & - & - & - & \\textbf{2} \\\\",
+            "\\textbf{Total} & \\textbf{18} & \\textbf{0} &",
         ] {
             assert!(text.contains(row), "{row}\n{text}");
         }
         assert_eq!(text.matches("\\begin{tabular}").count(), 4);
         assert!(!text.contains("999"));
 
-        let bare = Statistics { areas: vec![area(1, 0, false)], taxonomy: Taxonomy::default() }.to_latex();
+        let bare = Statistics { areas: vec![area(1, 0, false)], taxonomy: Taxonomy::default(), images: None };
+        let bare = bare.to_latex();
         assert_eq!(bare.matches("\\begin{tabular}").count(), 2);
     }
 }

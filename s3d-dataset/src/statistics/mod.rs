@@ -1,9 +1,11 @@
 //! The paper's tables of statistics, counted from a data set's files.
 
+mod comparison;
 mod latex;
 
 use crate::context::Context;
 use crate::error::Result;
+use crate::options::ExportOptions;
 use crate::record::data_set::DataSet;
 use crate::record::tables::RoomRecord;
 use s3d_io::Error as FileError;
@@ -29,6 +31,17 @@ pub struct Statistics {
     /// The classes and room types that are counted.
     #[serde(skip)]
     pub taxonomy: Taxonomy,
+    /// The images of the data set, if its options are known.
+    #[serde(skip)]
+    pub(crate) images: Option<ImageKinds>,
+}
+
+/// The images that a data set has.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ImageKinds {
+    /// The side of views, in pixels.
+    size: u32,
+    domains: Vec<Domain>,
 }
 
 /// What an area holds.
@@ -99,14 +112,17 @@ pub fn statistics(root: impl Into<PathBuf>) -> Result<Statistics> {
     data.files
         .require(&Context::default(), |path| folders.iter().any(|area| path.starts_with(area)))?;
 
-    Statistics::count(layout, areas, data.taxonomy(), |path, whole| {
+    let counted = Statistics::count(layout, areas, data.taxonomy(), |path, whole| {
         if whole {
             data.files.checked(path)
         } else {
             data.files.sized(path)
         }
         .map(drop)
-    })
+    })?;
+    let ExportOptions { size, modalities, .. } = data.options();
+    let images = Some(ImageKinds { size: *size, domains: modalities.clone() });
+    Ok(Statistics { images, ..counted })
 }
 
 impl Statistics {
@@ -129,7 +145,8 @@ impl Statistics {
         let areas = areas
             .iter()
             .map(|n| AreaStatistics::count(layout, *n, table.as_ref(), &check));
-        Ok(Self { areas: areas.collect::<Result<_>>()?, taxonomy: taxonomy.cloned().unwrap_or_default() })
+        let taxonomy = taxonomy.cloned().unwrap_or_default();
+        Ok(Self { areas: areas.collect::<Result<_>>()?, taxonomy, images: None })
     }
 
     /// Writes the tables as JSON and as Markdown.
